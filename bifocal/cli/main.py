@@ -1,0 +1,42 @@
+"""The ``bifocal`` command."""
+
+from __future__ import annotations
+
+import click
+
+from photocore.console import LazyGroup
+
+#: Name and one-line help of every command, in the order of work.
+SUMMARIES: dict[str, str] = {
+    "demo": "The whole workflow on the sample pair that ships with the package.",
+    "template": "An empty survey workbook with live formulas.",
+    "plan": "Camera stations, scale and expected precision for given lenses.",
+    "calibrate": "Lens calibration from board photos or straight lines.",
+    "undistort": "Photos freed of lens distortion.",
+    "align": "A pair file from two photos: control points, site distances or automatic.",
+    "match": "Homologous points found automatically, as a survey workbook.",
+    "solve": "Relief, coordinates and precision of measured points.",
+    "relief": "Dense relief map of the wall.",
+    "ortho": "Orthophoto to scale, and everything a drawing needs.",
+    "mosaic": "One orthophoto from several.",
+    "export": "Points as DXF, PLY, LAS, CSV, GeoJSON or workbook.",
+}
+
+EPILOG = """\b
+First steps:
+  bifocal demo                      the whole workflow on a sample pair
+  bifocal template survey.xlsx      an empty survey workbook
+  bifocal COMMAND --help            options and an example for each command
+"""
+
+
+@click.group(
+    cls=LazyGroup,
+    commands_package="bifocal.cli",
+    summaries=SUMMARIES,
+    epilog=EPILOG,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+@click.version_option(package_name="bifocal", prog_name="bifocal")
+def main() -> None:
+    """Relief, coordinates and orthophotos of a wall from two photos of the same scale."""

@@ -1,0 +1,1 @@
+"""Precision in closed form: error propagation through Midulla's equations."""

@@ -1,0 +1,1 @@
+"""Domain objects and arrays in, results out; no files."""

@@ -1,0 +1,1 @@
+"""Path in, path out: where files meet solvers."""

@@ -1,0 +1,5 @@
+"""Photogrammetry through air, glass and water: the refraction model of Maas and its tools."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -1,0 +1,41 @@
+"""The ``multimedia`` command."""
+
+from __future__ import annotations
+
+import click
+
+from photocore.console import LazyGroup
+
+#: Name and one-line help of every command, in the order of work.
+SUMMARIES: dict[str, str] = {
+    "index": "Refractive index of water, and its inverse.",
+    "shift": "Radial shift of a table of points.",
+    "template": "Workbook with radial shift and refractive index as live formulas.",
+    "project": "Image coordinates of object points through the media.",
+    "intersect": "Object points from image points of two or more cameras.",
+    "resect": "Orientation and calibration of each camera from control points.",
+    "adjust": "Bundle adjustment: cameras, points, media.",
+    "epipolar": "Epipolar curves and the candidates along them.",
+    "bathymetry": "Refraction correction of a DEM or point cloud.",
+    "waterlevel": "Mean water height from tie points on the surface.",
+    "openptv": "Project file from an OpenPTV experiment folder.",
+    "design": "Accuracy studies before anyone gets wet.",
+}
+
+EPILOG = """\b
+First steps:
+  multimedia index --wavelength 520 --temperature 20 --salinity 0 --depth 1
+  multimedia COMMAND --help         options and an example for each command
+"""
+
+
+@click.group(
+    cls=LazyGroup,
+    commands_package="multimedia.cli",
+    summaries=SUMMARIES,
+    epilog=EPILOG,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+@click.version_option(package_name="bifocal", prog_name="multimedia")
+def main() -> None:
+    """Photogrammetry through air, glass and water."""

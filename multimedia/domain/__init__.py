@@ -1,0 +1,1 @@
+"""Frozen objects that describe the survey, checked when they are made."""

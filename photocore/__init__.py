@@ -1,0 +1,1 @@
+"""What bifocal and multimedia share; private plumbing that users never import by name."""

@@ -1,0 +1,74 @@
+"""Array types and shape checks that name the argument."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from photocore.errors import InputError
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+BoolArray = NDArray[np.bool_]
+ByteArray = NDArray[np.uint8]
+
+
+def as_floats(value: ArrayLike, name: str) -> FloatArray:
+    """Return value as a float64 array.
+
+    Raises
+    ------
+    InputError
+        If it holds anything that is not a number; the message names the argument.
+    """
+    try:
+        return np.asarray(value, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise InputError(f"{name}: expected numbers, found {value!r:.60}.") from error
+
+
+def as_points(value: ArrayLike, name: str, *, dimension: int) -> FloatArray:
+    """Return value as float64 points, shape (..., dimension), coordinates on the last axis.
+
+    Raises
+    ------
+    InputError
+        If the last axis has another length.
+    """
+    points = as_floats(value, name)
+    if points.ndim == 0 or points.shape[-1] != dimension:
+        raise InputError(
+            f"{name}: expected points of shape (..., {dimension}), found shape {points.shape}."
+        )
+    return points
+
+
+def read_only(value: ArrayLike, name: str, *, shape: tuple[int, ...] | None = None) -> FloatArray:
+    """Return a read-only float64 copy, checked for shape and finiteness (for frozen objects).
+
+    Raises
+    ------
+    InputError
+        If the shape differs or a value is not finite.
+    """
+    array = np.array(as_floats(value, name))
+    if shape is not None and array.shape != shape:
+        raise InputError(f"{name}: expected shape {shape}, found {array.shape}.")
+    if not np.isfinite(array).all():
+        raise InputError(f"{name}: every value must be a finite number.")
+    array.setflags(write=False)
+    return array
+
+
+def positive(value: float, name: str, *, unit: str = "") -> float:
+    """Return value as a float, refusing anything that is not a finite number above zero.
+
+    Raises
+    ------
+    InputError
+        Otherwise.
+    """
+    number = float(as_floats(value, name))
+    if not (np.isfinite(number) and number > 0):
+        raise InputError(f"{name}: must be above zero{unit and f' [{unit}]'}, got {value}.")
+    return number

@@ -1,0 +1,125 @@
+"""Command-line plumbing: commands loaded on demand, one place that prints errors, progress."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from importlib import import_module
+from typing import Any, Protocol
+
+import click
+
+from photocore.errors import PhotogrammetryError
+
+
+class LazyGroup(click.Group):
+    """A group whose commands are imported only when they are used.
+
+    Parameters
+    ----------
+    commands_package : str
+        Package that holds one module per command, each with an attribute ``command``.
+    summaries : mapping of str to str
+        Command name to one-line help, in the order of ``--help``. Dashes in a name become
+        underscores in the module's.
+    """
+
+    def __init__(
+        self, *args: Any, commands_package: str, summaries: Mapping[str, str], **kwargs: Any
+    ) -> None:
+        super().__init__(*args, **kwargs)
+        self.commands_package, self.summaries = commands_package, dict(summaries)
+
+    def list_commands(self, ctx: click.Context) -> list[str]:  # noqa: ARG002
+        """Return the names in the order of work, not of the alphabet."""
+        return list(self.summaries)
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:  # noqa: ARG002
+        """Import and return one command."""
+        if cmd_name not in self.summaries:
+            return None
+        module = import_module(f"{self.commands_package}.{cmd_name.replace('-', '_')}")
+        command: click.Command = module.command
+        return command
+
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        """Suggest the nearest command when the name is unknown."""
+        if args and args[0] not in self.summaries and not args[0].startswith("-"):
+            from difflib import get_close_matches
+
+            near = get_close_matches(args[0], self.summaries, n=1)
+            hint = f" Did you mean '{near[0]}'?" if near else ""
+            ctx.fail(f"No such command '{args[0]}'.{hint}")
+        return super().resolve_command(ctx, args)
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:  # noqa: ARG002
+        """List the summaries without importing a single command."""
+        with formatter.section("Commands"):
+            formatter.write_dl(list(self.summaries.items()))
+
+    def invoke(self, ctx: click.Context) -> Any:
+        """Run a command; the one place where errors become messages and exit status 1."""
+        try:
+            return super().invoke(ctx)
+        except PhotogrammetryError as error:
+            click.echo(f"Error: {error}", err=True)
+        except KeyboardInterrupt:
+            click.echo("Stopped by the user; nothing was left half-written.", err=True)
+        except MemoryError:
+            click.echo(
+                "Error: not enough memory. Use smaller images, a coarser --gsd or --bounds.",
+                err=True,
+            )
+        except BrokenPipeError:
+            # The reader of our output went away (``| head``): not our failure, nothing to say.
+            sys.stderr.close()
+        except OSError as error:
+            name = f"{error.filename}: " if error.filename else ""
+            click.echo(f"Error: {name}{error.strerror or error}.", err=True)
+        return ctx.exit(1)
+
+
+def print_json(value: Any) -> None:
+    """Print one JSON object on stdout; NaN becomes null."""
+    from photocore.jsonfile import to_text
+
+    click.echo(to_text(value))
+
+
+def remark(message: str) -> None:
+    """Print a remark on stderr, so that results on stdout stay clean."""
+    click.echo(message, err=True)
+
+
+class Progress(Protocol):
+    """Told how far a long job is; pass `no_progress` where nobody listens."""
+
+    def __call__(self, done: float, total: float, what: str = "") -> None:
+        """Report that ``done`` of ``total`` parts are finished."""
+
+
+def no_progress(done: float, total: float, what: str = "") -> None:
+    """Ignore a progress report."""
+
+
+@contextmanager
+def progress_bar(title: str, *, quiet: bool = False) -> Iterator[Progress]:
+    """Yield a reporter that draws a bar on stderr when it is a terminal, and nothing otherwise."""
+    if quiet or not sys.stderr.isatty():
+        yield no_progress
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, TextColumn, TimeRemainingColumn
+    from rich.progress import Progress as RichProgress
+
+    columns = (TextColumn("{task.description}"), BarColumn(), TimeRemainingColumn())
+    with RichProgress(*columns, console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task(title, total=1.0)
+
+        def report(done: float, total: float, what: str = "") -> None:
+            bar.update(task, completed=done, total=total, description=what or title)
+
+        yield report

@@ -1,0 +1,100 @@
+"""The exception family: every message says what is wrong, where, and how to mend it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+
+class PhotogrammetryError(Exception):
+    """Root of everything raised on purpose; the command line prints it without a traceback."""
+
+
+class InputError(PhotogrammetryError, ValueError):
+    """A file, option, cell or array that the user can mend."""
+
+
+class CellError(InputError):
+    """One bad cell of a table: knows file, sheet, cell and column.
+
+    Parameters
+    ----------
+    message : str
+        What was found, what is expected and how to mend it.
+    file, sheet, cell, column : str
+        Where; empty where it does not apply (a CSV file has no sheet).
+    """
+
+    def __init__(
+        self, message: str, *, file: str = "", sheet: str = "", cell: str = "", column: str = ""
+    ) -> None:
+        self.message, self.file, self.sheet, self.cell, self.column = (
+            message,
+            file,
+            sheet,
+            cell,
+            column,
+        )
+        place = f"{sheet}!{cell}" if sheet and cell else sheet or cell
+        where = f"{file} › {place}" if file and place else file or place
+        if column:
+            where = f"{where} ({column})" if where else column
+        super().__init__(f"{where}: {message}" if where else message)
+
+
+class WorkbookError(InputError):
+    """All bad cells of a workbook at once.
+
+    Parameters
+    ----------
+    errors : sequence of CellError
+        Every fault found; the first ``shown`` are printed, the rest are counted.
+    shown : int
+        How many faults the message lists.
+    """
+
+    def __init__(self, errors: Sequence[CellError], *, shown: int = 50) -> None:
+        self.errors = tuple(errors)
+        lines = [str(error) for error in self.errors[:shown]]
+        if len(self.errors) > shown:
+            lines.append(f"... and {len(self.errors) - shown} more.")
+        super().__init__("\n".join(lines))
+
+
+class MissingExtraError(InputError):
+    """A command needs an optional dependency that is not installed.
+
+    Parameters
+    ----------
+    what : str
+        The capability asked for, e.g. ``"The lens database"``.
+    extra : str
+        The extra that brings it, e.g. ``"lens"``.
+    """
+
+    def __init__(self, what: str, extra: str) -> None:
+        super().__init__(
+            f"{what} needs an optional part that is not installed. "
+            f'Install it with: pip install "bifocal[{extra}]"'
+        )
+
+
+class GeometryError(PhotogrammetryError, ValueError):
+    """A configuration for which the whole calculation is impossible."""
+
+
+class ConvergenceError(PhotogrammetryError, RuntimeError):
+    """An iteration that did not converge.
+
+    Parameters
+    ----------
+    message : str
+        What was being solved and what to try.
+    iterations : int
+        Iterations done.
+    residual : float
+        What was left, in the unit named by the message.
+    """
+
+    def __init__(self, message: str, *, iterations: int, residual: float) -> None:
+        self.iterations, self.residual = iterations, residual
+        super().__init__(f"{message} ({iterations} iterations, residual {residual:.3g})")

@@ -1,0 +1,80 @@
+"""JSON files in and out, with messages that name file, line and key."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from photocore.errors import InputError
+from photocore.output import atomic_path
+
+
+def read_object(path: Path | str, *, what: str) -> dict[str, Any]:
+    """Return the object a JSON file holds.
+
+    Parameters
+    ----------
+    path : path
+        The file.
+    what : str
+        What it should be, for the message: ``"pair file"``.
+
+    Raises
+    ------
+    InputError
+        If the file is missing, is not text, not JSON, or not an object.
+    """
+    path = Path(path)
+    try:
+        text = path.read_text(encoding="utf-8-sig")
+    except FileNotFoundError:
+        raise InputError(f"{path}: no such {what}.") from None
+    except IsADirectoryError:
+        raise InputError(f"{path}: is a folder, expected a {what}.") from None
+    except UnicodeDecodeError:
+        raise InputError(f"{path}: is not a text file, expected a {what} (JSON).") from None
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read ({error.strerror}).") from error
+    try:
+        value = json.loads(text)
+    except json.JSONDecodeError as error:
+        raise InputError(
+            f"{path}: not valid JSON at line {error.lineno}, column {error.colno}: {error.msg}."
+        ) from None
+    except RecursionError:
+        raise InputError(f"{path}: nested too deeply for a {what}.") from None
+    if not isinstance(value, dict):
+        raise InputError(f"{path}: expected a {what}, a JSON object; found {type(value).__name__}.")
+    return value
+
+
+def write_object(path: Path | str, value: dict[str, Any], *, overwrite: bool = False) -> None:
+    """Write an object as indented JSON, whole or not at all; NaN and infinity become null."""
+    with atomic_path(path, overwrite=overwrite) as temporary:
+        temporary.write_text(to_text(value, indent=2) + "\n", encoding="utf-8")
+
+
+def to_text(value: Any, *, indent: int | None = None) -> str:
+    """Return JSON text of a structure that may hold numpy values; NaN and infinity become null."""
+    return json.dumps(plain(value), indent=indent, ensure_ascii=False, allow_nan=False)
+
+
+def plain(value: Any) -> Any:
+    """Return value with numpy types made plain and non-finite numbers made None."""
+    if isinstance(value, dict):
+        return {str(key): plain(item) for key, item in value.items()}
+    if isinstance(value, np.ndarray):
+        return plain(value.tolist())
+    if isinstance(value, list | tuple):
+        return [plain(item) for item in value]
+    if isinstance(value, np.generic):
+        return plain(value.item())
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    if isinstance(value, Path):
+        return value.as_posix()
+    return value

@@ -1,0 +1,105 @@
+"""Outputs that are whole or absent: write under a temporary name, then rename."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from photocore.errors import InputError
+
+
+def check_writable(path: Path | str, *, overwrite: bool) -> Path:
+    """Return path if a file may be created there; call it before any long work.
+
+    Raises
+    ------
+    InputError
+        If it exists and ``overwrite`` is false, is a folder, or its folder is missing or read-only.
+    """
+    path = Path(path)
+    if path.is_dir():
+        raise InputError(f"{path}: is a folder; name a file to write.")
+    if path.exists() and not overwrite:
+        raise InputError(f"{path}: exists already; add --overwrite (overwrite=True) to replace it.")
+    folder = path.parent
+    if not folder.is_dir():
+        raise InputError(f"{path}: the folder {folder} does not exist; create it first.")
+    if not os.access(folder, os.W_OK):
+        raise InputError(f"{path}: the folder {folder} is read-only; choose another place.")
+    return path
+
+
+@contextmanager
+def atomic_path(path: Path | str, *, overwrite: bool) -> Iterator[Path]:
+    """Yield a temporary path beside ``path``; rename it on success, remove it on any failure.
+
+    The temporary name keeps the ending, so libraries that choose a format by it work.
+
+    Raises
+    ------
+    InputError
+        As `check_writable`, and when the disk is full or the rename is refused.
+    """
+    path = check_writable(path, overwrite=overwrite)
+    handle, name = tempfile.mkstemp(prefix=f".{path.stem}-", suffix=path.suffix, dir=path.parent)
+    os.close(handle)
+    temporary = Path(name)
+    try:
+        yield temporary
+        _give_usual_mode(temporary)
+        temporary.replace(path)
+    except OSError as error:
+        raise InputError(
+            f"{path}: could not be written ({error.strerror or error}); nothing was left behind. "
+            "Free some space or choose another place, and close the file in other programs."
+        ) from error
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+@contextmanager
+def atomic_folder(path: Path | str, *, overwrite: bool) -> Iterator[Path]:
+    """Yield a temporary folder; on success its files move into ``path`` one by one.
+
+    Existing files of other names in ``path`` stay.
+
+    Raises
+    ------
+    InputError
+        If a file of the same name exists and ``overwrite`` is false, or writing fails.
+    """
+    path = Path(path)
+    if path.exists() and not path.is_dir():
+        raise InputError(f"{path}: is a file; name a folder.")
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+        temporary = Path(tempfile.mkdtemp(prefix=".writing-", dir=path))
+    except OSError as error:
+        raise InputError(f"{path}: cannot be written to ({error.strerror or error}).") from error
+    try:
+        yield temporary
+        made = [item.relative_to(temporary) for item in temporary.rglob("*") if item.is_file()]
+        taken = [str(name) for name in made if (path / name).exists()]
+        if taken and not overwrite:
+            raise InputError(
+                f"{path}: holds {', '.join(sorted(taken)[:5])} already; "
+                "add --overwrite (overwrite=True) to replace."
+            )
+        for name in made:
+            (path / name).parent.mkdir(parents=True, exist_ok=True)
+            (temporary / name).replace(path / name)
+    except OSError as error:
+        raise InputError(f"{path}: could not be written ({error.strerror or error}).") from error
+    finally:
+        shutil.rmtree(temporary, ignore_errors=True)
+
+
+def _give_usual_mode(path: Path) -> None:
+    """Replace mkstemp's owner-only mode by what a plain open() would have given."""
+    mask = os.umask(0)
+    os.umask(mask)
+    path.chmod(0o666 & ~mask)
