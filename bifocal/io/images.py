@@ -1,0 +1,326 @@
+"""Photos in and out: every path honours the EXIF orientation, pixels are upright as seen.
+
+Decoding is OpenCV's; headers and EXIF are read with Pillow, and with tifffile for TIFF (Pillow
+does not know 16-bit colour TIFF). Colours are RGB.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from photocore.errors import InputError
+from photocore.output import atomic_path
+
+ImageArray = NDArray[np.uint8] | NDArray[np.uint16]
+
+#: Larger photos are refused: 400 MP is twice the largest camera, and 1.2 GB in memory.
+MAX_PIXELS = 400_000_000
+RAW_ENDINGS = frozenset(
+    f".{ending}"
+    for ending in (
+        "3fr", "arw", "cr2", "cr3", "crw", "dcr", "dng", "erf", "fff", "iiq", "kdc", "mef", "mos",
+        "mrw", "nef", "nrw", "orf", "pef", "raf", "raw", "rw2", "rwl", "sr2", "srf", "srw", "x3f",
+    )
+)  # fmt: skip
+_KNOWN = frozenset({"JPEG", "PNG", "TIFF", "MPO", "BMP", "WEBP"})
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ImageInfo:
+    """What a photo says of itself without being decoded.
+
+    Attributes
+    ----------
+    path : Path
+    size : tuple of int
+        Width and height, upright. [px]
+    orientation : int
+        EXIF orientation 1..8 of the stored pixels.
+    bits : int
+        8 or 16 per channel.
+    make, model, lens : str
+        As the camera wrote them; empty if absent.
+    focal_length, focal_length_35 : float or None
+        True and 35 mm equivalent focal length. [mm]
+    focal_plane_pitch : float or None
+        Pixel size from the EXIF focal-plane resolution. [mm]
+    aperture, subject_distance : float or None
+        f-number and distance in metres.
+    """
+
+    path: Path
+    size: tuple[int, int]
+    orientation: int = 1
+    bits: int = 8
+    make: str = ""
+    model: str = ""
+    lens: str = ""
+    focal_length: float | None = None
+    focal_length_35: float | None = None
+    focal_plane_pitch: float | None = None
+    aperture: float | None = None
+    subject_distance: float | None = None
+
+    @property
+    def focal_pixels(self) -> float | None:
+        """Principal distance guessed from EXIF, focused at infinity; None if it cannot be. [px]."""
+        if self.focal_length and self.focal_plane_pitch:
+            return self.focal_length / self.focal_plane_pitch
+        if self.focal_length_35:
+            # The 35 mm equivalent refers to the diagonal of 36 x 24 mm.
+            return self.focal_length_35 * float(np.hypot(*self.size)) / float(np.hypot(36, 24))
+        return None
+
+
+def image_info(path: Path | str) -> ImageInfo:
+    """Return size, orientation and EXIF of a photo.
+
+    Raises
+    ------
+    InputError
+        If it is missing, camera raw, CMYK, not an image, or larger than `MAX_PIXELS`.
+    """
+    path = Path(path)
+    _refuse_early(path)
+    if path.suffix.lower() in {".tif", ".tiff"}:
+        return _tiff_info(path)
+    from PIL import Image, UnidentifiedImageError
+
+    try:
+        with _pillow_without_size_limit(), Image.open(path) as image:
+            if image.format not in _KNOWN:
+                raise InputError(
+                    f"{path}: {image.format} images are not read; save it as JPEG, PNG or TIFF."
+                )
+            _check_mode(path, image.mode)
+            bits = 16 if image.mode.startswith("I") else 8
+            return _info_from_exif(path, image.size, bits, image.getexif())
+    except UnidentifiedImageError:
+        raise InputError(f"{path}: is not an image (JPEG, PNG or TIFF).") from None
+    except (OSError, SyntaxError, ValueError) as error:
+        if isinstance(error, InputError):
+            raise
+        raise InputError(f"{path}: the image is damaged ({error}).") from error
+
+
+def read_image(path: Path | str, *, grey: bool = False) -> ImageArray:
+    """Return the upright pixels of a photo.
+
+    Parameters
+    ----------
+    path : path
+        JPEG, PNG or TIFF.
+    grey : bool
+        Convert colour to grey.
+
+    Returns
+    -------
+    image : ndarray, shape (h, w, 3) RGB or (h, w), uint8 or uint16
+        Alpha is dropped; 16 bit stays 16 bit.
+
+    Raises
+    ------
+    InputError
+        As `image_info`, and if the pixels cannot be decoded or are cut off.
+    """
+    import cv2
+
+    info = image_info(path)
+    flags = cv2.IMREAD_IGNORE_ORIENTATION | cv2.IMREAD_ANYDEPTH
+    flags |= cv2.IMREAD_GRAYSCALE if grey else cv2.IMREAD_ANYCOLOR
+    data = np.fromfile(info.path, dtype=np.uint8)  # imread itself fails on some Windows paths
+    if info.path.suffix.lower() in {".jpg", ".jpeg"}:
+        _refuse_cut_jpeg(info.path, data)
+    elif info.path.suffix.lower() in {".tif", ".tiff"}:
+        _hide_tiff_orientation(info.path, data)
+    try:
+        image = cv2.imdecode(data, flags)
+    except cv2.error as error:
+        raise InputError(f"{path}: the image cannot be decoded ({error.err}).") from error
+    if image is None:
+        raise InputError(f"{path}: the image cannot be decoded; open it and save it again.")
+    if image.dtype not in (np.uint8, np.uint16):
+        raise InputError(f"{path}: {image.dtype} pixels are not read; save it with 8 or 16 bits.")
+    if image.ndim == 3:
+        image = cv2.cvtColor(image, cv2.COLOR_BGR2RGB)
+    return turn_upright(image, info.orientation)
+
+
+def turn_upright(image: ImageArray, orientation: int) -> ImageArray:
+    """Return stored pixels as EXIF orientation 1 to 8 wants them seen."""
+    if orientation >= 5:
+        image = image.swapaxes(0, 1)
+    if orientation in (3, 4, 7, 8):
+        image = image[::-1]
+    if orientation in (2, 3, 6, 7):
+        image = image[:, ::-1]
+    return np.ascontiguousarray(image)
+
+
+def to_eight_bit(image: ImageArray) -> NDArray[np.uint8]:
+    """Return an image with 8 bits per channel; 16-bit values are divided by 257."""
+    if image.dtype == np.uint8:
+        return image.astype(np.uint8, copy=False)
+    return ((image.astype(np.uint32) + 128) // 257).astype(np.uint8)
+
+
+def write_image(path: Path | str, image: ImageArray, *, overwrite: bool = False) -> None:
+    """Write RGB, RGBA or grey pixels as the ending says (.png, .jpg, .tif), whole or not at all."""
+    import cv2
+
+    path = Path(path)
+    ending = path.suffix.lower()
+    if ending not in {".png", ".jpg", ".jpeg", ".tif", ".tiff"}:
+        raise InputError(f"{path}: images are written as .png, .jpg or .tif.")
+    order = {3: cv2.COLOR_RGB2BGR, 4: cv2.COLOR_RGBA2BGRA}
+    pixels = image if image.ndim == 2 else cv2.cvtColor(image, order[image.shape[2]])
+    options = [cv2.IMWRITE_JPEG_QUALITY, 95] if ending in {".jpg", ".jpeg"} else []
+    done, data = cv2.imencode(ending, pixels, options)
+    if not done:
+        raise InputError(f"{path}: an image of {image.dtype} {image.shape} cannot be written so.")
+    with atomic_path(path, overwrite=overwrite) as temporary:
+        temporary.write_bytes(data.tobytes())
+
+
+def _refuse_early(path: Path) -> None:
+    """Refuse what can be told from the name and the file system."""
+    if path.is_dir():
+        raise InputError(f"{path}: is a folder, expected a photo.")
+    if not path.is_file():
+        raise InputError(f"{path}: no such image.")
+    if path.stat().st_size == 0:
+        raise InputError(f"{path}: the file is empty.")
+    if path.suffix.lower() in RAW_ENDINGS:
+        raise InputError(
+            f"{path}: camera raw is not read. Develop it to a 16-bit TIFF (or JPEG) without any "
+            "lens correction, crop or straightening, the same way for both photos."
+        )
+
+
+def _check_mode(path: Path, mode: str) -> None:
+    """Refuse colour spaces that are not a photo's."""
+    if mode == "CMYK":
+        raise InputError(f"{path}: is CMYK, a printer's colour space; save it as RGB.")
+    if mode == "F":
+        raise InputError(f"{path}: has floating-point pixels; save it with 8 or 16 bits.")
+
+
+def _tiff_info(path: Path) -> ImageInfo:
+    """Return the facts of a TIFF, from its own tags."""
+    import tifffile
+
+    try:
+        with tifffile.TiffFile(path) as tiff:
+            page: Any = tiff.pages[0]
+            if page.photometric == tifffile.PHOTOMETRIC.SEPARATED:
+                _check_mode(path, "CMYK")
+            if np.dtype(page.dtype).kind == "f":
+                _check_mode(path, "F")
+            tags = {code: page.tags[code].value for code in (271, 272, 274) if code in page.tags}
+            size = (int(page.imagewidth), int(page.imagelength))
+            exif = {**tags, **_named_exif(page.tags.get(34665))}
+            return _info_from_exif(path, size, int(np.dtype(page.dtype).itemsize * 8), exif)
+    except (tifffile.TiffFileError, IndexError, TypeError, KeyError) as error:
+        raise InputError(f"{path}: is not a readable TIFF ({error}).") from error
+
+
+def _named_exif(tag: Any) -> dict[int, Any]:
+    """Return a TIFF's EXIF values under their numbers."""
+    if tag is None or not isinstance(tag.value, dict):
+        return {}
+    numbers = {
+        "FocalLength": 37386, "FNumber": 33437, "FocalLengthIn35mmFilm": 41989,
+        "LensModel": 42036, "SubjectDistance": 37382, "FocalPlaneXResolution": 41486,
+        "FocalPlaneResolutionUnit": 41488,
+    }  # fmt: skip
+    return {numbers[key]: value for key, value in tag.value.items() if key in numbers}
+
+
+def _info_from_exif(path: Path, size: tuple[int, int], bits: int, exif: Any) -> ImageInfo:
+    """Return the facts given the stored size and a mapping of EXIF tags."""
+    width, height = size
+    if width * height > MAX_PIXELS:
+        raise InputError(
+            f"{path}: claims {width} x {height} px; more than {MAX_PIXELS // 10**6} MP is refused."
+        )
+    tags = dict(exif)
+    if hasattr(exif, "get_ifd"):
+        tags |= dict(exif.get_ifd(34665))
+    orientation = tags.get(274, 1)
+    orientation = int(orientation) if orientation in range(1, 9) else 1
+    return ImageInfo(
+        path=path,
+        size=(height, width) if orientation >= 5 else (width, height),
+        orientation=orientation,
+        bits=bits,
+        make=_text(tags.get(271)),
+        model=_text(tags.get(272)),
+        lens=_text(tags.get(42036)),
+        focal_length=_number(tags.get(37386)),
+        focal_length_35=_number(tags.get(41989)),
+        focal_plane_pitch=_pitch(tags),
+        aperture=_number(tags.get(33437)),
+        subject_distance=_number(tags.get(37382)),
+    )
+
+
+def _text(value: Any) -> str:
+    """Return an EXIF text without padding."""
+    return str(value).replace("\x00", "").strip() if value is not None else ""
+
+
+def _number(value: Any) -> float | None:
+    """Return an EXIF rational as a float; None when absent, zero or broken."""
+    try:
+        number = value[0] / value[1] if isinstance(value, tuple) else float(value)
+    except (TypeError, ValueError, ZeroDivisionError, IndexError):
+        return None
+    return float(number) if np.isfinite(number) and number > 0 else None
+
+
+def _pitch(tags: dict[int, Any]) -> float | None:
+    """Return the pixel size in mm from the focal-plane resolution."""
+    resolution = _number(tags.get(41486))
+    unit = {2: 25.4, 3: 10.0, 4: 1.0}.get(tags.get(41488, 2))
+    return unit / resolution if resolution and unit else None
+
+
+def _refuse_cut_jpeg(path: Path, data: NDArray[np.uint8]) -> None:
+    """Refuse a JPEG without end-of-image mark: OpenCV would fill the rest with grey, silently."""
+    if data.tobytes().rfind(b"\xff\xd9") < len(data) // 2:
+        raise InputError(f"{path}: the photo is cut off (no end of image); copy it again.")
+
+
+def _hide_tiff_orientation(path: Path, data: NDArray[np.uint8]) -> None:
+    """Set the orientation tag in memory to 1: OpenCV turns TIFFs whatever its flags say."""
+    import tifffile
+
+    with tifffile.TiffFile(path) as tiff:
+        page: Any = tiff.pages[0]
+        tag = page.tags.get(274)
+        if tag is not None:
+            order = "<u2" if tiff.byteorder == "<" else ">u2"
+            data[tag.valueoffset : tag.valueoffset + 2] = np.array([1], order).view(np.uint8)
+
+
+@contextmanager
+def _pillow_without_size_limit() -> Iterator[None]:
+    """Let Pillow read headers of large photos; our own limit is checked instead."""
+    from PIL import Image
+
+    before = Image.MAX_IMAGE_PIXELS
+    Image.MAX_IMAGE_PIXELS = None
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            yield
+    finally:
+        Image.MAX_IMAGE_PIXELS = before
