@@ -154,7 +154,7 @@ def read_image(path: Path | str, *, grey: bool = False) -> ImageArray:
     return turn_upright(image, info.orientation)
 
 
-def turn_upright(image: ImageArray, orientation: int) -> ImageArray:
+def turn_upright(image: Any, orientation: int) -> ImageArray:
     """Return stored pixels as EXIF orientation 1 to 8 wants them seen."""
     if orientation >= 5:
         image = image.swapaxes(0, 1)
@@ -162,7 +162,8 @@ def turn_upright(image: ImageArray, orientation: int) -> ImageArray:
         image = image[::-1]
     if orientation in (2, 3, 6, 7):
         image = image[:, ::-1]
-    return np.ascontiguousarray(image)
+    upright: ImageArray = np.ascontiguousarray(image)
+    return upright
 
 
 def to_eight_bit(image: ImageArray) -> NDArray[np.uint8]:
