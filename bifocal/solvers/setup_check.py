@@ -1,0 +1,283 @@
+"""What points on the reference plane tell about the set-up, and the correction that follows.
+
+A point with r = 0 has the same plane position in both photos. Where marked points disagree, the
+photos differ in scale, rotation, shift or tilt; each of these reads as false relief.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from bifocal.domain.pair import SIGMA_PIXEL, Pair, apply_homography
+from photocore.arrays import BoolArray, FloatArray, as_points
+from photocore.errors import GeometryError, InputError
+
+#: Beyond this many sigma a plane point is taken for one that is not on the plane.
+OUTLIER_LIMIT = 4.0
+#: Tilt needs this many points: 6 unknowns, 2 observations a point, and some redundancy.
+MINIMUM_FOR_TILT = 5
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SetupParameter:
+    """One difference between the photos.
+
+    Attributes
+    ----------
+    name : str
+        ``scale``, ``rotation``, ``shift X``, ``shift Y``, ``tilt X``, ``tilt Y``.
+    value, sigma : float
+        In the given unit; image 2 against image 1.
+    unit : str
+        ``%``, ``deg`` or ``mm`` on the wall.
+    false_relief : float
+        Largest false relief it causes within the photo, not counting the zone close to the
+        nadir. [m]
+    """
+
+    name: str
+    value: float
+    sigma: float
+    unit: str
+    false_relief: float
+
+    @property
+    def is_significant(self) -> bool:
+        """Whether the value exceeds three times its standard deviation."""
+        return abs(self.value) > 3 * self.sigma
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class SetupCheck:
+    """Differences of the photos, found from points on the reference plane.
+
+    Attributes
+    ----------
+    parameters : tuple of SetupParameter
+    matrix : ndarray, shape (3, 3)
+        Homography on the plane that brings positions of image 2 onto those of image 1.
+    residuals : ndarray, shape (n, 2)
+        What is left after the correction. [m]
+    outliers : tuple of str
+        Marked points that do not lie on the plane (or are mispicked); not used.
+    points : int
+        Points used.
+    sigma0 : float
+        A posteriori over a priori standard deviation of a pick.
+    corrected : Pair
+        The pair with image 2 corrected.
+    """
+
+    parameters: tuple[SetupParameter, ...]
+    matrix: FloatArray
+    residuals: FloatArray
+    outliers: tuple[str, ...]
+    points: int
+    sigma0: float
+    corrected: Pair
+
+    def sentences(self) -> list[str]:
+        """Return the findings in words a surveyor acts on."""
+        lines = [
+            f"{p.name}: {p.value:+.3g} {p.unit} (sigma {p.sigma:.2g}); "
+            + (
+                f"would read as up to {abs(p.false_relief) * 1000:.0f} mm of relief"
+                if p.is_significant
+                else "not significant"
+            )
+            for p in self.parameters
+        ]
+        if not any(p.name.startswith("tilt") for p in self.parameters):
+            lines.append(
+                f"tilt: not determined; mark at least {MINIMUM_FOR_TILT} plane points, well spread."
+            )
+        lines += [f"{name}: marked as on the plane, but does not fit it." for name in self.outliers]
+        return lines
+
+
+def check_setup(
+    pair: Pair,
+    pixels1: ArrayLike,
+    pixels2: ArrayLike,
+    *,
+    names: Sequence[str] | None = None,
+    sigma_px: float | None = None,
+) -> SetupCheck:
+    """Find scale mismatch, rotation, shift and tilt between the photos from plane points.
+
+    Parameters
+    ----------
+    pair : Pair
+        The set-up as assumed.
+    pixels1, pixels2 : array_like, shape (n, 2)
+        The same points of the reference plane (r = 0) in both photos, n >= 2. [px]
+    names : sequence of str, optional
+        Their names, for messages.
+    sigma_px : float, optional
+        Measuring precision; default the pair's, else 0.5. [px]
+
+    Returns
+    -------
+    SetupCheck
+
+    Raises
+    ------
+    InputError
+        If fewer than two points are given.
+    GeometryError
+        If the points coincide, so that nothing but the shift could be told.
+
+    Notes
+    -----
+    Gauss-Newton on ``q1 = G q2`` with G = scale, rotation, shift and, from five points on, the two
+    projective terms of a tilt; weighted by the picks' precision in both photos. Points beyond
+    four sigma (robustly scaled) are left out one by one, worst first. Shift and tilt are counted
+    at the near nadir. Scale: false relief ``eps B`` everywhere; shift t: ``t B / s'`` at a fifth
+    of the points' largest radius; tilt p: ``p s' B`` at that radius. Rotation moves points across
+    the radius and makes no relief.
+    """
+    first = as_points(pixels1, "pixels1", dimension=2)
+    second = as_points(pixels2, "pixels2", dimension=2)
+    labels = list(names) if names is not None else [str(i + 1) for i in range(len(first))]
+    measured = np.isfinite(first).all(axis=1) & np.isfinite(second).all(axis=1)
+    if measured.sum() < 2:
+        raise InputError(
+            f"set-up check: {int(measured.sum())} point(s) measured in both photos are marked as "
+            "on the plane; at least 2 are needed, 5 or more well spread are better."
+        )
+    origin = pair.image2.nadir
+    q1 = pair.image1.plane_from_pixels(first) - origin
+    q2 = pair.image2.plane_from_pixels(second) - origin
+    sigma = sigma_px or pair.image2.sigma_pixel or pair.image1.sigma_pixel or SIGMA_PIXEL
+    weight = _root_weights(pair, first, second, sigma)
+    used = measured.copy()
+    while True:
+        values, covariance, scaled, left = _fit(q1, q2, weight, used)
+        worst, limit = _worst(scaled, used)
+        if worst is None or used.sum() <= 4 or scaled[worst] <= limit:
+            break
+        used[worst] = False
+    matrix = _matrix(values)
+    shift = np.array([[1, 0, origin[0]], [0, 1, origin[1]], [0, 0, 1]])
+    plane = shift @ matrix @ np.linalg.inv(shift)
+    redundancy = 2 * int(used.sum()) - len(values)
+    sigma0 = float(np.sqrt((scaled[used] ** 2).sum() / redundancy)) if redundancy > 0 else 1.0
+    radius = float(np.hypot(*q2[used].T).max())
+    corrected = replace(pair.image2, plane_from_pixel=plane @ pair.image2.plane_from_pixel)
+    return SetupCheck(
+        parameters=_parameters(values, np.sqrt(np.diag(covariance)), pair, radius),
+        matrix=plane,
+        residuals=left,
+        outliers=tuple(labels[i] for i in np.flatnonzero(measured & ~used)),
+        points=int(used.sum()),
+        sigma0=sigma0,
+        corrected=replace(pair, image2=corrected),
+    )
+
+
+def _root_weights(pair: Pair, first: FloatArray, second: FloatArray, sigma: float) -> FloatArray:
+    """Return matrices that make differences on the plane unit normal, shape (n, 2, 2)."""
+    covariance = np.zeros((len(first), 2, 2))
+    for photo, pixels in ((pair.image1, first), (pair.image2, second)):
+        metres = photo.metres_per_pixel(pixels)
+        covariance += metres @ metres.transpose(0, 2, 1) * sigma**2
+    safe = np.where(np.isfinite(covariance), covariance, np.eye(2))
+    inverse_root: FloatArray = np.linalg.inv(np.linalg.cholesky(safe))
+    return inverse_root
+
+
+def _matrix(values: FloatArray) -> FloatArray:
+    """Return the homography of (scale, rotation, shift X, shift Y[, tilt X, tilt Y])."""
+    scale, turn, tx, ty = values[:4]
+    px, py = values[4:] if len(values) == 6 else (0.0, 0.0)
+    stretch = 1.0 + scale
+    return np.array(
+        [
+            [stretch * np.cos(turn), stretch * np.sin(turn), tx],
+            [-stretch * np.sin(turn), stretch * np.cos(turn), ty],
+            [px, py, 1.0],
+        ]
+    )
+
+
+def _fit(
+    q1: FloatArray, q2: FloatArray, weight: FloatArray, used: BoolArray
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Return parameters, their covariance, each point's size of residual in sigma, and residuals.
+
+    Residual sizes are root mean squares over the two coordinates, so that 1 is usual.
+    """
+    unknowns = 6 if used.sum() >= MINIMUM_FOR_TILT else 4
+    values = np.zeros(unknowns)
+    # Unit-sized unknowns: rotation and scale act on the radius, tilt on its square.
+    radius = max(float(np.abs(q2[used]).max()), 1e-12)
+    units = np.array([1 / radius, 1 / radius, 1, 1, 1 / radius**2, 1 / radius**2])[:unknowns]
+    for _ in range(20):
+        left = q1 - apply_homography(_matrix(values), q2)
+        rows = np.stack([_slope(values, q2, k, units[k]) for k in range(unknowns)], axis=-1)
+        design = (weight[used] @ rows[used]).reshape(-1, unknowns)
+        seen = (weight[used] @ left[used][:, :, None]).reshape(-1)
+        if np.linalg.matrix_rank(design, tol=1e-8 * np.linalg.norm(design, 2)) < unknowns:
+            raise GeometryError(
+                "set-up check: the plane points lie on one spot or one line; "
+                "mark points spread over the photo."
+            )
+        step = np.linalg.lstsq(design, seen, rcond=None)[0] * units
+        values = values + step
+        if np.abs(step / units).max() < 1e-14 * radius:
+            break
+    left = q1 - apply_homography(_matrix(values), q2)
+    scaled = np.linalg.norm((weight @ left[:, :, None])[:, :, 0], axis=1)
+    covariance = np.linalg.inv(design.T @ design) * np.outer(units, units)
+    return values, covariance, scaled, left
+
+
+def _slope(values: FloatArray, q2: FloatArray, index: int, unit: float) -> FloatArray:
+    """Return the derivative of the mapped positions by one parameter, times its unit."""
+    step = 1e-6 * unit
+    ahead, behind = values.copy(), values.copy()
+    ahead[index] += step
+    behind[index] -= step
+    return (apply_homography(_matrix(ahead), q2) - apply_homography(_matrix(behind), q2)) / 2e-6
+
+
+def _worst(scaled: FloatArray, used: BoolArray) -> tuple[int | None, float]:
+    """Return the point that fits worst and the limit it has to keep."""
+    if used.sum() < 4:
+        return None, np.inf
+    # Robust unit: the median of |N2| is 1.177; never finer than a quarter of the given sigma.
+    unit = max(float(np.median(scaled[used])) / 1.177, 0.25)
+    worst = int(np.argmax(np.where(used, scaled, -1.0)))
+    return worst, OUTLIER_LIMIT * unit
+
+
+def _parameters(
+    values: FloatArray, sigmas: FloatArray, pair: Pair, radius: float
+) -> tuple[SetupParameter, ...]:
+    """Return the parameters in a surveyor's units with the false relief each one causes."""
+    lever, distance = pair.lever, pair.image2.distance
+    inner = radius / 5
+    # The correction maps image 2 onto image 1: image 2 itself deviates by the opposite.
+    values = np.concatenate([[values[0] / (1 + values[0])], values[1:]])
+    table = [
+        ("scale", 100.0, "%", lever),
+        ("rotation", float(np.degrees(1.0)), "deg", 0.0),
+        ("shift X", 1000.0, "mm", lever / inner),
+        ("shift Y", 1000.0, "mm", lever / inner),
+        ("tilt X", float(np.degrees(distance)), "deg", -lever * radius),
+        ("tilt Y", float(np.degrees(distance)), "deg", -lever * radius),
+    ]
+    return tuple(
+        SetupParameter(
+            name=name,
+            value=float(-value * factor),
+            sigma=float(sigma * factor),
+            unit=unit,
+            false_relief=float(-value * effect),
+        )
+        for (name, factor, unit, effect), value, sigma in zip(table, values, sigmas, strict=False)
+    )

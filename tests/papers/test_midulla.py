@@ -1,0 +1,190 @@
+"""Midulla: equations (1) to (7), the camera scheme, and the claims of sections 2.4 and 2.5."""
+
+from __future__ import annotations
+
+import mpmath
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from bifocal import (
+    plane_coordinates,
+    relief,
+    relief_displacement,
+    relief_displacements,
+    relief_from_displacement,
+)
+from bifocal.precision import (
+    false_relief_of_scale,
+    lever_arm,
+    sigma_relief,
+    sigmas,
+    uncertainty_radius,
+)
+from photocore.errors import GeometryError, InputError
+
+PAIRS = {"35/19": (35.0, 17.5, 19.0, 9.5), "35/28": (35.0, 17.5, 28.0, 14.0)}
+
+
+def seen(c1, d1, c2, d2, radius, r):
+    """Return s1, s2 [mm] of a point, by similar triangles at each camera."""
+    return c1 * radius / (d1 - r), c2 * radius / (d2 - r)
+
+
+def test_equation_1_by_hand():
+    # s = 8 mm, r = 0.5 m, d = 10 m: e = 8 * 0.5 / 10 = 0.4 mm.
+    assert relief_displacement(8.0, 0.5, d=10.0) == pytest.approx(0.4, abs=1e-15)
+
+
+def test_equation_2_is_the_inverse_of_equation_1():
+    assert relief_from_displacement(8.0, 0.4, d=10.0) == pytest.approx(0.5, abs=1e-15)
+
+
+@pytest.mark.parametrize("pair", PAIRS)
+@pytest.mark.parametrize("r", [-3.0, -0.5, -0.01, 0.0, 0.01, 0.5, 1.0, 4.0])
+def test_equations_5_and_6_are_exact_for_every_sign_of_relief(pair, r):
+    c1, d1, c2, d2 = PAIRS[pair]
+    s1, s2 = seen(c1, d1, c2, d2, 2.0, r)
+    assert relief(s1, s2, d1=d1, d2=d2) == pytest.approx(r, abs=2e-13)
+    e1, e2 = relief_displacements(s1, s2, d1=d1, d2=d2)
+    assert e1 == pytest.approx(s1 - c1 * 2.0 / d1, abs=1e-13)
+    assert e2 - e1 == pytest.approx(s2 - s1, abs=1e-13)
+
+
+@given(
+    d2=st.floats(0.5, 50), gap=st.floats(0.2, 50), share=st.floats(-2, 0.9),
+    radius=st.floats(0.05, 100),
+)  # fmt: skip
+def test_relief_equals_a_fifty_digit_solution(d2, gap, share, radius):
+    d1, r = d2 + gap, share * d2
+    with mpmath.workdps(50):
+        s1 = mpmath.mpf(d1) * radius / (mpmath.mpf(d1) - r)
+        s2 = mpmath.mpf(d2) * radius / (mpmath.mpf(d2) - r)
+        f1, f2 = float(s1), float(s2)
+        exact = (mpmath.mpf(f2) - f1) / (mpmath.mpf(f2) / d2 - mpmath.mpf(f1) / d1)
+        rate = abs(float(mpmath.mpf(f2) / d2 - mpmath.mpf(f1) / d1))
+    # Rounding of s2/d2 - s1/d1 relative to its size is all that may be lost.
+    allowed = 4e-16 * (f2 / d2 + f1 / d1) / rate * (abs(float(exact)) + d2 * 1e-3) + 1e-15
+    assert abs(float(relief(f1, f2, d1=d1, d2=d2)) - float(exact)) <= allowed
+
+
+def test_equation_7_has_the_sine_with_x_because_theta_is_an_azimuth():
+    x, y = plane_coordinates(5.0, 1.0, np.radians(30.0))
+    assert (float(x), float(y)) == pytest.approx((2.0, 4 * np.cos(np.radians(30.0))), abs=1e-14)
+    x, y = plane_coordinates(5.0, 1.0, np.radians(90.0))
+    assert (float(x), float(y)) == pytest.approx((4.0, 0.0), abs=1e-14)
+
+
+def test_points_on_the_plane_have_the_same_coordinates_in_both_photos():
+    s1, s2 = seen(*PAIRS["35/19"], np.linspace(0.1, 5, 9), 0.0)
+    np.testing.assert_allclose(s1, s2, rtol=1e-15)
+    np.testing.assert_array_equal(relief(s1, s1, d1=17.5, d2=9.5), 0.0)
+
+
+def test_relief_is_nan_at_the_nadir_point():
+    assert np.isnan(relief(0.0, 0.0, d1=17.5, d2=9.5))
+    assert np.isnan(relief_from_displacement(0.0, 0.0, d=9.5))
+
+
+def test_shapes_broadcast_and_scalars_equal_arrays_of_one():
+    s1, s2 = seen(*PAIRS["35/19"], np.linspace(0.1, 5, 6).reshape(2, 3), 0.3)
+    grid = relief(s1, s2, d1=17.5, d2=9.5)
+    assert grid.shape == (2, 3)
+    assert grid[1, 2] == relief(s1[1, 2], s2[1, 2], d1=17.5, d2=9.5)
+
+
+def test_unit_of_the_image_does_not_matter():
+    s1, s2 = seen(*PAIRS["35/19"], 2.0, 0.7)
+    assert relief(s1 * 1000, s2 * 1000, d1=17.5, d2=9.5) == pytest.approx(0.7, abs=1e-13)
+
+
+def test_equal_distances_are_refused():
+    with pytest.raises(GeometryError, match="different distances"):
+        relief(4.0, 5.0, d1=10.0, d2=10.0)
+
+
+@pytest.mark.parametrize("bad", [0.0, -1.0, np.nan, np.inf])
+def test_a_distance_that_is_no_distance_is_refused(bad):
+    with pytest.raises(InputError, match="d1"):
+        relief(4.0, 5.0, d1=bad, d2=9.5)
+
+
+def test_text_among_the_numbers_is_refused_by_name():
+    with pytest.raises(InputError, match="s1"):
+        relief("wide", 5.0, d1=17.5, d2=9.5)
+
+
+# Precision
+
+
+@pytest.mark.parametrize(("pair", "expected"), [("35/19", 0.0275), ("35/28", 0.093)])
+def test_one_pixel_picks_at_the_rms_radius_give_the_known_sigma(pair, expected):
+    _, d1, _, d2 = PAIRS[pair]
+    pixel = 22.7 / 3072 * 17.5 / 35  # 3.69 mm on the wall
+    radius = np.hypot(3072, 2048) * pixel / np.sqrt(12)
+    found = sigma_relief(radius, radius, d1=d1, d2=d2, sigma_1=pixel, sigma_2=pixel)
+    assert found == pytest.approx(expected, rel=0.01)
+
+
+def test_sigma_at_the_plane_is_the_lever_arm_over_the_radius():
+    found = sigma_relief(2.0, 2.0, d1=17.5, d2=9.5, sigma_1=0.0, sigma_2=0.003)
+    assert found == pytest.approx(0.003 * 17.5 * 9.5 / 8 / 2.0, rel=1e-14)
+
+
+@pytest.mark.parametrize("pair", PAIRS)
+@pytest.mark.parametrize("r", [-0.6, 0.0, 1.0])
+def test_closed_forms_agree_with_monte_carlo(pair, r):
+    c1, d1, c2, d2 = PAIRS[pair]
+    rng = np.random.default_rng(20240601)
+    radius, theta, noise, draws = 3.1, 0.7, 0.0074, 100_000
+    s1, s2 = seen(c1, d1, c2, d2, radius, r)
+    # Picks are x, y with equal noise in both images; s and theta follow from them.
+    direction = np.array([np.sin(theta), np.cos(theta)])
+    pick1 = s1 * direction + rng.normal(0, noise, (draws, 2))
+    pick2 = s2 * direction + rng.normal(0, noise, (draws, 2))
+    n1, n2 = np.hypot(*pick1.T), np.hypot(*pick2.T)
+    e1, e2 = relief_displacements(n1, n2, d1=d1, d2=d2)
+    x, y = plane_coordinates(n1, e1, np.arctan2(pick1[:, 0], pick1[:, 1]))
+    drawn = [np.std(v) for v in (relief(n1, n2, d1=d1, d2=d2), e1, e2, x, y)]
+    formal = sigmas(s1, s2, theta, d1=d1, d2=d2, sigma_1=noise, sigma_2=noise)
+    np.testing.assert_allclose(np.array(drawn) / np.array(formal), 1.0, atol=0.05)
+
+
+def test_sigma_r_of_both_forms_agrees():
+    s1, s2 = seen(*PAIRS["35/19"], 2.0, 0.8)
+    both = {"d1": 17.5, "d2": 9.5, "sigma_1": 0.004, "sigma_2": 0.007}
+    assert sigmas(s1, s2, 0.3, **both).r == pytest.approx(sigma_relief(s1, s2, **both), rel=1e-13)
+
+
+def test_strongly_different_lenses_are_preferable():
+    assert lever_arm(d1=17.5, d2=9.5) < lever_arm(d1=17.5, d2=14.0) / 3
+
+
+@pytest.mark.parametrize(("d2", "expected"), [(9.5, 0.21), (14.0, 0.70)])
+def test_one_percent_of_scale_mismatch_is_a_known_false_relief(d2, expected):
+    assert false_relief_of_scale(0.01, d1=17.5, d2=d2) == pytest.approx(expected, abs=0.005)
+    # The same from the equations: a point on the plane, image 2 a millionth too large.
+    assert relief(4.0, 4.000004, d1=17.5, d2=d2) * 1e4 == pytest.approx(
+        false_relief_of_scale(0.01, d1=17.5, d2=d2), rel=1e-5
+    )
+
+
+@pytest.mark.parametrize("r", [-0.5, 0.0, 0.9])
+def test_at_the_uncertainty_radius_sigma_is_the_wanted_one(r):
+    one_pick, wanted = 0.002, 0.03
+    radius = uncertainty_radius(wanted, d1=17.5, d2=9.5, sigma_m=one_pick * np.sqrt(2), r=r)
+    s1, s2 = 17.5 * radius / (17.5 - r), 9.5 * radius / (9.5 - r)
+    found = sigma_relief(s1, s2, d1=17.5, d2=9.5, sigma_1=one_pick, sigma_2=one_pick)
+    assert found == pytest.approx(wanted, rel=1e-12)
+
+
+def test_the_area_of_uncertainty_of_the_papers_camera_matches_the_field():
+    # 0.05 px and 1 cm: 104 px for 35/19 and 350 px for 35/28.
+    assert uncertainty_radius(0.01, d1=17.5, d2=9.5, sigma_m=0.05) == pytest.approx(104, abs=0.5)
+    assert uncertainty_radius(0.01, d1=17.5, d2=14.0, sigma_m=0.05) == pytest.approx(350, abs=0.5)
+
+
+def test_precision_refuses_a_near_camera_farther_than_the_far_one():
+    with pytest.raises(GeometryError, match="greater"):
+        lever_arm(d1=9.5, d2=17.5)
