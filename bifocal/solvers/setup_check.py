@@ -143,7 +143,7 @@ def check_setup(
     first = as_points(pixels1, "pixels1", dimension=2)
     second = as_points(pixels2, "pixels2", dimension=2)
     labels = list(names) if names is not None else [str(i + 1) for i in range(len(first))]
-    measured = np.isfinite(first).all(axis=1) & np.isfinite(second).all(axis=1)
+    measured: BoolArray = np.isfinite(np.hstack([first, second])).all(axis=1)
     if measured.sum() < 2:
         raise InputError(
             f"set-up check: {int(measured.sum())} point(s) measured in both photos are marked as "
