@@ -1,0 +1,180 @@
+"""A raster on the reference plane: where its pixels are, in the plane frame."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from photocore.arrays import FloatArray, positive
+from photocore.errors import InputError
+
+#: Rows and columns of a relief map and an orthophoto that differ by less are the same. [px]
+SAME_PIXEL = 1e-3
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Grid:
+    """Square pixels parallel to the axes of the plane frame, row 0 at the top.
+
+    Attributes
+    ----------
+    x0, y0 : float
+        Plane position of the centre of the top-left pixel. [m]
+    gsd : float
+        Side of a pixel. [m]
+    width, height : int
+        Columns and rows.
+
+    Examples
+    --------
+    >>> grid = Grid.from_bounds((0.0, 0.0, 2.0, 1.0), gsd=0.5)
+    >>> grid.width, grid.height, grid.x0, grid.y0
+    (4, 2, 0.25, 0.75)
+    """
+
+    x0: float
+    y0: float
+    gsd: float
+    width: int
+    height: int
+
+    def __post_init__(self) -> None:
+        positive(self.gsd, "gsd", unit="m")
+        if not (math.isfinite(self.x0) and math.isfinite(self.y0)):
+            raise InputError("the grid's corner is not a finite number.")
+        if self.width < 1 or self.height < 1:
+            raise InputError(f"a grid of {self.width} x {self.height} px is empty.")
+
+    @classmethod
+    def from_bounds(cls, bounds: tuple[float, float, float, float], *, gsd: float) -> Grid:
+        """Return the grid that fills xmin, ymin, xmax, ymax (outer edges of its pixels). [m]
+
+        The top-left corner is kept; the far edges grow to whole pixels.
+
+        Raises
+        ------
+        InputError
+            If the box is empty or not finite.
+        """
+        gsd = positive(gsd, "gsd", unit="m")
+        xmin, ymin, xmax, ymax = bounds
+        if not (np.isfinite(bounds).all() and xmax > xmin and ymax > ymin):
+            raise InputError(
+                f"bounds: expected xmin,ymin,xmax,ymax in metres with xmin < xmax and "
+                f"ymin < ymax, found {xmin:g},{ymin:g},{xmax:g},{ymax:g}."
+            )
+        # 10 m / 5 mm is 2000.0000000000002 in floating point: not a reason for one more column.
+        width, height = (
+            max(1, math.ceil(length / gsd - SAME_PIXEL)) for length in (xmax - xmin, ymax - ymin)
+        )
+        return cls(x0=xmin + gsd / 2, y0=ymax - gsd / 2, gsd=gsd, width=width, height=height)
+
+    @classmethod
+    def from_affine(cls, plane_from_pixel: FloatArray, shape: tuple[int, ...]) -> Grid:
+        """Return the grid of an array with this pixel-to-plane matrix (pixel centres).
+
+        Raises
+        ------
+        InputError
+            If its pixels are turned, mirrored or not square.
+        """
+        matrix = np.asarray(plane_from_pixel, dtype=np.float64)
+        if matrix.shape not in ((3, 3), (2, 3)):
+            raise InputError(f"plane_from_pixel: expected shape (3, 3), found {matrix.shape}.")
+        gsd = float(matrix[0, 0])
+        span = max(shape[0], shape[1]) * abs(gsd)
+        off = max(abs(matrix[0, 1]), abs(matrix[1, 0]), abs(matrix[1, 1] + gsd))
+        if not (gsd > 0 and off * max(shape[0], shape[1]) <= 1e-2 * gsd and span > 0):
+            raise InputError(
+                "the raster's pixels are not square and parallel to X and Y with row 0 on top; "
+                "resample it first (for instance with gdalwarp)."
+            )
+        return cls(
+            x0=float(matrix[0, 2]),
+            y0=float(matrix[1, 2]),
+            gsd=gsd,
+            width=int(shape[1]),
+            height=int(shape[0]),
+        )
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Rows and columns."""
+        return self.height, self.width
+
+    @property
+    def plane_from_pixel(self) -> FloatArray:
+        """Matrix from (column, row, 1) to (X, Y, 1), shape (3, 3). [m]"""
+        return np.array([[self.gsd, 0.0, self.x0], [0.0, -self.gsd, self.y0], [0.0, 0.0, 1.0]])
+
+    @property
+    def bounds(self) -> tuple[float, float, float, float]:
+        """Outer edges xmin, ymin, xmax, ymax. [m]"""
+        half = self.gsd / 2
+        return (
+            self.x0 - half,
+            self.y0 - (self.height - 1) * self.gsd - half,
+            self.x0 + (self.width - 1) * self.gsd + half,
+            self.y0 + half,
+        )
+
+    @property
+    def columns_x(self) -> FloatArray:
+        """X of every column. [m]"""
+        return self.x0 + self.gsd * np.arange(self.width)
+
+    @property
+    def rows_y(self) -> FloatArray:
+        """Y of every row. [m]"""
+        return self.y0 - self.gsd * np.arange(self.height)
+
+    def pixel_of(self, xy: FloatArray) -> FloatArray:
+        """Return (column, row) of plane positions, shape (..., 2). [px]"""
+        return np.stack(
+            [(xy[..., 0] - self.x0) / self.gsd, (self.y0 - xy[..., 1]) / self.gsd], axis=-1
+        )
+
+    def window(self, column: int, row: int, width: int, height: int) -> Grid:
+        """Return the part that starts at a column and row; it may reach beyond the edges."""
+        return Grid(
+            x0=self.x0 + column * self.gsd,
+            y0=self.y0 - row * self.gsd,
+            gsd=self.gsd,
+            width=width,
+            height=height,
+        )
+
+    def offset_in(self, other: Grid) -> tuple[float, float]:
+        """Return column and row of this grid's first pixel in another grid."""
+        column, row = other.pixel_of(np.array([self.x0, self.y0]))
+        return float(column), float(row)
+
+    def tiles(self, side: int) -> Iterator[tuple[int, int, Grid]]:
+        """Yield (column, row, window) of tiles that cover the grid, row by row."""
+        for row in range(0, self.height, side):
+            for column in range(0, self.width, side):
+                width, height = min(side, self.width - column), min(side, self.height - row)
+                yield column, row, self.window(column, row, width, height)
+
+    def snapped(self) -> Grid:
+        """Return a grid of the same cover whose pixel edges are whole multiples of the GSD.
+
+        Orthophotos of one wall made with the same GSD then fit together without resampling.
+        """
+        xmin, ymin, xmax, ymax = self.bounds
+        left, top = (
+            math.floor(xmin / self.gsd + SAME_PIXEL),
+            math.ceil(ymax / self.gsd - SAME_PIXEL),
+        )
+        right = math.ceil(xmax / self.gsd - SAME_PIXEL)
+        bottom = math.floor(ymin / self.gsd + SAME_PIXEL)
+        return Grid(
+            x0=(left + 0.5) * self.gsd,
+            y0=(top - 0.5) * self.gsd,
+            gsd=self.gsd,
+            width=right - left,
+            height=top - bottom,
+        )
