@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from importlib import import_module
 from typing import Any, Protocol
@@ -123,3 +123,23 @@ def progress_bar(title: str, *, quiet: bool = False) -> Iterator[Progress]:
             bar.update(task, completed=done, total=total, description=what or title)
 
         yield report
+
+
+def text_table(headings: Sequence[str], rows: Sequence[Sequence[object]]) -> str:
+    """Return a plain aligned table; text to the left, everything else to the right."""
+    cells = [[str(item) for item in row] for row in rows]
+    widths = [
+        max(len(heading), *(len(row[i]) for row in cells), 0) for i, heading in enumerate(headings)
+    ]
+    left = [all(isinstance(row[i], str) for row in rows) and i == 0 for i in range(len(headings))]
+
+    def line(items: Sequence[str]) -> str:
+        parts = [
+            item.ljust(width) if is_left else item.rjust(width)
+            for item, width, is_left in zip(items, widths, left, strict=True)
+        ]
+        return "  ".join(parts).rstrip()
+
+    return "\n".join(
+        [line(headings), "  ".join("-" * width for width in widths), *map(line, cells)]
+    )

@@ -1,0 +1,152 @@
+"""``bifocal plan``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from photocore.console import print_json, remark, text_table
+
+if TYPE_CHECKING:
+    from bifocal.solvers.planning import Plan
+
+EXAMPLE = """\b
+Examples:
+  bifocal plan --focal 35 --focal 28 --focal 19 --sensor 22.7x15.1 --pixels 3072x2048 --scale 1:500
+  bifocal plan --focal 35 --focal 18 --sensor 23.5x15.6 --pixels 6000x4000 --object 12x8
+               --free-space 20 --out plan.xlsx
+"""
+
+
+class Size(click.ParamType):  # type: ignore[type-arg,unused-ignore]
+    """Two numbers as WIDTHxHEIGHT; decimal commas are understood."""
+
+    name = "WxH"
+
+    def convert(
+        self, value: object, param: click.Parameter | None, ctx: click.Context | None
+    ) -> tuple[float, float]:
+        """Return width and height."""
+        if isinstance(value, tuple):
+            return value
+        parts = str(value).lower().replace("*", "x").replace("×", "x").replace(",", ".").split("x")
+        try:
+            width, height = (float(part) for part in parts)
+        except ValueError:
+            self.fail(f"{value!r} is not WIDTHxHEIGHT, e.g. 22.7x15.1", param, ctx)
+        return width, height
+
+
+class Scale(click.ParamType):  # type: ignore[type-arg,unused-ignore]
+    """A scale 1:N."""
+
+    name = "1:N"
+
+    def convert(
+        self, value: object, param: click.Parameter | None, ctx: click.Context | None
+    ) -> float:
+        """Return N."""
+        text = str(value).strip().removeprefix("1:")
+        try:
+            return float(text)
+        except ValueError:
+            self.fail(f"{value!r} is not a scale, e.g. 1:500", param, ctx)
+
+
+@click.command(
+    short_help="Camera stations, scale and expected precision for given lenses.", epilog=EXAMPLE
+)
+@click.option(
+    "--focal", "focal_lengths", type=float, multiple=True, required=True, metavar="MM",
+    help="A focal length at hand [mm]; repeat it for every lens or zoom mark.",
+)  # fmt: skip
+@click.option("--sensor", type=Size(), required=True, help="Width x height of the sensor [mm].")
+@click.option("--pixels", type=Size(), required=True, help="Columns x rows of the photo [px].")
+@click.option("--object", "object_size", type=Size(), help="Width x height of the wall [m].")
+@click.option("--scale", "scale_number", type=Scale(), help="Wanted scale of the photo, 1:N.")
+@click.option("--gsd", type=float, metavar="MM", help="Wanted pixel on the wall [mm].")
+@click.option(
+    "--sigma-r", type=float, metavar="MM",
+    help="Wanted sigma of the relief at the RMS radius of the photo [mm].",
+)  # fmt: skip
+@click.option(
+    "--sigma-px", type=float, default=0.5, show_default=True, help="Precision of a pick [px]."
+)
+@click.option(
+    "--sigma-r-max", type=float, metavar="MM",
+    help="Area of uncertainty: sigma of the relief above this [mm].  "
+    "[default: 3 x that of the best pair]",
+)  # fmt: skip
+@click.option("--free-space", type=float, metavar="M", help="Room in front of the wall [m].")
+@click.option("--out", type=click.Path(path_type=Path), help="Also write the plan as .xlsx.")
+@click.option("--overwrite", is_flag=True, help="Replace an existing file.")
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
+def command(
+    focal_lengths: tuple[float, ...], sensor: tuple[float, float], pixels: tuple[float, float],
+    object_size: tuple[float, float] | None, scale_number: float | None, gsd: float | None,
+    sigma_r: float | None, sigma_px: float, sigma_r_max: float | None, free_space: float | None,
+    out: Path | None, overwrite: bool, as_json: bool,
+) -> None:  # fmt: skip
+    """Compare pairs of lenses: where to stand, what a photo covers, how precise it gets.
+
+    Give the lenses and the camera, and one wish: the size of the wall, a scale, a pixel size on
+    the wall, or a sigma of the relief.
+    """
+    from bifocal.solvers.planning import Sensor
+    from bifocal.workflows.plan import make_plan, plan_as_dict
+
+    plan = make_plan(
+        focal_lengths,
+        Sensor(width=sensor[0], height=sensor[1], columns=int(pixels[0]), rows=int(pixels[1])),
+        out=out, overwrite=overwrite, object_size=object_size, scale_number=scale_number,
+        gsd=gsd and gsd / 1000, sigma_r=sigma_r and sigma_r / 1000, sigma_px=sigma_px,
+        sigma_r_max=sigma_r_max and sigma_r_max / 1000, free_space=free_space,
+    )  # fmt: skip
+    if as_json:
+        print_json(plan_as_dict(plan))
+    else:
+        _print(plan)
+    if out is not None:
+        remark(f"Plan written to {out}")
+
+
+def _print(plan: Plan) -> None:
+    """Print the stations and the precision over the frame of the best pair."""
+    rows = [
+        (
+            f"{s.c1:g}/{s.c2:g}", f"{s.d1:.2f}", f"{s.d2:.2f}", f"{s.delta_d:.2f}",
+            f"1:{s.scale_number:.0f}", f"{s.gsd * 1000:.2f}",
+            f"{s.footprint[0]:.1f} x {s.footprint[1]:.1f}", f"{s.photos[0]} x {s.photos[1]}",
+            f"{s.sigma_r_rms * 1000:.1f}", f"{s.sigma_r_corner * 1000:.1f}",
+            f"{s.sigma_ortho * 1000:.1f}", f"{s.uncertain_radius:.2f}",
+            "yes" if s.feasible else "NO",
+        )
+        for s in plan.stations
+    ]  # fmt: skip
+    headings = (
+        "lenses mm", "d1 m", "d2 m", "delta_d m", "scale", "pixel mm", "covers m", "photos",
+        "sigma r mm", "in corner", "ortho mm", "uncertain m", "fits",
+    )  # fmt: skip
+    click.echo(text_table(headings, rows))
+    for station in plan.stations:
+        if station.note:
+            click.echo(f"{station.c1:g}/{station.c2:g} mm: {station.note}")
+    best = plan.best
+    click.echo(
+        f"\nBest: {best.c1:g} mm from {best.d1:.2f} m and {best.c2:g} mm from {best.d2:.2f} m."
+        if best.feasible
+        else "\nNo pair of lenses fits into the free space."
+    )
+    x, y, sigma = plan.sigma_grid(best, columns=7, rows=5)
+    click.echo(f"\nsigma of r [mm] over its photo, picks of {plan.sigma_px:g} px:")
+    click.echo(
+        text_table(
+            ("Y \\ X [m]", *(f"{v:.1f}" for v in x)),
+            [
+                (f"{v:.1f}", *("nadir" if s != s else f"{s * 1000:.0f}" for s in row))
+                for v, row in zip(y, sigma, strict=True)
+            ],
+        )
+    )

@@ -1,0 +1,131 @@
+"""A camera plan as a workbook: stations, sigma over the frame, and a chart to compare lenses."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from photocore.output import atomic_path
+
+if TYPE_CHECKING:
+    from bifocal.solvers.planning import Plan
+
+_COLUMNS: tuple[tuple[str, str, str], ...] = (
+    ("pair", "Lenses", "@"),
+    ("d1", "d1 [m]", "0.000"),
+    ("d2", "d2 [m]", "0.000"),
+    ("delta_d", "delta_d [m]", "0.000"),
+    ("scale", "Scale 1:", "0"),
+    ("gsd", "Pixel on the wall [mm]", "0.00"),
+    ("width", "Photo covers, width [m]", "0.00"),
+    ("height", "Photo covers, height [m]", "0.00"),
+    ("photos", "Photos (across x up)", "@"),
+    ("sigma_rms", "sigma r, RMS radius [mm]", "0.0"),
+    ("sigma_corner", "sigma r, corner [mm]", "0.0"),
+    ("sigma_ortho", "sigma orthophoto [mm]", "0.0"),
+    ("uncertain", "Area of uncertainty, radius [m]", "0.00"),
+    ("share", "... of half diagonal", "0%"),
+    ("feasible", "Fits?", "@"),
+    ("note", "Note", "@"),
+)
+
+
+def write_plan(path: Path | str, plan: Plan, *, overwrite: bool = False) -> None:
+    """Write a plan as .xlsx: sheets ``Planning`` and ``Sigma r``, each with a chart.
+
+    Raises
+    ------
+    InputError
+        If the file exists and ``overwrite`` is false, or cannot be written.
+    """
+    from openpyxl import Workbook
+
+    book = Workbook()
+    _stations_sheet(book.active, plan)
+    _grid_sheet(book.create_sheet("Sigma r"), plan)
+    with atomic_path(path, overwrite=overwrite) as temporary:
+        book.save(temporary)
+
+
+def _stations_sheet(sheet: Any, plan: Plan) -> None:
+    """Fill the table of stations and the bar chart of expected precision."""
+    from openpyxl.chart import BarChart, Reference
+    from openpyxl.styles import Alignment, Font, PatternFill
+    from openpyxl.worksheet.table import Table, TableStyleInfo
+
+    sheet.title = "Planning"
+    sheet["A1"] = "Camera stations for a bifocal pair; best first"
+    sheet["A1"].font = Font(bold=True, size=14)
+    sensor = plan.sensor
+    sheet["A2"] = (
+        f"Sensor {sensor.width:g} x {sensor.height:g} mm, {sensor.columns} x {sensor.rows} px; "
+        f"picks precise to {plan.sigma_px:g} px; area of uncertainty: sigma r above "
+        f"{plan.sigma_r_max * 1000:.0f} mm"
+    )
+    for column, (_, label, _) in enumerate(_COLUMNS, start=1):
+        cell = sheet.cell(4, column, label)
+        cell.alignment = Alignment(wrap_text=True, vertical="top")
+        sheet.column_dimensions[cell.column_letter].width = 44 if label == "Note" else 11
+    for row, station in enumerate(plan.stations, start=5):
+        values = (
+            f"{station.c1:g}/{station.c2:g} mm", station.d1, station.d2, station.delta_d,
+            station.scale_number, station.gsd * 1000, *station.footprint,
+            f"{station.photos[0]} x {station.photos[1]}", station.sigma_r_rms * 1000,
+            station.sigma_r_corner * 1000, station.sigma_ortho * 1000, station.uncertain_radius,
+            station.uncertain_share, "yes" if station.feasible else "no", station.note,
+        )  # fmt: skip
+        for column, value in enumerate(values, start=1):
+            cell = sheet.cell(row, column, value)
+            cell.number_format = _COLUMNS[column - 1][2]
+            cell.alignment = Alignment(wrap_text=True, vertical="top")
+        if row == 5 and station.feasible:
+            for column in range(1, len(_COLUMNS) + 1):
+                sheet.cell(row, column).fill = PatternFill("solid", fgColor="E2F0D9")
+    last = 4 + len(plan.stations)
+    table = Table(
+        displayName="tblPlan", ref=f"A4:{sheet.cell(4, len(_COLUMNS)).column_letter}{last}"
+    )
+    table.tableStyleInfo = TableStyleInfo(name="TableStyleLight1", showRowStripes=False)
+    sheet.add_table(table)
+    sheet.freeze_panes = "B5"
+    chart = BarChart()
+    chart.title = "Expected sigma of the relief [mm]"
+    figures = Reference(sheet, min_col=10, max_col=12, min_row=4, max_row=last)
+    chart.add_data(figures, titles_from_data=True)
+    chart.set_categories(Reference(sheet, min_col=1, min_row=5, max_row=last))
+    chart.y_axis.title = "mm"
+    chart.x_axis.delete = chart.y_axis.delete = False
+    chart.width, chart.height = 22, 10
+    sheet.add_chart(chart, f"A{last + 3}")
+    sheet.page_setup.orientation = "landscape"
+    sheet.page_setup.fitToHeight = 0
+    sheet.sheet_properties.pageSetUpPr.fitToPage = True
+
+
+def _grid_sheet(sheet: Any, plan: Plan) -> None:
+    """Fill sigma of r over the frame of the best pair, coloured by size."""
+    from openpyxl.formatting.rule import ColorScaleRule
+    from openpyxl.styles import Font
+
+    best = plan.best
+    x, y, sigma = plan.sigma_grid(best, columns=15, rows=11)
+    sheet["A1"] = (
+        f"sigma of r [mm] over the photo, {best.c1:g}/{best.c2:g} mm; X across, Y down [m] from "
+        "the nadir"
+    )
+    sheet["A1"].font = Font(bold=True)
+    for column, value in enumerate(x, start=2):
+        sheet.cell(3, column, float(value)).number_format = "0.00"
+    for row, value in enumerate(y, start=4):
+        sheet.cell(row, 1, float(value)).number_format = "0.00"
+        for column, item in enumerate(sigma[row - 4], start=2):
+            # At the nadir itself relief is undefined: a word, not an empty cell.
+            cell = sheet.cell(row, column, "nadir" if item != item else float(item) * 1000)
+            cell.number_format = "0"
+    area = f"B4:{sheet.cell(3 + len(y), 1 + len(x)).coordinate}"
+    ends = {"start_type": "min", "start_color": "63BE7B", "end_type": "max", "end_color": "F8696B"}
+    middle = {"mid_type": "percentile", "mid_value": 60, "mid_color": "FFEB84"}
+    sheet.conditional_formatting.add(area, ColorScaleRule(**ends, **middle))
+    sheet.page_setup.orientation = "landscape"
+    sheet.page_setup.fitToHeight = 0
+    sheet.sheet_properties.pageSetUpPr.fitToPage = True

@@ -1,0 +1,308 @@
+"""Where to stand: stations, scale and expected precision for every pair of lenses at hand."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import combinations
+from math import ceil, hypot, sqrt
+
+import numpy as np
+
+from bifocal.precision import lever_arm, sigmas, uncertainty_radius
+from photocore.arrays import FloatArray, positive
+from photocore.errors import InputError
+
+#: Share of the photo that neighbouring photos of a large façade have in common.
+OVERLAP = 0.2
+#: Closer than this share of the far distance the two stations hardly differ.
+LEAST_RATIO = 1.05
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Sensor:
+    """A camera's sensor.
+
+    Attributes
+    ----------
+    width, height : float
+        [mm]
+    columns, rows : int
+        [px]
+    """
+
+    width: float
+    height: float
+    columns: int
+    rows: int
+
+    def __post_init__(self) -> None:
+        for name in ("width", "height", "columns", "rows"):
+            positive(getattr(self, name), f"sensor {name}")
+        across, along = self.width / self.columns, self.height / self.rows
+        if abs(across / along - 1) > 0.03:
+            raise InputError(
+                f"sensor: {self.width:g} x {self.height:g} mm with {self.columns} x {self.rows}"
+                f" px makes pixels of {across * 1000:.2f} x {along * 1000:.2f} um: not square; "
+                "check both pairs of numbers, and that both are width x height."
+            )
+
+    @property
+    def pitch(self) -> float:
+        """Pixel size. [mm]."""
+        return self.width / self.columns
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Station:
+    """Both stations of one pair of lenses and what to expect from them.
+
+    Attributes
+    ----------
+    c1, c2 : float
+        Principal distances of the far and the near camera. [mm]
+    d1, d2, delta_d : float
+        Distances to the wall and their difference. [m]
+    scale_number : float
+        1000 d / c, the same in both photos.
+    gsd : float
+        Pixel on the wall. [m]
+    footprint : tuple of float
+        Width and height of the wall in one photo. [m]
+    photos : tuple of int
+        Photos needed across and up, with overlap.
+    sigma_r_rms, sigma_r_corner : float
+        Expected sigma of the relief at the RMS radius of the frame and in its corner. [m]
+    sigma_ortho : float
+        Expected sigma of a position on the orthophoto of image 1, anywhere. [m]
+    uncertain_radius : float
+        Radius of the area of uncertainty for ``sigma_r_max``. [m]
+    uncertain_share : float
+        That radius over the frame's half diagonal.
+    feasible : bool
+        Whether both stations fit into the free space.
+    note : str
+        Why not, or what to mind.
+    """
+
+    c1: float
+    c2: float
+    d1: float
+    d2: float
+    delta_d: float
+    scale_number: float
+    gsd: float
+    footprint: tuple[float, float]
+    photos: tuple[int, int]
+    sigma_r_rms: float
+    sigma_r_corner: float
+    sigma_ortho: float
+    uncertain_radius: float
+    uncertain_share: float
+    feasible: bool
+    note: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Plan:
+    """Stations for every pair of lenses, best first.
+
+    Attributes
+    ----------
+    sensor : Sensor
+    stations : tuple of Station
+        Feasible ones first, then by expected precision of the relief.
+    sigma_px : float
+        Picking precision the figures rest on. [px]
+    sigma_r_max : float
+        Bound of the area of uncertainty. [m]
+    """
+
+    sensor: Sensor
+    stations: tuple[Station, ...]
+    sigma_px: float
+    sigma_r_max: float
+
+    @property
+    def best(self) -> Station:
+        """The feasible station of best precision; the least bad one if none is feasible."""
+        return self.stations[0]
+
+    def sigma_grid(
+        self, station: Station, *, columns: int = 9, rows: int = 7
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return X, Y from the nadir and sigma of r over the frame. [m].
+
+        Returns
+        -------
+        x : ndarray, shape (columns,)
+        y : ndarray, shape (rows,)
+            Downwards from the top of the frame.
+        sigma_r : ndarray, shape (rows, columns)
+            NaN at the nadir itself, where relief is undefined.
+        """
+        half_w, half_h = station.footprint[0] / 2, station.footprint[1] / 2
+        x = np.linspace(-half_w, half_w, columns)
+        y = np.linspace(half_h, -half_h, rows)
+        radius = np.hypot(*np.meshgrid(x, y))
+        sigma = self.sigma_px * station.gsd
+        grid = sigmas(
+            radius, radius, 0.0, d1=station.d1, d2=station.d2, sigma_1=sigma, sigma_2=sigma
+        ).r
+        return x, y, np.where(radius < 1e-9, np.nan, grid)
+
+
+def plan_stations(
+    focal_lengths: Sequence[float],
+    sensor: Sensor,
+    *,
+    object_size: tuple[float, float] | None = None,
+    scale_number: float | None = None,
+    gsd: float | None = None,
+    sigma_r: float | None = None,
+    sigma_px: float = 0.5,
+    sigma_r_max: float | None = None,
+    free_space: float | None = None,
+) -> Plan:
+    """Return stations, scale and precision for every pair of the given lenses.
+
+    Parameters
+    ----------
+    focal_lengths : sequence of float
+        Two or more different principal distances. [mm]
+    sensor : Sensor
+    object_size : tuple of float, optional
+        Width and height of the wall. Alone it sets the scale so that one photo covers it. [m]
+    scale_number : float, optional
+        Wanted photo scale 1 : scale_number.
+    gsd : float, optional
+        Wanted pixel on the wall. [m]
+    sigma_r : float, optional
+        Wanted sigma of the relief at the RMS radius of the frame. [m]
+    sigma_px : float
+        Picking precision per coordinate. [px]
+    sigma_r_max : float, optional
+        Bound of the area of uncertainty; default three times the sigma at the RMS radius of the
+        best pair. [m]
+    free_space : float, optional
+        Room in front of the wall. [m]
+
+    Returns
+    -------
+    Plan
+
+    Raises
+    ------
+    InputError
+        If fewer than two different lenses, no wish or more than one wish for the scale is given.
+
+    Notes
+    -----
+    Same scale: d = m c / 1000 for both lenses, so B = m c1 c2 / (1000 (c1 - c2)): at equal scale
+    only the difference of the focal lengths matters. sigma_r = sqrt(2) sigma_px GSD B / s'.
+
+    Examples
+    --------
+    The paper's camera at 1:500: 17.5 m and 9.5 m for 35 and 19 mm.
+
+    >>> canon = Sensor(width=22.7, height=15.1, columns=3072, rows=2048)
+    >>> best = plan_stations([35, 28, 19], canon, scale_number=500, sigma_px=1.0).best
+    >>> best.c1, best.c2, round(best.d1, 2), round(best.d2, 2), round(best.sigma_r_rms * 1000, 1)
+    (35.0, 19.0, 17.5, 9.5, 27.6)
+    """
+    lenses = sorted({positive(c, "focal length", unit="mm") for c in focal_lengths}, reverse=True)
+    if len(lenses) < 2:
+        raise InputError("give at least two different focal lengths, e.g. --focal 35 --focal 19.")
+    sigma_px = positive(sigma_px, "sigma_px", unit="px")
+    wishes = {"scale": scale_number, "gsd": gsd, "sigma_r": sigma_r}
+    given = [name for name, value in wishes.items() if value is not None]
+    if len(given) > 1:
+        raise InputError(f"give only one of {' and '.join(given)}: each of them sets the scale.")
+    if not given and object_size is None:
+        raise InputError("give the size of the wall, a photo scale, a GSD or a wanted sigma of r.")
+    for name, value in (*wishes.items(), ("free_space", free_space)):
+        if value is not None:
+            positive(value, name)
+
+    def scale_of(c1: float, c2: float) -> float:
+        """Return the photo scale number that the wish asks of one pair of lenses."""
+        if scale_number is not None:
+            return scale_number
+        if gsd is not None:
+            return gsd * 1000 / sensor.pitch
+        if sigma_r is not None:
+            # sigma_r = sqrt(2) sigma_px B / (RMS radius in px), B proportional to the scale number
+            radius_px = hypot(sensor.columns, sensor.rows) / sqrt(12)
+            return sigma_r * 1000 * (c1 - c2) / (c1 * c2) * radius_px / (sqrt(2) * sigma_px)
+        assert object_size is not None
+        width, height = (positive(v, "object size", unit="m") for v in object_size)
+        return 1000 * max(width / sensor.width, height / sensor.height)
+
+    pairs = [(c1, c2) for c1, c2 in combinations(lenses, 2) if c1 / c2 >= LEAST_RATIO]
+    if not pairs:
+        raise InputError("the focal lengths differ by less than 5 %: too little to see relief.")
+    drafts = [
+        _station(c1, c2, scale_of(c1, c2), sensor, object_size, sigma_px, free_space)
+        for c1, c2 in pairs
+    ]
+    drafts.sort(key=lambda s: (not s.feasible, s.sigma_r_rms, s.d1))
+    limit = sigma_r_max or 3 * drafts[0].sigma_r_rms
+    stations = tuple(_with_uncertainty(s, sigma_px, limit) for s in drafts)
+    return Plan(sensor=sensor, stations=stations, sigma_px=sigma_px, sigma_r_max=limit)
+
+
+def _station(
+    c1: float, c2: float, scale_number: float, sensor: Sensor,
+    object_size: tuple[float, float] | None, sigma_px: float, free_space: float | None,
+) -> Station:  # fmt: skip
+    """Return the stations of one pair of lenses, the uncertainty still open."""
+    d1, d2 = scale_number * c1 / 1000, scale_number * c2 / 1000
+    gsd = sensor.pitch * scale_number / 1000
+    footprint = (sensor.columns * gsd, sensor.rows * gsd)
+    half_diagonal = hypot(*footprint) / 2
+    # Mean square radius of a rectangle about its centre is diagonal² / 12.
+    rms = hypot(*footprint) / sqrt(12)
+    noise = sqrt(2) * sigma_px * gsd * lever_arm(d1=d1, d2=d2)
+    feasible = free_space is None or d1 <= free_space
+    note = ""
+    if not feasible:
+        assert free_space is not None
+        reach = 1000 * free_space / c1
+        note = (
+            f"needs {d1:.2f} m, only {free_space:.2f} m are free; at most 1:{reach:.0f} "
+            f"({sensor.columns * sensor.pitch * reach / 1000:.1f} m of wall in one photo)"
+        )
+    return Station(
+        c1=c1, c2=c2, d1=d1, d2=d2, delta_d=d1 - d2, scale_number=scale_number, gsd=gsd,
+        footprint=footprint, photos=_photos(object_size, footprint),
+        sigma_r_rms=noise / rms, sigma_r_corner=noise / half_diagonal,
+        sigma_ortho=sqrt(2) * sigma_px * gsd * d2 / (d1 - d2),
+        uncertain_radius=0.0, uncertain_share=0.0, feasible=feasible, note=note,
+    )  # fmt: skip
+
+
+def _photos(
+    object_size: tuple[float, float] | None, footprint: tuple[float, float]
+) -> tuple[int, int]:
+    """Return how many photos cover the wall across and up."""
+    if object_size is None:
+        return (1, 1)
+    counts = []
+    for size, covered in zip(object_size, footprint, strict=True):
+        step = covered * (1 - OVERLAP)
+        # A wall that fits to the millimetre fits: the 1e-9 absorbs rounding of the scale.
+        counts.append(1 + max(0, ceil((size - covered) / step - 1e-9)))
+    return (counts[0], counts[1])
+
+
+def _with_uncertainty(station: Station, sigma_px: float, limit: float) -> Station:
+    """Return the station with the area of uncertainty for the given sigma of r."""
+    from dataclasses import replace
+
+    radius = float(
+        uncertainty_radius(
+            limit, d1=station.d1, d2=station.d2, sigma_m=sqrt(2) * sigma_px * station.gsd
+        )
+    )
+    half_diagonal = hypot(*station.footprint) / 2
+    return replace(station, uncertain_radius=radius, uncertain_share=radius / half_diagonal)

@@ -1,0 +1,43 @@
+"""Planning: wishes in, stations out, as text, JSON or workbook."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+from bifocal.io.plan_workbook import write_plan
+from bifocal.solvers.planning import Plan, Sensor, plan_stations
+from photocore.output import check_writable
+
+
+def make_plan(
+    focal_lengths: Sequence[float],
+    sensor: Sensor,
+    *,
+    out: Path | None = None,
+    overwrite: bool = False,
+    **wishes: Any,
+) -> Plan:
+    """Return a plan, and write it as a workbook when a path is given.
+
+    ``wishes`` are the keyword arguments of `bifocal.solvers.planning.plan_stations`.
+    """
+    if out is not None:
+        check_writable(out, overwrite=overwrite)
+    plan = plan_stations(focal_lengths, sensor, **wishes)
+    if out is not None:
+        write_plan(out, plan, overwrite=overwrite)
+    return plan
+
+
+def plan_as_dict(plan: Plan) -> dict[str, Any]:
+    """Return a plan as plain data for ``--json``."""
+    x, y, sigma = plan.sigma_grid(plan.best)
+    return {
+        "stations": [asdict(station) for station in plan.stations],
+        "sigma_px": plan.sigma_px,
+        "sigma_r_max": plan.sigma_r_max,
+        "sigma_r_over_frame": {"x": x, "y": y, "sigma_r": sigma},
+    }

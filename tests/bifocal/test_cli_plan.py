@@ -1,0 +1,61 @@
+"""``bifocal plan`` as a user runs it."""
+
+from __future__ import annotations
+
+import json
+
+import openpyxl
+import pytest
+from click.testing import CliRunner
+
+from bifocal.cli.main import main
+
+CANON = ["--sensor", "22.7x15.1", "--pixels", "3072x2048"]
+LENSES = ["--focal", "35", "--focal", "28", "--focal", "19"]
+
+
+def run(*arguments):
+    return CliRunner().invoke(main, ["plan", *arguments])
+
+
+def test_the_table_names_the_best_pair_and_its_stations():
+    result = run(*LENSES, *CANON, "--scale", "1:500")
+    assert result.exit_code == 0
+    assert "Best: 35 mm from 17.50 m and 19 mm from 9.50 m." in result.stdout
+
+
+def test_json_is_one_object_and_nothing_else():
+    result = run(*LENSES, *CANON, "--scale", "1:500", "--sigma-px", "1", "--json")
+    data = json.loads(result.stdout)
+    assert data["stations"][0]["sigma_r_rms"] == pytest.approx(0.0275, rel=0.01)
+    assert data["sigma_r_over_frame"]["sigma_r"][3][4] is None
+
+
+def test_the_workbook_holds_the_stations_and_two_charts_of_precision(tmp_path):
+    out = tmp_path / "plan.xlsx"
+    assert run(*LENSES, *CANON, "--scale", "500", "--out", str(out)).exit_code == 0
+    book = openpyxl.load_workbook(out)
+    assert book["Planning"]["B5"].value == pytest.approx(17.5)
+    assert len(book["Planning"]._charts) == 1
+    assert book["Sigma r"]["I9"].value == "nadir"
+    again = run(*LENSES, *CANON, "--scale", "500", "--out", str(out))
+    assert again.exit_code == 1
+    assert "--overwrite" in again.stderr
+    assert run(*LENSES, *CANON, "--scale", "500", "--out", str(out), "--overwrite").exit_code == 0
+
+
+@pytest.mark.parametrize(
+    ("arguments", "status", "message"),
+    [
+        (["--focal", "35", *CANON, "--scale", "500"], 1, "two different focal lengths"),
+        ([*LENSES, "--sensor", "22.7", "--pixels", "3072x2048"], 2, "WIDTHxHEIGHT"),
+        ([*LENSES, *CANON], 1, "size of the wall"),
+        ([*LENSES, *CANON, "--scale", "one"], 2, "not a scale"),
+        ([*LENSES, *CANON, "--gsd", "-2"], 1, "above zero"),
+    ],
+)
+def test_mistakes_get_one_message_and_the_right_status(arguments, status, message):
+    result = run(*arguments)
+    assert result.exit_code == status
+    assert message in result.stderr
+    assert "Traceback" not in result.stderr
