@@ -10,7 +10,7 @@ import click
 from photocore.console import print_json, remark, text_table
 
 if TYPE_CHECKING:
-    from bifocal.solvers.planning import Plan
+    from bifocal.domain.plan import Plan
 
 EXAMPLE = """\b
 Examples:
@@ -94,7 +94,7 @@ def command(
     Give the lenses and the camera, and one wish: the size of the wall, a scale, a pixel size on
     the wall, or a sigma of the relief.
     """
-    from bifocal.solvers.planning import Sensor
+    from bifocal.domain.plan import Sensor
     from bifocal.workflows.plan import make_plan, plan_as_dict
 
     plan = make_plan(

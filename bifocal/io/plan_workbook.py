@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from photocore.output import atomic_path
 
 if TYPE_CHECKING:
-    from bifocal.solvers.planning import Plan
+    from bifocal.domain.plan import Plan
 
 _COLUMNS: tuple[tuple[str, str, str], ...] = (
     ("pair", "Lenses", "@"),
@@ -66,7 +66,9 @@ def _stations_sheet(sheet: Any, plan: Plan) -> None:
         cell = sheet.cell(4, column, label)
         cell.alignment = Alignment(wrap_text=True, vertical="top")
         sheet.column_dimensions[cell.column_letter].width = 44 if label == "Note" else 11
+    sheet.row_dimensions[4].height = 45
     for row, station in enumerate(plan.stations, start=5):
+        sheet.row_dimensions[row].height = 30 if station.note else 15
         values = (
             f"{station.c1:g}/{station.c2:g} mm", station.d1, station.d2, station.delta_d,
             station.scale_number, station.gsd * 1000, *station.footprint,

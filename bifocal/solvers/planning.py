@@ -3,153 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import replace
 from itertools import combinations
 from math import ceil, hypot, sqrt
 
-import numpy as np
-
-from bifocal.precision import lever_arm, sigmas, uncertainty_radius
-from photocore.arrays import FloatArray, positive
+from bifocal.domain.plan import Plan, Sensor, Station
+from bifocal.precision import lever_arm, uncertainty_radius
+from photocore.arrays import positive
 from photocore.errors import InputError
 
 #: Share of the photo that neighbouring photos of a large façade have in common.
 OVERLAP = 0.2
 #: Closer than this share of the far distance the two stations hardly differ.
 LEAST_RATIO = 1.05
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Sensor:
-    """A camera's sensor.
-
-    Attributes
-    ----------
-    width, height : float
-        [mm]
-    columns, rows : int
-        [px]
-    """
-
-    width: float
-    height: float
-    columns: int
-    rows: int
-
-    def __post_init__(self) -> None:
-        for name in ("width", "height", "columns", "rows"):
-            positive(getattr(self, name), f"sensor {name}")
-        across, along = self.width / self.columns, self.height / self.rows
-        if abs(across / along - 1) > 0.03:
-            raise InputError(
-                f"sensor: {self.width:g} x {self.height:g} mm with {self.columns} x {self.rows}"
-                f" px makes pixels of {across * 1000:.2f} x {along * 1000:.2f} um: not square; "
-                "check both pairs of numbers, and that both are width x height."
-            )
-
-    @property
-    def pitch(self) -> float:
-        """Pixel size. [mm]."""
-        return self.width / self.columns
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Station:
-    """Both stations of one pair of lenses and what to expect from them.
-
-    Attributes
-    ----------
-    c1, c2 : float
-        Principal distances of the far and the near camera. [mm]
-    d1, d2, delta_d : float
-        Distances to the wall and their difference. [m]
-    scale_number : float
-        1000 d / c, the same in both photos.
-    gsd : float
-        Pixel on the wall. [m]
-    footprint : tuple of float
-        Width and height of the wall in one photo. [m]
-    photos : tuple of int
-        Photos needed across and up, with overlap.
-    sigma_r_rms, sigma_r_corner : float
-        Expected sigma of the relief at the RMS radius of the frame and in its corner. [m]
-    sigma_ortho : float
-        Expected sigma of a position on the orthophoto of image 1, anywhere. [m]
-    uncertain_radius : float
-        Radius of the area of uncertainty for ``sigma_r_max``. [m]
-    uncertain_share : float
-        That radius over the frame's half diagonal.
-    feasible : bool
-        Whether both stations fit into the free space.
-    note : str
-        Why not, or what to mind.
-    """
-
-    c1: float
-    c2: float
-    d1: float
-    d2: float
-    delta_d: float
-    scale_number: float
-    gsd: float
-    footprint: tuple[float, float]
-    photos: tuple[int, int]
-    sigma_r_rms: float
-    sigma_r_corner: float
-    sigma_ortho: float
-    uncertain_radius: float
-    uncertain_share: float
-    feasible: bool
-    note: str
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Plan:
-    """Stations for every pair of lenses, best first.
-
-    Attributes
-    ----------
-    sensor : Sensor
-    stations : tuple of Station
-        Feasible ones first, then by expected precision of the relief.
-    sigma_px : float
-        Picking precision the figures rest on. [px]
-    sigma_r_max : float
-        Bound of the area of uncertainty. [m]
-    """
-
-    sensor: Sensor
-    stations: tuple[Station, ...]
-    sigma_px: float
-    sigma_r_max: float
-
-    @property
-    def best(self) -> Station:
-        """The feasible station of best precision; the least bad one if none is feasible."""
-        return self.stations[0]
-
-    def sigma_grid(
-        self, station: Station, *, columns: int = 9, rows: int = 7
-    ) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return X, Y from the nadir and sigma of r over the frame. [m].
-
-        Returns
-        -------
-        x : ndarray, shape (columns,)
-        y : ndarray, shape (rows,)
-            Downwards from the top of the frame.
-        sigma_r : ndarray, shape (rows, columns)
-            NaN at the nadir itself, where relief is undefined.
-        """
-        half_w, half_h = station.footprint[0] / 2, station.footprint[1] / 2
-        x = np.linspace(-half_w, half_w, columns)
-        y = np.linspace(half_h, -half_h, rows)
-        radius = np.hypot(*np.meshgrid(x, y))
-        sigma = self.sigma_px * station.gsd
-        grid = sigmas(
-            radius, radius, 0.0, d1=station.d1, d2=station.d2, sigma_1=sigma, sigma_2=sigma
-        ).r
-        return x, y, np.where(radius < 1e-9, np.nan, grid)
 
 
 def plan_stations(
@@ -297,8 +163,6 @@ def _photos(
 
 def _with_uncertainty(station: Station, sigma_px: float, limit: float) -> Station:
     """Return the station with the area of uncertainty for the given sigma of r."""
-    from dataclasses import replace
-
     radius = float(
         uncertainty_radius(
             limit, d1=station.d1, d2=station.d2, sigma_m=sqrt(2) * sigma_px * station.gsd

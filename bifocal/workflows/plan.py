@@ -7,8 +7,9 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+from bifocal.domain.plan import Plan, Sensor
 from bifocal.io.plan_workbook import write_plan
-from bifocal.solvers.planning import Plan, Sensor, plan_stations
+from bifocal.solvers.planning import plan_stations
 from photocore.output import check_writable
 
 
