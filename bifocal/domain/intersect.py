@@ -46,7 +46,12 @@ def intersect_pair(
     misfit = _misfit(q1, q2, metres2, centre)
     limit = sigma_r_max or UNCERTAIN_SHARE * near.distance
     flags = _flags(
-        relief, np.sqrt(covariance[:, 2, 2]), standardised, q1 - centre, limit, BLUNDER_LIMIT
+        relief,
+        np.sqrt(covariance[:, 2, 2]),
+        standardised,
+        np.hstack([q1 - centre, q2]),
+        limit,
+        BLUNDER_LIMIT,
     )
     return Intersection(
         xyz=xyz,
@@ -169,9 +174,9 @@ def _flags(
     """Return the first flag of `FLAGS` that applies to each point."""
     with np.errstate(invalid="ignore"):
         conditions = [
-            (radial == 0).all(axis=1),
+            np.all(radial[:, :2] == 0, axis=1),
             np.abs(standardised) > blunder,
-            np.isnan(radial).any(axis=1),
+            np.any(np.isnan(radial), axis=1),  # measured in one photo only, or beyond the horizon
             ~(sigma <= limit) | np.isnan(relief),
             sigma > limit / 2,
             np.abs(relief) < 2 * sigma,

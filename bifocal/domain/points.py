@@ -1,0 +1,74 @@
+"""Surveyed points as they leave the survey: names, coordinates, precision, flags."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from photocore.arrays import BoolArray, FloatArray, as_floats
+from photocore.errors import InputError
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class SurveyPoints:
+    """Points of one survey.
+
+    Attributes
+    ----------
+    ids : tuple of str, length n
+    xyz : ndarray, shape (n, 3)
+        X, Y on the reference plane and relief; NaN where undefined. [m]
+    world : ndarray, shape (n, 3), or None
+        E, N, H, where the survey is georeferenced. [m]
+    sigma_r : ndarray, shape (n,)
+        Standard deviation of the relief; NaN where unknown. [m]
+    flags, notes : tuple of str, length n
+    """
+
+    ids: tuple[str, ...]
+    xyz: FloatArray
+    world: FloatArray | None = None
+    sigma_r: FloatArray
+    flags: tuple[str, ...]
+    notes: tuple[str, ...]
+
+    def __post_init__(self) -> None:
+        count = len(self.ids)
+        for name, width in (("xyz", 3), ("world", 3), ("sigma_r", 0)):
+            value = getattr(self, name)
+            if value is None:
+                continue
+            array = np.array(as_floats(value, name))
+            if array.shape != ((count, width) if width else (count,)):
+                raise InputError(f"{name}: shape {array.shape} does not fit {count} points.")
+            array.setflags(write=False)
+            object.__setattr__(self, name, array)
+        for name in ("flags", "notes"):
+            if len(getattr(self, name)) != count:
+                raise InputError(f"{name}: {len(getattr(self, name))} for {count} points.")
+
+    def __len__(self) -> int:
+        return len(self.ids)
+
+    @property
+    def is_georeferenced(self) -> bool:
+        """Whether any point has world coordinates."""
+        return self.world is not None and bool(np.isfinite(self.world).all(axis=1).any())
+
+    def take(self, keep: BoolArray) -> SurveyPoints:
+        """Return the points where ``keep`` is true."""
+        return SurveyPoints(
+            ids=_take(self.ids, keep),
+            xyz=self.xyz[keep],
+            world=None if self.world is None else self.world[keep],
+            sigma_r=self.sigma_r[keep],
+            flags=_take(self.flags, keep),
+            notes=_take(self.notes, keep),
+        )
+
+
+def _take(items: Sequence[str], keep: BoolArray) -> tuple[str, ...]:
+    """Return the items where ``keep`` is true."""
+    return tuple(item for item, wanted in zip(items, keep, strict=True) if wanted)

@@ -1,0 +1,100 @@
+"""Exports read back by the libraries other programs use."""
+
+from __future__ import annotations
+
+import json
+
+import ezdxf
+import laspy
+import numpy as np
+import openpyxl
+import pytest
+
+from bifocal.domain.points import SurveyPoints
+from bifocal.io.exports import export_points
+from photocore.errors import InputError
+
+POINTS = SurveyPoints(
+    ids=("001", "=HYPERLINK(1)", "C", "lost"),
+    xyz=np.array([[1.0, 2.0, 0.5], [-3.25, 0.0, -0.1], [0.0, 0.0, 0.0], [np.nan] * 3]),
+    world=np.array(
+        [[500001.0, 4e6, 12.0], [500002.0, 4e6, 10.0], [500003.0, 4e6, 9.0], [np.nan] * 3]
+    ),
+    sigma_r=np.array([0.01, 0.02, 0.9, np.nan]),
+    flags=("OK", "OK", "UNCERTAIN", "NADIR"),
+    notes=("", "a,b", "", ""),
+)
+
+
+def test_dxf_points_lie_where_they_should_in_metres(tmp_path):
+    remarks = export_points(tmp_path / "p.dxf", POINTS)
+    drawing = ezdxf.readfile(tmp_path / "p.dxf")
+    assert drawing.dxfversion == "AC1024"
+    assert drawing.header["$INSUNITS"] == 6
+    found = [tuple(e.dxf.location) for e in drawing.modelspace().query("POINT")]
+    np.testing.assert_allclose(found, POINTS.xyz[:3])
+    assert [e.dxf.layer for e in drawing.modelspace().query("POINT")][2] == "BIFOCAL_UNCERTAIN"
+    texts = [e.dxf.text for e in drawing.modelspace().query("TEXT")]
+    assert "001" in texts
+    assert "+0.500" in texts
+    assert "lost" in remarks[0]
+
+
+def test_csv_orders_are_pnezd_and_penzd(tmp_path):
+    export_points(tmp_path / "a.csv", POINTS)
+    first, second, *_ = (tmp_path / "a.csv").read_text().splitlines()
+    assert first == "001,2.0000,1.0000,0.5000,OK"
+    assert second.startswith("'=HYPERLINK(1),")
+    assert second.endswith('"OK a,b"')
+    export_points(tmp_path / "b.csv", POINTS, order="PENZD", world=True)
+    assert (tmp_path / "b.csv").read_text().startswith("001,500001.0000,4000000.0000,12.0000")
+
+
+def test_italian_excel_gets_semicolons_and_decimal_commas(tmp_path):
+    export_points(tmp_path / "a.csv", POINTS, flavour="excel-it")
+    assert (tmp_path / "a.csv").read_bytes().startswith("\ufeff001;2,0000;1,0000".encode())
+
+
+def test_las_and_laz_keep_a_tenth_of_a_millimetre(tmp_path):
+    for name in ("p.las", "p.laz"):
+        export_points(tmp_path / name, POINTS, world=True)
+        cloud = laspy.read(tmp_path / name)
+        np.testing.assert_allclose(cloud.xyz, POINTS.world[:3], atol=5e-5)
+        np.testing.assert_allclose(cloud["sigma_r"], [0.01, 0.02, 0.9], rtol=1e-6)
+
+
+def test_ply_is_binary_doubles(tmp_path):
+    export_points(tmp_path / "p.ply", POINTS)
+    data = (tmp_path / "p.ply").read_bytes()
+    start = data.index(b"end_header\n") + len(b"end_header\n")
+    assert np.frombuffer(data[start : start + 24], "<f8").tolist() == [1.0, 2.0, 0.5]
+    assert b"element vertex 3" in data
+
+
+def test_geojson_is_valid_json_with_the_relief(tmp_path):
+    export_points(tmp_path / "p.geojson", POINTS)
+    data = json.loads((tmp_path / "p.geojson").read_text())
+    assert data["features"][0]["geometry"]["coordinates"] == [1.0, 2.0, 0.5]
+    assert data["features"][2]["properties"]["flag"] == "UNCERTAIN"
+
+
+def test_a_formula_as_a_name_stays_text_in_the_workbook(tmp_path):
+    export_points(tmp_path / "p.xlsx", POINTS)
+    sheet = openpyxl.load_workbook(tmp_path / "p.xlsx")["Results"]
+    assert (sheet["A3"].value, sheet["A3"].data_type) == ("=HYPERLINK(1)", "s")
+    assert sheet["A2"].value == "001"
+
+
+def test_refusals_name_the_mend(tmp_path):
+    with pytest.raises(InputError, match=r"\.dxf"):
+        export_points(tmp_path / "p.dwg", POINTS)
+    with pytest.raises(InputError, match="PNEZD"):
+        export_points(tmp_path / "p.csv", POINTS, order="XYZ")
+    (tmp_path / "q.csv").write_text("mine")
+    with pytest.raises(InputError, match="overwrite"):
+        export_points(tmp_path / "q.csv", POINTS)
+    assert (tmp_path / "q.csv").read_text() == "mine"
+    bare = SurveyPoints(ids=("a",), xyz=[[1, 2, 3]], sigma_r=[0.1], flags=("OK",), notes=("",))
+    with pytest.raises(InputError, match="Georeference"):
+        export_points(tmp_path / "w.csv", bare, world=True)
+    assert {p.name for p in tmp_path.iterdir()} == {"q.csv"}
