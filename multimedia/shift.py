@@ -258,7 +258,7 @@ def _solve(
     radius: FloatArray, heights: list[FloatArray], indices: Sequence[float], *, tangent: bool
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return the shifted radius and, if asked for, t and the index of the layer t belongs to."""
-    fixed = [float(h) if h.size == 1 else None for h in heights]
+    fixed = [h.item() if h.size == 1 else None for h in heights]
     varying = [h for h, f in zip(heights, fixed, strict=True) if f is None]
     shape = np.broadcast_shapes(radius.shape, *(h.shape for h in heights))
     outputs = [np.empty(shape) for _ in range(3 if tangent else 1)]

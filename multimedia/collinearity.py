@@ -1,0 +1,210 @@
+r"""Collinearity through plane-parallel media: object vector to image vector, with derivatives.
+
+Everything happens in the camera frame, the projection centre at the origin. The interface is a
+plane with unit normal m towards the camera; the camera is at height H above its *last* face. Let
+
+- a = the vector from the centre to the object point, w = m . a (negative: the point is below),
+- rho^2 = a . a - w^2, its squared distance from the normal through the centre (Maas' R),
+- q = R / R_bar, the inverse of the shift ratio (Maas 2015, Eqs. 1 to 9).
+
+Maas moves the point away from that normal by R_bar / R at constant depth. Moving it along the
+normal instead, by (q - 1) w, gives the same direction, hence the same image point, and one
+product less:
+
+.. math:: u = a + g m, \qquad g = (q - 1) w, \qquad x = -c\, u_x / u_z, \quad y = -c\, u_y / u_z .
+
+The derivatives of q are taken with respect to rho^2, in which it is smooth on the axis too. With
+the squared invariant :math:`\pi = (n_i \sin\beta_i)^2`:
+
+.. math:: S = \sum_i \frac{h_i}{\sqrt{n_i^2 - \pi}}, \quad \rho^2 = \pi S^2, \quad
+          q = \frac{S \sqrt{n_1^2 - \pi}}{\sum h_i} .
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from multimedia.shift import shift_ratio
+from photocore.arrays import FloatArray
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Medium:
+    """The parallel layers as one camera meets them.
+
+    Attributes
+    ----------
+    normal : ndarray, shape (3,)
+        Unit normal towards the camera, in the camera frame.
+    height : float
+        Height of the projection centre above the last face.
+    thicknesses : tuple of float
+        Of the layers between the first and the last medium.
+    indices : tuple of float
+        From the camera's medium to the object's.
+    """
+
+    normal: FloatArray
+    height: float
+    thicknesses: tuple[float, ...]
+    indices: tuple[float, ...]
+
+    @property
+    def first_height(self) -> float:
+        """Height of the projection centre above the first face (Maas' Z0)."""
+        return self.height - sum(self.thicknesses)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Shifts:
+    """g = (q - 1) w of every point, and its derivatives.
+
+    Attributes
+    ----------
+    g : ndarray, shape (n,)
+        How far the point seems raised along the normal.
+    w : ndarray, shape (n,)
+        m . a
+    by_rho2, by_w, by_height : ndarray, shape (n,)
+        With respect to rho^2, w (the depth follows, the height does not) and H.
+    by_thicknesses : ndarray, shape (n, layers - 2)
+        The last face stays where it is.
+    by_indices : ndarray, shape (n, layers)
+    """
+
+    g: FloatArray
+    w: FloatArray
+    by_rho2: FloatArray
+    by_w: FloatArray
+    by_height: FloatArray
+    by_thicknesses: FloatArray
+    by_indices: FloatArray
+
+
+def image_vectors(vectors: FloatArray, medium: Medium) -> FloatArray:
+    """Return u, the direction in the camera's medium in which each point is seen.
+
+    Parameters
+    ----------
+    vectors : ndarray, shape (n, 3)
+        a: projection centre to object points, in the camera frame.
+    medium : Medium
+        The layers. The centre must be above the first face.
+
+    Returns
+    -------
+    ndarray, shape (n, 3)
+        NaN for points that are not below the last face.
+    """
+    w = vectors @ medium.normal
+    _, q, _ = _inverse_ratio(vectors, w, medium)
+    g = (q - 1.0) * w
+    return vectors + g[:, None] * medium.normal
+
+
+def shifts(vectors: FloatArray, medium: Medium) -> Shifts:
+    """Return g of every point with its derivatives; see the head of the module.
+
+    Parameters
+    ----------
+    vectors, medium
+        As for `image_vectors`.
+    """
+    w = vectors @ medium.normal
+    rho2, q, heights = _inverse_ratio(vectors, w, medium)
+    whole = -w
+    n = medium.indices
+    with np.errstate(all="ignore"):
+        # tan(beta_1) = R_bar / whole = rho / (q whole), and the invariant from it.
+        tan2 = rho2 / (q * whole) ** 2
+        invariant = n[0] ** 2 * tan2 / (1.0 + tan2)
+        cosines = [np.sqrt(index**2 - invariant) for index in n]  # n_i cos(beta_i)
+        cosines[0] = n[0] / np.sqrt(1.0 + tan2)
+        s = np.zeros_like(w)
+        s_pi = np.zeros_like(w)
+        for height, cosine in zip(heights, cosines, strict=True):
+            part = height / cosine
+            s += part
+            s_pi += part / cosine**2
+        s_pi *= 0.5
+        first = cosines[0]
+        f_pi = s * (s + 2.0 * invariant * s_pi)  # d rho^2 / d invariant
+        q_pi = (s_pi * first - 0.5 * s / first) / whole
+        q_rho2 = q_pi / f_pi
+        # A change of S at a fixed invariant also moves the invariant (rho^2 is given).
+        by_s = first / whole - q_rho2 * 2.0 * invariant * s
+        q_heights = [by_s / cosine for cosine in cosines]
+        q_indices = [
+            -by_s * height * index / cosine**3
+            for height, index, cosine in zip(heights, n, cosines, strict=True)
+        ]
+        q_indices[0] += s * n[0] / (first * whole)
+    inner = range(1, len(n) - 1)
+    by_thicknesses = np.empty((len(w), len(n) - 2))
+    for k in inner:
+        # z0 = H - sum of thicknesses: what the layer gains the first medium loses.
+        by_thicknesses[:, k - 1] = w * (q_heights[k] - q_heights[0])
+    return Shifts(
+        g=(q - 1.0) * w,
+        w=w,
+        by_rho2=w * q_rho2,
+        # whole = -w and zp = -w - H; q also falls by q / whole per unit of the whole height.
+        by_w=(q - 1.0) + w * (q / whole - q_heights[-1]),
+        by_height=w * (q_heights[0] - q_heights[-1]),
+        by_thicknesses=by_thicknesses,
+        by_indices=w[:, None] * np.stack(q_indices, axis=-1),
+    )
+
+
+def rays_in_object_space(directions: FloatArray, medium: Medium) -> tuple[FloatArray, FloatArray]:
+    """Follow rays from the projection centre into the last medium.
+
+    Parameters
+    ----------
+    directions : ndarray, shape (n, 3)
+        In the camera frame, of any length.
+    medium : Medium
+        The layers.
+
+    Returns
+    -------
+    origins : ndarray, shape (n, 3)
+        Where the rays leave the last face, in the camera frame.
+    directions : ndarray, shape (n, 3)
+        Unit vectors in the last medium. NaN for rays away from the interface and after total
+        reflection.
+    """
+    m, n = medium.normal, medium.indices
+    unit = directions / np.sqrt((directions * directions).sum(-1, keepdims=True))
+    cosine = -(unit @ m)
+    # Snell: n_i times the component along the interface is the same in every medium.
+    along = (unit + cosine[:, None] * m) * n[0]
+    along2 = (along * along).sum(-1)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        travel = medium.first_height / np.where(cosine > 0, n[0] * cosine, np.nan)
+        for index, thickness in zip(n[1:-1], medium.thicknesses, strict=True):
+            travel += thickness / np.sqrt(index**2 - along2)
+        last = np.sqrt(n[-1] ** 2 - along2)
+    origins = travel[:, None] * along - medium.height * m
+    return origins, (along - last[:, None] * m) / n[-1]
+
+
+def _inverse_ratio(
+    vectors: FloatArray, w: FloatArray, medium: Medium
+) -> tuple[FloatArray, FloatArray, list[FloatArray | float]]:
+    """Return rho^2, q = R / R_bar, and the heights of the layers under each point."""
+    x, y, z = vectors.T
+    rho2 = np.maximum(x * x + y * y + z * z - w * w, 0.0)
+    depth = -(w + medium.height)
+    below = depth >= 0
+    if not below.all():
+        depth = np.where(below, depth, np.nan)
+    heights: list[FloatArray | float] = [medium.first_height, *medium.thicknesses, depth]
+    if not below.all():
+        q = np.full_like(w, np.nan)
+        inside: list[FloatArray | float] = [*heights[:-1], depth[below]]
+        q[below] = 1.0 / shift_ratio(np.sqrt(rho2[below]), inside, medium.indices)
+        return rho2, q, heights
+    return rho2, 1.0 / shift_ratio(np.sqrt(rho2), heights, medium.indices), heights

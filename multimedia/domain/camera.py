@@ -1,0 +1,288 @@
+"""A camera: where it stands, where it looks, and its interior orientation."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from photocore.arrays import FloatArray, as_floats, as_points, positive, read_only
+from photocore.distortion import NAMES as DISTORTION
+from photocore.distortion import Brown
+from photocore.errors import GeometryError, InputError
+from photocore.interior import image_from_pixel, pixel_from_image
+from photocore.rotation import (
+    angles_from_rotation,
+    rotation_from_vector,
+    rotation_vector_from_angle_rates,
+    world_from_camera,
+)
+
+#: Parameters of the exterior orientation; angles in rad.
+EXTERIOR = ("X0", "Y0", "Z0", "omega", "phi", "kappa")
+#: Parameters of the interior orientation; ``scale`` is that of x against y.
+INTERIOR = ("c", "xh", "yh", *DISTORTION)
+#: A full turn and a little: larger "radians" are degrees.
+LARGEST_ANGLE = 6.2832
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Sensor:
+    """Size of the sensor and its pixels: what pixels and image coordinates need of each other.
+
+    Attributes
+    ----------
+    width, height : int
+        [px]
+    pitch : ndarray, shape (2,)
+        Width and height of a pixel. [mm]
+    origin : ndarray, shape (2,)
+        (column, row) of the origin of the image coordinates, by default the centre of the
+        sensor: ((width - 1) / 2, (height - 1) / 2), integers being pixel centres. [px]
+
+    Examples
+    --------
+    >>> sensor = Sensor(width=1280, height=1024, pitch=[0.012, 0.012])
+    >>> sensor.image_from_pixel([639.5, 500.0]).tolist()
+    [0.0, 0.138]
+    """
+
+    width: int
+    height: int
+    pitch: FloatArray
+    origin: FloatArray = None  # type: ignore[assignment]
+
+    def __post_init__(self) -> None:
+        set_ = object.__setattr__
+        for name in ("width", "height"):
+            set_(self, name, round(positive(getattr(self, name), f"sensor {name}", unit="px")))
+        pitch = np.broadcast_to(as_floats(self.pitch, "pitch"), (2,))
+        if not (pitch > 0).all():
+            raise InputError(f"pitch: a pixel is {pitch} mm wide and high; both must be above 0.")
+        origin = ((self.width - 1) / 2, (self.height - 1) / 2)
+        set_(self, "pitch", read_only(pitch, "pitch", shape=(2,)))
+        set_(self, "origin", read_only(origin if self.origin is None else self.origin, "origin"))
+
+    @property
+    def half_diagonal(self) -> float:
+        """Distance from the centre to a corner. [mm]"""
+        return float(np.hypot(*(np.array([self.width, self.height]) * self.pitch)) / 2)
+
+    def image_from_pixel(self, pixels: ArrayLike) -> FloatArray:
+        """Return image coordinates of (column, row), shape (..., 2). [mm]"""
+        return image_from_pixel(pixels, origin=self.origin, pitch=self.pitch)
+
+    def pixel_from_image(self, image: ArrayLike) -> FloatArray:
+        """Return (column, row) of image coordinates, shape (..., 2). [px]"""
+        return pixel_from_image(image, origin=self.origin, pitch=self.pitch)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Camera:
+    """Exterior and interior orientation of one camera.
+
+    Attributes
+    ----------
+    centre : ndarray, shape (3,)
+        Projection centre. [object unit]
+    rotation : ndarray, shape (3, 3)
+        World from camera: its columns are the camera's axes, x to the right in the image, y up,
+        z backwards.
+    principal_distance : float
+        [mm]
+    principal_point : ndarray, shape (2,)
+        Image coordinates of the foot of the projection centre. [mm]
+    distortion : Brown
+        Lens distortion.
+    sensor : Sensor or None
+        Needed only where pixels are read or written.
+    name : str
+        For tables and messages.
+
+    Examples
+    --------
+    A camera 0.5 above the water, looking straight down:
+
+    >>> camera = Camera.from_angles((0, 0, 0.5), 0.0, 0.0, 0.0, principal_distance=25.0)
+    >>> camera.looks_along.tolist()
+    [-0.0, 0.0, -1.0]
+    """
+
+    centre: FloatArray
+    rotation: FloatArray
+    principal_distance: float
+    principal_point: FloatArray = (0.0, 0.0)  # type: ignore[assignment]
+    distortion: Brown = field(default_factory=Brown)
+    sensor: Sensor | None = None
+    name: str = ""
+
+    def __post_init__(self) -> None:
+        set_ = object.__setattr__
+        who = f"camera {self.name}: " if self.name else ""
+        rotation = read_only(self.rotation, f"{who}rotation", shape=(3, 3))
+        if not np.allclose(rotation @ rotation.T, np.eye(3), atol=1e-6):
+            raise GeometryError(
+                f"{who}rotation is not a rotation matrix: its rows must be unit vectors at right "
+                "angles. Check the nine numbers, or give the three angles."
+            )
+        if np.linalg.det(rotation) < 0:
+            raise GeometryError(
+                f"{who}rotation mirrors the world: one of the coordinate systems is left-handed. "
+                "Exchange two axes or change the sign of one."
+            )
+        set_(self, "rotation", rotation)
+        set_(self, "centre", read_only(self.centre, f"{who}centre", shape=(3,)))
+        distance = positive(self.principal_distance, f"{who}principal_distance", unit="mm")
+        set_(self, "principal_distance", distance)
+        point = read_only(self.principal_point, f"{who}principal_point", shape=(2,))
+        set_(self, "principal_point", point)
+
+    @classmethod
+    def from_angles(
+        cls,
+        centre: ArrayLike,
+        omega: float,
+        phi: float,
+        kappa: float,
+        *,
+        principal_distance: float,
+        principal_point: ArrayLike = (0.0, 0.0),
+        distortion: Brown | None = None,
+        sensor: Sensor | None = None,
+        name: str = "",
+    ) -> Camera:
+        """Return a camera from its angles.
+
+        Parameters
+        ----------
+        centre : array_like, shape (3,)
+            Projection centre. [object unit]
+        omega, phi, kappa : float
+            Rotations about X, the once and the twice rotated axes; all zero looks down the Z
+            axis with the image's x along X. [rad]
+        principal_distance : float
+            [mm]
+        principal_point : array_like, shape (2,)
+            [mm]
+        distortion : Brown, optional
+            None: no distortion.
+        sensor : Sensor, optional
+            Needed only where pixels are read or written.
+        name : str
+            For tables and messages.
+
+        Raises
+        ------
+        InputError
+            If an angle exceeds a full turn: it is in degrees, or needs unwinding.
+        """
+        angles = as_floats([omega, phi, kappa], "omega, phi, kappa")
+        if not (np.abs(angles) <= LARGEST_ANGLE).all():
+            raise InputError(
+                f"{f'camera {name}: ' if name else ''}omega, phi, kappa = "
+                f"{', '.join(f'{a:g}' for a in angles)}: angles are in radians and at most one "
+                "full turn (6.2832). Are these degrees? Convert with numpy.radians; take whole "
+                "turns off with numpy.remainder(angle, 2 * numpy.pi)."
+            )
+        return cls(
+            centre=as_floats(centre, "centre"),
+            rotation=world_from_camera(*(float(a) for a in angles)),
+            principal_distance=principal_distance,
+            principal_point=as_floats(principal_point, "principal_point"),
+            distortion=distortion or Brown(),
+            sensor=sensor,
+            name=name,
+        )
+
+    @classmethod
+    def looking_at(
+        cls, centre: ArrayLike, target: ArrayLike, *, principal_distance: float, name: str = ""
+    ) -> Camera:
+        """Return a camera at ``centre`` whose axis goes through ``target``, image x level."""
+        eye = as_points(centre, "centre", dimension=3)
+        back = eye - as_points(target, "target", dimension=3)
+        length = float(np.linalg.norm(back))
+        if length == 0:
+            raise GeometryError("looking_at: centre and target are the same point.")
+        back = back / length
+        # Straight down or up, "level" leaves kappa open: take the image's x along X.
+        level = np.array([-back[1], back[0], 0.0])
+        right = level / np.linalg.norm(level) if np.hypot(*level[:2]) > 1e-9 else np.eye(3)[0]
+        right = right - (right @ back) * back
+        right /= np.linalg.norm(right)
+        rotation = np.column_stack([right, np.cross(back, right), back])
+        return cls(centre=eye, rotation=rotation, principal_distance=principal_distance, name=name)
+
+    @property
+    def angles(self) -> tuple[float, float, float]:
+        """Omega, phi, kappa. [rad]"""
+        return angles_from_rotation(self.rotation)
+
+    @property
+    def looks_along(self) -> FloatArray:
+        """Unit vector of the viewing direction in the world, shape (3,)."""
+        return -self.rotation[:, 2]
+
+    def value(self, name: str) -> float:
+        """Return the parameter of `EXTERIOR` or `INTERIOR` called ``name``."""
+        if name in EXTERIOR:
+            index = EXTERIOR.index(name)
+            return float(self.centre[index]) if index < 3 else self.angles[index - 3]
+        if name == "c":
+            return self.principal_distance
+        if name in ("xh", "yh"):
+            return float(self.principal_point["xy".index(name[0])])
+        return float(getattr(self.distortion, name))
+
+    def stepped(self, names: Sequence[str], step: ArrayLike) -> Camera:
+        """Return the camera after adding ``step`` to the named parameters.
+
+        ``omega``, ``phi``, ``kappa`` here are the three components of a small rotation vector in
+        the world frame if all three are named (the camera turns by it; no gimbal lock), so that a
+        solver may use `multimedia.solvers.jacobian`'s derivatives as they are. See
+        `angle_rates` for the way back to angles.
+
+        Raises
+        ------
+        InputError
+            If some but not all angles are named, or a name is unknown.
+        """
+        change = dict(zip(names, as_floats(step, "step").tolist(), strict=True))
+        unknown = [name for name in change if name not in EXTERIOR + INTERIOR]
+        angles = [change[name] for name in EXTERIOR[3:] if name in change]
+        if unknown or len(angles) not in (0, 3):
+            raise InputError(
+                f"camera parameters {', '.join(names)}: name omega, phi and kappa together; the "
+                f"others are {', '.join(EXTERIOR[:3] + INTERIOR)}."
+            )
+        rotation = self.rotation
+        if angles:
+            rotation = rotation_from_vector(angles) @ rotation
+            # The product of many small turns drifts off by rounding; one polar step mends it.
+            rotation = rotation @ (1.5 * np.eye(3) - 0.5 * rotation.T @ rotation)
+        terms = {
+            name: getattr(self.distortion, name) + change.get(name, 0.0) for name in DISTORTION
+        }
+        return replace(
+            self,
+            centre=self.centre + [change.get(name, 0.0) for name in EXTERIOR[:3]],
+            rotation=rotation,
+            principal_distance=self.principal_distance + change.get("c", 0.0),
+            principal_point=self.principal_point + [change.get(n, 0.0) for n in ("xh", "yh")],
+            distortion=replace(self.distortion, **terms),
+        )
+
+    def angle_rates(self) -> FloatArray:
+        """Return d(omega, phi, kappa) / d(rotation vector), shape (3, 3); huge near phi = 90 deg.
+
+        A covariance of rotation vectors C becomes one of angles as ``A C A.T``.
+        """
+        omega, phi, _ = self.angles
+        if abs(np.cos(phi)) < 1e-9:
+            raise GeometryError(
+                f"camera {self.name}: phi is 90 degrees, where omega and kappa turn about the "
+                "same axis and have no precision of their own. Turn the world frame."
+            )
+        return np.linalg.inv(rotation_vector_from_angle_rates(omega, phi))

@@ -1,0 +1,271 @@
+"""Lens distortion after Brown: ideal <-> measured image coordinates, with derivatives.
+
+One formula, three conventions. With r2 = x^2 + y^2, q = k1 r2 + k2 r2^2 + k3 r2^3:
+
+    x' = x (1 + q) + p1 (r2 + 2 x^2) + 2 p2 x y
+    y' = y (1 + q) + p2 (r2 + 2 y^2) + 2 p1 x y
+    B(x, y) = (scale * x' - sin(shear) * y', cos(shear) * y')
+
+- ``brown``: measured = principal point + B(ideal). OpenCV's model in mm; see `from_opencv`.
+- ``photogrammetric``: ideal = B(measured - principal point). The correction is a function of the
+  measured coordinates, as in most calibration certificates.
+- ``openptv``: measured = B(ideal + principal point): about the centre of the sensor.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import Enum
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from photocore.arrays import FloatArray, as_points
+from photocore.errors import InputError
+
+#: Names of the parameters in the order of `Brown`'s fields.
+NAMES = ("k1", "k2", "k3", "p1", "p2", "scale", "shear")
+#: Newton steps of the inverse; honest lenses need 3 to 5.
+_STEPS = 25
+
+
+class Convention(Enum):
+    """What the formula is applied to; the module's head has the equations."""
+
+    BROWN = "brown"
+    PHOTOGRAMMETRIC = "photogrammetric"
+    OPENPTV = "openptv"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Brown:
+    """Distortion coefficients with the convention they belong to.
+
+    Attributes
+    ----------
+    k1, k2, k3 : float
+        Radial. [mm^-2, mm^-4, mm^-6]
+    p1, p2 : float
+        Decentring. [mm^-1]
+    scale : float
+        Scale of x against y.
+    shear : float
+        Departure of the axes from a right angle. [rad]
+    convention : Convention
+        What they are applied to.
+
+    Examples
+    --------
+    10 mm from the centre, k1 = 1e-5 moves a point 10 um outwards:
+
+    >>> Brown(k1=1e-5).measured([10.0, 0.0], [0.0, 0.0]).round(9).tolist()
+    [10.01, 0.0]
+    """
+
+    k1: float = 0.0
+    k2: float = 0.0
+    k3: float = 0.0
+    p1: float = 0.0
+    p2: float = 0.0
+    scale: float = 1.0
+    shear: float = 0.0
+    convention: Convention = Convention.BROWN
+
+    def __post_init__(self) -> None:
+        values = np.array([getattr(self, name) for name in NAMES], dtype=np.float64)
+        if not np.isfinite(values).all():
+            raise InputError(f"distortion: every coefficient must be a number, found {values}.")
+        if not (0.5 < self.scale < 2.0 and abs(self.shear) < 0.5):
+            raise InputError(
+                f"distortion: scale {self.scale:g} must be near 1 and shear {self.shear:g} near "
+                "0 [rad]: they describe the axes of the sensor, not the size of the image."
+            )
+
+    @classmethod
+    def from_opencv(cls, coefficients: Sequence[float], *, principal_distance: float) -> Brown:
+        """Return the same distortion from OpenCV's k1 k2 p1 p2 [k3].
+
+        OpenCV counts in units of the principal distance and with y downwards.
+
+        Raises
+        ------
+        InputError
+            For the rational, thin-prism and tilted models (more than 5 coefficients).
+        """
+        values = [float(v) for v in coefficients]
+        if any(values[5:]):
+            raise InputError(
+                "OpenCV distortion: only k1 k2 p1 p2 k3 can be used here, found "
+                f"{len(values)} coefficients. Calibrate without the rational, thin-prism and "
+                "tilted models."
+            )
+        k1, k2, q1, q2, k3 = [*values, *[0.0] * 5][:5]
+        c = principal_distance
+        return cls(k1=k1 / c**2, k2=k2 / c**4, k3=k3 / c**6, p1=q2 / c, p2=-q1 / c)
+
+    @property
+    def is_identity(self) -> bool:
+        """Whether nothing is distorted."""
+        return not (self.k1 or self.k2 or self.k3 or self.p1 or self.p2 or self.shear) and (
+            self.scale == 1.0
+        )
+
+    def measured(self, ideal: ArrayLike, principal_point: ArrayLike) -> FloatArray:
+        """Return where ideal coordinates (about the principal point) are measured. [mm]
+
+        Parameters
+        ----------
+        ideal : array_like, shape (..., 2)
+            Central projection, origin at the principal point. [mm]
+        principal_point : array_like, shape (2,)
+            [mm]
+
+        Returns
+        -------
+        ndarray, shape (..., 2)
+            Origin at the centre of the sensor; NaN where the distortion cannot be inverted.
+        """
+        points = as_points(ideal, "ideal", dimension=2)
+        centre = as_points(principal_point, "principal_point", dimension=2)
+        if self.is_identity:
+            return points + centre
+        if self.convention is Convention.BROWN:
+            return self._formula(points) + centre
+        if self.convention is Convention.OPENPTV:
+            return self._formula(points + centre)
+        return self._inverse(points) + centre
+
+    def ideal(self, measured: ArrayLike, principal_point: ArrayLike) -> FloatArray:
+        """Return the ideal coordinates of measured ones: undoes `measured`, shape (..., 2). [mm]"""
+        points = as_points(measured, "measured", dimension=2)
+        centre = as_points(principal_point, "principal_point", dimension=2)
+        if self.is_identity:
+            return points - centre
+        if self.convention is Convention.BROWN:
+            return self._inverse(points - centre)
+        if self.convention is Convention.OPENPTV:
+            return self._inverse(points) - centre
+        return self._formula(points - centre)
+
+    def measured_with_jacobian(
+        self, ideal: FloatArray, principal_point: FloatArray, names: Sequence[str] = ()
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return `measured` with its derivatives.
+
+        Parameters
+        ----------
+        ideal, principal_point
+            As for `measured`.
+        names : sequence of str
+            Of `NAMES` and ``xh``, ``yh`` (principal point).
+
+        Returns
+        -------
+        measured : ndarray, shape (..., 2)
+        by_ideal : ndarray, shape (..., 2, 2)
+        by_names : ndarray, shape (..., 2, len(names))
+        """
+        measured = self.measured(ideal, principal_point)
+        by_names = np.zeros((*ideal.shape, len(names)))
+        if self.convention is Convention.BROWN:
+            argument = ideal
+        elif self.convention is Convention.OPENPTV:
+            argument = ideal + principal_point
+        else:
+            argument = measured - principal_point
+        by_argument = self._by_argument(argument)
+        for k, name in enumerate(names):
+            if name not in ("xh", "yh"):
+                by_names[..., k] = self._by_coefficient(argument, name)
+        if self.convention is Convention.PHOTOGRAMMETRIC:
+            # ideal = B(m): dm = (dB/dm)^-1 (d ideal - dB of the coefficients).
+            by_argument = inverse_2x2(by_argument)
+            by_names = -(by_argument @ by_names)
+        for k, name in enumerate(names):
+            if name in ("xh", "yh"):
+                axis = 0 if name == "xh" else 1
+                if self.convention is Convention.OPENPTV:
+                    by_names[..., k] = by_argument[..., axis]
+                else:
+                    by_names[..., axis, k] = 1.0
+        return measured, by_argument, by_names
+
+    def _formula(self, points: FloatArray) -> FloatArray:
+        """Return B(x, y)."""
+        x, y = points[..., 0], points[..., 1]
+        x1, y1 = self._brown(x, y)
+        out = np.empty_like(points)
+        out[..., 0] = self.scale * x1 - np.sin(self.shear) * y1
+        out[..., 1] = np.cos(self.shear) * y1
+        return out
+
+    def _brown(self, x: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return x', y': B without the axes' scale and shear."""
+        xx, yy, xy = x * x, y * y, x * y
+        r2 = xx + yy
+        q = 1.0 + r2 * (self.k1 + r2 * (self.k2 + r2 * self.k3))
+        x1 = x * q + self.p1 * (r2 + 2.0 * xx) + 2.0 * self.p2 * xy
+        y1 = y * q + self.p2 * (r2 + 2.0 * yy) + 2.0 * self.p1 * xy
+        return x1, y1
+
+    def _by_argument(self, points: FloatArray) -> FloatArray:
+        """Return dB/d(x, y), shape (..., 2, 2)."""
+        x, y = points[..., 0], points[..., 1]
+        r2 = x * x + y * y
+        q = 1.0 + r2 * (self.k1 + r2 * (self.k2 + r2 * self.k3))
+        dq = 2.0 * (self.k1 + r2 * (2.0 * self.k2 + r2 * 3.0 * self.k3))  # dq/dx = dq * x
+        xx = q + dq * x * x + 6.0 * self.p1 * x + 2.0 * self.p2 * y
+        mixed = dq * x * y + 2.0 * self.p1 * y + 2.0 * self.p2 * x
+        yy = q + dq * y * y + 6.0 * self.p2 * y + 2.0 * self.p1 * x
+        sin, cos = np.sin(self.shear), np.cos(self.shear)
+        out = np.empty((*points.shape, 2))
+        out[..., 0, 0] = self.scale * xx - sin * mixed
+        out[..., 0, 1] = self.scale * mixed - sin * yy
+        out[..., 1, 0] = cos * mixed
+        out[..., 1, 1] = cos * yy
+        return out
+
+    def _by_coefficient(self, points: FloatArray, name: str) -> FloatArray:
+        """Return dB/d(coefficient), shape (..., 2)."""
+        x, y = points[..., 0], points[..., 1]
+        r2 = x * x + y * y
+        sin, cos = np.sin(self.shear), np.cos(self.shear)
+        if name in ("scale", "shear"):
+            x1, y1 = self._brown(x, y)
+            zero = np.zeros_like(x1)
+            parts = (x1, zero) if name == "scale" else (-cos * y1, -sin * y1)
+            return np.stack(parts, axis=-1)
+        if name == "p1":
+            dx, dy = r2 + 2.0 * x * x, 2.0 * x * y
+        elif name == "p2":
+            dx, dy = 2.0 * x * y, r2 + 2.0 * y * y
+        else:
+            power = r2 ** (NAMES.index(name) + 1)
+            dx, dy = x * power, y * power
+        return np.stack([self.scale * dx - sin * dy, cos * dy], axis=-1)
+
+    def _inverse(self, target: FloatArray) -> FloatArray:
+        """Return the argument for which B gives ``target``, NaN where Newton finds none."""
+        points = target.copy()
+        size = 1.0 + np.abs(target).max(axis=-1, initial=0.0)
+        with np.errstate(all="ignore"):
+            for _ in range(_STEPS):
+                miss = target - self._formula(points)
+                step = (inverse_2x2(self._by_argument(points)) @ miss[..., None])[..., 0]
+                points += step
+                # Quadratic convergence: after a step this small the next would be lost in rounding.
+                if not (np.abs(step).max(axis=-1) > 1e-9 * size).any():
+                    break
+            lost = ~(np.abs(self._formula(points) - target).max(axis=-1) <= 1e-11 * size)
+        points[lost] = np.nan
+        return points
+
+
+def inverse_2x2(matrices: FloatArray) -> FloatArray:
+    """Return the inverses of matrices, shape (..., 2, 2)."""
+    a, b = matrices[..., 0, 0], matrices[..., 0, 1]
+    c, d = matrices[..., 1, 0], matrices[..., 1, 1]
+    out = np.empty_like(matrices)
+    out[..., 0, 0], out[..., 0, 1], out[..., 1, 0], out[..., 1, 1] = d, -b, -c, a
+    return out / (a * d - b * c)[..., None, None]

@@ -1,0 +1,94 @@
+"""Rotations from the angles omega, phi, kappa, and small rotation vectors."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from photocore.arrays import FloatArray, as_floats
+
+
+def world_from_camera(omega: float, phi: float, kappa: float) -> FloatArray:
+    r"""Rotation matrix of a camera, its columns being the camera's axes in the world.
+
+    Parameters
+    ----------
+    omega, phi, kappa : float
+        Rotations about the X, the once rotated Y and the twice rotated Z axis. [rad]
+
+    Returns
+    -------
+    ndarray, shape (3, 3)
+        :math:`R = R_x(\omega) R_y(\phi) R_z(\kappa)`; a point P is at
+        :math:`R^T (P - X_0)` in the camera frame, whose z axis points backwards.
+
+    Examples
+    --------
+    A quarter turn about Z: the camera's x axis is the world's Y axis.
+
+    >>> world_from_camera(0.0, 0.0, np.pi / 2).round(9)[:, 0].tolist()
+    [0.0, 1.0, 0.0]
+    """
+    so, sp, sk = np.sin((omega, phi, kappa))
+    co, cp, ck = np.cos((omega, phi, kappa))
+    return np.array(
+        [
+            [cp * ck, -cp * sk, sp],
+            [co * sk + so * sp * ck, co * ck - so * sp * sk, -so * cp],
+            [so * sk - co * sp * ck, so * ck + co * sp * sk, co * cp],
+        ]
+    )
+
+
+def angles_from_rotation(rotation: ArrayLike) -> tuple[float, float, float]:
+    """Return omega, phi, kappa of a matrix made by `world_from_camera`. [rad]
+
+    phi lies in [-pi/2, pi/2]; at its ends, where omega and kappa turn about the same axis,
+    kappa is set to 0.
+
+    Examples
+    --------
+    >>> [round(a, 9) for a in angles_from_rotation(world_from_camera(0.1, -0.2, 3.0))]
+    [0.1, -0.2, 3.0]
+    """
+    r = as_floats(rotation, "rotation")
+    cos_phi = float(np.hypot(r[0, 0], r[0, 1]))
+    phi = float(np.arctan2(r[0, 2], cos_phi))
+    if cos_phi < 1e-12:
+        return float(np.arctan2(r[2, 1], r[1, 1])), phi, 0.0
+    return float(np.arctan2(-r[1, 2], r[2, 2])), phi, float(np.arctan2(-r[0, 1], r[0, 0]))
+
+
+def rotation_vector_from_angle_rates(omega: float, phi: float) -> FloatArray:
+    """Return B with (rotation vector in the world) = B (d omega, d phi, d kappa), shape (3, 3).
+
+    The columns are the axes the three angles turn about, written in the world. B is singular at
+    phi = +-pi/2: that is the gimbal lock of the angles, not of the camera.
+    """
+    so, sp = np.sin((omega, phi))
+    co, cp = np.cos((omega, phi))
+    return np.array([[1.0, 0.0, sp], [0.0, co, -so * cp], [0.0, so, co * cp]])
+
+
+def rotation_from_vector(vector: ArrayLike) -> FloatArray:
+    """Return the rotation about a vector by its length, shape (3, 3) (Rodrigues).
+
+    Examples
+    --------
+    >>> rotation_from_vector([0.0, 0.0, np.pi / 2]).round(9)[:, 0].tolist()
+    [0.0, 1.0, 0.0]
+    """
+    x, y, z = as_floats(vector, "vector")
+    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    angle = float(np.sqrt(x * x + y * y + z * z))
+    # np.sinc keeps both factors exact down to angle 0.
+    first = np.sinc(angle / np.pi)
+    second = 0.5 * np.sinc(angle / (2.0 * np.pi)) ** 2
+    return np.eye(3) + first * cross + second * (cross @ cross)
+
+
+def nearest_rotation(matrix: ArrayLike) -> FloatArray:
+    """Return the rotation nearest to a matrix that is one but for rounding, shape (3, 3)."""
+    u, _, vt = np.linalg.svd(as_floats(matrix, "matrix"))
+    u[:, 2] *= np.sign(np.linalg.det(u @ vt))
+    return np.asarray(u @ vt)
