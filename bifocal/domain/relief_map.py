@@ -1,0 +1,171 @@
+"""A relief map: relief, precision and quality on a square grid of the reference plane."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import IntEnum
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from bifocal.domain.grid import Grid
+from photocore.arrays import ByteArray, FloatArray, as_points, read_only
+from photocore.errors import InputError
+
+Float32Array = NDArray[np.float32]
+
+
+class Quality(IntEnum):
+    """Where the relief of a pixel comes from (third band of a relief GeoTIFF)."""
+
+    UNKNOWN = 0
+    MEASURED = 1
+    INTERPOLATED = 2
+    HIDDEN = 3
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ReliefMap:
+    """Relief of a wall as seen square on: pixel (column, row) is a point (X, Y) of the plane.
+
+    Attributes
+    ----------
+    r : ndarray of float32, shape (height, width)
+        Relief, positive towards the cameras; NaN where unknown. [m]
+    sigma : ndarray of float32, shape (height, width)
+        Standard deviation of r; NaN where r is. [m]
+    quality : ndarray of uint8, shape (height, width)
+        A `Quality` per pixel: measured in both photos, interpolated from its neighbours, hidden
+        from at least one camera (relief taken from the surface behind), or unknown.
+    plane_from_pixel : ndarray, shape (3, 3)
+        Affine map from (column, row, 1) to (X, Y, 1): square pixels, rows downwards. [m]
+
+    Raises
+    ------
+    InputError
+        If the arrays differ in shape or the pixels are not square and upright.
+
+    Examples
+    --------
+    >>> grid = Grid.from_bounds((0.0, 0.0, 2.0, 1.0), gsd=0.5)
+    >>> flat = ReliefMap.from_relief(np.zeros((2, 4)), plane_from_pixel=grid.plane_from_pixel)
+    >>> flat.gsd, flat.bounds
+    (0.5, (0.0, 0.0, 2.0, 1.0))
+    >>> float(flat.sample([1.2, 0.1]))
+    0.0
+    """
+
+    r: Float32Array
+    sigma: Float32Array
+    quality: ByteArray
+    plane_from_pixel: FloatArray
+
+    def __post_init__(self) -> None:
+        set_ = object.__setattr__
+        r = np.asarray(self.r, dtype=np.float32)
+        if r.ndim != 2 or 0 in r.shape:
+            raise InputError(f"r: expected shape (height, width), found {r.shape}.")
+        sigma = np.asarray(self.sigma, dtype=np.float32)
+        quality = np.asarray(self.quality, dtype=np.uint8)
+        for name, array in (("sigma", sigma), ("quality", quality)):
+            if array.shape != r.shape:
+                raise InputError(f"{name}: shape {array.shape} differs from that of r {r.shape}.")
+        matrix = read_only(self.plane_from_pixel, "plane_from_pixel", shape=(3, 3))
+        Grid.from_affine(matrix, r.shape)  # refuses turned, mirrored and oblong pixels
+        for name, value in (("r", r), ("sigma", sigma), ("quality", quality)):
+            view = value.view()
+            view.setflags(write=False)
+            set_(self, name, view)
+        set_(self, "plane_from_pixel", matrix)
+
+    @classmethod
+    def from_relief(cls, r: ArrayLike, *, plane_from_pixel: ArrayLike) -> ReliefMap:
+        """Return a map of given relief with zero sigma: finite pixels count as measured."""
+        relief = np.asarray(r, dtype=np.float32)
+        known = np.isfinite(relief)
+        return cls(
+            r=relief,
+            sigma=np.where(known, np.float32(0), np.float32(np.nan)),
+            quality=np.where(known, Quality.MEASURED, Quality.UNKNOWN).astype(np.uint8),
+            plane_from_pixel=np.asarray(plane_from_pixel, dtype=np.float64),
+        )
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Height and width. [px]"""
+        return self.r.shape[0], self.r.shape[1]
+
+    @property
+    def grid(self) -> Grid:
+        """Where the pixels are."""
+        return Grid.from_affine(self.plane_from_pixel, self.r.shape)
+
+    @property
+    def gsd(self) -> float:
+        """Side of a pixel on the plane. [m]"""
+        return float(self.plane_from_pixel[0, 0])
+
+    @property
+    def bounds(self) -> tuple[float, float, float, float]:
+        """Outer edges (X min, Y min, X max, Y max). [m]"""
+        return self.grid.bounds
+
+    @property
+    def known(self) -> NDArray[np.bool_]:
+        """Pixels whose relief is known, shape (height, width)."""
+        return np.isfinite(self.r)
+
+    def pixels_from_plane(self, positions: ArrayLike) -> FloatArray:
+        """Return (column, row) of plane positions (X, Y), shape (..., 2). [px]"""
+        return self.grid.pixel_of(as_points(positions, "positions", dimension=2))
+
+    def plane_positions(self, rows: slice = slice(None)) -> FloatArray:
+        """Return (X, Y) of the pixel centres of some rows, shape (n, width, 2). [m]"""
+        x, y = self.grid.columns_x, self.grid.rows_y[rows]
+        return np.stack(np.broadcast_arrays(x[None, :], y[:, None]), axis=-1)
+
+    def sample(self, positions: ArrayLike) -> FloatArray:
+        """Return the relief at plane positions (X, Y), shape (...); see `sample_with_sigma`. [m]"""
+        return self._sample(self.r, as_points(positions, "positions", dimension=2))
+
+    def sample_with_sigma(self, positions: ArrayLike) -> tuple[FloatArray, FloatArray]:
+        """Return relief and sigma at plane positions (X, Y), each of shape (...). [m]
+
+        Bilinear between four known pixels; beside unknown ones the nearest pixel; NaN outside the
+        map and where the nearest pixel is unknown.
+        """
+        points = as_points(positions, "positions", dimension=2)
+        return self._sample(self.r, points), self._sample(self.sigma, points)
+
+    def sample_quality(self, positions: ArrayLike) -> ByteArray:
+        """Return the `Quality` of the nearest pixel; UNKNOWN outside the map."""
+        pixels = self.pixels_from_plane(positions)
+        index, inside = self._nearest(pixels)
+        found = self.quality[index[..., 1], index[..., 0]]
+        return np.where(inside, found, np.uint8(Quality.UNKNOWN)).astype(np.uint8)
+
+    def _nearest(self, pixels: FloatArray) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+        """Return the nearest pixel, clamped into the map, and whether it was inside."""
+        height, width = self.shape
+        limit = np.array([width, height])
+        with np.errstate(invalid="ignore"):
+            inside = np.asarray(((pixels >= -0.5) & (pixels < limit - 0.5)).all(-1))
+        rounded = np.floor(np.where(inside[..., None], pixels, 0.0) + 0.5).astype(np.int64)
+        return np.clip(rounded, 0, limit - 1), inside
+
+    def _sample(self, band: Float32Array, points: FloatArray) -> FloatArray:
+        """Bilinear interpolation of a band that falls back to the nearest pixel beside NaN."""
+        height, width = self.shape
+        pixels = self.pixels_from_plane(points)
+        index, inside = self._nearest(pixels)
+        nearest = band[index[..., 1], index[..., 0]].astype(np.float64)
+        safe = np.where(inside[..., None], pixels, 0.0)
+        low = np.clip(np.floor(safe), 0, [max(width - 2, 0), max(height - 2, 0)]).astype(np.int64)
+        share = np.clip(safe - low, 0.0, 1.0)
+        col, row = low[..., 0], low[..., 1]
+        right, under = np.minimum(col + 1, width - 1), np.minimum(row + 1, height - 1)
+        u, v = share[..., 0], share[..., 1]
+        upper = band[row, col] * (1 - u) + band[row, right] * u
+        lower = band[under, col] * (1 - u) + band[under, right] * u
+        value = upper * (1 - v) + lower * v
+        return np.where(inside, np.where(np.isfinite(value), value, nearest), np.nan)
