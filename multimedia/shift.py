@@ -30,20 +30,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from multimedia.tangent import solve
 from photocore.arrays import FloatArray, as_floats
 from photocore.errors import InputError
-
-#: Elements worked on at a time: the dozen scratch rows stay in the processor's second-level cache.
-BLOCK = 4096
-
-#: A Newton step that changes t by less than this share leaves an error of 1.5e-18 (the factor of
-#: the quadratic convergence is at most 1.5 for every set-up).
-LAST_STEP = 1e-9
-
-#: Seen at most: 12 steps in ordinary set-ups, 60 within 1e-15 of the limit of vision.
-MAX_STEPS = 200
-
-_Height = float | FloatArray
 
 
 class ShiftDerivatives(NamedTuple):
@@ -115,7 +104,7 @@ def shifted_radius(
     2.0
     """
     radius, layers = _checked(radius, heights, indices)
-    return _solve(radius, layers, indices, tangent=False)[0]
+    return solve(radius, layers, indices, tangent=False)[0]
 
 
 def shift_ratio(
@@ -147,7 +136,7 @@ def shift_ratio(
     1.142735
     """
     radius, layers = _checked(radius, heights, indices)
-    radius_bar, _, _ = _solve(radius, layers, indices, tangent=False)
+    radius_bar, _, _ = solve(radius, layers, indices, tangent=False)
     limit = axis_ratio(layers, indices)
     # Below 1e-150 the square of t is lost, and the limit is exact to the last digit anyway.
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -196,7 +185,8 @@ def shift_derivatives(
               \frac{\partial\bar R}{\partial n_i}
                 = D \frac{h_i T_i}{n_i c_i^2} - [i = 1] \frac{H T_1}{n_1 c_1^2}
 
-    with :math:`H = \sum h_i`.
+    with :math:`H = \sum h_i`. The differences are formed from :math:`n_1 - n_i`, so that they keep
+    their digits where the media hardly differ, and are zero where they do not.
 
     Examples
     --------
@@ -207,27 +197,9 @@ def shift_derivatives(
     0.06
     """
     radius, layers = _checked(radius, heights, indices)
-    radius_bar, t, lowest = _solve(radius, layers, indices, tangent=True)
+    radius_bar, t, lowest = solve(radius, layers, indices, tangent=True)
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        tangents = [
-            lowest * t / np.sqrt(n**2 + (n - lowest) * (n + lowest) * t**2) for n in indices
-        ]
-        whole = sum(layers, np.zeros(()))
-        slope = sum(
-            (
-                np.where(height > 0, height / n * (1 + tangent**2) ** 1.5, 0.0)
-                for height, n, tangent in zip(layers, indices, tangents, strict=True)
-            ),
-            np.zeros(()),
-        )
-        first = (1 + tangents[0] ** 2) / indices[0]
-        d_radius = whole * first * np.sqrt(1 + tangents[0] ** 2) / slope
-        d_heights = [tangents[0] - d_radius * tangent for tangent in tangents]
-        d_indices = [
-            np.where(height > 0, d_radius * height * tangent * (1 + tangent**2) / n, 0.0)
-            for height, n, tangent in zip(layers, indices, tangents, strict=True)
-        ]
-        d_indices[0] = tangents[0] * first * (d_radius * layers[0] - whole)
+        d_radius, d_heights, d_indices = _derivatives(t, lowest, layers, indices)
     shape = radius_bar.shape
     return ShiftDerivatives(
         radius_bar,
@@ -235,6 +207,44 @@ def shift_derivatives(
         np.stack([np.broadcast_to(d, shape) for d in d_heights], axis=-1),
         np.stack([np.broadcast_to(d, shape) for d in d_indices], axis=-1),
     )
+
+
+def _derivatives(
+    t: FloatArray, lowest: FloatArray, heights: list[FloatArray], indices: Sequence[float]
+) -> tuple[FloatArray, list[FloatArray], list[FloatArray]]:
+    """Return the derivatives of the shifted radius with respect to R, heights and indices."""
+    squared_invariant = (lowest * t) ** 2 / (1 + t * t)
+    tangents = [lowest * t / np.sqrt(n**2 + (n - lowest) * (n + lowest) * t**2) for n in indices]
+    secants = [np.sqrt(1 + tangent**2) for tangent in tangents]
+
+    def gap(i: int, j: int) -> FloatArray:
+        """Return tan²βi - tan²βj, through the invariant."""
+        split = (indices[j] - indices[i]) * (indices[j] + indices[i])
+        return split * squared_invariant * (secants[i] * secants[j] / indices[i] / indices[j]) ** 2
+
+    def sum_over_layers(terms: list[FloatArray]) -> FloatArray:
+        """Return sum(h_i term_i); what an absent layer would do to the ray does not count."""
+        parts = [np.where(h > 0, h * term, 0.0) for h, term in zip(heights, terms, strict=True)]
+        return np.asarray(sum(parts[1:], parts[0]))
+
+    layers = range(len(indices))
+    steepness = [secants[i] ** 3 / indices[i] for i in layers]
+    slope = sum_over_layers(steepness)
+    whole = np.asarray(sum(heights[1:], heights[0]))
+    d_radius = whole * steepness[0] / slope
+
+    rise = tangents[0] * sum_over_layers([secants[i] / indices[i] * gap(i, 0) for i in layers])
+    d_heights = []
+    for i in layers:
+        apart = [gap(j, i) / (tangents[i] + tangents[j]) for j in layers]
+        apart = [np.where(t == 0, 0.0, a) for a in apart]
+        d_heights.append((rise + steepness[0] * sum_over_layers(apart)) / slope)
+
+    stretch = [tangents[i] * secants[i] ** 2 / indices[i] for i in layers]
+    d_indices = [np.where(heights[i] > 0, d_radius * heights[i] * stretch[i], 0.0) for i in layers]
+    others = sum_over_layers([np.zeros(()), *steepness[1:]])
+    d_indices[0] = -stretch[0] * whole * others / slope
+    return d_radius, d_heights, d_indices
 
 
 def _checked(
@@ -252,137 +262,3 @@ def _checked(
         if array.size and array.min() < 0:
             raise InputError(f"{name}: a distance cannot be negative, found {array.min():g}.")
     return radius, layers
-
-
-def _solve(
-    radius: FloatArray, heights: list[FloatArray], indices: Sequence[float], *, tangent: bool
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return the shifted radius and, if asked for, t and the index of the layer t belongs to."""
-    fixed = [h.item() if h.size == 1 else None for h in heights]
-    varying = [h for h, f in zip(heights, fixed, strict=True) if f is None]
-    shape = np.broadcast_shapes(radius.shape, *(h.shape for h in heights))
-    outputs = [np.empty(shape) for _ in range(3 if tangent else 1)]
-    operands = [np.broadcast_to(a, shape) for a in (radius, *varying)] + outputs
-    flags = [["readonly"]] * (1 + len(varying)) + [["writeonly"]] * len(outputs)
-    # nditer hands out contiguous rows of any broadcast without ever expanding it as a whole.
-    with (
-        np.errstate(all="ignore"),
-        np.nditer(
-            operands,
-            flags=["external_loop", "buffered", "zerosize_ok"],
-            op_flags=flags,  # type: ignore[arg-type]  # numpy wants literals
-            buffersize=BLOCK,
-        ) as rows,
-    ):
-        for row in rows:
-            moving = iter(row[1 : 1 + len(varying)])
-            layers = [next(moving) if f is None else f for f in fixed]
-            result = _solve_row(row[0], layers, indices)
-            for target, values in zip(row[1 + len(varying) :], result, strict=False):
-                target[...] = values
-    if not tangent:
-        return outputs[0], outputs[0], outputs[0]
-    return outputs[0], outputs[1], outputs[2]
-
-
-def _solve_row(
-    radius: FloatArray, heights: list[_Height], indices: Sequence[float]
-) -> tuple[FloatArray, FloatArray, float | FloatArray]:
-    """Return shifted radius, t and the lowest index for one row of elements."""
-    present = [
-        (h, n) for h, n in zip(heights, indices, strict=True) if not isinstance(h, float) or h > 0
-    ]
-    lowest = min([indices[0], *(n for _, n in present)])
-    straight = sum((h for h, n in present if n == lowest), 0.0)
-    bent = [(h, (n / lowest) ** 2, (n - lowest) * (n + lowest) / lowest**2)
-            for h, n in present if n > lowest]  # fmt: skip
-    first = (indices[0] / lowest) ** 2, (indices[0] - lowest) * (indices[0] + lowest) / lowest**2
-
-    t = _tangent_of_lowest(radius, straight, bent)
-    whole = sum((h for h, _ in present), 0.0)
-    if first[1] == 0:
-        radius_bar = whole * t
-    else:
-        radius_bar = t * t
-        radius_bar *= first[1]
-        radius_bar += first[0]
-        np.sqrt(radius_bar, out=radius_bar)
-        np.divide(t, radius_bar, out=radius_bar)
-        radius_bar *= whole
-
-    belongs: float | FloatArray = lowest
-    gone = np.flatnonzero(straight == 0) if isinstance(straight, np.ndarray) else ()
-    if len(gone) and lowest < indices[0]:
-        # Here the layer of the lowest index has no height: it is absent, the next one limits.
-        part = [h[gone] if isinstance(h, np.ndarray) else h for h in heights]
-        part = [0.0 if n == lowest else h for h, n in zip(part, indices, strict=True)]
-        belongs = np.full(radius.shape, lowest)
-        radius_bar[gone], t[gone], belongs[gone] = _solve_row(radius[gone], part, indices)
-    return radius_bar, t, belongs
-
-
-def _tangent_of_lowest(
-    radius: FloatArray, straight: _Height, bent: list[tuple[_Height, float, float]]
-) -> FloatArray:
-    """Return the root t of ``straight t + sum(h t / sqrt(a + b t²)) = radius``; NaN where none is.
-
-    Parameters
-    ----------
-    radius : ndarray, shape (n,)
-        R.
-    straight : float or ndarray, shape (n,)
-        Height of the layers of the lowest index.
-    bent : list of (height, a, b)
-        The other layers.
-    """
-    if not bent:
-        return radius / straight
-    # F(t) = A t - B t³ + ..., so t = x + (B / A) x³ + ... with x = R / A.
-    linear = straight + sum(h * a**-0.5 for h, a, _ in bent)
-    inverse = 1.0 / linear
-    x = radius * inverse
-    steepest = x.max(initial=0.0)
-    t = x * x
-    if steepest < 0.6:
-        t *= sum(h * (0.5 * b * a**-1.5) for h, a, b in bent)
-        t *= inverse
-        t += 1.0
-        t *= x
-    else:
-        # F(t) <= straight t + sum(h / sqrt(b)): for oblique rays the better lower bound.
-        ceiling = sum(h * b**-0.5 for h, _, b in bent)
-        t = np.fmax(x, (radius - ceiling) / straight)
-        if np.any(straight == 0):
-            t = np.where(straight == 0, np.where(radius < ceiling, x, np.nan), t)
-
-    square, root, term = np.empty_like(t), np.empty_like(t), np.empty_like(t)
-    value, slope = np.empty_like(t), np.empty_like(t)
-    for _ in range(MAX_STEPS):
-        np.multiply(t, t, out=square)
-        value[...] = straight
-        slope[...] = straight
-        for height, a, b in bent:
-            np.multiply(square, b, out=root)
-            root += a
-            np.sqrt(root, out=root)
-            np.divide(1.0, root, out=root)  # s = 1 / sqrt(a + b t²)
-            np.multiply(root, height, out=term)
-            value += term  # F / t gains h s
-            root *= root
-            root *= a
-            term *= root
-            slope += term  # F' gains h a s³
-        value *= t
-        np.subtract(radius, value, out=value)
-        value /= slope
-        t += value
-        np.abs(value, out=value)
-        np.multiply(t, LAST_STEP, out=term)
-        if not np.greater(value, term, out=_flags(t)).any():
-            break
-    return t
-
-
-def _flags(t: FloatArray) -> np.ndarray[tuple[int, ...], np.dtype[np.bool_]]:
-    """Return scratch for a comparison."""
-    return np.empty(t.shape, dtype=bool)
