@@ -2,17 +2,51 @@ from .domain.camera import Camera, Sensor
 from .domain.flat_interface import FlatInterface
 from .domain.layers import Layers
 from .domain.shifting import radial_shift, radial_shift_derivatives, radial_shift_ratio
+from .materials import (
+    ACRYLIC,
+    FLOAT_GLASS,
+    FUSED_SILICA,
+    N_BK7,
+    POLYCARBONATE,
+    SAPPHIRE,
+    Material,
+    air_refractive_index,
+)
 from .shift import ShiftDerivatives
 from .snell import critical_angle, refracted_angle, refracted_direction
 from .solvers.projection import project, projection_status
-from .water import water_refractive_index
+from .water import (
+    HOEHLE,
+    PARRISH,
+    QUAN_FRY,
+    WaterFormula,
+    WaterIndexDerivatives,
+    salinity_from_index,
+    temperature_from_index,
+    water_index_derivatives,
+    water_index_sigma,
+    water_refractive_index,
+)
 
 __all__ = [
+    "ACRYLIC",
     "Camera",
+    "FLOAT_GLASS",
+    "FUSED_SILICA",
     "FlatInterface",
+    "HOEHLE",
     "Layers",
+    "Material",
+    "N_BK7",
+    "PARRISH",
+    "POLYCARBONATE",
+    "QUAN_FRY",
+    "SAPPHIRE",
     "Sensor",
     "ShiftDerivatives",
+    "WaterFormula",
+    "WaterIndexDerivatives",
+    "air_refractive_index",
     "critical_angle",
     "project",
     "projection_status",
@@ -21,5 +55,9 @@ __all__ = [
     "radial_shift_ratio",
     "refracted_angle",
     "refracted_direction",
+    "salinity_from_index",
+    "temperature_from_index",
+    "water_index_derivatives",
+    "water_index_sigma",
     "water_refractive_index",
 ]
