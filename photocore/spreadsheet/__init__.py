@@ -1,0 +1,1 @@
+"""Spreadsheet files as packages: safe reading, in-place changes, fast writing, lint."""

@@ -1,0 +1,185 @@
+"""Sheets as sparse grids of typed cells, whatever the file format."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from datetime import datetime, timedelta
+
+
+@dataclass(frozen=True, slots=True)
+class CellDate:
+    """A number that a spreadsheet shows as a date or time.
+
+    Parameters
+    ----------
+    when : datetime
+        The moment.
+    style : str
+        Number format, e.g. ``"d-mmm"``; empty where the file has none.
+    """
+
+    when: datetime
+    style: str = ""
+
+    @property
+    def shown(self) -> str:
+        """The date as text, without a time when it is midnight."""
+        midnight = self.when.hour == self.when.minute == self.when.second == 0
+        return self.when.strftime("%Y-%m-%d" if midnight else "%Y-%m-%d %H:%M:%S")
+
+
+@dataclass(frozen=True, slots=True)
+class CellFault:
+    """An error value such as ``#DIV/0!``."""
+
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class NotCalculated:
+    """A formula whose file holds no result yet."""
+
+    formula: str = ""
+
+
+Value = float | str | bool | CellDate | CellFault | NotCalculated
+
+
+@dataclass(slots=True)
+class Grid:
+    """The cells of one sheet that hold something.
+
+    Rows and columns are counted from 1, as spreadsheets do.
+
+    Parameters
+    ----------
+    title : str
+        Name of the sheet.
+    rows : dict
+        Row number to (column number to value).
+    hidden : set of int
+        Hidden or filtered rows.
+    merged : list of (top, left, bottom, right)
+        Merged ranges, both ends included.
+    truncated : bool
+        Whether reading stopped early because the sheet is too long.
+    """
+
+    title: str
+    rows: dict[int, dict[int, Value]] = field(default_factory=dict)
+    hidden: set[int] = field(default_factory=set)
+    merged: list[tuple[int, int, int, int]] = field(default_factory=list)
+    truncated: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class TableArea:
+    """A named table: where it lies and how many of its rows are headings and totals."""
+
+    name: str
+    sheet: str
+    area: tuple[int, int, int, int]
+    header_rows: int = 1
+    totals_rows: int = 0
+
+
+@dataclass(slots=True)
+class SheetFile:
+    """An open spreadsheet: its sheets are read when asked for.
+
+    Parameters
+    ----------
+    label : str
+        File name for messages.
+    titles : list of str
+        Sheet names in order, visible ones first.
+    load : callable
+        Reads one sheet by its name; `grid` calls it once per sheet.
+    tables : list of TableArea
+        Named tables.
+    names : dict
+        Defined names of single cells: lower-case name to (sheet, row, column).
+    remarks : list of str
+        What the user should know about the file as a whole.
+    """
+
+    label: str
+    titles: list[str]
+    load: Callable[[str], Grid]
+    tables: Sequence[TableArea] = ()
+    names: dict[str, tuple[str, int, int]] = field(default_factory=dict)
+    remarks: list[str] = field(default_factory=list)
+    _grids: dict[str, Grid] = field(default_factory=dict)
+
+    def grid(self, title: str) -> Grid:
+        """Return the cells of one sheet."""
+        if title not in self._grids:
+            self._grids[title] = self.load(title)
+        return self._grids[title]
+
+
+def column_letters(column: int) -> str:
+    """Return the letters of a column counted from 1.
+
+    >>> column_letters(28)
+    'AB'
+    """
+    letters = ""
+    while column > 0:
+        column, rest = divmod(column - 1, 26)
+        letters = chr(65 + rest) + letters
+    return letters
+
+
+def column_number(letters: str) -> int:
+    """Return the number, counted from 1, of a column's letters.
+
+    >>> column_number("AB")
+    28
+    """
+    number = 0
+    for letter in letters.upper():
+        number = number * 26 + ord(letter) - 64
+    return number
+
+
+def cell_name(row: int, column: int) -> str:
+    """Return a cell's name.
+
+    >>> cell_name(3, 2)
+    'B3'
+    """
+    return f"{column_letters(column)}{row}"
+
+
+def split_cell(reference: str) -> tuple[int, int]:
+    """Return row and column of a cell's name, dollar signs allowed.
+
+    >>> split_cell("$B$3")
+    (3, 2)
+    """
+    plain = reference.replace("$", "")
+    letters = plain.rstrip("0123456789")
+    return int(plain[len(letters) :]), column_number(letters)
+
+
+def split_area(reference: str) -> tuple[int, int, int, int]:
+    """Return (top, left, bottom, right) of a range or of one cell.
+
+    >>> split_area("B3:D9")
+    (3, 2, 9, 4)
+    """
+    first, _, last = reference.partition(":")
+    top, left = split_cell(first)
+    bottom, right = split_cell(last or first)
+    return top, left, bottom, right
+
+
+def date_of_serial(serial: float, *, since_1904: bool) -> datetime:
+    """Return the moment a spreadsheet's day number stands for."""
+    origin = datetime(1904, 1, 1) if since_1904 else datetime(1899, 12, 30)
+    # Day 60 of the 1900 calendar is the 29 February that never was; before it, days are one off.
+    if not since_1904 and 0 < serial < 60:
+        serial += 1
+    return origin + timedelta(days=serial)

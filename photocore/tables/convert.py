@@ -1,0 +1,263 @@
+"""From the cells of one column to an array: every bad cell is named, none stops the others."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+
+import numpy as np
+
+from photocore.arrays import FloatArray
+from photocore.spreadsheet.grid import CellDate, CellFault, NotCalculated, Value
+from photocore.tables.model import Column
+from photocore.tables.numbers import (
+    Decimal,
+    NumberText,
+    converted,
+    decimal_of,
+    proven_by,
+    take_apart,
+    unit_symbol,
+)
+
+Complain = Callable[[int, str], None]
+
+_YES = {"1", "yes", "y", "true", "x", "on", "si", "sì", "s", "vero", "ja", "j", "wahr"}
+_NO = {"0", "no", "n", "false", "off", "falso", "nein", "falsch"}
+
+
+def decimal_evidence(values: Sequence[Value | None]) -> set[Decimal]:
+    """Return the decimal separators that the texts of a column prove."""
+    parts = (take_apart(value) for value in values if isinstance(value, str))
+    return proven_by(part for part in parts if part is not None)
+
+
+def numbers(
+    column: Column,
+    values: Sequence[Value | None],
+    *,
+    unit: str,
+    decimal: Decimal | None,
+    elsewhere: set[Decimal],
+    complain: Complain,
+) -> tuple[FloatArray, str, list[str]]:
+    """Return a column's numbers (NaN where blank), the unit its cells say, and remarks.
+
+    Parameters
+    ----------
+    column : Column
+        What is expected.
+    values : sequence
+        Cell values, None where blank.
+    unit : str
+        Unit that the heading says, empty if none.
+    decimal : {"point", "comma"}, optional
+        Decimal separator of texts as the user says; detected when None.
+    elsewhere : set
+        Separators that the other columns of the table prove, for a column that proves none.
+    complain : callable
+        Takes the index of a bad cell and what is wrong with it.
+    """
+    result = np.full(len(values), np.nan)
+    texts: dict[int, NumberText] = {}
+    unfinished: list[int] = []
+    wanted = unit or column.unit
+    for index, value in enumerate(values):
+        if isinstance(value, float):
+            result[index] = value
+            if not math.isfinite(value):
+                complain(index, f"found {value}, expected a finite number.")
+        elif value is None:
+            continue
+        elif isinstance(value, str):
+            part = take_apart(value)
+            if part is not None:
+                texts[index] = part
+            elif value.strip():
+                complain(index, _not_a_number(value, wanted))
+        elif isinstance(value, NotCalculated):
+            unfinished.append(index)
+        else:
+            complain(index, _wrong_type(value, wanted))
+    if unfinished:
+        more = f" (and {len(unfinished) - 1} more in this column)" if len(unfinished) > 1 else ""
+        complain(
+            unfinished[0],
+            f"its formula has never been calculated{more}. Open the file in the spreadsheet "
+            "program, save it there, and try again.",
+        )
+    found = _typed_unit(texts, wanted, complain)
+    _read_texts(result, texts, decimal, elsewhere, complain)
+    remarks = []
+    typed = sum(bool(part.unit) for part in texts.values())
+    if typed:
+        remarks.append(f"{column.key}: the unit typed into {typed} cells was taken off.")
+    if column.kind == "integer":
+        for broken in np.flatnonzero(np.isfinite(result) & (result != np.floor(result))):
+            complain(int(broken), f"found {result[broken]:.15g}, expected a whole number.")
+    return result, found or unit, remarks
+
+
+def flags(values: Sequence[Value | None], complain: Complain) -> FloatArray:
+    """Return 1 for yes, 0 for no, NaN where blank."""
+    result = np.full(len(values), np.nan)
+    for index, value in enumerate(values):
+        if value is None or (isinstance(value, str) and not value.strip()):
+            continue
+        if isinstance(value, bool):
+            result[index] = float(value)
+            continue
+        word = f"{value:.15g}" if isinstance(value, float) else str(value).strip().casefold()
+        if word in _YES | _NO:
+            result[index] = float(word in _YES)
+        elif isinstance(value, float | str):
+            complain(index, f'found "{_short(str(value))}", expected 1 (yes) or 0 (no).')
+        else:
+            complain(index, _wrong_type(value, ""))
+    return result
+
+
+def texts(values: Sequence[Value | None], complain: Complain) -> list[str]:
+    """Return a column's texts; whole numbers lose the decimal point, so that 1.0 is ``"1"``."""
+    result = []
+    for index, value in enumerate(values):
+        if isinstance(value, float):
+            text = str(int(value)) if value.is_integer() and abs(value) < 1e15 else repr(value)
+        elif isinstance(value, str):
+            text = value.strip()
+        elif isinstance(value, bool):
+            text = "TRUE" if value else "FALSE"
+        elif isinstance(value, CellDate):
+            text = value.shown
+        elif isinstance(value, CellFault | NotCalculated):
+            complain(index, _wrong_type(value, ""))
+            text = ""
+        else:
+            text = ""
+        result.append(text)
+    return result
+
+
+def _read_texts(
+    result: FloatArray,
+    parts: dict[int, NumberText],
+    decimal: Decimal | None,
+    elsewhere: set[Decimal],
+    complain: Complain,
+) -> None:
+    """Fill in the numbers that were typed as text, with one decimal separator for the column."""
+    proven = proven_by(parts.values())
+    thousands = any(part.has_thousands for part in parts.values())
+    commas = sum(part.evidence == "comma" for part in parts.values())
+    points = sum(part.evidence == "point" for part in parts.values())
+    usual: Decimal = "comma" if commas > points else "point"
+    for index, part in parts.items():
+        mark = decimal or decimal_of(part, proven, thousands=thousands, elsewhere=elsewhere)
+        if mark is None:
+            small, large = sorted((part.value("comma") or 0, part.value("point") or 0), key=abs)
+            complain(
+                index,
+                f'found "{part.digits}", which may mean {small:.15g} or {large:.15g}. Say which '
+                "with --decimal comma or --decimal point.",
+            )
+            continue
+        value = part.value(mark)
+        mixed = decimal is None and len(proven) == 2 and mark != usual and part.evidence != "none"
+        if value is None or mixed:
+            complain(index, _mixed(part, decimal or usual))
+        elif not math.isfinite(value):
+            complain(index, f'found "{_short(part.digits)}", which is too large for a number.')
+        else:
+            result[index] = value
+
+
+def _typed_unit(parts: dict[int, NumberText], wanted: str, complain: Complain) -> str:
+    """Check the units typed into cells; return the common one where the heading says none."""
+    symbols = {index: unit_symbol(part.unit) for index, part in parts.items() if part.unit}
+    if not symbols:
+        return ""
+    if not wanted and "" not in symbols.values():
+        common = set(symbols.values())
+        if len(common) == 1 and len(symbols) == len(parts):
+            return common.pop()
+    for index, symbol in symbols.items():
+        part = parts[index]
+        if symbol and symbol == wanted:
+            continue
+        shown = f"{part.digits} {part.unit}"
+        value = part.value("comma" if "," in part.digits else "point")
+        better = converted(value, symbol, wanted) if value is not None and symbol else None
+        number = better if better is not None else value
+        advice = f"Write {number:.15g}; the" if number is not None and symbol == "" else "The"
+        if better is not None:
+            advice = f"Write {better:.15g}; the"
+        complain(
+            index,
+            f'found "{_short(shown)}", expected a number{wanted and f" in {wanted}"}. '
+            f"{advice} unit belongs in the heading.",
+        )
+        del parts[index]
+    return ""
+
+
+def _mixed(part: NumberText, agreed: Decimal) -> str:
+    other: Decimal = "point" if agreed == "comma" else "comma"
+    value = part.value(other)
+    if value is None:
+        return f'found "{_short(part.digits)}", expected a number.'
+    return (
+        f'found "{_short(part.digits)}", while numbers here are written with the decimal '
+        f"{agreed}. Write {_localised(value, agreed)}, or say --decimal {other} if all are."
+    )
+
+
+def _localised(value: float, decimal: Decimal) -> str:
+    text = f"{value:.15g}"
+    return text.replace(".", ",") if decimal == "comma" else text
+
+
+def _not_a_number(text: str, unit: str) -> str:
+    expected = f"expected a number{unit and f' in {unit}'}"
+    if text.strip().casefold() in ("nan", "inf", "-inf", "n/a", "na", "-", "none", "null"):
+        return f'found "{_short(text)}", {expected}. Leave the cell empty where there is none.'
+    return f'found "{_short(text)}", {expected}. Type the number, or clear the cell.'
+
+
+def _wrong_type(value: Value, unit: str) -> str:
+    expected = f"expected a number{unit and f' in {unit}'}"
+    if isinstance(value, CellFault):
+        return f"holds the error {value.text}. Mend its formula, or clear the cell."
+    if isinstance(value, NotCalculated):
+        return (
+            "its formula has never been calculated. Open the file in the spreadsheet program, save "
+            "it there, and try again."
+        )
+    if isinstance(value, CellDate):
+        number = " or ".join(_before_the_date(value))
+        if not number:
+            return (
+                f"holds a time of day, {expected}. Format the cell as a number and type it again."
+            )
+        return (
+            f"holds the date {value.shown}, {expected}. Spreadsheets make dates of numbers typed "
+            f"with the other decimal separator: it was probably {number}. Format the column as a "
+            "number and type it again."
+        )
+    return f"holds {str(value).upper()}, {expected}."
+
+
+def _before_the_date(value: CellDate) -> Iterator[str]:
+    """Yield the numbers that were probably typed before the spreadsheet made a date of them."""
+    style = value.style.lower()
+    if "h" in style and "d" not in style:
+        return
+    if style and "d" not in style:
+        # "1.25" cannot be a day and a month, so it became January 2025, shown as Jan-25.
+        yield f"{value.when.month}.{value.when:%y}"
+    else:
+        yield f"{value.when.day}.{value.when.month}"
+
+
+def _short(text: str) -> str:
+    text = " ".join(text.split())
+    return text if len(text) <= 40 else f"{text[:37]}..."

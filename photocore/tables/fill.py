@@ -1,0 +1,102 @@
+"""Filling a table's columns from its cells, whatever file they come from."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from photocore.errors import CellError, InputError
+from photocore.spreadsheet.grid import CellDate, Grid, Value, cell_name, column_letters
+from photocore.tables import convert
+from photocore.tables.headings import Match
+from photocore.tables.model import Column, Table
+from photocore.tables.numbers import Decimal, unit_symbol
+
+
+def fill(
+    table: Table,
+    columns: Sequence[Column],
+    raw: Mapping[str, Sequence[Value | None]],
+    decimal: Decimal | None,
+    errors: list[CellError],
+    *,
+    proven: Mapping[str, set[Decimal]] | None = None,
+) -> None:
+    """Convert the cells of every column asked for and put them into the table.
+
+    Parameters
+    ----------
+    table : Table
+        Takes the values, units, remarks.
+    columns : sequence of Column
+        The columns to convert; those without cells become blank.
+    raw : mapping
+        Key to cells.
+    decimal : {"point", "comma"}, optional
+        As the user says.
+    errors : list
+        Takes the complaints, in the order of the sheet.
+    proven : mapping, optional
+        Decimal separators proven by columns that are converted already.
+    """
+    numeric = [c.key for c in columns if c.kind in ("number", "integer") and c.key in raw]
+    evidence = {key: convert.decimal_evidence(raw[key]) for key in numeric} | dict(proven or {})
+    gathered: list[tuple[int, int, CellError]] = []
+    for column in columns:
+        values = raw.get(column.key, [None] * len(table))
+
+        def complain(index: int, message: str, key: str = column.key) -> None:
+            place = (table.rows[index], table.columns[key])
+            gathered.append((*place, table.error(index, key, message)))
+
+        if column.kind == "text":
+            table.values[column.key] = convert.texts(values, complain)
+            dated = sum(isinstance(value, CellDate) for value in values)
+            if dated:
+                table.remarks.append(
+                    f"{column.key}: {dated} cells hold dates; type a name like 3-4 as '3-4."
+                )
+        elif column.kind == "flag":
+            table.values[column.key] = convert.flags(values, complain)
+        else:
+            others = set[Decimal]().union(*(v for k, v in evidence.items() if k != column.key))
+            numbers, unit, remarks = convert.numbers(
+                column,
+                values,
+                unit=table.units.get(column.key, ""),
+                decimal=decimal,
+                elsewhere=others,
+                complain=complain,
+            )
+            table.values[column.key] = numbers
+            table.remarks += remarks
+            if unit:
+                table.units[column.key] = unit
+    errors += [error for _, _, error in sorted(gathered, key=lambda item: item[:2])]
+
+
+def refuse_doubles(label: str, title: str, match: Match) -> None:
+    """Refuse a heading that stands above several columns, when any of them could be meant.
+
+    Raises
+    ------
+    InputError
+        Naming the cells.
+    """
+    for key, numbers in match.doubles.items():
+        cells = " and ".join(cell_name(match.header, number) for number in numbers)
+        where = f"{label} › {title}" if title else label
+        raise InputError(
+            f'{where}: the heading "{match.headings[key]}" stands in {cells}; which one is {key}? '
+            f'Say it by letter: --columns "{key}={column_letters(numbers[0])}".'
+        )
+
+
+def take_unit_row(grid: Grid, match: Match) -> None:
+    """Skip a row of units below the headings, and remember them."""
+    cells = grid.rows.get(match.first, {})
+    units = {key: cells[number] for key, number in match.columns.items() if number in cells}
+    symbols = {key: unit_symbol(v) for key, v in units.items() if isinstance(v, str)}
+    if match.header and symbols and len(symbols) == len(units) and all(symbols.values()):
+        match.first += 1
+        for key, symbol in symbols.items():
+            match.units.setdefault(key, symbol)

@@ -1,0 +1,331 @@
+"""Finding columns by their headings, in whatever row, order, case and language."""
+
+from __future__ import annotations
+
+import re
+import unicodedata
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+from photocore.spreadsheet.grid import Grid, Value, cell_name, column_letters, column_number
+from photocore.tables.model import Column
+from photocore.tables.numbers import unit_symbol
+
+_UNIT = re.compile(r"\s*[\[(]\s*([^\])]*)\s*[\])]\s*$")
+_LOOSE_UNIT = re.compile(r"[\s_,]+(mm|cm|m|px|pixel|deg|°|gon|rad)$", re.IGNORECASE)
+_DROPPED = re.compile(r"[\s_.\-:/'\"`´]+")
+_PHOTO = re.compile(r"(?:image|photo|picture|foto|bild|immagine|aufnahme)\s*([12])$")
+#: Rows of a sheet that are searched for headings.
+_SEARCHED = 400
+
+
+@dataclass(slots=True)
+class Match:
+    """Where a table's columns lie in a grid.
+
+    Parameters
+    ----------
+    columns : dict
+        Key to column number.
+    first, last : int
+        First and last row that may hold data.
+    header : int
+        Row of the (lower) headings; 0 where the table has none.
+    headings, units : dict
+        Key to heading as written, and to the unit it says.
+    doubles : dict
+        Key to the columns that all carry its heading.
+    score : tuple of int
+        How many columns matched, how many by their own key, and 1 for a single heading row.
+    remarks : list of str
+        Choices made that the user should know.
+    """
+
+    columns: dict[str, int]
+    first: int
+    last: int = 10**9
+    header: int = 0
+    headings: dict[str, str] = field(default_factory=dict)
+    units: dict[str, str] = field(default_factory=dict)
+    doubles: dict[str, list[int]] = field(default_factory=dict)
+    score: tuple[int, int, int] = (0, 0, 0)
+    remarks: list[str] = field(default_factory=list)
+
+    def missing(self, columns: Sequence[Column]) -> list[str]:
+        """Return the keys of required columns that were not found."""
+        return [c.key for c in columns if c.required and c.key not in self.columns]
+
+
+def bare(text: str) -> str:
+    """Return a heading without unit, case, blanks and punctuation.
+
+    >>> bare("S_1 [mm]"), bare("Distanza radiale 1 (mm)")
+    ('s1', 'distanzaradiale1')
+    """
+    text = unicodedata.normalize("NFKC", text).casefold()
+    return _DROPPED.sub("", _UNIT.sub("", text))
+
+
+def unit_of(text: str) -> str:
+    """Return the unit a heading says in brackets or at its end, as a stable symbol.
+
+    >>> unit_of("s1 [mm]"), unit_of("theta"), unit_of("x far px")
+    ('mm', '', 'px')
+    """
+    found = _UNIT.search(text) or _LOOSE_UNIT.search(text)
+    return unit_symbol(found[1]) if found else ""
+
+
+def find_columns(
+    grid: Grid,
+    columns: Sequence[Column],
+    *,
+    column_map: Mapping[str, str] | None = None,
+    rows: tuple[int, int] | None = None,
+    span: tuple[int, int] | None = None,
+) -> Match | None:
+    """Return the best place of a table in a grid, None where no heading fits at all.
+
+    Parameters
+    ----------
+    grid : Grid
+        The sheet.
+    columns : sequence of Column
+        What is looked for.
+    column_map : mapping, optional
+        Key to heading or column letter, as the user says.
+    rows : (first, last), optional
+        The only rows where the heading may be.
+    span : (left, right), optional
+        The only columns that count (those of a named table).
+    """
+    candidates = sorted(grid.rows)[:_SEARCHED]
+    fixed, wanted = _apply_map(grid, columns, column_map, candidates)
+    if fixed and len(fixed) == len(wanted):
+        return _without_heading(grid, columns, fixed, candidates)
+    if rows:
+        candidates = [row for row in candidates if rows[0] <= row <= rows[1]]
+    best: Match | None = None
+    for row in candidates:
+        for texts, header in _heading_texts(grid, row, span):
+            match = _assign(wanted, texts, fixed, header)
+            match.score = (*match.score[:2], int(header == row))
+            _take_nameless(grid, match, wanted)
+            if match.score[0] > len(fixed) and (best is None or match.score > best.score):
+                best = match
+    return best
+
+
+def _apply_map(
+    grid: Grid,
+    columns: Sequence[Column],
+    column_map: Mapping[str, str] | None,
+    candidates: Sequence[int],
+) -> tuple[dict[str, int], list[Column]]:
+    """Return columns fixed by letter, and the columns to look for with the headings to expect."""
+    if not column_map:
+        return {}, list(columns)
+    texts = {
+        value.strip()
+        for row in candidates
+        for value in grid.rows[row].values()
+        if isinstance(value, str)
+    }
+    fixed: dict[str, int] = {}
+    wanted = []
+    for column in columns:
+        place = column_map.get(column.key, "").strip()
+        if not place:
+            continue
+        if place not in texts and re.fullmatch(r"[A-Za-z]{1,3}", place):
+            fixed[column.key] = column_number(place)
+        elif place not in texts and place.isdecimal():
+            fixed[column.key] = int(place)
+        wanted.append(Column(column.key, (place,), column.kind, column.required, column.unit))
+    if len(fixed) == len(wanted):
+        return fixed, wanted
+    mapped = {column.key for column in wanted}
+    # With headings to go by, columns that the map does not name are found as usual.
+    return fixed, wanted + [column for column in columns if column.key not in mapped]
+
+
+def _heading_texts(
+    grid: Grid, row: int, span: tuple[int, int] | None
+) -> list[tuple[dict[int, list[str]], int]]:
+    """Return the headings that a row, alone or with the next, gives each column."""
+
+    def inside(cells: Mapping[int, Value]) -> dict[int, str]:
+        left, right = span or (1, 10**6)
+        return {
+            column: str(int(value)) if isinstance(value, float) and value % 1 == 0 else str(value)
+            for column, value in cells.items()
+            if left <= column <= right and isinstance(value, str | float)
+        }
+
+    upper = inside(grid.rows[row])
+    single = {
+        column: [upper[column]]
+        for column, value in grid.rows[row].items()
+        if isinstance(value, str) and value.strip() and column in upper
+    }
+    found = [(single, row)] if single else []
+    cells = grid.rows.get(row + 1, {})
+    lower = {c: v for c, v in inside(cells).items() if isinstance(cells[c], str) and v.strip()}
+    if lower and len(lower) >= 2:
+        groups = _filled_right(grid, row, upper, lower)
+        double: dict[int, list[str]] = {}
+        for column in sorted(set(lower) | set(single)):
+            group, own = groups.get(column, ""), lower.get(column, "")
+            if own:
+                digit = _PHOTO.search(group.strip().casefold())
+                numbered = [_numbered(own, digit[1])] if digit else []
+                double[column] = [*numbered, f"{group} {own}".strip(), own]
+            else:
+                double[column] = [upper[column]]
+        found.append((double, row + 1))
+    return found
+
+
+def _numbered(text: str, digit: str) -> str:
+    """Return a heading with a digit in front of its unit: ``x [mm]`` of photo 1 is ``x1 [mm]``."""
+    unit = _UNIT.search(text)
+    return f"{text[: unit.start()]}{digit}{unit[0]}" if unit else f"{text.strip()}{digit}"
+
+
+def _filled_right(
+    grid: Grid, row: int, upper: Mapping[int, str], lower: Mapping[int, str]
+) -> dict[int, str]:
+    """Return the upper headings, each reaching right over its merged or empty cells."""
+    reach = {left: right for top, left, _, right in grid.merged if top == row}
+    groups: dict[int, str] = {}
+    for column in sorted(upper):
+        right = reach.get(column, 0)
+        following = next((c for c in sorted(upper) if c > column), max(lower) + 1)
+        for target in range(column, (right or following - 1) + 1):
+            if not right and target > column and target not in lower:
+                break  # an empty column ends the group
+            groups[target] = upper[column]
+    return groups
+
+
+def _assign(
+    columns: Sequence[Column],
+    texts: Mapping[int, list[str]],
+    fixed: Mapping[str, int],
+    header: int,
+) -> Match:
+    """Give each column asked for one of the headings, by key, then by alias in order."""
+    match = Match(columns=dict(fixed), first=header + 1, header=header)
+    taken: dict[int, str] = {number: key for key, number in fixed.items()}
+    exact = 0
+    forms = {number: _forms(variants) for number, variants in texts.items()}
+
+    def take(column: Column, number: int) -> None:
+        match.columns[column.key], taken[number] = number, column.key
+        shown = texts[number][0].strip()
+        match.headings[column.key] = shown
+        unit = next((u for u in map(unit_of, texts[number]) if u), "")
+        if unit:
+            match.units[column.key] = unit
+
+    for column in columns:
+        for number in sorted(texts):
+            mine = (t.strip() == column.key for t in texts[number])
+            if column.key not in match.columns and number not in taken and any(mine):
+                take(column, number)
+                exact += 1
+    keys = {column.key: bare(column.key) for column in columns}
+    for column in columns:
+        for number in sorted(texts):
+            if (
+                column.key not in match.columns
+                and number not in taken
+                and keys[column.key] in forms[number]
+            ):
+                take(column, number)
+    aliases = {column.key: {bare(alias) for alias in column.aliases} for column in columns}
+    for number in sorted(texts):
+        for column in columns:
+            if (
+                column.key not in match.columns
+                and number not in taken
+                and not aliases[column.key].isdisjoint(forms[number])
+            ):
+                take(column, number)
+    for column in columns:
+        number = match.columns.get(column.key, 0)
+        if number in texts and column.key not in fixed:
+            same = [
+                other
+                for other in sorted(texts)
+                if (other == number or other not in taken) and forms[other][0] == forms[number][0]
+            ]
+            if len(same) > 1:
+                match.doubles[column.key] = same
+    match.score = (len(match.columns), exact, 0)
+    return match
+
+
+def _take_nameless(grid: Grid, match: Match, columns: Sequence[Column]) -> None:
+    """Take the column left of the others for the point names when only its heading is missing."""
+    name = next((column for column in columns if column.kind == "text"), None)
+    if name is None or name.key != "id" or name.key in match.columns or not match.columns:
+        return
+    number = min(match.columns.values()) - 1
+    below = [row for row in grid.rows if match.header < row <= match.header + 50]
+    filled = sum(number in grid.rows[row] for row in below)
+    if number > 0 and filled > len(below) / 2 and number not in grid.rows[match.header]:
+        match.columns[name.key] = number
+        match.headings[name.key] = ""
+        match.remarks.append(
+            f"Column {column_letters(number)} has no heading; it is taken for the point names."
+        )
+
+
+def _forms(variants: Sequence[str]) -> list[str]:
+    forms = []
+    for text in variants:
+        form = bare(text)
+        if form and form not in forms:
+            forms.append(form)
+        loose = bare(_LOOSE_UNIT.sub("", _UNIT.sub("", text).strip()))
+        if loose and loose not in forms:
+            forms.append(loose)
+    return forms or [""]
+
+
+def _without_heading(
+    grid: Grid, columns: Sequence[Column], fixed: dict[str, int], candidates: Sequence[int]
+) -> Match:
+    """Return where the data begin in a table whose columns are known by letter."""
+    from photocore.tables.numbers import take_apart
+
+    kinds = {column.key: column.kind for column in columns}
+    numeric = [number for key, number in fixed.items() if kinds[key] in ("number", "integer")]
+    match = Match(columns=fixed, first=candidates[0] if candidates else 1, score=(len(fixed), 0, 1))
+    previous: Mapping[int, Value] = {}
+    for row in candidates:
+        cells = grid.rows[row]
+        values = [cells[number] for number in numeric if number in cells]
+        numbers = [v for v in values if not isinstance(v, str) or take_apart(v) is not None]
+        lonely = len(cells) == 1 and len(numeric) > 1
+        if not numeric or (numbers and len(numbers) == len(values) and not lonely):
+            match.first = row
+            match.header = row - 1 if previous and not lonely else 0
+            break
+        previous = cells
+    for key, number in fixed.items():
+        above = grid.rows.get(match.first - 1, {}).get(number, "")
+        heading = above if isinstance(above, str) else ""
+        match.headings[key] = heading or f"column {column_letters(number)}"
+        if unit_of(heading):
+            match.units[key] = unit_of(heading)
+    return match
+
+
+def describe(grid: Grid, match: Match | None) -> str:
+    """Return a few words on the headings found nearest, for a message."""
+    row = match.header if match else next(iter(sorted(grid.rows)), 0)
+    cells = grid.rows.get(row, {})
+    shown = [f'"{v}" ({cell_name(row, c)})' for c, v in sorted(cells.items()) if isinstance(v, str)]
+    return ", ".join(shown[:12]) + (", ..." if len(shown) > 12 else "")

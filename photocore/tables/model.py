@@ -1,0 +1,229 @@
+"""What is asked of a table and what comes back."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+
+from photocore.arrays import FloatArray
+from photocore.errors import CellError, InputError
+from photocore.spreadsheet.grid import cell_name, column_letters
+
+Kind = Literal["number", "integer", "flag", "text"]
+
+
+@dataclass(frozen=True, slots=True)
+class Column:
+    """A column that a command understands.
+
+    Parameters
+    ----------
+    key : str
+        Stable name, also a heading.
+    aliases : tuple of str
+        Other headings, in any language; several columns may share one (``"x"`` for ``x1`` and
+        ``x2``): the first column with that heading goes to the first of them, and so on.
+    kind : {"number", "integer", "flag", "text"}
+        Numbers, integers and flags (1/0, yes/no, true/false) become float64 with NaN where blank;
+        texts become ``str``, with numbers that are whole written without a decimal point.
+    required : bool
+        Whether a table without this column is refused. Blank cells are left to the caller.
+    unit : str
+        The unit expected when neither the heading nor the cell says one, for messages.
+    """
+
+    key: str
+    aliases: tuple[str, ...] = ()
+    kind: Kind = "number"
+    required: bool = False
+    unit: str = ""
+
+
+@dataclass(slots=True, kw_only=True)
+class Table:
+    """A table read from a file, with the way back to its cells.
+
+    Parameters
+    ----------
+    file, sheet : str
+        Where it was found; the sheet is empty for text files.
+    values : dict
+        Key to float64 array (NaN where blank) or list of str (empty where blank). Every column
+        asked for is there, also those the file lacks (all blank; see ``present``).
+    present : frozenset of str
+        Keys whose column exists in the file.
+    units : dict
+        Key to the unit its heading or cells say (``"mm"``); absent where they say none.
+    headings : dict
+        Key to the heading as it stands in the file.
+    rows : list of int
+        Row of the sheet (or record of the text file) of each entry.
+    columns : dict
+        Key to column number, counted from 1.
+    blocks : list of str
+        Label of the block each entry belongs to (a row that holds only a photo number starts
+        one); empty where there are none.
+    remarks : list of str
+        What was done that the user should know: hidden rows used, rows left out, ...
+    """
+
+    file: str
+    sheet: str
+    values: dict[str, FloatArray | list[str]]
+    present: frozenset[str]
+    rows: list[int]
+    columns: dict[str, int]
+    units: dict[str, str] = field(default_factory=dict)
+    headings: dict[str, str] = field(default_factory=dict)
+    blocks: list[str] = field(default_factory=list)
+    remarks: list[str] = field(default_factory=list)
+
+    def __len__(self) -> int:
+        return len(self.rows)
+
+    def numbers(self, key: str) -> FloatArray:
+        """Return a column of numbers, shape (n,)."""
+        value = self.values[key]
+        if isinstance(value, list):
+            raise TypeError(f"{key} is a column of text")
+        return value
+
+    def texts(self, key: str) -> list[str]:
+        """Return a column of texts."""
+        value = self.values[key]
+        if not isinstance(value, list):
+            raise TypeError(f"{key} is a column of numbers")
+        return value
+
+    def cell(self, row: int, key: str) -> str:
+        """Return the name of a cell, e.g. ``"C17"``; only its row where the column is missing."""
+        column = self.columns.get(key)
+        return cell_name(self.rows[row], column) if column else f"row {self.rows[row]}"
+
+    def error(self, row: int, key: str, message: str) -> CellError:
+        """Return a complaint about one cell, to be raised or gathered in a `WorkbookError`."""
+        return CellError(
+            message, file=self.file, sheet=self.sheet, cell=self.cell(row, key), column=key
+        )
+
+    def repeated(self, key: str) -> list[CellError]:
+        """Return a complaint for each text of a column that occurred before; blanks do not count.
+
+        The messages name both cells.
+        """
+        first: dict[str, int] = {}
+        errors = []
+        for row, text in enumerate(self.texts(key)):
+            if text and first.setdefault(text, row) != row:
+                other = self.cell(first[text], key)
+                message = f'"{text}" stands in {other} already; give each point its own name.'
+                errors.append(self.error(row, key, message))
+        return errors
+
+
+@dataclass(slots=True, kw_only=True)
+class NamedValues:
+    """Single values found by name: a defined name, or a label with its value to the right.
+
+    Parameters
+    ----------
+    file : str
+        Where they were found.
+    values : dict
+        Key to number (NaN where blank or absent) or text (empty where blank or absent).
+    places : dict
+        Key to (sheet, cell) of every value whose place was found, blank or not.
+    remarks : list of str
+        What the user should know.
+    """
+
+    file: str
+    values: dict[str, float | str]
+    places: dict[str, tuple[str, str]]
+    remarks: list[str] = field(default_factory=list)
+
+    def number(self, key: str) -> float:
+        """Return a number, NaN where blank or absent."""
+        value = self.values[key]
+        return value if isinstance(value, float) else np.nan
+
+    def text(self, key: str) -> str:
+        """Return a text, empty where blank or absent."""
+        value = self.values[key]
+        return value if isinstance(value, str) else ""
+
+    def has(self, key: str) -> bool:
+        """Whether a value was found that is not blank."""
+        value = self.values[key]
+        return bool(value) if isinstance(value, str) else not np.isnan(value)
+
+    def cell(self, key: str) -> str:
+        """Return the name of the value's cell, empty where it was not found."""
+        return self.places.get(key, ("", ""))[1]
+
+    def error(self, key: str, message: str) -> CellError:
+        """Return a complaint about one value, to be raised or gathered in a `WorkbookError`."""
+        sheet, cell = self.places.get(key, ("", ""))
+        return CellError(message, file=self.file, sheet=sheet, cell=cell, column=key)
+
+
+def parse_column_map(text: str, keys: Sequence[str] = ()) -> dict[str, str]:
+    """Return key -> heading or column letter from what a user typed.
+
+    Parameters
+    ----------
+    text : str
+        ``"s1=My column, s2=C"``, or the keys in the order of the file's columns for tables
+        without headings: ``"id,X,Y"`` (``-`` skips a column).
+    keys : sequence of str
+        The keys that exist; empty accepts any. Upper and lower case may be mixed up.
+
+    Raises
+    ------
+    InputError
+        If an entry cannot be understood, a key is unknown or named twice.
+
+    Examples
+    --------
+    >>> parse_column_map("id, X, -, Y")
+    {'id': 'A', 'X': 'B', 'Y': 'D'}
+    >>> parse_column_map("s1 = distance 1; s2=C")
+    {'s1': 'distance 1', 's2': 'C'}
+    """
+    entries = [entry.strip() for entry in re.split(r"[,;]", text)]
+    named = any("=" in entry for entry in entries)
+    found: dict[str, str] = {}
+    for position, entry in enumerate(entries, start=1):
+        if named:
+            key, equals, place = (part.strip() for part in entry.partition("="))
+            if not (key and equals and place):
+                raise InputError(
+                    f'--columns: "{entry}" cannot be understood; write KEY=HEADING or KEY=LETTER.'
+                )
+        elif entry in ("-", ""):
+            continue
+        else:
+            key, place = entry, column_letters(position)
+        key = _known(key, keys)
+        if key in found:
+            raise InputError(f'--columns: "{key}" is named twice.')
+        found[key] = place
+    if not found:
+        raise InputError("--columns: names no column; write for example id=A,s1=B,s2=C.")
+    return found
+
+
+def _known(key: str, keys: Sequence[str]) -> str:
+    if not keys or key in keys:
+        return key
+    alike = [known for known in keys if known.casefold() == key.casefold()]
+    if len(alike) == 1:
+        return alike[0]
+    raise InputError(f'--columns: there is no column "{key}"; known are {", ".join(keys)}.')
+
+
+ColumnMap = Mapping[str, str]

@@ -1,0 +1,168 @@
+"""Numbers as people type them: decimal commas, thousands, units, odd minus signs."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Literal
+
+Decimal = Literal["point", "comma"]
+Evidence = Literal["point", "comma", "none", "grouped comma", "grouped point"]
+
+#: Units people type, as they are written in headings; spelling to stable symbol.
+UNITS = {
+    **{
+        "mm": "mm",
+        "cm": "cm",
+        "dm": "dm",
+        "m": "m",
+        "km": "km",
+        "µm": "um",
+        "μm": "um",
+        "um": "um",
+    },
+    **{"px": "px", "pixel": "px", "pixels": "px", "pix": "px", "°": "deg", "deg": "deg"},
+    **{"degree": "deg", "degrees": "deg", "grad": "deg", "gradi": "deg", "gon": "gon"},
+    **{"rad": "rad", "%": "%", "°c": "degC", "nm": "nm", "-": "-"},
+}
+_METRES = {"um": 1e-6, "mm": 1e-3, "cm": 1e-2, "dm": 1e-1, "m": 1.0, "km": 1e3}
+_SPACES = dict.fromkeys(map(ord, "\u00a0\u2007\u2009\u202f\u2002\u2003"), " ")
+_MINUS = dict.fromkeys(map(ord, "\u2212\u2012\u2013\ufe63\uff0d"), "-")
+_NUMBER = re.compile(
+    r"(?P<number>[+-]?(?:\d[\d.,' \u2019]*|[.,]\d+)(?:[eE][+-]?\d+)?)"
+    r"\s*(?P<unit>[^\d\s.,'+-][^\d.,]*|)"
+)
+#: Thousands: groups of three digits with one kind of separator between them.
+_GROUPED = re.compile(r"[+-]?[1-9]\d{0,2}([.,' \u2019])\d{3}(\1\d{3})*$")
+
+
+@dataclass(frozen=True, slots=True)
+class NumberText:
+    """A text that looks like a number, taken apart but not yet read.
+
+    Parameters
+    ----------
+    digits : str
+        The number with its separators, blanks for thousands already taken out.
+    unit : str
+        Unit typed behind it, as typed.
+    """
+
+    digits: str
+    unit: str
+
+    @property
+    def evidence(self) -> Evidence:
+        """Which decimal separator the text proves, if any."""
+        point, comma = self.digits.count("."), self.digits.count(",")
+        if point and comma:
+            return "point" if self.digits.rfind(".") > self.digits.rfind(",") else "comma"
+        if not point and not comma:
+            return "none"
+        # 1,250,000 can only be grouped; 1,250 may be either.
+        if _GROUPED.match(re.split("[eE]", self.digits)[0]):
+            if point + comma > 1:
+                return "point" if comma else "comma"
+            return "grouped point" if point else "grouped comma"
+        return "point" if point else "comma"
+
+    @property
+    def has_thousands(self) -> bool:
+        """Whether the text certainly has separators between thousands."""
+        return self.digits.count(".") + self.digits.count(",") > 1
+
+    def value(self, decimal: Decimal) -> float | None:
+        """Return the number read with a decimal separator; None if it cannot be one."""
+        text, mark, other = (
+            (self.digits, ".", ",") if decimal == "point" else (self.digits, ",", ".")
+        )
+        mantissa = re.split("[eE]", text)[0]
+        whole, _, fraction = mantissa.partition(mark)
+        if other in fraction or mark in fraction:
+            return None
+        if other in whole and not _GROUPED.match(whole):
+            return None
+        try:
+            return float(text.replace(other, "").replace(mark, "."))
+        except ValueError:
+            return None
+
+
+def take_apart(text: str) -> NumberText | None:
+    """Return the parts of a text that looks like a number with or without unit, else None.
+
+    >>> take_apart("−1 250,5 mm")
+    NumberText(digits='-1250,5', unit='mm')
+    >>> take_apart("n/a") is None
+    True
+    """
+    clean = text.translate(_SPACES).translate(_MINUS).strip()
+    match = _NUMBER.fullmatch(clean)
+    if match is None:
+        return None
+    digits = match["number"].strip()
+    for blank in (" ", "'", "\u2019"):
+        if blank in digits:
+            whole, mark, rest = re.match(r"([^.,]*)([.,]?)(.*)", digits).groups()  # type: ignore[union-attr]
+            if not _GROUPED.match(whole) or blank in rest:
+                return None
+            digits = whole.replace(blank, "") + mark + rest
+    return NumberText(digits, match["unit"].strip())
+
+
+def unit_symbol(text: str) -> str:
+    """Return the stable symbol of a unit, empty when it is not a known unit.
+
+    >>> unit_symbol("[Pixel]"), unit_symbol("furlong")
+    ('px', '')
+    """
+    return UNITS.get(text.strip(" []().").casefold(), "")
+
+
+def converted(value: float, unit: str, wanted: str) -> float | None:
+    """Return a length in another unit, None where the two do not convert."""
+    if unit in _METRES and wanted in _METRES:
+        return float(f"{value * _METRES[unit] / _METRES[wanted]:.15g}")
+    return None
+
+
+def proven_by(texts: Iterable[NumberText]) -> set[Decimal]:
+    """Return the decimal separators that texts prove."""
+    marks: set[Decimal] = set()
+    for text in texts:
+        evidence = text.evidence
+        if evidence in ("point", "comma"):
+            marks.add(evidence)
+    return marks
+
+
+def decimal_of(
+    text: NumberText, proven: set[Decimal], *, thousands: bool, elsewhere: set[Decimal]
+) -> Decimal | None:
+    """Return the decimal separator with which to read a text, None where it stays ambiguous.
+
+    A wrong guess is wrong a thousandfold, so 1,250 is only read when the column, or else the other
+    columns of the table, leave one meaning.
+
+    Parameters
+    ----------
+    text : NumberText
+        The text.
+    proven, elsewhere : set
+        Separators that its own column and the other columns prove.
+    thousands : bool
+        Whether its column certainly has separators between thousands.
+    """
+    agreed = next(iter(proven)) if len(proven) == 1 else None
+    evidence = text.evidence
+    if evidence in ("point", "comma"):
+        return evidence
+    if evidence == "none":
+        return "point"
+    own: Decimal = "comma" if evidence == "grouped comma" else "point"
+    if agreed:
+        return agreed if agreed == own or thousands else None
+    if elsewhere:
+        return own if elsewhere == {own} else None
+    return "point" if own == "point" else None

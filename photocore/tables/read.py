@@ -1,0 +1,435 @@
+"""Reading tables and single values from the files people bring."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from photocore.errors import CellError, InputError, WorkbookError
+from photocore.spreadsheet.grid import Grid, SheetFile, TableArea, Value, cell_name
+from photocore.spreadsheet.package import check_header
+from photocore.tables import convert
+from photocore.tables.csvread import CsvFile, open_csv, read_csv_table
+from photocore.tables.fill import fill, refuse_doubles, take_unit_row
+from photocore.tables.headings import Match, bare, describe, find_columns
+from photocore.tables.model import Column, NamedValues, Table
+from photocore.tables.numbers import Decimal, take_apart
+from photocore.tables.rows import data_rows
+
+Source = Path | str | SheetFile | CsvFile
+
+#: Rows with content that are read beyond the limit: titles, notes, headings above the table.
+_MARGIN = 1000
+
+
+def open_tables(path: Path | str, *, max_rows: int = 100_000) -> SheetFile | CsvFile:
+    """Open a file once, to read several tables and values from it.
+
+    Parameters
+    ----------
+    path : path
+        An .xlsx, .xlsm, .ods, .csv, .tsv or .txt file.
+    max_rows : int
+        Rows of a sheet after which reading stops; text files have no limit.
+
+    Raises
+    ------
+    InputError
+        If the file is missing, empty, damaged, protected, unsafe or of another kind.
+    """
+    path = Path(path)
+    ending = path.suffix.lower()
+    if ending in (".csv", ".tsv", ".txt"):
+        return open_csv(path)
+    if not path.exists():
+        raise InputError(f"{path}: no such file.")
+    if ending in (".xls", ".xlsb", ".numbers", ".fods"):
+        raise InputError(f"{path}: {ending} files cannot be read; save the workbook as .xlsx.")
+    if ending in (".ods", ".ots"):
+        from photocore.spreadsheet.ods import open_ods
+
+        return open_ods(path, max_rows=max_rows + _MARGIN)
+    if ending in (".xlsx", ".xlsm", ".xltx", ".xltm"):
+        from photocore.spreadsheet.xlsx import open_xlsx
+
+        return open_xlsx(path, max_rows=max_rows + _MARGIN)
+    check_header(path)
+    raise InputError(
+        f'{path}: the ending "{ending}" is not known; give a .xlsx, .xlsm, .ods or .csv file.'
+    )
+
+
+def read_table(
+    source: Source,
+    columns: Sequence[Column],
+    *,
+    name: str | None = None,
+    sheet: str | None = None,
+    decimal: Decimal | None = None,
+    column_map: Mapping[str, str] | None = None,
+    max_rows: int = 100_000,
+    visible_only: bool = False,
+    errors: list[CellError] | None = None,
+) -> Table:
+    """Read a table, found by name, then by its headings, wherever it stands.
+
+    Parameters
+    ----------
+    source : path or open file
+        A file, or what `open_tables` returned.
+    columns : sequence of Column
+        What is asked for. Case, blanks, punctuation, order and units in brackets do not matter.
+    name : str, optional
+        Name of the table (``"Points"`` finds the table ``tblPoints``, then the sheet ``Points``).
+    sheet : str, optional
+        The only sheet to look at.
+    decimal : {"point", "comma"}, optional
+        Decimal separator of numbers typed as text; detected per column when None.
+    column_map : mapping, optional
+        Key to heading or column letter (see `parse_column_map`). A table whose columns are all
+        given by letter needs no headings.
+    max_rows : int
+        Most rows of a workbook's table; text files have no limit.
+    visible_only : bool
+        Leave hidden and filtered rows out instead of using them with a remark.
+    errors : list, optional
+        Gathers the bad cells instead of raising, to report those of several tables together.
+
+    Raises
+    ------
+    WorkbookError
+        Naming every bad cell, unless ``errors`` is given.
+    InputError
+        If the file cannot be read, or no table has the required headings.
+    """
+    if decimal not in (None, "point", "comma"):
+        raise InputError(f'decimal: expected "point" or "comma", found {decimal!r}.')
+    found = errors if errors is not None else []
+    book = (
+        source
+        if isinstance(source, SheetFile | CsvFile)
+        else open_tables(source, max_rows=max_rows)
+    )
+    if isinstance(book, CsvFile):
+        table = read_csv_table(book, columns, decimal=decimal, column_map=column_map, errors=found)
+    else:
+        place = _find(book, columns, name=name, sheet=sheet, column_map=column_map)
+        table = _read_grid(
+            book, place, columns, decimal, visible_only, max_rows=max_rows, errors=found
+        )
+        table.remarks[:0] = book.remarks
+    if errors is None and found:
+        raise WorkbookError(found)
+    return table
+
+
+@dataclass(slots=True)
+class _Place:
+    """A table in a workbook: its sheet, its columns, and its named area if it has one."""
+
+    grid: Grid
+    match: Match
+    area: TableArea | None = None
+
+
+def _find(
+    book: SheetFile,
+    columns: Sequence[Column],
+    *,
+    name: str | None,
+    sheet: str | None,
+    column_map: Mapping[str, str] | None,
+) -> _Place:
+    """Return the place of a table: by the table's name, by the sheet's, then by headings alone."""
+    titles = book.titles
+    if sheet is not None:
+        titles = [title for title in titles if bare(title) == bare(sheet)]
+        if not titles:
+            raise InputError(
+                f'{book.label}: has no sheet "{sheet}"; it has {_quoted(book.titles)}.'
+            )
+    wanted = bare(name or "")
+    near: _Place | None = None
+    for area in book.tables if wanted else ():
+        if area.sheet in titles and bare(area.name) in (wanted, f"tbl{wanted}"):
+            place = _in_area(book, area, columns, column_map)
+            if place and not place.match.missing(columns):
+                return place
+            near = near or place
+    for title in titles if wanted else ():
+        if bare(title) == wanted:
+            place = _in_sheet(book, title, columns, column_map)
+            if place and not place.match.missing(columns):
+                return place
+            near = near or place
+    places = [p for title in titles if (p := _in_sheet(book, title, columns, column_map))]
+    whole = [place for place in places if not place.match.missing(columns)]
+    if whole:
+        best = max(whole, key=lambda place: place.match.score[:2])
+        others = [p for p in whole if p is not best and p.match.score[:2] == best.match.score[:2]]
+        if others:
+            best.match.remarks.append(
+                f'The sheet "{best.grid.title}" is used; {_quoted(p.grid.title for p in others)} '
+                "has the same headings."
+            )
+        return best
+    raise _nothing_found(
+        book,
+        titles,
+        columns,
+        near or max(places, key=lambda place: place.match.score, default=None),
+    )
+
+
+def _in_area(
+    book: SheetFile,
+    area: TableArea,
+    columns: Sequence[Column],
+    column_map: Mapping[str, str] | None,
+) -> _Place | None:
+    """Look for the columns in the heading row of a named table."""
+    if area.header_rows == 0:
+        return None
+    grid = book.grid(area.sheet)
+    top, left, bottom, right = area.area
+    header = top + area.header_rows - 1
+    match = find_columns(
+        grid, columns, column_map=column_map, rows=(header, header), span=(left, right)
+    )
+    if match is None:
+        return None
+    match = replace(match, header=header, first=header + 1, last=bottom - area.totals_rows)
+    if not area.totals_rows:
+        _reach_below(grid, match, bottom)
+    return _Place(grid, match, area)
+
+
+def _reach_below(grid: Grid, match: Match, bottom: int) -> None:
+    """Take in rows typed directly below a named table that did not grow with them."""
+    used = set(match.columns.values())
+    row = bottom
+    while used & set(grid.rows.get(row + 1, ())):
+        row += 1
+    if row > bottom:
+        match.last = row
+        match.remarks.append(
+            f'The sheet "{grid.title}" has {row - bottom} rows directly below the table; they are '
+            "used too."
+        )
+
+
+def _in_sheet(
+    book: SheetFile,
+    title: str,
+    columns: Sequence[Column],
+    column_map: Mapping[str, str] | None,
+) -> _Place | None:
+    """Look for the columns anywhere in a sheet."""
+    grid = book.grid(title)
+    match = find_columns(grid, columns, column_map=column_map)
+    if match is None:
+        return None
+    area = next(
+        (a for a in book.tables if a.sheet == title and a.area[0] <= match.header <= a.area[2]),
+        None,
+    )
+    if area and area.totals_rows:
+        match.last = area.area[2] - area.totals_rows
+    return _Place(grid, match)
+
+
+def _nothing_found(
+    book: SheetFile, titles: Sequence[str], columns: Sequence[Column], near: _Place | None
+) -> InputError:
+    """Return the complaint that no table fits, naming the nearest one."""
+    required = [column.key for column in columns if column.required]
+    headings = ", ".join(required or [column.key for column in columns])
+    if near is None or not near.match.header:
+        empty = not any(book.grid(title).rows for title in titles)
+        what = "has no filled cell" if empty else f"has no table with the headings {headings}"
+        advice = (
+            ""
+            if empty
+            else ' Write them above the columns, or say which columns to use: --columns "id=A,...".'
+        )
+        return InputError(f"{book.label}: {what} (looked in {_quoted(titles)}).{advice}")
+    missing = ", ".join(near.match.missing(columns))
+    return InputError(
+        f"{book.label} › {near.grid.title}: the table in row {near.match.header} has no column "
+        f"{missing}; its headings are {describe(near.grid, near.match)}. Rename a heading, or say "
+        f'which column it is: --columns "{near.match.missing(columns)[0]}=HEADING".'
+    )
+
+
+def _read_grid(
+    book: SheetFile,
+    place: _Place,
+    columns: Sequence[Column],
+    decimal: Decimal | None,
+    visible_only: bool,
+    *,
+    max_rows: int,
+    errors: list[CellError],
+) -> Table:
+    """Turn the cells of a table into arrays."""
+    grid, match = place.grid, place.match
+    refuse_doubles(book.label, grid.title, match)
+    take_unit_row(grid, match)
+    found = data_rows(grid, match, columns, visible_only=visible_only)
+    if grid.truncated or len(found.rows) > max_rows:
+        raise InputError(
+            f"{book.label} › {grid.title}: has more than {max_rows} rows. Save the sheet as .csv "
+            "and use that file; text tables have no limit."
+        )
+    table = Table(
+        file=book.label,
+        sheet=grid.title,
+        values={},
+        present=frozenset(match.columns),
+        rows=found.rows,
+        columns=dict(match.columns),
+        units=dict(match.units),
+        headings=dict(match.headings),
+        blocks=found.blocks,
+        remarks=[*match.remarks, *found.remarks],
+    )
+    _refuse_merged(table, grid, errors)
+    raw: dict[str, list[Value | None]] = {}
+    for key, number in match.columns.items():
+        raw[key] = [grid.rows[row].get(number) for row in found.rows]
+    fill(table, columns, raw, decimal, errors)
+    return table
+
+
+def _refuse_merged(table: Table, grid: Grid, errors: list[CellError]) -> None:
+    """Complain about merged cells among the data: they hide values."""
+    used = {number: key for key, number in table.columns.items()}
+    index_of = {row: index for index, row in enumerate(table.rows)}
+    for top, left, bottom, right in grid.merged:
+        rows = [
+            index_of[row] for row in range(top, min(bottom, top + 10**5) + 1) if row in index_of
+        ]
+        keys = [
+            used[number] for number in range(left, min(right, left + 500) + 1) if number in used
+        ]
+        if rows and keys:
+            area = f"{cell_name(top, left)}:{cell_name(bottom, right)}"
+            message = f"the cells {area} are merged, so only one of them has a value; unmerge them."
+            errors.append(table.error(rows[0], keys[0], message))
+
+
+def _quoted(titles: object) -> str:
+    return ", ".join(f'"{title}"' for title in titles)  # type: ignore[attr-defined]
+
+
+def read_named_values(
+    source: Source,
+    names: Sequence[Column],
+    *,
+    sheet: str | None = None,
+    decimal: Decimal | None = None,
+    errors: list[CellError] | None = None,
+) -> NamedValues:
+    """Read single values: by defined name, else the value to the right of a label.
+
+    Parameters
+    ----------
+    source : path or open file
+        A file, or what `open_tables` returned.
+    names : sequence of Column
+        What is asked for; keys and aliases are labels, keys also defined names.
+    sheet : str, optional
+        Sheet to prefer when looking for labels, e.g. ``"Setup"``.
+    decimal, errors
+        As for `read_table`.
+
+    Raises
+    ------
+    WorkbookError
+        Naming every bad cell, unless ``errors`` is given.
+    InputError
+        If the file cannot be read, or a required value is absent or blank.
+    """
+    book = source if isinstance(source, SheetFile | CsvFile) else open_tables(source)
+    if isinstance(book, CsvFile):
+        book = book.as_sheets()
+    found = errors if errors is not None else []
+    titles = sorted(book.titles, key=lambda title: bare(title) != bare(sheet or ""))
+    result = NamedValues(file=book.label, values={}, places={})
+    for name in names:
+        place = _by_defined_name(book, name) or _by_label(book, titles, name)
+        value: Value | None = None
+        if place:
+            title, row, column = place
+            result.places[name.key] = (title, cell_name(row, column))
+            value = book.grid(title).rows.get(row, {}).get(column)
+
+        def complain(_: int, message: str, key: str = name.key) -> None:
+            found.append(result.error(key, message))
+
+        result.values[name.key] = _single(name, value, decimal, complain)
+    if errors is None and found:
+        raise WorkbookError(found)
+    faulty = {error.column for error in found}
+    missing = [n.key for n in names if n.required and not result.has(n.key) and n.key not in faulty]
+    if missing:
+        where = f"{book.label} › {sheet}" if sheet else book.label
+        raise InputError(f"{where}: no value for {', '.join(missing)}; fill it in.")
+    return result
+
+
+def _single(
+    name: Column, value: Value | None, decimal: Decimal | None, complain: convert.Complain
+) -> float | str:
+    if name.kind == "text":
+        return convert.texts([value], complain)[0]
+    if name.kind == "flag":
+        return float(convert.flags([value], complain)[0])
+    numbers, _, _ = convert.numbers(
+        name, [value], unit="", decimal=decimal, elsewhere=set(), complain=complain
+    )
+    return float(np.asarray(numbers)[0])
+
+
+def _by_defined_name(book: SheetFile, name: Column) -> tuple[str, int, int] | None:
+    place = book.names.get(name.key.casefold())
+    return place if place and place[0] in book.titles else None
+
+
+def _by_label(book: SheetFile, titles: Sequence[str], name: Column) -> tuple[str, int, int] | None:
+    """Return the cell of a value whose label stands to its left."""
+    labels = {bare(name.key), *map(bare, name.aliases)}
+    for title in titles:
+        grid = book.grid(title)
+        values = _value_column(grid)
+        for row in sorted(grid.rows):
+            cells = grid.rows[row]
+            for column in sorted(cells):
+                text = cells[column]
+                if isinstance(text, str) and bare(text) in labels:
+                    return title, row, _right_of(cells, column, values, name)
+    return None
+
+
+def _value_column(grid: Grid) -> int:
+    """Return the column headed "value", 0 where there is none."""
+    for row in sorted(grid.rows)[:20]:
+        for column, text in grid.rows[row].items():
+            if isinstance(text, str) and bare(text) in ("value", "valore", "wert"):
+                return column
+    return 0
+
+
+def _right_of(cells: Mapping[int, Value], column: int, values: int, name: Column) -> int:
+    """Return the column of a value: the one headed so, else the first that fits the kind."""
+    if values > column:
+        return values
+    right = [c for c in sorted(cells) if c > column]
+    if name.kind != "text":
+        fitting = [c for c in right if not isinstance(cells[c], str)]
+        fitting += [c for c in right if take_apart(str(cells[c])) is not None]
+        return next(iter(fitting), right[-1] if len(right) == 1 else column + 1)
+    return next(iter(right), column + 1)

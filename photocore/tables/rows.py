@@ -1,0 +1,139 @@
+"""Which rows of a sheet are data: blocks, repeated headings, notes below, hidden rows."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+from photocore.spreadsheet.grid import Grid, Value
+from photocore.tables.headings import Match, bare
+from photocore.tables.model import Column
+
+
+@dataclass(slots=True)
+class DataRows:
+    """The rows of a table.
+
+    Parameters
+    ----------
+    rows : list of int
+        Row numbers.
+    blocks : list of str
+        Label of the block each row belongs to, empty where there is none.
+    remarks : list of str
+        What was left out or used with doubt.
+    """
+
+    rows: list[int] = field(default_factory=list)
+    blocks: list[str] = field(default_factory=list)
+    remarks: list[str] = field(default_factory=list)
+
+
+class RowSorter:
+    """Tells data from headings, block labels and notes, one row after the other.
+
+    Parameters
+    ----------
+    match : Match
+        Where the columns are.
+    columns : sequence of Column
+        What they are.
+    headings : mapping
+        The cells of the heading row, by column.
+    """
+
+    def __init__(
+        self, match: Match, columns: Sequence[Column], headings: Mapping[int, Value]
+    ) -> None:
+        kinds = {column.key: column.kind for column in columns}
+        self.columns = match.columns
+        self.text = {n for key, n in match.columns.items() if kinds[key] == "text"}
+        self.numeric = {
+            n for key, n in match.columns.items() if kinds[key] in ("number", "integer")
+        }
+        # A prepared row whose only content is a preset flag holds no data.
+        self.filling = {n for key, n in match.columns.items() if kinds[key] != "flag"}
+        used = set(match.columns.values())
+        self.headings = {n: bare(str(v)) for n, v in headings.items() if n in used}
+        self.block = ""
+        self.previous = match.first - 1
+        self.left_out: list[int] = []
+
+    def is_data(self, row: int, cells: Mapping[int, Value]) -> bool:
+        """Whether a row holds data; block labels and rows left out are remembered."""
+        if len(cells) == 1:
+            number, value = next(iter(cells.items()))
+            if number not in self.text and len(self.numeric) > 1:
+                self.block = label(value)
+                self.previous = row
+                return False
+        if not self.filling & cells.keys():
+            return False
+        if self.headings and any(isinstance(cells.get(n), str) for n in self.headings):
+            shown = {n: bare(str(cells.get(n, ""))) for n in self.headings}
+            if shown == self.headings:
+                self.previous = row
+                return False
+        if row != self.previous + 1 and self.numeric and not self.numeric & cells.keys():
+            self.left_out.append(row)
+            return False
+        self.previous = row
+        return True
+
+    def remarks(self) -> list[str]:
+        """Return what the user should know of the rows left out."""
+        if not self.left_out:
+            return []
+        rows = ", ".join(map(str, self.left_out[:5])) + (", ..." if len(self.left_out) > 5 else "")
+        return [f"Left out as notes, since they stand apart and hold no number: row {rows}."]
+
+
+def label(value: Value) -> str:
+    """Return the label of a block as text, 27.0 as ``"27"``."""
+    if isinstance(value, float) and value.is_integer():
+        return str(int(value))
+    return str(value).strip()
+
+
+def data_rows(
+    grid: Grid, match: Match, columns: Sequence[Column], *, visible_only: bool
+) -> DataRows:
+    """Return the rows of a table that hold data.
+
+    Parameters
+    ----------
+    grid : Grid
+        The sheet.
+    match : Match
+        Where the table's columns and headings are.
+    columns : sequence of Column
+        What was asked for.
+    visible_only : bool
+        Leave hidden rows out.
+    """
+    found = DataRows()
+    sorter = RowSorter(match, columns, grid.rows.get(match.header, {}))
+    above = [row for row in grid.rows if row < min(match.header or match.first, match.first)]
+    if match.header and above:
+        cells = grid.rows[max(above)]
+        if len(cells) == 1 and not isinstance(next(iter(cells.values())), str):
+            sorter.block = label(next(iter(cells.values())))
+    elif above:
+        for row in sorted(above)[-2:]:
+            if len(grid.rows[row]) == 1:
+                sorter.block = label(next(iter(grid.rows[row].values())))
+    hidden = 0
+    for row in sorted(grid.rows):
+        if not match.first <= row <= match.last or not sorter.is_data(row, grid.rows[row]):
+            continue
+        if row in grid.hidden:
+            hidden += 1
+            if visible_only:
+                continue
+        found.rows.append(row)
+        found.blocks.append(sorter.block)
+    found.remarks += sorter.remarks()
+    if hidden:
+        what = "were left out" if visible_only else "are used too; --visible-only leaves them out"
+        found.remarks.append(f"{hidden} hidden or filtered rows {what}.")
+    return found

@@ -1,0 +1,412 @@
+"""Tables as people bring them, in every file format."""
+
+import datetime
+import zipfile
+
+import numpy as np
+import openpyxl
+import pytest
+
+from photocore.errors import InputError, WorkbookError
+from photocore.tables import (
+    Column,
+    open_tables,
+    parse_column_map,
+    read_named_values,
+    read_table,
+)
+
+POLAR = (
+    Column("id", ("Point", "Punto", "Punkt", "Nr."), kind="text", required=True),
+    Column("s1", ("distanza radiale 1", "Radialdistanz 1"), required=True, unit="mm"),
+    Column("s2", ("distanza radiale 2", "Radialdistanz 2"), required=True, unit="mm"),
+    Column("theta", ("anomalia", "Richtung"), unit="deg"),
+    Column("use", kind="flag"),
+)
+SAMPLES = [("P1", 12.5, 13.25, 30.0), ("P2", 14.75, 15.5, 200.0)]
+
+
+@pytest.fixture
+def book(tmp_path):
+    """Return a function that writes rows to a workbook and returns its path."""
+
+    def write(*sheets, name="survey.xlsx", edit=None):
+        workbook = openpyxl.Workbook()
+        workbook.remove(workbook.active)
+        for number, rows in enumerate(sheets, start=1):
+            sheet = workbook.create_sheet(f"Sheet{number}")
+            for row in rows:
+                sheet.append(row)
+        if edit:
+            edit(workbook)
+        workbook.save(tmp_path / name)
+        return tmp_path / name
+
+    return write
+
+
+def polar_rows(heading=("id", "s1", "s2", "theta"), data=SAMPLES):
+    return [heading, *data]
+
+
+def check_samples(table):
+    assert table.texts("id") == ["P1", "P2"]
+    assert table.numbers("s1").tolist() == [12.5, 14.75]
+    assert table.numbers("s2").tolist() == [13.25, 15.5]
+
+
+@pytest.mark.parametrize(
+    "heading",
+    [
+        ("id", "s1", "s2", "theta"),
+        ("ID ", "S1 [mm]", " s_2 (mm)", "Theta [deg]"),
+        ("Punto", "Distanza radiale 1", "distanza_radiale 2 [mm]", "Anomalia [°]"),
+        ("Punkt", "Radialdistanz 1 [mm]", "RADIALDISTANZ 2", "Richtung"),
+        ("Point", "s₁ [mm]", "s₂ [mm]", "theta"),
+        ("Nr", "s1 mm", "s2, mm", "theta"),
+    ],
+)
+def test_headings_are_found_in_any_case_language_and_with_units(book, heading):
+    table = read_table(book(polar_rows(heading)), POLAR)
+    check_samples(table)
+    assert table.numbers("theta").tolist() == [30.0, 200.0]
+
+
+def test_units_in_headings_are_reported(book):
+    table = read_table(book(polar_rows(("id", "s1 [px]", "s2 (mm)", "theta"))), POLAR)
+    assert table.units == {"s1": "px", "s2": "mm"}
+
+
+def test_a_row_of_units_below_the_headings_is_taken_as_units(book):
+    rows = [("id", "s1", "s2"), (None, "[mm]", "mm"), ("P1", 1, 2)]
+    table = read_table(book(rows), POLAR)
+    assert table.units == {"s1": "mm", "s2": "mm"}
+    assert table.texts("id") == ["P1"]
+
+
+def test_columns_are_found_in_any_order_sheet_and_row(book):
+    rows = [(), ("Survey of the church",), (), (None, "s2", "theta", "id", "other", "s1")]
+    rows += [(None, s2, theta, name, "x", s1) for name, s1, s2, theta in SAMPLES]
+    table = read_table(book([("notes",)], [], rows), POLAR)
+    check_samples(table)
+    assert table.sheet == "Sheet3"
+    assert table.cell(1, "s1") == "F6"
+    assert str(table.error(1, "s1", "too long.")) == "survey.xlsx › Sheet3!F6 (s1): too long."
+
+
+def test_a_missing_optional_column_is_blank_and_not_present(book):
+    table = read_table(book([row[:3] for row in polar_rows()]), POLAR)
+    assert "theta" not in table.present
+    assert np.isnan(table.numbers("theta")).all()
+
+
+def test_a_missing_required_column_is_named_with_the_headings_that_are_there(book):
+    path = book([("id", "s1", "theta"), ("P1", 1, 2)])
+    with pytest.raises(InputError, match=r'row 1 has no column s2; .*"theta" \(C1\).*--columns'):
+        read_table(path, POLAR)
+
+
+def test_a_table_is_found_by_its_name_before_anything_else(book):
+    from openpyxl.worksheet.table import Table as ExcelTable
+
+    def add(workbook):
+        workbook.worksheets[1].add_table(ExcelTable(displayName="tblPoints", ref="A1:D3"))
+
+    other = [("id", "s1", "s2", "theta", "use"), ("wrong", 1, 2, 3, 1)]
+    path = book(other, polar_rows(), edit=add)
+    check_samples(read_table(path, POLAR, name="Points"))
+    assert read_table(path, POLAR).texts("id") == ["wrong"]
+
+
+def test_rows_typed_below_a_named_table_are_used_with_a_remark(book):
+    from openpyxl.worksheet.table import Table as ExcelTable
+
+    def add(workbook):
+        workbook.worksheets[0].add_table(ExcelTable(displayName="tblPoints", ref="A1:D2"))
+
+    table = read_table(book(polar_rows(), edit=add), POLAR, name="Points")
+    check_samples(table)
+    assert "1 rows directly below the table" in table.remarks[0]
+
+
+def test_a_sheet_that_is_not_there_is_named_with_those_that_are(book):
+    with pytest.raises(InputError, match='no sheet "Punti"; it has "Sheet1"'):
+        read_table(book(polar_rows()), POLAR, sheet="Punti")
+
+
+def test_ids_stay_text_and_whole_numbers_lose_their_point(book):
+    rows = [("id", "s1", "s2"), ("001", 1, 2), (1, 1, 2), (2.0, 1, 2), ("=x", 1, 2), (1.5, 1, 2)]
+
+    def as_text(workbook):
+        workbook.worksheets[0]["A5"].data_type = "s"
+
+    table = read_table(book(rows, edit=as_text), POLAR)
+    assert table.texts("id") == ["001", "1", "2", "=x", "1.5"]
+
+
+def test_numbers_typed_as_text_are_read_with_commas_spaces_minus_signs_and_units(book):
+    cells = ["12,5", " 1 250,5 ", "\u22123,25", "7\u00a0mm", "1\u202f000,5", "0,125"]
+    rows = [("id", "s1 [mm]", "s2"), *((f"P{i}", cell, 1) for i, cell in enumerate(cells))]
+    table = read_table(book(rows), POLAR)
+    assert table.numbers("s1").tolist() == [12.5, 1250.5, -3.25, 7.0, 1000.5, 0.125]
+    assert table.remarks == ["s1: the unit typed into 1 cells was taken off."]
+
+
+def test_a_wrong_unit_in_a_cell_is_refused_with_the_converted_number(book):
+    path = book([("id", "s1 [mm]", "s2"), ("P1", "1,24 cm", 1)])
+    with pytest.raises(WorkbookError, match=r'Sheet1!B2 \(s1\): found "1,24 cm".* Write 12.4; the'):
+        read_table(path, POLAR)
+
+
+@pytest.mark.parametrize(
+    ("cell", "message"),
+    [
+        ("abc", 'found "abc", expected a number in mm'),
+        ("n/a", "Leave the cell empty"),
+        (True, "holds TRUE"),
+        ("1,250", "may mean 1.25 or 1250.*--decimal"),
+        (datetime.date(2026, 5, 1), "holds the date 2026-05-01.*probably 1.5"),
+        (datetime.time(1, 30), "time of day"),
+        ("=1/0", "never been calculated"),
+    ],
+)
+def test_a_bad_number_is_named_with_its_cell(book, cell, message):
+    path = book([("id", "s1", "s2"), ("P1", 1, 2), ("P2", cell, 2)])
+    with pytest.raises(WorkbookError, match=rf"survey.xlsx › Sheet1!B3 \(s1\): .*{message}"):
+        read_table(path, POLAR)
+
+
+def test_january_2025_was_typed_as_a_number_with_two_decimals(book):
+    def style(workbook):
+        workbook.worksheets[0]["B2"].number_format = "mmm-yy"
+
+    path = book([("id", "s1", "s2"), ("P1", datetime.date(2025, 1, 1), 2)], edit=style)
+    with pytest.raises(WorkbookError, match="probably 1.25"):
+        read_table(path, POLAR)
+
+
+def test_a_format_with_a_unit_is_not_taken_for_a_date(book):
+    def style(workbook):
+        workbook.worksheets[0]["B2"].number_format = '0.00" mm"'
+
+    table = read_table(book([("id", "s1", "s2"), ("P1", 12.5, 2)], edit=style), POLAR)
+    assert table.numbers("s1").tolist() == [12.5]
+
+
+def test_all_bad_cells_are_reported_at_once_in_the_order_of_the_sheet(book):
+    path = book([("id", "s1", "s2"), ("P1", "a", "b"), ("P2", 1, "c")])
+    with pytest.raises(WorkbookError) as caught:
+        read_table(path, POLAR)
+    assert [error.cell for error in caught.value.errors] == ["B2", "C2", "C3"]
+
+
+def test_bad_cells_of_several_tables_can_be_gathered(book):
+    opened = open_tables(book([("id", "s1", "s2"), ("P1", "a", 1)], [("X", "Y"), ("b", 1)]))
+    errors = []
+    table = read_table(opened, POLAR, errors=errors)
+    read_table(opened, (Column("X"), Column("Y")), sheet="Sheet2", errors=errors)
+    assert [(error.sheet, error.cell) for error in errors] == [("Sheet1", "B2"), ("Sheet2", "A2")]
+    assert np.isnan(table.numbers("s1")).all()
+
+
+def test_the_user_decides_what_an_ambiguous_number_means(book):
+    path = book([("id", "s1", "s2"), ("P1", "1,250", 2)])
+    assert read_table(path, POLAR, decimal="comma").numbers("s1").tolist() == [1.25]
+    assert read_table(path, POLAR, decimal="point").numbers("s1").tolist() == [1250.0]
+
+
+def test_another_number_of_the_table_settles_what_an_ambiguous_one_means(book):
+    path = book([("id", "s1", "s2"), ("P1", "1,250", "2,5")])
+    assert read_table(path, POLAR).numbers("s1").tolist() == [1.25]
+
+
+def test_point_and_comma_in_one_column_are_refused(book):
+    rows = [("id", "s1", "s2"), ("P1", "1,25", 2), ("P2", "1,5", 2), ("P3", "1.75", 2)]
+    with pytest.raises(WorkbookError, match=r'B4 \(s1\): found "1.75", while .*comma. Write 1,75'):
+        read_table(book(rows), POLAR)
+
+
+def test_error_values_are_named_and_cached_results_of_formulas_are_read(tmp_path, book):
+    path = book([("id", "s1", "s2"), ("P1", 1, "=B2*2"), ("P2", 2, "=1/0")])
+    with zipfile.ZipFile(path) as package:
+        parts = {name: package.read(name) for name in package.namelist()}
+    sheet = parts["xl/worksheets/sheet1.xml"]
+    sheet = sheet.replace(b"<f>B2*2</f><v></v>", b"<f>B2*2</f><v>2.5</v>")
+    sheet = sheet.replace(b"<f>B2*2</f><v />", b"<f>B2*2</f><v>2.5</v>")
+    sheet = sheet.replace(b'<c r="C3"><f>1/0</f>', b'<c r="C3" t="e"><f>1/0</f>')
+    for empty in (b"<v></v>", b"<v />"):
+        sheet = sheet.replace(b"1/0</f>" + empty, b"1/0</f><v>#DIV/0!</v>")
+    parts["xl/worksheets/sheet1.xml"] = sheet
+    with zipfile.ZipFile(tmp_path / "cached.xlsx", "w") as package:
+        for name, data in parts.items():
+            package.writestr(name, data)
+    with pytest.raises(WorkbookError, match=r"C3 \(s2\): holds the error #DIV/0!") as caught:
+        read_table(tmp_path / "cached.xlsx", POLAR)
+    assert len(caught.value.errors) == 1
+
+
+def test_hidden_rows_are_used_with_a_remark_unless_only_visible_ones_are_wanted(book):
+    def hide(workbook):
+        workbook.worksheets[0].row_dimensions[2].hidden = True
+
+    path = book(polar_rows(), edit=hide)
+    table = read_table(path, POLAR)
+    check_samples(table)
+    assert table.remarks == [
+        "1 hidden or filtered rows are used too; --visible-only leaves them out."
+    ]
+    assert read_table(path, POLAR, visible_only=True).texts("id") == ["P2"]
+
+
+def test_merged_cells_in_the_data_are_refused(book):
+    def merge(workbook):
+        workbook.worksheets[0].merge_cells("B2:B3")
+
+    with pytest.raises(WorkbookError, match=r"B2:B3 are merged"):
+        read_table(book(polar_rows(), edit=merge), POLAR)
+
+
+def test_merged_two_row_headings_name_photo_and_coordinate(book):
+    columns = (Column("id", kind="text"), *map(Column, ("x1", "y1", "x2", "y2")))
+    rows = [("id", "Photo 1", None, "Photo 2", None), (None, "x [mm]", "y [mm]", "x", "y")]
+    rows += [("P1", 1, 2, 3, 4)]
+
+    def merge(workbook):
+        for area in ("A1:A2", "B1:C1", "D1:E1"):
+            workbook.worksheets[0].merge_cells(area)
+
+    table = read_table(book(rows, edit=merge), columns)
+    assert [table.numbers(k).tolist() for k in ("x1", "y1", "x2", "y2")] == [[1], [2], [3], [4]]
+    assert table.units == {"x1": "mm", "y1": "mm"}
+    assert table.texts("id") == ["P1"]
+
+
+def test_a_key_row_wins_over_the_row_of_labels_above_it(book):
+    rows = [("Punto", "s1 [mm]", "s2 [mm]"), ("id", "s1", "s2"), ("P1", 1, 2)]
+    assert read_table(book(rows), POLAR).texts("id") == ["P1"]
+
+
+def test_blocks_with_repeated_headings_and_gaps_are_one_table(book):
+    heading = ("id", "s1", "s2")
+    rows = [heading, ("P1", 1, 2), (), heading, ("P2", 3, 4), (), ("P3", 5, 6)]
+    rows += [(), ("measured by Rossi",), ("on a rainy day",)]
+    table = read_table(book(rows), POLAR)
+    assert table.texts("id") == ["P1", "P2", "P3"]
+    assert table.remarks == [
+        "Left out as notes, since they stand apart and hold no number: row 9, 10."
+    ]
+
+
+def test_prepared_rows_that_hold_only_a_flag_are_no_data(book):
+    rows = [("id", "s1", "s2", "use"), ("P1", 1, 2, "yes"), (None, None, None, 1)]
+    table = read_table(book(rows), POLAR)
+    assert table.texts("id") == ["P1"]
+    assert table.numbers("use").tolist() == [1.0]
+
+
+def test_repeated_names_and_points_are_found(book):
+    table = read_table(book([("id", "s1", "s2"), ("P1", 1, 2), ("P1", 3, 4)]), POLAR)
+    assert [str(error) for error in table.repeated("id")] == [
+        'survey.xlsx › Sheet1!A3 (id): "P1" stands in A2 already; give each point its own name.'
+    ]
+
+
+def test_more_rows_than_the_limit_lead_to_csv(book):
+    rows = [("id", "s1", "s2"), *((f"P{i}", 1, 2) for i in range(6))]
+    with pytest.raises(InputError, match=r"more than 5 rows. Save the sheet as .csv"):
+        read_table(book(rows), POLAR, max_rows=5)
+
+
+def test_the_same_heading_twice_needs_a_letter(book):
+    path = book([("id", "s1", "s2", "s1"), ("P1", 1, 2, 3)])
+    with pytest.raises(InputError, match=r'"s1" stands in B1 and D1.*--columns "s1=B"'):
+        read_table(path, POLAR)
+    assert read_table(path, POLAR, column_map={"s1": "D"}).numbers("s1").tolist() == [3.0]
+
+
+def test_a_column_map_names_headings_or_letters():
+    assert parse_column_map("s1=my column, S2=C", ("s1", "s2")) == {"s1": "my column", "s2": "C"}
+    with pytest.raises(InputError, match='no column "s3"; known are s1, s2'):
+        parse_column_map("s3=A", ("s1", "s2"))
+    with pytest.raises(InputError, match="named twice"):
+        parse_column_map("s1=A,s1=B")
+
+
+def test_named_values_are_found_by_name_and_by_label(book):
+    from openpyxl.workbook.defined_name import DefinedName
+
+    def name(workbook):
+        workbook.defined_names["c_1"] = DefinedName("c_1", attr_text="Sheet1!$D$2")
+
+    rows = [("name", "description", "unit", "value"), ("long lens", None, "mm", 35)]
+    rows += [("d_2", "distance 2 of the near camera", "m", "9,5"), ("input unit", "", "", "px")]
+    names = (
+        Column("c_1"),
+        Column("d_2"),
+        Column("unit", ("input unit",), kind="text"),
+        Column("pitch"),
+    )
+    values = read_named_values(book(rows, edit=name), names)
+    assert (values.number("c_1"), values.number("d_2"), values.text("unit")) == (35.0, 9.5, "px")
+    assert not values.has("pitch")
+    assert str(values.error("d_2", "too near.")) == "survey.xlsx › Sheet1!D3 (d_2): too near."
+
+
+def test_a_missing_required_value_is_named(book):
+    with pytest.raises(InputError, match=r"survey.xlsx › Setup: no value for c_1"):
+        read_named_values(book([("x", 1)]), [Column("c_1", required=True)], sheet="Setup")
+
+
+class TestSampleWorkbooks:
+    """The workbooks of the data folder, each with a trap of its own."""
+
+    XY = (
+        Column("id", ("ID", "Point"), kind="text"),
+        Column("x1", ("x",)),
+        Column("y1", ("y",)),
+        Column("x2", ("x",)),
+        Column("y2", ("y",)),
+    )
+
+    def test_without_headings_the_columns_are_given_by_order(self, data_dir):
+        columns = (Column("id", kind="text"), Column("X"), Column("Y"))
+        path = data_dir / "spreadsheets/no_header_xy.xlsx"
+        with pytest.raises(InputError, match="no table with the headings id, X, Y.*--columns"):
+            read_table(path, columns)
+        table = read_table(path, columns, column_map=parse_column_map("id,X,Y"))
+        assert len(table) == 28
+        assert table.texts("id")[0] == "1"
+        assert table.numbers("Y")[0] == -283760.6273
+
+    def test_repeated_names_go_to_photo_1_and_2_and_a_nameless_first_column_names_points(
+        self, data_dir
+    ):
+        table = read_table(data_dir / "spreadsheets/repeated_column_names.xlsx", self.XY)
+        assert len(table) == 22
+        assert table.texts("id")[16] == "T1"
+        assert [table.numbers(k)[16] for k in ("x1", "y1", "x2", "y2")] == [
+            -10.105,
+            15.011,
+            -103.829,
+            16.042,
+        ]
+
+    def test_rows_that_hold_only_a_photo_number_label_blocks(self, data_dir):
+        path = data_dir / "spreadsheets/photo_number_rows.xlsx"
+        with pytest.raises(InputError, match="stands in A2 and E2 and G2"):
+            read_table(path, self.XY)
+        table = read_table(path, self.XY, column_map=parse_column_map("x1,y1,x2,y2"))
+        assert table.blocks == ["27"] * 4 + ["28"] * 4
+        assert table.numbers("x1").tolist()[3:5] == [15338.0, 7365.0]
+        assert table.cell(4, "x1") == "A8"
+
+    def test_headings_in_two_rows_are_read_together(self, data_dir):
+        columns = (Column("id", kind="text"), Column("row1"), Column("col2"), Column("X"))
+        table = read_table(
+            data_dir / "spreadsheets/two_row_header_empty_sheets.xlsx",
+            columns,
+            column_map={"row1": "588 i", "col2": "589 j"},
+        )
+        assert len(table) == 230
+        assert table.texts("id")[0] == "1"
+        assert (table.numbers("row1")[0], table.numbers("col2")[0]) == (2026.0, 17744.0)
