@@ -142,9 +142,10 @@ def _apply_map(
         elif place not in texts and place.isdecimal():
             fixed[column.key] = int(place)
         wanted.append(Column(column.key, (place,), column.kind, column.required, column.unit))
-    if len(fixed) == len(wanted):
-        return fixed, wanted
     mapped = {column.key for column in wanted}
+    complete = all(column.key in mapped for column in columns if column.required)
+    if len(fixed) == len(wanted) and complete:
+        return fixed, wanted
     # With headings to go by, columns that the map does not name are found as usual.
     return fixed, wanted + [column for column in columns if column.key not in mapped]
 

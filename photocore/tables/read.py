@@ -404,9 +404,11 @@ def _by_label(book: SheetFile, titles: Sequence[str], name: Column) -> tuple[str
     labels = {bare(name.key), *map(bare, name.aliases)}
     for title in titles:
         grid = book.grid(title)
-        values = _value_column(grid)
+        headings, values = _value_column(grid)
         for row in sorted(grid.rows):
             cells = grid.rows[row]
+            if row == headings:
+                continue
             for column in sorted(cells):
                 text = cells[column]
                 if isinstance(text, str) and bare(text) in labels:
@@ -414,13 +416,13 @@ def _by_label(book: SheetFile, titles: Sequence[str], name: Column) -> tuple[str
     return None
 
 
-def _value_column(grid: Grid) -> int:
-    """Return the column headed "value", 0 where there is none."""
+def _value_column(grid: Grid) -> tuple[int, int]:
+    """Return row and column of the heading "value", zeros where there is none."""
     for row in sorted(grid.rows)[:20]:
         for column, text in grid.rows[row].items():
             if isinstance(text, str) and bare(text) in ("value", "valore", "wert"):
-                return column
-    return 0
+                return row, column
+    return 0, 0
 
 
 def _right_of(cells: Mapping[int, Value], column: int, values: int, name: Column) -> int:
