@@ -15,6 +15,7 @@ from .materials import (
 from .shift import ShiftDerivatives
 from .snell import critical_angle, refracted_angle, refracted_direction
 from .solvers.projection import project, projection_status
+from .solvers.resection import Resection, resect
 from .water import (
     HOEHLE,
     PARRISH,
@@ -41,6 +42,7 @@ __all__ = [
     "PARRISH",
     "POLYCARBONATE",
     "QUAN_FRY",
+    "Resection",
     "SAPPHIRE",
     "Sensor",
     "ShiftDerivatives",
@@ -55,6 +57,7 @@ __all__ = [
     "radial_shift_ratio",
     "refracted_angle",
     "refracted_direction",
+    "resect",
     "salinity_from_index",
     "temperature_from_index",
     "water_index_derivatives",

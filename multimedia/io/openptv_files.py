@@ -1,0 +1,317 @@
+"""The single files of OpenPTV: .ori, .addpar, ptv.par, _targets, calibration body, rt_is."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from multimedia.domain.camera import Camera, Sensor
+from multimedia.domain.flat_interface import FlatInterface
+from multimedia.domain.layers import Layers
+from photocore.arrays import FloatArray, IntArray
+from photocore.distortion import Brown, Convention
+from photocore.errors import GeometryError, InputError
+from photocore.rotation import nearest_rotation, world_from_camera
+
+#: A printed matrix has 7 decimals; angles and matrix of one camera differ by a few of the last.
+MATRIX_ROUNDING = 1e-5
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ControlParameters:
+    """What ptv.par says.
+
+    Attributes
+    ----------
+    images, calibration_images : tuple of str
+        Base name of the sequence and the calibration image of each camera.
+    sensor : Sensor
+        Its origin is OpenPTV's: (width / 2, height / 2).
+    field : int
+        0 for whole frames, 1 or 2 for the odd or even lines of interlaced video.
+    indices : tuple of float
+        Air, glass, water as the file says.
+    thickness : float
+        Of the glass. [mm]
+    """
+
+    images: tuple[str, ...]
+    calibration_images: tuple[str, ...]
+    sensor: Sensor
+    field: int
+    indices: tuple[float, ...]
+    thickness: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Targets:
+    """Detected targets of one image: pixels (column, row), pixel counts, correspondence numbers."""
+
+    pixels: FloatArray
+    counts: IntArray
+    numbers: IntArray
+
+
+def read_control(path: Path) -> ControlParameters:
+    """Read ptv.par.
+
+    Raises
+    ------
+    InputError
+        If a line is missing or not what it should be; the message names the line.
+    """
+    lines = [line.strip() for line in _text(path).splitlines()]
+    while lines and not lines[-1]:
+        lines.pop()
+    count = int(_number(path, lines, 0, "number of cameras"))
+    if not 1 <= count <= 64:
+        raise InputError(f"{path}, line 1: {count} cameras; expected 1 to 64.")
+    names = lines[1 : 1 + 2 * count]
+    first = 1 + 2 * count
+    what = ("high-pass flag", "all-camera flag", "TIFF flag", "image width", "image height",
+            "pixel width", "pixel height", "field flag", "index of air", "index of glass",
+            "index of water", "glass thickness")  # fmt: skip
+    values = [_number(path, lines, first + k, name) for k, name in enumerate(what)]
+    width, height, pitch = int(values[3]), int(values[4]), values[5:7]
+    if max(pitch) > 0.2:
+        raise InputError(
+            f"{path}, line {first + 6}: a pixel of {pitch[0]:g} x {pitch[1]:g} mm is no camera's; "
+            "expected some 0.002 to 0.03 mm. Is it in micrometres?"
+        )
+    return ControlParameters(
+        images=tuple(names[0::2]),
+        calibration_images=tuple(names[1::2]),
+        sensor=Sensor(
+            width=width, height=height, pitch=np.array(pitch), origin=np.array([width, height]) / 2
+        ),
+        field=int(values[7]),
+        indices=tuple(values[8:11]),
+        thickness=values[11],
+    )
+
+
+def read_camera(path: Path, *, sensor: Sensor, name: str) -> tuple[Camera, FloatArray, list[str]]:
+    """Read an .ori file and the .addpar beside it.
+
+    Returns
+    -------
+    camera : Camera
+        With OpenPTV's distortion convention.
+    glass : ndarray, shape (3,)
+        From the origin to the foot on the water side of the glass; towards the camera. [mm]
+    remarks : list of str
+        What is odd about the files.
+
+    Raises
+    ------
+    InputError
+        If numbers are missing or angles and matrix contradict each other.
+    """
+    values = _numbers(path, 3 + 3 + 9 + 2 + 1, "X0 Y0 Z0, angles, matrix, xh yh, c")
+    remarks: list[str] = []
+    matrix = values[6:15].reshape(3, 3)
+    rotation = _rotation(path, values[3:6], matrix, remarks)
+    glass = values[18:21] if len(values) >= 21 else np.zeros(3)
+    if not np.any(glass):
+        remarks.append(f"{path.name}: no glass vector; the camera looks through no interface.")
+    c, point = float(values[17]), values[15:17]
+    terms = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0])
+    added = path.with_name(path.name.removesuffix(".ori") + ".addpar")
+    if added.exists():
+        terms = _numbers(added, 7, "k1 k2 k3 p1 p2 scale shear")[:7]
+    else:
+        remarks.append(f"{path.name}: no {added.name} beside it; taken as free of distortion.")
+    # OpenPTV's scale stretches both axes, after the distortion: the same image as a longer
+    # principal distance with smaller coefficients. Ours is that of x against y.
+    s = float(terms[5])
+    if not 0.5 < s < 2:
+        raise InputError(f"{added}: the scale is {s:g}; expected a value near 1.")
+    k1, k2, k3, p1, p2 = terms[:5] / [s**2, s**4, s**6, s, s]
+    distortion = Brown(
+        k1=k1, k2=k2, k3=k3, p1=p1, p2=p2, shear=float(terms[6]), convention=Convention.OPENPTV
+    )
+    if not 5.0 < c < 2000.0:
+        remarks.append(f"{path.name}: principal distance {c:g} mm; is it in mm?")
+    camera = Camera(
+        centre=values[:3], rotation=rotation, principal_distance=c * s, principal_point=point * s,
+        distortion=distortion, sensor=sensor, name=name,
+    )  # fmt: skip
+    return camera, glass, remarks
+
+
+def glass_interface(
+    glass: FloatArray, indices: tuple[float, ...], thickness: float
+) -> FlatInterface:
+    """Return the interface that a glass vector describes: its tip is on the water side."""
+    layers = Layers(indices=indices, thicknesses=(thickness,))
+    return FlatInterface(layers=layers, point=glass, normal=glass)
+
+
+def read_targets(path: Path, *, field: int = 0) -> Targets:
+    """Read a _targets file: number, column, row, pixels, width, height, grey sum, correspondence.
+
+    Raises
+    ------
+    InputError
+        If the count in the first line does not fit the lines that follow.
+    """
+    text = _text(path).split(None, 1)
+    count = int(_float(path, text[0] if text else "", "number of targets"))
+    rest = text[1].split() if len(text) > 1 else []
+    if len(rest) != 8 * count:
+        raise InputError(
+            f"{path}: its first line announces {count} targets of 8 numbers, {len(rest)} numbers "
+            "follow. The file is cut off, or is no target file."
+        )
+    try:
+        table = np.array(rest, dtype=np.float64).reshape(count, 8)
+    except ValueError as error:
+        raise InputError(f"{path}: {error}; expected numbers only.") from None
+    pixels = table[:, 1:3].copy()
+    if field in (1, 2):
+        # Half frames: the file counts every other line.
+        pixels[:, 1] = 2 * pixels[:, 1] + (field == 1)
+    return Targets(
+        pixels=pixels, counts=table[:, 3].astype(np.int64), numbers=table[:, 7].astype(np.int64)
+    )
+
+
+def read_body(path: Path) -> tuple[list[str], FloatArray]:
+    """Read a calibration body: lines of number X Y Z.
+
+    Raises
+    ------
+    InputError
+        If a line has other than four numbers; the message names it.
+    """
+    ids, points = [], []
+    for number, line in enumerate(_text(path).splitlines(), start=1):
+        fields = line.replace(",", " ").split()
+        if not fields or fields[0].startswith("#"):
+            continue
+        if len(fields) != 4:
+            raise InputError(
+                f"{path}, line {number}: found {len(fields)} values, expected number X Y Z."
+            )
+        ids.append(fields[0])
+        points.append([_float(path, field, f"line {number}") for field in fields[1:]])
+    if not ids:
+        raise InputError(f"{path}: no points; expected lines of number X Y Z.")
+    return ids, np.array(points)
+
+
+def read_correspondences(path: Path) -> tuple[FloatArray, IntArray]:
+    """Read an rt_is file: positions, shape (n, 3) [mm], and target numbers, shape (n, cameras).
+
+    -1 where a camera did not see the particle.
+
+    Raises
+    ------
+    InputError
+        If the count in the first line does not fit the lines that follow.
+    """
+    lines = [line.split() for line in _text(path).splitlines() if line.strip()]
+    count = int(_float(path, lines[0][0] if lines else "", "number of particles"))
+    rows = lines[1:]
+    widths = {len(row) for row in rows}
+    if len(rows) != count or len(widths) > 1 or (widths and min(widths) < 6):
+        raise InputError(
+            f"{path}: its first line announces {count} particles, {len(rows)} lines follow "
+            "(expected number X Y Z and one target number per camera)."
+        )
+    table = np.array(
+        [[_float(path, value, f"line {k}") for value in row] for k, row in enumerate(rows, 2)]
+    ).reshape(count, -1)
+    return table[:, 1:4].copy(), table[:, 4:].astype(np.int64).reshape(count, -1)
+
+
+def ori_text(camera: Camera, glass: FloatArray) -> str:
+    """Return the content of an .ori file."""
+    x, m = camera.centre, camera.rotation
+    rows = "\n".join("    " + " ".join(f"{v:.15f}" for v in row) for row in m)
+    return (
+        f"{x[0]:.15g} {x[1]:.15g} {x[2]:.15g}\n"
+        f"    {' '.join(f'{v:.16g}' for v in camera.angles)}\n\n{rows}\n\n"
+        f"    {camera.principal_point[0]:.16g} {camera.principal_point[1]:.16g}\n"
+        f"    {camera.principal_distance:.16g}\n\n"
+        f"    {glass[0]:.15f} {glass[1]:.15f} {glass[2]:.15f}\n"
+    )
+
+
+def addpar_text(camera: Camera) -> str:
+    """Return the content of an .addpar file.
+
+    Raises
+    ------
+    InputError
+        If OpenPTV has no parameters for this distortion.
+    """
+    d = camera.distortion
+    centred = d.convention is Convention.OPENPTV or (
+        d.convention is Convention.BROWN and not np.any(camera.principal_point)
+    )
+    if not (centred or d.is_identity) or d.scale != 1.0:
+        raise InputError(
+            f"camera {camera.name}: OpenPTV counts distortion from the centre of the sensor and "
+            "has no separate scale of x, so this camera cannot be written exactly. Calibrate with "
+            'distortion convention = "openptv" and without scale.'
+        )
+    terms = (d.k1, d.k2, d.k3, d.p1, d.p2, 1.0, d.shear)
+    return " ".join(f"{v:.16g}" for v in terms) + "\n"
+
+
+def _rotation(path: Path, angles: FloatArray, matrix: FloatArray, remarks: list[str]) -> FloatArray:
+    """Return the rotation from angles and printed matrix, which must agree."""
+    by_angles = world_from_camera(*(float(a) for a in angles))
+    if not np.any(matrix) or np.abs(by_angles - matrix).max() < MATRIX_ROUNDING:
+        return by_angles
+    if np.abs(world_from_camera(*np.radians(angles)) - matrix).max() < MATRIX_ROUNDING:
+        remarks.append(
+            f"{path.name}: the angles are in degrees, though OpenPTV wants radians; its matrix "
+            "tells, and is used."
+        )
+    elif np.abs(matrix @ matrix.T - np.eye(3)).max() > 1e-3:
+        raise InputError(f"{path}: the 3 x 3 matrix is not a rotation; a number is wrong.")
+    elif np.linalg.det(matrix) < 0:
+        raise GeometryError(
+            f"{path}: the 3 x 3 matrix mirrors the world: a coordinate system is left-handed."
+        )
+    else:
+        remarks.append(f"{path.name}: angles and matrix disagree; the matrix is used.")
+    return nearest_rotation(matrix)
+
+
+def _text(path: Path) -> str:
+    try:
+        return path.read_text(encoding="utf-8", errors="strict")
+    except FileNotFoundError:
+        raise InputError(f"{path}: no such file.") from None
+    except UnicodeDecodeError:
+        raise InputError(f"{path}: is not a text file.") from None
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read ({error.strerror}).") from None
+
+
+def _float(path: Path, text: str, what: str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        raise InputError(f"{path}, {what}: expected a number, found {text!r:.40}.") from None
+
+
+def _number(path: Path, lines: list[str], index: int, what: str) -> float:
+    if index >= len(lines):
+        raise InputError(f"{path}: ends before line {index + 1} ({what}).")
+    return _float(path, (lines[index].split() or [""])[0], f"line {index + 1} ({what})")
+
+
+def _numbers(path: Path, least: int, what: str) -> FloatArray:
+    words = _text(path).split()
+    values = [_float(path, word, f"value {k}") for k, word in enumerate(words, 1)]
+    if len(values) < least:
+        raise InputError(f"{path}: {len(values)} numbers, expected at least {least}: {what}.")
+    if not np.isfinite(values).all():
+        raise InputError(f"{path}: holds a value that is not a finite number.")
+    return np.array(values)

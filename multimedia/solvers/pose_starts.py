@@ -1,0 +1,133 @@
+"""Poses to start a resection from, found without any approximate value."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from multimedia.collinearity import shifts
+from multimedia.domain.camera import Camera
+from multimedia.domain.flat_interface import FlatInterface
+from photocore.arrays import FloatArray
+from photocore.errors import GeometryError
+
+#: Camera frame with y down and z forwards (OpenCV) from ours.
+_FLIP = np.diag([1.0, -1.0, -1.0])
+#: Rounds of "apparent points from the pose, pose from the apparent points".
+_ROUNDS = 4
+
+
+def pose_starts(
+    camera: Camera, control: FloatArray, image: FloatArray, interface: FlatInterface | None
+) -> list[Camera]:
+    """Return poses from which ``camera`` may have seen the control points.
+
+    Parameters
+    ----------
+    camera : Camera
+        Its interior orientation is used, its pose is not.
+    control : ndarray, shape (n, 3)
+        At least 3 points.
+    image : ndarray, shape (n, 2)
+        [mm]
+    interface : FlatInterface or None
+        What the camera looks through.
+
+    Returns
+    -------
+    list of Camera
+        Possibly empty; best guesses first is not promised.
+
+    Notes
+    -----
+    Maas' modular idea the other way round: once points are replaced by apparent ones on the
+    camera's straight rays, any pose solver for one medium serves. The first apparent points are
+    those of a camera looking along the normal, which need no pose; then the pose found gives
+    better ones.
+    """
+    ideal = camera.distortion.ideal(image, camera.principal_point)
+    good = np.isfinite(ideal).all(axis=1)
+    if good.sum() < 3:
+        return []
+    control, ideal = control[good], ideal[good]
+    starts = []
+    if interface is None:
+        return _straight(camera, control, ideal)
+    if interface.moves_with_camera:
+        # Seen through its port a camera has, to first order, a longer principal distance; the
+        # pose this gives is refined by apparent points like any other.
+        indices = interface.layers.indices
+        longer = replace(camera, principal_distance=camera.principal_distance * indices[-1])
+        for pose in _straight(longer, control, ideal):
+            starts.append(replace(pose, principal_distance=camera.principal_distance))
+    else:
+        starts = _straight(camera, _seen_along_normal(control, interface), ideal)
+    return [better for start in starts for better in _refined(start, control, ideal, interface)]
+
+
+def _refined(
+    start: Camera, control: FloatArray, ideal: FloatArray, interface: FlatInterface
+) -> list[Camera]:
+    """Return the start and what the apparent points make of it."""
+    found = [start]
+    pose = start
+    for _ in range(_ROUNDS):
+        try:
+            medium = interface.medium(pose)
+        except GeometryError:
+            break
+        shift = shifts((control - pose.centre) @ pose.rotation, medium)
+        normal = pose.rotation @ medium.normal
+        apparent = control + shift.g[:, None] * normal
+        if not np.isfinite(apparent).all():
+            break
+        poses = _straight(pose, apparent, ideal)
+        if not poses:
+            break
+        # Of the mirror poses of a flat target keep the branch this start belongs to.
+        pose = min(poses, key=lambda other: -float(np.trace(other.rotation.T @ pose.rotation)))
+    if pose is not start:
+        found.append(pose)
+    return found
+
+
+def _seen_along_normal(control: FloatArray, interface: FlatInterface) -> FloatArray:
+    """Return where the points seem to be for a camera far away along the normal."""
+    indices, inner = interface.layers.indices, interface.layers.thicknesses
+    depth = (interface.point - control) @ interface.normal
+    raised = depth * (1.0 - indices[0] / indices[-1])
+    for thickness, index in zip(inner, indices[1:-1], strict=True):
+        raised = raised + thickness * (1.0 - indices[0] / index)
+    return control + raised[:, None] * interface.normal
+
+
+def _straight(camera: Camera, control: FloatArray, ideal: FloatArray) -> list[Camera]:
+    """Return the poses OpenCV finds for straight rays."""
+    import cv2
+
+    centre = control.mean(axis=0)
+    scale = float(np.abs(control - centre).max()) or 1.0
+    points = np.ascontiguousarray((control - centre) / scale, dtype=np.float64)
+    rays = np.ascontiguousarray(ideal * (1.0, -1.0) / camera.principal_distance, dtype=np.float64)
+    flags = [cv2.SOLVEPNP_SQPNP]
+    spread = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
+    if len(points) >= 4 and spread[2] < 1e-3 * spread[0]:
+        flags.append(cv2.SOLVEPNP_IPPE)
+    if len(points) == 3:
+        flags.append(cv2.SOLVEPNP_P3P)
+    if len(points) >= 6:
+        flags.append(cv2.SOLVEPNP_EPNP)
+    found = []
+    for flag in flags:
+        try:
+            _, turns, shifts_, _ = cv2.solvePnPGeneric(points, rays, np.eye(3), None, flags=flag)
+        except cv2.error:
+            # A solver that does not take this configuration; the others remain.
+            continue
+        for turn, shift in zip(turns, shifts_, strict=True):
+            rotation, _ = cv2.Rodrigues(turn)
+            position = -(rotation.T @ shift).ravel() * scale + centre
+            if np.isfinite(position).all() and np.isfinite(rotation).all():
+                found.append(replace(camera, centre=position, rotation=rotation.T @ _FLIP))
+    return found

@@ -1,0 +1,338 @@
+"""Orientation and calibration of one camera from control points seen through the media."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from multimedia.domain.camera import EXTERIOR, INTERIOR, Camera
+from multimedia.domain.flat_interface import FlatInterface
+from multimedia.solvers.pose_starts import pose_starts
+from multimedia.solvers.projection import Media, as_interface, project_with_jacobian
+from photocore.adjustment import correlations, fit, minimise
+from photocore.arrays import BoolArray, FloatArray, as_points
+from photocore.errors import ConvergenceError, GeometryError, InputError
+
+#: A residual beyond this many of its own standard deviations is a gross error (1 honest in 2000).
+OUTLIER_LIMIT = 3.5
+#: Field of view (half, as a tangent) beyond which image coordinates are no millimetres.
+_WIDEST = 4.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Resection:
+    """An oriented camera with its precision.
+
+    Attributes
+    ----------
+    camera : Camera
+        The adjusted camera.
+    names : tuple of str
+        The parameters estimated; omega, phi, kappa are angles here. [object unit, rad, mm]
+    covariance : ndarray, shape (u, u)
+        Of those parameters, with the a-posteriori sigma0; NaN without redundancy.
+    residuals : ndarray, shape (n, 2)
+        Measured minus computed image coordinates; NaN for points not used. [mm]
+    standardised : ndarray, shape (n, 2)
+        Residuals over their own standard deviations.
+    sigma0 : float
+        A-posteriori standard deviation of an image coordinate of weight one; NaN without
+        redundancy. [mm]
+    redundancy : int
+        Observations beyond the necessary ones.
+    iterations : int
+        Steps of the final adjustment.
+    """
+
+    camera: Camera
+    names: tuple[str, ...]
+    covariance: FloatArray
+    residuals: FloatArray
+    standardised: FloatArray
+    sigma0: float
+    redundancy: int
+    iterations: int
+
+    @property
+    def sigmas(self) -> dict[str, float]:
+        """Standard deviation of every estimated parameter. [object unit, rad, mm]"""
+        sigma = np.sqrt(np.diag(self.covariance))
+        return dict(zip(self.names, sigma.tolist(), strict=True))
+
+    @property
+    def correlations(self) -> FloatArray:
+        """Correlation matrix of the estimated parameters, shape (u, u)."""
+        return correlations(self.covariance)
+
+    @property
+    def suspects(self) -> BoolArray:
+        """Whether a point looks like a gross error, shape (n,)."""
+        with np.errstate(invalid="ignore"):
+            return np.asarray((np.abs(self.standardised) > OUTLIER_LIMIT).any(axis=1))
+
+
+def resect(
+    camera: Camera,
+    object_points: ArrayLike,
+    image_points: ArrayLike,
+    layers: Media = None,
+    *,
+    estimate: Sequence[str] = EXTERIOR,
+    sigma: ArrayLike | None = None,
+) -> Resection:
+    """Orient, and if asked calibrate, a camera from control points.
+
+    Parameters
+    ----------
+    camera : Camera
+        Interior orientation (kept unless estimated) and start values. The start may be as bad as
+        you like: poses from P3P-type solutions through the apparent points compete with it.
+    object_points : array_like, shape (n, 3)
+        Control points, error-free. [object unit]
+    image_points : array_like, shape (n, 2)
+        Measured image coordinates; NaN where a point was not measured. [mm]
+    layers : Layers, FlatInterface or None
+        As for `project`.
+    estimate : sequence of str
+        Parameters to determine: the exterior orientation and any of c, xh, yh, k1, k2, k3, p1,
+        p2, scale, shear.
+    sigma : array_like, broadcast to shape (n, 2), optional
+        Standard deviations of the image coordinates; only their ratios matter. [mm]
+
+    Returns
+    -------
+    Resection
+
+    Raises
+    ------
+    InputError
+        If there are too few points, or image coordinates that cannot be millimetres.
+    GeometryError
+        If control points lie on a line, one coordinate system is mirrored, or the points cannot
+        determine a parameter: the message names it.
+    ConvergenceError
+        If no start leads to a solution.
+
+    Notes
+    -----
+    Least squares of measured minus projected image coordinates, with analytic derivatives through
+    the media: Maas 2015's modular model in its use for spatial resection.
+
+    Examples
+    --------
+    A camera found from five points, with no idea where it stands:
+
+    >>> from multimedia import Layers, project
+    >>> truth = Camera.from_angles((0.1, 0.2, 0.6), 0.1, 0.2, 0.3, principal_distance=25.0)
+    >>> water = Layers(indices=(1.0, 1.337))
+    >>> control = [(0, 0, -0.2), (0.1, 0, -0.3), (0, 0.1, -0.1), (0.1, 0.1, -0.2), (0, 0, -0.4)]
+    >>> start = Camera.from_angles((0, 0, 1), 0, 0, 0, principal_distance=25.0)
+    >>> found = resect(start, control, project(truth, control, water), water)
+    >>> found.camera.centre.round(9).tolist()
+    [0.1, 0.2, 0.6]
+    """
+    names = _checked_names(estimate)
+    control, image, weights, used = _checked_points(
+        camera, object_points, image_points, sigma, len(names)
+    )
+    what = f"resection of camera {camera.name}" if camera.name else "resection"
+    problem = _Problem(control, image, weights, as_interface(layers), names, what)
+    start = _best_start(camera, replace(problem, names=EXTERIOR))
+    result = fit(start, problem.equations, problem.advance, names=names, what=what)
+    _refuse_mirrored(result.state, result.sigma0, problem)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        spread = result.sigma0 * np.sqrt(np.maximum(result.redundancy_numbers, 0.0))
+        controlled = result.redundancy_numbers > 1e-9
+        standardised = np.where(controlled, -result.residuals / spread, np.nan)
+    shape = (len(used), 2)
+    residuals, normed = np.full(shape, np.nan), np.full(shape, np.nan)
+    residuals[used] = -result.residuals.reshape(-1, 2) * weights
+    normed[used] = standardised.reshape(-1, 2)
+    return Resection(
+        camera=result.state,
+        names=names,
+        covariance=_angle_covariance(result.state, names, result.cofactor * result.sigma0**2),
+        residuals=residuals,
+        standardised=normed,
+        sigma0=result.sigma0,
+        redundancy=result.redundancy,
+        iterations=result.iterations,
+    )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Problem:
+    """Control points, their images, and the parameters wanted."""
+
+    control: FloatArray
+    image: FloatArray
+    weights: FloatArray
+    interface: FlatInterface | None
+    names: tuple[str, ...]
+    what: str
+
+    def equations(self, camera: Camera) -> tuple[FloatArray, FloatArray] | None:
+        """Return computed minus measured and its derivatives; None if a point is not seen."""
+        try:
+            found = project_with_jacobian(
+                camera, self.control, self.interface, camera_names=self.names
+            )
+        except GeometryError:
+            return None
+        if not np.isfinite(found.image).all():
+            return None
+        miss = (found.image - self.image) / self.weights
+        jacobian = found.by_camera / self.weights[:, :, None]
+        return miss.ravel(), jacobian.reshape(-1, len(self.names))
+
+    def advance(self, camera: Camera, step: FloatArray) -> Camera | None:
+        """Return the camera after a step, None where there is no such camera."""
+        try:
+            return camera.stepped(self.names, step)
+        except (InputError, GeometryError):
+            return None
+
+    def cost(self, camera: Camera) -> float:
+        """Return the weighted square sum, infinite where a point is not seen."""
+        found = self.equations(camera)
+        return np.inf if found is None else float(found[0] @ found[0])
+
+
+def _best_start(camera: Camera, problem: _Problem) -> Camera:
+    """Return the pose of the smallest square sum that any start leads to."""
+    found: list[tuple[float, Camera]] = []
+    starts = [camera, *pose_starts(camera, problem.control, problem.image, problem.interface)]
+    for start in starts:
+        if not np.isfinite(problem.cost(start)):
+            continue
+        try:
+            pose, residuals, _, _ = minimise(
+                start, problem.equations, problem.advance, most=60, settle=1e-4
+            )
+        except ConvergenceError:
+            continue
+        found.append((float(residuals @ residuals), pose))
+    if not found:
+        raise ConvergenceError(
+            f"{problem.what}: no position was found from which the camera sees all control points "
+            "through the interface. Check that image and object points belong together, the units "
+            "(mm in the image), the principal distance, and on which side of the interface the "
+            "normal points",
+            iterations=len(starts),
+            residual=float("nan"),
+        )
+    return min(found, key=lambda pair: pair[0])[1]
+
+
+def _checked_names(estimate: Sequence[str]) -> tuple[str, ...]:
+    """Return the parameters in canonical order; the exterior orientation always belongs."""
+    unknown = [name for name in estimate if name not in EXTERIOR + INTERIOR]
+    if unknown:
+        raise InputError(
+            f"estimate: {', '.join(unknown)} is no camera parameter; choose of "
+            f"{', '.join(INTERIOR)} (the exterior orientation is always estimated)."
+        )
+    return EXTERIOR + tuple(name for name in INTERIOR if name in estimate)
+
+
+def _checked_points(
+    camera: Camera,
+    object_points: ArrayLike,
+    image_points: ArrayLike,
+    sigma: ArrayLike | None,
+    unknowns: int,
+) -> tuple[FloatArray, FloatArray, FloatArray, BoolArray]:
+    """Return control, image points, relative sigmas, and which rows they are."""
+    who = f"camera {camera.name}: " if camera.name else ""
+    control = as_points(object_points, "object_points", dimension=3).reshape(-1, 3)
+    image = as_points(image_points, "image_points", dimension=2).reshape(-1, 2)
+    if len(control) != len(image):
+        raise InputError(
+            f"{who}{len(control)} object points but {len(image)} image points; give one image "
+            "point per object point, NaN where it was not measured."
+        )
+    used = np.asarray(np.isfinite(control).all(axis=1) & np.isfinite(image).all(axis=1))
+    count = int(used.sum())
+    if 2 * count < unknowns or count < 3:
+        raise InputError(
+            f"{who}{count} control points measured, but {unknowns} parameters need at least "
+            f"{max(3, (unknowns + 1) // 2)}. Measure more points or estimate fewer parameters."
+        )
+    control, image = control[used], image[used]
+    weights = np.ones_like(image)
+    if sigma is not None:
+        given = np.broadcast_to(np.asarray(sigma, dtype=np.float64), (len(used), 2))[used]
+        if not (given > 0).all():
+            raise InputError(f"{who}sigma: every standard deviation must be above zero.")
+        weights = given / np.sqrt(np.mean(given**2))
+    refuse_pixels(camera, image)
+    spread = np.linalg.svd(control - control.mean(axis=0), compute_uv=False)
+    if spread[1] < 1e-6 * spread[0] or spread[0] == 0:
+        raise GeometryError(
+            f"{who}all control points lie on one line; a camera can turn about it freely. Use "
+            "points spread over an area, better over a volume."
+        )
+    return control, image, weights, used
+
+
+def refuse_pixels(camera: Camera, image: FloatArray) -> None:
+    """Refuse image coordinates that are no millimetres.
+
+    Raises
+    ------
+    InputError
+        If they lie far off the sensor, or farther out than any lens sees.
+    """
+    who = f"camera {camera.name}: " if camera.name else ""
+    farthest = float(np.nanmax(np.abs(image), initial=0.0))
+    limit = _WIDEST * camera.principal_distance
+    if camera.sensor is not None:
+        limit = min(limit, 1.5 * camera.sensor.half_diagonal)
+    if farthest > limit:
+        raise InputError(
+            f"{who}an image point lies {farthest:.4g} mm from the centre, but the principal "
+            f"distance is {camera.principal_distance:g} mm"
+            + (
+                f" and the sensor ends at {camera.sensor.half_diagonal:.4g} mm"
+                if camera.sensor is not None
+                else ""
+            )
+            + ". Are these pixels? Give millimetres, or columns headed col and row with the sensor."
+        )
+
+
+def _refuse_mirrored(camera: Camera, sigma0: float, problem: _Problem) -> None:
+    """Refuse a bad fit that becomes a good one when the control is mirrored."""
+    size = float(np.sqrt(np.mean(problem.image**2)))
+    if not sigma0 > 0.005 * size:
+        return
+    if problem.interface is None:
+        normal = np.linalg.svd(problem.control - problem.control.mean(axis=0))[2][0]
+    else:
+        # Mirrored along the faces, so that the points stay beyond them.
+        normal = problem.interface.tangents[0]
+    offset = (problem.control - problem.control.mean(axis=0)) @ normal
+    mirrored = replace(
+        problem, control=problem.control - 2.0 * offset[:, None] * normal, names=EXTERIOR
+    )
+    try:
+        other = _best_start(camera, mirrored)
+    except ConvergenceError:
+        return
+    count = 2 * len(problem.image) - len(EXTERIOR)
+    if count > 0 and np.sqrt(mirrored.cost(other) / count) < 0.2 * sigma0:
+        raise GeometryError(
+            f"{problem.what}: the control points fit the image only as in a mirror. One coordinate "
+            "system is left-handed, or x or y of the image points the wrong way: image x runs to "
+            "the right, y up; X, Y, Z must be right-handed."
+        )
+
+
+def _angle_covariance(camera: Camera, names: tuple[str, ...], covariance: FloatArray) -> FloatArray:
+    """Return the covariance of angles from that of the rotation vector."""
+    change = np.eye(len(names))
+    change[3:6, 3:6] = camera.angle_rates()
+    return change @ covariance @ change.T

@@ -1,0 +1,247 @@
+"""Least squares: Levenberg-Marquardt, covariance, redundancy, and what cannot be determined."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Generic, TypeVar
+
+import numpy as np
+from scipy.linalg import svd
+
+from photocore.arrays import FloatArray
+from photocore.errors import ConvergenceError, GeometryError
+
+State = TypeVar("State")
+#: Weighted residuals and their derivatives, shape (n,) and (n, u); None where impossible.
+Equations = tuple[FloatArray, FloatArray] | None
+
+#: A combination of unknowns is undetermined if its singular value, the columns being scaled to
+#: length one, is below this share of the largest. Double precision leaves 1e-16 times the condition
+#: of the columns; perfect but weak networks reach 1e-8.
+RANK_TOLERANCE = 1e-11
+#: Steps smaller than this share of what an unknown may vary by one sigma end the iteration.
+_SMALL = 1e-10
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Fit(Generic[State]):
+    """An adjusted state with its precision.
+
+    Attributes
+    ----------
+    state : State
+        Where the weighted square sum is smallest.
+    residuals : ndarray, shape (n,)
+        Weighted residuals there.
+    cofactor : ndarray, shape (u, u)
+        Inverse of the normal matrix; times sigma0^2 the covariance.
+    redundancy_numbers : ndarray, shape (n,)
+        Share of an observation's error that shows in its own residual, 0 to 1.
+    iterations : int
+        Steps taken.
+    """
+
+    state: State
+    residuals: FloatArray
+    cofactor: FloatArray
+    redundancy_numbers: FloatArray
+    iterations: int
+
+    @property
+    def redundancy(self) -> int:
+        """Observations beyond the necessary ones."""
+        return len(self.residuals) - len(self.cofactor)
+
+    @property
+    def sigma0(self) -> float:
+        """A-posteriori standard deviation of unit weight; NaN without redundancy."""
+        if self.redundancy <= 0:
+            return float("nan")
+        return float(np.sqrt(self.residuals @ self.residuals / self.redundancy))
+
+
+def correlations(covariance: FloatArray) -> FloatArray:
+    """Return the correlation matrix of a covariance matrix.
+
+    Examples
+    --------
+    >>> correlations(np.array([[4.0, 3.0], [3.0, 9.0]])).tolist()
+    [[1.0, 0.5], [0.5, 1.0]]
+    """
+    sigma = np.sqrt(np.diag(covariance))
+    return covariance / np.outer(sigma, sigma)
+
+
+def minimise(
+    state: State,
+    equations: Callable[[State], Equations],
+    advance: Callable[[State, FloatArray], State | None],
+    *,
+    what: str = "adjustment",
+    most: int = 200,
+    settle: float = _SMALL,
+) -> tuple[State, FloatArray, FloatArray, int]:
+    """Return state, weighted residuals, derivatives and steps at the least square sum.
+
+    Parameters
+    ----------
+    state : State
+        Start; its equations must be possible.
+    equations : callable
+        State to weighted residuals (computed minus measured) and their derivatives by the step.
+    advance : callable
+        State and step to the next state, None if that is impossible.
+    what : str
+        What is adjusted, for messages.
+    most : int
+        Steps after which it gives up.
+    settle : float
+        Ends when the step is below this share of the square sum's own scale.
+
+    Raises
+    ------
+    GeometryError
+        If the start is impossible.
+    ConvergenceError
+        If ``most`` steps do not settle it.
+
+    Notes
+    -----
+    Levenberg-Marquardt with the columns scaled to length one, so units do not matter (Moré 1978),
+    with Nielsen's rule (1999) for the damping, and with the second-order correction of Transtrum
+    and Sethna (2012): principal distance, position and distortion trade off along narrow curved
+    valleys, in which straight steps crawl.
+    Steps into impossible states (a point behind the camera) are refused like uphill ones.
+    """
+    current = equations(state)
+    if current is None:
+        raise GeometryError(f"{what}: the start values are impossible.")
+    residuals, jacobian = current
+    damping, growth, cost = 1e-4, 2.0, float(residuals @ residuals)
+    for step_number in range(1, most + 1):
+        length = np.sqrt((jacobian * jacobian).sum(axis=0))
+        length[length == 0] = 1.0
+        left, values, right = svd(jacobian / length, full_matrices=False, check_finite=False)
+        target = left.T @ residuals
+        largest = values.max(initial=0.0)
+        # Never below rounding: directions without information stay where they are.
+        floor = (largest * RANK_TOLERANCE) ** 2 + 1e-300
+        while True:
+            share = values / (values**2 + damping * largest**2 + floor)
+            step = -(right.T @ (share * target))
+            bend = _bend(state, equations, advance, residuals, jacobian, step / length)
+            if bend is not None:
+                correction = -0.5 * (right.T @ (share * (left.T @ bend)))
+                if np.linalg.norm(correction) < 0.75 * np.linalg.norm(step):
+                    step = step + correction
+            small = bool(np.abs(step).max(initial=0.0) <= settle * np.sqrt(cost))
+            following = advance(state, step / length)
+            new = None if following is None else equations(following)
+            new_cost = np.inf if new is None else float(new[0] @ new[0])
+            if following is not None and new is not None and new_cost <= cost:
+                break
+            # At the rounding level no step goes downhill any more.
+            if small or damping > 1e8:
+                return state, residuals, jacobian, step_number
+            damping = max(damping * growth, 1e-12)
+            growth *= 2.0
+        # Nielsen's rule: the damping follows how well the linear model foretold the drop.
+        foretold = cost - float(((target + values * (right @ step)) ** 2).sum())
+        foretold -= float(residuals @ residuals - target @ target)
+        ratio = (cost - new_cost) / foretold if foretold > 0 else 1.0
+        damping *= max(0.1, 1.0 - (2.0 * min(ratio, 1.0) - 1.0) ** 3)
+        growth = 2.0
+        settled = small or cost - new_cost <= 1e-14 * cost
+        state, (residuals, jacobian), cost = following, new, new_cost
+        if (settled and damping < 1e-3) or cost == 0.0:
+            return state, residuals, jacobian, step_number
+    raise ConvergenceError(
+        f"{what}: the adjustment does not settle; the start values are too far off, or the data "
+        "cannot determine all unknowns.",
+        iterations=most,
+        residual=float(np.sqrt(cost / max(len(residuals), 1))),
+    )
+
+
+def _bend(
+    state: State,
+    equations: Callable[[State], Equations],
+    advance: Callable[[State, FloatArray], State | None],
+    residuals: FloatArray,
+    jacobian: FloatArray,
+    step: FloatArray,
+    probe: float = 0.1,
+) -> FloatArray | None:
+    """Return the second derivative of the residuals along a step, None where it cannot be had."""
+    ahead = advance(state, probe * step)
+    found = None if ahead is None else equations(ahead)
+    if found is None:
+        return None
+    return (2.0 / probe) * ((found[0] - residuals) / probe - jacobian @ step)
+
+
+def undetermined(jacobian: FloatArray, names: Sequence[str]) -> list[str]:
+    """Return the unknowns that the equations leave open, with those they are mixed with.
+
+    Examples
+    --------
+    Only the sum of a and b acts:
+
+    >>> undetermined(np.array([[1.0, 1.0, 0.0], [2.0, 2.0, 1.0]]), ["a", "b", "c"])
+    ['a', 'b']
+    """
+    length = np.sqrt((jacobian * jacobian).sum(axis=0))
+    silent = [name for name, size in zip(names, length, strict=True) if size == 0]
+    scaled = jacobian / np.where(length == 0, 1.0, length)
+    _, values, right = svd(scaled, full_matrices=True, check_finite=False)
+    full = np.zeros(len(names))
+    full[: len(values)] = values
+    weak = right[full <= max(full.max(initial=0.0), 1e-300) * RANK_TOLERANCE]
+    share = np.abs(weak).max(axis=0, initial=0.0)
+    mixed = [name for name, part in zip(names, share, strict=True) if part > 0.05]
+    return list(dict.fromkeys(silent + mixed))
+
+
+def fit(
+    state: State,
+    equations: Callable[[State], Equations],
+    advance: Callable[[State, FloatArray], State | None],
+    *,
+    names: Sequence[str],
+    what: str,
+    most: int = 200,
+) -> Fit[State]:
+    """Adjust and return precision too; refuse to return unknowns the data cannot determine.
+
+    Parameters
+    ----------
+    state, equations, advance, most
+        As for `minimise`.
+    names : sequence of str
+        Of the unknowns, for messages.
+    what : str
+        What is adjusted, for messages.
+
+    Raises
+    ------
+    GeometryError
+        If a combination of unknowns is undetermined; the message names them.
+    """
+    state, residuals, jacobian, steps = minimise(state, equations, advance, what=what, most=most)
+    open_ = undetermined(jacobian, names)
+    if open_:
+        raise GeometryError(
+            f"{what}: the data cannot determine {', '.join(open_)}. Fix some of them, or measure "
+            "more points, better spread in the image and in depth."
+        )
+    length = np.sqrt((jacobian * jacobian).sum(axis=0))
+    left, values, right = svd(jacobian / length, full_matrices=False, check_finite=False)
+    half = (right.T / values) / length[:, None]
+    return Fit(
+        state=state,
+        residuals=residuals,
+        cofactor=half @ half.T,
+        redundancy_numbers=1.0 - (left * left).sum(axis=1),
+        iterations=steps,
+    )
