@@ -21,7 +21,7 @@ Equations = tuple[FloatArray, FloatArray] | None
 #: of the columns; perfect but weak networks reach 1e-8.
 RANK_TOLERANCE = 1e-11
 #: Steps smaller than this share of what an unknown may vary by one sigma end the iteration.
-_SMALL = 1e-10
+SETTLE = 1e-10
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -73,6 +73,31 @@ def correlations(covariance: FloatArray) -> FloatArray:
     return covariance / np.outer(sigma, sigma)
 
 
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Minimum(Generic[State]):
+    """Where an iteration ended.
+
+    Attributes
+    ----------
+    state : State
+        The best state found.
+    residuals : ndarray, shape (n,)
+        Weighted residuals there.
+    jacobian : ndarray, shape (n, u)
+        Their derivatives.
+    iterations : int
+        Steps taken.
+    settled : bool
+        Whether it ended because nothing changed any more.
+    """
+
+    state: State
+    residuals: FloatArray
+    jacobian: FloatArray
+    iterations: int
+    settled: bool
+
+
 def minimise(
     state: State,
     equations: Callable[[State], Equations],
@@ -80,9 +105,10 @@ def minimise(
     *,
     what: str = "adjustment",
     most: int = 200,
-    settle: float = _SMALL,
-) -> tuple[State, FloatArray, FloatArray, int]:
-    """Return state, weighted residuals, derivatives and steps at the least square sum.
+    settle: float = SETTLE,
+    rounding: float = 0.0,
+) -> Minimum[State]:
+    """Go from a start to the least square sum.
 
     Parameters
     ----------
@@ -97,14 +123,14 @@ def minimise(
     most : int
         Steps after which it gives up.
     settle : float
-        Ends when the step is below this share of the square sum's own scale.
+        Ends when the step moves the residuals by less than this share of their length.
+    rounding : float
+        Ends when the root mean square of the residuals is below this: error-free data.
 
     Raises
     ------
     GeometryError
         If the start is impossible.
-    ConvergenceError
-        If ``most`` steps do not settle it.
 
     Notes
     -----
@@ -112,13 +138,13 @@ def minimise(
     with Nielsen's rule (1999) for the damping, and with the second-order correction of Transtrum
     and Sethna (2012): principal distance, position and distortion trade off along narrow curved
     valleys, in which straight steps crawl.
-    Steps into impossible states (a point behind the camera) are refused like uphill ones.
     """
     current = equations(state)
     if current is None:
         raise GeometryError(f"{what}: the start values are impossible.")
     residuals, jacobian = current
     damping, growth, cost = 1e-4, 2.0, float(residuals @ residuals)
+    settled, step_number = cost <= len(residuals) * rounding**2, 0
     for step_number in range(1, most + 1):
         length = np.sqrt((jacobian * jacobian).sum(axis=0))
         length[length == 0] = 1.0
@@ -143,7 +169,13 @@ def minimise(
                 break
             # At the rounding level no step goes downhill any more.
             if small or damping > 1e8:
-                return state, residuals, jacobian, step_number
+                return Minimum(
+                    state=state,
+                    residuals=residuals,
+                    jacobian=jacobian,
+                    iterations=step_number,
+                    settled=True,
+                )
             damping = max(damping * growth, 1e-12)
             growth *= 2.0
         # Nielsen's rule: the damping follows how well the linear model foretold the drop.
@@ -154,13 +186,15 @@ def minimise(
         growth = 2.0
         settled = small or cost - new_cost <= 1e-14 * cost
         state, (residuals, jacobian), cost = following, new, new_cost
-        if (settled and damping < 1e-3) or cost == 0.0:
-            return state, residuals, jacobian, step_number
-    raise ConvergenceError(
-        f"{what}: the adjustment does not settle; the start values are too far off, or the data "
-        "cannot determine all unknowns.",
-        iterations=most,
-        residual=float(np.sqrt(cost / max(len(residuals), 1))),
+        settled = (settled and damping < 1e-3) or cost <= len(residuals) * rounding**2
+        if settled:
+            break
+    return Minimum(
+        state=state,
+        residuals=residuals,
+        jacobian=jacobian,
+        iterations=step_number,
+        settled=settled,
     )
 
 
@@ -211,12 +245,13 @@ def fit(
     names: Sequence[str],
     what: str,
     most: int = 200,
+    rounding: float = 0.0,
 ) -> Fit[State]:
     """Adjust and return precision too; refuse to return unknowns the data cannot determine.
 
     Parameters
     ----------
-    state, equations, advance, most
+    state, equations, advance, most, rounding
         As for `minimise`.
     names : sequence of str
         Of the unknowns, for messages.
@@ -227,21 +262,31 @@ def fit(
     ------
     GeometryError
         If a combination of unknowns is undetermined; the message names them.
+    ConvergenceError
+        If ``most`` steps do not settle it.
     """
-    state, residuals, jacobian, steps = minimise(state, equations, advance, what=what, most=most)
+    found = minimise(state, equations, advance, what=what, most=most, rounding=rounding)
+    jacobian, residuals = found.jacobian, found.residuals
     open_ = undetermined(jacobian, names)
     if open_:
         raise GeometryError(
             f"{what}: the data cannot determine {', '.join(open_)}. Fix some of them, or measure "
             "more points, better spread in the image and in depth."
         )
+    if not found.settled:
+        raise ConvergenceError(
+            f"{what}: the adjustment does not settle. The data can hardly tell the unknowns apart, "
+            "or image and object points do not belong together",
+            iterations=found.iterations,
+            residual=float(np.sqrt(np.mean(residuals**2))),
+        )
     length = np.sqrt((jacobian * jacobian).sum(axis=0))
     left, values, right = svd(jacobian / length, full_matrices=False, check_finite=False)
     half = (right.T / values) / length[:, None]
     return Fit(
-        state=state,
+        state=found.state,
         residuals=residuals,
         cofactor=half @ half.T,
         redundancy_numbers=1.0 - (left * left).sum(axis=1),
-        iterations=steps,
+        iterations=found.iterations,
     )

@@ -141,7 +141,9 @@ def resect(
     what = f"resection of camera {camera.name}" if camera.name else "resection"
     problem = _Problem(control, image, weights, as_interface(layers), names, what)
     start = _best_start(camera, replace(problem, names=EXTERIOR))
-    result = fit(start, problem.equations, problem.advance, names=names, what=what)
+    result = fit(
+        start, problem.equations, problem.advance, names=names, what=what, rounding=problem.floor
+    )
     _refuse_mirrored(result.state, result.sigma0, problem)
     with np.errstate(invalid="ignore", divide="ignore"):
         spread = result.sigma0 * np.sqrt(np.maximum(result.redundancy_numbers, 0.0))
@@ -188,6 +190,11 @@ class _Problem:
         jacobian = found.by_camera / self.weights[:, :, None]
         return miss.ravel(), jacobian.reshape(-1, len(self.names))
 
+    @property
+    def floor(self) -> float:
+        """Residuals that are nothing but rounding."""
+        return 2e-16 * float(np.abs(self.image).max(initial=0.0))
+
     def advance(self, camera: Camera, step: FloatArray) -> Camera | None:
         """Return the camera after a step, None where there is no such camera."""
         try:
@@ -208,13 +215,10 @@ def _best_start(camera: Camera, problem: _Problem) -> Camera:
     for start in starts:
         if not np.isfinite(problem.cost(start)):
             continue
-        try:
-            pose, residuals, _, _ = minimise(
-                start, problem.equations, problem.advance, most=60, settle=1e-4
-            )
-        except ConvergenceError:
-            continue
-        found.append((float(residuals @ residuals), pose))
+        pose = minimise(
+            start, problem.equations, problem.advance, most=60, settle=1e-4, rounding=problem.floor
+        )
+        found.append((float(pose.residuals @ pose.residuals), pose.state))
     if not found:
         raise ConvergenceError(
             f"{problem.what}: no position was found from which the camera sees all control points "
