@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 from photocore.console import print_json, remark, text_table
+from photocore.options import Scale, Size
 
 if TYPE_CHECKING:
     from bifocal.domain.plan import Plan
@@ -18,41 +19,6 @@ Examples:
   bifocal plan --focal 35 --focal 18 --sensor 23.5x15.6 --pixels 6000x4000 --object 12x8
                --free-space 20 --out plan.xlsx
 """
-
-
-class Size(click.ParamType):  # type: ignore[type-arg,unused-ignore]
-    """Two numbers as WIDTHxHEIGHT; decimal commas are understood."""
-
-    name = "WxH"
-
-    def convert(
-        self, value: object, param: click.Parameter | None, ctx: click.Context | None
-    ) -> tuple[float, float]:
-        """Return width and height."""
-        if isinstance(value, tuple):
-            return value
-        parts = str(value).lower().replace("*", "x").replace("×", "x").replace(",", ".").split("x")
-        try:
-            width, height = (float(part) for part in parts)
-        except ValueError:
-            self.fail(f"{value!r} is not WIDTHxHEIGHT, e.g. 22.7x15.1", param, ctx)
-        return width, height
-
-
-class Scale(click.ParamType):  # type: ignore[type-arg,unused-ignore]
-    """A scale 1:N."""
-
-    name = "1:N"
-
-    def convert(
-        self, value: object, param: click.Parameter | None, ctx: click.Context | None
-    ) -> float:
-        """Return N."""
-        text = str(value).strip().removeprefix("1:")
-        try:
-            return float(text)
-        except ValueError:
-            self.fail(f"{value!r} is not a scale, e.g. 1:500", param, ctx)
 
 
 @click.command(

@@ -13,10 +13,15 @@ from numpy.typing import ArrayLike
 from photocore.arrays import FloatArray, as_points, read_only
 from photocore.errors import InputError
 from photocore.jsonfile import read_object, write_object
+from photocore.lensformats import read_foreign_lens
 
 FORMAT = "bifocal-lens/1"
-#: Number of coefficients OpenCV knows for each model.
-MODELS: Mapping[str, tuple[int, ...]] = {"opencv": (0, 4, 5, 8, 12, 14), "fisheye": (4,)}
+#: Numbers of coefficients each model may have; empty: any even number from 8 on.
+MODELS: Mapping[str, tuple[int, ...]] = {
+    "opencv": (0, 4, 5, 8, 12, 14),
+    "fisheye": (4,),
+    "radial": (),
+}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -28,7 +33,9 @@ class Lens:
     camera_matrix : ndarray, shape (3, 3)
         fx, fy, cx, cy. [px]
     coefficients : ndarray, shape (k,)
-        ``opencv``: k1 k2 p1 p2 [k3 ...]; ``fisheye``: k1..k4.
+        ``opencv``: k1 k2 p1 p2 [k3 ...]; ``fisheye``: k1..k4; ``radial``: pairs of ideal radius
+        [px] and seen over ideal radius, from 0 to beyond the corner, for lenses whose profile no
+        polynomial of Brown's fits (the lens database's zooms).
     model : str
         A key of `MODELS`.
     image_size : tuple of int
@@ -55,21 +62,36 @@ class Lens:
         set_(self, "coefficients", read_only(np.ravel(self.coefficients), "coefficients"))
         if self.model not in MODELS:
             raise InputError(f"lens model: {self.model!r} is not one of {', '.join(MODELS)}.")
-        if len(self.coefficients) not in MODELS[self.model]:
+        count = len(self.coefficients)
+        if self.model == "radial":
+            _check_profile(self.coefficients)
+        elif count not in MODELS[self.model]:
             raise InputError(
-                f"lens model {self.model!r} takes {MODELS[self.model]} coefficients, "
-                f"found {len(self.coefficients)}."
+                f"lens model {self.model!r} takes {MODELS[self.model]} coefficients, found {count}."
             )
+        size = tuple(int(v) for v in self.image_size)
+        if len(size) != 2 or min(size) < 1:
+            raise InputError(f"image_size: expected width and height [px], found {size}.")
+        set_(self, "image_size", size)
 
     @classmethod
     def read(cls, path: Path | str) -> Lens:
-        """Read a ``lens.json``."""
+        """Read a ``lens.json``, COLMAP ``cameras.txt``, Metashape ``.xml`` or OpenCV ``.yml``.
+
+        Raises
+        ------
+        InputError
+            If the file is missing or one of its values is unusable; the message names it.
+        """
+        if Path(path).suffix.lower() in {".txt", ".xml", ".yml", ".yaml"}:
+            foreign = read_foreign_lens(path)
+            return cls(**foreign._asdict())
         data = read_object(path, what="lens file")
         try:
             known = {
                 "camera_matrix": data.pop("camera_matrix"),
                 "coefficients": data.pop("coefficients"),
-                "image_size": tuple(int(v) for v in data.pop("image_size")),
+                "image_size": tuple(data.pop("image_size")),
             }
             data.pop("format", None)
             return cls(
@@ -109,6 +131,8 @@ class Lens:
         flat = np.ascontiguousarray(points.reshape(-1, 1, 2))
         if not len(flat):
             return points.copy()
+        if self.model == "radial":
+            return self._scaled(points, inverse=True)
         criteria = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 100, 1e-12)
         matrix = np.array(self.camera_matrix)
         coefficients = np.array(self.coefficients)
@@ -128,6 +152,8 @@ class Lens:
         flat = points.reshape(-1, 2)
         if not len(flat):
             return points.copy()
+        if self.model == "radial":
+            return self._scaled(points, inverse=False)
         matrix = np.array(self.camera_matrix)
         rays = np.column_stack([flat, np.ones(len(flat))]) @ np.linalg.inv(matrix).T
         zero = np.zeros(3)
@@ -139,3 +165,40 @@ class Lens:
         else:
             seen, _ = cv2.projectPoints(rays[:, None, :], zero, zero, matrix, coefficients)
         return np.asarray(seen, dtype=np.float64).reshape(points.shape)
+
+    @property
+    def principal_point(self) -> FloatArray:
+        """Column and row where the axis meets the photo, shape (2,). [px]."""
+        return self.camera_matrix[:2, 2]
+
+    def _scaled(self, points: FloatArray, *, inverse: bool) -> FloatArray:
+        """Return points moved along the radius by the tabulated profile."""
+        from scipy.interpolate import CubicSpline
+
+        ideal, factor = self.coefficients[0::2], self.coefficients[1::2]
+        profile = CubicSpline(ideal, factor)
+        offset = points - self.principal_point
+        radius = np.hypot(offset[..., 0], offset[..., 1])
+        if not inverse:
+            return self.principal_point + offset * profile(radius)[..., None]
+        # Seen radius rises with the ideal one (checked when made), so Newton from the inverse
+        # of the table's nodes converges in three steps to rounding.
+        guess = CubicSpline(ideal * factor, ideal)(radius)
+        slope = profile.derivative()
+        for _ in range(4):
+            gap = guess * profile(guess) - radius
+            guess = guess - gap / (profile(guess) + guess * slope(guess))
+        with np.errstate(divide="ignore", invalid="ignore"):
+            ratio = np.where(radius > 0, guess / radius, 1.0 / profile(0.0))
+        return self.principal_point + offset * ratio[..., None]
+
+
+def _check_profile(coefficients: FloatArray) -> None:
+    """Refuse a radial profile that does not start on the axis or folds the photo over."""
+    if len(coefficients) < 8 or len(coefficients) % 2:
+        raise InputError("lens model 'radial' takes at least four pairs of radius and factor.")
+    ideal, factor = coefficients[0::2], coefficients[1::2]
+    if ideal[0] != 0 or (np.diff(ideal) <= 0).any() or (np.diff(ideal * factor) <= 0).any():
+        raise InputError(
+            "lens model 'radial': radii must start at 0 and rise, and so must radius x factor."
+        )

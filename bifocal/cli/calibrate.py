@@ -1,0 +1,144 @@
+"""``bifocal calibrate``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from photocore.console import print_json, progress_bar, remark, text_table
+from photocore.options import Size
+
+if TYPE_CHECKING:
+    from bifocal.solvers.calibration import Calibration
+
+EXAMPLE = """\b
+Examples:
+  bifocal calibrate board*.jpg --out lens35.json
+  bifocal calibrate board*.jpg --pattern charuco --board 8x11 --out lens35.json
+  bifocal calibrate facade.jpg --straight-edges --focal-px 4740 --out lens35.json
+  bifocal calibrate facade.jpg --lines lines.csv --out lens35.json
+  bifocal calibrate facade.jpg --database --out lens35.json
+
+One lens file holds for one lens at one focus and one zoom mark.
+"""
+
+
+@click.command(short_help="Lens calibration from board photos or straight lines.", epilog=EXAMPLE)
+@click.argument(
+    "images", nargs=-1, required=True, metavar="IMAGE...", type=click.Path(path_type=Path)
+)
+@click.option("--out", type=click.Path(path_type=Path), required=True, help="The lens file.")
+@click.option(
+    "--pattern", default="chessboard", show_default=True,
+    type=click.Choice(["chessboard", "circles", "asymmetric-circles", "charuco"]),
+    help="What is on the board.",
+)  # fmt: skip
+@click.option(
+    "--board", type=Size(),
+    help="Inner corners of a chessboard, circles of a grid, squares of a ChArUco board, across x "
+    "up.  [default: chessboard recognised by itself]",
+)  # fmt: skip
+@click.option(
+    "--model", default="auto", show_default=True,
+    type=click.Choice(["auto", "k1", "k1k2", "k1k2p", "k1k2pk3", "fisheye"]),
+    help="Distortion terms; auto takes in what an F test at 1 % asks for.",
+)  # fmt: skip
+@click.option(
+    "--straight-edges", is_flag=True,
+    help="No board: use the straight edges of a façade (radial terms only).",
+)  # fmt: skip
+@click.option(
+    "--lines", type=click.Path(path_type=Path),
+    help="No board: points picked along straight lines; headings line, col [px], row [px].",
+)  # fmt: skip
+@click.option("--focal-px", type=float, help="With lines: principal distance [px].")
+@click.option("--database", is_flag=True, help="Take the lens database's data for this photo.")
+@click.option("--camera-name", default="", help="With --database: camera, if EXIF lacks it.")
+@click.option("--lens-name", default="", help="With --database: lens, if EXIF lacks it.")
+@click.option("--focal", type=float, help="With --database: focal length [mm], if EXIF lacks it.")
+@click.option("--overwrite", is_flag=True, help="Replace an existing file.")
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
+def command(
+    images: tuple[Path, ...], out: Path, pattern: str, board: tuple[float, float] | None,
+    model: str, straight_edges: bool, lines: Path | None, focal_px: float | None, database: bool,
+    camera_name: str, lens_name: str, focal: float | None, overwrite: bool, as_json: bool,
+) -> None:  # fmt: skip
+    """Find principal distance, principal point and distortion of a lens.
+
+    From ten or more photos of a flat board, tilted differently and filling every corner; or, where
+    there is no board, from straight lines of a façade or from the lens database.
+    """
+    from bifocal.workflows import lenses
+
+    if sum([straight_edges or lines is not None, database]) > 1:
+        raise click.UsageError("choose one of board photos, straight lines and --database.")
+    if database:
+        lens, notes = lenses.write_database_lens(
+            images[0], out, overwrite=overwrite, camera_name=camera_name, lens_name=lens_name,
+            focal_length=focal,
+        )  # fmt: skip
+        _tell(as_json, lens.to_dict(), [f"Lens: {lens.source}"], notes)
+    elif straight_edges or lines is not None:
+        found, notes = lenses.calibrate_from_edges(
+            images, out, lines=lines, focal_px=focal_px, overwrite=overwrite
+        )
+        k1, k2 = found.lens.coefficients[:2]
+        text = [
+            f"{found.lines} lines; straight to {found.rms_before:.2f} px before, "
+            f"{found.rms_after:.2f} px after the correction",
+            f"k1 = {k1:+.5f} (sigma {found.sigma_k1:.5f}), k2 = {k2:+.5f} ({found.sigma_k2:.5f})",
+        ]
+        _tell(as_json, found.lens.to_dict(), text, notes)
+    else:
+        size = (int(board[0]), int(board[1])) if board else None
+        with progress_bar("Calibrating", quiet=as_json) as progress:
+            result, without = lenses.calibrate_from_boards(
+                images, out, pattern=pattern, board=size, model=model, overwrite=overwrite,
+                progress=progress,
+            )  # fmt: skip
+        notes = tuple(f"{name}: the board was not found; left out" for name in without)
+        data = result.lens.to_dict() | {
+            "photo_rms": result.photo_rms, "dropped": result.dropped, "without_board": without,
+            "suspicious": result.suspicious, "tried": dict(result.tried),
+        }  # fmt: skip
+        _tell(as_json, data, _board_text(result), notes)
+    remark(f"Lens file written to {out}")
+
+
+def _tell(as_json: bool, data: dict[str, Any], text: list[str], notes: tuple[str, ...]) -> None:
+    """Print the result, and remarks on stderr."""
+    for note in notes:
+        remark(note)
+    if as_json:
+        print_json(data)
+    else:
+        click.echo("\n".join(text))
+
+
+def _board_text(result: Calibration) -> list[str]:
+    """Return the calibration in words and tables."""
+    lens, sigma = result.lens, result.standard_deviations
+    matrix = lens.camera_matrix
+    values = {
+        "fx": matrix[0, 0], "fy": matrix[1, 1], "cx": matrix[0, 2], "cy": matrix[1, 2],
+    }  # fmt: skip
+    names = ("k1", "k2", "k3", "k4") if lens.model == "fisheye" else ("k1", "k2", "p1", "p2", "k3")
+    values |= dict(zip(names, lens.coefficients.tolist(), strict=False))
+    rows = [
+        (name, f"{value:.3f}" if name[0] in "fc" else f"{value:.6f}",
+         f"{sigma[name]:.3f}" if name[0] in "fc" else f"{sigma[name]:.6f}")
+        for name, value in values.items() if name in sigma
+    ]  # fmt: skip
+    text = [text_table(("", "value", "sigma"), rows), f"\nRMS {lens.sigma0:.3f} px; {lens.source}"]
+    if result.tried:
+        text.append("Models: " + ", ".join(f"{name} {rms:.3f} px" for name, rms in result.tried))
+    text.append("\nPhotos, RMS [px]:")
+    text += [f"  {name}  {value:.3f}" for name, value in result.photo_rms.items()]
+    text += [f"Left out, does not fit the others: {name}" for name in result.dropped]
+    text += [f"Look at it, much worse than the others: {name}" for name in result.suspicious]
+    text.append("\nCoverage, board points per part of the photo:")
+    text += ["  " + " ".join(f"{count:4d}" for count in row) for row in result.coverage.tolist()]
+    text.append(f"\nVerdict: {result.verdict}")
+    return text

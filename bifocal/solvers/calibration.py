@@ -1,0 +1,424 @@
+"""Lens calibration from photos of a board: detection, choice of model, outliers, verdict."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from scipy.stats import f as f_distribution
+
+from bifocal.domain.lens import Lens
+from photocore.arrays import ByteArray, FloatArray, IntArray
+from photocore.errors import GeometryError, InputError
+
+#: Half width of the corner refinement window [px]; smaller where squares are smaller.
+CORNER_WINDOW = 11
+#: A photo whose RMS is this many times the median is named; beyond the second it is left out.
+SUSPICIOUS, DROPPED = 4.0, 8.0
+#: Error probability of the F test that lets another distortion term in.
+SIGNIFICANCE = 0.01
+COVERAGE_CELLS = (8, 6)
+PATTERNS = ("chessboard", "circles", "asymmetric-circles", "charuco")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class BoardView:
+    """The board as one photo shows it.
+
+    Attributes
+    ----------
+    name : str
+        Of the photo.
+    board : ndarray, shape (n, 3)
+        Points on the board, z = 0. [squares]
+    pixels : ndarray, shape (n, 2)
+        Where they are seen. [px]
+    """
+
+    name: str
+    board: FloatArray
+    pixels: FloatArray
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Calibration:
+    """A calibrated lens and how good it is.
+
+    Attributes
+    ----------
+    lens : Lens
+    standard_deviations : dict of str to float
+        Of fx, fy, cx, cy [px] and each distortion coefficient.
+    photo_rms : dict of str to float
+        RMS residual of each photo used. [px]
+    dropped, suspicious : tuple of str
+        Photos left out, and photos to look at.
+    coverage : ndarray, shape (6, 8)
+        Board points per cell of the photo.
+    tried : tuple of (model name, rms)
+    verdict : str
+        In words.
+    """
+
+    lens: Lens
+    standard_deviations: dict[str, float]
+    photo_rms: dict[str, float]
+    dropped: tuple[str, ...]
+    suspicious: tuple[str, ...]
+    coverage: IntArray
+    tried: tuple[tuple[str, float], ...]
+    verdict: str
+
+
+@dataclass(frozen=True, slots=True)
+class _Model:
+    """A set of distortion terms: OpenCV's flags and how many unknowns they leave."""
+
+    name: str
+    flags: int
+    terms: int
+    names: tuple[str, ...] = field(default=())
+
+
+def _models() -> dict[str, _Model]:
+    """Return the models in order of growing freedom."""
+    import cv2
+
+    k2, k3, tangential = cv2.CALIB_FIX_K2, cv2.CALIB_FIX_K3, cv2.CALIB_ZERO_TANGENT_DIST
+    return {
+        "k1": _Model("k1", k2 | k3 | tangential, 1, ("k1",)),
+        "k1k2": _Model("k1k2", k3 | tangential, 2, ("k1", "k2")),
+        "k1k2p": _Model("k1k2p", k3, 4, ("k1", "k2", "p1", "p2")),
+        "k1k2pk3": _Model("k1k2pk3", 0, 5, ("k1", "k2", "p1", "p2", "k3")),
+    }
+
+
+def detect_board(
+    image: ByteArray, name: str, *, pattern: str, size: tuple[int, int]
+) -> BoardView | None:
+    """Return the board's points in a grey photo; None when it is not found whole.
+
+    Parameters
+    ----------
+    image : ndarray, shape (h, w), uint8
+    name : str
+        Of the photo.
+    pattern : str
+        One of `PATTERNS`.
+    size : tuple of int
+        Inner corners (chessboard), circles, or squares (ChArUco) across and up.
+    """
+    import cv2
+
+    columns, rows = size
+    if pattern == "charuco":
+        return _detect_charuco(image, name, size)
+    if pattern == "chessboard":
+        flags = cv2.CALIB_CB_ADAPTIVE_THRESH | cv2.CALIB_CB_NORMALIZE_IMAGE
+        found, corners = cv2.findChessboardCorners(_reduced(image)[0], size, flags=flags)
+        if not found:
+            return None
+        corners = corners.reshape(-1, 2) * _reduced(image)[1]
+        corners = _refined(image, corners.astype(np.float32), size)
+        board = np.mgrid[0:columns, 0:rows].T.reshape(-1, 2)
+    else:
+        asymmetric = pattern == "asymmetric-circles"
+        flags = cv2.CALIB_CB_ASYMMETRIC_GRID if asymmetric else cv2.CALIB_CB_SYMMETRIC_GRID
+        found, corners = cv2.findCirclesGrid(image, size, flags=flags)
+        if not found:
+            found, corners = cv2.findCirclesGrid(image, size, flags=flags | cv2.CALIB_CB_CLUSTERING)
+        if not found:
+            return None
+        board = np.mgrid[0:columns, 0:rows].T.reshape(-1, 2)
+        if asymmetric:
+            board = np.column_stack([2 * board[:, 0] + board[:, 1] % 2, board[:, 1]])
+    flat = np.column_stack([board, np.zeros(len(board))]).astype(np.float64)
+    return BoardView(name=name, board=flat, pixels=np.asarray(corners, float).reshape(-1, 2))
+
+
+def find_board_size(images: Sequence[ByteArray]) -> tuple[int, int]:
+    """Return the inner corners of the chessboard that most photos show.
+
+    Raises
+    ------
+    InputError
+        If no two photos agree.
+    """
+    import cv2
+
+    flags = (
+        cv2.CALIB_CB_LARGER
+        | cv2.CALIB_CB_EXHAUSTIVE
+        | cv2.CALIB_CB_ACCURACY
+        | cv2.CALIB_CB_NORMALIZE_IMAGE
+    )
+    votes: Counter[tuple[int, int]] = Counter()
+    for image in images:
+        found, _, meta = cv2.findChessboardCornersSBWithMeta(_reduced(image)[0], (3, 3), flags)
+        if found:
+            rows, columns = sorted(meta.shape)
+            votes[(int(columns), int(rows))] += 1
+    if not votes or votes.most_common(1)[0][1] < min(2, len(images)):
+        raise InputError(
+            "no chessboard was recognised. Say which board it is, e.g. --pattern chessboard "
+            "--board 9x6 (inner corners), or use straight façade lines with --lines."
+        )
+    return votes.most_common(1)[0][0]
+
+
+def _reduced(image: ByteArray) -> tuple[ByteArray, float]:
+    """Return a copy of at most 2000 px for the search, and the factor back."""
+    import cv2
+
+    factor = max(1.0, max(image.shape[:2]) / 2000)
+    if factor == 1.0:
+        return image, 1.0
+    small = cv2.resize(image, None, fx=1 / factor, fy=1 / factor, interpolation=cv2.INTER_AREA)
+    return small, factor
+
+
+def _refined(image: ByteArray, corners: Any, size: tuple[int, int]) -> FloatArray:
+    """Return corners refined in a window that reaches half-way to the usual neighbour."""
+    import cv2
+
+    grid = corners.reshape(size[1], size[0], 2)
+    gaps = [np.median(np.linalg.norm(np.diff(grid, axis=axis), axis=2)) for axis in (0, 1)]
+    window = int(np.clip(min(gaps) / 2 - 1, 2, CORNER_WINDOW))
+    criteria = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 100, 1e-4)
+    refined = cv2.cornerSubPix(
+        image, np.array(corners[:, None], order="C"), (window, window), (-1, -1), criteria
+    )
+    return np.asarray(refined, dtype=np.float64).reshape(-1, 2)
+
+
+def _detect_charuco(image: ByteArray, name: str, size: tuple[int, int]) -> BoardView | None:
+    """Return the ChArUco corners seen, over the common dictionaries; at least six."""
+    import cv2
+
+    best: BoardView | None = None
+    for dictionary in (
+        cv2.aruco.DICT_4X4_250, cv2.aruco.DICT_5X5_250, cv2.aruco.DICT_6X6_250,
+        cv2.aruco.DICT_ARUCO_ORIGINAL,
+    ):  # fmt: skip
+        board = cv2.aruco.CharucoBoard(
+            size, 1.0, 0.7, cv2.aruco.getPredefinedDictionary(dictionary)
+        )
+        corners, ids, _, _ = cv2.aruco.CharucoDetector(board).detectBoard(image)
+        if ids is not None and len(ids) >= 6 and (best is None or len(ids) > len(best.pixels)):
+            points = np.asarray(board.getChessboardCorners(), dtype=np.float64)[np.ravel(ids)]
+            best = BoardView(
+                name=name, board=points, pixels=np.asarray(corners, float).reshape(-1, 2)
+            )
+    return best
+
+
+def calibrate(
+    views: Sequence[BoardView], image_size: tuple[int, int], *, model: str = "auto"
+) -> Calibration:
+    """Return the lens that explains the views.
+
+    Parameters
+    ----------
+    views : sequence of BoardView
+        At least three, better ten or more, the board held at different tilts and places.
+    image_size : tuple of int
+        Width and height of the photos. [px]
+    model : str
+        ``auto`` takes terms in while an F test at 1 % asks for them; or ``k1``, ``k1k2``,
+        ``k1k2p``, ``k1k2pk3``, ``fisheye``.
+
+    Returns
+    -------
+    Calibration
+
+    Raises
+    ------
+    InputError
+        If fewer than three views are given or the model is unknown.
+    GeometryError
+        If the views do not determine the lens (all of one tilt).
+    """
+    models = _models()
+    if model not in ("auto", "fisheye", *models):
+        raise InputError(f"model: {model!r} is not one of auto, {', '.join(models)}, fisheye.")
+    kept = list(views)
+    dropped: list[str] = []
+    while True:
+        if len(kept) < 3:
+            raise InputError(
+                f"{len(kept)} usable photo(s) of the board; take at least 3, better 10, with the "
+                "board tilted differently and in every corner of the photo."
+            )
+        solution = _solve(kept, image_size, model, models)
+        rms = {view.name: float(v) for view, v in zip(kept, solution.per_view, strict=True)}
+        worst = max(rms, key=lambda name: rms[name])
+        if rms[worst] <= max(DROPPED * float(np.median(list(rms.values()))), 0.5):
+            break
+        dropped.append(worst)
+        kept = [view for view in kept if view.name != worst]
+    limit = max(SUSPICIOUS * float(np.median(list(rms.values()))), 0.5)
+    suspicious = tuple(name for name, value in rms.items() if value > limit)
+    coverage = _coverage(kept, image_size)
+    verdict = _verdict(solution, coverage, len(kept), image_size)
+    lens = Lens(
+        camera_matrix=solution.matrix,
+        coefficients=solution.coefficients,
+        model=solution.kind,
+        image_size=image_size,
+        sigma0=solution.rms,
+        source=f"board calibration, {len(kept)} photos, model {solution.name}",
+        extra={
+            "standard_deviations": solution.deviations,
+            "coverage": coverage.tolist(),
+            "verdict": verdict,
+        },
+    )
+    return Calibration(
+        lens=lens, standard_deviations=solution.deviations, photo_rms=rms, dropped=tuple(dropped),
+        suspicious=suspicious, coverage=coverage, tried=solution.tried, verdict=verdict,
+    )  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Solution:
+    """One adjustment's outcome."""
+
+    name: str
+    kind: str
+    rms: float
+    matrix: FloatArray
+    coefficients: FloatArray
+    deviations: dict[str, float]
+    per_view: FloatArray
+    tried: tuple[tuple[str, float], ...]
+
+
+def _solve(
+    views: Sequence[BoardView], size: tuple[int, int], wanted: str, models: dict[str, _Model]
+) -> _Solution:
+    """Return the adjustment with the wanted model, or with the one that the data justify."""
+    if wanted == "fisheye":
+        return _solve_fisheye(views, size)
+    names = list(models) if wanted == "auto" else [wanted]
+    results = {name: _solve_brown(views, size, models[name]) for name in names}
+    chosen = names[0]
+    observations = 2 * sum(len(view.pixels) for view in views)
+    for name in names[1:]:
+        small, large = results[chosen], results[name]
+        freedom = observations - 6 * len(views) - 4 - models[name].terms
+        extra = models[name].terms - models[chosen].terms
+        if freedom < 1:
+            break
+        gain = (small.rms**2 - large.rms**2) / large.rms**2 * freedom / extra
+        if gain > f_distribution.ppf(1 - SIGNIFICANCE, extra, freedom):
+            chosen = name
+    tried = tuple((name, result.rms) for name, result in results.items())
+    best = results[chosen]
+    if wanted == "auto" and _field_of_view(best.matrix, size) > 100:
+        fisheye = _solve_fisheye(views, size)
+        tried = (*tried, ("fisheye", fisheye.rms))
+        if fisheye.rms < 0.8 * best.rms:
+            best = fisheye
+    return replace(best, tried=tried)
+
+
+def _solve_brown(views: Sequence[BoardView], size: tuple[int, int], model: _Model) -> _Solution:
+    """Adjust OpenCV's model with the given terms."""
+    import cv2
+
+    try:
+        rms, matrix, terms, _, _, deviations, _, per_view = cv2.calibrateCameraExtended(
+            [v.board.astype(np.float32) for v in views],
+            [v.pixels.astype(np.float32) for v in views],
+            size, None, None, flags=model.flags,
+        )  # fmt: skip
+    except cv2.error as error:
+        raise GeometryError(f"the calibration failed: {error.err}") from error
+    if not np.isfinite(matrix).all() or matrix[0, 0] <= 0:
+        raise GeometryError(
+            "the photos do not determine the lens: tilt the board differently from photo to photo."
+        )
+    order = ("fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2", "k3")
+    sigmas = dict(zip(order, np.ravel(deviations).tolist(), strict=False))
+    wanted = {n: v for n, v in sigmas.items() if n in model.names or n in order[:4]}
+    return _Solution(
+        name=model.name, kind="opencv", rms=float(rms), matrix=matrix,
+        coefficients=np.ravel(terms)[:5], deviations=wanted, per_view=np.ravel(per_view), tried=(),
+    )  # fmt: skip
+
+
+def _solve_fisheye(views: Sequence[BoardView], size: tuple[int, int]) -> _Solution:
+    """Adjust OpenCV's fisheye model (equidistant with four terms)."""
+    import cv2
+
+    # OpenCV 5 moved these two flags out of the fisheye namespace.
+    place: Any = cv2 if hasattr(cv2, "CALIB_RECOMPUTE_EXTRINSIC") else cv2.fisheye
+    flags = place.CALIB_RECOMPUTE_EXTRINSIC | place.CALIB_FIX_SKEW
+    try:
+        rms, matrix, terms, turns, shifts = cv2.fisheye.calibrate(
+            [v.board[None] for v in views], [v.pixels[None] for v in views],
+            size, None, None, flags=flags,
+        )  # fmt: skip
+    except cv2.error as error:
+        raise GeometryError(f"the fisheye calibration failed: {error.err}") from error
+    per_view = []
+    normal = np.zeros((8, 8))
+    for view, turn, shift in zip(views, turns, shifts, strict=True):
+        seen, jacobian = cv2.fisheye.projectPoints(view.board[None], turn, shift, matrix, terms)
+        left = seen.reshape(-1, 2) - view.pixels
+        per_view.append(np.sqrt((left**2).sum() / len(left)))
+        # Columns of OpenCV's jacobian: f (2), c (2), k (4), rotation (3), shift (3), skew.
+        inner, outer = jacobian[:, :8], jacobian[:, 8:14]
+        mixed = inner.T @ outer
+        normal += inner.T @ inner - mixed @ np.linalg.solve(outer.T @ outer, mixed.T)
+    count = sum(len(view.pixels) for view in views)
+    freedom = max(2 * count - 8 - 6 * len(views), 1)
+    variance = sum(v**2 * len(view.pixels) for v, view in zip(per_view, views, strict=True))
+    sigmas = np.sqrt(np.diag(np.linalg.inv(normal)) * variance / freedom)
+    names = ("fx", "fy", "cx", "cy", "k1", "k2", "k3", "k4")
+    return _Solution(
+        name="fisheye", kind="fisheye", rms=float(rms), matrix=matrix,
+        coefficients=np.ravel(terms), deviations=dict(zip(names, sigmas.tolist(), strict=True)),
+        per_view=np.array(per_view), tried=(),
+    )  # fmt: skip
+
+
+def _field_of_view(matrix: FloatArray, size: tuple[int, int]) -> float:
+    """Return the diagonal angle of view. [deg]."""
+    return float(2 * np.degrees(np.arctan(np.hypot(*size) / 2 / matrix[0, 0])))
+
+
+def _coverage(views: Sequence[BoardView], size: tuple[int, int]) -> IntArray:
+    """Return the number of board points per cell of the photo, top row first."""
+    pixels = np.concatenate([view.pixels for view in views])
+    columns, rows = COVERAGE_CELLS
+    counts, _, _ = np.histogram2d(
+        pixels[:, 1], pixels[:, 0], bins=(rows, columns), range=((0, size[1]), (0, size[0]))
+    )
+    return counts.astype(np.int64)
+
+
+def _verdict(solution: _Solution, coverage: IntArray, photos: int, size: tuple[int, int]) -> str:
+    """Return the quality in words, with what would improve it."""
+    advice = []
+    share = float((coverage > 0).mean())
+    corners = [coverage[0, 0], coverage[0, -1], coverage[-1, 0], coverage[-1, -1]]
+    if share < 0.6 or sum(c == 0 for c in corners) > 2:
+        advice.append(
+            f"the board reaches only {share:.0%} of the photo and {sum(c > 0 for c in corners)} of "
+            "4 corners: distortion there is extrapolated"
+        )
+    if photos < 8:
+        advice.append(f"only {photos} photos: take ten or more")
+    sigma_f = solution.deviations.get("fx", 0.0) / solution.matrix[0, 0]
+    if sigma_f > 2e-3:
+        advice.append(f"the principal distance is known to {sigma_f:.1%} only: tilt the board more")
+    # A residual of a ten-thousandth of the width is what a rigid, flat board gives.
+    coarse = solution.rms > max(1.0, size[0] / 4000)
+    if coarse:
+        advice.append(f"residuals of {solution.rms:.2f} px: is the board flat, are photos sharp?")
+    word = "poor" if coarse or share < 0.35 else "usable" if advice else "good"
+    return word + (": " + "; ".join(advice) if advice else "")

@@ -1,0 +1,271 @@
+"""Lenses: board photos, straight lines or the database in; lens file or undistorted photos out."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from photocore.tables import Column, read_table
+
+from bifocal.domain.lens import Lens
+from bifocal.io.images import ImageArray, image_info, read_image, to_eight_bit, write_image
+from bifocal.io.lens_database import lens_from_database
+from bifocal.solvers.calibration import (
+    PATTERNS,
+    BoardView,
+    Calibration,
+    calibrate,
+    detect_board,
+    find_board_size,
+)
+from bifocal.solvers.plumbline import PlumbLine, calibrate_from_lines, find_straight_edges
+from photocore.arrays import ByteArray, FloatArray
+from photocore.console import Progress, no_progress
+from photocore.errors import InputError
+from photocore.output import check_writable
+
+
+def calibrate_from_boards(
+    images: Sequence[Path],
+    out: Path,
+    *,
+    pattern: str = "chessboard",
+    board: tuple[int, int] | None = None,
+    model: str = "auto",
+    overwrite: bool = False,
+    progress: Progress = no_progress,
+) -> tuple[Calibration, tuple[str, ...]]:
+    """Calibrate from board photos and write the lens file.
+
+    Returns
+    -------
+    calibration : Calibration
+    without : tuple of str
+        Photos in which the board was not found.
+    """
+    check_writable(out, overwrite=overwrite)
+    if pattern not in PATTERNS:
+        raise InputError(f"pattern: {pattern!r} is not one of {', '.join(PATTERNS)}.")
+    if board is None and pattern != "chessboard":
+        raise InputError(f"give the size of the {pattern} board, e.g. --board 7x5.")
+    size = _common_size(images)
+    names = _unique_names(images)
+    if board is None:
+        sample = [_grey(path) for path in images[:8]]
+        board = find_board_size(sample)
+    views: list[BoardView] = []
+    without: list[str] = []
+    for done, (path, name) in enumerate(zip(images, names, strict=True)):
+        progress(done, len(images), f"searching {name}")
+        view = detect_board(_grey(path), name, pattern=pattern, size=board)
+        if view is None:
+            without.append(name)
+        else:
+            views.append(view)
+    progress(len(images), len(images), "adjusting")
+    result = calibrate(views, size, model=model)
+    result.lens.write(out, overwrite=overwrite)
+    return result, tuple(without)
+
+
+def calibrate_from_edges(
+    images: Sequence[Path],
+    out: Path,
+    *,
+    lines: Path | None = None,
+    focal_px: float | None = None,
+    overwrite: bool = False,
+) -> tuple[PlumbLine, tuple[str, ...]]:
+    """Calibrate from straight façade lines and write the lens file.
+
+    Parameters
+    ----------
+    images : sequence of Path
+        Photos of one lens at one zoom mark; the size, and without ``lines`` the edges, are taken
+        from them.
+    out : Path
+        The lens file.
+    lines : Path, optional
+        Table of picked points with headings ``line``, ``col [px]``, ``row [px]``.
+    focal_px : float, optional
+        Principal distance; default from EXIF, else the photo's diagonal. [px]
+
+    Returns
+    -------
+    result : PlumbLine
+    remarks : tuple of str
+    """
+    check_writable(out, overwrite=overwrite)
+    size = _common_size(images)
+    remarks: list[str] = []
+    if focal_px is None:
+        focal_px = image_info(images[0]).focal_pixels
+        if focal_px is None:
+            focal_px = float(np.hypot(*size))
+            remarks.append(
+                f"no focal length in EXIF: a principal distance of {focal_px:.0f} px (the photo's "
+                "diagonal) is assumed; give --focal-px if you know it."
+            )
+    chains: list[FloatArray] = []
+    if lines is not None:
+        chains = _picked_lines(lines)
+    else:
+        for path in images:
+            chains += find_straight_edges(_grey(path))
+    result = calibrate_from_lines(chains, size, focal_px=focal_px)
+    if result.rms_after > 0.8 * result.rms_before:
+        remarks.append(
+            "the correction hardly straightens the lines: either the lens has little distortion, or "
+            "these edges are not straight in reality. Prefer a board, or pick the lines yourself."
+        )
+    result.lens.write(out, overwrite=overwrite)
+    return result, tuple(remarks)
+
+
+def write_database_lens(
+    image: Path, out: Path, *, overwrite: bool = False, **names: Any
+) -> tuple[Lens, tuple[str, ...]]:
+    """Write the lens file of the lens database for a photo; see `lens_from_database`."""
+    check_writable(out, overwrite=overwrite)
+    found = lens_from_database(image, **names)
+    found.lens.write(out, overwrite=overwrite)
+    return found.lens, (_database_remark(found.name, found.axis_scale, found.corner_shift),)
+
+
+def undistort_images(
+    images: Sequence[Path],
+    lens: str,
+    *,
+    folder: Path | None = None,
+    overwrite: bool = False,
+    progress: Progress = no_progress,
+    **names: Any,
+) -> tuple[list[Path], tuple[str, ...]]:
+    """Write photos without lens distortion, each resampled once.
+
+    Parameters
+    ----------
+    images : sequence of Path
+    lens : str
+        A lens file, or ``exif`` for the lens database.
+    folder : Path, optional
+        Where to; default beside each photo. Names get ``_undistorted``.
+
+    Returns
+    -------
+    written : list of Path
+    remarks : tuple of str
+    """
+    one = None if lens.lower() == "exif" else Lens.read(lens)
+    targets = []
+    for path in images:
+        target = (folder or path.parent) / f"{path.stem}_undistorted{path.suffix}"
+        targets.append(check_writable(target, overwrite=overwrite))
+    remarks: list[str] = []
+    for done, (path, target) in enumerate(zip(images, targets, strict=True)):
+        progress(done, len(images), path.name)
+        if one is None:
+            found = lens_from_database(path, **names)
+            current = found.lens
+            remark = _database_remark(found.name, found.axis_scale, found.corner_shift)
+            remarks.append(f"{path.name}: {remark}")
+        else:
+            current = one
+        check_size(current, path)
+        write_image(target, undistorted(read_image(path), current), overwrite=overwrite)
+    progress(len(images), len(images))
+    return targets, tuple(remarks)
+
+
+def check_size(lens: Lens, path: Path) -> None:
+    """Refuse a lens that belongs to photos of another size.
+
+    Raises
+    ------
+    InputError
+        If the photo's size is not the lens file's.
+    """
+    size = image_info(path).size
+    if size != lens.image_size:
+        turned = " (turned by 90 degrees?)" if size == lens.image_size[::-1] else ""
+        raise InputError(
+            f"{path}: is {size[0]} x {size[1]} px, the lens file is for "
+            f"{lens.image_size[0]} x {lens.image_size[1]} px{turned}. "
+            "Calibrate with photos of the same size and zoom."
+        )
+
+
+def undistorted(image: ImageArray, lens: Lens) -> ImageArray:
+    """Return the photo without distortion: same size, same camera matrix, cubic, in strips."""
+    import cv2
+
+    height, width = image.shape[:2]
+    result = np.empty_like(image)
+    # Strips keep the coordinate maps small, and below remap's limit of 32767 rows.
+    for top in range(0, height, 512):
+        bottom = min(top + 512, height)
+        columns, rows = np.meshgrid(np.arange(width), np.arange(top, bottom))
+        seen = lens.distort(np.stack([columns, rows], axis=-1)).astype(np.float32)
+        result[top:bottom] = cv2.remap(
+            image, np.ascontiguousarray(seen[..., 0]), np.ascontiguousarray(seen[..., 1]),
+            cv2.INTER_CUBIC, borderMode=cv2.BORDER_CONSTANT,
+        )  # fmt: skip
+    return result
+
+
+def _database_remark(name: str, axis_scale: float, corner: float) -> str:
+    """Say what the database gave and what was taken out."""
+    return (
+        f"{name}: {corner:.1f} px in the corner; the database's scale on the axis "
+        f"({(axis_scale - 1) * 100:+.2f} %) was taken out"
+    )
+
+
+def _grey(path: Path) -> ByteArray:
+    """Return a photo in grey, 8 bit."""
+    return to_eight_bit(read_image(path, grey=True))
+
+
+def _common_size(images: Sequence[Path]) -> tuple[int, int]:
+    """Return the size all photos share."""
+    if not images:
+        raise InputError("name at least one photo.")
+    sizes = {path: image_info(path).size for path in images}
+    first = sizes[images[0]]
+    other = [path for path, size in sizes.items() if size != first]
+    if other:
+        raise InputError(
+            f"{other[0]}: is {sizes[other[0]][0]} x {sizes[other[0]][1]} px, {images[0]} is "
+            f"{first[0]} x {first[1]} px; all photos must come from one camera, not cropped, held "
+            "the same way."
+        )
+    focals = {image_info(path).focal_length for path in images} - {None}
+    if len(focals) > 1:
+        raise InputError(
+            f"the photos were taken at different focal lengths ({', '.join(map(str, focals))} mm): "
+            "each zoom mark needs a calibration of its own."
+        )
+    return first
+
+
+def _unique_names(images: Sequence[Path]) -> list[str]:
+    """Return file names, with folders where names repeat."""
+    names = [path.name for path in images]
+    return [str(p) if names.count(p.name) > 1 else p.name for p in images]
+
+
+def _picked_lines(path: Path) -> list[FloatArray]:
+    """Return the points of each line in a table."""
+    table = read_table(
+        path,
+        [
+            Column("line", aliases=("id", "name"), kind="text", required=True),
+            Column("col", aliases=("column", "x"), kind="number", required=True),
+            Column("row", aliases=("y",), kind="number", required=True),
+        ],
+    )
+    names = list(table.values["line"])
+    points = np.column_stack([table.values["col"], table.values["row"]])
+    return [points[[n == name for n in names]] for name in dict.fromkeys(names)]

@@ -1,0 +1,159 @@
+"""Lens calibrations written by other programs, brought to OpenCV's conventions.
+
+Pixels here have integers at pixel centres; COLMAP and Metashape count from the corner of the image,
+half a pixel more.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import NamedTuple
+from xml.etree import ElementTree
+
+import numpy as np
+
+from photocore.arrays import FloatArray
+from photocore.errors import InputError
+
+
+class LensData(NamedTuple):
+    """What a calibration file holds, in OpenCV's conventions and our pixels."""
+
+    camera_matrix: FloatArray
+    coefficients: FloatArray
+    model: str
+    image_size: tuple[int, int]
+    source: str
+
+
+def read_foreign_lens(path: Path | str) -> LensData:
+    """Return the calibration in a COLMAP, Metashape or OpenCV file, told apart by ending.
+
+    ``.txt`` COLMAP ``cameras.txt``, ``.xml`` Metashape (or OpenCV), ``.yml .yaml`` OpenCV.
+
+    Raises
+    ------
+    InputError
+        If the file is missing, of another kind, or uses terms OpenCV's model does not have.
+    """
+    path = Path(path)
+    if not path.is_file():
+        raise InputError(f"{path}: no such lens file.")
+    ending = path.suffix.lower()
+    if ending in {".yml", ".yaml"}:
+        return _opencv(path)
+    try:
+        text = path.read_text(encoding="utf-8")
+    except UnicodeDecodeError:
+        raise InputError(f"{path}: is not a text file, expected a lens calibration.") from None
+    if ending == ".xml":
+        return _opencv(path) if "opencv_storage" in text[:500] else _metashape(path, text)
+    if ending == ".txt":
+        return _colmap(path, text)
+    raise InputError(
+        f"{path}: lens files are lens.json, COLMAP cameras.txt, Metashape .xml or OpenCV .yml."
+    )
+
+
+def _matrix(fx: float, fy: float, cx: float, cy: float) -> FloatArray:
+    """Return the camera matrix."""
+    return np.array([[fx, 0.0, cx], [0.0, fy, cy], [0.0, 0.0, 1.0]])
+
+
+def _colmap(path: Path, text: str) -> LensData:
+    """Read the one camera of a COLMAP ``cameras.txt``."""
+    rows = [line.split() for line in text.splitlines() if line.strip() and line[0] != "#"]
+    if len(rows) != 1 or len(rows[0]) < 5:
+        raise InputError(
+            f"{path}: expected COLMAP's cameras.txt with one camera, found {len(rows)} lines; "
+            "keep the line of this lens only."
+        )
+    _, model, *numbers = rows[0]
+    try:
+        width, height, *p = (float(item) for item in numbers)
+    except ValueError:
+        raise InputError(f"{path}: {' '.join(rows[0])!r} is not a COLMAP camera line.") from None
+    forms: dict[str, tuple[int, Sequence[int], Sequence[int | None]]] = {
+        # model: (count, indices of fx fy cx cy, indices of the OpenCV coefficients or None for 0)
+        "SIMPLE_PINHOLE": (3, (0, 0, 1, 2), ()),
+        "PINHOLE": (4, (0, 1, 2, 3), ()),
+        "SIMPLE_RADIAL": (4, (0, 0, 1, 2), (3, None, None, None)),
+        "RADIAL": (5, (0, 0, 1, 2), (3, 4, None, None)),
+        "OPENCV": (8, (0, 1, 2, 3), (4, 5, 6, 7)),
+        "OPENCV_FISHEYE": (8, (0, 1, 2, 3), (4, 5, 6, 7)),
+        "FULL_OPENCV": (12, (0, 1, 2, 3), (4, 5, 6, 7, 8, 9, 10, 11)),
+    }
+    if model not in forms or len(p) != forms[model][0]:
+        raise InputError(f"{path}: COLMAP camera {model} with {len(p)} parameters is not read.")
+    _, (fx, fy, cx, cy), terms = forms[model]
+    return LensData(
+        _matrix(p[fx], p[fy], p[cx] - 0.5, p[cy] - 0.5),
+        np.array([0.0 if i is None else p[i] for i in terms]),
+        "fisheye" if model == "OPENCV_FISHEYE" else "opencv",
+        (int(width), int(height)),
+        f"COLMAP {model}, {path.name}",
+    )
+
+
+def _metashape(path: Path, text: str) -> LensData:
+    """Read a Metashape camera calibration (frame camera)."""
+    try:
+        root = ElementTree.fromstring(text)
+    except ElementTree.ParseError as error:
+        raise InputError(f"{path}: is not valid XML ({error}).") from None
+    node = root if root.tag == "calibration" else root.find(".//calibration")
+    if node is None or node.findtext("projection") not in {"frame", "perspective"}:
+        raise InputError(f"{path}: holds no frame calibration of Metashape.")
+
+    def value(name: str) -> float:
+        try:
+            return float(node.findtext(name) or 0.0)
+        except ValueError:
+            raise InputError(f"{path}: <{name}> is not a number.") from None
+
+    if any(abs(value(name)) > 1e-9 for name in ("k4", "b2", "p3", "p4")):
+        raise InputError(
+            f"{path}: uses k4, b2, p3 or p4, which OpenCV's model lacks; "
+            "calibrate again in Metashape with these switched off."
+        )
+    width, height, f = value("width"), value("height"), value("f")
+    if not (width > 0 and height > 0 and f > 0):
+        raise InputError(f"{path}: <width>, <height> and <f> must be above zero.")
+    matrix = _matrix(
+        f + value("b1"), f, width / 2 + value("cx") - 0.5, height / 2 + value("cy") - 0.5
+    )
+    # Metashape's p1 goes with r² + 2x², OpenCV's with 2xy in x: they are exchanged.
+    terms = [value("k1"), value("k2"), value("p2"), value("p1"), value("k3")]
+    size = (int(width), int(height))
+    return LensData(matrix, np.array(terms), "opencv", size, f"Metashape, {path.name}")
+
+
+def _opencv(path: Path) -> LensData:
+    """Read an OpenCV FileStorage calibration."""
+    import cv2
+
+    try:
+        storage = cv2.FileStorage(str(path), cv2.FILE_STORAGE_READ)
+    except (cv2.error, SystemError) as error:
+        raise InputError(f"{path}: is not an OpenCV calibration file.") from error
+
+    def first(*names: str) -> FloatArray | None:
+        for name in names:
+            node = storage.getNode(name)
+            if not node.empty():
+                return np.asarray(node.mat() if node.isMap() else node.real(), dtype=np.float64)
+        return None
+
+    matrix = first("camera_matrix", "cameraMatrix", "Camera_Matrix", "K", "M1")
+    terms = first(
+        "distortion_coefficients", "dist_coeffs", "distCoeffs", "Distortion_Coefficients", "D", "D1"
+    )
+    width, height = first("image_width", "image_Width"), first("image_height", "image_Height")
+    storage.release()
+    if matrix is None or matrix.shape != (3, 3) or terms is None:
+        raise InputError(f"{path}: lacks camera_matrix (3x3) or distortion_coefficients.")
+    if width is None or height is None:
+        raise InputError(f"{path}: lacks image_width and image_height; add both.")
+    size = (int(width), int(height))
+    return LensData(matrix, np.ravel(terms), "opencv", size, f"OpenCV, {path.name}")

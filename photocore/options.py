@@ -1,0 +1,40 @@
+"""Option types shared by the commands of both packages."""
+
+from __future__ import annotations
+
+import click
+
+
+class Size(click.ParamType):  # type: ignore[type-arg,unused-ignore]
+    """Two numbers as WIDTHxHEIGHT; decimal commas are understood."""
+
+    name = "WxH"
+
+    def convert(
+        self, value: object, param: click.Parameter | None, ctx: click.Context | None
+    ) -> tuple[float, float]:
+        """Return width and height."""
+        if isinstance(value, tuple):
+            return value
+        parts = str(value).lower().replace("*", "x").replace("×", "x").replace(",", ".").split("x")
+        try:
+            width, height = (float(part) for part in parts)
+        except ValueError:
+            self.fail(f"{value!r} is not WIDTHxHEIGHT, e.g. 22.7x15.1", param, ctx)
+        return width, height
+
+
+class Scale(click.ParamType):  # type: ignore[type-arg,unused-ignore]
+    """A scale 1:N."""
+
+    name = "1:N"
+
+    def convert(
+        self, value: object, param: click.Parameter | None, ctx: click.Context | None
+    ) -> float:
+        """Return N."""
+        text = str(value).strip().removeprefix("1:")
+        try:
+            return float(text)
+        except ValueError:
+            self.fail(f"{value!r} is not a scale, e.g. 1:500", param, ctx)

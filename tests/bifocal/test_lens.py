@@ -1,0 +1,376 @@
+"""Lens files, distortion both ways, calibration from boards and lines, the lens database."""
+
+from __future__ import annotations
+
+import json
+
+import cv2
+import numpy as np
+import pytest
+from click.testing import CliRunner
+from PIL import Image
+
+from bifocal import Lens
+from bifocal.cli.main import main
+from bifocal.io.images import read_image, write_image
+from bifocal.solvers.calibration import BoardView, calibrate, detect_board, find_board_size
+from bifocal.solvers.plumbline import calibrate_from_lines, find_straight_edges
+from bifocal.workflows.lenses import undistorted
+from photocore.errors import InputError
+
+MATRIX = np.array([[900.0, 0, 511.5], [0, 905.0, 383.5], [0, 0, 1]])
+BROWN = Lens(
+    camera_matrix=MATRIX, coefficients=[-0.2, 0.06, 1e-3, -5e-4, 0.0], image_size=(1024, 768)
+)
+GRID = np.stack(np.meshgrid(np.linspace(0, 1023, 9), np.linspace(0, 767, 7)), axis=-1)
+
+
+def brown_by_hand(pixels, lens):
+    """Return distorted pixels, written out from the textbook."""
+    k1, k2, p1, p2, k3 = lens.coefficients
+    fx, fy, cx, cy = MATRIX[0, 0], MATRIX[1, 1], MATRIX[0, 2], MATRIX[1, 2]
+    x, y = (pixels[..., 0] - cx) / fx, (pixels[..., 1] - cy) / fy
+    q = x * x + y * y
+    radial = 1 + k1 * q + k2 * q**2 + k3 * q**3
+    u = x * radial + 2 * p1 * x * y + p2 * (q + 2 * x * x)
+    v = y * radial + p1 * (q + 2 * y * y) + 2 * p2 * x * y
+    return np.stack([fx * u + cx, fy * v + cy], axis=-1)
+
+
+def test_distortion_is_browns_and_its_inverse_exact():
+    seen = BROWN.distort(GRID)
+    np.testing.assert_allclose(seen, brown_by_hand(GRID, BROWN), atol=1e-9)
+    np.testing.assert_allclose(BROWN.undistort(seen), GRID, atol=1e-8)
+
+
+def test_a_radial_profile_goes_both_ways():
+    radius = np.linspace(0, 760, 40)
+    lens = Lens(
+        camera_matrix=MATRIX, model="radial", image_size=(1024, 768),
+        coefficients=np.column_stack([radius, 1 - 8e-8 * radius**2]).ravel(),
+    )  # fmt: skip
+    seen = lens.distort(GRID)
+    expected = np.array([511.5, 383.5]) * (1 - (1 - 8e-8 * (511.5**2 + 383.5**2)))
+    np.testing.assert_allclose(seen[0, 0], expected, atol=1e-6)
+    np.testing.assert_allclose(lens.undistort(seen), GRID, atol=1e-9)
+    middle = np.array([[511.5, 383.5]])
+    np.testing.assert_allclose(lens.undistort(middle), middle, atol=1e-12)
+
+
+def test_a_fisheye_goes_both_ways():
+    lens = Lens(
+        camera_matrix=MATRIX, coefficients=[0.05, -0.01, 0.002, 0.0], model="fisheye",
+        image_size=(1024, 768),
+    )  # fmt: skip
+    np.testing.assert_allclose(lens.undistort(lens.distort(GRID)), GRID, atol=1e-6)
+
+
+# Files of other programs
+
+
+def test_colmap_pixels_are_half_a_pixel_off_ours(tmp_path):
+    path = tmp_path / "cameras.txt"
+    path.write_text("# list\n1 OPENCV 1024 768 900 905 512 384 -0.2 0.06 0.001 -0.0005\n")
+    lens = Lens.read(path)
+    np.testing.assert_allclose(lens.camera_matrix, MATRIX)
+    np.testing.assert_allclose(lens.coefficients, [-0.2, 0.06, 1e-3, -5e-4])
+
+
+def test_metashape_exchanges_the_tangential_terms(tmp_path):
+    path = tmp_path / "cal.xml"
+    path.write_text(
+        "<calibration><projection>frame</projection><width>1024</width><height>768</height>"
+        "<f>905</f><cx>0</cx><cy>0</cy><b1>-5</b1><k1>-0.2</k1><k2>0.06</k2>"
+        "<p1>-0.0005</p1><p2>0.001</p2></calibration>"
+    )
+    lens = Lens.read(path)
+    np.testing.assert_allclose(lens.camera_matrix, MATRIX)
+    np.testing.assert_allclose(lens.distort(GRID), brown_by_hand(GRID, BROWN), atol=1e-9)
+    path.write_text(path.read_text().replace("<k1>", "<k4>0.1</k4><k1>"))
+    with pytest.raises(InputError, match="k4"):
+        Lens.read(path)
+
+
+def test_opencv_yaml_is_read(tmp_path):
+    path = tmp_path / "cal.yml"
+    storage = cv2.FileStorage(str(path), cv2.FILE_STORAGE_WRITE)
+    storage.write("image_width", 1024)
+    storage.write("image_height", 768)
+    storage.write("camera_matrix", MATRIX)
+    storage.write("distortion_coefficients", np.array([[-0.2, 0.06, 1e-3, -5e-4, 0.0]]))
+    storage.release()
+    lens = Lens.read(path)
+    np.testing.assert_allclose(lens.camera_matrix, MATRIX)
+    assert lens.image_size == (1024, 768)
+
+
+def test_our_own_file_keeps_everything(tmp_path):
+    BROWN.write(tmp_path / "l.json")
+    data = json.loads((tmp_path / "l.json").read_text())
+    data["mine"] = "kept"
+    (tmp_path / "l.json").write_text(json.dumps(data))
+    lens = Lens.read(tmp_path / "l.json")
+    assert lens.to_dict()["mine"] == "kept"
+    np.testing.assert_array_equal(lens.camera_matrix, MATRIX)
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        ("{}", "camera_matrix"),
+        ('{"camera_matrix": [[1]], "coefficients": [], "image_size": [1, 1]}', "shape"),
+        (
+            '{"camera_matrix": [[1,0,0],[0,1,0],[0,0,1]], "coefficients": [1], "image_size": [1,1]}',
+            "coefficients",
+        ),
+        (
+            '{"camera_matrix": [[1,0,0],[0,1,0],[0,0,1]], "coefficients": [], "image_size": [1, 1],'
+            ' "model": "magic"}',
+            "magic",
+        ),
+    ],
+)
+def test_a_broken_lens_file_is_named(tmp_path, content, message):
+    (tmp_path / "bad.json").write_text(content)
+    with pytest.raises(InputError, match=message) as caught:
+        Lens.read(tmp_path / "bad.json")
+    assert "bad.json" in str(caught.value)
+
+
+# Boards
+
+
+def board_views(count=12, noise=0.1, lens=BROWN, seed=5):
+    """Return views of a 9 x 6 board through a known lens."""
+    rng = np.random.default_rng(seed)
+    board = np.column_stack([np.mgrid[0:9, 0:6].T.reshape(-1, 2), np.zeros(54)]).astype(float)
+    views = []
+    while len(views) < count:
+        turn, _ = cv2.Rodrigues(rng.uniform(-0.5, 0.5, 3))
+        shift = [rng.uniform(-9, 2), rng.uniform(-7, 1), rng.uniform(10, 16)]
+        points = board @ turn.T + shift
+        ideal = points[:, :2] / points[:, 2:] * [900, 905] + [511.5, 383.5]
+        pixels = lens.distort(ideal) + rng.normal(0, noise, (54, 2))
+        if (pixels > 0).all() and (pixels < [1024, 768]).all():
+            views.append(BoardView(name=f"v{len(views)}", board=board, pixels=pixels))
+    return views
+
+
+def test_a_known_lens_is_found_within_its_standard_deviations():
+    result = calibrate(board_views(), (1024, 768))
+    sigma = result.standard_deviations
+    matrix = result.lens.camera_matrix
+    for value, truth, name in (
+        (matrix[0, 0], 900, "fx"), (matrix[1, 1], 905, "fy"),
+        (matrix[0, 2], 511.5, "cx"), (matrix[1, 2], 383.5, "cy"),
+        (result.lens.coefficients[0], -0.2, "k1"), (result.lens.coefficients[2], 1e-3, "p1"),
+    ):  # fmt: skip
+        assert abs(value - truth) < 4 * sigma[name]
+    assert result.lens.sigma0 == pytest.approx(0.1 * np.sqrt(2), rel=0.1)
+    assert dict(result.tried).keys() == {"k1", "k1k2", "k1k2p", "k1k2pk3"}
+
+
+def test_terms_that_are_not_there_are_not_taken_in():
+    plain = Lens(camera_matrix=MATRIX, coefficients=[-0.1, 0, 0, 0], image_size=(1024, 768))
+    result = calibrate(board_views(lens=plain), (1024, 768))
+    assert set(result.standard_deviations) == {"fx", "fy", "cx", "cy", "k1"}
+
+
+def test_a_photo_that_does_not_fit_is_left_out_and_named():
+    views = board_views()
+    rng = np.random.default_rng(1)
+    bad = views[3]
+    views[3] = BoardView(
+        name="blurred", board=bad.board, pixels=bad.pixels + rng.normal(0, 8, (54, 2))
+    )
+    result = calibrate(views, (1024, 768))
+    assert result.dropped == ("blurred",)
+
+
+def test_few_photos_are_refused():
+    with pytest.raises(InputError, match="at least 3"):
+        calibrate(board_views(2), (1024, 768))
+
+
+def drawn_board(squares=(10, 7), pixel=60):
+    rows, columns = np.indices((squares[1] * pixel, squares[0] * pixel)) // pixel
+    board = ((rows + columns) % 2 * 220 + 20).astype(np.uint8)
+    return cv2.copyMakeBorder(board, 60, 60, 60, 60, cv2.BORDER_CONSTANT, value=240)
+
+
+def test_the_board_size_is_recognised_and_corners_found():
+    image = cv2.GaussianBlur(drawn_board(), (0, 0), 1.2)
+    assert find_board_size([image, image]) == (9, 6)
+    view = detect_board(image, "x", pattern="chessboard", size=(9, 6))
+    spacing = np.diff(view.pixels.reshape(6, 9, 2), axis=1)
+    np.testing.assert_allclose(np.linalg.norm(spacing, axis=2), 60, atol=0.1)
+
+
+def test_charuco_corners_are_found():
+    board = cv2.aruco.CharucoBoard(
+        (7, 5), 1.0, 0.7, cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_5X5_250)
+    )
+    image = board.generateImage((700, 500), marginSize=20)
+    view = detect_board(image, "x", pattern="charuco", size=(7, 5))
+    assert len(view.pixels) == 24
+    assert (
+        detect_board(np.full((200, 200), 99, np.uint8), "x", pattern="charuco", size=(7, 5)) is None
+    )
+
+
+@pytest.mark.parametrize("pattern", ["circles", "asymmetric-circles"])
+def test_circle_grids_are_found(pattern):
+    image = np.full((500, 700), 230, np.uint8)
+    asymmetric = pattern == "asymmetric-circles"
+    size = (4, 7) if asymmetric else (7, 5)
+    for row in range(size[1]):
+        for column in range(size[0]):
+            x = 2 * column + row % 2 if asymmetric else column
+            cv2.circle(image, (100 + 60 * x, 70 + 60 * row), 14, 20, -1, cv2.LINE_AA)
+    view = detect_board(cv2.GaussianBlur(image, (0, 0), 1), "x", pattern=pattern, size=size)
+    first, second = view.pixels[:2]
+    assert np.linalg.norm(second - first) == pytest.approx(120 if asymmetric else 60, abs=0.3)
+
+
+def test_the_reference_photos_give_the_reference_values(data_dir, tmp_path):
+    photos = sorted(str(p) for p in (data_dir / "calibration_left").glob("*.jpg"))
+    out = tmp_path / "lens.json"
+    result = CliRunner().invoke(main, ["calibrate", *photos, "--out", str(out), "--json"])
+    assert result.exit_code == 0, result.stderr
+    lens = Lens.read(out)
+    np.testing.assert_allclose(
+        lens.camera_matrix[[0, 1, 0, 1], [0, 1, 2, 2]], [536.07, 536.02, 342.37, 235.54], atol=0.5
+    )
+    assert lens.sigma0 == pytest.approx(0.409, abs=0.005)
+    data = json.loads(result.stdout)
+    assert data["suspicious"] == ["left02.jpg"]
+
+
+# Straight lines
+
+
+def bent_lines(lens):
+    lines = []
+    for offset in np.linspace(20, 740, 9):
+        lines.append(np.column_stack([np.linspace(10, 1010, 40), np.full(40, offset)]))
+    for offset in np.linspace(20, 1000, 9):
+        lines.append(np.column_stack([np.full(40, offset), np.linspace(10, 750, 40)]))
+    return [lens.distort(line) for line in lines]
+
+
+def test_straight_lines_give_the_radial_terms():
+    lens = Lens(
+        camera_matrix=[[900, 0, 511.5], [0, 900, 383.5], [0, 0, 1]],
+        coefficients=[-0.15, 0.04, 0, 0], image_size=(1024, 768),
+    )  # fmt: skip
+    rng = np.random.default_rng(2)
+    lines = [line + rng.normal(0, 0.1, line.shape) for line in bent_lines(lens)]
+    found = calibrate_from_lines(lines, (1024, 768), focal_px=900.0)
+    assert abs(found.lens.coefficients[0] + 0.15) < 4 * found.sigma_k1
+    assert np.abs(found.lens.undistort(GRID) - lens.undistort(GRID)).max() < 0.3
+    assert found.rms_before > 2
+    assert found.rms_after == pytest.approx(0.1, abs=0.02)
+
+
+def test_edges_of_a_picture_are_enough():
+    lens = Lens(
+        camera_matrix=[[900, 0, 511.5], [0, 900, 383.5], [0, 0, 1]],
+        coefficients=[-0.1, 0.0, 0, 0], image_size=(1024, 768),
+    )  # fmt: skip
+    rows, columns = np.indices((768, 1024))
+    wall = (((rows // 96) + (columns // 128)) % 2 * 120 + 60).astype(np.uint8)
+    grid = np.stack([columns, rows], axis=-1).reshape(-1, 2).astype(float)
+    ideal = lens.undistort(grid).astype(np.float32).reshape(768, 1024, 2)
+    photo = cv2.remap(wall, ideal[..., 0], ideal[..., 1], cv2.INTER_LINEAR)
+    lines = find_straight_edges(cv2.GaussianBlur(photo, (0, 0), 0.8))
+    found = calibrate_from_lines(lines, (1024, 768), focal_px=900.0)
+    assert found.lines >= 6
+    assert np.abs(found.lens.undistort(GRID) - lens.undistort(GRID)).max() < 1.5
+
+
+def test_too_few_lines_are_refused():
+    with pytest.raises(InputError, match="at least 3"):
+        calibrate_from_lines([GRID[0], GRID[1]], (1024, 768), focal_px=900.0)
+
+
+# Photos and the database
+
+
+def test_an_undistorted_photo_shows_straight_what_was_straight():
+    rows, columns = np.indices((768, 1024))
+    wall = (127 + 100 * np.sin(columns / 20) * np.sin(rows / 25)).astype(np.uint8)
+    grid = np.stack([columns, rows], axis=-1).reshape(-1, 2).astype(float)
+    ideal = BROWN.undistort(grid).astype(np.float32).reshape(768, 1024, 2)
+    seen = cv2.remap(wall, ideal[..., 0], ideal[..., 1], cv2.INTER_CUBIC)
+    back = undistorted(seen, BROWN)[80:-80, 80:-80]
+    assert np.abs(back.astype(int) - wall[80:-80, 80:-80]).mean() < 1.0
+
+
+def canon(path, focal=19.0, lens="Canon EF-S 18-55mm f/3.5-5.6", model="Canon EOS 300D DIGITAL"):
+    exif = Image.Exif()
+    exif[271], exif[272] = "Canon", model
+    exif.get_ifd(34665).update({37386: focal, **({42036: lens} if lens else {})})
+    Image.new("RGB", (3072, 2048), (120, 110, 100)).save(path, exif=exif)
+    return path
+
+
+def test_the_database_scale_on_the_axis_is_taken_out(tmp_path):
+    pytest.importorskip("lensfunpy")
+    from bifocal.io.lens_database import lens_from_database
+
+    for focal, axis in ((19.0, 1.035), (35.0, 1.007)):
+        found = lens_from_database(canon(tmp_path / f"{focal}.jpg", focal))
+        assert found.axis_scale == pytest.approx(axis, abs=0.001)
+        centre = found.lens.principal_point
+        near = np.array([[1.0, 0.0], [0.0, 1.0]])
+        stretch = np.linalg.norm(found.lens.distort(centre + near) - centre, axis=1)
+        np.testing.assert_allclose(stretch, 1.0, atol=2e-4)
+        assert found.corner_shift > 15
+
+
+def test_an_ambiguous_or_unknown_lens_is_offered_as_a_choice(tmp_path):
+    pytest.importorskip("lensfunpy")
+    from bifocal.io.lens_database import lens_from_database
+
+    with pytest.raises(InputError, match=r"Choose one[\s\S]*EF-S 18-55mm f/3.5-5.6"):
+        lens_from_database(canon(tmp_path / "a.jpg", lens=""))
+    with pytest.raises(InputError, match="not in the lens database"):
+        lens_from_database(canon(tmp_path / "b.jpg", model="iPhone 12", lens=""))
+    Image.new("RGB", (30, 20)).save(tmp_path / "c.jpg")
+    with pytest.raises(InputError, match="--focal"):
+        lens_from_database(tmp_path / "c.jpg")
+
+
+def test_the_commands_write_lens_file_and_photo(tmp_path):
+    pytest.importorskip("lensfunpy")
+    photo = canon(tmp_path / "far.jpg")
+    run = CliRunner().invoke
+    done = run(main, ["calibrate", str(photo), "--database", "--out", str(tmp_path / "l.json")])
+    assert done.exit_code == 0, done.stderr
+    assert "taken out" in done.stderr
+    done = run(main, ["undistort", str(photo), "--lens", str(tmp_path / "l.json")])
+    assert done.exit_code == 0, done.stderr
+    assert read_image(tmp_path / "far_undistorted.jpg").shape == (2048, 3072, 3)
+    again = run(main, ["undistort", str(photo), "--lens", str(tmp_path / "l.json")])
+    assert again.exit_code == 1
+    assert "--overwrite" in again.stderr
+
+
+def test_mistakes_with_lenses_are_named(tmp_path):
+    run = CliRunner().invoke
+    write_image(tmp_path / "grey.png", np.full((300, 400), 128, np.uint8))
+    write_image(tmp_path / "other.png", np.full((400, 300), 128, np.uint8))
+    BROWN.write(tmp_path / "l.json")
+    cases = [
+        (["calibrate", "grey.png", "--out", "o.json"], "no chessboard was recognised"),
+        (["calibrate", "grey.png", "other.png", "--out", "o.json"], "one camera"),
+        (["calibrate", "none.png", "--out", "o.json"], "no such image"),
+        (["undistort", "grey.png", "--lens", "l.json"], "400 x 300"),
+        (["undistort", "grey.png", "--lens", "none.json"], "no such lens file"),
+    ]
+    for arguments, message in cases:
+        full = [str(tmp_path / a) if "." in a else a for a in arguments]
+        result = run(main, full)
+        assert result.exit_code == 1, arguments
+        assert message in result.stderr
+    assert not (tmp_path / "o.json").exists()
