@@ -12,6 +12,7 @@ from bifocal.domain.points import SurveyPoints
 from photocore.arrays import BoolArray, FloatArray
 from photocore.errors import InputError
 from photocore.output import atomic_path
+from photocore.tables import write_csv
 
 #: Point lists as surveyors name them: P point, N north, E east, Z height, D description.
 ORDERS = ("PNEZD", "PENZD")
@@ -165,38 +166,20 @@ def _write_las(path: Path, points: SurveyPoints, coordinates: FloatArray) -> Non
 def _write_csv(
     path: Path, points: SurveyPoints, coordinates: FloatArray, *, order: str, flavour: str
 ) -> None:
-    """Write a surveyor's point list without a header line, comma-named order."""
+    """Write a surveyor's point list without a heading line, comma-named order."""
     if order not in ORDERS:
         raise InputError(f"order: {order!r} is not one of {', '.join(ORDERS)}.")
-    columns = {"E": 0, "N": 1, "Z": 2}
-    separator, decimal, encoding = {
-        "plain": (",", ".", "utf-8"),
-        "excel-it": (";", ",", "utf-8-sig"),
-        "excel-de": (";", ",", "utf-8-sig"),
-    }.get(flavour, ("", "", ""))
-    if not separator:
-        raise InputError(f"csv flavour: {flavour!r} is not one of plain, excel-it, excel-de.")
-    lines = []
-    for i, place in enumerate(coordinates.tolist()):
-        numbers = [
-            f"{place[columns[letter]]:.4f}".replace(".", decimal)
-            for letter in order
-            if letter in columns
-        ]
-        description = points.flags[i] + (f" {points.notes[i]}" if points.notes[i] else "")
-        cells = [_csv_text(points.ids[i], separator), *numbers, _csv_text(description, separator)]
-        lines.append(separator.join(cells))
-    path.write_bytes("".join(f"{line}\r\n" for line in lines).encode(encoding))
-
-
-def _csv_text(text: str, separator: str) -> str:
-    """Return text that a spreadsheet shows and never computes."""
-    text = text.replace("\r", " ").replace("\n", " ")
-    if text[:1] in set("=+-@\t"):
-        text = f"'{text}"
-    if separator in text or '"' in text:
-        return '"' + text.replace('"', '""') + '"'
-    return text
+    axes = {"E": coordinates[:, 0], "N": coordinates[:, 1], "Z": coordinates[:, 2]}
+    notes = zip(points.flags, points.notes, strict=True)
+    columns: dict[str, object] = {
+        "P": list(points.ids),
+        **{letter: axes[letter] for letter in order if letter in axes},
+        "D": [f"{flag} {note}".strip() for flag, note in notes],
+    }
+    write_csv(
+        path, columns, flavour=flavour, formats=dict.fromkeys("ENZ", ".4f"), headings=False,
+        overwrite=True,
+    )  # fmt: skip
 
 
 def _write_geojson(path: Path, points: SurveyPoints, coordinates: FloatArray) -> None:

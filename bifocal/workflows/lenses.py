@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from photocore.tables import Column, read_table
 
 from bifocal.domain.lens import Lens
 from bifocal.io.images import ImageArray, image_info, read_image, to_eight_bit, write_image
@@ -25,6 +24,7 @@ from photocore.arrays import ByteArray, FloatArray
 from photocore.console import Progress, no_progress
 from photocore.errors import InputError
 from photocore.output import check_writable
+from photocore.tables import Column, read_table
 
 
 def calibrate_from_boards(
@@ -117,8 +117,8 @@ def calibrate_from_edges(
     result = calibrate_from_lines(chains, size, focal_px=focal_px)
     if result.rms_after > 0.8 * result.rms_before:
         remarks.append(
-            "the correction hardly straightens the lines: either the lens has little distortion, or "
-            "these edges are not straight in reality. Prefer a board, or pick the lines yourself."
+            "the correction hardly straightens the lines: either the lens has little distortion, "
+            "or these edges are not straight in reality. Prefer a board, or pick lines yourself."
         )
     result.lens.write(out, overwrite=overwrite)
     return result, tuple(remarks)

@@ -9,7 +9,9 @@ import laspy
 import numpy as np
 import openpyxl
 import pytest
+from click.testing import CliRunner
 
+from bifocal.cli.main import main
 from bifocal.domain.points import SurveyPoints
 from bifocal.io.exports import export_points
 from photocore.errors import InputError
@@ -98,3 +100,24 @@ def test_refusals_name_the_mend(tmp_path):
     with pytest.raises(InputError, match="Georeference"):
         export_points(tmp_path / "w.csv", bare, world=True)
     assert {p.name for p in tmp_path.iterdir()} == {"q.csv"}
+
+
+def test_the_command_takes_a_result_table_and_names_what_it_lacks(tmp_path):
+    run = CliRunner().invoke
+    table = tmp_path / "result.csv"
+    table.write_text(
+        "Point,X [m],Y [m],Z [m],sigma_r,flag\n001,1.5,2.5,0.25,0.01,OK\nx,,,,,NADIR\n"
+    )
+    out = tmp_path / "o.geojson"
+    done = run(main, ["export", str(table), "--out", str(out)])
+    assert done.exit_code == 0, done.stderr
+    assert "left out: x" in done.stderr
+    data = json.loads(out.read_text())
+    assert data["features"][0]["geometry"]["coordinates"] == [1.5, 2.5, 0.25]
+    table.write_text("Point,s1\nA,3\n")
+    done = run(main, ["export", str(table), "--out", str(tmp_path / "o.dxf")])
+    assert done.exit_code == 1
+    assert "bifocal solve" in done.stderr
+    done = run(main, ["export", str(tmp_path / "none.xlsx"), "--out", str(tmp_path / "o.dxf")])
+    assert done.exit_code == 1
+    assert "none.xlsx" in done.stderr

@@ -118,9 +118,9 @@ def test_our_own_file_keeps_everything(tmp_path):
     ("content", "message"),
     [
         ("{}", "camera_matrix"),
-        ('{"camera_matrix": [[1]], "coefficients": [], "image_size": [1, 1]}', "shape"),
+        ('{"camera_matrix": [[1]], "coefficients": [], "image_size": [9,9]}', "shape"),
         (
-            '{"camera_matrix": [[1,0,0],[0,1,0],[0,0,1]], "coefficients": [1], "image_size": [1,1]}',
+            '{"camera_matrix": [[1,0,0],[0,1,0],[0,0,1]], "coefficients": [1],"image_size": [9,9]}',
             "coefficients",
         ),
         (

@@ -1,0 +1,45 @@
+"""``bifocal export``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from photocore.console import remark
+
+EXAMPLE = """\b
+Examples:
+  bifocal export result.xlsx --out points.dxf
+  bifocal export result.xlsx --out points.csv --order PENZD --world
+  bifocal export result.xlsx --out points.csv --csv-flavour excel-it
+"""
+
+
+@click.command(short_help="Points as DXF, PLY, LAS, CSV, GeoJSON or workbook.", epilog=EXAMPLE)
+@click.argument("result", type=click.Path(path_type=Path))
+@click.option(
+    "--out", type=click.Path(path_type=Path), required=True,
+    help="File to write; its ending chooses the format: .dxf .ply .las .laz .csv .geojson .xlsx",
+)  # fmt: skip
+@click.option("--world", is_flag=True, help="E, N, H instead of the wall's X, Y, relief [m].")
+@click.option(
+    "--order", type=click.Choice(["PNEZD", "PENZD"]), default="PNEZD", show_default=True,
+    help="Columns of a .csv: Point, North, East, height Z, Description.",
+)  # fmt: skip
+@click.option(
+    "--csv-flavour", type=click.Choice(["plain", "excel-it", "excel-de"]), default="plain",
+    show_default=True, help="Separator, decimal sign and encoding of a .csv.",
+)  # fmt: skip
+@click.option("--overwrite", is_flag=True, help="Replace an existing file.")
+def command(
+    result: Path, out: Path, world: bool, order: str, csv_flavour: str, overwrite: bool
+) -> None:
+    """Write the points of a solved survey (RESULT: .xlsx, .ods or .csv) for other programs."""
+    from bifocal.workflows.export import export
+
+    for note in export(
+        result, out, world=world, order=order, flavour=csv_flavour, overwrite=overwrite
+    ):
+        remark(note)
+    click.echo(out)

@@ -1,0 +1,22 @@
+"""Result in, points for other programs out."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from bifocal.io.exports import export_points
+from bifocal.io.point_tables import read_survey_points
+from photocore.output import check_writable
+
+
+def export(
+    source: Path, out: Path, *, world: bool = False, order: str = "PNEZD",
+    flavour: str = "plain", overwrite: bool = False,
+) -> tuple[str, ...]:  # fmt: skip
+    """Write the points of a result in the format the ending of ``out`` names; return remarks."""
+    check_writable(out, overwrite=overwrite)
+    points, remarks = read_survey_points(source)
+    more = export_points(
+        out, points, world=world, order=order, flavour=flavour, overwrite=overwrite
+    )
+    return (*remarks, *more)
