@@ -1,0 +1,266 @@
+"""Interfaces between media that a ray can meet: plane of any tilt, sphere, cylinder.
+
+A surface answers four questions, for many rays at once: on which side a point lies, how far a ray
+travels to its next meeting with the surface, the unit normal there, and how the normal turns when
+the point moves (the shape operator, which the derivative of a refracted ray needs).
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass, replace
+from typing import Self
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from photocore.arrays import FloatArray, as_floats, positive, read_only
+from photocore.errors import GeometryError
+
+
+class Surface(ABC):
+    """What ray tracing asks of an interface. All arrays are float64, points on the last axis."""
+
+    @abstractmethod
+    def side(self, points: FloatArray) -> FloatArray:
+        """Return a value per point, shape (...): its sign tells the side, zero is on the surface.
+
+        Positive on the side the normals point to. [unit of the points]
+        """
+
+    @abstractmethod
+    def hop(self, origins: FloatArray, directions: FloatArray, beyond: FloatArray) -> FloatArray:
+        """Return the distance along each ray to the first meeting farther than ``beyond``.
+
+        Shape (n,); NaN where the ray never meets the surface.
+        """
+
+    @abstractmethod
+    def normals(self, points: FloatArray) -> FloatArray:
+        """Return the unit normals at points of the surface, shape (n, 3)."""
+
+    @abstractmethod
+    def turn(self, points: FloatArray, normals: FloatArray, steps: FloatArray) -> FloatArray:
+        """Return how the unit normals change when points of the surface move along it.
+
+        ``steps`` are k tangent vectors per point, shape (n, k, 3); so is the result.
+        """
+
+    @abstractmethod
+    def shifted(self, vector: ArrayLike) -> Self:
+        """Return the surface moved by a vector."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Plane(Surface):
+    """A plane of any tilt.
+
+    Attributes
+    ----------
+    point : ndarray, shape (3,)
+        Any point of the plane.
+    normal : ndarray, shape (3,)
+        Its normal; made a unit vector. Default: the vertical.
+
+    Examples
+    --------
+    >>> surface = Plane.level(1.8075)
+    >>> float(surface.side(np.array([0.0, 0.0, 2.0])).round(4))
+    0.1925
+    """
+
+    point: FloatArray
+    normal: FloatArray = (0.0, 0.0, 1.0)  # type: ignore[assignment]
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "point", read_only(self.point, "point", shape=(3,)))
+        object.__setattr__(self, "normal", _unit(self.normal, "normal"))
+
+    @classmethod
+    def level(cls, height: float) -> Plane:
+        """Return the horizontal plane Z = height."""
+        return cls(point=(0.0, 0.0, height))  # type: ignore[arg-type]
+
+    @classmethod
+    def tilted(cls, height: float, *, slope_x: float, slope_y: float) -> Plane:
+        """Return the plane Z = height + slope_x X + slope_y Y."""
+        return cls(
+            point=(0.0, 0.0, height),  # type: ignore[arg-type]
+            normal=(-slope_x, -slope_y, 1.0),  # type: ignore[arg-type]
+        )
+
+    def side(self, points: FloatArray) -> FloatArray:
+        """Return the signed distance to the plane."""
+        distance: FloatArray = (points - self.point) @ self.normal
+        return distance
+
+    def hop(self, origins: FloatArray, directions: FloatArray, beyond: FloatArray) -> FloatArray:
+        """Return the distance to the plane along each ray; NaN for rays along or away from it."""
+        with np.errstate(divide="ignore", invalid="ignore"):
+            distance = -self.side(origins) / (directions @ self.normal)
+        return np.where((distance > beyond) & np.isfinite(distance), distance, np.nan)
+
+    def normals(self, points: FloatArray) -> FloatArray:
+        """Return the one normal for every point."""
+        return np.broadcast_to(self.normal, points.shape)
+
+    def turn(
+        self,
+        points: FloatArray,  # noqa: ARG002
+        normals: FloatArray,  # noqa: ARG002
+        steps: FloatArray,
+    ) -> FloatArray:
+        """Return zero: the normal of a plane never turns."""
+        return np.zeros_like(steps)
+
+    def shifted(self, vector: ArrayLike) -> Plane:
+        """Return the plane moved by a vector."""
+        return replace(self, point=self.point + as_floats(vector, "vector"))
+
+    def moved(self, rotation: FloatArray, translation: FloatArray) -> Plane:
+        """Return the plane given in one frame as seen in another, x' = rotation x + translation."""
+        return Plane(point=rotation @ self.point + translation, normal=rotation @ self.normal)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Sphere(Surface):
+    """A sphere, such as the inner or outer face of a dome port; normals point outwards.
+
+    Attributes
+    ----------
+    centre : ndarray, shape (3,)
+        Its centre.
+    radius : float
+        Its radius, in the unit of the centre.
+    """
+
+    centre: FloatArray
+    radius: float
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "centre", read_only(self.centre, "centre", shape=(3,)))
+        object.__setattr__(self, "radius", positive(self.radius, "radius"))
+
+    def side(self, points: FloatArray) -> FloatArray:
+        """Return the distance outside the sphere, negative inside."""
+        distance: FloatArray = np.linalg.norm(points - self.centre, axis=-1) - self.radius
+        return distance
+
+    def hop(self, origins: FloatArray, directions: FloatArray, beyond: FloatArray) -> FloatArray:
+        """Return the distance to the next meeting with the sphere; NaN where there is none."""
+        return _hop_round(origins - self.centre, directions, self.radius, beyond)
+
+    def normals(self, points: FloatArray) -> FloatArray:
+        """Return the outward radii."""
+        return (points - self.centre) / self.radius
+
+    def turn(
+        self,
+        points: FloatArray,  # noqa: ARG002
+        normals: FloatArray,  # noqa: ARG002
+        steps: FloatArray,
+    ) -> FloatArray:
+        """Return the steps over the radius."""
+        return steps / self.radius
+
+    def shifted(self, vector: ArrayLike) -> Sphere:
+        """Return the sphere moved by a vector."""
+        return replace(self, centre=self.centre + as_floats(vector, "vector"))
+
+    def moved(self, rotation: FloatArray, translation: FloatArray) -> Sphere:
+        """Return the sphere given in one frame as seen in another."""
+        return replace(self, centre=rotation @ self.centre + translation)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Cylinder(Surface):
+    """An endless circular cylinder, such as one wall of a glass tube; normals point outwards.
+
+    Attributes
+    ----------
+    point : ndarray, shape (3,)
+        Any point of the axis.
+    axis : ndarray, shape (3,)
+        Direction of the axis; made a unit vector.
+    radius : float
+        Radius, in the unit of the point.
+    """
+
+    point: FloatArray
+    axis: FloatArray
+    radius: float
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "point", read_only(self.point, "point", shape=(3,)))
+        object.__setattr__(self, "axis", _unit(self.axis, "axis"))
+        object.__setattr__(self, "radius", positive(self.radius, "radius"))
+
+    def _across(self, vectors: FloatArray) -> FloatArray:
+        """Return the part of vectors at right angles to the axis."""
+        return vectors - (vectors @ self.axis)[..., None] * self.axis
+
+    def side(self, points: FloatArray) -> FloatArray:
+        """Return the distance outside the cylinder, negative inside."""
+        across = self._across(points - self.point)
+        distance: FloatArray = np.linalg.norm(across, axis=-1) - self.radius
+        return distance
+
+    def hop(self, origins: FloatArray, directions: FloatArray, beyond: FloatArray) -> FloatArray:
+        """Return the distance to the next meeting with the wall; NaN where there is none."""
+        across, along = self._across(origins - self.point), self._across(directions)
+        return _hop_round(across, along, self.radius, beyond)
+
+    def normals(self, points: FloatArray) -> FloatArray:
+        """Return the outward radii, at right angles to the axis."""
+        return self._across(points - self.point) / self.radius
+
+    def turn(
+        self,
+        points: FloatArray,  # noqa: ARG002
+        normals: FloatArray,  # noqa: ARG002
+        steps: FloatArray,
+    ) -> FloatArray:
+        """Return the part of the steps across the axis, over the radius."""
+        return self._across(steps) / self.radius
+
+    def shifted(self, vector: ArrayLike) -> Cylinder:
+        """Return the cylinder moved by a vector."""
+        return replace(self, point=self.point + as_floats(vector, "vector"))
+
+    def moved(self, rotation: FloatArray, translation: FloatArray) -> Cylinder:
+        """Return the cylinder given in one frame as seen in another."""
+        return replace(self, point=rotation @ self.point + translation, axis=rotation @ self.axis)
+
+
+def _hop_round(
+    offset: FloatArray, directions: FloatArray, radius: float, beyond: FloatArray
+) -> FloatArray:
+    """Return the first root beyond ``beyond`` of |offset + t directions| = radius.
+
+    For the cylinder the vectors are the parts across its axis, so directions may be short.
+    """
+    a = (directions * directions).sum(-1)
+    half_b = (offset * directions).sum(-1)
+    length = np.sqrt((offset * offset).sum(-1))
+    # (|offset| - r)(|offset| + r), not the difference of squares: exact beside the surface.
+    c = (length - radius) * (length + radius)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        # Discriminant from the distance of the ray to the centre: no cancellation far away.
+        nearest = offset - (half_b / a)[..., None] * directions
+        gap = np.sqrt((nearest * nearest).sum(-1))
+        root = np.sqrt(a * (radius - gap) * (radius + gap))
+        # The two roots without subtracting near-equal numbers: q / a and c / q.
+        q = -(half_b + np.copysign(root, half_b))
+        first, second = q / a, c / q
+        near, far = np.fmin(first, second), np.fmax(first, second)
+        distance = np.where(near > beyond, near, np.where(far > beyond, far, np.nan))
+    return np.where(np.isfinite(distance), distance, np.nan)
+
+
+def _unit(vector: ArrayLike, name: str) -> FloatArray:
+    """Return a read-only unit vector."""
+    given = read_only(vector, name, shape=(3,))
+    length = float(np.linalg.norm(given))
+    if length == 0:
+        raise GeometryError(f"{name}: the vector (0, 0, 0) has no direction.")
+    return read_only(given / length, name)
