@@ -1,7 +1,12 @@
 from .domain.camera import Camera, Sensor
 from .domain.flat_interface import FlatInterface
+from .domain.height_field import RasterSurface, WaveSurface
+from .domain.interfaces import Interfaces
 from .domain.layers import Layers
+from .domain.mesh_surface import MeshSurface
+from .domain.ray_paths import RayPaths, RayStatus
 from .domain.shifting import radial_shift, radial_shift_derivatives, radial_shift_ratio
+from .domain.surfaces import Cylinder, Plane, Sphere
 from .materials import (
     ACRYLIC,
     FLOAT_GLASS,
@@ -15,6 +20,7 @@ from .materials import (
 from .shift import ShiftDerivatives
 from .snell import critical_angle, refracted_angle, refracted_direction
 from .solvers.projection import project, projection_status
+from .solvers.raytrace import aim_rays, trace_rays
 from .solvers.resection import Resection, resect
 from .water import (
     HOEHLE,
@@ -30,6 +36,17 @@ from .water import (
 )
 
 __all__ = [
+    "RasterSurface",
+    "WaveSurface",
+    "Interfaces",
+    "MeshSurface",
+    "RayPaths",
+    "RayStatus",
+    "Cylinder",
+    "Plane",
+    "Sphere",
+    "aim_rays",
+    "trace_rays",
     "ACRYLIC",
     "Camera",
     "FLOAT_GLASS",

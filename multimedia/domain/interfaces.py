@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from multimedia.domain.layers import Layers
 from multimedia.domain.surfaces import Cylinder, Plane, Sphere, Surface
 from photocore.arrays import BoolArray, FloatArray, as_floats, read_only
 from photocore.errors import GeometryError, InputError
@@ -74,32 +75,31 @@ class Interfaces:
     @classmethod
     def parallel(
         cls,
-        indices: Sequence[float],
-        thicknesses: Sequence[float],
+        layers: Layers,
         *,
         point: ArrayLike = (0.0, 0.0, 0.0),
         normal: ArrayLike = (0.0, 0.0, 1.0),
+        with_camera: bool = False,
     ) -> Interfaces:
         """Return plane-parallel layers, the model of Maas, as surfaces.
 
         Parameters
         ----------
-        indices : sequence of float
-            From the camera to the object.
-        thicknesses : sequence of float
-            Of the media between the first and the last.
+        layers : Layers
+            Media from the camera to the object.
         point : array_like, shape (3,)
-            A point of the last interface, the one on the water side.
+            A point of the last interface, the one that touches the object's medium.
         normal : array_like, shape (3,)
             Towards the cameras.
+        with_camera : bool
+            Whether point and normal are given in the camera frame and move with it.
         """
         last = Plane(point=point, normal=normal)  # type: ignore[arg-type]
-        inner = as_floats(thicknesses, "thicknesses").reshape(-1)
-        if not (np.isfinite(inner).all() and (inner >= 0).all()):
-            raise InputError("thicknesses: every thickness must be zero or more.")
+        inner = np.asarray(layers.thicknesses)
         heights = np.append(np.cumsum(inner[::-1])[::-1], 0.0)
         surfaces = tuple(last.shifted(height * last.normal) for height in heights)
-        return cls(surfaces=surfaces, indices=tuple(indices))
+        moves = (with_camera,) * len(surfaces)
+        return cls(surfaces=surfaces, indices=layers.indices, with_camera=moves)
 
     def seen_from(self, centre: ArrayLike, world_from_camera: ArrayLike) -> Interfaces:
         """Return the interfaces for one camera, all of them in the object frame.

@@ -83,7 +83,9 @@ class MeshSurface(HeightField):
         margin = 1e-9 * max(1.0, float(np.abs(used).max()))
         set_(self, "lowest", float(used.min()) - margin)
         set_(self, "highest", float(used.max()) + margin)
-        set_(self, "steepest", float(np.hypot(*self._facet.T).max()))
+        # Slivers along the hull of a triangulation may stand on edge; they are no waves.
+        real = np.abs(area) > 1e-2 * np.median(np.abs(area))
+        set_(self, "steepest", float(np.hypot(*self._facet[real].T).max()))
         set_(self, "feature", float(np.sqrt(np.median(np.abs(area)))))
         set_(self, "_grid", _Grid.over(corners[..., :2]))
 
