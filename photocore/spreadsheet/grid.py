@@ -75,13 +75,14 @@ class Grid:
 
 @dataclass(frozen=True, slots=True)
 class TableArea:
-    """A named table: where it lies and how many of its rows are headings and totals."""
+    """A named table: where it lies, how many rows are headings and totals, its part."""
 
     name: str
     sheet: str
     area: tuple[int, int, int, int]
     header_rows: int = 1
     totals_rows: int = 0
+    part: str = ""
 
 
 @dataclass(slots=True)

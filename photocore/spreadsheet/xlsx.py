@@ -73,8 +73,8 @@ def open_xlsx(path: Path, *, max_rows: int) -> SheetFile:
     """
     with open_package(path) as package:
         book = read_directory(path, package)
-        tables = [area for sheet in book.sheets for area in _tables(path, package, sheet)]
-        strings = _shared_strings(path, package, book)
+        tables = [area for sheet in book.sheets for area in read_tables(path, package, sheet)]
+        strings = read_shared_strings(path, package, book)
         dates = _date_styles(path, package, book)
     parts = {sheet.title: sheet.part for sheet in book.sheets}
     reader = _SheetReader(path, strings, dates, since_1904=book.since_1904, max_rows=max_rows)
@@ -177,7 +177,8 @@ def _relations(path: Path, package: zipfile.ZipFile, part: str) -> dict[str, tup
     return found
 
 
-def _tables(path: Path, package: zipfile.ZipFile, sheet: Sheet) -> list[TableArea]:
+def read_tables(path: Path, package: zipfile.ZipFile, sheet: Sheet) -> list[TableArea]:
+    """Return the named tables of a sheet."""
     found: list[TableArea] = []
 
     def start(name: str, attributes: dict[str, str]) -> None:
@@ -189,6 +190,7 @@ def _tables(path: Path, package: zipfile.ZipFile, sheet: Sheet) -> list[TableAre
                     area=split_area(attributes["ref"]),
                     header_rows=int(attributes.get("headerRowCount", "1")),
                     totals_rows=int(attributes.get("totalsRowCount", "0")),
+                    part=target,
                 )
             )
         raise EnoughError
@@ -204,7 +206,8 @@ def _tables(path: Path, package: zipfile.ZipFile, sheet: Sheet) -> list[TableAre
     return found
 
 
-def _shared_strings(path: Path, package: zipfile.ZipFile, book: Workbook) -> list[str]:
+def read_shared_strings(path: Path, package: zipfile.ZipFile, book: Workbook) -> list[str]:
+    """Return the texts that cells of type ``s`` point to."""
     part = next((target for kind, target in book.relations.values() if kind == "sharedStrings"), "")
     strings: list[str] = []
     if part not in package.namelist():

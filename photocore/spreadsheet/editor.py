@@ -1,0 +1,334 @@
+"""Changing an existing workbook: only the cells asked for, all else byte for byte as it was."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import zipfile
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from photocore.errors import InputError
+from photocore.output import atomic_path
+from photocore.spreadsheet import formulas
+from photocore.spreadsheet.cellxml import CellInput
+from photocore.spreadsheet.grid import Grid, TableArea, cell_name
+from photocore.spreadsheet.package import check_header, open_package, read_part
+from photocore.spreadsheet.splice import NewCell, SheetChanges, Spliced, splice_sheet
+from photocore.spreadsheet.xlsx import (
+    Sheet,
+    Workbook,
+    open_xlsx,
+    read_directory,
+    read_shared_strings,
+    read_tables,
+)
+
+
+@dataclass(slots=True)
+class WorkbookEditor:
+    """Gathers changes to a workbook and writes them in one go.
+
+    Sheets, styles, drawings, charts, macros, comments: whatever the changes do not touch is copied
+    byte for byte. Formulas are never overwritten. Where a typed value changes, the stored results
+    of all formulas that may depend on it are taken out unless a new one is given, so that no
+    program shows a stale number.
+
+    Parameters
+    ----------
+    path : path
+        The workbook, .xlsx or .xlsm.
+
+    Raises
+    ------
+    InputError
+        If it is not a workbook, is damaged, unsafe, or digitally signed.
+    """
+
+    path: Path
+    book: Workbook = field(init=False)
+    tables: list[TableArea] = field(init=False)
+    changes: dict[str, SheetChanges] = field(init=False, default_factory=dict)
+    grown: dict[str, tuple[TableArea, int]] = field(init=False, default_factory=dict)
+    _grids: dict[str, Grid] = field(init=False, default_factory=dict)
+
+    def __post_init__(self) -> None:
+        self.path = Path(self.path)
+        if self.path.suffix.lower() not in (".xlsx", ".xlsm"):
+            check_header(self.path)
+            raise InputError(
+                f"{self.path}: only .xlsx and .xlsm workbooks can be changed in place."
+            )
+        with open_package(self.path) as package:
+            if any(name.startswith("_xmlsignatures/") for name in package.namelist()):
+                raise InputError(
+                    f"{self.path}: is digitally signed; a change would break the signature. Remove "
+                    "the signature first, or write to another kind of file."
+                )
+            self.book = read_directory(self.path, package)
+            self.tables = [t for s in self.book.sheets for t in read_tables(self.path, package, s)]
+
+    @property
+    def titles(self) -> list[str]:
+        """Names of the sheets, in the order of the workbook."""
+        return [sheet.title for sheet in self.book.sheets]
+
+    def table(self, name: str) -> TableArea | None:
+        """Return a named table, None where there is none; upper and lower case are alike."""
+        found = (t for t in self.tables if t.name.casefold() == name.casefold())
+        return next(found, None)
+
+    def grid(self, title: str) -> Grid:
+        """Return a sheet's cells as they stand in the file."""
+        if title not in self._grids:
+            self._sheet(title)
+            self._grids[title] = open_xlsx(self.path, max_rows=2**20).grid(title)
+        return self._grids[title]
+
+    def set_value(self, title: str, row: int, column: int, value: CellInput) -> None:
+        """Type a value into a cell; its format stays. None clears the cell."""
+        if isinstance(value, float) and not np.isfinite(value):
+            raise InputError(
+                f"{self.path.name} › {title}!{cell_name(row, column)}: {value} is not a number "
+                "that can be typed into a cell."
+            )
+        self._changes(title).inputs.setdefault(row, {})[column] = value
+
+    def set_result(self, title: str, row: int, column: int, value: CellInput) -> None:
+        """Store the result of a cell's formula; a cell without formula is left alone.
+
+        NaN is stored as the error value #N/A.
+        """
+        self._changes(title).cached.setdefault(row, {})[column] = value
+
+    def set_results(
+        self, title: str, first_row: int, columns: Mapping[int, ArrayLike | Sequence[CellInput]]
+    ) -> None:
+        """Store the results of whole columns of formulas.
+
+        Parameters
+        ----------
+        title : str
+            Sheet.
+        first_row : int
+            Row of the first result.
+        columns : mapping
+            Column number to results, one per row. Texts, booleans and numbers may be mixed in a
+            list.
+        """
+        cached = self._changes(title).cached
+        for column, values in columns.items():
+            plain = values.tolist() if isinstance(values, np.ndarray) else values
+            for row, value in enumerate(plain, start=first_row):  # type: ignore[arg-type]
+                cached.setdefault(row, {})[column] = value
+
+    def append_rows(
+        self,
+        table: str,
+        rows: Sequence[Mapping[str, CellInput]],
+        results: Sequence[Mapping[str, CellInput]] = (),
+    ) -> list[int]:
+        """Add rows to a named table; formulas and formats are those of its last row.
+
+        The table, its filter, the conditional formats and validations of its last row, and charts
+        and names that reach to its last row grow with it.
+
+        Parameters
+        ----------
+        table : str
+            Name of the table.
+        rows : sequence of mappings
+            Heading to typed value; headings without value stay empty or get their formula.
+        results : sequence of mappings
+            Heading to cached result of the row's formulas.
+
+        Returns
+        -------
+        list of int
+            The new rows' numbers.
+
+        Raises
+        ------
+        InputError
+            If there is no such table or heading, the table ends in a row of totals, or the cells
+            below it are not empty.
+        """
+        area = self.table(table)
+        if area is None:
+            names = ", ".join(t.name for t in self.tables) or "none"
+            raise InputError(f'{self.path.name}: has no table "{table}"; it has {names}.')
+        area, bottom = self.grown.get(area.name, (area, area.area[2]))
+        where = f"{self.path.name} › {area.sheet}"
+        if area.totals_rows:
+            raise InputError(
+                f"{where}: the table {area.name} ends in a row of totals; switch it off in the "
+                "spreadsheet program (Table design) before rows are added."
+            )
+        headings = self._headings(area)
+        _, left, last, right = area.area
+        model = formulas.row_cells(self.path, self._sheet(area.sheet), last, left, right)
+        new_rows = list(range(bottom + 1, bottom + 1 + len(rows)))
+        self._refuse_occupied(area, new_rows)
+        for index, row in enumerate(new_rows):
+            given = rows[index]
+            unknown = [name for name in given if name not in headings]
+            if unknown:
+                raise InputError(f'{where}: the table {area.name} has no column "{unknown[0]}".')
+            cached = results[index] if index < len(results) else {}
+            cells = self._changes(area.sheet).added.setdefault(row, {})
+            for name, column in headings.items():
+                like = model.get(column, formulas.ModelCell())
+                formula = like.formula and formulas.moved(
+                    like.formula, cell_name(last, column), cell_name(row, column)
+                )
+                value = cached.get(name) if formula else given.get(name)
+                if formula or value is not None or like.style:
+                    cells[column] = NewCell(value, formula or None, like.style)
+        if new_rows:
+            self.grown[area.name] = (area, new_rows[-1])
+        return new_rows
+
+    def save(
+        self, target: Path | str | None = None, *, overwrite: bool = False, backup: bool = True
+    ) -> None:
+        """Write the changed workbook.
+
+        Parameters
+        ----------
+        target : path, optional
+            Where to; the workbook itself when None. Then the old file is kept beside it with
+            ``.bak`` added to its name.
+        overwrite : bool
+            Whether to replace another existing file.
+        backup : bool
+            Whether to keep the ``.bak``.
+
+        Raises
+        ------
+        InputError
+            If the target is open in another program, exists, or has another ending.
+        """
+        target = self.path if target is None else Path(target)
+        in_place = target.exists() and target.samefile(self.path)
+        if target.suffix.lower() != self.path.suffix.lower():
+            raise InputError(
+                f"{target}: must end in {self.path.suffix} like {self.path.name}, so that macros "
+                "stay what they are."
+            )
+        check_not_open(target)
+        parts = self.changed_parts()
+        with atomic_path(target, overwrite=overwrite or in_place) as temporary:
+            rewrite_package(self.path, temporary, parts)
+            if in_place and backup:
+                shutil.copy2(self.path, self.path.with_name(f"{self.path.name}.bak"))
+
+    def changed_parts(self) -> dict[str, bytes]:
+        """Return the parts of the package that change, with their new content."""
+        with open_package(self.path) as package:
+            spliced = self._splice(package)
+            tainted = {title for title, sheet in spliced.items() if sheet.inputs_changed}
+            references = formulas.References(self.path, package, self.book, self.tables)
+            stale = references.dependents(tainted)
+            parts: dict[str, bytes] = {}
+            stripped = False
+            for sheet in self.book.sheets:
+                found = spliced.get(sheet.title)
+                if found is None and sheet.title in stale:
+                    data = read_part(self.path, package, sheet.part)
+                    found = splice_sheet(self.path, sheet.part, data, SheetChanges())
+                if found is not None:
+                    strip = sheet.title in stale
+                    parts[sheet.part] = found.joined(strip=strip)
+                    stripped |= strip and bool(found.strips)
+            for area, bottom in self.grown.values():
+                references.grow(area, bottom, parts)
+            if stripped:
+                formulas.recalculate_on_load(self.path, package, self.book, parts)
+            original = {name: read_part(self.path, package, name) for name in parts}
+        return {name: data for name, data in parts.items() if data != original[name]}
+
+    def _splice(self, package: zipfile.ZipFile) -> dict[str, Spliced]:
+        """Return the changed sheets."""
+        strings: list[str] | None = None
+
+        def shared() -> list[str]:
+            nonlocal strings
+            if strings is None:
+                strings = read_shared_strings(self.path, package, self.book)
+            return strings
+
+        spliced = {}
+        for sheet in self.book.sheets:
+            changes = self.changes.get(sheet.title)
+            if changes:
+                data = read_part(self.path, package, sheet.part)
+                spliced[sheet.title] = splice_sheet(self.path, sheet.part, data, changes, shared)
+        return spliced
+
+    def _changes(self, title: str) -> SheetChanges:
+        self._sheet(title)
+        return self.changes.setdefault(title, SheetChanges())
+
+    def _sheet(self, title: str) -> Sheet:
+        for sheet in self.book.sheets:
+            if sheet.title == title:
+                return sheet
+        names = ", ".join(f'"{name}"' for name in self.titles)
+        raise InputError(f'{self.path.name}: has no sheet "{title}"; it has {names}.')
+
+    def _headings(self, area: TableArea) -> dict[str, int]:
+        """Return heading -> column of a table."""
+        top, left, _, right = area.area
+        cells = self.grid(area.sheet).rows.get(top + area.header_rows - 1, {})
+        return {str(cells[c]): c for c in range(left, right + 1) if c in cells}
+
+    def _refuse_occupied(self, area: TableArea, rows: Iterable[int]) -> None:
+        cells = self.grid(area.sheet).rows
+        _, left, _, right = area.area
+        for row in rows:
+            for column in cells.get(row, {}):
+                if left <= column <= right:
+                    raise InputError(
+                        f"{self.path.name} › {area.sheet}!{cell_name(row, column)}: is not empty, "
+                        f"so the table {area.name} cannot grow. Move what stands below the table."
+                    )
+
+
+def check_not_open(path: Path) -> None:
+    """Refuse a file that a spreadsheet program has open.
+
+    Raises
+    ------
+    InputError
+        Naming the program and the way out.
+    """
+    locks = {"Excel": f"~${path.name}", "LibreOffice": f".~lock.{path.name}#"}
+    for program, name in locks.items():
+        if (path.parent / name).exists():
+            raise InputError(
+                f"{path}: is open in {program}. Close it there and try again, or write to another "
+                f"file with --out. (If it is not open, delete the left-over file {name}.)"
+            )
+
+
+def rewrite_package(source: Path, target: Path, parts: Mapping[str, bytes]) -> None:
+    """Copy a zip package with some parts replaced; order, dates and methods stay."""
+    with zipfile.ZipFile(source) as old, target.open("wb") as file:
+        with zipfile.ZipFile(file, "w") as new:
+            new.comment = old.comment
+            for info in old.infolist():
+                data = parts.get(info.filename)
+                copy = zipfile.ZipInfo(info.filename, info.date_time)
+                copy.compress_type = (
+                    info.compress_type
+                    if info.compress_type in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
+                    else zipfile.ZIP_DEFLATED
+                )
+                copy.external_attr, copy.create_system = info.external_attr, info.create_system
+                new.writestr(copy, old.read(info) if data is None else data)
+        file.flush()
+        os.fsync(file.fileno())

@@ -1,0 +1,455 @@
+"""Changing cells of a sheet's XML in place: every other byte stays as it was."""
+
+from __future__ import annotations
+
+import re
+from bisect import bisect_left
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from xml.parsers import expat
+from xml.sax.saxutils import unescape as unescape_xml
+
+from photocore.errors import InputError
+from photocore.spreadsheet.cellxml import CellInput, cell_xml, escape_attribute, type_and_content
+from photocore.spreadsheet.grid import cell_name, column_number, split_area
+from photocore.spreadsheet.package import local, new_parser
+from photocore.spreadsheet.xlsx import unescape
+
+_TAG = re.compile(rb"""<[^\s/>]+(?:\s+[^\s=]+\s*=\s*(?:"[^"]*"|'[^']*'))*\s*(/?)>""")
+
+
+@dataclass(frozen=True, slots=True)
+class NewCell:
+    """A cell to be made: with a formula and its result, or with a value only.
+
+    Parameters
+    ----------
+    value : float, int, str, bool or None
+        Value, or cached result of the formula.
+    formula : str, optional
+        Formula without the equals sign.
+    style : str
+        Index of the cell format as text, empty for the default.
+    """
+
+    value: CellInput
+    formula: str | None = None
+    style: str = ""
+
+
+@dataclass(slots=True)
+class SheetChanges:
+    """What is to change in one sheet; rows and columns are counted from 1.
+
+    Parameters
+    ----------
+    inputs : dict
+        Row to (column to value): typed cells, made where they are missing. The cell's format
+        stays. A cell that holds a formula is never overwritten.
+    cached : dict
+        Row to (column to result): results of formulas that are there. Cells that hold no formula
+        (any more) are left as they are.
+    added : dict
+        Row to (column to `NewCell`): cells with formulas in new rows.
+    """
+
+    inputs: dict[int, dict[int, CellInput]] = field(default_factory=dict)
+    cached: dict[int, dict[int, CellInput]] = field(default_factory=dict)
+    added: dict[int, dict[int, NewCell]] = field(default_factory=dict)
+
+    def __bool__(self) -> bool:
+        return bool(self.inputs or self.cached or self.added)
+
+
+@dataclass(slots=True)
+class Spliced:
+    """A sheet with its changes, ready to be joined with or without stale results.
+
+    Parameters
+    ----------
+    data : bytes
+        The sheet as it was.
+    edits, strips : list of (start, end, replacement)
+        The changes asked for; the results of all other formulas, to be taken out.
+    inputs_changed : bool
+        Whether any typed value differs from what was there.
+    """
+
+    data: bytes
+    edits: list[tuple[int, int, bytes]] = field(default_factory=list)
+    strips: list[tuple[int, int, bytes]] = field(default_factory=list)
+    inputs_changed: bool = False
+
+    def joined(self, *, strip: bool) -> bytes:
+        """Return the changed sheet, without results of other formulas if ``strip``."""
+        edits = self.edits
+        if strip and self.strips:
+            edits = sorted([*edits, *self.strips], key=lambda edit: edit[:2])
+        if not edits:
+            return self.data
+        pieces: list[bytes | memoryview] = []
+        position = 0
+        view = memoryview(self.data)
+        for start, end, replacement in edits:
+            pieces += [view[position:start], replacement]
+            position = end
+        pieces.append(view[position:])
+        return b"".join(pieces)
+
+
+def splice_sheet(
+    path: Path,
+    part: str,
+    data: bytes,
+    changes: SheetChanges,
+    strings: Callable[[], list[str]] = list,
+) -> Spliced:
+    """Work out the changes of one sheet's XML.
+
+    Parameters
+    ----------
+    path, part : Path, str
+        File and part, for messages.
+    data : bytes
+        The sheet's XML.
+    changes : SheetChanges
+        What is to change.
+    strings : callable
+        Returns the workbook's shared strings, to see whether a text differs at all.
+
+    Raises
+    ------
+    InputError
+        If a typed value would overwrite a formula, or the XML is damaged or not UTF-8.
+    """
+    head = data[:200]
+    if head.startswith((b"\xff\xfe", b"\xfe\xff")) or re.search(
+        rb"encoding\s*=\s*[\"'](?!utf-?8|us-ascii)", head, re.IGNORECASE
+    ):
+        raise InputError(
+            f"{path}: the part {part} is not stored as UTF-8. Open the file in the spreadsheet "
+            "program, save it there, and try again."
+        )
+    splicer = _Splicer(path, part, data, changes, strings)
+    return splicer.run()
+
+
+class _Splicer:
+    """One pass over a sheet, gathering edits by byte position."""
+
+    def __init__(
+        self,
+        path: Path,
+        part: str,
+        data: bytes,
+        changes: SheetChanges,
+        strings: Callable[[], list[str]],
+    ) -> None:
+        self.path, self.part, self.data, self.strings = path, part, data, strings
+        self.changes = changes
+        self.result = Spliced(data)
+        self.edits = self.result.edits
+        self.new_rows = sorted({*changes.inputs, *changes.added})
+        self.parser = new_parser(path, part, start=self.start, end=self.end)
+        self.kinds: dict[str, str] = {}
+        self.letters: dict[str, int] = {}
+        self.inside = False
+        self.prefix = ""
+        self.row = self.column = 0
+        self.row_start = self.cell_start = self.data_start = 0
+        self.attributes: dict[str, str] = {}
+        self.children: list[tuple[str, int, int]] = []
+        self.child_start = self.depth = 0
+        self.new_columns: list[int] = []
+        self.inputs: Mapping[int, CellInput] = {}
+        self.cached: Mapping[int, CellInput] = {}
+        self.added: Mapping[int, NewCell] = {}
+        self.dimension: tuple[int, int, str] | None = None
+
+    def run(self) -> Spliced:
+        """Parse, and return the edits in the order of the file."""
+        try:
+            self.parser.Parse(self.data, True)
+        except expat.ExpatError as error:
+            raise InputError(
+                f"{self.path}: damaged, the part {self.part} is not valid XML ({error})."
+            ) from None
+        if self.dimension and self.edits:
+            self.grow_dimension(*self.dimension)
+        self.edits.sort(key=lambda edit: edit[:2])
+        return self.result
+
+    def start(self, name: str, attributes: dict[str, str]) -> None:
+        """Handle an opening tag."""
+        kind = self.kinds.get(name)
+        if kind is None:
+            kind = self.kinds[name] = local(name)
+        if kind == "c" and self.inside and not self.depth:
+            self.start_cell(attributes)
+        elif kind == "row" and self.inside and not self.depth:
+            self.start_row(name, attributes)
+        elif self.inside:
+            # Only direct children of a cell count; "t" and "r" lie deeper, in a rich text.
+            if not self.depth:
+                self.child_start = self.parser.CurrentByteIndex
+            self.depth += 1
+        elif kind == "sheetData":
+            self.inside = True
+            self.data_start = self.parser.CurrentByteIndex
+            self.prefix = name[: len(name) - len(kind)]
+        elif kind == "dimension":
+            start = self.parser.CurrentByteIndex
+            self.dimension = (start, self.tag_end(start), attributes.get("ref", ""))
+
+    def end(self, name: str) -> None:
+        """Handle a closing tag."""
+        kind = self.kinds[name]
+        if not self.inside:
+            return
+        if kind == "c" and not self.depth:
+            self.end_cell(name)
+        elif kind == "row" and not self.depth:
+            self.end_row(name)
+        elif kind == "sheetData":
+            self.inside = False
+            self.add_rows(10**9, self.closing(name, self.data_start))
+        else:
+            self.depth -= 1
+            if not self.depth:
+                end = self.element_end(name, self.child_start)
+                self.children.append((kind, self.child_start, end))
+
+    def start_row(self, name: str, attributes: dict[str, str]) -> None:
+        """Insert the new rows before this one and note what is to happen in it."""
+        self.row_start = self.parser.CurrentByteIndex
+        self.row = int(attributes.get("r", self.row + 1))
+        self.column = 0
+        if self.new_rows and self.new_rows[0] < self.row:
+            self.add_rows(self.row, (self.row_start, self.row_start, "", ""))
+        if self.new_rows and self.new_rows[0] == self.row:
+            self.new_rows.pop(0)
+        self.prefix = name[: len(name) - 3]
+        self.inputs = self.changes.inputs.get(self.row, {})
+        self.added = self.changes.added.get(self.row, {})
+        self.cached = self.changes.cached.get(self.row, {})
+        self.new_columns = sorted({*self.inputs, *self.added}) if self.inputs or self.added else []
+
+    def end_row(self, name: str) -> None:
+        """Insert the new cells behind the last one of this row."""
+        if self.new_columns:
+            self.add_cells(10**6, self.closing(name, self.row_start))
+
+    def start_cell(self, attributes: dict[str, str]) -> None:
+        """Insert the new cells before this one."""
+        self.cell_start = self.parser.CurrentByteIndex
+        self.attributes = attributes
+        self.children.clear()
+        reference = attributes.get("r")
+        if reference is None:
+            self.column += 1
+        else:
+            letters = reference.rstrip("0123456789")
+            column = self.letters.get(letters)
+            if column is None:
+                column = self.letters[letters] = column_number(letters)
+            self.column = column
+        if self.new_columns and self.new_columns[0] < self.column:
+            self.add_cells(self.column, (self.cell_start, self.cell_start, "", ""))
+
+    def end_cell(self, name: str) -> None:
+        """Change this cell if asked, and note a formula's result for stripping."""
+        column = self.column
+        if self.new_columns and self.new_columns[0] == column:
+            self.new_columns.pop(0)
+            self.replace(name, self.inputs.get(column), self.added.get(column))
+        elif column in self.cached:
+            self.put_result(name, self.cached[column])
+        elif len(self.children) > 1 and self.child("f"):
+            self.strip(name)
+
+    def replace(self, name: str, value: CellInput, new: NewCell | None) -> None:
+        """Give this cell another typed value, or a formula if it is empty."""
+        name_of_cell = cell_name(self.row, self.column)
+        if self.child("f"):
+            raise InputError(
+                f"{self.path} › {name_of_cell}: holds a formula, which is not overwritten."
+            )
+        if new is not None and self.children:
+            raise InputError(
+                f"{self.path} › {name_of_cell}: is not empty; a new row cannot be put there."
+            )
+        if new is None and self.holds(value):
+            return
+        style = self.attributes.get("s", "") or (new.style if new else "")
+        xml = cell_xml(
+            name_of_cell,
+            new.value if new else value,
+            prefix=self.prefix,
+            style=style,
+            formula=new.formula if new else None,
+        )
+        self.edits.append((self.cell_start, self.element_end(name, self.cell_start), xml.encode()))
+        self.result.inputs_changed = True
+
+    def put_result(self, name: str, value: CellInput) -> None:
+        """Give this cell's formula another cached result."""
+        formula = self.child("f")
+        if formula is None:
+            return  # the user put a value in its place: it stays
+        kind, content = type_and_content(value, self.tag, formula=True)
+        self.edits.append(self.with_result(name, kind, content))
+
+    def strip(self, name: str) -> None:
+        """Note how to take the cached result out of this formula cell."""
+        if self.child("v"):
+            self.result.strips.append(self.with_result(name, "", ""))
+
+    def with_result(self, name: str, kind: str, content: str) -> tuple[int, int, bytes]:
+        """Return the edit that gives a formula cell this result and keeps all else of it."""
+        kept = [
+            f' {key}="{escape_attribute(value)}"'
+            for key, value in self.attributes.items()
+            if key != "t"
+        ]
+        kept += [f' t="{kind}"'] if kind else []
+        before = b"".join(self.data[s:e] for k, s, e in self.children if k == "f")
+        after = b"".join(self.data[s:e] for k, s, e in self.children if k not in ("f", "v", "is"))
+        opening = f"<{name}{''.join(kept)}>".encode()
+        replacement = opening + before + content.encode() + after + f"</{name}>".encode()
+        return self.cell_start, self.element_end(name, self.cell_start), replacement
+
+    def holds(self, value: CellInput) -> bool:
+        """Whether this cell holds the value already."""
+        kind = self.attributes.get("t", "n")
+        found = self.child("v") or self.child("is")
+        if found is None:
+            return value is None or value == ""
+        inner = self.data[self.tag_end(found[0]) : self.data.rfind(b"<", found[0], found[1])]
+        text = unescape_xml(inner.decode("utf-8"), {"&quot;": '"', "&apos;": "'"})
+        try:
+            if kind == "n" and not isinstance(value, str | bool) and value is not None:
+                return float(text) == float(value)
+            if kind == "b" and isinstance(value, bool):
+                return (text == "1") is value
+            if kind == "s" and isinstance(value, str):
+                return self.strings()[int(text)] == value
+            if kind == "inlineStr" and isinstance(value, str):
+                plain = re.fullmatch(r"\s*<(?:\w+:)?t(?:\s[^>]*)?>([^<]*)</(?:\w+:)?t>\s*", text)
+                return plain is not None and unescape(plain[1]) == value
+        except (ValueError, IndexError):
+            return False
+        return False
+
+    def child(self, kind: str) -> tuple[int, int] | None:
+        """Return where a direct child of this cell lies."""
+        for found, start, end in self.children:
+            if found == kind:
+                return start, end
+        return None
+
+    def add_cells(self, before: int, place: tuple[int, int, str, str]) -> None:
+        """Insert the new cells of this row whose columns lie before one."""
+        count = bisect_left(self.new_columns, before)
+        columns, self.new_columns = self.new_columns[:count], self.new_columns[count:]
+        self.insert(self.cells(self.row, columns, self.inputs, self.added), place)
+
+    def add_rows(self, before: int, place: tuple[int, int, str, str]) -> None:
+        """Insert the new rows whose numbers lie before one."""
+        count = bisect_left(self.new_rows, before)
+        rows, self.new_rows = self.new_rows[:count], self.new_rows[count:]
+        pieces = []
+        for row in rows:
+            inputs = self.changes.inputs.get(row, {})
+            added = self.changes.added.get(row, {})
+            cells = self.cells(row, sorted({*inputs, *added}), inputs, added)
+            if cells:
+                pieces.append(f'<{self.tag("row")} r="{row}">{cells}</{self.tag("row")}>')
+        self.insert("".join(pieces), place)
+
+    def insert(self, xml: str, place: tuple[int, int, str, str]) -> None:
+        """Insert XML at a place (start, end, text before, text behind)."""
+        if xml:
+            start, end, opening, closing = place
+            self.edits.append((start, end, f"{opening}{xml}{closing}".encode()))
+            self.result.inputs_changed = True
+
+    def cells(
+        self,
+        row: int,
+        columns: Iterable[int],
+        inputs: Mapping[int, CellInput],
+        added: Mapping[int, NewCell],
+    ) -> str:
+        """Return the XML of new cells; clearing a cell that is not there makes none."""
+        pieces = []
+        for column in columns:
+            new = added.get(column)
+            value = new.value if new else inputs.get(column)
+            if new is None and (value is None or value == ""):
+                continue
+            pieces.append(
+                cell_xml(
+                    cell_name(row, column),
+                    value,
+                    prefix=self.prefix,
+                    style=new.style if new else "",
+                    formula=new.formula if new else None,
+                )
+            )
+        return "".join(pieces)
+
+    def closing(self, name: str, start: int) -> tuple[int, int, str, str]:
+        """Return the place just inside the end of an element, which may be self-closed."""
+        match = self.match_tag(start)
+        if match[1]:
+            opening = self.data[start : match.end()].decode("utf-8")[:-2].rstrip()
+            return start, match.end(), f"{opening}>", f"</{name}>"
+        end = self.parser.CurrentByteIndex
+        return end, end, "", ""
+
+    def element_end(self, name: str, start: int) -> int:
+        """Return the position behind an element whose end is being reported."""
+        position: int = self.parser.CurrentByteIndex
+        # Expat reports the end of an empty element behind it, of others at their closing tag.
+        if self.data.startswith(b"</" + name.encode(), position):
+            return self.data.index(b">", position) + 1
+        return self.tag_end(start)
+
+    def tag_end(self, start: int) -> int:
+        """Return the position behind an opening tag."""
+        return self.match_tag(start).end()
+
+    def match_tag(self, start: int) -> re.Match[bytes]:
+        """Return the match of an opening tag; group 1 is filled if it closes itself."""
+        match = _TAG.match(self.data, start)
+        if match is None:
+            raise InputError(f"{self.path}: damaged, the part {self.part} cannot be taken apart.")
+        return match
+
+    def tag(self, name: str) -> str:
+        """Return an element name with the sheet's prefix."""
+        return self.prefix + name
+
+    def grow_dimension(self, start: int, end: int, reference: str) -> None:
+        """Let the sheet's stated extent take in the cells that were made."""
+        made = [
+            (row, column)
+            for rows in (self.changes.inputs, self.changes.added)
+            for row, columns in rows.items()
+            for column in columns
+        ]
+        if not made or not reference:
+            return
+        top, left, bottom, right = split_area(reference)
+        top, left = min(top, *(r for r, _ in made)), min(left, *(c for _, c in made))
+        bottom, right = max(bottom, *(r for r, _ in made)), max(right, *(c for _, c in made))
+        grown = f"{cell_name(top, left)}:{cell_name(bottom, right)}"
+        if (top, left, bottom, right) != split_area(reference):
+            tag = re.sub(
+                rb"""(\sref\s*=\s*)("[^"]*"|'[^']*')""",
+                lambda match: match[1] + f'"{grown}"'.encode(),
+                self.data[start:end],
+                count=1,
+            )
+            self.edits.append((start, end, tag))

@@ -1,0 +1,296 @@
+"""Existing workbooks changed in place: nothing but the cells asked for may differ."""
+
+import math
+import zipfile
+
+import openpyxl
+import pytest
+
+from photocore.errors import InputError
+from photocore.spreadsheet.editor import WorkbookEditor
+from photocore.spreadsheet.package import open_package
+from photocore.spreadsheet.splice import SheetChanges, splice_sheet
+from photocore.tables import Column, read_table
+from tests import office
+from tests.golden import make_rich_workbook
+
+# What openpyxl says it would lose is the point of these tests.
+pytestmark = pytest.mark.filterwarnings("ignore::UserWarning:openpyxl")
+
+POINTS = "xl/worksheets/sheet1.xml"
+NOTES = "xl/worksheets/sheet2.xml"
+BOOK = "xl/workbook.xml"
+COLUMNS = (Column("id", kind="text"), Column("s1"), Column("s2"), Column("ds"), Column("twice"))
+
+
+def contents(path):
+    with zipfile.ZipFile(path) as package:
+        return {name: package.read(name) for name in package.namelist()}
+
+
+def differing(first, second):
+    one, two = contents(first), contents(second)
+    assert list(one) == list(two)
+    return {name for name in one if one[name] != two[name]}
+
+
+@pytest.fixture(params=["", "x"], ids=["plain", "prefixed"])
+def rich(request, tmp_path):
+    return make_rich_workbook.write(tmp_path / "rich.xlsm", request.param)
+
+
+def splice(xml, **changes):
+    data = xml.encode()
+    found = splice_sheet(None, "sheet", data, SheetChanges(**changes))
+    return found.joined(strip=False).decode()
+
+
+def test_a_result_changes_only_its_sheet(rich, tmp_path):
+    editor = WorkbookEditor(rich)
+    editor.set_result("Points", 3, 4, 0.5)
+    editor.save(tmp_path / "out.xlsm")
+    assert differing(rich, tmp_path / "out.xlsm") == {POINTS}
+    before, after = contents(rich)[POINTS], contents(tmp_path / "out.xlsm")[POINTS]
+    assert after == before.replace(b"v>0.75<", b"v>0.5<", 1)
+
+
+def test_saving_without_a_change_changes_no_part(rich, tmp_path):
+    editor = WorkbookEditor(rich)
+    editor.set_value("Points", 3, 1, "P1")
+    editor.set_value("Points", 4, 1, "P2 é <&>")
+    editor.set_value("Points", 3, 2, 12.5)
+    editor.save(tmp_path / "out.xlsm")
+    assert differing(rich, tmp_path / "out.xlsm") == set()
+
+
+def test_a_typed_value_takes_the_results_that_depend_on_it_out(rich, tmp_path):
+    out = tmp_path / "out.xlsm"
+    editor = WorkbookEditor(rich)
+    editor.set_value("Points", 3, 2, 12.25)
+    editor.set_result("Points", 3, 4, 1.0)
+    editor.save(out)
+    assert differing(rich, out) == {POINTS, NOTES, BOOK}
+    assert b'fullCalcOnLoad="1"' in contents(out)[BOOK]
+    book = openpyxl.load_workbook(out, data_only=True)
+    assert [c.value for c in book["Points"][3]][:5] == ["P1", 12.25, 13.25, 1.0, None]
+    assert book["My notes"]["B1"].value is None  # SUM(all_s1), a name that leads to Points
+    assert book["Far away"]["A1"].value == 2  # depends on nothing that changed
+    formulas = openpyxl.load_workbook(out)
+    assert formulas["Points"]["D3"].value == "=C3-B3"
+    assert formulas["My notes"]["B1"].value == "=SUM(all_s1)"
+
+
+def test_texts_come_back_as_they_went_in(rich, tmp_path):
+    texts = ["001", "=1+1", "a\nb", "  x ", "é<&>\"'", "_x0041_", "tab\there", "#N/A", "\x0b!"]
+    editor = WorkbookEditor(rich)
+    for row, text in enumerate(texts, start=10):
+        editor.set_value("My notes", row, 3, text)
+    editor.save(tmp_path / "out.xlsm")
+    grid = WorkbookEditor(tmp_path / "out.xlsm").grid("My notes")
+    assert [grid.rows[row][3] for row in range(10, 10 + len(texts))] == texts
+    assert differing(rich, tmp_path / "out.xlsm") == {NOTES, BOOK}
+
+
+def test_numbers_come_back_to_the_last_bit(rich, tmp_path):
+    numbers = [0.1, 1 / 3, 1e-300, -2.5e17, 5.0, math.pi * 1e5]
+    editor = WorkbookEditor(rich)
+    for row, number in enumerate(numbers, start=10):
+        editor.set_value("My notes", row, 1, number)
+    editor.save(tmp_path / "out.xlsm")
+    grid = WorkbookEditor(tmp_path / "out.xlsm").grid("My notes")
+    assert [grid.rows[row][1] for row in range(10, 10 + len(numbers))] == numbers
+
+
+def test_a_formula_is_never_overwritten(rich, tmp_path):
+    editor = WorkbookEditor(rich)
+    editor.set_value("Points", 3, 4, 1.0)
+    with pytest.raises(InputError, match=r"rich.xlsm.*D3: holds a formula"):
+        editor.save(tmp_path / "out.xlsm")
+    assert not (tmp_path / "out.xlsm").exists()
+
+
+def test_a_value_the_user_put_in_place_of_a_formula_stays(rich, tmp_path):
+    editor = WorkbookEditor(rich)
+    editor.set_result("Points", 3, 2, 99.0)
+    editor.save(tmp_path / "out.xlsm")
+    assert differing(rich, tmp_path / "out.xlsm") == set()
+
+
+def test_no_result_is_stored_as_not_available_and_infinity_is_refused(rich, tmp_path):
+    editor = WorkbookEditor(rich)
+    editor.set_results("Points", 3, {4: [math.nan, 0.5], 5: ["text", True]})
+    editor.save(tmp_path / "out.xlsm")
+    sheet = openpyxl.load_workbook(tmp_path / "out.xlsm", data_only=True)["Points"]
+    assert [sheet[c].value for c in ("D3", "D4", "E3", "E4")] == ["#N/A", 0.5, "text", True]
+    with pytest.raises(InputError, match=r"Points!B3: inf is not a number"):
+        editor.set_value("Points", 3, 2, math.inf)
+
+
+def test_rows_are_added_to_a_table_with_formulas_formats_and_all_that_reaches_there(rich, tmp_path):
+    out = tmp_path / "out.xlsm"
+    editor = WorkbookEditor(rich)
+    rows = editor.append_rows(
+        "tblpoints",
+        [{"id": "P3", "s1": 1.5, "s2": 2.0}, {"id": "P4", "s1": 3.0, "s2": 4.5}],
+        [{"ds": 0.5, "twice": 1.0}, {"ds": 1.5, "twice": 3.0}],
+    )
+    assert rows == [5, 6]
+    editor.set_results("Points", 3, {4: [0.75, 0.75]})
+    editor.save(out)
+    changed = {POINTS, NOTES, BOOK, "xl/tables/table1.xml", "xl/charts/chart1.xml"}
+    assert differing(rich, out) == changed
+    new = contents(out)
+    assert new["xl/tables/table1.xml"].count(b'ref="A2:E6"') == 2
+    assert b"Points!$B$3:$B$6" in new["xl/charts/chart1.xml"]
+    assert b"Points!$B$3:$B$6" in new[BOOK]
+    assert new[POINTS].count(b'sqref="B3:C6"') == 2
+    assert b"<xm:sqref>D3:D6</xm:sqref>" in new[POINTS]
+    assert b'ref="A1:E6"' in new[POINTS]
+    formulas = openpyxl.load_workbook(out)["Points"]
+    assert [formulas[c].value for c in ("D5", "D6")] == ["=C5-B5", "=C6-B6"]
+    assert formulas["E6"].value == "=tblPoints[[#This Row],[ds]]*2"
+    assert formulas["B6"].number_format == "0.000"
+    table = read_table(out, COLUMNS[:4], name="Points")
+    assert table.texts("id") == ["P1", "P2 é <&>", "P3", "P4"]
+    assert table.numbers("ds").tolist() == [0.75, 0.75, 0.5, 1.5]
+
+
+def test_a_table_does_not_grow_over_other_cells(rich):
+    editor = WorkbookEditor(rich)
+    editor.set_value("Points", 6, 2, "my remark")
+    editor.save()
+    with pytest.raises(InputError, match=r"Points!B6: is not empty, so the table tblPoints"):
+        WorkbookEditor(rich).append_rows("tblPoints", [{}, {}])
+
+
+def test_unknown_tables_columns_and_sheets_are_named(rich):
+    editor = WorkbookEditor(rich)
+    with pytest.raises(InputError, match='has no table "tblX"; it has tblPoints'):
+        editor.append_rows("tblX", [])
+    with pytest.raises(InputError, match='tblPoints has no column "s9"'):
+        editor.append_rows("tblPoints", [{"s9": 1}])
+    with pytest.raises(InputError, match='no sheet "X"; it has "Points", "My notes"'):
+        editor.set_value("X", 1, 1, 1)
+
+
+def test_in_place_a_backup_is_kept_and_macros_stay(rich):
+    before = contents(rich)
+    editor = WorkbookEditor(rich)
+    editor.set_result("Points", 3, 4, 0.5)
+    editor.save(overwrite=True)
+    backup = rich.with_name("rich.xlsm.bak")
+    assert contents(backup) == before
+    assert contents(rich)["xl/vbaProject.bin"] == before["xl/vbaProject.bin"]
+
+
+def test_the_same_changes_give_the_same_bytes(rich, tmp_path):
+    for name in ("a.xlsm", "b.xlsm"):
+        editor = WorkbookEditor(rich)
+        editor.set_value("Points", 3, 2, 1.0)
+        editor.save(tmp_path / name)
+    assert (tmp_path / "a.xlsm").read_bytes() == (tmp_path / "b.xlsm").read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("lock", "program"), [("~$rich.xlsm", "Excel"), (".~lock.rich.xlsm#", "LibreOffice")]
+)
+def test_a_workbook_open_elsewhere_is_left_alone(rich, lock, program):
+    (rich.parent / lock).touch()
+    editor = WorkbookEditor(rich)
+    editor.set_value("Points", 3, 2, 1.0)
+    with pytest.raises(InputError, match=rf"is open in {program}.*--out"):
+        editor.save()
+
+
+def test_a_macro_workbook_stays_one(rich, tmp_path):
+    with pytest.raises(InputError, match=r"must end in \.xlsm"):
+        WorkbookEditor(rich).save(tmp_path / "out.xlsx")
+
+
+def test_a_signed_workbook_is_refused(rich):
+    with zipfile.ZipFile(rich, "a") as package:
+        package.writestr("_xmlsignatures/sig1.xml", "<Signature/>")
+    with pytest.raises(InputError, match="digitally signed"):
+        WorkbookEditor(rich)
+
+
+@pytest.mark.parametrize(
+    ("before", "after"),
+    [
+        (
+            "<w><sheetData/></w>",
+            '<w><sheetData><row r="2"><c r="B2"><v>7</v></c></row></sheetData></w>',
+        ),
+        (
+            '<w><sheetData><row r="2"/></sheetData></w>',
+            '<w><sheetData><row r="2"><c r="B2"><v>7</v></c></row></sheetData></w>',
+        ),
+        (
+            '<w><sheetData><row r="1"/><row><c/><c s="3"/><c/></row></sheetData></w>',
+            '<w><sheetData><row r="1"/><row><c/><c r="B2" s="3"><v>7</v></c><c/></row>'
+            "</sheetData></w>",
+        ),
+        (
+            '<w><sheetData><row r="2"><c r="A2"/><c r="C2"/></row><row r="3"/></sheetData></w>',
+            '<w><sheetData><row r="2"><c r="A2"/><c r="B2"><v>7</v></c><c r="C2"/></row>'
+            '<row r="3"/></sheetData></w>',
+        ),
+        (
+            '<w><sheetData><row r="3" ht="1>0"><c r="B3" t="s"><v>0</v></c></row></sheetData></w>',
+            '<w><sheetData><row r="2"><c r="B2"><v>7</v></c></row><row r="3" ht="1>0">'
+            '<c r="B3" t="s"><v>0</v></c></row></sheetData></w>',
+        ),
+        (
+            '<x:w><x:sheetData><x:row r="2"><x:c r="B2" t="inlineStr"><x:is><x:t>a</x:t></x:is>'
+            "</x:c></x:row></x:sheetData><y:row/></x:w>",
+            '<x:w><x:sheetData><x:row r="2"><x:c r="B2"><x:v>7</x:v></x:c></x:row></x:sheetData>'
+            "<y:row/></x:w>",
+        ),
+    ],
+)
+def test_a_cell_is_put_in_its_place_whatever_is_left_implied(before, after):
+    assert splice(before, inputs={2: {2: 7.0}}) == after
+
+
+def test_clearing_a_cell_keeps_its_format():
+    before = '<w><sheetData><row r="2"><c r="B2" s="4" t="s"><v>0</v></c></row></sheetData></w>'
+    assert '<c r="B2" s="4"/>' in splice(before, inputs={2: {2: None}})
+
+
+def test_a_result_keeps_the_formula_of_an_array_to_the_byte():
+    before = (
+        '<w><sheetData><row r="2"><c r="B2" cm="1" t="e"><f t="array" ref="B2:B3" >A1&amp;"x"</f>'
+        "<v>#N/A</v></c></row></sheetData></w>"
+    )
+    after = splice(before, cached={2: {2: "y"}})
+    assert '<c r="B2" cm="1" t="str"><f t="array" ref="B2:B3" >A1&amp;"x"</f><v>y</v></c>' in after
+
+
+def test_utf_16_sheets_and_damaged_ones_are_refused(tmp_path):
+    with pytest.raises(InputError, match="not stored as UTF-8"):
+        splice_sheet(tmp_path, "s", '<?xml version="1.0"?><w/>'.encode("utf-16"), SheetChanges())
+    with pytest.raises(InputError, match="not valid XML"):
+        splice_sheet(tmp_path, "s", b"<w><sheetData>", SheetChanges())
+
+
+@pytest.mark.office
+def test_libreoffice_opens_the_changed_workbook_and_calculates_the_new_rows(rich, tmp_path):
+    out = tmp_path / "out.xlsm"
+    editor = WorkbookEditor(rich)
+    editor.append_rows("tblPoints", [{"id": "P3", "s1": 1.5, "s2": 2.0}])
+    editor.save(out)
+    values = office.recalculated(out, tmp_path / "office")
+    assert values["Points"]["D5"] == 0.5
+    assert values["Points"]["E5"] == 1.0
+    assert values["My notes"]["B1"] == 12.5 + 14.75 + 1.5
+
+
+def test_an_editor_reads_the_real_samples_and_changes_one_sheet(data_dir, tmp_path):
+    for path in sorted((data_dir / "spreadsheets").glob("*.xlsx")):
+        editor = WorkbookEditor(path)
+        editor.set_value(editor.titles[0], 5, 1, 0.125)
+        editor.save(tmp_path / path.name)
+        assert differing(path, tmp_path / path.name) == {"xl/worksheets/sheet1.xml"}
+        with open_package(tmp_path / path.name):
+            grid = WorkbookEditor(tmp_path / path.name).grid(editor.titles[0])
+        assert grid.rows[5][1] == 0.125
