@@ -1,0 +1,377 @@
+"""OpenPTV experiment folders: read into a project, write back."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from multimedia.domain.camera import Camera
+from multimedia.domain.flat_interface import FlatInterface
+from multimedia.domain.project import ImagePoints, ObjectPoints, Project
+from multimedia.io.openptv_files import (
+    ControlParameters,
+    Targets,
+    addpar_text,
+    glass_interface,
+    ori_text,
+    read_body,
+    read_camera,
+    read_control,
+    read_correspondences,
+    read_targets,
+)
+from photocore.arrays import FloatArray, IntArray
+from photocore.distortion import Brown, Convention
+from photocore.errors import InputError
+from photocore.output import atomic_folder
+
+#: OpenPTV's usual places, in the order of search.
+_PARAMETERS = ("", "parameters", "parametersRun1", "parametersMultiPlane")
+_BODIES = ("target_on_a_side.txt", "calblock.txt", "calibration_target.txt", "target_file.txt")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Experiment:
+    """What an OpenPTV folder holds.
+
+    Attributes
+    ----------
+    project : Project
+        Cameras, media and calibration body; no image points yet.
+    targets : tuple of Targets or None
+        Detections of each camera's calibration image.
+    particles, particle_targets : ndarray
+        Stored positions, shape (n, 3), and target numbers per camera, of the first ``rt_is``
+        frame found; empty without one.
+    frame_targets : tuple of Targets or None
+        Detections of that frame.
+    """
+
+    project: Project
+    targets: tuple[Targets | None, ...]
+    particles: FloatArray
+    particle_targets: IntArray
+    frame_targets: tuple[Targets | None, ...]
+
+
+def read_experiment(folder: Path | str, *, swap_indices: bool = False) -> Experiment:
+    """Read an OpenPTV experiment folder.
+
+    Parameters
+    ----------
+    folder : path
+        Holding ptv.par, or a folder ``parameters`` that does; ``cal`` and ``img`` beside it.
+    swap_indices : bool
+        Exchange the indices of glass and water.
+
+    Raises
+    ------
+    InputError
+        If a file the experiment needs is missing or damaged; the message names it.
+    """
+    folder = Path(folder)
+    if not folder.is_dir():
+        raise InputError(f"{folder}: is no folder; give the folder of an OpenPTV experiment.")
+    control_path = _control_path(folder)
+    control = read_control(control_path)
+    roots = list(dict.fromkeys([control_path.parent, control_path.parent.parent, folder]))
+    remarks: list[str] = []
+    indices = _checked_indices(control, control_path.name, swap_indices, remarks)
+    cameras, media, media_of = _cameras(control, roots, indices, remarks)
+    body, source = _body(roots, remarks)
+    targets = tuple(
+        _targets(roots, [f"{name}_targets"], control.field) for name in control.calibration_images
+    )
+    for camera, found in zip(cameras, targets, strict=True):
+        if found is None:
+            remarks.append(f"{camera.name}: no _targets file of its calibration image was found.")
+    particles, numbers, frame = _particles(roots, control, remarks)
+    project = Project(
+        cameras=tuple(cameras),
+        media=media,
+        media_of=media_of,
+        object_points=body,
+        sigma_image=0.5 * float(control.sensor.pitch.mean()),
+        unit="mm",
+        name=folder.resolve().name,
+        extra={"source": f"OpenPTV {control_path.name}, {source}" if source else "OpenPTV"},
+        remarks=tuple(remarks),
+    )
+    return Experiment(
+        project=project,
+        targets=targets,
+        particles=particles,
+        particle_targets=numbers,
+        frame_targets=frame,
+    )
+
+
+def write_experiment(folder: Path | str, project: Project, *, overwrite: bool = False) -> None:
+    """Write cal/*.ori, *.addpar, *_targets, the calibration body and parameters/ptv.par.
+
+    Raises
+    ------
+    InputError
+        If OpenPTV cannot hold the project: other than three or more parallel media fixed in the
+        world and common to all cameras, no sensor, or distortion it does not know.
+    """
+    cameras = project.cameras
+    first = project.interface_of(0)
+    if first is None or len(first.layers.indices) != 3:
+        raise InputError("OpenPTV needs three media (air, glass, water) before every camera.")
+    layers = first.layers
+    lines = [str(len(cameras))]
+    files: dict[str, str] = {}
+    for number, camera in enumerate(cameras):
+        interface = project.interface_of(number)
+        if interface is None or interface.moves_with_camera or interface.layers != layers:
+            raise InputError(
+                f"camera {camera.name}: OpenPTV knows only media that are fixed in the world and "
+                "the same for all cameras."
+            )
+        if camera.sensor is None:
+            raise InputError(f"camera {camera.name}: OpenPTV needs its sensor.")
+        # The glass vector runs from the origin to the foot on the water side.
+        reach = float(interface.point @ interface.normal)
+        if reach <= 0:
+            raise InputError(
+                f"camera {camera.name}: the water side of the glass must lie between origin and "
+                "camera for OpenPTV; move the origin of the object frame into the water."
+            )
+        # OpenPTV's origin of the image is the corner-to-corner centre of the sensor.
+        centre = np.array([camera.sensor.width, camera.sensor.height]) / 2
+        shift = camera.sensor.image_from_pixel(centre)
+        if np.abs(shift).max() > 1e-9:
+            camera = _moved_origin(camera, shift)
+        base = f"cal/{camera.name}.tif"
+        files[f"{base}.ori"] = ori_text(camera, interface.normal * reach)
+        files[f"{base}.addpar"] = addpar_text(camera)
+        lines += [f"img/{camera.name}.", base]
+        rows = project.image_points.of_camera(camera.name)
+        if rows:
+            files[f"{base}_targets"] = _targets_text(project, number, rows)
+    sensor = cameras[0].sensor
+    if sensor is None:
+        raise InputError(f"camera {cameras[0].name}: OpenPTV needs its sensor.")
+    lines += ["1", "0", "1", str(sensor.width), str(sensor.height)]
+    lines += [f"{v:.15g}" for v in (*sensor.pitch,)] + ["0"]
+    lines += [f"{v:.15g}" for v in (*layers.indices, *layers.thicknesses)]
+    files["parameters/ptv.par"] = "\n".join(lines) + "\n"
+    if project.object_points.ids:
+        files["cal/calblock.txt"] = "".join(
+            f"{k} {x:.15g} {y:.15g} {z:.15g}\n"
+            for k, (x, y, z) in enumerate(project.object_points.xyz, start=1)
+        )
+    with atomic_folder(folder, overwrite=overwrite) as temporary:
+        for name, text in files.items():
+            (temporary / name).parent.mkdir(parents=True, exist_ok=True)
+            (temporary / name).write_text(text, encoding="utf-8", newline="\n")
+
+
+def _moved_origin(camera: Camera, shift: FloatArray) -> Camera:
+    """Return the camera with the image origin moved to ``shift``; distortion about it must not."""
+    if camera.distortion.convention is Convention.OPENPTV and not camera.distortion.is_identity:
+        raise InputError(
+            f"camera {camera.name}: its distortion is counted from an origin other than OpenPTV's."
+        )
+    return replace(camera, principal_point=camera.principal_point - shift)
+
+
+def _targets_text(project: Project, camera: int, rows: Sequence[int]) -> str:
+    """Return a _targets file; the last number is the row of the point in the calibration body."""
+    sensor = project.cameras[camera].sensor
+    if sensor is None:
+        return ""
+    pixels = sensor.pixel_from_image(project.image_points.image[list(rows)])
+    place = project.object_points.rows([project.image_points.ids[row] for row in rows])
+    lines = [f"{len(rows)}\n"]
+    for k, ((x, y), number) in enumerate(zip(pixels, place, strict=True)):
+        lines.append(f"{k:4d} {x:.9f} {y:.9f} 20 5 5 1000 {number}\n")
+    return "".join(lines)
+
+
+def _control_path(folder: Path) -> Path:
+    """Return where ptv.par is."""
+    for name in _PARAMETERS:
+        path = folder / name / "ptv.par"
+        if path.is_file():
+            return path
+    others = sorted(folder.glob("*/ptv.par"))
+    if others:
+        return others[0]
+    if any(folder.glob("parameters*.y*ml")):
+        raise InputError(
+            f"{folder}: has its parameters as YAML only. Save them once as a parameters folder "
+            "with ptv.par (pyptv: export legacy parameters)."
+        )
+    raise InputError(
+        f"{folder}: neither ptv.par nor parameters/ptv.par was found; is this the folder of an "
+        "OpenPTV experiment?"
+    )
+
+
+def _find(roots: Sequence[Path], name: str) -> Path | None:
+    """Return a file that OpenPTV calls ``name``: there, or of that name beside the others."""
+    # Folders recorded under Windows have backslashes.
+    name = name.replace("\\", "/").strip()
+    for root in roots:
+        for candidate in (root / name, root / Path(name).name, root / "cal" / Path(name).name):
+            if candidate.is_file():
+                return candidate
+    return None
+
+
+def _checked_indices(
+    control: ControlParameters, file: str, swap: bool, remarks: list[str]
+) -> tuple[float, ...]:
+    """Return the indices, and say what is odd about them."""
+    air, glass, water = control.indices
+    if swap:
+        remarks.append(f"{file}: indices of glass and water exchanged, as asked.")
+        air, glass, water = air, water, glass
+    if glass < water:
+        remarks.append(
+            f"{file}: glass has index {glass:g} and water {water:g}; real glass (1.46 to 1.9) is "
+            "denser than water (1.33 to 1.36), so the two are most likely interchanged. Used as "
+            "they are; --swap-indices (swap_indices=True) exchanges them."
+        )
+    if control.thickness == 0:
+        remarks.append(f"{file}: the glass has no thickness.")
+    if control.thickness > 0 and control.thickness < 0.1:
+        remarks.append(
+            f"{file}: glass of {control.thickness:g} mm; OpenPTV's lengths are in mm, is this in m?"
+        )
+    return air, glass, water
+
+
+def _cameras(
+    control: ControlParameters,
+    roots: Sequence[Path],
+    indices: tuple[float, ...],
+    remarks: list[str],
+) -> tuple[list[Camera], dict[str, FlatInterface], tuple[str, ...]]:
+    """Return cameras, the different glass walls, and the wall of each camera."""
+    cameras: list[Camera] = []
+    media: dict[str, FlatInterface] = {}
+    media_of: list[str] = []
+    for number, image in enumerate(control.calibration_images, start=1):
+        path = _find(roots, f"{image}.ori")
+        if path is None:
+            raise InputError(
+                f"{roots[0]}: {image}.ori of camera {number} was not found; ptv.par names it."
+            )
+        name = Path(image.replace("\\", "/")).name.split(".")[0] or f"cam{number}"
+        if name in {camera.name for camera in cameras}:
+            name = f"{name}_{number}"
+        camera, glass, said = read_camera(path, sensor=control.sensor, name=name)
+        remarks += said
+        if camera.distortion.is_identity:
+            # Without distortion all conventions agree; the usual one calibrates best.
+            camera = replace(camera, distortion=Brown())
+        cameras.append(camera)
+        if not np.any(glass):
+            media_of.append("")
+            continue
+        wall = glass_interface(glass, indices, control.thickness)
+        same = [k for k, other in media.items() if _same(wall, other)]
+        if not same:
+            same = [f"wall{len(media) + 1}"]
+            media[same[0]] = wall
+        media_of.append(same[0])
+        height = float(wall.normal @ (camera.centre - wall.point))
+        if height < control.thickness:
+            remarks.append(
+                f"{path.name}: the camera stands {height:g} mm above the water side of the glass: "
+                "inside or behind it. Turn the glass vector or check the units."
+            )
+    return cameras, media, tuple(media_of)
+
+
+def _same(one: FlatInterface, other: FlatInterface) -> bool:
+    return bool(np.allclose(one.point, other.point) and np.allclose(one.normal, other.normal))
+
+
+def _body(roots: Sequence[Path], remarks: list[str]) -> tuple[ObjectPoints, str]:
+    """Return the calibration body named by cal_ori.par, or found by its usual name."""
+    names = list(_BODIES)
+    listed = _find(roots, "cal_ori.par")
+    if listed is not None:
+        first = listed.read_text(encoding="utf-8", errors="replace").splitlines()[:1]
+        names = [*first, *names]
+    for name in names:
+        path = _find(roots, name) if name.strip() else None
+        if path is not None:
+            ids, xyz = read_body(path)
+            return ObjectPoints(ids=tuple(ids), xyz=xyz), path.name
+    remarks.append("no calibration body (cal_ori.par names it) was found: no object points.")
+    return ObjectPoints(), ""
+
+
+def _targets(roots: Sequence[Path], names: Sequence[str], field: int) -> Targets | None:
+    for name in names:
+        path = _find(roots, name)
+        if path is not None:
+            return read_targets(path, field=field)
+    return None
+
+
+def _particles(
+    roots: Sequence[Path], control: ControlParameters, remarks: list[str]
+) -> tuple[FloatArray, IntArray, tuple[Targets | None, ...]]:
+    """Return the first stored frame: positions, target numbers and the targets."""
+    nothing = np.empty((0, 3)), np.empty((0, len(control.images)), dtype=np.int64), ()
+    found = [path for root in roots for path in sorted((root / "res").glob("rt_is.*"))]
+    found += [path for root in roots for path in sorted(root.glob("rt_is.*"))]
+    if not found:
+        return nothing
+    path = found[0]
+    frame = path.suffix.lstrip(".")
+    positions, numbers = read_correspondences(path)
+    if numbers.shape[1] < len(control.images):
+        raise InputError(
+            f"{path}: {numbers.shape[1]} target columns for {len(control.images)} cameras."
+        )
+    numbers = numbers[:, : len(control.images)]
+    frames = tuple(
+        _targets(roots, [f"{image}{frame}_targets", f"{image}.{frame}_targets"], control.field)
+        for image in control.images
+    )
+    if any(targets is None for targets in frames):
+        remarks.append(f"{path.name}: its _targets files were not all found; frame left out.")
+        return nothing
+    return positions, numbers, frames
+
+
+def particle_points(experiment: Experiment) -> tuple[ObjectPoints, ImagePoints]:
+    """Return the stored particles of a frame and their image points, ids p1, p2, ...
+
+    Raises
+    ------
+    InputError
+        If a particle refers to a target that does not exist.
+    """
+    ids = tuple(f"p{k}" for k in range(1, len(experiment.particles) + 1))
+    cameras: list[str] = []
+    names: list[str] = []
+    pixels: list[FloatArray] = []
+    for k, targets in enumerate(experiment.frame_targets):
+        camera = experiment.project.cameras[k]
+        if targets is None or camera.sensor is None:
+            continue
+        number = experiment.particle_targets[:, k]
+        if (number >= len(targets.pixels)).any():
+            raise InputError(
+                f"rt_is: target {int(number.max())} of {camera.name} does not exist; its _targets "
+                f"file holds {len(targets.pixels)}. Positions and targets are of other frames."
+            )
+        seen = np.flatnonzero(number >= 0)
+        cameras += [camera.name] * len(seen)
+        names += [ids[row] for row in seen]
+        pixels.append(camera.sensor.image_from_pixel(targets.pixels[number[seen]]))
+    if not pixels:
+        return ObjectPoints(), ImagePoints()
+    images = ImagePoints(cameras=tuple(cameras), ids=tuple(names), image=np.concatenate(pixels))
+    return ObjectPoints(ids=ids, xyz=experiment.particles), images

@@ -1,0 +1,311 @@
+"""Tables of object points and image points, CSV or workbook, tolerant in and plain out."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from multimedia.domain.camera import Camera
+from multimedia.domain.project import SHOWN, ImagePoints, ObjectPoints
+from photocore.arrays import FloatArray
+from photocore.errors import CellError, InputError, WorkbookError
+from photocore.tables import Column, Table, open_tables, read_table, write_csv
+
+#: Metres per unit of length that a heading may name.
+METRES: Mapping[str, float] = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "µm": 1e-6, "km": 1e3}
+
+_ID = Column("id", ("point", "name", "no", "nr", "number", "punkt", "punto", "pnt"), kind="text")
+_GROUP = Column("group", ("set", "plate", "frame", "gruppe", "gruppo", "code"), kind="text")
+_CAMERA = Column(
+    "camera", ("cam", "image", "photo", "kamera", "bild", "foto", "fotocamera"), kind="text",
+    required=True,
+)  # fmt: skip
+_OBJECT = (
+    _ID,
+    Column("X", ("E", "easting", "Rechtswert"), required=True),
+    Column("Y", ("N", "northing", "Hochwert"), required=True),
+    Column("Z", ("H", "height", "depth", "elevation", "Höhe", "quota"), required=True),
+    Column("sigma_X", ("sX", "std X")),
+    Column("sigma_Y", ("sY", "std Y")),
+    Column("sigma_Z", ("sZ", "std Z")),
+    _GROUP,
+)
+_IMAGE = (
+    _CAMERA,
+    _ID,
+    Column("x", ("x mm", "x'"), unit="mm"),
+    Column("y", ("y mm", "y'"), unit="mm"),
+    Column("col", ("column", "u", "spalte", "colonna"), unit="px"),
+    Column("row", ("line", "v", "zeile", "riga"), unit="px"),
+    Column("sigma_x", ("sx", "sigma")),
+    Column("sigma_y", ("sy",)),
+    _GROUP,
+)
+
+
+def read_object_points(path: Path, *, unit: str) -> tuple[ObjectPoints, list[str]]:
+    """Read a table with id, X, Y, Z and, if there, sigma_X, sigma_Y, sigma_Z and group.
+
+    Parameters
+    ----------
+    path : path
+        .csv, .xlsx, .ods; found by heading.
+    unit : str
+        Unit wanted; headings with another unit are converted.
+
+    Returns
+    -------
+    points : ObjectPoints
+    remarks : list of str
+
+    Raises
+    ------
+    InputError
+        Naming every bad cell and every repeated id.
+    """
+    table = read_table(path, _OBJECT, name="ObjectPoints")
+    errors = table.repeated("id")
+    xyz = _gathered(table, ("X", "Y", "Z"), unit, errors)
+    sigma = np.column_stack(
+        [table.numbers(k) * _factor(table, k, unit) for k in ("sigma_X", "sigma_Y", "sigma_Z")]
+    )
+    if (sigma < 0).any():
+        row = int(np.argwhere(sigma < 0)[0, 0])
+        errors.append(table.error(row, "sigma_X", "a standard deviation cannot be negative."))
+    if errors:
+        raise WorkbookError(errors)
+    points = ObjectPoints(ids=_ids(table), xyz=xyz, sigma=sigma, groups=tuple(table.texts("group")))
+    return points, list(table.remarks)
+
+
+def read_image_points(path: Path, cameras: Sequence[Camera]) -> tuple[ImagePoints, list[str]]:
+    """Read a table of image points.
+
+    Either long, one row per camera and point: camera, id, and x, y [mm] or col, row [px]; or
+    wide, one row per point with columns such as ``cam1 col``, ``cam1 row``, ``cam2 col``...
+
+    Parameters
+    ----------
+    path : path
+        .csv, .xlsx, .ods; found by heading.
+    cameras : sequence of Camera
+        Pixels need their sensors.
+
+    Returns
+    -------
+    points : ImagePoints
+    remarks : list of str
+
+    Raises
+    ------
+    InputError
+        Naming every bad cell.
+    """
+    book = open_tables(path)
+    try:
+        table = read_table(book, _IMAGE, name="ImagePoints")
+    except WorkbookError:
+        raise
+    except InputError as error:
+        wide = _read_wide(book, cameras)
+        if wide is None:
+            raise InputError(
+                f"{error} A wide table needs columns such as {cameras[0].name} col and "
+                f"{cameras[0].name} row for its cameras."
+            ) from None
+        return wide
+    by_name = {camera.name: camera for camera in cameras}
+    names = table.texts("camera")
+    errors: list[CellError] = []
+    for row, name in enumerate(names):
+        if name not in by_name:
+            errors.append(
+                table.error(row, "camera", f"no camera is called {name!r}; known: "
+                            f"{', '.join(list(by_name)[:SHOWN])}.")
+            )  # fmt: skip
+    if not ({"x", "y"} <= table.present or {"col", "row"} <= table.present):
+        raise InputError(f"{path}: neither columns x and y [mm] nor col and row [px] were found.")
+    in_mm = {"x", "y"} <= table.present
+    keys = ("x", "y") if in_mm else ("col", "row")
+    values = np.column_stack([table.numbers(key) for key in keys])
+    blank = np.isnan(values).any(axis=1)
+    for index in np.flatnonzero(blank).tolist():
+        key = keys[int(np.isnan(values[index]).argmax())]
+        errors.append(table.error(index, key, "is blank; leave the row out instead."))
+    sigma = _sigmas(table)
+    if errors:
+        raise WorkbookError(errors)
+    if in_mm:
+        values = values * [_factor(table, key, "mm") for key in keys]
+    else:
+        for name in dict.fromkeys(names):
+            rows = [row for row, other in enumerate(names) if other == name]
+            values[rows], sigma[rows] = _to_mm(by_name[name], values[rows], sigma[rows])
+    ids = _ids(table)
+    points = ImagePoints(
+        cameras=tuple(names), ids=ids, image=values, sigma=sigma,
+        groups=tuple(table.texts("group")),
+    )  # fmt: skip
+    return points, list(table.remarks)
+
+
+def object_columns(points: ObjectPoints, unit: str) -> dict[str, FloatArray | tuple[str, ...]]:
+    """Return the columns of a table of object points."""
+    columns: dict[str, FloatArray | tuple[str, ...]] = {"id": points.ids}
+    for k, axis in enumerate("XYZ"):
+        columns[f"{axis} [{unit}]"] = points.xyz[:, k]
+    if points.sigma is not None and np.isfinite(points.sigma).any():
+        for k, axis in enumerate("XYZ"):
+            columns[f"sigma_{axis} [{unit}]"] = points.sigma[:, k]
+    if any(points.groups):
+        columns["group"] = points.groups
+    return columns
+
+
+def image_columns(
+    points: ImagePoints, cameras: Sequence[Camera]
+) -> dict[str, FloatArray | tuple[str, ...]]:
+    """Return the columns of a table of image points, in pixels where every sensor is known."""
+    columns: dict[str, FloatArray | tuple[str, ...]] = {"camera": points.cameras, "id": points.ids}
+    sensors = {camera.name: camera.sensor for camera in cameras}
+    if all(sensors.get(name) is not None for name in points.cameras):
+        pixels = np.array(points.image)
+        for name in dict.fromkeys(points.cameras):
+            rows, sensor = points.of_camera(name), sensors[name]
+            if sensor is not None:
+                pixels[rows] = sensor.pixel_from_image(points.image[rows])
+        columns |= {"col [px]": pixels[:, 0], "row [px]": pixels[:, 1]}
+    else:
+        columns |= {"x [mm]": points.image[:, 0], "y [mm]": points.image[:, 1]}
+    if points.sigma is not None and np.isfinite(points.sigma).any():
+        columns |= {"sigma_x [mm]": points.sigma[:, 0], "sigma_y [mm]": points.sigma[:, 1]}
+    if any(points.groups):
+        columns["group"] = points.groups
+    return columns
+
+
+def write_columns(
+    path: Path, columns: Mapping[str, FloatArray | Sequence[str]], *, overwrite: bool
+) -> None:
+    """Write columns as .csv or .xlsx, by the ending; NaN becomes an empty cell."""
+    if path.suffix.lower() == ".csv":
+        write_csv(path, columns, overwrite=overwrite)
+        return
+    if path.suffix.lower() != ".xlsx":
+        raise InputError(f"{path}: tables are written as .csv or .xlsx; give one of these endings.")
+    from openpyxl import Workbook
+    from openpyxl.styles import Font
+
+    from photocore.output import atomic_path
+
+    book = Workbook()
+    sheet = book.active
+    sheet.append(list(columns))
+    for cell in sheet[1]:
+        cell.font = Font(bold=True)
+    for row in zip(*columns.values(), strict=True):
+        sheet.append([_cell(value) for value in row])
+    sheet.freeze_panes = "A2"
+    with atomic_path(path, overwrite=overwrite) as temporary:
+        book.save(temporary)
+
+
+def _cell(value: object) -> object:
+    """Return a cell value: no NaN, no text that a spreadsheet takes for a formula."""
+    if isinstance(value, float | np.floating):
+        return float(value) if np.isfinite(value) else None
+    if isinstance(value, np.integer):
+        return int(value)
+    return f"'{value}" if isinstance(value, str) and value.startswith(("=", "+", "@")) else value
+
+
+def _ids(table: Table) -> tuple[str, ...]:
+    """Return the ids; rows of a table without an id column are numbered from 1."""
+    ids = table.texts("id")
+    if "id" not in table.present:
+        return tuple(str(k) for k in range(1, len(ids) + 1))
+    errors = [
+        table.error(row, "id", "is blank; every point needs a name.")
+        for row, text in enumerate(ids)
+        if not text
+    ]
+    if errors:
+        raise WorkbookError(errors)
+    return tuple(ids)
+
+
+def _factor(table: Table, key: str, unit: str) -> float:
+    """Return what converts a column to ``unit``; 1 where the heading says no length."""
+    found = table.units.get(key, "")
+    if found not in METRES or unit not in METRES:
+        return 1.0
+    return METRES[found] / METRES[unit]
+
+
+def _gathered(table: Table, keys: Sequence[str], unit: str, errors: list[CellError]) -> FloatArray:
+    """Return columns side by side in ``unit``; blanks are complained about."""
+    values = np.column_stack([table.numbers(key) for key in keys])
+    for row, column in np.argwhere(np.isnan(values)):
+        errors.append(table.error(int(row), keys[column], "is blank; give a number."))
+    return values * [_factor(table, key, unit) for key in keys]
+
+
+def _sigmas(table: Table) -> FloatArray:
+    """Return sigma_x, sigma_y in their own unit; one column serves both."""
+    x, y = table.numbers("sigma_x"), table.numbers("sigma_y")
+    if "sigma_y" not in table.present:
+        y = x
+    return np.column_stack([x, y])
+
+
+def _to_mm(camera: Camera, pixels: FloatArray, sigma: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return image coordinates and sigmas of pixels."""
+    if camera.sensor is None:
+        raise InputError(
+            f"camera {camera.name}: image points are given in pixels, but its sensor is not "
+            "described; add [camera.sensor] with width, height and pitch."
+        )
+    return camera.sensor.image_from_pixel(pixels), sigma * camera.sensor.pitch
+
+
+def _read_wide(book: object, cameras: Sequence[Camera]) -> tuple[ImagePoints, list[str]] | None:
+    """Read one row per point with a pair of columns per camera; None if there are none."""
+    columns = [_ID, _GROUP]
+    for camera in cameras:
+        columns += [
+            Column(f"{camera.name} {key}", unit="px" if key in ("col", "row") else "mm")
+            for key in ("col", "row", "x", "y")
+        ]
+    try:
+        table = read_table(book, columns, name="ImagePoints")  # type: ignore[arg-type]
+    except WorkbookError:
+        raise
+    except InputError:
+        return None
+    names: list[str] = []
+    rows: list[int] = []
+    images: list[FloatArray] = []
+    for camera in cameras:
+        for first, second in (("col", "row"), ("x", "y")):
+            keys = (f"{camera.name} {first}", f"{camera.name} {second}")
+            if not set(keys) <= table.present:
+                continue
+            values = np.column_stack([table.numbers(key) for key in keys])
+            seen = np.flatnonzero(np.isfinite(values).all(axis=1))
+            image = values[seen]
+            if first == "col":
+                image, _ = _to_mm(camera, image, np.ones_like(image))
+            names += [camera.name] * len(seen)
+            rows += seen.tolist()
+            images.append(image)
+            break
+    if not images:
+        return None
+    ids, groups = _ids(table), table.texts("group")
+    points = ImagePoints(
+        cameras=tuple(names), ids=tuple(ids[row] for row in rows), image=np.concatenate(images),
+        groups=tuple(groups[row] for row in rows),
+    )  # fmt: skip
+    return points, list(table.remarks)

@@ -1,0 +1,333 @@
+"""The project file: TOML a person can read, with tables of points beside it."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from multimedia.domain.camera import Camera, Sensor
+from multimedia.domain.flat_interface import FlatInterface
+from multimedia.domain.layers import Layers
+from multimedia.domain.project import SIGMA_IMAGE, SIGMA_PIXEL, ImagePoints, ObjectPoints, Project
+from multimedia.io.point_tables import (
+    METRES,
+    image_columns,
+    object_columns,
+    read_image_points,
+    read_object_points,
+    write_columns,
+)
+from photocore.distortion import NAMES, Brown, Convention
+from photocore.errors import GeometryError, InputError
+from photocore.output import atomic_path, check_writable
+
+FORMAT = "multimedia-project/1"
+_HEAD = """\
+# Project of the `multimedia` commands; object lengths in `unit`, image lengths in mm, angles in
+# degrees. Tables of points: paths relative to this file.
+"""
+
+
+def read_project(path: Path | str) -> Project:
+    """Read a project file and its tables.
+
+    Raises
+    ------
+    InputError
+        Naming file, section and key.
+    GeometryError
+        If a camera is impossible.
+    """
+    path = Path(path)
+    data = _toml(path)
+    try:
+        return _project(data, path.parent)
+    except GeometryError as error:
+        raise GeometryError(f"{path}: {error}") from None
+    except InputError as error:
+        if type(error) is not InputError or str(error).startswith(str(path.parent / "")):
+            raise
+        raise InputError(f"{path}: {error}") from None
+
+
+def write_project(path: Path | str, project: Project, *, overwrite: bool = False) -> list[Path]:
+    """Write a project file and, beside it, the tables it names.
+
+    The tables are called after the project: ``tank.toml`` goes with ``tank_object_points.csv``
+    and ``tank_image_points.csv``.
+
+    Returns
+    -------
+    list of Path
+        The files written.
+
+    Raises
+    ------
+    InputError
+        If a file exists and ``overwrite`` is false.
+    """
+    import tomli_w
+
+    path = Path(path)
+    data = project_data(project)
+    tables: dict[Path, dict[str, Any]] = {}
+    if project.object_points.ids:
+        table = path.with_name(f"{path.stem}_object_points.csv")
+        data["object_points"] = table.name
+        tables[table] = dict(object_columns(project.object_points, project.unit))
+    if project.image_points.ids:
+        table = path.with_name(f"{path.stem}_image_points.csv")
+        data["image_points"] = table.name
+        tables[table] = dict(image_columns(project.image_points, project.cameras))
+    # Tables (arrays of them too) must follow the plain keys.
+    order = sorted(data, key=lambda key: isinstance(data[key], dict | list))
+    for file in (path, *tables):
+        check_writable(file, overwrite=overwrite)
+    for table, columns in tables.items():
+        write_columns(table, columns, overwrite=overwrite)
+    with atomic_path(path, overwrite=overwrite) as temporary:
+        text = _HEAD + tomli_w.dumps({key: data[key] for key in order})
+        temporary.write_text(text, encoding="utf-8")
+    return [path, *tables]
+
+
+def project_data(project: Project) -> dict[str, Any]:
+    """Return the content of the project file, without the names of the tables."""
+    data: dict[str, Any] = {"format": FORMAT}
+    if project.name:
+        data["name"] = project.name
+    data["unit"] = project.unit
+    data["sigma_image"] = float(project.sigma_image)
+    data |= {k: v for k, v in project.extra.items() if k not in data}
+    data["media"] = {name: _media_data(media) for name, media in project.media.items()}
+    data["camera"] = [
+        _camera_data(camera, media)
+        for camera, media in zip(project.cameras, project.media_of, strict=True)
+    ]
+    return data
+
+
+def _toml(path: Path) -> dict[str, Any]:
+    try:
+        return tomllib.loads(path.read_text(encoding="utf-8-sig"))
+    except FileNotFoundError:
+        raise InputError(f"{path}: no such project file.") from None
+    except IsADirectoryError:
+        raise InputError(
+            f"{path}: is a folder. Give the project file in it; for an OpenPTV experiment make "
+            "one with `multimedia openptv`."
+        ) from None
+    except UnicodeDecodeError:
+        raise InputError(f"{path}: is not a text file, expected a project file (TOML).") from None
+    except tomllib.TOMLDecodeError as error:
+        raise InputError(f"{path}: is not valid TOML: {error}.") from None
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read ({error.strerror}).") from None
+
+
+def _project(data: dict[str, Any], folder: Path) -> Project:
+    found = data.pop("format", None)
+    if found != FORMAT:
+        raise InputError(f'format must be "{FORMAT}", found {found!r}.')
+    unit = str(data.pop("unit", "m"))
+    if unit not in METRES:
+        raise InputError(f"unit: {unit!r} is no unit of length; choose {', '.join(METRES)}.")
+    described = data.pop("media", {})
+    if not isinstance(described, dict):
+        raise InputError("media: expected sections such as [media.tank].")
+    media = {name: _media(value, f"media.{name}") for name, value in described.items()}
+    sections = data.pop("camera", [])
+    if not isinstance(sections, list) or not sections:
+        raise InputError("there is no camera; add at least one section [[camera]].")
+    pairs = [_camera(value, number) for number, value in enumerate(sections, start=1)]
+    cameras = tuple(camera for camera, _ in pairs)
+    remarks = [remark for item in media.values() for remark in item.layers.remarks]
+    objects, images = ObjectPoints(), ImagePoints()
+    if "object_points" in data:
+        table = folder / str(data.pop("object_points"))
+        objects, said = read_object_points(table, unit=unit)
+        remarks += [f"{table.name}: {text}" for text in said]
+    if "image_points" in data:
+        table = folder / str(data.pop("image_points"))
+        images, said = read_image_points(table, cameras)
+        remarks += [f"{table.name}: {text}" for text in said]
+    return Project(
+        cameras=cameras,
+        media=media,
+        media_of=tuple(name for _, name in pairs),
+        object_points=objects,
+        image_points=images,
+        sigma_image=_sigma(data, cameras),
+        unit=unit,
+        name=str(data.pop("name", "")),
+        extra=data,
+        remarks=tuple(remarks),
+    )
+
+
+def _sigma(data: dict[str, Any], cameras: tuple[Camera, ...]) -> float:
+    """Return the precision of an image coordinate: as given, else half a pixel. [mm]"""
+    if "sigma_image" in data:
+        value = _number(data, "sigma_image", "project")
+        del data["sigma_image"]
+        if not value > 0:
+            raise InputError(f"sigma_image: must be above zero [mm], found {value:g}.")
+        return value
+    pitches = [camera.sensor.pitch.mean() for camera in cameras if camera.sensor is not None]
+    return SIGMA_PIXEL * float(np.mean(pitches)) if pitches else SIGMA_IMAGE
+
+
+def _media(value: Any, where: str) -> FlatInterface:
+    _only(value, where, ("indices", "thicknesses", "point", "normal", "moves_with_camera"))
+    return FlatInterface(
+        layers=Layers.from_dict(value, where=where),
+        point=_vector(value, "point", where, (0.0, 0.0, 0.0)),
+        normal=_vector(value, "normal", where, (0.0, 0.0, 1.0)),
+        moves_with_camera=_flag(value, "moves_with_camera", where),
+    )
+
+
+def _media_data(media: FlatInterface) -> dict[str, Any]:
+    data: dict[str, Any] = dict(media.layers.as_dict())
+    data |= {"point": media.point.tolist(), "normal": media.normal.tolist()}
+    if media.moves_with_camera:
+        data["moves_with_camera"] = True
+    return data
+
+
+_CAMERA_KEYS = ("name", "media", "centre", "omega", "phi", "kappa", "c", "principal_point",
+                "distortion", "sensor")  # fmt: skip
+
+
+def _camera(value: Any, number: int) -> tuple[Camera, str]:
+    where = f"camera {number}"
+    _only(value, where, _CAMERA_KEYS)
+    name = str(value.get("name", f"cam{number}"))
+    where = f"camera {name}"
+    angles = np.array([_number(value, key, where) for key in ("omega", "phi", "kappa")])
+    if (np.abs(angles) > 720.0).any():
+        raise InputError(f"{where}: omega, phi, kappa are in degrees; found {angles.tolist()}.")
+    c = _number(value, "c", where)
+    sensor = _sensor(value["sensor"], where) if "sensor" in value else None
+    if sensor is not None and c > 100.0 * sensor.half_diagonal:
+        raise InputError(
+            f"{where}: c = {c:g} but the sensor is only {2 * sensor.half_diagonal:.4g} mm across. "
+            "Is c in pixels, or the pitch in micrometres? Both are in mm."
+        )
+    # Whole turns do not matter, and from_angles takes none.
+    turns = np.radians(np.remainder(angles + 180.0, 360.0) - 180.0)
+    camera = Camera.from_angles(
+        _vector(value, "centre", where, None),
+        *(float(a) for a in turns),
+        principal_distance=c,
+        principal_point=_vector(value, "principal_point", where, (0.0, 0.0)),
+        distortion=_distortion(value.get("distortion", {}), where, c),
+        sensor=sensor,
+        name=name,
+    )
+    return camera, str(value.get("media", ""))
+
+
+def _camera_data(camera: Camera, media: str) -> dict[str, Any]:
+    data: dict[str, Any] = {"name": camera.name}
+    if media:
+        data["media"] = media
+    data["centre"] = camera.centre.tolist()
+    degrees = np.degrees(camera.angles)
+    data |= {key: float(a) for key, a in zip(("omega", "phi", "kappa"), degrees, strict=True)}
+    data["c"] = camera.principal_distance
+    data["principal_point"] = camera.principal_point.tolist()
+    if not camera.distortion.is_identity:
+        terms = {name: float(getattr(camera.distortion, name)) for name in NAMES}
+        data["distortion"] = {"convention": camera.distortion.convention.value} | terms
+    if camera.sensor is not None:
+        data["sensor"] = {
+            "width": camera.sensor.width,
+            "height": camera.sensor.height,
+            "pitch": camera.sensor.pitch.tolist(),
+            "origin": camera.sensor.origin.tolist(),
+        }
+    return data
+
+
+def _sensor(value: Any, where: str) -> Sensor:
+    where = f"{where}, sensor"
+    _only(value, where, ("width", "height", "pitch", "origin"))
+    pitch = value.get("pitch")
+    if isinstance(pitch, int | float):
+        value = {**value, "pitch": [pitch, pitch]}
+    found = _vector(value, "pitch", where, None)
+    if (found > 0.2).any():
+        raise InputError(f"{where}: a pitch of {found.tolist()} mm? Typical are 0.002 to 0.03 mm.")
+    origin = _vector(value, "origin", where, None) if "origin" in value else None
+    size = [int(_number(value, key, where)) for key in ("width", "height")]
+    return Sensor(width=size[0], height=size[1], pitch=found, origin=origin)  # type: ignore[arg-type]
+
+
+def _distortion(value: Any, where: str, c: float) -> Brown:
+    where = f"{where}, distortion"
+    _only(value, where, ("convention", *NAMES))
+    convention = value.get("convention", Convention.BROWN.value)
+    terms = {name: _number(value, name, where) for name in NAMES if name in value}
+    if convention == "opencv":
+        given = [terms.get(name, 0.0) for name in ("k1", "k2", "p1", "p2", "k3")]
+        if "scale" in terms or "shear" in terms:
+            raise InputError(f"{where}: OpenCV's model has no scale and shear.")
+        return Brown.from_opencv(given, principal_distance=c)
+    known = {item.value: item for item in Convention}
+    if convention not in known:
+        raise InputError(
+            f"{where}: convention {convention!r} is not known; choose {', '.join(known)} or opencv."
+        )
+    return Brown(**terms, convention=known[convention])
+
+
+def _only(value: Any, where: str, keys: tuple[str, ...]) -> None:
+    """Refuse keys that nothing reads: most are typing errors."""
+    if not isinstance(value, Mapping):
+        raise InputError(f"{where}: expected a section of keys, found {value!r:.40}.")
+    for key in value:
+        if key not in keys:
+            from difflib import get_close_matches
+
+            near = get_close_matches(key, keys, n=1)
+            hint = f" Did you mean {near[0]!r}?" if near else ""
+            raise InputError(f"{where}: unknown key {key!r}.{hint} Known: {', '.join(keys)}.")
+
+
+def _number(value: Mapping[str, Any], key: str, where: str) -> float:
+    if key not in value:
+        raise InputError(f"{where}: the key {key!r} is missing.")
+    found = value[key]
+    if isinstance(found, bool) or not isinstance(found, int | float) or not np.isfinite(found):
+        raise InputError(f"{where}: {key} must be a number, found {found!r:.40}.")
+    return float(found)
+
+
+def _vector(
+    value: Mapping[str, Any], key: str, where: str, default: tuple[float, ...] | None
+) -> Any:
+    if key not in value:
+        if default is None:
+            raise InputError(f"{where}: the key {key!r} is missing.")
+        return np.array(default)
+    size = 2 if key in ("principal_point", "pitch", "origin") else 3
+    found = value[key]
+    if (
+        not isinstance(found, list)
+        or len(found) != size
+        or not all(isinstance(v, int | float) and np.isfinite(v) for v in found)
+    ):
+        raise InputError(f"{where}: {key} must be {size} numbers, found {found!r:.60}.")
+    return np.array(found, dtype=np.float64)
+
+
+def _flag(value: Mapping[str, Any], key: str, where: str) -> bool:
+    found = value.get(key, False)
+    if not isinstance(found, bool):
+        raise InputError(f"{where}: {key} must be true or false, found {found!r:.40}.")
+    return found

@@ -1,0 +1,91 @@
+"""Which detected target is which control point, from an approximate orientation."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from multimedia.domain.camera import Camera
+from multimedia.domain.flat_interface import FlatInterface
+from multimedia.solvers.projection import project
+from multimedia.solvers.resection import resect
+from photocore.arrays import FloatArray, IntArray
+from photocore.errors import ConvergenceError, GeometryError, InputError
+
+#: Search radius with the given orientation, and the factor on the median misfit afterwards. [px]
+FIRST_RADIUS, WIDEST_MISFIT = 25.0, 6.0
+_ROUNDS = 4
+
+
+def match_targets(
+    camera: Camera,
+    control: FloatArray,
+    targets: FloatArray,
+    interface: FlatInterface | None,
+    *,
+    radius: float = FIRST_RADIUS,
+) -> IntArray:
+    """Return the target of each control point, -1 where there is none, shape (n,).
+
+    Parameters
+    ----------
+    camera : Camera
+        Approximate orientation, with its sensor.
+    control : ndarray, shape (n, 3)
+        Control points.
+    targets : ndarray, shape (m, 2)
+        Detected targets. [px]
+    interface : FlatInterface or None
+        What the camera looks through.
+    radius : float
+        Largest distance from the place expected with the given orientation. [px]
+
+    Notes
+    -----
+    Nearest neighbours in both directions, then a resection, then again within a radius that
+    follows the misfits: a start that is some pixels off does not end in wrong partners.
+    """
+    if camera.sensor is None:
+        raise InputError(f"camera {camera.name}: matching targets needs its sensor.")
+    state = camera
+    found = _nearest(state, control, targets, interface, radius)
+    for _ in range(_ROUNDS):
+        seen = found >= 0
+        if seen.sum() < 4:
+            return found
+        image = np.full((len(control), 2), np.nan)
+        image[seen] = camera.sensor.image_from_pixel(targets[found[seen]])
+        try:
+            result = resect(state, control, image, interface)
+        except (GeometryError, ConvergenceError, InputError):
+            return found
+        miss = np.linalg.norm(result.residuals[seen] / camera.sensor.pitch, axis=1)
+        state = result.camera
+        limit = min(radius, max(1.5, WIDEST_MISFIT * float(np.median(miss))))
+        again = _nearest(state, control, targets, interface, limit)
+        if np.array_equal(again, found):
+            return found
+        found = again
+    return found
+
+
+def _nearest(
+    camera: Camera,
+    control: FloatArray,
+    targets: FloatArray,
+    interface: FlatInterface | None,
+    radius: float,
+) -> IntArray:
+    """Return mutual nearest neighbours within a radius."""
+    from scipy.spatial import cKDTree
+
+    found = np.full(len(control), -1, dtype=np.int64)
+    image = project(camera, control, interface)
+    seen = np.flatnonzero(np.isfinite(image).all(axis=1))
+    if camera.sensor is None or not len(seen) or not len(targets):
+        return found
+    expected = camera.sensor.pixel_from_image(image[seen])
+    distance, nearest = cKDTree(targets).query(expected)
+    _, back = cKDTree(expected).query(targets)
+    mutual = (back[nearest] == np.arange(len(seen))) & (distance < radius)
+    found[seen[mutual]] = nearest[mutual]
+    return found
