@@ -6,9 +6,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from multimedia.collinearity import shifts
+from multimedia.collinearity import image_vectors
 from multimedia.domain.camera import Camera
 from multimedia.domain.flat_interface import FlatInterface
+from multimedia.domain.interfaces import Interfaces
+from multimedia.solvers.projection import Placed
+from multimedia.solvers.traced_projection import sight_vectors
 from photocore.arrays import FloatArray
 from photocore.errors import GeometryError
 
@@ -19,7 +22,7 @@ _ROUNDS = 4
 
 
 def pose_starts(
-    camera: Camera, control: FloatArray, image: FloatArray, interface: FlatInterface | None
+    camera: Camera, control: FloatArray, image: FloatArray, interface: Placed
 ) -> list[Camera]:
     """Return poses from which ``camera`` may have seen the control points.
 
@@ -31,7 +34,7 @@ def pose_starts(
         At least 3 points.
     image : ndarray, shape (n, 2)
         [mm]
-    interface : FlatInterface or None
+    interface : FlatInterface, Interfaces or None
         What the camera looks through.
 
     Returns
@@ -54,10 +57,14 @@ def pose_starts(
     starts = []
     if interface is None:
         return _straight(camera, control, ideal)
-    if interface.moves_with_camera:
+    if isinstance(interface, Interfaces) or interface.moves_with_camera:
         # Seen through its port a camera has, to first order, a longer principal distance; the
         # pose this gives is refined by apparent points like any other.
-        indices = interface.layers.indices
+        if isinstance(interface, Interfaces):
+            indices = interface.indices
+            starts += _straight(camera, control, ideal)
+        else:
+            indices = interface.layers.indices
         longer = replace(camera, principal_distance=camera.principal_distance * indices[-1])
         for pose in _straight(longer, control, ideal):
             starts.append(replace(pose, principal_distance=camera.principal_distance))
@@ -67,19 +74,23 @@ def pose_starts(
 
 
 def _refined(
-    start: Camera, control: FloatArray, ideal: FloatArray, interface: FlatInterface
+    start: Camera, control: FloatArray, ideal: FloatArray, interface: FlatInterface | Interfaces
 ) -> list[Camera]:
     """Return the start and what the apparent points make of it."""
     found = [start]
     pose = start
     for _ in range(_ROUNDS):
+        vectors = (control - pose.centre) @ pose.rotation
         try:
-            medium = interface.medium(pose)
+            if isinstance(interface, Interfaces):
+                seen = sight_vectors(pose, control, interface)
+                # As far away as the point itself, in the direction in which it is seen.
+                seen = seen * np.linalg.norm(vectors, axis=1, keepdims=True)
+            else:
+                seen = image_vectors(vectors, interface.medium(pose))
         except GeometryError:
             break
-        shift = shifts((control - pose.centre) @ pose.rotation, medium)
-        normal = pose.rotation @ medium.normal
-        apparent = control + shift.g[:, None] * normal
+        apparent = pose.centre + seen @ pose.rotation.T
         if not np.isfinite(apparent).all():
             break
         poses = _straight(pose, apparent, ideal)

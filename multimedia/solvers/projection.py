@@ -11,13 +11,18 @@ from numpy.typing import ArrayLike
 from multimedia.collinearity import Shifts, image_vectors, shifts
 from multimedia.domain.camera import EXTERIOR, INTERIOR, Camera
 from multimedia.domain.flat_interface import FlatInterface
+from multimedia.domain.interfaces import Interfaces
 from multimedia.domain.layers import Layers
+from multimedia.domain.ray_paths import RayStatus
+from multimedia.solvers.raytrace import aim_rays
+from multimedia.solvers.traced_projection import sight, sight_vectors
 from photocore.arrays import BoolArray, FloatArray, as_points
 from photocore.errors import InputError
 
 #: What lies between a camera and the object: parallel layers whose last face is the plane Z = 0,
-#: the same anywhere else, or nothing.
-Media = Layers | FlatInterface | None
+#: the same anywhere else, surfaces of any form (ray-traced), or nothing.
+Media = Layers | FlatInterface | Interfaces | None
+Placed = FlatInterface | Interfaces | None
 #: Points worked on at a time; their scratch rows stay in the processor's cache.
 BLOCK = 8192
 
@@ -45,7 +50,7 @@ class Projection:
     by_interface: FloatArray
 
 
-def as_interface(media: Media) -> FlatInterface | None:
+def as_interface(media: Media) -> Placed:
     """Return bare layers as an interface whose last face is the plane Z = 0."""
     return FlatInterface(layers=media) if isinstance(media, Layers) else media
 
@@ -59,9 +64,10 @@ def project(camera: Camera, points: ArrayLike, layers: Media = None) -> FloatArr
         Exterior and interior orientation.
     points : array_like, shape (..., 3)
         X, Y, Z. [unit of the camera's centre]
-    layers : Layers, FlatInterface or None
+    layers : Layers, FlatInterface, Interfaces or None
         Bare `Layers` have their last face in the plane Z = 0 with the camera above and the
-        points below; a `FlatInterface` lies anywhere. None: straight rays.
+        points below; a `FlatInterface` lies anywhere; `Interfaces` of any form are ray-traced.
+        None: straight rays.
 
     Returns
     -------
@@ -98,9 +104,13 @@ def project(camera: Camera, points: ArrayLike, layers: Media = None) -> FloatArr
     """
     xyz = as_points(points, "points", dimension=3)
     interface = as_interface(layers)
-    medium = None if interface is None else interface.medium(camera)
     flat = xyz.reshape(-1, 3)
     image: FloatArray = np.empty((len(flat), 2))
+    if isinstance(interface, Interfaces):
+        _central(sight_vectors(camera, flat, interface), camera, out=image)
+        image = camera.distortion.measured(image, camera.principal_point)
+        return image.reshape(*xyz.shape[:-1], 2)
+    medium = None if interface is None else interface.medium(camera)
     for start in range(0, len(flat), BLOCK):
         part = slice(start, start + BLOCK)
         vectors = (flat[part] - camera.centre) @ camera.rotation
@@ -132,7 +142,10 @@ def projection_status(camera: Camera, points: ArrayLike, layers: Media = None) -
     vectors: FloatArray = (xyz - camera.centre) @ camera.rotation
     image = project(camera, xyz, interface)
     before: BoolArray = np.zeros(len(xyz), dtype=bool)
-    if interface is not None:
+    if isinstance(interface, Interfaces):
+        paths = aim_rays(camera.centre, xyz, interface.seen_from(camera.centre, camera.rotation))
+        vectors = paths.directions[:, 0] @ camera.rotation
+    elif interface is not None:
         medium = interface.medium(camera)
         before = vectors @ medium.normal + medium.height > 0
         vectors = image_vectors(vectors, medium)
@@ -146,6 +159,10 @@ def projection_status(camera: Camera, points: ArrayLike, layers: Media = None) -
     status[np.isnan(image).any(axis=-1)] = "outside the lens model"
     status[vectors[:, 2] >= 0] = "behind the camera"
     status[before] = "before the interface"
+    if isinstance(interface, Interfaces):
+        for code in RayStatus:
+            if code != RayStatus.OK:
+                status[paths.status == code] = code.label
     status[~np.isfinite(xyz).all(axis=-1)] = "not a number"
     return status.tolist()
 
@@ -176,6 +193,8 @@ def project_with_jacobian(
     Projection
     """
     interface = as_interface(layers)
+    if isinstance(interface, Interfaces):
+        return _traced(camera, points, interface, camera_names, interface_names)
     vectors = (points - camera.centre) @ camera.rotation
     if interface is None:
         if interface_names:
@@ -185,20 +204,8 @@ def project_with_jacobian(
         medium = interface.medium(camera)
         shift = shifts(vectors, medium)
         seen = vectors + shift.g[:, None] * medium.normal
-    ideal = np.empty((len(points), 2))
-    _central(seen, camera, out=ideal)
-    own = [name for name in camera_names if name in INTERIOR and name != "c"]
-    image, by_ideal, by_own = camera.distortion.measured_with_jacobian(
-        ideal, camera.principal_point, own
-    )
-    # d(ideal)/du = -(c / u_z) [1 0 x/c; 0 1 y/c]  with x = -c u_x / u_z.
-    by_seen = np.empty((len(points), 2, 3))
-    lever = -camera.principal_distance / seen[:, 2]
-    by_seen[:, :, 0] = lever[:, None] * by_ideal[:, :, 0]
-    by_seen[:, :, 1] = lever[:, None] * by_ideal[:, :, 1]
-    towards = (ideal / camera.principal_distance)[:, None, :] * by_ideal
-    by_seen[:, :, 2] = lever[:, None] * towards.sum(-1)
-
+    lens = _through_lens(camera, seen, camera_names)
+    by_seen = lens.by_seen
     by_vector = by_seen
     along = None
     if shift is not None and medium is not None:
@@ -213,20 +220,71 @@ def project_with_jacobian(
         camera_names, camera, interface, vectors, by_seen, by_vector, by_point, along, shift
     )
     for k, name in enumerate(camera_names):
-        if name in exterior:
-            by_camera[:, :, k] = exterior[name]
-        elif name == "c":
-            by_camera[:, :, k] = (by_ideal @ (ideal / camera.principal_distance)[..., None])[..., 0]
-        else:
-            by_camera[:, :, k] = by_own[:, :, own.index(name)]
+        by_camera[:, :, k] = exterior[name] if name in exterior else lens.by_interior[name]
     by_interface = np.empty((len(points), 2, len(interface_names)))
     if interface is not None and shift is not None and along is not None:
         columns = _by_interface(interface_names, camera, interface, vectors, by_seen, along, shift)
         for k, column in enumerate(columns):
             by_interface[:, :, k] = column
     return Projection(
-        image=image, by_point=by_point, by_camera=by_camera, by_interface=by_interface
+        image=lens.image, by_point=by_point, by_camera=by_camera, by_interface=by_interface
     )
+
+
+def _traced(
+    camera: Camera,
+    points: FloatArray,
+    interfaces: Interfaces,
+    camera_names: Sequence[str],
+    interface_names: Sequence[str],
+) -> Projection:
+    """Project through ray-traced surfaces."""
+    exterior = any(name in EXTERIOR for name in camera_names)
+    seen = sight(camera, points, interfaces, exterior=exterior, index_names=interface_names)
+    lens = _through_lens(camera, seen.vectors, camera_names)
+    by_camera = np.empty((len(points), 2, len(camera_names)))
+    for k, name in enumerate(camera_names):
+        if name in EXTERIOR:
+            by_camera[:, :, k] = (lens.by_seen @ seen.by_exterior[name][:, :, None])[:, :, 0]
+        else:
+            by_camera[:, :, k] = lens.by_interior[name]
+    return Projection(
+        image=lens.image,
+        by_point=lens.by_seen @ seen.by_point,
+        by_camera=by_camera,
+        by_interface=lens.by_seen @ seen.by_indices,
+    )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Lens:
+    """Image points of camera-frame vectors, and their derivatives."""
+
+    image: FloatArray
+    by_seen: FloatArray  # (n, 2, 3)
+    by_interior: dict[str, FloatArray]  # each (n, 2)
+
+
+def _through_lens(camera: Camera, seen: FloatArray, names: Sequence[str]) -> _Lens:
+    """Apply central projection and distortion to vectors in the first medium."""
+    ideal = np.empty((len(seen), 2))
+    _central(seen, camera, out=ideal)
+    own = [name for name in names if name in INTERIOR and name != "c"]
+    # d(ideal)/du = -(c / u_z) [1 0 x/c; 0 1 y/c]  with x = -c u_x / u_z.
+    lever = -camera.principal_distance / seen[:, 2]
+    by_seen: FloatArray = np.zeros((len(seen), 2, 3))
+    by_seen[:, 0, 0] = by_seen[:, 1, 1] = lever
+    by_seen[:, 0, 2] = lever * (ideal[:, 0] / camera.principal_distance)
+    by_seen[:, 1, 2] = lever * (ideal[:, 1] / camera.principal_distance)
+    by_c = ideal / camera.principal_distance
+    if camera.distortion.is_identity and not own:
+        return _Lens(ideal + camera.principal_point, by_seen, {"c": by_c})
+    image, by_ideal, by_own = camera.distortion.measured_with_jacobian(
+        ideal, camera.principal_point, own
+    )
+    by_interior = {name: by_own[:, :, k] for k, name in enumerate(own)}
+    by_interior["c"] = (by_ideal @ by_c[..., None])[..., 0]
+    return _Lens(image, by_ideal @ by_seen, by_interior)
 
 
 def _central(seen: FloatArray, camera: Camera, *, out: FloatArray) -> None:

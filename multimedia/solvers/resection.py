@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from multimedia.domain.camera import EXTERIOR, INTERIOR, Camera
 from multimedia.domain.flat_interface import FlatInterface
 from multimedia.solvers.pose_starts import pose_starts
-from multimedia.solvers.projection import Media, as_interface, project_with_jacobian
+from multimedia.solvers.projection import Media, Placed, as_interface, project_with_jacobian
 from photocore.adjustment import correlations, fit, minimise
 from photocore.arrays import BoolArray, FloatArray, as_points
 from photocore.errors import ConvergenceError, GeometryError, InputError
@@ -94,7 +94,7 @@ def resect(
         Control points, error-free. [object unit]
     image_points : array_like, shape (n, 2)
         Measured image coordinates; NaN where a point was not measured. [mm]
-    layers : Layers, FlatInterface or None
+    layers : Layers, FlatInterface, Interfaces or None
         As for `project`.
     estimate : sequence of str
         Parameters to determine: the exterior orientation and any of c, xh, yh, k1, k2, k3, p1,
@@ -172,7 +172,7 @@ class _Problem:
     control: FloatArray
     image: FloatArray
     weights: FloatArray
-    interface: FlatInterface | None
+    interface: Placed
     names: tuple[str, ...]
     what: str
 
@@ -313,7 +313,7 @@ def _refuse_mirrored(camera: Camera, sigma0: float, problem: _Problem) -> None:
     size = float(np.sqrt(np.mean(problem.image**2)))
     if not sigma0 > 0.005 * size:
         return
-    if problem.interface is None:
+    if not isinstance(problem.interface, FlatInterface):
         normal = np.linalg.svd(problem.control - problem.control.mean(axis=0))[2][0]
     else:
         # Mirrored along the faces, so that the points stay beyond them.

@@ -8,7 +8,9 @@ import pytest
 
 from multimedia.domain.camera import EXTERIOR, INTERIOR, Camera
 from multimedia.domain.flat_interface import FlatInterface
+from multimedia.domain.interfaces import Interfaces
 from multimedia.domain.layers import Layers
+from multimedia.domain.surfaces import Sphere
 from multimedia.solvers.projection import project, project_with_jacobian, projection_status
 from photocore.distortion import NAMES, Brown, Convention
 from photocore.errors import GeometryError, InputError
@@ -199,3 +201,45 @@ def test_a_step_turns_the_camera_by_the_rotation_vector():
     assert np.abs(moved - derivative_ @ step).max() < 1e-9
     angles = np.array(camera.stepped(names, step).angles) - camera.angles
     assert angles == pytest.approx(camera.angle_rates() @ step, abs=1e-10)
+
+
+def as_surfaces(q):
+    """Return the same layers as surfaces for the ray tracer."""
+    flat = interface_of(q)
+    return Interfaces.parallel(
+        flat.layers, point=flat.point, normal=flat.normal, with_camera=flat.moves_with_camera
+    )
+
+
+@pytest.mark.parametrize("scene", ["tank", "tilted wall", "camera in water", "housing"])
+def test_shift_and_ray_tracing_give_the_same_image_and_derivatives(scene):
+    q = PLAIN | SCENES[scene]
+    camera, points = camera_of(q), np.array(POINTS)
+    names = [f"index{k}" for k in range(1, len(q["indices"]) + 1)]
+    flat, traced = (
+        project_with_jacobian(
+            camera, points, media, camera_names=EXTERIOR + INTERIOR, interface_names=names
+        )
+        for media in (interface_of(q), as_surfaces(q))
+    )
+    assert np.abs(traced.image - flat.image).max() < 1e-11
+    assert np.abs(traced.by_point - flat.by_point).max() < 1e-9
+    # By the centre and the indices the traced derivatives are differences.
+    size = np.abs(flat.by_camera).max(axis=(0, 1))
+    assert (np.abs(traced.by_camera - flat.by_camera).max(axis=(0, 1)) < 1e-6 * size + 1e-9).all()
+    assert np.abs(traced.by_interface - flat.by_interface).max() < 1e-5
+
+
+def test_a_camera_at_the_centre_of_a_dome_sees_as_without_it():
+    dome = tuple(Sphere(centre=(0, 0, 0), radius=r) for r in (0.08, 0.085))
+    port = Interfaces(surfaces=dome, indices=(1.0, 1.5, 1.337), with_camera=(True, True))
+    camera = Camera.from_angles((1.0, 2.0, -3.0), 0.3, 0.2, 0.1, principal_distance=25.0)
+    points = np.array([(1.1, 1.9, -4.0), (0.8, 2.4, -5.0)])
+    assert project(camera, points, port) == pytest.approx(project(camera, points), abs=1e-11)
+
+
+def test_a_point_beyond_the_critical_angle_of_a_dome_or_off_it_has_a_reason():
+    q = PLAIN
+    status = projection_status(camera_of(q), [POINTS[0], (0, 0, 0.3)], as_surfaces(q))
+    assert status[0] == "ok"
+    assert "sides" in status[1]
