@@ -1,3 +1,4 @@
+from .domain.bathymetry import BathymetryStatus, CorrectedPoints, Precision
 from .domain.camera import (
     Camera,
     Sensor,
@@ -58,6 +59,7 @@ from .snell import (
     refracted_angle,
     refracted_direction,
 )
+from .solvers.bathymetry import correct_bathymetry
 from .solvers.projection import (
     project,
     projection_status,
@@ -66,10 +68,13 @@ from .solvers.raytrace import (
     aim_rays,
     trace_rays,
 )
+from .solvers.refracted_rays import RayIntersections, correct_lidar_beams, intersect_refracted_rays
 from .solvers.resection import (
     Resection,
     resect,
 )
+from .solvers.water_surface import WaterLevel, mean_water_level
+from .solvers.waves import WaveEffect, wave_effect
 from .water import (
     HOEHLE,
     PARRISH,
@@ -84,36 +89,48 @@ from .water import (
 )
 
 __all__ = [
+    "WaveEffect",
+    "wave_effect",
+    "WaterLevel",
+    "mean_water_level",
+    "RayIntersections",
+    "correct_lidar_beams",
+    "intersect_refracted_rays",
+    "correct_bathymetry",
+    "BathymetryStatus",
+    "CorrectedPoints",
+    "Precision",
+    "RasterSurface",
+    "WaveSurface",
+    "Interfaces",
+    "MeshSurface",
+    "RayPaths",
+    "RayStatus",
+    "Cylinder",
+    "Plane",
+    "Sphere",
+    "aim_rays",
+    "trace_rays",
     "ACRYLIC",
     "Camera",
-    "Cylinder",
     "FLOAT_GLASS",
     "FUSED_SILICA",
     "FlatInterface",
     "HOEHLE",
-    "Interfaces",
     "Layers",
     "Material",
-    "MeshSurface",
     "N_BK7",
     "PARRISH",
     "POLYCARBONATE",
-    "Plane",
     "QUAN_FRY",
-    "RasterSurface",
-    "RayPaths",
-    "RayStatus",
     "Resection",
     "SAPPHIRE",
     "Sensor",
     "ShiftDerivatives",
     "ShiftIteration",
     "ShiftTable",
-    "Sphere",
     "WaterFormula",
     "WaterIndexDerivatives",
-    "WaveSurface",
-    "aim_rays",
     "air_refractive_index",
     "best_over_compensation",
     "critical_angle",
@@ -128,7 +145,6 @@ __all__ = [
     "resect",
     "salinity_from_index",
     "temperature_from_index",
-    "trace_rays",
     "water_index_derivatives",
     "water_index_sigma",
     "water_refractive_index",

@@ -1,0 +1,155 @@
+"""What a refraction correction is given and what it returns."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import IntEnum
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from multimedia.domain.height_field import HeightField
+from multimedia.domain.interfaces import HIGHEST_INDEX
+from multimedia.domain.surfaces import Plane
+from photocore.arrays import FloatArray, IntArray, as_floats
+from photocore.errors import GeometryError, InputError
+
+#: A water surface: flat or tilted, a raster, a mesh or waves.
+WaterSurface = Plane | HeightField
+
+
+class BathymetryStatus(IntEnum):
+    """How a point was treated; written to tables by its label."""
+
+    DRY = 0
+    NADIR = 1
+    RAYS = 2
+    NO_SURFACE = 3
+    FAILED = 4
+
+    @property
+    def label(self) -> str:
+        """The treatment in words."""
+        return _LABELS[self]
+
+
+_LABELS = {
+    BathymetryStatus.DRY: "dry",
+    BathymetryStatus.NADIR: "nadir",
+    BathymetryStatus.RAYS: "rays",
+    BathymetryStatus.NO_SURFACE: "outside the water surface",
+    BathymetryStatus.FAILED: "failed",
+}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Precision:
+    """Standard deviations that are carried through to the corrected points.
+
+    Attributes
+    ----------
+    index : float
+        Of the refractive index.
+    level : float
+        Of the height of the water surface. [m]
+    point : float
+        Of each coordinate of the apparent points. [m]
+    """
+
+    index: float = 0.0
+    level: float = 0.0
+    point: float = 0.0
+
+    def __post_init__(self) -> None:
+        for name in ("index", "level", "point"):
+            value = float(as_floats(getattr(self, name), f"sigma of the {name}"))
+            if not 0 <= value < np.inf:
+                raise InputError(f"sigma of the {name}: must be zero or more, got {value}.")
+
+    @property
+    def is_given(self) -> bool:
+        """Whether there is anything to carry through."""
+        return self.index > 0 or self.level > 0 or self.point > 0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class CorrectedPoints:
+    """Points after refraction correction.
+
+    Attributes
+    ----------
+    xyz : ndarray, shape (..., 3)
+        True positions; dry points and points outside the modelled surface as they were given;
+        NaN where the correction failed. [m]
+    depth : ndarray, shape (...)
+        Height of the water surface above the point, true, not apparent; 0 for dry points. [m]
+    status : ndarray of int, shape (...)
+        `BathymetryStatus`.
+    covariance : ndarray, shape (..., 3, 3), or None
+        From the `Precision` given; None if none was. [m²]
+    """
+
+    xyz: FloatArray
+    depth: FloatArray
+    status: IntArray
+    covariance: FloatArray | None = None
+
+    @property
+    def sigma(self) -> FloatArray | None:
+        """Standard deviations of X, Y and Z, shape (..., 3); None without `Precision`. [m]"""
+        if self.covariance is None:
+            return None
+        return np.sqrt(np.diagonal(self.covariance, axis1=-2, axis2=-1))
+
+
+def as_water_surface(level: float | WaterSurface) -> WaterSurface:
+    """Return a height as the horizontal plane at that height, a surface as it is.
+
+    Raises
+    ------
+    InputError
+        If it is neither.
+    GeometryError
+        If a plane stands on edge.
+    """
+    if isinstance(level, HeightField):
+        return level
+    if isinstance(level, Plane):
+        if abs(level.normal[2]) < 0.5:
+            raise GeometryError(
+                "water_level: the plane is steeper than 60 degrees; a water surface is not."
+            )
+        # Normals of a water surface point up.
+        return level if level.normal[2] > 0 else Plane(point=level.point, normal=-level.normal)
+    height = as_floats(level, "water_level")
+    if height.ndim or not np.isfinite(height):
+        raise InputError(
+            f"water_level: expected one height [m] or a water surface, found {level!r:.60}."
+        )
+    return Plane.level(float(height))
+
+
+def height_of(surface: WaterSurface, xy: FloatArray) -> FloatArray:
+    """Return the height of the water above positions, shape (...); NaN outside the surface."""
+    if isinstance(surface, HeightField):
+        return surface.height_at(xy)
+    slope = surface.normal[:2] / surface.normal[2]
+    offset: FloatArray = (xy - surface.point[:2]) @ slope
+    return surface.point[2] - offset
+
+
+def checked_index(index: ArrayLike) -> float:
+    """Return the refractive index of water.
+
+    Raises
+    ------
+    InputError
+        If it is no index of a liquid; the message says what it may be instead.
+    """
+    value = float(as_floats(index, "index"))
+    if not 1.0 <= value <= HIGHEST_INDEX:
+        raise InputError(
+            f"index: {value:g} is no refractive index of water; expected about 1.33 to 1.35 "
+            "(`multimedia index` computes it from temperature, salinity and wavelength)."
+        )
+    return value

@@ -1,0 +1,394 @@
+"""Refraction correction of points measured through a water surface as if it were not there.
+
+A point cloud or DEM made with ordinary photogrammetry shows the bottom too high: its points are
+where the straight rays in air would meet. With the cameras that saw a point the true position
+follows rigorously, without them its depth is stretched by the refractive index.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from multimedia.domain.bathymetry import (
+    BathymetryStatus,
+    CorrectedPoints,
+    Precision,
+    WaterSurface,
+    as_water_surface,
+    checked_index,
+    height_of,
+)
+from multimedia.domain.interfaces import Interfaces
+from multimedia.domain.layers import Layers
+from multimedia.domain.shifting import radial_shift_derivatives
+from multimedia.domain.surfaces import Plane
+from multimedia.solvers.raytrace import aim_rays
+from photocore.arrays import BoolArray, FloatArray, IntArray, as_points
+from photocore.errors import GeometryError, InputError
+
+#: Rays per block: bounds memory however many points and cameras there are.
+BLOCK_RAYS = 200_000
+#: Newton needs 3 to 5 steps.
+MOST_STEPS = 30
+#: A point is found when a step moves it by less than this share of the scene size.
+TOLERANCE = 1e-13
+#: Step of the differences for the index, and for the level as a share of the camera height.
+DIFFERENCE = 1e-5
+#: Two rays of a smaller angle do not fix a point. [rad]
+SMALLEST_ANGLE = 1e-4
+
+
+def correct_bathymetry(
+    points: ArrayLike,
+    *,
+    water_level: float | WaterSurface,
+    index: float,
+    cameras: ArrayLike | None = None,
+    visible: ArrayLike | None = None,
+    precision: Precision | None = None,
+) -> CorrectedPoints:
+    r"""Correct apparent points under water for the refraction at the water surface.
+
+    Parameters
+    ----------
+    points : array_like, shape (..., 3)
+        Points as ordinary photogrammetry gives them, Z up. Points above the water stay as they are.
+        [m]
+    water_level : float or WaterSurface
+        Height of the water [m], or a `Plane`, `RasterSurface`, `MeshSurface` or `WaveSurface`.
+    index : float
+        Refractive index of the water relative to the air, 1.33 to 1.35.
+    cameras : array_like, shape (m, 3), optional
+        Projection centres, above the water. Without them every point is treated as if seen from
+        straight above. [m]
+    visible : array_like of bool, shape (..., m), optional
+        Which camera saw which point; all of them by default. A point seen by fewer than two
+        cameras (or by rays that hardly differ) gets the nadir correction and says so.
+    precision : Precision, optional
+        Standard deviations of index, level and points, carried through to the result.
+
+    Returns
+    -------
+    CorrectedPoints
+        Positions, depths, how each point was treated, and covariances.
+
+    Raises
+    ------
+    InputError, GeometryError
+        If the index is none of water, shapes do not match, or a camera is not above the water.
+
+    Notes
+    -----
+    Nadir: the apparent depth a becomes n a; X and Y stay. This leaves the planimetric shift and,
+    for cameras off the vertical, several per cent of the depth.
+
+    Rigorous: let u_i(P) be the direction in air of the refracted ray from camera C_i to the true
+    point P. The apparent point A is where the straight rays meet best, that is where
+    :math:`\sum_i w_i (I - u_i u_i^T)(A - C_i) = 0` with :math:`w_i = 1/|A - C_i|^2` (equal
+    precision in the images). These are three equations for the three coordinates of P, solved by
+    Newton's method with exact derivatives; P, A and their covariance follow without any
+    assumption on depth or angle.
+
+    Examples
+    --------
+    A stone seen 195.7 mm under water of level 1.8075 m is in truth 65.7 mm deeper (Gueguen and
+    Mandlburger 2024, Table 1):
+
+    >>> apparent = [0.3, 0.2, 1.8075 - 0.1957]
+    >>> result = correct_bathymetry(apparent, water_level=1.8075, index=1.33575)
+    >>> print(round(float(result.xyz[2]) - apparent[2], 4))
+    -0.0657
+    """
+    xyz = as_points(points, "points", dimension=3)
+    shape = xyz.shape[:-1]
+    flat = xyz.reshape(-1, 3)
+    surface, n_water = as_water_surface(water_level), checked_index(index)
+    centres = _checked_cameras(cameras, surface)
+    seen = _checked_visibility(visible, shape, len(centres))
+    precision = precision or Precision()
+    block = max(BLOCK_RAYS // max(len(centres), 1), 1)
+    parts = [
+        _correct_block(
+            flat[first : first + block],
+            surface,
+            n_water,
+            centres,
+            None if seen is None else seen[first : first + block],
+            precision,
+        )
+        for first in range(0, max(len(flat), 1), block)
+    ]
+    covariance = None
+    if precision.is_given:
+        covariance = np.concatenate([part[3] for part in parts]).reshape(*shape, 3, 3)
+    return CorrectedPoints(
+        xyz=np.concatenate([part[0] for part in parts]).reshape(xyz.shape),
+        depth=np.concatenate([part[1] for part in parts]).reshape(shape),
+        status=np.concatenate([part[2] for part in parts]).reshape(shape),
+        covariance=covariance,
+    )
+
+
+def _correct_block(
+    apparent: FloatArray,
+    surface: WaterSurface,
+    index: float,
+    centres: FloatArray,
+    seen: BoolArray | None,
+    precision: Precision,
+) -> tuple[FloatArray, FloatArray, IntArray, FloatArray]:
+    """Return position, depth, status and covariance of one block of points."""
+    level = height_of(surface, apparent[:, :2])
+    below = level - apparent[:, 2]
+    status = np.where(below > 0, BathymetryStatus.NADIR, BathymetryStatus.DRY).astype(np.int64)
+    status[np.isnan(below)] = BathymetryStatus.NO_SURFACE
+    status[~np.isfinite(apparent).all(-1)] = BathymetryStatus.FAILED
+    xyz = apparent.copy()
+    covariance = np.broadcast_to(np.eye(3) * precision.point**2, (len(xyz), 3, 3)).copy()
+    wet = np.flatnonzero(status == BathymetryStatus.NADIR)
+    xyz[wet, 2] = level[wet] - index * below[wet]
+    covariance[wet, 2, 2] = (
+        (index * precision.point) ** 2
+        + (below[wet] * precision.index) ** 2
+        + ((1 - index) * precision.level) ** 2
+    )
+    if len(centres) and wet.size:
+        mask = np.ones((len(wet), len(centres)), bool) if seen is None else seen[wet]
+        enough = mask.sum(-1) >= 2
+        rows = wet[enough]
+        if rows.size:
+            task = _Task.near(apparent[rows], centres, mask[enough], surface, index)
+            found, ok, weak = _solve(task, xyz[rows])
+            xyz[rows[~weak]] = np.where(ok[~weak, None], found[~weak], np.nan)
+            status[rows[~weak]] = np.where(
+                ok[~weak], BathymetryStatus.RAYS, BathymetryStatus.FAILED
+            )
+            if precision.is_given:
+                good = np.flatnonzero(ok & ~weak)
+                covariance[rows[good]] = _propagate(task.take(good), found[good], precision)
+    depth = np.maximum(height_of(surface, xyz[:, :2]) - xyz[:, 2], 0.0)
+    covariance[status == BathymetryStatus.FAILED] = np.nan
+    return xyz, depth, status, covariance
+
+
+class _Task(NamedTuple):
+    """Points with the cameras that saw them, in coordinates near the origin."""
+
+    apparent: FloatArray  # (n, 3)
+    centres: FloatArray  # (m, 3)
+    weights: FloatArray  # (n, m); 0 where not seen
+    surface: WaterSurface
+    n_water: float
+    origin: FloatArray  # (3,), to be added again
+
+    @classmethod
+    def near(
+        cls,
+        apparent: FloatArray,
+        centres: FloatArray,
+        seen: BoolArray,
+        surface: WaterSurface,
+        index: float,
+    ) -> _Task:
+        """Move the scene to the origin: map coordinates would cost six digits."""
+        origin = np.round(apparent.mean(0))
+        local, at = apparent - origin, centres - origin
+        square = ((local[:, None] - at) ** 2).sum(-1)
+        return cls(
+            local, at, np.where(seen, 1 / square, 0.0), surface.shifted(-origin), index, origin
+        )
+
+    def take(self, rows: IntArray) -> _Task:
+        """Return the task for some of the points."""
+        return self._replace(apparent=self.apparent[rows], weights=self.weights[rows])
+
+
+def _solve(task: _Task, start: FloatArray) -> tuple[FloatArray, BoolArray, BoolArray]:
+    """Return true positions, which were found, and which have rays too parallel to be fixed."""
+    point = start - task.origin
+    scale = np.linalg.norm(task.apparent[:, None] - task.centres, axis=-1).max(-1)
+    ok = np.zeros(len(point), dtype=bool)
+    weak = ok.copy()
+    rows = np.arange(len(point))
+    for step_number in range(MOST_STEPS):
+        part = task.take(rows)
+        balance, normal, change = _balance(part, point[rows])
+        if step_number == 0:
+            # Smallest over largest eigenvalue of the normal matrix: the square of the ray angle.
+            values = np.linalg.eigvalsh(np.nan_to_num(normal))
+            weak[rows] = values[:, 0] < SMALLEST_ANGLE**2 * values[:, 2]
+        usable = np.isfinite(change).all((-1, -2)) & np.isfinite(balance).all(-1) & ~weak[rows]
+        rows, part = rows[usable], part.take(np.flatnonzero(usable))
+        if not rows.size:
+            break
+        step = np.linalg.solve(change[usable], balance[usable, :, None])[..., 0]
+        step = _below_surface(part.surface, point[rows], step)
+        point[rows] += step
+        done = np.linalg.norm(step, axis=-1) <= TOLERANCE * scale[rows]
+        # One step after a small one is exact: convergence is quadratic.
+        small = np.linalg.norm(step, axis=-1) <= 1e-9 * scale[rows]
+        ok[rows[small]] = True
+        rows = rows[~done]
+        if not rows.size:
+            break
+    return point + task.origin, ok, weak
+
+
+def _below_surface(surface: WaterSurface, point: FloatArray, step: FloatArray) -> FloatArray:
+    """Shorten steps that would lift a point out of the water: it keeps a tenth of its depth."""
+    depth = height_of(surface, point[:, :2]) - point[:, 2]
+    reach = height_of(surface, point[:, :2] + step[:, :2]) - point[:, 2] - step[:, 2]
+    with np.errstate(invalid="ignore", divide="ignore"):
+        share = np.where(reach < 0.1 * depth, 0.9 * depth / (depth - reach), 1.0)
+    return step * share[:, None]
+
+
+def _balance(task: _Task, point: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return sum w (I - u u')(A - C), the normal matrix, and minus the derivative by the point."""
+    heading, derivative = _pointing(task, point)
+    toward = task.apparent[:, None] - task.centres
+    along = (heading * toward).sum(-1)
+    weights = task.weights
+    used = weights > 0
+    heading = np.where(used[..., None], heading, 0.0)
+    derivative = np.where(used[..., None, None], derivative, 0.0)
+    along = np.where(used, along, 0.0)
+    balance = (weights[..., None] * (toward - along[..., None] * heading)).sum(1)
+    outer = np.einsum("nm,nmi,nmj->nij", weights, heading, heading)
+    normal = np.eye(3) * weights.sum(-1)[:, None, None] - outer
+    # d(u u') r = (u . r) du + u (r . du)
+    change = np.einsum("nm,nmij->nij", weights * along, derivative)
+    change += np.einsum("nm,nmi,nmk,nmkj->nij", weights, heading, toward, derivative, optimize=True)
+    return balance, normal, change
+
+
+def _pointing(task: _Task, point: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return directions in air of the rays to points, (n, m, 3), and derivatives (n, m, 3, 3)."""
+    if isinstance(task.surface, Plane):
+        return _pointing_at_plane(task, task.surface, point)
+    water = Interfaces(surfaces=(task.surface,), indices=(1.0, task.n_water))
+    heading = np.full((*task.weights.shape, 3), np.nan)
+    derivative = np.full((*task.weights.shape, 3, 3), np.nan)
+    row, camera = np.nonzero(task.weights > 0)
+    path = aim_rays(task.centres[camera], point[row], water, jacobian=True)
+    heading[row, camera], derivative[row, camera] = path.directions[:, 0], path.jacobian
+    return heading, derivative
+
+
+def _pointing_at_plane(
+    task: _Task, plane: Plane, point: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return the same for a flat surface of any tilt, by Maas's radial shift in its frame."""
+    up = plane.normal
+    height = plane.side(task.centres)
+    depth = -plane.side(point)
+    offset = point[:, None] - task.centres
+    across = offset - (offset @ up)[..., None] * up
+    radius = np.sqrt((across * across).sum(-1))
+    # A point that Newton lifts out of the water for a moment is treated as if on the surface.
+    shift = radial_shift_derivatives(
+        radius,
+        z0=height[None, :],
+        zp=np.maximum(depth, 0.0)[:, None],
+        layers=Layers(indices=(1.0, task.n_water)),
+    )
+    small = radius < 1e-9 * (height + depth[:, None])
+    with np.errstate(divide="ignore", invalid="ignore"):
+        outward = np.where(small[..., None], 0.0, across / radius[..., None])
+        ratio = np.where(small, shift.d_radius, shift.radius_bar / radius)
+    # Straight ray in air: radius_bar outwards, height + depth down.
+    fall = height + depth[:, None]
+    ray = ratio[..., None] * across - fall[..., None] * up
+    # Its derivative: outwards by radius and depth, sideways by the ratio, down by the depth.
+    level = np.eye(3) - np.outer(up, up)
+    outer = outward[..., :, None] * outward[..., None, :]
+    derivative = (
+        shift.d_radius[..., None, None] * outer
+        + ratio[..., None, None] * (level - outer)
+        - shift.d_heights[..., 1, None, None] * outward[..., :, None] * up
+        + np.outer(up, up)
+    )
+    length = np.sqrt((ray * ray).sum(-1))
+    heading = ray / length[..., None]
+    normalise = np.eye(3) - heading[..., :, None] * heading[..., None, :]
+    return heading, normalise @ derivative / length[..., None, None]
+
+
+def _propagate(task: _Task, found: FloatArray, precision: Precision) -> FloatArray:
+    """Return the covariance of true positions from index, level and apparent points."""
+    point = found - task.origin
+    _, normal, change = _balance(task, point)
+    by_point = np.linalg.solve(change, normal + _weight_change(task, point))
+    covariance: FloatArray = precision.point**2 * by_point @ by_point.transpose(0, 2, 1)
+    step = DIFFERENCE * float(np.abs(task.centres[:, 2] - task.apparent[:, 2].mean()).max())
+    lift = np.array([0.0, 0.0, step])
+    variants = (
+        (
+            precision.index,
+            DIFFERENCE,
+            {"n_water": task.n_water + DIFFERENCE},
+            {"n_water": task.n_water - DIFFERENCE},
+        ),
+        (
+            precision.level,
+            step,
+            {"surface": task.surface.shifted(lift)},
+            {"surface": task.surface.shifted(-lift)},
+        ),
+    )
+    for sigma, width, more, less in variants:
+        if sigma == 0:
+            continue
+        ahead, _, _ = _balance(task._replace(**more), point)
+        behind, _, _ = _balance(task._replace(**less), point)
+        rate = np.linalg.solve(change, ((ahead - behind) / (2 * width))[..., None])
+        covariance += sigma**2 * rate @ rate.transpose(0, 2, 1)
+    return covariance
+
+
+def _weight_change(task: _Task, point: FloatArray) -> FloatArray:
+    """Return how the balance changes because the weights 1 / |A - C|^2 follow the point A."""
+    heading, _ = _pointing(task, point)
+    toward = task.apparent[:, None] - task.centres
+    aside = toward - (heading * toward).sum(-1)[..., None] * heading
+    aside = np.where((task.weights > 0)[..., None], aside, 0.0)
+    # d(1 / r^2) = -2 r . dr / r^4
+    change: FloatArray = -2 * np.einsum("nm,nmi,nmj->nij", task.weights**2, aside, toward)
+    return change
+
+
+def _checked_cameras(cameras: ArrayLike | None, surface: WaterSurface) -> FloatArray:
+    """Return projection centres, shape (m, 3), all of them above the water."""
+    if cameras is None:
+        return np.zeros((0, 3))
+    centres = as_points(cameras, "cameras", dimension=3).reshape(-1, 3)
+    if not len(centres):
+        raise InputError("cameras: no camera is given; leave them out for the nadir correction.")
+    if not np.isfinite(centres).all():
+        raise InputError("cameras: every coordinate must be a finite number.")
+    under = np.flatnonzero(surface.side(centres) <= 0)
+    if under.size:
+        first = centres[under[0]]
+        raise GeometryError(
+            f"cameras: {under.size} of {len(centres)} are not above the water surface (first: "
+            f"number {under[0] + 1} at Z = {first[2]:g}). Check the water level, the sign of Z and "
+            "the unit (m, not mm)."
+        )
+    return centres
+
+
+def _checked_visibility(
+    visible: ArrayLike | None, shape: tuple[int, ...], count: int
+) -> BoolArray | None:
+    """Return which camera saw which point, shape (n, m)."""
+    if visible is None:
+        return None
+    seen = np.asarray(visible, dtype=bool)
+    if seen.shape != (*shape, count):
+        raise InputError(
+            f"visible: expected shape {(*shape, count)} (points, cameras), found {seen.shape}."
+        )
+    return seen.reshape(-1, count)

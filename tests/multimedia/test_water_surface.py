@@ -1,0 +1,86 @@
+"""The mean water height from tie points."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import multimedia as mm
+from photocore.errors import GeometryError, InputError
+
+
+def tie_points(seed: int, *, surface: int, bottom: int, spread: float = 0.002, slope: float = 0.0):
+    rng = np.random.default_rng(seed)
+    xy = rng.uniform(-2, 2, (surface + bottom, 2))
+    z = np.concatenate(
+        [
+            rng.normal(1.8, spread, surface) + slope * xy[:surface, 0],
+            rng.uniform(1.3, 1.7, bottom),
+        ]
+    )
+    return np.column_stack([xy, z])
+
+
+@pytest.mark.parametrize(
+    ("surface", "bottom"), [(50, 0), (50, 50), (40, 200), (200, 20), (30, 250)]
+)
+@pytest.mark.parametrize("seed", range(5))
+def test_the_level_is_found_among_any_number_of_bottom_points(surface, bottom, seed) -> None:
+    points = tie_points(seed, surface=surface, bottom=bottom)
+    water = mm.mean_water_level(points)
+    assert abs(water.level - 1.8) < 4.5 * 0.002 / np.sqrt(surface)
+    assert not water.used[surface:].any()
+    assert water.used[:surface].mean() > 0.9
+    assert water.below >= bottom
+
+
+def test_points_over_the_water_are_rejected_too() -> None:
+    points = tie_points(3, surface=60, bottom=60)
+    points = np.vstack([points, [[0, 0, 2.4], [1, 0, 1.95], [0, 1, 3.0]]])
+    water = mm.mean_water_level(points)
+    assert water.above >= 3
+    assert abs(water.level - 1.8) < 0.001
+
+
+def test_sigma_is_that_of_the_mean() -> None:
+    levels = [mm.mean_water_level(tie_points(s, surface=100, bottom=100)) for s in range(60)]
+    scatter = np.std([water.level for water in levels])
+    assert np.mean([water.sigma for water in levels]) == pytest.approx(scatter, rel=0.25)
+    assert np.mean([water.spread for water in levels]) == pytest.approx(0.002, rel=0.05)
+
+
+def test_a_tilted_surface_is_fitted_with_its_slope() -> None:
+    points = tie_points(4, surface=200, bottom=100, slope=0.003)
+    water = mm.mean_water_level(points, tilted=True, spread=0.005)
+    assert water.slope[0] == pytest.approx(0.003, abs=4 * water.slope_sigma[0])
+    assert abs(water.slope[1]) < 4 * water.slope_sigma[1]
+    at_corner = 1.8 + 0.003 * 2
+    corner = mm.correct_bathymetry([2.0, 0, 1.0], water_level=water.surface, index=1.34)
+    assert corner.depth == pytest.approx(1.34 * (at_corner - 1.0), abs=0.003)
+
+
+def test_shifting_heights_and_order_of_points_do_not_matter() -> None:
+    points = tie_points(5, surface=40, bottom=60)
+    water = mm.mean_water_level(points)
+    lifted = mm.mean_water_level(points[::-1] + np.array([1000.0, 0, 412.0]))
+    assert lifted.level - 412 == pytest.approx(water.level, abs=1e-9)
+    assert lifted.used[::-1].tolist() == water.used.tolist()
+
+
+def test_a_perfectly_flat_surface_has_no_spread() -> None:
+    points = np.column_stack([np.arange(12.0), np.zeros(12), np.full(12, 1.5)])
+    water = mm.mean_water_level(points)
+    assert (water.level, water.used.sum()) == (pytest.approx(1.5), 12)
+    assert water.spread < 1e-12
+
+
+@pytest.mark.parametrize(
+    ("points", "kind", "message"),
+    [
+        ([[0, 0, 1.0]] * 3, InputError, "3 tie points; at least 5"),
+        (np.column_stack([np.zeros((8, 2)), 10.0 ** np.arange(8)]), GeometryError, "one height"),
+    ],
+)
+def test_too_few_points_on_the_surface_are_refused(points, kind, message) -> None:
+    with pytest.raises(kind, match=message):
+        mm.mean_water_level(points, spread=0.001 if len(points) > 5 else None)
