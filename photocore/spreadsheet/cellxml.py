@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable
 
 import numpy as np
 
@@ -45,17 +44,15 @@ def number_text(value: float) -> str:
     return repr(value).removesuffix(".0")
 
 
-def type_and_content(
-    value: CellInput, tag: Callable[[str], str], *, formula: bool
-) -> tuple[str, str]:
+def type_and_content(value: CellInput, prefix: str, *, formula: bool) -> tuple[str, str]:
     """Return a cell's ``t`` attribute (empty for numbers) and the XML of its value.
 
     Parameters
     ----------
     value : float, int, str, bool or None
         NaN becomes the error value #N/A, None no value.
-    tag : callable
-        Adds the sheet's namespace prefix to an element name.
+    prefix : str
+        Namespace prefix of the sheet with its colon, empty if it has none.
     formula : bool
         Whether the value is the result of a formula (its text is stored in another way).
 
@@ -64,7 +61,7 @@ def type_and_content(
     InputError
         If a number is infinite or a text is longer than a cell can hold.
     """
-    v = tag("v")
+    v = f"{prefix}v"
     if value is None:
         return "", ""
     if isinstance(value, bool | np.bool_):
@@ -77,7 +74,7 @@ def type_and_content(
             )
         if formula:
             return "str", f"<{v}>{escape(value)}</{v}>"
-        t, inline = tag("t"), tag("is")
+        t, inline = f"{prefix}t", f"{prefix}is"
         return "inlineStr", f'<{inline}><{t} xml:space="preserve">{escape(value)}</{t}></{inline}>'
     number = float(value)
     if math.isnan(number):
@@ -113,15 +110,11 @@ def cell_xml(
     >>> cell_xml("B3", 1.5, style="2", formula="A3*3")
     '<c r="B3" s="2"><f>A3*3</f><v>1.5</v></c>'
     """
-
-    def tag(name: str) -> str:
-        return prefix + name
-
-    kind, content = type_and_content(value, tag, formula=formula is not None)
+    kind, content = type_and_content(value, prefix, formula=formula is not None)
     attributes = f' r="{reference}"' + (f' s="{style}"' if style else "")
     attributes += f' t="{kind}"' if kind else ""
     if formula is not None:
-        content = f"<{tag('f')}>{escape(formula)}</{tag('f')}>{content}"
+        content = f"<{prefix}f>{escape(formula)}</{prefix}f>{content}"
     if not content:
-        return f"<{tag('c')}{attributes}/>"
-    return f"<{tag('c')}{attributes}>{content}</{tag('c')}>"
+        return f"<{prefix}c{attributes}/>"
+    return f"<{prefix}c{attributes}>{content}</{prefix}c>"

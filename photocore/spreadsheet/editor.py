@@ -17,8 +17,9 @@ from photocore.output import atomic_path
 from photocore.spreadsheet import formulas
 from photocore.spreadsheet.cellxml import CellInput
 from photocore.spreadsheet.grid import Grid, TableArea, cell_name
+from photocore.spreadsheet.newrows import NewColumn, NewRows, RowFormula
 from photocore.spreadsheet.package import check_header, open_package, read_part
-from photocore.spreadsheet.splice import NewCell, SheetChanges, Spliced, splice_sheet
+from photocore.spreadsheet.splice import SheetChanges, Spliced, splice_sheet
 from photocore.spreadsheet.xlsx import (
     Sheet,
     Workbook,
@@ -122,8 +123,7 @@ class WorkbookEditor:
         """
         cached = self._changes(title).cached
         for column, values in columns.items():
-            plain = values.tolist() if isinstance(values, np.ndarray) else values
-            for row, value in enumerate(plain, start=first_row):  # type: ignore[arg-type]
+            for row, value in enumerate(_plain(values), start=first_row):
                 cached.setdefault(row, {})[column] = value
 
     def append_rows(
@@ -157,40 +157,79 @@ class WorkbookEditor:
             If there is no such table or heading, the table ends in a row of totals, or the cells
             below it are not empty.
         """
+        headings = [name for row in rows for name in row]
+        cached = [name for row in results for name in row]
+        return self.append_columns(
+            table,
+            {name: [row.get(name) for row in rows] for name in dict.fromkeys(headings)},
+            {name: [row.get(name) for row in results] for name in dict.fromkeys(cached)},
+            count=len(rows),
+        )
+
+    def append_columns(
+        self,
+        table: str,
+        inputs: Mapping[str, ArrayLike | Sequence[CellInput]],
+        results: Mapping[str, ArrayLike | Sequence[CellInput]] | None = None,
+        *,
+        count: int | None = None,
+    ) -> list[int]:
+        """Add many rows to a named table, given by columns; as `append_rows` otherwise.
+
+        Parameters
+        ----------
+        table : str
+            Name of the table.
+        inputs, results : mapping
+            Heading to typed values, and to cached results of the formulas, one per row.
+        count : int, optional
+            Number of rows; the length of the columns when None.
+
+        Returns
+        -------
+        list of int
+            The new rows' numbers.
+        """
+        area, bottom = self._growing(table)
+        where = f"{self.path.name} › {area.sheet}"
+        results = results or {}
+        headings = self._headings(area)
+        unknown = [name for name in (*inputs, *results) if name not in headings]
+        if unknown:
+            raise InputError(f'{where}: the table {area.name} has no column "{unknown[0]}".')
+        given = {name: _plain(values) for name, values in (*inputs.items(), *results.items())}
+        count = count or max((len(values) for values in given.values()), default=0)
+        new_rows = list(range(bottom + 1, bottom + 1 + count))
+        if not new_rows:
+            return []
+        _, left, last, right = area.area
+        model = formulas.row_cells(self.path, self._sheet(area.sheet), last, left, right)
+        self._refuse_occupied(area, new_rows)
+        columns = []
+        for name, column in headings.items():
+            like = model.get(column, formulas.ModelCell())
+            formula = RowFormula(like.formula, last) if like.formula else None
+            fits = name in (results if formula else inputs)
+            values = [*given[name]] if fits else []
+            values += [None] * (count - len(values))
+            columns.append(NewColumn(column, values, like.style, formula))
+        columns.sort(key=lambda column: column.column)
+        self._changes(area.sheet).added.append(NewRows(bottom + 1, count, columns))
+        self.grown[area.name] = (area, new_rows[-1])
+        return new_rows
+
+    def _growing(self, table: str) -> tuple[TableArea, int]:
+        """Return a table that may grow, and its last row so far."""
         area = self.table(table)
         if area is None:
             names = ", ".join(t.name for t in self.tables) or "none"
             raise InputError(f'{self.path.name}: has no table "{table}"; it has {names}.')
-        area, bottom = self.grown.get(area.name, (area, area.area[2]))
-        where = f"{self.path.name} › {area.sheet}"
         if area.totals_rows:
             raise InputError(
-                f"{where}: the table {area.name} ends in a row of totals; switch it off in the "
-                "spreadsheet program (Table design) before rows are added."
+                f"{self.path.name} › {area.sheet}: the table {area.name} ends in a row of totals; "
+                "switch it off in the spreadsheet program (Table design) before rows are added."
             )
-        headings = self._headings(area)
-        _, left, last, right = area.area
-        model = formulas.row_cells(self.path, self._sheet(area.sheet), last, left, right)
-        new_rows = list(range(bottom + 1, bottom + 1 + len(rows)))
-        self._refuse_occupied(area, new_rows)
-        for index, row in enumerate(new_rows):
-            given = rows[index]
-            unknown = [name for name in given if name not in headings]
-            if unknown:
-                raise InputError(f'{where}: the table {area.name} has no column "{unknown[0]}".')
-            cached = results[index] if index < len(results) else {}
-            cells = self._changes(area.sheet).added.setdefault(row, {})
-            for name, column in headings.items():
-                like = model.get(column, formulas.ModelCell())
-                formula = like.formula and formulas.moved(
-                    like.formula, cell_name(last, column), cell_name(row, column)
-                )
-                value = cached.get(name) if formula else given.get(name)
-                if formula or value is not None or like.style:
-                    cells[column] = NewCell(value, formula or None, like.style)
-        if new_rows:
-            self.grown[area.name] = (area, new_rows[-1])
-        return new_rows
+        return self.grown.get(area.name, (area, area.area[2]))
 
     def save(
         self, target: Path | str | None = None, *, overwrite: bool = False, backup: bool = True
@@ -296,6 +335,11 @@ class WorkbookEditor:
                         f"{self.path.name} › {area.sheet}!{cell_name(row, column)}: is not empty, "
                         f"so the table {area.name} cannot grow. Move what stands below the table."
                     )
+
+
+def _plain(values: ArrayLike | Sequence[CellInput]) -> Sequence[CellInput]:
+    """Return values as Python objects."""
+    return values.tolist() if isinstance(values, np.ndarray) else list(values)  # type: ignore[arg-type]
 
 
 def check_not_open(path: Path) -> None:

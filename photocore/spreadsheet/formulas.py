@@ -85,17 +85,6 @@ def row_cells(path: Path, sheet: Sheet, row: int, left: int, right: int) -> dict
     return found
 
 
-def moved(formula: str, origin: str, target: str) -> str:
-    """Return a formula as copying it to another cell makes it; absolute references stay.
-
-    >>> moved("A2*$B$1", "C2", "C5")
-    'A5*$B$1'
-    """
-    from openpyxl.formula.translate import Translator
-
-    return str(Translator(f"={formula}", origin=origin).translate_formula(target))[1:]
-
-
 @dataclass(slots=True)
 class References:
     """The formulas, names and charts of a package, and what they refer to."""

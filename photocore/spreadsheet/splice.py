@@ -4,38 +4,20 @@ from __future__ import annotations
 
 import re
 from bisect import bisect_left
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from xml.parsers import expat
 from xml.sax.saxutils import unescape as unescape_xml
 
 from photocore.errors import InputError
-from photocore.spreadsheet.cellxml import CellInput, cell_xml, escape_attribute, type_and_content
+from photocore.spreadsheet.cellxml import CellInput, escape_attribute, type_and_content
 from photocore.spreadsheet.grid import cell_name, column_number, split_area
+from photocore.spreadsheet.newrows import NewCell, NewRows, new_cell_xml
 from photocore.spreadsheet.package import local, new_parser
 from photocore.spreadsheet.xlsx import unescape
 
 _TAG = re.compile(rb"""<[^\s/>]+(?:\s+[^\s=]+\s*=\s*(?:"[^"]*"|'[^']*'))*\s*(/?)>""")
-
-
-@dataclass(frozen=True, slots=True)
-class NewCell:
-    """A cell to be made: with a formula and its result, or with a value only.
-
-    Parameters
-    ----------
-    value : float, int, str, bool or None
-        Value, or cached result of the formula.
-    formula : str, optional
-        Formula without the equals sign.
-    style : str
-        Index of the cell format as text, empty for the default.
-    """
-
-    value: CellInput
-    formula: str | None = None
-    style: str = ""
 
 
 @dataclass(slots=True)
@@ -50,16 +32,29 @@ class SheetChanges:
     cached : dict
         Row to (column to result): results of formulas that are there. Cells that hold no formula
         (any more) are left as they are.
-    added : dict
-        Row to (column to `NewCell`): cells with formulas in new rows.
+    added : list of NewRows
+        Rows to be added, with formulas, formats and results.
     """
 
     inputs: dict[int, dict[int, CellInput]] = field(default_factory=dict)
     cached: dict[int, dict[int, CellInput]] = field(default_factory=dict)
-    added: dict[int, dict[int, NewCell]] = field(default_factory=dict)
+    added: list[NewRows] = field(default_factory=list)
 
     def __bool__(self) -> bool:
         return bool(self.inputs or self.cached or self.added)
+
+    def added_rows(self) -> Iterator[int]:
+        """Yield the numbers of the rows to be added."""
+        for block in self.added:
+            yield from range(block.first, block.first + block.count)
+
+    def added_cells(self, row: int) -> dict[int, NewCell]:
+        """Return the cells to be added in one row."""
+        found: dict[int, NewCell] = {}
+        for block in self.added:
+            if block.first <= row < block.first + block.count:
+                found |= block.cells(row)
+        return found
 
 
 @dataclass(slots=True)
@@ -150,7 +145,7 @@ class _Splicer:
         self.changes = changes
         self.result = Spliced(data)
         self.edits = self.result.edits
-        self.new_rows = sorted({*changes.inputs, *changes.added})
+        self.new_rows = sorted({*changes.inputs, *changes.added_rows()})
         self.parser = new_parser(path, part, start=self.start, end=self.end)
         self.kinds: dict[str, str] = {}
         self.letters: dict[str, int] = {}
@@ -231,7 +226,7 @@ class _Splicer:
             self.new_rows.pop(0)
         self.prefix = name[: len(name) - 3]
         self.inputs = self.changes.inputs.get(self.row, {})
-        self.added = self.changes.added.get(self.row, {})
+        self.added = self.changes.added_cells(self.row) if self.changes.added else {}
         self.cached = self.changes.cached.get(self.row, {})
         self.new_columns = sorted({*self.inputs, *self.added}) if self.inputs or self.added else []
 
@@ -282,13 +277,8 @@ class _Splicer:
         if new is None and self.holds(value):
             return
         style = self.attributes.get("s", "") or (new.style if new else "")
-        xml = cell_xml(
-            name_of_cell,
-            new.value if new else value,
-            prefix=self.prefix,
-            style=style,
-            formula=new.formula if new else None,
-        )
+        cell = NewCell(new.value, new.formula, style) if new else NewCell(value, None, style)
+        xml = new_cell_xml(self.row, self.column, cell, self.prefix)
         self.edits.append((self.cell_start, self.element_end(name, self.cell_start), xml.encode()))
         self.result.inputs_changed = True
 
@@ -297,7 +287,7 @@ class _Splicer:
         formula = self.child("f")
         if formula is None:
             return  # the user put a value in its place: it stays
-        kind, content = type_and_content(value, self.tag, formula=True)
+        kind, content = type_and_content(value, self.prefix, formula=True)
         self.edits.append(self.with_result(name, kind, content))
 
     def strip(self, name: str) -> None:
@@ -358,14 +348,45 @@ class _Splicer:
         """Insert the new rows whose numbers lie before one."""
         count = bisect_left(self.new_rows, before)
         rows, self.new_rows = self.new_rows[:count], self.new_rows[count:]
-        pieces = []
-        for row in rows:
+        pieces: list[str] = []
+        position = 0
+        while position < len(rows):
+            block = self.block_of(rows[position])
+            if block is not None:
+                start = rows[position] - block.first
+                length = self.run_length(rows, position, block)
+                pieces += block.xml(self.prefix, start, start + length)
+                position += length
+                continue
+            row = rows[position]
             inputs = self.changes.inputs.get(row, {})
-            added = self.changes.added.get(row, {})
+            added = self.changes.added_cells(row)
             cells = self.cells(row, sorted({*inputs, *added}), inputs, added)
             if cells:
-                pieces.append(f'<{self.tag("row")} r="{row}">{cells}</{self.tag("row")}>')
+                pieces.append(f'<{self.prefix}row r="{row}">{cells}</{self.prefix}row>')
+            position += 1
         self.insert("".join(pieces), place)
+
+    def block_of(self, row: int) -> NewRows | None:
+        """Return the block that alone fills a row."""
+        if row in self.changes.inputs:
+            return None
+        blocks = [b for b in self.changes.added if b.first <= row < b.first + b.count]
+        return blocks[0] if len(blocks) == 1 else None
+
+    def run_length(self, rows: list[int], position: int, block: NewRows) -> int:
+        """Return how many of the rows from a position on follow each other in one block."""
+        if len(self.changes.added) > 1:
+            return 1
+        length = 1
+        while (
+            position + length < len(rows)
+            and rows[position + length] == rows[position] + length
+            and rows[position + length] < block.first + block.count
+            and rows[position + length] not in self.changes.inputs
+        ):
+            length += 1
+        return length
 
     def insert(self, xml: str, place: tuple[int, int, str, str]) -> None:
         """Insert XML at a place (start, end, text before, text behind)."""
@@ -388,15 +409,8 @@ class _Splicer:
             value = new.value if new else inputs.get(column)
             if new is None and (value is None or value == ""):
                 continue
-            pieces.append(
-                cell_xml(
-                    cell_name(row, column),
-                    value,
-                    prefix=self.prefix,
-                    style=new.style if new else "",
-                    formula=new.formula if new else None,
-                )
-            )
+            cell = new or NewCell(value)
+            pieces.append(new_cell_xml(row, column, cell, self.prefix))
         return "".join(pieces)
 
     def closing(self, name: str, start: int) -> tuple[int, int, str, str]:
@@ -427,18 +441,12 @@ class _Splicer:
             raise InputError(f"{self.path}: damaged, the part {self.part} cannot be taken apart.")
         return match
 
-    def tag(self, name: str) -> str:
-        """Return an element name with the sheet's prefix."""
-        return self.prefix + name
-
     def grow_dimension(self, start: int, end: int, reference: str) -> None:
         """Let the sheet's stated extent take in the cells that were made."""
-        made = [
-            (row, column)
-            for rows in (self.changes.inputs, self.changes.added)
-            for row, columns in rows.items()
-            for column in columns
-        ]
+        made = [(row, column) for row, cells in self.changes.inputs.items() for column in cells]
+        for block in self.changes.added:
+            numbers = [column.column for column in block.columns]
+            made += [(block.first, min(numbers)), (block.first + block.count - 1, max(numbers))]
         if not made or not reference:
             return
         top, left, bottom, right = split_area(reference)

@@ -294,3 +294,59 @@ def test_an_editor_reads_the_real_samples_and_changes_one_sheet(data_dir, tmp_pa
         with open_package(tmp_path / path.name):
             grid = WorkbookEditor(tmp_path / path.name).grid(editor.titles[0])
         assert grid.rows[5][1] == 0.125
+
+
+def test_many_rows_are_added_by_columns_and_read_back_to_the_bit(rich, tmp_path):
+    import numpy as np
+
+    random = np.random.default_rng(3)
+    s1, s2 = random.normal(size=(2, 5000))
+    s2[7] = math.nan
+    editor = WorkbookEditor(rich)
+    inputs = {"id": [f"Q{i}" for i in range(5000)], "s1": s1, "s2": [*s2[:7], None, *s2[8:]]}
+    editor.append_columns("tblPoints", inputs, {"ds": s2 - s1})
+    editor.set_results("Points", 3, {4: [0.75, 0.75]})
+    editor.save(tmp_path / "out.xlsm")
+    sheet = WorkbookEditor(tmp_path / "out.xlsm").grid("Points")
+    assert [sheet.rows[row][2] for row in range(5, 5005)] == s1.tolist()
+    assert 3 not in sheet.rows[12]
+    assert sheet.rows[12][4].text == "#N/A"
+    assert sheet.rows[5004][4] == s2[-1] - s1[-1]
+
+
+def test_blocks_and_typed_cells_meet_in_rows_that_exist_or_not():
+    from photocore.spreadsheet.newrows import NewColumn, NewRows, RowFormula
+
+    before = '<w><sheetData><row r="3"><c r="A3" s="5"/><c r="C3"/></row></sheetData></w>'
+    columns = [
+        NewColumn(1, [1.0, 2.0, None], "7"),
+        NewColumn(2, [5.0, None, 6.0], "", RowFormula("A1*$A$1", 1)),
+    ]
+    changes = SheetChanges(added=[NewRows(2, 3, columns)], inputs={4: {4: "note"}})
+    after = splice_sheet(None, "s", before.encode(), changes).joined(strip=False).decode()
+    assert after == (
+        '<w><sheetData><row r="2"><c r="A2" s="7"><v>1</v></c><c r="B2"><f>A2*$A$1</f><v>5</v></c>'
+        '</row><row r="3"><c r="A3" s="5"><v>2</v></c><c r="B3"><f>A3*$A$1</f></c><c r="C3"/></row>'
+        '<row r="4"><c r="A4" s="7"/><c r="B4"><f>A4*$A$1</f><v>6</v></c><c r="D4" '
+        't="inlineStr"><is><t xml:space="preserve">note</t></is></c></row></sheetData></w>'
+    )
+
+
+@pytest.mark.parametrize(
+    ("formula", "moved"),
+    [
+        ("A2+B$2+$C2", "A7+B$2+$C7"),
+        ("SUM(A1:A2)-SUM(2:2)", "SUM(A6:A7)-SUM(7:7)"),
+        ("'A2 sheet'!A2&\"A2\"", "'A2 sheet'!A7&\"A2\""),
+        ("tbl_A2[[#This Row],[A2]]*c_1*LOG10(A2)", "tbl_A2[[#This Row],[A2]]*c_1*LOG10(A7)"),
+        ("Sheet2!A2*XFD2+A2_x+A2.x", "Sheet2!A7*XFD7+A2_x+A2.x"),
+    ],
+)
+def test_a_formula_copied_downwards_moves_its_relative_rows_only(formula, moved):
+    from openpyxl.formula.translate import Translator
+
+    from photocore.spreadsheet.newrows import RowFormula
+
+    assert RowFormula(formula, 2).at(7) == moved
+    if "_x" not in formula:
+        assert Translator(f"={formula}", "F2").translate_formula("F7") == f"={moved}"
