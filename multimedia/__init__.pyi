@@ -1,4 +1,8 @@
-from .domain.bathymetry import BathymetryStatus, CorrectedPoints, Precision
+from .domain.bathymetry import (
+    BathymetryStatus,
+    CorrectedPoints,
+    Precision,
+)
 from .domain.camera import (
     Camera,
     Sensor,
@@ -59,7 +63,22 @@ from .snell import (
     refracted_angle,
     refracted_direction,
 )
-from .solvers.bathymetry import correct_bathymetry
+from .solvers.approximations import (
+    Approximation,
+    agrafiotis,
+    lavest,
+    telem,
+)
+from .solvers.bathymetry import (
+    correct_bathymetry,
+)
+from .solvers.dispersion import (
+    colour_positions,
+    correct_dispersion,
+    layers_per_colour,
+    seam_width,
+    shift_per_colour,
+)
 from .solvers.projection import (
     project,
     projection_status,
@@ -68,13 +87,23 @@ from .solvers.raytrace import (
     aim_rays,
     trace_rays,
 )
-from .solvers.refracted_rays import RayIntersections, correct_lidar_beams, intersect_refracted_rays
+from .solvers.refracted_rays import (
+    RayIntersections,
+    correct_lidar_beams,
+    intersect_refracted_rays,
+)
 from .solvers.resection import (
     Resection,
     resect,
 )
-from .solvers.water_surface import WaterLevel, mean_water_level
-from .solvers.waves import WaveEffect, wave_effect
+from .solvers.water_surface import (
+    WaterLevel,
+    mean_water_level,
+)
+from .solvers.waves import (
+    WaveEffect,
+    wave_effect,
+)
 from .water import (
     HOEHLE,
     PARRISH,
@@ -89,52 +118,56 @@ from .water import (
 )
 
 __all__ = [
-    "WaveEffect",
-    "wave_effect",
-    "WaterLevel",
-    "mean_water_level",
-    "RayIntersections",
-    "correct_lidar_beams",
-    "intersect_refracted_rays",
-    "correct_bathymetry",
-    "BathymetryStatus",
-    "CorrectedPoints",
-    "Precision",
-    "RasterSurface",
-    "WaveSurface",
-    "Interfaces",
-    "MeshSurface",
-    "RayPaths",
-    "RayStatus",
-    "Cylinder",
-    "Plane",
-    "Sphere",
-    "aim_rays",
-    "trace_rays",
     "ACRYLIC",
+    "Approximation",
+    "BathymetryStatus",
     "Camera",
+    "CorrectedPoints",
+    "Cylinder",
     "FLOAT_GLASS",
     "FUSED_SILICA",
     "FlatInterface",
     "HOEHLE",
+    "Interfaces",
     "Layers",
     "Material",
+    "MeshSurface",
     "N_BK7",
     "PARRISH",
     "POLYCARBONATE",
+    "Plane",
+    "Precision",
     "QUAN_FRY",
+    "RasterSurface",
+    "RayIntersections",
+    "RayPaths",
+    "RayStatus",
     "Resection",
     "SAPPHIRE",
     "Sensor",
     "ShiftDerivatives",
     "ShiftIteration",
     "ShiftTable",
+    "Sphere",
     "WaterFormula",
     "WaterIndexDerivatives",
+    "WaterLevel",
+    "WaveEffect",
+    "WaveSurface",
+    "agrafiotis",
+    "aim_rays",
     "air_refractive_index",
     "best_over_compensation",
+    "colour_positions",
+    "correct_bathymetry",
+    "correct_dispersion",
+    "correct_lidar_beams",
     "critical_angle",
+    "intersect_refracted_rays",
     "iterated_radius",
+    "lavest",
+    "layers_per_colour",
+    "mean_water_level",
     "project",
     "projection_status",
     "radial_shift",
@@ -144,8 +177,13 @@ __all__ = [
     "refracted_direction",
     "resect",
     "salinity_from_index",
+    "seam_width",
+    "shift_per_colour",
+    "telem",
     "temperature_from_index",
+    "trace_rays",
     "water_index_derivatives",
     "water_index_sigma",
     "water_refractive_index",
+    "wave_effect",
 ]
