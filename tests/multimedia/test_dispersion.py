@@ -94,7 +94,7 @@ def test_correction_removes_the_seam_of_a_rendered_image() -> None:
         image, **scene, colours=exaggerated, principal_distance=24.0, pixel_size=0.02
     )
     assert seam_between(image) > 2.0
-    assert seam_between(corrected) < 0.03
+    assert seam_between(corrected) < 0.01
     np.testing.assert_array_equal(corrected[..., 1], image[..., 1])
 
 
