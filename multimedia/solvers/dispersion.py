@@ -285,8 +285,8 @@ def correct_dispersion(
 
     Notes
     -----
-    One lookup per pixel and channel (`colour_positions`), cubic spline. Off the depth zp a part of the
-    seam remains: see `seam_width`.
+    One lookup per pixel and channel (`colour_positions`) in a cubic spline. Off the depth zp a part
+    of the seam remains: see `seam_width`.
 
     Examples
     --------
