@@ -104,13 +104,15 @@ def image_vectors(vectors: FloatArray, medium: Medium) -> FloatArray:
     return vectors + g[:, None] * medium.normal
 
 
-def shifts(vectors: FloatArray, medium: Medium) -> Shifts:
+def shifts(vectors: FloatArray, medium: Medium, *, media: bool = True) -> Shifts:
     """Return g of every point with its derivatives; see the head of the module.
 
     Parameters
     ----------
     vectors, medium
         As for `image_vectors`.
+    media : bool
+        Whether the derivatives by thicknesses and indices are wanted; empty otherwise.
     """
     w = vectors @ medium.normal
     rho2, q, heights = _inverse_ratio(vectors, w, medium)
@@ -136,16 +138,20 @@ def shifts(vectors: FloatArray, medium: Medium) -> Shifts:
         # A change of S at a fixed invariant also moves the invariant (rho^2 is given).
         by_s = first / whole - q_rho2 * 2.0 * invariant * s
         q_heights = [by_s / cosine for cosine in cosines]
-        q_indices = [
-            -by_s * height * index / cosine**3
-            for height, index, cosine in zip(heights, n, cosines, strict=True)
-        ]
-        q_indices[0] += s * n[0] / (first * whole)
-    inner = range(1, len(n) - 1)
-    by_thicknesses = np.empty((len(w), len(n) - 2))
-    for k in inner:
+        q_indices = []
+        if media:
+            q_indices = [
+                -by_s * height * index / cosine**3
+                for height, index, cosine in zip(heights, n, cosines, strict=True)
+            ]
+            q_indices[0] += s * n[0] / (first * whole)
+    by_thicknesses: FloatArray = np.empty((len(w), len(n) - 2 if media else 0))
+    for k in range(1, by_thicknesses.shape[1] + 1):
         # z0 = H - sum of thicknesses: what the layer gains the first medium loses.
         by_thicknesses[:, k - 1] = w * (q_heights[k] - q_heights[0])
+    by_indices = np.empty((len(w), 0))
+    if media:
+        by_indices = w[:, None] * np.stack(q_indices, axis=-1)
     return Shifts(
         g=(q - 1.0) * w,
         w=w,
@@ -154,7 +160,7 @@ def shifts(vectors: FloatArray, medium: Medium) -> Shifts:
         by_w=(q - 1.0) + w * (q / whole - q_heights[-1]),
         by_height=w * (q_heights[0] - q_heights[-1]),
         by_thicknesses=by_thicknesses,
-        by_indices=w[:, None] * np.stack(q_indices, axis=-1),
+        by_indices=by_indices,
     )
 
 
@@ -177,11 +183,11 @@ def rays_in_object_space(directions: FloatArray, medium: Medium) -> tuple[FloatA
         reflection.
     """
     m, n = medium.normal, medium.indices
-    unit = directions / np.sqrt((directions * directions).sum(-1, keepdims=True))
+    unit = directions / np.sqrt(np.einsum("ni,ni->n", directions, directions))[:, None]
     cosine = -(unit @ m)
     # Snell: n_i times the component along the interface is the same in every medium.
     along = (unit + cosine[:, None] * m) * n[0]
-    along2 = (along * along).sum(-1)
+    along2 = np.einsum("ni,ni->n", along, along)
     with np.errstate(invalid="ignore", divide="ignore"):
         travel = medium.first_height / np.where(cosine > 0, n[0] * cosine, np.nan)
         for index, thickness in zip(n[1:-1], medium.thicknesses, strict=True):

@@ -25,6 +25,8 @@ Media = Layers | FlatInterface | Interfaces | None
 Placed = FlatInterface | Interfaces | None
 #: Points worked on at a time; their scratch rows stay in the processor's cache.
 BLOCK = 8192
+#: Field of view (half, as a tangent) beyond which image coordinates are no millimetres.
+WIDEST = 4.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -202,7 +204,7 @@ def project_with_jacobian(
         seen, shift, medium = vectors, None, None
     else:
         medium = interface.medium(camera)
-        shift = shifts(vectors, medium)
+        shift = shifts(vectors, medium, media=bool(interface_names))
         seen = vectors + shift.g[:, None] * medium.normal
     lens = _through_lens(camera, seen, camera_names)
     by_seen = lens.by_seen
@@ -210,11 +212,13 @@ def project_with_jacobian(
     along = None
     if shift is not None and medium is not None:
         # u = a + g(rho^2, w) m: the change of g adds a product of two vectors to the identity.
-        along = by_seen @ medium.normal  # d(image)/dg
-        gradient = 2.0 * shift.by_rho2[:, None] * (vectors - shift.w[:, None] * medium.normal)
-        gradient += shift.by_w[:, None] * medium.normal
-        by_vector = by_seen + along[:, :, None] * gradient[:, None, :]
-    by_point = by_vector @ camera.rotation.T
+        along = (by_seen.reshape(-1, 3) @ medium.normal).reshape(-1, 2)  # d(image)/dg
+        twice = 2.0 * shift.by_rho2
+        gradient = twice[:, None] * vectors
+        gradient += (shift.by_w - twice * shift.w)[:, None] * medium.normal
+        by_vector = along[:, :, None] * gradient[:, None, :]
+        by_vector += by_seen
+    by_point = (by_vector.reshape(-1, 3) @ camera.rotation.T).reshape(-1, 2, 3)
     by_camera = np.empty((len(points), 2, len(camera_names)))
     exterior = _by_exterior(
         camera_names, camera, interface, vectors, by_seen, by_vector, by_point, along, shift
@@ -296,6 +300,32 @@ def _central(seen: FloatArray, camera: Camera, *, out: FloatArray) -> None:
         factor = np.where(depth < 0, factor, np.nan)
     np.multiply(seen[:, 0], factor, out=out[:, 0])
     np.multiply(seen[:, 1], factor, out=out[:, 1])
+
+
+def refuse_pixels(camera: Camera, image: FloatArray) -> None:
+    """Refuse image coordinates that are no millimetres.
+
+    Raises
+    ------
+    InputError
+        If they lie far off the sensor, or farther out than any lens sees.
+    """
+    who = f"camera {camera.name}: " if camera.name else ""
+    farthest = float(np.nanmax(np.abs(image), initial=0.0))
+    limit = WIDEST * camera.principal_distance
+    if camera.sensor is not None:
+        limit = min(limit, 1.5 * camera.sensor.half_diagonal)
+    if farthest > limit:
+        raise InputError(
+            f"{who}an image point lies {farthest:.4g} mm from the centre, but the principal "
+            f"distance is {camera.principal_distance:g} mm"
+            + (
+                f" and the sensor ends at {camera.sensor.half_diagonal:.4g} mm"
+                if camera.sensor is not None
+                else ""
+            )
+            + ". Are these pixels? Give millimetres, or columns headed col and row with the sensor."
+        )
 
 
 def _by_exterior(

@@ -11,15 +11,19 @@ from numpy.typing import ArrayLike
 from multimedia.domain.camera import EXTERIOR, INTERIOR, Camera
 from multimedia.domain.flat_interface import FlatInterface
 from multimedia.solvers.pose_starts import pose_starts
-from multimedia.solvers.projection import Media, Placed, as_interface, project_with_jacobian
+from multimedia.solvers.projection import (
+    Media,
+    Placed,
+    as_interface,
+    project_with_jacobian,
+    refuse_pixels,
+)
 from photocore.adjustment import correlations, fit, minimise
 from photocore.arrays import BoolArray, FloatArray, as_points
 from photocore.errors import ConvergenceError, GeometryError, InputError
 
 #: A residual beyond this many of its own standard deviations is a gross error (1 honest in 2000).
 OUTLIER_LIMIT = 3.5
-#: Field of view (half, as a tangent) beyond which image coordinates are no millimetres.
-_WIDEST = 4.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -280,32 +284,6 @@ def _checked_points(
             "points spread over an area, better over a volume."
         )
     return control, image, weights, used
-
-
-def refuse_pixels(camera: Camera, image: FloatArray) -> None:
-    """Refuse image coordinates that are no millimetres.
-
-    Raises
-    ------
-    InputError
-        If they lie far off the sensor, or farther out than any lens sees.
-    """
-    who = f"camera {camera.name}: " if camera.name else ""
-    farthest = float(np.nanmax(np.abs(image), initial=0.0))
-    limit = _WIDEST * camera.principal_distance
-    if camera.sensor is not None:
-        limit = min(limit, 1.5 * camera.sensor.half_diagonal)
-    if farthest > limit:
-        raise InputError(
-            f"{who}an image point lies {farthest:.4g} mm from the centre, but the principal "
-            f"distance is {camera.principal_distance:g} mm"
-            + (
-                f" and the sensor ends at {camera.sensor.half_diagonal:.4g} mm"
-                if camera.sensor is not None
-                else ""
-            )
-            + ". Are these pixels? Give millimetres, or columns headed col and row with the sensor."
-        )
 
 
 def _refuse_mirrored(camera: Camera, sigma0: float, problem: _Problem) -> None:

@@ -1,0 +1,385 @@
+"""Object points from image points of any number of cameras, through the media."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.stats import chi2
+
+from multimedia.domain.camera import Camera
+from multimedia.domain.point_status import PointStatus
+from multimedia.domain.project import SIGMA_IMAGE, SIGMA_PIXEL
+from multimedia.solvers.object_rays import image_rays, inverse_3x3, nearest_points, times
+from multimedia.solvers.projection import (
+    Media,
+    Placed,
+    as_interface,
+    project,
+    project_with_jacobian,
+    refuse_pixels,
+)
+from photocore.arrays import BoolArray, FloatArray, IntArray, as_points
+from photocore.errors import InputError
+
+#: Points worked on at a time, so that their equations stay in the processor's cache.
+BLOCK = 4096
+#: Chance that an honest point is called a gross error.
+RISK = 0.001
+#: Largest angle between two rays below which a point is called weak. [rad]
+WEAK_ANGLE = np.radians(2.0)
+#: Gauss-Newton steps: exact rays need one, picks a few pixels off three.
+_MOST_STEPS = 25
+#: A step smaller than this share of the distance ends the iteration: 1e-12 of 1 m is 1e-9 mm.
+_SMALL = 1e-12
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Intersection:
+    """Intersected points with their precision.
+
+    Attributes
+    ----------
+    xyz : ndarray, shape (n, 3)
+        NaN where there is no point. [object unit]
+    covariance : ndarray, shape (n, 3, 3)
+        From the a-priori standard deviations of the image coordinates.
+    residuals : ndarray, shape (cameras, n, 2)
+        Measured minus computed image coordinates; NaN where not seen. [mm]
+    standardised : ndarray, shape (cameras, n, 2)
+        Residuals over their own standard deviations.
+    sigma0 : ndarray, shape (n,)
+        Root of the weighted square sum over the redundancy: 1 on average if the a-priori
+        standard deviations are right.
+    rays : ndarray of int, shape (n,)
+        How many cameras saw each point.
+    angle : ndarray, shape (n,)
+        Largest angle between two rays in the object's medium. [rad]
+    status : ndarray of int, shape (n,)
+        `PointStatus`.
+    """
+
+    xyz: FloatArray
+    covariance: FloatArray
+    residuals: FloatArray
+    standardised: FloatArray
+    sigma0: FloatArray
+    rays: IntArray
+    angle: FloatArray
+    status: IntArray
+
+    @property
+    def sigma(self) -> FloatArray:
+        """Standard deviations of X, Y, Z, shape (n, 3)."""
+        return np.sqrt(np.diagonal(self.covariance, axis1=1, axis2=2))
+
+    @property
+    def worst_camera(self) -> IntArray:
+        """Camera of the largest standardised residual of each point, -1 where there is none."""
+        size = np.nanmax(np.nan_to_num(np.abs(self.standardised), nan=-1.0), axis=2)
+        worst = np.argmax(size, axis=0)
+        return np.where(size.max(axis=0) >= 0, worst, -1).astype(np.int64)
+
+
+def intersect(
+    cameras: Sequence[Camera],
+    image_points: ArrayLike,
+    layers: Media | Sequence[Media] = None,
+    *,
+    sigma: ArrayLike | None = None,
+) -> Intersection:
+    """Intersect the rays of every point by least squares of the image residuals.
+
+    Parameters
+    ----------
+    cameras : sequence of Camera
+        At least two.
+    image_points : array_like, shape (cameras, n, 2)
+        Measured image coordinates; NaN where a camera did not see a point. [mm]
+    layers : Layers, FlatInterface, Interfaces, None, or a sequence of these
+        What the cameras look through, one for all or one each.
+    sigma : array_like, broadcast to shape (cameras, n, 2), optional
+        Standard deviations of the image coordinates; by default half a pixel of each camera's
+        sensor, else 0.005 mm. [mm]
+
+    Returns
+    -------
+    Intersection
+        Points no two rays lead to are NaN, with a status.
+
+    Raises
+    ------
+    InputError
+        If the shapes do not fit, or image coordinates cannot be millimetres.
+
+    Notes
+    -----
+    The start is the point nearest to the rays in the object's medium; Gauss-Newton with analytic
+    derivatives through the media follows until the steps vanish. The gross-error test compares
+    the weighted square sum with chi-square at 0.1 %.
+
+    Examples
+    --------
+    >>> from multimedia import Layers, project
+    >>> water = Layers(indices=(1.0, 1.337))
+    >>> pair = [Camera.looking_at((x, 0, 0.5), (0, 0, -0.1), principal_distance=25.0)
+    ...         for x in (-0.2, 0.2)]
+    >>> seen = [project(camera, [(0.01, 0.02, -0.1)], water) for camera in pair]
+    >>> intersect(pair, seen, water).xyz.round(9).tolist()
+    [[0.01, 0.02, -0.1]]
+    """
+    image, placed = _checked(cameras, image_points, layers)
+    sigmas = _sigmas(cameras, sigma, image.shape)
+    parts = []
+    for start in range(0, max(image.shape[1], 1), BLOCK):
+        part = slice(start, start + BLOCK)
+        parts.append(_block(cameras, image[:, part], sigmas[:, part], placed))
+    return Intersection(
+        xyz=np.concatenate([p.xyz for p in parts]),
+        covariance=np.concatenate([p.covariance for p in parts]),
+        residuals=np.concatenate([p.residuals for p in parts], axis=1),
+        standardised=np.concatenate([p.standardised for p in parts], axis=1),
+        sigma0=np.concatenate([p.sigma0 for p in parts]),
+        rays=np.concatenate([p.rays for p in parts]),
+        angle=np.concatenate([p.angle for p in parts]),
+        status=np.concatenate([p.status for p in parts]),
+    )
+
+
+def intersect_rays(
+    cameras: Sequence[Camera],
+    image_points: ArrayLike,
+    layers: Media | Sequence[Media] = None,
+) -> FloatArray:
+    """Return the points nearest to the rays in the object's medium: fast, linear, no precision.
+
+    Parameters
+    ----------
+    cameras, image_points, layers
+        As for `intersect`.
+
+    Returns
+    -------
+    ndarray, shape (n, 3)
+        Exact for exact image points; else every ray counts alike, near or far.
+    """
+    image, placed = _checked(cameras, image_points, layers)
+    rays = [image_rays(c, p, m) for c, p, m in zip(cameras, image, placed, strict=True)]
+    return nearest_points([o for o, _ in rays], [d for _, d in rays])
+
+
+def intersect_pairs(
+    cameras: Sequence[Camera],
+    image_points: ArrayLike,
+    layers: Media | Sequence[Media] = None,
+) -> tuple[FloatArray, FloatArray]:
+    """Return the mean of the midpoints of all pairs of rays, as OpenPTV's point positions.
+
+    Parameters
+    ----------
+    cameras, image_points, layers
+        As for `intersect`.
+
+    Returns
+    -------
+    xyz : ndarray, shape (n, 3)
+    distance : ndarray, shape (n,)
+        Mean distance between the rays of the pairs. [object unit]
+    """
+    image, placed = _checked(cameras, image_points, layers)
+    rays = [image_rays(c, p, m) for c, p, m in zip(cameras, image, placed, strict=True)]
+    total, apart = np.zeros((image.shape[1], 3)), np.zeros(image.shape[1])
+    count = np.zeros(image.shape[1])
+    for (o1, d1), (o2, d2) in combinations(rays, 2):
+        across = np.cross(d1, d2)
+        square = (across * across).sum(-1)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            along1 = (np.cross(o2 - o1, d2) * across).sum(-1) / square
+            along2 = (np.cross(o2 - o1, d1) * across).sum(-1) / square
+            one, two = o1 + along1[:, None] * d1, o2 + along2[:, None] * d2
+        good = np.isfinite(one[:, 0]) & np.isfinite(two[:, 0])
+        total[good] += 0.5 * (one + two)[good]
+        apart[good] += np.sqrt(((one - two) ** 2).sum(-1))[good]
+        count += good
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return total / count[:, None], apart / count
+
+
+def _block(
+    cameras: Sequence[Camera],
+    image: FloatArray,
+    sigmas: FloatArray,
+    placed: Sequence[Placed],
+) -> Intersection:
+    """Intersect one block of points."""
+    m, n, _ = image.shape
+    seen: BoolArray = np.asarray(np.isfinite(image).all(axis=-1))
+    rays = [image_rays(c, p, i) for c, p, i in zip(cameras, image, placed, strict=True)]
+    xyz = nearest_points([o for o, _ in rays], [d for _, d in rays])
+    angle = _largest_angle([d for _, d in rays])
+    status = np.where(np.isfinite(xyz).all(axis=1), PointStatus.NOT_CONVERGED, PointStatus.WEAK)
+    count = seen.sum(axis=0)
+    normal: FloatArray = np.full((6, n), np.nan)
+    active = np.flatnonzero(status == PointStatus.NOT_CONVERGED)
+    reach = np.abs(xyz - cameras[0].centre).max(axis=1)
+    lever: FloatArray = np.full((m, n, 2, 3), np.nan)
+    before: FloatArray = np.full(n, np.nan)
+    for _ in range(_MOST_STEPS):
+        if not active.size:
+            break
+        everything = active.size == n
+        some = slice(None) if everything else active
+        new, step, by_point = _step(
+            cameras, xyz[some], image[:, some], sigmas[:, some], seen[:, some], placed
+        )
+        lost: BoolArray = np.asarray(np.isnan(step[:, 0]))
+        moved = np.where(lost[:, None], xyz[some], xyz[some] + step)
+        normal[:, some], lever[:, some], xyz[some] = new, by_point, moved
+        size = np.sqrt(np.einsum("ni,ni->n", step, step))
+        with np.errstate(invalid="ignore", divide="ignore"):
+            # Each step is shorter than the last by the same factor: the next one need not be made
+            # to know that it is nothing.
+            following = size * np.fmin(size / before[some], 1.0)
+            done: BoolArray = np.asarray(np.fmin(size, following) <= _SMALL * reach[some])
+        before[some] = size
+        status[active[done]] = PointStatus.OK
+        status[active[lost]] = PointStatus.BEHIND
+        active = active[~done & ~lost]
+    return _assembled(
+        cameras, image, sigmas, placed, xyz=xyz, normal=normal, lever=lever, angle=angle,
+        rays=count, status=status,
+    )  # fmt: skip
+
+
+def _step(
+    cameras: Sequence[Camera],
+    xyz: FloatArray,
+    image: FloatArray,
+    sigmas: FloatArray,
+    seen: BoolArray,
+    placed: Sequence[Placed],
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return normal matrices (6, n), steps (n, 3), weighted derivatives (m, n, 2, 3)."""
+    n = len(xyz)
+    lever: FloatArray = np.full((len(cameras), n, 2, 3), np.nan)
+    normal, right = np.zeros((6, n)), np.zeros((3, n))
+    for k, camera in enumerate(cameras):
+        use: slice | BoolArray = slice(None) if seen[k].all() else seen[k]
+        found = project_with_jacobian(camera, xyz[use], placed[k])
+        weight = 1.0 / sigmas[k][use]
+        miss = (image[k][use] - found.image) * weight
+        weighted = found.by_point * weight[:, :, None]
+        lever[k, use] = weighted
+        for axis in range(2):
+            a, b, c = weighted[:, axis].T
+            v = miss[:, axis]
+            normal[:, use] += np.stack([a * a, a * b, a * c, b * b, b * c, c * c])
+            right[:, use] += np.stack([a * v, b * v, c * v])
+    return normal, times(inverse_3x3(normal), right).T, lever
+
+
+def _assembled(
+    cameras: Sequence[Camera],
+    image: FloatArray,
+    sigmas: FloatArray,
+    placed: Sequence[Placed],
+    *,
+    xyz: FloatArray,
+    normal: FloatArray,
+    lever: FloatArray,
+    angle: FloatArray,
+    rays: IntArray,
+    status: IntArray,
+) -> Intersection:
+    """Return precision, residuals and tests of the points found."""
+    xyz[status == PointStatus.WEAK] = np.nan
+    xyz[(status == PointStatus.BEHIND) | (status == PointStatus.NOT_CONVERGED)] = np.nan
+    status[rays == 1] = PointStatus.ONE_RAY
+    status[rays == 0] = PointStatus.NO_RAY
+    inverse = inverse_3x3(normal)
+    covariance = np.moveaxis(inverse[[0, 1, 2, 1, 3, 4, 2, 4, 5]].reshape(3, 3, -1), 2, 0).copy()
+    covariance[np.isnan(xyz[:, 0])] = np.nan
+    residuals: FloatArray = np.empty_like(image)
+    for k, camera in enumerate(cameras):
+        residuals[k] = image[k] - project(camera, xyz, placed[k])
+    weighted = residuals / sigmas
+    known = np.nan_to_num(weighted, nan=0.0)
+    square = np.einsum("mnk,mnk->n", known, known)
+    redundancy = 2 * rays - 3
+    with np.errstate(divide="ignore", invalid="ignore"):
+        sigma0 = np.where(redundancy > 0, np.sqrt(square / redundancy), np.nan)
+        sigma0[np.isnan(xyz[:, 0])] = np.nan
+        # Cofactor of a weighted residual: 1 - a N^-1 a^T.
+        spread = 1.0 - np.einsum("mnki,mnki->mnk", lever @ covariance, lever)
+        standardised = weighted / np.sqrt(np.where(spread > 1e-9, spread, np.nan))
+    good = status == PointStatus.OK
+    status[good & (angle < WEAK_ANGLE)] = PointStatus.WEAK
+    limits = chi2.ppf(1.0 - RISK, np.maximum(2 * np.arange(len(cameras) + 1) - 3, 1))
+    status[good & (square > limits[rays])] = PointStatus.GROSS_ERROR
+    return Intersection(
+        xyz=xyz,
+        covariance=covariance,
+        residuals=residuals,
+        standardised=standardised,
+        sigma0=sigma0,
+        rays=rays.astype(np.int64),
+        angle=angle,
+        status=status.astype(np.int64),
+    )
+
+
+def _largest_angle(directions: Sequence[FloatArray]) -> FloatArray:
+    """Return the largest angle between two rays of each point; NaN with fewer than two."""
+    widest = np.full(len(directions[0]), np.nan)
+    for one, two in combinations(directions, 2):
+        # The chord keeps small angles exact where the cosine would lose them.
+        gap = one - two
+        chord = np.sqrt(np.einsum("ni,ni->n", gap, gap))
+        widest = np.fmax(widest, chord)
+    return 2.0 * np.arcsin(np.minimum(0.5 * widest, 1.0))
+
+
+def _checked(
+    cameras: Sequence[Camera], image_points: ArrayLike, layers: Media | Sequence[Media]
+) -> tuple[FloatArray, list[Placed]]:
+    """Return image points and what each camera looks through."""
+    if len(cameras) < 2:
+        raise InputError(f"cameras: an intersection needs two or more, found {len(cameras)}.")
+    image = as_points(image_points, "image_points", dimension=2)
+    if image.ndim != 3 or image.shape[0] != len(cameras):
+        raise InputError(
+            f"image_points: expected shape ({len(cameras)} cameras, n points, 2), found "
+            f"{image.shape}. Use NaN where a camera did not see a point."
+        )
+    media = list(layers) if isinstance(layers, Sequence) else [layers] * len(cameras)
+    if len(media) != len(cameras):
+        raise InputError(f"layers: expected one per camera ({len(cameras)}), found {len(media)}.")
+    for camera, points in zip(cameras, image, strict=True):
+        refuse_pixels(camera, points)
+    return image, [as_interface(item) for item in media]
+
+
+def _sigmas(
+    cameras: Sequence[Camera], sigma: ArrayLike | None, shape: tuple[int, ...]
+) -> FloatArray:
+    """Return standard deviations of all image coordinates. [mm]"""
+    if sigma is None:
+        given = np.array(
+            [
+                SIGMA_IMAGE if c.sensor is None else SIGMA_PIXEL * float(c.sensor.pitch.mean())
+                for c in cameras
+            ]
+        )
+        return np.broadcast_to(given[:, None, None], shape)
+    try:
+        values = np.broadcast_to(np.asarray(sigma, dtype=np.float64), shape)
+    except ValueError:
+        raise InputError(
+            f"sigma: shape {np.shape(sigma)} does not fit image points of shape {shape}."
+        ) from None
+    if (values <= 0).any():
+        raise InputError("sigma: every standard deviation must be above zero [mm].")
+    return values

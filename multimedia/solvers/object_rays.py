@@ -1,0 +1,125 @@
+"""Image points to rays in the object's medium, and their linear intersection."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from multimedia.collinearity import rays_in_object_space
+from multimedia.domain.camera import Camera
+from multimedia.domain.interfaces import Interfaces
+from multimedia.solvers.projection import Media, as_interface
+from multimedia.solvers.traced_projection import object_rays as traced_rays
+from photocore.arrays import FloatArray, as_points
+
+
+def image_rays(
+    camera: Camera, image_points: ArrayLike, layers: Media = None
+) -> tuple[FloatArray, FloatArray]:
+    """Follow image points through the media into the object's medium.
+
+    Parameters
+    ----------
+    camera : Camera
+        Exterior and interior orientation.
+    image_points : array_like, shape (..., 2)
+        Measured image coordinates. [mm]
+    layers : Layers, FlatInterface, Interfaces or None
+        As for `project`.
+
+    Returns
+    -------
+    origins : ndarray, shape (..., 3)
+        Where the rays enter the object's medium, in the world. [object unit]
+    directions : ndarray, shape (..., 3)
+        Unit vectors there. NaN for rays that do not reach it.
+
+    Notes
+    -----
+    Snell's law in closed form: no iteration.
+
+    Examples
+    --------
+    45 degrees in air are 32.04 degrees in water of index 1.3329:
+
+    >>> from multimedia import Layers
+    >>> camera = Camera.from_angles((0, 0, 1), 0.0, 0.0, 0.0, principal_distance=25.0)
+    >>> origin, ray = image_rays(camera, (25.0, 0.0), Layers(indices=(1.0, 1.3329)))
+    >>> origin.round(9).tolist(), round(float(np.degrees(np.arcsin(ray[0]))), 2)
+    ([1.0, 0.0, 0.0], 32.04)
+    """
+    measured = as_points(image_points, "image_points", dimension=2)
+    ideal = camera.distortion.ideal(measured, camera.principal_point).reshape(-1, 2)
+    directions: FloatArray = np.empty((len(ideal), 3))
+    directions[:, :2] = ideal
+    directions[:, 2] = -camera.principal_distance
+    interface = as_interface(layers)
+    shape = (*measured.shape[:-1], 3)
+    if isinstance(interface, Interfaces):
+        origins, rays = traced_rays(camera, directions, interface)
+        return origins.reshape(shape), rays.reshape(shape)
+    if interface is None:
+        rays = directions @ camera.rotation.T
+        rays /= np.sqrt((rays * rays).sum(-1, keepdims=True))
+        return np.broadcast_to(camera.centre, shape).copy(), rays.reshape(shape)
+    origins, rays = rays_in_object_space(directions, interface.medium(camera))
+    world = origins @ camera.rotation.T + camera.centre
+    return world.reshape(shape), (rays @ camera.rotation.T).reshape(shape)
+
+
+def nearest_points(origins: Sequence[FloatArray], directions: Sequence[FloatArray]) -> FloatArray:
+    """Return the points nearest to all rays, least squares of the distances, shape (n, 3).
+
+    NaN rays do not count; NaN where fewer than two remain or all are parallel.
+
+    Notes
+    -----
+    Normal equations sum(I - d d^T) X = sum((I - d d^T) o), solved in closed form.
+    """
+    n = len(origins[0])
+    normal, right = np.zeros((6, n)), np.zeros((3, n))
+    for origin, direction in zip(origins, directions, strict=True):
+        seen = np.isfinite(direction[:, 0])
+        o, d = (origin, direction) if seen.all() else (origin[seen], direction[seen])
+        x, y, z = d.T
+        part = np.stack([1 - x * x, -x * y, -x * z, 1 - y * y, -y * z, 1 - z * z])
+        along = np.einsum("ni,ni->n", o, d)
+        foot = (o - along[:, None] * d).T
+        if seen.all():
+            normal += part
+            right += foot
+        else:
+            normal[:, seen] += part
+            right[:, seen] += foot
+    return solve_3x3(normal, right).T
+
+
+def solve_3x3(normal: FloatArray, right: FloatArray) -> FloatArray:
+    """Solve symmetric 3 x 3 systems, shape (3, n); NaN where singular.
+
+    ``normal`` holds the rows xx, xy, xz, yy, yz, zz.
+    """
+    return times(inverse_3x3(normal), right)
+
+
+def inverse_3x3(normal: FloatArray) -> FloatArray:
+    """Return the inverses of symmetric 3 x 3 matrices, as rows xx, xy, xz, yy, yz, zz."""
+    xx, xy, xz, yy, yz, zz = normal
+    out = np.empty_like(normal)
+    out[0], out[1], out[2] = yy * zz - yz * yz, xz * yz - xy * zz, xy * yz - xz * yy
+    out[3], out[4], out[5] = xx * zz - xz * xz, xy * xz - xx * yz, xx * yy - xy * xy
+    determinant = xx * out[0] + xy * out[1] + xz * out[2]
+    # Singular when the determinant is rounding of its own terms.
+    size = xx * yy * zz
+    with np.errstate(divide="ignore", invalid="ignore"):
+        out /= np.where(determinant > 1e-13 * size, determinant, np.nan)
+    return out
+
+
+def times(inverse: FloatArray, right: FloatArray) -> FloatArray:
+    """Return symmetric matrices times vectors, shape (3, n)."""
+    xx, xy, xz, yy, yz, zz = inverse
+    a, b, c = right
+    return np.stack([xx * a + xy * b + xz * c, xy * a + yy * b + yz * c, xz * a + yz * b + zz * c])
