@@ -1,0 +1,136 @@
+"""Points known from outside: check points on the wall and control points in the world."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from bifocal.domain.tolerances import Verdict
+from photocore.arrays import BoolArray, FloatArray
+from photocore.errors import InputError
+from photocore.similarity import Similarity
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class KnownPoints:
+    """Names with coordinates; NaN where a cell was blank.
+
+    Attributes
+    ----------
+    ids : tuple of str, length n
+        Names, as in the table of measured points.
+    xyz : ndarray, shape (n, 3)
+        X, Y, Z on the wall, or E, N, H in the world. [m]
+    use : ndarray of bool, shape (n,)
+        False for points that are listed but take no part.
+    """
+
+    ids: tuple[str, ...] = ()
+    xyz: FloatArray = field(default_factory=lambda: np.zeros((0, 3)))
+    use: BoolArray | None = None
+
+    def __post_init__(self) -> None:
+        n = len(self.ids)
+        xyz = np.array(self.xyz, dtype=np.float64).reshape(-1, 3)
+        use = np.ones(n, dtype=bool) if self.use is None else np.array(self.use, dtype=bool)
+        if len(xyz) != n or len(use) != n:
+            raise InputError(f"{n} names, {len(xyz)} points and {len(use)} marks do not match.")
+        object.__setattr__(self, "xyz", xyz)
+        object.__setattr__(self, "use", use)
+
+    def __len__(self) -> int:
+        return len(self.ids)
+
+    @property
+    def used(self) -> BoolArray:
+        """`use` as an array, shape (n,)."""
+        assert self.use is not None
+        return self.use
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AxisErrors:
+    """Statistics of the errors of one axis; NaN where there is none. [m]"""
+
+    n: int
+    rmse: float
+    mean: float
+    max_abs: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class CheckResult:
+    """Errors at check points.
+
+    Attributes
+    ----------
+    ids : tuple of str, length n
+        Names in the order of the `Check` sheet.
+    found : ndarray, shape (n, 3)
+        Solved X, Y, Z; NaN where the point was not measured. [m]
+    errors : ndarray, shape (n, 3)
+        Found minus known; NaN where either is missing or the point is not used. [m]
+    axes : mapping of str to AxisErrors
+        Statistics for ``"X"``, ``"Y"``, ``"Z"``.
+    verdicts : tuple of Verdict
+        The largest RMSE of the axes against every rule and scale; empty without check points.
+    missing : tuple of str
+        Check points that were not measured.
+    """
+
+    ids: tuple[str, ...]
+    found: FloatArray
+    errors: FloatArray
+    axes: Mapping[str, AxisErrors]
+    verdicts: tuple[Verdict, ...]
+    missing: tuple[str, ...]
+
+    @property
+    def accuracy(self) -> float:
+        """The largest RMSE of the three axes; NaN without check points. [m]"""
+        values = [axis.rmse for axis in self.axes.values() if axis.n]
+        return max(values, default=float("nan"))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Georeference:
+    """A wall placed in the world.
+
+    Attributes
+    ----------
+    ids : tuple of str, length n
+        Control points in the order given.
+    world_from_wall : Similarity
+        X, Y, Z on the wall to E, N, H.
+    model : str
+        ``"2D"``, ``"levelled"`` or ``"3D"``.
+    residuals : ndarray, shape (n, 3)
+        Known minus computed E, N, H, also of points left out; NaN where unknown. [m]
+    found : ndarray, shape (n, 3)
+        Solved X, Y, Z of the control points. [m]
+    used : ndarray of bool, shape (n,)
+        Points the transformation rests on.
+    bad : tuple of str
+        Points the program left out because they contradict the others.
+    sigma0 : float
+        Standard deviation of a coordinate; NaN without redundancy. [m]
+    redundancy : int
+        Observations minus parameters.
+    origin, offset : ndarray, shape (3,)
+        Whole-metre origin of the world coordinates and where the centre lies from it: with them
+        differences of large coordinates lose no digits. [m]
+    """
+
+    ids: tuple[str, ...]
+    world_from_wall: Similarity
+    model: str
+    residuals: FloatArray
+    found: FloatArray
+    used: BoolArray
+    bad: tuple[str, ...]
+    sigma0: float
+    redundancy: int
+    origin: FloatArray
+    offset: FloatArray

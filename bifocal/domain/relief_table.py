@@ -1,0 +1,57 @@
+"""Solved points: every column of the workbook's `Points` table that is computed."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from photocore.arrays import FloatArray
+
+#: The computed columns in the order of the workbook; `flag` follows.
+COMPUTED = (
+    "s1_used s2_used theta_used ds den r e1 e2 s_c X Y Z q sigma_r".split()  # noqa: SIM905
+)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ReliefTable:
+    """Relief, coordinates and precision of points.
+
+    Attributes
+    ----------
+    ids : tuple of str, length n
+        Names of the points.
+    columns : mapping of str to ndarray, shape (n,)
+        The workbook's computed columns by key: ``s1_used s2_used ds e1 e2 s_c q`` [mm],
+        ``theta_used`` [deg], ``den`` [mm/m], ``r X Y Z sigma_r`` [m]. NaN where undefined.
+    flags : tuple of str, length n
+        One of `bifocal.domain.intersection.FLAGS` per point.
+    standardised : ndarray, shape (n,)
+        Misfit across the radius over its standard deviation; NaN where it cannot be tested.
+    carried : mapping of str to ndarray, shape (n,)
+        For points measured in raw pixels of a general pair: positions carried to the plane
+        ``x1 y1 x2 y2`` [mm at image scale, from the zoom centre], least-squares gains
+        ``g1x g1y g2x g2y`` [mm per mm of q], and ``k_q`` [mm/px], ``k_r`` [m/px].
+    image_scale : float or None
+        Scale number of image 1; None where no principal distance is known.
+    """
+
+    ids: tuple[str, ...]
+    columns: Mapping[str, FloatArray]
+    flags: tuple[str, ...]
+    standardised: FloatArray
+    carried: Mapping[str, FloatArray]
+    image_scale: float | None
+
+    def __len__(self) -> int:
+        return len(self.ids)
+
+    def __getitem__(self, key: str) -> FloatArray:
+        return self.columns[key]
+
+    @property
+    def xyz(self) -> FloatArray:
+        """X, Y and relief, shape (n, 3). [m]"""
+        return np.stack([self.columns[key] for key in ("X", "Y", "Z")], axis=-1)

@@ -1,0 +1,132 @@
+"""The sheet `Charts`: points on the wall, precision, errors; numbers beside, all live."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from openpyxl.chart import BarChart, Reference, ScatterChart, Series
+from openpyxl.chart.shapes import GraphicalProperties
+from openpyxl.styles import Font
+
+from bifocal.io.survey_content import CHART_ROWS, SurveyContent, check_cells
+from bifocal.io.survey_reference_sheets import CHECK_HEAD
+from bifocal.io.survey_sheets import LABEL_FONT, BookBuilder, protect, set_up_print
+from bifocal.io.survey_words import word
+from photocore.bookrows import CellValue, RowBlock, column_letters
+
+#: Row of the headings of the chart data; text would break a scatter chart, so blanks are #N/A.
+HEAD = 4
+#: Column of the first chart data: far enough right to stay out of the charts' way.
+LEFT = 16
+_KEYS = ("X", "Y", "s_c", "sigma_r")
+
+
+def charts(
+    builder: BookBuilder, content: SurveyContent, cells: Mapping[str, list[CellValue]]
+) -> None:
+    """Write the chart data and three charts."""
+    language = builder.language
+    rows = min(content.point_rows, CHART_ROWS)
+    sheet = builder.sheet("Charts", word("Charts", language))
+    note = word("chart_data", language).format(n=rows)
+    builder.text(sheet, f"{column_letters(LEFT)}{HEAD - 2}", note, LABEL_FONT)
+    columns: list[list[CellValue]] = [[] for _ in range(LEFT)]
+    for i, key in enumerate(_KEYS):
+        letter = column_letters(LEFT + i)
+        builder.text(sheet, f"{letter}{HEAD}", key, LABEL_FONT)
+        at = f"ROW()-{HEAD}"
+        found = f"INDEX(tblPoints[{key}],{at})"
+        builder.formula(
+            sheet, f"{letter}{HEAD + 1}", f"IF(ISNUMBER({found}),{found},NA())", None, form="0.000"
+        )
+        sheet[f"{letter}{HEAD + 1}"].font = Font(color="A6A6A6", size=8)
+        listed = [
+            value if isinstance(value, int | float) else float("nan")
+            for value in cells.get(key, [])[:rows]
+        ]
+        columns.append(listed + [float("nan")] * (rows - len(listed)))
+    builder.blocks["Charts"] = RowBlock(row=HEAD + 1, columns=columns)
+    last = HEAD + rows
+    data = [
+        Reference(sheet, min_col=LEFT + 1 + i, min_row=HEAD + 1, max_row=last)
+        for i in range(len(_KEYS))
+    ]
+    plan = _scatter(word("chart_plan", language), "X [m]", "Y [m]", data[0], data[1])
+    _equal_scales(plan, cells)
+    sheet.add_chart(plan, "A3")
+    sigma = _scatter(word("chart_sigma", language), "s' [mm]", "sigma_r [m]", data[2], data[3])
+    sigma.height, sigma.width = 8, 16
+    sheet.add_chart(sigma, "A30")
+    _errors(builder, content)
+    set_up_print(sheet, language, landscape=False)
+    sheet.print_area = "A1:J66"
+    protect(sheet)
+
+
+def _scatter(title: str, x_title: str, y_title: str, x: Reference, y: Reference) -> ScatterChart:
+    """Return a chart of dots: markers set one by one, or LibreOffice shows none."""
+    chart = ScatterChart()
+    chart.style, chart.scatterStyle, chart.legend = 13, "lineMarker", None
+    chart.title, chart.x_axis.title, chart.y_axis.title = title, x_title, y_title
+    series = Series(y, x, title=title)
+    series.marker.symbol, series.marker.size = "circle", 5
+    series.marker.graphicalProperties = GraphicalProperties(solidFill="1F3FA8")
+    series.marker.graphicalProperties.line.solidFill = "1F3FA8"
+    series.graphicalProperties.line.noFill = True
+    chart.series.append(series)
+    for axis in (chart.x_axis, chart.y_axis):
+        axis.delete, axis.tickLblPos, axis.crosses = False, "low", "min"
+        axis.number_format = "0.00"
+    return chart
+
+
+def _equal_scales(chart: ScatterChart, cells: Mapping[str, list[CellValue]]) -> None:
+    """Give X and Y the same scale, so that the wall keeps its shape."""
+    extents = []
+    for key in ("X", "Y"):
+        listed = [v for v in cells.get(key, []) if isinstance(v, int | float) and v == v]
+        extents.append((min(listed), max(listed)) if listed else (-5.0, 5.0))
+    span = max(high - low for low, high in extents) * 1.1 or 1.0
+    for axis, (low, high) in zip((chart.x_axis, chart.y_axis), extents, strict=True):
+        middle = (low + high) / 2
+        step = _round_step(span / 8)
+        axis.scaling.min = round((middle - span / 2) / step) * step
+        axis.scaling.max = axis.scaling.min + _steps(span, step) * step
+        axis.majorUnit = step
+    chart.height, chart.width = 12.5, 13.5
+
+
+def _round_step(rough: float) -> float:
+    """Return 1, 2 or 5 times a power of ten, not below rough."""
+    power = 10.0 ** len(str(int(1e6 / rough))) if rough < 1 else 1.0
+    for factor in sorted(f * 10.0**e for f in (1, 2, 5) for e in range(-6, 7)):
+        if factor >= rough:
+            return float(factor)
+    return power
+
+
+def _steps(span: float, step: float) -> int:
+    """Return how many steps cover the span."""
+    return int(span / step) + 1
+
+
+def _errors(builder: BookBuilder, content: SurveyContent) -> None:
+    """Draw a bar for the relief error of each check point."""
+    sheet, language = builder.book["Check"], builder.language
+    chart = BarChart()
+    chart.type, chart.style, chart.title, chart.legend = (
+        "col", 10, word("chart_error", language), None
+    )  # fmt: skip
+    rows = max(len(content.known), 8)
+    errors = Reference(sheet, min_col=11, min_row=CHECK_HEAD + 1, max_row=CHECK_HEAD + rows)
+    names = Reference(sheet, min_col=1, min_row=CHECK_HEAD + 1, max_row=CHECK_HEAD + rows)
+    series = Series(errors, title="dZ")
+    series.graphicalProperties = GraphicalProperties(solidFill="C55A11")
+    chart.series.append(series)
+    chart.set_categories(names)
+    chart.x_axis.delete = chart.y_axis.delete = False
+    chart.x_axis.tickLblPos, chart.y_axis.title = "low", "dZ [m]"
+    chart.y_axis.number_format = "0.000"
+    chart.height, chart.width = 8, 16
+    builder.book["Charts"].add_chart(chart, "A48")
+    assert check_cells(content) is not None

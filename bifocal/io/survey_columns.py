@@ -1,0 +1,352 @@
+"""Tables of the survey workbook: keys, kinds, number formats and live formulas.
+
+Formulas are written with ``[@key]`` for the cell of the same row; `row_formula` turns that into the
+file's structured references. Only functions of Excel 2007 are used, no text formats, no locale.
+Names never look like cells, so `d_1` and not the paper's `d1`.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+
+from bifocal.domain.setup import ON_PLANE_SIGMAS
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Column:
+    """One column of a table.
+
+    Attributes
+    ----------
+    key : str
+        Heading; stable, ASCII, never translated.
+    kind : str
+        ``input`` (typed by the user), ``formula``, or ``value`` (written by the program).
+    formula : str
+        With ``[@key]`` for the same row.
+    places : int or None
+        Decimals shown; None for text and whole numbers.
+    width : float
+        In characters.
+    folded : bool
+        Whether the column is grouped and folded away: a step on the way, not a result.
+    """
+
+    key: str
+    kind: str = "input"
+    formula: str = ""
+    places: int | None = None
+    width: float = 10.0
+    folded: bool = False
+
+
+def row_formula(table: str, text: str) -> str:
+    """Return a formula with ``[@key]`` written as the file format wants it."""
+    return "=" + re.sub(r"\[@(\w+)\]", rf"{table}[[#This Row],[\1]]", text)
+
+
+def _f(key: str, formula: str, places: int | None = None, **more: object) -> Column:
+    return Column(key=key, kind="formula", formula=formula, places=places, **more)  # type: ignore[arg-type]
+
+
+_XY = "[@x1],[@y1],[@x2],[@y2]"
+_X1, _Y1 = "([@x1]-off_x1)*unit_x", "([@y1]-off_y1)*unit_y"
+_X2, _Y2 = "([@x2]-off_x2)*unit_x", "([@y2]-off_y2)*unit_y"
+
+
+def _radius(x: str, y: str, polar: str, factor: str) -> str:
+    return (
+        f"IF(COUNT({_XY})=4,SQRT(({x})^2+({y})^2){factor},"
+        f'IF(AND(COUNT({_XY})=0,COUNT([@s1],[@s2])=2),{polar}{factor},""))'
+    )
+
+
+def _flag(inputs: str, miss: str) -> str:
+    """Return the formula of the flag; its order is that of the library."""
+    return (
+        f'IF(COUNT({inputs})=0,"",IF([@s1_used]="","CHECK",IF([@den]="","",'
+        f'IF([@s1_used]=0,"NADIR",IF({miss},"OFF-RADIAL",IF(ISERROR([@r]),"UNCERTAIN",'
+        'IF([@sigma_r]>sigma_r_max,"UNCERTAIN",IF([@sigma_r]>sigma_r_max/2,"WEAK",'
+        'IF(ABS([@r])<k_plane*[@sigma_r],"ON-PLANE","OK")))))))))'
+    )
+
+
+_RELIEF = (
+    _f("ds", 'IF([@s1_used]="","",[@s2_used]-[@s1_used])', 4),
+    _f(
+        "den",
+        'IF(OR([@s1_used]="",COUNT(d_1,d_2)<2),"",[@s2_used]/d_2-[@s1_used]/d_1)',
+        6,
+    ),
+    _f(
+        "r",
+        'IF([@den]="","",IF(AND([@s1_used]>0,[@den]*(d_1-d_2)>0),[@ds]/[@den],NA()))',
+        4,
+    ),
+)
+
+#: The `Points` table of an ideal pair.
+IDEAL_POINTS: tuple[Column, ...] = (
+    Column(key="id", width=12),
+    *(Column(key=key, places=4) for key in ("x1", "y1", "x2", "y2", "s1", "s2")),
+    Column(key="theta", places=4, width=11),
+    Column(key="use", width=6),
+    Column(key="code", width=10),
+    Column(key="note", width=18),
+    _f("s1_used", _radius(_X1, _Y1, "[@s1]", ""), 4, folded=True),
+    _f("s2_used", _radius(_X2, _Y2, "[@s2]", "*k_12"), 4, folded=True),
+    _f(
+        "theta_used",
+        'IF([@s1_used]="","",IF(COUNT([@x1],[@y1])=2,IF([@s1_used]=0,0,'
+        f'DEGREES(ATAN2({_Y1},{_X1}))),IF(COUNT([@theta])=1,[@theta],"")))',
+        4,
+        folded=True,
+    ),
+    *_RELIEF,
+    _f("e1", 'IF([@r]="","",[@s1_used]*[@r]/d_1)', 4),
+    _f("e2", 'IF([@r]="","",[@s2_used]*[@r]/d_2)', 4),
+    _f("s_c", 'IF([@r]="","",[@s1_used]-[@e1])', 4),
+    _f(
+        "X",
+        'IF(OR([@den]="",[@theta_used]="",m_1=""),"",[@s_c]*SIN(RADIANS([@theta_used]))*m_1/1000)',
+        4,
+    ),
+    _f(
+        "Y",
+        'IF(OR([@den]="",[@theta_used]="",m_1=""),"",[@s_c]*COS(RADIANS([@theta_used]))*m_1/1000)',
+        4,
+    ),
+    _f("Z", 'IF([@r]="","",[@r])', 4),
+    _f(
+        "q",
+        f"IF(COUNT({_XY})=4,IF([@s1_used]>0,"
+        f'(({_X1})*({_Y2})-({_Y1})*({_X2}))*k_12/[@s1_used],0),"")',
+        5,
+    ),
+    _f(
+        "sigma_r",
+        'IF([@r]="","",sigma_s*SQRT((1-[@r]/d_1)^2+(k_12*(1-[@r]/d_2))^2)/ABS([@den]))',
+        4,
+    ),
+    _f(
+        "flag",
+        _flag(
+            f"{_XY},[@s1],[@s2]",
+            "ABS(N([@q]))>k_off*sigma_s*SQRT(1+([@s2_used]/[@s1_used])^2)",
+        ),
+        width=13,
+    ),
+)
+
+
+def pair_points(*, undistorted: bool) -> tuple[Column, ...]:
+    """Return the `Points` table of a general pair measured in raw pixels.
+
+    Parameters
+    ----------
+    undistorted : bool
+        Whether the photos have lens distortion, which no formula can take out: the pixels freed of
+        it are then written beside the raw ones.
+    """
+    prefix = "u" if undistorted else ""
+    pixels = [(f"[@{prefix}col{i}]", f"[@{prefix}row{i}]") for i in (1, 2)]
+    carried = []
+    for image, (col, row) in enumerate(pixels, start=1):
+        h = f"h{image}_"
+        below = f"({h}31*{col}+{h}32*{row}+{h}33)"
+        for axis, line in (("x", 1), ("y", 2)):
+            above = f"({h}{line}1*{col}+{h}{line}2*{row}+{h}{line}3)"
+            carried.append(
+                _f(
+                    f"{axis}{image}",
+                    f'IF(COUNT({col},{row})=2,({above}/{below}-e_{axis})*1000/m_1,"")',
+                    4,
+                )
+            )
+    moved = {
+        f"{axis}{image}": f"([@{axis}{image}]-[@q]*[@g{image}{axis}])"
+        for image in (1, 2)
+        for axis in ("x", "y")
+    }
+    own = {
+        f"{axis}{image}": f"({moved[f'{axis}{image}']}-(n{image}_{axis}-e_{axis})*1000/m_1)"
+        for image in (1, 2)
+        for axis in ("x", "y")
+    }
+
+    def radius(image: int, parts: dict[str, str]) -> str:
+        return f"SQRT({parts[f'x{image}']}^2+{parts[f'y{image}']}^2)"
+
+    def place(axis: str) -> str:
+        return f'IF([@r]="","",e_{axis}+({moved[f"{axis}1"]}-{own[f"{axis}1"]}*[@r]/d_1)*m_1/1000)'
+
+    return (
+        Column(key="id", width=12),
+        *(Column(key=key, places=3) for key in ("col1", "row1", "col2", "row2")),
+        Column(key="use", width=6),
+        Column(key="code", width=10),
+        Column(key="note", width=18),
+        *(
+            Column(key=f"u{key}", kind="value", places=3, folded=True)
+            for key in ("col1", "row1", "col2", "row2")
+            if undistorted
+        ),
+        *carried,
+        _f(
+            "q",
+            f"IF(COUNT({_XY})=4,IF([@x1]^2+[@y1]^2>0,"
+            '([@x1]*[@y2]-[@y1]*[@x2])/SQRT([@x1]^2+[@y1]^2),0),"")',
+            5,
+        ),
+        *(
+            Column(key=key, kind="value", places=6, folded=True)
+            for key in ("g1x", "g1y", "g2x", "g2y", "k_q", "k_r")
+        ),
+        _f("s1_used", f'IF([@q]="","",{radius(1, moved)})', 4, folded=True),
+        _f("s2_used", f'IF([@q]="","",{radius(2, moved)})', 4, folded=True),
+        _f(
+            "theta_used",
+            f'IF([@q]="","",IF([@s1_used]=0,0,DEGREES(ATAN2({moved["y1"]},{moved["x1"]}))))',
+            4,
+            folded=True,
+        ),
+        *_RELIEF,
+        _f("e1", f'IF([@r]="","",{radius(1, own)}*[@r]/d_1)', 4),
+        _f("e2", f'IF([@r]="","",{radius(2, own)}*[@r]/d_2)', 4),
+        _f("s_c", f'IF([@r]="","",{radius(1, own)}-[@e1])', 4),
+        _f("X", place("x"), 4),
+        _f("Y", place("y"), 4),
+        _f("Z", 'IF([@r]="","",[@r])', 4),
+        _f("sigma_r", 'IF([@r]="","",IF(ISNUMBER([@r]),sigma_px*[@k_r],NA()))', 4),
+        _f(
+            "flag",
+            _flag(_XY, "ABS(N([@q]))>k_off*sigma_px*N([@k_q])").replace(
+                "[@s1_used]=0", "[@x1]^2+[@y1]^2=0"
+            ),
+            width=13,
+        ),
+    )
+
+
+_AT = "ROW()-ROW(tblResults[[#Headers],[id]])"
+
+
+def _from_points(key: str) -> str:
+    cell = f"INDEX(tblPoints[{key}],{_AT})"
+    return f'IF(ISNUMBER({cell}),{cell},"")'
+
+
+def _text_from_points(key: str) -> str:
+    cell = f"INDEX(tblPoints[{key}],{_AT})"
+    return f'IF({cell}="","",{cell})'
+
+
+def _world(row: int, name: str) -> str:
+    turned = "+".join(f"g_{row}{i}*([@{axis}]-g_{axis}0)" for i, axis in enumerate("XYZ", start=1))
+    return f'IF(AND(ISNUMBER(g_k),COUNT([@X],[@Y],[@Z])=3),g_{name}0+g_k*({turned}),"")'
+
+
+RESULTS: tuple[Column, ...] = (
+    _f("id", _text_from_points("id"), width=12),
+    *(_f(key, _from_points(key), 3, width=9) for key in "XYZ"),
+    *(_f(name, _world(row, name), 3, width=13) for row, name in enumerate("ENH", start=1)),
+    _f("sigma_r", _from_points("sigma_r"), 3, width=9),
+    _f("flag", _text_from_points("flag"), width=13),
+    _f("note", _text_from_points("note"), width=16),
+)
+
+
+def _look_up(axis: str) -> str:
+    # The second search finds the number 7 among names kept as text.
+    at = 'IFERROR(MATCH([@id],tblPoints[id],0),MATCH([@id]&"",tblPoints[id],0))'
+    cell = f"INDEX(tblPoints[{axis}],{at})"
+    return f'IF([@id]="","",IFERROR(IF(ISNUMBER({cell}),{cell},""),""))'
+
+
+CHECK: tuple[Column, ...] = (
+    Column(key="id", width=12),
+    *(Column(key=f"{axis}_ref", places=4, width=11) for axis in "XYZ"),
+    Column(key="use", width=6),
+    *(_f(axis, _look_up(axis), 4) for axis in "XYZ"),
+    *(
+        _f(
+            f"d{axis}",
+            f'IF(AND(COUNT([@{axis}],[@{axis}_ref])=2,OR([@use]="",[@use]<>0)),'
+            f'[@{axis}]-[@{axis}_ref],"")',
+            4,
+        )
+        for axis in "XYZ"
+    ),
+)
+
+GEOREFERENCE: tuple[Column, ...] = (
+    Column(key="id", width=12),
+    *(Column(key=axis, places=4, width=14) for axis in "ENH"),
+    Column(key="use", width=6),
+    Column(key="found_bad", kind="value", width=9),
+    *(_f(axis, _look_up(axis), 4) for axis in "XYZ"),
+    _f(
+        "w",
+        'IF(AND(OR([@use]="",[@use]<>0),OR([@found_bad]="",[@found_bad]<>0),'
+        'COUNT([@X],[@Y],[@Z],[@E],[@N])=5,OR(g_used="2D",COUNT([@H])=1)),1,0)',
+        width=7,
+        folded=True,
+    ),
+    *(_f(f"c{axis}", f"IF([@w]=1,[@{axis}]-g_{axis}0,0)", 4, folded=True) for axis in "XYZ"),
+    # From a whole-metre origin: exact, whatever the size of the coordinates.
+    *(_f(f"c{axis}", f"IF([@w]=1,[@{axis}]-g_{axis}r,0)", 4, folded=True) for axis in "EN"),
+    _f("cH", 'IF(AND([@w]=1,g_used<>"2D"),[@H]-g_Hr,0)', 4, folded=True),
+    *(
+        _f(
+            f"v{name}",
+            f"IF(AND(ISNUMBER(g_k),COUNT([@X],[@Y],[@Z],[@{name}])=4),"
+            f"([@{name}]-g_{name}r)-(g_{name}t+g_k*("
+            + "+".join(f"g_{row}{i}*([@{axis}]-g_{axis}0)" for i, axis in enumerate("XYZ", 1))
+            + ')),"")',
+            4,
+        )
+        for row, name in enumerate("ENH", start=1)
+    ),
+)
+
+#: Relief whose area of uncertainty the sheet `Planning` shows. [cm]
+PLANNED_RELIEF = (1, 2, 5, 10, 20, 50, 100)
+UNCERTAINTY: tuple[Column, ...] = (
+    Column(key="relief_cm", width=13),
+    _f(
+        "radius_mm",
+        f'IF(COUNT(d_1,d_2)<2,"",{ON_PLANE_SIGMAS:g}*SQRT(2)*sigma_s*(d_1-[@relief_cm]/100)*'
+        "(d_2-[@relief_cm]/100)/([@relief_cm]/100*ABS(d_1-d_2)))",
+        2,
+        width=18,
+    ),
+    _f("radius_m", 'IF(OR([@radius_mm]="",m_1=""),"",[@radius_mm]*m_1/1000)', 2, width=18),
+    _f(
+        "share",
+        'IF(OR([@radius_mm]="",COUNT(sensor_w,sensor_h)<2),"",'
+        "200*[@radius_mm]/SQRT(sensor_w^2+sensor_h^2))",
+        0,
+        width=18,
+    ),
+)
+FRAME_SHARES = (10, 20, 30, 40, 50, 60, 70, 80, 90, 100)
+OVER_FRAME: tuple[Column, ...] = (
+    Column(key="share", width=13),
+    _f(
+        "s_mm",
+        'IF(COUNT(sensor_w,sensor_h)<2,"",[@share]/200*SQRT(sensor_w^2+sensor_h^2))',
+        2,
+        width=18,
+    ),
+    _f(
+        "sigma_r",
+        'IF(OR([@s_mm]="",COUNT(d_1,d_2)<2),"",SQRT(2)*sigma_s*b_lever/[@s_mm])',
+        4,
+        width=18,
+    ),
+)
+LOG: tuple[Column, ...] = tuple(
+    Column(key=key, kind="value", width=width)
+    for key, width in (("time", 12), ("program", 16), ("what", 40), ("file", 30), ("sha256", 68))
+)

@@ -1,0 +1,307 @@
+"""The sheets of a new survey workbook, built with openpyxl: see `bifocal.io.survey_book`."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+from openpyxl import Workbook
+from openpyxl.formatting.rule import FormulaRule
+from openpyxl.styles import Alignment, Border, Font, PatternFill, Protection, Side
+from openpyxl.utils import get_column_letter
+from openpyxl.workbook.defined_name import DefinedName
+from openpyxl.worksheet.datavalidation import DataValidation
+from openpyxl.worksheet.table import Table, TableFormula, TableStyleInfo
+from openpyxl.worksheet.worksheet import Worksheet
+
+from bifocal.io.survey_columns import Column, row_formula
+from bifocal.io.survey_words import label, word
+from photocore.bookrows import CellValue, RowBlock
+
+INPUT_FILL = PatternFill("solid", start_color="FFF9DB", end_color="FFF9DB")
+HEAD_FILL = PatternFill("solid", start_color="DCE6F1", end_color="DCE6F1")
+FORMULA_FONT = Font(color="1F3FA8")
+INPUT_EDGE = Border(*(Side(style="hair", color="BFBFBF"),) * 4)
+TITLE_FONT, HEAD_FONT, LABEL_FONT = Font(bold=True, size=14), Font(bold=True), Font(size=9)
+NOTE_FONT = Font(italic=True, color="595959")
+#: Fill and text of each flag; the word itself always stands in the cell too.
+FLAG_COLOURS = {
+    "OK": ("E2F0D9", "1E5B12"),
+    "ON-PLANE": ("DDEBF7", "1F4E79"),
+    "WEAK": ("FFF2CC", "7F6000"),
+    "UNCERTAIN": ("FCE4D6", "9C3D00"),
+    "NADIR": ("EDEDED", "3B3B3B"),
+    "OFF-RADIAL": ("F8CBCB", "8B0000"),
+    "CHECK": ("E4DFEC", "3F2A63"),
+}
+
+
+@dataclass(slots=True, eq=False)
+class BookBuilder:
+    """A workbook under construction with the values its formula cells will show."""
+
+    language: str
+    book: Workbook = field(default_factory=Workbook)
+    results: dict[str, dict[str, CellValue]] = field(default_factory=dict)
+    blocks: dict[str, RowBlock] = field(default_factory=dict)
+
+    def sheet(self, name: str, title: str, note: str = "") -> Worksheet:
+        """Add a sheet with its title and one line of help."""
+        first = len(self.book.sheetnames) == 1 and not self.results
+        sheet = self.book.active if first else self.book.create_sheet()
+        assert sheet is not None
+        sheet.title = name
+        self.results[name] = {}
+        sheet["A1"], sheet["A1"].font = title, TITLE_FONT
+        if note:
+            sheet["A2"], sheet["A2"].font = note, NOTE_FONT
+        sheet.sheet_view.showGridLines = False
+        sheet.sheet_view.zoomScale = 100
+        return sheet
+
+    def name(self, name: str, sheet: str, cell: str) -> None:
+        """Give a cell a name."""
+        absolute = re.sub(r"([A-Z]+)(\d+)", r"$\1$\2", cell)
+        self.book.defined_names[name] = DefinedName(name, attr_text=f"'{sheet}'!{absolute}")
+
+    def formula(
+        self,
+        sheet: Worksheet,
+        cell: str,
+        text: str,
+        value: CellValue,
+        *,
+        form: str = "",
+        name: str = "",
+        editable: bool = False,
+    ) -> None:
+        """Write a formula with its value."""
+        target = sheet[cell]
+        target.value, target.font = "=" + text, FORMULA_FONT
+        if form:
+            target.number_format = form
+        if editable:
+            target.fill, target.border = INPUT_FILL, INPUT_EDGE
+            target.protection = Protection(locked=False)
+        self.results[sheet.title][cell] = value
+        if name:
+            self.name(name, sheet.title, cell)
+
+    def input(
+        self,
+        sheet: Worksheet,
+        cell: str,
+        value: CellValue,
+        *,
+        form: str = "",
+        name: str = "",
+    ) -> None:
+        """Write a cell that the user fills in."""
+        target = sheet[cell]
+        if value is not None and value == value and value != "":
+            target.value = value
+            if isinstance(value, str):
+                target.data_type = "s"
+            else:
+                self.results[sheet.title][cell] = float(value)
+        target.fill, target.border = INPUT_FILL, INPUT_EDGE
+        target.protection = Protection(locked=False)
+        if form:
+            target.number_format = form
+        if name:
+            self.name(name, sheet.title, cell)
+
+    def text(self, sheet: Worksheet, cell: str, value: str, font: Font | None = None) -> None:
+        """Write a word."""
+        sheet[cell].value = value
+        sheet[cell].data_type = "s"
+        if font is not None:
+            sheet[cell].font = font
+
+    def table(
+        self,
+        sheet: Worksheet,
+        name: str,
+        columns: Sequence[Column],
+        *,
+        at: tuple[int, int],
+        rows: int,
+        cells: Mapping[str, Sequence[CellValue]],
+        repeat: bool = False,
+        short: bool = False,
+    ) -> None:
+        """Write a table: labels, keys, rows.
+
+        Parameters
+        ----------
+        at : tuple of int
+            Row of the keys (labels stand above) and first column.
+        rows : int
+            Rows of the table.
+        cells : mapping
+            Key to values; shorter than ``rows`` where the rest is blank.
+        repeat : bool
+            Write one prototype row and leave the rest to `finish_book`; for a table that starts in
+            column A and has nothing beside it.
+        short : bool
+            Write formulas as A1 references.
+        """
+        head, left = at
+        letters = {c.key: get_column_letter(left + i) for i, c in enumerate(columns)}
+        for i, column in enumerate(columns):
+            above, key = sheet.cell(head - 1, left + i), sheet.cell(head, left + i)
+            above.value, above.font = label(column.key, self.language), LABEL_FONT
+            above.alignment = Alignment(wrap_text=True, vertical="bottom", horizontal="center")
+            key.value, key.font, key.fill = column.key, HEAD_FONT, HEAD_FILL
+            key.alignment = Alignment(horizontal="center")
+            width = sheet.column_dimensions[letters[column.key]]
+            width.width = max(width.width if width.customWidth else 0, column.width)
+            if column.folded:
+                width.outlineLevel, width.hidden = 1, True
+            for row in range(head + 1, head + 1 + (1 if repeat else rows)):
+                cell = sheet.cell(row, left + i)
+                self._cell(cell, name, column, None if repeat else _at(cells, column, row - head))
+        sheet.row_dimensions[head - 1].height = 38
+        self._add_table(sheet, name, columns, at, rows)
+        if repeat:
+            self.blocks[sheet.title] = _block(name, columns, head + 1, rows, cells, letters, short)
+
+    def _cell(self, cell: object, table: str, column: Column, value: CellValue) -> None:
+        """Write one cell of a table."""
+        sheet, place = cell.parent, cell.coordinate  # type: ignore[attr-defined]
+        form = _number_format(column)
+        if column.kind == "formula":
+            self.formula(sheet, place, row_formula(table, column.formula)[1:], value, form=form)
+        elif column.kind == "input":
+            self.input(sheet, place, value, form=form)
+        else:
+            self.input(sheet, place, value, form=form)
+            sheet[place].fill, sheet[place].protection = PatternFill(), Protection(locked=True)
+        if column.key in ("flag", "use", "verdict"):
+            sheet[place].alignment = Alignment(horizontal="center")
+
+    def _add_table(
+        self, sheet: Worksheet, name: str, columns: Sequence[Column], at: tuple[int, int], rows: int
+    ) -> None:
+        head, left = at
+        last = get_column_letter(left + len(columns) - 1)
+        reference = f"{get_column_letter(left)}{head}:{last}{head + rows}"
+        table = Table(displayName=name, name=name, ref=reference)
+        table._initialise_columns()
+        for described, column in zip(table.tableColumns, columns, strict=True):
+            described.name = column.key
+            if column.kind == "formula":
+                text = row_formula(name, column.formula)[1:]
+                described.calculatedColumnFormula = TableFormula(attr_text=text)
+        table.tableStyleInfo = TableStyleInfo(name="TableStyleLight1", showRowStripes=False)
+        sheet.add_table(table)
+
+
+def _at(cells: Mapping[str, Sequence[CellValue]], column: Column, row: int) -> CellValue:
+    values = cells.get(column.key, ())
+    return values[row - 1] if row <= len(values) else None
+
+
+def _number_format(column: Column) -> str:
+    if column.places is not None:
+        return "0." + "0" * column.places if column.places else "0"
+    # Names typed as 1-2 must not turn into dates: text, but only where text is typed.
+    return "@" if column.kind == "input" and column.key in ("id", "code", "note") else "General"
+
+
+def _block(
+    table: str,
+    columns: Sequence[Column],
+    first: int,
+    rows: int,
+    cells: Mapping[str, Sequence[CellValue]],
+    letters: Mapping[str, str],
+    short: bool,
+) -> RowBlock:
+    """Return the rows that `finish_book` makes of the prototype."""
+    listed = [list(cells.get(column.key, ())) for column in columns]
+    listed = [values + [None] * (rows - len(values)) for values in listed]
+    formulas = {}
+    if short:
+        for i, column in enumerate(columns):
+            if column.kind == "formula":
+                formulas[i] = _short_formula(table, column.formula, letters, first - 1)
+    return RowBlock(row=first, columns=listed, formulas=formulas)
+
+
+def _short_formula(table: str, text: str, letters: Mapping[str, str], head: int):  # type: ignore[no-untyped-def]
+    """Return a function of the row that writes the formula with A1 references."""
+    text = text.replace(f"ROW()-ROW({table}[[#Headers],[id]])", "\0")
+    parts = re.split(r"\[@(\w+)\]", text)
+    pieces = [letters[part] if i % 2 else part for i, part in enumerate(parts)]
+
+    def formula(row: int) -> str:
+        joined = "".join(f"{part}{row}" if i % 2 else part for i, part in enumerate(pieces))
+        return joined.replace("\0", str(row - head))
+
+    return formula
+
+
+def flag_colours(sheet: Worksheet, letter: str, first: int, last: int) -> None:
+    """Colour the flags of a column; the word tells the same."""
+    for flag, (fill, text) in FLAG_COLOURS.items():
+        rule = FormulaRule(
+            formula=[f'${letter}{first}="{flag}"'],
+            fill=PatternFill("solid", start_color=fill, end_color=fill),
+            font=Font(color=text, bold=flag in ("OFF-RADIAL", "NADIR", "CHECK")),
+            stopIfTrue=True,
+        )
+        sheet.conditional_formatting.add(f"{letter}{first}:{letter}{last}", rule)
+
+
+def validate(
+    sheet: Worksheet,
+    cells: str,
+    *,
+    choices: str = "",
+    above_zero: bool = False,
+    between: tuple[float, float] | None = None,
+    prompt: str = "",
+) -> None:
+    """Refuse what cannot be meant."""
+    if choices:
+        rule = DataValidation(type="list", formula1=f'"{choices}"', allow_blank=True)
+    elif above_zero:
+        rule = DataValidation(type="decimal", operator="greaterThan", formula1="0")
+    else:
+        low, high = between or (-1e7, 1e7)
+        rule = DataValidation(
+            type="decimal", operator="between", formula1=f"{low:.0f}", formula2=f"{high:.0f}"
+        )
+    rule.allow_blank, rule.showErrorMessage = True, True
+    if prompt:
+        rule.promptTitle, rule.prompt, rule.showInputMessage = "bifocal", prompt[:250], True
+    rule.add(cells)
+    sheet.add_data_validation(rule)
+
+
+def set_up_print(
+    sheet: Worksheet, language: str, *, landscape: bool, repeat: str = "", fit: bool = True
+) -> None:
+    """Set A4, one page wide, repeated headings and a footer with the page number."""
+    sheet.page_setup.paperSize = sheet.PAPERSIZE_A4
+    sheet.page_setup.orientation = "landscape" if landscape else "portrait"
+    if fit:
+        sheet.sheet_properties.pageSetUpPr.fitToPage = True
+        sheet.page_setup.fitToWidth, sheet.page_setup.fitToHeight = 1, 0
+    if repeat:
+        sheet.print_title_rows = repeat
+    sheet.oddFooter.left.text = "&F · &A"
+    sheet.oddFooter.right.text = f"{word('page', language)} &P / &N"
+    margins = sheet.page_margins
+    margins.left = margins.right = 0.5
+    margins.top = margins.bottom = 0.6
+
+
+def protect(sheet: Worksheet) -> None:
+    """Protect formula cells against slips, without a password; filters and widths stay free."""
+    guard = sheet.protection
+    guard.sheet = True
+    guard.formatCells = guard.formatColumns = guard.formatRows = False
+    guard.sort = guard.autoFilter = False
