@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -12,6 +13,10 @@ from photocore.errors import InputError
 
 #: Codes that mark a point as lying on the reference plane (r = 0), for the set-up check.
 PLANE_CODES = ("PLANE", "PIANO", "EBENE")
+
+
+#: Stands for columns that were not given; replaced by blanks when the object is made.
+_ABSENT: Any = None
 
 
 def _blank(points: int, columns: int) -> FloatArray:
@@ -44,15 +49,15 @@ class PointObservations:
     """
 
     ids: tuple[str, ...]
-    xy1: FloatArray = field(default=None)  # type: ignore[assignment]
-    xy2: FloatArray = field(default=None)  # type: ignore[assignment]
-    polar: FloatArray = field(default=None)  # type: ignore[assignment]
-    pixels1: FloatArray = field(default=None)  # type: ignore[assignment]
-    pixels2: FloatArray = field(default=None)  # type: ignore[assignment]
-    use: BoolArray = field(default=None)  # type: ignore[assignment]
+    xy1: FloatArray = _ABSENT
+    xy2: FloatArray = _ABSENT
+    polar: FloatArray = _ABSENT
+    pixels1: FloatArray = _ABSENT
+    pixels2: FloatArray = _ABSENT
+    use: BoolArray = _ABSENT
     code: tuple[str, ...] = ()
     note: tuple[str, ...] = ()
-    r_measured: FloatArray = field(default=None)  # type: ignore[assignment]
+    r_measured: FloatArray = _ABSENT
 
     def __post_init__(self) -> None:
         n, set_ = len(self.ids), object.__setattr__
@@ -109,8 +114,6 @@ class PointObservations:
         index = np.arange(len(self))[np.asarray(rows)]
         arrays = ("xy1", "xy2", "polar", "pixels1", "pixels2", "use", "r_measured")
         words = ("ids", "code", "note")
-        return replace(
-            self,
-            **{name: getattr(self, name)[index] for name in arrays},
-            **{name: tuple(getattr(self, name)[i] for i in index) for name in words},
-        )
+        chosen: dict[str, Any] = {name: getattr(self, name)[index] for name in arrays}
+        chosen |= {name: tuple(getattr(self, name)[i] for i in index) for name in words}
+        return replace(self, **chosen)

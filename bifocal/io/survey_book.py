@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+from collections.abc import Mapping
 from pathlib import Path
 
 from openpyxl.worksheet.worksheet import Worksheet
@@ -18,6 +19,7 @@ from bifocal.io.survey_content import (
     result_cells,
     setup_cells,
 )
+from bifocal.io.survey_defaults import IDEAL_FORMULAS, PAIR_FORMULAS
 from bifocal.io.survey_sheets import (
     HEAD_FONT,
     LABEL_FONT,
@@ -39,28 +41,6 @@ _DERIVED = "m_1 m_2 k_12 b_lever unit_x unit_y off_x1 off_y1 off_x2 off_y2"
 _FORMS = {"d_1": "0.000", "d_2": "0.000", "delta_d": "0.000", "pitch": "0.000000"}
 _FORMS |= {"m_1": "0.00", "m_2": "0.00", "k_12": "0.000000", "b_lever": "0.000"}
 _FORMS |= {"sigma_s": "0.000000", "sigma_r_max": "0.0000"}
-_FORMULAS = {
-    "d_1": 'IF(COUNT(d_2,delta_d)=2,d_2+delta_d,"")',
-    "sigma_s": "IF(COUNT(pitch)=1,0.5*pitch,0.004)",
-    "sigma_r_max": 'IF(COUNT(d_1,d_2)=2,0.02*MIN(d_1,d_2),"")',
-    "m_1": 'IF(COUNT(c_1,d_1)=2,1000*d_1/c_1,"")',
-    "m_2": 'IF(COUNT(c_2,d_2)=2,1000*d_2/c_2,"")',
-    "k_12": "IF(COUNT(m_1,m_2)=2,m_2/m_1,1)",
-    "b_lever": 'IF(COUNT(d_1,d_2)=2,IF(d_1=d_2,"",d_1*d_2/(d_1-d_2)),"")',
-    "unit_x": 'IF(input_unit="px",pitch,1)',
-    "unit_y": 'IF(input_unit="px",-pitch,1)',
-    "off_x1": 'IF(input_unit="px",nadir_1_col,0)',
-    "off_y1": 'IF(input_unit="px",nadir_1_row,0)',
-    "off_x2": 'IF(input_unit="px",nadir_2_col,0)',
-    "off_y2": 'IF(input_unit="px",nadir_2_row,0)',
-}
-_PAIR_FORMULAS = {
-    **{key: _FORMULAS[key] for key in ("d_1", "sigma_r_max", "b_lever")},
-    "sigma_s": "sigma_px*pixel_mm",
-    "m_1": "IF(COUNT(c_1)=1,1000*d_1/c_1,1000)",
-    "e_x": "(d_1*n2_x-d_2*n1_x)/(d_1-d_2)",
-    "e_y": "(d_1*n2_y-d_2*n1_y)/(d_1-d_2)",
-}
 
 
 def write_book(path: Path | str, content: SurveyContent, *, overwrite: bool = False) -> None:
@@ -127,10 +107,10 @@ def _setup(builder: BookBuilder, content: SurveyContent) -> None:
     cells = setup_cells(content)
     if content.is_pair:
         groups = _pair_groups()
-        formulas = _PAIR_FORMULAS
+        formulas = PAIR_FORMULAS
     else:
         groups = [_TYPED.split(), _LIMITS.split(), _DERIVED.split()]
-        formulas = _FORMULAS
+        formulas = IDEAL_FORMULAS
     derived = set(groups[-1])
     row = 5
     for group in groups:
@@ -158,7 +138,7 @@ def _setup_cell(
     row: int,
     name: str,
     cells: dict[str, CellValue],
-    formulas: dict[str, str],
+    formulas: Mapping[str, str],
     *,
     typed: bool,
     content: SurveyContent,

@@ -40,7 +40,7 @@ def charts(
             sheet, f"{letter}{HEAD + 1}", f"IF(ISNUMBER({found}),{found},NA())", None, form="0.000"
         )
         sheet[f"{letter}{HEAD + 1}"].font = Font(color="A6A6A6", size=8)
-        listed = [
+        listed: list[CellValue] = [
             value if isinstance(value, int | float) else float("nan")
             for value in cells.get(key, [])[:rows]
         ]

@@ -134,18 +134,17 @@ def georeference(builder: BookBuilder, content: SurveyContent, cells: Cells) -> 
     language = builder.language
     sheet = builder.sheet("Georeference", word("Georeference", language), word("geo_how", language))
     _parameters(builder, content)
+    spare: dict[str, list[CellValue]] = {
+        key: [*cells.get(key, []), *[0] * content.control_rows]
+        for key in ("w", "cX", "cY", "cZ", "cE", "cN", "cH")
+    }
     builder.table(
         sheet,
         "tblGeo",
         GEOREFERENCE,
         at=(CONTROL_HEAD, 1),
         rows=content.control_rows,
-        cells=cells
-        | {"w": cells.get("w", []) + [0] * content.control_rows}
-        | {
-            f"c{axis}": cells.get(f"c{axis}", []) + [0.0] * content.control_rows
-            for axis in "XYZENH"
-        },
+        cells=dict(cells) | spare,
     )
     sheet.column_dimensions["A"].width = 34
     first, last = CONTROL_HEAD + 1, CONTROL_HEAD + content.control_rows

@@ -327,7 +327,7 @@ WORDS: Mapping[str, tuple[str, str, str]] = {
     ),
     "points_how": (
         "Give x1 y1 x2 y2 (both photos) or s1 s2 theta. Code PLANE = lies on the reference plane.",
-        "Dare x1 y1 x2 y2 (ambedue le foto) o s1 s2 theta. Codice PIANO = sul piano di riferimento.",
+        "Dare x1 y1 x2 y2 (due foto) o s1 s2 theta. Codice PIANO = sul piano di riferimento.",
         "x1 y1 x2 y2 (beide Bilder) oder s1 s2 theta. Code EBENE = liegt auf der Bezugsebene.",
     ),
     "points_pair": (

@@ -77,10 +77,8 @@ def georeference(table: ReliefTable, control: KnownPoints, *, model: str = "auto
     rows = [place.get(name, -1) for name in control.ids]
     found = xyz[rows] if rows else np.zeros((0, 3))
     flat = bool(np.isnan(control.xyz[:, 2]).all())
-    if model == "auto":
-        names = ("2D",) if flat else ("levelled", "3D")
-    else:
-        names = (model,)
+    simplest = ("2D",) if flat else ("levelled", "3D")
+    names = simplest if model == "auto" else (model,)
     usable = {
         name: control.used
         & ~np.isnan(found).any(axis=1)

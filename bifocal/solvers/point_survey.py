@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from bifocal import rays
@@ -146,7 +148,9 @@ def solve_pair(
         jacobian = photo.metres_per_pixel(pixels)
         positions.append(photo.plane_from_pixels(pixels))
         spreads.append(jacobian @ jacobian.transpose(0, 2, 1) * sigma**2)
-    a1, a2, _ = rays.adjust_onto_epipolar_line(*positions, *spreads, centre)
+    a1, a2, _ = rays.adjust_onto_epipolar_line(
+        positions[0], positions[1], spreads[0], spreads[1], centre
+    )
     x1, x2 = ((p - centre) * to_mm for p in positions)
     radius = np.hypot(x1[:, 0], x1[:, 1])
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -205,7 +209,7 @@ def _relief_columns(s1: FloatArray, s2: FloatArray, d1: float, d2: float) -> dic
 
 
 def _misfit_spread(
-    x1: FloatArray, x2: FloatArray, spreads: list[FloatArray], to_mm: float
+    x1: FloatArray, x2: FloatArray, spreads: Sequence[FloatArray], to_mm: float
 ) -> FloatArray:
     """Return the standard deviation of q. [mm]"""
     g1 = np.stack([x2[:, 1], -x2[:, 0]], axis=-1)

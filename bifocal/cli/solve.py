@@ -1,0 +1,148 @@
+"""``bifocal solve``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import click
+
+from photocore.console import remark, text_table
+
+EXAMPLE = """\b
+Examples:
+  bifocal solve survey.xlsx --out result.xlsx
+  bifocal solve points.csv --pair wall.pair.json --json
+  bifocal solve points.csv --d1 17.5 --d2 9.5 --c1 35 --c2 19 --out result.csv
+  bifocal solve old.xlsx --columns "id=A,s1=distance far,s2=D" --d1 17.5 --d2 9.5
+"""
+#: Points shown on the screen; the files hold all.
+SHOWN = 40
+
+
+@click.command(short_help="Relief, coordinates and precision of measured points.", epilog=EXAMPLE)
+@click.argument("survey", type=click.Path(path_type=Path), metavar="SURVEY")
+@click.option(
+    "--out",
+    type=click.Path(path_type=Path),
+    metavar="FILE",
+    help="Result: a workbook (.xlsx, .xlsm) or a text table (.csv).  [default: none]",
+)
+@click.option(
+    "--pair",
+    type=click.Path(path_type=Path),
+    metavar="PAIR.pair.json",
+    help="Pair file, for points in raw pixels.  [default: the workbook's own set-up]",
+)
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
+@click.option(
+    "--columns",
+    metavar="MAP",
+    help='Which column is which: "id=A,s1=My heading" or "id,x1,y1,x2,y2" for tables without '
+    "headings.  [default: found by heading]",
+)
+@click.option("--sheet", metavar="NAME", help="Sheet of the points.  [default: found]")
+@click.option(
+    "--decimal",
+    type=click.Choice(["point", "comma"]),
+    help="Decimal separator of numbers typed as text.  [default: found]",
+)
+@click.option("--visible-only", is_flag=True, help="Leave out hidden and filtered rows.")
+@click.option("--d1", type=float, metavar="M", help="Distance of camera 1 [m].  [default: Setup]")
+@click.option("--d2", type=float, metavar="M", help="Distance of camera 2 [m].  [default: Setup]")
+@click.option(
+    "--c1", type=float, metavar="MM", help="Principal distance of image 1 [mm].  [default: Setup]"
+)
+@click.option(
+    "--c2", type=float, metavar="MM", help="Principal distance of image 2 [mm].  [default: Setup]"
+)
+@click.option("--pitch", type=float, metavar="MM", help="Size of a pixel [mm].  [default: Setup]")
+@click.option(
+    "--unit",
+    type=click.Choice(["mm", "px"]),
+    help="Unit of x1 y1 x2 y2.  [default: as headings or Setup say, else mm]",
+)
+@click.option(
+    "--sigma-s",
+    type=float,
+    metavar="MM",
+    help="Precision of an image coordinate [mm].  [default: Setup, else 0.5 px]",
+)
+@click.option(
+    "--sigma-px",
+    type=float,
+    metavar="PX",
+    help="Precision of a raw pixel [px].  [default: the pair file's, else from the misfits of 20 "
+    "or more points, else 0.5]",
+)
+@click.option(
+    "--sigma-r-max",
+    type=float,
+    metavar="M",
+    help="Sigma of r beyond which a point is UNCERTAIN [m].  [default: 2 % of d2]",
+)
+@click.option(
+    "--adjust-setup",
+    is_flag=True,
+    help="Correct the set-up by points of the reference plane (code PLANE, r = 0).",
+)
+@click.option(
+    "--georeference",
+    "model",
+    type=click.Choice(["auto", "levelled", "3D", "2D"]),
+    help="Model of the roto-translation.  [default: the workbook's, else auto]",
+)
+@click.option(
+    "--scale-tolerance",
+    type=float,
+    default=0.02,
+    show_default=True,
+    metavar="SHARE",
+    help="Share by which the scales of both photos may differ.",
+)
+@click.option(
+    "--tolerance-rule",
+    "rules",
+    multiple=True,
+    metavar="RULE",
+    help="Rule for the verdict: line-0.18, print-0.25, eckstein, a number of mm at scale "
+    "(0.2mm) or fixed cm (2cm); repeat it.  [default: the three named]",
+)
+@click.option(
+    "--lang",
+    "language",
+    type=click.Choice(["en", "it", "de"]),
+    help="Language of a new workbook.  [default: the survey's, else en]",
+)
+@click.option("--overwrite", is_flag=True, help="Replace an existing file.")
+def command(
+    survey: Path, out: Path | None, as_json: bool, language: str | None, overwrite: bool,
+    **options: Any,
+) -> None:  # fmt: skip
+    """Solve measured points: relief r, displacements, coordinates, precision, check points.
+
+    SURVEY is a survey workbook, or any table (.xlsx, .xlsm, .ods, .csv) with the headings id and
+    x1 y1 x2 y2, or s1 s2 theta, or col1 row1 col2 row2 (raw pixels, with --pair).
+    """
+    from bifocal.workflows.solve import solve_file
+    from bifocal.workflows.solve_options import solve_options
+    from bifocal.workflows.solve_output import point_rows, solution_json, summary, write_result
+    from photocore.output import check_writable
+
+    if out is not None:
+        check_writable(out, overwrite=overwrite)
+    solution = solve_file(survey, solve_options(**options))
+    for text in solution.remarks:
+        remark(text)
+    if out is not None:
+        write_result(out, solution, language=language, overwrite=overwrite)
+        remark(f"{out}: {len(solution.table)} points written.")
+    if as_json:
+        click.echo(solution_json(solution))
+        return
+    headings = ["id", "r [m]", "e1 [mm]", "e2 [mm]", "X [m]", "Y [m]", "sigma_r [m]", "flag"]
+    click.echo(text_table(headings, point_rows(solution, SHOWN)))
+    if len(solution.table) > SHOWN:
+        click.echo(f"... and {len(solution.table) - SHOWN} more points (--json or --out for all).")
+    for line in summary(solution):
+        click.echo(line)

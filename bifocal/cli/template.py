@@ -1,0 +1,33 @@
+"""``bifocal template``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from photocore.console import remark
+
+EXAMPLE = """\b
+Examples:
+  bifocal template survey.xlsx
+  bifocal template rilievo.xlsx --lang it
+"""
+
+
+@click.command(short_help="An empty survey workbook with live formulas.", epilog=EXAMPLE)
+@click.argument("out", type=click.Path(path_type=Path), metavar="OUT.xlsx")
+@click.option(
+    "--lang", "language", type=click.Choice(["en", "it", "de"]), default="en", show_default=True,
+    help="Language of labels and help.",
+)  # fmt: skip
+@click.option("--overwrite", is_flag=True, help="Replace an existing file.")
+def command(out: Path, language: str, overwrite: bool) -> None:
+    """Write an empty survey workbook: type what you measured, relief appears beside it.
+
+    Every result is a live formula; the workbook needs neither this program nor macros.
+    """
+    from bifocal.workflows.survey import write_template
+
+    write_template(out, language=language, overwrite=overwrite)
+    remark(f"{out}: fill in Setup and Points; then: bifocal solve {out} --out result.xlsx")

@@ -1,0 +1,515 @@
+"""Read measured points from whatever people bring: our workbook, their own, or a text table."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+
+from bifocal.domain.lens import Lens
+from bifocal.domain.observations import PointObservations
+from bifocal.domain.pair import Pair, Photo
+from bifocal.domain.reference import KnownPoints
+from bifocal.io.survey_setup_reader import SetupValues, read_setup
+from bifocal.io.survey_words import ALIASES, COLUMNS, LANGUAGES, WORDS
+from photocore.arrays import BoolArray, FloatArray
+from photocore.errors import CellError, InputError, WorkbookError
+from photocore.spreadsheet.grid import SheetFile
+from photocore.tables import Column, Table, open_tables, read_named_values, read_table
+from photocore.tables.csvread import CsvFile
+from photocore.tables.headings import bare
+from photocore.tables.numbers import Decimal
+
+_XY, _POLAR = ("x1", "y1", "x2", "y2"), ("s1", "s2", "theta")
+_PIXELS = ("col1", "row1", "col2", "row2")
+_TEXT, _FLAG = ("id", "code", "note"), ("use",)
+#: Coordinates of both photos under one heading each, in the order of the photos.
+_SHARED = {"x1": "x", "y1": "y", "x2": "x", "y2": "y"} | {
+    "col1": "col", "row1": "row", "col2": "col", "row2": "row"
+}  # fmt: skip
+_FAR_NEAR = {"1": ("far", "lontana", "fern"), "2": ("near", "vicina", "nah")}
+_TO_MM = {"mm": 1.0, "cm": 10.0, "um": 1e-3, "m": 1000.0}
+_TO_M = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "dm": 0.1}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class SurveyInput:
+    """What a survey file holds, checked cell by cell.
+
+    Attributes
+    ----------
+    points : PointObservations
+        Measured points.
+    setup : SetupValues
+        The cells of `Setup` that were found.
+    unit : str
+        Unit of x1..y2 that the headings say; empty where they say none.
+    known, control : KnownPoints
+        Check points and control points.
+    model : str
+        Georeference model asked for.
+    language : str
+        Of the workbook; ``en`` for other files.
+    is_ours : bool
+        Whether it is a survey workbook with live formulas.
+    table : Table
+        The table of points, with the way back to its cells.
+    remarks : tuple of str
+        What the user should know.
+    """
+
+    points: PointObservations
+    setup: SetupValues
+    unit: str
+    known: KnownPoints
+    control: KnownPoints
+    model: str
+    language: str
+    is_ours: bool
+    table: Table
+    remarks: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ReadOptions:
+    """How to read: columns by hand, sheet, decimal separator, hidden rows.
+
+    Attributes
+    ----------
+    columns : mapping
+        Key to heading or column letter.
+    sheet : str or None
+        The sheet of the points.
+    decimal : {"point", "comma"} or None
+        Decimal separator of numbers typed as text.
+    visible_only : bool
+        Leave hidden rows out.
+    """
+
+    columns: Mapping[str, str] = field(default_factory=dict)
+    sheet: str | None = None
+    decimal: Decimal | None = None
+    visible_only: bool = False
+
+
+def point_columns(*, shared: bool = False) -> list[Column]:
+    """Return the columns of measured points with every heading that is understood.
+
+    Parameters
+    ----------
+    shared : bool
+        Also take the headings "x y x y" and "col row col row" for photos 1 and 2. Tables of points
+        often hold X and Y on the wall too, so this is tried only where nothing else fits.
+    """
+    keys = ("id", *_XY, *_POLAR, *_PIXELS, *_FLAG, "code", "note", "r_measured")
+    columns = []
+    for key in keys:
+        names = [name for name in COLUMNS.get(key, ("", "", "", ""))[1:] if name]
+        names += ALIASES.get(key, ())
+        if shared and key in _SHARED:
+            names.append(_SHARED[key])
+        if key in _PIXELS:
+            axis = "x" if key.startswith("col") else "y"
+            names += [f"{axis} {word} px" for word in _FAR_NEAR[key[-1]]]
+            names += [f"{key[:3]} {word}" for word in _FAR_NEAR[key[-1]]]
+        kind: Literal["number", "flag", "text"] = "number"
+        if key in _TEXT:
+            kind = "text"
+        elif key in _FLAG:
+            kind = "flag"
+        unit = {"theta": "deg", "r_measured": "m", "s1": "mm", "s2": "mm"}.get(key, "")
+        if key in _PIXELS:
+            unit = "px"
+        columns.append(Column(key, tuple(dict.fromkeys(names)), kind=kind, unit=unit))
+    return columns
+
+
+def read_survey(path: Path | str, options: ReadOptions | None = None) -> SurveyInput:
+    """Read a survey: points, set-up, check points and control points.
+
+    Parameters
+    ----------
+    path : path
+        ``.xlsx``, ``.xlsm``, ``.ods`` or ``.csv``.
+    options : ReadOptions, optional
+        How to read.
+
+    Returns
+    -------
+    SurveyInput
+
+    Raises
+    ------
+    WorkbookError
+        Naming every bad cell of all sheets.
+    InputError
+        If the file or a sheet cannot be used at all.
+    """
+    options = options or ReadOptions()
+    book = open_tables(path)
+    errors: list[CellError] = []
+    table = _read_points(book, options, errors)
+    _require_coordinates(table, book, path)
+    points, unit = _observations(table, errors)
+    remarks = list(table.remarks)
+    sheets = book if isinstance(book, SheetFile) else None
+    setup = read_setup(Path(path), sheets, options.decimal, errors)
+    remarks += setup.remarks
+    known = _known(book, "Check", ("X_ref", "Y_ref", "Z_ref"), errors, remarks, options)
+    control = _known(book, "Georeference", ("E", "N", "H"), errors, remarks, options)
+    model, language = "auto", "en"
+    if isinstance(book, SheetFile):
+        model = (
+            read_named_values(
+                book, [Column("g_model", kind="text")], sheet="Georeference", errors=errors
+            ).text("g_model")
+            or "auto"
+        )
+        language = _language(book)
+    if errors:
+        raise WorkbookError(errors)
+    return SurveyInput(
+        points=points,
+        setup=setup,
+        unit=unit,
+        known=_with_measured(known, points),
+        control=control,
+        model=model,
+        language=language,
+        is_ours=isinstance(book, SheetFile)
+        and any(area.name == "tblPoints" for area in book.tables),
+        table=table,
+        remarks=tuple(dict.fromkeys(remarks)),
+    )
+
+
+def _read_points(
+    book: SheetFile | CsvFile, options: ReadOptions, errors: list[CellError]
+) -> Table:
+    """Return the table of points; headings that both photos share are the last resort."""
+    for shared in (False, True):
+        found: list[CellError] = []
+        try:
+            table = read_table(
+                book,
+                point_columns(shared=shared),
+                name="Points",
+                sheet=options.sheet,
+                decimal=options.decimal,
+                column_map=options.columns or None,
+                visible_only=options.visible_only,
+                errors=found,
+            )
+        except InputError:
+            if shared:
+                raise
+            continue
+        if shared or table.present & {*_XY, *_PIXELS, "s1", "s2"}:
+            break
+    errors += found
+    return table
+
+
+def _require_coordinates(table: Table, book: object, path: Path | str) -> None:
+    """Refuse a table without the coordinates of both photos.
+
+    Raises
+    ------
+    InputError
+        Naming the missing sheet or columns.
+    """
+    have = table.present
+    for keys in (_XY, _PIXELS, ("s1", "s2")):
+        if have.issuperset(keys):
+            return
+    where = f"{table.file} › {table.sheet}" if table.sheet else table.file
+    ours = isinstance(book, SheetFile) and bare(table.sheet) != "points"
+    if ours and not any(bare(title) == "points" for title in book.titles):  # type: ignore[attr-defined]
+        shown = ", ".join(f'"{title}"' for title in book.titles)  # type: ignore[attr-defined]
+        raise InputError(
+            f'{Path(path).name}: there is no sheet "Points" and no other table of points measured '
+            f"on both photos (looked in {shown}). It needs the headings x1 y1 x2 y2, or s1 s2 "
+            "theta, or col1 row1 col2 row2; say which columns they are with --columns."
+        )
+    groups = [keys for keys in (_XY, _PIXELS, ("s1", "s2")) if have & set(keys)]
+    wanted = groups[0] if groups else _XY
+    missing = ", ".join(key for key in wanted if key not in have)
+    raise InputError(
+        f"{where}: there is no column {missing}. Points need x1 y1 x2 y2 [mm or px], or s1 s2 [mm] "
+        'and theta, or col1 row1 col2 row2 [px]; say which columns they are: --columns "id=A,...".'
+    )
+
+
+def _observations(table: Table, errors: list[CellError]) -> tuple[PointObservations, str]:
+    """Return the points and the unit of x1..y2 that the headings say."""
+    faulty = {(error.cell, error.column) for error in errors}
+    ids = table.texts("id")
+    if "id" not in table.present:
+        ids = [str(number) for number in range(1, len(table) + 1)]
+    ids = [name or "" for name in ids]
+    errors += table.repeated("id")
+    use = table.numbers("use")
+    used: BoolArray = np.isnan(use) | (use != 0)
+    unit, factor = _unit_of_xy(table, errors)
+    xy = _stack(table, _XY) * factor
+    polar = _stack(table, _POLAR)
+    for i, key in enumerate(("s1", "s2")):
+        symbol = table.units.get(key, "mm") or "mm"
+        if symbol not in _TO_MM:
+            errors.append(_unit_error(table, key, symbol, "mm"))
+        else:
+            polar[:, i] *= _TO_MM[symbol]
+    polar[:, 2] = _degrees(table, polar[:, 2], errors)
+    pixels = _stack(table, _PIXELS)
+    for key in _PIXELS:
+        if table.units.get(key, "px") not in ("px", ""):
+            errors.append(_unit_error(table, key, table.units[key], "px"))
+    measured = table.numbers("r_measured") * _metres(table, "r_measured", errors)
+    _check_rows(table, ids, used, xy, polar, pixels, faulty, errors)
+    if errors:
+        ids = [name or f"row {row}" for name, row in zip(ids, table.rows, strict=True)]
+    points = PointObservations(
+        ids=tuple(ids),
+        xy1=xy[:, :2],
+        xy2=xy[:, 2:],
+        polar=polar,
+        pixels1=pixels[:, :2],
+        pixels2=pixels[:, 2:],
+        use=used,
+        code=tuple(table.texts("code")),
+        note=tuple(table.texts("note")),
+        r_measured=measured,
+    )
+    return points, unit
+
+
+def _stack(table: Table, keys: Sequence[str]) -> FloatArray:
+    return np.stack([table.numbers(key) for key in keys], axis=-1).reshape(-1, len(keys))
+
+
+def _unit_of_xy(table: Table, errors: list[CellError]) -> tuple[str, float]:
+    """Return ``mm`` or ``px`` as the headings say, and the factor to it."""
+    said = {key: table.units[key] for key in _XY if table.units.get(key)}
+    kinds = set(said.values())
+    if not kinds:
+        return "", 1.0
+    if len(kinds) > 1:
+        key = next(iter(said))
+        shown = ", ".join(f"{name} [{symbol}]" for name, symbol in said.items())
+        errors.append(
+            CellError(
+                f"the coordinates have different units: {shown}. Give all in mm or all in px.",
+                file=table.file,
+                sheet=table.sheet,
+                column=key,
+            )
+        )
+        return "", 1.0
+    symbol = kinds.pop()
+    if symbol == "px":
+        return "px", 1.0
+    if symbol not in _TO_MM:
+        errors.append(_unit_error(table, next(iter(said)), symbol, "mm or px"))
+        return "", 1.0
+    return "mm", _TO_MM[symbol]
+
+
+def _unit_error(table: Table, key: str, symbol: str, wanted: str) -> CellError:
+    return CellError(
+        f'the heading "{table.headings.get(key, key)}" says [{symbol}], expected [{wanted}].',
+        file=table.file,
+        sheet=table.sheet,
+        column=key,
+    )
+
+
+def _metres(table: Table, key: str, errors: list[CellError]) -> float:
+    symbol = table.units.get(key) or "m"
+    if symbol not in _TO_M:
+        errors.append(_unit_error(table, key, symbol, "m"))
+        return 1.0
+    return _TO_M[symbol]
+
+
+def _degrees(table: Table, theta: FloatArray, errors: list[CellError]) -> FloatArray:
+    symbol = table.units.get("theta") or "deg"
+    if symbol == "gon":
+        return np.asarray(theta * 0.9)
+    if symbol == "rad":
+        return np.degrees(theta)
+    if symbol != "deg":
+        errors.append(_unit_error(table, "theta", symbol, "deg"))
+    return theta
+
+
+def _check_rows(
+    table: Table,
+    ids: Sequence[str],
+    used: BoolArray,
+    xy: FloatArray,
+    polar: FloatArray,
+    pixels: FloatArray,
+    faulty: set[tuple[str, str]],
+    errors: list[CellError],
+) -> None:
+    """Complain about points without a name, measured on one photo only, or with s <= 0."""
+    for row in range(len(table)):
+        if used[row] and not ids[row]:
+            errors.append(table.error(row, "id", "the point has no name; give it one."))
+    groups = ((_XY, xy), (_PIXELS, pixels), (("s1", "s2"), polar[:, :2]))
+    for keys, values in groups:
+        given = ~np.isnan(values)
+        partly = used & given.any(axis=1) & ~given.all(axis=1)
+        if keys == ("s1", "s2"):
+            # Image coordinates, where both photos have them, make the radial distances idle.
+            partly &= np.isnan(xy).all(axis=1)
+        for row in np.flatnonzero(partly).tolist():
+            lacking = [key for i, key in enumerate(keys) if not given[row, i]]
+            if any((table.cell(row, key), key) in faulty for key in lacking):
+                continue  # its own complaint stands already
+            errors.append(table.error(row, lacking[0], _incomplete(ids[row], keys, lacking)))
+    if "s1" in table.present or "s2" in table.present:
+        for i, key in enumerate(("s1", "s2")):
+            for row in np.flatnonzero(used & (polar[:, i] <= 0)).tolist():
+                errors.append(
+                    table.error(
+                        row,
+                        key,
+                        f"{polar[row, i]:g} mm at point {ids[row]}: a radial distance must be "
+                        "above zero; at the nadir itself there is no relief to measure. Set use = "
+                        "0 or measure it again.",
+                    )
+                )
+
+
+def _incomplete(name: str, keys: Sequence[str], lacking: Sequence[str]) -> str:
+    images = {key[-1] for key in lacking}
+    here = {key[-1] for key in keys if key not in lacking}
+    if len(images) == 1 and images.isdisjoint(here):
+        other = "2" if images == {"1"} else "1"
+        return (
+            f"point {name} is measured only on image {other}; measure it on image "
+            f"{images.pop()} too, or set use = 0."
+        )
+    return f"point {name} lacks {', '.join(lacking)}; complete it, or set use = 0."
+
+
+def _known(
+    book: object,
+    sheet: str,
+    keys: tuple[str, str, str],
+    errors: list[CellError],
+    remarks: list[str],
+    options: ReadOptions,
+) -> KnownPoints:
+    """Return check or control points of the sheet made for them; none where it is absent."""
+    if not isinstance(book, SheetFile):
+        return KnownPoints()
+    names = {bare(sheet), bare(f"tbl{sheet}"), "tblgeo" if sheet == "Georeference" else ""}
+    areas = [area for area in book.tables if bare(area.name) in names]
+    titles = [title for title in book.titles if bare(title) in names]
+    if not areas and not titles:
+        return KnownPoints()
+    columns = [_plain_column("id", "text")]
+    columns += [_plain_column(key, "number") for key in keys]
+    columns.append(_plain_column("use", "flag"))
+    table = read_table(
+        book,
+        columns,
+        name="Geo" if sheet == "Georeference" and areas else sheet,
+        sheet=areas[0].sheet if areas else titles[0],
+        decimal=options.decimal,
+        errors=errors,
+    )
+    remarks += [text for text in table.remarks if "rows directly below" not in text]
+    errors += table.repeated("id")
+    xyz = np.stack(
+        [table.numbers(key) * _metres(table, key, errors) for key in keys], axis=-1
+    ).reshape(-1, 3)
+    use = table.numbers("use")
+    rows = [i for i, name in enumerate(table.texts("id")) if name]
+    for i, name in enumerate(table.texts("id")):
+        if not name and not np.isnan(xyz[i]).all():
+            errors.append(table.error(i, "id", "coordinates without the name of a point."))
+    return KnownPoints(
+        ids=tuple(table.texts("id")[i] for i in rows),
+        xyz=xyz[rows],
+        use=(np.isnan(use) | (use != 0))[rows],
+    )
+
+
+def _plain_column(key: str, kind: Literal["number", "flag", "text"]) -> Column:
+    names = [name for name in COLUMNS[key][1:] if name] + list(ALIASES.get(key, ()))
+    if key in ("E", "N", "H"):
+        names += {"E": ["Easting", "Rechtswert"], "N": ["Northing", "Hochwert"],
+                  "H": ["Elevation", "Z world"]}[key]  # fmt: skip
+    return Column(key, tuple(names), kind=kind, required=key == "id")
+
+
+def _with_measured(known: KnownPoints, points: PointObservations) -> KnownPoints:
+    """Add relief measured on site, given beside the points, to the check points."""
+    rows = [
+        i
+        for i in np.flatnonzero(~np.isnan(points.r_measured) & points.use)
+        if points.ids[i] not in known.ids
+    ]
+    if not rows:
+        return known
+    nothing = np.full(len(rows), np.nan)
+    more = np.stack([nothing, nothing, points.r_measured[rows]], axis=-1)
+    return KnownPoints(
+        ids=(*known.ids, *(points.ids[i] for i in rows)),
+        xyz=np.vstack([known.xyz, more]),
+        use=np.concatenate([known.used, np.ones(len(rows), dtype=bool)]),
+    )
+
+
+def _language(book: SheetFile) -> str:
+    """Return the language of a survey workbook by the title of its sheet `Points`."""
+    title = next((name for name in book.titles if bare(name) == "points"), None)
+    if title is not None:
+        words = {str(cell) for cell in book.grid(title).rows.get(1, {}).values()}
+        for language, text in zip(LANGUAGES, WORDS["Points"], strict=True):
+            if text in words:
+                return language
+    return "en"
+
+
+def pair_of(values: SetupValues, folder: Path) -> Pair | None:
+    """Return the general pair that a workbook's `Setup` describes; None if it describes none.
+
+    Parameters
+    ----------
+    values : SetupValues
+        The cells of `Setup`.
+    folder : Path
+        Where the workbook lies; a pair file with lens distortion is looked for from there.
+    """
+    matrices = values.matrices
+    if matrices is None or values.d1 is None or values.d2 is None:
+        return None
+    lenses: list[Lens | None] = [None, None]
+    file = folder / values.pair_file if values.pair_file else None
+    if file is not None and file.is_file():
+        try:
+            given = Pair.read(file)
+            lenses = [given.image1.lens, given.image2.lens]
+        except InputError:
+            lenses = [None, None]
+    photos = [
+        Photo(
+            plane_from_pixel=matrix,
+            nadir=nadir,
+            distance=distance,
+            lens=lens,
+            extra={} if c is None else {"principal_distance": c},
+        )
+        for matrix, nadir, distance, lens, c in zip(
+            matrices, values.nadirs, (values.d1, values.d2), lenses, (values.c1, values.c2),
+            strict=True,
+        )
+    ]  # fmt: skip
+    return Pair(image1=photos[0], image2=photos[1], folder=folder)

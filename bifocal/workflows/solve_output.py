@@ -1,0 +1,240 @@
+"""What `bifocal solve` shows and writes: a table, JSON, a workbook, a text table."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+from typing import Any
+
+from bifocal.domain.tolerances import sentence
+from bifocal.io.survey_book import write_book
+from bifocal.io.survey_content import SurveyContent
+from bifocal.workflows.solve import Solution
+from bifocal.workflows.survey import log_row, relative_name
+from photocore.errors import InputError
+from photocore.jsonfile import to_text
+from photocore.tables import write_csv
+
+#: Beyond this many points a spreadsheet is no tool any more.
+MOST_ROWS = 100_000
+_NUMBERS = ("r", "e1", "e2", "s_c", "X", "Y", "Z", "q", "sigma_r")
+
+
+def write_result(
+    path: Path | str, solution: Solution, *, language: str | None = None, overwrite: bool = False
+) -> None:
+    """Write a solved survey as a workbook (.xlsx) or a text table (.csv).
+
+    Parameters
+    ----------
+    path : path
+        Its ending says which.
+    solution : Solution
+        What was solved.
+    language : str, optional
+        Of the workbook; default that of the survey.
+    overwrite : bool
+        Replace an existing file.
+
+    Raises
+    ------
+    InputError
+        If the ending is another, or there are too many points for a workbook.
+    """
+    path = Path(path)
+    ending = path.suffix.lower()
+    if ending == ".csv":
+        write_csv(path, _csv_columns(solution), overwrite=overwrite)
+        return
+    if ending != ".xlsx":
+        raise InputError(f"{path}: results are written as .xlsx or .csv.")
+    if len(solution.table) > MOST_ROWS:
+        raise InputError(
+            f"{path}: {len(solution.table)} points are too many for a workbook (limit {MOST_ROWS})."
+            f" Write a text table instead: --out {path.with_suffix('.csv').name}"
+        )
+    write_book(path, result_content(solution, path, language), overwrite=overwrite)
+
+
+def result_content(solution: Solution, path: Path, language: str | None) -> SurveyContent:
+    """Return the content of a new result workbook."""
+    what = "solved" + (", set-up corrected by plane points" if solution.adjusted else "")
+    return SurveyContent(
+        language=language or solution.survey.language,
+        setup=solution.setup,
+        pair=solution.pair,
+        pair_file=(
+            relative_name(solution.pair_path, path.parent) if solution.pair_path is not None else ""
+        ),
+        sigma_px=solution.sigma_px,
+        points=solution.points,
+        table=solution.table,
+        known=solution.survey.known,
+        check=solution.check,
+        control=solution.survey.control,
+        georeference=solution.georeference,
+        model=solution.survey.model,
+        log=[log_row(what, solution.source)],
+    )
+
+
+def _csv_columns(solution: Solution) -> dict[str, Any]:
+    """Return the columns of the text table, headings with units."""
+    table, world = solution.table, solution.world
+    columns: dict[str, Any] = {"id": list(table.ids)}
+    units = {"e1": "mm", "e2": "mm", "s_c": "mm", "q": "mm"}
+    for key in ("X", "Y", "Z"):
+        columns[f"{key} [m]"] = table[key]
+    if solution.georeference is not None:
+        columns |= {f"{key} [m]": world[:, i] for i, key in enumerate("ENH")}
+    for key in ("r", "e1", "e2", "s_c", "q", "sigma_r"):
+        columns[f"{key} [{units.get(key, 'm')}]"] = table[key]
+    columns["flag"] = list(table.flags)
+    columns["note"] = list(solution.points.note)
+    return columns
+
+
+def solution_json(solution: Solution) -> str:
+    """Return everything as the text of one JSON object; undefined numbers are null."""
+    head = to_text(_head(solution))
+    # A million points: each record is put together as text, not as a tree of objects.
+    records = ",\n".join(_records(solution))
+    return f'{{"points": [{records}], {head[1:]}'
+
+
+def _records(solution: Solution) -> list[str]:
+    table = solution.table
+    columns = [table[key].tolist() for key in _NUMBERS]
+    world = [solution.world[:, i].tolist() for i in range(3)] if solution.georeference else []
+    keys = [*_NUMBERS, *("ENH" if world else "")]
+    numbers = [[_number(value) for value in values] for values in (*columns, *world)]
+    names = [json.dumps(name, ensure_ascii=False) for name in table.ids]
+    use = ["true" if value else "false" for value in solution.points.use]
+    template = (
+        '{{"id": {}, ' + ", ".join(f'"{key}": {{}}' for key in keys)
+        + ', "flag": "{}", "use": {}}}'
+    )  # fmt: skip
+    return [template.format(*row) for row in zip(names, *numbers, table.flags, use, strict=True)]
+
+
+def _number(value: float) -> str:
+    return repr(value) if math.isfinite(value) else "null"
+
+
+def _head(solution: Solution) -> dict[str, Any]:
+    """Return all but the points."""
+    axes = solution.check.axes
+    head: dict[str, Any] = {
+        "check": {
+            "n": axes["Z"].n,
+            "rmse": axes["Z"].rmse,
+            "max_abs": axes["Z"].max_abs,
+            "mean": axes["Z"].mean,
+            "axes": {
+                key: {"n": a.n, "rmse": a.rmse, "mean": a.mean, "max_abs": a.max_abs}
+                for key, a in axes.items()
+            },
+            "errors": [
+                {"id": name, "dX": e[0], "dY": e[1], "dZ": e[2]}
+                for name, e in zip(solution.check.ids, solution.check.errors, strict=True)
+            ],
+            "verdict": verdict_lines(solution),
+            "missing": list(solution.check.missing),
+        },
+        "georeference": _georeference(solution),
+        "setup_check": _setup_check(solution),
+        "sigma_px": solution.sigma_px,
+        "units": {"r": "m", "X": "m", "e1": _length_unit(solution), "sigma_r": "m"},
+        "remarks": list(solution.remarks),
+    }
+    return head
+
+
+def _length_unit(solution: Solution) -> str:
+    """Return the unit of e1, e2, s_c and q: without an image scale they are on the wall."""
+    known = solution.pair is None or solution.table.image_scale is not None
+    return "mm" if known else "m"
+
+
+def _georeference(solution: Solution) -> dict[str, Any] | None:
+    geo = solution.georeference
+    if geo is None:
+        return None
+    return {
+        "model": geo.model,
+        "n": int(geo.used.sum()),
+        "left_out": list(geo.bad),
+        "sigma0": geo.sigma0,
+        "scale": geo.world_from_wall.scale,
+        "rotation": geo.world_from_wall.rotation,
+        "wall_centre": geo.world_from_wall.source_centre,
+        "world_centre": geo.world_from_wall.target_centre,
+        "residuals": [
+            {"id": name, "vE": v[0], "vN": v[1], "vH": v[2], "used": bool(used)}
+            for name, v, used in zip(geo.ids, geo.residuals, geo.used, strict=True)
+        ],
+    }
+
+
+def _setup_check(solution: Solution) -> dict[str, Any] | None:
+    check = solution.setup_check
+    if check is None:
+        return None
+    return {
+        "points": check.points,
+        "sigma0": check.sigma0,
+        "outliers": list(check.outliers),
+        "adjusted": solution.adjusted,
+        "parameters": [
+            {
+                "name": p.name,
+                "value": p.value,
+                "sigma": p.sigma,
+                "unit": p.unit,
+                "false_relief": p.false_relief,
+            }
+            for p in check.parameters
+        ],
+    }
+
+
+def verdict_lines(solution: Solution) -> list[str]:
+    """Return one sentence per tolerance rule."""
+    verdicts = solution.check.verdicts
+    rules = list(dict.fromkeys(verdict.rule.key for verdict in verdicts))
+    return [sentence(tuple(v for v in verdicts if v.rule.key == key)) for key in rules]
+
+
+def point_rows(solution: Solution, most: int) -> list[tuple[str, ...]]:
+    """Return the first points as rows of text: id, r, e1, e2, X, Y, sigma_r, flag."""
+    table = solution.table
+    rows = []
+    for i in range(min(most, len(table))):
+        shown = [_shown(table[key][i], 4) for key in ("r", "e1", "e2", "X", "Y", "sigma_r")]
+        rows.append((table.ids[i], *shown, table.flags[i]))
+    return rows
+
+
+def summary(solution: Solution) -> list[str]:
+    """Return check points, verdict and georeference in words."""
+    lines = []
+    for axis, found in solution.check.axes.items():
+        if found.n:
+            lines.append(
+                f"Check {axis}: {found.n} points, RMSE {found.rmse:.4f} m, "
+                f"mean {found.mean:+.4f} m, largest {found.max_abs:.4f} m"
+            )
+    lines += [f"Drawing scale, {line}" for line in verdict_lines(solution)]
+    geo = solution.georeference
+    if geo is not None:
+        spread = "no redundancy" if math.isnan(geo.sigma0) else f"sigma0 {geo.sigma0:.4f} m"
+        lines.append(
+            f"Georeference: {geo.model}, {int(geo.used.sum())} points, {spread}, scale "
+            f"{geo.world_from_wall.scale:.6f}"
+        )
+    return lines
+
+
+def _shown(value: float, places: int) -> str:
+    return f"{value:.{places}f}" if math.isfinite(value) else "-"

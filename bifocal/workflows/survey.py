@@ -1,0 +1,158 @@
+"""Survey workbooks: the empty template, measured points as a workbook."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+from datetime import UTC, datetime
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+
+from bifocal.domain.observations import PointObservations
+from bifocal.domain.pair import Pair
+from bifocal.domain.setup import SurveySetup
+from bifocal.io.survey_book import write_book
+from bifocal.io.survey_content import SurveyContent
+from bifocal.io.survey_words import LANGUAGES
+from bifocal.solvers.point_survey import solve_ideal, solve_pair
+from photocore.errors import InputError
+from photocore.output import check_writable
+
+LogRow = tuple[str, str, str, str, str]
+
+
+def write_template(path: Path | str, *, language: str = "en", overwrite: bool = False) -> None:
+    """Write an empty survey workbook with live formulas.
+
+    Parameters
+    ----------
+    path : path
+        An ``.xlsx`` file.
+    language : {"en", "it", "de"}
+        Of labels and help; keys and flags are the same in all.
+    overwrite : bool
+        Replace an existing file.
+
+    Raises
+    ------
+    InputError
+        If the language is unknown or the file cannot be written.
+    """
+    if language not in LANGUAGES:
+        raise InputError(f"language: {language!r} is none of {', '.join(LANGUAGES)}.")
+    check_book_path(path)
+    write_book(path, SurveyContent(language=language), overwrite=overwrite)
+
+
+def write_survey(
+    path: Path | str,
+    points: PointObservations,
+    *,
+    setup: SurveySetup | None = None,
+    pair: Pair | None = None,
+    pair_path: Path | str | None = None,
+    sigma_px: float | None = None,
+    language: str = "en",
+    what: str = "points written",
+    overwrite: bool = False,
+) -> None:
+    """Write measured points as a survey workbook, solved, every result a live formula.
+
+    Parameters
+    ----------
+    path : path
+        An ``.xlsx`` file.
+    points : PointObservations
+        With ``pixels1`` and ``pixels2`` [px] for a pair; ``xy1, xy2`` or ``polar`` for a set-up.
+    setup : SurveySetup, optional
+        Of an ideal pair.
+    pair : Pair, optional
+        Any pair; give this or ``setup``.
+    pair_path : path, optional
+        Where the pair file lies; named in the workbook.
+    sigma_px : float, optional
+        Measuring precision; default the pair's, else 0.5. [px]
+    language : {"en", "it", "de"}
+        Of labels and help.
+    what : str
+        For the sheet `Log`.
+    overwrite : bool
+        Replace an existing file.
+
+    Raises
+    ------
+    InputError
+        If neither or both of pair and set-up are given, or the file cannot be written.
+
+    Notes
+    -----
+    With a pair, the raw pixels ``col1 row1 col2 row2`` are the inputs; ``x1 y1 x2 y2`` are live
+    formulas: the homographies in `Setup` carry them to the plane, in millimetres of the image
+    scale about the zoom centre. `bifocal solve` gives the same from the workbook as from the pair.
+    """
+    if (setup is None) == (pair is None):
+        raise InputError("write_survey: give a pair or a set-up, one of them.")
+    path = check_book_path(path)
+    check_writable(path, overwrite=overwrite)
+    if pair is not None:
+        table = solve_pair(pair, points, sigma_px=sigma_px)
+    else:
+        assert setup is not None
+        table = solve_ideal(setup, points)
+    content = SurveyContent(
+        language=language,
+        setup=setup,
+        pair=pair,
+        pair_file=relative_name(pair_path, path.parent) if pair_path is not None else "",
+        sigma_px=sigma_px,
+        points=points,
+        table=table,
+        log=[log_row(what, pair_path)],
+    )
+    write_book(path, content, overwrite=overwrite)
+
+
+def check_book_path(path: Path | str) -> Path:
+    """Return the path of a workbook to write, refusing other endings.
+
+    Raises
+    ------
+    InputError
+        If it does not end in ``.xlsx``.
+    """
+    path = Path(path)
+    if path.suffix.lower() != ".xlsx":
+        raise InputError(f"{path}: a new workbook must end in .xlsx.")
+    return path
+
+
+def relative_name(path: Path | str, folder: Path) -> str:
+    """Return a file's name as seen from a folder."""
+    try:
+        return Path(os.path.relpath(Path(path).resolve(), folder.resolve())).as_posix()
+    except ValueError:  # another drive
+        return Path(path).as_posix()
+
+
+def log_row(what: str, file: Path | str | None) -> LogRow:
+    """Return a row of the sheet `Log`: date, program, what was done, from which file."""
+    path = None if file is None else Path(file)
+    digest = ""
+    if path is not None and path.is_file():
+        digest = hashlib.sha256(path.read_bytes()).hexdigest()
+    return (today(), program(), what, "" if path is None else path.name, digest)
+
+
+def today() -> str:
+    """Return the date in UTC; that of SOURCE_DATE_EPOCH where set, for reproducible files."""
+    stamp = os.environ.get("SOURCE_DATE_EPOCH", "")
+    moment = datetime.fromtimestamp(int(stamp), UTC) if stamp.isdigit() else datetime.now(UTC)
+    return moment.strftime("%Y-%m-%d")
+
+
+def program() -> str:
+    """Return the program's name and version."""
+    try:
+        return f"bifocal {version('bifocal')}"
+    except PackageNotFoundError:
+        return "bifocal"

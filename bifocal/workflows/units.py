@@ -1,0 +1,75 @@
+"""Millimetres taken for pixels, or pixels for millimetres, found out from the numbers."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from bifocal.domain.observations import PointObservations
+from bifocal.domain.setup import SurveySetup
+from photocore.errors import InputError
+
+#: No lens sees further to the side than this many principal distances (72 degrees off axis).
+WIDEST = 3.0
+#: Without a principal distance: no sensor or film of a hand camera is this large. [mm]
+LARGEST_MM = 150.0
+#: Pixels that all lie within this of the top-left corner are millimetres. [px]
+CORNER_PX = 60.0
+
+
+def refuse_wrong_unit(
+    setup: SurveySetup, points: PointObservations, where: str, *, said: str = ""
+) -> None:
+    """Refuse coordinates whose size shows that they are in the other unit.
+
+    Parameters
+    ----------
+    setup : SurveySetup
+        Says the unit and how far from the nadir a point can lie.
+    points : PointObservations
+        As typed.
+    where : str
+        File and sheet, for the message.
+    said : str
+        Unit that the headings say, for the message.
+
+    Raises
+    ------
+    InputError
+        Naming the unit that the numbers seem to be in.
+    """
+    used = points.use
+    cartesian = used & points.is_cartesian
+    place = "the headings" if said else "Setup (input_unit)"
+    if setup.unit == "mm":
+        limit = LARGEST_MM if setup.c1 is None else WIDEST * max(setup.c1, setup.c2 or 0.0)
+        typed = np.hstack([points.xy1, points.xy2])[cartesian]
+        radial = points.polar[used & ~points.is_cartesian][:, :2]
+        for values, what in ((typed, "coordinates"), (radial, "radial distances")):
+            known = np.abs(values[~np.isnan(values)])
+            if known.size and np.median(known) > limit:
+                raise InputError(
+                    f"{where}: {what} of {np.median(known):.4g} mm lie outside any photo taken "
+                    f"with this lens (limit {limit:.4g} mm): they look like pixels, while "
+                    f"{place} says mm. "
+                    + (
+                        "Set the input unit to px and fill in pitch and the nadir points."
+                        if what == "coordinates"
+                        else "Multiply them by the size of a pixel [mm/px]."
+                    )
+                )
+        return
+    typed = np.hstack([points.xy1, points.xy2])[cartesian]
+    nadir = max(abs(value) for value in (*setup.nadir1, *setup.nadir2))
+    if typed.size and nadir > 2 * CORNER_PX and float(np.nanmax(np.abs(typed))) < CORNER_PX:
+        raise InputError(
+            f"{where}: no coordinate exceeds {np.nanmax(np.abs(typed)):.4g} px although the nadir "
+            f"points lie at ({setup.nadir1[0]:g}, {setup.nadir1[1]:g}) px: they look like "
+            f"millimetres, while {place} says px. Set the input unit to mm."
+        )
+    if typed.size and nadir == 0 and setup.pitch is not None:
+        reach = float(np.nanmax(np.abs(typed))) * setup.pitch
+        if reach < 0.01 * (setup.c1 or 20.0):
+            raise InputError(
+                f"{where}: all points lie within {reach:.3g} mm of the nadir: the coordinates look "
+                f"like millimetres, while {place} says px. Set the input unit to mm."
+            )

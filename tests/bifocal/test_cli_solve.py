@@ -1,0 +1,421 @@
+"""`bifocal solve` and `bifocal template` as a surveyor uses them, and every bad input."""
+
+from __future__ import annotations
+
+import json
+import os
+import zipfile
+from pathlib import Path
+
+import numpy as np
+import openpyxl
+import pytest
+from click.testing import CliRunner
+
+from bifocal.cli.main import main
+
+SETUP = {"c_1": 35, "c_2": 19, "d_2": 9.5, "delta_d": 8}
+
+
+def run(*arguments):
+    return CliRunner().invoke(main, [str(argument) for argument in arguments])
+
+
+def seen(x, y, r, c, d):
+    return c * x / (d - r), c * y / (d - r)
+
+
+def rows(points):
+    """Rows id, x1, y1, x2, y2 [mm] of points (X, Y, r) seen with 35 mm/17.5 m and 19 mm/9.5 m."""
+    return [(name, *seen(x, y, r, 35, 17.5), *seen(x, y, r, 19, 9.5)) for name, x, y, r in points]
+
+
+POINTS = [("P1", 2, 0, 1), ("P2", -3, 2, 0.5), ("P3", 4, -2, -0.4), ("P4", -4, -1.5, 0)]
+
+
+def fill(path, table=None, setup=SETUP, **sheets):
+    """Fill in a template the way a user does, with openpyxl standing for Excel."""
+    assert run("template", path, "--overwrite").exit_code == 0
+    book = openpyxl.load_workbook(path)
+    for name, value in setup.items():
+        put(book, name, value)
+    for row, values in enumerate(table or rows(POINTS), start=5):
+        for column, value in enumerate(values, start=1):
+            book["Points"].cell(row, column, value)
+    for name, lines in sheets.items():
+        start = next(i for i in range(1, 60) if book[name].cell(i, 1).value == "id") + 1
+        for row, values in enumerate(lines, start=start):
+            for column, value in enumerate(values, start=1):
+                if value is not None:
+                    book[name].cell(row, column, value)
+    book.save(path)
+    return path
+
+
+def put(book, name, value):
+    cell = book.defined_names[name].attr_text.split("!")[1].replace("$", "")
+    book["Setup"][cell] = value
+
+
+def solved(path, *options):
+    result = run("solve", path, "--json", *options)
+    assert result.exit_code == 0, result.stderr
+    return json.loads(result.stdout), result.stderr
+
+
+def by_id(answer):
+    return {point["id"]: point for point in answer["points"]}
+
+
+def write_csv(path, text):
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def test_a_filled_template_gives_the_points_back(tmp_path):
+    answer, _ = solved(fill(tmp_path / "s.xlsx"))
+    for name, x, y, r in POINTS:
+        found = by_id(answer)[name]
+        assert [found["X"], found["Y"], found["r"]] == pytest.approx([x, y, r], abs=1e-9)
+    assert by_id(answer)["P4"]["flag"] == "ON-PLANE"
+    assert answer["check"] == {**answer["check"], "n": 0, "rmse": None, "max_abs": None}
+
+
+def test_check_sheet_gives_errors_and_a_verdict(tmp_path):
+    path = fill(tmp_path / "s.xlsx", Check=[("P1", 2.01, None, 1.005), ("P2", None, None, 0.497)])
+    answer, _ = solved(path)
+    # Errors of r: -5 and +3 mm: RMSE sqrt(17) mm.
+    assert answer["check"]["n"] == 2
+    assert answer["check"]["rmse"] == pytest.approx(np.sqrt(17) / 1000, abs=1e-9)
+    assert answer["check"]["max_abs"] == pytest.approx(0.005, abs=1e-9)
+    assert "0.18 mm: holds 1:100 (18 mm), fails 1:50 (9 mm)" in answer["check"]["verdict"]
+
+
+def test_georeference_sheet_gives_world_coordinates(tmp_path):
+    world = [(name, 1000 + x, 2000 - r, 50 + y) for name, x, y, r in POINTS]
+    path = fill(tmp_path / "s.xlsx", Georeference=world)
+    answer, _ = solved(path)
+    found = by_id(answer)["P2"]
+    assert [found["E"], found["N"], found["H"]] == pytest.approx([997, 1999.5, 52], abs=1e-8)
+
+
+def test_result_workbook_holds_numbers_and_formulas(tmp_path):
+    out = tmp_path / "result.xlsx"
+    result = run("solve", fill(tmp_path / "s.xlsx"), "--out", out)
+    assert result.exit_code == 0, result.stderr
+    values = openpyxl.load_workbook(out, data_only=True)["Results"]
+    assert [values.cell(5, i).value for i in (1, 2, 4)] == [
+        "P1",
+        pytest.approx(2.0),
+        pytest.approx(1.0),
+    ]
+    assert openpyxl.load_workbook(out)["Points"]["N5"].value.startswith("=")
+
+
+def test_an_existing_result_is_kept_unless_asked(tmp_path):
+    survey, out = fill(tmp_path / "s.xlsx"), tmp_path / "result.xlsx"
+    out.write_bytes(b"mine")
+    result = run("solve", survey, "--out", out)
+    assert result.exit_code == 1
+    assert "--overwrite" in result.stderr
+    assert out.read_bytes() == b"mine"
+    assert run("solve", survey, "--out", out, "--overwrite").exit_code == 0
+
+
+def test_radial_distances_from_a_text_table(tmp_path):
+    text = "Point;s1 [mm];s2 [mm];theta [deg];r measured [m]\nA;4,2424242424;4,4705882353;90;0,99\n"
+    answer, _ = solved(
+        write_csv(tmp_path / "p.csv", text), "--d1", 17.5, "--d2", 9.5, "--c1", 35, "--c2", 19
+    )
+    assert by_id(answer)["A"]["r"] == pytest.approx(1.0, abs=1e-8)
+    assert by_id(answer)["A"]["X"] == pytest.approx(2.0, abs=1e-8)
+    assert answer["check"]["max_abs"] == pytest.approx(0.01, abs=1e-8)
+
+
+def test_swapped_images_are_said_and_solved(tmp_path):
+    swapped = [(name, x2, y2, x1, y1) for name, x1, y1, x2, y2 in rows(POINTS)]
+    setup = {"c_1": 19, "c_2": 35, "d_1": 9.5, "d_2": 17.5}
+    answer, remarks = solved(fill(tmp_path / "s.xlsx", swapped, setup))
+    assert "swapped images" in remarks
+    found = by_id(answer)["P1"]
+    assert [found["X"], found["r"]] == pytest.approx([2, 1], abs=1e-9)
+    assert found["e1"] == pytest.approx(35 * 2 / 16.5 / 17.5)
+
+
+def write_pair(path, **more):
+    scale = 0.005
+    matrix = [[scale, 0, -7.5], [0, -scale, 5.0], [0, 0, 1]]
+    data = {
+        "format": "bifocal-pair/1",
+        "image1": {"plane_from_pixel": matrix, "nadir": [0, 0], "distance": 17.5},
+        "image2": {"plane_from_pixel": matrix, "nadir": [0, 0], "distance": 9.5},
+    }
+    for key, value in more.items():
+        image, name = key.split("_", 1)
+        data[image][name] = value
+    path.write_text(json.dumps(data))
+    return path
+
+
+def pixel_rows(points=POINTS):
+    lines = ["Point,col1 [px],row1 [px],col2 [px],row2 [px]"]
+    for name, x, y, r in points:
+        cells = []
+        for d in (17.5, 9.5):
+            qx, qy = x * d / (d - r), y * d / (d - r)
+            cells += [(qx + 7.5) / 0.005, (5.0 - qy) / 0.005]
+        lines.append(",".join([name, *map(repr, cells)]))
+    return "\n".join(lines) + "\n"
+
+
+def test_raw_pixels_with_a_pair_file_and_the_workbook_made_of_them(tmp_path):
+    pair = write_pair(tmp_path / "wall.pair.json")
+    points = write_csv(tmp_path / "p.csv", pixel_rows())
+    answer, _ = solved(points, "--pair", pair)
+    for name, x, y, r in POINTS:
+        found = by_id(answer)[name]
+        assert [found["X"], found["Y"], found["r"]] == pytest.approx([x, y, r], abs=1e-9)
+    out = tmp_path / "survey.xlsx"
+    assert run("solve", points, "--pair", pair, "--out", out).exit_code == 0
+    again, _ = solved(out)
+    assert again["points"] == answer["points"]
+
+
+def test_millimetres_with_a_pair_file_need_the_principal_distances(tmp_path):
+    text = "id,x1 [mm],y1 [mm],x2 [mm],y2 [mm]\n" + "\n".join(
+        ",".join(map(str, row)) for row in rows(POINTS)
+    )
+    points = write_csv(tmp_path / "p.csv", text)
+    bare = write_pair(tmp_path / "bare.pair.json")
+    result = run("solve", points, "--pair", bare)
+    assert result.exit_code == 1
+    assert "principal_distance" in result.stderr
+    whole = write_pair(
+        tmp_path / "whole.pair.json", image1_principal_distance=35, image2_principal_distance=19
+    )
+    answer, _ = solved(points, "--pair", whole)
+    assert by_id(answer)["P1"]["r"] == pytest.approx(1.0, abs=1e-9)
+
+
+def test_plane_points_reveal_and_mend_a_wrong_scale(tmp_path):
+    plane = [(f"W{i}", x, y, 0) for i, (x, y) in enumerate([(4, 2), (-4, 2), (4, -2), (-4, -2),
+                                                            (0, 2), (3, 0)])]  # fmt: skip
+    table = [
+        (name, x1, y1, x2 * 1.01, y2 * 1.01) for name, x1, y1, x2, y2 in rows([*POINTS, *plane])
+    ]
+    codes = [""] * len(POINTS) + ["PLANE"] * len(plane)
+    table = [(*row, None, None, None, None, code) for row, code in zip(table, codes, strict=True)]
+    path = fill(tmp_path / "s.xlsx", table)
+    wrong, remarks = solved(path)
+    assert "scale: +1 %" in remarks
+    # 1 % of scale reads as 0.21 m of relief with 35 and 19 mm.
+    assert by_id(wrong)["P4"]["r"] == pytest.approx(0.206, abs=0.01)
+    right, _ = solved(path, "--adjust-setup")
+    for name, x, y, r in POINTS:
+        found = by_id(right)[name]
+        assert [found["X"], found["Y"], found["r"]] == pytest.approx([x, y, r], abs=1e-6)
+    assert right["setup_check"]["adjusted"] is True
+
+
+def test_adjusting_needs_plane_points(tmp_path):
+    result = run("solve", fill(tmp_path / "s.xlsx"), "--adjust-setup")
+    assert result.exit_code == 1
+    assert "code PLANE" in result.stderr
+
+
+def refused(path, *patterns, options=()):
+    result = run("solve", path, *options)
+    assert result.exit_code == 1, result.stdout + result.stderr
+    assert not isinstance(result.exception, Exception) or isinstance(result.exception, SystemExit)
+    for pattern in patterns:
+        assert pattern in result.stderr
+    assert result.stdout == ""
+
+
+def edited(path, change):
+    book = openpyxl.load_workbook(path)
+    change(book)
+    book.save(path)
+    return path
+
+
+def test_missing_sheet_points(tmp_path):
+    path = edited(fill(tmp_path / "s.xlsx"), lambda book: book.remove(book["Points"]))
+    refused(path, 'no sheet "Points"')
+
+
+def test_missing_sheet_setup(tmp_path):
+    def change(book):
+        book.remove(book["Setup"])
+        for name in list(book.defined_names):
+            if "Setup" in book.defined_names[name].attr_text:
+                del book.defined_names[name]
+
+    refused(edited(fill(tmp_path / "s.xlsx"), change), "no value for d_1, d_2")
+
+
+def test_missing_column(tmp_path):
+    def change(book):
+        book["Points"]["E4"] = "my own"
+
+    refused(edited(fill(tmp_path / "s.xlsx"), change), "no column y2")
+
+
+def test_all_bad_cells_are_reported_at_once_with_sheet_and_cell(tmp_path):
+    def change(book):
+        book["Points"]["B5"] = "twelve"
+        book["Points"]["C6"] = "#DIV/0!"
+        book["Points"]["D7"] = "NaN"
+        book["Points"]["A8"] = "P1"
+        put(book, "c_1", "thirty-five")
+
+    path = edited(fill(tmp_path / "s.xlsx"), change)
+    refused(
+        path,
+        "Points!B5 (x1)", '"twelve"', "Points!C6 (y1)", "#DIV/0!", "Points!D7 (x2)", "NaN",
+        "Points!A8 (id)", "stands in A5 already", "Setup!C5 (c_1)",
+    )  # fmt: skip
+
+
+def test_equal_distances(tmp_path):
+    refused(fill(tmp_path / "s.xlsx", setup={**SETUP, "d_1": 9.5, "delta_d": None}), "both 9.5 m")
+
+
+def test_distances_that_contradict_the_way_between_the_cameras(tmp_path):
+    refused(fill(tmp_path / "s.xlsx", setup={**SETUP, "d_1": 18.5}), "Setup!C9 (d_1)", "= 17.5 m")
+
+
+def test_scales_that_do_not_match(tmp_path):
+    refused(fill(tmp_path / "s.xlsx", setup={**SETUP, "c_2": 28}), "differ by", "tolerance 2.0%")
+
+
+def test_radial_distance_not_above_zero(tmp_path):
+    table = [("P1", None, None, None, None, 0, 4.4, 90), ("P2", None, None, None, None, 4, -1, 90)]
+    refused(fill(tmp_path / "s.xlsx", table), "Points!F5 (s1)", "Points!G6 (s2)", "above zero")
+
+
+def test_point_measured_on_one_image_only(tmp_path):
+    table = [*rows(POINTS), ("P9", 1.0, 2.0, None, None)]
+    refused(fill(tmp_path / "s.xlsx", table), "Points!D9 (x2)", "P9 is measured only on image 1")
+    unused = [*table[:-1], (*table[-1], None, None, None, 0)]
+    assert run("solve", fill(tmp_path / "t.xlsx", unused)).exit_code == 0
+
+
+def test_pixels_typed_where_millimetres_are_expected(tmp_path):
+    table = [(name, *(135 * v for v in values)) for name, *values in rows(POINTS)]
+    refused(fill(tmp_path / "s.xlsx", table), "look like pixels", "input_unit")
+
+
+def test_millimetres_typed_where_pixels_are_expected(tmp_path):
+    setup = SETUP | {
+        "input_unit": "px", "pitch": 0.0074, "nadir_1_col": 1536, "nadir_1_row": 1024,
+        "nadir_2_col": 1536, "nadir_2_row": 1024,
+    }  # fmt: skip
+    refused(fill(tmp_path / "s.xlsx", setup=setup), "look like millimetres")
+
+
+def test_pixels_without_nadir_points(tmp_path):
+    setup = {**SETUP, "input_unit": "px", "pitch": 0.0074}
+    refused(fill(tmp_path / "s.xlsx", setup=setup), "nadir_1_col")
+
+
+def test_empty_file(tmp_path):
+    (tmp_path / "e.csv").write_text("")
+    (tmp_path / "e.xlsx").write_bytes(b"")
+    refused(tmp_path / "e.csv", "empty")
+    refused(tmp_path / "e.xlsx", "empty")
+
+
+def test_empty_template(tmp_path):
+    assert run("template", tmp_path / "t.xlsx").exit_code == 0
+    refused(tmp_path / "t.xlsx", "no point")
+
+
+def test_encrypted_file(tmp_path):
+    (tmp_path / "s.xlsx").write_bytes(b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1" + bytes(2000))
+    refused(tmp_path / "s.xlsx", "password")
+
+
+def test_zip_bomb(tmp_path):
+    path = tmp_path / "s.xlsx"
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as package:
+        package.writestr("[Content_Types].xml", "<Types/>")
+        package.writestr("xl/worksheets/sheet1.xml", bytes(2 * 2**20))
+    refused(path, "unpack")
+
+
+def test_a_file_that_is_no_workbook(tmp_path):
+    (tmp_path / "s.xlsx").write_text("just a letter")
+    refused(tmp_path / "s.xlsx", "not a workbook")
+
+
+def test_a_missing_file(tmp_path):
+    refused(tmp_path / "nowhere.xlsx", "no such file")
+
+
+def test_a_pair_file_with_a_singular_homography(tmp_path):
+    pair = write_pair(
+        tmp_path / "bad.pair.json", image1_plane_from_pixel=[[1, 2, 3], [2, 4, 6], [0, 0, 1]]
+    )
+    points = write_csv(tmp_path / "p.csv", pixel_rows())
+    refused(points, "singular", options=("--pair", pair))
+
+
+def test_raw_pixels_without_a_pair(tmp_path):
+    points = write_csv(tmp_path / "p.csv", pixel_rows())
+    refused(points, "--pair", options=("--d1", 17.5, "--d2", 9.5))
+
+
+def test_too_few_control_points(tmp_path):
+    path = fill(tmp_path / "s.xlsx", Georeference=[("P1", 1000, 2000, 50)])
+    refused(path, "at least 2")
+
+
+def test_a_formula_as_point_name_stays_text(tmp_path):
+    table = [('=HYPERLINK("http://evil")', *row[1:]) for row in rows(POINTS[:1])]
+    text = "id;x1;y1;x2;y2\n" + ";".join(map(str, table[0])).replace('"', '""')
+    text = text.replace("=HYPERLINK", '"=HYPERLINK').replace('evil"")', 'evil"")"')
+    points = write_csv(tmp_path / "p.csv", text + "\n")
+    out = tmp_path / "r.xlsx"
+    result = run("solve", points, "--d1", 17.5, "--d2", 9.5, "--out", out)
+    assert result.exit_code == 0, result.stderr
+    cell = openpyxl.load_workbook(out)["Points"]["A5"]
+    assert (cell.data_type, cell.value) == ("s", '=HYPERLINK("http://evil")')
+
+
+def test_usage_errors_are_status_two():
+    assert run("solve").exit_code == 2
+    assert run("solve", "a.csv", "--unit", "inch").exit_code == 2
+    assert run("template").exit_code == 2
+
+
+@pytest.mark.skipif("BIFOCAL_DATA" not in os.environ, reason="BIFOCAL_DATA is not set")
+@pytest.mark.parametrize(
+    ("name", "median", "rms", "sigma_px"),
+    [("church_1", 0.0042, 0.0078, 0.36), ("church_2", 0.0105, 0.020, 0.32)],
+)
+def test_real_church_points_reach_the_accuracy_of_the_pair(name, median, rms, sigma_px, tmp_path):
+    folder = Path(os.environ["BIFOCAL_DATA"]) / "facade_pairs" / name
+    geometry = json.loads((folder / "geometry.json").read_text())
+    data = {"format": "bifocal-pair/1"}
+    for key, camera in (("image1", "far"), ("image2", "near")):
+        data[key] = {
+            "plane_from_pixel": np.linalg.inv(geometry[camera]["H_wall_to_pixel"]).tolist(),
+            "nadir": geometry[camera]["nadir_wall_m"],
+            "distance": geometry[camera]["height_over_plane_m"],
+        }
+    pair = tmp_path / "wall.pair.json"
+    pair.write_text(json.dumps(data))
+    reference = np.genfromtxt(folder / "points.csv", delimiter=",", names=True)
+    # The points' own table: its headings x_far_px ... are understood as they are.
+    answer, _ = solved(folder / "points.csv", "--pair", pair)
+    assert answer["sigma_px"] == pytest.approx(sigma_px, abs=0.005)
+    r = np.array([np.nan if p["r"] is None else p["r"] for p in answer["points"]])
+    sigma = np.array([np.nan if p["r"] is None else p["sigma_r"] for p in answer["points"]])
+    nadir = geometry["near"]["nadir_wall_m"]
+    away = np.hypot(reference["X_m"] - nadir[0], reference["Y_m"] - nadir[1]) > 4
+    error = (r - reference["relief_m"])[away]
+    assert np.nanmedian(np.abs(error)) <= median
+    assert np.sqrt(np.nanmean(error**2)) <= rms
+    formal = np.hypot(sigma, reference["srelief_m"])[away]
+    assert 0.7 <= 1.4826 * np.nanmedian(np.abs(error / formal)) <= 1.4

@@ -1,0 +1,105 @@
+"""World coordinates of a wall, one bad control point, refusals."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from bifocal.domain.reference import KnownPoints
+from bifocal.domain.relief_table import ReliefTable
+from bifocal.solvers.georeference import georeference
+from photocore.errors import GeometryError, InputError
+
+RNG = np.random.default_rng(8)
+XYZ = np.column_stack([RNG.uniform(-5, 5, 12), RNG.uniform(-3, 3, 12), RNG.uniform(-1, 1, 12)])
+IDS = tuple(f"P{i}" for i in range(12))
+UTM = np.array([351234.0, 4123456.0, 33.0])
+TURN = np.array([[np.cos(0.3), 0, np.sin(0.3)], [np.sin(0.3), 0, -np.cos(0.3)], [0, 1, 0]])
+
+
+def table():
+    columns = {axis: XYZ[:, i] for i, axis in enumerate("XYZ")}
+    return ReliefTable(
+        ids=IDS, columns=columns, flags=("OK",) * 12, standardised=np.zeros(12), carried={},
+        image_scale=500.0,
+    )  # fmt: skip
+
+
+def control(world, rows):
+    return KnownPoints(ids=tuple(IDS[i] for i in rows), xyz=world[list(rows)])
+
+
+def levelled(noise=0.0):
+    return UTM + 1.0001 * XYZ @ TURN.T + np.random.default_rng(1).normal(0, noise, XYZ.shape)
+
+
+def test_every_point_gets_its_world_coordinates():
+    found = georeference(table(), control(levelled(), range(4)))
+    assert found.model == "levelled"
+    assert found.world_from_wall(XYZ) == pytest.approx(levelled(), abs=1e-8)
+    assert found.redundancy == 7
+
+
+def test_sigma0_is_that_of_the_noise():
+    found = georeference(table(), control(levelled(0.02), range(12)))
+    assert found.sigma0 == pytest.approx(0.02, rel=0.3)
+    assert found.residuals.mean(axis=0) == pytest.approx(0, abs=1e-9)
+
+
+@pytest.mark.parametrize("count", [4, 5, 12])
+def test_one_bad_point_is_found_and_left_out(count):
+    world = levelled(0.005)
+    world[2] += [0.4, 0.0, 0.3]
+    found = georeference(table(), control(world, range(count)))
+    assert found.bad == ("P2",)
+    assert found.sigma0 < 0.02
+    assert found.world_from_wall(XYZ) == pytest.approx(levelled(), abs=0.02)
+    assert found.residuals[2, 0] == pytest.approx(0.4, abs=0.03)
+
+
+def test_good_points_are_never_thrown_out_more_than_chance_allows():
+    thrown = 0
+    for seed in range(60):
+        world = UTM + XYZ @ TURN.T + np.random.default_rng(seed).normal(0, 0.01, XYZ.shape)
+        thrown += len(georeference(table(), control(world, range(8))).bad)
+    assert thrown <= 4
+
+
+def test_a_wall_that_leans_is_given_seven_parameters():
+    rotation = Rotation.from_euler("xyz", [0.3, 0.5, 1.2]).as_matrix()
+    world = UTM + 0.98 * XYZ @ rotation.T
+    world += np.random.default_rng(3).normal(0, 0.003, world.shape)
+    found = georeference(table(), control(world, range(7)))
+    assert found.model == "3D"
+    assert found.world_from_wall.scale == pytest.approx(0.98, abs=2e-3)
+
+
+def test_noise_alone_is_no_reason_for_more_parameters():
+    assert georeference(table(), control(levelled(0.01), range(8))).model == "levelled"
+
+
+def test_without_heights_the_plan_is_fitted():
+    world = np.column_stack([XYZ[:, :2] * 2.0 + [100, 200], np.full(12, np.nan)])
+    found = georeference(table(), control(world, range(5)))
+    assert found.model == "2D"
+    assert found.world_from_wall(XYZ)[:, :2] == pytest.approx(world[:, :2], abs=1e-9)
+    assert np.isnan(found.residuals[:, 2]).all()
+
+
+def test_too_few_points_are_refused_with_the_number_needed():
+    with pytest.raises(GeometryError, match=r"1 usable control point.*at least 2"):
+        georeference(table(), control(levelled(), [0]))
+    with pytest.raises(GeometryError, match="3D needs at least 3"):
+        georeference(table(), control(levelled(), [0, 1]), model="3D")
+
+
+def test_names_that_were_not_measured_are_said():
+    known = KnownPoints(ids=("P0", "TOWER"), xyz=levelled()[:2])
+    with pytest.raises(GeometryError, match="Not among the measured points: TOWER"):
+        georeference(table(), known)
+
+
+def test_unknown_model_is_refused():
+    with pytest.raises(InputError, match="affine"):
+        georeference(table(), control(levelled(), range(4)), model="affine")
