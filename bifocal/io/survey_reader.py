@@ -186,9 +186,7 @@ def read_survey(path: Path | str, options: ReadOptions | None = None) -> SurveyI
     )
 
 
-def _read_points(
-    book: SheetFile | CsvFile, options: ReadOptions, errors: list[CellError]
-) -> Table:
+def _read_points(book: SheetFile | CsvFile, options: ReadOptions, errors: list[CellError]) -> Table:
     """Return the table of points; headings that both photos share are the last resort."""
     for shared in (False, True):
         found: list[CellError] = []
@@ -222,9 +220,15 @@ def _require_coordinates(table: Table, book: object, path: Path | str) -> None:
         Naming the missing sheet or columns.
     """
     have = table.present
-    for keys in (_XY, _PIXELS, ("s1", "s2")):
-        if have.issuperset(keys):
-            return
+    kinds = (_XY, _PIXELS, ("s1", "s2"))
+    # A column that is missing beside filled ones matters even where another kind is complete.
+    broken = any(
+        not have.issuperset(keys)
+        and any(not np.isnan(table.numbers(key)).all() for key in keys if key in have)
+        for keys in kinds
+    )
+    if not broken and any(have.issuperset(keys) for keys in kinds):
+        return
     where = f"{table.file} › {table.sheet}" if table.sheet else table.file
     ours = isinstance(book, SheetFile) and bare(table.sheet) != "points"
     if ours and not any(bare(title) == "points" for title in book.titles):  # type: ignore[attr-defined]
@@ -234,7 +238,7 @@ def _require_coordinates(table: Table, book: object, path: Path | str) -> None:
             f"on both photos (looked in {shown}). It needs the headings x1 y1 x2 y2, or s1 s2 "
             "theta, or col1 row1 col2 row2; say which columns they are with --columns."
         )
-    groups = [keys for keys in (_XY, _PIXELS, ("s1", "s2")) if have & set(keys)]
+    groups = [keys for keys in kinds if have & set(keys) and not have.issuperset(keys)]
     wanted = groups[0] if groups else _XY
     missing = ", ".join(key for key in wanted if key not in have)
     raise InputError(
