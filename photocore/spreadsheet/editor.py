@@ -373,6 +373,6 @@ def rewrite_package(source: Path, target: Path, parts: Mapping[str, bytes]) -> N
                     else zipfile.ZIP_DEFLATED
                 )
                 copy.external_attr, copy.create_system = info.external_attr, info.create_system
-                new.writestr(copy, old.read(info) if data is None else data)
+                new.writestr(copy, read_part(source, old, info.filename) if data is None else data)
         file.flush()
         os.fsync(file.fileno())

@@ -11,6 +11,7 @@ from pathlib import Path
 from xml.sax.saxutils import escape as escape_xml
 from xml.sax.saxutils import unescape as unescape_xml
 
+from photocore.errors import InputError
 from photocore.spreadsheet.grid import TableArea, cell_name, split_area, split_cell
 from photocore.spreadsheet.package import EnoughError, local, open_package, read_part, scan_part
 from photocore.spreadsheet.xlsx import Sheet, Workbook
@@ -19,6 +20,7 @@ _RANGE = re.compile(
     r"(?P<sheet>(?:'(?:[^']|'')+'|[A-Za-z0-9_.À-ɏ]+)!)?"
     r"(?P<c1>\$?[A-Z]{1,3})(?P<r1>\$?\d+):(?P<c2>\$?[A-Z]{1,3})(?P<r2>\$?\d+)(?![\w(])"
 )
+_AREA = re.compile(r"[A-Z]{1,3}\d{1,7}(:[A-Z]{1,3}\d{1,7})?")
 #: Functions whose result may depend on any cell, whatever their text names.
 _FAR_REACHING = re.compile(r"\b(INDIRECT|OFFSET|CELL|INFO)\s*\(", re.IGNORECASE)
 
@@ -81,7 +83,14 @@ def row_cells(path: Path, sheet: Sheet, row: int, left: int, right: int) -> dict
             text.append(data)
 
     with open_package(path) as package:
-        scan_part(path, package, sheet.part, start=start, end=end, text=collect)
+        try:
+            scan_part(path, package, sheet.part, start=start, end=end, text=collect)
+        except ValueError as error:
+            if isinstance(error, InputError):
+                raise
+            raise InputError(
+                f"{path} › {sheet.title}: damaged near row {place[0]}, a cell cannot be understood."
+            ) from error
     return found
 
 
@@ -239,6 +248,9 @@ def _grown_sheet(data: bytes, area: TableArea, bottom: int) -> bytes:
     def grown(reference: str) -> str:
         pieces = []
         for piece in reference.split():
+            if not _AREA.fullmatch(piece):
+                pieces.append(piece)
+                continue
             first_row, first_column, last_row, last_column = split_area(piece)
             inside = left <= first_column and last_column <= right
             if inside and last_row == last and first_row >= top:

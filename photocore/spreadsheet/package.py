@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import lzma
 import zipfile
+import zlib
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -19,6 +21,16 @@ MOST_MEMBERS = 10_000
 _RATIO_MATTERS_FROM = 2**20
 _OLE = b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1"
 _CHUNK = 2**18
+#: What unpacking a damaged member may raise.
+_UNPACKING = (
+    zipfile.BadZipFile,
+    zlib.error,
+    lzma.LZMAError,
+    OSError,
+    EOFError,
+    NotImplementedError,
+    RuntimeError,  # zipfile's word for a missing password
+)
 
 
 class EnoughError(Exception):
@@ -130,13 +142,8 @@ def read_part(path: Path, package: zipfile.ZipFile, name: str) -> bytes:
         return package.read(name)
     except KeyError:
         raise InputError(f"{path}: is not a workbook, the part {name} is missing.") from None
-    except (zipfile.BadZipFile, OSError, EOFError, ValueError, NotImplementedError) as error:
+    except _UNPACKING as error:
         raise _damaged(path, name) from error
-    except Exception as error:
-        # The decompressors (zlib, lzma, bz2) raise classes of their own without a common base.
-        if type(error).__module__ in ("zlib", "_lzma", "lzma"):
-            raise _damaged(path, name) from error
-        raise
 
 
 def scan_part(
@@ -173,7 +180,7 @@ def scan_part(
             f"{path}: damaged, the part {name} is not valid XML ({error}). Open it in the "
             "spreadsheet program and save it again."
         ) from None
-    except (zipfile.BadZipFile, OSError, EOFError, NotImplementedError) as error:
+    except _UNPACKING as error:
         raise _damaged(path, name) from error
 
 

@@ -170,6 +170,13 @@ class _Splicer:
             raise InputError(
                 f"{self.path}: damaged, the part {self.part} is not valid XML ({error})."
             ) from None
+        except ValueError as error:
+            if isinstance(error, InputError):
+                raise
+            raise InputError(
+                f"{self.path}: damaged, the part {self.part} cannot be understood near row "
+                f"{self.row}."
+            ) from error
         if self.dimension and self.edits:
             self.grow_dimension(*self.dimension)
         self.edits.sort(key=lambda edit: edit[:2])
@@ -447,7 +454,7 @@ class _Splicer:
         for block in self.changes.added:
             numbers = [column.column for column in block.columns]
             made += [(block.first, min(numbers)), (block.first + block.count - 1, max(numbers))]
-        if not made or not reference:
+        if not made or not re.fullmatch(r"[A-Z]{1,3}\d+(:[A-Z]{1,3}\d+)?", reference):
             return
         top, left, bottom, right = split_area(reference)
         top, left = min(top, *(r for r, _ in made)), min(left, *(c for _, c in made))
