@@ -1,6 +1,7 @@
 from .domain.intersection import Intersection
 from .domain.lens import Lens
 from .domain.pair import Pair, Photo
+from .domain.relief_map import Quality, ReliefMap
 from .equations import (
     plane_coordinates,
     relief,
@@ -8,12 +9,17 @@ from .equations import (
     relief_displacements,
     relief_from_displacement,
 )
+from .solvers.dense.solve import DenseRelief, dense_relief
 
 __all__ = [
+    "DenseRelief",
     "Intersection",
     "Lens",
     "Pair",
     "Photo",
+    "Quality",
+    "ReliefMap",
+    "dense_relief",
     "plane_coordinates",
     "relief",
     "relief_displacement",

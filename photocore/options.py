@@ -24,6 +24,27 @@ class Size(click.ParamType):  # type: ignore[type-arg,unused-ignore]
         return width, height
 
 
+class Numbers(click.ParamType):  # type: ignore[type-arg,unused-ignore]
+    """So many numbers with commas between them; decimal points."""
+
+    def __init__(self, count: int) -> None:
+        self.count, self.name = count, "numbers"
+
+    def convert(
+        self, value: object, param: click.Parameter | None, ctx: click.Context | None
+    ) -> tuple[float, ...]:
+        """Return the numbers."""
+        if isinstance(value, tuple):
+            return value
+        try:
+            numbers = tuple(float(part) for part in str(value).split(","))
+        except ValueError:
+            numbers = ()
+        if len(numbers) != self.count:
+            self.fail(f"{value!r} is not {self.count} numbers with commas between them", param, ctx)
+        return numbers
+
+
 class Scale(click.ParamType):  # type: ignore[type-arg,unused-ignore]
     """A scale 1:N."""
 

@@ -1,0 +1,182 @@
+"""Relief maps in and out: three-band GeoTIFF, coloured point cloud, shaded preview."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bifocal.domain.relief_map import ReliefMap
+from bifocal.io.geotiff import RasterReader, create_raster
+from photocore.arrays import ByteArray, FloatArray
+from photocore.errors import InputError
+from photocore.output import atomic_path
+
+#: Bands of the GeoTIFF, in this order.
+BANDS = ("relief [m]", "sigma [m]", "quality (1 measured, 2 interpolated, 3 hidden, 0 unknown)")
+#: Longer side of a preview. [px]
+PREVIEW_SIDE = 2000
+_ROWS = 512
+
+
+class Cloud(NamedTuple):
+    """Points of a relief map, ready to be written.
+
+    Attributes
+    ----------
+    xyz : ndarray, shape (n, 3)
+        X, Y, relief. [m]
+    colours : ndarray of uint8, shape (n, 3)
+    sigma : ndarray, shape (n,)
+        Of the relief. [m]
+    quality : ndarray of uint8, shape (n,)
+    """
+
+    xyz: FloatArray
+    colours: ByteArray
+    sigma: FloatArray
+    quality: ByteArray
+
+
+def write_relief_map(
+    path: Path | str, relief: ReliefMap, *, overwrite: bool = False, tags: dict[str, str]
+) -> None:
+    """Write relief, sigma and quality as a float32 GeoTIFF; NaN where unknown."""
+    with create_raster(
+        path,
+        relief.grid,
+        bands=3,
+        dtype=np.float32,
+        names=BANDS,
+        nodata=float("nan"),
+        tags=tags,
+        overwrite=overwrite,
+    ) as file:
+        for row in range(0, relief.shape[0], _ROWS):
+            part = slice(row, row + _ROWS)
+            bands = [relief.r[part], relief.sigma[part], relief.quality[part].astype(np.float32)]
+            file.write(np.stack(bands, axis=-1), row=row)
+
+
+def read_relief_map(path: Path | str) -> ReliefMap:
+    """Read a relief map; other programs' maps of one band count as measured with sigma 0.
+
+    Raises
+    ------
+    InputError
+        If the file is no raster in the plane frame.
+    """
+    with RasterReader(path) as file:
+        grid = file.grid
+        relief = file.read_floats(0, 0, grid.width, grid.height)
+        own = file.bands >= 3 and file.names[:1] == BANDS[:1]
+        others = file.read(0, 0, grid.width, grid.height, bands=[2, 3]) if own else None
+    if others is None:
+        return ReliefMap.from_relief(relief, plane_from_pixel=grid.plane_from_pixel)
+    return ReliefMap(
+        r=relief,
+        sigma=others[..., 0],
+        quality=np.nan_to_num(others[..., 1]).astype(np.uint8),
+        plane_from_pixel=grid.plane_from_pixel,
+    )
+
+
+def write_cloud(path: Path | str, cloud: Cloud, *, overwrite: bool = False) -> None:
+    """Write a coloured point cloud as .ply, .las or .laz.
+
+    Raises
+    ------
+    InputError
+        If the ending is another.
+    """
+    path = Path(path)
+    writers = {".ply": _write_ply, ".las": _write_las, ".laz": _write_las}
+    writer = writers.get(path.suffix.lower())
+    if writer is None:
+        raise InputError(f"{path}: point clouds are written as .ply, .las or .laz.")
+    with atomic_path(path, overwrite=overwrite) as temporary:
+        writer(temporary, cloud)
+
+
+def _write_ply(path: Path, cloud: Cloud) -> None:
+    """Write a binary PLY."""
+    fields = [("x", "<f8"), ("y", "<f8"), ("z", "<f8"), ("red", "u1"), ("green", "u1"),
+              ("blue", "u1"), ("sigma", "<f4"), ("quality", "u1")]  # fmt: skip
+    rows = np.zeros(len(cloud.xyz), dtype=fields)
+    for axis, name in enumerate(("x", "y", "z")):
+        rows[name] = cloud.xyz[:, axis]
+    for axis, name in enumerate(("red", "green", "blue")):
+        rows[name] = cloud.colours[:, axis]
+    rows["sigma"], rows["quality"] = cloud.sigma, cloud.quality
+    kinds = {"<f8": "double", "<f4": "float", "u1": "uchar"}
+    properties = "".join(f"property {kinds[kind]} {name}\n" for name, kind in fields)
+    header = (
+        "ply\nformat binary_little_endian 1.0\ncomment metres, plane frame\n"
+        f"element vertex {len(rows)}\n{properties}end_header\n"
+    )
+    path.write_bytes(header.encode("ascii") + rows.tobytes())
+
+
+def _write_las(path: Path, cloud: Cloud) -> None:
+    """Write LAS 1.4 (or LAZ) with colour, sigma as extra dimension and quality as user data."""
+    import laspy
+
+    header = laspy.LasHeader(point_format=7, version="1.4")
+    header.offsets = np.floor(cloud.xyz.min(axis=0))
+    header.scales = np.full(3, 1e-4)
+    header.add_extra_dim(
+        laspy.ExtraBytesParams(name="sigma", type=np.float32, description="sigma of relief, m")
+    )
+    points = laspy.LasData(header)
+    points.x, points.y, points.z = cloud.xyz.T
+    for axis, name in enumerate(("red", "green", "blue")):
+        points[name] = cloud.colours[:, axis].astype(np.uint16) * 257
+    points["sigma"] = cloud.sigma.astype(np.float32)
+    points.user_data = cloud.quality
+    points.write(str(path))
+
+
+def write_preview(path: Path | str, relief: ReliefMap, *, overwrite: bool = False) -> None:
+    """Write a picture of the relief: colours with hill shade, colour bar, axes in metres."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.colors import Normalize
+    from matplotlib.figure import Figure
+
+    path = Path(path)
+    if path.suffix.lower() != ".png":
+        raise InputError(f"{path}: the preview is written as .png.")
+    step = max(1, -(-max(relief.shape) // PREVIEW_SIDE))
+    r = relief.r[::step, ::step]
+    known = np.isfinite(r)
+    low, high = (float(v) for v in np.percentile(r[known], [0.5, 99.5]))
+    scale = ScalarMappable(Normalize(low, max(high, low + 1e-3)), "viridis")
+    picture = shaded(scale.to_rgba(r)[..., :3], r, relief.gsd * step)
+    picture[~known] = 1.0
+    height, width = r.shape
+    size = 12.0 if width >= height else 12.0 * width / height + 2.5
+    figure = Figure(figsize=(size, size * height / width * 0.82 + 1.0), dpi=150)
+    FigureCanvasAgg(figure)
+    axes = figure.add_subplot()
+    x_min, y_min, x_max, y_max = relief.bounds
+    axes.imshow(picture, extent=(x_min, x_max, y_min, y_max), interpolation="antialiased")
+    axes.set_xlabel("X [m]")
+    axes.set_ylabel("Y [m]")
+    bar = figure.colorbar(scale, ax=axes, fraction=0.035, pad=0.02)
+    bar.set_label("relief r [m], positive towards the cameras")
+    with atomic_path(path, overwrite=overwrite) as temporary:
+        figure.savefig(temporary, bbox_inches="tight", format="png")
+
+
+def shaded(colours: NDArray[np.floating], r: NDArray[np.float32], gsd: float) -> FloatArray:
+    """Return colours darkened and lightened by light from the upper left, shape (h, w, 3)."""
+    filled = np.where(np.isfinite(r), r, np.nanmedian(r)).astype(np.float64)
+    down, across = np.gradient(filled, gsd)
+    # Slopes are halved: steps of a façade are steep, and its surfaces should not turn black.
+    normal = np.stack([-0.5 * across, 0.5 * down, np.ones_like(filled)], axis=-1)
+    normal /= np.linalg.norm(normal, axis=-1, keepdims=True)
+    light = np.array([-0.45, 0.5, 0.74])
+    shade = np.clip(normal @ light / light[2], 0.25, 1.6)
+    return np.clip(colours * shade[..., None] ** 0.8, 0, 1)

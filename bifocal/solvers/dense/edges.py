@@ -1,0 +1,100 @@
+"""Steps of relief made sharp: near an edge a pixel belongs to the upper or to the lower surface.
+
+Flow runs as a ramp from one surface to the other. Both surfaces are known beside the ramp, so the
+question is only which pixel is whose: the photos answer it, smoothed along the image's own edges.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from bifocal.solvers.dense.frame import Float32Array, Frame, zoom_map
+
+#: Half width of a ramp. [px]
+REACH = 7
+#: Steps whose parallax is smaller than this are left as measured. [px]
+LEAST_STEP = 1.0
+#: Differences of grey value and of its gradient beyond these count alike. [grey levels]
+GREY_LIMIT, GRADIENT_LIMIT, GREY_SHARE = 12.0, 8.0, 0.4
+#: Half window and regularisation of the guided filter (He et al. 2013). [px, grey levels²]
+WINDOW, SOFTNESS = 4, 100.0
+#: What the measured value is favoured by. [grey levels]
+FAVOUR = 0.1
+
+
+def sharpen(frame: Frame, relief: Float32Array, lever: float) -> Float32Array:
+    """Return the relief of photo 1 with ramps at steps replaced by one of the two surfaces.
+
+    Parameters
+    ----------
+    frame : Frame
+    relief : ndarray of float32, shape (height, width)
+        Measured relief. [m]
+    lever : float
+        B = d1 d2 / (d1 - d2). [m]
+    """
+    import cv2
+
+    median = cv2.medianBlur(relief, 5)
+    disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * REACH + 1, 2 * REACH + 1))
+    upper, lower = cv2.dilate(median, disc), cv2.erode(median, disc)
+    x, y = frame.from_centre()
+    parallax = (upper - lower) * np.sqrt(x * x + y * y) / np.float32(lever)
+    band = parallax > LEAST_STEP
+    result = relief.copy()
+    far, near = _features(frame.image1), _features(frame.image2)
+    guide = _Guide(far[..., 0])
+    costs = []
+    for candidate, favour in ((relief, FAVOUR), (upper, 0.0), (lower, 0.0)):
+        costs.append(guide.smooth(_mismatch(frame, far, near, candidate)) - favour)
+    up = band & (costs[1] < costs[0]) & (costs[1] <= costs[2])
+    down = band & (costs[2] < costs[0]) & (costs[2] < costs[1])
+    result[up] = upper[up]
+    result[down] = lower[down]
+    return result
+
+
+def _features(image: np.ndarray) -> Float32Array:
+    """Return grey value and both derivatives, shape (height, width, 3)."""
+    import cv2
+
+    grey = image.astype(np.float32)
+    across = cv2.Sobel(image, cv2.CV_32F, 1, 0, ksize=3, scale=0.25)
+    down = cv2.Sobel(image, cv2.CV_32F, 0, 1, ksize=3, scale=0.25)
+    return np.dstack([grey, across, down])
+
+
+def _mismatch(
+    frame: Frame, far: Float32Array, near: Float32Array, relief: Float32Array
+) -> Float32Array:
+    """Return how badly photo 2 fits photo 1 at given relief. [grey levels]"""
+    import cv2
+
+    columns, rows = zoom_map(frame, relief)
+    moved = cv2.remap(near, columns, rows, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+    off = cv2.absdiff(moved, far)
+    grey = np.minimum(off[..., 0], GREY_LIMIT) * np.float32(GREY_SHARE)
+    return np.asarray(grey + np.minimum(off[..., 1] + off[..., 2], GRADIENT_LIMIT))
+
+
+class _Guide:
+    """Guided filter: averages within a window, but not across edges of the guiding image."""
+
+    def __init__(self, image: Float32Array) -> None:
+        self.image = image
+        self.mean = self._blur(image)
+        self.spread = self._blur(image * image) - self.mean * self.mean + SOFTNESS
+
+    def smooth(self, values: Float32Array) -> Float32Array:
+        """Return the values smoothed."""
+        mean = self._blur(values)
+        slope = (self._blur(self.image * values) - self.mean * mean) / self.spread
+        level = mean - slope * self.mean
+        return np.asarray(self._blur(slope) * self.image + self._blur(level))
+
+    @staticmethod
+    def _blur(values: np.ndarray) -> Float32Array:
+        import cv2
+
+        side = 2 * WINDOW + 1
+        return np.asarray(cv2.blur(values, (side, side)))

@@ -1,0 +1,169 @@
+"""A coarse first relief: zoom photo 2 by every hypothesis, correlate, smooth along eight paths.
+
+Optical flow follows parallaxes of some ten pixels by itself. Porches two metres deep, oblique
+photos and repeated courses of stone need a first value; this one comes from a few hundred pixels
+across.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from bifocal.solvers.dense.frame import Float32Array, Frame
+from photocore.arrays import BoolArray, ByteArray
+
+#: Width or height at which the sweep works; more brings little, costs squarely. [px]
+COARSE_SIDE = 420
+#: Relief tried, as shares of d2: porches go deeper than cornices stand out.
+DEEPEST, HIGHEST = -0.36, 0.22
+#: Steps per coarse pixel of parallax at the far corner, and the most hypotheses.
+STEPS_PER_PIXEL, MOST_STEPS = 1.0, 128
+#: Grey values this weak are noise: they do not correlate. [grey levels]
+NOISE = 2.0
+#: Cost of a hypothesis that falls outside photo 2, between a good (0) and a bad match (1).
+OUTSIDE = 0.45
+#: Penalties of the smoothing: one step, any jump, and how edges of the image lower them.
+ONE_STEP, JUMP = 0.06, 0.55
+
+
+def coarse_relief(
+    frame: Frame, relief_range: tuple[float, float] | None = None
+) -> tuple[Float32Array, int]:
+    """Return a first relief of the pixels of photo 1 on a coarser grid, and its factor. [m]
+
+    Parameters
+    ----------
+    frame : Frame
+    relief_range : tuple of float, optional
+        Least and greatest relief tried; by default -36 % to 22 % of d2. [m]
+
+    Notes
+    -----
+    Hypotheses are uniform in parallax, r / (d2 - r) - r / (d1 - r), not in r. The matching cost is
+    1 - ZNCC over two window sizes; semi-global matching (Hirschmueller 2008) on eight paths.
+    """
+    import cv2
+
+    factor = max(1, round(max(frame.grid.shape) / COARSE_SIDE))
+    size = (frame.grid.width // factor, frame.grid.height // factor)
+    if min(size) < 16:
+        factor, size = 1, (frame.grid.width, frame.grid.height)
+
+    def shrink(image: ByteArray) -> Float32Array:
+        blurred = cv2.resize(
+            image[: size[1] * factor, : size[0] * factor], size, interpolation=cv2.INTER_AREA
+        )
+        return np.asarray(blurred, dtype=np.float32)
+
+    far, near = shrink(frame.image1), shrink(frame.image2)
+    inside = shrink(frame.seen2.astype(np.uint8) * 255) > 250
+    outside = shrink(frame.seen1.astype(np.uint8) * 255) < 250
+    centre = (frame.centre + 0.5) / factor - 0.5
+    relief = hypotheses(frame, size, centre, relief_range)
+    cost = _cost_volume(far, near, inside, frame, relief, centre)
+    cost[outside] = OUTSIDE
+    best = _semi_global(cost, far)
+    coarse = relief[best].astype(np.float32)
+    return np.asarray(cv2.medianBlur(coarse, 5)), factor
+
+
+def hypotheses(
+    frame: Frame,
+    size: tuple[int, int],
+    centre: np.ndarray,
+    relief_range: tuple[float, float] | None,
+) -> np.ndarray:
+    """Return relief values that are uniform in parallax, from low to high, shape (n,). [m]"""
+    d1, d2 = frame.distances
+    low, high = relief_range or (DEEPEST * d2, HIGHEST * d2)
+    zoom = [d2 * (d1 - r) / (d1 * (d2 - r)) for r in (low, high)]
+    corners = np.array([[0, 0], [size[0], 0], [0, size[1]], size]) - centre
+    reach = float(np.hypot(*corners.T).max())
+    count = int(np.clip((zoom[1] - zoom[0]) * reach * STEPS_PER_PIXEL, 8, MOST_STEPS))
+    factor = np.linspace(zoom[0], zoom[1], count)
+    return np.asarray(d1 * d2 * (factor - 1) / (factor * d1 - d2))
+
+
+def _cost_volume(
+    far: Float32Array,
+    near: Float32Array,
+    inside: BoolArray,
+    frame: Frame,
+    relief: np.ndarray,
+    centre: np.ndarray,
+) -> Float32Array:
+    """Return 1 - ZNCC of every pixel and hypothesis, 0..1, shape (height, width, n)."""
+    import cv2
+
+    d1, d2 = frame.distances
+    height, width = far.shape
+    x = np.arange(width, dtype=np.float32)[None, :] - np.float32(centre[0])
+    y = np.arange(height, dtype=np.float32)[:, None] - np.float32(centre[1])
+    x, y = np.broadcast_arrays(x, y)
+    cost = np.empty((height, width, len(relief)), dtype=np.float32)
+    windows = (5, 11)
+    moments = {n: _moments(far, n) for n in windows}
+    content = inside.astype(np.float32)
+    for i, r in enumerate(relief):
+        zoom = np.float32(d2 * (d1 - r) / (d1 * (d2 - r)))
+        maps = (zoom * x + np.float32(centre[0]), zoom * y + np.float32(centre[1]))
+        moved = cv2.remap(near, *maps, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+        there = cv2.remap(content, *maps, cv2.INTER_LINEAR, borderValue=0.0)
+        score = np.zeros_like(far)
+        for n in windows:
+            mean, variance = moments[n]
+            mean2, variance2 = _moments(moved, n)
+            shared = cv2.blur(far * moved, (n, n)) - mean * mean2
+            score += 0.5 * shared / np.sqrt((variance + NOISE**2) * (variance2 + NOISE**2))
+        cost[..., i] = np.where(there > 0.99, np.clip(1 - score, 0, 1), OUTSIDE)
+    return cost
+
+
+def _moments(image: Float32Array, n: int) -> tuple[Float32Array, Float32Array]:
+    """Return local mean and variance in an n x n window."""
+    import cv2
+
+    mean = cv2.blur(image, (n, n))
+    return mean, np.maximum(cv2.blur(image * image, (n, n)) - mean * mean, 0)
+
+
+def _semi_global(cost: Float32Array, image: Float32Array) -> np.ndarray:
+    """Return the best hypothesis per pixel after smoothing along eight paths."""
+    total = np.zeros_like(cost)
+    for down, across in ((0, 1), (1, 0), (1, 1), (1, -1)):
+        for reverse in (False, True):
+            _add_path(cost, image, total, down, across, reverse=reverse)
+    return np.asarray(total.argmin(-1))
+
+
+def _add_path(
+    cost: Float32Array,
+    image: Float32Array,
+    total: Float32Array,
+    down: int,
+    across: int,
+    *,
+    reverse: bool,
+) -> None:
+    """Add the smoothed cost of one path direction to the total."""
+    if down == 0:  # along rows: the same as along columns of the transposed volume
+        cost, image, total = (a.swapaxes(0, 1) for a in (cost, image, total))
+        across = 0
+    if reverse:
+        cost, image, total = cost[::-1], image[::-1], total[::-1]
+    before = np.ascontiguousarray(cost[0])
+    total[0] += before
+    for row in range(1, len(cost)):
+        shifted, neighbour = before, image[row - 1]
+        if across:
+            shifted, neighbour = np.roll(before, across, axis=0), np.roll(neighbour, across)
+            edge = 0 if across > 0 else -1
+            shifted[edge] = 0.0
+        least = shifted.min(1, keepdims=True)
+        step = np.abs(image[row] - neighbour)[:, None]
+        jump = least + JUMP / (1 + step / 12)
+        best = np.minimum(shifted, jump)
+        np.minimum(best[:, 1:], shifted[:, :-1] + ONE_STEP, out=best[:, 1:])
+        np.minimum(best[:, :-1], shifted[:, 1:] + ONE_STEP, out=best[:, :-1])
+        before = cost[row] + best - least
+        total[row] += before

@@ -1,0 +1,328 @@
+"""Dense relief of a bifocal pair: seed, flow, edges, noise, plane."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bifocal.domain.grid import Grid
+from bifocal.domain.pair import Pair
+from bifocal.domain.relief_map import Quality, ReliefMap
+from bifocal.solvers.dense import edges, flow, seed, smooth, splat
+from bifocal.solvers.dense.frame import (
+    Float32Array,
+    Frame,
+    as_grey,
+    common_bounds,
+    make_frame,
+    native_gsd,
+    working_grid,
+)
+from bifocal.solvers.dense.registration import Registration, check_registration
+from photocore.arrays import BoolArray, ByteArray
+from photocore.console import Progress, no_progress
+from photocore.errors import InputError
+
+Bounds = tuple[float, float, float, float]
+
+#: Coarsening of the working frame, and the most pixels it may have.
+QUALITIES = {"fast": (2.0, 3.2e6), "standard": (1.0, 9e6), "best": (1.0, 30e6)}
+#: Limits of a validated pixel: across the radius and there and back. [px]
+ACROSS_LIMIT, LOOP_LIMIT = 0.5, 0.6
+#: A measured relief is known better than this share of d2.
+SIGMA_SHARE = 0.01
+#: Relief maps of more pixels than this are refused: a unit has been mistaken.
+LARGEST_MAP = 400e6
+#: Error across the radius that counts as noise rather than as an edge, for smoothing. [px]
+NOISE_CLIP = 0.25
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class DenseRelief(ReliefMap):
+    """A relief map and how it came about.
+
+    Attributes
+    ----------
+    registration : Registration
+        Whether the photos fit each other; its remarks are for the user.
+    working_gsd : float
+        Pixel at which the photos were matched. [m]
+    """
+
+    registration: Registration
+    working_gsd: float
+
+    def summary(self) -> dict[str, object]:
+        """Return the figures of `bifocal relief --json`."""
+        known = self.known
+        shares = {q.name.lower(): float((self.quality == q).mean()) for q in Quality}
+        values = self.r[known]
+        return {
+            "size": [self.shape[1], self.shape[0]],
+            "gsd": self.gsd,
+            "working_gsd": self.working_gsd,
+            "bounds": list(self.bounds),
+            "shares": shares,
+            "relief": dict(
+                zip(
+                    ("min", "p1", "median", "p99", "max"),
+                    np.percentile(values, [0, 1, 50, 99, 100]).tolist(),
+                    strict=True,
+                )
+            ),
+            "sigma_median": float(np.median(self.sigma[self.quality == Quality.MEASURED]))
+            if (self.quality == Quality.MEASURED).any()
+            else None,
+            "registration": self.registration.to_dict(),
+        }
+
+
+def dense_relief(
+    pair: Pair,
+    image1: NDArray[np.generic],
+    image2: NDArray[np.generic],
+    *,
+    gsd: float | None = None,
+    bounds: Bounds | None = None,
+    quality: str = "standard",
+    relief_range: tuple[float, float] | None = None,
+    progress: Progress = no_progress,
+) -> DenseRelief:
+    r"""Measure the relief of everything both photos of a pair show.
+
+    Parameters
+    ----------
+    pair : Pair
+        Geometry; registered, see Notes.
+    image1, image2 : ndarray of uint8 or uint16, shape (height, width[, 3])
+        Far and near photo as taken; lens distortion is removed on the way if the pair has lenses.
+    gsd : float, optional
+        Pixel of the map; by default that of the far photo on the plane. [m]
+    bounds : tuple of float, optional
+        X min, Y min, X max, Y max; by default all that both photos see of the plane. [m]
+    quality : str
+        ``fast`` matches at half the resolution, ``best`` also large photos at full resolution.
+    relief_range : tuple of float, optional
+        Least and greatest relief to expect; by default -36 % to +22 % of d2. [m]
+    progress : callable
+        Told how far the work is.
+
+    Returns
+    -------
+    DenseRelief
+        A `ReliefMap` (``r``, ``sigma``, ``quality``, ``plane_from_pixel``) with diagnostics.
+
+    Raises
+    ------
+    InputError
+        If an image, the GSD, the bounds or the quality is unusable.
+    GeometryError
+        If the photos have no common area or do not fit each other.
+
+    Notes
+    -----
+    On the plane photo 2 is a zoom of photo 1 by k(r) about one point e, whatever the offset of the
+    cameras: ``q2 - e = k(r) (q1 - e)``. Flow along the radius from e gives k and so r; flow across
+    it is known to be zero, so its local RMS is the matching precision, and
+
+    .. math:: \sigma_r = \sigma_m B / s', \qquad B = d_1 d_2 / (d_1 - d_2).
+
+    A relative scale error of the photos shifts all relief by B times that error and leaves no
+    residual: the scale must come from control points or distances (`bifocal align`).
+
+    Examples
+    --------
+    >>> from bifocal.solvers.scene import bifocal_cameras, facade, render
+    >>> cameras = bifocal_cameras(size=(192, 128), pixel=0.059)
+    >>> shot = render(facade(texel=0.04), cameras, rng=np.random.default_rng(1))
+    >>> result = dense_relief(shot.pair, shot.image1, shot.image2)
+    >>> result.shape, round(result.gsd, 6)
+    ((128, 192), 0.059)
+    """
+    grey1, grey2 = as_grey(image1, "image1"), as_grey(image2, "image2")
+    if quality not in QUALITIES:
+        raise InputError(f"quality: expected {', '.join(QUALITIES)}, got {quality!r}.")
+    target, work = _grids(pair, (grey1, grey2), gsd, bounds, quality, relief_range)
+    frame = make_frame(pair, grey1, grey2, work)
+    progress(0.1, 1.0, "First relief")
+    coarse, _ = seed.coarse_relief(frame, relief_range)
+    progress(0.2, 1.0, "Matching")
+    found = flow.measure(frame, coarse, finest=0)
+    registration = check_registration(frame, found)
+    progress(0.7, 1.0, "Edges")
+    source, usable = _surfaces(frame, found, relief_range)
+    progress(0.85, 1.0, "Relief map")
+    layer = splat.to_plane(frame, source, usable, target)
+    _complete(frame, layer, target, coarse)
+    progress(1.0, 1.0)
+    return _resampled(layer, target, gsd, bounds, registration, work.gsd, pair, grey1)
+
+
+def _grids(
+    pair: Pair,
+    images: tuple[ByteArray, ByteArray],
+    gsd: float | None,
+    bounds: Bounds | None,
+    quality: str,
+    relief_range: tuple[float, float] | None,
+) -> tuple[Grid, Grid]:
+    """Return the grid of the map (at working resolution at the finest) and the working grid."""
+    native = native_gsd(pair.image1, images[0].shape)
+    common = common_bounds(pair, (images[0].shape, images[1].shape))
+    step = native if gsd is None else float(gsd)
+    box = common if bounds is None else bounds
+    wanted = Grid.from_bounds(box, gsd=step)
+    size = f"{box[2] - box[0]:.3g} x {box[3] - box[1]:.3g} m"
+    if wanted.width * wanted.height > LARGEST_MAP:
+        raise InputError(
+            f"gsd: {step:g} m over {size} would be {wanted.width} x {wanted.height} px. Is the "
+            f"unit right? The GSD is in metres; a pixel of the far photo is {native:.4g} m."
+        )
+    if min(wanted.shape) < 2:
+        raise InputError(
+            f"gsd: {step:g} m over {size} leaves {wanted.width} x {wanted.height} px. Is the unit "
+            f"right? The GSD is in metres; a pixel of the far photo is {native:.4g} m."
+        )
+    low, high = relief_range or (
+        seed.DEEPEST * pair.image2.distance,
+        seed.HIGHEST * pair.image2.distance,
+    )
+    reach = _seen_box(pair, box, low, high) if bounds is not None else box
+    reach = (
+        max(reach[0], common[0]),
+        max(reach[1], common[1]),
+        min(reach[2], common[2]),
+        min(reach[3], common[3]),
+    )
+    if reach[2] - reach[0] < 16 * native or reach[3] - reach[1] < 16 * native:
+        raise InputError(
+            f"bounds: {box} m lie outside what both photos see, "
+            f"{tuple(round(v, 2) for v in common)} m."
+        )
+    factor, most = QUALITIES[quality]
+    area = (reach[2] - reach[0]) * (reach[3] - reach[1])
+    fine = max(native * factor, np.sqrt(area / most), step / 2)
+    if factor == 1.0 and fine < 1.01 * native:
+        fine = native
+    work = working_grid(pair, images[0].shape, reach, fine)
+    if bounds is None and fine == native and gsd is None:
+        return work, work  # the map's pixels are those of the working frame
+    return Grid.from_bounds(box, gsd=max(step, fine)), work
+
+
+def _seen_box(pair: Pair, box: Bounds, low: float, high: float) -> Bounds:
+    """Return where photo 1 sees, on the plane, what stands within a box between two reliefs."""
+    foot = pair.image1.foot
+    corners = np.array([[box[0], box[1]], [box[2], box[3]]])
+    places = [
+        foot.nadir + (corners - foot.nadir) * foot.distance / (foot.distance - r)
+        for r in (low, 0.0, min(high, 0.6 * foot.distance))
+    ]
+    stacked = np.concatenate(places)
+    (a, b), (c, d) = stacked.min(0), stacked.max(0)
+    return float(a), float(b), float(c), float(d)
+
+
+def _surfaces(
+    frame: Frame, found: flow.Measurement, relief_range: tuple[float, float] | None
+) -> tuple[splat.Layer, BoolArray]:
+    """Return relief, sigma and quality of the pixels of photo 1, and which of them to use."""
+    d2 = frame.distances[1]
+    lever = frame.pair.lever
+    low, high = relief_range or (seed.DEEPEST * d2, seed.HIGHEST * d2)
+    margin = 0.1 * (high - low)
+    relief = np.clip(np.nan_to_num(found.r), low - margin, high + margin).astype(np.float32)
+    relief = edges.sharpen(frame, relief, lever)
+    quiet = np.minimum(found.sigma_px, np.float32(NOISE_CLIP))
+    relief = smooth.shrink_noise(relief, flow.sigma_of_relief(frame, relief, quiet))
+    sigma = flow.sigma_of_relief(frame, relief, found.sigma_px)
+    valid = (np.abs(found.across) < ACROSS_LIMIT) & (found.loop < LOOP_LIMIT)
+    valid &= sigma < SIGMA_SHARE * d2
+    quality = np.where(valid, Quality.MEASURED, Quality.INTERPOLATED).astype(np.uint8)
+    x, y = frame.from_centre()
+    reach = np.maximum(np.sqrt(x * x + y * y), 1)
+    covered = splat.hidden_in_second(
+        frame, relief, (1.5 * lever / reach + 0.002 * d2).astype(np.float32)
+    )
+    covered &= ~valid
+    layer = splat.Layer(relief, sigma, quality)
+    filled = splat.fill_outwards(layer, covered, frame.grid, frame.pair.image1.nadir)
+    inside = flow.is_inside(frame, relief)
+    usable = inside & ~(splat.ramps(frame, relief) & ~filled & ~valid)
+    layer.quality[covered] = Quality.HIDDEN
+    return layer, usable
+
+
+def _complete(frame: Frame, layer: splat.Layer, grid: Grid, coarse: Float32Array) -> None:
+    """Fill strips hidden from photo 1 from the surface behind (in place)."""
+    del coarse
+    holes = ~np.isfinite(layer.r)
+    nadir = frame.pair.image1.nadir
+    # Holes outside what both photos see stay unknown.
+    seen = _cover(frame, grid)
+    splat.fill_outwards(layer, holes & seen, grid, nadir)
+
+
+def _cover(frame: Frame, grid: Grid) -> BoolArray:
+    """Return which pixels of the map both photos cover (taken at r = 0)."""
+    import cv2
+
+    both = (frame.seen1 & frame.seen2).astype(np.uint8)
+    column, row = frame.grid.offset_in(grid)
+    scale = frame.grid.gsd / grid.gsd
+    matrix = np.array([[scale, 0, column], [0, scale, row]])
+    return np.asarray(
+        cv2.warpAffine(both, matrix, (grid.width, grid.height), flags=cv2.INTER_NEAREST) > 0
+    )
+
+
+def _resampled(
+    layer: splat.Layer,
+    grid: Grid,
+    gsd: float | None,
+    bounds: Bounds | None,
+    registration: Registration,
+    working_gsd: float,
+    pair: Pair,
+    image1: ByteArray,
+) -> DenseRelief:
+    """Return the map at the GSD asked for, refined by interpolation if that is finer."""
+    import cv2
+
+    step = native_gsd(pair.image1, image1.shape) if gsd is None else float(gsd)
+    r, sigma, quality = layer
+    if step < 0.999 * grid.gsd:
+        box = grid.bounds if bounds is None else bounds
+        fine = Grid.from_bounds(box, gsd=step)
+        column, row = grid.pixel_of(np.array([fine.x0, fine.y0]))
+        ratio = fine.gsd / grid.gsd
+        matrix = np.array([[ratio, 0, column], [0, ratio, row]])
+        size = (fine.width, fine.height)
+
+        def warp(band: np.ndarray, how: int) -> np.ndarray:
+            return np.asarray(
+                cv2.warpAffine(
+                    band,
+                    matrix,
+                    size,
+                    flags=how | cv2.WARP_INVERSE_MAP,
+                    borderMode=cv2.BORDER_REPLICATE,
+                )
+            )
+
+        nearest = warp(r, cv2.INTER_NEAREST)
+        smoothed = warp(r, cv2.INTER_LINEAR)
+        r = np.where(np.isfinite(smoothed), smoothed, nearest)
+        sigma, quality = warp(sigma, cv2.INTER_NEAREST), warp(quality, cv2.INTER_NEAREST)
+        grid = fine
+    known = np.isfinite(r)
+    return DenseRelief(
+        r=r,
+        sigma=np.where(known, sigma, np.float32(np.nan)),
+        quality=np.where(known, quality, np.uint8(Quality.UNKNOWN)),
+        plane_from_pixel=grid.plane_from_pixel,
+        registration=registration,
+        working_gsd=working_gsd,
+    )

@@ -1,0 +1,229 @@
+"""From the pixels of photo 1 to the pixels of the relief map, nearer surfaces over farther ones."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from bifocal.domain.grid import Grid
+from bifocal.domain.relief_map import Quality
+from bifocal.rays import Foot
+from bifocal.solvers.dense.frame import Float32Array, Frame, zoom_map
+from photocore.arrays import BoolArray, ByteArray, FloatArray
+
+#: A relief agrees with the pixel it came from to this. [m], relative to d1
+AGREEMENT = 4e-4
+#: A ramp that stretches the wall by more than this is flow running over a hidden strip.
+STRETCH = 1.3
+#: Steps outwards when a hidden strip is filled; 2**LEAPS steps of LEAP pixels are the most.
+LEAP, LEAPS = 3, 7
+
+
+class Layer(NamedTuple):
+    """Bands of a relief map in the making."""
+
+    r: Float32Array
+    sigma: Float32Array
+    quality: ByteArray
+
+
+def ramps(frame: Frame, relief: Float32Array) -> BoolArray:
+    """Return pixels of photo 1 on ramps that no camera can have seen as a surface.
+
+    With s1 the radius about the nadir of photo 1, ``ds'/ds1 = 1 - r/d1 - (s1/d1) dr/ds1`` is how
+    much wall one pixel covers; on a true surface it is near one.
+    """
+    import cv2
+
+    foot = frame.pair.image1.foot
+    x, y = _from_nadir(frame.grid, foot)
+    across = cv2.Sobel(relief, cv2.CV_32F, 1, 0, ksize=3, scale=0.125)
+    down = cv2.Sobel(relief, cv2.CV_32F, 0, 1, ksize=3, scale=0.125)
+    distance = np.float32(foot.distance)
+    stretch = 1 - (relief + across * x + down * y) / distance
+    return np.asarray(stretch > STRETCH)
+
+
+def to_plane(frame: Frame, source: Layer, usable: BoolArray, grid: Grid) -> Layer:
+    """Return the relief map on a grid of the plane.
+
+    Parameters
+    ----------
+    frame : Frame
+    source : Layer
+        Bands in the frame of photo 1.
+    usable : ndarray of bool
+        Pixels that may be used.
+    grid : Grid
+        Of the relief map.
+    """
+    import cv2
+
+    foot = frame.pair.image1.foot
+    relief = np.where(usable, source.r, np.float32(np.nan))
+    first = _scatter(frame, relief, grid, foot)
+    known = np.isfinite(first)
+    around = np.ones((5, 5), dtype=np.uint8)
+    upper = cv2.dilate(np.where(known, first, np.float32(-1e3)), around)
+    lower = cv2.erode(np.where(known, first, np.float32(1e3)), around)
+    result = Layer(
+        np.full(grid.shape, np.nan, dtype=np.float32),
+        np.full(grid.shape, np.nan, dtype=np.float32),
+        np.zeros(grid.shape, dtype=np.uint8),
+    )
+    for start in (upper, first, lower):
+        start = np.where(np.abs(start) < 999, start, np.float32(np.nan))
+        _gather(frame, source, relief, grid, foot, start, result)
+    return result
+
+
+def _scatter(frame: Frame, relief: Float32Array, grid: Grid, foot: Foot) -> Float32Array:
+    """Drop every pixel of photo 1 where it stands on the plane; the highest wins."""
+    x, y = _from_nadir(frame.grid, foot)
+    share = 1 - relief / np.float32(foot.distance)
+    ratio = frame.grid.gsd / grid.gsd
+    nadir = grid.pixel_of(foot.nadir)
+    with np.errstate(invalid="ignore"):
+        column = x * share * np.float32(ratio) + np.float32(nadir[0] + 0.5)
+        row = y * share * np.float32(ratio) + np.float32(nadir[1] + 0.5)
+        inside = (column >= 0) & (column < grid.width) & (row >= 0) & (row < grid.height)
+    height = relief[inside]
+    index = row[inside].astype(np.int32) * np.int64(grid.width) + column[inside].astype(np.int32)
+    result = np.full(grid.shape, np.nan, dtype=np.float32)
+    if height.size:
+        low, high = float(height.min()), float(height.max())
+        # A radix sort of 16-bit levels: later writes win, so the highest comes last.
+        level = ((height - low) * (65535 / max(high - low, 1e-9))).astype(np.uint16)
+        order = np.argsort(level, kind="stable")
+        result.ravel()[index[order]] = height[order]
+    return result
+
+
+def _gather(
+    frame: Frame,
+    source: Layer,
+    relief: Float32Array,
+    grid: Grid,
+    foot: Foot,
+    start: Float32Array,
+    result: Layer,
+) -> None:
+    """Look up, where nothing is known yet, the surface that a first value leads to (in place)."""
+    import cv2
+
+    todo = np.isfinite(start) & ~np.isfinite(result.r)
+    row, column = np.nonzero(todo)
+    if not len(row):
+        return
+    places = np.stack([grid.columns_x[column], grid.rows_y[row]], axis=-1)
+    away = ((places - foot.nadir) / [frame.grid.gsd, -frame.grid.gsd]).astype(np.float32)
+    nadir = frame.grid.pixel_of(foot.nadir).astype(np.float32)
+    value = start[row, column]
+    for _ in range(2):
+        q = nadir + away * (foot.distance / (foot.distance - value))[:, None]
+        value = _at(relief, q, cv2.INTER_NEAREST)
+    q = nadir + away * (foot.distance / (foot.distance - value))[:, None]
+    final = _at(relief, q, cv2.INTER_NEAREST)
+    tolerance = AGREEMENT * foot.distance
+    with np.errstate(invalid="ignore"):
+        good = np.abs(final - value) < tolerance
+        smooth = _at(relief, q, cv2.INTER_LINEAR)
+        final = np.where(np.abs(smooth - final) < tolerance, smooth, final)
+    row, column, q, final = row[good], column[good], q[good], final[good]
+    result.r[row, column] = final
+    result.sigma[row, column] = _at(source.sigma, q, cv2.INTER_NEAREST)
+    result.quality[row, column] = _at(source.quality, q, cv2.INTER_NEAREST)
+
+
+def _at(band: np.ndarray, q: Float32Array, how: int) -> np.ndarray:
+    """Return a band at (column, row) positions, NaN or 0 outside."""
+    import cv2
+
+    outside = np.nan if band.dtype == np.float32 else 0
+    parts = np.array_split(q, len(q) // 30000 + 1)
+    found = [
+        cv2.remap(
+            band,
+            np.ascontiguousarray(part[None, :, 0]),
+            np.ascontiguousarray(part[None, :, 1]),
+            how,
+            borderMode=cv2.BORDER_CONSTANT,
+            borderValue=outside,
+        )[0]
+        for part in parts
+        if len(part)
+    ]
+    return np.concatenate(found) if found else np.zeros(0, dtype=band.dtype)
+
+
+def fill_outwards(layer: Layer, holes: BoolArray, grid: Grid, nadir: FloatArray) -> BoolArray:
+    """Fill holes from the next known pixel farther out (in place); return which were filled.
+
+    Behind a step lies the lower surface, and it goes on outwards: the nearest pixel would smear
+    the step itself over what it hides.
+    """
+    height, width = layer.r.shape
+    row, column = np.nonzero(holes)
+    if not len(row):
+        return np.zeros_like(holes)
+    centre = grid.pixel_of(nadir)
+    dx, dy = column - centre[0], row - centre[1]
+    length = np.maximum(np.hypot(dx, dy), 1e-9)
+    number = np.full(height * width, -1, dtype=np.int64)
+    number[row * width + column] = np.arange(len(row))
+    to_column = np.clip(np.rint(column + LEAP * dx / length).astype(np.int64), 0, width - 1)
+    to_row = np.clip(np.rint(row + LEAP * dy / length).astype(np.int64), 0, height - 1)
+    target = to_row * width + to_column
+    for _ in range(LEAPS):  # each round doubles the leap of those that are still in a hole
+        hop = number[target]
+        target = np.where(hop >= 0, target[np.maximum(hop, 0)], target)
+    good = np.isfinite(layer.r.ravel()[target]) & (number[target] < 0)
+    at, source = (row * width + column)[good], target[good]
+    layer.r.ravel()[at] = layer.r.ravel()[source]
+    layer.sigma.ravel()[at] = 3 * layer.sigma.ravel()[source]
+    layer.quality.ravel()[at] = Quality.HIDDEN
+    filled = np.zeros(height * width, dtype=bool)
+    filled[at] = True
+    return filled.reshape(height, width)
+
+
+def hidden_in_second(frame: Frame, relief: Float32Array, step: Float32Array) -> BoolArray:
+    """Return pixels of photo 1 that a higher surface covers in photo 2.
+
+    Parameters
+    ----------
+    frame : Frame
+    relief : ndarray of float32
+        Relief of the pixels of photo 1. [m]
+    step : ndarray of float32, broadcastable
+        How much higher the covering surface must be. [m]
+    """
+    columns, rows = zoom_map(frame, relief)
+    height, width = relief.shape
+    with np.errstate(invalid="ignore"):
+        column, row = np.rint(columns).astype(np.int32), np.rint(rows).astype(np.int32)
+        inside = (column >= 0) & (column < width) & (row >= 0) & (row < height)
+    index = np.where(inside, row.astype(np.int64) * width + column, 0)
+    level = ((relief - relief.min()) * (65535 / max(float(np.ptp(relief)), 1e-9))).astype(np.uint16)
+    order = np.argsort(level.ravel(), kind="stable")
+    order = order[inside.ravel()[order]]
+    top = np.full(height * width, np.float32(-1e3))
+    top[index.ravel()[order]] = relief.ravel()[order]
+    covering = _close(top.reshape(height, width))
+    return np.asarray(inside & (covering.ravel()[index] > relief + step))
+
+
+def _from_nadir(grid: Grid, foot: Foot) -> tuple[Float32Array, Float32Array]:
+    """Return offsets of a grid's pixels from a nadir, shapes (1, width) and (height, 1). [px]"""
+    nadir = grid.pixel_of(foot.nadir)
+    x = np.arange(grid.width, dtype=np.float32)[None, :] - np.float32(nadir[0])
+    y = np.arange(grid.height, dtype=np.float32)[:, None] - np.float32(nadir[1])
+    return x, y
+
+
+def _close(top: Float32Array) -> Float32Array:
+    """Close the cracks of a forward-mapped surface."""
+    import cv2
+
+    return np.asarray(cv2.morphologyEx(top, cv2.MORPH_CLOSE, np.ones((3, 3), dtype=np.uint8)))

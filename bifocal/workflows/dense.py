@@ -1,0 +1,165 @@
+"""Pair file in, relief map, preview and point cloud out."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from bifocal.domain.pair import Pair
+from bifocal.domain.relief_map import ReliefMap
+from bifocal.io.images import ImageArray, read_image, to_eight_bit
+from bifocal.io.relief_files import Cloud, write_cloud, write_preview, write_relief_map
+from bifocal.solvers.dense import DenseRelief, dense_relief
+from photocore.console import Progress, no_progress
+from photocore.errors import GeometryError, InputError
+from photocore.output import check_writable
+
+_ROWS = 256
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ReliefJob:
+    """What to make of a pair.
+
+    Attributes
+    ----------
+    out : Path
+        Relief map, GeoTIFF.
+    preview, cloud : Path or None
+        Picture (.png) and point cloud (.ply, .las, .laz).
+    gsd : float or None
+        Pixel of the map. [m]
+    bounds : tuple of float or None
+        X min, Y min, X max, Y max. [m]
+    quality : str
+        ``fast``, ``standard`` or ``best``.
+    relief_range : tuple of float or None
+        Least and greatest relief to expect. [m]
+    overwrite : bool
+    """
+
+    out: Path
+    preview: Path | None = None
+    cloud: Path | None = None
+    gsd: float | None = None
+    bounds: tuple[float, float, float, float] | None = None
+    quality: str = "standard"
+    relief_range: tuple[float, float] | None = None
+    overwrite: bool = False
+
+
+def relief_of_pair(
+    pair_file: Path, job: ReliefJob, *, progress: Progress = no_progress
+) -> tuple[dict[str, Any], tuple[str, ...]]:
+    """Make the relief map of a pair file.
+
+    Returns
+    -------
+    summary : dict
+        Figures of the map and the files written.
+    remarks : tuple of str
+        What the user should know.
+
+    Raises
+    ------
+    InputError, GeometryError
+        If a file or an option is unusable, or the photos do not fit; nothing is then written.
+    """
+    _check_outputs(job)
+    pair = Pair.read(pair_file)
+    image1, image2 = (
+        _photo(pair, file, key)
+        for file, key in ((pair.image1.file, "image1"), (pair.image2.file, "image2"))
+    )
+    result = dense_relief(
+        pair, image1, image2, gsd=job.gsd, bounds=job.bounds, quality=job.quality,
+        relief_range=job.relief_range, progress=progress,
+    )  # fmt: skip
+    if not result.known.any():
+        raise GeometryError(
+            "no relief could be measured within the bounds: the photos have no common area there."
+        )
+    tags = {
+        "BIFOCAL_D1": f"{pair.image1.distance:.6g}",
+        "BIFOCAL_D2": f"{pair.image2.distance:.6g}",
+        "BIFOCAL_PAIR": Path(pair_file).name,
+    }
+    write_relief_map(job.out, result, overwrite=job.overwrite, tags=tags)
+    written = [job.out]
+    if job.preview is not None:
+        write_preview(job.preview, result, overwrite=job.overwrite)
+        written.append(job.preview)
+    if job.cloud is not None:
+        write_cloud(job.cloud, coloured_cloud(result, pair, image1), overwrite=job.overwrite)
+        written.append(job.cloud)
+    summary = result.summary() | {"written": [str(path) for path in written]}
+    return summary, (*pair.remarks, *_remarks(result))
+
+
+def coloured_cloud(relief: ReliefMap, pair: Pair, image1: ImageArray) -> Cloud:
+    """Return the known points of a relief map with the colours of photo 1."""
+    import cv2
+
+    picture = to_eight_bit(image1)
+    if picture.ndim == 2:
+        picture = np.repeat(picture[..., None], 3, axis=2)
+    parts = []
+    for row in range(0, relief.shape[0], _ROWS):
+        rows = slice(row, row + _ROWS)
+        known = relief.known[rows]
+        xyz = np.concatenate(
+            [relief.plane_positions(rows)[known], relief.r[rows][known][:, None]], axis=1
+        )
+        if not len(xyz):
+            continue
+        pixels = pair.image1.project(xyz).astype(np.float32)
+        colours = np.concatenate(
+            [
+                cv2.remap(
+                    picture,
+                    np.ascontiguousarray(some[None, :, 0]),
+                    np.ascontiguousarray(some[None, :, 1]),
+                    cv2.INTER_LINEAR,
+                )[0]
+                for some in np.array_split(pixels, len(pixels) // 30000 + 1)
+            ]
+        )
+        parts.append(
+            Cloud(
+                xyz,
+                colours,
+                relief.sigma[rows][known].astype(np.float64),
+                relief.quality[rows][known],
+            )
+        )
+    return Cloud(*(np.concatenate(bands) for bands in zip(*parts, strict=True)))
+
+
+def _check_outputs(job: ReliefJob) -> None:
+    """Refuse, before any work, outputs that could not be written."""
+    check_writable(job.out, overwrite=job.overwrite)
+    if job.out.suffix.lower() not in {".tif", ".tiff"}:
+        raise InputError(f"{job.out}: the relief map is written as .tif.")
+    if job.preview is not None:
+        check_writable(job.preview, overwrite=job.overwrite)
+        if job.preview.suffix.lower() != ".png":
+            raise InputError(f"{job.preview}: the preview is written as .png.")
+    if job.cloud is not None:
+        check_writable(job.cloud, overwrite=job.overwrite)
+        if job.cloud.suffix.lower() not in {".ply", ".las", ".laz"}:
+            raise InputError(f"{job.cloud}: point clouds are written as .ply, .las or .laz.")
+
+
+def _photo(pair: Pair, file: str, key: str) -> ImageArray:
+    """Read a photo named in a pair file."""
+    if not file:
+        raise InputError(f'the pair file names no photo for "{key}": add its "file".')
+    return read_image(pair.folder / file)
+
+
+def _remarks(result: DenseRelief) -> tuple[str, ...]:
+    """Return what the registration tells the user."""
+    return result.registration.remarks

@@ -1,0 +1,140 @@
+"""``bifocal relief`` from the command line."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import rasterio
+from click.testing import CliRunner
+
+from bifocal import Pair
+from bifocal.cli.main import main
+from bifocal.io.images import write_image
+from bifocal.io.relief_files import read_relief_map
+from bifocal.solvers.scene import bifocal_cameras, facade, render
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return a folder with a small pair: photos, pair file and its truth."""
+    place = tmp_path_factory.mktemp("pair")
+    cameras = bifocal_cameras(size=(384, 256), pixel=0.0296)
+    shot = render(facade(seed=5, texel=0.02), cameras, rng=np.random.default_rng(5))
+    write_image(place / "far.png", shot.image1)
+    write_image(place / "near.png", shot.image2)
+    shot.pair.write(place / "wall.pair.json")
+    np.save(place / "truth.npy", shot.truth.r)
+    return place
+
+
+def run(*arguments: object) -> tuple[int, str, str]:
+    result = CliRunner().invoke(main, ["relief", *(str(a) for a in arguments)])
+    assert result.exception is None or isinstance(result.exception, SystemExit)
+    return result.exit_code, result.stdout, result.stderr
+
+
+def test_relief_writes_three_bands_and_says_what_guarantees_the_scale(folder, tmp_path):
+    out = tmp_path / "relief.tif"
+    code, text, told = run(folder / "wall.pair.json", "--out", out)
+    assert code == 0
+    assert "measured" in text
+    assert "relative scale" in told
+    with rasterio.open(out) as file:
+        assert file.count == 3
+        assert file.dtypes == ("float32",) * 3
+        assert file.shape == (256, 384)
+        # Corner of the corner pixel: half a frame of 384 x 256 px of 29.6 mm.
+        assert (file.transform.c, file.transform.f) == pytest.approx((-5.6832, 3.7888))
+        relief, quality = file.read(1), file.read(3)
+    truth = np.load(folder / "truth.npy")
+    assert np.nanmedian(np.abs(relief - truth)) < 0.04  # 30 mm pixels: nearly all are edges
+    np.testing.assert_array_equal(np.isnan(relief), quality == 0)
+    assert read_relief_map(out).gsd == pytest.approx(0.0296)
+
+
+def test_json_preview_and_clouds(folder, tmp_path):
+    import laspy
+    from PIL import Image
+
+    out, ply, png = (tmp_path / name for name in ("r.tif", "r.ply", "r.png"))
+    code, text, _ = run(
+        folder / "wall.pair.json", "--out", out, "--json", "--cloud", ply, "--preview", png,
+        "--gsd", "0.05", "--bounds", "-3,-2,3,2", "--quality", "fast",
+    )  # fmt: skip
+    assert code == 0
+    summary = json.loads(text)
+    assert summary["size"] == [120, 80]
+    assert sum(summary["shares"].values()) == pytest.approx(1.0)
+    assert len(summary["written"]) == 3
+    with Image.open(png) as picture:
+        assert picture.size[0] > 800
+    header, body = ply.read_bytes().split(b"end_header\n")
+    count = int(header.split(b"vertex ")[1].split()[0])
+    assert len(body) == count * (24 + 3 + 4 + 1)
+    laz = tmp_path / "r.laz"
+    assert run(folder / "wall.pair.json", "--out", out, "--overwrite", "--cloud", laz)[0] == 0
+    cloud = laspy.read(laz)
+    assert np.abs(cloud.z).max() < 2
+    assert cloud.red.max() > 30000
+
+
+def test_existing_files_stay_unless_told(folder, tmp_path):
+    out = tmp_path / "relief.tif"
+    out.write_bytes(b"mine")
+    code, _, told = run(folder / "wall.pair.json", "--out", out)
+    assert code == 1
+    assert "--overwrite" in told
+    assert out.read_bytes() == b"mine"
+
+
+def test_wrong_endings_are_refused_before_any_work(folder, tmp_path):
+    pair = folder / "wall.pair.json"
+    for arguments, said in (
+        (["--out", tmp_path / "r.jpg"], "written as .tif"),
+        (["--out", tmp_path / "r.tif", "--preview", tmp_path / "p.gif"], "written as .png"),
+        (["--out", tmp_path / "r.tif", "--cloud", tmp_path / "c.xyz"], ".ply, .las or .laz"),
+        (["--out", tmp_path / "no" / "r.tif"], "does not exist"),
+    ):
+        code, _, told = run(pair, *arguments)
+        assert code == 1
+        assert said in told
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_mistaken_gsd_is_asked_back(folder, tmp_path):
+    code, _, told = run(folder / "wall.pair.json", "--out", tmp_path / "r.tif", "--gsd", "1e-5")
+    assert code == 1
+    assert "Is the unit right?" in told
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_usage_errors_are_status_2(folder, tmp_path):
+    code, _, told = run(folder / "wall.pair.json", "--out", tmp_path / "r.tif", "--bounds", "1,2")
+    assert code == 2
+    assert "4 numbers" in told
+
+
+def test_a_photo_that_is_missing_or_no_photo_is_named(folder, tmp_path):
+    pair = Pair.read(folder / "wall.pair.json")
+    replace(pair, image1=replace(pair.image1, file="gone.png")).write(tmp_path / "a.pair.json")
+    code, _, told = run(tmp_path / "a.pair.json", "--out", tmp_path / "r.tif")
+    assert code == 1
+    assert "gone.png" in told
+    replace(pair, image1=replace(pair.image1, file="")).write(tmp_path / "b.pair.json")
+    code, _, told = run(tmp_path / "b.pair.json", "--out", tmp_path / "r.tif")
+    assert code == 1
+    assert 'names no photo for "image1"' in told
+
+
+def test_swapped_photos_are_set_right_with_a_remark(folder, tmp_path):
+    data = json.loads((folder / "wall.pair.json").read_text())
+    data["image1"], data["image2"] = data["image2"], data["image1"]
+    swapped = folder / "swapped.pair.json"
+    swapped.write_text(json.dumps(data))
+    code, _, told = run(swapped, "--out", tmp_path / "r.tif")
+    assert code == 0
+    assert "exchanged" in told

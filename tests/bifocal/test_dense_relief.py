@@ -1,0 +1,286 @@
+"""Dense relief against the exact relief of rendered façades, and what it refuses."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from bifocal import Pair, Quality, dense_relief
+from bifocal.solvers.dense import edges, flow, seed, smooth, splat
+from bifocal.solvers.dense.frame import as_grey, common_bounds, make_frame, working_grid
+from bifocal.solvers.scene import (
+    RICH,
+    Rendering,
+    Scene,
+    SetupErrors,
+    bifocal_cameras,
+    facade,
+    render,
+)
+from bifocal.solvers.scene.shapes import box
+from photocore.errors import GeometryError, InputError
+
+PIXEL = 0.0148
+
+
+@cache
+def shot(seed_: int = 5, d2: float = 9.5) -> Rendering:
+    """Return a small rendered pair: 768 x 512 px."""
+    cameras = bifocal_cameras(size=(768, 512), pixel=PIXEL, d2=d2)
+    return render(facade(seed=seed_, texel=0.01), cameras, rng=np.random.default_rng(seed_))
+
+
+@cache
+def result():
+    return dense_relief(shot().pair, shot().image1, shot().image2)
+
+
+def away_from_edges(truth: np.ndarray, pixels: int = 8) -> np.ndarray:
+    import cv2
+
+    kernel = np.ones((3, 3), dtype=np.uint8)
+    steps = cv2.dilate(truth, kernel) - cv2.erode(truth, kernel) > 0.03
+    near = cv2.dilate(steps.astype(np.uint8), np.ones((2 * pixels + 1,) * 2, dtype=np.uint8))
+    return near == 0
+
+
+def test_the_map_lies_on_the_pixels_of_an_ideal_far_photo():
+    np.testing.assert_allclose(result().plane_from_pixel, shot().truth.plane_from_pixel, atol=1e-9)
+    assert result().shape == (512, 768)
+
+
+def test_relief_of_smooth_parts_is_right_to_millimetres():
+    truth = shot().truth.r
+    both = shot().visible1 & shot().visible2 & away_from_edges(truth)
+    error = np.abs(result().r - truth)[both]
+    assert np.median(error) < 0.003
+    assert (error > 0.03).mean() < 0.05
+
+
+def test_the_deep_door_and_the_high_cornice_are_found():
+    truth, both = shot().truth.r, shot().visible1 & shot().visible2
+    smooth_ = away_from_edges(truth, 4)
+    for part in (truth < -0.5, truth > 0.85):
+        chosen = both & part & smooth_
+        assert chosen.sum() > 500
+        assert np.median(np.abs(result().r - truth)[chosen]) < 0.02
+
+
+def test_two_sigma_hold_most_errors_of_measured_pixels():
+    truth = shot().truth.r
+    chosen = (result().quality == Quality.MEASURED) & away_from_edges(truth)
+    chosen &= shot().visible1 & shot().visible2
+    assert (np.abs(result().r - truth) < 2 * result().sigma)[chosen].mean() > 0.8
+
+
+def test_what_no_camera_sees_is_never_called_measured():
+    unseen = ~shot().visible1 & ~shot().visible2
+    assert (result().quality[unseen] == Quality.MEASURED).mean() < 0.35
+    assert np.isnan(result().r[result().quality == Quality.UNKNOWN]).all()
+    assert np.isfinite(result().r[result().quality != Quality.UNKNOWN]).all()
+
+
+def test_photos_that_fit_are_not_blamed_but_the_scale_is_always_mentioned():
+    registration = result().registration
+    assert registration.systematic < 0.05
+    assert abs(registration.wall) < 0.2
+    assert len(registration.remarks) <= 2
+    # B = 17.5 * 9.5 / 8 = 20.8 m: 0.1 % are 21 mm.
+    assert "21 mm" in registration.remarks[-1]
+
+
+def test_offset_and_tilted_cameras_give_the_same_relief():
+    errors = SetupErrors(tilt_deg=1.5, offset=0.3, distance=0.02)
+    cameras = bifocal_cameras(
+        size=(768, 512), pixel=PIXEL, errors=errors, rng=np.random.default_rng(2)
+    )
+    other = render(facade(seed=5, texel=0.01), cameras, rng=np.random.default_rng(3))
+    grid = other.truth.grid
+    found = dense_relief(other.pair, other.image1, other.image2, gsd=grid.gsd, bounds=grid.bounds)
+    assert found.shape == other.truth.shape
+    both = other.visible1 & other.visible2 & away_from_edges(other.truth.r)
+    error = np.abs(found.r - other.truth.r)[both]
+    assert np.nanmedian(error) < 0.004
+    assert np.isfinite(error).mean() > 0.97
+
+
+def test_bounds_and_gsd_are_kept():
+    found = dense_relief(
+        shot().pair, shot().image1, shot().image2, gsd=0.02, bounds=(3.5, -2.5, 5.5, 0.5)
+    )
+    assert found.shape == (150, 100)
+    assert found.bounds == pytest.approx((3.5, -2.5, 5.5, 0.5))
+    wanted = shot().truth.sample(found.plane_positions())
+    assert np.nanmedian(np.abs(found.r - wanted)) < 0.005
+
+
+def test_a_finer_gsd_than_the_photo_is_interpolated():
+    found = dense_relief(
+        shot().pair, shot().image1, shot().image2, gsd=PIXEL / 2, bounds=(3.5, -2.5, 5.5, 0.5)
+    )
+    assert found.gsd == PIXEL / 2
+    wanted = shot().truth.sample(found.plane_positions())
+    assert np.nanmedian(np.abs(found.r - wanted)) < 0.005
+
+
+def test_fast_quality_is_coarser_but_covers_the_same():
+    found = dense_relief(shot().pair, shot().image1, shot().image2, quality="fast")
+    assert found.shape == result().shape
+    assert found.working_gsd == pytest.approx(2 * PIXEL)
+    assert np.nanmedian(np.abs(found.r - shot().truth.r)) < 0.03
+
+
+def test_pairs_of_little_difference_in_distance_work_too():
+    other = shot(6, 14.0)
+    found = dense_relief(other.pair, other.image1, other.image2)
+    both = other.visible1 & other.visible2 & away_from_edges(other.truth.r)
+    assert np.nanmedian(np.abs(found.r - other.truth.r)[both]) < 0.01
+
+
+def test_sixteen_bit_photos_give_the_same_relief():
+    wide = [image.astype(np.uint16) * 256 for image in (shot().image1, shot().image2)]
+    again = dense_relief(shot().pair, *wide)
+    np.testing.assert_array_equal(again.r, result().r)
+
+
+def shifted_pair(metres: float, angle_deg: float = 0.0) -> Pair:
+    """Return the pair with photo 2 put wrongly on the plane."""
+    pair = shot().pair
+    c, s = np.cos(np.radians(angle_deg)), np.sin(np.radians(angle_deg))
+    move = np.array([[c, -s, metres], [s, c, 0.0], [0, 0, 1.0]])
+    second = replace(pair.image2, plane_from_pixel=move @ pair.image2.plane_from_pixel)
+    return replace(pair, image2=second)
+
+
+def test_a_shifted_photo_is_flagged_with_the_shift():
+    found = dense_relief(shifted_pair(1.5 * PIXEL), shot().image1, shot().image2)
+    assert found.registration.shift[0] == pytest.approx(1.5, abs=0.3)
+    assert "do not fit exactly" in found.registration.remarks[0]
+
+
+def test_a_rotated_photo_is_refused():
+    with pytest.raises(GeometryError, match=r"not registered: .*`bifocal align"):
+        dense_relief(shifted_pair(0.0, 2.0), shot().image1, shot().image2)
+
+
+def test_photos_of_different_walls_are_refused():
+    noise = np.random.default_rng(0).integers(0, 256, shot().image2.shape, dtype=np.uint8)
+    with pytest.raises(GeometryError, match="can be matched between the two photos"):
+        dense_relief(shot().pair, shot().image1, noise)
+
+
+def test_photos_without_common_area_are_refused():
+    with pytest.raises(GeometryError, match="no common area"):
+        dense_relief(shifted_pair(100.0), shot().image1, shot().image2)
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        ({"gsd": 1e-5}, "Is the unit right"),
+        ({"gsd": 10.0}, "Is the unit"),
+        ({"gsd": -1.0}, "gsd"),
+        ({"bounds": (50.0, 50.0, 60.0, 60.0)}, "lie outside what both photos see"),
+        ({"bounds": (1.0, 0.0, -1.0, 2.0)}, "bounds"),
+        ({"quality": "superb"}, "expected fast, standard, best"),
+    ],
+)
+def test_impossible_options_are_refused(options, said):
+    with pytest.raises(InputError, match=said):
+        dense_relief(shot().pair, shot().image1, shot().image2, **options)
+
+
+def test_images_that_are_none_are_refused():
+    with pytest.raises(InputError, match="1 x 1 px is too small"):
+        dense_relief(shot().pair, np.zeros((1, 1, 3), np.uint8), shot().image2)
+    with pytest.raises(InputError, match="found float64"):
+        dense_relief(shot().pair, np.zeros((64, 64)), shot().image2)
+    with pytest.raises(InputError, match="expected shape"):
+        dense_relief(shot().pair, np.zeros((64, 64, 7), np.uint8), shot().image2)
+
+
+def small_frame():
+    images = [as_grey(image, "image") for image in (shot().image1, shot().image2)]
+    box = common_bounds(shot().pair, (images[0].shape, images[1].shape))
+    return make_frame(shot().pair, *images, working_grid(shot().pair, images[0].shape, box, PIXEL))
+
+
+def test_an_ideal_photo_is_not_resampled():
+    np.testing.assert_array_equal(small_frame().image1, as_grey(shot().image1, "image1"))
+
+
+def test_the_coarse_sweep_finds_relief_to_a_few_centimetres():
+    frame = small_frame()
+    coarse, factor = seed.coarse_relief(frame)
+    truth = shot().truth.r[factor // 2 :: factor, factor // 2 :: factor]
+    height, width = (min(a, b) for a, b in zip(truth.shape, coarse.shape, strict=True))
+    error = np.abs(coarse[:height, :width] - truth[:height, :width])
+    assert np.median(error) < 0.06
+
+
+def test_sigma_is_the_lever_times_the_matching_precision_over_the_radius():
+    frame = small_frame()
+    flat = np.zeros(frame.grid.shape, dtype=np.float32)
+    sigma = flow.sigma_of_relief(frame, flat, flat + np.float32(0.1))
+    # By hand: 0.1 px * 20.78125 m / 300 px at 300 px to the right of the nadir (383.5, 255.5).
+    x = 383.5 + 300.5
+    assert sigma[255, int(x)] == pytest.approx(0.1 * 20.78125 / 300.5, rel=1e-4)
+
+
+def test_flow_of_a_known_zoom_gives_its_relief_and_nothing_across():
+    frame = small_frame()
+    x, y = frame.from_centre()
+    k = 9.5 * (17.5 - 0.7) / (17.5 * (9.5 - 0.7))
+    zoom = np.dstack(np.broadcast_arrays((k - 1) * x, (k - 1) * y)).astype(np.float32)
+    relief, across = flow.split(frame, zoom)
+    assert relief[10, 10] == pytest.approx(0.7, abs=1e-4)
+    assert np.abs(across).max() < 1e-3
+
+
+def test_smoothing_quiets_a_flat_wall_and_keeps_a_step():
+    rng = np.random.default_rng(1)
+    wall = np.zeros((80, 80), dtype=np.float32)
+    wall[:, 40:] = 0.5
+    noisy = wall + rng.normal(0, 0.01, wall.shape).astype(np.float32)
+    quiet = smooth.shrink_noise(noisy, np.full_like(wall, 0.01))
+    assert np.std((quiet - wall)[:, 15:25]) < 0.003
+    assert np.abs(quiet - wall)[10:-10, 38:42].max() < 0.06
+
+
+def test_a_ramp_over_a_step_is_made_sharp():
+    """A slab 0.3 m thick: its front appears in photo 1 enlarged by d1 / (d1 - r)."""
+    import cv2
+
+    scene = Scene(wall=RICH.wall, texel=0.01)
+    scene.add(box((0.8, 2.2), (0.6, 1.6), (-0.1, 0.3), RICH.trim))
+    cameras = bifocal_cameras(size=(400, 300), pixel=PIXEL)
+    taken = render(scene, cameras, rng=np.random.default_rng(1))
+    images = [as_grey(image, "image") for image in (taken.image1, taken.image2)]
+    bounds = common_bounds(taken.pair, (images[0].shape, images[1].shape))
+    frame = make_frame(
+        taken.pair, *images, working_grid(taken.pair, images[0].shape, bounds, PIXEL)
+    )
+    x, y = (axis * PIXEL * (17.5 - 0.3) / 17.5 for axis in frame.from_centre())
+    slab = (x > 0.8) & (x < 2.2) & (-y > 0.6) & (-y < 1.6)
+    relief = np.where(slab, 0.3, 0.0).astype(np.float32)
+    blurred = cv2.GaussianBlur(relief, (0, 0), 2.0)
+    sharp = edges.sharpen(frame, blurred, frame.pair.lever)
+    assert np.abs(sharp - relief).mean() < 0.75 * np.abs(blurred - relief).mean()
+
+
+def test_hidden_strips_take_the_surface_behind():
+    grid = small_frame().grid.window(0, 0, 768, 512)
+    r = np.zeros(grid.shape, dtype=np.float32)
+    r[:, 500:560] = 0.4
+    holes = np.zeros(grid.shape, dtype=bool)
+    holes[:, 560:575] = True
+    r[holes] = np.nan
+    layer = splat.Layer(r, np.zeros_like(r), np.ones(grid.shape, dtype=np.uint8))
+    filled = splat.fill_outwards(layer, holes, grid, np.zeros(2))
+    middle = slice(200, 312)
+    assert filled[middle, 560:575].all()
+    np.testing.assert_array_equal(layer.r[middle, 560:575], 0.0)
+    assert (layer.quality[middle, 560:575] == Quality.HIDDEN).all()
