@@ -1,0 +1,339 @@
+"""Faults in a workbook that make Excel offer to repair it, or that show as errors elsewhere.
+
+No validator on the package index finds these; each rule stands for a prompt or an error that was
+seen in a spreadsheet program.
+"""
+
+from __future__ import annotations
+
+import re
+import zipfile
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from photocore.spreadsheet.grid import TableArea, cell_name, split_area, split_cell
+from photocore.spreadsheet.package import local, open_package, scan_part
+from photocore.spreadsheet.xlsx import Sheet, Workbook, read_directory, read_tables
+
+_LIKE_A_CELL = re.compile(r"[A-Za-z]{1,3}\d{1,7}|[rR]\d*[cC]\d*|[rR]\d*|[cC]\d*")
+_NAME = re.compile(r"[A-Za-z_\\À-ɏ][\w.\\]*")
+_TEXTS = re.compile(r"\"(?:[^\"]|\"\")*\"|'(?:[^']|'')*'")
+_FUNCTION = re.compile(r"([A-Za-z_][\w.]*)\s*\(")
+#: Functions that show as #NAME? in LibreOffice 7.4, or whose result depends on the language.
+_AVOIDED = frozenset(
+    {"LET", "LAMBDA", "XLOOKUP", "XMATCH", "FILTER", "SORT", "SORTBY", "UNIQUE", "SEQUENCE"}
+    | {"RANDARRAY", "TEXT", "CELL", "INFO"}
+)
+_LONGEST_FORMULA = 8192
+
+
+@dataclass(slots=True)
+class _SheetFacts:
+    """What one pass over a sheet finds."""
+
+    texts: dict[str, str | None] = field(default_factory=dict)
+    formulas: dict[str, str] = field(default_factory=dict)
+    rules: list[str] = field(default_factory=list)
+    cells: list[tuple[int, int]] = field(default_factory=list)
+    merged: list[tuple[int, int, int, int]] = field(default_factory=list)
+    validations: list[dict[str, str]] = field(default_factory=list)
+    styles: set[int] = field(default_factory=set)
+
+
+def lint(path: Path | str) -> list[str]:
+    """Return the faults of a workbook, none if it is sound.
+
+    Parameters
+    ----------
+    path : path
+        An .xlsx or .xlsm file.
+
+    Raises
+    ------
+    InputError
+        If the file is not a workbook at all.
+    """
+    path = Path(path)
+    with open_package(path) as package:
+        book = read_directory(path, package)
+        tables = {sheet.title: read_tables(path, package, sheet) for sheet in book.sheets}
+        faults = [*_package_faults(path, package), *_name_faults(book, tables)]
+        shared = _strings(path, package, book)
+        formats = _count(path, package, book, "styles", "cellXfs", "xf")
+        for sheet in book.sheets:
+            facts = _read(path, package, sheet, shared)
+            found = [
+                *_order_faults(facts, formats),
+                *_formula_faults(facts),
+                *_rule_faults(facts),
+                *_table_faults(path, package, tables[sheet.title], facts),
+            ]
+            faults += [f"{sheet.title}: {fault}" for fault in found]
+    return faults
+
+
+def _package_faults(path: Path, package: zipfile.ZipFile) -> Iterator[str]:
+    """Yield parts without content type and relations that lead nowhere."""
+    import posixpath
+
+    parts = set(package.namelist())
+    known: set[str] = set()
+    endings: set[str] = set()
+
+    def start(name: str, attributes: dict[str, str]) -> None:
+        if local(name) == "Override":
+            known.add(attributes["PartName"].lstrip("/"))
+        elif local(name) == "Default":
+            endings.add(attributes["Extension"].lower())
+
+    scan_part(path, package, "[Content_Types].xml", start=start)
+    for part in sorted(parts - known - {"[Content_Types].xml"}):
+        if part.rpartition(".")[2].lower() not in endings:
+            yield f"the part {part} has no content type"
+    for part in sorted(known - parts):
+        yield f"the part {part} has a content type but is missing"
+    for part in sorted(p for p in parts if p.endswith(".rels")):
+        folder = posixpath.dirname(posixpath.dirname(part))
+        targets: list[str] = []
+
+        def relation(name: str, attributes: dict[str, str], targets: list[str] = targets) -> None:
+            if local(name) == "Relationship" and attributes.get("TargetMode") != "External":
+                targets.append(attributes["Target"])
+
+        scan_part(path, package, part, start=relation)
+        for target in targets:
+            whole = target[1:] if target.startswith("/") else posixpath.join(folder, target)
+            if posixpath.normpath(whole) not in parts:
+                yield f"{part} leads to {target}, which is missing"
+
+
+def _name_faults(book: Workbook, tables: dict[str, list[TableArea]]) -> Iterator[str]:
+    """Yield bad names of sheets, tables and cells."""
+    titles = [sheet.title for sheet in book.sheets]
+    for title in titles:
+        if not title or len(title) > 31 or re.search(r"[\[\]:*?/\\]", title) or title[0] == "'":
+            yield f'the sheet name "{title}" is not allowed'
+    names = [name for name in book.names if not name.startswith("_xlnm.")]
+    names += [table.name for areas in tables.values() for table in areas]
+    for name, count in Counter(n.casefold() for n in [*names, *titles]).items():
+        if count > 1 and name not in {t.casefold() for t in titles}:
+            yield f'the name "{name}" is used {count} times'
+    for name in names:
+        if _LIKE_A_CELL.fullmatch(name):
+            yield f'the name "{name}" looks like a cell'
+        elif not _NAME.fullmatch(name) or len(name) > 255:
+            yield f'the name "{name}" is not allowed'
+    for name, reference in book.names.items():
+        if "#REF!" in reference:
+            yield f'the name "{name}" leads nowhere ({reference})'
+        for sheet in re.findall(r"'((?:[^']|'')+)'!", reference):
+            if sheet.replace("''", "'") not in titles:
+                yield f'the name "{name}" leads to a missing sheet ({reference})'
+        for sheet in re.findall(r"(?:^|[,(])([A-Za-z_][\w.]*)!", reference):
+            if sheet not in titles:
+                yield f'the name "{name}" leads to a missing sheet ({reference})'
+
+
+def _order_faults(facts: _SheetFacts, formats: int) -> Iterator[str]:
+    """Yield cells out of order, cells twice, unknown formats and overlapping merged ranges."""
+    for before, after in zip(facts.cells, facts.cells[1:], strict=False):
+        if after <= before:
+            yield f"the cell {cell_name(*after)} comes after {cell_name(*before)}"
+    for style in sorted(facts.styles):
+        if style >= formats:
+            yield f"the cell format {style} does not exist"
+    for index, first in enumerate(facts.merged):
+        for second in facts.merged[index + 1 :]:
+            if _overlap(first, second):
+                yield f"merged ranges overlap at {cell_name(*second[:2])}"
+
+
+def _formula_faults(facts: _SheetFacts) -> Iterator[str]:
+    """Yield formulas that Excel or LibreOffice will not read."""
+    for cell, formula in facts.formulas.items():
+        for fault in formula_faults(formula):
+            yield f"{cell}: {fault}: {formula:.80}"
+
+
+def formula_faults(formula: str) -> Iterator[str]:
+    """Yield what is wrong with a formula as it is stored in a file.
+
+    Examples
+    --------
+    >>> list(formula_faults("SUMME(A1;B1)"))
+    ['";" separates arguments', 'SUMME is not an English function name']
+    """
+    from openpyxl.utils import FORMULAE
+
+    bare = _TEXTS.sub("''", formula)
+    if formula.startswith("="):
+        yield "begins with an equals sign"
+    if len(formula) > _LONGEST_FORMULA:
+        yield f"has {len(formula)} characters, more than {_LONGEST_FORMULA}"
+    if "[@" in bare:
+        yield "[@column] is [#This Row] in a file"
+    if ";" in re.sub(r"\{[^}]*\}", "", bare):
+        yield '";" separates arguments'
+    if bare.count("(") != bare.count(")"):
+        yield "brackets do not match"
+    if "#REF!" in bare:
+        yield "leads nowhere"
+    for function in _FUNCTION.findall(re.sub(r"\[[^\[\]]*\]", "", bare)):
+        name = function.upper().removeprefix("_XLFN.").removeprefix("_XLWS.")
+        if name in _AVOIDED:
+            yield f"{name} is not understood everywhere"
+        elif name not in FORMULAE and not function.upper().startswith("_XLFN."):
+            yield f"{function} is not an English function name"
+
+
+def _rule_faults(facts: _SheetFacts) -> Iterator[str]:
+    """Yield faults of conditional formats and validations."""
+    for formula in facts.rules:
+        if re.search(r"\w\[", _TEXTS.sub("''", formula)):
+            yield f"a rule may not name a table: {formula:.80}"
+        for fault in formula_faults(formula):
+            yield f"rule: {fault}: {formula:.80}"
+    for attributes in facts.validations:
+        for key, most in (("promptTitle", 32), ("errorTitle", 32), ("prompt", 255), ("error", 255)):
+            if len(attributes.get(key, "")) > most:
+                yield f"the {key} of a validation is longer than {most} characters"
+        if len(attributes.get("list", "")) > 257:
+            yield "the list of a validation is longer than 255 characters"
+
+
+def _table_faults(
+    path: Path, package: zipfile.ZipFile, tables: list[TableArea], facts: _SheetFacts
+) -> Iterator[str]:
+    """Yield faults of the named tables of a sheet."""
+    for index, table in enumerate(tables):
+        top, left, bottom, right = table.area
+        columns, filters = _table_columns(path, package, table)
+        if bottom - top < table.header_rows + table.totals_rows:
+            yield f"the table {table.name} has no row of data"
+        if len(columns) != right - left + 1:
+            width = right - left + 1
+            yield f"the table {table.name} names {len(columns)} columns but is {width} wide"
+        repeated = [n for n, count in Counter(c.casefold() for c in columns).items() if count > 1]
+        for name in repeated:
+            yield f'the table {table.name} has the column "{name}" twice'
+        for offset, name in enumerate(columns):
+            cell = cell_name(top, left + offset)
+            if re.search(r"[\[\]#'@\n\r\t]", name) or name != name.strip() or not name:
+                yield f'{cell}: the heading "{name}" has characters that need care in formulas'
+            if table.header_rows and facts.texts.get(cell) != name:
+                yield f'{cell}: holds {facts.texts.get(cell)!r}, but its table column is "{name}"'
+        for reference in filters:
+            area = split_area(reference)
+            if area[:2] != (top, left) or area[3] != right or area[2] != bottom - table.totals_rows:
+                yield f"the filter of the table {table.name} has another range"
+        for other in tables[index + 1 :]:
+            if _overlap(table.area, other.area):
+                yield f"the tables {table.name} and {other.name} overlap"
+        if any(_overlap(table.area, area) for area in facts.merged):
+            yield f"the table {table.name} holds merged cells"
+
+
+def _table_columns(
+    path: Path, package: zipfile.ZipFile, table: TableArea
+) -> tuple[list[str], list[str]]:
+    """Return a table's column names and the range of its filter."""
+    names: list[str] = []
+    filters: list[str] = []
+
+    def start(name: str, attributes: dict[str, str]) -> None:
+        if local(name) == "tableColumn":
+            names.append(attributes.get("name", "").replace("_x000a_", "\n"))
+        elif local(name) == "autoFilter":
+            filters.append(attributes.get("ref", ""))
+
+    scan_part(path, package, table.part, start=start)
+    return names, filters
+
+
+def _read(path: Path, package: zipfile.ZipFile, sheet: Sheet, shared: list[str]) -> _SheetFacts:
+    """Return the facts of one sheet."""
+    facts = _SheetFacts()
+    text: list[str] = []
+    cell, kind_of_cell, inside = "", "", ""
+    row = column = 0
+
+    def start(name: str, attributes: dict[str, str]) -> None:
+        nonlocal cell, kind_of_cell, inside, row, column
+        kind = local(name)
+        if kind == "row":
+            row, column = int(attributes.get("r", row + 1)), 0
+        elif kind == "c":
+            row, column = split_cell(attributes["r"]) if "r" in attributes else (row, column + 1)
+            cell, kind_of_cell = cell_name(row, column), attributes.get("t", "n")
+            facts.cells.append((row, column))
+            facts.styles.add(int(attributes.get("s", "0")))
+        elif kind in ("v", "f", "t", "formula", "formula1", "formula2"):
+            inside = kind
+            text.clear()
+        elif kind == "mergeCell":
+            facts.merged.append(split_area(attributes["ref"]))
+        elif kind == "dataValidation":
+            facts.validations.append(dict(attributes))
+
+    def end(name: str) -> None:
+        nonlocal inside
+        kind = local(name)
+        if kind != inside:
+            return
+        inside = ""
+        found = "".join(text)
+        if kind == "f" and found:
+            facts.formulas[cell] = found
+        elif kind == "t":
+            facts.texts[cell] = found
+        elif kind == "v":
+            known = kind_of_cell == "s" and int(found) < len(shared)
+            facts.texts[cell] = shared[int(found)] if known else None
+            if kind_of_cell == "str":
+                facts.texts[cell] = found
+        elif kind == "formula1" and found.startswith('"'):
+            facts.validations[-1]["list"] = found
+        elif kind.startswith("formula"):
+            facts.rules.append(found)
+
+    def collect(data: str) -> None:
+        if inside:
+            text.append(data)
+
+    scan_part(path, package, sheet.part, start=start, end=end, text=collect)
+    return facts
+
+
+def _strings(path: Path, package: zipfile.ZipFile, book: Workbook) -> list[str]:
+    from photocore.spreadsheet.xlsx import read_shared_strings
+
+    return read_shared_strings(path, package, book)
+
+
+def _count(
+    path: Path, package: zipfile.ZipFile, book: Workbook, part: str, outer: str, inner: str
+) -> int:
+    """Return how many elements another one holds in a part."""
+    target = next((t for kind, t in book.relations.values() if kind == part), "")
+    count, inside = 0, False
+
+    def start(name: str, attributes: dict[str, str]) -> None:  # noqa: ARG001
+        nonlocal count, inside
+        inside |= local(name) == outer
+        count += inside and local(name) == inner
+
+    def end(name: str) -> None:
+        nonlocal inside
+        inside &= local(name) != outer
+
+    if target in package.namelist():
+        scan_part(path, package, target, start=start, end=end)
+    return max(count, 1)
+
+
+def _overlap(first: tuple[int, int, int, int], second: tuple[int, int, int, int]) -> bool:
+    return not (
+        first[2] < second[0] or second[2] < first[0] or first[3] < second[1] or second[3] < first[1]
+    )
