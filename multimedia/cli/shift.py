@@ -1,0 +1,78 @@
+"""``multimedia shift``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from photocore.console import print_json, remark
+from photocore.options import Numbers
+
+EXAMPLE = """\b
+Examples:
+  multimedia shift points.csv --out shifted.csv --camera 0.2,0.1,0.75
+                   --indices 1,1.5,1.337 --thicknesses 0.01
+  multimedia shift points.xlsx --out shifted.xlsx --z0 500 --indices 1,1.337
+  multimedia shift tank.xlsx --json       set-up taken from the workbook's cells n_1 ... z_0
+"""
+
+
+@click.command(short_help="Radial shift of a table of points.", epilog=EXAMPLE)
+@click.argument("source", metavar="IN", type=click.Path(path_type=Path))
+@click.option("--out", type=click.Path(path_type=Path), help="Result, .xlsx or .csv.")
+@click.option(
+    "--camera", type=Numbers(3), metavar="X,Y,Z",
+    help="Camera, in the unit of the points; Z = 0 is the interface on the water side.",
+)  # fmt: skip
+@click.option(
+    "--z0", type=float, metavar="LENGTH",
+    help="Instead of --camera: its distance from the first interface, nadir at X = Y = 0.",
+)  # fmt: skip
+@click.option(
+    "--indices", type=Numbers(), metavar="N,N,...",
+    help="Refractive indices from the camera to the object.  [default: the workbook's]",
+)  # fmt: skip
+@click.option(
+    "--thicknesses", type=Numbers(), metavar="T,...",
+    help="Thicknesses of the media between the first and the last, in the unit of the points.  "
+    "[default: the workbook's; none for two media]",
+)  # fmt: skip
+@click.option("--sheet", help="The only sheet to look at.  [default: all]")
+@click.option(
+    "--decimal", type=click.Choice(["point", "comma"]),
+    help="Decimal separator of numbers typed as text.  [default: detected]",
+)  # fmt: skip
+@click.option(
+    "--csv", "flavour", type=click.Choice(["plain", "excel-it", "excel-de"]), default="plain",
+    show_default=True, help="How to write .csv: comma and point, or semicolon and comma.",
+)  # fmt: skip
+@click.option("--overwrite", is_flag=True, help="Replace an existing file.")
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
+def command(
+    source: Path, out: Path | None, camera: tuple[float, float, float] | None, z0: float | None,
+    indices: tuple[float, ...] | None, thicknesses: tuple[float, ...] | None, sheet: str | None,
+    decimal: str | None, flavour: str, overwrite: bool, as_json: bool,
+) -> None:  # fmt: skip
+    """Shift points so that straight rays see them where they are seen through the media.
+
+    IN is a table (.xlsx, .xlsm, .ods, .csv) with X, Y, Z (points in water have Z below 0) or R, ZP
+    (distance from the camera's nadir, depth). All lengths in one unit. An .xlsx result has live
+    formulas.
+    """
+    if out is None and not as_json:
+        raise click.UsageError("give --out FILE, --json, or both.")
+    if camera is not None and z0 is not None:
+        raise click.UsageError("give --camera or --z0, not both.")
+    from multimedia.workflows.shift import shift_file
+
+    report = shift_file(
+        source, out, camera=camera, z0=z0, indices=indices, thicknesses=thicknesses,
+        decimal=decimal, sheet=sheet, flavour=flavour, overwrite=overwrite,
+    )  # fmt: skip
+    for text in report.remarks:
+        remark(f"Note: {text}")
+    if as_json:
+        print_json(report.as_dict())
+    if out is not None:
+        remark(f"{len(report.points.ids)} points written to {out}")

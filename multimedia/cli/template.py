@@ -1,0 +1,38 @@
+"""``multimedia template``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from photocore.console import remark
+
+EXAMPLE = """\b
+Examples:
+  multimedia template tank.xlsx
+  multimedia template oblique.xlsx --newton 10 --rows 200
+"""
+
+
+@click.command(
+    short_help="Workbook with radial shift and refractive index as live formulas.", epilog=EXAMPLE
+)
+@click.argument("out", metavar="OUT.xlsx", type=click.Path(path_type=Path))
+@click.option(
+    "--rows", type=int, default=50, show_default=True, help="Prepared rows of the table of points."
+)
+@click.option(
+    "--newton", type=int, default=6, show_default=True,
+    help="Newton steps: 6 reach 1e-9 up to 75 degrees in the thinnest medium, 10 up to 85.",
+)  # fmt: skip
+@click.option("--overwrite", is_flag=True, help="Replace an existing file.")
+def command(out: Path, rows: int, newton: int, overwrite: bool) -> None:
+    """Write a workbook that shifts points and gives the refractive index of water by itself.
+
+    No macros, no circular references: Excel, LibreOffice and others calculate it.
+    """
+    from multimedia.workflows.shift import write_template
+
+    write_template(out, rows=rows, steps=newton, overwrite=overwrite)
+    remark(f"Workbook written to {out}")

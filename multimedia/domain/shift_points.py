@@ -1,0 +1,98 @@
+"""Points to be shifted radially, and what came of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from multimedia.domain.layers import Layers
+from multimedia.domain.shifting import radial_shift_ratio
+from photocore.arrays import FloatArray
+from photocore.errors import InputError
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ShiftSetup:
+    """The camera above its media.
+
+    Attributes
+    ----------
+    layers : Layers
+        The media.
+    z0 : float
+        Camera centre to the first interface. [unit of all lengths]
+    nadir : (float, float)
+        X and Y of the camera.
+    """
+
+    layers: Layers
+    z0: float
+    nadir: tuple[float, float] = (0.0, 0.0)
+
+    @classmethod
+    def from_camera(cls, camera: tuple[float, float, float], layers: Layers) -> ShiftSetup:
+        """Return the set-up of a camera at (X, Y, Z), Z = 0 being the interface on the water side.
+
+        Raises
+        ------
+        InputError
+            If the camera is not above all media.
+        """
+        z0 = camera[2] - layers.thickness
+        if z0 < 0:
+            raise InputError(
+                f"the camera is at Z = {camera[2]:g}, but the media above Z = 0 (the interface on "
+                f"the water side) are {layers.thickness:g} thick: it must be above them. Are "
+                "camera and thicknesses in the same unit?"
+            )
+        return cls(layers=layers, z0=z0, nadir=(camera[0], camera[1]))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ShiftPoints:
+    """Points under the media.
+
+    Attributes
+    ----------
+    ids : tuple of str
+        Names.
+    radius, depth : ndarray, shape (n,)
+        Horizontal distance from the camera's nadir, and depth under the last interface.
+    xy : ndarray, shape (n, 2)
+        Coordinates; NaN for points given by radius.
+    """
+
+    ids: tuple[str, ...]
+    radius: FloatArray
+    depth: FloatArray
+    xy: FloatArray
+
+    def shifted(self, setup: ShiftSetup) -> ShiftResult:
+        """Return the points as straight rays see them."""
+        ratio = radial_shift_ratio(self.radius, z0=setup.z0, zp=self.depth, layers=setup.layers)
+        nadir = np.asarray(setup.nadir)
+        return ShiftResult(
+            radius_bar=self.radius * ratio,
+            xy_bar=nadir + (self.xy - nadir) * ratio[:, None],
+            flags=tuple("NO-RAY" if missing else "OK" for missing in np.isnan(ratio)),
+        )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ShiftResult:
+    """Shifted points.
+
+    Attributes
+    ----------
+    radius_bar : ndarray, shape (n,)
+        Shifted radius; NaN where no ray exists.
+    xy_bar : ndarray, shape (n, 2)
+        Shifted coordinates; NaN for points given by radius.
+    flags : tuple of str
+        ``OK`` or ``NO-RAY``.
+    """
+
+    radius_bar: FloatArray
+    xy_bar: FloatArray
+    flags: tuple[str, ...]

@@ -1,0 +1,170 @@
+"""Tables of points for the radial shift: read tolerantly, written as text."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from multimedia.domain.layers import Layers
+from multimedia.domain.shift_points import ShiftPoints, ShiftResult, ShiftSetup
+from photocore.errors import CellError, InputError, WorkbookError
+from photocore.tables import Column, Table, open_tables, read_named_values, read_table, write_csv
+
+#: Most layers a workbook is searched for.
+MOST_LAYERS = 9
+
+COLUMNS = (
+    Column("id", ("Point", "Name", "No", "Nr", "Punkt", "Punktnummer", "Punto"), "text"),
+    Column("X", ("East", "E", "Rechtswert", "Est")),
+    Column("Y", ("North", "N", "Hochwert", "Nord")),
+    Column("Z", ("Height", "H", "Elevation", "Höhe", "Quota")),
+    Column("R", ("Radius", "radial distance", "Raggio", "distanza radiale", "Radialdistanz")),
+    Column("ZP", ("Depth", "Z_P", "water depth", "Tiefe", "Wassertiefe", "Profondità")),
+)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ShiftInput:
+    """What a file holds.
+
+    Attributes
+    ----------
+    table : Table
+        The table, with the way back to its cells.
+    setup : ShiftSetup or None
+        Camera and media, where the file is a workbook that names them.
+    """
+
+    table: Table
+    setup: ShiftSetup | None
+
+
+def read_shift_input(
+    path: Path | str, *, decimal: str | None = None, sheet: str | None = None
+) -> ShiftInput:
+    """Read a table of points, and the set-up if the workbook has one.
+
+    Parameters
+    ----------
+    path : path
+        An .xlsx, .xlsm, .ods or .csv file.
+    decimal : {"point", "comma"}, optional
+        Decimal separator of numbers typed as text.
+    sheet : str, optional
+        The only sheet to look at.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read or holds no such table.
+    WorkbookError
+        Naming every bad cell.
+    """
+    book = open_tables(path)
+    table = read_table(book, COLUMNS, name="Multimedia", sheet=sheet, decimal=decimal)  # type: ignore[arg-type]
+    if not {"R", "ZP"} <= table.present and not {"X", "Y", "Z"} <= table.present:
+        raise InputError(
+            f"{table.file}: the table needs the columns X, Y, Z (Z = 0 at the interface on the "
+            "water side, points in water negative) or R, ZP (distance from the camera's nadir, "
+            "depth); other headings can be renamed to these."
+        )
+    units = {table.units[key] for key in ("X", "Y", "Z", "R", "ZP") if key in table.units}
+    if len(units) > 1:
+        raise InputError(
+            f"{table.file}: the headings mix {' and '.join(sorted(units))}; all lengths must be in "
+            "one unit, the same as camera and thicknesses."
+        )
+    if Path(path).suffix.lower() in (".csv", ".tsv", ".txt"):
+        return ShiftInput(table=table, setup=None)
+    names = [Column(f"n_{i}") for i in range(1, MOST_LAYERS + 1)]
+    names += [Column(f"t_{i}") for i in range(1, MOST_LAYERS - 1)]
+    names += [Column("z_0"), Column("X_0"), Column("Y_0")]
+    values = read_named_values(book, names, sheet="Multimedia")
+    numbers = {column.key: values.number(column.key) for column in names}
+    indices = [n for i in range(1, MOST_LAYERS + 1) if not np.isnan(n := numbers[f"n_{i}"])]
+    if len(indices) < 2 or np.isnan(numbers["z_0"]):
+        return ShiftInput(table=table, setup=None)
+    try:
+        layers = Layers(
+            indices=tuple(indices),
+            thicknesses=tuple(numbers[f"t_{i}"] for i in range(1, len(indices) - 1)),
+        )
+        setup = ShiftSetup(
+            layers=layers,
+            z0=numbers["z_0"],
+            nadir=(float(np.nan_to_num(numbers["X_0"])), float(np.nan_to_num(numbers["Y_0"]))),
+        )
+    except InputError as error:
+        raise InputError(f"{values.file} › Multimedia: {error}") from None
+    return ShiftInput(table=table, setup=setup)
+
+
+def points_of(table: Table, nadir: tuple[float, float]) -> ShiftPoints:
+    """Return the points of a table; R and ZP win where both forms are filled in.
+
+    Raises
+    ------
+    WorkbookError
+        Naming every point that is incomplete or on the wrong side of the water.
+    """
+    x, y, z = (table.numbers(key) for key in ("X", "Y", "Z"))
+    radius, depth = table.numbers("R").copy(), table.numbers("ZP").copy()
+    from_xy, from_z = np.isnan(radius), np.isnan(depth)
+    radius[from_xy] = np.hypot(x - nadir[0], y - nadir[1])[from_xy]
+    depth[from_z] = -z[from_z]
+    every = np.stack([x, y, z, table.numbers("R"), table.numbers("ZP")])
+    rows: list[int] = np.flatnonzero(~np.isnan(every).all(axis=0)).tolist()
+    errors: list[CellError] = []
+    for row in rows:
+        if np.isnan(radius[row]):
+            key = "R" if "R" in table.present else "X"
+            errors.append(table.error(row, key, "is blank; give X and Y, or R."))
+        elif radius[row] < 0:
+            errors.append(table.error(row, "R", f"found {radius[row]:g}; a radius is positive."))
+        if np.isnan(depth[row]):
+            key = "ZP" if "ZP" in table.present else "Z"
+            errors.append(table.error(row, key, "is blank; give Z, or ZP."))
+        elif depth[row] < 0:
+            key = "Z" if from_z[row] else "ZP"
+            errors.append(
+                table.error(
+                    row,
+                    key,
+                    f"the point is {-depth[row]:g} above the water side of the interface; dry "
+                    "points are not refracted: take it out (Z is negative, ZP positive in water).",
+                )
+            )
+    if errors:
+        raise WorkbookError(errors)
+    if not rows:
+        raise InputError(f"{table.file}: there is no point; fill in X, Y, Z or R, ZP.")
+    ids = table.texts("id")
+    return ShiftPoints(
+        ids=tuple(ids[row] or str(number) for number, row in enumerate(rows, start=1)),
+        radius=radius[rows],
+        depth=depth[rows],
+        xy=np.stack([x, y], axis=-1)[rows],
+    )
+
+
+def write_shift_csv(
+    path: Path | str,
+    points: ShiftPoints,
+    result: ShiftResult,
+    *,
+    flavour: str = "plain",
+    overwrite: bool = False,
+) -> None:
+    """Write shifted points as text, numbers to the last bit."""
+    columns: dict[str, object] = {"id": list(points.ids)}
+    with_xy = not np.isnan(points.xy).all()
+    if with_xy:
+        columns |= {"X": points.xy[:, 0], "Y": points.xy[:, 1]}
+    columns |= {"R": points.radius, "ZP": points.depth, "Rbar": result.radius_bar}
+    columns["dR"] = result.radius_bar - points.radius
+    if with_xy:
+        columns |= {"Xbar": result.xy_bar[:, 0], "Ybar": result.xy_bar[:, 1]}
+    columns["flag"] = list(result.flags)
+    write_csv(path, columns, flavour=flavour, overwrite=overwrite)

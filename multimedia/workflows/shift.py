@@ -1,0 +1,167 @@
+"""Radial shift of a table: file in, file out; and the empty workbook."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from multimedia.domain.layers import Layers
+from multimedia.domain.shift_points import ShiftPoints, ShiftResult, ShiftSetup
+from multimedia.io.shift_files import points_of, read_shift_input, write_shift_csv
+from multimedia.io.shift_workbook import write_shift_workbook
+from photocore.errors import InputError
+from photocore.output import check_writable
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ShiftReport:
+    """What was shifted.
+
+    Attributes
+    ----------
+    setup, points, result
+        Camera and media, points, shifted points.
+    remarks : tuple of str
+        What the user should know.
+    """
+
+    setup: ShiftSetup
+    points: ShiftPoints
+    result: ShiftResult
+    remarks: tuple[str, ...]
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return everything as plain data for ``--json``."""
+        points = [
+            {
+                "id": name,
+                "R": self.points.radius[i],
+                "ZP": self.points.depth[i],
+                "Rbar": self.result.radius_bar[i],
+                "dR": self.result.radius_bar[i] - self.points.radius[i],
+                "Xbar": self.result.xy_bar[i, 0],
+                "Ybar": self.result.xy_bar[i, 1],
+                "flag": self.result.flags[i],
+            }
+            for i, name in enumerate(self.points.ids)
+        ]
+        setup = {**self.setup.layers.as_dict(), "z0": self.setup.z0, "nadir": self.setup.nadir}
+        return {"points": points, "setup": setup, "remarks": self.remarks}
+
+
+def shift_file(
+    path: Path | str,
+    out: Path | str | None,
+    *,
+    camera: tuple[float, float, float] | None = None,
+    z0: float | None = None,
+    indices: tuple[float, ...] | None = None,
+    thicknesses: tuple[float, ...] | None = None,
+    decimal: str | None = None,
+    sheet: str | None = None,
+    flavour: str = "plain",
+    overwrite: bool = False,
+) -> ShiftReport:
+    """Shift the points of a file radially.
+
+    Parameters
+    ----------
+    path : path
+        An .xlsx, .xlsm, .ods or .csv file with X, Y, Z or R, ZP; a workbook may hold the set-up.
+    out : path or None
+        An .xlsx file (live formulas) or .csv file (numbers); None writes nothing.
+    camera : (float, float, float), optional
+        X, Y, Z of the camera, Z = 0 at the interface on the water side.
+    z0 : float, optional
+        Instead of camera, its distance from the first interface.
+    indices, thicknesses : tuple of float, optional
+        The media; those of the workbook otherwise.
+    decimal, sheet
+        How to read the table.
+    flavour : str
+        How to write CSV, see `photocore.tables.FLAVOURS`.
+    overwrite : bool
+        Replace an existing file.
+
+    Returns
+    -------
+    ShiftReport
+
+    Raises
+    ------
+    InputError
+        If a cell, an option or a file is at fault.
+    """
+    out = None if out is None else Path(out)
+    if out is not None:
+        check_writable(out, overwrite=overwrite)
+        if out.suffix.lower() not in (".xlsx", ".csv"):
+            raise InputError(f"{out}: results are written as .xlsx or .csv.")
+    given = read_shift_input(path, decimal=decimal, sheet=sheet)
+    setup = _setup(given.setup, camera, z0, indices, thicknesses)
+    points = points_of(given.table, setup.nadir)
+    result = points.shifted(setup)
+    if out is not None and out.suffix.lower() == ".csv":
+        write_shift_csv(out, points, result, flavour=flavour, overwrite=overwrite)
+    elif out is not None:
+        write_shift_workbook(out, setup, points, rows=1, overwrite=overwrite)
+    remarks = [*given.table.remarks]
+    remarks += setup.layers.remarks_about(z0=setup.z0, zp=points.depth)
+    unseen = [name for name, flag in zip(points.ids, result.flags, strict=True) if flag != "OK"]
+    if unseen:
+        remarks.append(
+            f"{len(unseen)} points cannot be seen from the camera, no ray gets there: "
+            f"{', '.join(unseen[:10])}."
+        )
+    return ShiftReport(setup=setup, points=points, result=result, remarks=tuple(remarks))
+
+
+def _setup(
+    own: ShiftSetup | None,
+    camera: tuple[float, float, float] | None,
+    z0: float | None,
+    indices: tuple[float, ...] | None,
+    thicknesses: tuple[float, ...] | None,
+) -> ShiftSetup:
+    """Return the set-up from the options, completed from the workbook."""
+    if camera is not None and z0 is not None:
+        raise InputError("give the camera's position or z0, not both.")
+    if indices is None and own is None:
+        raise InputError(
+            "the refractive indices are not known: give --indices, from the camera to the object, "
+            "e.g. --indices 1,1.5,1.337 --thicknesses 0.01 for air, 10 mm of glass (in metres), "
+            "water."
+        )
+    media = own.layers if own is not None else Layers(indices=(1.0, 1.0))
+    if indices is not None or thicknesses is not None:
+        media = Layers(
+            indices=media.indices if indices is None else indices,
+            thicknesses=thicknesses
+            if thicknesses is not None
+            else (media.thicknesses if indices is None or len(indices) > 2 else ()),
+        )
+    if camera is not None:
+        return ShiftSetup.from_camera(camera, media)
+    if z0 is not None:
+        if z0 < 0:
+            raise InputError(f"z0: the camera must be above the first interface, found {z0:g}.")
+        return ShiftSetup(layers=media, z0=z0, nadir=own.nadir if own else (0.0, 0.0))
+    if own is None:
+        raise InputError(
+            "the camera's position is not known: give --camera X,Y,Z (Z = 0 at the interface on "
+            "the water side), or --z0."
+        )
+    return ShiftSetup(layers=media, z0=own.z0, nadir=own.nadir)
+
+
+def write_template(path: Path | str, *, rows: int, steps: int, overwrite: bool) -> None:
+    """Write the workbook with a tank as an example set-up and an empty table.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be written, or rows or steps are out of range.
+    """
+    setup = ShiftSetup(layers=Layers(indices=(1.0, 1.5, 1.337), thicknesses=(10.0,)), z0=500.0)
+    write_shift_workbook(path, setup, rows=rows, steps=steps, overwrite=overwrite)
