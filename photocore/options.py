@@ -25,9 +25,15 @@ class Size(click.ParamType):  # type: ignore[type-arg,unused-ignore]
 
 
 class Numbers(click.ParamType):  # type: ignore[type-arg,unused-ignore]
-    """So many numbers with commas between them; decimal points."""
+    """So many numbers with commas between them; decimal points.
 
-    def __init__(self, count: int) -> None:
+    Parameters
+    ----------
+    count : int, optional
+        How many; any number of them when None.
+    """
+
+    def __init__(self, count: int | None = None) -> None:
         self.count, self.name = count, "numbers"
 
     def convert(
@@ -39,8 +45,8 @@ class Numbers(click.ParamType):  # type: ignore[type-arg,unused-ignore]
         try:
             numbers = tuple(float(part) for part in str(value).split(","))
         except ValueError:
-            numbers = ()
-        if len(numbers) != self.count:
+            self.fail(f"{value!r} is not a list of numbers with commas between them", param, ctx)
+        if self.count is not None and len(numbers) != self.count:
             self.fail(f"{value!r} is not {self.count} numbers with commas between them", param, ctx)
         return numbers
 
@@ -59,33 +65,3 @@ class Scale(click.ParamType):  # type: ignore[type-arg,unused-ignore]
             return float(text)
         except ValueError:
             self.fail(f"{value!r} is not a scale, e.g. 1:500", param, ctx)
-
-
-class Numbers(click.ParamType):  # type: ignore[type-arg,unused-ignore]
-    """Numbers with commas between them, e.g. ``1,1.5,1.337``.
-
-    Parameters
-    ----------
-    count : int, optional
-        How many there must be.
-    """
-
-    name = "N,N,..."
-
-    def __init__(self, count: int | None = None) -> None:
-        self.count = count
-
-    def convert(
-        self, value: object, param: click.Parameter | None, ctx: click.Context | None
-    ) -> tuple[float, ...]:
-        """Return the numbers; blanks and semicolons separate too."""
-        if isinstance(value, tuple):
-            return value
-        parts = str(value).replace(";", " ").replace(",", " ").split()
-        try:
-            numbers = tuple(float(part) for part in parts)
-        except ValueError:
-            self.fail(f"{value!r} is not a list of numbers, e.g. 1,1.5,1.337", param, ctx)
-        if self.count is not None and len(numbers) != self.count:
-            self.fail(f"{value!r}: expected {self.count} numbers, e.g. 0.2,0.1,0.75", param, ctx)
-        return numbers

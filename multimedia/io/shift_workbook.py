@@ -443,7 +443,7 @@ def _values(
     # Not layers.heights: the sheet computes with what it holds.
     heights: list[ArrayLike] = [setup.z0, *setup.layers.thicknesses, points.depth]
     found = unrolled_shift(points.radius, heights, setup.layers.indices, steps=steps)
-    with_xy: list[bool] = np.isfinite(points.xy).all(axis=1).tolist()
+    with_xy = np.asarray(np.isfinite(points.xy).all(axis=1)).tolist()
     with np.errstate(divide="ignore", invalid="ignore"):
         ratio = np.where(points.radius == 0, 1.0, found.radius_bar / points.radius)
     nadir = np.asarray(setup.nadir)

@@ -153,8 +153,9 @@ def test_six_columns_reach_a_billionth_up_to_75_degrees_and_ten_up_to_85() -> No
 
 
 def test_the_columns_say_themselves_when_they_are_too_few() -> None:
-    setup = ORDERS["five media"]
-    points = points_for(setup, steepest=89.0)
+    gap = Layers(indices=(1.34, 1.0, 1.34), thicknesses=(0.02,))
+    setup = ShiftSetup(layers=gap, z0=100)
+    points = points_for(setup, steepest=89.9)
     heights = setup.layers.heights(z0=setup.z0, zp=points.depth)
     found = unrolled_shift(points.radius, heights, setup.layers.indices)
     exact = radial_shift(points.radius, z0=setup.z0, zp=points.depth, layers=setup.layers)
