@@ -19,11 +19,13 @@ from photocore.spreadsheet.grid import Grid, SheetFile, Value, cell_name
 from photocore.tables.fill import fill, refuse_doubles, take_unit_row
 from photocore.tables.headings import Match, describe, find_columns
 from photocore.tables.model import Column, Table
-from photocore.tables.numbers import Decimal, take_apart
+from photocore.tables.numbers import Decimal
 from photocore.tables.rows import RowSorter, label
 
 _DELIMITERS = (";", "\t", ",", "|")
 _GUARDED = re.compile(r"'+[=+\-@\t\r]")
+#: A text that may be a number with three decimals or one with thousands.
+_GROUPED = re.compile(r"[+-]?[1-9]\d{0,2}[.,]\d{3}")
 _SAMPLE = 200
 _CHUNK = 50_000
 
@@ -294,28 +296,31 @@ def _read_chunk(texts: list[str]) -> _Chunk:
     """Read plain numbers (NaN where blank); leave the texts alone if any is not plain."""
     numbers = _floats(texts)
     if numbers is not None:
-        fractions = numbers[numbers % 1 > 0]
-        if not fractions.size:
-            return _Chunk(numbers)
-        grouped = bool(np.all(np.rint(fractions * 1000) / 1000 == fractions))
-        return _Chunk(numbers, marks=frozenset({"grouped point" if grouped else "point"}))
+        return _Chunk(numbers, marks=_marks(texts, numbers, "point"))
     if any("." in text for text in texts):
         return _Chunk(texts=texts)
     numbers = _floats([text.replace(",", ".") for text in texts])
     if numbers is None:
         return _Chunk(texts=texts)
-    marks = set()
+    return _Chunk(numbers, marks=_marks(texts, numbers, "comma"))
+
+
+def _marks(texts: list[str], numbers: FloatArray, decimal: Decimal) -> frozenset[str]:
+    """Return what plain numbers prove about the separator they were read with."""
     # Only numbers of three decimals can be mistaken for thousands; look at their texts alone.
-    thousandths = np.rint(numbers * 1000) / 1000
-    if np.any((thousandths != numbers) & np.isfinite(numbers)):
-        marks.add("comma")
-    for index in np.flatnonzero(thousandths == numbers):
-        part = take_apart(texts[index]) if "," in texts[index] else None
-        if part is not None:
-            marks.add(part.evidence)
-            if marks >= {"comma", "grouped comma"}:
+    with np.errstate(over="ignore"):
+        thousandths = (np.rint(numbers * 1000) / 1000 == numbers) | ~np.isfinite(numbers)
+    marks = set() if thousandths.all() else {str(decimal)}
+    mark = "." if decimal == "point" else ","
+    for index in np.flatnonzero(thousandths):
+        if mark in texts[index]:
+            grouped = _GROUPED.fullmatch(texts[index].strip())
+            marks.add(f"grouped {decimal}" if grouped else decimal)
+            if decimal == "point" and "point" in marks:
                 break
-    return _Chunk(numbers, marks=frozenset(marks))
+            if len(marks) == 2:
+                break
+    return frozenset(marks)
 
 
 def _floats(texts: list[str]) -> FloatArray | None:
