@@ -1,0 +1,159 @@
+"""Where the wall is: relief asked for window by window, from a number, a map or triangles."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bifocal.domain.grid import SAME_PIXEL, Grid
+from photocore.arrays import FloatArray
+from photocore.errors import InputError
+
+ReliefArray = NDArray[np.float32]
+Bounds = tuple[float, float, float, float]
+#: Returns relief for (column, row, width, height) of a map, NaN beyond its edges.
+Fetch = Callable[[int, int, int, int], ReliefArray]
+
+#: Side of the blocks whose extremes a map remembers; smaller blocks give tighter tile margins. [px]
+_BLOCK = 128
+#: A map whose relief changes by more than this many pixel sides from one pixel to the next has a
+#: step there, not a slope (72 degrees): interpolating across it would invent a ramp.
+_STEP = 3.0
+
+
+class Surface(Protocol):
+    """Relief over the reference plane."""
+
+    def window(self, grid: Grid) -> ReliefArray:
+        """Return relief at the pixel centres of a grid; NaN where unknown. [m]"""
+
+    def extremes(self, bounds: Bounds) -> tuple[float, float]:
+        """Return the lowest and highest relief over a box; NaN, NaN where nothing is known. [m]"""
+
+
+class FlatSurface:
+    """A wall without relief, parallel to the reference plane.
+
+    Parameters
+    ----------
+    r : float
+        Its relief. [m]
+    """
+
+    def __init__(self, r: float = 0.0) -> None:
+        if not math.isfinite(r):
+            raise InputError(f"relief: must be a finite number [m], got {r}.")
+        self.r = float(r)
+
+    def window(self, grid: Grid) -> ReliefArray:
+        """Return the constant."""
+        return np.full(grid.shape, self.r, np.float32)
+
+    def extremes(self, bounds: Bounds) -> tuple[float, float]:  # noqa: ARG002
+        """Return the constant twice."""
+        return self.r, self.r
+
+
+class MapSurface:
+    """A relief map, in memory or read from a file window by window.
+
+    Parameters
+    ----------
+    grid : Grid
+        Where the map's pixels are.
+    fetch : callable
+        Returns any window of it.
+    """
+
+    def __init__(self, grid: Grid, fetch: Fetch) -> None:
+        self.grid, self._fetch = grid, fetch
+        self._lowest, self._highest = self._scan()
+        if np.isnan(self._lowest).all():
+            raise InputError(
+                "the relief map is empty: every pixel is unknown (NaN). Make it again, or render "
+                "on the plane."
+            )
+
+    @classmethod
+    def of_array(cls, r: NDArray[np.floating], grid: Grid) -> MapSurface:
+        """Return the surface of an array in memory, shape (height, width). [m]"""
+        if r.shape != grid.shape:
+            raise InputError(f"relief: expected shape {grid.shape}, found {r.shape}.")
+
+        def fetch(column: int, row: int, width: int, height: int) -> ReliefArray:
+            out = np.full((height, width), np.nan, np.float32)
+            c0, r0 = max(column, 0), max(row, 0)
+            c1, r1 = min(column + width, grid.width), min(row + height, grid.height)
+            if c1 > c0 and r1 > r0:
+                out[r0 - row : r1 - row, c0 - column : c1 - column] = r[r0:r1, c0:c1]
+            return out
+
+        return cls(grid, fetch)
+
+    def window(self, grid: Grid) -> ReliefArray:
+        """Return relief at the pixel centres of a grid.
+
+        Bilinear on slopes, nearest across steps and beside holes, so that edges stay sharp.
+        """
+        column, row = grid.offset_in(self.grid)
+        same_gsd = abs(grid.gsd / self.grid.gsd - 1) * max(grid.shape) < SAME_PIXEL
+        if same_gsd and max(abs(column - round(column)), abs(row - round(row))) < 10 * SAME_PIXEL:
+            return self._fetch(round(column), round(row), grid.width, grid.height)
+        return self._resample(grid, column, row)
+
+    def extremes(self, bounds: Bounds) -> tuple[float, float]:
+        """Return the extremes of the blocks that touch the box."""
+        side = _BLOCK * self.grid.gsd
+        xmin, _, _, ymax = self.grid.bounds
+        c0, c1 = (math.floor((x - xmin) / side) for x in (bounds[0], bounds[2]))
+        r0, r1 = (math.floor((ymax - y) / side) for y in (bounds[3], bounds[1]))
+        cut = np.s_[max(r0, 0) : max(r1 + 1, 0), max(c0, 0) : max(c1 + 1, 0)]
+        lowest, highest = self._lowest[cut], self._highest[cut]
+        if not lowest.size or np.isnan(lowest).all():
+            return math.nan, math.nan
+        return float(np.nanmin(lowest)), float(np.nanmax(highest))
+
+    def _scan(self) -> tuple[FloatArray, FloatArray]:
+        """Return the extremes of every block."""
+        rows, columns = (-(-length // _BLOCK) for length in self.grid.shape)
+        lowest = np.full((rows, columns), np.nan)
+        highest = np.full((rows, columns), np.nan)
+        strip = 4 * _BLOCK  # whole tiles of the file at a time
+        for top in range(0, self.grid.height, strip):
+            height = min(strip, self.grid.height - top)
+            values = self._fetch(0, top, self.grid.width, height)
+            for first in range(0, height, _BLOCK):
+                block = values[first : first + _BLOCK]
+                starts = np.arange(0, self.grid.width, _BLOCK)
+                index = (top + first) // _BLOCK
+                # fmin and fmax skip NaN without a warning where all is NaN.
+                lowest[index] = np.fmin.reduceat(np.fmin.reduce(block, axis=0), starts)
+                highest[index] = np.fmax.reduceat(np.fmax.reduce(block, axis=0), starts)
+        if np.isinf(lowest).any() or np.isinf(highest).any():
+            raise InputError("the relief map holds infinite values; mark unknown pixels as NaN.")
+        return lowest, highest
+
+    def _resample(self, grid: Grid, column: float, row: float) -> ReliefArray:
+        import cv2
+
+        step = grid.gsd / self.grid.gsd
+        c0, r0 = math.floor(column) - 1, math.floor(row) - 1
+        c1 = math.ceil(column + (grid.width - 1) * step) + 2
+        r1 = math.ceil(row + (grid.height - 1) * step) + 2
+        patch = np.ascontiguousarray(self._fetch(c0, r0, c1 - c0, r1 - r0))
+        x = (column - c0 + step * np.arange(grid.width)).astype(np.float32)
+        y = (row - r0 + step * np.arange(grid.height)).astype(np.float32)
+        map_x = np.broadcast_to(x, grid.shape).copy()
+        map_y = np.broadcast_to(y[:, None], grid.shape).copy()
+        near = cv2.remap(patch, map_x, map_y, cv2.INTER_NEAREST)
+        smooth = cv2.remap(patch, map_x, map_y, cv2.INTER_LINEAR)
+        # Steps and holes of the map, as seen by the four neighbours of a position.
+        known = np.where(np.isnan(patch), np.float32(1e6), patch)
+        corner = np.ones((2, 2), np.uint8)
+        spread = cv2.dilate(known, corner, anchor=(0, 0)) - cv2.erode(known, corner, anchor=(0, 0))
+        rough = (spread > _STEP * self.grid.gsd)[np.ix_(np.floor(y).astype(int), np.floor(x).astype(int))]
+        return np.asarray(np.where(rough | np.isnan(smooth), near, smooth), np.float32)
