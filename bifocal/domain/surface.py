@@ -155,5 +155,7 @@ class MapSurface:
         known = np.where(np.isnan(patch), np.float32(1e6), patch)
         corner = np.ones((2, 2), np.uint8)
         spread = cv2.dilate(known, corner, anchor=(0, 0)) - cv2.erode(known, corner, anchor=(0, 0))
-        rough = (spread > _STEP * self.grid.gsd)[np.ix_(np.floor(y).astype(int), np.floor(x).astype(int))]
+        rough = (spread > _STEP * self.grid.gsd)[
+            np.ix_(np.floor(y).astype(int), np.floor(x).astype(int))
+        ]
         return np.asarray(np.where(rough | np.isnan(smooth), near, smooth), np.float32)

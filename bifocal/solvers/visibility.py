@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,9 +13,16 @@ from bifocal.domain.surface import Bounds, ReliefArray, Surface
 from bifocal.rays import Foot
 from photocore.arrays import BoolArray
 
-#: A point is hidden when another on its ray lies this much nearer to the nadir. Two neighbours
-#: that share a cell differ by at most its diagonal, 1.44 px; less would call slopes hidden. [px]
+#: A pixel of the buffer is a candidate when another on its ray lies this much farther in. [px]
 _MARGIN = 1.0
+#: Shadows shorter than this cannot be told from the half pixel to which steps are known. [px]
+_LEAST_SHADOW = 0.35
+#: A step lies anywhere between two pixel centres; shadows are taken this much longer than from the
+#: middle, which on rendered walls finds 99 % of the hidden pixels at 0.25 % false alarms. [px]
+_RIM = 0.45
+#: Where a ray is compared with the relief: distances from the pixel, and from its occluder. [px]
+_BESIDE = (1.25, 1.75)
+_AROUND = (-2.0, -1.5, -1.0, -0.5, 0.0, 0.5, 1.0, 1.5, 2.0)
 #: No more than this many points are inserted between two neighbours.
 _MOST_STEPS = 400
 
@@ -98,103 +106,144 @@ def _towards(bounds: Bounds, camera: Foot, share: float) -> Bounds:
     )
 
 
+class _Tile(NamedTuple):
+    """A window with its surroundings, in pixels, seen from the nadir."""
+
+    relief: ReliefArray  # [px]
+    x: ReliefArray  # of every column, from the nadir [px]
+    y: ReliefArray  # of every row, upwards [px]
+    rho: ReliefArray  # distance from the nadir [px]
+    distance: np.float32  # of the camera [px]
+    core: tuple[slice, slice]  # the window itself
+
+
 def _hidden(
     relief: ReliefArray, grid: Grid, camera: Foot, column: int, row: int, shape: tuple[int, int]
 ) -> BoolArray:
     """Return the hidden pixels of the part of ``grid`` that starts at column and row."""
-    gsd, d = grid.gsd, camera.distance
+    gsd = grid.gsd
     x = ((grid.columns_x - camera.nadir[0]) / gsd).astype(np.float32)
     y = ((grid.rows_y - camera.nadir[1]) / gsd).astype(np.float32)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        stretch = np.float32(d) / np.where(relief < d, np.float32(d) - relief, np.float32(np.nan))
-    known = ~np.isnan(stretch)
-    if not known.any():
+    tile = _Tile(
+        relief=relief * np.float32(1 / gsd),
+        x=x,
+        y=y,
+        rho=np.sqrt(x * x + (y * y)[:, None]),
+        distance=np.float32(camera.distance / gsd),
+        core=np.s_[row : row + shape[0], column : column + shape[1]],
+    )
+    buffer = _Buffer.of_tile(tile)
+    if buffer is None:
         return np.zeros(shape, bool)
-    side = np.float32(1.02 * float(np.nanmax(stretch)))
-    u = x * (stretch / side)
-    v = y[:, None] * (stretch / side)
-    core = np.s_[row : row + shape[0], column : column + shape[1]]
-    # Only cells that hold a pixel of the core matter; everything else goes to a cell of its own.
-    u0, v0 = np.floor(np.nanmin(u[core], initial=np.inf)), np.floor(np.nanmin(v[core], initial=np.inf))
-    if not (np.isfinite(u0) and np.isfinite(v0)):
-        return np.zeros(shape, bool)
-    columns = int(np.nanmax(u[core]) - u0) + 2
-    rows = int(np.nanmax(v[core]) - v0) + 2
-    rho = np.sqrt(x * x + (y * y)[:, None])
-
-    nearest = np.full(rows * columns + 1, np.inf, np.float32)
-
-    def cell_of(u: NDArray[np.float32], v: NDArray[np.float32]) -> NDArray[np.int32]:
-        with np.errstate(invalid="ignore"):
-            i, j = (v - v0).astype(np.int32), (u - u0).astype(np.int32)
-            inside = (u >= u0) & (v >= v0) & (i < rows) & (j < columns)
-        return np.where(inside, i * np.int32(columns) + j, np.int32(rows * columns))
-
-    cells = cell_of(u, v)
-    np.minimum.at(nearest, cells.ravel(), rho.ravel())
-    for first, second in (
-        (np.s_[:, :-1], np.s_[:, 1:]),
-        (np.s_[:-1], np.s_[1:]),
-    ):
-        _join(nearest, cell_of, u, v, rho, first, second)
-    nearest[-1] = np.inf
-    found = nearest[cells[core]] < rho[core] - np.float32(_MARGIN)
-    return _sharpen(found, relief, nearest, cells[core], columns, x, y, rho, d / gsd, gsd, column, row)
+    return _sharpen(tile, buffer)
 
 
-def _sharpen(found, relief, nearest, cells, columns, x, y, rho, distance, gsd, column, row):  # type: ignore[no-untyped-def]
-    import cv2
+class _Buffer(NamedTuple):
+    """The z-buffer: the smallest rho in each cell of q, and the cell of each pixel of the core."""
 
-    square = np.ones((3, 3), np.uint8)
-    flags = found.astype(np.uint8)
-    sure = cv2.erode(flags, square) > 0
-    at = np.nonzero((cv2.dilate(flags, square) > 0) & ~sure)
-    if not len(at[0]):
-        return found
-    # The occluder: the innermost point in the cells around.
-    c = cells[at].astype(np.int64)
-    occ = nearest[c]
-    for dr in (-1, 0, 1):
-        for dc in (-1, 0, 1):
-            occ = np.fmin(occ, nearest[np.clip(c + dr * columns + dc, 0, len(nearest) - 1)])
-    i, j = at[0] + row, at[1] + column
-    r = relief[i, j] / np.float32(gsd)
-    p = rho[i, j]
-    hidden = np.zeros(len(c), bool)
-    ux, uy = -x[j] / p, y[i] / p
-    rise = (np.float32(distance) - r) / p
-    reach = p - occ
-    scaled = relief
-    rows, cols = relief.shape
-    for local, t0 in WIN:
-        t = np.full_like(reach, t0) if local else reach + np.float32(t0)
-        ii = np.rint(i + uy * t).astype(np.int32)
-        jj = np.rint(j + ux * t).astype(np.int32)
-        ok = (t > TMIN) & (ii >= 0) & (ii < rows) & (jj >= 0) & (jj < cols)
-        h = relief[np.clip(ii, 0, rows - 1), np.clip(jj, 0, cols - 1)] / np.float32(gsd)
-        with np.errstate(invalid="ignore"):
-            hidden |= ok & (h > r + rise * (t - TOL))
-    out = sure.copy()
-    out[at] = hidden
-    return out
+    nearest: ReliefArray
+    cells: NDArray[np.int32]
+    columns: int
 
-WIN=[(True,a) for a in (0.75,1.25,1.75,2.25)]+[(False,a) for a in np.arange(-2,2.1,.5)]
-TMIN=0.75
-TOL=0.5
+    @classmethod
+    def of_tile(cls, tile: _Tile) -> _Buffer | None:
+        """Return the filled buffer; None if nothing of the core is known."""
+        core = tile.core
+        depth = tile.distance - tile.relief
+        with np.errstate(divide="ignore", invalid="ignore"):
+            stretch = np.where(depth > 0, tile.distance / depth, np.float32(np.nan))
+        largest = np.fmax.reduce(stretch, axis=None)
+        if np.isnan(largest) or np.isnan(np.fmax.reduce(stretch[core], axis=None)):
+            return None
+        # Just wider than the widest gap between neighbours on a flat part: no cell stays empty.
+        stretch *= np.float32(1 / (1.02 * float(largest)))
+        u, v = tile.x * stretch, tile.y[:, None] * stretch
+        # Only cells that hold a pixel of the core matter; the rest goes to a cell of its own.
+        u0, u1 = (float(f.reduce(u[core], axis=None)) for f in (np.fmin, np.fmax))
+        v0, v1 = (float(f.reduce(v[core], axis=None)) for f in (np.fmin, np.fmax))
+        u -= np.float32(math.floor(u0))
+        v -= np.float32(math.floor(v0))
+        columns, rows = (int(math.floor(b) - math.floor(a)) + 1 for a, b in ((u0, u1), (v0, v1)))
+        nearest = np.full(rows * columns + 1, np.inf, np.float32)
+        cells = _cells(u, v, rows, columns)
+        np.minimum.at(nearest, cells.ravel(), tile.rho.ravel())
+        for first, second in ((np.s_[:, :-1], np.s_[:, 1:]), (np.s_[:-1], np.s_[1:])):
+            ends = [(a[first], a[second]) for a in (u, v, tile.rho)]
+            _join(nearest, ends, rows, columns)
+        nearest[-1] = np.inf
+        return cls(nearest, cells[core], columns)
 
-def _join(nearest, cell_of, u, v, rho, first, second) -> None:  # type: ignore[no-untyped-def]
-    """Insert points of the faces between neighbours that lie more than a cell apart."""
-    du, dv = u[second] - u[first], v[second] - v[first]
+
+def _cells(u: ReliefArray, v: ReliefArray, rows: int, columns: int) -> NDArray[np.int32]:
+    """Return the cell of positions; the one after the last for what lies outside or is NaN."""
+    inside = (u >= 0) & (v >= 0) & (u < columns) & (v < rows)
     with np.errstate(invalid="ignore"):
-        gap = np.maximum(np.abs(du), np.abs(dv))
-        at = np.nonzero(gap.ravel() > 1.0)[0]
-    if not len(at):
+        cells = v.astype(np.int32) * np.int32(columns) + u.astype(np.int32)
+    cells[~inside] = rows * columns
+    return cells
+
+
+def _join(
+    nearest: ReliefArray, ends: list[tuple[ReliefArray, ReliefArray]], rows: int, columns: int
+) -> None:
+    """Insert points of the faces between neighbours that lie more than a cell apart."""
+    (u, u_next), (v, v_next), _ = ends
+    gap = np.maximum(np.abs(u_next - u), np.abs(v_next - v))
+    at = np.nonzero(gap > 1)
+    if not len(at[0]):
         return
-    count = np.minimum(np.ceil(gap.ravel()[at]), _MOST_STEPS).astype(np.int64)
-    index = np.repeat(np.arange(len(at)), count)
+    count = np.minimum(np.ceil(gap[at]), _MOST_STEPS).astype(np.int64)
+    index = np.repeat(np.arange(len(count)), count)
     part = np.arange(len(index)) - np.repeat(np.cumsum(count) - count, count)
     t = ((part + 1) / (count + 1)[index]).astype(np.float32)
-    starts = [a[first].ravel()[at][index] for a in (u, v, rho)]
-    ends = [a[second].ravel()[at][index] for a in (u, v, rho)]
-    pu, pv, prho = (a + (b - a) * t for a, b in zip(starts, ends, strict=True))
-    np.minimum.at(nearest, cell_of(pu, pv), prho)
+    points = [a[at][index] + (b[at] - a[at])[index] * t for a, b in ends]
+    np.minimum.at(nearest, _cells(points[0], points[1], rows, columns), points[2])
+
+
+def _sharpen(tile: _Tile, buffer: _Buffer) -> BoolArray:
+    """Return the hidden pixels, those at the rims of shadows decided along their own rays.
+
+    The cells are a pixel wide, so the rim of a shadow is known to a pixel only, and shadows of
+    a pixel are missed. Where that matters the ray from the pixel to the camera is followed at the
+    place of the occluder and right beside the pixel: it is hidden if relief rises above the ray.
+    """
+    import cv2
+
+    core, rho = tile.core, tile.rho[tile.core]
+    found = buffer.nearest[buffer.cells] < rho - np.float32(_MARGIN)
+    flags, square = found.astype(np.uint8), np.ones((3, 3), np.uint8)
+    sure = cv2.erode(flags, square) > 0
+    unsure = (cv2.dilate(flags, square) > 0) & ~sure
+    known = np.where(np.isnan(tile.relief), np.float32(-1e9), tile.relief)
+    rise = cv2.dilate(known, square)[core] - tile.relief[core]
+    unsure |= rise * rho > np.float32(_LEAST_SHADOW) * (tile.distance - tile.relief[core])
+    row, column = np.nonzero(unsure & ~sure)
+    if not len(row):
+        return found
+    cell = buffer.cells[row, column].astype(np.int64)
+    occluder = buffer.nearest[cell]
+    for shift in [i * buffer.columns + j for i in (-1, 0, 1) for j in (-1, 0, 1)]:
+        # At a rim the occluder may lie just beside the pixel's own cell.
+        occluder = np.fmin(occluder, buffer.nearest[np.clip(cell + shift, 0, cell.max())])
+    sure[row, column] = _above_ray(tile, row + core[0].start, column + core[1].start, occluder)
+    return sure
+
+
+def _above_ray(
+    tile: _Tile, row: NDArray[np.int64], column: NDArray[np.int64], occluder: ReliefArray
+) -> BoolArray:
+    """Return which pixels' rays to the camera run into relief beside them or at the occluder."""
+    rows, columns = tile.relief.shape
+    r, rho = tile.relief[row, column], tile.rho[row, column]
+    slope = (tile.distance - r) / rho
+    to_x, to_y = -tile.x[column] / rho, tile.y[row] / rho
+    hidden = np.zeros(len(row), bool)
+    to_occluder = np.where(np.isfinite(occluder), rho - occluder, np.float32(0))
+    near = [np.full(len(row), t, np.float32) for t in _BESIDE]
+    for t in [*near, *(to_occluder + np.float32(shift) for shift in _AROUND)]:
+        i = np.rint(row + to_y * t).astype(np.int32)
+        j = np.rint(column + to_x * t).astype(np.int32)
+        inside = (t >= _BESIDE[0]) & (i >= 0) & (i < rows) & (j >= 0) & (j < columns)
+        height = tile.relief[i.clip(0, rows - 1), j.clip(0, columns - 1)]
+        hidden |= inside & (height > r + slope * (t - np.float32(_RIM)))
+    return hidden

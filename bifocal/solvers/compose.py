@@ -1,0 +1,293 @@
+"""A window of the orthophoto from one or both photos: visibility, choice, feathering, filling."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from bifocal.domain.grid import Grid
+from bifocal.domain.ortho_image import ImageArray, Orthophoto, OrthoOptions, Source
+from bifocal.domain.pair import Pair
+from bifocal.domain.relief_map import ReliefMap
+from bifocal.domain.surface import FlatSurface, MapSurface, ReliefArray, Surface
+from bifocal.solvers.orthorectify import View, footprint, native_gsd
+from bifocal.solvers.pull_push import fill_holes
+from bifocal.solvers.visibility import hidden_from
+from photocore.arrays import BoolArray, ByteArray
+from photocore.errors import InputError
+
+#: Side of the windows an orthophoto is made in; larger ones repeat less of their surroundings,
+#: smaller ones need less memory. [px]
+TILE = 1024
+#: How far around a window colours are sought to fill holes. [px]
+_FILL_REACH = 128
+#: Image 2 is only preferred to image 1 where its pixels are finer than this: its orthophoto error
+#: is d1 / d2 times larger (sigma_m d1 / (d1 - d2) against sigma_m d2 / (d1 - d2)).
+_FINER = 0.6
+
+
+class Tile(NamedTuple):
+    """A finished window: colours, where they come from, and what is hidden."""
+
+    image: ImageArray
+    source: ByteArray
+    hidden: BoolArray
+
+
+class _Look(NamedTuple):
+    """A window as one photo sees it."""
+
+    image: ImageArray
+    inside: BoolArray
+    hidden: BoolArray
+
+
+def orthophoto(
+    pair: Pair,
+    image: ImageArray | Sequence[ImageArray],
+    relief: ReliefMap | Surface | ArrayLike | None = None,
+    *,
+    gsd: float | None = None,
+    bounds: tuple[float, float, float, float] | None = None,
+    source: int = 1,
+    options: OrthoOptions | None = None,
+) -> Orthophoto:
+    """Return the orthophoto of a wall in memory.
+
+    Every pixel is taken from the original photo in one step that joins relief, homography and
+    lens distortion. Pixels that relief hides from the camera are left empty.
+
+    Parameters
+    ----------
+    pair : Pair
+    image : ndarray, shape (h, w, 3) or (h, w), uint8 or uint16
+        The photo, RGB. A sequence (image 1, image 2) renders from both: from the far photo
+        wherever it sees the wall, else from the near one.
+    relief : ReliefMap, Surface or float, optional
+        Where the wall is; a number is a parallel plane, None the reference plane. [m]
+    gsd : float, optional
+        Pixel size; by default that of the relief map, else of the photo in its middle. [m]
+    bounds : tuple of float, optional
+        xmin, ymin, xmax, ymax; by default the relief map's, else what the photo covers. [m]
+    source : int
+        1 if ``image`` is image 1 (default), 2 if it is image 2; unused for a sequence.
+    options : OrthoOptions, optional
+        Interpolation, mask, filling.
+
+    Returns
+    -------
+    Orthophoto
+
+    Raises
+    ------
+    InputError
+        If the image is not a photo, or the relief map and the photo have nothing in common.
+    GeometryError
+        If the photo looks past the horizon and no ``bounds`` are given.
+
+    Notes
+    -----
+    With an error sigma_m of matching, the orthophoto of image 1 is wrong by
+    ``sigma_m d2 / (d1 - d2)`` whatever the distance from the nadir, that of image 2 by
+    ``sigma_m d1 / (d1 - d2)``: image 1 is the one to project.
+
+    Examples
+    --------
+    A photo square to a flat wall, 10 mm a pixel, comes back unchanged:
+
+    >>> from bifocal import Photo
+    >>> h = [[0.01, 0, -0.02], [0, -0.01, 0.01], [0, 0, 1]]
+    >>> far = Photo(plane_from_pixel=h, nadir=(0, 0), distance=17.5)
+    >>> near = Photo(plane_from_pixel=h, nadir=(0, 0), distance=9.5)
+    >>> photo = np.arange(15, dtype=np.uint8).reshape(3, 5)
+    >>> flat = orthophoto(Pair(image1=far, image2=near), photo)
+    >>> bool((flat.image == photo).all()), round(flat.gsd, 9)
+    (True, 0.01)
+    """
+    options = options or OrthoOptions()
+    surface = as_surface(relief)
+    photos = {1: pair.image1, 2: pair.image2}
+    if isinstance(image, np.ndarray):
+        if source not in photos:
+            raise InputError(f"source: must be 1 or 2, got {source}.")
+        images = {source: image}
+    else:
+        images = dict(enumerate(image, start=1))
+        if len(images) != 2:
+            raise InputError(f"image: expected one photo or two, got {len(images)}.")
+    first = min(images)
+    height, width = images[first].shape[:2]
+    grid = choose_grid(pair, first, (width, height), surface, gsd=gsd, bounds=bounds)
+    views = [
+        View.prepare(photos[number], pixels, number=number, gsd=grid.gsd)
+        for number, pixels in images.items()
+    ]
+    out = np.zeros((*grid.shape, *views[0].image.shape[2:]), views[0].image.dtype)
+    marks = np.zeros(grid.shape, np.uint8)
+    hidden = np.zeros(grid.shape, bool)
+    for column, row, tile in render(views, surface, grid, options):
+        cut = np.s_[row : row + tile.source.shape[0], column : column + tile.source.shape[1]]
+        out[cut], marks[cut], hidden[cut] = tile
+    if not marks.any():
+        raise InputError(NOTHING_IN_COMMON)
+    return Orthophoto(
+        image=out, source=marks, hidden=hidden, plane_from_pixel=grid.plane_from_pixel
+    )
+
+
+#: Said when no pixel of an orthophoto could be taken from a photo.
+NOTHING_IN_COMMON = (
+    "the photo shows nothing of the area asked for: the relief map or the bounds belong to another "
+    "wall, or to another pair file."
+)
+
+
+def as_surface(relief: ReliefMap | Surface | ArrayLike | None) -> Surface:
+    """Return relief of any kind as a surface."""
+    if relief is None:
+        return FlatSurface()
+    if hasattr(relief, "window") and hasattr(relief, "extremes"):
+        return relief
+    if hasattr(relief, "r") and hasattr(relief, "plane_from_pixel"):
+        r = np.asarray(relief.r)
+        return MapSurface.of_array(r, Grid.from_affine(relief.plane_from_pixel, r.shape))
+    number = np.asarray(relief)
+    if number.ndim != 0 or number.dtype.kind not in "fiu":
+        raise InputError(
+            "relief: expected a relief map (with .r and .plane_from_pixel) or one number in metres."
+        )
+    return FlatSurface(float(number))
+
+
+def choose_grid(
+    pair: Pair,
+    number: int,
+    size: tuple[int, int],
+    surface: Surface,
+    *,
+    gsd: float | None,
+    bounds: tuple[float, float, float, float] | None,
+) -> Grid:
+    """Return the grid asked for, by default the relief map's own, else that of the photo."""
+    photo = pair.image1 if number == 1 else pair.image2
+    own = surface.grid if isinstance(surface, MapSurface) else None
+    if own is not None and bounds is None and (gsd is None or gsd == own.gsd):
+        return own
+    if gsd is None:
+        gsd = own.gsd if own is not None else native_gsd(photo, size)
+    if bounds is None:
+        bounds = own.bounds if own is not None else footprint(photo, size)
+    return Grid.from_bounds(bounds, gsd=gsd)
+
+
+def render(
+    views: Sequence[View], surface: Surface, grid: Grid, options: OrthoOptions
+) -> Iterator[tuple[int, int, Tile]]:
+    """Yield (column, row, tile) of an orthophoto, each in memory that does not grow with it."""
+    for column, row, window in grid.tiles(TILE):
+        yield column, row, render_window(views, surface, window, options)
+
+
+def render_window(
+    views: Sequence[View], surface: Surface, window: Grid, options: OrthoOptions
+) -> Tile:
+    """Return one window of an orthophoto."""
+    margin = _FILL_REACH if options.fill else 0
+    if len(views) > 1:
+        margin = max(margin, math.ceil(2 * options.feather))
+    wide = window
+    if margin:
+        wide = window.window(
+            -margin, -margin, window.width + 2 * margin, window.height + 2 * margin
+        )
+    relief = surface.window(wide)
+    looks = [_look(view, surface, wide, relief, options) for view in views]
+    image, source = _choose(views, looks, wide, options)
+    hidden: BoolArray = (source == Source.NONE) & np.logical_or.reduce([o.hidden for o in looks])
+    if options.fill:
+        # Holes lie within the photos' own area: the rim of the orthophoto is not extended.
+        area = np.logical_or.reduce([look.inside for look in looks]) | np.isnan(relief)
+        image, source = _fill(image, source, area)
+    if margin:
+        core = np.s_[margin : margin + window.height, margin : margin + window.width]
+        image, source, hidden = image[core], source[core], hidden[core]
+    return Tile(image, source, hidden)
+
+
+def _look(
+    view: View, surface: Surface, grid: Grid, relief: ReliefArray, options: OrthoOptions
+) -> _Look:
+    column, row = view.pixel_map(grid, relief)
+    inside = view.inside(column, row)
+    if not inside.any():
+        shape = (*grid.shape, *view.image.shape[2:])
+        return _Look(np.zeros(shape, view.image.dtype), inside, np.zeros(grid.shape, bool))
+    hidden = np.zeros(grid.shape, bool)
+    if options.mask_hidden:
+        hidden = hidden_from(surface, grid, view.foot, relief) & inside
+    return _Look(view.sample(column, row, options.interpolation), inside, hidden)
+
+
+def _choose(
+    views: Sequence[View], looks: Sequence[_Look], grid: Grid, options: OrthoOptions
+) -> tuple[ImageArray, ByteArray]:
+    """Return colours and sources of a window: the better view, feathered where both see it."""
+    usable = [look.inside & ~look.hidden for look in looks]
+    if len(views) == 1:
+        source = np.where(usable[0], np.uint8(views[0].number), np.uint8(0))
+        return _masked(looks[0].image, usable[0]), source
+    share = _share_of_first(views, usable, grid, options.feather)
+    source = np.where(share >= 1, np.uint8(Source.IMAGE_1), np.uint8(Source.BOTH))
+    source[share <= 0] = Source.IMAGE_2
+    source[~(usable[0] | usable[1])] = Source.NONE
+    if not (source == Source.BOTH).any() and not (source == Source.IMAGE_2).any():
+        return _masked(looks[0].image, usable[0]), source
+    first, second = (look.image.astype(np.float32) for look in looks)
+    weight = share.reshape(share.shape + (1,) * (first.ndim - 2)).astype(np.float32)
+    mixed = second + (first - second) * weight
+    image = np.rint(mixed).astype(looks[0].image.dtype)
+    return _masked(image, source > 0), source
+
+
+def _share_of_first(
+    views: Sequence[View], usable: Sequence[BoolArray], grid: Grid, feather: float
+) -> NDArray[np.float32]:
+    """Return the weight of the first view, 0..1."""
+    import cv2
+
+    first, second = usable
+    middle = np.array([[grid.x0 + grid.gsd * grid.width / 2, grid.y0 - grid.gsd * grid.height / 2]])
+    sizes = []
+    for view in views:
+        pixel = view.photo.pixels_from_plane(middle)
+        sizes.append(math.sqrt(abs(float(np.linalg.det(view.photo.metres_per_pixel(pixel)[0])))))
+    if sizes[1] < _FINER * sizes[0]:
+        return np.where(second, np.float32(0), np.float32(1))
+    if feather == 0:
+        return first.astype(np.float32)
+    # Towards the rim of the first photo's part the second fades in, where it sees the wall at all.
+    depth = cv2.distanceTransform(first.astype(np.uint8), cv2.DIST_L2, 3)
+    share = np.clip(depth / np.float32(feather), 0, 1)
+    return np.where(second, share, first.astype(np.float32)).astype(np.float32)
+
+
+def _masked(image: ImageArray, keep: BoolArray) -> ImageArray:
+    """Return the image with 0 where it is not to be kept."""
+    if keep.all():
+        return image
+    import cv2
+
+    out: ImageArray = cv2.copyTo(image, keep.astype(np.uint8))
+    return out
+
+
+def _fill(image: ImageArray, source: ByteArray, area: BoolArray) -> tuple[ImageArray, ByteArray]:
+    holes = (source == Source.NONE) & area
+    if not holes.any():
+        return image, source
+    filled, done = fill_holes(image, source > 0, holes)
+    return filled, np.where(done, np.uint8(Source.FILLED), source)

@@ -1,0 +1,351 @@
+"""From a photo to a window of the orthophoto by one combined map: relief, homography, lens."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bifocal.domain.grid import Grid
+from bifocal.domain.ortho_image import ImageArray, Interpolation
+from bifocal.domain.pair import Photo, apply_homography
+from bifocal.domain.surface import ReliefArray
+from bifocal.rays import Foot
+from photocore.arrays import BoolArray, FloatArray
+from photocore.errors import GeometryError, InputError
+
+MapArray = NDArray[np.float32]
+
+#: Distortion is tabulated every so many ideal pixels and interpolated linearly in between; for a
+#: 19 mm zoom (44 px in the corner) that is true to 0.001 px.
+_LENS_STEP = 8
+#: cv2.remap addresses pixels with 16 bits.
+_REMAP_LIMIT = 32_000
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ChromaticShift:
+    """Radial stretch of the red and the blue image against the green one.
+
+    Attributes
+    ----------
+    red, blue : tuple of float
+        a0, a1 of ``rho' = rho (1 + a0 + a1 (rho / R)^2)``, R half the diagonal.
+    centre : tuple of float
+        Column and row about which they stretch. [px]
+    radius : float
+        R. [px]
+    """
+
+    red: tuple[float, float]
+    blue: tuple[float, float]
+    centre: tuple[float, float]
+    radius: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class View:
+    """A photo made ready for orthophotos of a certain pixel size.
+
+    Attributes
+    ----------
+    photo : Photo
+    image : ndarray, shape (h, w, 3) or (h, w)
+        Its pixels, reduced by ``factor``.
+    factor : int
+        Original pixels per pixel of ``image`` along a side.
+    size : tuple of int
+        Width and height of the original. [px]
+    number : int
+        1 or 2.
+    chromatic : ChromaticShift, optional
+        Shift of the colours to undo.
+    """
+
+    photo: Photo
+    image: ImageArray
+    factor: int
+    size: tuple[int, int]
+    number: int
+    lens: LensTable | None = None
+    chromatic: ChromaticShift | None = None
+
+    @classmethod
+    def prepare(
+        cls,
+        photo: Photo,
+        image: ImageArray,
+        *,
+        number: int,
+        gsd: float | None = None,
+        chromatic: ChromaticShift | None = None,
+    ) -> View:
+        """Return a view; a photo much finer than ``gsd`` is reduced first, against aliasing.
+
+        Raises
+        ------
+        InputError
+            If the image is not a photo of 8 or 16 bits per channel.
+        """
+        image = check_image(image)
+        size = (image.shape[1], image.shape[0])
+        factor = 1
+        if gsd is not None:
+            factor = max(1, math.floor(gsd / native_gsd(photo, size) + 0.25))
+        factor = min(factor, max(1, min(size) // 2))
+        if factor > 1:
+            image = _reduced(image, factor)
+        lens = LensTable.of_photo(photo, size) if photo.lens is not None else None
+        return cls(
+            photo=photo,
+            image=image,
+            factor=factor,
+            size=size,
+            number=number,
+            lens=lens,
+            chromatic=chromatic,
+        )
+
+    @property
+    def foot(self) -> Foot:
+        """Nadir and distance of the camera."""
+        return self.photo.foot
+
+    def pixel_map(self, grid: Grid, relief: ReliefArray) -> tuple[MapArray, MapArray]:
+        """Return column and row of the photo for every pixel of a window; NaN where none."""
+        column, row = _project(self.photo, self.size, grid, relief)
+        if self.lens is not None:
+            column, row = self.lens.distort(column, row)
+        return column.astype(np.float32), row.astype(np.float32)
+
+    def inside(self, column: MapArray, row: MapArray) -> BoolArray:
+        """Return which positions lie within the photo; NaN does not."""
+        width, height = self.size
+        found: BoolArray = (column >= -0.5) & (column <= width - 0.5)
+        found &= row >= -0.5
+        found &= row <= height - 0.5
+        return found
+
+    def sample(self, column: MapArray, row: MapArray, interpolation: Interpolation) -> ImageArray:
+        """Return the photo's colours at positions, shape (h, w, 3) or (h, w)."""
+        if self.chromatic is None or self.image.ndim == 2:
+            return self._remap(self.image, column, row, interpolation)
+        shift = self.chromatic
+        x, y = column - np.float32(shift.centre[0]), row - np.float32(shift.centre[1])
+        square = (x * x + y * y) * np.float32(shift.radius**-2)
+        bands = []
+        for band, (a0, a1) in enumerate((shift.red, (0.0, 0.0), shift.blue)):
+            stretch = np.float32(a0) + np.float32(a1) * square
+            plane = np.ascontiguousarray(self.image[:, :, band])
+            moved = (column + x * stretch, row + y * stretch)
+            bands.append(self._remap(plane, *moved, interpolation))
+        return np.stack(bands, axis=-1)
+
+    def _remap(
+        self, image: ImageArray, column: MapArray, row: MapArray, interpolation: Interpolation
+    ) -> ImageArray:
+        import cv2
+
+        flag = {
+            "nearest": cv2.INTER_NEAREST,
+            "linear": cv2.INTER_LINEAR,
+            "cubic": cv2.INTER_CUBIC,
+            "lanczos": cv2.INTER_LANCZOS4,
+        }[interpolation]
+        if self.factor > 1:
+            # Corners stay corners: the centre of the first reduced pixel is (factor - 1) / 2.
+            column, row = (
+                (c + np.float32(0.5)) / np.float32(self.factor) - np.float32(0.5)
+                for c in (column, row)
+            )
+        if max(image.shape[:2]) > _REMAP_LIMIT:
+            image, column, row = _part(image, column, row)
+        found: ImageArray = cv2.remap(image, column, row, flag, borderMode=cv2.BORDER_REPLICATE)
+        return found
+
+
+def check_image(image: ImageArray) -> ImageArray:
+    """Return an array that is a photo: 8 or 16 bits, grey or RGB; alpha is dropped.
+
+    Raises
+    ------
+    InputError
+        Otherwise.
+    """
+    image = np.asarray(image)
+    if image.dtype not in (np.uint8, np.uint16):
+        raise InputError(
+            f"image: expected 8 or 16 bits per channel (uint8, uint16), found {image.dtype}."
+        )
+    if image.ndim == 3 and image.shape[2] == 4:
+        image = image[:, :, :3]
+    if image.ndim == 3 and image.shape[2] == 1:
+        image = image[:, :, 0]
+    if not (image.ndim == 2 or (image.ndim == 3 and image.shape[2] == 3)):
+        raise InputError(f"image: expected shape (h, w) or (h, w, 3), found {image.shape}.")
+    if min(image.shape[:2]) < 2:
+        raise InputError(
+            f"image: {image.shape[1]} x {image.shape[0]} px is not a photo; check the file."
+        )
+    return np.ascontiguousarray(image)
+
+
+def native_gsd(photo: Photo, size: tuple[int, int]) -> float:
+    """Return the side of a pixel in the middle of a photo, on the reference plane. [m]"""
+    middle = np.array([[(size[0] - 1) / 2, (size[1] - 1) / 2]])
+    area = abs(float(np.linalg.det(photo.metres_per_pixel(middle)[0])))
+    if not (math.isfinite(area) and area > 0):
+        raise GeometryError(
+            "the middle of the photo does not look at the reference plane; check plane_from_pixel."
+        )
+    return math.sqrt(area)
+
+
+def footprint(photo: Photo, size: tuple[int, int]) -> tuple[float, float, float, float]:
+    """Return the box on the reference plane that a photo covers: xmin, ymin, xmax, ymax. [m]
+
+    Raises
+    ------
+    GeometryError
+        If the photo looks past the horizon of the plane.
+    """
+    width, height = size
+    columns = np.linspace(-0.5, width - 0.5, 33)
+    rows = np.linspace(-0.5, height - 0.5, 33)
+    rim = np.concatenate(
+        [np.stack(np.broadcast_arrays(columns, row), -1) for row in rows[[0, -1]]]
+        + [np.stack(np.broadcast_arrays(column, rows), -1) for column in columns[[0, -1]]]
+    )
+    ideal = rim if photo.lens is None else photo.lens.undistort(rim)
+    # The denominator of the homography changes sign where the photo meets the horizon.
+    depth = ideal @ photo.plane_from_pixel[2, :2] + photo.plane_from_pixel[2, 2]
+    plane = apply_homography(photo.plane_from_pixel, ideal)
+    if not np.isfinite(plane).all() or depth.min() * depth.max() <= 0:
+        raise GeometryError(
+            "the photo looks past the horizon of the reference plane, so it covers no finite "
+            "part of it. Say which part is wanted: --bounds XMIN,YMIN,XMAX,YMAX."
+        )
+    low, high = plane.min(0), plane.max(0)
+    return float(low[0]), float(low[1]), float(high[0]), float(high[1])
+
+
+def _project(
+    photo: Photo, size: tuple[int, int], grid: Grid, relief: ReliefArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return the ideal (column, row) of every pixel of a window, in double precision.
+
+    Notes
+    -----
+    ``q = N + (P - N) k`` with ``k = d / (d - r)``, Midulla Eq. (1) on the plane; the homography
+    is linear in (q, 1), so it becomes ``a + k (b (X - Nx) + c (Y - Ny))`` in each of its rows.
+    """
+    matrix = np.linalg.inv(photo.plane_from_pixel)
+    nx, ny = photo.nadir
+    x, y = grid.columns_x - nx, grid.rows_y - ny
+    with np.errstate(divide="ignore", invalid="ignore"):
+        k = photo.distance / (photo.distance - relief.astype(np.float64))
+    k[k < 0] = np.nan  # relief behind the camera
+    constant = matrix @ np.array([nx, ny, 1.0])
+    reach = max(np.abs(x).max(), np.abs(y).max())
+    tilt = np.abs(matrix[2, :2]).max() * reach * max(1.0, float(np.fmax.reduce(k, axis=None)))
+    square = tilt < 1e-13 * abs(constant[2])
+
+    def row_of(i: int) -> FloatArray:
+        value = (matrix[i, 0] * x)[None, :] + (matrix[i, 1] * y)[:, None]
+        value *= k
+        value += constant[i]
+        return value
+
+    if square:
+        matrix, constant = matrix / constant[2], constant / constant[2]
+        return row_of(0), row_of(1)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        scale = 1.0 / row_of(2)
+    # A homography also maps what lies behind the camera; the photo is on the side of its middle,
+    # and the last row of the inverse is one over that of the homography.
+    middle = float(photo.plane_from_pixel[2] @ np.array([size[0] / 2, size[1] / 2, 1.0]))
+    scale[scale * middle <= 0] = np.nan
+    return row_of(0) * scale, row_of(1) * scale
+
+
+def _reduced(image: ImageArray, factor: int) -> ImageArray:
+    """Return an image averaged over squares of ``factor`` pixels; incomplete squares at the end."""
+    import cv2
+
+    height, width = image.shape[:2]
+    high, wide = -(-height // factor) * factor, -(-width // factor) * factor
+    padded = cv2.copyMakeBorder(image, 0, high - height, 0, wide - width, cv2.BORDER_REPLICATE)
+    small: ImageArray = cv2.resize(
+        padded, (wide // factor, high // factor), interpolation=cv2.INTER_AREA
+    )
+    return small
+
+
+def _part(
+    image: ImageArray, column: MapArray, row: MapArray
+) -> tuple[ImageArray, MapArray, MapArray]:
+    """Cut out of a very large photo what a window needs."""
+    height, width = image.shape[:2]
+    margin = 8
+
+    def limits(positions: MapArray, length: int) -> tuple[int, int]:
+        low, high = (f.reduce(positions, axis=None) for f in (np.fmin, np.fmax))
+        if np.isnan(low):
+            return 0, 1
+        first = int(np.clip(math.floor(low) - margin, 0, length - 1))
+        return first, int(np.clip(math.ceil(high) + margin, first + 1, length))
+
+    c0, c1 = limits(column, width)
+    r0, r1 = limits(row, height)
+    if max(c1 - c0, r1 - r0) > _REMAP_LIMIT:
+        raise InputError("the orthophoto is too coarse for this photo; choose a finer --gsd.")
+    return image[r0:r1, c0:c1], column - np.float32(c0), row - np.float32(r0)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LensTable:
+    """Where ideal pixels are seen through the lens, tabulated."""
+
+    shift: NDArray[np.float32]
+    left: float
+    top: float
+
+    @classmethod
+    def of_photo(cls, photo: Photo, size: tuple[int, int]) -> LensTable:
+        """Tabulate over the ideal pixels that the photo shows."""
+        assert photo.lens is not None
+        width, height = size
+        columns, rows = np.linspace(-1, width, 65), np.linspace(-1, height, 65)
+        rim = [np.stack(np.broadcast_arrays(columns, row), -1) for row in (-1.0, float(height))]
+        rim += [np.stack(np.broadcast_arrays(column, rows), -1) for column in (-1.0, float(width))]
+        ideal = photo.lens.undistort(np.concatenate(rim))
+        low = np.floor(np.nanmin(ideal, axis=0)) - _LENS_STEP
+        high = np.ceil(np.nanmax(ideal, axis=0)) + _LENS_STEP
+        if not (np.isfinite(low).all() and (high - low).max() < 20 * max(size)):
+            raise GeometryError(
+                "the lens file bends the rim of this photo beyond all bounds; calibrate again "
+                "with board photos that reach into the corners."
+            )
+        x = np.arange(low[0], high[0] + _LENS_STEP, _LENS_STEP)
+        y = np.arange(low[1], high[1] + _LENS_STEP, _LENS_STEP)
+        points = np.stack(np.meshgrid(x, y), axis=-1)
+        shift = (photo.lens.distort(points) - points).astype(np.float32)
+        return cls(np.ascontiguousarray(shift), float(low[0]), float(low[1]))
+
+    def distort(self, column: FloatArray, row: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return raw positions of ideal ones; NaN where the photo cannot show them."""
+        import cv2
+
+        u = ((column - self.left) * (1 / _LENS_STEP)).astype(np.float32)
+        v = ((row - self.top) * (1 / _LENS_STEP)).astype(np.float32)
+        shift = cv2.remap(
+            self.shift,
+            u,
+            v,
+            cv2.INTER_LINEAR,
+            borderMode=cv2.BORDER_CONSTANT,
+            borderValue=(math.nan, math.nan),
+        )
+        return column + shift[:, :, 0], row + shift[:, :, 1]

@@ -1,0 +1,66 @@
+"""Close holes in a picture with the colours around them, smoothly, by a pyramid of averages."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from photocore.arrays import BoolArray
+
+#: Halvings of the picture; 2^6 px is half of the widest hole that is closed.
+_LEVELS = 6
+
+
+def fill_holes(
+    image: NDArray[Any], known: BoolArray, holes: BoolArray
+) -> tuple[NDArray[Any], BoolArray]:
+    """Return the image with holes closed, and which of them were.
+
+    Parameters
+    ----------
+    image : ndarray, shape (h, w) or (h, w, c)
+    known : ndarray of bool, shape (h, w)
+        Pixels that hold colours.
+    holes : ndarray of bool, shape (h, w)
+        Pixels to close; those too far from any known one stay as they are.
+
+    Notes
+    -----
+    Pull: known colours are averaged over 2 x 2 pixels again and again until averages reach into
+    the holes. Push: each level takes its unknown pixels from the next coarser one.
+    """
+    import cv2
+
+    weight = known.astype(np.float32)
+    colour = image.astype(np.float32)
+    colour *= weight.reshape(weight.shape + (1,) * (image.ndim - 2))
+    levels = [(colour, weight)]
+    for _ in range(_LEVELS):
+        if min(weight.shape) < 2:
+            break
+        size = ((weight.shape[1] + 1) // 2, (weight.shape[0] + 1) // 2)
+        colour = cv2.resize(colour, size, interpolation=cv2.INTER_AREA)
+        weight = cv2.resize(weight, size, interpolation=cv2.INTER_AREA)
+        levels.append((colour, weight))
+    filled = _plain(*levels[-1])
+    for colour, weight in reversed(levels[:-1]):
+        height, width = weight.shape
+        coarse = cv2.resize(filled, (width, height), interpolation=cv2.INTER_LINEAR)
+        missing = weight <= 0
+        filled = _plain(colour, weight)
+        filled[missing] = coarse[missing]
+    values = filled.reshape(*known.shape, -1)
+    done: BoolArray = holes & np.isfinite(values).all(axis=-1)
+    out = image.copy()
+    limit = np.iinfo(image.dtype).max
+    out[done] = np.clip(np.rint(filled[done]), 0, limit).astype(image.dtype)
+    return out, done
+
+
+def _plain(colour: NDArray[np.float32], weight: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Return the colours themselves; NaN where nothing is known."""
+    divisor = np.where(weight > 0, weight, np.float32(np.nan))
+    plain: NDArray[np.float32] = colour / divisor.reshape(weight.shape + (1,) * (colour.ndim - 2))
+    return plain
