@@ -65,3 +65,48 @@ class Scale(click.ParamType):  # type: ignore[type-arg,unused-ignore]
             return float(text)
         except ValueError:
             self.fail(f"{value!r} is not a scale, e.g. 1:500", param, ctx)
+
+
+class Length(click.ParamType):  # type: ignore[type-arg,unused-ignore]
+    """A length in metres, or with its unit: 0.005, 5mm, 0.5 cm."""
+
+    name = "M"
+
+    def convert(
+        self, value: object, param: click.Parameter | None, ctx: click.Context | None
+    ) -> float:
+        """Return metres."""
+        if isinstance(value, float):
+            return value
+        text = str(value).strip().lower().replace(",", ".")
+        for unit, metres in (("mm", 1e-3), ("cm", 1e-2), ("m", 1.0)):
+            if text.endswith(unit):
+                text, factor = text.removesuffix(unit), metres
+                break
+        else:
+            factor = 1.0
+        try:
+            number = float(text)
+        except ValueError:
+            self.fail(f"{value!r} is not a length, e.g. 0.005 or 5mm", param, ctx)
+        # 5 * 1e-3 is 0.005 exactly, 3.69 * 1e-3 is not 0.00369: divide instead.
+        return number / (1 / factor) if factor < 1 else number
+
+
+class Bounds(click.ParamType):  # type: ignore[type-arg,unused-ignore]
+    """A box XMIN,YMIN,XMAX,YMAX in metres."""
+
+    name = "XMIN,YMIN,XMAX,YMAX"
+
+    def convert(
+        self, value: object, param: click.Parameter | None, ctx: click.Context | None
+    ) -> tuple[float, float, float, float]:
+        """Return the four numbers."""
+        if isinstance(value, tuple):
+            return value
+        parts = str(value).replace(";", " ").replace(",", " ").split()
+        try:
+            xmin, ymin, xmax, ymax = (float(part) for part in parts)
+        except ValueError:
+            self.fail(f"{value!r} is not XMIN,YMIN,XMAX,YMAX, e.g. -4,0,4,7.5", param, ctx)
+        return xmin, ymin, xmax, ymax

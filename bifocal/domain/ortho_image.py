@@ -5,16 +5,16 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from enum import IntEnum
-from typing import Literal
+from typing import Any, Literal
 
-import numpy as np
 from numpy.typing import NDArray
 
 from bifocal.domain.grid import Grid
 from photocore.arrays import BoolArray, ByteArray, FloatArray
 from photocore.errors import InputError
 
-ImageArray = NDArray[np.uint8] | NDArray[np.uint16]
+#: 8 or 16 bits, shape (h, w) or (h, w, 3).
+ImageArray = NDArray[Any]
 Interpolation = Literal["nearest", "linear", "cubic", "lanczos"]
 INTERPOLATIONS = ("nearest", "linear", "cubic", "lanczos")
 

@@ -108,9 +108,11 @@ class MapSurface:
     def extremes(self, bounds: Bounds) -> tuple[float, float]:
         """Return the extremes of the blocks that touch the box."""
         side = _BLOCK * self.grid.gsd
-        xmin, _, _, ymax = self.grid.bounds
-        c0, c1 = (math.floor((x - xmin) / side) for x in (bounds[0], bounds[2]))
-        r0, r1 = (math.floor((ymax - y) / side) for y in (bounds[3], bounds[1]))
+        xmin, ymin, xmax, ymax = self.grid.bounds
+        left, right = (min(max(x, xmin - side), xmax + side) for x in (bounds[0], bounds[2]))
+        bottom, top = (min(max(y, ymin - side), ymax + side) for y in (bounds[1], bounds[3]))
+        c0, c1 = (math.floor((x - xmin) / side) for x in (left, right))
+        r0, r1 = (math.floor((ymax - y) / side) for y in (top, bottom))
         cut = np.s_[max(r0, 0) : max(r1 + 1, 0), max(c0, 0) : max(c1 + 1, 0)]
         lowest, highest = self._lowest[cut], self._highest[cut]
         if not lowest.size or np.isnan(lowest).all():

@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bifocal.domain.grid import Grid
+from bifocal.domain.relief_map import Quality, ReliefMap
 from photocore.errors import InputError
 from photocore.output import atomic_path, check_writable
 
@@ -30,6 +31,8 @@ CACHE_MB = 48
 LOCAL_CRS = (
     'LOCAL_CS["{name}",UNIT["metre",1,AUTHORITY["EPSG","9001"]],AXIS["X",EAST],AXIS["Y",NORTH]]'
 )
+#: Descriptions of the bands of a relief map.
+RELIEF_BANDS = ("relief [m]", "sigma [m]", "quality")
 #: Metres per unit of the DPI tag.
 METRES_PER_INCH = 0.0254
 
@@ -292,6 +295,67 @@ def gsd_at_scale(dpi: float, scale: float) -> float:
     0.005
     """
     return METRES_PER_INCH * scale / dpi
+
+
+def write_relief(
+    path: Path | str, relief: ReliefMap, *, overwrite: bool = False, overviews: bool = False
+) -> None:
+    """Write a relief map: relief, sigma, quality; NaN where unknown."""
+    grid = relief.grid
+    with create_raster(
+        path,
+        grid,
+        bands=3,
+        dtype=np.float32,
+        overwrite=overwrite,
+        names=RELIEF_BANDS,
+        nodata=float("nan"),
+        overviews=overviews,
+    ) as writer:
+        for column, row, part in grid.tiles(4 * BLOCK):
+            cut = np.s_[row : row + part.height, column : column + part.width]
+            layers = (relief.r[cut], relief.sigma[cut], relief.quality[cut])
+            block = np.stack([np.asarray(layer, np.float32) for layer in layers], axis=-1)
+            writer.write(block, column=column, row=row)
+
+
+def read_relief(path: Path | str) -> ReliefMap:
+    """Return a whole relief map; sigma and quality are filled in where the file lacks them.
+
+    A file of one band is taken as exact: sigma 0, quality measured.
+    """
+    with RasterReader(path) as reader:
+        check_relief(reader)
+        size = (0, 0, reader.grid.width, reader.grid.height)
+        r = reader.read_floats(*size)
+        sigma, quality = (
+            np.zeros_like(r),
+            np.where(np.isnan(r), Quality.UNKNOWN, Quality.MEASURED).astype(np.uint8),
+        )
+        sigma[np.isnan(r)] = np.nan
+        if reader.bands >= 2:
+            sigma = np.asarray(reader.read(*size, bands=[2])[:, :, 0], np.float32)
+        if reader.bands >= 3:
+            band = np.asarray(reader.read(*size, bands=[3])[:, :, 0], np.float64)
+            quality = np.nan_to_num(band).astype(np.uint8)
+        return ReliefMap(
+            r=r, sigma=sigma, quality=quality, plane_from_pixel=reader.grid.plane_from_pixel
+        )
+
+
+def check_relief(reader: RasterReader) -> None:
+    """Refuse a raster that cannot be a relief map.
+
+    Raises
+    ------
+    InputError
+        If its first band is a picture.
+    """
+    if reader.dtype == np.uint8 or reader.dtype.kind not in "fiu":
+        raise InputError(
+            f"{reader.path}: band 1 is {reader.dtype}, a picture rather than relief in metres. "
+            "Give the file written by `bifocal relief`."
+        )
 
 
 @contextlib.contextmanager

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from typing import NamedTuple
+from typing import NamedTuple, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from bifocal.domain.grid import Grid
-from bifocal.domain.ortho_image import ImageArray, Orthophoto, OrthoOptions, Source
+from bifocal.domain.ortho_image import ImageArray, OrthoOptions, Orthophoto, Source
 from bifocal.domain.pair import Pair
 from bifocal.domain.relief_map import ReliefMap
 from bifocal.domain.surface import FlatSurface, MapSurface, ReliefArray, Surface
@@ -25,6 +25,8 @@ from photocore.errors import InputError
 TILE = 1024
 #: How far around a window colours are sought to fill holes. [px]
 _FILL_REACH = 128
+#: Pixels this near to a hole and this much before it belong to what hides it. [px, m]
+_FILL_SIDE, _BEFORE = 65, 0.02
 #: Image 2 is only preferred to image 1 where its pixels are finer than this: its orthophoto error
 #: is d1 / d2 times larger (sigma_m d1 / (d1 - d2) against sigma_m d2 / (d1 - d2)).
 _FINER = 0.6
@@ -151,7 +153,7 @@ def as_surface(relief: ReliefMap | Surface | ArrayLike | None) -> Surface:
     if relief is None:
         return FlatSurface()
     if hasattr(relief, "window") and hasattr(relief, "extremes"):
-        return relief
+        return cast(Surface, relief)
     if hasattr(relief, "r") and hasattr(relief, "plane_from_pixel"):
         r = np.asarray(relief.r)
         return MapSurface.of_array(r, Grid.from_affine(relief.plane_from_pixel, r.shape))
@@ -205,13 +207,18 @@ def render_window(
             -margin, -margin, window.width + 2 * margin, window.height + 2 * margin
         )
     relief = surface.window(wide)
+    unknown = np.isnan(relief)
+    if options.fill and unknown.any():
+        # Where relief is unknown that of the surroundings shows the photo itself, slightly off.
+        relief, _ = fill_holes(relief, ~unknown, unknown)
     looks = [_look(view, surface, wide, relief, options) for view in views]
     image, source = _choose(views, looks, wide, options)
     hidden: BoolArray = (source == Source.NONE) & np.logical_or.reduce([o.hidden for o in looks])
     if options.fill:
+        source[unknown & (source > 0)] = Source.FILLED
         # Holes lie within the photos' own area: the rim of the orthophoto is not extended.
-        area = np.logical_or.reduce([look.inside for look in looks]) | np.isnan(relief)
-        image, source = _fill(image, source, area)
+        area = np.logical_or.reduce([look.inside for look in looks])
+        image, source = _fill(image, source, area, relief)
     if margin:
         core = np.s_[margin : margin + window.height, margin : margin + window.width]
         image, source, hidden = image[core], source[core], hidden[core]
@@ -285,9 +292,22 @@ def _masked(image: ImageArray, keep: BoolArray) -> ImageArray:
     return out
 
 
-def _fill(image: ImageArray, source: ByteArray, area: BoolArray) -> tuple[ImageArray, ByteArray]:
+def _fill(
+    image: ImageArray, source: ByteArray, area: BoolArray, relief: ReliefArray
+) -> tuple[ImageArray, ByteArray]:
+    """Close holes within an area, with the colours of the surface behind, not of what hides it."""
+    import cv2
+
     holes = (source == Source.NONE) & area
     if not holes.any():
         return image, source
-    filled, done = fill_holes(image, source > 0, holes)
-    return filled, np.where(done, np.uint8(Source.FILLED), source)
+    known = source > 0
+    depth = np.where(holes & ~np.isnan(relief), relief, np.float32(-1e6))
+    around = cv2.dilate(depth, np.ones((_FILL_SIDE, _FILL_SIDE), np.uint8))
+    before = (around > -1e6) & (relief > around + np.float32(_BEFORE))
+    image, done = fill_holes(image, known & ~before, holes)
+    if (holes & ~done).any():
+        # Nothing of the surface behind is in sight: better the colours of what hides it than none.
+        image, rest = fill_holes(image, known | done, holes & ~done)
+        done |= rest
+    return image, np.where(done, np.uint8(Source.FILLED), source)

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from photocore.arrays import BoolArray
 
-#: Halvings of the picture; 2^6 px is half of the widest hole that is closed.
-_LEVELS = 6
+#: Halvings of the picture; holes up to 2^8 px wide are closed.
+_LEVELS = 8
 
 
 def fill_holes(
@@ -34,8 +34,8 @@ def fill_holes(
     import cv2
 
     weight = known.astype(np.float32)
-    colour = image.astype(np.float32)
-    colour *= weight.reshape(weight.shape + (1,) * (image.ndim - 2))
+    colour: NDArray[Any] = image.astype(np.float32)
+    colour[~known] = 0
     levels = [(colour, weight)]
     for _ in range(_LEVELS):
         if min(weight.shape) < 2:
@@ -51,16 +51,19 @@ def fill_holes(
         missing = weight <= 0
         filled = _plain(colour, weight)
         filled[missing] = coarse[missing]
-    values = filled.reshape(*known.shape, -1)
-    done: BoolArray = holes & np.isfinite(values).all(axis=-1)
+    found = np.isfinite(filled.reshape(*known.shape, -1)).all(axis=-1)
+    done: BoolArray = holes & found
     out = image.copy()
-    limit = np.iinfo(image.dtype).max
-    out[done] = np.clip(np.rint(filled[done]), 0, limit).astype(image.dtype)
+    if image.dtype.kind == "f":
+        out[done] = filled[done]
+    else:
+        limit = np.iinfo(image.dtype).max
+        out[done] = np.clip(np.rint(filled[done]), 0, limit).astype(image.dtype)
     return out, done
 
 
 def _plain(colour: NDArray[np.float32], weight: NDArray[np.float32]) -> NDArray[np.float32]:
     """Return the colours themselves; NaN where nothing is known."""
-    divisor = np.where(weight > 0, weight, np.float32(np.nan))
-    plain: NDArray[np.float32] = colour / divisor.reshape(weight.shape + (1,) * (colour.ndim - 2))
-    return plain
+    divisor = np.where(weight > 0, weight, np.float32(np.nan)).astype(np.float32)
+    divisor = divisor.reshape(weight.shape + (1,) * (colour.ndim - 2))
+    return np.asarray(colour / divisor, dtype=np.float32)

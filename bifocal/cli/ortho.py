@@ -1,0 +1,120 @@
+"""``bifocal ortho``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from photocore.console import print_json, progress_bar, remark
+from photocore.options import Bounds, Length, Scale
+
+EXAMPLE = """\b
+Examples:
+  bifocal ortho wall.pair.json --relief relief.tif --out ortho.tif
+  bifocal ortho wall.pair.json --points result.xlsx --breakline P7,P8,P9 --out ortho.tif
+  bifocal ortho wall.pair.json --plane --gsd 5mm --bounds -4,0,4,7.5 --out flat.tif
+  bifocal ortho wall.pair.json --relief relief.tif --image both --fill --out ortho.tif
+"""
+
+_file = click.Path(path_type=Path)
+
+
+@click.command(short_help="Orthophoto to scale, and everything a drawing needs.", epilog=EXAMPLE)
+@click.argument("pair", type=_file)
+@click.option("--out", type=_file, help="GeoTIFF to write.")
+@click.option("--relief", type=_file, help="Relief map of `bifocal relief`.")
+@click.option("--points", type=_file, help="Result of `bifocal solve`: relief between its points.")
+@click.option(
+    "--breakline", "breaklines", multiple=True, metavar="ID,ID,...",
+    help="Points along an edge that no triangle may cross; repeat it. With --points.",
+)  # fmt: skip
+@click.option(
+    "--plane", is_flag=False, flag_value="0", type=Length(), metavar="[M]",
+    help="No relief: the reference plane, or one so many metres before it.",
+)  # fmt: skip
+@click.option(
+    "--image", type=click.Choice(["1", "2", "both"]), default="1", show_default=True,
+    help="Photo that gives the colours: 1 far, 2 near, both: 1 where it sees the wall, else 2.",
+)  # fmt: skip
+@click.option(
+    "--gsd", type=Length(),
+    help="Pixel of the orthophoto [m], or with its unit: 5mm.  [default: that of the relief map "
+    "or the photo]",
+)  # fmt: skip
+@click.option("--bounds", type=Bounds(), help="Part of the wall [m].  [default: all that is known]")
+@click.option(
+    "--interpolation", type=click.Choice(["cubic", "linear", "nearest", "lanczos"]),
+    default="cubic", show_default=True, help="Between the pixels of the photo.",
+)  # fmt: skip
+@click.option(
+    "--mask/--no-mask", default=True, show_default=True,
+    help="Leave empty what relief hides from the camera, or show what hides it.",
+)  # fmt: skip
+@click.option("--fill", is_flag=True, help="Close holes with the colours around them.")
+@click.option(
+    "--match/--no-match", default=True, show_default=True,
+    help="With --image both: bring photo 2 to the colours of photo 1.",
+)  # fmt: skip
+@click.option(
+    "--vignetting", default="", metavar="cos4|K1,K2,K3",
+    help="Undo the fall-off of light to the corners.  [default: off]",
+)  # fmt: skip
+@click.option("--chromatic", is_flag=True, help="Measure and undo red and blue fringes.")
+@click.option(
+    "--feather", type=float, default=8.0, show_default=True,
+    help="Width of the transition between the photos [px].",
+)  # fmt: skip
+@click.option("--scale", type=Scale(), help="Scale of the drawing 1:N: DPI tag, and --deliver.")
+@click.option(
+    "--overviews/--no-overviews", default=None,
+    help="Reduced copies in the file.  [default: above 50 megapixels]",
+)  # fmt: skip
+@click.option("--tfw", is_flag=True, help="Also write the world file beside it.")
+@click.option("--any-size", is_flag=True, help="Do not ask back about an unusual size.")
+@click.option("--overwrite", is_flag=True, help="Replace existing files.")
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
+def command(
+    pair: Path, out: Path | None, relief: Path | None, points: Path | None,
+    breaklines: tuple[str, ...], plane: float | None, image: str, gsd: float | None,
+    bounds: tuple[float, float, float, float] | None, interpolation: str, mask: bool, fill: bool,
+    match: bool, vignetting: str, chromatic: bool, feather: float, scale: float | None,
+    overviews: bool | None, tfw: bool, any_size: bool, overwrite: bool, as_json: bool,
+) -> None:  # fmt: skip
+    """Make the orthophoto of a wall from the photos of a PAIR file.
+
+    Every pixel is taken from the original photo, moved by its own relief. Relief comes from a
+    map, from measured points, or is none (--plane). What the camera cannot see stays empty; the
+    last band says where each pixel comes from (0 nothing, 1 and 2 the photos, 3 both, 4 filled).
+    """
+    from bifocal.domain.ortho_image import OrthoOptions
+    from bifocal.workflows.ortho import OrthoTask, make_ortho
+
+    if out is None:
+        raise click.UsageError("Missing option '--out'.")
+    if sum(choice is not None for choice in (relief, points, plane)) > 1:
+        raise click.UsageError("Give one of --relief, --points and --plane.")
+    if relief is None and points is None and plane is None:
+        remark("No relief given: the wall is taken as flat (as with --plane).")
+    task = OrthoTask(
+        relief=relief, points=points, breaklines=[line.split(",") for line in breaklines],
+        plane=plane or 0.0, image=image, gsd=gsd, bounds=bounds, scale=scale,
+        options=OrthoOptions(
+            interpolation=interpolation,  # type: ignore[arg-type]
+            mask_hidden=mask, fill=fill, feather=feather,
+        ),
+        match=match, vignetting=vignetting, chromatic=chromatic, any_size=any_size,
+        overviews=overviews,
+    )  # fmt: skip
+    with progress_bar("orthophoto", quiet=as_json) as progress:
+        result = make_ortho(pair, out, task, overwrite=overwrite, world_file=tfw, progress=progress)
+    for text in result.remarks:
+        remark(text)
+    if as_json:
+        print_json(result.to_dict())
+        return
+    grid, shares = result.grid, result.shares
+    click.echo(
+        f"{out}: {grid.width} x {grid.height} px of {grid.gsd * 1000:g} mm; "
+        f"{100 * (1 - shares['none']):.1f} % covered, {100 * shares['hidden']:.1f} % hidden"
+    )
