@@ -10,6 +10,7 @@ import numpy as np
 
 from multimedia.domain.camera import Camera
 from multimedia.domain.flat_interface import FlatInterface
+from multimedia.domain.interfaces import Interfaces
 from photocore.arrays import FloatArray, read_only
 from photocore.errors import InputError
 
@@ -126,7 +127,7 @@ class Project:
     ----------
     cameras : tuple of Camera
         With different names.
-    media : mapping of str to FlatInterface
+    media : mapping of str to FlatInterface or Interfaces
         What lies between cameras and object, by name; cameras may share one.
     media_of : tuple of str
         Name of each camera's media; empty for straight rays.
@@ -145,7 +146,7 @@ class Project:
     """
 
     cameras: tuple[Camera, ...]
-    media: Mapping[str, FlatInterface] = field(default_factory=dict)
+    media: Mapping[str, FlatInterface | Interfaces] = field(default_factory=dict)
     media_of: tuple[str, ...] = ()
     object_points: ObjectPoints = field(default_factory=ObjectPoints)
     image_points: ImagePoints = field(default_factory=ImagePoints)
@@ -178,13 +179,13 @@ class Project:
         """Names in the order of the cameras."""
         return tuple(camera.name for camera in self.cameras)
 
-    def interface_of(self, camera: int) -> FlatInterface | None:
+    def interface_of(self, camera: int) -> FlatInterface | Interfaces | None:
         """Return what camera number ``camera`` looks through, None for nothing."""
         name = self.media_of[camera]
         return self.media[name] if name else None
 
     @property
-    def interfaces(self) -> tuple[FlatInterface | None, ...]:
+    def interfaces(self) -> tuple[FlatInterface | Interfaces | None, ...]:
         """What each camera looks through."""
         return tuple(self.interface_of(k) for k in range(len(self.cameras)))
 

@@ -120,14 +120,18 @@ def write_experiment(folder: Path | str, project: Project, *, overwrite: bool = 
     """
     cameras = project.cameras
     first = project.interface_of(0)
-    if first is None or len(first.layers.indices) != 3:
+    if not isinstance(first, FlatInterface) or len(first.layers.indices) != 3:
         raise InputError("OpenPTV needs three media (air, glass, water) before every camera.")
     layers = first.layers
     lines = [str(len(cameras))]
     files: dict[str, str] = {}
     for number, camera in enumerate(cameras):
         interface = project.interface_of(number)
-        if interface is None or interface.moves_with_camera or interface.layers != layers:
+        if (
+            not isinstance(interface, FlatInterface)
+            or interface.moves_with_camera
+            or interface.layers != layers
+        ):
             raise InputError(
                 f"camera {camera.name}: OpenPTV knows only media that are fixed in the world and "
                 "the same for all cameras."

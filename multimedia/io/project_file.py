@@ -11,8 +11,10 @@ import numpy as np
 
 from multimedia.domain.camera import Camera, Sensor
 from multimedia.domain.flat_interface import FlatInterface
+from multimedia.domain.interfaces import Interfaces
 from multimedia.domain.layers import Layers
 from multimedia.domain.project import SIGMA_IMAGE, SIGMA_PIXEL, ImagePoints, ObjectPoints, Project
+from multimedia.domain.surfaces import Cylinder, Plane, Sphere, Surface
 from multimedia.io.point_tables import (
     METRES,
     image_columns,
@@ -26,6 +28,12 @@ from photocore.errors import GeometryError, InputError
 from photocore.output import atomic_path, check_writable
 
 FORMAT = "multimedia-project/1"
+#: Keys of each kind of ray-traced surface.
+_KINDS: Mapping[str, tuple[str, ...]] = {
+    "plane": ("point", "normal"),
+    "sphere": ("centre", "radius"),
+    "cylinder": ("point", "axis", "radius"),
+}
 _HEAD = """\
 # Project of the `multimedia` commands; object lengths in `unit`, image lengths in mm, angles in
 # degrees. Tables of points: paths relative to this file.
@@ -145,7 +153,12 @@ def _project(data: dict[str, Any], folder: Path) -> Project:
         raise InputError("there is no camera; add at least one section [[camera]].")
     pairs = [_camera(value, number) for number, value in enumerate(sections, start=1)]
     cameras = tuple(camera for camera, _ in pairs)
-    remarks = [remark for item in media.values() for remark in item.layers.remarks]
+    remarks = [
+        f"media.{label}: {remark}"
+        for label, item in media.items()
+        if isinstance(item, FlatInterface)
+        for remark in item.layers.remarks
+    ]
     objects, images = ObjectPoints(), ImagePoints()
     if "object_points" in data:
         table = folder / str(data.pop("object_points"))
@@ -181,7 +194,9 @@ def _sigma(data: dict[str, Any], cameras: tuple[Camera, ...]) -> float:
     return SIGMA_PIXEL * float(np.mean(pitches)) if pitches else SIGMA_IMAGE
 
 
-def _media(value: Any, where: str) -> FlatInterface:
+def _media(value: Any, where: str) -> FlatInterface | Interfaces:
+    if isinstance(value, Mapping) and "surfaces" in value:
+        return _surfaces(value, where)
     _only(value, where, ("indices", "thicknesses", "point", "normal", "moves_with_camera"))
     return FlatInterface(
         layers=Layers.from_dict(value, where=where),
@@ -191,12 +206,67 @@ def _media(value: Any, where: str) -> FlatInterface:
     )
 
 
-def _media_data(media: FlatInterface) -> dict[str, Any]:
+def _surfaces(value: Mapping[str, Any], where: str) -> Interfaces:
+    """Return ray-traced surfaces of any form."""
+    _only(value, where, ("indices", "surfaces"))
+    listed = value["surfaces"]
+    if not isinstance(listed, list) or not listed:
+        raise InputError(f"{where}: surfaces must be a list of sections, camera side first.")
+    surfaces: list[Surface] = []
+    moving: list[bool] = []
+    for number, item in enumerate(listed, start=1):
+        place = f"{where}, surface {number}"
+        kind = str(item.get("kind", "")) if isinstance(item, Mapping) else ""
+        if kind not in _KINDS:
+            raise InputError(f"{place}: kind must be one of {', '.join(_KINDS)}, found {kind!r}.")
+        _only(item, place, ("kind", "moves_with_camera", *_KINDS[kind]))
+        vectors = {key: _vector(item, key, place, None) for key in _KINDS[kind] if key != "radius"}
+        if kind == "plane":
+            surfaces.append(Plane(**vectors))
+        elif kind == "sphere":
+            surfaces.append(Sphere(**vectors, radius=_number(item, "radius", place)))
+        else:
+            surfaces.append(Cylinder(**vectors, radius=_number(item, "radius", place)))
+        moving.append(_flag(item, "moves_with_camera", place))
+    indices = value.get("indices")
+    if not isinstance(indices, list):
+        raise InputError(f"{where}: indices must be a list of numbers, camera side first.")
+    try:
+        return Interfaces(
+            surfaces=tuple(surfaces), indices=tuple(indices), with_camera=tuple(moving)
+        )
+    except InputError as error:
+        raise InputError(f"{where}: {error}") from None
+
+
+def _media_data(media: FlatInterface | Interfaces) -> dict[str, Any]:
+    if isinstance(media, Interfaces):
+        return {
+            "indices": list(media.indices),
+            "surfaces": [
+                _surface_data(surface) | ({"moves_with_camera": True} if moves else {})
+                for surface, moves in zip(media.surfaces, media.with_camera, strict=True)
+            ],
+        }
     data: dict[str, Any] = dict(media.layers.as_dict())
     data |= {"point": media.point.tolist(), "normal": media.normal.tolist()}
     if media.moves_with_camera:
         data["moves_with_camera"] = True
     return data
+
+
+def _surface_data(surface: Surface) -> dict[str, Any]:
+    kinds = {Plane: "plane", Sphere: "sphere", Cylinder: "cylinder"}
+    kind = kinds.get(type(surface))
+    if kind is None:
+        raise InputError(
+            f"a {type(surface).__name__} cannot be written into a project file; it holds "
+            f"{', '.join(_KINDS)}."
+        )
+    values = {key: getattr(surface, key) for key in _KINDS[kind]}
+    return {"kind": kind} | {
+        k: float(v) if k == "radius" else v.tolist() for k, v in values.items()
+    }
 
 
 _CAMERA_KEYS = ("name", "media", "centre", "omega", "phi", "kappa", "c", "principal_point",

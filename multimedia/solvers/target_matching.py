@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 
 from multimedia.domain.camera import Camera
-from multimedia.domain.flat_interface import FlatInterface
-from multimedia.solvers.projection import project
+from multimedia.solvers.projection import Placed, project
 from multimedia.solvers.resection import resect
 from photocore.arrays import FloatArray, IntArray
 from photocore.errors import ConvergenceError, GeometryError, InputError
 
-#: Search radius with the given orientation, and the factor on the median misfit afterwards. [px]
-FIRST_RADIUS, WIDEST_MISFIT = 25.0, 6.0
+#: Search radius with the given orientation; afterwards so many median misfits, but not less than
+#: two pixels. [px]
+FIRST_RADIUS, WIDEST_MISFIT, LEAST_RADIUS = 25.0, 4.0, 2.0
 _ROUNDS = 4
 
 
@@ -20,7 +20,7 @@ def match_targets(
     camera: Camera,
     control: FloatArray,
     targets: FloatArray,
-    interface: FlatInterface | None,
+    interface: Placed,
     *,
     radius: float = FIRST_RADIUS,
 ) -> IntArray:
@@ -34,7 +34,7 @@ def match_targets(
         Control points.
     targets : ndarray, shape (m, 2)
         Detected targets. [px]
-    interface : FlatInterface or None
+    interface : FlatInterface, Interfaces or None
         What the camera looks through.
     radius : float
         Largest distance from the place expected with the given orientation. [px]
@@ -60,7 +60,7 @@ def match_targets(
             return found
         miss = np.linalg.norm(result.residuals[seen] / camera.sensor.pitch, axis=1)
         state = result.camera
-        limit = min(radius, max(1.5, WIDEST_MISFIT * float(np.median(miss))))
+        limit = min(radius, max(LEAST_RADIUS, WIDEST_MISFIT * float(np.median(miss))))
         again = _nearest(state, control, targets, interface, limit)
         if np.array_equal(again, found):
             return found
@@ -72,7 +72,7 @@ def _nearest(
     camera: Camera,
     control: FloatArray,
     targets: FloatArray,
-    interface: FlatInterface | None,
+    interface: Placed,
     radius: float,
 ) -> IntArray:
     """Return mutual nearest neighbours within a radius."""

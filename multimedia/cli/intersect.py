@@ -1,0 +1,52 @@
+"""``multimedia intersect``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+EXAMPLE = """\b
+Examples:
+  multimedia intersect tank.toml
+  multimedia intersect tank.toml --points frame.csv --out particles.xlsx
+  multimedia intersect tank.toml --method pairs
+"""
+
+
+@click.command(short_help="Object points from image points of two or more cameras.", epilog=EXAMPLE)
+@click.argument("project", type=click.Path(path_type=Path))
+@click.option(
+    "--points", type=click.Path(path_type=Path),
+    help="Table of image points: camera, id, and col, row [px] or x, y [mm]; or one row per point "
+    "with columns such as 'cam1 col', 'cam1 row'.  [default: the project's own]",
+)  # fmt: skip
+@click.option(
+    "--method", type=click.Choice(("rigorous", "rays", "pairs")), default="rigorous",
+    show_default=True,
+    help="Least squares of the image residuals; of the distances to the rays; or the mean of the "
+    "midpoints of all pairs of rays, as OpenPTV does.",
+)  # fmt: skip
+@click.option("--out", type=click.Path(path_type=Path), help="Also write a .csv or .xlsx table.")
+@click.option("--overwrite", is_flag=True, help="Replace an existing file.")
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
+def command(
+    project: Path,
+    points: Path | None,
+    method: str,
+    out: Path | None,
+    overwrite: bool,
+    as_json: bool,
+) -> None:
+    """Intersect the rays of every point that two or more cameras of PROJECT (.toml) saw.
+
+    Gives X, Y, Z with standard deviations [unit of the project], the number of rays, the largest
+    angle between them [deg], sigma0 (about 1 if the image coordinates are as good as the project's
+    sigma_image says), the camera to suspect where rays do not meet, and a status.
+    """
+    from multimedia.cli.tables import show
+    from multimedia.workflows.cameras import intersect_project
+
+    table = intersect_project(project, points=points, out=out, method=method, overwrite=overwrite)
+    places = dict.fromkeys(("X", "Y", "Z"), 4) | {"angle": 1, "sigma0": 2}
+    show(table, as_json=as_json, out=out, digits=places)

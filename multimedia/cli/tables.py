@@ -1,0 +1,52 @@
+"""Printing the tables of the camera commands."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from photocore.console import print_json, remark, text_table
+
+if TYPE_CHECKING:
+    from multimedia.workflows.cameras import Table
+
+#: Rows printed when the table also goes into a file.
+_SHOWN = 10
+
+
+def show(
+    table: Table,
+    *,
+    as_json: bool,
+    out: Path | None,
+    digits: Mapping[str, int],
+    key: str = "points",
+) -> None:
+    """Print a table: as JSON, or as text with the given number of decimals."""
+    for line in table.remarks:
+        remark(f"Note: {line}")
+    if as_json:
+        print_json({key: table.records(), "summary": list(table.summary)})
+    else:
+        records = table.records()
+        shown = records if out is None else records[:_SHOWN]
+        rows = [[_text(row[name], digits.get(name)) for name in table.columns] for row in shown]
+        click.echo(text_table(tuple(table.columns), rows))
+        if len(shown) < len(records):
+            click.echo(f"... and {len(records) - len(shown)} more")
+        for line in table.summary:
+            click.echo(line)
+    if out is not None:
+        remark(f"Table written to {out}")
+
+
+def _text(value: object, digits: int | None) -> str:
+    """Return a cell: numbers with their decimals, nothing for what is undefined."""
+    if isinstance(value, float):
+        if value != value:
+            return "-"
+        return f"{value:.{digits}f}" if digits is not None else f"{value:.4g}"
+    return str(value)

@@ -1,0 +1,96 @@
+"""A picture of epipolar curves and their candidates over the photo."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from photocore.arrays import FloatArray
+from photocore.errors import InputError
+from photocore.output import atomic_path
+
+
+def draw_epipolar(
+    path: Path,
+    curves: Sequence[FloatArray],
+    labels: Sequence[str],
+    targets: FloatArray,
+    *,
+    size: tuple[int, int],
+    photo: Path | None = None,
+    title: str = "",
+    overwrite: bool = False,
+) -> None:
+    """Draw curves in pixels over a photo, or over an empty frame of its size.
+
+    Parameters
+    ----------
+    path : path
+        .png, .svg or .pdf.
+    curves : sequence of ndarray, shape (k, 2)
+        Vertices (column, row). [px]
+    labels : sequence of str
+        One per curve.
+    targets : ndarray, shape (m, 2)
+        Candidates. [px]
+    size : tuple of int
+        Width and height of the image. [px]
+    photo : path, optional
+        The image to draw over.
+    title : str
+        Heading.
+    overwrite : bool
+        Whether an existing file may be replaced.
+
+    Raises
+    ------
+    InputError
+        If the photo cannot be read or the ending is unknown.
+    """
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    if path.suffix.lower() not in (".png", ".svg", ".pdf"):
+        raise InputError(f"{path}: a picture is written as .png, .svg or .pdf.")
+    figure = Figure(figsize=(9.0, 9.0 * size[1] / size[0] + 0.4), layout="constrained")
+    FigureCanvasAgg(figure)
+    axes = figure.add_subplot()
+    if photo is not None:
+        axes.imshow(_grey(photo), cmap="gray", interpolation="nearest")
+    for curve, label in zip(curves, labels, strict=True):
+        seen = curve[np.isfinite(curve).all(axis=1)]
+        (line,) = axes.plot(seen[:, 0], seen[:, 1], "-", linewidth=1.2)
+        if len(seen):
+            axes.annotate(
+                label, seen[len(seen) // 2], color=line.get_color(), fontsize=9,
+                xytext=(4, 4), textcoords="offset points",
+            )  # fmt: skip
+    if len(targets):
+        axes.plot(
+            targets[:, 0], targets[:, 1], "o", fillstyle="none", markersize=7, color="tab:red",
+            label="candidates",
+        )  # fmt: skip
+        axes.legend(loc="upper right")
+    axes.set_xlim(-0.5, size[0] - 0.5)
+    axes.set_ylim(size[1] - 0.5, -0.5)
+    axes.set_aspect("equal")
+    axes.set_xlabel("column [px]")
+    axes.set_ylabel("row [px]")
+    axes.set_title(title)
+    with atomic_path(path, overwrite=overwrite) as temporary:
+        figure.savefig(temporary, dpi=150)
+
+
+def _grey(photo: Path) -> np.ndarray[tuple[int, ...], np.dtype[np.uint8]]:
+    """Return a photo as grey values."""
+    from PIL import Image, UnidentifiedImageError
+
+    try:
+        with Image.open(photo) as image:
+            return np.asarray(image.convert("L"), dtype=np.uint8)
+    except FileNotFoundError:
+        raise InputError(f"{photo}: no such image.") from None
+    except (UnidentifiedImageError, OSError) as error:
+        raise InputError(f"{photo}: is no image that can be read ({error}).") from None

@@ -1,0 +1,339 @@
+"""Projection, intersection and resection of a project: path in, result and path out."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from multimedia.domain.camera import EXTERIOR, INTERIOR
+from multimedia.domain.point_status import PointStatus
+from multimedia.domain.project import SHOWN, ImagePoints, ObjectPoints, Project
+from multimedia.io.point_tables import read_image_points, read_object_points, write_columns
+from multimedia.io.project_file import read_project, write_project
+from multimedia.solvers.intersection import (
+    Intersection,
+    intersect,
+    intersect_pairs,
+    intersect_rays,
+)
+from multimedia.solvers.projection import project as project_points
+from multimedia.solvers.projection import projection_status
+from multimedia.solvers.resection import Resection, resect
+from photocore.arrays import FloatArray
+from photocore.errors import InputError
+from photocore.output import check_writable
+
+#: How points may be intersected.
+METHODS = ("rigorous", "rays", "pairs")
+_ANGLES = ("omega", "phi", "kappa")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Table:
+    """Columns to print or write, with what to say about them."""
+
+    columns: dict[str, Any]
+    remarks: tuple[str, ...] = ()
+    summary: tuple[str, ...] = ()
+
+    def records(self) -> list[dict[str, Any]]:
+        """Return one mapping per row."""
+        names = list(self.columns)
+        return [
+            dict(zip(names, row, strict=True)) for row in zip(*self.columns.values(), strict=True)
+        ]
+
+
+def project_project(
+    path: Path, *, points: Path | None, out: Path | None, overwrite: bool = False
+) -> Table:
+    """Project the object points of a project, or of another table, into all its cameras."""
+    if out is not None:
+        check_writable(out, overwrite=overwrite)
+    project = read_project(path)
+    objects, remarks = _objects(project, points)
+    names: list[str] = []
+    parts: list[FloatArray] = []
+    pixels: list[FloatArray] = []
+    status: list[str] = []
+    for camera, media in zip(project.cameras, project.interfaces, strict=True):
+        image = project_points(camera, objects.xyz, media)
+        parts.append(image)
+        names += [camera.name] * len(objects.ids)
+        status += projection_status(camera, objects.xyz, media)
+        if camera.sensor is not None:
+            pixels.append(camera.sensor.pixel_from_image(image))
+    image = np.concatenate(parts)
+    columns: dict[str, Any] = {
+        "camera": names,
+        "id": list(objects.ids) * len(project.cameras),
+        "x": image[:, 0],
+        "y": image[:, 1],
+    }
+    if len(pixels) == len(parts):
+        both = np.concatenate(pixels)
+        columns |= {"col": both[:, 0], "row": both[:, 1]}
+    columns["status"] = status
+    units = {"x": "mm", "y": "mm", "col": "px", "row": "px"}
+    _write(out, columns, units, overwrite)
+    return Table(columns=columns, remarks=(*project.remarks, *remarks))
+
+
+def intersect_project(
+    path: Path,
+    *,
+    points: Path | None,
+    out: Path | None,
+    method: str = "rigorous",
+    overwrite: bool = False,
+) -> Table:
+    """Intersect the image points of a project, or of another table."""
+    if out is not None:
+        check_writable(out, overwrite=overwrite)
+    project = read_project(path)
+    images, remarks = _images(project, points)
+    ids = images.names
+    image, sigma = images.grid(project.camera_names, ids)
+    sigma = np.where(np.isnan(sigma), project.sigma_image, sigma)
+    u = project.unit
+    if method == "rigorous":
+        found = intersect(project.cameras, image, project.interfaces, sigma=sigma)
+        columns, units, summary = _intersection_columns(project, found, u)
+        xyz = found.xyz
+    else:
+        if method == "rays":
+            xyz = intersect_rays(project.cameras, image, project.interfaces)
+            extra: dict[str, Any] = {}
+        else:
+            xyz, distance = intersect_pairs(project.cameras, image, project.interfaces)
+            extra = {"ray_distance": distance}
+        rays = np.isfinite(image).all(axis=-1).sum(axis=0)
+        lost = [PointStatus.NO_RAY, PointStatus.ONE_RAY]
+        status = [
+            PointStatus.OK.label if good else (lost[n] if n < 2 else PointStatus.WEAK).label
+            for good, n in zip(np.isfinite(xyz[:, 0]), rays.tolist(), strict=True)
+        ]
+        columns = {"X": xyz[:, 0], "Y": xyz[:, 1], "Z": xyz[:, 2], **extra}
+        columns |= {"rays": rays, "status": status}
+        units = dict.fromkeys(("X", "Y", "Z", "ray_distance"), u)
+        summary = [
+            f"{int(np.isfinite(xyz[:, 0]).sum())} points from {len(images.ids)} image points"
+        ]
+    columns = {"id": list(ids), **columns}
+    summary += _check(project, list(ids), xyz)
+    _write(out, columns, units, overwrite)
+    return Table(columns=columns, remarks=(*project.remarks, *remarks), summary=tuple(summary))
+
+
+def _intersection_columns(
+    project: Project, found: Intersection, unit: str
+) -> tuple[dict[str, Any], dict[str, str], list[str]]:
+    """Return the columns of a rigorous intersection, their units, and a summary."""
+    sigma = found.sigma
+    worst = found.worst_camera
+    doubtful = found.status == PointStatus.GROSS_ERROR
+    columns: dict[str, Any] = {
+        **{axis: found.xyz[:, k] for k, axis in enumerate("XYZ")},
+        **{f"sigma_{axis}": sigma[:, k] for k, axis in enumerate("XYZ")},
+        "rays": found.rays,
+        "angle": np.degrees(found.angle),
+        "sigma0": found.sigma0,
+        "suspect": [
+            project.cameras[camera].name if bad and camera >= 0 else ""
+            for camera, bad in zip(worst.tolist(), doubtful.tolist(), strict=True)
+        ],
+        "status": [PointStatus(code).label for code in found.status.tolist()],
+    }
+    units = dict.fromkeys(("X", "Y", "Z", "sigma_X", "sigma_Y", "sigma_Z"), unit) | {"angle": "deg"}
+    good = np.isfinite(found.xyz[:, 0])
+    summary = [f"{int(good.sum())} points"]
+    controlled = np.isfinite(found.sigma0)
+    if controlled.any():
+        weights = np.maximum(2 * found.rays[controlled] - 3, 1)
+        overall = np.sqrt((found.sigma0[controlled] ** 2 * weights).sum() / weights.sum())
+        summary[0] += (
+            f", sigma0 {overall:.3g} (1 expected with image coordinates of "
+            f"{project.sigma_image * 1000:g} um)"
+        )
+    for code in PointStatus:
+        count = int((found.status == code).sum())
+        if count and code != PointStatus.OK:
+            summary.append(f"{count} points: {code.label}")
+    return columns, units, summary
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Resected:
+    """Resections of the cameras of a project."""
+
+    project: Project
+    results: dict[str, Resection]
+    used: dict[str, tuple[str, ...]]
+    remarks: tuple[str, ...]
+
+
+def resect_project(
+    path: Path,
+    *,
+    estimate: Sequence[str],
+    cameras: Sequence[str] = (),
+    out: Path | None = None,
+    residuals: Path | None = None,
+    overwrite: bool = False,
+) -> Resected:
+    """Orient the cameras of a project, each on its own, from its control points."""
+    for file in (out, residuals):
+        if file is not None:
+            check_writable(file, overwrite=overwrite)
+    project = read_project(path)
+    unknown = [name for name in cameras if name not in project.camera_names]
+    if unknown:
+        raise InputError(
+            f"--camera: no camera is called {', '.join(unknown)}; the project has "
+            f"{', '.join(project.camera_names)}."
+        )
+    objects = project.object_points
+    if not objects.ids:
+        raise InputError(f"{path}: names no object_points; a resection needs control points.")
+    remarks = list(project.remarks)
+    results: dict[str, Resection] = {}
+    used: dict[str, tuple[str, ...]] = {}
+    adjusted = list(project.cameras)
+    for k, camera in enumerate(project.cameras):
+        if cameras and camera.name not in cameras:
+            continue
+        rows = project.image_points.of_camera(camera.name)
+        ids = [project.image_points.ids[row] for row in rows]
+        place = objects.rows(ids)
+        known = [(row, at) for row, at in zip(rows, place, strict=True) if at >= 0]
+        strange = [name for name, at in zip(ids, place, strict=True) if at < 0]
+        if strange:
+            more = " ..." if len(strange) > SHOWN else ""
+            remarks.append(
+                f"{camera.name}: {len(strange)} image points have no object point of their name "
+                f"and were left out: {', '.join(strange[:SHOWN])}{more}"
+            )
+        image = project.image_points.image[[row for row, _ in known]]
+        sigma = _image_sigma(project, [row for row, _ in known])
+        control = objects.xyz[[at for _, at in known]]
+        result = resect(
+            camera, control, image, project.interface_of(k), estimate=estimate, sigma=sigma
+        )
+        results[camera.name] = result
+        used[camera.name] = tuple(objects.ids[at] for _, at in known)
+        adjusted[k] = result.camera
+        suspects = [
+            name for name, bad in zip(used[camera.name], result.suspects, strict=True) if bad
+        ]
+        if suspects:
+            remarks.append(f"{camera.name}: gross errors? points {', '.join(suspects[:SHOWN])}")
+    project = replace(project, cameras=tuple(adjusted))
+    if residuals is not None:
+        _write(residuals, residual_columns(results, used), {"vx": "mm", "vy": "mm"}, overwrite)
+    if out is not None:
+        write_project(out, project, overwrite=overwrite)
+    return Resected(project=project, results=results, used=used, remarks=tuple(remarks))
+
+
+def residual_columns(
+    results: dict[str, Resection], used: dict[str, tuple[str, ...]]
+) -> dict[str, Any]:
+    """Return the residuals of all cameras as columns."""
+    names = list(results)
+    if not names:
+        return {}
+    v = np.concatenate([results[name].residuals for name in names])
+    w = np.concatenate([results[name].standardised for name in names])
+    return {
+        "camera": [name for name in names for _ in used[name]],
+        "id": [point for name in names for point in used[name]],
+        "vx": v[:, 0],
+        "vy": v[:, 1],
+        "wx": w[:, 0],
+        "wy": w[:, 1],
+    }
+
+
+def resected_as_dict(found: Resected) -> dict[str, Any]:
+    """Return resections as plain data for ``--json``; angles in degrees."""
+    cameras = []
+    for name, result in found.results.items():
+        values = {p: _shown(p, result.camera.value(p)) for p in EXTERIOR + INTERIOR}
+        sigmas = {p: _shown(p, s) for p, s in result.sigmas.items()}
+        cameras.append(
+            {
+                "name": name,
+                "sigma0": result.sigma0,
+                "sigma0_um": result.sigma0 * 1000.0,
+                "points": len(found.used[name]),
+                "redundancy": result.redundancy,
+                "iterations": result.iterations,
+                "estimated": list(result.names),
+                **values,
+                "sigma": sigmas,
+                "correlations": result.correlations,
+                "suspects": [
+                    p for p, bad in zip(found.used[name], result.suspects, strict=True) if bad
+                ],
+            }
+        )
+    return {"unit": found.project.unit, "cameras": cameras, "remarks": list(found.remarks)}
+
+
+def _shown(name: str, value: float) -> float:
+    return float(np.degrees(value)) if name in _ANGLES else value
+
+
+def _image_sigma(project: Project, rows: Sequence[int]) -> FloatArray | None:
+    """Return standard deviations of image points, None if all are alike."""
+    sigma = project.image_points.sigma
+    if sigma is None or not rows:
+        return None
+    given = sigma[list(rows)]
+    if np.isnan(given).all():
+        return None
+    return np.where(np.isnan(given), project.sigma_image, given)
+
+
+def _objects(project: Project, points: Path | None) -> tuple[ObjectPoints, list[str]]:
+    if points is not None:
+        return read_object_points(points, unit=project.unit)
+    if not project.object_points.ids:
+        raise InputError("the project names no object_points; give a table with --points.")
+    return project.object_points, []
+
+
+def _images(project: Project, points: Path | None) -> tuple[ImagePoints, list[str]]:
+    if points is not None:
+        return read_image_points(points, project.cameras)
+    if not project.image_points.ids:
+        raise InputError("the project names no image_points; give a table with --points.")
+    return project.image_points, []
+
+
+def _check(project: Project, ids: list[str], xyz: FloatArray) -> list[str]:
+    """Return how well intersected points agree with the object points of the same name."""
+    place = project.object_points.rows(ids)
+    known = [k for k, at in enumerate(place) if at >= 0 and np.isfinite(xyz[k, 0])]
+    if not known:
+        return []
+    miss = xyz[known] - project.object_points.xyz[[place[k] for k in known]]
+    rms = np.sqrt((miss**2).mean(axis=0))
+    return [
+        f"against {len(known)} known points: RMS X {rms[0]:.4g}, Y {rms[1]:.4g}, Z {rms[2]:.4g}, "
+        f"3D {np.sqrt((miss**2).sum(axis=1).mean()):.4g} {project.unit}"
+    ]
+
+
+def _write(
+    out: Path | None, columns: dict[str, Any], units: dict[str, str], overwrite: bool
+) -> None:
+    """Write columns with their units in the headings."""
+    if out is None:
+        return
+    headed = {f"{k} [{units[k]}]" if k in units else k: v for k, v in columns.items()}
+    write_columns(out, headed, overwrite=overwrite)

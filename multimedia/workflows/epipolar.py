@@ -1,0 +1,226 @@
+"""Epipolar curves of a project's image points."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from multimedia.domain.camera import Camera
+from multimedia.domain.project import SHOWN, ImagePoints, Project
+from multimedia.io.epipolar_picture import draw_epipolar
+from multimedia.io.point_tables import write_columns
+from multimedia.io.project_file import read_project
+from multimedia.solvers.epipolar import epipolar_candidates, epipolar_curve
+from photocore.arrays import FloatArray
+from photocore.errors import InputError
+from photocore.output import check_writable
+
+#: The depth range without --z-range: that of the object points, this share of it wider.
+_MARGIN = 0.25
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Curves:
+    """Curves and candidates as plain data.
+
+    Attributes
+    ----------
+    curves : list of dict
+        ``id``, ``vertices`` (image [mm], pixel [px] and object point of each).
+    candidates : list of dict
+        ``id``, ``target``, ``distance`` [mm] and the object point.
+    z_range : tuple of float
+        Depth range used.
+    remarks : tuple of str
+        What the user should know.
+    """
+
+    curves: list[dict[str, Any]]
+    candidates: list[dict[str, Any]]
+    z_range: tuple[float, float]
+    remarks: tuple[str, ...]
+
+
+def epipolar_project(
+    path: Path,
+    *,
+    camera: str,
+    other: str,
+    ids: Sequence[str] = (),
+    at: tuple[float, float] | None = None,
+    z_range: tuple[float, float] | None = None,
+    chord_error: float = 5e-4,
+    vertices: int | None = None,
+    tolerance: float = 0.01,
+    out: Path | None = None,
+    picture: Path | None = None,
+    photo: Path | None = None,
+    overwrite: bool = False,
+) -> Curves:
+    """Return the epipolar curves of points of ``camera`` in the image of ``other``.
+
+    Parameters
+    ----------
+    path : path
+        Project file.
+    camera, other : str
+        Names of the cameras.
+    ids : sequence of str
+        Image points of ``camera``; all of them if neither ``ids`` nor ``at`` is given.
+    at : tuple of float, optional
+        (column, row) of a point instead. [px]
+    z_range : tuple of float, optional
+        Depth range; by default that of the object points and a little more.
+    chord_error, vertices
+        As for `epipolar_curve`. [mm]
+    tolerance : float
+        Half width of the band in which candidates are looked for. [mm]
+    out, picture : path, optional
+        Table of vertices; picture of the curves over ``photo``.
+    """
+    for file in (out, picture):
+        if file is not None:
+            check_writable(file, overwrite=overwrite)
+    project = read_project(path)
+    one, two = _index(project, camera), _index(project, other)
+    if one == two:
+        raise InputError("--camera and --to name the same camera; an epipolar curve needs two.")
+    first, second = project.cameras[one], project.cameras[two]
+    names, image = _points(project, first, ids, at)
+    depths, remarks = _depths(project, z_range)
+    found = epipolar_curve(
+        first, image, second, (project.interface_of(one), project.interface_of(two)),
+        z_range=depths, chord_error=chord_error, vertices=vertices,
+    )  # fmt: skip
+    rows = project.image_points.of_camera(other)
+    targets = project.image_points.image[rows]
+    near = epipolar_candidates(found, targets, tolerance=tolerance)
+    curves = []
+    for name, vertex, point, count in zip(
+        names, found.image, found.points, found.counts, strict=True
+    ):
+        curves.append(
+            {"id": name, "image": vertex[:count], "points": point[:count]}
+            | _pixels(second, vertex[:count])
+        )
+    lost = [c["id"] for c in curves if not np.isfinite(c["image"]).all()]
+    if lost:
+        remarks.append(
+            f"{other} cannot see the whole ray of {', '.join(lost[:SHOWN])}: is the depth range "
+            "on the object's side of the interface?"
+        )
+    candidates = [
+        {
+            "id": names[curve],
+            "target": project.image_points.ids[rows[target]],
+            "distance": distance,
+            "X": point[0],
+            "Y": point[1],
+            "Z": point[2],
+        }
+        for curve, target, distance, point in zip(
+            near.curves, near.targets, near.distance, near.points, strict=True
+        )
+    ]
+    if out is not None:
+        write_columns(out, _columns(curves, project.unit), overwrite=overwrite)
+    if picture is not None:
+        _draw(
+            picture, second, curves, targets[near.targets], photo, f"{camera} in {other}", overwrite
+        )
+    return Curves(
+        curves=curves, candidates=candidates, z_range=depths,
+        remarks=(*project.remarks, *remarks),
+    )  # fmt: skip
+
+
+def _draw(
+    picture: Path,
+    camera: Camera,
+    curves: Sequence[dict[str, Any]],
+    targets: FloatArray,
+    photo: Path | None,
+    title: str,
+    overwrite: bool,
+) -> None:
+    """Draw the curves over the photo."""
+    if camera.sensor is None:
+        raise InputError(f"--picture: camera {camera.name} has no sensor, so no pixels to draw in.")
+    draw_epipolar(
+        picture, [c["pixels"] for c in curves], [c["id"] for c in curves],
+        camera.sensor.pixel_from_image(targets),
+        size=(camera.sensor.width, camera.sensor.height), photo=photo,
+        title=f"Epipolar curves of {title}", overwrite=overwrite,
+    )  # fmt: skip
+
+
+def _columns(curves: Sequence[dict[str, Any]], unit: str) -> dict[str, Any]:
+    """Return the vertices of all curves as columns."""
+    image = np.concatenate([c["image"] for c in curves])
+    points = np.concatenate([c["points"] for c in curves])
+    columns: dict[str, Any] = {
+        "id": [c["id"] for c in curves for _ in c["image"]],
+        "vertex": [k for c in curves for k in range(1, len(c["image"]) + 1)],
+        "x [mm]": image[:, 0],
+        "y [mm]": image[:, 1],
+    }
+    if all("pixels" in c for c in curves):
+        pixels = np.concatenate([c["pixels"] for c in curves])
+        columns |= {"col [px]": pixels[:, 0], "row [px]": pixels[:, 1]}
+    return columns | {f"{axis} [{unit}]": points[:, k] for k, axis in enumerate("XYZ")}
+
+
+def _pixels(camera: Camera, image: FloatArray) -> dict[str, FloatArray]:
+    if camera.sensor is None:
+        return {}
+    return {"pixels": camera.sensor.pixel_from_image(image)}
+
+
+def _index(project: Project, name: str) -> int:
+    if name not in project.camera_names:
+        raise InputError(
+            f"no camera is called {name!r}; the project has {', '.join(project.camera_names)}."
+        )
+    return project.camera_names.index(name)
+
+
+def _points(
+    project: Project, camera: Camera, ids: Sequence[str], at: tuple[float, float] | None
+) -> tuple[list[str], FloatArray]:
+    """Return names and image points to draw curves for."""
+    if at is not None:
+        if camera.sensor is None:
+            raise InputError(f"--at: camera {camera.name} has no sensor, so no pixels.")
+        return [f"{at[0]:g},{at[1]:g}"], camera.sensor.image_from_pixel([at])
+    images: ImagePoints = project.image_points
+    rows = {images.ids[row]: row for row in images.of_camera(camera.name)}
+    missing = [name for name in ids if name not in rows]
+    if missing:
+        raise InputError(
+            f"camera {camera.name} has no image point called {', '.join(missing[:SHOWN])}."
+        )
+    names = list(ids) or list(rows)
+    if not names:
+        raise InputError(f"camera {camera.name} has no image points; give --at COL,ROW.")
+    return names, images.image[[rows[name] for name in names]]
+
+
+def _depths(
+    project: Project, z_range: tuple[float, float] | None
+) -> tuple[tuple[float, float], list[str]]:
+    """Return the depth range, and how it was chosen."""
+    if z_range is not None:
+        return z_range, []
+    if not project.object_points.ids:
+        raise InputError("give the depth range of the object with --z-range ZMIN,ZMAX.")
+    z = project.object_points.xyz[:, 2]
+    margin = _MARGIN * float(z.max() - z.min()) or 0.05 * (abs(float(z[0])) or 1.0)
+    low, high = float(z.min()) - margin, float(z.max()) + margin
+    return (low, high), [
+        f"depth range {low:.4g} to {high:.4g} {project.unit}, from the object points; --z-range "
+        "sets another."
+    ]
