@@ -135,8 +135,8 @@ def command(
     for text in solution.remarks:
         remark(text)
     if out is not None:
-        write_result(out, solution, language=language, overwrite=overwrite)
-        remark(f"{out}: {len(solution.table)} points written.")
+        said = write_result(out, solution, language=language, overwrite=overwrite)
+        remark(f"{out}: {len(solution.table)} points written{'; ' + said if said else '.'}")
     if as_json:
         click.echo(solution_json(solution))
         return

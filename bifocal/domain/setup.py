@@ -38,6 +38,8 @@ class SurveySetup:
         ``"mm"``: x, y from the nadir, y up. ``"px"``: (column, row) of the image.
     sigma_r_max : float or None
         Points of less precise relief are UNCERTAIN; default 2 % of the shorter distance. [m]
+    off_radial_sigmas, on_plane_sigmas : float
+        Beyond how many sigma a point is OFF-RADIAL, below how many ON-PLANE.
     """
 
     d1: float
@@ -50,6 +52,8 @@ class SurveySetup:
     nadir2: tuple[float, float] = (0.0, 0.0)
     unit: str = "mm"
     sigma_r_max: float | None = None
+    off_radial_sigmas: float = OFF_RADIAL_SIGMAS
+    on_plane_sigmas: float = ON_PLANE_SIGMAS
 
     def __post_init__(self) -> None:
         for name in ("d1", "d2"):

@@ -158,7 +158,7 @@ def _setup_cell(
     is_default = {
         "d_1": content.distances is None,
         "sigma_s": own is None or own.sigma_s is None,
-        "sigma_r_max": own is None or own.sigma_r_max is None,
+        "sigma_r_max": content.sigma_r_max is None and (own is None or own.sigma_r_max is None),
     }
     if not typed or (name in formulas and is_default.get(name, False)):
         builder.formula(sheet, cell, formulas[name], value, form=form, name=name, editable=typed)

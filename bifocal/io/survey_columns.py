@@ -346,6 +346,22 @@ OVER_FRAME: tuple[Column, ...] = (
         width=18,
     ),
 )
+
+
+def verdict_columns(holds: str, fails: str) -> tuple[Column, ...]:
+    """Return the table of verdicts with its two words in the workbook's language."""
+    return (
+        Column(key="rule", width=16),
+        Column(key="scale", width=9),
+        Column(key="tolerance", places=1, width=11),
+        _f(
+            "verdict",
+            f'IF(check_worst="","",IF(check_worst<=[@tolerance]/1000,"{holds}","{fails}"))',
+            width=11,
+        ),
+    )
+
+
 LOG: tuple[Column, ...] = tuple(
     Column(key=key, kind="value", width=width)
     for key, width in (("time", 12), ("program", 16), ("what", 40), ("file", 30), ("sha256", 68))

@@ -11,7 +11,7 @@ from bifocal.domain.observations import PointObservations
 from bifocal.domain.pair import SIGMA_PIXEL, UNCERTAIN_SHARE, Pair
 from bifocal.domain.reference import CheckResult, Georeference, KnownPoints
 from bifocal.domain.relief_table import ReliefTable
-from bifocal.domain.setup import SurveySetup
+from bifocal.domain.setup import OFF_RADIAL_SIGMAS, ON_PLANE_SIGMAS, SurveySetup
 from bifocal.domain.tolerances import RULES, SCALES, ToleranceRule
 from photocore.arrays import FloatArray
 from photocore.bookrows import CellValue
@@ -52,6 +52,10 @@ class SurveyContent:
         For the verdict.
     sensor : tuple of float or None
         Width and height. [mm]
+    flag_sigmas : tuple of float
+        Limits of OFF-RADIAL and ON-PLANE. [sigma]
+    sigma_r_max : float or None
+        Limit of UNCERTAIN for a general pair; default 2 % of d2. [m]
     log : sequence of tuple of str
         Rows of the sheet `Log`: date, program, what, file, SHA-256.
     """
@@ -70,6 +74,8 @@ class SurveyContent:
     model: str = "auto"
     rules: tuple[ToleranceRule, ...] = RULES
     sensor: tuple[float, float] | None = None
+    flag_sigmas: tuple[float, float] = (OFF_RADIAL_SIGMAS, ON_PLANE_SIGMAS)
+    sigma_r_max: float | None = None
     log: Sequence[tuple[str, str, str, str, str]] = ()
 
     @property
@@ -245,7 +251,8 @@ def control_cells(content: SurveyContent) -> dict[str, list[CellValue]]:
 def setup_cells(content: SurveyContent) -> dict[str, CellValue]:
     """Return the value of every named cell of `Setup`; what is absent is blank."""
     setup, pair = content.setup, content.pair
-    cells: dict[str, CellValue] = {"input_unit": "mm", "k_off": 3.5, "k_plane": 2}
+    off, near = content.flag_sigmas
+    cells: dict[str, CellValue] = {"input_unit": "mm", "k_off": off, "k_plane": near}
     ratio = 1.0
     if setup is not None:
         cells |= {
@@ -293,7 +300,7 @@ def _pair_cells(content: SurveyContent, pair: Pair) -> dict[str, CellValue]:
         "c_2": near.extra.get("principal_distance"),
         "pitch": far.extra.get("pixel_size"),
         "sigma_px": sigma,
-        "sigma_r_max": UNCERTAIN_SHARE * near.distance,
+        "sigma_r_max": content.sigma_r_max or UNCERTAIN_SHARE * near.distance,
         "m_1": 1000.0 if scale is None else scale,
         "e_x": centre[0],
         "e_y": centre[1],

@@ -13,7 +13,7 @@ from bifocal.domain.lens import Lens
 from bifocal.domain.observations import PointObservations
 from bifocal.domain.pair import Pair, Photo
 from bifocal.domain.reference import KnownPoints
-from bifocal.io.survey_setup_reader import SetupValues, read_setup
+from bifocal.io.survey_setup_reader import SetupValues, is_general, read_setup
 from bifocal.io.survey_words import ALIASES, COLUMNS, LANGUAGES, WORDS
 from photocore.arrays import BoolArray, FloatArray
 from photocore.errors import CellError, InputError, WorkbookError
@@ -57,6 +57,9 @@ class SurveyInput:
         Whether it is a survey workbook with live formulas.
     table : Table
         The table of points, with the way back to its cells.
+    known_rows, control_rows : tuple of int
+        Rows of the sheets `Check` and `Georeference`; check points given beside the points follow
+        after these.
     remarks : tuple of str
         What the user should know.
     """
@@ -70,7 +73,9 @@ class SurveyInput:
     language: str
     is_ours: bool
     table: Table
-    remarks: tuple[str, ...]
+    known_rows: tuple[int, ...] = ()
+    control_rows: tuple[int, ...] = ()
+    remarks: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -158,8 +163,8 @@ def read_survey(path: Path | str, options: ReadOptions | None = None) -> SurveyI
     sheets = book if isinstance(book, SheetFile) else None
     setup = read_setup(Path(path), sheets, options.decimal, errors)
     remarks += setup.remarks
-    known = _known(book, "Check", ("X_ref", "Y_ref", "Z_ref"), errors, remarks, options)
-    control = _known(book, "Georeference", ("E", "N", "H"), errors, remarks, options)
+    known, known_rows = _known(book, "Check", ("X_ref", "Y_ref", "Z_ref"), errors, remarks, options)
+    control, control_rows = _known(book, "Georeference", ("E", "N", "H"), errors, remarks, options)
     model, language = "auto", "en"
     if isinstance(book, SheetFile):
         model = (
@@ -182,18 +187,23 @@ def read_survey(path: Path | str, options: ReadOptions | None = None) -> SurveyI
         is_ours=isinstance(book, SheetFile)
         and any(area.name == "tblPoints" for area in book.tables),
         table=table,
+        known_rows=known_rows,
+        control_rows=control_rows,
         remarks=tuple(dict.fromkeys(remarks)),
     )
 
 
 def _read_points(book: SheetFile | CsvFile, options: ReadOptions, errors: list[CellError]) -> Table:
     """Return the table of points; headings that both photos share are the last resort."""
+    # In the workbook of a general pair x1..y2 are formulas that follow from the raw pixels.
+    general = isinstance(book, SheetFile) and is_general(book)
+    followed = {*_XY, *_POLAR} if general else set()
     for shared in (False, True):
         found: list[CellError] = []
         try:
             table = read_table(
                 book,
-                point_columns(shared=shared),
+                [c for c in point_columns(shared=shared) if c.key not in followed],
                 name="Points",
                 sheet=options.sheet,
                 decimal=options.decimal,
@@ -208,6 +218,8 @@ def _read_points(book: SheetFile | CsvFile, options: ReadOptions, errors: list[C
         if shared or table.present & {*_XY, *_PIXELS, "s1", "s2"}:
             break
     errors += found
+    for key in followed:
+        table.values[key] = np.full(len(table), np.nan)
     return table
 
 
@@ -408,15 +420,15 @@ def _known(
     errors: list[CellError],
     remarks: list[str],
     options: ReadOptions,
-) -> KnownPoints:
-    """Return check or control points of the sheet made for them; none where it is absent."""
+) -> tuple[KnownPoints, tuple[int, ...]]:
+    """Return check or control points of the sheet made for them, and their rows."""
     if not isinstance(book, SheetFile):
-        return KnownPoints()
+        return KnownPoints(), ()
     names = {bare(sheet), bare(f"tbl{sheet}"), "tblgeo" if sheet == "Georeference" else ""}
     areas = [area for area in book.tables if bare(area.name) in names]
     titles = [title for title in book.titles if bare(title) in names]
     if not areas and not titles:
-        return KnownPoints()
+        return KnownPoints(), ()
     columns = [_plain_column("id", "text")]
     columns += [_plain_column(key, "number") for key in keys]
     columns.append(_plain_column("use", "flag"))
@@ -438,11 +450,12 @@ def _known(
     for i, name in enumerate(table.texts("id")):
         if not name and not np.isnan(xyz[i]).all():
             errors.append(table.error(i, "id", "coordinates without the name of a point."))
-    return KnownPoints(
+    known = KnownPoints(
         ids=tuple(table.texts("id")[i] for i in rows),
         xyz=xyz[rows],
         use=(np.isnan(use) | (use != 0))[rows],
     )
+    return known, tuple(table.rows[i] for i in rows)
 
 
 def _plain_column(key: str, kind: Literal["number", "flag", "text"]) -> Column:

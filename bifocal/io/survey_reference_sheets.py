@@ -17,10 +17,10 @@ from bifocal.io.survey_columns import (
     OVER_FRAME,
     PLANNED_RELIEF,
     UNCERTAINTY,
+    verdict_columns,
 )
 from bifocal.io.survey_content import SurveyContent, setup_cells, verdict_rows
 from bifocal.io.survey_sheets import (
-    HEAD_FILL,
     HEAD_FONT,
     LABEL_FONT,
     BookBuilder,
@@ -28,12 +28,14 @@ from bifocal.io.survey_sheets import (
     set_up_print,
     validate,
 )
-from bifocal.io.survey_words import label, word
-from photocore.bookrows import CellValue
+from bifocal.io.survey_words import word
+from photocore.bookrows import CellValue, column_letters
 
 Cells = Mapping[str, list[CellValue]]
 #: Row of the keys of the two tables; statistics and parameters stand above.
 CHECK_HEAD, CONTROL_HEAD = 12, 27
+#: First column of the verdict, beside the check table.
+VERDICT_LEFT = 14
 
 
 def check(builder: BookBuilder, content: SurveyContent, cells: Cells) -> None:
@@ -86,47 +88,33 @@ def check(builder: BookBuilder, content: SurveyContent, cells: Cells) -> None:
 def _verdict(builder: BookBuilder, content: SurveyContent, accuracy: float | None) -> None:
     """Write what drawing scales the accuracy holds, beside the check table."""
     sheet, language = builder.book["Check"], builder.language
-    for letter, key, width in (
-        ("N", "rule", 16),
-        ("O", "scale", 10),
-        ("P", "tolerance", 12),
-        ("Q", "verdict", 12),
-    ):
-        builder.text(sheet, f"{letter}{CHECK_HEAD - 1}", label(key, language), LABEL_FONT)
-        builder.text(sheet, f"{letter}{CHECK_HEAD}", key, HEAD_FONT)
-        sheet[f"{letter}{CHECK_HEAD}"].fill = HEAD_FILL
-        sheet.column_dimensions[letter].width = width
     holds, fails = word("holds", language), word("fails", language)
     rows = verdict_rows(content)
-    for row, (rule, scale, limit) in enumerate(rows, start=CHECK_HEAD + 1):
-        builder.text(sheet, f"N{row}", rule.name)
-        sheet[f"O{row}"] = scale
-        sheet[f"O{row}"].number_format = '"1:"0'
-        millimetres = limit * 1000.0
-        if rule.line_mm is not None:
-            text = f"{rule.line_mm!r}*O{row}"
-            builder.formula(sheet, f"P{row}", text, rule.line_mm * scale, form="0.0")
-        else:
-            sheet[f"P{row}"] = millimetres
-            sheet[f"P{row}"].number_format = "0.0"
-        value = None
-        if accuracy is not None:
-            value = holds if accuracy <= limit else fails
-        builder.formula(
-            sheet,
-            f"Q{row}",
-            f'IF(check_worst="","",IF(check_worst<=P{row}/1000,"{holds}","{fails}"))',
-            value,
-        )
-        sheet[f"Q{row}"].alignment = Alignment(horizontal="center")
+    verdicts: list[CellValue] = [
+        None if accuracy is None else holds if accuracy <= limit else fails for *_, limit in rows
+    ]
+    builder.table(
+        sheet,
+        "tblVerdict",
+        verdict_columns(holds, fails),
+        at=(CHECK_HEAD, VERDICT_LEFT),
+        rows=len(rows),
+        cells={
+            "rule": [rule.name for rule, *_ in rows],
+            "scale": [scale for _, scale, _ in rows],
+            "tolerance": [limit * 1000.0 for *_, limit in rows],
+            "verdict": verdicts,
+        },
+    )
     first, last = CHECK_HEAD + 1, CHECK_HEAD + len(rows)
+    letter = column_letters(VERDICT_LEFT + 2)
     for verb, fill, ink in ((holds, "E2F0D9", "1E5B12"), (fails, "F8CBCB", "8B0000")):
         rule_ = FormulaRule(
-            formula=[f'$Q{first}="{verb}"'],
+            formula=[f'${letter}{first}="{verb}"'],
             fill=PatternFill("solid", start_color=fill, end_color=fill),
             font=Font(color=ink),
         )
-        sheet.conditional_formatting.add(f"Q{first}:Q{last}", rule_)
+        sheet.conditional_formatting.add(f"{letter}{first}:{letter}{last}", rule_)
 
 
 def georeference(builder: BookBuilder, content: SurveyContent, cells: Cells) -> None:
@@ -340,12 +328,15 @@ def planning(builder: BookBuilder, content: SurveyContent) -> None:
             f'IF(COUNT({size},m_1)=2,{size}*m_1/1000,"")',
             covered,
             form="0.00",
+            name=size.replace("sensor", "covered"),
         )
     builder.text(sheet, "A6", word("footprint", language))
     builder.text(sheet, "A7", word("gsd", language))
     pitch = cells.get("pitch")
     gsd = float(pitch) * float(scale) if pitch and scale else None
-    builder.formula(sheet, "B7", 'IF(COUNT(pitch,m_1)=2,pitch*m_1,"")', gsd, form="0.00")
+    builder.formula(
+        sheet, "B7", 'IF(COUNT(pitch,m_1)=2,pitch*m_1,"")', gsd, form="0.00", name="gsd_mm"
+    )
     diagonal = math.hypot(width, height) if width and height else None
     sigma = cells.get("sigma_s")
     builder.text(sheet, "A9", word("uncertainty", language), HEAD_FONT)

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from bifocal.domain.setup import SurveySetup
+from bifocal.domain.setup import OFF_RADIAL_SIGMAS, ON_PLANE_SIGMAS, SurveySetup
 from bifocal.io.survey_words import SETUP
 from photocore.arrays import FloatArray
 from photocore.errors import CellError, InputError
@@ -17,9 +17,9 @@ from photocore.tables import Column, NamedValues, read_named_values
 from photocore.tables.numbers import Decimal
 
 _CAMERA = ("c_1", "c_2", "d_1", "d_2", "delta_d", "pitch")
-_PRECISION = ("sigma_s", "sigma_px", "sigma_r_max")
+_PRECISION = ("sigma_s", "sigma_px", "sigma_r_max", "k_off", "k_plane")
 _NADIRS = ("nadir_1_col", "nadir_1_row", "nadir_2_col", "nadir_2_row")
-_NUMBERS = (*_CAMERA, *_PRECISION, *_NADIRS)
+_NUMBERS = (*_CAMERA, *_PRECISION, *_NADIRS, "sensor_w", "sensor_h")
 #: Labels people write beside the values in their own sheets.
 _LABELS = {
     "c_1": ("f1", "principal distance 1", "distanza principale 1", "kammerkonstante 1"),
@@ -51,6 +51,8 @@ class SetupValues:
     sigma_r_max: float | None = None
     nadir1: tuple[float, float] | None = None
     nadir2: tuple[float, float] | None = None
+    flag_sigmas: tuple[float, float] = (OFF_RADIAL_SIGMAS, ON_PLANE_SIGMAS)
+    sensor: tuple[float, float] | None = None
     unit: str = ""
     pair_file: str = ""
     matrices: tuple[FloatArray, FloatArray] | None = None
@@ -95,6 +97,8 @@ class SetupValues:
                 nadir2=self.nadir2 or (0.0, 0.0),
                 unit=unit,
                 sigma_r_max=self.sigma_r_max,
+                off_radial_sigmas=self.flag_sigmas[0],
+                on_plane_sigmas=self.flag_sigmas[1],
             )
         except InputError as error:
             raise InputError(f"{self.where}: {error}") from None
@@ -119,9 +123,11 @@ def read_setup(
     if book is None:
         return SetupValues(where=path.name)
     found: list[CellError] = []
+    # In the workbook of a general pair sigma_s follows from sigma_px: nothing to read.
+    columns = [c for c in _columns() if not (c.key == "sigma_s" and is_general(book))]
     values = read_named_values(
         book,
-        _columns(),
+        columns,
         sheet="Setup",
         decimal=decimal,
         errors=found,
@@ -131,7 +137,11 @@ def read_setup(
     defaults = {key for key in ("sigma_s", "sigma_r_max") if key in formulas}
     # Cells with the template's own formula are defaults, calculated or not.
     errors += [e for e in found if e.column not in formulas]
-    number = {key: _number(values, key) for key in _NUMBERS if key not in defaults}
+    number = {
+        key: _number(values, key)
+        for key in _NUMBERS
+        if key not in defaults and key in values.values
+    }
     _check_positive(values, number, errors)
     d1 = _distance(values, number, "d_1" in formulas, errors)
     nadirs = [_place(number[f"nadir_{i}_col"], number[f"nadir_{i}_row"]) for i in (1, 2)]
@@ -147,6 +157,8 @@ def read_setup(
         sigma_r_max=number.get("sigma_r_max"),
         nadir1=nadirs[0],
         nadir2=nadirs[1],
+        flag_sigmas=(number["k_off"] or OFF_RADIAL_SIGMAS, number["k_plane"] or ON_PLANE_SIGMAS),
+        sensor=_place(number["sensor_w"], number["sensor_h"]),
         unit=_unit(values, errors),
         pair_file=values.text("pair_file"),
         matrices=matrices,
@@ -154,6 +166,11 @@ def read_setup(
         where=where,
         remarks=tuple(values.remarks),
     )
+
+
+def is_general(book: SheetFile) -> bool:
+    """Whether a workbook describes a general pair by homographies."""
+    return "h1_11" in book.names
 
 
 def _columns() -> list[Column]:

@@ -37,6 +37,14 @@ FLAG_COLOURS = {
 }
 
 
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class TableContent:
+    """A table as built: its columns and their values by key."""
+
+    columns: Sequence[Column]
+    cells: Mapping[str, Sequence[CellValue]]
+
+
 @dataclass(slots=True, eq=False)
 class BookBuilder:
     """A workbook under construction with the values its formula cells will show."""
@@ -45,6 +53,7 @@ class BookBuilder:
     book: Workbook = field(default_factory=Workbook)
     results: dict[str, dict[str, CellValue]] = field(default_factory=dict)
     blocks: dict[str, RowBlock] = field(default_factory=dict)
+    tables: dict[str, TableContent] = field(default_factory=dict)
 
     def sheet(self, name: str, title: str, note: str = "") -> Worksheet:
         """Add a sheet with its title and one line of help."""
@@ -148,6 +157,7 @@ class BookBuilder:
             Write formulas as A1 references.
         """
         head, left = at
+        self.tables[name] = TableContent(columns=columns, cells=cells)
         letters = {c.key: get_column_letter(left + i) for i, c in enumerate(columns)}
         for i, column in enumerate(columns):
             above, key = sheet.cell(head - 1, left + i), sheet.cell(head, left + i)
@@ -207,6 +217,8 @@ def _number_format(column: Column) -> str:
     if column.places is not None:
         return "0." + "0" * column.places if column.places else "0"
     # Names typed as 1-2 must not turn into dates: text, but only where text is typed.
+    if column.key == "scale":
+        return '"1:"0'
     return "@" if column.kind == "input" and column.key in ("id", "code", "note") else "General"
 
 

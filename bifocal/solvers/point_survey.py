@@ -87,7 +87,15 @@ def solve_ideal(setup: SurveySetup, points: PointObservations) -> ReliefTable:
     return ReliefTable(
         ids=points.ids,
         columns=columns,
-        flags=_flags(s1, standardised, incomplete, r, sigma_r, setup.relief_limit),
+        flags=_flags(
+            s1,
+            standardised,
+            incomplete,
+            r,
+            sigma_r,
+            setup.relief_limit,
+            (setup.off_radial_sigmas, setup.on_plane_sigmas),
+        ),
         standardised=standardised,
         carried={},
         image_scale=setup.scale_number,
@@ -101,6 +109,7 @@ def solve_pair(
     sigma_px: float | None = None,
     sigma_r_max: float | None = None,
     principal_distance: float | None = None,
+    flag_sigmas: tuple[float, float] = (OFF_RADIAL_SIGMAS, ON_PLANE_SIGMAS),
 ) -> ReliefTable:
     """Solve points measured in raw pixels of any pair, tilted or offset.
 
@@ -117,6 +126,8 @@ def solve_pair(
     principal_distance : float, optional
         Of image 1, for columns in image millimetres; default the pair's own. Without one the scale
         is 1:1000, so that image millimetres read as metres on the wall. [mm]
+    flag_sigmas : tuple of float
+        Beyond how many sigma a point is OFF-RADIAL, below how many ON-PLANE.
 
     Returns
     -------
@@ -192,7 +203,7 @@ def solve_pair(
     return ReliefTable(
         ids=points.ids,
         columns=columns,
-        flags=_flags(radius, standardised, np.isnan(q), r, sigma_r, limit),
+        flags=_flags(radius, standardised, np.isnan(q), r, sigma_r, limit, flag_sigmas),
         standardised=standardised,
         carried=dict(zip(names, values, strict=True)) | {"k_q": k_q, "k_r": k_r},
         image_scale=scale_number if own else None,
@@ -229,16 +240,17 @@ def _flags(
     r: FloatArray,
     sigma_r: FloatArray,
     limit: float,
+    sigmas: tuple[float, float],
 ) -> tuple[str, ...]:
     """Return the first flag that applies, in the order of the workbook's formula."""
     with np.errstate(invalid="ignore"):
         conditions = [
             s1 == 0,
-            np.abs(standardised) > OFF_RADIAL_SIGMAS,
+            np.abs(standardised) > sigmas[0],
             incomplete,
             np.isnan(r) | (sigma_r > limit),
             sigma_r > limit / 2,
-            np.abs(r) < ON_PLANE_SIGMAS * sigma_r,
+            np.abs(r) < sigmas[1] * sigma_r,
         ]
     names = ["NADIR", "OFF-RADIAL", "CHECK", "UNCERTAIN", "WEAK", "ON-PLANE"]
     return tuple(np.select(conditions, names, default="OK").tolist())

@@ -93,6 +93,10 @@ class Solution:
         What the points of the reference plane tell.
     adjusted : bool
         Whether the set-up was corrected by it.
+    exchanged : bool
+        Whether images 1 and 2 were exchanged.
+    overridden : bool
+        Whether options took the place of what the workbook says.
     remarks : tuple of str
         What the user should know.
     """
@@ -109,6 +113,8 @@ class Solution:
     georeference: Georeference | None
     setup_check: SetupCheck | None
     adjusted: bool
+    exchanged: bool
+    overridden: bool
     remarks: tuple[str, ...]
 
     @property
@@ -142,6 +148,7 @@ def solve_file(path: Path | str, options: SolveOptions | None = None) -> Solutio
     survey = read_survey(path, options.read)
     remarks = list(survey.remarks)
     values = survey.setup.with_options(**options.setup)
+    survey = replace(survey, setup=values)
     if not len(survey.points):
         raise InputError(f"{_where(survey)}: there is no point. Fill in the measured points.")
     pair, pair_path = _pair(path, values, options, remarks)
@@ -175,6 +182,8 @@ def solve_file(path: Path | str, options: SolveOptions | None = None) -> Solutio
         georeference=world,
         setup_check=geometry.check,
         adjusted=geometry.adjusted,
+        exchanged=geometry.exchanged,
+        overridden=bool(options.setup) or options.pair is not None or geometry.new_sigma,
         remarks=tuple(dict.fromkeys(remarks)),
     )
 
@@ -190,6 +199,8 @@ class _Solved:
     sigma_px: float | None = None
     check: SetupCheck | None = None
     adjusted: bool = False
+    exchanged: bool = False
+    new_sigma: bool = False
 
     @property
     def is_pair(self) -> bool:
@@ -227,7 +238,8 @@ def _solve_general(
     remarks: list[str],
 ) -> _Solved:
     """Solve raw pixels with a pair; coordinates in millimetres are carried to pixels first."""
-    if pair.remarks:
+    exchanged = bool(pair.remarks)
+    if exchanged:
         points = points.exchanged()
     points = _as_pixels(pair, points, survey)
     sigma = options.sigma_px or values.sigma_px
@@ -253,10 +265,18 @@ def _solve_general(
         pair,
         points,
         sigma_px=sigma,
-        sigma_r_max=options.setup.get("sigma_r_max") or values.sigma_r_max,
+        sigma_r_max=values.sigma_r_max,
+        flag_sigmas=values.flag_sigmas,
     )
     return _Solved(
-        points=points, table=table, pair=pair, sigma_px=sigma, check=check, adjusted=adjusted
+        points=points,
+        table=table,
+        pair=pair,
+        sigma_px=sigma,
+        check=check,
+        adjusted=adjusted,
+        exchanged=exchanged,
+        new_sigma=sigma != values.sigma_px,
     )
 
 
@@ -360,7 +380,8 @@ def _solve_ideal(
     if remark:
         remarks.append(remark)
     refuse_wrong_unit(setup, points, _where(survey), said=survey.unit)
-    if setup.is_exchanged:
+    exchanged = setup.is_exchanged
+    if exchanged:
         remarks.append(
             f"d_1 = {setup.d1:g} m is shorter than d_2 = {setup.d2:g} m: image 1 is the near "
             "camera here (swapped images). The two were exchanged; results are right."
@@ -377,6 +398,7 @@ def _solve_ideal(
         setup=setup,
         check=check,
         adjusted=options.adjust_setup,
+        exchanged=exchanged,
     )
 
 

@@ -4,12 +4,17 @@ from __future__ import annotations
 
 import json
 import math
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from bifocal.domain.tolerances import sentence
 from bifocal.io.survey_book import write_book
 from bifocal.io.survey_content import SurveyContent
+from bifocal.io.survey_update import can_update, update_book
+from bifocal.solvers.check_points import check_points
+from bifocal.solvers.georeference import georeference
+from bifocal.solvers.point_survey import solve_ideal
 from bifocal.workflows.solve import Solution
 from bifocal.workflows.survey import log_row, relative_name
 from photocore.errors import InputError
@@ -23,8 +28,8 @@ _NUMBERS = ("r", "e1", "e2", "s_c", "X", "Y", "Z", "q", "sigma_r")
 
 def write_result(
     path: Path | str, solution: Solution, *, language: str | None = None, overwrite: bool = False
-) -> None:
-    """Write a solved survey as a workbook (.xlsx) or a text table (.csv).
+) -> str:
+    """Write a solved survey as a workbook (.xlsx, .xlsm) or a text table (.csv).
 
     Parameters
     ----------
@@ -37,6 +42,16 @@ def write_result(
     overwrite : bool
         Replace an existing file.
 
+    Returns
+    -------
+    str
+        Why the survey's own workbook was not carried over; empty where there is nothing to say.
+
+    Notes
+    -----
+    A survey workbook is carried over with all the user put into it, results filled in; any other
+    table gives a new workbook.
+
     Raises
     ------
     InputError
@@ -46,15 +61,64 @@ def write_result(
     ending = path.suffix.lower()
     if ending == ".csv":
         write_csv(path, _csv_columns(solution), overwrite=overwrite)
-        return
-    if ending != ".xlsx":
-        raise InputError(f"{path}: results are written as .xlsx or .csv.")
+        return ""
+    if ending not in (".xlsx", ".xlsm"):
+        raise InputError(f"{path}: results are written as .xlsx, .xlsm or .csv.")
     if len(solution.table) > MOST_ROWS:
         raise InputError(
             f"{path}: {len(solution.table)} points are too many for a workbook (limit {MOST_ROWS})."
             f" Write a text table instead: --out {path.with_suffix('.csv').name}"
         )
-    write_book(path, result_content(solution, path, language), overwrite=overwrite)
+    content = result_content(solution, path, language)
+    reason = _why_new(solution, path, language)
+    if not reason:
+        own = as_typed(solution, content)
+        reason = can_update(solution.source, path, solution.survey, own)
+        if not reason:
+            update_book(solution.source, path, solution.survey, own, overwrite=overwrite)
+            return ""
+    if ending == ".xlsm":
+        raise InputError(
+            f"{path}: the macros of {solution.source.name} cannot be carried over, since {reason}. "
+            "Write the result as .xlsx."
+        )
+    write_book(path, content, overwrite=overwrite)
+    return f"a new workbook was made, since {reason}." if solution.survey.is_ours else ""
+
+
+def _why_new(solution: Solution, path: Path, language: str | None) -> str:
+    """Return why the survey's own workbook cannot take the results; empty if it can."""
+    if not solution.survey.is_ours:
+        return "the points do not come from a survey workbook"
+    if solution.adjusted:
+        return "the set-up was corrected"
+    if solution.overridden:
+        return "the set-up was given by options"
+    if solution.exchanged and solution.pair is not None:
+        return "the images were exchanged"
+    if language not in (None, solution.survey.language):
+        return "another language was asked for"
+    del path
+    return ""
+
+
+def as_typed(solution: Solution, content: SurveyContent) -> SurveyContent:
+    """Return the content as the workbook's formulas see it: images in the order they were typed."""
+    if not solution.exchanged or solution.setup is None:
+        return content
+    setup, points = solution.setup.exchanged(), solution.points.exchanged()
+    table = solve_ideal(setup, points)
+    world = None
+    if solution.georeference is not None:
+        world = georeference(table, solution.survey.control, model=solution.georeference.model)
+    return replace(
+        content,
+        setup=setup,
+        points=points,
+        table=table,
+        check=check_points(table, solution.survey.known),
+        georeference=world,
+    )
 
 
 def result_content(solution: Solution, path: Path, language: str | None) -> SurveyContent:
@@ -75,6 +139,9 @@ def result_content(solution: Solution, path: Path, language: str | None) -> Surv
         control=solution.survey.control,
         georeference=solution.georeference,
         model=solution.survey.model,
+        sensor=solution.survey.setup.sensor,
+        flag_sigmas=solution.survey.setup.flag_sigmas,
+        sigma_r_max=solution.survey.setup.sigma_r_max,
         log=[log_row(what, solution.source)],
     )
 
