@@ -1,0 +1,146 @@
+"""Small tables a bathymetric survey brings: cameras, who saw what, rays, trajectory, tie points."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from photocore.arrays import FloatArray
+from photocore.errors import CellError, InputError, WorkbookError
+from photocore.tables import Column, Table, read_table
+
+_XYZ = (
+    Column("X", ("x", "x0", "xc", "east", "easting", "e"), required=True, unit="m"),
+    Column("Y", ("y", "y0", "yc", "north", "northing", "n"), required=True, unit="m"),
+    Column("Z", ("z", "z0", "zc", "height", "altitude", "elevation", "h"), required=True, unit="m"),
+)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class CameraPositions:
+    """Projection centres by name.
+
+    Attributes
+    ----------
+    ids : tuple of str
+    centres : ndarray, shape (m, 3)
+        [m]
+    """
+
+    ids: tuple[str, ...]
+    centres: FloatArray
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class RayTable:
+    """Measured rays, grouped by point.
+
+    Attributes
+    ----------
+    ids : tuple of str
+        One per point.
+    origins, directions : ndarray, shape (n, k, 3)
+        NaN for rays a point does not have.
+    """
+
+    ids: tuple[str, ...]
+    origins: FloatArray
+    directions: FloatArray
+
+
+def read_camera_positions(path: Path | str) -> CameraPositions:
+    """Read a table ``id, X, Y, Z`` of projection centres (.csv, .xlsx, .ods).
+
+    Raises
+    ------
+    InputError
+        If a column or a coordinate is missing, or a name stands twice.
+    """
+    name = Column("id", ("camera", "image", "photo", "label", "name", "file"), kind="text")
+    table = read_table(path, (name, *_XYZ))
+    errors = table.repeated("id")
+    centres = _complete(table, ("X", "Y", "Z"), errors)
+    if not len(table):
+        raise InputError(f"{path}: holds no camera.")
+    if errors:
+        raise WorkbookError(errors)
+    ids = tuple(text or str(k) for k, text in enumerate(table.texts("id"), start=1))
+    return CameraPositions(ids=ids, centres=centres)
+
+
+def read_visibility(path: Path | str) -> dict[str, set[str]]:
+    """Read a table ``point, camera``: one row per point and camera that saw it."""
+    point = Column("point", ("id", "pointid"), kind="text", required=True)
+    camera = Column("camera", ("image", "photo"), kind="text", required=True)
+    table = read_table(path, (point, camera))
+    seen: dict[str, set[str]] = {}
+    for name, photo in zip(table.texts("point"), table.texts("camera"), strict=True):
+        seen.setdefault(name, set()).add(photo)
+    return seen
+
+
+def read_rays(path: Path | str) -> RayTable:
+    """Read a table ``id, X0, Y0, Z0, DX, DY, DZ``: one row per ray, several per point.
+
+    Raises
+    ------
+    InputError
+        If a column or a number is missing.
+    """
+    columns = (
+        Column("id", ("point",), kind="text", required=True),
+        *(Column(f"{axis}0", required=True, unit="m") for axis in "XYZ"),
+        *(Column(f"D{axis}", required=True) for axis in "XYZ"),
+    )
+    table = read_table(path, columns)
+    errors: list[CellError] = []
+    origins = _complete(table, ("X0", "Y0", "Z0"), errors)
+    directions = _complete(table, ("DX", "DY", "DZ"), errors)
+    if errors:
+        raise WorkbookError(errors)
+    if not len(table):
+        raise InputError(f"{path}: holds no rays.")
+    ids, point, counts = np.unique(table.texts("id"), return_inverse=True, return_counts=True)
+    # Points in the order of their first ray, rays in the order of the file.
+    first = np.full(len(ids), len(point))
+    np.minimum.at(first, point, np.arange(len(point)))
+    rank = np.empty(len(ids), dtype=np.int64)
+    rank[np.argsort(first)] = np.arange(len(ids))
+    order = np.argsort(point, kind="stable")
+    slot = np.empty(len(point), dtype=np.int64)
+    slot[order] = np.arange(len(point)) - np.repeat(np.cumsum(counts) - counts, counts)
+    shape = (len(ids), int(counts.max()), 3)
+    grid_origins, grid_directions = np.full(shape, np.nan), np.full(shape, np.nan)
+    grid_origins[rank[point], slot] = origins
+    grid_directions[rank[point], slot] = directions
+    names = tuple(str(name) for name in ids[np.argsort(rank)])
+    return RayTable(ids=names, origins=grid_origins, directions=grid_directions)
+
+
+def read_trajectory(path: Path | str) -> tuple[FloatArray, FloatArray]:
+    """Read a table ``time, X, Y, Z`` of sensor positions; times (k,) ascending, positions (k, 3).
+
+    Raises
+    ------
+    InputError
+        If the times do not increase.
+    """
+    columns = (Column("time", ("gps_time", "t"), required=True, unit="s"), *_XYZ)
+    table = read_table(path, columns)
+    errors: list[CellError] = []
+    rows = _complete(table, ("time", "X", "Y", "Z"), errors)
+    if errors:
+        raise WorkbookError(errors)
+    if len(rows) < 2 or not (np.diff(rows[:, 0]) > 0).all():
+        raise InputError(f"{path}: needs at least two rows whose times increase.")
+    return rows[:, 0], rows[:, 1:]
+
+
+def _complete(table: Table, keys: tuple[str, ...], errors: list[CellError]) -> FloatArray:
+    """Return columns of numbers, (n, k); a blank or infinite cell becomes a complaint."""
+    values = np.column_stack([table.numbers(key) for key in keys])
+    for row, column in np.argwhere(~np.isfinite(values)):
+        errors.append(table.error(int(row), keys[column], "is blank; expected a number."))
+    return values

@@ -1,0 +1,89 @@
+"""A water surface from what the user gives: a height, a raster, a mesh or a fitted level."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from multimedia.domain.bathymetry import WaterSurface
+from multimedia.domain.height_field import RasterSurface
+from multimedia.domain.mesh_surface import MeshSurface
+from multimedia.domain.surfaces import Plane
+from multimedia.io.cloud_ply import read_ply_mesh
+from multimedia.io.dem import Dem, Window
+from photocore.errors import InputError
+from photocore.jsonfile import read_object
+
+FORMAT = "multimedia-waterlevel/1"
+#: A water surface of more cells is coarser than it looks: averaging it down loses nothing.
+MOST_CELLS = 25_000_000
+
+
+def read_water_surface(given: str, *, crs: Any = None) -> WaterSurface:
+    """Return the surface that a number or a file describes.
+
+    Parameters
+    ----------
+    given : str
+        A height [m]; or a raster (.tif), a triangle mesh (.ply), or the result of
+        ``multimedia waterlevel --out`` (.json).
+    crs : object, optional
+        Reference system of the data; a raster in another one is refused.
+
+    Raises
+    ------
+    InputError
+        If it is neither.
+    """
+    try:
+        height = float(given.replace(",", "."))
+    except ValueError:
+        height = None
+    if height is not None:
+        if not np.isfinite(height):
+            raise InputError(f"water level: {given} is no height; give metres.")
+        return Plane.level(height)
+    path = Path(given)
+    kind = path.suffix.lower()
+    if kind not in (".tif", ".tiff", ".ply", ".json"):
+        raise InputError(
+            f"water level: {given!r} is neither a height in metres nor a .tif raster, .ply mesh or "
+            ".json of `multimedia waterlevel`. A decimal point, no unit: 1.8075."
+        )
+    if kind == ".json":
+        return _read_fitted(path)
+    if kind == ".ply":
+        if not path.is_file():
+            raise InputError(f"{path}: no such water surface.")
+        vertices, triangles = read_ply_mesh(path)
+        return MeshSurface(vertices=vertices, triangles=triangles)
+    with Dem(path) as raster:
+        if crs is not None and raster.crs is not None and raster.crs != crs:
+            raise InputError(
+                f"{path}: the water surface is in another coordinate reference system than the "
+                "data; transform one of them first."
+            )
+        if raster.width * raster.height > MOST_CELLS:
+            raise InputError(
+                f"{path}: {raster.width} x {raster.height} cells; average the water surface down "
+                f"to at most {MOST_CELLS / 1e6:g} million (waves are metres long, not millimetres)."
+            )
+        heights = raster.read(Window(0, 0, raster.width, raster.height))
+        return RasterSurface(raster=heights, xy_from_cell=raster.xy_from_cell)
+
+
+def _read_fitted(path: Path) -> Plane:
+    value = read_object(path, what="water level file")
+    try:
+        level, (x, y) = float(value["level"]), value["centre"]
+        slope_x, slope_y = value["slope"]
+        return Plane(
+            point=(float(x), float(y), level),  # type: ignore[arg-type]
+            normal=(-float(slope_x), -float(slope_y), 1.0),  # type: ignore[arg-type]
+        )
+    except (KeyError, TypeError, ValueError):
+        raise InputError(
+            f"{path}: expected level, slope and centre, as `multimedia waterlevel` writes them."
+        ) from None

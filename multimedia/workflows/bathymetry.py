@@ -1,0 +1,503 @@
+"""Refraction correction of files: DEM or point cloud in, the same corrected out."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from multimedia.domain.bathymetry import (
+    BathymetryStatus,
+    CorrectedPoints,
+    Precision,
+    WaterSurface,
+    checked_index,
+    height_of,
+)
+from multimedia.domain.surfaces import Plane
+from multimedia.io.clouds import MARK, Chunk, Cloud, open_cloud
+from multimedia.io.dem import Dem, Window
+from multimedia.io.survey_tables import (
+    CameraPositions,
+    read_camera_positions,
+    read_rays,
+    read_trajectory,
+    read_visibility,
+)
+from multimedia.io.water_surfaces import read_water_surface
+from multimedia.solvers.bathymetry import correct_bathymetry
+from multimedia.solvers.refracted_rays import correct_lidar_beams, intersect_refracted_rays
+from multimedia.solvers.regrid import pull_back
+from photocore.arrays import BoolArray, FloatArray
+from photocore.console import Progress, no_progress
+from photocore.errors import GeometryError, InputError
+from photocore.output import atomic_path, check_writable
+from photocore.tables import write_csv
+
+#: Side of the windows in which a DEM is corrected: 8 MB of heights. [cells]
+WINDOW = 1024
+#: Widest planimetric shift that is followed across a window's edge. [cells]
+WIDEST_MARGIN = 4096
+#: Deeper than any photo sees: most likely millimetres. [m]
+DEEPEST = 200.0
+#: Lengths that differ by more than this are most likely in different units.
+MIXED_UNITS = 1000.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Job:
+    """What `correct_file` is asked to do.
+
+    Attributes
+    ----------
+    source, target : Path
+    water_level : str
+        A height [m] or a file, see `read_water_surface`.
+    index : float
+    cameras, visibility, trajectory : Path or None
+        Camera positions; who saw what; sensor positions over time (lidar).
+    max_angle : float or None
+        A camera sees a point only within this angle from the vertical. [rad]
+    precision : Precision
+    group_index : float or None
+    beams : bool
+        The points are lidar echoes with columns X0, Y0, Z0 or a trajectory.
+    rays : bool
+        The source is a table of measured rays.
+    sigma_direction : float
+        Of measured rays. [rad]
+    nodata : float or None
+    allow_dry : bool
+        Accept data without a single point under water.
+    overwrite : bool
+    """
+
+    source: Path
+    target: Path
+    water_level: str
+    index: float
+    cameras: Path | None = None
+    visibility: Path | None = None
+    trajectory: Path | None = None
+    max_angle: float | None = None
+    precision: Precision = field(default_factory=Precision)
+    group_index: float | None = None
+    beams: bool = False
+    rays: bool = False
+    sigma_direction: float = 1e-4
+    nodata: float | None = None
+    allow_dry: bool = False
+    overwrite: bool = False
+
+
+@dataclass(slots=True)
+class Outcome:
+    """What was done, for the user.
+
+    Attributes
+    ----------
+    counts : dict of str to int
+        Points per treatment.
+    max_depth, mean_change : float
+        Largest true depth and mean change of Z under water. [m]
+    lowest, highest : float
+        Range of the given heights. [m]
+    remarks : list of str
+    """
+
+    counts: dict[str, int] = field(default_factory=dict)
+    max_depth: float = 0.0
+    mean_change: float = 0.0
+    lowest: float = np.inf
+    highest: float = -np.inf
+    remarks: list[str] = field(default_factory=list)
+    _sum: float = 0.0
+    _wet: int = 0
+
+    def add(self, given: FloatArray, result: CorrectedPoints) -> None:
+        """Count a piece."""
+        for status in BathymetryStatus:
+            count = int((result.status == status).sum())
+            if count:
+                self.counts[status.label] = self.counts.get(status.label, 0) + count
+        finite = given[..., 2][np.isfinite(given[..., 2])]
+        if finite.size:
+            self.lowest = min(self.lowest, float(finite.min()))
+            self.highest = max(self.highest, float(finite.max()))
+        wet = np.isin(result.status, (BathymetryStatus.NADIR, BathymetryStatus.RAYS))
+        if wet.any():
+            self._wet += int(wet.sum())
+            self._sum += float((result.xyz - given)[..., 2][wet].sum())
+            self.mean_change = self._sum / self._wet
+            self.max_depth = max(self.max_depth, float(result.depth[wet].max()))
+
+    def judge(self, surface: WaterSurface, *, allow_dry: bool) -> None:
+        """Raise GeometryError when nothing lies under water; note what looks like millimetres."""
+        if not self._wet and not allow_dry:
+            level = _typical_level(surface)
+            hint = ""
+            if 0 < self.lowest / 2 <= 1000 * level <= 2 * self.highest:
+                hint = " The heights look like millimetres, the water level like metres."
+            raise GeometryError(
+                f"no point lies under the water surface: heights {self.lowest:g} to "
+                f"{self.highest:g}, water level {level:g}.{hint} Check level and unit, or say "
+                "--allow-dry if that is right."
+            )
+        span = self.highest - self.lowest
+        if self.max_depth > DEEPEST and 0 < span < self.max_depth / MIXED_UNITS:
+            raise GeometryError(
+                f"the water level {_typical_level(surface):g} lies {self.max_depth:g} above "
+                f"heights that span only {span:g}: are they in different units (mm and m)?"
+            )
+        if self.max_depth > DEEPEST:
+            self.remarks.append(
+                f"The deepest point lies {self.max_depth:.0f} m under water, deeper than photos "
+                "see: are the heights in millimetres, or is the water level wrong?"
+            )
+        failed = self.counts.get(BathymetryStatus.FAILED.label, 0)
+        if failed:
+            self.remarks.append(f"{failed} points could not be corrected and are marked so.")
+        outside = self.counts.get(BathymetryStatus.NO_SURFACE.label, 0)
+        if outside:
+            self.remarks.append(
+                f"{outside} points lie outside the modelled water surface and were left as given."
+            )
+
+
+def correct_file(job: Job, *, progress: Progress = no_progress) -> Outcome:
+    """Correct a DEM, a point cloud, lidar echoes or measured rays, as the job says.
+
+    Raises
+    ------
+    InputError, GeometryError
+        If anything is wrong with the data; the target is then not written.
+    """
+    check_writable(job.target, overwrite=job.overwrite)
+    checked_index(job.index)
+    if job.source.resolve() == job.target.resolve():
+        raise InputError(f"{job.target}: is the input itself; name another file for --out.")
+    if job.rays:
+        return _correct_rays(job)
+    if job.source.suffix.lower() in (".tif", ".tiff"):
+        return _correct_dem(job, progress)
+    return _correct_cloud(job, progress)
+
+
+def _correct_cloud(job: Job, progress: Progress) -> Outcome:
+    """Correct a point cloud piece by piece."""
+    cloud = open_cloud(job.source)
+    if job.target.suffix.lower() != job.source.suffix.lower():
+        raise InputError(
+            f"{job.target}: a {job.source.suffix} cloud is written as {job.source.suffix}, with "
+            "every attribute kept; give --out the same ending."
+        )
+    if cloud.has(MARK):
+        raise InputError(
+            f"{job.source}: has an attribute '{MARK}', so it has been corrected already. Correct "
+            "the original, or remove the attribute."
+        )
+    surface = read_water_surface(job.water_level)
+    outcome = Outcome(remarks=list(cloud.remarks))
+    correct = _corrector(job, cloud, surface, outcome)
+    sigmas = ("sigma_X", "sigma_Y", "sigma_Z") if job.precision.is_given and not job.beams else ()
+    spoken = job.source.suffix.lower() not in (".ply", ".las", ".laz")
+    numbers = ("X0", "Y0", "Z0", "gps_time") if job.beams else ()
+    texts = ("id", "cameras") if job.cameras else ()
+    done = 0
+    with (
+        atomic_path(job.target, overwrite=job.overwrite) as temporary,
+        cloud.writer(temporary, (MARK, "water_depth", *sigmas)) as writer,
+    ):
+        for chunk in cloud.chunks(numbers=numbers, texts=texts):
+            result = correct(chunk)
+            outcome.add(chunk.xyz, result)
+            status: Any = result.status
+            if spoken:
+                status = [BathymetryStatus(int(code)).label for code in result.status]
+            extra = {MARK: status, "water_depth": result.depth}
+            if sigmas and result.sigma is not None:
+                extra |= dict(zip(sigmas, result.sigma.T, strict=True))
+            writer.write(chunk, result.xyz, extra)
+            done += len(chunk.xyz)
+            progress(done, done + 1, f"{done} points")
+        outcome.judge(surface, allow_dry=job.allow_dry)
+    return outcome
+
+
+def _corrector(
+    job: Job, cloud: Cloud, surface: WaterSurface, outcome: Outcome
+) -> Callable[[Chunk], CorrectedPoints]:
+    """Return the function that corrects one piece of a cloud."""
+    if job.beams:
+        sensor = _sensor_positions(job, cloud)
+        return lambda chunk: correct_lidar_beams(
+            sensor(chunk),
+            chunk.xyz,
+            water_level=surface,
+            index=job.index,
+            group_index=job.group_index,
+        )
+    if job.cameras is None:
+        return lambda chunk: correct_bathymetry(
+            chunk.xyz, water_level=surface, index=job.index, precision=job.precision
+        )
+    cameras = read_camera_positions(job.cameras)
+    pairs = read_visibility(job.visibility) if job.visibility else None
+    if pairs is not None:
+        _check_pairs(pairs, cameras, job)
+        if not cloud.has("id"):
+            raise InputError(f"{job.source}: --visibility needs a column id in the point cloud.")
+    elif not cloud.has("cameras") and job.max_angle is None:
+        outcome.remarks.append(
+            "Nothing says which camera saw which point; every camera is taken to see every point. "
+            "--visibility, a column 'cameras' or --max-angle do better."
+        )
+
+    def correct(chunk: Chunk) -> CorrectedPoints:
+        _check_camera_unit(chunk.xyz, cameras.centres, job)
+        return correct_bathymetry(
+            chunk.xyz,
+            water_level=surface,
+            index=job.index,
+            cameras=cameras.centres,
+            visible=_visible(chunk, cameras, pairs, job),
+            precision=job.precision,
+        )
+
+    return correct
+
+
+def _visible(
+    chunk: Chunk, cameras: CameraPositions, pairs: Mapping[str, set[str]] | None, job: Job
+) -> BoolArray:
+    """Return which camera saw which point: by table, by column, by angle, or all."""
+    seen = np.ones((len(chunk.xyz), len(cameras.ids)), dtype=bool)
+    if pairs is not None:
+        sets = [pairs.get(name, set()) for name in chunk.texts["id"]]
+        seen = np.array([[camera in names for camera in cameras.ids] for names in sets])
+    elif "cameras" in chunk.texts:
+        place = {name: k for k, name in enumerate(cameras.ids)}
+        seen[:] = False
+        for number, text in enumerate(chunk.texts["cameras"]):
+            names = text.replace(";", " ").replace(",", " ").replace("|", " ").split()
+            unknown = [name for name in names if name not in place]
+            if unknown:
+                raise InputError(
+                    f"{job.source}: point {number + 1} names camera {unknown[0]!r}, which is not "
+                    f"in {job.cameras}."
+                )
+            seen[number, [place[name] for name in names]] = True
+    if job.max_angle is not None:
+        seen &= _within_angle(chunk.xyz, cameras.centres, job.max_angle)
+    return seen
+
+
+def _within_angle(points: FloatArray, centres: FloatArray, angle: float) -> BoolArray:
+    """Return whether each camera sees each point within an angle from the vertical, (n, m)."""
+    offset = centres - points[..., None, :]
+    aside = np.hypot(offset[..., 0], offset[..., 1])
+    inside: BoolArray = aside <= np.tan(angle) * offset[..., 2]
+    return inside
+
+
+def _check_camera_unit(points: FloatArray, centres: FloatArray, job: Job) -> None:
+    """Raise GeometryError for cameras in millimetres over points in metres."""
+    plan = points[np.isfinite(points).all(-1), :2]
+    extent = float(np.ptp(plan, axis=0).max()) if len(plan) else 0.0
+    height = float(np.median(centres[:, 2]) - np.nanmedian(points[:, 2]))
+    if 0 < MIXED_UNITS * extent < height:
+        raise GeometryError(
+            f"{job.cameras}: the cameras are {height:g} above points that cover only {extent:g}: "
+            "are cameras and points in different units (mm and m)?"
+        )
+
+
+def _check_pairs(pairs: Mapping[str, set[str]], cameras: CameraPositions, job: Job) -> None:
+    """Raise InputError for cameras that only one of the tables knows."""
+    unknown = sorted(set().union(*pairs.values()) - set(cameras.ids))
+    if unknown:
+        raise InputError(
+            f"{job.visibility}: camera {unknown[0]!r} is not in {job.cameras}"
+            f"{f' (and {len(unknown) - 1} more)' if len(unknown) > 1 else ''}."
+        )
+
+
+def _sensor_positions(job: Job, cloud: Cloud) -> Callable[[Chunk], FloatArray]:
+    """Return the function that finds where the sensor was for the points of a piece."""
+    if job.trajectory is None:
+        if not all(cloud.has(name) for name in ("X0", "Y0", "Z0")):
+            raise InputError(
+                f"{job.source}: lidar beams need the sensor position of each point: columns X0, Y0 "
+                "and Z0, or --trajectory with times."
+            )
+        return lambda chunk: np.column_stack([chunk.numbers[n] for n in ("X0", "Y0", "Z0")])
+    if not cloud.has("gps_time"):
+        raise InputError(f"{job.source}: --trajectory needs a time (gps_time) for each point.")
+    times, positions = read_trajectory(job.trajectory)
+
+    def at_time(chunk: Chunk) -> FloatArray:
+        when = chunk.numbers["gps_time"]
+        if when.min() < times[0] or when.max() > times[-1]:
+            raise InputError(
+                f"{job.trajectory}: covers times {times[0]:g} to {times[-1]:g}, the points need "
+                f"{when.min():g} to {when.max():g}."
+            )
+        return np.column_stack([np.interp(when, times, positions[:, k]) for k in range(3)])
+
+    return at_time
+
+
+def _correct_dem(job: Job, progress: Progress) -> Outcome:
+    """Correct an elevation model window by window."""
+    if job.target.suffix.lower() not in (".tif", ".tiff"):
+        raise InputError(f"{job.target}: a DEM is written as .tif.")
+    if job.beams or job.visibility:
+        raise InputError(
+            f"{job.source}: cells of a DEM have no beams and no names; --beams, --trajectory and "
+            "--visibility are for point clouds."
+        )
+    with Dem(job.source, nodata=job.nodata) as dem:
+        if "REFRACTION_INDEX" in dem.tags:
+            raise InputError(f"{job.source}: has been corrected for refraction already.")
+        surface = read_water_surface(job.water_level, crs=dem.crs)
+        if not dem.has_position and (job.cameras is not None or _varies(surface)):
+            raise InputError(
+                f"{job.source}: has no position (no geotransform), so its cells cannot be related "
+                "to cameras or to a water surface; georeference it first."
+            )
+        centres = None
+        outcome = Outcome()
+        if job.cameras is not None:
+            if dem.is_geographic:
+                raise InputError(
+                    f"{job.source}: its cells are in degrees, but rays need metres; transform it "
+                    "to a projected reference system."
+                )
+            centres = read_camera_positions(job.cameras).centres
+            if job.max_angle is None:
+                outcome.remarks.append(
+                    "Every camera is taken to see every cell; --max-angle limits that."
+                )
+        tags = {"REFRACTION_INDEX": f"{job.index:g}", "REFRACTION_WATER_LEVEL": job.water_level}
+        bands = ("height", "sigma") if job.precision.is_given else ("height",)
+        windows = list(dem.windows(WINDOW))
+        with (
+            atomic_path(job.target, overwrite=job.overwrite) as temporary,
+            dem.writer(temporary, bands=bands, tags=tags) as write,
+        ):
+            for number, window in enumerate(windows, start=1):
+                write(window, _correct_window(job, dem, window, surface, centres, outcome))
+                progress(number, len(windows), "DEM windows")
+            outcome.judge(surface, allow_dry=job.allow_dry)
+        outcome.remarks[:0] = dem.remarks
+    return outcome
+
+
+def _correct_window(
+    job: Job,
+    dem: Dem,
+    window: Window,
+    surface: WaterSurface,
+    centres: FloatArray | None,
+    outcome: Outcome,
+) -> FloatArray:
+    """Return the bands of one window, shape (bands, height, width)."""
+    margin = 0
+    while True:
+        wide = Window(
+            window.column - margin,
+            window.row - margin,
+            window.width + 2 * margin,
+            window.height + 2 * margin,
+        )
+        given = np.concatenate([dem.positions(wide), dem.read(wide)[..., None]], axis=-1)
+        known = np.isfinite(given[..., 2])
+        points = given[known]
+        visible = None
+        if centres is not None and job.max_angle is not None:
+            visible = _within_angle(points, centres, job.max_angle)
+        result = correct_bathymetry(
+            points,
+            water_level=surface,
+            index=job.index,
+            cameras=centres,
+            visible=visible,
+            precision=job.precision,
+        )
+        move = np.full((*known.shape, 2), np.nan)
+        move[known] = (result.xyz - points)[:, :2] @ np.linalg.inv(dem.xy_from_cell[:, :2]).T
+        reach = int(np.ceil(np.nanmax(np.abs(move), initial=0.0)))
+        needed = reach + 2 if reach else 0
+        if needed <= margin or centres is None:
+            break
+        if needed > WIDEST_MARGIN:
+            raise GeometryError(
+                f"{job.source}: the correction would move cells by {reach} cells; are cameras and "
+                "DEM in the same unit and reference system?"
+            )
+        margin = needed
+    layers = [result.xyz[:, 2]]
+    if result.sigma is not None:
+        layers.append(result.sigma[:, 2])
+    bands = np.full((len(layers), *known.shape), np.nan)
+    for band, values in zip(bands, layers, strict=True):
+        band[known] = values
+    if centres is not None:
+        bands = pull_back(bands, move)
+    inner = (slice(margin, margin + window.height), slice(margin, margin + window.width))
+    own = np.zeros_like(known)
+    own[inner] = True
+    counted = own[known]
+    outcome.add(
+        points[counted],
+        CorrectedPoints(
+            xyz=result.xyz[counted], depth=result.depth[counted], status=result.status[counted]
+        ),
+    )
+    return bands[:, *inner]
+
+
+def _correct_rays(job: Job) -> Outcome:
+    """Refract and intersect a table of measured rays."""
+    if job.target.suffix.lower() != ".csv":
+        raise InputError(f"{job.target}: intersected rays are written as .csv.")
+    table = read_rays(job.source)
+    surface = read_water_surface(job.water_level)
+    found = intersect_refracted_rays(
+        table.origins,
+        table.directions,
+        water_level=surface,
+        index=job.index,
+        sigma_direction=job.sigma_direction,
+    )
+    outcome = Outcome()
+    depth = np.maximum(height_of(surface, found.xyz[:, :2]) - found.xyz[:, 2], 0.0)
+    result = CorrectedPoints(xyz=found.xyz, depth=depth, status=found.status)
+    outcome.add(found.xyz, result)
+    outcome.judge(surface, allow_dry=job.allow_dry)
+    columns: dict[str, Any] = {"id": list(table.ids)}
+    columns |= dict(zip("XYZ", found.xyz.T, strict=True))
+    columns |= dict(zip(("sigma_X", "sigma_Y", "sigma_Z"), found.sigma.T, strict=True))
+    columns |= {
+        "misfit": found.misfit,
+        "rays": found.rays,
+        MARK: [BathymetryStatus(int(code)).label for code in found.status],
+        "water_depth": depth,
+    }
+    write_csv(job.target, columns, overwrite=job.overwrite)
+    return outcome
+
+
+def _varies(surface: WaterSurface) -> bool:
+    """Return whether the water is anything but level."""
+    return not (isinstance(surface, Plane) and abs(surface.normal[2]) == 1.0)
+
+
+def _typical_level(surface: WaterSurface) -> float:
+    """Return one height of the surface, for messages."""
+    if isinstance(surface, Plane):
+        return float(surface.point[2])
+    return (surface.lowest + surface.highest) / 2

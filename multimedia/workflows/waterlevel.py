@@ -1,0 +1,76 @@
+"""Mean water height from a file of tie points."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from multimedia.io.clouds import open_cloud
+from multimedia.io.water_surfaces import FORMAT
+from multimedia.solvers.water_surface import WaterLevel, mean_water_level
+from photocore.errors import InputError
+from photocore.jsonfile import write_object
+from photocore.output import check_writable
+
+#: A level whose standard deviation exceeds this is no level of a lab or a river: millimetres? [m]
+COARSEST = 1.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FittedLevel:
+    """A water level with what the user should know."""
+
+    water: WaterLevel
+    remarks: list[str] = field(default_factory=list)
+
+    def as_dict(self) -> dict[str, object]:
+        """Return the numbers, as printed and as written to the file."""
+        water = self.water
+        return {
+            "format": FORMAT,
+            "level": water.level,
+            "sigma": water.sigma,
+            "spread": water.spread,
+            "points": int(water.used.sum()),
+            "rejected_below": water.below,
+            "rejected_above": water.above,
+            "slope": water.slope,
+            "slope_sigma": water.slope_sigma,
+            "centre": water.centre,
+        }
+
+
+def fit_water_level(
+    source: Path,
+    *,
+    tilted: bool = False,
+    spread: float | None = None,
+    target: Path | None = None,
+    overwrite: bool = False,
+) -> FittedLevel:
+    """Estimate the water level from tie points and write it to a file where asked for.
+
+    Raises
+    ------
+    InputError, GeometryError
+        If the file cannot be read or shows no water surface.
+    """
+    if target is not None:
+        check_writable(target, overwrite=overwrite)
+        if target.suffix.lower() != ".json":
+            raise InputError(f"{target}: a water level is written as .json.")
+    cloud = open_cloud(source)
+    points = np.concatenate([chunk.xyz for chunk in cloud.chunks()])
+    fitted = FittedLevel(
+        water=mean_water_level(points, tilted=tilted, spread=spread), remarks=list(cloud.remarks)
+    )
+    if fitted.water.spread > COARSEST:
+        fitted.remarks.append(
+            f"A surface point scatters by {fitted.water.spread:.3g} m; are the heights in "
+            "millimetres?"
+        )
+    if target is not None:
+        write_object(target, fitted.as_dict(), overwrite=overwrite)
+    return fitted
