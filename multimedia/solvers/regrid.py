@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from photocore.arrays import BoolArray, FloatArray
+from photocore.arrays import FloatArray
 
 #: Steps of the fixed point; the shift of neighbouring cells differs by a few per cent of a cell.
 STEPS = 6
@@ -37,15 +37,15 @@ def pull_back(values: FloatArray, move: FloatArray) -> FloatArray:
     """
     rows, columns = move.shape[:2]
     home = np.stack(np.meshgrid(np.arange(columns), np.arange(rows)), axis=-1).astype(np.float64)
-    known: BoolArray = np.isfinite(move).all(axis=-1)
+    known = np.asarray(np.isfinite(move).all(axis=-1))
     if not np.nan_to_num(move).any():
         return values
     place = home.copy()
     for _ in range(STEPS):
         shift = _bilinear(np.moveaxis(move, -1, 0), place)
-        place = np.where(
-            np.isfinite(shift).all(0)[..., None], home - np.moveaxis(shift, 0, -1), place
-        )
+        source = home - np.moveaxis(shift, 0, -1)
+        found = np.asarray(np.isfinite(source).all(axis=-1))
+        place = np.where(found[..., None], source, place)
     pulled = _bilinear(values, place)
     return np.where(np.isfinite(pulled), pulled, np.where(known, values, np.nan))
 
