@@ -2,47 +2,45 @@
 
 from __future__ import annotations
 
-import tempfile
-from collections.abc import Sequence
-from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import ArrayLike
-from openpyxl import Workbook
 from openpyxl.formatting.rule import FormulaRule
-from openpyxl.styles import Alignment, Border, Font, PatternFill, Side
+from openpyxl.styles import Alignment, Font, PatternFill
 from openpyxl.utils import get_column_letter
-from openpyxl.workbook.defined_name import DefinedName
-from openpyxl.worksheet.datavalidation import DataValidation
 from openpyxl.worksheet.table import Table, TableFormula, TableStyleInfo
-from openpyxl.worksheet.worksheet import Worksheet
 
 from multimedia.domain.shift_points import ShiftPoints, ShiftSetup
-from multimedia.unrolled import STEPS, TOLERANCE, unrolled_shift
-from multimedia.water import (
-    QUAN_FRY,
-    salinity_from_index,
-    water_index_derivatives,
-    water_refractive_index,
+from multimedia.io.index_sheet import write_index_sheet
+from multimedia.io.live_book import (
+    BOLD,
+    HEAD,
+    INPUT,
+    NOTE,
+    SMALL,
+    LiveBook,
+    allow_between,
+    headings,
 )
+from multimedia.unrolled import STEPS, TOLERANCE, unrolled_shift
 from photocore.errors import InputError
 from photocore.output import check_writable
 from photocore.spreadsheet.cellxml import CellInput
-from photocore.spreadsheet.editor import WorkbookEditor
 
 #: More rows make a workbook that is slow to open; text tables have no limit.
 MOST_ROWS = 20_000
 
-_INPUT = PatternFill("solid", start_color="FFF9DB", end_color="FFF9DB")
-_HEAD = PatternFill("solid", start_color="DCE6F1", end_color="DCE6F1")
-_EDGE = Border(*(Side(style="hair", color="BFBFBF"),) * 4)
-_FORMULA, _TITLE, _BOLD = Font(color="1F3FA8"), Font(bold=True, size=14), Font(bold=True)
-_SMALL, _NOTE = Font(size=9), Font(italic=True, color="595959")
 _FLAGS = {
     "OK": ("E2F0D9", "1E5B12"),
     "CHECK": ("E4DFEC", "3F2A63"),
     "DRY": ("FCE4D6", "9C3D00"),
+}
+
+_WORDS = {
+    "z_0": "distance from the camera's centre to the first interface",
+    "X_0": "X of the camera",
+    "Y_0": "Y of the camera",
 }
 
 _README = (
@@ -71,60 +69,6 @@ _README = (
     "n_w = 1.338 + 4e-5 (486 + 0.003 d + 50 S - wavelength - T): Höhle 1971; Maas 2015, Eq. (4). "
     "Salinity S in per cent: sea water 3.5.",
 )
-
-
-@dataclass(slots=True, eq=False)
-class _Book:
-    """A workbook under construction, with the values its formulas will show."""
-
-    book: Workbook = field(default_factory=Workbook)
-    results: list[tuple[str, int, int, CellInput]] = field(default_factory=list)
-    inputs: list[tuple[str, int, int, float]] = field(default_factory=list)
-
-    def sheet(self, name: str, title: str, note: str, *, first: bool = False) -> Worksheet:
-        sheet: Worksheet = self.book.active if first else self.book.create_sheet()
-        sheet.title = name
-        sheet["A1"], sheet["A1"].font = title, _TITLE
-        sheet["A2"], sheet["A2"].font = note, _NOTE
-        sheet.sheet_view.showGridLines = False
-        sheet.page_setup.paperSize = 9  # A4
-        sheet.page_setup.orientation = "landscape"
-        sheet.sheet_properties.pageSetUpPr.fitToPage = True
-        sheet.page_setup.fitToHeight = 0
-        sheet.oddFooter.left.text, sheet.oddFooter.right.text = "&F · &A", "&P / &N"
-        return sheet
-
-    def formula(self, sheet: Worksheet, row: int, column: int, text: str, value: CellInput) -> None:
-        cell = sheet.cell(row, column, f"={text}")
-        cell.font = _FORMULA
-        self.results.append((sheet.title, row, column, value))
-
-    def typed(self, sheet: Worksheet, row: int, column: int, value: CellInput) -> None:
-        cell = sheet.cell(row, column)
-        if value is not None and value == value:
-            cell.value = value
-            if isinstance(value, str):
-                cell.data_type = "s"  # a name like =A1 is a name, not a formula
-            elif float(f"{value:.16g}") != value:
-                self.inputs.append((sheet.title, row, column, float(value)))
-        cell.fill, cell.border = _INPUT, _EDGE
-
-    def name(self, name: str, sheet: Worksheet, row: int, column: int) -> None:
-        place = f"'{sheet.title}'!${get_column_letter(column)}${row}"
-        self.book.defined_names[name] = DefinedName(name, attr_text=place)
-
-    def save(self, path: Path, *, overwrite: bool) -> None:
-        """Write the workbook, then put the values into its formula cells."""
-        check_writable(path, overwrite=overwrite)
-        with tempfile.TemporaryDirectory() as folder:
-            plain = Path(folder) / "plain.xlsx"
-            self.book.save(plain)
-            editor = WorkbookEditor(plain)
-            for title, row, column, number in self.inputs:  # openpyxl writes 16 digits only
-                editor.set_value(title, row, column, number)
-            for title, row, column, value in self.results:
-                editor.set_result(title, row, column, value)
-            editor.save(path, overwrite=overwrite)
 
 
 def write_shift_workbook(
@@ -170,16 +114,16 @@ def write_shift_workbook(
             f"{path}: {count} rows; a workbook may have 1 to {MOST_ROWS}. Write a .csv file."
         )
     check_writable(path, overwrite=overwrite)
-    book = _Book()
+    book = LiveBook()
     readme = book.sheet("Readme", "Photogrammetry through water", "", first=True)
     readme.column_dimensions["A"].width = 110
     for row, line in enumerate(_README, start=3):
         cell = readme.cell(row, 1, line.lstrip("#"))
         cell.alignment = Alignment(wrap_text=True, vertical="top")
-        cell.font = _BOLD if line.startswith("#") else Font()
+        cell.font = BOLD if line.startswith("#") else Font()
         # openpyxl cannot ask for automatic heights; LibreOffice and Excel wrap at about 115 signs.
         readme.row_dimensions[row].height = 15 * (1 + len(line) // 115)
-    index = _refractive_index(book)
+    index = write_index_sheet(book)
     setup_rows = _media(book, setup, index if points is None else None)
     if points is None:
         media = ShiftSetup(
@@ -199,90 +143,7 @@ def write_shift_workbook(
     book.save(path, overwrite=overwrite)
 
 
-def _refractive_index(book: _Book) -> float:
-    """Write the sheet of the refractive index; return the index it shows."""
-    sheet = book.sheet(
-        "RefractiveIndex",
-        "Refractive index of water",
-        "Fill in the yellow cells; salinity in per cent (sea water 3.5).",
-    )
-    sheet.column_dimensions["A"].width, sheet.column_dimensions["B"].width = 18, 66
-    sheet.column_dimensions["C"].width, sheet.column_dimensions["D"].width = 14, 10
-    given = {
-        "wavelength_nm": (550.0, "Wavelength; blue 460, green 550, red 620", "nm", (180, 1200)),
-        "temperature_c": (
-            20.0,
-            "Water temperature; the formulas hold from 0 to 30",
-            "°C",
-            (-5, 100),
-        ),
-        "salinity_percent": (
-            0.0,
-            "Salinity; sea water 3.5 (per cent)",
-            "%",
-            (0, 30),
-        ),
-        "depth_m": (0.0, "Water depth", "m", (0, 11000)),
-    }
-    _headings(sheet, 4, ("name", "description", "value", "unit"))
-    for row, (name, (value, words, unit, limits)) in enumerate(given.items(), start=5):
-        sheet.cell(row, 1, name)
-        sheet.cell(row, 2, words)
-        sheet.cell(row, 4, unit)
-        book.typed(sheet, row, 3, value)
-        book.name(name, sheet, row, 3)
-        _between(sheet, f"C{row}", limits, words)
-    nm, celsius = given["wavelength_nm"][0], given["temperature_c"][0]
-    slopes = water_index_derivatives(
-        wavelength_nm=nm, temperature_c=celsius, salinity_percent=0.0, depth=0.0
-    )
-    n_w = float(slopes.refractive_index)
-    quan_fry = water_refractive_index(
-        wavelength_nm=nm, temperature_c=celsius, salinity_percent=0.0, depth=0.0, formula=QUAN_FRY
-    )
-    measured = 1.3345
-    salinity = salinity_from_index(measured, wavelength_nm=nm, temperature_c=celsius, depth=0.0)
-    results = (
-        ("n_w", "Refractive index (Höhle 1971; Maas 2015, Eq. 4)",
-         "1.338+4E-5*(486+0.003*depth_m+50*salinity_percent-wavelength_nm-temperature_c)", n_w, ""),
-        ("n_w_quan_fry", "Refractive index (Quan and Fry 1995), for comparison", _QUAN_FRY_FORMULA,
-         float(quan_fry), ""),
-        ("dn_dT", "Change of n_w per degree", "-4E-5", float(slopes.d_temperature), "1/°C"),
-        ("dn_dS", "Change of n_w per per cent of salt", "4E-5*50", float(slopes.d_salinity), "1/%"),
-    )  # fmt: skip
-    _headings(sheet, 10, ("result", "description", "value", "unit"))
-    for row, (name, words, text, value, unit) in enumerate(results, start=11):
-        sheet.cell(row, 1, name)
-        sheet.cell(row, 2, words)
-        sheet.cell(row, 4, unit)
-        book.formula(sheet, row, 3, text, value)
-        sheet.cell(row, 3).number_format = "0.000000"
-    book.name("n_w", sheet, 11, 3)
-    _headings(sheet, 16, ("inverse", "description", "value", "unit"))
-    sheet.cell(17, 1, "n_measured")
-    sheet.cell(17, 2, "A measured index, e.g. from an adjustment")
-    book.typed(sheet, 17, 3, measured)
-    book.name("n_measured", sheet, 17, 3)
-    sheet.cell(18, 1, "salinity")
-    sheet.cell(18, 2, "Salinity of that water (Höhle)")
-    sheet.cell(18, 4, "%")
-    text = "((n_measured-1.338)/4E-5-486-0.003*depth_m+wavelength_nm+temperature_c)/50"
-    book.formula(sheet, 18, 3, text, float(salinity))
-    sheet.cell(18, 3).number_format = "0.000"
-    sheet.freeze_panes = "A5"
-    return n_w
-
-
-#: Quan and Fry's Eq. (3) in the names of the sheet; their salinity is per mille.
-_QUAN_FRY_FORMULA = (
-    "1.31405+(0.0001779-0.00000105*temperature_c+0.000000016*temperature_c^2)*10*salinity_percent"
-    "-0.00000202*temperature_c^2"
-    "+(15.868+0.01155*10*salinity_percent-0.00423*temperature_c)/wavelength_nm"
-    "-4382/wavelength_nm^2+1145500/wavelength_nm^3"
-)
-
-
-def _media(book: _Book, setup: ShiftSetup, live_index: float | None) -> int:
+def _media(book: LiveBook, setup: ShiftSetup, live_index: float | None) -> int:
     """Write camera and media; return the last row used."""
     sheet = book.sheet(
         "Multimedia",
@@ -290,19 +151,21 @@ def _media(book: _Book, setup: ShiftSetup, live_index: float | None) -> int:
         "Yellow: fill in. Blue: calculated. All lengths in one unit. See Readme.",
     )
     layers, count = setup.layers, len(setup.layers.indices)
-    _headings(sheet, 4, ("name", "value", "k", "q"))
+    headings(sheet, 4, ("name", "value", "k", "q"))
     row = 5
     for i, index in enumerate(layers.indices, start=1):
         sheet.cell(row, 1, f"n_{i}")
         last = i == count
         if last and live_index is not None:
             book.formula(sheet, row, 2, "n_w", live_index)
-            sheet.cell(row, 2).fill = _INPUT
+            sheet.cell(row, 2).fill = INPUT
             index = live_index
         else:
             book.typed(sheet, row, 2, index)
-        _between(sheet, f"B{row}", (1, 3), "Refractive index, camera's medium first; at least 1.")
+        allow_between(sheet, f"B{row}", (1, 3), "Refractive index, at least 1; the camera's first.")
         book.name(f"n_{i}", sheet, row, 2)
+        place = "the camera" if i == 1 else "the object" if last else f"layer {i - 1}"
+        sheet.cell(row, 5, f"refractive index of the medium of {place}").font = NOTE
         row += 1
     every = [*layers.indices[:-1], layers.indices[-1] if live_index is None else live_index]
     for i, index in enumerate(every, start=1):
@@ -311,20 +174,23 @@ def _media(book: _Book, setup: ShiftSetup, live_index: float | None) -> int:
         book.formula(sheet, 4 + i, 4, f"1-k_{i}^2", 1 - k * k)
         book.name(f"k_{i}", sheet, 4 + i, 3)
         book.name(f"q_{i}", sheet, 4 + i, 4)
+        sheet.cell(4 + i, 3).number_format = sheet.cell(4 + i, 4).number_format = "0.000000"
     typed: list[tuple[str, float]] = [(f"t_{i}", t) for i, t in enumerate(layers.thicknesses, 1)]
     typed += [("z_0", setup.z0), ("X_0", setup.nadir[0]), ("Y_0", setup.nadir[1])]
     for name, value in typed:
         sheet.cell(row, 1, name)
         book.typed(sheet, row, 2, value)
         book.name(name, sheet, row, 2)
+        words = _WORDS.get(name, f"thickness of layer {name[2:]}")
+        sheet.cell(row, 5, words).font = NOTE
         if name[0] in "tz":
-            _between(sheet, f"B{row}", (0, 1e9), "A length, zero or more.")
+            allow_between(sheet, f"B{row}", (0, 1e9), "A length, zero or more.")
         row += 1
     return row - 1
 
 
 def _points(
-    book: _Book,
+    book: LiveBook,
     setup: ShiftSetup,
     points: ShiftPoints | None,
     *,
@@ -338,7 +204,7 @@ def _points(
     values = _values(setup, points, count, steps)
     for number, (key, label, text) in enumerate(columns, start=1):
         above, head = sheet.cell(first - 1, number, label), sheet.cell(first, number, key)
-        above.font, head.font, head.fill = _SMALL, _BOLD, _HEAD
+        above.font, head.font, head.fill = SMALL, BOLD, HEAD
         above.alignment = Alignment(wrap_text=True, horizontal="center", vertical="bottom")
         head.alignment = Alignment(horizontal="center")
         sheet.column_dimensions[get_column_letter(number)].width = 13 if number > 1 else 11
@@ -349,7 +215,7 @@ def _points(
             else:
                 book.typed(sheet, row, number, value)
             cell = sheet.cell(row, number)
-            cell.number_format = "@" if key == "id" else "0.0E+00" if key == "resid" else "General"
+            cell.number_format = _number_format(key)
     sheet.row_dimensions[first - 1].height = 42
     last = get_column_letter(len(columns))
     table = Table(displayName="tblMM", name="tblMM", ref=f"A{first}:{last}{first + count}")
@@ -371,7 +237,7 @@ def _points(
     letters = {key: get_column_letter(i) for i, (key, _, _) in enumerate(columns, start=1)}
     for key in ("R", "ZP"):
         place = f"{letters[key]}{first + 1}:{letters[key]}{first + count}"
-        _between(sheet, place, (0, 1e9), "A length, zero or more; in water ZP is positive.")
+        allow_between(sheet, place, (0, 1e9), "A length, zero or more; in water ZP is positive.")
     sheet.freeze_panes = f"B{first + 1}"
     sheet.print_title_rows = f"{first - 1}:{first}"
 
@@ -424,7 +290,7 @@ def _columns(layers: int, steps: int) -> list[tuple[str, str, str]]:
         )  # fmt: skip
     columns += [
         ("resid", "F(u) - R", f'IF({end}="","",{end}*({f(end)})-{r})'),
-        ("flag", "OK / CHECK / DRY",
+        ("flag", "OK, CHECK or DRY",
          f'IF(COUNT({r},{at("ZP_u")})<2,"",IF({at("ZP_u")}<0,"DRY",'
          f'IF(ABS({at("resid")})<={TOLERANCE:.0E}*{r},"OK","CHECK")))'),
     ]  # fmt: skip
@@ -466,25 +332,12 @@ def _values(
     return values
 
 
-def _headings(sheet: Worksheet, row: int, words: Sequence[str]) -> None:
-    """Write a row of headings."""
-    for column, word in enumerate(words, start=1):
-        cell = sheet.cell(row, column, word)
-        cell.font, cell.fill = _BOLD, _HEAD
-
-
-def _between(sheet: Worksheet, cells: str, limits: tuple[float, float], prompt: str) -> None:
-    """Refuse numbers outside the limits, with a prompt."""
-    rule = DataValidation(
-        type="decimal",
-        operator="between",
-        formula1=f"{limits[0]:g}",
-        formula2=f"{limits[1]:.0f}",
-        allow_blank=True,
-        showErrorMessage=True,
-        showInputMessage=True,
-        promptTitle="multimedia",
-        prompt=prompt,
-    )
-    rule.add(cells)
-    sheet.add_data_validation(rule)
+def _number_format(key: str) -> str:
+    """Return how a column is shown; every digit is kept."""
+    if key == "id":
+        return "@"
+    if key == "resid":
+        return "0.0E+00"
+    if key in ("X", "Y", "Z", "R", "ZP", "flag"):
+        return "General"
+    return "0.000000" if key[0] == "u" else "0.00000"

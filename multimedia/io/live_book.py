@@ -1,0 +1,107 @@
+"""A new workbook whose formulas already show their values."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from openpyxl import Workbook
+from openpyxl.styles import Border, Font, PatternFill, Side
+from openpyxl.utils import get_column_letter
+from openpyxl.workbook.defined_name import DefinedName
+from openpyxl.worksheet.datavalidation import DataValidation
+from openpyxl.worksheet.worksheet import Worksheet
+
+from photocore.output import check_writable
+from photocore.spreadsheet.cellxml import CellInput
+from photocore.spreadsheet.editor import WorkbookEditor
+
+INPUT = PatternFill("solid", start_color="FFF9DB", end_color="FFF9DB")
+HEAD = PatternFill("solid", start_color="DCE6F1", end_color="DCE6F1")
+EDGE = Border(*(Side(style="hair", color="BFBFBF"),) * 4)
+FORMULA, TITLE, BOLD = Font(color="1F3FA8"), Font(bold=True, size=14), Font(bold=True)
+SMALL, NOTE = Font(size=9), Font(italic=True, color="595959")
+
+
+@dataclass(slots=True, eq=False)
+class LiveBook:
+    """A workbook under construction, with the values its formulas will show."""
+
+    book: Workbook = field(default_factory=Workbook)
+    results: list[tuple[str, int, int, CellInput]] = field(default_factory=list)
+    inputs: list[tuple[str, int, int, float]] = field(default_factory=list)
+
+    def sheet(self, name: str, title: str, note: str, *, first: bool = False) -> Worksheet:
+        """Add a sheet with its title and one line of help, ready to print."""
+        sheet: Worksheet = self.book.active if first else self.book.create_sheet()
+        sheet.title = name
+        sheet["A1"], sheet["A1"].font = title, TITLE
+        sheet["A2"], sheet["A2"].font = note, NOTE
+        sheet.sheet_view.showGridLines = False
+        sheet.page_setup.paperSize = 9  # A4
+        sheet.page_setup.orientation = "landscape"
+        sheet.sheet_properties.pageSetUpPr.fitToPage = True
+        sheet.page_setup.fitToHeight = 0
+        sheet.oddFooter.left.text, sheet.oddFooter.right.text = "&F · &A", "&P / &N"
+        return sheet
+
+    def formula(self, sheet: Worksheet, row: int, column: int, text: str, value: CellInput) -> None:
+        """Write a formula and the value it has."""
+        cell = sheet.cell(row, column, f"={text}")
+        cell.font = FORMULA
+        self.results.append((sheet.title, row, column, value))
+
+    def typed(self, sheet: Worksheet, row: int, column: int, value: CellInput) -> None:
+        """Write a cell that the user fills in."""
+        cell = sheet.cell(row, column)
+        if value is not None and value == value:
+            cell.value = value
+            if isinstance(value, str):
+                cell.data_type = "s"  # a name like =A1 is a name, not a formula
+            elif float(f"{value:.16g}") != value:
+                self.inputs.append((sheet.title, row, column, float(value)))
+        cell.fill, cell.border = INPUT, EDGE
+
+    def name(self, name: str, sheet: Worksheet, row: int, column: int) -> None:
+        """Give a cell a name."""
+        place = f"'{sheet.title}'!${get_column_letter(column)}${row}"
+        self.book.defined_names[name] = DefinedName(name, attr_text=place)
+
+    def save(self, path: Path, *, overwrite: bool) -> None:
+        """Write the workbook, then put the values into its formula cells."""
+        check_writable(path, overwrite=overwrite)
+        with tempfile.TemporaryDirectory() as folder:
+            plain = Path(folder) / "plain.xlsx"
+            self.book.save(plain)
+            editor = WorkbookEditor(plain)
+            for title, row, column, number in self.inputs:  # openpyxl writes 16 digits only
+                editor.set_value(title, row, column, number)
+            for title, row, column, value in self.results:
+                editor.set_result(title, row, column, value)
+            editor.save(path, overwrite=overwrite)
+
+
+def headings(sheet: Worksheet, row: int, words: Sequence[str]) -> None:
+    """Write a row of headings."""
+    for column, word in enumerate(words, start=1):
+        cell = sheet.cell(row, column, word)
+        cell.font, cell.fill = BOLD, HEAD
+
+
+def allow_between(sheet: Worksheet, cells: str, limits: tuple[float, float], prompt: str) -> None:
+    """Refuse numbers outside the limits, with a prompt."""
+    rule = DataValidation(
+        type="decimal",
+        operator="between",
+        formula1=f"{limits[0]:g}",
+        formula2=f"{limits[1]:.0f}",
+        allow_blank=True,
+        showErrorMessage=True,
+        showInputMessage=True,
+        promptTitle="multimedia",
+        prompt=prompt,
+    )
+    rule.add(cells)
+    sheet.add_data_validation(rule)
