@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 
 import numpy as np
 
@@ -26,7 +26,7 @@ _YES = {"1", "yes", "y", "true", "x", "on", "si", "sì", "s", "vero", "ja", "j",
 _NO = {"0", "no", "n", "false", "off", "falso", "nein", "falsch"}
 
 
-def decimal_evidence(values: Sequence[Value | None]) -> set[Decimal]:
+def decimal_evidence(values: Iterable[Value | None]) -> set[Decimal]:
     """Return the decimal separators that the texts of a column prove."""
     parts = (take_apart(value) for value in values if isinstance(value, str))
     return proven_by(part for part in parts if part is not None)

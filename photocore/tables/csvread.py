@@ -6,7 +6,7 @@ import codecs
 import csv
 import io
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass, field
 from itertools import islice
 from pathlib import Path
@@ -16,6 +16,7 @@ import numpy as np
 from photocore.arrays import FloatArray
 from photocore.errors import CellError, InputError
 from photocore.spreadsheet.grid import Grid, SheetFile, Value, cell_name
+from photocore.tables.convert import decimal_evidence
 from photocore.tables.fill import fill, refuse_doubles, take_unit_row
 from photocore.tables.headings import Match, describe, find_columns
 from photocore.tables.model import Column, Table
@@ -149,7 +150,7 @@ def read_csv_table(
     gathered = _Gathered(match, columns)
     _gather(file, delimiter, grid, table, gathered, errors)
     quick = gathered.quick(decimal)
-    slow = gathered.careful(quick)
+    slow = gathered.careful(quick, decimal)
     fill(
         table,
         [c for c in columns if c.key not in quick],
@@ -269,17 +270,33 @@ class _Gathered:
                 found[key] = np.concatenate(arrays)
         return found
 
-    def careful(self, quick: Mapping[str, FloatArray]) -> dict[str, list[Value | None]]:
+    def careful(
+        self, quick: Mapping[str, FloatArray], decimal: Decimal | None
+    ) -> dict[str, list[Value | None]]:
         """Return the cells of all other columns."""
         cells = {
-            key: [c for chunk in chunks for c in chunk.cells()]
+            key: self.cells(chunks, decimal)
             for key, chunks in self.numbers.items()
             if key not in quick
         }
         return self.texts | cells
 
+    def cells(self, chunks: Sequence[_Chunk], decimal: Decimal | None) -> list[Value | None]:
+        """Return the cells of a column: numbers where they are clear, texts elsewhere."""
+        marks: set[str] = set()
+        for chunk in chunks:
+            marks |= chunk.marks if chunk.numbers is not None else decimal_evidence(chunk.texts)
+        clear = bool(decimal or marks & {"point", "comma"}) and _clear(marks, set(), decimal)
+        found: list[Value | None] = []
+        for chunk in chunks:
+            if chunk.numbers is not None and (clear or not chunk.marks):
+                found += [None if np.isnan(x) else x for x in chunk.numbers.tolist()]
+            else:
+                found += chunk.cells()
+        return found
 
-def _clear(marks: frozenset[str], others: frozenset[str], decimal: Decimal | None) -> bool:
+
+def _clear(marks: Set[str], others: Set[str], decimal: Decimal | None) -> bool:
     """Whether numbers with these marks have one meaning."""
     if not marks:
         return True

@@ -33,8 +33,9 @@ _NUMBER = re.compile(
     r"(?P<number>[+-]?(?:\d[\d.,' \u2019]*|[.,]\d+)(?:[eE][+-]?\d+)?)"
     r"\s*(?P<unit>[^\d\s.,'+-][^\d.,]*|)"
 )
+_PLAIN = re.compile(r"[+-]?[0-9]+([.,][0-9]*)?")
 #: Thousands: groups of three digits with one kind of separator between them.
-_GROUPED = re.compile(r"[+-]?[1-9]\d{0,2}([.,' \u2019])\d{3}(\1\d{3})*$")
+_GROUPED = re.compile(r"[+-]?[1-9]\d{0,2}([.,' \u2019])\d{3}(\1\d{3})*(?=$|[eE])")
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,25 +48,13 @@ class NumberText:
         The number with its separators, blanks for thousands already taken out.
     unit : str
         Unit typed behind it, as typed.
+    evidence : str
+        Which decimal separator the text proves, if any.
     """
 
     digits: str
     unit: str
-
-    @property
-    def evidence(self) -> Evidence:
-        """Which decimal separator the text proves, if any."""
-        point, comma = self.digits.count("."), self.digits.count(",")
-        if point and comma:
-            return "point" if self.digits.rfind(".") > self.digits.rfind(",") else "comma"
-        if not point and not comma:
-            return "none"
-        # 1,250,000 can only be grouped; 1,250 may be either.
-        if _GROUPED.match(re.split("[eE]", self.digits)[0]):
-            if point + comma > 1:
-                return "point" if comma else "comma"
-            return "grouped point" if point else "grouped comma"
-        return "point" if point else "comma"
+    evidence: Evidence
 
     @property
     def has_thousands(self) -> bool:
@@ -74,6 +63,10 @@ class NumberText:
 
     def value(self, decimal: Decimal) -> float | None:
         """Return the number read with a decimal separator; None if it cannot be one."""
+        plain_point = self.evidence == decimal == "point" and self.digits.count(".") == 1
+        plain_point = plain_point and "," not in self.digits
+        if self.evidence == "none" or plain_point:
+            return float(self.digits)
         text, mark, other = (
             (self.digits, ".", ",") if decimal == "point" else (self.digits, ",", ".")
         )
@@ -93,10 +86,12 @@ def take_apart(text: str) -> NumberText | None:
     """Return the parts of a text that looks like a number with or without unit, else None.
 
     >>> take_apart("−1 250,5 mm")
-    NumberText(digits='-1250,5', unit='mm')
+    NumberText(digits='-1250,5', unit='mm', evidence='comma')
     >>> take_apart("n/a") is None
     True
     """
+    if plain := _PLAIN.fullmatch(text):
+        return NumberText(text, "", _evidence(text) if plain[1] else "none")
     clean = text.translate(_SPACES).translate(_MINUS).strip()
     match = _NUMBER.fullmatch(clean)
     if match is None:
@@ -108,7 +103,22 @@ def take_apart(text: str) -> NumberText | None:
             if not _GROUPED.match(whole) or blank in rest:
                 return None
             digits = whole.replace(blank, "") + mark + rest
-    return NumberText(digits, match["unit"].strip())
+    return NumberText(digits, match["unit"].strip(), _evidence(digits))
+
+
+def _evidence(digits: str) -> Evidence:
+    """Return which decimal separator a number's text proves, if any."""
+    point, comma = digits.count("."), digits.count(",")
+    if point and comma:
+        return "point" if digits.rfind(".") > digits.rfind(",") else "comma"
+    if not point and not comma:
+        return "none"
+    # 1,250,000 can only be grouped; 1,250 may be either.
+    if _GROUPED.match(digits):
+        if point + comma > 1:
+            return "point" if comma else "comma"
+        return "grouped point" if point else "grouped comma"
+    return "point" if point else "comma"
 
 
 def unit_symbol(text: str) -> str:
