@@ -91,7 +91,15 @@ def open_xlsx(path: Path, *, max_rows: int) -> SheetFile:
         load=load,
         tables=tables,
         names=_single_cells(book),
+        remarks=_remarks(book),
     )
+
+
+def _remarks(book: Workbook) -> list[str]:
+    """Return what the user should know about values that come from elsewhere."""
+    if any(kind == "externalLink" for kind, _ in book.relations.values()):
+        return ["The workbook refers to other workbooks; their values are used as last stored."]
+    return []
 
 
 def read_directory(path: Path, package: zipfile.ZipFile) -> Workbook:

@@ -23,7 +23,7 @@ from photocore.tables.model import Column, Table
 from photocore.tables.numbers import Decimal
 from photocore.tables.rows import RowSorter, label
 
-_DELIMITERS = (";", "\t", ",", "|")
+_DELIMITERS = (";", "\t", ",", "|", " ")
 _GUARDED = re.compile(r"'+[=+\-@\t\r]")
 #: A text that may be a number with three decimals or one with thousands.
 _GROUPED = re.compile(r"[+-]?[1-9]\d{0,2}[.,]\d{3}")
@@ -60,7 +60,7 @@ class CsvFile:
             # The line that names the delimiter keeps its number, as spreadsheets count it.
             yield []
         try:
-            yield from csv.reader(lines, delimiter=delimiter)
+            yield from csv.reader(lines, delimiter=delimiter, skipinitialspace=delimiter == " ")
         except csv.Error as error:
             raise InputError(
                 f"{self.label}: cannot be split into fields ({error}); look for a quotation mark "

@@ -133,6 +133,14 @@ def test_columns_without_headings_are_given_by_letter(file):
     assert table.numbers("s2").tolist() == [2.5, 4.5]
 
 
+def test_columns_lined_up_with_blanks_are_read(file):
+    table = read_table(
+        file("  id    s1     s2\nP1   1.5   -2.25\nP10 12.5    3\n", "points.txt"), COLUMNS
+    )
+    assert table.texts("id") == ["P1", "P10"]
+    assert table.numbers("s2").tolist() == [-2.25, 3.0]
+
+
 def test_named_values_are_read_from_text_tables_too(file):
     values = read_named_values(file("d_1;17,5\nd_2;9,5\n"), [Column("d_1"), Column("d_2")])
     assert (values.number("d_1"), values.number("d_2")) == (17.5, 9.5)

@@ -274,6 +274,15 @@ def test_strict_workbooks_are_read(tmp_path):
     assert read_table(path, COLUMNS).numbers("s1").tolist() == [12.5, 14.75]
 
 
+def test_values_from_other_workbooks_are_used_as_stored_with_a_remark(tmp_path):
+    relations = make_rich_workbook.parts()["xl/_rels/workbook.xml.rels"]
+    link = f'<Relationship Id="x" Type="{make_rich_workbook.OFFICE}/externalLink" Target="y.xml"/>'
+    relations = relations.replace(b"</Relationships>", f"{link}</Relationships>".encode())
+    path = tmp_path / "survey.xlsx"
+    path.write_bytes(rebuilt(parts={"xl/_rels/workbook.xml.rels": relations}))
+    assert "refers to other workbooks" in read_table(path, COLUMNS).remarks[0]
+
+
 def test_the_limits_are_those_of_the_documentation():
     assert package.LARGEST_RATIO == 250
     assert package.LARGEST_PART == 256 * 2**20
