@@ -52,7 +52,8 @@ class Candidates:
     distance : ndarray, shape (m,)
         Distance of the image point from the curve. [mm]
     points : ndarray, shape (m, 3)
-        Object point of the foot on the curve. [object unit]
+        Object point of the foot on the curve, interpolated between vertices: good enough to
+        sort candidates by depth; `intersect` gives the exact one. [object unit]
     """
 
     curves: IntArray
