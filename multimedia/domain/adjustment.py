@@ -1,0 +1,182 @@
+"""What a bundle adjustment estimates, and what it returns."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from multimedia.domain.camera import INTERIOR
+from multimedia.domain.project import Project
+from photocore.adjustment import correlations
+from photocore.arrays import FloatArray, positive
+from photocore.errors import InputError
+
+#: How control points enter: error-free, with their sigmas, or as a free network.
+CONTROL = ("fixed", "weighted", "free")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ScaleBar:
+    """A known distance between two object points.
+
+    Attributes
+    ----------
+    first, second : str
+        Ids of the points.
+    length, sigma : float
+        [object unit]
+    """
+
+    first: str
+    second: str
+    length: float
+    sigma: float
+
+    def __post_init__(self) -> None:
+        positive(self.length, f"scale bar {self.first}-{self.second}: length")
+        positive(self.sigma, f"scale bar {self.first}-{self.second}: sigma")
+        if self.first == self.second:
+            raise InputError(f"scale bar: {self.first} is named at both ends.")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Unknowns:
+    """What an adjustment estimates.
+
+    Attributes
+    ----------
+    fixed_cameras : tuple of str
+        Cameras whose exterior orientation is kept.
+    interior : tuple of str
+        Of c, xh, yh, k1, k2, k3, p1, p2, scale, shear; for every camera.
+    shared_interior : bool or mapping of str to str
+        One set for all cameras (the same camera moved), one for each, or camera name to the name
+        of a set.
+    media : tuple of str
+        Unknowns of the media. ``index3`` or ``thickness1``: one value common to all media;
+        ``offset``, ``tilt1``, ``tilt2``: one for each; ``wall:index3``: of the media ``wall``
+        only.
+    control : str
+        ``fixed``: control points are error-free unless they have a sigma; ``weighted``: all
+        need a sigma; ``free``: their coordinates are start values, the datum is that of a free
+        network.
+    plates : tuple of str
+        Groups of object points that are rigid plates: their coordinates are in the plate's own
+        frame, the pose of each is unknown.
+    scale_bars : tuple of ScaleBar
+    priors : mapping of str to float
+        Label of an unknown to the standard deviation of its start value: a water level read to
+        2 mm is ``{"water:offset": 0.002}``.
+    robust : float or None
+        Huber's bound in standard deviations; observations beyond it lose weight. None: plain
+        least squares.
+    """
+
+    fixed_cameras: tuple[str, ...] = ()
+    interior: tuple[str, ...] = ()
+    shared_interior: bool | Mapping[str, str] = False
+    media: tuple[str, ...] = ()
+    control: str = "fixed"
+    plates: tuple[str, ...] = ()
+    scale_bars: tuple[ScaleBar, ...] = ()
+    priors: Mapping[str, float] = field(default_factory=dict)
+    robust: float | None = None
+
+    def __post_init__(self) -> None:
+        unknown = [name for name in self.interior if name not in INTERIOR]
+        if unknown:
+            raise InputError(f"interior: {', '.join(unknown)} is not one of {', '.join(INTERIOR)}.")
+        if self.control not in CONTROL:
+            raise InputError(f"control: {self.control!r} is not one of {', '.join(CONTROL)}.")
+        if self.robust is not None:
+            positive(self.robust, "robust")
+        for label, sigma in self.priors.items():
+            positive(sigma, f"prior of {label}")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Adjustment:
+    """An adjusted project with its precision.
+
+    Attributes
+    ----------
+    project : Project
+        Adjusted cameras, media and object points (new points added).
+    names : tuple of str
+        Labels of the unknowns that are not object points: ``cam1:X0``, ``interior:c``,
+        ``index3``, ``wall:offset``, ``plate A:X0``.
+    values : ndarray, shape (u,)
+        Their adjusted values; offsets and tilts count from the start. [object unit, rad, mm]
+    covariance : ndarray, shape (u, u)
+        Of those, with the a-posteriori sigma0.
+    point_covariance : ndarray, shape (p, 3, 3)
+        Of the object points of ``project``; 0 where fixed, NaN where not measured. [object unit²]
+    residuals : ndarray, shape (n, 2)
+        Measured minus computed, per row of the image points. [mm]
+    standardised : ndarray, shape (n, 2)
+        Residuals over their own standard deviations; beyond 3.5 a gross error.
+    redundancy_numbers : ndarray, shape (n, 2)
+        Share of an error that shows in its own residual.
+    weights : ndarray, shape (n, 2)
+        Robust weights, 1 for plain least squares.
+    sigma0 : float
+        A-posteriori standard deviation of an image coordinate. [mm]
+    redundancy : int
+    iterations : int
+    sigma0_of : mapping of str to float
+        The same per camera: root of the square sum over the sum of redundancy numbers. [mm]
+    remarks : tuple of str
+        What the user should be told.
+    """
+
+    project: Project
+    names: tuple[str, ...]
+    values: FloatArray
+    covariance: FloatArray
+    point_covariance: FloatArray
+    residuals: FloatArray
+    standardised: FloatArray
+    redundancy_numbers: FloatArray
+    weights: FloatArray
+    sigma0: float
+    redundancy: int
+    iterations: int
+    sigma0_of: Mapping[str, float]
+    remarks: tuple[str, ...] = ()
+
+    def value(self, name: str) -> float:
+        """Return one adjusted unknown by its label."""
+        return float(self.values[self.names.index(name)])
+
+    def sigma(self, name: str) -> float:
+        """Return the standard deviation of one unknown by its label."""
+        row = self.names.index(name)
+        return float(np.sqrt(self.covariance[row, row]))
+
+    @property
+    def correlations(self) -> FloatArray:
+        """Correlation matrix of the unknowns, shape (u, u)."""
+        return correlations(self.covariance)
+
+    @property
+    def smallest_detectable(self) -> FloatArray:
+        """Error of an image coordinate found with 80 % power at 0.1 % risk, shape (n, 2). [mm]
+
+        Baarda's internal reliability: 4.13 sigma / sqrt(redundancy number).
+        """
+        with np.errstate(divide="ignore", invalid="ignore"):
+            ratio = np.where(self.redundancy_numbers > 1e-9, self.redundancy_numbers, np.nan)
+            return 4.13 * self.sigma0 / np.sqrt(ratio)
+
+    def suspects(self, limit: float = 3.5) -> list[str]:
+        """Return a sentence for each image point that looks like a gross error, worst first."""
+        worst = np.abs(np.nan_to_num(self.standardised)).max(axis=1, initial=0.0)
+        points = self.project.image_points
+        rows = [int(row) for row in np.argsort(-worst) if worst[row] > limit]
+        return [
+            f"point {points.ids[row]} in camera {points.cameras[row]}: residual "
+            f"{np.hypot(*self.residuals[row]) * 1000:.1f} um, {worst[row]:.1f} sigma"
+            for row in rows
+        ]
