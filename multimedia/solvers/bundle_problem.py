@@ -158,7 +158,8 @@ class Problem:
         observations = self.observations
         miss = np.empty((len(observations.point), 2))
         by_point = np.zeros((len(observations.point), 2, 3))
-        columns, dense = [], []
+        columns: list[IntArray] = []
+        dense: list[FloatArray] = []
         for k, camera in enumerate(state.cameras):
             rows = observations.rows[k]
             found = self._camera_rows(state, k, camera, rows)
@@ -169,9 +170,11 @@ class Problem:
             dense.append(block / observations.sigma[rows][:, :, None])
         miss = (miss - observations.image) / observations.sigma
         by_point /= observations.sigma[:, :, None]
+        extra_miss, extra_dense, extra_point, extra_by_point = self._extra(state)
         return Linear(
-            miss=miss, columns=columns, dense=dense, by_point=by_point, **self._extra(state)
-        )
+            miss=miss, columns=columns, dense=dense, by_point=by_point, extra_miss=extra_miss,
+            extra_dense=extra_dense, extra_point=extra_point, extra_by_point=extra_by_point,
+        )  # fmt: skip
 
     def _camera_rows(
         self, state: State, k: int, camera: Camera, rows: IntArray
@@ -221,7 +224,7 @@ class Problem:
         eliminated = found.by_point * self.free[which][:, None, :]
         return found.image, np.array(at, dtype=np.int64), np.concatenate(blocks, 2), eliminated
 
-    def _extra(self, state: State) -> dict[str, FloatArray | IntArray]:
+    def _extra(self, state: State) -> tuple[FloatArray, FloatArray, IntArray, FloatArray]:
         """Return the rows of weighted coordinates, priors and scale bars."""
         miss: list[float] = []
         dense: list[FloatArray] = []
@@ -261,12 +264,12 @@ class Problem:
                 if c >= 0
             }
             add((length - bar.length) / bar.sigma, columns, -1, nothing)
-        return {
-            "extra_miss": np.array(miss),
-            "extra_dense": np.array(dense).reshape(len(miss), self.dense_count),
-            "extra_point": np.array(point, dtype=np.int64),
-            "extra_by_point": np.array(by_point).reshape(len(miss), 3),
-        }
+        return (
+            np.array(miss),
+            np.array(dense).reshape(len(miss), self.dense_count),
+            np.array(point, dtype=np.int64),
+            np.array(by_point).reshape(len(miss), 3),
+        )
 
     def advance(self, state: State, step: FloatArray, point_step: FloatArray) -> State | None:
         """Return the state after a step, None where it is impossible."""

@@ -21,8 +21,8 @@ def start_points(project: Project, ids: Sequence[str], points: FloatArray) -> Fl
     GeometryError
         If the rays of a point do not meet beyond the interface from these starts.
     """
-    wanted = np.flatnonzero(np.isnan(points).any(axis=1))
-    if not len(wanted):
+    wanted = [j for j, xyz in enumerate(points) if np.isnan(xyz).any()]
+    if not wanted:
         return points
     names = [ids[j] for j in wanted]
     found = _intersected(project, names)
@@ -52,7 +52,7 @@ def start_poses(
     poses = []
     for plate, label in enumerate(plates):
         on = np.flatnonzero(plate_of == plate)
-        found = _intersected(project, [ids[j] for j in on])
+        found = _intersected(project, [ids[int(j)] for j in on])
         good = np.isfinite(found).all(axis=1)
         if good.sum() < 3:
             raise GeometryError(

@@ -1,0 +1,131 @@
+"""Project in, adjusted project and report out."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from multimedia.domain.adjustment import Adjustment, ScaleBar, Unknowns
+from multimedia.io.adjustment_report import write_adjustment_report
+from multimedia.io.project_file import read_project, write_project
+from multimedia.solvers.bundle import bundle_adjust
+from multimedia.water import salinity_from_index, water_index_derivatives
+from photocore.errors import InputError
+from photocore.output import check_writable
+
+
+def adjust_project(
+    source: Path,
+    unknowns: Unknowns,
+    *,
+    out: Path | None = None,
+    report: Path | None = None,
+    overwrite: bool = False,
+) -> tuple[Adjustment, tuple[str, ...]]:
+    """Adjust a project file; write the adjusted project and the report where asked.
+
+    Returns
+    -------
+    result : Adjustment
+    remarks : tuple of str
+    """
+    for path in (out, report):
+        if path is not None:
+            check_writable(path, overwrite=overwrite)
+    project = read_project(source)
+    result = bundle_adjust(project, unknowns)
+    if out is not None:
+        write_project(out, result.project, overwrite=overwrite)
+    if report is not None:
+        title = f"Bundle adjustment of {project.name or source.name}"
+        write_adjustment_report(
+            report, result, title=title, notes=project.remarks, overwrite=overwrite
+        )
+    return result, (*project.remarks, *result.remarks)
+
+
+def parse_scale_bar(text: str) -> ScaleBar:
+    """Return the scale bar of ``first,second,length,sigma``.
+
+    Raises
+    ------
+    InputError
+        If it has another form.
+    """
+    parts = [part.strip() for part in text.split(",")]
+    try:
+        first, second, length, sigma = parts
+        return ScaleBar(first=first, second=second, length=float(length), sigma=float(sigma))
+    except ValueError as error:
+        if isinstance(error, InputError):
+            raise
+        raise InputError(
+            f"--scale-bar {text}: expected first,second,length,sigma, e.g. 11,14,0.5,0.0001"
+        ) from None
+
+
+def parse_prior(text: str) -> tuple[str, float]:
+    """Return label and standard deviation of ``label=sigma``.
+
+    Raises
+    ------
+    InputError
+        If it has another form.
+    """
+    label, _, sigma = text.rpartition("=")
+    try:
+        return label.strip(), float(sigma)
+    except ValueError:
+        raise InputError(f"--prior {text}: expected label=sigma, e.g. tank:offset=0.002") from None
+
+
+def salinity_of(
+    result: Adjustment, *, wavelength_nm: float, temperature_c: float, depth: float
+) -> tuple[float, float] | None:
+    """Return the salinity that follows from an adjusted index of water, and its sigma. [%].
+
+    None if the last medium's index was not estimated.
+    """
+    used = [name for name in result.project.media_of if name]
+    if not used:
+        return None
+    last = len(result.project.media[used[0]].layers.indices)
+    names = [name for name in result.names if name.rpartition(":")[2] == f"index{last}"]
+    if not names:
+        return None
+    salinity = float(
+        salinity_from_index(
+            result.value(names[0]), wavelength_nm=wavelength_nm, temperature_c=temperature_c,
+            depth=depth,
+        )
+    )  # fmt: skip
+    rates = water_index_derivatives(
+        wavelength_nm=wavelength_nm, temperature_c=temperature_c, salinity_percent=salinity,
+        depth=depth,
+    )  # fmt: skip
+    return salinity, result.sigma(names[0]) / abs(float(rates.d_salinity))
+
+
+def as_dict(result: Adjustment) -> dict[str, Any]:
+    """Return an adjustment as plain data for ``--json``."""
+    points = result.project.object_points
+    sigma = np.asarray(points.sigma)
+    return {
+        "sigma0_mm": result.sigma0,
+        "sigma0_mm_of": dict(result.sigma0_of),
+        "redundancy": result.redundancy,
+        "iterations": result.iterations,
+        "unknowns": {
+            name: {"value": result.values[k], "sigma": result.sigma(name)}
+            for k, name in enumerate(result.names)
+        },
+        "correlations": result.correlations,
+        "points": [
+            {"id": name, "xyz": points.xyz[j], "sigma": sigma[j]}
+            for j, name in enumerate(points.ids)
+        ],
+        "suspects": result.suspects(),
+        "remarks": result.remarks,
+    }
