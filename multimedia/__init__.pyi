@@ -1,3 +1,4 @@
+from .domain.adjustment import Adjustment, ScaleBar, Unknowns
 from .domain.bathymetry import BathymetryStatus, CorrectedPoints, Precision
 from .domain.camera import Camera, Sensor
 from .domain.flat_interface import FlatInterface
@@ -28,6 +29,17 @@ from .shift import ShiftDerivatives
 from .snell import critical_angle, refracted_angle, refracted_direction
 from .solvers.approximations import Approximation, agrafiotis, lavest, telem
 from .solvers.bathymetry import correct_bathymetry
+from .solvers.bundle import bundle_adjust
+from .solvers.design import (
+    CalibrationCosts,
+    Placement,
+    Study,
+    calibration_costs,
+    compare_placements,
+    object_grid,
+    ring_of_cameras,
+    study_setup,
+)
 from .solvers.dispersion import (
     colour_positions,
     correct_dispersion,
@@ -59,8 +71,10 @@ from .water import (
 
 __all__ = [
     "ACRYLIC",
+    "Adjustment",
     "Approximation",
     "BathymetryStatus",
+    "CalibrationCosts",
     "Camera",
     "Candidates",
     "CorrectedPoints",
@@ -80,6 +94,7 @@ __all__ = [
     "ObjectPoints",
     "PARRISH",
     "POLYCARBONATE",
+    "Placement",
     "Plane",
     "PointStatus",
     "Precision",
@@ -91,11 +106,14 @@ __all__ = [
     "RayStatus",
     "Resection",
     "SAPPHIRE",
+    "ScaleBar",
     "Sensor",
     "ShiftDerivatives",
     "ShiftIteration",
     "ShiftTable",
     "Sphere",
+    "Study",
+    "Unknowns",
     "WaterFormula",
     "WaterIndexDerivatives",
     "WaterLevel",
@@ -105,7 +123,10 @@ __all__ = [
     "aim_rays",
     "air_refractive_index",
     "best_over_compensation",
+    "bundle_adjust",
+    "calibration_costs",
     "colour_positions",
+    "compare_placements",
     "correct_bathymetry",
     "correct_dispersion",
     "correct_lidar_beams",
@@ -121,6 +142,7 @@ __all__ = [
     "lavest",
     "layers_per_colour",
     "mean_water_level",
+    "object_grid",
     "project",
     "projection_status",
     "radial_shift",
@@ -131,9 +153,11 @@ __all__ = [
     "refracted_angle",
     "refracted_direction",
     "resect",
+    "ring_of_cameras",
     "salinity_from_index",
     "seam_width",
     "shift_per_colour",
+    "study_setup",
     "telem",
     "temperature_from_index",
     "trace_rays",

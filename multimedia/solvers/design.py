@@ -1,0 +1,418 @@
+"""Accuracy studies of a set-up before anyone gets wet.
+
+Everything follows from the derivatives of the projection through the media at object points where
+something is to be measured: precision, what unknown media do to coordinates, and ray angles.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from multimedia.domain.camera import EXTERIOR, Camera
+from multimedia.domain.flat_interface import FlatInterface
+from multimedia.domain.layers import Layers
+from multimedia.solvers.intersection import intersect
+from multimedia.solvers.object_rays import image_rays
+from multimedia.solvers.projection import project, project_with_jacobian
+from multimedia.solvers.resection import resect
+from photocore.arrays import BoolArray, FloatArray, as_points, positive
+from photocore.errors import GeometryError, InputError, PhotogrammetryError
+
+#: Steps in which sensitivities are given: what one can be wrong by on a good day. Lengths in mm.
+STEPS: Mapping[str, tuple[float, str]] = {
+    "index": (0.001, "0.001"),
+    "offset": (1.0, "1 mm"),
+    "tilt": (float(np.radians(0.1)), "0.1 deg"),
+    "thickness": (0.1, "0.1 mm"),
+}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Study:
+    """What a set-up promises.
+
+    Attributes
+    ----------
+    points : ndarray, shape (n, 3)
+        Where it was evaluated. [object unit]
+    sigma : ndarray, shape (n, 3)
+        Expected standard deviations of X, Y, Z; NaN where fewer than two cameras see the point.
+    angle : ndarray, shape (n,)
+        Largest angle between two rays at the point, in its medium. [rad]
+    angle_in_air : ndarray, shape (n,)
+        The same if the tank were empty: Maas 2015, Fig. 4. [rad]
+    seen_by : ndarray of int, shape (n,)
+        Cameras that see it.
+    sensitivity : mapping of str to ndarray, shape (3,)
+        Unknown of the media, e.g. ``tank:index3``, to the RMS error of X, Y, Z that one step of it
+        (`STEPS`) causes. [object unit]
+    """
+
+    points: FloatArray
+    sigma: FloatArray
+    angle: FloatArray
+    angle_in_air: FloatArray
+    seen_by: FloatArray
+    sensitivity: Mapping[str, FloatArray]
+
+    @property
+    def rms_sigma(self) -> FloatArray:
+        """RMS of the standard deviations over the points, shape (3,)."""
+        return np.sqrt(np.nanmean(self.sigma**2, axis=0))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CalibrationCosts:
+    """Table 1 of Maas 2015 on simulated data: mean errors of check points in X, Y, Z.
+
+    Attributes
+    ----------
+    air : tuple of float
+        I: calibrated and measured in air.
+    air_calibration_in_water : tuple of float
+        II: calibrated in air, oriented and measured in water.
+    water : tuple of float
+        III: calibrated and measured in water.
+    sigma0 : tuple of float
+        Of I, II and III. [mm]
+    """
+
+    air: tuple[float, float, float]
+    air_calibration_in_water: tuple[float, float, float]
+    water: tuple[float, float, float]
+    sigma0: tuple[float, float, float]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Placement:
+    """One way to place the cameras and what it gives: half angle [rad], RMS sigmas, ray angle."""
+
+    half_angle: float
+    sigma: tuple[float, float, float]
+    angle: float
+
+
+def study_setup(
+    cameras: Sequence[Camera],
+    media: Sequence[FlatInterface | None],
+    points: FloatArray,
+    *,
+    sigma_image: float,
+    names: Sequence[str] = (),
+    millimetre: float = 1e-3,
+) -> Study:
+    """Return expected precision, ray angles and sensitivities of a set-up.
+
+    Parameters
+    ----------
+    cameras : sequence of Camera
+        At least two.
+    media : sequence of FlatInterface or None
+        What each camera looks through.
+    points : ndarray, shape (n, 3)
+        Object points, where measurements are planned. [object unit]
+    sigma_image : float
+        Precision of an image coordinate. [mm]
+    names : sequence of str
+        Name of each camera's media; cameras of one name share its unknowns.
+    millimetre : float
+        A millimetre in object units: 0.001 for metres, 1 for millimetres.
+
+    Returns
+    -------
+    Study
+
+    Raises
+    ------
+    InputError
+        If there are fewer than two cameras.
+    GeometryError
+        If no point is seen by two cameras.
+
+    Notes
+    -----
+    Covariance ``sigma² (sum J^T J)^-1`` over the cameras that see the point; an error of a media
+    parameter p moves the intersected point by ``-(sum J^T J)^-1 sum J^T dx/dp``.
+    """
+    if len(cameras) < 2:
+        raise InputError("design: at least two cameras are needed to intersect anything.")
+    positive(sigma_image, "sigma_image", unit="mm")
+    points = as_points(points, "points", dimension=3).reshape(-1, 3)
+    names = tuple(names) or tuple(str(k) for k in range(len(cameras)))
+    normal = np.zeros((len(points), 3, 3))
+    moments: dict[str, FloatArray] = {}
+    rays, straight = [], []
+    seen_by = np.zeros(len(points))
+    for camera, interface, name in zip(cameras, media, names, strict=True):
+        image = project(camera, points, interface)
+        seen: BoolArray = np.all(np.isfinite(image), axis=1) & _on_sensor(camera, image)
+        seen_by += seen
+        if seen.any():
+            own = interface.parameter_names if interface is not None else ()
+            found = project_with_jacobian(camera, points[seen], interface, interface_names=own)
+            normal[seen] += found.by_point.transpose(0, 2, 1) @ found.by_point
+            right = found.by_point.transpose(0, 2, 1) @ found.by_interface
+            for k, parameter in enumerate(own):
+                key = f"{name}:{parameter}"
+                moment = moments.setdefault(key, np.zeros((len(points), 3)))
+                moment[seen] += right[:, :, k]
+        direction = np.full((len(points), 3), np.nan)
+        direction[seen] = image_rays(camera, image[seen], interface)[1]
+        rays.append(direction)
+        line = points - camera.centre
+        line = line / np.linalg.norm(line, axis=1, keepdims=True)
+        straight.append(np.where(seen[:, None], line, np.nan))
+    enough = seen_by >= 2
+    if not enough.any():
+        raise GeometryError(
+            "design: no point is seen by two cameras. Turn the cameras towards the object, use a "
+            "shorter principal distance, or choose other points."
+        )
+    inverse = np.full_like(normal, np.nan)
+    inverse[enough] = np.linalg.inv(normal[enough])
+    sigma = sigma_image * np.sqrt(np.diagonal(inverse, axis1=1, axis2=2))
+    sensitivity = {}
+    for key, moment in moments.items():
+        kind = key.rpartition(":")[2].rstrip("0123456789")
+        step = STEPS[kind][0] * (millimetre if kind in ("offset", "thickness") else 1.0)
+        moved = np.einsum("nij,nj->ni", inverse, moment)
+        sensitivity[key] = np.sqrt(np.nanmean(moved**2, axis=0)) * step
+    return Study(
+        points=points, sigma=sigma, angle=_largest_angle(rays),
+        angle_in_air=_largest_angle(straight), seen_by=seen_by, sensitivity=sensitivity,
+    )  # fmt: skip
+
+
+def _on_sensor(camera: Camera, image: FloatArray) -> BoolArray:
+    """Return which image points lie on the sensor; all, where its size is not known."""
+    if camera.sensor is None:
+        return np.ones(len(image), dtype=bool)
+    pixels = camera.sensor.pixel_from_image(np.nan_to_num(image, nan=1e12))
+    size = np.array([camera.sensor.width, camera.sensor.height])
+    return np.asarray(((pixels >= -0.5) & (pixels <= size - 0.5)).all(axis=1))
+
+
+def _largest_angle(rays: Sequence[FloatArray]) -> FloatArray:
+    """Return the largest angle between any two unit vectors of each point; NaN below two."""
+    largest = np.full(len(rays[0]), np.nan)
+    for i, first in enumerate(rays):
+        for second in rays[i + 1 :]:
+            # Angle from the cross product too: the cosine alone is blind near zero.
+            sine = np.linalg.norm(np.cross(first, second), axis=1)
+            largest = np.fmax(largest, np.arctan2(sine, (first * second).sum(axis=1)))
+    return largest
+
+
+def object_grid(
+    extent: tuple[float, float], depths: tuple[float, float], *, count: int = 7
+) -> FloatArray:
+    """Return count x count points on each of count levels, centred under the origin.
+
+    Parameters
+    ----------
+    extent : tuple of float
+        Width and height of the object space. [object unit]
+    depths : tuple of float
+        Least and largest depth below the last face, both above 0. [object unit]
+
+    Examples
+    --------
+    >>> object_grid((2.0, 1.0), (0.1, 0.5), count=2)[0].tolist()
+    [-1.0, -0.5, -0.1]
+    """
+    low, high = sorted(positive(depth, "depth") for depth in depths)
+    x = np.linspace(-extent[0] / 2, extent[0] / 2, count)
+    y = np.linspace(-extent[1] / 2, extent[1] / 2, count)
+    mesh = np.meshgrid(x, y, -np.linspace(low, high, count), indexing="ij")
+    return np.stack([axis.ravel() for axis in mesh], axis=-1)
+
+
+def ring_of_cameras(
+    count: int,
+    distance: float,
+    half_angle: float,
+    *,
+    interface: FlatInterface,
+    target: FloatArray,
+    principal_distance: float,
+) -> tuple[Camera, ...]:
+    """Return cameras evenly on a cone about the vertical through the target, all looking at it.
+
+    Parameters
+    ----------
+    count : int
+        Two stand opposite each other.
+    distance : float
+        From the point of the last face above the target. [object unit]
+    half_angle : float
+        Of the cone, in air; 0 puts them all on the axis. [rad]
+    interface : FlatInterface
+        What they look through; a camera that would stand inside it raises `GeometryError`.
+    target : ndarray, shape (3,)
+        Point in the object's medium that they aim at as it appears.
+    principal_distance : float
+        [mm]
+    """
+    cameras = []
+    top = np.array([target[0], target[1], 0.0])
+    for k in range(count):
+        azimuth = 2 * np.pi * k / count
+        offset = np.array(
+            [np.sin(half_angle) * np.cos(azimuth), np.sin(half_angle) * np.sin(azimuth),
+             np.cos(half_angle)]
+        )  # fmt: skip
+        centre = top + distance * offset
+        # Aim where the target appears: two rounds of shifting the aim by the image of the target.
+        aim = target.astype(np.float64)
+        camera = Camera.looking_at(
+            centre, aim, principal_distance=principal_distance, name=f"cam{k + 1}"
+        )
+        for _ in range(6):
+            seen = project(camera, target, interface)
+            if not np.isfinite(seen).all():
+                raise GeometryError(f"design: camera {k + 1} cannot see the target.")
+            direction = camera.rotation @ np.array([*seen, -principal_distance])
+            aim = centre + direction
+            camera = Camera.looking_at(
+                centre, aim, principal_distance=principal_distance, name=f"cam{k + 1}"
+            )
+        cameras.append(camera)
+    return tuple(cameras)
+
+
+def compare_placements(
+    count: int,
+    distance: float,
+    *,
+    interface: FlatInterface,
+    points: FloatArray,
+    principal_distance: float,
+    sigma_image: float,
+    half_angles: Sequence[float] = tuple(np.radians(np.arange(5, 61, 5)).tolist()),
+) -> tuple[Placement, ...]:
+    """Return the expected precision of rings of cameras of different opening.
+
+    Angles under which a camera cannot see all points are left out.
+
+    Raises
+    ------
+    GeometryError
+        If no opening works.
+    """
+    target = points.mean(axis=0)
+    found = []
+    for half_angle in half_angles:
+        try:
+            cameras = ring_of_cameras(
+                count, distance, half_angle, interface=interface, target=target,
+                principal_distance=principal_distance,
+            )  # fmt: skip
+            study = study_setup(cameras, [interface] * count, points, sigma_image=sigma_image)
+        except GeometryError:
+            continue
+        if (study.seen_by < count).any():
+            continue
+        x, y, z = study.rms_sigma.tolist()
+        found.append(
+            Placement(
+                half_angle=float(half_angle), sigma=(x, y, z), angle=float(np.mean(study.angle))
+            )
+        )
+    if not found:
+        raise GeometryError(
+            "design: under no angle do all cameras see all points; increase the distance."
+        )
+    return tuple(found)
+
+
+def calibration_costs(
+    cameras: Sequence[Camera],
+    interface: FlatInterface,
+    points: FloatArray,
+    *,
+    rng: np.random.Generator,
+    sigma_image: float,
+    index_error: float = 0.002,
+    tilt_error: float = float(np.radians(0.3)),
+    water_noise: float = 2.0,
+    interior: Sequence[str] = ("c", "xh", "yh", "k1", "scale", "shear"),
+) -> CalibrationCosts:
+    """Return what calibrating in air costs when measuring in water: the pattern of Table 1.
+
+    Parameters
+    ----------
+    cameras : sequence of Camera
+        As they are.
+    interface : FlatInterface
+        The glass with water behind it, as assumed in the evaluation.
+    points : ndarray, shape (n, 3)
+        Every other one serves as control, the rest as check points. [object unit]
+    rng : Generator
+        Of the noise.
+    sigma_image : float
+        In air. [mm]
+    index_error, tilt_error : float
+        By how much the real water and glass differ from what is assumed. [-, rad]
+    water_noise : float
+        Noise of image coordinates in water over that in air: blur, dispersion, turbidity.
+    interior : sequence of str
+        What a calibration estimates.
+
+    Notes
+    -----
+    I: air-glass-air, calibrated. II: air-glass-water with the calibration of I. III: the same,
+    calibrated again: interior parameters absorb part of what is wrong with the media
+    (Maas 2015, Sect. 7).
+    """
+    last = len(interface.layers.indices)
+    dry = replace(
+        interface,
+        layers=Layers(
+            indices=(*interface.layers.indices[:-1], interface.layers.indices[0]),
+            thicknesses=interface.layers.thicknesses,
+        ),
+    )
+    real = interface.stepped([f"index{last}", "tilt1"], [index_error, tilt_error])
+    control = np.arange(len(points)) % 2 == 0
+
+    def evaluate(
+        true_media: FlatInterface, assumed: FlatInterface, start: Sequence[Camera], noise: float,
+        estimate: Sequence[str],
+    ) -> tuple[list[Camera], FloatArray, float]:  # fmt: skip
+        oriented, images, sigma0 = [], [], []
+        for camera, first in zip(cameras, start, strict=True):
+            image = project(camera, points, true_media)
+            image = image + rng.normal(0, noise, image.shape)
+            images.append(image)
+            result = resect(
+                first, points[control], image[control], assumed, estimate=(*EXTERIOR, *estimate)
+            )
+            oriented.append(result.camera)
+            sigma0.append(result.sigma0)
+        found = intersect(oriented, np.stack(images)[:, ~control], assumed).xyz
+        error = np.sqrt(np.nanmean((found - points[~control]) ** 2, axis=0))
+        return oriented, error, float(np.sqrt(np.mean(np.square(sigma0))))
+
+    try:
+        calibrated, first, sigma1 = evaluate(dry, dry, cameras, sigma_image, interior)
+        _, second, sigma2 = evaluate(real, interface, calibrated, sigma_image * water_noise, ())
+        _, third, sigma3 = evaluate(
+            real, interface, calibrated, sigma_image * water_noise, interior
+        )
+    except PhotogrammetryError as error:
+        raise GeometryError(
+            f"design: the set-up cannot be calibrated with these points ({error}); give points "
+            "that fill the object space."
+        ) from error
+
+    def triple(values: FloatArray) -> tuple[float, float, float]:
+        x, y, z = values.tolist()
+        return x, y, z
+
+    return CalibrationCosts(
+        air=triple(first), air_calibration_in_water=triple(second), water=triple(third),
+        sigma0=(sigma1, sigma2, sigma3),
+    )  # fmt: skip

@@ -1,0 +1,200 @@
+"""A set-up in, its expected accuracy out."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from multimedia.domain.camera import Camera
+from multimedia.domain.flat_interface import FlatInterface
+from multimedia.domain.layers import Layers
+from multimedia.io.design_files import write_design_plot, write_design_workbook
+from multimedia.io.project_file import read_project
+from multimedia.solvers.design import (
+    STEPS,
+    CalibrationCosts,
+    Placement,
+    Study,
+    calibration_costs,
+    compare_placements,
+    object_grid,
+    ring_of_cameras,
+    study_setup,
+)
+from photocore.arrays import FloatArray
+from photocore.errors import GeometryError, InputError
+from photocore.output import check_writable
+
+#: A millimetre in the units that projects use.
+MILLIMETRE = {"m": 1e-3, "cm": 0.1, "mm": 1.0}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Design:
+    """Everything the command shows.
+
+    Attributes
+    ----------
+    study : Study
+    by_depth : ndarray, shape (levels, 6)
+        Depth, RMS sigma X, Y, Z, mean ray angle and the same in air. [unit, unit, deg]
+    sensitivities : tuple of (unknown, step in words, (dX, dY, dZ))
+    placements : tuple of Placement
+    costs : CalibrationCosts or None
+    unit : str
+    remarks : tuple of str
+    """
+
+    study: Study
+    by_depth: FloatArray
+    sensitivities: tuple[tuple[str, str, tuple[float, ...]], ...]
+    placements: tuple[Placement, ...]
+    costs: CalibrationCosts | None
+    unit: str
+    remarks: tuple[str, ...]
+
+
+def design_ring(
+    *,
+    count: int,
+    distance: float,
+    half_angle: float,
+    principal_distance: float,
+    indices: Sequence[float],
+    thicknesses: Sequence[float],
+    extent: tuple[float, float],
+    depths: tuple[float, float],
+    sigma_image: float,
+    seed: int = 1,
+    unit: str = "m",
+) -> Design:
+    """Study cameras on a cone above a water surface or a glass; arguments as in the solvers."""
+    interface = FlatInterface(layers=Layers(indices=tuple(indices), thicknesses=tuple(thicknesses)))
+    points = object_grid(extent, depths)
+    cameras = ring_of_cameras(
+        count, distance, half_angle, interface=interface, target=points.mean(axis=0),
+        principal_distance=principal_distance,
+    )  # fmt: skip
+    placements = compare_placements(
+        count, distance, interface=interface, points=points,
+        principal_distance=principal_distance, sigma_image=sigma_image,
+    )  # fmt: skip
+    return _design(
+        cameras, [interface] * count, points, sigma_image, ("media",) * count, placements, seed,
+        unit, (),
+    )  # fmt: skip
+
+
+def design_project(source: Path, *, seed: int = 1) -> Design:
+    """Study the cameras of a project file at its object points."""
+    project = read_project(source)
+    if not project.object_points.ids:
+        raise InputError(
+            f"{source}: the project has no object points; add the places where you will measure."
+        )
+    return _design(
+        project.cameras, project.interfaces, project.object_points.xyz, project.sigma_image,
+        project.media_of, (), seed, project.unit, project.remarks,
+    )  # fmt: skip
+
+
+def _design(
+    cameras: Sequence[Camera], media: Sequence[Any], points: FloatArray, sigma_image: float,
+    names: Sequence[str], placements: tuple[Placement, ...], seed: int, unit: str,
+    remarks: tuple[str, ...],
+) -> Design:  # fmt: skip
+    """Run all studies of one set-up."""
+    study = study_setup(
+        cameras, media, points, sigma_image=sigma_image, names=names,
+        millimetre=MILLIMETRE.get(unit, 1e-3),
+    )  # fmt: skip
+    notes = list(remarks)
+    blind = int((study.seen_by < 2).sum())
+    if blind:
+        notes.append(f"{blind} of {len(points)} points are seen by fewer than two cameras.")
+    costs = None
+    interface = media[0]
+    if isinstance(interface, FlatInterface) and all(item is interface for item in media):
+        rng = np.random.default_rng(seed)
+        try:
+            costs = calibration_costs(
+                cameras, interface, points[study.seen_by == len(cameras)], rng=rng,
+                sigma_image=sigma_image,
+            )  # fmt: skip
+        except (GeometryError, InputError) as error:
+            notes.append(f"calibration not simulated: {error}")
+    else:
+        notes.append("calibration not simulated: the cameras look through different media.")
+    sensitivities = tuple(
+        (name, STEPS[name.rpartition(":")[2].rstrip("0123456789")][1], tuple(moved.tolist()))
+        for name, moved in study.sensitivity.items()
+    )
+    return Design(
+        study=study, by_depth=_by_depth(study), sensitivities=sensitivities,
+        placements=placements, costs=costs, unit=unit, remarks=tuple(notes),
+    )  # fmt: skip
+
+
+def _by_depth(study: Study) -> FloatArray:
+    """Return RMS precision and mean angles per depth level (at most 12 levels)."""
+    depth = -study.points[:, 2]
+    levels = np.unique(depth)
+    if len(levels) > 12:
+        edges = np.quantile(depth, np.linspace(0, 1, 13))
+        group = np.clip(np.searchsorted(edges, depth, side="right") - 1, 0, 11)
+    else:
+        group = np.searchsorted(levels, depth)
+    rows = []
+    for k in np.unique(group):
+        own = (group == k) & np.isfinite(study.sigma[:, 0])
+        if own.any():
+            sigma = np.sqrt(np.mean(study.sigma[own] ** 2, axis=0))
+            angles = [float(np.degrees(np.mean(a[own]))) for a in (study.angle, study.angle_in_air)]
+            rows.append([float(depth[own].mean()), *sigma.tolist(), *angles])
+    return np.array(rows)
+
+
+def write_design(design: Design, *, out: Path | None, plot: Path | None, overwrite: bool) -> None:
+    """Write the workbook and the picture where asked."""
+    for path in (out, plot):
+        if path is not None:
+            check_writable(path, overwrite=overwrite)
+    if out is not None:
+        write_design_workbook(out, design, overwrite=overwrite)
+    if plot is not None:
+        write_design_plot(plot, design, overwrite=overwrite)
+
+
+def as_dict(design: Design) -> dict[str, Any]:
+    """Return a design as plain data for ``--json``."""
+    x, y, z = design.study.rms_sigma.tolist()
+    costs = design.costs
+    return {
+        "unit": design.unit,
+        "sigma_rms": {"X": x, "Y": y, "Z": z},
+        "by_depth": [
+            dict(
+                zip(("depth", "sigma_X", "sigma_Y", "sigma_Z", "angle_deg", "angle_in_air_deg"),
+                    row, strict=True)
+            )
+            for row in design.by_depth.tolist()
+        ],
+        "sensitivity": [
+            {"unknown": name, "step": step, "shift": moved}
+            for name, step, moved in design.sensitivities
+        ],
+        "placements": [
+            {"half_angle_deg": float(np.degrees(p.half_angle)), "sigma": p.sigma,
+             "angle_deg": float(np.degrees(p.angle))}
+            for p in design.placements
+        ],
+        "calibration": None if costs is None else {
+            "I_air": costs.air, "II_air_calibration_in_water": costs.air_calibration_in_water,
+            "III_water": costs.water, "sigma0_mm": costs.sigma0,
+        },
+        "remarks": design.remarks,
+    }  # fmt: skip

@@ -1,0 +1,77 @@
+"""``multimedia adjust`` as a user runs it."""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+
+from multimedia import read_project, write_project
+from multimedia.cli.main import main
+
+
+def bundle_project(**changes):
+    spec = importlib.util.spec_from_file_location(
+        "bundle_cases", Path(__file__).with_name("test_bundle.py")
+    )
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module.with_true_cameras(module.a_project(**changes), interior=False)
+
+
+@pytest.fixture(scope="module")
+def project(tmp_path_factory):
+    path = tmp_path_factory.mktemp("adjust") / "tank.toml"
+    write_project(path, bundle_project(noise=0.001))
+    return path
+
+
+def test_adjusting_writes_project_and_report_and_says_the_salinity(project, tmp_path):
+    out, report = tmp_path / "new.toml", tmp_path / "r.html"
+    arguments = [
+        "adjust", str(project), "--interior", "c,xh,yh,k1", "--media", "index3", "--out", str(out),
+        "--report", str(report), "--wavelength", "520", "--temperature", "20",
+    ]  # fmt: skip
+    result = CliRunner().invoke(main, arguments)
+    assert result.exit_code == 0, result.stderr
+    assert "index3" in result.stdout
+    assert "Salinity" in result.stdout
+    media = next(iter(read_project(out).media.values()))
+    assert media.layers.indices[2] == pytest.approx(1.3365, abs=2e-4)
+    text = report.read_text()
+    assert text.count("<svg") == 4
+    assert "http" not in text
+    again = CliRunner().invoke(main, arguments)
+    assert again.exit_code == 1
+    assert "--overwrite" in again.stderr
+
+
+def test_json_holds_values_sigmas_and_correlations(project):
+    result = CliRunner().invoke(
+        main, ["adjust", str(project), "--interior", "c", "--media", "index3", "--json"]
+    )
+    data = json.loads(result.stdout)
+    assert data["unknowns"]["index3"]["sigma"] > 0
+    assert len(data["correlations"]) == len(data["unknowns"])
+
+
+@pytest.mark.parametrize(
+    ("arguments", "status", "message"),
+    [
+        (["none.toml"], 1, "none.toml"),
+        (["PROJECT", "--media", "index7"], 1, "index7"),
+        (["PROJECT", "--interior", "focus"], 1, "focus"),
+        (["PROJECT", "--scale-bar", "1,2"], 1, "first,second,length,sigma"),
+        (["PROJECT", "--prior", "offset"], 1, "label=sigma"),
+        (["PROJECT", "--control", "maybe"], 2, "maybe"),
+        (["PROJECT", "--fix-camera", "cam9"], 1, "cam9"),
+    ],
+)
+def test_mistakes_are_named(project, arguments, status, message):
+    full = [str(project) if a == "PROJECT" else a for a in arguments]
+    result = CliRunner().invoke(main, ["adjust", *full])
+    assert result.exit_code == status
+    assert message in result.stderr

@@ -1,0 +1,132 @@
+"""Accuracy studies: closed forms, Monte Carlo, the papers' claims, the command."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import openpyxl
+import pytest
+from click.testing import CliRunner
+
+from multimedia import Camera, FlatInterface, Layers, intersect, project
+from multimedia.cli.main import main
+from multimedia.solvers.design import (
+    calibration_costs,
+    compare_placements,
+    object_grid,
+    ring_of_cameras,
+    study_setup,
+)
+from photocore.errors import GeometryError, InputError
+
+TANK = FlatInterface(layers=Layers(indices=(1.0, 1.5, 1.337), thicknesses=(0.01,)))
+POINTS = object_grid((0.3, 0.2), (0.02, 0.2), count=5)
+RIG = ring_of_cameras(
+    4, 0.6, np.radians(30), interface=TANK, target=POINTS.mean(axis=0), principal_distance=25.0
+)
+
+
+def test_the_target_is_seen_in_the_middle_of_every_photo():
+    for camera in RIG:
+        np.testing.assert_allclose(project(camera, POINTS.mean(axis=0), TANK), 0, atol=1e-9)
+
+
+def test_expected_precision_agrees_with_monte_carlo():
+    point = POINTS[[17]]
+    study = study_setup(RIG, [TANK] * 4, point, sigma_image=0.002)
+    rng = np.random.default_rng(3)
+    image = np.stack([project(c, point, TANK) for c in RIG])
+    noisy = image + rng.normal(0, 0.002, (4, 4000, 2))
+    found = intersect(RIG, noisy, TANK).xyz
+    np.testing.assert_allclose(found.std(axis=0) / study.sigma[0], 1.0, atol=0.05)
+
+
+def test_without_media_two_cameras_follow_the_textbook():
+    # Normal case, in the middle: sigma Z = Z^2 / (b c) sqrt(2) sigma.
+    height, base, c, sigma = 2.0, 0.4, 50.0, 0.004
+    cameras = [
+        Camera.from_angles((x, 0, height), 0, 0, 0, principal_distance=c)
+        for x in (-base / 2, base / 2)
+    ]
+    study = study_setup(cameras, [None, None], np.zeros((1, 3)), sigma_image=sigma)
+    expected = height**2 / (base * c) * np.sqrt(2) * sigma
+    assert study.sigma[0, 2] == pytest.approx(expected, rel=1e-9)
+    angle = 2 * np.arctan(base / 2 / height)
+    assert study.angle[0] == pytest.approx(angle, rel=1e-9)
+
+
+def test_refraction_makes_the_intersection_angle_smaller():
+    study = study_setup(RIG, [TANK] * 4, POINTS, sigma_image=0.001)
+    assert (study.angle < study.angle_in_air).all()
+
+
+def test_sensitivities_are_what_a_wrong_index_does():
+    study = study_setup(RIG, [TANK] * 4, POINTS, sigma_image=0.001, names=("t",) * 4)
+    image = np.stack([project(c, POINTS, TANK) for c in RIG])
+    for name, parameter, step in (("t:index3", "index3", 0.001), ("t:offset", "offset", 0.001)):
+        wrong = TANK.stepped([parameter], [step])
+        moved = intersect(RIG, image, wrong).xyz - POINTS
+        rms = np.sqrt(np.mean(moved**2, axis=0))
+        np.testing.assert_allclose(study.sensitivity[name], rms, rtol=0.03)
+
+
+def test_wider_placements_give_better_depth():
+    found = compare_placements(
+        4, 0.6, interface=TANK, points=POINTS, principal_distance=25.0, sigma_image=0.001
+    )
+    depth = [p.sigma[2] for p in found]
+    assert depth == sorted(depth, reverse=True)
+
+
+def test_an_air_calibration_costs_in_water_and_a_new_one_regains_half():
+    costs = calibration_costs(
+        RIG, TANK, object_grid((0.3, 0.2), (0.02, 0.2), count=6), rng=np.random.default_rng(1),
+        sigma_image=0.0005,
+    )  # fmt: skip
+    first, second, third = (
+        np.linalg.norm(v) for v in (costs.air, costs.air_calibration_in_water, costs.water)
+    )
+    # Table 1: II about 5 times I, III about 2 times I.
+    assert second > 3 * first
+    assert 1.3 * first < third < 0.8 * second
+
+
+def test_what_cannot_be_studied_is_refused():
+    with pytest.raises(InputError, match="two cameras"):
+        study_setup(RIG[:1], [TANK], POINTS, sigma_image=0.001)
+    away = ring_of_cameras(
+        2, 0.6, 0.3, interface=TANK, target=np.array([0, 0, -0.1]), principal_distance=25.0
+    )
+    with pytest.raises(GeometryError, match="no point is seen"):
+        study_setup(away, [TANK] * 2, POINTS + np.array([0, 0, 5.0]), sigma_image=0.001)
+
+
+ARGUMENTS = [
+    "design", "--cameras", "3", "--distance", "0.6", "--c", "25", "--extent", "0.3x0.2",
+    "--depths", "0.02x0.2", "--indices", "1,1.5,1.337", "--thicknesses", "0.01",
+]  # fmt: skip
+
+
+def test_the_command_prints_tables_and_writes_workbook_and_picture(tmp_path):
+    out, plot = tmp_path / "d.xlsx", tmp_path / "d.png"
+    result = CliRunner().invoke(main, [*ARGUMENTS, "--out", str(out), "--plot", str(plot)])
+    assert result.exit_code == 0, result.stderr
+    assert "III water" in result.stdout
+    assert openpyxl.load_workbook(out).sheetnames[:2] == ["Precision", "Sensitivity"]
+    assert plot.read_bytes()[:4] == b"\x89PNG"
+    data = json.loads(CliRunner().invoke(main, [*ARGUMENTS, "--json"]).stdout)
+    assert data["by_depth"][0]["angle_deg"] < data["by_depth"][0]["angle_in_air_deg"]
+    again = CliRunner().invoke(main, [*ARGUMENTS, "--out", str(out)])
+    assert again.exit_code == 1
+    assert "--overwrite" in again.stderr
+
+
+def test_missing_options_and_wrong_indices_are_named():
+    result = CliRunner().invoke(main, ["design", "--distance", "1"])
+    assert result.exit_code == 2
+    assert "--depths" in result.stderr
+    wrong = [a if a != "1,1.5,1.337" else "1,0.5,1.337" for a in ARGUMENTS]
+    result = CliRunner().invoke(main, wrong)
+    assert result.exit_code == 1
+    assert "index" in result.stderr.lower()
