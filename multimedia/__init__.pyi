@@ -1,6 +1,7 @@
 from .domain.adjustment import Adjustment, ScaleBar, Unknowns
 from .domain.bathymetry import BathymetryStatus, CorrectedPoints, Precision
 from .domain.camera import Camera, Sensor
+from .domain.design import CalibrationCosts, Placement, Study
 from .domain.flat_interface import FlatInterface
 from .domain.height_field import RasterSurface, WaveSurface
 from .domain.interfaces import Interfaces
@@ -31,9 +32,6 @@ from .solvers.approximations import Approximation, agrafiotis, lavest, telem
 from .solvers.bathymetry import correct_bathymetry
 from .solvers.bundle import bundle_adjust
 from .solvers.design import (
-    CalibrationCosts,
-    Placement,
-    Study,
     calibration_costs,
     compare_placements,
     object_grid,

@@ -11,7 +11,7 @@ from photocore.console import print_json, remark, text_table
 from photocore.options import Size
 
 if TYPE_CHECKING:
-    from multimedia.workflows.design import Design
+    from multimedia.domain.design import Design
 
 EXAMPLE = """\b
 Examples:

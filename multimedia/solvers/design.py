@@ -7,11 +7,12 @@ something is to be measured: precision, what unknown media do to coordinates, an
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from multimedia.domain.camera import EXTERIOR, Camera
+from multimedia.domain.design import CalibrationCosts, Placement, Study
 from multimedia.domain.flat_interface import FlatInterface
 from multimedia.domain.layers import Layers
 from multimedia.solvers.intersection import intersect
@@ -28,71 +29,6 @@ STEPS: Mapping[str, tuple[float, str]] = {
     "tilt": (float(np.radians(0.1)), "0.1 deg"),
     "thickness": (0.1, "0.1 mm"),
 }
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Study:
-    """What a set-up promises.
-
-    Attributes
-    ----------
-    points : ndarray, shape (n, 3)
-        Where it was evaluated. [object unit]
-    sigma : ndarray, shape (n, 3)
-        Expected standard deviations of X, Y, Z; NaN where fewer than two cameras see the point.
-    angle : ndarray, shape (n,)
-        Largest angle between two rays at the point, in its medium. [rad]
-    angle_in_air : ndarray, shape (n,)
-        The same if the tank were empty: Maas 2015, Fig. 4. [rad]
-    seen_by : ndarray of int, shape (n,)
-        Cameras that see it.
-    sensitivity : mapping of str to ndarray, shape (3,)
-        Unknown of the media, e.g. ``tank:index3``, to the RMS error of X, Y, Z that one step of it
-        (`STEPS`) causes. [object unit]
-    """
-
-    points: FloatArray
-    sigma: FloatArray
-    angle: FloatArray
-    angle_in_air: FloatArray
-    seen_by: FloatArray
-    sensitivity: Mapping[str, FloatArray]
-
-    @property
-    def rms_sigma(self) -> FloatArray:
-        """RMS of the standard deviations over the points, shape (3,)."""
-        return np.sqrt(np.nanmean(self.sigma**2, axis=0))
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class CalibrationCosts:
-    """Table 1 of Maas 2015 on simulated data: mean errors of check points in X, Y, Z.
-
-    Attributes
-    ----------
-    air : tuple of float
-        I: calibrated and measured in air.
-    air_calibration_in_water : tuple of float
-        II: calibrated in air, oriented and measured in water.
-    water : tuple of float
-        III: calibrated and measured in water.
-    sigma0 : tuple of float
-        Of I, II and III. [mm]
-    """
-
-    air: tuple[float, float, float]
-    air_calibration_in_water: tuple[float, float, float]
-    water: tuple[float, float, float]
-    sigma0: tuple[float, float, float]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Placement:
-    """One way to place the cameras and what it gives: half angle [rad], RMS sigmas, ray angle."""
-
-    half_angle: float
-    sigma: tuple[float, float, float]
-    angle: float
 
 
 def study_setup(

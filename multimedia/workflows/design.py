@@ -3,22 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from multimedia.domain.camera import Camera
+from multimedia.domain.design import Design, Placement, Study
 from multimedia.domain.flat_interface import FlatInterface
 from multimedia.domain.layers import Layers
 from multimedia.io.design_files import write_design_plot, write_design_workbook
 from multimedia.io.project_file import read_project
 from multimedia.solvers.design import (
     STEPS,
-    CalibrationCosts,
-    Placement,
-    Study,
     calibration_costs,
     compare_placements,
     object_grid,
@@ -31,31 +28,6 @@ from photocore.output import check_writable
 
 #: A millimetre in the units that projects use.
 MILLIMETRE = {"m": 1e-3, "cm": 0.1, "mm": 1.0}
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Design:
-    """Everything the command shows.
-
-    Attributes
-    ----------
-    study : Study
-    by_depth : ndarray, shape (levels, 6)
-        Depth, RMS sigma X, Y, Z, mean ray angle and the same in air. [unit, unit, deg]
-    sensitivities : tuple of (unknown, step in words, (dX, dY, dZ))
-    placements : tuple of Placement
-    costs : CalibrationCosts or None
-    unit : str
-    remarks : tuple of str
-    """
-
-    study: Study
-    by_depth: FloatArray
-    sensitivities: tuple[tuple[str, str, tuple[float, ...]], ...]
-    placements: tuple[Placement, ...]
-    costs: CalibrationCosts | None
-    unit: str
-    remarks: tuple[str, ...]
 
 
 def design_ring(
