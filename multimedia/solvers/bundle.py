@@ -9,6 +9,7 @@ import numpy as np
 
 from multimedia.domain.adjustment import Adjustment, Unknowns
 from multimedia.domain.camera import EXTERIOR, Camera
+from multimedia.domain.flat_interface import FlatInterface
 from multimedia.domain.project import ObjectPoints, Project
 from multimedia.solvers.bundle_dense import LARGEST, solve_dense
 from multimedia.solvers.bundle_problem import (
@@ -327,8 +328,9 @@ def _values(problem: Problem, state: State) -> tuple[FloatArray, FloatArray]:
         if second is not None:
             values[second : second + len(inner)] = [camera.value(name) for name in inner]
     for who, name, column in place.media:
-        if name.startswith(("index", "thickness")):
-            values[column] = state.media[who].value(name)
+        interface = state.media[who]
+        if name.startswith(("index", "thickness")) and isinstance(interface, FlatInterface):
+            values[column] = interface.value(name)
     for plate, first in enumerate(place.plates):
         rotation, shift = state.poses[plate]
         stand_in = Camera(centre=shift, rotation=rotation, principal_distance=1.0)

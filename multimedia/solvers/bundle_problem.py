@@ -10,6 +10,7 @@ import numpy as np
 from multimedia.domain.adjustment import Unknowns
 from multimedia.domain.camera import EXTERIOR, Camera
 from multimedia.domain.flat_interface import FlatInterface
+from multimedia.domain.interfaces import Interfaces
 from multimedia.domain.project import Project
 from multimedia.solvers.projection import project_with_jacobian
 from photocore.arrays import BoolArray, FloatArray, IntArray
@@ -37,7 +38,7 @@ class State:
     """
 
     cameras: tuple[Camera, ...]
-    media: Mapping[str, FlatInterface]
+    media: Mapping[str, FlatInterface | Interfaces]
     points: FloatArray
     poses: tuple[tuple[FloatArray, FloatArray], ...]
     drift: FloatArray
@@ -281,7 +282,7 @@ class Problem:
             media = dict(state.media)
             for name, interface in state.media.items():
                 own = [(p, float(step[c])) for who, p, c in place.media if who == name]
-                if own:
+                if own and isinstance(interface, FlatInterface):
                     media[name] = interface.stepped([p for p, _ in own], [v for _, v in own])
         except (InputError, GeometryError):
             return None
@@ -393,7 +394,12 @@ def _media_columns(
         for owner in owners:
             if owner not in project.media:
                 raise InputError(f"media: there are no media {owner!r}, only {', '.join(used)}.")
-            allowed = project.media[owner].parameter_names
+            interface = project.media[owner]
+            if not isinstance(interface, FlatInterface):
+                raise InputError(
+                    f"media: {owner} is ray-traced; only plane-parallel media can be estimated."
+                )
+            allowed = interface.parameter_names
             if parameter not in allowed:
                 raise InputError(
                     f"media: {owner} has no {parameter!r}; its parameters are {', '.join(allowed)}."
@@ -417,10 +423,16 @@ def with_common_values(project: Project, wanted: Sequence[str]) -> Project:
     for item in wanted:
         if ":" in item or not item.startswith(_MATERIAL):
             continue
-        used = [name for name in dict.fromkeys(project.media_of) if name]
-        values = [media[name].value(item) for name in used if item in media[name].parameter_names]
+        flat = {
+            name: interface
+            for name, interface in media.items()
+            if name in project.media_of
+            and isinstance(interface, FlatInterface)
+            and item in interface.parameter_names
+        }
+        values = [interface.value(item) for interface in flat.values()]
         if len(set(values)) > 1:
             mean = float(np.mean(values))
-            for name in used:
-                media[name] = media[name].stepped([item], [mean - media[name].value(item)])
+            for name, interface in flat.items():
+                media[name] = interface.stepped([item], [mean - interface.value(item)])
     return replace(project, media=media)

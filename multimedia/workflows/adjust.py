@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from multimedia.domain.adjustment import Adjustment, ScaleBar, Unknowns
+from multimedia.domain.flat_interface import FlatInterface
 from multimedia.io.adjustment_report import write_adjustment_report
 from multimedia.io.project_file import read_project, write_project
 from multimedia.solvers.bundle import bundle_adjust
@@ -91,7 +92,10 @@ def salinity_of(
     used = [name for name in result.project.media_of if name]
     if not used:
         return None
-    last = len(result.project.media[used[0]].layers.indices)
+    interface = result.project.media[used[0]]
+    if not isinstance(interface, FlatInterface):
+        return None
+    last = len(interface.layers.indices)
     names = [name for name in result.names if name.rpartition(":")[2] == f"index{last}"]
     if not names:
         return None
