@@ -30,7 +30,7 @@ from photocore.arrays import BoolArray, FloatArray, IntArray, as_points
 from photocore.errors import GeometryError, InputError
 
 #: Rays per block: bounds memory however many points and cameras there are.
-BLOCK_RAYS = 200_000
+BLOCK_RAYS = 400_000
 #: Newton needs 3 to 5 steps.
 MOST_STEPS = 30
 #: A point is found when a step moves it by less than this share of the scene size.
@@ -248,73 +248,70 @@ def _below_surface(surface: WaterSurface, point: FloatArray, step: FloatArray) -
 
 def _balance(task: _Task, point: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return sum w (I - u u')(A - C), the normal matrix, and minus the derivative by the point."""
-    heading, derivative = _pointing(task, point)
-    toward = task.apparent[:, None] - task.centres
+    row, camera = np.nonzero(task.weights)
+    heading, derivative = _pointing(task, point, row, camera)
+    weight = task.weights[row, camera]
+    toward = task.apparent[row] - task.centres[camera]
     along = (heading * toward).sum(-1)
-    weights = task.weights
-    used = weights > 0
-    heading = np.where(used[..., None], heading, 0.0)
-    derivative = np.where(used[..., None, None], derivative, 0.0)
-    along = np.where(used, along, 0.0)
-    balance = (weights[..., None] * (toward - along[..., None] * heading)).sum(1)
-    outer = np.einsum("nm,nmi,nmj->nij", weights, heading, heading)
-    normal = np.eye(3) * weights.sum(-1)[:, None, None] - outer
+    aside = toward - along[:, None] * heading
+    outer = np.eye(3) - heading[:, :, None] * heading[:, None, :]
     # d(u u') r = (u . r) du + u (r . du)
-    change = np.einsum("nm,nmij->nij", weights * along, derivative)
-    change += np.einsum("nm,nmi,nmk,nmkj->nij", weights, heading, toward, derivative, optimize=True)
-    return balance, normal, change
+    change = along[:, None, None] * derivative
+    change += heading[:, :, None] * (toward[:, None, :] @ derivative)
+    # Pairs come sorted by point, and every point has a camera: sums over runs.
+    starts = np.searchsorted(row, np.arange(len(point)))
+    return (
+        np.add.reduceat(weight[:, None] * aside, starts),
+        np.add.reduceat(weight[:, None, None] * outer, starts),
+        np.add.reduceat(weight[:, None, None] * change, starts),
+    )
 
 
-def _pointing(task: _Task, point: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return directions in air of the rays to points, (n, m, 3), and derivatives (n, m, 3, 3)."""
+def _pointing(
+    task: _Task, point: FloatArray, row: IntArray, camera: IntArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return directions in air of the rays of pairs, (k, 3), and their derivatives (k, 3, 3)."""
     if isinstance(task.surface, Plane):
-        return _pointing_at_plane(task, task.surface, point)
+        return _pointing_at_plane(task, task.surface, point, row, camera)
     water = Interfaces(surfaces=(task.surface,), indices=(1.0, task.n_water))
-    heading = np.full((*task.weights.shape, 3), np.nan)
-    derivative = np.full((*task.weights.shape, 3, 3), np.nan)
-    row, camera = np.nonzero(task.weights > 0)
     path = aim_rays(task.centres[camera], point[row], water, jacobian=True)
-    heading[row, camera], derivative[row, camera] = path.directions[:, 0], path.jacobian
-    return heading, derivative
+    return path.directions[:, 0], np.asarray(path.jacobian)
 
 
 def _pointing_at_plane(
-    task: _Task, plane: Plane, point: FloatArray
+    task: _Task, plane: Plane, point: FloatArray, row: IntArray, camera: IntArray
 ) -> tuple[FloatArray, FloatArray]:
     """Return the same for a flat surface of any tilt, by Maas's radial shift in its frame."""
     up = plane.normal
-    height = plane.side(task.centres)
-    depth = -plane.side(point)
-    offset = point[:, None] - task.centres
-    across = offset - (offset @ up)[..., None] * up
-    radius = np.sqrt((across * across).sum(-1))
+    height = plane.side(task.centres)[camera]
     # A point that Newton lifts out of the water for a moment is treated as if on the surface.
+    depth = np.maximum(-plane.side(point), 0.0)[row]
+    offset = point[row] - task.centres[camera]
+    across = offset - (offset @ up)[:, None] * up
+    radius = np.sqrt((across * across).sum(-1))
     shift = radial_shift_derivatives(
-        radius,
-        z0=height[None, :],
-        zp=np.maximum(depth, 0.0)[:, None],
-        layers=Layers(indices=(1.0, task.n_water)),
+        radius, z0=height, zp=depth, layers=Layers(indices=(1.0, task.n_water))
     )
-    small = radius < 1e-9 * (height + depth[:, None])
+    small = radius < 1e-9 * (height + depth)
     with np.errstate(divide="ignore", invalid="ignore"):
-        outward = np.where(small[..., None], 0.0, across / radius[..., None])
+        outward = np.where(small[:, None], 0.0, across / radius[:, None])
         ratio = np.where(small, shift.d_radius, shift.radius_bar / radius)
     # Straight ray in air: radius_bar outwards, height + depth down.
-    fall = height + depth[:, None]
-    ray = ratio[..., None] * across - fall[..., None] * up
-    # Its derivative: outwards by radius and depth, sideways by the ratio, down by the depth.
-    level = np.eye(3) - np.outer(up, up)
-    outer = outward[..., :, None] * outward[..., None, :]
+    ray = ratio[:, None] * across - (height + depth)[:, None] * up
+    # Its derivative: sideways by the ratio, outwards by radius and depth, down by the depth.
     derivative = (
-        shift.d_radius[..., None, None] * outer
-        + ratio[..., None, None] * (level - outer)
-        - shift.d_heights[..., 1, None, None] * outward[..., :, None] * up
+        ratio[:, None, None] * (np.eye(3) - np.outer(up, up))
+        + outward[:, :, None]
+        * ((shift.d_radius - ratio)[:, None] * outward - shift.d_heights[:, 1, None] * up)[
+            :, None, :
+        ]
         + np.outer(up, up)
     )
-    length = np.sqrt((ray * ray).sum(-1))
-    heading = ray / length[..., None]
-    normalise = np.eye(3) - heading[..., :, None] * heading[..., None, :]
-    return heading, normalise @ derivative / length[..., None, None]
+    length = np.sqrt((ray * ray).sum(-1))[:, None]
+    heading = ray / length
+    # Only what is at right angles to the ray turns it.
+    derivative -= heading[:, :, None] * (heading[:, None, :] @ derivative)
+    return heading, derivative / length[:, :, None]
 
 
 def _propagate(task: _Task, found: FloatArray, precision: Precision) -> FloatArray:
@@ -351,13 +348,14 @@ def _propagate(task: _Task, found: FloatArray, precision: Precision) -> FloatArr
 
 def _weight_change(task: _Task, point: FloatArray) -> FloatArray:
     """Return how the balance changes because the weights 1 / |A - C|^2 follow the point A."""
-    heading, _ = _pointing(task, point)
-    toward = task.apparent[:, None] - task.centres
-    aside = toward - (heading * toward).sum(-1)[..., None] * heading
-    aside = np.where((task.weights > 0)[..., None], aside, 0.0)
+    row, camera = np.nonzero(task.weights)
+    heading, _ = _pointing(task, point, row, camera)
+    toward = task.apparent[row] - task.centres[camera]
+    aside = toward - (heading * toward).sum(-1)[:, None] * heading
     # d(1 / r^2) = -2 r . dr / r^4
-    change: FloatArray = -2 * np.einsum("nm,nmi,nmj->nij", task.weights**2, aside, toward)
-    return change
+    change = -2 * (task.weights[row, camera] ** 2)[:, None, None] * aside[:, :, None]
+    starts = np.searchsorted(row, np.arange(len(point)))
+    return np.add.reduceat(change * toward[:, None, :], starts)
 
 
 def _checked_cameras(cameras: ArrayLike | None, surface: WaterSurface) -> FloatArray:
