@@ -225,24 +225,23 @@ def _solve(task: _Task, start: FloatArray) -> tuple[FloatArray, BoolArray, BoolA
         if not rows.size:
             break
         step = np.linalg.solve(change[usable], balance[usable, :, None])[..., 0]
-        step = _below_surface(part.surface, point[rows], step)
-        point[rows] += step
-        done = np.linalg.norm(step, axis=-1) <= TOLERANCE * scale[rows]
+        point[rows] += _kept_in_water(part.surface, point[rows], step)
+        # Judged by the whole step: one that was shortened has not arrived.
+        length = np.linalg.norm(step, axis=-1) / scale[rows]
         # One step after a small one is exact: convergence is quadratic.
-        small = np.linalg.norm(step, axis=-1) <= 1e-9 * scale[rows]
-        ok[rows[small]] = True
-        rows = rows[~done]
+        ok[rows] = length <= 1e-9
+        rows = rows[length > TOLERANCE]
         if not rows.size:
             break
     return point + task.origin, ok, weak
 
 
-def _below_surface(surface: WaterSurface, point: FloatArray, step: FloatArray) -> FloatArray:
-    """Shorten steps that would lift a point out of the water: it keeps a tenth of its depth."""
+def _kept_in_water(surface: WaterSurface, point: FloatArray, step: FloatArray) -> FloatArray:
+    """Shorten steps that would more than halve or double a depth: rays that hardly differ."""
     depth = height_of(surface, point[:, :2]) - point[:, 2]
-    reach = height_of(surface, point[:, :2] + step[:, :2]) - point[:, 2] - step[:, 2]
+    change = height_of(surface, point[:, :2] + step[:, :2]) - point[:, 2] - step[:, 2] - depth
     with np.errstate(invalid="ignore", divide="ignore"):
-        share = np.where(reach < 0.1 * depth, 0.9 * depth / (depth - reach), 1.0)
+        share = np.fmin(1.0, np.where(change < 0, 0.5, 1.0) * depth / np.abs(change))
     return step * share[:, None]
 
 
