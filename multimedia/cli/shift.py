@@ -47,18 +47,22 @@ Examples:
     "--csv", "flavour", type=click.Choice(["plain", "excel-it", "excel-de"]), default="plain",
     show_default=True, help="How to write .csv: comma and point, or semicolon and comma.",
 )  # fmt: skip
+@click.option(
+    "--new", is_flag=True, help="Write a new workbook with live formulas, not the table's own."
+)
 @click.option("--overwrite", is_flag=True, help="Replace an existing file.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 def command(
     source: Path, out: Path | None, camera: tuple[float, float, float] | None, z0: float | None,
     indices: tuple[float, ...] | None, thicknesses: tuple[float, ...] | None, sheet: str | None,
-    decimal: str | None, flavour: str, overwrite: bool, as_json: bool,
+    decimal: str | None, flavour: str, new: bool, overwrite: bool, as_json: bool,
 ) -> None:  # fmt: skip
     """Shift points so that straight rays see them where they are seen through the media.
 
     IN is a table (.xlsx, .xlsm, .ods, .csv) with X, Y, Z (points in water have Z below 0) or R, ZP
-    (distance from the camera's nadir, depth). All lengths in one unit. An .xlsx result has live
-    formulas.
+    (distance from the camera's nadir, depth). All lengths in one unit. A workbook comes back with
+    the results put in and everything else as it was; a text table becomes .csv, or a workbook with
+    live formulas.
     """
     if out is None and not as_json:
         raise click.UsageError("give --out FILE, --json, or both.")
@@ -68,7 +72,7 @@ def command(
 
     report = shift_file(
         source, out, camera=camera, z0=z0, indices=indices, thicknesses=thicknesses,
-        decimal=decimal, sheet=sheet, flavour=flavour, overwrite=overwrite,
+        decimal=decimal, sheet=sheet, flavour=flavour, new=new, overwrite=overwrite,
     )  # fmt: skip
     for text in report.remarks:
         remark(f"Note: {text}")

@@ -101,8 +101,8 @@ def read_shift_input(
     return ShiftInput(table=table, setup=setup)
 
 
-def points_of(table: Table, nadir: tuple[float, float]) -> ShiftPoints:
-    """Return the points of a table; R and ZP win where both forms are filled in.
+def points_of(table: Table, nadir: tuple[float, float]) -> tuple[ShiftPoints, list[int]]:
+    """Return the points of a table and their entries in it; R and ZP win over X, Y, Z.
 
     Raises
     ------
@@ -141,12 +141,13 @@ def points_of(table: Table, nadir: tuple[float, float]) -> ShiftPoints:
     if not rows:
         raise InputError(f"{table.file}: there is no point; fill in X, Y, Z or R, ZP.")
     ids = table.texts("id")
-    return ShiftPoints(
+    points = ShiftPoints(
         ids=tuple(ids[row] or str(number) for number, row in enumerate(rows, start=1)),
         radius=radius[rows],
         depth=depth[rows],
         xy=np.stack([x, y], axis=-1)[rows],
     )
+    return points, rows
 
 
 def write_shift_csv(

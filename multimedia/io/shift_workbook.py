@@ -201,7 +201,7 @@ def _points(
     """Write the table of points; its keys stand in row ``first``."""
     sheet = book.book["Multimedia"]
     columns = _columns(len(setup.layers.indices), steps)
-    values = _values(setup, points, count, steps)
+    values = table_values(setup, points, count, steps)
     for number, (key, label, text) in enumerate(columns, start=1):
         above, head = sheet.cell(first - 1, number, label), sheet.cell(first, number, key)
         above.font, head.font, head.fill = SMALL, BOLD, HEAD
@@ -297,7 +297,7 @@ def _columns(layers: int, steps: int) -> list[tuple[str, str, str]]:
     return columns
 
 
-def _values(
+def table_values(
     setup: ShiftSetup, points: ShiftPoints | None, count: int, steps: int
 ) -> dict[str, list[CellInput]]:
     """Return what every column shows, blank rows included."""

@@ -9,6 +9,7 @@ from typing import Any
 from multimedia.domain.layers import Layers
 from multimedia.domain.shift_points import ShiftPoints, ShiftResult, ShiftSetup
 from multimedia.io.shift_files import points_of, read_shift_input, write_shift_csv
+from multimedia.io.shift_update import add_columns, is_template, update_template
 from multimedia.io.shift_workbook import write_shift_workbook
 from photocore.errors import InputError
 from photocore.output import check_writable
@@ -61,6 +62,7 @@ def shift_file(
     decimal: str | None = None,
     sheet: str | None = None,
     flavour: str = "plain",
+    new: bool = False,
     overwrite: bool = False,
 ) -> ShiftReport:
     """Shift the points of a file radially.
@@ -70,7 +72,8 @@ def shift_file(
     path : path
         An .xlsx, .xlsm, .ods or .csv file with X, Y, Z or R, ZP; a workbook may hold the set-up.
     out : path or None
-        An .xlsx file (live formulas) or .csv file (numbers); None writes nothing.
+        A .csv file, or a workbook: the user's own with the results put in where the points come
+        from one, otherwise a new one with live formulas. None writes nothing.
     camera : (float, float, float), optional
         X, Y, Z of the camera, Z = 0 at the interface on the water side.
     z0 : float, optional
@@ -81,6 +84,8 @@ def shift_file(
         How to read the table.
     flavour : str
         How to write CSV, see `photocore.tables.FLAVOURS`.
+    new : bool
+        Write a new workbook with live formulas in any case.
     overwrite : bool
         Replace an existing file.
 
@@ -96,16 +101,21 @@ def shift_file(
     out = None if out is None else Path(out)
     if out is not None:
         check_writable(out, overwrite=overwrite)
-        if out.suffix.lower() not in (".xlsx", ".csv"):
+        if out.suffix.lower() not in (".xlsx", ".xlsm", ".csv"):
             raise InputError(f"{out}: results are written as .xlsx or .csv.")
     given = read_shift_input(path, decimal=decimal, sheet=sheet)
     setup = _setup(given.setup, camera, z0, indices, thicknesses)
-    points = points_of(given.table, setup.nadir)
+    points, rows = points_of(given.table, setup.nadir)
     result = points.shifted(setup)
+    table, kind = given.table, Path(path).suffix.lower()
     if out is not None and out.suffix.lower() == ".csv":
         write_shift_csv(out, points, result, flavour=flavour, overwrite=overwrite)
-    elif out is not None:
+    elif out is not None and (new or kind not in (".xlsx", ".xlsm")):
         write_shift_workbook(out, setup, points, rows=1, overwrite=overwrite)
+    elif out is not None and given.setup is not None and is_template(path):
+        update_template(path, out, table, rows, setup, given.setup, points, overwrite=overwrite)
+    elif out is not None:
+        add_columns(path, out, table, rows, points, result, overwrite=overwrite)
     remarks = [*given.table.remarks]
     remarks += setup.layers.remarks_about(z0=setup.z0, zp=points.depth)
     unseen = [name for name, flag in zip(points.ids, result.flags, strict=True) if flag != "OK"]

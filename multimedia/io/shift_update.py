@@ -1,0 +1,173 @@
+"""Shifted points put into the user's own workbook; all else stays byte for byte as it was."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from multimedia.domain.shift_points import ShiftPoints, ShiftResult, ShiftSetup
+from multimedia.io.shift_workbook import table_values
+from photocore.arrays import FloatArray
+from photocore.errors import InputError
+from photocore.spreadsheet.cellxml import CellInput
+from photocore.spreadsheet.editor import WorkbookEditor
+from photocore.spreadsheet.grid import SheetFile
+from photocore.tables import Table, open_tables
+
+#: Columns added to a table that has none of them yet.
+ADDED = ("Rbar", "dR", "Xbar", "Ybar", "flag")
+
+
+def is_template(path: Path | str) -> bool:
+    """Tell whether a workbook is one of ours, with formulas for the shift."""
+    return WorkbookEditor(Path(path)).table("tblMM") is not None
+
+
+def update_template(
+    path: Path | str,
+    out: Path,
+    table: Table,
+    rows: Sequence[int],
+    setup: ShiftSetup,
+    own: ShiftSetup,
+    points: ShiftPoints,
+    *,
+    overwrite: bool,
+) -> None:
+    """Store the results of the formulas, and the set-up where options changed it.
+
+    Parameters
+    ----------
+    path, out : path
+        The workbook and where the new one goes; may be the same.
+    table : Table
+        As read from it.
+    rows : sequence of int
+        Entry of the table of each point.
+    setup, own : ShiftSetup
+        Set-up used, and that of the workbook.
+    points : ShiftPoints
+        The points.
+    overwrite : bool
+        Replace an existing file.
+
+    Raises
+    ------
+    InputError
+        If the number of media differs, a changed value is a formula, or the file cannot be written.
+    """
+    editor = WorkbookEditor(Path(path))
+    if len(setup.layers.indices) != len(own.layers.indices):
+        raise InputError(
+            f"{path}: its formulas are for {len(own.layers.indices)} media, the options give "
+            f"{len(setup.layers.indices)}; add --new for a new workbook."
+        )
+    _store_setup(editor, setup, own)
+    area = editor.table("tblMM")
+    if area is None:
+        raise InputError(f"{path}: has no table tblMM.")
+    top, left, _, right = area.area
+    cells = editor.grid(area.sheet).rows.get(top, {})
+    columns = {str(cells[c]): c for c in range(left, right + 1) if c in cells}
+    steps = sum(key[0] == "u" and key[1:].isdigit() for key in columns) - 1
+    values = table_values(setup, points, len(points.ids), max(steps, 1))
+    for key, column in columns.items():
+        for position, row in enumerate(rows):
+            if key in values and key not in ("id", "X", "Y", "Z", "R", "ZP"):
+                editor.set_result(area.sheet, table.rows[row], column, values[key][position])
+    editor.save(out, overwrite=overwrite)
+
+
+def add_columns(
+    path: Path | str,
+    out: Path,
+    table: Table,
+    rows: Sequence[int],
+    points: ShiftPoints,
+    result: ShiftResult,
+    *,
+    overwrite: bool,
+) -> None:
+    """Write the shifted points beside the user's table, in columns of their own.
+
+    Columns called Rbar, dR, Xbar, Ybar or flag are filled; those that are missing are added to
+    the right of everything on the sheet.
+
+    Parameters
+    ----------
+    path, out, table, rows, points, overwrite
+        As in `update_template`.
+    result : ShiftResult
+        The shifted points.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be written.
+    """
+    editor = WorkbookEditor(Path(path))
+    grid = editor.grid(table.sheet)
+    head = _head_row(grid.rows, table)
+    found = {str(value).strip(): c for c, value in grid.rows[head].items() if value is not None}
+    last = max(max(cells, default=0) for cells in grid.rows.values())
+    with_xy = not np.isnan(points.xy).all()
+    columns: dict[str, FloatArray | Sequence[str]] = {
+        "Rbar": result.radius_bar,
+        "dR": result.radius_bar - points.radius,
+    }
+    if with_xy:
+        columns |= {"Xbar": result.xy_bar[:, 0], "Ybar": result.xy_bar[:, 1]}
+    columns["flag"] = result.flags
+    for key, values in columns.items():
+        column = found.get(key)
+        if column is None:
+            last += 1
+            column = last
+            editor.set_value(table.sheet, head, column, key)
+        for position, row in enumerate(rows):
+            value: CellInput = values[position]
+            if not isinstance(value, str):
+                value = None if np.isnan(values[position]) else float(values[position])
+            editor.set_value(table.sheet, table.rows[row], column, value)
+    editor.save(out, overwrite=overwrite)
+
+
+def _store_setup(editor: WorkbookEditor, setup: ShiftSetup, own: ShiftSetup) -> None:
+    """Type changed set-up values into their named cells, and store what follows from them."""
+
+    def named(given: ShiftSetup) -> dict[str, float]:
+        values = {f"n_{i}": n for i, n in enumerate(given.layers.indices, start=1)}
+        values |= {f"t_{i}": t for i, t in enumerate(given.layers.thicknesses, start=1)}
+        return values | {"z_0": given.z0, "X_0": given.nadir[0], "Y_0": given.nadir[1]}
+
+    book = open_tables(editor.path)
+    places = book.names if isinstance(book, SheetFile) else {}
+    before = named(own)
+    for name, value in named(setup).items():
+        if value == before[name]:
+            continue
+        if name.casefold() not in places:
+            raise InputError(
+                f"{editor.path.name}: has no cell named {name}; add --new for a new workbook."
+            )
+        title, row, column = places[name.casefold()]
+        editor.set_value(title, row, column, value)
+    lowest = min(setup.layers.indices)
+    for i, index in enumerate(setup.layers.indices, start=1):
+        k = lowest / index
+        for name, value in ((f"k_{i}", k), (f"q_{i}", 1 - k * k)):
+            if name in places:
+                editor.set_result(*places[name], value)
+
+
+def _head_row(rows: Mapping[int, Mapping[int, object]], table: Table) -> int:
+    """Return the row of the headings."""
+    key = next(iter(table.columns))
+    first = table.rows[0]
+    for row in range(first - 1, 0, -1):
+        cell = rows.get(row, {}).get(table.columns[key])
+        if isinstance(cell, str) and cell.strip() == table.headings.get(key, "").strip():
+            return row
+    return first - 1

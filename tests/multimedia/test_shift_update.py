@@ -1,0 +1,109 @@
+"""Results put into the user's own workbook: everything else stays."""
+
+from __future__ import annotations
+
+import json
+import zipfile
+from pathlib import Path
+
+import openpyxl
+import pytest
+from click.testing import CliRunner, Result
+from openpyxl.chart import ScatterChart
+
+from multimedia import Layers, radial_shift
+from multimedia.cli.main import main
+from tests import office
+
+MEDIA = ("--indices", "1,1.5,1.34", "--thicknesses", "0.01", "--camera", "0,0,0.51")
+LAYERS = Layers(indices=(1.0, 1.5, 1.34), thicknesses=(0.01,))
+
+
+def run(*arguments: object) -> Result:
+    return CliRunner().invoke(main, ["shift", *(str(argument) for argument in arguments)])
+
+
+@pytest.fixture
+def own(tmp_path: Path) -> Path:
+    """Return a surveyor's workbook: a title, a table, a note beside it, a chart, another sheet."""
+    book = openpyxl.Workbook()
+    sheet = book.active
+    sheet.title = "Messung"
+    sheet["A1"] = "Becken 3"
+    sheet.append([])
+    sheet.append(["Punkt", "X [m]", "Y [m]", "Z [m]", "Bemerkung"])
+    sheet.append(["A", 0.3, 0.4, -0.2, "Rand"])
+    sheet.append(["B", 0.0, 0.1, -0.1, None])
+    sheet["G4"] = "=B4*2"
+    sheet.add_chart(ScatterChart(), "J2")
+    book.create_sheet("Notizen")["A1"] = "bleibt"
+    path = tmp_path / "becken.xlsx"
+    book.save(path)
+    return path
+
+
+def test_columns_are_added_and_everything_else_stays(own: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out.xlsx"
+    result = run(own, *MEDIA, "--out", out)
+    assert result.exit_code == 0, result.stderr
+    sheet = openpyxl.load_workbook(out)["Messung"]
+    assert [c.value for c in sheet[3]][:12] == [
+        "Punkt", "X [m]", "Y [m]", "Z [m]", "Bemerkung", None, None,
+        "Rbar", "dR", "Xbar", "Ybar", "flag",
+    ]  # fmt: skip
+    exact = float(radial_shift(0.5, z0=0.5, zp=0.2, layers=LAYERS))
+    assert sheet["H4"].value == pytest.approx(exact, rel=1e-15)
+    assert sheet["J4"].value == pytest.approx(0.3 * exact / 0.5, rel=1e-14)
+    assert sheet["L4"].value == "OK"
+    assert sheet["G4"].value == "=B4*2"
+    with zipfile.ZipFile(own) as before, zipfile.ZipFile(out) as after:
+        changed = {n for n in before.namelist() if before.read(n) != after.read(n)}
+        assert before.namelist() == after.namelist()
+    assert changed <= {"xl/worksheets/sheet1.xml", "xl/workbook.xml"}
+
+
+def test_a_second_run_fills_the_same_columns_and_keeps_a_backup(own: Path) -> None:
+    assert run(own, *MEDIA, "--out", own, "--overwrite").exit_code == 0
+    once = openpyxl.load_workbook(own)["Messung"].max_column
+    assert run(own, *MEDIA[:-1], "0,0,0.61", "--out", own, "--overwrite").exit_code == 0
+    sheet = openpyxl.load_workbook(own)["Messung"]
+    assert sheet.max_column == once
+    exact = float(radial_shift(0.5, z0=0.6, zp=0.2, layers=LAYERS))
+    assert sheet["H4"].value == pytest.approx(exact, rel=1e-15)
+    assert own.with_name("becken.xlsx.bak").exists()
+
+
+def test_a_new_workbook_has_live_formulas(own: Path, tmp_path: Path) -> None:
+    out = tmp_path / "live.xlsx"
+    assert run(own, *MEDIA, "--out", out, "--new").exit_code == 0
+    assert "Rbar" in str(office.formulas_of(out)["Multimedia"].values())
+
+
+@pytest.mark.office
+def test_a_template_gets_results_and_the_options_set_up(tmp_path: Path) -> None:
+    first, second = tmp_path / "tank.xlsx", tmp_path / "moved.xlsx"
+    points = tmp_path / "points.csv"
+    points.write_text("id,X,Y,Z\nA,0.3,0.4,-0.2\nB,0,0,-0.1\n", encoding="utf-8")
+    assert run(points, *MEDIA, "--out", first).exit_code == 0
+    changed = ("--z0", "0.8", "--indices", "1,1.5,1.337")
+    result = run(first, *changed, "--out", second, "--json")
+    assert result.exit_code == 0, result.stderr
+    told = json.loads(result.stdout)["points"][0]["Rbar"]
+    layers = Layers(indices=(1.0, 1.5, 1.337), thicknesses=(0.01,))
+    assert told == pytest.approx(float(radial_shift(0.5, z0=0.8, zp=0.2, layers=layers)), rel=1e-15)
+    live, kept = office.recalculated(second, tmp_path), office.stored(second)
+    for sheet, cells in office.formulas_of(second).items():
+        for cell in cells:
+            value = live[sheet].get(cell)
+            if isinstance(value, float | int):
+                assert kept[sheet].get(cell) == pytest.approx(value, rel=1e-12, abs=1e-12), cell
+    assert told in [pytest.approx(v) for v in kept["Multimedia"].values() if isinstance(v, float)]
+
+
+def test_a_template_for_other_media_is_refused(tmp_path: Path) -> None:
+    first, points = tmp_path / "tank.xlsx", tmp_path / "points.csv"
+    points.write_text("id,R,ZP\nA,0.3,0.2\n", encoding="utf-8")
+    run(points, *MEDIA, "--out", first)
+    result = run(first, "--indices", "1,1.337", "--out", tmp_path / "two.xlsx")
+    assert result.exit_code == 1
+    assert "formulas are for 3 media, the options give 2" in result.stderr
