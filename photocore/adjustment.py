@@ -123,9 +123,10 @@ def minimise(
     most : int
         Steps after which it gives up.
     settle : float
-        Ends when the step moves the residuals by less than this share of their length.
+        Ends when a step moves the residuals by less than this share of their length.
     rounding : float
-        Ends when the root mean square of the residuals is below this: error-free data.
+        Rounding error of a residual: ends when the residuals, or what a step changes of them,
+        are nothing else.
 
     Raises
     ------
@@ -161,7 +162,9 @@ def minimise(
                 correction = -0.5 * (right.T @ (share * (left.T @ bend)))
                 if np.linalg.norm(correction) < 0.75 * np.linalg.norm(step):
                     step = step + correction
-            small = bool(np.abs(step).max(initial=0.0) <= settle * np.sqrt(cost))
+            # How far the step moves the residuals: for each unknown, its share of one sigma.
+            moved = float(np.linalg.norm(values * (right @ step)))
+            small = moved <= settle * np.sqrt(cost) + 10.0 * rounding * np.sqrt(len(residuals))
             following = advance(state, step / length)
             new = None if following is None else equations(following)
             new_cost = np.inf if new is None else float(new[0] @ new[0])

@@ -13,7 +13,14 @@ from multimedia.domain.camera import Camera, Sensor
 from multimedia.domain.flat_interface import FlatInterface
 from multimedia.domain.interfaces import Interfaces
 from multimedia.domain.layers import Layers
-from multimedia.domain.project import SIGMA_IMAGE, SIGMA_PIXEL, ImagePoints, ObjectPoints, Project
+from multimedia.domain.project import (
+    SIGMA_IMAGE,
+    SIGMA_PIXEL,
+    ImagePoints,
+    ObjectPoints,
+    Project,
+    refuse_repeated,
+)
 from multimedia.domain.surfaces import Cylinder, Plane, Sphere, Surface
 from multimedia.io.point_tables import (
     METRES,
@@ -153,6 +160,7 @@ def _project(data: dict[str, Any], folder: Path) -> Project:
         raise InputError("there is no camera; add at least one section [[camera]].")
     pairs = [_camera(value, number) for number, value in enumerate(sections, start=1)]
     cameras = tuple(camera for camera, _ in pairs)
+    refuse_repeated([camera.name for camera in cameras], "cameras")
     remarks = [
         f"media.{label}: {remark}"
         for label, item in media.items()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -24,6 +24,9 @@ from photocore.errors import ConvergenceError, GeometryError, InputError
 
 #: A residual beyond this many of its own standard deviations is a gross error (1 honest in 2000).
 OUTLIER_LIMIT = 3.5
+#: A pose whose residuals are below this share of the image coordinates is the right one, unless the
+#: control is flatter than the other share and has a mirror pose. False minima leave a tenth.
+FITS, DEEP = 0.003, 0.05
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -194,6 +197,12 @@ class _Problem:
         jacobian = found.by_camera / self.weights[:, :, None]
         return miss.ravel(), jacobian.reshape(-1, len(self.names))
 
+    def is_beyond_doubt(self, cost: float) -> bool:
+        """Whether a pose fits so well that no other can: a body with depth, tiny residuals."""
+        spread = np.linalg.svd(self.control - self.control.mean(axis=0), compute_uv=False)
+        deep = spread[2] > DEEP * spread[0]
+        return bool(deep and cost < (FITS**2) * float((self.image**2).sum()))
+
     @property
     def floor(self) -> float:
         """Residuals that are nothing but rounding."""
@@ -215,24 +224,33 @@ class _Problem:
 def _best_start(camera: Camera, problem: _Problem) -> Camera:
     """Return the pose of the smallest square sum that any start leads to."""
     found: list[tuple[float, Camera]] = []
-    starts = [camera, *pose_starts(camera, problem.control, problem.image, problem.interface)]
-    for start in starts:
+    count = 1
+    for start in _starts(camera, problem):
+        count += 1
         if not np.isfinite(problem.cost(start)):
             continue
         pose = minimise(
             start, problem.equations, problem.advance, most=60, settle=1e-4, rounding=problem.floor
         )
         found.append((float(pose.residuals @ pose.residuals), pose.state))
+        if problem.is_beyond_doubt(found[-1][0]):
+            break
     if not found:
         raise ConvergenceError(
             f"{problem.what}: no position was found from which the camera sees all control points "
             "through the interface. Check that image and object points belong together, the units "
             "(mm in the image), the principal distance, and on which side of the interface the "
             "normal points",
-            iterations=len(starts),
+            iterations=count,
             residual=float("nan"),
         )
     return min(found, key=lambda pair: pair[0])[1]
+
+
+def _starts(camera: Camera, problem: _Problem) -> Iterator[Camera]:
+    """Yield the pose given, then those found without it, which cost some time to find."""
+    yield camera
+    yield from pose_starts(camera, problem.control, problem.image, problem.interface)
 
 
 def _checked_names(estimate: Sequence[str]) -> tuple[str, ...]:

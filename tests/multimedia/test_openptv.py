@@ -1,0 +1,275 @@
+"""OpenPTV in and out: the real four-camera tank, folders as OpenPTV makes them, damaged files."""
+
+from __future__ import annotations
+
+import csv
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from multimedia.domain.flat_interface import FlatInterface
+from multimedia.domain.project import ImagePoints, ObjectPoints, Project
+from multimedia.io.openptv import particle_points, read_experiment, write_experiment
+from multimedia.io.openptv_files import (
+    glass_interface,
+    read_camera,
+    read_control,
+    read_correspondences,
+    read_targets,
+)
+from multimedia.solvers.intersection import intersect, intersect_pairs
+from multimedia.solvers.projection import project
+from multimedia.solvers.resection import resect
+from multimedia.workflows.openptv import import_openptv
+from photocore.distortion import Brown, Convention
+from photocore.errors import GeometryError, InputError
+from tests.multimedia.tank import LAYERS, SENSOR, cameras, control
+
+CALIBRATION = ("c", "xh", "yh", "k1", "p1", "p2", "scale")
+
+
+@pytest.fixture
+def cavity(data_dir: Path) -> Path:
+    return data_dir / "openptv_cavity"
+
+
+# sigma0 in um: as the file has the media (exterior orientation only), and in physical order.
+EXTERIOR_AS_FILE = (5.73, 4.58, 8.99, 9.06)
+EXTERIOR_PHYSICAL = (6.23, 7.12, 7.95, 4.79)
+CALIBRATED_PHYSICAL = (5.67, 3.54, 4.54, 3.54)
+
+
+@pytest.mark.parametrize("swap", [False, True])
+def test_the_real_tank_is_resected_as_stated(cavity, swap):
+    found = import_openptv(cavity, out=None, swap_indices=swap)
+    assert found.matched == (43, 43, 71, 71)
+    stated = EXTERIOR_PHYSICAL if swap else EXTERIOR_AS_FILE
+    project_, images = found.project, found.project.image_points
+    for k, camera in enumerate(project_.cameras):
+        rows = images.of_camera(camera.name)
+        place = project_.object_points.rows([images.ids[row] for row in rows])
+        xyz, image = project_.object_points.xyz[place], images.image[rows]
+        media = project_.interface_of(k)
+        plain = resect(camera, xyz, image, media)
+        assert plain.sigma0 * 1000 == pytest.approx(stated[k], rel=0.01)
+        if swap:
+            full = resect(camera, xyz, image, media, estimate=CALIBRATION)
+            assert full.sigma0 * 1000 <= CALIBRATED_PHYSICAL[k]
+
+
+def test_interchanged_indices_are_said(cavity):
+    remarks = " ".join(read_experiment(cavity).project.remarks)
+    assert "glass has index 1.33 and water 1.46" in remarks
+    assert "interchanged" in remarks
+    swapped = read_experiment(cavity, swap_indices=True).project
+    assert swapped.media["wall1"].layers.indices == (1.0, 1.46, 1.33)
+    assert "interchanged" not in " ".join(swapped.remarks)
+
+
+@pytest.mark.parametrize(("indices", "column"), [((1, 1.33, 1.46), 11), ((1, 1.46, 1.33), 15)])
+def test_real_particles_are_intersected_as_openptv_does(cavity, indices, column):
+    with (cavity / "particles_frame10001.csv").open() as file:
+        rows = np.array([[float(v) for v in row] for row in list(csv.reader(file))[1:]])
+    sensor = read_control(cavity / "ptv.par").sensor
+    views, media = [], []
+    for k in range(1, 5):
+        camera, glass, _ = read_camera(
+            cavity / f"particles_cam{k}.tif.ori", sensor=sensor, name=f"cam{k}"
+        )
+        views.append(camera)
+        media.append(glass_interface(glass, indices, 6.0))
+    image = np.stack([sensor.image_from_pixel(rows[:, 2 * k : 2 * k + 2]) for k in range(4)])
+    xyz, apart = intersect_pairs(views, image, media)
+    assert len(xyz) == 373
+    # The file holds seven decimals.
+    assert np.abs(xyz - rows[:, column : column + 3]).max() < 1e-6
+    assert np.abs(apart - rows[:, column + 3]).max() < 1e-6
+    stored = np.linalg.norm(xyz - rows[:, 8:11], axis=1)
+    if column == 11:
+        assert stored.max() < 0.003
+        assert np.median(stored) < 0.0006
+        # The rigorous points differ: they weigh rays by the image, not pairs alike.
+        rigorous = intersect(views, image, media)
+        ours = np.sqrt(np.nansum(rigorous.residuals**2))
+        theirs = np.stack(
+            [i - project(c, xyz, m) for c, i, m in zip(views, image, media, strict=True)]
+        )
+        assert ours < np.sqrt((theirs**2).sum())
+
+
+@pytest.fixture
+def tank_project() -> Project:
+    wall = FlatInterface(layers=LAYERS, point=(0, 0, 0), normal=(0, 0, 1))
+    # OpenPTV's glass vector starts at the origin, so the origin must lie in the water.
+    shift = np.array([0, 0, 100.0])
+    lens = Brown(k1=2e-5, k2=-3e-8, p1=1e-5, p2=-2e-5, shear=0.0004, convention=Convention.OPENPTV)
+    half = np.array([SENSOR.width, SENSOR.height]) / 2
+    views = tuple(
+        replace(c, centre=c.centre + shift, sensor=replace(SENSOR, origin=half))
+        for c in cameras(lens)
+    )
+    wall = replace(wall, point=shift)
+    points = control(50) + shift
+    image = [project(c, points, wall) for c in views]
+    ids = tuple(str(k) for k in range(1, 51))
+    return Project(
+        cameras=views, media={"wall1": wall}, media_of=("wall1",) * 4, unit="mm",
+        object_points=ObjectPoints(ids=ids, xyz=points),
+        image_points=ImagePoints(
+            cameras=tuple(c.name for c in views for _ in ids), ids=ids * 4,
+            image=np.concatenate(image),
+        ),
+    )  # fmt: skip
+
+
+def test_export_and_import_give_the_same_cameras_media_and_points(tank_project, tmp_path):
+    write_experiment(tmp_path / "exp", tank_project)
+    found = import_openptv(tmp_path / "exp", out=None)
+    for got, want in zip(found.project.cameras, tank_project.cameras, strict=True):
+        assert np.abs(got.centre - want.centre).max() < 1e-12
+        assert np.abs(got.rotation - want.rotation).max() < 1e-14
+        assert got.distortion == want.distortion
+        assert got.principal_point == pytest.approx(want.principal_point, abs=1e-14)
+    assert found.matched == (50,) * 4
+    assert found.project.object_points.xyz == pytest.approx(tank_project.object_points.xyz)
+    assert np.abs(found.project.image_points.image - tank_project.image_points.image).max() < 1e-10
+
+
+def test_optv_projects_an_exported_camera_to_the_same_place(tank_project, tmp_path):
+    pytest.importorskip("optv")
+    from optv.calibration import Calibration
+    from optv.imgcoord import image_coordinates
+    from optv.parameters import ControlParams
+
+    write_experiment(tmp_path / "exp", tank_project)
+    for camera in tank_project.cameras:
+        calibration = Calibration()
+        base = tmp_path / "exp" / "cal" / f"{camera.name}.tif"
+        calibration.from_file(f"{base}.ori".encode(), f"{base}.addpar".encode())
+        parameters = ControlParams(4)
+        media = parameters.get_multimedia_params()
+        media.set_layers(np.array([1.5]), np.array([10.0]))
+        media.set_n1(1.0)
+        media.set_n3(1.337)
+        points = np.ascontiguousarray(tank_project.object_points.xyz)
+        theirs = image_coordinates(points, calibration, parameters.get_multimedia_params())
+        ours = project(camera, points, tank_project.media["wall1"])
+        # optv stops its iteration at 1e-3 mm in the water.
+        assert np.abs(theirs - ours).max() < 1e-4
+
+
+def test_a_folder_with_parameters_cal_img_and_res_is_read(tank_project, tmp_path):
+    folder = tmp_path / "exp"
+    write_experiment(folder, tank_project)
+    (folder / "img").mkdir()
+    (folder / "res").mkdir()
+    rows = ["2"]
+    for k, camera in enumerate(tank_project.cameras):
+        pixels = camera.sensor.pixel_from_image(
+            project(camera, tank_project.object_points.xyz[:2], tank_project.media["wall1"])
+        )
+        lines = [f"{n} {x:.6f} {y:.6f} 9 3 3 99 {n}" for n, (x, y) in enumerate(pixels)]
+        (folder / "img" / f"cam{k + 1}.10001_targets").write_text("2\n" + "\n".join(lines) + "\n")
+    for n in range(2):
+        x, y, z = tank_project.object_points.xyz[n]
+        rows.append(f"{n + 1} {x:.3f} {y:.3f} {z:.3f} {n} {n} {n} {n if n else -1}")
+    (folder / "res" / "rt_is.10001").write_text("\n".join(rows) + "\n")
+    experiment = read_experiment(folder)
+    objects, images = particle_points(experiment)
+    assert objects.ids == ("p1", "p2")
+    assert len(images.ids) == 7
+    image, _ = images.grid(experiment.project.camera_names, images.names)
+    found = intersect(experiment.project.cameras, image, experiment.project.interfaces)
+    assert np.abs(found.xyz - tank_project.object_points.xyz[:2]).max() < 1e-4
+
+
+def test_what_openptv_cannot_hold_is_refused_by_name(tank_project, tmp_path):
+    views = tank_project.cameras
+    scaled = replace(views[0], distortion=Brown(scale=1.01))
+    with pytest.raises(InputError, match=r"camera cam1.*scale"):
+        write_experiment(tmp_path / "a", tank_project.with_cameras((scaled, *views[1:])))
+    with pytest.raises(InputError, match=r"cam1.*sensor"):
+        write_experiment(
+            tmp_path / "b", tank_project.with_cameras((replace(views[0], sensor=None), *views[1:]))
+        )
+    assert not (tmp_path / "a").exists() or not list((tmp_path / "a").iterdir())
+
+
+def rewritten(folder: Path, name: str, old: str, new: str) -> None:
+    path = folder / name
+    text = path.read_text()
+    assert old in text
+    path.write_text(text.replace(old, new, 1))
+
+
+def test_angles_in_degrees_are_found_by_the_matrix(tank_project, tmp_path):
+    folder = tmp_path / "exp"
+    write_experiment(folder, tank_project)
+    camera = tank_project.cameras[1]
+    radians = " ".join(f"{v:.16g}" for v in camera.angles)
+    degrees = " ".join(f"{v:.10f}" for v in np.degrees(camera.angles))
+    rewritten(folder, "cal/cam2.tif.ori", radians, degrees)
+    found = read_experiment(folder).project
+    assert any("angles are in degrees" in remark for remark in found.remarks)
+    assert np.abs(found.cameras[1].rotation - camera.rotation).max() < 1e-9
+
+
+def test_damaged_files_are_named(tank_project, tmp_path):
+    folder = tmp_path / "exp"
+    write_experiment(folder, tank_project)
+    ori = folder / "cal" / "cam3.tif.ori"
+    good = ori.read_text()
+    ori.write_text(good[:60])
+    with pytest.raises(InputError, match=r"cam3\.tif\.ori: .* numbers, expected"):
+        read_experiment(folder)
+    ori.write_text(good.replace(good.split()[8], "abc"))
+    with pytest.raises(InputError, match=r"cam3\.tif\.ori, value 9: expected a number"):
+        read_experiment(folder)
+    matrix = tank_project.cameras[2].rotation * (1, 1, -1)
+    words = good.split()
+    words[6:15] = [f"{v:.9f}" for v in matrix.ravel()]
+    ori.write_text(" ".join(words))
+    with pytest.raises(GeometryError, match="left-handed"):
+        read_experiment(folder)
+    ori.unlink()
+    with pytest.raises(InputError, match=r"cam3\.tif\.ori of camera 3 was not found"):
+        read_experiment(folder)
+    (folder / "parameters" / "ptv.par").unlink()
+    with pytest.raises(InputError, match=r"neither ptv\.par"):
+        read_experiment(folder)
+
+
+def test_a_glass_vector_on_the_wrong_side_is_remarked(tank_project, tmp_path):
+    folder = tmp_path / "exp"
+    write_experiment(folder, tank_project)
+    words = (folder / "cal" / "cam1.tif.ori").read_text().split()
+    words[18:21] = ["0", "0", "-100"]
+    (folder / "cal" / "cam1.tif.ori").write_text(" ".join(words))
+    remarks = read_experiment(folder).project.remarks
+    assert any("cam1.tif.ori: the camera stands" in remark for remark in remarks)
+
+
+def test_target_and_correspondence_files_that_are_cut_off_are_named(tmp_path):
+    targets = tmp_path / "cam1_targets"
+    targets.write_text("2\n0 1.0 2.0 9 3 3 99 -1\n")
+    with pytest.raises(InputError, match="announces 2 targets"):
+        read_targets(targets)
+    stored = tmp_path / "rt_is.1"
+    stored.write_text("2\n1 0.0 0.0 0.0 1 2 3 4\n")
+    with pytest.raises(InputError, match="announces 2 particles"):
+        read_correspondences(stored)
+
+
+def test_openptvs_scale_is_a_longer_principal_distance(tmp_path, tank_project):
+    folder = tmp_path / "exp"
+    write_experiment(folder, tank_project)
+    base = folder / "cal" / "cam1.tif"
+    terms = (2e-5, -3e-8, 0.0, 1e-5, -2e-5, 1.01, 0.0004)
+    Path(f"{base}.addpar").write_text(" ".join(repr(v) for v in terms))
+    camera, _, _ = read_camera(Path(f"{base}.ori"), sensor=SENSOR, name="cam1")
+    plain = tank_project.cameras[0]
+    points = tank_project.object_points.xyz
+    want = 1.01 * project(plain, points, tank_project.media["wall1"])
+    assert np.abs(project(camera, points, tank_project.media["wall1"]) - want).max() < 1e-12
