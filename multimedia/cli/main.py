@@ -25,6 +25,7 @@ SUMMARIES: dict[str, str] = {
 EPILOG = """\b
 First steps:
   multimedia index --wavelength 520 --temperature 20 --salinity 0 --depth 1
+  multimedia template tank.xlsx     radial shift and refractive index as live formulas
   multimedia COMMAND --help         options and an example for each command
 """
 

@@ -13,7 +13,7 @@ from photocore.arrays import FloatArray
 from photocore.errors import InputError
 from photocore.spreadsheet.cellxml import CellInput
 from photocore.spreadsheet.editor import WorkbookEditor
-from photocore.spreadsheet.grid import SheetFile
+from photocore.spreadsheet.grid import SheetFile, cell_name
 from photocore.tables import Table, open_tables
 
 #: Columns added to a table that has none of them yet.
@@ -145,14 +145,20 @@ def _store_setup(editor: WorkbookEditor, setup: ShiftSetup, own: ShiftSetup) -> 
     book = open_tables(editor.path)
     places = book.names if isinstance(book, SheetFile) else {}
     before = named(own)
-    for name, value in named(setup).items():
-        if value == before[name]:
-            continue
+    changed = {name: value for name, value in named(setup).items() if value != before[name]}
+    for name, value in changed.items():
         if name.casefold() not in places:
             raise InputError(
                 f"{editor.path.name}: has no cell named {name}; add --new for a new workbook."
             )
         title, row, column = places[name.casefold()]
+        formula = _formula_in(editor.path, title, row, column)
+        if formula:
+            raise InputError(
+                f"{editor.path.name} › {title}!{cell_name(row, column)} ({name}): holds the formula "
+                f"{formula}, which is never overwritten. Change what it refers to, or add --new for "
+                "a new workbook."
+            )
         editor.set_value(title, row, column, value)
     lowest = min(setup.layers.indices)
     for i, index in enumerate(setup.layers.indices, start=1):
@@ -160,6 +166,18 @@ def _store_setup(editor: WorkbookEditor, setup: ShiftSetup, own: ShiftSetup) -> 
         for name, value in ((f"k_{i}", k), (f"q_{i}", 1 - k * k)):
             if name in places:
                 editor.set_result(*places[name], value)
+
+
+def _formula_in(path: Path, title: str, row: int, column: int) -> str:
+    """Return the formula of a cell, empty if it has none."""
+    from openpyxl import load_workbook
+
+    book = load_workbook(path, read_only=True)
+    try:
+        value = book[title].cell(row, column).value
+    finally:
+        book.close()
+    return value if isinstance(value, str) and value.startswith("=") else ""
 
 
 def _head_row(rows: Mapping[int, Mapping[int, object]], table: Table) -> int:

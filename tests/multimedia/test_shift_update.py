@@ -13,6 +13,7 @@ from openpyxl.chart import ScatterChart
 
 from multimedia import Layers, radial_shift
 from multimedia.cli.main import main
+from photocore.spreadsheet.editor import WorkbookEditor
 from tests import office
 
 MEDIA = ("--indices", "1,1.5,1.34", "--thicknesses", "0.01", "--camera", "0,0,0.51")
@@ -107,3 +108,19 @@ def test_a_template_for_other_media_is_refused(tmp_path: Path) -> None:
     result = run(first, "--indices", "1,1.337", "--out", tmp_path / "two.xlsx")
     assert result.exit_code == 1
     assert "formulas are for 3 media, the options give 2" in result.stderr
+
+
+def test_an_option_does_not_overwrite_a_formula(tmp_path: Path) -> None:
+    path = tmp_path / "tank.xlsx"
+    CliRunner().invoke(main, ["template", str(path), "--rows", "2"])
+    editor = WorkbookEditor(path)
+    for column, value in ((1, "A"), (5, 120.0), (6, 80.0)):
+        editor.set_value("Multimedia", 15, column, value)
+    editor.save()
+    editor = WorkbookEditor(path)
+    editor.set_result("Multimedia", 7, 2, 1.33464)
+    editor.save()
+    result = run(path, "--indices", "1,1.5,1.4", "--out", tmp_path / "out.xlsx")
+    assert result.exit_code == 1
+    assert "Multimedia!B7 (n_3): holds the formula =n_w" in result.stderr
+    assert run(path, "--indices", "1,1.5,1.4", "--out", tmp_path / "x.xlsx", "--new").exit_code == 0

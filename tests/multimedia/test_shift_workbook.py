@@ -14,6 +14,7 @@ from multimedia.domain.shift_points import ShiftPoints, ShiftSetup
 from multimedia.io.shift_workbook import write_shift_workbook
 from multimedia.unrolled import unrolled_shift
 from photocore.errors import InputError
+from photocore.spreadsheet.lint import lint
 from tests import office
 
 ORDERS = {
@@ -176,6 +177,7 @@ def test_a_camera_on_the_glass_is_calculated_too() -> None:
 def test_names_and_headings_are_what_spreadsheets_accept(tmp_path: Path) -> None:
     path = tmp_path / "tank.xlsx"
     write_shift_workbook(path, ORDERS["air glass water"], rows=3)
+    assert lint(path) == []
     book = openpyxl.load_workbook(path)
     assert book.sheetnames == ["Readme", "Multimedia", "RefractiveIndex"]
     for name in book.defined_names:
