@@ -155,9 +155,9 @@ def _store_setup(editor: WorkbookEditor, setup: ShiftSetup, own: ShiftSetup) -> 
         formula = _formula_in(editor.path, title, row, column)
         if formula:
             raise InputError(
-                f"{editor.path.name} › {title}!{cell_name(row, column)} ({name}): holds the formula "
-                f"{formula}, which is never overwritten. Change what it refers to, or add --new for "
-                "a new workbook."
+                f"{editor.path.name} › {title}!{cell_name(row, column)} ({name}): holds the "
+                f"formula {formula}, which is never overwritten. Change what it refers to, or add "
+                "--new for a new workbook."
             )
         editor.set_value(title, row, column, value)
     lowest = min(setup.layers.indices)
