@@ -26,7 +26,7 @@ from photocore.output import atomic_path, check_writable
 #: Side of a tile of the file; GDAL's and most viewers' sweet spot. [px]
 BLOCK = 512
 #: GDAL keeps no more than this of a raster in memory; its own default is 5 % of the machine. [MB]
-CACHE_MB = 48
+CACHE_MB = 96
 #: Name of the local system every raster is in.
 LOCAL_CRS = (
     'LOCAL_CS["{name}",UNIT["metre",1,AUTHORITY["EPSG","9001"]],AXIS["X",EAST],AXIS["Y",NORTH]]'
@@ -236,7 +236,8 @@ def create_raster(
         "interleave": "pixel" if colour else "band",
         "compress": "deflate",
         "predictor": 3 if np.dtype(dtype).kind == "f" else 2,
-        "zlevel": 4,
+        # libdeflate's fastest level: twice the speed of level 4 for 4 % more bytes on photographs.
+        "zlevel": 1,
         "bigtiff": "IF_SAFER",
     }
     if colour:

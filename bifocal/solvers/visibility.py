@@ -256,17 +256,22 @@ def _above_ray(
     hidden = np.zeros(len(row), bool)
     to_occluder = np.where(np.isfinite(occluder), rho - occluder, np.float32(0))
 
-    def height(t: ReliefArray) -> tuple[ReliefArray, BoolArray]:
-        i = np.rint(row + to_y * t).astype(np.int32)
-        j = np.rint(column + to_x * t).astype(np.int32)
+    def height(of: NDArray[np.int64], t: ReliefArray) -> tuple[ReliefArray, BoolArray]:
+        i = np.rint(row[of] + to_y[of] * t).astype(np.int32)
+        j = np.rint(column[of] + to_x[of] * t).astype(np.int32)
         inside = (i >= 0) & (i < rows) & (j >= 0) & (j < columns)
         return tile.relief[i.clip(0, rows - 1), j.clip(0, columns - 1)], inside
 
     near = [np.full(len(row), t, np.float32) for t in _BESIDE]
-    for t in [*near, *(to_occluder + np.float32(shift) for shift in _AROUND)]:
-        above, inside = height(t)
-        below, _ = height(t - 1)
+    left = np.arange(len(row))
+    for t_all in [*near, *(to_occluder + np.float32(shift) for shift in _AROUND)]:
+        t, ray = t_all[left], slope[left]
+        above, inside = height(left, t)
+        over = above - r[left] - ray * t
+        perhaps = np.nonzero(inside & (t >= _BESIDE[0]) & (over > -np.float32(_RIM) * ray))[0]
         # The benefit of the doubt is a step's only: a slope just short of the ray's hides nothing.
-        rim = np.where(above - below > np.float32(_STEEP) * slope, np.float32(_RIM), 0)
-        hidden |= inside & (t >= _BESIDE[0]) & (above > r + slope * (t - rim))
+        below, _ = height(left[perhaps], t[perhaps] - 1)
+        step = above[perhaps] - below > np.float32(_STEEP) * ray[perhaps]
+        hidden[left[perhaps[step | (over[perhaps] > 0)]]] = True
+        left = left[~hidden[left]]
     return hidden

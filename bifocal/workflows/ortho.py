@@ -22,6 +22,7 @@ from bifocal.solvers.compose import NOTHING_IN_COMMON, choose_grid, render
 from bifocal.solvers.orthorectify import View, native_gsd
 from bifocal.solvers.radiometry import correct_view, match_exposure
 from bifocal.solvers.triangles import TriangleSurface
+from photocore.arrays import ByteArray
 from photocore.console import Progress, no_progress
 from photocore.errors import InputError
 from photocore.output import check_writable
@@ -165,9 +166,12 @@ def make_ortho(
             total = grid.width * grid.height
             done = 0
             for column, row, tile in render(views, surface, grid, task.options):
-                source = tile.source.astype(first.dtype)
-                block = np.dstack([tile.image, source])
-                writer.write(block, column=column, row=row, mask=tile.source > 0)
+                writer.write(
+                    with_band(tile.image, tile.source),
+                    column=column,
+                    row=row,
+                    mask=tile.source > 0,
+                )
                 counts += np.bincount(tile.source.ravel(), minlength=len(Source))
                 hidden += int(np.count_nonzero(tile.hidden))
                 done += tile.source.size
@@ -177,6 +181,16 @@ def make_ortho(
     shares = {source.name.lower(): float(counts[source]) / total for source in Source}
     shares["hidden"] = hidden / total
     return OrthoResult(path=out, grid=grid, shares=shares, remarks=tuple(remarks))
+
+
+def with_band(image: ImageArray, band: ByteArray) -> ImageArray:
+    """Return colours and one more band, shape (h, w, bands); stored band after band."""
+    layers = image.reshape(*image.shape[:2], -1)
+    stacked = np.empty((layers.shape[2] + 1, *band.shape), image.dtype)
+    for number in range(layers.shape[2]):
+        stacked[number] = layers[:, :, number]
+    stacked[-1] = band
+    return stacked.transpose(1, 2, 0)
 
 
 def read_photo(pair: Pair, number: int) -> ImageArray:
