@@ -91,22 +91,3 @@ class Length(click.ParamType):  # type: ignore[type-arg,unused-ignore]
             self.fail(f"{value!r} is not a length, e.g. 0.005 or 5mm", param, ctx)
         # 5 * 1e-3 is 0.005 exactly, 3.69 * 1e-3 is not 0.00369: divide instead.
         return number / (1 / factor) if factor < 1 else number
-
-
-class Bounds(click.ParamType):  # type: ignore[type-arg,unused-ignore]
-    """A box XMIN,YMIN,XMAX,YMAX in metres."""
-
-    name = "XMIN,YMIN,XMAX,YMAX"
-
-    def convert(
-        self, value: object, param: click.Parameter | None, ctx: click.Context | None
-    ) -> tuple[float, float, float, float]:
-        """Return the four numbers."""
-        if isinstance(value, tuple):
-            return value
-        parts = str(value).replace(";", " ").replace(",", " ").split()
-        try:
-            xmin, ymin, xmax, ymax = (float(part) for part in parts)
-        except ValueError:
-            self.fail(f"{value!r} is not XMIN,YMIN,XMAX,YMAX, e.g. -4,0,4,7.5", param, ctx)
-        return xmin, ymin, xmax, ymax

@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from photocore.console import print_json, progress_bar, remark
-from photocore.options import Bounds, Length, Scale
+from photocore.options import Length, Numbers, Scale
 
 EXAMPLE = """\b
 Examples:
@@ -15,6 +15,8 @@ Examples:
   bifocal ortho wall.pair.json --points result.xlsx --breakline P7,P8,P9 --out ortho.tif
   bifocal ortho wall.pair.json --plane --gsd 5mm --bounds -4,0,4,7.5 --out flat.tif
   bifocal ortho wall.pair.json --relief relief.tif --image both --fill --out ortho.tif
+  bifocal ortho wall.pair.json --relief relief.tif --deliver drawing --scale 1:50 --dpi 254
+                --control control.csv --section x=1.5 --section y=2 --contours 0.05
 """
 
 _file = click.Path(path_type=Path)
@@ -42,7 +44,10 @@ _file = click.Path(path_type=Path)
     help="Pixel of the orthophoto [m], or with its unit: 5mm.  [default: that of the relief map "
     "or the photo]",
 )  # fmt: skip
-@click.option("--bounds", type=Bounds(), help="Part of the wall [m].  [default: all that is known]")
+@click.option(
+    "--bounds", type=Numbers(4), metavar="XMIN,YMIN,XMAX,YMAX",
+    help="Part of the wall [m].  [default: all that is known]",
+)  # fmt: skip
 @click.option(
     "--interpolation", type=click.Choice(["cubic", "linear", "nearest", "lanczos"]),
     default="cubic", show_default=True, help="Between the pixels of the photo.",
@@ -65,7 +70,27 @@ _file = click.Path(path_type=Path)
     "--feather", type=float, default=8.0, show_default=True,
     help="Width of the transition between the photos [px].",
 )  # fmt: skip
-@click.option("--scale", type=Scale(), help="Scale of the drawing 1:N: DPI tag, and --deliver.")
+@click.option(
+    "--deliver", "folder", type=_file, metavar="DIR",
+    help="Write GeoTIFF, PNG, DXF and PDF, of the relief too, into a folder. Needs --scale.",
+)  # fmt: skip
+@click.option("--scale", type=Scale(), help="Scale of the drawing 1:N, e.g. 1:50.")
+@click.option(
+    "--dpi", type=float, default=254.0, show_default=True,
+    help="Pixels per inch of paper; at 1:50 and 254 dpi a pixel is 5.00 mm. With --deliver.",
+)  # fmt: skip
+@click.option("--title", default="", help="Title of the drawing.  [default: the pair's name]")
+@click.option(
+    "--paper", type=click.Choice(["A4", "A3", "A2", "A1", "A0"], case_sensitive=False),
+    help="Sheet of paper.  [default: the smallest that fits]",
+)  # fmt: skip
+@click.option("--mark", type=_file, help="Table of points to draw.  [default: --points]")
+@click.option("--control", type=_file, help="Table of control points to draw.")
+@click.option(
+    "--section", "sections", multiple=True, metavar="x=M|y=M|'X,Y X,Y ...'",
+    help="Section of the relief as DXF and SVG [m]; repeat it. With --deliver.",
+)  # fmt: skip
+@click.option("--contours", type=Length(), help="Between contour lines [m].  [default: by relief]")
 @click.option(
     "--overviews/--no-overviews", default=None,
     help="Reduced copies in the file.  [default: above 50 megapixels]",
@@ -77,8 +102,10 @@ _file = click.Path(path_type=Path)
 def command(
     pair: Path, out: Path | None, relief: Path | None, points: Path | None,
     breaklines: tuple[str, ...], plane: float | None, image: str, gsd: float | None,
-    bounds: tuple[float, float, float, float] | None, interpolation: str, mask: bool, fill: bool,
-    match: bool, vignetting: str, chromatic: bool, feather: float, scale: float | None,
+    bounds: tuple[float, ...] | None, interpolation: str, mask: bool, fill: bool,
+    match: bool, vignetting: str, chromatic: bool, feather: float, folder: Path | None,
+    scale: float | None, dpi: float, title: str, paper: str | None, mark: Path | None,
+    control: Path | None, sections: tuple[str, ...], contours: float | None,
     overviews: bool | None, tfw: bool, any_size: bool, overwrite: bool, as_json: bool,
 ) -> None:  # fmt: skip
     """Make the orthophoto of a wall from the photos of a PAIR file.
@@ -88,17 +115,21 @@ def command(
     last band says where each pixel comes from (0 nothing, 1 and 2 the photos, 3 both, 4 filled).
     """
     from bifocal.domain.ortho_image import OrthoOptions
+    from bifocal.workflows.deliver import DeliverTask, deliver
     from bifocal.workflows.ortho import OrthoTask, make_ortho
 
-    if out is None:
-        raise click.UsageError("Missing option '--out'.")
+    if (out is None) == (folder is None):
+        raise click.UsageError("Give either --out FILE or --deliver DIR.")
+    if folder is not None and scale is None:
+        raise click.UsageError("--deliver needs the scale of the drawing, e.g. --scale 1:50.")
     if sum(choice is not None for choice in (relief, points, plane)) > 1:
         raise click.UsageError("Give one of --relief, --points and --plane.")
     if relief is None and points is None and plane is None:
         remark("No relief given: the wall is taken as flat (as with --plane).")
     task = OrthoTask(
         relief=relief, points=points, breaklines=[line.split(",") for line in breaklines],
-        plane=plane or 0.0, image=image, gsd=gsd, bounds=bounds, scale=scale,
+        plane=plane or 0.0, image=image, gsd=gsd,
+        bounds=(bounds[0], bounds[1], bounds[2], bounds[3]) if bounds else None, scale=scale,
         options=OrthoOptions(
             interpolation=interpolation,  # type: ignore[arg-type]
             mask_hidden=mask, fill=fill, feather=feather,
@@ -106,15 +137,30 @@ def command(
         match=match, vignetting=vignetting, chromatic=chromatic, any_size=any_size,
         overviews=overviews,
     )  # fmt: skip
+    files: dict[str, object] = {}
     with progress_bar("orthophoto", quiet=as_json) as progress:
-        result = make_ortho(pair, out, task, overwrite=overwrite, world_file=tfw, progress=progress)
+        if folder is not None and scale is not None:
+            wish = DeliverTask(
+                scale=scale, dpi=dpi, title=title, paper=paper, marked=mark, control=control,
+                sections=sections, interval=contours,
+            )  # fmt: skip
+            done = deliver(pair, folder, task, wish, overwrite=overwrite, progress=progress)
+            result = done.ortho
+            files = {"folder": str(folder), "files": list(done.files), "sheet": done.sheet}
+        else:
+            result = make_ortho(
+                pair, out or Path("ortho.tif"), task, overwrite=overwrite, world_file=tfw,
+                progress=progress,
+            )  # fmt: skip
     for text in result.remarks:
         remark(text)
     if as_json:
-        print_json(result.to_dict())
+        print_json(result.to_dict() | files)
         return
     grid, shares = result.grid, result.shares
     click.echo(
-        f"{out}: {grid.width} x {grid.height} px of {grid.gsd * 1000:g} mm; "
+        f"{result.path}: {grid.width} x {grid.height} px of {grid.gsd * 1000:g} mm; "
         f"{100 * (1 - shares['none']):.1f} % covered, {100 * shares['hidden']:.1f} % hidden"
     )
+    if files:
+        click.echo(f"{folder}: {', '.join(done.files)} (sheet {done.sheet})")

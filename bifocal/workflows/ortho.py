@@ -16,7 +16,7 @@ from bifocal.domain.ortho_image import OrthoOptions, Source
 from bifocal.domain.pair import Pair, Photo
 from bifocal.domain.surface import Bounds, FlatSurface, MapSurface, Surface
 from bifocal.io.geotiff import RasterReader, check_relief, create_raster, dpi_at_scale
-from bifocal.io.images import ImageArray, read_image
+from bifocal.io.images import ImageArray, image_info, read_image
 from bifocal.io.point_tables import read_survey_points
 from bifocal.solvers.compose import NOTHING_IN_COMMON, choose_grid, render
 from bifocal.solvers.orthorectify import View, native_gsd
@@ -140,7 +140,10 @@ def make_ortho(
     with open_surface(task, pair, remarks) as surface:
         numbers = {"1": (1,), "2": (2,), "both": (1, 2)}[task.image]
         images = {number: read_photo(pair, number) for number in numbers}
-        grid = _grid(pair, images, surface, task)
+        first_image = images[numbers[0]]
+        size = (first_image.shape[1], first_image.shape[0])
+        grid = _grid(pair, numbers[0], size, surface, task)
+        del first_image
         views = _views(pair, images, surface, grid, task, remarks)
         counts = np.zeros(len(Source), np.int64)
         hidden = 0
@@ -268,10 +271,17 @@ def _triangles(task: OrthoTask, remarks: list[str]) -> TriangleSurface:
         raise InputError(f"{task.points}: {error}") from None
 
 
-def _grid(pair: Pair, images: dict[int, ImageArray], surface: Surface, task: OrthoTask) -> Grid:
+def planned_grid(pair: Pair, surface: Surface, task: OrthoTask) -> Grid:
+    """Return the grid the task will have, without decoding a photo; asks back like `make_ortho`."""
+    number = 2 if task.image == "2" else 1
+    photo = pair.image1 if number == 1 else pair.image2
+    if not photo.file:
+        raise InputError(f'the pair file names no "file" for image{number}; add it.')
+    return _grid(pair, number, image_info(pair.folder / photo.file).size, surface, task)
+
+
+def _grid(pair: Pair, first: int, size: tuple[int, int], surface: Surface, task: OrthoTask) -> Grid:
     """Return the grid, or ask back if it cannot be meant."""
-    first = min(images)
-    size = (images[first].shape[1], images[first].shape[0])
     bounds = task.bounds
     if bounds is None and isinstance(surface, TriangleSurface):
         bounds = surface.bounds

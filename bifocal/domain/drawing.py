@@ -1,0 +1,188 @@
+"""What goes on a drawing besides the picture: points, contour lines, sections, and its frame."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from bifocal.domain.grid import Grid
+from bifocal.domain.points import SurveyPoints
+from photocore.arrays import FloatArray
+from photocore.errors import InputError
+
+#: Paper sizes, width x height upright. [mm]
+PAPERS: Mapping[str, tuple[float, float]] = {
+    "A4": (210, 297),
+    "A3": (297, 420),
+    "A2": (420, 594),
+    "A1": (594, 841),
+    "A0": (841, 1189),
+}
+#: White around the frame: wider on the left, for binding. [mm]
+LEFT, MARGIN = 20.0, 10.0
+#: Room between the frame and the picture for the numbers of the grid. [mm]
+BAND = 9.0
+#: Height of the strip with title, scale bar and level mark. [mm]
+STRIP = 34.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Section:
+    """A cut through the wall.
+
+    Attributes
+    ----------
+    name : str
+        What was asked for: ``x=1.5``, ``y=2`` or the corners of a polyline.
+    axis : str
+        ``x`` (upright cut), ``y`` (level cut) or ``line``.
+    path : ndarray, shape (k, 2)
+        Corners on the plane. [m]
+    place : ndarray, shape (n,)
+        Y of an upright cut, X of a level one, else the distance along the line. [m]
+    relief : ndarray, shape (n,)
+        NaN where unknown. [m]
+    """
+
+    name: str
+    axis: str
+    path: FloatArray
+    place: FloatArray
+    relief: FloatArray
+
+    def pieces(self) -> list[FloatArray]:
+        """Return the known pieces as drawn: shape (n, 2), relief to the right or upwards. [m]"""
+        known = np.isfinite(self.relief)
+        edges = np.flatnonzero(np.diff(np.concatenate([[0], known.astype(np.int8), [0]])))
+        upright = self.axis == "x"
+        columns = (self.relief, self.place) if upright else (self.place, self.relief)
+        line = np.stack(columns, axis=-1)
+        return [line[a:b] for a, b in edges.reshape(-1, 2).tolist() if b - a > 1]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Drawing:
+    """Everything on a drawing of one orthophoto.
+
+    Attributes
+    ----------
+    title, subtitle : str
+    grid : Grid
+        Of the picture.
+    scale : float
+        1:scale.
+    points, control : SurveyPoints, optional
+    contours : tuple of (float, ndarray of shape (n, 2))
+        Level and line. [m]
+    sections : tuple of Section
+    notes : tuple of str
+        Lines for the title block.
+    """
+
+    title: str
+    subtitle: str = "Orthophoto"
+    grid: Grid
+    scale: float
+    points: SurveyPoints | None = None
+    control: SurveyPoints | None = None
+    contours: tuple[tuple[float, FloatArray], ...] = ()
+    sections: tuple[Section, ...] = ()
+    notes: tuple[str, ...] = field(default=())
+
+    @property
+    def paper_size(self) -> tuple[float, float]:
+        """Width and height of the picture on paper. [mm]"""
+        factor = 1000.0 / self.scale * self.grid.gsd
+        return self.grid.width * factor, self.grid.height * factor
+
+    def grid_step(self) -> float:
+        """Return the spacing of grid crosses: about 5 cm on paper, a round number. [m]"""
+        return round_step(0.05 * self.scale)
+
+    def crosses(self) -> FloatArray:
+        """Return the grid crosses on the picture, shape (n, 2). [m]"""
+        xmin, ymin, xmax, ymax = self.grid.bounds
+        step = self.grid_step()
+        x, y = (multiples(a, b, step) for a, b in ((xmin, xmax), (ymin, ymax)))
+        return np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
+
+    def bar_length(self) -> float:
+        """Return the length of the scale bar: about 6 cm on paper. [m]"""
+        return round_step(0.06 * self.scale)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Sheet:
+    """A sheet of paper for a drawing.
+
+    Attributes
+    ----------
+    name : str
+        ``A3 landscape``.
+    width, height : float
+        [mm]
+    """
+
+    name: str
+    width: float
+    height: float
+
+    @classmethod
+    def fitting(cls, drawing: Drawing, paper: str | None = None) -> Sheet:
+        """Return the smallest sheet that holds a drawing.
+
+        Raises
+        ------
+        InputError
+            If it does not fit the paper asked for, or not even A0.
+        """
+        wide, high = drawing.paper_size
+        need = (wide + LEFT + MARGIN + 2 * BAND, high + 2 * MARGIN + 2 * BAND + STRIP)
+        for name, (short, long) in PAPERS.items():
+            if paper is not None and name != paper:
+                continue
+            ways = [("portrait", (short, long)), ("landscape", (long, short))]
+            for turned, size in ways if high > wide else ways[::-1]:
+                if need[0] <= size[0] and need[1] <= size[1]:
+                    return cls(name=f"{name} {turned}", width=size[0], height=size[1])
+        wanted = paper or "A0"
+        raise InputError(
+            f"at 1:{drawing.scale:g} the picture is {wide:.0f} x {high:.0f} mm and does not fit "
+            f"{wanted}. Choose a smaller scale (1:{drawing.scale * 2:g}), --bounds, or another "
+            "--paper."
+        )
+
+    @property
+    def frame(self) -> tuple[float, float, float, float]:
+        """Left, bottom, right, top of the frame from the sheet's lower left corner. [mm]"""
+        return LEFT, MARGIN, self.width - MARGIN, self.height - MARGIN
+
+    def origin(self, drawing: Drawing) -> tuple[float, float]:
+        """Return the lower left corner of the picture, centred above the strip. [mm]"""
+        left, bottom, right, top = self.frame
+        wide, high = drawing.paper_size
+        return (left + right - wide) / 2, (bottom + STRIP + top - high) / 2
+
+
+def round_step(length: float) -> float:
+    """Return the largest of 1, 2, 5 times a power of ten that does not exceed a length.
+
+    Examples
+    --------
+    >>> round_step(3.0), round_step(0.7), round_step(5.0)
+    (2.0, 0.5, 5.0)
+    """
+    power = 10.0 ** math.floor(math.log10(length) + 1e-9)
+    for factor in (5.0, 2.0):
+        if factor * power <= length * (1 + 1e-9):
+            return round(factor * power, 9)
+    return round(power, 9)
+
+
+def multiples(low: float, high: float, step: float) -> FloatArray:
+    """Return the multiples of a step from low to high."""
+    first, last = math.ceil(low / step - 1e-9), math.floor(high / step + 1e-9)
+    return np.round(np.arange(first, last + 1) * step, 9)

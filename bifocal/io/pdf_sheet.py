@@ -1,0 +1,278 @@
+"""A print sheet as PDF: picture at exact scale, frame, title block, grid, scale bar, level mark.
+
+Written directly: the picture goes from the raster to the page strip by strip, so a sheet of
+100 megapixels needs no more memory than a small one, and 1 mm of the page is 1 mm on paper.
+"""
+
+from __future__ import annotations
+
+import zlib
+from pathlib import Path
+from typing import BinaryIO
+
+import numpy as np
+
+from bifocal.domain.drawing import BAND, STRIP, Drawing, Sheet, multiples
+from bifocal.io.geotiff import RasterReader
+from bifocal.io.strips import colour_strips, predicted
+from photocore.output import atomic_path
+
+#: PDF's own unit in millimetres: 72 to the inch.
+_UNITS_PER_MM = 72 / 25.4
+
+
+def write_sheet(
+    path: Path, drawing: Drawing, sheet: Sheet, reader: RasterReader, *, overwrite: bool
+) -> None:
+    """Write a drawing on a sheet; empty pixels are white."""
+    with atomic_path(path, overwrite=overwrite) as temporary, temporary.open("wb") as file:
+        pdf = _Pdf(file)
+        picture = pdf.begin_stream(
+            f"/Type /XObject /Subtype /Image /Width {drawing.grid.width} "
+            f"/Height {drawing.grid.height} /ColorSpace /DeviceRGB /BitsPerComponent 8 "
+            f"/DecodeParms << /Predictor 15 /Colors 3 /Columns {drawing.grid.width} >>"
+        )
+        above = np.zeros((1, drawing.grid.width * 3), np.uint8)
+        for colours, valid in colour_strips(reader):
+            paper = np.where(valid[:, :, None] > 0, colours, np.uint8(255))
+            pixels = paper.reshape(len(paper), -1)
+            pdf.add(predicted(pixels, above))
+            above = pixels[-1:]
+        pdf.end_stream()
+        pdf.finish(_Page(drawing, sheet).commands(), picture, sheet)
+
+
+class _Pdf:
+    """The objects of a PDF file, with their places."""
+
+    def __init__(self, file: BinaryIO) -> None:
+        self.file, self.places = file, [0]
+        file.write(b"%PDF-1.4\n%\xe2\xe3\xcf\xd3\n")
+
+    def begin_stream(self, entries: str) -> int:
+        """Open a compressed stream whose length is written after it."""
+        number = self._begin()
+        self.length_at = number + 1
+        head = f"<< {entries} /Filter /FlateDecode /Length {self.length_at} 0 R >>\nstream\n"
+        self.file.write(head.encode("ascii"))
+        self._start, self._packer = self.file.tell(), zlib.compressobj(3)
+        return number
+
+    def add(self, data: bytes) -> None:
+        """Add to the open stream."""
+        self.file.write(self._packer.compress(data))
+
+    def end_stream(self) -> None:
+        """Close the stream and write its length."""
+        self.file.write(self._packer.flush())
+        length = self.file.tell() - self._start
+        self.file.write(b"\nendstream\nendobj\n")
+        self.object(str(length))
+
+    def object(self, body: str) -> int:
+        """Write an object and return its number."""
+        number = self._begin()
+        self.file.write(f"{body}\nendobj\n".encode("cp1252"))
+        return number
+
+    def _begin(self) -> int:
+        number = len(self.places)
+        self.places.append(self.file.tell())
+        self.file.write(f"{number} 0 obj\n".encode("ascii"))
+        return number
+
+    def finish(self, commands: str, picture: int, sheet: Sheet) -> None:
+        """Write page, catalogue and table of objects."""
+        content = self.begin_stream("")
+        self.add(commands.encode("cp1252", errors="replace"))
+        self.end_stream()
+        fonts = [
+            self.object(
+                f"<< /Type /Font /Subtype /Type1 /BaseFont /{name} /Encoding /WinAnsiEncoding >>"
+            )
+            for name in ("Helvetica", "Helvetica-Bold")
+        ]
+        pages = len(self.places) + 1
+        width, height = sheet.width * _UNITS_PER_MM, sheet.height * _UNITS_PER_MM
+        page = self.object(
+            f"<< /Type /Page /Parent {pages} 0 R /MediaBox [0 0 {width:.4f} {height:.4f}] "
+            f"/Contents {content} 0 R /Resources << /XObject << /Im {picture} 0 R >> "
+            f"/Font << /F1 {fonts[0]} 0 R /F2 {fonts[1]} 0 R >> >> >>"
+        )
+        self.object(f"<< /Type /Pages /Kids [{page} 0 R] /Count 1 >>")
+        # Viewers must not fit the page to the paper: the scale would be lost.
+        root = self.object(
+            f"<< /Type /Catalog /Pages {pages} 0 R /ViewerPreferences << /PrintScaling /None >> >>"
+        )
+        start = self.file.tell()
+        rows = "".join(f"{place:010d} 00000 n \n" for place in self.places[1:])
+        table = f"xref\n0 {len(self.places)}\n0000000000 65535 f \n{rows}"
+        trailer = f"trailer\n<< /Size {len(self.places)} /Root {root} 0 R >>\n"
+        self.file.write(f"{table}{trailer}startxref\n{start}\n%%EOF\n".encode("ascii"))
+
+
+class _Page:
+    """The drawing commands of a sheet, in millimetres."""
+
+    def __init__(self, drawing: Drawing, sheet: Sheet) -> None:
+        self.drawing, self.sheet = drawing, sheet
+        self.parts = [f"{_UNITS_PER_MM:.8f} 0 0 {_UNITS_PER_MM:.8f} 0 0 cm"]
+        self.origin = sheet.origin(drawing)
+        self.factor = 1000.0 / drawing.scale
+
+    def commands(self) -> str:
+        """Return all commands."""
+        x, y = self.origin
+        wide, high = self.drawing.paper_size
+        self.parts.append(f"q {wide:.6f} 0 0 {high:.6f} {x:.6f} {y:.6f} cm /Im Do Q")
+        self._frame()
+        self._grid()
+        self._contours()
+        self._points()
+        self._title()
+        self._scale_bar()
+        self._level()
+        return "\n".join(self.parts) + "\n"
+
+    def _place(self, x: float, y: float) -> tuple[float, float]:
+        """Return where a plane position is on the sheet. [mm]"""
+        xmin, ymin, _, _ = self.drawing.grid.bounds
+        return self.origin[0] + (x - xmin) * self.factor, self.origin[1] + (y - ymin) * self.factor
+
+    def _line(self, points: list[tuple[float, float]], *, width: float = 0.18) -> None:
+        start, *rest = (f"{x:.4f} {y:.4f}" for x, y in points)
+        steps = " ".join(f"{point} l" for point in rest)
+        self.parts.append(f"{width} w {start} m {steps} S")
+
+    def _box(self, x: float, y: float, wide: float, high: float, *, fill: bool = False) -> None:
+        self.parts.append(f"0.18 w {x:.4f} {y:.4f} {wide:.4f} {high:.4f} re {'B' if fill else 'S'}")
+
+    def _text(
+        self, x: float, y: float, text: str, *, size: float = 2.5, bold: bool = False,
+        middle: bool = False, turned: bool = False,
+    ) -> None:  # fmt: skip
+        clean = text.replace("\\", "\\\\").replace("(", "\\(").replace(")", "\\)")
+        # Helvetica's digits are 0.556 of the size wide; close enough to centre short labels.
+        shift = 0.278 * size * len(text) if middle else 0.0
+        if turned:
+            matrix = f"0 1 -1 0 {x:.4f} {y - shift:.4f}"
+        else:
+            matrix = f"1 0 0 1 {x - shift:.4f} {y:.4f}"
+        self.parts.append(f"BT /F{2 if bold else 1} {size} Tf {matrix} Tm ({clean}) Tj ET")
+
+    def _frame(self) -> None:
+        left, bottom, right, top = self.sheet.frame
+        self.parts.append("0 G 0 g")
+        self.parts.append(f"0.5 w {left} {bottom} {right - left:.4f} {top - bottom:.4f} re S")
+        self._line([(left, bottom + STRIP), (right, bottom + STRIP)], width=0.35)
+        x, y = self.origin
+        self._box(x, y, *self.drawing.paper_size)
+
+    def _grid(self) -> None:
+        """Draw crosses on the picture, and ticks with coordinates around it."""
+        xmin, ymin, xmax, ymax = self.drawing.grid.bounds
+        step = self.drawing.grid_step()
+        for shade, width in (("1 G", 0.5), ("0 G", 0.13)):  # white halo: legible on any colour
+            self.parts.append(shade)
+            for px, py in (self._place(*place) for place in self.drawing.crosses().tolist()):
+                self._line([(px - 2, py), (px + 2, py)], width=width)
+                self._line([(px, py - 2), (px, py + 2)], width=width)
+        digits = 0 if step >= 1 else (1 if step >= 0.1 else 2)
+        for x in multiples(xmin, xmax, step).tolist():
+            px, bottom = self._place(x, ymin)
+            top = self._place(x, ymax)[1]
+            for y, out in ((bottom, -1.0), (top, 1.0)):
+                self._line([(px, y), (px, y + 1.5 * out)])
+                self._text(
+                    px, y + (2.2 if out > 0 else -4.2), f"{x:.{digits}f}", size=2.2, middle=True
+                )
+        for y in multiples(ymin, ymax, step).tolist():
+            left, py = self._place(xmin, y)
+            right = self._place(xmax, y)[0]
+            for x, out in ((left, -1.0), (right, 1.0)):
+                self._line([(x, py), (x + 1.5 * out, py)])
+                self._text(
+                    x + (-2.2 if out < 0 else 4.0),
+                    py,
+                    f"{y:.{digits}f}",
+                    size=2.2,
+                    middle=True,
+                    turned=True,
+                )
+
+    def _contours(self) -> None:
+        self.parts.append("0.75 0.1 0.1 RG")
+        for _, line in self.drawing.contours:
+            self._line([self._place(x, y) for x, y in line.tolist()], width=0.1)
+        self.parts.append("0.1 0.2 0.8 RG")
+        for cut in self.drawing.sections:
+            self._line([self._place(x, y) for x, y in cut.path.tolist()], width=0.2)
+        self.parts.append("0 G")
+
+    def _points(self) -> None:
+        for points, size in ((self.drawing.points, 1.0), (self.drawing.control, 1.6)):
+            if points is None:
+                continue
+            for name, (x, y, _) in zip(points.ids, points.xyz.tolist(), strict=True):
+                if not (np.isfinite(x) and np.isfinite(y)):
+                    continue
+                px, py = self._place(x, y)
+                corners = [(px - size, py - size), (px + size, py - size), (px, py + size)]
+                if points is self.drawing.control:
+                    self._line([*corners, corners[0]], width=0.25)
+                else:
+                    self._line([(px - size, py), (px + size, py)])
+                    self._line([(px, py - size), (px, py + size)])
+                label = (px + size + 0.4, py + 0.4, name)
+                self.parts.append("1 G 0.7 w 1 Tr")  # white outline: legible on any colour
+                self._text(*label, size=2.0)
+                self.parts.append("0 G 0 Tr")
+                self._text(*label, size=2.0)
+
+    def _title(self) -> None:
+        left, bottom, right, _ = self.sheet.frame
+        block = left + 0.44 * (right - left)
+        self._line([(block, bottom), (block, bottom + STRIP)], width=0.35)
+        self._text(block + 3, bottom + STRIP - 8, self.drawing.title, size=5.0, bold=True)
+        self._text(
+            block + 3,
+            bottom + STRIP - 14,
+            f"{self.drawing.subtitle} 1:{self.drawing.scale:g}",
+            size=3.5,
+        )
+        self._text(right - 30, bottom + 2.5, self.sheet.name, size=2.2)
+        for number, note in enumerate(self.drawing.notes[:5]):
+            self._text(block + 3, bottom + STRIP - 19 - 3.2 * number, note, size=2.2)
+
+    def _scale_bar(self) -> None:
+        left, bottom, _, _ = self.sheet.frame
+        length = self.drawing.bar_length()
+        wide = length * self.factor
+        x, y = left + 6, bottom + 8
+        for part in range(5):
+            self.parts.append("0 g" if part % 2 == 0 else "1 g")
+            self._box(x + part * wide / 5, y, wide / 5, 1.8, fill=True)
+        self.parts.append("0 g")
+        for part in (0, 1, 5):
+            unit = " m" if part == 5 else ""
+            self._text(
+                x + part * wide / 5, y + 3, f"{length * part / 5:g}{unit}", size=2.4, middle=True
+            )
+        self._text(x, y - 4.2, f"1:{self.drawing.scale:g}  (print at 100 %)", size=2.2)
+
+    def _level(self) -> None:
+        """Draw the level mark: the triangle that says how high Y = 0 is, and where up is."""
+        left, bottom, _, _ = self.sheet.frame
+        x, y = left + 8, bottom + STRIP - 7
+        self._line([(x - 2.2, y + 3), (x + 2.2, y + 3), (x, y), (x - 2.2, y + 3)], width=0.25)
+        self._line([(x - 4, y), (x + 22, y)], width=0.25)
+        self._text(x + 4, y + 1, "±0.00 = Y 0", size=2.6)
+        arrow = left + 40
+        self._line([(arrow, y - 3), (arrow, y + 4)], width=0.3)
+        self._line([(arrow - 1, y + 2), (arrow, y + 4), (arrow + 1, y + 2)], width=0.3)
+        self._text(arrow + 2, y, "Y up", size=2.4)
+        xmin, ymin, _, ymax = self.drawing.grid.bounds
+        if ymin <= 0 <= ymax:
+            px, py = self._place(xmin, 0.0)
+            tip = px - BAND + 2.2
+            self._line([(tip - 1.4, py + 2), (tip + 1.4, py + 2), (tip, py), (tip - 1.4, py + 2)])

@@ -1,0 +1,65 @@
+"""Finished rasters re-read as full-width strips, and PNG written from them at any size."""
+
+from __future__ import annotations
+
+import struct
+import zlib
+from collections.abc import Iterator
+from pathlib import Path
+from typing import BinaryIO
+
+import numpy as np
+
+from bifocal.io.geotiff import METRES_PER_INCH, RasterReader
+from photocore.arrays import ByteArray
+from photocore.output import atomic_path
+
+#: Rows read at a time: one row of tiles of the file.
+ROWS = 512
+
+
+def colour_strips(reader: RasterReader) -> Iterator[tuple[ByteArray, ByteArray]]:
+    """Yield RGB of shape (rows, width, 3) and validity (rows, width), 8 bits, from the top."""
+    grid = reader.grid
+    bands = [1, 2, 3] if reader.bands >= 3 else [1, 1, 1]
+    for top in range(0, grid.height, ROWS):
+        size = (0, top, grid.width, min(ROWS, grid.height - top))
+        colours = reader.read(*size, bands=bands)
+        if colours.dtype != np.uint8:
+            colours = (colours.astype(np.uint32) // 257).astype(np.uint8)
+        yield colours, reader.read(*size, mask=True)
+
+
+def write_png(path: Path, reader: RasterReader, *, dpi: float, overwrite: bool) -> None:
+    """Write the raster as a PNG with its resolution; empty pixels are transparent."""
+    grid = reader.grid
+    with atomic_path(path, overwrite=overwrite) as temporary, temporary.open("wb") as file:
+        file.write(b"\x89PNG\r\n\x1a\n")
+        # 8 bits, colour with alpha, no interlace.
+        _chunk(file, b"IHDR", struct.pack(">IIBBBBB", grid.width, grid.height, 8, 6, 0, 0, 0))
+        per_metre = round(dpi / METRES_PER_INCH)
+        _chunk(file, b"pHYs", struct.pack(">IIB", per_metre, per_metre, 1))
+        packer = zlib.compressobj(3)
+        above = np.zeros((1, grid.width * 4), np.uint8)
+        for colours, valid in colour_strips(reader):
+            pixels = np.dstack([colours, valid]).reshape(len(colours), -1)
+            _chunk(file, b"IDAT", packer.compress(predicted(pixels, above)))
+            above = pixels[-1:]
+        _chunk(file, b"IDAT", packer.flush())
+        _chunk(file, b"IEND", b"")
+
+
+def predicted(pixels: ByteArray, above: ByteArray) -> bytes:
+    """Return rows as PNG's filter 2 wants them: each minus the one above, led by the number 2."""
+    rows = np.empty((len(pixels), pixels.shape[1] + 1), np.uint8)
+    rows[:, 0] = 2
+    rows[0, 1:] = pixels[0] - above[0]
+    rows[1:, 1:] = pixels[1:] - pixels[:-1]
+    return rows.tobytes()
+
+
+def _chunk(file: BinaryIO, kind: bytes, data: bytes) -> None:
+    if not data and kind == b"IDAT":
+        return
+    file.write(struct.pack(">I", len(data)) + kind + data)
+    file.write(struct.pack(">I", zlib.crc32(kind + data)))

@@ -1,0 +1,200 @@
+"""Everything a drawing needs, in one folder, from one call."""
+
+from __future__ import annotations
+
+import unicodedata
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from datetime import date
+from pathlib import Path
+
+import numpy as np
+
+from bifocal.domain.drawing import Drawing, Sheet, round_step
+from bifocal.domain.grid import Grid
+from bifocal.domain.pair import Pair
+from bifocal.domain.points import SurveyPoints
+from bifocal.domain.surface import FlatSurface, Surface
+from bifocal.io.drawings import write_drawing, write_section_dxf, write_section_svg
+from bifocal.io.geotiff import RasterReader, create_raster, dpi_at_scale, gsd_at_scale
+from bifocal.io.pdf_sheet import write_sheet
+from bifocal.io.point_tables import read_survey_points
+from bifocal.io.strips import write_png
+from bifocal.solvers.compose import TILE
+from bifocal.solvers.sections import contours, section
+from bifocal.solvers.shading import shaded
+from bifocal.workflows.ortho import OrthoResult, OrthoTask, make_ortho, open_surface, planned_grid
+from photocore.arrays import positive
+from photocore.console import Progress, no_progress
+from photocore.errors import InputError
+from photocore.output import atomic_folder
+
+#: Print resolution for which 1:50 makes pixels of 5.00 mm. [dpi]
+DPI = 254.0
+#: Relief detail worth drawing, on paper. [mm]
+_CONTOUR_DETAIL = 0.4
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DeliverTask:
+    """What is wanted besides the orthophoto itself.
+
+    Attributes
+    ----------
+    scale : float
+        1:scale.
+    dpi : float
+        Pixels per inch of paper.
+    title : str
+        Empty: the name of the pair.
+    paper : str, optional
+        ``A4`` to ``A0``; None: the smallest that holds the picture.
+    marked, control : Path, optional
+        Tables of points to draw.
+    sections : sequence of str
+        ``x=1.5``, ``y=2`` or corners.
+    interval : float, optional
+        Between contour lines; None: about 1/25 of the relief. [m]
+    """
+
+    scale: float
+    dpi: float = DPI
+    title: str = ""
+    paper: str | None = None
+    marked: Path | None = None
+    control: Path | None = None
+    sections: Sequence[str] = ()
+    interval: float | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Delivery:
+    """What was made: the orthophoto's result, the files and the sheet of paper."""
+
+    ortho: OrthoResult
+    files: tuple[str, ...]
+    sheet: str
+
+
+def deliver(
+    pair_path: Path,
+    folder: Path,
+    task: OrthoTask,
+    wish: DeliverTask,
+    *,
+    overwrite: bool = False,
+    progress: Progress = no_progress,
+) -> Delivery:
+    """Write orthophoto, relief, drawings, sections and print sheets into a folder.
+
+    Raises
+    ------
+    InputError
+        If the picture does not fit the paper, a table or section is unusable, or writing fails.
+    """
+    scale = positive(wish.scale, "scale")
+    gsd = task.gsd or gsd_at_scale(positive(wish.dpi, "dpi"), scale)
+    task = replace(task, gsd=gsd, scale=scale, overviews=True)
+    pair = Pair.read(pair_path)
+    title = wish.title or str(pair.extra.get("name") or pair_path.name.split(".")[0])
+    name = file_name(title)
+    remarks: list[str] = []
+    points = _points(wish.marked or task.points, remarks)
+    control = _points(wish.control, remarks)
+    with open_surface(task, pair, []) as surface:
+        # Everything that can be refused is, before the work.
+        grid = planned_grid(pair, surface, task)
+        notes = _notes(pair, grid, wish, task)
+        drawing = Drawing(
+            title=title, grid=grid, scale=scale, points=points, control=control, notes=notes
+        )
+        sheet = Sheet.fitting(drawing, wish.paper)
+        cuts = tuple(section(surface, grid, cut, step=gsd) for cut in wish.sections)
+        drawing = replace(drawing, sections=cuts)
+        with atomic_folder(folder, overwrite=overwrite) as place:
+            result = make_ortho(
+                pair_path, place / f"{name}.tif", task, world_file=True, progress=progress
+            )
+            _pictures(place, name, drawing, sheet)
+            if not isinstance(surface, FlatSurface):
+                _relief(place, f"{name}_relief", surface, drawing, sheet, wish)
+            for number, cut in enumerate(cuts, start=1):
+                for writer, ending in ((write_section_dxf, "dxf"), (write_section_svg, "svg")):
+                    target = place / f"{name}_section{number}.{ending}"
+                    writer(target, cut, scale=scale, overwrite=False)
+            files = tuple(sorted(item.name for item in place.iterdir()))
+    result = replace(result, path=folder / f"{name}.tif", remarks=(*result.remarks, *remarks))
+    return Delivery(ortho=result, files=files, sheet=sheet.name)
+
+
+def file_name(title: str) -> str:
+    """Return a title as a file name every system and CAD program takes.
+
+    Examples
+    --------
+    >>> file_name("Palazzo Müller (nord)")
+    'Palazzo_Muller_nord'
+    """
+    plain = unicodedata.normalize("NFKD", title).encode("ascii", "ignore").decode("ascii")
+    words = "".join(c if c.isalnum() or c == "-" else " " for c in plain).split()
+    return "_".join(words) or "ortho"
+
+
+def _pictures(place: Path, name: str, drawing: Drawing, sheet: Sheet) -> None:
+    """Write PNG, drawing and print sheet of the raster of that name."""
+    dpi = dpi_at_scale(drawing.grid.gsd, drawing.scale)
+    with RasterReader(place / f"{name}.tif") as reader:
+        write_png(place / f"{name}.png", reader, dpi=dpi, overwrite=False)
+        write_drawing(place / f"{name}.dxf", drawing, f"{name}.png", overwrite=False)
+        write_sheet(place / f"{name}.pdf", drawing, sheet, reader, overwrite=False)
+
+
+def _relief(
+    place: Path, name: str, surface: Surface, drawing: Drawing, sheet: Sheet, wish: DeliverTask
+) -> None:
+    """Write the relief as numbers, and shaded with contour lines as picture, drawing and sheet."""
+    grid = drawing.grid
+    low, high = surface.extremes(grid.bounds)
+    interval = wish.interval or round_step(max((high - low) / 12, 0.001))
+    lines = contours(
+        surface, grid, interval=interval, detail=_CONTOUR_DETAIL / 1000 * drawing.scale
+    )
+    with create_raster(
+        place / f"{name}_values.tif", grid, bands=1, dtype=np.float32, nodata=float("nan"),
+        names=["relief [m]"], overviews=True, world_file=True,
+    ) as writer:  # fmt: skip
+        for column, row, part in grid.tiles(TILE):
+            writer.write(surface.window(part), column=column, row=row)
+    with create_raster(
+        place / f"{name}.tif", grid, bands=3, dtype=np.uint8, colour=True, world_file=True,
+        dpi=dpi_at_scale(grid.gsd, drawing.scale), overviews=True,
+    ) as writer:  # fmt: skip
+        for column, row, part in grid.tiles(TILE):
+            picture, known = shaded(surface, part, limits=(low, high))
+            writer.write(picture, column=column, row=row, mask=known > 0)
+    notes = (f"relief {low:+.2f} to {high:+.2f} m, contour lines every {interval:g} m",)
+    drawing = replace(drawing, subtitle="Relief", contours=lines, notes=(*notes, *drawing.notes))
+    _pictures(place, name, drawing, sheet)
+
+
+def _points(path: Path | None, remarks: list[str]) -> SurveyPoints | None:
+    if path is None:
+        return None
+    points, notes = read_survey_points(path)
+    remarks.extend(notes)
+    if not np.isfinite(points.xyz[:, :2]).all(axis=1).any():
+        raise InputError(f"{path}: no point has X and Y in the plane frame.")
+    return points
+
+
+def _notes(pair: Pair, grid: Grid, wish: DeliverTask, task: OrthoTask) -> tuple[str, ...]:
+    """Return the lines of the title block."""
+    relief = task.relief or task.points
+    dpi = dpi_at_scale(grid.gsd, wish.scale)
+    image = {"1": "far photo", "2": "near photo", "both": "both photos"}[task.image]
+    return (
+        f"pixel {grid.gsd * 1000:.4g} mm on the wall, {dpi:.4g} dpi on paper",
+        f"{image}, camera distances {pair.image1.distance:.3f} m and {pair.image2.distance:.3f} m",
+        f"relief: {relief.name if relief else f'plane at {task.plane:g} m'}",
+        f"bifocal, {date.today().isoformat()}",
+    )

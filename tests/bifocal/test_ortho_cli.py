@@ -1,0 +1,258 @@
+"""``bifocal ortho`` from the command line: files, deliveries, refusals."""
+
+from __future__ import annotations
+
+import json
+import os
+from pathlib import Path
+
+import ezdxf
+import numpy as np
+import pytest
+import rasterio
+from click.testing import CliRunner, Result
+from PIL import Image
+
+from bifocal import Pair, Photo
+from bifocal.cli.main import main
+from bifocal.domain.grid import Grid
+from bifocal.domain.relief_map import ReliefMap
+from bifocal.io.geotiff import create_raster, read_relief, write_relief
+from bifocal.io.images import write_image
+
+SIZE = (420, 300)
+GSD = 0.01
+
+
+def relief_of(grid: Grid) -> np.ndarray:
+    x, y = np.meshgrid(grid.columns_x, grid.rows_y)
+    return np.where((np.abs(x - 0.8) < 0.2) & (np.abs(y) < 1), 0.3, 0.02 * x).astype(np.float32)
+
+
+@pytest.fixture
+def wall(tmp_path: Path) -> Path:
+    rng = np.random.default_rng(4)
+    for name in ("far.png", "near.png"):
+        write_image(tmp_path / name, rng.integers(0, 255, (SIZE[1], SIZE[0], 3), dtype=np.uint8))
+    matrix = [[GSD, 0, -2.095], [0, -GSD, 1.495], [0, 0, 1]]
+    pair = Pair(
+        image1=Photo(plane_from_pixel=matrix, nadir=(0, 0), distance=12.0, file="far.png"),
+        image2=Photo(plane_from_pixel=matrix, nadir=(0, 0), distance=7.0, file="near.png"),
+        extra={"name": "Torre (est)"},
+    )
+    pair.write(tmp_path / "wall.pair.json")
+    grid = Grid.from_bounds((-2.1, -1.5, 2.1, 1.5), gsd=GSD)
+    relief = ReliefMap.from_relief(relief_of(grid), plane_from_pixel=grid.plane_from_pixel)
+    write_relief(tmp_path / "relief.tif", relief)
+    return tmp_path
+
+
+def run(folder: Path, *arguments: str) -> Result:
+    old = Path.cwd()
+    os.chdir(folder)
+    try:
+        return CliRunner().invoke(main, ["ortho", "wall.pair.json", *arguments])
+    finally:
+        os.chdir(old)
+
+
+def test_a_relief_map_survives_its_file(wall: Path) -> None:
+    relief = read_relief(wall / "relief.tif")
+    np.testing.assert_array_equal(relief.r, relief_of(relief.grid))
+    assert relief.grid.bounds == pytest.approx((-2.1, -1.5, 2.1, 1.5))
+    assert (relief.quality == 1).all()
+
+
+def test_the_orthophoto_has_colours_source_band_mask_and_place(wall: Path) -> None:
+    done = run(wall, "--relief", "relief.tif", "--out", "o.tif", "--tfw", "--json")
+    assert done.exit_code == 0, done.output
+    result = json.loads(done.stdout)
+    assert result["shares"]["hidden"] > 0.001
+    assert (wall / "o.tfw").exists()
+    with rasterio.open(wall / "o.tif") as file:
+        assert file.count == 4
+        assert file.descriptions == ("red", "green", "blue", "source")
+        source, mask = file.read(4), file.dataset_mask()
+        assert ((source > 0) == (mask > 0)).all()
+        assert set(np.unique(source)) == {0, 1}
+        assert file.bounds == pytest.approx((-2.1, -1.5, 2.1, 1.5))
+
+
+def test_a_flat_wall_gives_back_the_photo(wall: Path) -> None:
+    assert run(wall, "--plane", "--out", "o.tif").exit_code == 0
+    with rasterio.open(wall / "o.tif") as file:
+        found = file.read([1, 2, 3]).transpose(1, 2, 0)
+    with Image.open(wall / "far.png") as photo:
+        np.testing.assert_array_equal(found, np.asarray(photo))
+
+
+def test_relief_from_points_with_a_breakline(wall: Path) -> None:
+    rows = ["id,X,Y,Z,flag", "A,-1,-1,0,OK", "B,1,-1,0,OK", "C,1,1,0.2,OK", "D,-1,1,0.2,OK"]
+    rows += ["E,0,-1,0.1,OK", "F,0,1,0.3,OK", "G,0,0,9,UNCERTAIN"]
+    (wall / "p.csv").write_text("\n".join(rows) + "\n")
+    done = run(wall, "--points", "p.csv", "--breakline", "E,F", "--out", "o.tif", "--json")
+    assert done.exit_code == 0, done.output
+    result = json.loads(done.stdout)
+    assert result["bounds"] == pytest.approx([-1, -1, 1, 1])
+    assert "1 of 7 points left out" in done.stderr
+    missing = run(wall, "--points", "p.csv", "--breakline", "E,X9", "--out", "q.tif")
+    assert missing.exit_code == 1
+    assert "no usable point X9" in missing.stderr
+
+
+def test_one_to_fifty_at_254_dpi_is_five_millimetres_in_every_file(wall: Path) -> None:
+    (wall / "c.csv").write_text("id,X,Y,Z\nK1,-1.5,-1,0\n")
+    done = run(
+        wall, "--relief", "relief.tif", "--deliver", "d", "--scale", "1:50", "--dpi", "254",
+        "--control", "c.csv", "--section", "y=0.5", "--section", "x=0.8", "--json",
+    )  # fmt: skip
+    assert done.exit_code == 0, done.output
+    folder, name = wall / "d", "Torre_est"
+    result = json.loads(done.stdout)
+    assert set(result["files"]) == {item.name for item in folder.iterdir()}
+    with rasterio.open(folder / f"{name}.tif") as file:
+        assert file.res == pytest.approx((0.005, 0.005))
+        assert file.compression.value == "DEFLATE"
+        assert file.crs.to_wkt().startswith("LOCAL_CS")
+    for ending in ("tif", "png"):
+        with Image.open(folder / f"{name}.{ending}") as image:
+            assert image.info["dpi"][0] == pytest.approx(254, abs=0.01)
+            assert image.size == (840, 600)
+    values = [float(v) for v in (folder / f"{name}.tfw").read_text().split()]
+    assert values == pytest.approx([0.005, 0, 0, -0.005, -2.0975, 1.4975])
+    drawing = ezdxf.readfile(folder / f"{name}.dxf")
+    assert drawing.dxfversion == "AC1024"  # R2010
+    (picture,) = drawing.modelspace().query("IMAGE")
+    assert tuple(picture.dxf.insert)[:2] == pytest.approx((-2.1, -1.5))
+    assert picture.dxf.u_pixel.x == pytest.approx(0.005)
+    assert picture.image_def.dxf.filename == f"{name}.png"
+    layers = {entity.dxf.layer for entity in drawing.modelspace()}
+    assert {"BIFOCAL_GRID", "BIFOCAL_SCALEBAR", "BIFOCAL_CONTROL"} <= layers
+    relief = ezdxf.readfile(folder / f"{name}_relief.dxf")
+    levels = {line.dxf.elevation for line in relief.query('LWPOLYLINE[layer=="BIFOCAL_CONTOURS"]')}
+    assert any(0.02 < level < 0.3 for level in levels)
+
+
+def test_the_png_is_the_geotiff(wall: Path) -> None:
+    run(wall, "--relief", "relief.tif", "--deliver", "d", "--scale", "1:50")
+    with Image.open(wall / "d" / "Torre_est.png") as png:
+        pixels = np.asarray(png)
+    with rasterio.open(wall / "d" / "Torre_est.tif") as file:
+        np.testing.assert_array_equal(pixels[:, :, :3], file.read([1, 2, 3]).transpose(1, 2, 0))
+        np.testing.assert_array_equal(pixels[:, :, 3], file.dataset_mask())
+
+
+def test_the_sheet_is_true_to_scale(wall: Path) -> None:
+    done = run(wall, "--relief", "relief.tif", "--deliver", "d", "--scale", "1:20")
+    assert done.exit_code == 0, done.output
+    pdf = (wall / "d" / "Torre_est.pdf").read_bytes()
+    # 4.2 m x 3 m at 1:20 is 210 x 150 mm: A3 across, 420 x 297 mm at 72 / 25.4 units per mm.
+    box = pdf[pdf.index(b"/MediaBox [") :].split(b"]")[0].split(b"[")[1].split()
+    assert [float(v) for v in box[2:]] == pytest.approx(
+        [420 * 72 / 25.4, 297 * 72 / 25.4], abs=0.01
+    )
+    assert pdf.rstrip().endswith(b"%%EOF")
+    start = int(pdf.split(b"startxref")[1].split()[0])
+    assert pdf[start : start + 4] == b"xref"
+
+
+def test_a_level_section_shows_the_relief_where_it_is(wall: Path) -> None:
+    run(wall, "--relief", "relief.tif", "--deliver", "d", "--scale", "1:50", "--section", "y=0.5")
+    drawing = ezdxf.readfile(wall / "d" / "Torre_est_section1.dxf")
+    points = np.concatenate(
+        [
+            np.array(line.get_points("xy"))
+            for line in drawing.query('LWPOLYLINE[layer=="BIFOCAL_SECTIONS"]')
+        ]
+    )
+    inside = np.abs(points[:, 0] - 0.8) < 0.19
+    np.testing.assert_allclose(points[inside, 1], 0.3, atol=1e-6)
+    outside = points[:, 0] < 0.5
+    np.testing.assert_allclose(points[outside, 1], 0.02 * points[outside, 0], atol=2e-4)
+    svg = (wall / "d" / "Torre_est_section1.svg").read_text()
+    # 4.2 m at 1:50 is 84 mm, with 10 mm on either side.
+    assert 'width="10' in svg
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("--plane", "--gsd", "1"), "--any-size"),
+        (("--plane", "--gsd", "0.00001"), "420,000 x 300,000 px"),
+        (("--plane", "--bounds", "0,0,0,1"), "xmin < xmax"),
+        (("--plane", "--bounds", "500,500,501,501"), "another wall"),
+        (("--relief", "absent.tif"), "no such raster"),
+        (("--relief", "nan.tif"), "every pixel is unknown"),
+        (("--relief", "mm.tif"), "must be in metres"),
+        (("--relief", "elsewhere.tif"), "another wall"),
+        (("--relief", "picture.tif"), "picture rather than relief"),
+        (("--points", "far.png"), "far.png"),
+        (("--plane", "--vignetting", "much"), "cos4"),
+        (("--plane", "--feather", "-1"), "feather"),
+    ],
+)
+def test_what_cannot_be_meant_is_asked_back(
+    wall: Path, arguments: tuple[str, ...], message: str
+) -> None:
+    grid = Grid.from_bounds((-2.1, -1.5, 2.1, 1.5), gsd=GSD)
+    far = Grid.from_bounds((90.0, 90.0, 91.0, 91.0), gsd=GSD)
+    for name, place, value in (
+        ("nan.tif", grid, np.nan),
+        ("mm.tif", grid, 300.0),
+        ("elsewhere.tif", far, 0.0),
+    ):
+        with create_raster(wall / name, place, bands=1, dtype=np.float32) as writer:
+            writer.write(np.full(place.shape, value, np.float32))
+    with create_raster(wall / "picture.tif", grid, bands=1, dtype=np.uint8) as writer:
+        writer.write(np.zeros(grid.shape, np.uint8))
+    before = set(wall.iterdir())
+    done = run(wall, *arguments, "--out", "o.tif")
+    assert done.exit_code == 1
+    assert message in done.stderr
+    assert "Traceback" not in done.output
+    assert set(wall.iterdir()) == before
+
+
+def test_a_one_pixel_photo_is_refused(wall: Path) -> None:
+    write_image(wall / "far.png", np.zeros((1, 1, 3), np.uint8), overwrite=True)
+    done = run(wall, "--plane", "--out", "o.tif")
+    assert done.exit_code == 1
+    assert "1 x 1 px is not a photo" in done.stderr
+
+
+@pytest.mark.skipif(os.name == "nt" or os.geteuid() == 0, reason="root may write anywhere")
+def test_a_read_only_folder_is_refused(wall: Path) -> None:
+    (wall / "locked").mkdir(mode=0o500)
+    done = run(wall, "--plane", "--out", "locked/o.tif")
+    assert done.exit_code == 1
+    assert "read-only" in done.stderr
+
+
+def test_a_drawing_that_fits_no_paper_is_refused_before_the_work(wall: Path) -> None:
+    done = run(wall, "--plane", "--deliver", "d", "--scale", "1:1", "--any-size")
+    assert done.exit_code == 1
+    assert "does not fit A0" in done.stderr
+    assert not (wall / "d").exists()
+
+
+def test_wrong_usage_is_exit_2(wall: Path) -> None:
+    assert run(wall).exit_code == 2
+    assert run(wall, "--deliver", "d").exit_code == 2
+    assert run(wall, "--out", "o.tif", "--plane", "--relief", "relief.tif").exit_code == 2
+
+
+def test_both_photos_are_blended_and_matched(wall: Path) -> None:
+    done = run(wall, "--relief", "relief.tif", "--image", "both", "--out", "o.tif")
+    assert done.exit_code == 0, done.output
+    assert "image 2" in done.stderr
+
+
+def test_wider_than_32767_pixels_works(wall: Path) -> None:
+    done = run(
+        wall, "--plane", "--gsd", "0.001", "--bounds", "-2.1,-0.02,37.9,0.02", "--out", "o.tif"
+    )
+    assert done.exit_code == 0, done.output
+    with rasterio.open(wall / "o.tif") as file:
+        assert (file.width, file.height) == (40000, 40)
+        row = file.read(1, window=rasterio.windows.Window(0, 20, 4200, 1))
+    assert row.any()
