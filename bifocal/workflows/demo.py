@@ -1,0 +1,177 @@
+"""The whole workflow on the sample pair: photos, points, workbook, relief map, orthophoto.
+
+The sample is rendered by the package's own ray caster, so everything about it is known exactly.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from bifocal.domain.observations import PointObservations
+from bifocal.domain.relief_map import ReliefMap
+from bifocal.io.geotiff import RasterReader, read_relief, write_relief
+from bifocal.io.images import write_image
+from bifocal.solvers.scene import Rendering, bifocal_cameras, demo_scene, render
+from bifocal.workflows.dense import ReliefJob, relief_of_pair
+from bifocal.workflows.ortho import OrthoTask, make_ortho
+from bifocal.workflows.solve import solve_file
+from bifocal.workflows.solve_output import write_result
+from bifocal.workflows.survey import write_survey
+from photocore.arrays import FloatArray
+from photocore.console import Progress, no_progress
+from photocore.errors import InputError
+
+#: Photos of 1536 x 1024 px, 7.38 mm on the wall: a quarter of the paper's camera, quick to make.
+SIZE, PIXEL = (1536, 1024), 0.00738
+#: Picks of a careful hand. [px]
+PICK_SIGMA = 0.2
+SEED = 20240601
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class DemoResult:
+    """What was found, against the truth.
+
+    Attributes
+    ----------
+    folder : Path
+        Where the results lie.
+    files : tuple of (file name, what it is)
+    ids : tuple of str
+        Targets that were surveyed.
+    true, found, sigma : ndarray, shape (n,)
+        Relief of the targets and its expected precision. [m]
+    flags : tuple of str
+    map_median, map_share : float
+        Median error of the relief map [m] and share of it beyond 3 cm, where both photos see.
+    map_known : float
+        Share of the wall with a measured relief.
+    remarks : tuple of str
+    """
+
+    folder: Path
+    files: tuple[tuple[str, str], ...]
+    ids: tuple[str, ...]
+    true: FloatArray
+    found: FloatArray
+    sigma: FloatArray
+    flags: tuple[str, ...]
+    map_median: float
+    map_share: float
+    map_known: float
+    remarks: tuple[str, ...] = field(default=())
+
+    @property
+    def rmse(self) -> float:
+        """RMS error of the relief of targets that are not uncertain. [m]."""
+        used = np.array([flag in ("OK", "ON-PLANE", "WEAK") for flag in self.flags])
+        return float(np.sqrt(np.mean((self.found - self.true)[used] ** 2)))
+
+
+def run_demo(
+    folder: Path, *, overwrite: bool = False, progress: Progress = no_progress
+) -> DemoResult:
+    """Render the sample pair, survey it in every way, and compare with the truth.
+
+    Raises
+    ------
+    InputError
+        If the folder cannot be made, or holds results already and ``overwrite`` is false.
+    """
+    names = [name for name, _ in _FILES]
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"{folder}: cannot be made ({error.strerror}).") from error
+    taken = [name for name in names if (folder / name).exists()]
+    if taken and not overwrite:
+        raise InputError(
+            f"{folder}: holds {', '.join(taken[:3])} ... already; add --overwrite, or name another "
+            "folder with --out."
+        )
+    progress(0.0, 1.0, "photographing the sample façade")
+    rng = np.random.default_rng(SEED)
+    sample = render(demo_scene(), bifocal_cameras(size=SIZE, pixel=PIXEL), rng=rng)
+    write_image(folder / "far.png", sample.image1, overwrite=True)
+    write_image(folder / "near.png", sample.image2, overwrite=True)
+    sample.pair.write(folder / "facade.pair.json", overwrite=True)
+    write_relief(folder / "truth.tif", sample.truth, overwrite=True)
+    progress(0.4, 1.0, "surveying targets in the workbook")
+    ids, true, found, sigma, flags = _survey(folder, sample, rng)
+    progress(0.5, 1.0, "measuring dense relief")
+    job = ReliefJob(out=folder / "relief.tif", preview=folder / "relief.png", overwrite=True)
+    _, remarks = relief_of_pair(folder / "facade.pair.json", job)
+    progress(0.85, 1.0, "making the orthophoto")
+    make_ortho(
+        folder / "facade.pair.json", folder / "ortho.tif",
+        OrthoTask(relief=folder / "relief.tif"), overwrite=True,
+    )  # fmt: skip
+    _write_preview(folder / "ortho.png", folder / "ortho.tif")
+    progress(1.0, 1.0, "done")
+    median, share, known = _against_truth(read_relief(folder / "relief.tif"), sample)
+    return DemoResult(
+        folder=folder, files=_FILES, ids=ids, true=true, found=found, sigma=sigma, flags=flags,
+        map_median=median, map_share=share, map_known=known, remarks=remarks,
+    )  # fmt: skip
+
+
+_FILES: tuple[tuple[str, str], ...] = (
+    ("far.png", "far photo, 35 mm from 17.5 m"),
+    ("near.png", "near photo, 19 mm from 9.5 m"),
+    ("facade.pair.json", "the pair: homographies, nadirs, distances"),
+    ("survey.xlsx", "picked targets in the survey workbook, live formulas"),
+    ("result.xlsx", "solved: relief, coordinates, precision, check"),
+    ("relief.tif", "relief map: relief, sigma, quality"),
+    ("relief.png", "the same as a picture"),
+    ("ortho.tif", "orthophoto to scale"),
+    ("ortho.png", "the same as a picture"),
+    ("truth.tif", "the exact relief, to compare"),
+)
+
+
+def _survey(
+    folder: Path, sample: Rendering, rng: np.random.Generator
+) -> tuple[tuple[str, ...], FloatArray, FloatArray, FloatArray, tuple[str, ...]]:
+    """Pick targets as a careful hand would, solve the workbook; return ids, true, found."""
+    targets = [target for target in sample.targets if target.seen]
+    noise = rng.normal(0, PICK_SIGMA, (2, len(targets), 2))
+    true = np.array([target.xyz[2] for target in targets])
+    points = PointObservations(
+        ids=tuple(target.name for target in targets),
+        pixels1=np.array([target.pixel1 for target in targets]) + noise[0],
+        pixels2=np.array([target.pixel2 for target in targets]) + noise[1],
+        r_measured=true,
+    )
+    write_survey(
+        folder / "survey.xlsx", points, pair=sample.pair, sigma_px=PICK_SIGMA,
+        pair_path=folder / "facade.pair.json", overwrite=True,
+    )  # fmt: skip
+    solution = solve_file(folder / "survey.xlsx")
+    write_result(folder / "result.xlsx", solution, overwrite=True)
+    table = solution.table
+    return points.ids, true, table["r"], table["sigma_r"], table.flags
+
+
+def _against_truth(relief: ReliefMap, sample: Rendering) -> tuple[float, float, float]:
+    """Return median error, share beyond 3 cm and share known, where both cameras see the wall."""
+    both = sample.visible1 & sample.visible2 & np.isfinite(sample.truth.r)
+    places = np.concatenate(
+        [sample.truth.plane_positions(slice(k, k + 1)).reshape(-1, 2) for k in range(len(both))]
+    )
+    found = relief.sample(places).reshape(both.shape)
+    known = both & np.isfinite(found)
+    error = np.abs(found - sample.truth.r)[known]
+    share = float(known.sum() / both.sum())
+    return float(np.median(error)), float((error > 0.03).mean()), share
+
+
+def _write_preview(path: Path, raster: Path) -> None:
+    """Write the colours of an orthophoto as PNG, hidden pixels transparent."""
+    with RasterReader(raster) as file:
+        width, height = file.grid.width, file.grid.height
+        colours = file.read(0, 0, width, height, bands=[1, 2, 3])
+        mask = file.read(0, 0, width, height, mask=True)
+    write_image(path, np.dstack([colours, mask]), overwrite=True)
