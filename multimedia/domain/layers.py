@@ -45,7 +45,7 @@ class Layers:
     [0.5, 0.01, 0.2]
     """
 
-    indices: tuple[float, ...] = (1.0, 1.5, 1.337)
+    indices: tuple[float, ...]
     thicknesses: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
