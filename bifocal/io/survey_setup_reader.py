@@ -125,6 +125,9 @@ def read_setup(
     found: list[CellError] = []
     # In the workbook of a general pair sigma_s follows from sigma_px: nothing to read.
     columns = [c for c in _columns() if not (c.key == "sigma_s" and is_general(book))]
+    if "d_1" in book.names and "d_2" in book.names:
+        # Our own workbook: every value has its name, labels need not be searched for.
+        columns = [c for c in columns if c.key.casefold() in book.names]
     values = read_named_values(
         book,
         columns,
@@ -137,11 +140,7 @@ def read_setup(
     defaults = {key for key in ("sigma_s", "sigma_r_max") if key in formulas}
     # Cells with the template's own formula are defaults, calculated or not.
     errors += [e for e in found if e.column not in formulas]
-    number = {
-        key: _number(values, key)
-        for key in _NUMBERS
-        if key not in defaults and key in values.values
-    }
+    number = {key: _number(values, key) for key in _NUMBERS if key not in defaults}
     _check_positive(values, number, errors)
     d1 = _distance(values, number, "d_1" in formulas, errors)
     nadirs = [_place(number[f"nadir_{i}_col"], number[f"nadir_{i}_row"]) for i in (1, 2)]
@@ -160,7 +159,7 @@ def read_setup(
         flag_sigmas=(number["k_off"] or OFF_RADIAL_SIGMAS, number["k_plane"] or ON_PLANE_SIGMAS),
         sensor=_place(number["sensor_w"], number["sensor_h"]),
         unit=_unit(values, errors),
-        pair_file=values.text("pair_file"),
+        pair_file=values.text("pair_file") if "pair_file" in values.values else "",
         matrices=matrices,
         nadirs=plane_nadirs,
         where=where,
@@ -189,7 +188,7 @@ def _general_names() -> list[str]:
 
 
 def _number(values: NamedValues, key: str) -> float | None:
-    return values.number(key) if values.has(key) else None
+    return values.number(key) if key in values.values and values.has(key) else None
 
 
 def _formulas(path: Path, values: NamedValues) -> set[str]:
@@ -259,7 +258,7 @@ def _near(number: dict[str, float | None], d1: float | None) -> float | None:
 
 def _unit(values: NamedValues, errors: list[CellError]) -> str:
     """Return the input unit, empty where the cell is blank."""
-    text = values.text("input_unit").strip().casefold()
+    text = values.text("input_unit").strip().casefold() if "input_unit" in values.values else ""
     if text in ("", "mm"):
         return text
     if text in ("px", "pixel", "pixels", "pix"):
@@ -272,7 +271,7 @@ def _general(
     values: NamedValues,
 ) -> tuple[tuple[FloatArray, FloatArray] | None, tuple[FloatArray, FloatArray]]:
     """Return homographies and nadirs on the wall, if the workbook describes a general pair."""
-    if not all(values.has(name) for name in _general_names()):
+    if not all(name in values.values and values.has(name) for name in _general_names()):
         return None, (np.zeros(2), np.zeros(2))
     first, second = (
         np.array([[values.number(f"h{k}_{i}{j}") for j in "123"] for i in "123"]) for k in "12"

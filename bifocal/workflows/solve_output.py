@@ -158,7 +158,8 @@ def _csv_columns(solution: Solution) -> dict[str, Any]:
     for key in ("r", "e1", "e2", "s_c", "q", "sigma_r"):
         columns[f"{key} [{units.get(key, 'm')}]"] = table[key]
     columns["flag"] = list(table.flags)
-    columns["note"] = list(solution.points.note)
+    if any(solution.points.note):
+        columns["note"] = list(solution.points.note)
     return columns
 
 

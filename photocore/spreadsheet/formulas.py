@@ -139,7 +139,8 @@ class References:
         return re.compile("|".join(words), re.IGNORECASE)
 
     def _formulas(self, sheet: Sheet) -> str:
-        """Return all formulas of a sheet as one text."""
+        """Return all formulas of a sheet as one text, repeated ones once."""
+        found: dict[str, None] = {}
         pieces: list[str] = []
         inside = False
 
@@ -150,7 +151,8 @@ class References:
         def end(name: str) -> None:  # noqa: ARG001
             nonlocal inside
             if inside:
-                pieces.append("\n")
+                found["".join(pieces)] = None
+                pieces.clear()
             inside = False
 
         def collect(data: str) -> None:
@@ -158,7 +160,7 @@ class References:
                 pieces.append(data)
 
         scan_part(self.path, self.package, sheet.part, start=start, end=end, text=collect)
-        return "".join(pieces)
+        return "\n".join(found)
 
     def grow(self, area: TableArea, bottom: int, parts: dict[str, bytes]) -> None:
         """Let a table, and all that reaches to its last row, reach down to a new one.
