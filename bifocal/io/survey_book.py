@@ -6,6 +6,7 @@ import io
 from collections.abc import Mapping
 from pathlib import Path
 
+from openpyxl.styles import Alignment
 from openpyxl.worksheet.worksheet import Worksheet
 
 from bifocal.io import survey_charts, survey_reference_sheets
@@ -153,6 +154,7 @@ def _setup_cell(
     builder.text(sheet, f"A{row}", name)
     builder.text(sheet, f"B{row}", words[("en", "it", "de").index(builder.language)])
     builder.text(sheet, f"D{row}", unit, LABEL_FONT)
+    sheet[f"D{row}"].alignment = Alignment(indent=1)
     cell, form, value = f"C{row}", _FORMS.get(name, "General"), cells.get(name)
     own = content.setup
     is_default = {
@@ -165,6 +167,7 @@ def _setup_cell(
         return
     builder.input(sheet, cell, value, form=form, name=name)
     if name == "input_unit":
+        sheet[cell].alignment = Alignment(horizontal="right")
         validate(sheet, cell, choices="mm,px")
     elif name in ("c_1", "c_2", "d_1", "d_2", "pitch", "sigma_s", "sigma_px", "sigma_r_max"):
         validate(sheet, cell, above_zero=True)

@@ -8,7 +8,7 @@ from openpyxl.chart import BarChart, Reference, ScatterChart, Series
 from openpyxl.chart.shapes import GraphicalProperties
 from openpyxl.styles import Font
 
-from bifocal.io.survey_content import CHART_ROWS, SurveyContent, check_cells
+from bifocal.io.survey_content import CHART_ROWS, SurveyContent
 from bifocal.io.survey_reference_sheets import CHECK_HEAD
 from bifocal.io.survey_sheets import LABEL_FONT, BookBuilder, protect, set_up_print
 from bifocal.io.survey_words import word
@@ -39,7 +39,7 @@ def charts(
         builder.formula(
             sheet, f"{letter}{HEAD + 1}", f"IF(ISNUMBER({found}),{found},NA())", None, form="0.000"
         )
-        sheet[f"{letter}{HEAD + 1}"].font = Font(color="A6A6A6", size=8)
+        sheet[f"{letter}{HEAD + 1}"].font = Font(name="Calibri", color="A6A6A6", size=8)
         listed: list[CellValue] = [
             value if isinstance(value, int | float) else float("nan")
             for value in cells.get(key, [])[:rows]
@@ -60,6 +60,7 @@ def charts(
     _errors(builder, content)
     set_up_print(sheet, language, landscape=False)
     sheet.print_area = "A1:J66"
+    sheet.page_setup.fitToHeight = 1
     protect(sheet)
 
 
@@ -97,12 +98,9 @@ def _equal_scales(chart: ScatterChart, cells: Mapping[str, list[CellValue]]) -> 
 
 
 def _round_step(rough: float) -> float:
-    """Return 1, 2 or 5 times a power of ten, not below rough."""
-    power = 10.0 ** len(str(int(1e6 / rough))) if rough < 1 else 1.0
-    for factor in sorted(f * 10.0**e for f in (1, 2, 5) for e in range(-6, 7)):
-        if factor >= rough:
-            return float(factor)
-    return power
+    """Return the least of 1, 2 or 5 times a power of ten that is not below rough."""
+    steps = sorted(factor * 10.0**power for factor in (1, 2, 5) for power in range(-6, 7))
+    return next((step for step in steps if step >= rough), steps[-1])
 
 
 def _steps(span: float, step: float) -> int:
@@ -129,4 +127,3 @@ def _errors(builder: BookBuilder, content: SurveyContent) -> None:
     chart.y_axis.number_format = "0.000"
     chart.height, chart.width = 8, 16
     builder.book["Charts"].add_chart(chart, "A48")
-    assert check_cells(content) is not None

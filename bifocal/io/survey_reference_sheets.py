@@ -234,7 +234,7 @@ def _parameters(builder: BookBuilder, content: SurveyContent) -> None:
     formula("B10", "g_alpha", 'IF(g_k="","",DEGREES(ATAN2(g_11,g_21)))', angle)
     _centres(builder, content)
     text(14, "geo_rotation")
-    builder.text(sheet, "F14", word("geo_solved", language))
+    builder.text(sheet, "J14", word("geo_solved", language))
     cosines = {
         "11": ("g_a2/g_l2", "g_aL/g_lL"), "12": ("-g_b2/g_l2", "0"), "13": ("0", "g_bL/g_lL"),
         "21": ("g_b2/g_l2", "g_bL/g_lL"), "22": ("g_a2/g_l2", "0"), "23": ("0", "-g_aL/g_lL"),
@@ -254,7 +254,7 @@ def _parameters(builder: BookBuilder, content: SurveyContent) -> None:
             )
             solved = entry if kind == "3D" and geo is not None else None
             builder.input(sheet, f"{'GHI'[j]}{14 + i}", solved, name=f"s3_{key}")
-    builder.text(sheet, "F17", word("geo_scale", language))
+    builder.text(sheet, "J17", word("geo_scale", language))
     builder.input(sheet, "G17", k if kind == "3D" else None, name="s3_k")
     _write_sums(builder, sums)
 

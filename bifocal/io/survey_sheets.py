@@ -21,10 +21,12 @@ from photocore.bookrows import CellValue, RowBlock
 
 INPUT_FILL = PatternFill("solid", start_color="FFF9DB", end_color="FFF9DB")
 HEAD_FILL = PatternFill("solid", start_color="DCE6F1", end_color="DCE6F1")
-FORMULA_FONT = Font(color="1F3FA8")
+_FACE = "Calibri"
+FORMULA_FONT = Font(name=_FACE, size=11, color="1F3FA8")
 INPUT_EDGE = Border(*(Side(style="hair", color="BFBFBF"),) * 4)
-TITLE_FONT, HEAD_FONT, LABEL_FONT = Font(bold=True, size=14), Font(bold=True), Font(size=9)
-NOTE_FONT = Font(italic=True, color="595959")
+TITLE_FONT = Font(name=_FACE, size=14, bold=True)
+HEAD_FONT, LABEL_FONT = Font(name=_FACE, size=11, bold=True), Font(name=_FACE, size=9)
+NOTE_FONT = Font(name=_FACE, size=11, italic=True, color="595959")
 #: Fill and text of each flag; the word itself always stands in the cell too.
 FLAG_COLOURS = {
     "OK": ("E2F0D9", "1E5B12"),
