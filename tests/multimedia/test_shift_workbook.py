@@ -13,6 +13,7 @@ from multimedia import QUAN_FRY, Layers, radial_shift, water_refractive_index
 from multimedia.domain.shift_points import ShiftPoints, ShiftSetup
 from multimedia.io.shift_workbook import write_shift_workbook
 from multimedia.unrolled import unrolled_shift
+from multimedia.workflows.shift import write_template
 from photocore.errors import InputError
 from photocore.spreadsheet.lint import lint
 from tests import office
@@ -209,3 +210,13 @@ def test_impossible_sizes_are_refused(
     with pytest.raises(InputError, match=message):
         write_shift_workbook(tmp_path / "x.xlsx", ORDERS["two media"], **options)  # type: ignore[arg-type]
     assert not list(tmp_path.iterdir())
+
+
+def test_the_committed_template_is_what_the_command_writes(tmp_path: Path) -> None:
+    committed = Path(__file__).parents[2] / "templates" / "multimedia.xlsx"
+    fresh = tmp_path / "fresh.xlsx"
+    write_template(fresh, rows=50, steps=6, overwrite=False)
+    assert office.formulas_of(fresh) == office.formulas_of(committed), (
+        "run: multimedia template templates/multimedia.xlsx --overwrite"
+    )
+    assert office.stored(fresh) == office.stored(committed)
