@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike
 from multimedia.domain.interfaces import Interfaces
 from multimedia.domain.ray_paths import RayPaths, RayStatus
 from multimedia.domain.surfaces import Plane
+from multimedia.solvers.least_time import least_time_path
 from photocore.arrays import BoolArray, FloatArray, IntArray, as_points
 
 #: Rays per block: keeps the working set of a block in the cache and memory constant.
@@ -262,8 +263,10 @@ def _attempts(path: Interfaces) -> Iterator[Callable[[FloatArray, FloatArray], _
     """Yield ways to find a ray, the cheap one first; each is tried on what the others left."""
     for stages in STAGES:
         yield partial(_by_stages, path=path, stages=stages)
-    # Waves and facets leave a few points whose straight start lies across a kink or a crest.
-    if not all(isinstance(surface, Plane) for surface in path.surfaces):
+    if all(isinstance(surface, Plane) for surface in path.surfaces):
+        yield partial(_by_least_time, path=path)
+    else:
+        # Waves leave a few points whose straight start lies across a crest.
         for ring in RINGS:
             for bearing in range(RING_STARTS):
                 angle = 2 * np.pi * bearing / RING_STARTS
@@ -280,6 +283,19 @@ def _by_stages(start: FloatArray, end: FloatArray, *, path: Interfaces, stages: 
         heading = _newton(start, end, heading, path.with_indices(indices))[0]
     _, march, _, reached = _newton(start, end, heading, path)
     return march, reached
+
+
+def _by_least_time(start: FloatArray, end: FloatArray, *, path: Interfaces) -> _Found:
+    """Take the path of least time, for planes only."""
+    vertices, directions, reached = least_time_path(start, end, path)
+    # Shooting along that direction gains the last digits, where it can follow.
+    rows = np.flatnonzero(reached)
+    _, march, _, followed = _newton(start[rows], end[rows], directions[rows, 0], path)
+    done = rows[followed]
+    vertices[done], directions[done] = march.vertices[followed], march.directions[followed]
+    empty = np.zeros((len(start), 2, 3))
+    status = np.where(reached, RayStatus.OK, RayStatus.TOTAL_REFLECTION).astype(np.int64)
+    return _March(vertices, directions, empty, empty, status), reached
 
 
 def _from_ring(

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import json
+from pathlib import Path
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -349,3 +352,46 @@ def test_rays_that_miss_a_surface_say_so() -> None:
 def test_impossible_surfaces_are_refused_in_plain_words(make, message) -> None:
     with pytest.raises((InputError, GeometryError), match=message):
         make()
+
+
+def golden_shifts() -> list[dict]:
+    """Return the 50-digit radial shifts: housings, thin gaps, critical angles, grazing rays."""
+    path = Path(__file__).parents[1] / "golden" / "radial_shift.json"
+    return json.loads(path.read_text(encoding="utf-8"))
+
+
+def test_rays_through_parallel_planes_equal_the_50_digit_shifts() -> None:
+    cases = golden_shifts()
+    limits = 0
+    for case in cases:
+        layers = mm.Layers(indices=case["indices"], thicknesses=case["heights"][1:-1])
+        height, depth = sum(case["heights"][:-1]), case["heights"][-1]
+        path = mm.aim_rays(
+            [0, 0, height], [case["radius"], 0, -depth], mm.Interfaces.parallel(layers)
+        )
+        if path.status != mm.RayStatus.OK:
+            # No ray: a camera that touches the glass sees only a circle, and light that reaches a
+            # point of the interface beyond the critical angle never leaves the denser medium.
+            assert case["heights"][0] == 0 or depth == 0, case
+            limits += 1
+            continue
+        heading = path.directions[0]
+        expected = float(case["radius_bar"]) / (height + depth)
+        angle = np.arctan2(heading[0], -heading[2])
+        assert angle == pytest.approx(np.arctan(expected), rel=1e-12, abs=1e-300), case
+        if expected < 1e3:  # beyond, R_bar magnifies the rounding of a unit vector
+            assert heading[0] / -heading[2] == pytest.approx(expected, rel=1e-12), case
+    assert limits < 0.03 * len(cases)
+
+
+def test_least_time_finds_the_ray_that_shooting_loses() -> None:
+    # Double glazing under water: the air gap between the panes, hit beside the critical angle.
+    layers = mm.Layers(indices=(1.337, 1.5, 1.0, 1.5, 1.337), thicknesses=(0.006, 1e-5, 0.006))
+    points = np.array([[r, 0.0, -1.0] for r in (1.0, 2.0, 5.0, 20.0)])
+    interfaces = mm.Interfaces.parallel(layers, normal=[0.1, 0.05, 1.0])
+    path = mm.aim_rays([0, 0, 1.0], points, interfaces)
+    assert (path.status == mm.RayStatus.OK).all()
+    for k, surface in enumerate(interfaces.surfaces):
+        before = layers.indices[k] * np.cross(path.directions[:, k], surface.normal)
+        after = layers.indices[k + 1] * np.cross(path.directions[:, k + 1], surface.normal)
+        np.testing.assert_allclose(before, after, atol=1e-9)

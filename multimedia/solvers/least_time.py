@@ -1,0 +1,129 @@
+"""Rays through planes by Fermat's principle: the path of least time.
+
+Through planes of any tilt the travel time is a convex function of where the ray crosses them, so
+its minimum always exists and damped Newton always finds it, also where shooting loses the ray:
+beside the critical angle, through thin gaps of a thinner medium, on an interface itself.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from multimedia.domain.interfaces import Interfaces
+from multimedia.domain.surfaces import Plane
+from photocore.arrays import BoolArray, FloatArray
+
+#: A thin gap beside the critical angle gains a factor of 1.5 per step: 60 steps for 1e10.
+MOST_STEPS = 120
+MOST_HALVINGS = 40
+#: Snell's law is met when the refracted components differ by less than this (of an index).
+TOLERANCE = 1e-13
+#: Legs shorter than this share of the scene have no direction of their own (touching surfaces).
+SHORTEST = 1e-15
+#: Cosine to the normal below which a leg runs along its surface.
+GRAZING = 1e-9
+
+
+def least_time_path(
+    starts: FloatArray, ends: FloatArray, interfaces: Interfaces
+) -> tuple[FloatArray, FloatArray, BoolArray]:
+    """Return crossings (n, k, 3), directions (n, k + 1, 3), and which paths obey Snell's law.
+
+    All surfaces must be planes that separate start and end.
+    """
+    planes = [surface for surface in interfaces.surfaces if isinstance(surface, Plane)]
+    count, total = len(planes), len(starts)
+    bases = np.stack([_basis(plane.normal) for plane in planes])  # (k, 2, 3)
+    indices = np.array(interfaces.indices)
+    scale = np.linalg.norm(ends - starts, axis=-1) + 1e-300
+    crossings = np.empty((total, count, 3))
+    for number, plane in enumerate(planes):
+        above, below = plane.side(starts), plane.side(ends)
+        share = above / np.where(above == below, 1.0, above - below)
+        crossings[:, number] = starts + share[:, None] * (ends - starts)
+    rows = np.arange(total)
+    for _ in range(MOST_STEPS):
+        corners = _corners(starts[rows], crossings[rows], ends[rows])
+        gradient, hessian, time = _time(corners, bases, indices, scale[rows])
+        step = -np.linalg.solve(hessian, gradient[..., None])[..., 0].reshape(-1, count, 2)
+        move = np.einsum("nka,kai->nki", step, bases)
+        slope = (gradient.reshape(step.shape) * step).sum((-1, -2))
+        share = np.ones(len(rows))
+        waiting = np.arange(len(rows))
+        for _ in range(MOST_HALVINGS):
+            tried = crossings[rows[waiting]] + share[waiting, None, None] * move[waiting]
+            later = _lengths(
+                _corners(starts[rows[waiting]], tried, ends[rows[waiting]]), scale[rows[waiting]]
+            )
+            enough = time[waiting] + 1e-4 * share[waiting] * slope[waiting]
+            # Near the minimum rounding of the time hides the gain: a full step is right there.
+            hidden = np.abs(slope[waiting]) < 1e-12 * time[waiting]
+            waiting = waiting[(later @ indices > enough) & ~hidden]
+            if not waiting.size:
+                break
+            share[waiting] *= 0.5
+        crossings[rows] += share[:, None, None] * move
+        large = np.abs(step).max((-1, -2)) > 1e-16 * scale[rows]
+        rows = rows[large & (np.abs(gradient).max(-1) > 0.01 * TOLERANCE)]
+        if not rows.size:
+            break
+    corners = _corners(starts, crossings, ends)
+    gradient, _, _ = _time(corners, bases, indices, scale)
+    legs = np.diff(corners, axis=1)
+    directions = legs / np.maximum(np.linalg.norm(legs, axis=-1, keepdims=True), 1e-300)
+    # A component of a short leg is only known to the rounding of its ends.
+    shortest = np.linalg.norm(legs, axis=-1).min(-1)
+    rounding = 8 * np.finfo(float).eps * np.abs(corners).max((-1, -2))
+    allowed = TOLERANCE + rounding / np.maximum(shortest, 1e-300)
+    good = np.abs(gradient).max(-1) <= np.minimum(allowed, 1e-9) * indices.max()
+    # An end on an interface: a leg along it is the limit of total reflection, no ray.
+    for leg, plane, points in ((0, planes[0], starts), (-1, planes[-1], ends)):
+        touches = np.abs(plane.side(points)) <= 100 * SHORTEST * scale
+        runs = np.linalg.norm(legs[:, leg], axis=-1) > 100 * SHORTEST * scale
+        along = np.abs(directions[:, leg] @ plane.normal) < GRAZING
+        good &= ~(touches & runs & along)
+    return crossings, directions, np.asarray(good)
+
+
+def _corners(starts: FloatArray, crossings: FloatArray, ends: FloatArray) -> FloatArray:
+    """Return start, crossings and end in one array, shape (n, k + 2, 3)."""
+    return np.concatenate([starts[:, None], crossings, ends[:, None]], axis=1)
+
+
+def _lengths(corners: FloatArray, scale: FloatArray) -> FloatArray:
+    """Return the lengths of the legs, smoothed where a leg has none, shape (n, k + 1)."""
+    legs = np.diff(corners, axis=1)
+    length: FloatArray = np.sqrt((legs * legs).sum(-1) + (SHORTEST * scale[:, None]) ** 2)
+    return length
+
+
+def _time(
+    corners: FloatArray, bases: FloatArray, indices: FloatArray, scale: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return gradient (n, 2k) and Hessian (n, 2k, 2k) of the travel time, and the time."""
+    count = len(bases)
+    length = _lengths(corners, scale)
+    unit = np.diff(corners, axis=1) / length[..., None]
+    pull = indices[:, None] * unit
+    gradient = np.einsum("kai,nki->nka", bases, pull[:, :-1] - pull[:, 1:])
+    stiff = (np.eye(3) - unit[..., :, None] * unit[..., None, :]) * (indices / length)[
+        ..., None, None
+    ]
+    hessian = np.zeros((len(corners), count, 2, count, 2))
+    for k in range(count):
+        both = stiff[:, k] + stiff[:, k + 1]
+        hessian[:, k, :, k] = bases[k] @ both @ bases[k].T
+        if k + 1 < count:
+            cross = -bases[k] @ stiff[:, k + 1] @ bases[k + 1].T
+            hessian[:, k, :, k + 1] = cross
+            hessian[:, k + 1, :, k] = cross.transpose(0, 2, 1)
+    flat = hessian.reshape(len(corners), 2 * count, 2 * count)
+    return gradient.reshape(len(corners), -1), flat, length @ indices
+
+
+def _basis(normal: FloatArray) -> FloatArray:
+    """Return two unit vectors in a plane, shape (2, 3)."""
+    aside = np.eye(3)[np.argmin(np.abs(normal))]
+    first = np.cross(normal, aside)
+    first = first / np.linalg.norm(first)
+    return np.stack([first, np.cross(normal, first)])
