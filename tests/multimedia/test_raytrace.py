@@ -387,7 +387,7 @@ def test_rays_through_parallel_planes_equal_the_50_digit_shifts() -> None:
 def test_least_time_finds_the_ray_that_shooting_loses() -> None:
     # Double glazing under water: the air gap between the panes, hit beside the critical angle.
     layers = mm.Layers(indices=(1.337, 1.5, 1.0, 1.5, 1.337), thicknesses=(0.006, 1e-5, 0.006))
-    points = np.array([[r, 0.0, -1.0] for r in (1.0, 2.0, 5.0, 20.0)])
+    points = np.array([[-r, 0.0, -1.0] for r in (1.0, 2.0, 5.0, 20.0)])
     interfaces = mm.Interfaces.parallel(layers, normal=[0.1, 0.05, 1.0])
     path = mm.aim_rays([0, 0, 1.0], points, interfaces)
     assert (path.status == mm.RayStatus.OK).all()
