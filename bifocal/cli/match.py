@@ -1,0 +1,113 @@
+"""``bifocal match``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import click
+
+from photocore.console import print_json, remark
+
+EXAMPLE = """\b
+Examples:
+  bifocal match wall.pair.json --out survey.xlsx
+  bifocal match wall.pair.json --count 2000 --out points.csv
+  bifocal match wall.pair.json --what targets --out targets.xlsx
+Then:
+  bifocal solve survey.xlsx --out result.xlsx
+  bifocal solve points.csv --pair wall.pair.json --json
+"""
+
+
+@click.command(
+    short_help="Homologous points found automatically, as a survey workbook.", epilog=EXAMPLE
+)
+@click.argument("pair", type=click.Path(path_type=Path))
+@click.option(
+    "--out", type=click.Path(path_type=Path), required=True,
+    help="Survey workbook (.xlsx) or table (.csv) to write.",
+)  # fmt: skip
+@click.option(
+    "--count",
+    type=click.IntRange(1, 100_000),
+    default=4000,
+    show_default=True,
+    help="About so many feature points, spread evenly.",
+)
+@click.option(
+    "--what",
+    type=click.Choice(["all", "features", "targets"]),
+    default="all",
+    show_default=True,
+    help="Natural detail, survey targets, or both.",
+)
+@click.option(
+    "--relief-min",
+    type=float,
+    metavar="M",
+    help="Lowest relief looked for [m].  [default: -0.5 x near distance]",
+)
+@click.option(
+    "--relief-max",
+    type=float,
+    metavar="M",
+    help="Highest relief looked for [m].  [default: 0.4 x near distance]",
+)
+@click.option(
+    "--lang",
+    type=click.Choice(["en", "it", "de"]),
+    default="en",
+    show_default=True,
+    help="Language of the workbook.",
+)
+@click.option("--overwrite", is_flag=True, help="Replace an existing file.")
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
+def command(
+    pair: Path, out: Path, count: int, what: str, relief_min: float | None,
+    relief_max: float | None, lang: str, overwrite: bool, as_json: bool,
+) -> None:  # fmt: skip
+    """Find the same details of the wall in both photos of PAIR.
+
+    Discs, chequers and coded markers are found and measured by their centres; natural detail is
+    matched along the radial lines. Every point is checked by how far off its line it fits.
+    """
+    from bifocal.domain.pair import Pair
+    from bifocal.solvers.match_points import MatchSettings
+    from bifocal.workflows.match import match_photos, match_summary
+
+    reliefs = None
+    if relief_min is not None or relief_max is not None:
+        near = Pair.read(pair).image2.distance
+        reliefs = (
+            -0.5 * near if relief_min is None else relief_min,
+            0.4 * near if relief_max is None else relief_max,
+        )
+    settings = MatchSettings(
+        count=count,
+        relief_range=reliefs,
+        features=what != "targets",
+        targets=what != "features",
+    )
+    found = match_photos(pair, out, settings, language=lang, overwrite=overwrite)
+    summary = match_summary(*found)
+    if as_json:
+        print_json({**summary, "out": out})
+        return
+    _print(summary)
+    remark(f"Points written to {out}")
+
+
+def _print(summary: dict[str, Any]) -> None:
+    """Print what was found."""
+    kinds = ", ".join(f"{number} {kind}" for kind, number in summary["kinds"].items())
+    low, high = summary["relief_range"]
+    click.echo(f"{summary['count']} points ({kinds}).")
+    click.echo(
+        f"Precision {summary['sigma_px']:.2f} px along the radial lines, misfit across them "
+        f"{summary['misfit_px']:.2f} px."
+    )
+    click.echo(
+        f"Relief from {low:.2f} to {high:.2f} m, sigma of r {1000 * summary['sigma_r_median']:.1f} "
+        "mm at the median."
+    )

@@ -1,0 +1,138 @@
+"""Control points and taped lengths from a table."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from bifocal.domain.alignment import Control
+from photocore.arrays import FloatArray
+from photocore.errors import CellError, InputError, WorkbookError
+from photocore.tables import Column, Table, read_table
+
+#: Length units a heading may say, in metres.
+METRES = {"m": 1.0, "cm": 0.01, "mm": 0.001, "km": 1000.0}
+
+COLUMNS = (
+    Column("id", ("point", "name", "punto", "punkt", "nr", "no", "number"), kind="text"),
+    Column("X", ("X_ref", "X wall", "east", "E", "X control"), unit="m"),
+    Column("Y", ("Y_ref", "Y wall", "north", "N", "Y control"), unit="m"),
+    Column("r", ("r measured", "relief", "Z", "Z_ref", "r_ref", "rilievo", "relief measured"),
+           unit="m"),
+    Column("col1", ("column1", "col far", "x far", "colonna1", "spalte1"), unit="px"),
+    Column("row1", ("row far", "y far", "riga1", "zeile1"), unit="px"),
+    Column("col2", ("column2", "col near", "x near", "colonna2", "spalte2"), unit="px"),
+    Column("row2", ("row near", "y near", "riga2", "zeile2"), unit="px"),
+    Column("sigma", ("sigma control", "std"), unit="m"),
+)  # fmt: skip
+LENGTHS = (
+    Column("from", ("point 1", "da", "von", "a"), kind="text", required=True),
+    Column("to", ("point 2", "nach", "b"), kind="text", required=True),
+    Column("length", ("distance", "lunghezza", "distanza", "laenge", "länge", "strecke"),
+           required=True, unit="m"),
+)  # fmt: skip
+
+
+def read_control(path: Path | str, *, sigma: float, sigma_plane: float, unit: str = "") -> Control:
+    """Read control points: id, X, Y, r and their pixels col1, row1, col2, row2.
+
+    Parameters
+    ----------
+    path : path
+        ``.csv``, ``.xlsx``, ``.xlsm`` or ``.ods``.
+    sigma : float
+        Standard deviation of a coordinate where the table has none. [m]
+    sigma_plane : float
+        That of r = 0 for a point on the wall whose r is blank. [m]
+    unit : str
+        Unit of the coordinates; by default the headings', else metres.
+
+    Returns
+    -------
+    Control
+        r is 0 where X and Y are given and r is blank: a point on the wall.
+
+    Raises
+    ------
+    WorkbookError, InputError
+        Naming every bad cell; if there are no pixels.
+    """
+    table = read_table(path, COLUMNS)
+    keys = ("col1", "row1", "col2", "row2")
+    missing = [key for key in keys if key not in table.present]
+    if missing:
+        raise InputError(
+            f"{path}: the columns {', '.join(missing)} are missing: where the points are seen. "
+            "Each control point needs its pixel in both photos (col1, row1, col2, row2)."
+        )
+    if not len(table):
+        raise InputError(f"{path}: no control points in the table.")
+    names = [text or str(number) for number, text in enumerate(table.texts("id"), start=1)]
+    xyz = np.column_stack([_metres(table, key, unit) for key in ("X", "Y", "r")])
+    errors = table.repeated("id") if "id" in table.present else []
+    errors += _halves(table, keys)
+    if errors:
+        raise WorkbookError(errors)
+    own = _metres(table, "sigma", unit)
+    spread = np.tile(np.where(np.isfinite(own), own, sigma)[:, None], (1, 3))
+    spread = np.maximum(spread, 1e-5)
+    on_wall = np.isfinite(xyz[:, :2]).all(axis=1) & np.isnan(xyz[:, 2])
+    xyz[on_wall, 2] = 0.0
+    spread[on_wall, 2] = sigma_plane
+    return Control(
+        ids=tuple(names),
+        xyz=xyz,
+        sigma=spread,
+        pixels1=np.column_stack([table.numbers("col1"), table.numbers("row1")]),
+        pixels2=np.column_stack([table.numbers("col2"), table.numbers("row2")]),
+    )
+
+
+def read_lengths(path: Path | str, control: Control) -> Control:
+    """Read taped lengths (from, to, length) between control points and add them."""
+    table = read_table(path, LENGTHS)
+    index = {name: number for number, name in enumerate(control.ids)}
+    lengths = _metres(table, "length", "")
+    found: list[tuple[int, int, float]] = []
+    errors: list[CellError] = []
+    for row, ends in enumerate(zip(table.texts("from"), table.texts("to"), strict=True)):
+        for key, name in zip(("from", "to"), ends, strict=True):
+            if name not in index:
+                message = f'"{name}" is not a point of the control table.'
+                errors.append(table.error(row, key, message))
+        if not lengths[row] > 0:
+            errors.append(table.error(row, "length", "expected a length above zero, in metres."))
+        elif ends[0] in index and ends[1] in index:
+            found.append((index[ends[0]], index[ends[1]], float(lengths[row])))
+    if errors:
+        raise WorkbookError(errors)
+    return Control(
+        ids=control.ids,
+        xyz=control.xyz,
+        sigma=control.sigma,
+        pixels1=control.pixels1,
+        pixels2=control.pixels2,
+        lengths=(*control.lengths, *found),
+    )
+
+
+def _metres(table: Table, key: str, unit: str) -> FloatArray:
+    """Return a column of lengths in metres, by its heading's unit."""
+    said = unit or table.units.get(key, "m")
+    if said not in METRES:
+        raise InputError(
+            f'{table.file}: column {key}: the unit "{said}" is not a length; use m, cm or mm.'
+        )
+    return table.numbers(key) * METRES[said]
+
+
+def _halves(table: Table, keys: tuple[str, ...]) -> list[CellError]:
+    """Return complaints about pixels of which only one coordinate is given."""
+    errors = []
+    for first, second in (keys[:2], keys[2:]):
+        a, b = table.numbers(first), table.numbers(second)
+        for row in np.flatnonzero(np.isnan(a) != np.isnan(b)):
+            key = first if np.isnan(a[row]) else second
+            errors.append(table.error(int(row), key, "is blank although its partner is given."))
+    return errors

@@ -1,0 +1,257 @@
+"""Features of two photos and their matches: SIFT on a reduced photo, mutual nearest neighbours."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from photocore.arrays import BoolArray, ByteArray, FloatArray
+
+#: SIFT doubles its input: 2.5 MP needs 0.6 GB, and patches are refined on the full photo anyway.
+FEATURE_PIXELS = 2.5e6
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Features:
+    """Keypoints in pixels of the full photo with descriptors of unit length.
+
+    Attributes
+    ----------
+    pixels : ndarray, shape (n, 2)
+    size : ndarray, shape (n,)
+        Diameter. [px]
+    strength : ndarray, shape (n,)
+    descriptors : ndarray, shape (n, 128), float32
+    reduction : float
+        Full pixels per pixel searched.
+    """
+
+    pixels: FloatArray
+    size: FloatArray
+    strength: FloatArray
+    descriptors: NDArray[np.float32]
+    reduction: float
+
+
+def stretch(image: ByteArray) -> ByteArray:
+    """Return a grey image with its 1st to 99th percentile spread over the whole range.
+
+    A dark or hazy photo then gives as many features as a bright one.
+    """
+    sample = image[::8, ::8]
+    low, high = np.percentile(sample, [1, 99])
+    if high - low > 180 or high <= low:
+        return image
+    table = np.clip((np.arange(256) - low) * (255.0 / (high - low)), 0, 255).astype(np.uint8)
+    return np.asarray(cv2.LUT(image, table), dtype=np.uint8)
+
+
+def find_features(
+    image: ByteArray, *, limit: int = 8000, budget: float = FEATURE_PIXELS
+) -> Features:
+    """Return the strongest features of a grey photo.
+
+    Parameters
+    ----------
+    image : ndarray, shape (h, w), uint8
+    limit : int
+        At most so many.
+    budget : float
+        Pixels searched; larger photos are reduced to this.
+    """
+    image = stretch(image)
+    reduction = max(1.0, float(np.sqrt(image.size / budget)))
+    if reduction > 1.0:
+        size = (round(image.shape[1] / reduction), round(image.shape[0] / reduction))
+        small = cv2.resize(image, size, interpolation=cv2.INTER_AREA)
+    else:
+        small = image
+    factor = np.array([image.shape[1] / small.shape[1], image.shape[0] / small.shape[0]])
+    detector: Any = cv2.SIFT.create(nfeatures=limit, contrastThreshold=0.02)
+    keypoints, descriptors = detector.detectAndCompute(small, None)
+    if not keypoints:
+        empty = np.zeros(0)
+        return Features(
+            pixels=np.zeros((0, 2)),
+            size=empty,
+            strength=empty,
+            descriptors=np.zeros((0, 128), np.float32),
+            reduction=reduction,
+        )
+    points = np.array([k.pt for k in keypoints], dtype=np.float64)
+    # Square root of L1-normalised SIFT: Euclidean distance then is Hellinger's.
+    descriptors = descriptors / np.maximum(descriptors.sum(axis=1, keepdims=True), 1e-9)
+    return Features(
+        pixels=(points + 0.5) * factor - 0.5,
+        size=np.array([k.size for k in keypoints]) * factor.mean(),
+        strength=np.array([k.response for k in keypoints]),
+        descriptors=np.sqrt(descriptors).astype(np.float32),
+        reduction=reduction,
+    )
+
+
+def match_features(
+    first: Features, second: Features, *, ratio: float = 0.85
+) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Return indices of mutual nearest neighbours that stand out from the second nearest."""
+    if len(first.pixels) < 2 or len(second.pixels) < 2:
+        return np.zeros(0, np.intp), np.zeros(0, np.intp)
+    count = len(first.pixels)
+    nearest = np.zeros(count, np.intp)
+    distinct = np.zeros(count, dtype=bool)
+    back_value = np.full(len(second.pixels), -np.inf, np.float32)
+    back = np.zeros(len(second.pixels), np.intp)
+    for start in range(0, count, 2000):
+        part = first.descriptors[start : start + 2000] @ second.descriptors.T
+        best = part.argmax(axis=1)
+        rows = np.arange(len(part))
+        value = part[rows, best].copy()
+        column_best = part.argmax(axis=0)
+        column_value = part[column_best, np.arange(part.shape[1])]
+        better = column_value > back_value
+        back_value[better] = column_value[better]
+        back[better] = column_best[better] + start
+        part[rows, best] = -1.0
+        runner = part.max(axis=1)
+        nearest[start : start + 2000] = best
+        # |a - b|² = 2 - 2 a·b for unit vectors.
+        distinct[start : start + 2000] = (2 - 2 * value) < ratio**2 * (2 - 2 * runner)
+    rows = np.arange(count)
+    good = distinct & (back[nearest] == rows)
+    return rows[good], nearest[good]
+
+
+def match_along_lines(
+    first: Features,
+    second: Features,
+    epipole: FloatArray,
+    expected: tuple[FloatArray, FloatArray],
+    *,
+    across: float,
+    ratio: float = 0.9,
+) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Return the nearest neighbours among those that lie near each feature's epipolar segment.
+
+    Parameters
+    ----------
+    first, second : Features
+    epipole : ndarray, shape (2,)
+        Where all lines of photo 2 meet. [px]
+    expected : two ndarrays, shape (n, 2)
+        The segments' ends in photo 2. [px]
+    across : float
+        Largest distance from the line. [px]
+    ratio : float
+        Required distinctness among the candidates on the segment.
+
+    Returns
+    -------
+    rows1, rows2 : ndarray of int
+        Paired features; each appears once.
+    """
+    angle1 = _angle((expected[0] + expected[1]) / 2 - epipole)
+    angle2 = _angle(second.pixels - epipole)
+    reach = np.linalg.norm(second.pixels - epipole, axis=1)
+    slack = np.arctan2(across, reach)
+    order1 = np.argsort(angle1)
+    order1 = order1[np.isfinite(angle1[order1])]
+    nearest = np.full(len(angle1), -1, np.intp)
+    similarity = np.full(len(angle1), -1.0, np.float32)
+    # Features next to each other in angle share their candidates: lines meet in the epipole.
+    for start in range(0, len(order1), 128):
+        rows = order1[start : start + 128]
+        middle = (angle1[rows[0]] + angle1[rows[-1]]) / 2
+        half = (angle1[rows[-1]] - angle1[rows[0]]) / 2
+        away = np.abs((angle2 - middle + np.pi) % (2 * np.pi) - np.pi)
+        candidates = np.flatnonzero(away < half + slack)
+        if len(candidates):
+            ends = expected[0][rows], expected[1][rows]
+            best, value = _best_on_segment(
+                first.descriptors[rows], second, candidates, ends, across, ratio
+            )
+            nearest[rows], similarity[rows] = best, value
+    # One partner each: the most similar keeps it.
+    order = np.argsort(-similarity)
+    order = order[nearest[order] >= 0]
+    _, keep = np.unique(nearest[order], return_index=True)
+    rows = order[keep]
+    return rows, nearest[rows]
+
+
+def _angle(away: FloatArray) -> FloatArray:
+    return np.asarray(np.arctan2(away[:, 1], away[:, 0]))
+
+
+def _best_on_segment(
+    descriptors: NDArray[np.float32],
+    second: Features,
+    candidates: NDArray[np.intp],
+    ends: tuple[FloatArray, FloatArray],
+    across: float,
+    ratio: float,
+) -> tuple[NDArray[np.intp], NDArray[np.float32]]:
+    """Return each feature's distinct nearest candidate near its segment (-1: none)."""
+    x2 = second.pixels[candidates]
+    along = ends[1] - ends[0]
+    length = np.linalg.norm(along, axis=1, keepdims=True)
+    along = along / np.maximum(length, 1e-9)
+    dx = x2[None, :, 0] - ends[0][:, 0, None]
+    dy = x2[None, :, 1] - ends[0][:, 1, None]
+    at = dx * along[:, 0, None] + dy * along[:, 1, None]
+    off = np.abs(dx * along[:, 1, None] - dy * along[:, 0, None])
+    inside = (off < across) & (at > -across) & (at < length + across)
+    part = np.where(inside, descriptors @ second.descriptors[candidates].T, np.float32(-1.0))
+    best = part.argmax(axis=1)
+    lines = np.arange(len(part))
+    value = part[lines, best].copy()
+    # A second feature at the same place (another orientation) is no rival.
+    close = np.abs(x2[None, :, 0] - x2[best, None, 0]) < across
+    close &= np.abs(x2[None, :, 1] - x2[best, None, 1]) < across
+    part[close] = -1.0
+    runner = part.max(axis=1)
+    good = (value > 0.6) & ((2 - 2 * value) < ratio**2 * (2 - 2 * runner))
+    return (
+        np.where(good, candidates[best], -1).astype(np.intp),
+        np.where(good, value, -1.0).astype(np.float32),
+    )
+
+
+def sharpness(image: ByteArray) -> float:
+    """Return how much fine detail a photo has against coarse detail, 0 (blurred) to about 1.
+
+    Ratio of the gradient at one pixel to that at four pixels, on the strongest edges: a sharp
+    photo keeps its steepness at every scale, a blurred one has none left at the finest.
+    """
+    height, width = image.shape
+    part = image[height // 8 : -height // 8 or None, width // 8 : -width // 8 or None]
+    if part.size > 4e6:
+        step = int(np.ceil(np.sqrt(part.size / 4e6)))
+        band = part.shape[0] // step
+        part = part[(part.shape[0] - band) // 2 :][:band]
+    grey = part.astype(np.float32)
+
+    def gradient(image: NDArray[np.float32]) -> NDArray[np.float32]:
+        dx = np.abs(image[1:-1, 2:] - image[1:-1, :-2])
+        dy = np.abs(image[2:, 1:-1] - image[:-2, 1:-1])
+        return np.maximum(dx, dy)
+
+    fine = gradient(cv2.GaussianBlur(grey, (0, 0), 0.7))
+    coarse = gradient(cv2.GaussianBlur(grey, (0, 0), 2.8))
+    edges = coarse > np.percentile(coarse[::4, ::4], 98)
+    if not edges.any() or coarse[edges].mean() < 1e-3:
+        return 0.0
+    # An ideal edge is steeper by the ratio of the blurs, 4; noise is far below on these edges.
+    return float((np.median(fine[edges]) / np.median(coarse[edges]) - 1.0) / 1.5)
+
+
+def drop_repeated(pixels1: FloatArray, pixels2: FloatArray, *, apart: float = 1.0) -> BoolArray:
+    """Return which matches to keep when several sit at one place (one per orientation)."""
+    keys = np.round(np.concatenate([pixels1, pixels2], axis=1) / apart).astype(np.int64)
+    _, first = np.unique(keys, axis=0, return_index=True)
+    keep = np.zeros(len(pixels1), dtype=bool)
+    keep[first] = True
+    return keep

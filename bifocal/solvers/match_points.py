@@ -1,0 +1,435 @@
+"""Homologous points of a pair found automatically, each along its radial line.
+
+Features of both photos are paired under the pair's geometry: the partner of a pixel lies on one
+line, and how far along it is the relief. The patch around it is then matched by least squares with
+one unknown, the position along that line, under the zoom k(r) that the relief implies.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from bifocal.domain.pair import Pair, Photo, apply_homography
+from bifocal.rays import relief_of_rays, zoom_factor
+from bifocal.solvers.features import (
+    Features,
+    drop_repeated,
+    find_features,
+    match_along_lines,
+)
+from bifocal.solvers.patches import PatchResult, refine, same_scale
+from bifocal.solvers.targets import Targets, find_targets
+from bifocal.solvers.tie_points import robust_sigma
+from photocore.arrays import BoolArray, ByteArray, FloatArray, IntArray
+from photocore.errors import GeometryError
+
+#: A patch's own sigma is too good by this factor: neighbouring samples are not independent.
+OPTIMISM = 1.7
+#: Patches that agree less than this are not the same detail.
+LEAST_AGREEMENT = 0.8
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Matches:
+    """Homologous points.
+
+    Attributes
+    ----------
+    pixels1, pixels2 : ndarray, shape (n, 2)
+        Raw pixels. [px]
+    sigma : ndarray, shape (n,)
+        Precision of the position along the radial line. [px]
+    misfit : ndarray, shape (n,)
+        How far off the line the patch fits best. [px]
+    agreement : ndarray, shape (n,)
+        Correlation of the patches, up to 1.
+    ids : tuple of str
+    kinds : tuple of str
+        ``feature``, ``disc`` or ``code``.
+    """
+
+    pixels1: FloatArray
+    pixels2: FloatArray
+    sigma: FloatArray
+    misfit: FloatArray
+    agreement: FloatArray
+    ids: tuple[str, ...]
+    kinds: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MatchSettings:
+    """What `match_pair` looks for.
+
+    Attributes
+    ----------
+    count : int
+        About so many points, spread evenly.
+    relief_range : pair of float or None
+        Lowest and highest relief looked for; by default -0.5 to 0.4 of the near distance. [m]
+    features, targets : bool
+        What is looked for.
+    budget : float
+        Pixels of a photo searched for features.
+    """
+
+    count: int = 4000
+    relief_range: tuple[float, float] | None = None
+    features: bool = True
+    targets: bool = True
+    budget: float = 6e6
+
+
+def match_pair(
+    pair: Pair, images: tuple[ByteArray, ByteArray], settings: MatchSettings | None = None
+) -> Matches:
+    """Return homologous points spread over the façade.
+
+    Parameters
+    ----------
+    pair : Pair
+    images : two ndarrays, shape (h, w), uint8
+        Far and near photo, grey.
+    settings : MatchSettings
+
+    Raises
+    ------
+    GeometryError
+        If hardly anything matches: photos and pair file do not belong together.
+    """
+    settings = settings or MatchSettings()
+    near = pair.image2.distance
+    reliefs = settings.relief_range or (-0.5 * near, 0.4 * near)
+    parts = []
+    if settings.targets:
+        parts.append(_target_matches(pair, images, reliefs))
+    if settings.features:
+        parts.append(_feature_matches(pair, images, reliefs, settings))
+    found = _joined(parts)
+    if not len(found.ids) or (settings.features and len(found.ids) < 20):
+        raise GeometryError(
+            f"only {len(found.ids)} points match: photos and pair file do not belong together, "
+            "or a photo is blurred. Make the pair file again with `bifocal align`."
+        )
+    return found
+
+
+def _feature_matches(
+    pair: Pair,
+    images: tuple[ByteArray, ByteArray],
+    reliefs: tuple[float, float],
+    settings: MatchSettings,
+) -> Matches:
+    """Return matched features, spread evenly."""
+    limit = int(np.clip(6 * settings.count, 6000, 24000))
+    first = _tiled_features(images[0], settings.budget, limit)
+    second = _tiled_features(images[1], settings.budget, 3 * limit // 2)
+    rows1, rows2 = _guided(pair, first, second, reliefs)
+    pixels1, pixels2 = first.pixels[rows1], second.pixels[rows2]
+    keep = drop_repeated(pixels1, pixels2)
+    pixels1, pixels2 = pixels1[keep], pixels2[keep]
+    found, misfit = refine_along_lines(pair, images, pixels1, pixels2)
+    relief = relief_at(pair, pixels1, found.pixels2)
+    sigma = np.hypot(OPTIMISM * found.sigma, 0.02)
+    good = _accepted(pair, found, misfit, sigma, relief, reliefs, pixels1)
+    chosen = np.flatnonzero(good)
+    chosen = chosen[spread_evenly(pixels1[chosen], sigma[chosen], images[0].shape, settings.count)]
+    order = np.lexsort((pixels1[chosen, 0], pixels1[chosen, 1] // 100))
+    chosen = chosen[order]
+    # With the misfit across the line put back, `solve` can tell honest points from blunders.
+    along = directions_at(pair, pixels1, np.nan_to_num(relief))
+    across = np.stack([-along[:, 1], along[:, 0]], axis=1)
+    pixels2 = found.pixels2 + across * misfit[:, None]
+    return Matches(
+        pixels1=pixels1[chosen],
+        pixels2=pixels2[chosen],
+        sigma=sigma[chosen],
+        misfit=misfit[chosen],
+        agreement=found.zncc[chosen],
+        ids=tuple(f"M{number:04d}" for number in range(1, len(chosen) + 1)),
+        kinds=("feature",) * len(chosen),
+    )
+
+
+def _joined(parts: list[Matches]) -> Matches:
+    """Return several sets of matches as one."""
+    return Matches(
+        pixels1=np.concatenate([part.pixels1 for part in parts]),
+        pixels2=np.concatenate([part.pixels2 for part in parts]),
+        sigma=np.concatenate([part.sigma for part in parts]),
+        misfit=np.concatenate([part.misfit for part in parts]),
+        agreement=np.concatenate([part.agreement for part in parts]),
+        ids=tuple(name for part in parts for name in part.ids),
+        kinds=tuple(kind for part in parts for kind in part.kinds),
+    )
+
+
+def _target_matches(
+    pair: Pair, images: tuple[ByteArray, ByteArray], reliefs: tuple[float, float]
+) -> Matches:
+    """Return survey targets seen in both photos; coded ones keep their code as name."""
+    first, second = find_targets(images[0]), find_targets(images[1])
+    rows1, rows2 = pair_targets(pair, first, second, reliefs)
+    pixels1, pixels2 = first.pixels[rows1], second.pixels[rows2]
+    kinds = tuple(first.kinds[row] for row in rows1)
+    patches, misfit = refine_along_lines(pair, images, pixels1, pixels2)
+    # A disc's or code's own centre beats the patch around it; a chequer's crossing does not.
+    own = np.array([kind != "chequer" for kind in kinds], dtype=bool)
+    pixels2 = np.where(own[:, None], pixels2, patches.pixels2)
+    relief = relief_at(pair, pixels1, pixels2)
+    on_line = seen_at(pair, pixels1, relief)
+    off = np.linalg.norm(pixels2 - on_line, axis=1)
+    sigma = np.where(own, 0.02, np.hypot(OPTIMISM * patches.sigma, 0.03))
+    good = (patches.zncc > LEAST_AGREEMENT) & (own | patches.converged) & np.isfinite(relief)
+    good &= (relief > reliefs[0]) & (relief < reliefs[1]) & (sigma < 0.3)
+    order = np.flatnonzero(good)
+    order = order[np.lexsort((pixels1[order, 0], pixels1[order, 1] // 100))]
+    names, number = [], 0
+    for row in order:
+        code = first.codes[rows1[row]]
+        number += not code
+        names.append(code or f"T{number:03d}")
+    return Matches(
+        pixels1=pixels1[order],
+        pixels2=pixels2[order],
+        sigma=sigma[order],
+        misfit=np.where(own, off, np.nan_to_num(misfit))[order],
+        agreement=patches.zncc[order],
+        ids=tuple(names),
+        kinds=tuple(kinds[row] for row in order),
+    )
+
+
+def pair_targets(
+    pair: Pair, first: Targets, second: Targets, reliefs: tuple[float, float]
+) -> tuple[IntArray, IntArray]:
+    """Return indices of the same targets in both photos.
+
+    Coded ones by their code; others if exactly one of the same kind, colour and size (under the
+    zoom its relief implies) lies on the radial line.
+    """
+    count1, count2 = len(first.codes), len(second.codes)
+    if not (count1 and count2):
+        return np.zeros(0, np.int64), np.zeros(0, np.int64)
+    x1 = np.repeat(first.pixels, count2, axis=0)
+    x2 = np.tile(second.pixels, (count1, 1))
+    relief = relief_at(pair, x1, x2)
+    fits = np.isfinite(relief) & (relief > reliefs[0]) & (relief < reliefs[1])
+    fits[~fits] = False
+    usable = np.clip(np.nan_to_num(relief), *reliefs)
+    off = np.linalg.norm(seen_at(pair, x1, usable) - x2, axis=1)
+    zoom = np.sqrt(np.abs(np.linalg.det(local_zoom(pair, x1, usable))))
+    grown = np.repeat(first.size, count2) * zoom / np.tile(second.size, count1)
+    fits &= (off < 2.0) & (grown > 0.8) & (grown < 1.25)
+    table = fits.reshape(count1, count2)
+    kinds1, kinds2 = np.array(first.kinds), np.array(second.kinds)
+    table &= kinds1[:, None] == kinds2[None, :]
+    table &= first.dark[:, None] == second.dark[None, :]
+    codes1, codes2 = np.array(first.codes), np.array(second.codes)
+    coded = (codes1 != "")[:, None] | (codes2 != "")[None, :]
+    table = np.where(coded, codes1[:, None] == codes2[None, :], table)
+    alone = table & (table.sum(axis=1) == 1)[:, None] & (table.sum(axis=0) == 1)[None, :]
+    rows1, rows2 = np.nonzero(alone)
+    return rows1.astype(np.int64), rows2.astype(np.int64)
+
+
+def _tiled_features(image: ByteArray, budget: float, limit: int) -> Features:
+    """Return features found in overlapping strips (SIFT's memory grows with its input)."""
+    reduction = max(1.0, float(np.sqrt(image.size / budget)))
+    strips = max(1, int(np.ceil(image.size / reduction**2 / 2.5e6)))
+    if strips == 1:
+        return find_features(image, limit=limit, budget=budget)
+    height = image.shape[0]
+    margin = int(64 * reduction)
+    edges = np.linspace(0, height, strips + 1).astype(int)
+    parts = []
+    for top, bottom in pairwise(edges.tolist()):
+        start, stop = max(top - margin, 0), min(bottom + margin, height)
+        strip = image[start:stop]
+        part = find_features(
+            strip, limit=int(1.3 * limit / strips), budget=strip.size / reduction**2
+        )
+        row = part.pixels[:, 1] + start
+        inside = (row >= top - 0.5) & (row < bottom - 0.5)
+        pixels = np.column_stack([part.pixels[:, 0], row])
+        parts.append(
+            (pixels[inside], part.size[inside], part.strength[inside], part.descriptors[inside])
+        )
+    joined = [np.concatenate(items) for items in zip(*parts, strict=True)]
+    return Features(
+        pixels=joined[0],
+        size=joined[1],
+        strength=joined[2],
+        descriptors=joined[3],
+        reduction=reduction,
+    )
+
+
+def seen_at(pair: Pair, pixels1: FloatArray, relief: FloatArray | float) -> FloatArray:
+    """Return where photo 2 sees the points of photo 1 if they have a given relief. [px]"""
+    centre = pair.zoom_centre
+    factor = zoom_factor(
+        np.asarray(relief, dtype=np.float64), d1=pair.image1.distance, d2=pair.image2.distance
+    )
+    q1 = pair.image1.plane_from_pixels(pixels1)
+    q2 = centre + np.asarray(factor)[..., None] * (q1 - centre)
+    return np.asarray(pair.image2.pixels_from_plane(q2))
+
+
+def relief_at(pair: Pair, pixels1: FloatArray, pixels2: FloatArray) -> FloatArray:
+    """Return the relief of point pairs (not adjusted across the line). [m]"""
+    return relief_of_rays(
+        pair.image1.plane_from_pixels(pixels1),
+        pair.image2.plane_from_pixels(pixels2),
+        pair.image1.foot,
+        pair.image2.foot,
+    )
+
+
+def _ideal(photo: Photo, pixels: FloatArray) -> FloatArray:
+    return pixels if photo.lens is None else np.asarray(photo.lens.undistort(pixels))
+
+
+def _guided(
+    pair: Pair, first: Features, second: Features, reliefs: tuple[float, float]
+) -> tuple[IntArray, IntArray]:
+    """Return features paired along their radial lines."""
+    ends = [_ideal(pair.image2, seen_at(pair, first.pixels, relief)) for relief in reliefs]
+    ideal = Features(
+        pixels=_ideal(pair.image2, second.pixels),
+        size=second.size,
+        strength=second.strength,
+        descriptors=second.descriptors,
+        reduction=second.reduction,
+    )
+    across = 1.5 + second.reduction
+    expected = (ends[0], ends[1])
+    to_pixels = np.linalg.inv(pair.image2.plane_from_pixel)
+    epipole = apply_homography(to_pixels, np.asarray(pair.zoom_centre))
+    rows1, rows2 = match_along_lines(first, ideal, epipole, expected, across=across)
+    return rows1.astype(np.int64), rows2.astype(np.int64)
+
+
+def directions_at(pair: Pair, pixels1: FloatArray, relief: FloatArray) -> FloatArray:
+    """Return unit vectors in photo 2 along which a point moves as its relief grows, (n, 2)."""
+    step = 1e-3 * pair.image2.distance
+    shift = seen_at(pair, pixels1, relief + step) - seen_at(pair, pixels1, relief - step)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return shift / np.linalg.norm(shift, axis=1, keepdims=True)
+
+
+def local_zoom(pair: Pair, pixels1: FloatArray, relief: FloatArray) -> FloatArray:
+    """Return the derivative of photo 2 by photo 1 under the zoom k(r), shape (n, 2, 2)."""
+    factor = zoom_factor(relief, d1=pair.image1.distance, d2=pair.image2.distance)
+    metres1 = _raw_metres(pair.image1, pixels1)
+    metres2 = _raw_metres(pair.image2, seen_at(pair, pixels1, relief))
+    bad = ~(np.abs(np.linalg.det(np.nan_to_num(metres2))) > 0) | ~np.isfinite(factor)
+    metres2[bad] = np.eye(2)
+    return np.nan_to_num(np.linalg.inv(metres2) @ metres1 * factor[:, None, None])
+
+
+def _raw_metres(photo: Photo, pixels: FloatArray) -> FloatArray:
+    """Return the derivative of the plane position by the raw pixel, lens included. [m/px]"""
+    if photo.lens is None:
+        return np.array(photo.metres_per_pixel(pixels))
+    half = np.array([0.5, 0.0])
+    parts = [
+        photo.plane_from_pixels(pixels + offset) - photo.plane_from_pixels(pixels - offset)
+        for offset in (half, half[::-1])
+    ]
+    return np.stack(parts, axis=-1)
+
+
+def refine_along_lines(
+    pair: Pair,
+    images: tuple[ByteArray, ByteArray],
+    pixels1: FloatArray,
+    pixels2: FloatArray,
+    *,
+    reach: float = 4.0,
+) -> tuple[PatchResult, FloatArray]:
+    """Return matches refined along their radial lines, and how far off the line they fit best.
+
+    Parameters
+    ----------
+    pair : Pair
+    images : two ndarrays, uint8
+    pixels1, pixels2 : ndarray, shape (n, 2)
+        Approximate matches.
+    reach : float
+        Farther from the start than this a match is lost. [px]
+
+    Returns
+    -------
+    result : PatchResult
+    misfit : ndarray, shape (n,)
+        [px]
+    """
+    relief = np.nan_to_num(relief_at(pair, pixels1, pixels2))
+    relief = np.clip(relief, -3 * pair.image2.distance, 0.9 * pair.image2.distance)
+    # On the line, at the relief nearest to the approximate match.
+    start = seen_at(pair, pixels1, relief)
+    local = local_zoom(pair, pixels1, relief)
+    along = directions_at(pair, pixels1, relief)
+    along = np.where(np.isfinite(along), along, [1.0, 0.0])
+    smooth1, smooth2 = same_scale(*images, local)
+    basis = along[:, :, None]
+    found = refine(smooth1, smooth2, pixels1, start, local, basis, reach=reach)
+    across = np.stack([-along[:, 1], along[:, 0]], axis=1)
+    both = np.stack([along, across], axis=2)
+    free = refine(smooth1, smooth2, pixels1, found.pixels2, local, both, iterations=4, reach=reach)
+    misfit = ((free.pixels2 - found.pixels2) * across).sum(axis=1)
+    return found, np.where(free.converged, misfit, np.nan)
+
+
+def _accepted(
+    pair: Pair,
+    found: PatchResult,
+    misfit: FloatArray,
+    sigma: FloatArray,
+    relief: FloatArray,
+    reliefs: tuple[float, float],
+    pixels1: FloatArray,
+) -> BoolArray:
+    """Return which matches to believe."""
+    good = found.converged & (found.zncc > LEAST_AGREEMENT) & (sigma < 0.5)
+    good &= np.isfinite(misfit) & (relief > reliefs[0]) & (relief < reliefs[1])
+    if not good.any():
+        return np.asarray(good)
+    # Honest misfits across the line show what the pair's geometry and the patches are good for.
+    usual = max(robust_sigma(misfit[good]), 0.05)
+    good &= np.abs(misfit) < np.maximum(3.5 * usual, 0.3)
+    rate = _pixels_per_metre(pair, pixels1, relief)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        good &= sigma / rate < 0.05 * pair.image2.distance
+    return np.asarray(good)
+
+
+def _pixels_per_metre(pair: Pair, pixels1: FloatArray, relief: FloatArray) -> FloatArray:
+    """Return how fast a point moves in photo 2 as its relief grows. [px/m]"""
+    step = 1e-3 * pair.image2.distance
+    shift = seen_at(pair, pixels1, relief + step) - seen_at(pair, pixels1, relief - step)
+    return np.linalg.norm(shift, axis=1) / (2 * step)
+
+
+def spread_evenly(
+    pixels: FloatArray, sigma: FloatArray, shape: tuple[int, ...], count: int
+) -> IntArray:
+    """Return the indices of about ``count`` points, the best of every part of the photo first.
+
+    The photo is divided into cells, half as many as points are wanted; the best point of each cell
+    comes first, then the second best of each, until there are enough.
+    """
+    if len(pixels) <= count:
+        return np.arange(len(pixels), dtype=np.int64)
+    side = np.sqrt(2.0 * shape[0] * shape[1] / count)
+    cell = (pixels[:, 1] // side) * 100_000 + pixels[:, 0] // side
+    order = np.lexsort((sigma, cell))
+    start = np.r_[True, np.diff(cell[order]) != 0]
+    first = np.maximum.accumulate(np.where(start, np.arange(len(order)), 0))
+    rank = np.arange(len(order)) - first
+    by_rank = np.lexsort((sigma[order], rank))
+    return np.sort(order[by_rank[:count]]).astype(np.int64)

@@ -1,0 +1,149 @@
+"""Why two photos do not make a bifocal pair, each reason in the user's terms."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+
+from bifocal.domain.alignment import Interior, SiteMeasures
+from bifocal.pinhole import Pinhole
+from bifocal.solvers.bundle import Solution
+from bifocal.solvers.features import sharpness
+from bifocal.solvers.relative import Ties, rotation_only, transferred
+from photocore.arrays import ByteArray
+from photocore.errors import GeometryError, InputError
+
+#: Below this a photo is blurred (sharp photos: 0.3 to 0.6; blurred by 3 px: below 0.17).
+BLURRED = 0.15
+#: Walls farther away than this are taken for coordinates in millimetres. [m]
+FARTHEST = 300.0
+#: The distances must differ by this share; relief errors grow with its inverse.
+LEAST_CHANGE = 0.03
+
+
+class SamePhotoError(GeometryError):
+    """Both photos are one and the same."""
+
+
+def check_sharp(name: str, image: ByteArray) -> None:
+    """Refuse a blurred photo."""
+    value = sharpness(image)
+    if value < BLURRED:
+        raise GeometryError(
+            f"{name}: the photo is blurred (fine detail {value:.2f}, a sharp photo has 0.3). Take "
+            "it again from a tripod, focused on the wall; nothing later can make up for it."
+        )
+
+
+def check_different(name1: str, name2: str, images: tuple[ByteArray, ByteArray]) -> None:
+    """Refuse one photo given twice, also saved again or in another size."""
+    small = [
+        cv2.resize(image, (96, 64), interpolation=cv2.INTER_AREA).astype(np.float64)
+        for image in images
+    ]
+    a, b = (part - part.mean() for part in small)
+    alike = float((a * b).sum() / max(np.sqrt((a * a).sum() * (b * b).sum()), 1e-9))
+    if alike > 0.9995:
+        raise SamePhotoError(
+            f"{name1} and {name2} are the same photo. The method needs two photos taken from two "
+            "distances: a long lens from afar and a short one from near."
+        )
+
+
+def check_parallax(
+    ties: Ties,
+    interiors: tuple[Interior, Interior],
+    names: tuple[str, str],
+    *,
+    flat_is_fine: bool,
+) -> None:
+    """Refuse photos in which nothing moves against the wall.
+
+    Parameters
+    ----------
+    flat_is_fine : bool
+        Both distances were measured and the camera was square to the wall: a flat wall then is
+        no obstacle.
+    """
+    misfit = np.linalg.norm(ties.pixels2 - transferred(ties.homography, ties.pixels1), axis=1)
+    moving = float((misfit > 2.5 * ties.tolerance).mean())
+    height, width = interiors[0].image_size[1], interiors[0].image_size[0]
+    corners = np.array([[0, 0], [width, 0], [width, height], [0, height]], dtype=np.float64)
+    moved = transferred(ties.homography, corners) - corners
+    if moving < 0.03 and np.abs(moved).max() < 2 * ties.tolerance:
+        raise SamePhotoError(
+            f"{names[0]} and {names[1]} show the same view: one photo twice, or two shots from the "
+            "same place. The method needs two distances."
+        )
+    if moving >= 0.03:
+        return
+    if rotation_only(ties, interiors):
+        raise GeometryError(
+            f"no parallax: {names[0]} and {names[1]} were taken from one place, only the zoom was "
+            "changed. A zoom enlarges everything alike, so relief leaves no trace. This is the "
+            "classic mistake: change the lens AND walk, long lens from afar, short lens from near."
+        )
+    if not flat_is_fine:
+        raise GeometryError(
+            "no parallax: nothing in the photos stands out from the wall or behind it (or only "
+            "the zoom was changed, without walking), so the nadir cannot be found. Give four "
+            "control points (--control), or both distances with the camera square to the wall "
+            "(--distance1, --distance2 without --auto)."
+        )
+
+
+def check_units(cameras: tuple[Pinhole, Pinhole], site: SiteMeasures) -> None:
+    """Refuse control points that are not in metres."""
+    d1, d2 = (float(camera.centre[2]) for camera in cameras)
+    for name, found, measured in (("1", d1, site.distance1), ("2", d2, site.distance2)):
+        if measured is None:
+            continue
+        for factor, unit in ((1000.0, "mm"), (100.0, "cm")):
+            if 0.8 < found / measured / factor < 1.25:
+                raise InputError(
+                    f"the control points are in {unit}: they put camera {name} {found:,.0f} away, "
+                    f"--distance{name} says {measured:g} m. Write them in metres, or the unit into "
+                    f"the headings (X [{unit}])."
+                )
+    if max(d1, d2) > FARTHEST:
+        raise InputError(
+            f"the control points put the cameras {d2:,.0f} and {d1:,.0f} m from the wall: they "
+            "are in mm or cm. Write them in metres, or the unit into the headings (X [mm])."
+        )
+
+
+def check_movement(solution: Solution) -> None:
+    """Refuse a pair whose cameras stand (almost) at one distance."""
+    first, second = solution.cameras
+    d1, d2 = float(first.centre[2]), float(second.centre[2])
+    moved = float(np.linalg.norm(first.centre - second.centre))
+    if moved < LEAST_CHANGE * d1:
+        raise GeometryError(
+            f"no parallax: both photos were taken from one place ({moved:.2f} m apart, {d1:.2f} m "
+            "from the wall), only the zoom was changed. This is the classic mistake: change the "
+            "lens AND walk, long lens from afar, short lens from near."
+        )
+    if abs(d1 - d2) < LEAST_CHANGE * max(d1, d2):
+        raise GeometryError(
+            f"hardly any change of distance: {d1:.2f} and {d2:.2f} m. Relief comes from the "
+            "difference; go nearer with the short lens, by a third of the distance or more."
+        )
+
+
+def check_determined(solution: Solution) -> None:
+    """Refuse a set-up whose distances came out hardly better than guessed."""
+    covariance = solution.covariance
+    for number, camera in enumerate(solution.cameras, start=1):
+        distance = float(camera.centre[2])
+        sigma = float(np.sqrt(covariance[11 * number - 2, 11 * number - 2]))
+        if sigma < 0.06 * distance:
+            continue
+        missing = (
+            "control points off the wall (a relief of 0.3 m or more), the focal lengths "
+            "(--lens, --focal1, --focal2) or the distances (--distance1, --distance2)"
+        )
+        raise GeometryError(
+            f"the distance of camera {number} is not determined: {distance:.2f} ± {sigma:.2f} m. "
+            f"A flat wall seen square on does not tell a long lens from a short distance. Give "
+            f"{missing}."
+        )

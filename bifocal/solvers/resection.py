@@ -1,0 +1,121 @@
+"""First camera of a photo from control points: where it stood, which way it looked, its lens."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import cv2
+import numpy as np
+
+from bifocal.domain.alignment import Interior
+from bifocal.pinhole import Pinhole, camera_matrix, project
+from photocore.arrays import BoolArray, FloatArray
+from photocore.errors import GeometryError
+
+#: Picks that miss by more than this share of the image width are gross, whatever the lens.
+GROSS_SHARE = 0.006
+
+
+def resect(
+    xyz: FloatArray, pixels: FloatArray, interior: Interior, *, seed: int = 7
+) -> tuple[Pinhole, BoolArray]:
+    """Return an approximate camera and which points agree with it.
+
+    Parameters
+    ----------
+    xyz : ndarray, shape (n, 3)
+        Control points. [m]
+    pixels : ndarray, shape (n, 2)
+        Their ideal pixels.
+    interior : Interior
+        What is known of the lens. An unknown principal distance is searched over a wide range.
+    seed : int
+        Of the random subsets.
+
+    Returns
+    -------
+    camera : Pinhole
+    agree : ndarray of bool, shape (n,)
+
+    Raises
+    ------
+    GeometryError
+        With fewer than four points, or points in line, or none that agree.
+    """
+    if len(xyz) < 4:
+        raise GeometryError(
+            f"{len(xyz)} control points with X, Y and pixels in this photo; a camera needs four, "
+            "and nine are advised."
+        )
+    _refuse_line(xyz)
+    generator = np.random.default_rng(seed)
+    width = max(interior.image_size)
+    spread = min(3.0 * interior.sigma_focal, 1.3)
+    count = 1 + 2 * int(np.ceil(spread / 0.08)) if spread > 0.02 else 1
+    best: tuple[float, Any, Any] = (np.inf, None, None)
+    for factor in np.exp(np.linspace(-spread, spread, count)) if count > 1 else [1.0]:
+        matrix = camera_matrix(interior.focal * factor, interior.aspect, *interior.centre)
+        for camera in _candidates(xyz, pixels, matrix, generator):
+            misfit = np.linalg.norm(pixels - project(camera, xyz), axis=1)
+            misfit = np.nan_to_num(misfit, nan=1e6)
+            # Robust cost that still prefers the more precise of two solutions, and at equal fit the
+            # lens that is nearer to what is known.
+            cost = np.minimum(misfit / (GROSS_SHARE * width), 1.0) ** 2
+            prior = (np.log(factor) / interior.sigma_focal) ** 2
+            total = float(cost.sum()) + 1e-6 * prior
+            if total < best[0]:
+                best = (total, camera, misfit)
+    _, camera, misfit = best
+    agree = misfit < GROSS_SHARE * width if misfit is not None else np.zeros(len(xyz), bool)
+    if camera is None or agree.sum() < 4:
+        raise GeometryError(
+            "no camera fits four of the control points. Check that their pixels belong to the "
+            "right photo and the right point, that Y points up, and that all are in metres."
+        )
+    return camera, agree
+
+
+def _candidates(
+    xyz: FloatArray, pixels: FloatArray, matrix: FloatArray, generator: np.random.Generator
+) -> list[Pinhole]:
+    """Return cameras from all points and from small random subsets."""
+    found = _solve(xyz, pixels, matrix)
+    if len(xyz) >= 6:
+        subsets = [generator.choice(len(xyz), 5, replace=False) for _ in range(12)]
+    elif len(xyz) == 5:
+        subsets = [np.delete(np.arange(5), index) for index in range(5)]
+    else:
+        subsets = []
+    for subset in subsets:
+        found += _solve(xyz[subset], pixels[subset], matrix)
+    return found
+
+
+def _solve(xyz: FloatArray, pixels: FloatArray, matrix: FloatArray) -> list[Pinhole]:
+    """Return OpenCV's solutions of one set of points in front of the wall."""
+    try:
+        _, turns, shifts, _ = cv2.solvePnPGeneric(
+            np.ascontiguousarray(xyz),
+            np.ascontiguousarray(pixels),
+            matrix,
+            None,
+            flags=cv2.SOLVEPNP_SQPNP,
+        )
+    except cv2.error:
+        return []
+    cameras = []
+    for turn, shift in zip(turns, shifts, strict=True):
+        rotation = cv2.Rodrigues(turn)[0]
+        centre = -rotation.T @ shift.ravel()
+        if np.isfinite(centre).all() and centre[2] > 0:
+            cameras.append(Pinhole(matrix, rotation, centre))
+    return cameras
+
+
+def _refuse_line(xyz: FloatArray) -> None:
+    """Refuse points that lie (almost) on one line."""
+    singular = np.linalg.svd(xyz - xyz.mean(axis=0), compute_uv=False)
+    if singular[1] < 0.02 * singular[0]:
+        raise GeometryError(
+            "the control points lie on one line; choose them spread over the whole wall."
+        )

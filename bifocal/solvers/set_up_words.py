@@ -1,0 +1,123 @@
+"""A set-up in sentences a surveyor acts on: what is off, what it would do, what was done."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from bifocal import rays
+from bifocal.pinhole import Pinhole, tilt
+
+
+def set_up_words(
+    cameras: tuple[Pinhole, Pinhole], deviations: dict[str, float], *, sigma_px: float
+) -> tuple[str, ...]:
+    """Return the set-up in sentences.
+
+    Parameters
+    ----------
+    cameras : pair of Pinhole
+        Far and near camera.
+    deviations : dict
+        Standard deviations of ``distance1``, ``distance2``. [m]
+    sigma_px : float
+        Expected precision of a homologous point, for the precision of relief. [px]
+    """
+    far, near = cameras
+    d1, d2 = float(far.centre[2]), float(near.centre[2])
+    lever = d1 * d2 / (d1 - d2)
+    words = [
+        f"Far camera {d1:.3f} m ± {_mm(deviations['distance1'])}, near camera {d2:.3f} m ± "
+        f"{_mm(deviations['distance2'])} from the wall; {d1 - d2:.3f} m apart in depth.",
+        _offset(far, near),
+        *(_turn(name, camera) for name, camera in (("Far", far), ("Near", near))),
+        _roll(far, near),
+        _scale(far, near, lever),
+        _zone(far, near, lever, sigma_px),
+    ]
+    return tuple(word for word in words if word)
+
+
+def _mm(value: float) -> str:
+    return f"{1000 * value:.0f} mm" if value < 1 else f"{value:.1f} m"
+
+
+def _offset(far: Pinhole, near: Pinhole) -> str:
+    """Say how the near camera stands beside the far one's axis."""
+    shift = near.centre[:2] - far.centre[:2]
+    sides = [("right", "left"), ("high", "low")]
+    parts = [
+        f"{abs(100 * value):.0f} cm too far {side[int(value < 0)]}"
+        if axis == 0
+        else f"{abs(100 * value):.0f} cm too {side[int(value < 0)]}"
+        for axis, (value, side) in enumerate(zip(shift, sides, strict=True))
+        if abs(value) >= 0.005
+    ]
+    if not parts:
+        return "Both cameras stand on one axis to within 5 mm."
+    centre = rays.zoom_centre(_foot(far), _foot(near)) - far.centre[:2]
+    moved = 100 * float(np.linalg.norm(centre))
+    return (
+        f"The near camera stands {' and '.join(parts)} of the far camera's axis; relief therefore "
+        f"spreads from a point {moved:.0f} cm from the far nadir (taken into account)."
+    )
+
+
+def _turn(name: str, camera: Pinhole) -> str:
+    """Say how a camera is turned away from the wall's normal."""
+    right, up = np.rad2deg(np.arctan(tilt(camera)))
+    total = float(np.rad2deg(np.arccos(np.clip(-camera.rotation[2, 2], -1, 1))))
+    if total < 0.05:
+        return f"{name} camera square to the wall."
+    parts = [
+        f"{abs(value):.1f}° {words[int(value < 0)]}"
+        for value, words in ((right, ("to the right", "to the left")), (up, ("up", "down")))
+        if abs(value) >= 0.05
+    ]
+    return (
+        f"{name} camera tilted {total:.1f}°: it looks {' and '.join(parts)} (corrected by the "
+        "homography)."
+    )
+
+
+def _roll(far: Pinhole, near: Pinhole) -> str:
+    """Say how much the photos are turned against each other in their own plane."""
+    angles = [np.arctan2(c.rotation[0, 1], c.rotation[0, 0]) for c in (far, near)]
+    turn = float(np.rad2deg((angles[1] - angles[0] + np.pi) % (2 * np.pi) - np.pi))
+    if abs(turn) < 0.05:
+        return ""
+    side = "clockwise" if turn > 0 else "counter-clockwise"
+    return f"The near photo is turned {abs(turn):.1f}° {side} against the far one (corrected)."
+
+
+def _scale(far: Pinhole, near: Pinhole, lever: float) -> str:
+    """Say how far the photos are from one scale."""
+    ratio = (near.matrix[0, 0] / near.centre[2]) / (far.matrix[0, 0] / far.centre[2])
+    off = ratio - 1.0
+    if abs(off) < 0.05:
+        return (
+            f"The scales differ by {100 * off:+.2f} % (would read as {1000 * abs(off) * lever:.0f} "
+            "mm of relief; corrected)."
+        )
+    bigger = "larger" if ratio > 1 else "smaller"
+    shown = ratio if ratio > 1 else 1 / ratio
+    return (
+        f"The near photo's scale is {shown:.2f} times {bigger} than the far one's (corrected; the "
+        "coarser photo limits the precision)."
+    )
+
+
+def _zone(far: Pinhole, near: Pinhole, lever: float, sigma_px: float) -> str:
+    """Say what precision to expect where."""
+    pixel = max(far.centre[2] / far.matrix[0, 0], near.centre[2] / near.matrix[0, 0])
+    sigma_m = sigma_px * pixel
+    radius = sigma_m * lever / 0.01
+    at = 0.25 * far.centre[2]
+    return (
+        f"With {sigma_px:.2g} px per point, relief is good to {1000 * sigma_m * lever / at:.1f} mm "
+        f"at {at:.1f} m from the centre of zoom; within {100 * radius:.0f} cm of it worse than 1 "
+        "cm (area of uncertainty)."
+    )
+
+
+def _foot(camera: Pinhole) -> rays.Foot:
+    return rays.Foot(camera.centre[:2], float(camera.centre[2]))

@@ -1,0 +1,308 @@
+"""Two photos in, a pair file, its lens files and a picture out."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from bifocal.domain.alignment import Alignment, Control, Interior, SiteMeasures
+from bifocal.domain.lens import Lens
+from bifocal.domain.photo_lens import lens_of_photo
+from bifocal.io.alignment_picture import write_alignment_picture
+from bifocal.io.control import read_control, read_lengths
+from bifocal.io.images import ImageInfo, image_info, read_image, to_eight_bit
+from bifocal.solvers.alignment import make_alignment, with_files
+from bifocal.solvers.set_up import PhotoInput, set_up, silent
+from photocore.arrays import ByteArray, FloatArray
+from photocore.errors import InputError
+from photocore.output import check_writable
+
+#: A wall point given without r lies on the plane to this. [m]
+SIGMA_ON_WALL = 0.005
+#: Nominal focal lengths are rounded and change with focus; 35 mm equivalents are rounder still.
+SIGMA_NOMINAL, SIGMA_EQUIVALENT = 0.02, 0.04
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LensData:
+    """What is known of one photo's lens; None where the EXIF data are to be used.
+
+    Attributes
+    ----------
+    lens : Path or None
+        Lens file.
+    focal : float or None
+        Focal length. [mm]
+    pixel_size, sensor_width : float or None
+        Either turns millimetres into pixels. [mm]
+    """
+
+    lens: Path | None = None
+    focal: float | None = None
+    pixel_size: float | None = None
+    sensor_width: float | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AlignOptions:
+    """What `align` is told besides the photos.
+
+    Attributes
+    ----------
+    lenses : pair of LensData
+    site : SiteMeasures
+    auto : bool
+    control, lengths : Path or None
+        Tables of control points and of taped lengths.
+    length : (pixels (4,), metres) or None
+        One length between two points of the far photo on the wall.
+    line : (pixels (4,), is_vertical) or None
+        A level or upright line of the wall in the far photo.
+    unit : str
+        Unit of the control coordinates; empty: as the headings say, else metres.
+    """
+
+    lenses: tuple[LensData, LensData] = field(default_factory=lambda: (LensData(), LensData()))
+    site: SiteMeasures = field(default_factory=SiteMeasures)
+    auto: bool = False
+    control: Path | None = None
+    lengths: Path | None = None
+    length: tuple[tuple[float, ...], float] | None = None
+    line: tuple[tuple[float, ...], bool] | None = None
+    unit: str = ""
+
+
+def align_photos(
+    far: Path,
+    near: Path,
+    out: Path,
+    options: AlignOptions,
+    *,
+    picture: Path | None = None,
+    overwrite: bool = False,
+    step: Callable[[str], None] = silent,
+) -> Alignment:
+    """Set a pair up, write the pair file (and lens files it needs, and the picture), return it.
+
+    Raises
+    ------
+    InputError, GeometryError
+        If files or options are at fault, or the photos do not make a pair.
+    """
+    way, options = _way(options)
+    for path in (out, picture):
+        if path is not None:
+            check_writable(path, overwrite=overwrite)
+    infos = image_info(far), image_info(near)
+    interiors = _interiors(infos, options.lenses)
+    control = _control(options, interiors[0].image_size)
+    photos = tuple(
+        PhotoInput(grey=_grey(info.path), interior=interior, name=info.path.name)
+        for info, interior in zip(infos, interiors, strict=True)
+    )
+    given = (photos[0], photos[1])
+    made = set_up(given, control=control, site=options.site, step=step)
+    paths, ordered = (far, near), given
+    if made.exchanged:
+        paths, ordered = (near, far), (given[1], given[0])
+    line = None
+    if options.line is not None:
+        line = (np.array(options.line[0], dtype=np.float64).reshape(2, 2), options.line[1])
+    alignment = make_alignment(made, ordered, way=way, direction=line)
+    if picture is not None:
+        step("drawing the picture")
+        images: list[ByteArray] = [photo.grey for photo in ordered if photo.grey is not None]
+        write_alignment_picture(picture, alignment, (images[0], images[1]), overwrite=overwrite)
+    names = (_relative(paths[0], out.parent), _relative(paths[1], out.parent))
+    lenses = _write_lenses(alignment, out, overwrite=overwrite)
+    alignment = with_files(alignment, names, lenses)
+    alignment.pair.write(out, overwrite=overwrite)
+    return alignment
+
+
+def alignment_as_dict(alignment: Alignment) -> dict[str, Any]:
+    """Return an alignment as plain data for ``--json``."""
+    pair = alignment.pair
+    return {
+        "way": alignment.way,
+        "distance1": pair.image1.distance,
+        "distance2": pair.image2.distance,
+        "nadir1": pair.image1.nadir,
+        "nadir2": pair.image2.nadir,
+        "zoom_centre": pair.zoom_centre,
+        **{
+            key: alignment.setup[key]
+            for key in ("standard_deviations", "focal_px", "common_points", "assumed", "sigma0")
+        },
+        "control": alignment.setup.get("control", []),
+        "words": alignment.words,
+        "remarks": alignment.remarks,
+    }
+
+
+def _way(options: AlignOptions) -> tuple[str, AlignOptions]:
+    """Return which way into the pair file the options describe."""
+    site = options.site
+    measured = [value for value in (site.distance1, site.distance2, site.delta_d) if value]
+    if site.distance1 and site.distance2 and site.delta_d:
+        raise InputError("give two of --distance1, --distance2 and --delta-d; the third follows.")
+    if options.control is not None:
+        return "control", options
+    if options.auto:
+        return "auto", options
+    if len(measured) >= 2:
+        return "site", replace(options, site=replace(site, parallel=True))
+    raise InputError(
+        "say how the pair is to be set up: --control FILE (points measured on the wall), "
+        "--distance1 and --distance2 (or one of them and --delta-d) with the cameras square to "
+        "the wall, or --auto with one distance or length."
+    )
+
+
+def _interiors(
+    infos: tuple[ImageInfo, ImageInfo], lenses: tuple[LensData, LensData]
+) -> tuple[Interior, Interior]:
+    """Return both interior orientations."""
+    first, second = (
+        _interior(info, data, number)
+        for number, (info, data) in enumerate(zip(infos, lenses, strict=True), start=1)
+    )
+    return first, second
+
+
+def _interior(info: ImageInfo, data: LensData, number: int) -> Interior:
+    """Return the best that is known of a photo's interior orientation."""
+    if data.lens is not None:
+        lens = lens_of_photo(Lens.read(data.lens), info.size, orientation=info.orientation)
+        return Interior.from_lens(lens, source=data.lens.name)
+    pitch = data.pixel_size
+    if pitch is None and data.sensor_width is not None:
+        pitch = data.sensor_width / max(info.size)
+    if data.focal is not None:
+        pitch = pitch or info.focal_plane_pitch or _pitch_from_exif(info)
+        if pitch is None:
+            # 35 mm film's width: says little of the pixel, so the focal length stays weak.
+            return Interior.from_focal(
+                data.focal / 36.0 * max(info.size),
+                image_size=info.size,
+                sigma=0.3,
+                source=f"{data.focal:g} mm, a sensor 36 mm wide assumed (--sensor-width)",
+            )
+        return Interior.from_focal(
+            data.focal / pitch,
+            image_size=info.size,
+            sigma=SIGMA_NOMINAL,
+            source=f"--focal{number} {data.focal:g} mm",
+            pixel_size=pitch,
+        )
+    if info.focal_length and (pitch or info.focal_plane_pitch):
+        pitch = pitch or info.focal_plane_pitch or 1.0
+        return Interior.from_focal(
+            info.focal_length / pitch,
+            image_size=info.size,
+            sigma=SIGMA_NOMINAL,
+            source=f"EXIF, {info.focal_length:g} mm",
+            pixel_size=pitch,
+        )
+    if info.focal_pixels:
+        return Interior.from_focal(
+            info.focal_pixels,
+            image_size=info.size,
+            sigma=SIGMA_EQUIVALENT,
+            source=f"EXIF, {info.focal_length_35:g} mm equivalent",
+        )
+    return Interior.unknown(info.size)
+
+
+def _pitch_from_exif(info: ImageInfo) -> float | None:
+    """Return the pixel size that true and equivalent focal length together tell. [mm]"""
+    if info.focal_length and info.focal_pixels:
+        return info.focal_length / info.focal_pixels
+    return None
+
+
+def _control(options: AlignOptions, size: tuple[int, int]) -> Control:
+    """Return the control points and lengths the options name."""
+    control = Control()
+    if options.control is not None:
+        control = read_control(
+            options.control,
+            sigma=options.site.sigma_control,
+            sigma_plane=SIGMA_ON_WALL,
+            unit=options.unit,
+        )
+    if options.lengths is not None:
+        if options.control is None:
+            raise InputError("--lengths names points of the --control table; give that too.")
+        control = read_lengths(options.lengths, control)
+    if options.length is not None:
+        control = _with_length(control, options.length, options.site.sigma_control)
+    for pixels, number in ((control.pixels1, 1), (control.pixels2, 2)):
+        _check_inside(control, pixels, size if number == 1 else None)
+    return control
+
+
+def _with_length(
+    control: Control, length: tuple[tuple[float, ...], float], sigma: float
+) -> Control:
+    """Return control with two more points on the wall and the length between them."""
+    count = len(control.ids)
+    ends = np.array(length[0], dtype=np.float64).reshape(2, 2)
+    nothing = np.full((2, 2), np.nan)
+    xyz = np.array([[np.nan, np.nan, 0.0]] * 2)
+    return Control(
+        ids=(*control.ids, "length, one end", "length, other end"),
+        xyz=np.concatenate([control.xyz, xyz]),
+        sigma=np.concatenate([control.sigma, np.full((2, 3), max(sigma, SIGMA_ON_WALL))]),
+        pixels1=np.concatenate([control.pixels1, ends]),
+        pixels2=np.concatenate([control.pixels2, nothing]),
+        lengths=(*control.lengths, (count, count + 1, length[1])),
+    )
+
+
+def _check_inside(control: Control, pixels: FloatArray, size: tuple[int, int] | None) -> None:
+    """Refuse picks far outside the photo: they belong to another photo or another size."""
+    if size is None:
+        return
+    width, height = size
+    outside = (pixels < -0.5).any(axis=1) | (pixels > [width, height]).any(axis=1)
+    if outside.any():
+        name = control.ids[int(np.flatnonzero(outside)[0])]
+        raise InputError(
+            f'control point "{name}" and {int(outside.sum()) - 1} more lie outside the far photo '
+            f"({width} x {height} px). Were the picks made on a photo of another size, or are far "
+            "and near exchanged?"
+        )
+
+
+def _grey(path: Path) -> ByteArray:
+    return np.asarray(to_eight_bit(read_image(path, grey=True)), dtype=np.uint8)
+
+
+def _relative(path: Path, folder: Path) -> str:
+    """Return a path relative to a folder, with slashes; absolute across Windows drives."""
+    try:
+        return Path(os.path.relpath(path.resolve(), folder.resolve())).as_posix()
+    except ValueError:
+        return path.resolve().as_posix()
+
+
+def _write_lenses(
+    alignment: Alignment, out: Path, *, overwrite: bool
+) -> tuple[str | None, str | None]:
+    """Write the lens files the pair needs beside it and return their names."""
+    stem = out.name.removesuffix(".json").removesuffix(".pair")
+    names: list[str | None] = []
+    for number, photo in enumerate((alignment.pair.image1, alignment.pair.image2), start=1):
+        if photo.lens is None:
+            names.append(None)
+            continue
+        name = f"{stem}.lens{number}.json"
+        photo.lens.write(out.parent / name, overwrite=overwrite)
+        names.append(name)
+    return names[0], names[1]

@@ -1,0 +1,218 @@
+"""Cameras from control points, lengths and common points."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from bifocal.domain.alignment import Control, Interior, SiteMeasures
+from bifocal.pinhole import project
+from bifocal.solvers.bundle import Problem, adjust
+from bifocal.solvers.resection import resect
+from bifocal.solvers.set_up import PhotoInput, set_up
+from photocore.errors import GeometryError, InputError
+from tests.bifocal.layered_wall import SIZE, camera
+
+FAR = camera(16.0, offset=(0.4, -0.2), turn_deg=(8.0, -20.0, 1.0), shift=(4.0, -3.0))
+NEAR = camera(9.0, offset=(-0.3, 0.1), turn_deg=(-6.0, 15.0, -2.0), shift=(-3.0, 5.0))
+WALL = np.array(
+    [[-3, -2, 0], [3, -2, 0], [3, 2, 0], [-3, 2, 0], [0, -2, 0], [0.2, 1.9, 0], [-2.9, 0, 0],
+     [3, 0.1, 0]], dtype=float,
+)  # fmt: skip
+OFF = np.array([[-2, 1, 0.5], [2, -1, -0.5], [1.5, 1.5, 0.6], [-1.5, -1.5, -0.4]])
+POINTS = np.concatenate([WALL, OFF])
+
+
+def interior(*, focal: float | None = None) -> Interior:
+    if focal is None:
+        return Interior.unknown(SIZE)
+    return Interior.from_focal(focal, image_size=SIZE, sigma=0.02, source="test")
+
+
+def control(xyz: np.ndarray = POINTS, *, sigma_px: float = 0.0, seed: int = 0) -> Control:
+    noise = np.random.default_rng(seed).normal(0, 1, (2, len(xyz), 2)) * sigma_px
+    return Control(
+        ids=tuple(f"P{i}" for i in range(len(xyz))),
+        xyz=xyz.copy(),
+        sigma=np.full((len(xyz), 3), 0.001),
+        pixels1=project(FAR, xyz) + noise[0],
+        pixels2=project(NEAR, xyz) + noise[1],
+    )
+
+
+def photos(**focal: float) -> tuple[PhotoInput, PhotoInput]:
+    return (
+        PhotoInput(grey=None, interior=interior(focal=focal.get("far")), name="far.jpg"),
+        PhotoInput(grey=None, interior=interior(focal=focal.get("near")), name="near.jpg"),
+    )
+
+
+def misplaced(made, truth) -> list[float]:
+    return [
+        float(np.linalg.norm(found.centre - true.centre))
+        for found, true in zip(made.solution.cameras, truth, strict=True)
+    ]
+
+
+@pytest.mark.parametrize("photo", [FAR, NEAR])
+def test_resection_finds_the_camera_without_knowing_the_lens(photo) -> None:
+    found, agree = resect(POINTS, project(photo, POINTS), interior())
+    assert agree.all()
+    assert np.linalg.norm(found.centre - photo.centre) < 0.05 * photo.centre[2]
+
+
+def test_control_points_determine_both_cameras_and_lenses() -> None:
+    made = set_up(photos(), control=control(), site=SiteMeasures(sigma_pick=0.1))
+    # The lens is free within its prior: what is left is what the prior of the principal point pulls.
+    assert max(misplaced(made, (FAR, NEAR))) < 0.05
+    assert made.gross == ()
+
+
+def test_known_lenses_leave_nothing_to_the_prior() -> None:
+    exact = tuple(
+        PhotoInput(
+            grey=None,
+            interior=replace(
+                interior(focal=cam.matrix[0, 0]),
+                sigma_focal=1e-5,
+                centre=cam.matrix[:2, 2],
+                sigma_centre=0.01,
+                sigma_aspect=1e-5,
+            ),
+            name="photo",
+        )
+        for cam in (FAR, NEAR)
+    )
+    made = set_up(exact, control=control(), site=SiteMeasures())
+    assert max(misplaced(made, (FAR, NEAR))) < 1e-5
+
+
+def test_standard_deviations_cover_the_errors() -> None:
+    ratios = []
+    for seed in range(6):
+        made = set_up(
+            photos(far=FAR.matrix[0, 0], near=NEAR.matrix[0, 0]),
+            control=control(sigma_px=0.5, seed=seed),
+            site=SiteMeasures(),
+        )
+        sigma = np.sqrt(made.solution.covariance[9, 9])
+        ratios.append((made.solution.cameras[0].centre[2] - FAR.centre[2]) / sigma)
+    assert 0.2 < np.sqrt(np.mean(np.square(ratios))) < 1.6
+
+
+@pytest.mark.parametrize("size", [0.05, 1.0])
+def test_a_gross_error_is_named_and_left_out(size: float) -> None:
+    points = control(sigma_px=0.3)
+    points.xyz[5, 0] += size
+    made = set_up(
+        photos(far=FAR.matrix[0, 0], near=NEAR.matrix[0, 0]), control=points, site=SiteMeasures()
+    )
+    assert made.gross == ("P5",)
+    assert any("P5 is a gross error" in text for text in made.remarks)
+    assert max(misplaced(made, (FAR, NEAR))) < 0.25
+
+
+def test_a_wrong_pick_in_one_photo_is_named() -> None:
+    points = control(sigma_px=0.3)
+    points.pixels2[9] += [9.0, -4.0]
+    made = set_up(
+        photos(far=FAR.matrix[0, 0], near=NEAR.matrix[0, 0]), control=points, site=SiteMeasures()
+    )
+    assert made.gross == ("P9",)
+
+
+def test_few_control_points_draw_the_advice_of_nine() -> None:
+    made = set_up(photos(), control=control(POINTS[[0, 1, 2, 3, 8, 9]]), site=SiteMeasures())
+    assert any("advises nine" in text for text in made.remarks)
+
+
+def test_exchanged_photos_are_put_right_and_said_so() -> None:
+    first, second = photos()
+    made = set_up((second, first), control=control().exchanged(), site=SiteMeasures())
+    assert made.exchanged
+    assert "near.jpg is the near photo" in made.remarks[0]
+    assert made.solution.cameras[0].centre[2] > made.solution.cameras[1].centre[2]
+
+
+def test_control_in_millimetres_is_refused() -> None:
+    points = control()
+    points.xyz[:] *= 1000
+    points.sigma[:] *= 1000
+    with pytest.raises(InputError, match="in mm or cm"):
+        set_up(photos(), control=points, site=SiteMeasures())
+
+
+def test_control_in_millimetres_is_told_by_the_tape() -> None:
+    points = control()
+    points.xyz[:] *= 1000
+    points.sigma[:] *= 1000
+    with pytest.raises(InputError, match="are in mm: they put camera 1 1[56],"):
+        set_up(photos(), control=points, site=SiteMeasures(distance1=16.0))
+
+
+def test_points_in_one_line_are_refused() -> None:
+    line = np.column_stack([np.linspace(-3, 3, 6), np.full(6, 0.5), np.zeros(6)])
+    with pytest.raises(GeometryError, match="on one line"):
+        set_up(photos(), control=control(line), site=SiteMeasures())
+
+
+def test_a_flat_wall_square_on_with_unknown_lens_is_not_determined() -> None:
+    flat = Control(
+        ids=tuple("abcdefgh"),
+        xyz=WALL.copy(),
+        sigma=np.full((8, 3), 0.001),
+        pixels1=project(camera(16.0), WALL),
+        pixels2=project(camera(9.0), WALL),
+    )
+    with pytest.raises(GeometryError, match="distance of camera 1 is not determined"):
+        set_up(photos(), control=flat, site=SiteMeasures())
+    # One relief point of 0.5 m off the axis, or the tape, settles it.
+    made = set_up(photos(), control=flat, site=SiteMeasures(distance1=16.0, distance2=9.0))
+    assert made.solution.cameras[0].centre[2] == pytest.approx(16.0, abs=0.001)
+
+
+def test_photos_from_one_place_are_refused_as_the_classic_mistake() -> None:
+    zoomed = camera(16.0, focal=900.0, offset=(0.4, -0.2), turn_deg=(8.0, -20.0, 1.0))
+    points = control()
+    same = replace(points, pixels2=project(zoomed, POINTS))
+    with pytest.raises(GeometryError, match="only the zoom was changed"):
+        set_up(photos(), control=same, site=SiteMeasures())
+
+
+def test_hardly_any_change_of_distance_is_refused() -> None:
+    beside = camera(15.8, offset=(-3.0, 0.0), turn_deg=(5.0, 12.0, 0.0))
+    points = replace(control(), pixels2=project(beside, POINTS))
+    with pytest.raises(GeometryError, match="hardly any change of distance"):
+        set_up(photos(), control=points, site=SiteMeasures())
+
+
+def test_common_points_alone_need_a_tilt_or_a_tape_but_give_the_ratio_of_distances() -> None:
+    rng = np.random.default_rng(3)
+    xyz = np.column_stack([rng.uniform(-3, 3, (300, 2)), np.zeros(300)])
+    xyz[200:, 2] = rng.uniform(-0.6, 0.6, 100)
+    exact = tuple(
+        replace(
+            interior(focal=cam.matrix[0, 0]), sigma_focal=1e-4, centre=cam.matrix[:2, 2],
+            sigma_centre=0.1,
+        )
+        for cam in (FAR, NEAR)
+    )  # fmt: skip
+    problem = Problem(
+        interiors=exact,
+        tie1=project(FAR, xyz),
+        tie2=project(NEAR, xyz),
+        sigma_tie=0.1,
+        tie_used=np.ones(300, bool),
+        wall=xyz[:, 2] == 0,
+        sigma_wall=np.full(300, 0.1),
+        measured={"distance1": (16.0, 0.01)},
+        gauge=True,
+    )
+    start = tuple(cam._replace(centre=cam.centre + [0.05, -0.05, 0.1]) for cam in (FAR, NEAR))
+    solution = adjust(problem, start)
+    assert solution.cameras[0].centre[2] == pytest.approx(16.0, abs=1e-3)
+    assert solution.cameras[1].centre[2] == pytest.approx(9.0, abs=2e-3)
+    # The gauge holds the start's origin; the offset between the cameras is what counts.
+    offset = solution.cameras[1].centre - solution.cameras[0].centre
+    np.testing.assert_allclose(np.linalg.norm(offset), np.linalg.norm(NEAR.centre - FAR.centre),
+                               rtol=1e-3)  # fmt: skip

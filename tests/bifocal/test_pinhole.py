@@ -1,0 +1,121 @@
+"""A pinhole camera is a homography, a nadir and a distance."""
+
+import numpy as np
+import pytest
+
+from bifocal import Pair, Photo
+from bifocal.pinhole import (
+    Pinhole,
+    camera_matrix,
+    fundamental,
+    pinhole_from_plane,
+    pixel_from_plane,
+    plane_from_pixel,
+    plane_transfer,
+    project,
+    projection_rows,
+    rotation_matrix,
+    tilt,
+    triangulate,
+)
+
+SQUARE_ON = np.diag([1.0, -1.0, -1.0])
+
+
+def make(seed: int, distance: float) -> Pinhole:
+    rng = np.random.default_rng(seed)
+    turn = rotation_matrix(rng.uniform(-0.5, 0.5, 3))
+    return Pinhole(
+        camera_matrix(2500.0 + 100 * seed, 1.001, 1510.0, 1000.0),
+        turn @ SQUARE_ON,
+        np.array([*rng.uniform(-2, 2, 2), distance]),
+    )
+
+
+def photo_of(camera: Pinhole) -> Photo:
+    return Photo(
+        plane_from_pixel=plane_from_pixel(camera),
+        nadir=camera.centre[:2],
+        distance=camera.centre[2],
+    )
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_homography_nadir_and_distance_give_the_camera_back(seed: int) -> None:
+    camera = make(seed, 9.0)
+    back = pinhole_from_plane(-3.0 * plane_from_pixel(camera), camera.centre[:2], 9.0)
+    np.testing.assert_allclose(back.matrix, camera.matrix, rtol=1e-9, atol=1e-7)
+    np.testing.assert_allclose(back.rotation, camera.rotation, atol=1e-10)
+
+
+def test_a_photo_projects_as_its_pinhole_does() -> None:
+    camera = make(1, 12.0)
+    xyz = np.random.default_rng(0).uniform(-1.5, 1.5, (50, 3))
+    np.testing.assert_allclose(photo_of(camera).project(xyz), project(camera, xyz), atol=1e-8)
+
+
+def test_a_point_behind_the_camera_has_no_pixel() -> None:
+    assert np.isnan(project(make(0, 5.0), np.array([[0.0, 0.0, 60.0]]))).all()
+
+
+def test_square_on_camera_by_hand() -> None:
+    # 2000 px, 10 m: a pixel is 5 mm; 1 m right and 0.5 m up are 200 px right and 100 px up.
+    camera = Pinhole(camera_matrix(2000, 1, 100, 80), SQUARE_ON, np.array([0.0, 0.0, 10.0]))
+    np.testing.assert_allclose(project(camera, np.array([[1.0, 0.5, 0.0]])), [[300.0, -20.0]])
+    # 2 m of relief at 10 m: 10 / 8 times as far from the nadir.
+    np.testing.assert_allclose(project(camera, np.array([[1.0, 0.0, 2.0]])), [[350.0, 80.0]])
+    np.testing.assert_allclose(tilt(camera), [0.0, 0.0])
+    np.testing.assert_allclose(
+        pixel_from_plane(camera) @ [1.0, 0.5, 1.0] / -10.0, [-300.0, 20.0, -1.0]
+    )
+
+
+def test_a_camera_turned_to_the_right_has_positive_tilt() -> None:
+    # Looking 3 degrees towards +X: its axis is (sin 3, 0, -cos 3).
+    a = np.deg2rad(3.0)
+    turn = np.array([[np.cos(a), 0, np.sin(a)], [0, 1, 0], [-np.sin(a), 0, np.cos(a)]])
+    camera = Pinhole(np.eye(3), SQUARE_ON @ turn, np.array([0.0, 0.0, 1.0]))
+    np.testing.assert_allclose(camera.rotation[2], [np.sin(a), 0, -np.cos(a)], atol=1e-15)
+    np.testing.assert_allclose(tilt(camera), [np.tan(a), 0.0], atol=1e-15)
+
+
+def test_projection_rows_are_the_derivative() -> None:
+    camera = make(3, 8.0)
+    xyz = np.array([[0.3, -0.4, 0.5], [-1.0, 0.2, -0.3]])
+    for axis in range(3):
+        step = np.zeros(3)
+        step[axis] = 1e-6
+        slope = (project(camera, xyz + step) - project(camera, xyz - step)) / 2e-6
+        np.testing.assert_allclose(projection_rows(camera, xyz)[:, :, axis], slope, rtol=1e-6)
+
+
+def test_rays_meet_where_the_point_is_and_obey_the_fundamental_matrix() -> None:
+    far, near = make(1, 14.0), make(2, 8.0)
+    xyz = np.random.default_rng(4).uniform(-1, 1, (30, 3))
+    x1, x2 = project(far, xyz), project(near, xyz)
+    np.testing.assert_allclose(triangulate(far, near, x1, x2), xyz, atol=1e-9)
+    h1, h2 = (np.column_stack([x, np.ones(30)]) for x in (x1, x2))
+    line = h1 @ fundamental(far, near).T
+    distance = (h2 * line).sum(1) / np.hypot(line[:, 0], line[:, 1])
+    np.testing.assert_allclose(distance, 0.0, atol=1e-8)
+
+
+def test_a_plane_is_carried_from_photo_to_photo_also_when_it_slopes() -> None:
+    far, near = make(1, 14.0), make(2, 8.0)
+    xy = np.random.default_rng(5).uniform(-1, 1, (20, 2))
+    xyz = np.column_stack([xy, 0.1 + 0.02 * xy[:, 0] - 0.03 * xy[:, 1]])
+    h1 = np.column_stack([project(far, xyz), np.ones(20)])
+    mapped = h1 @ plane_transfer(far, near, np.array([0.1, 0.02, -0.03])).T
+    np.testing.assert_allclose(mapped[:, :2] / mapped[:, 2:], project(near, xyz), atol=1e-8)
+
+
+def test_rotation_of_nothing_is_exactly_nothing() -> None:
+    assert (rotation_matrix(np.zeros(3)) == np.eye(3)).all()
+
+
+def test_pair_of_two_pinholes_intersects_their_points() -> None:
+    far, near = make(1, 14.0), make(2, 8.0)
+    pair = Pair(image1=photo_of(far), image2=photo_of(near))
+    xyz = np.random.default_rng(6).uniform(-1, 1, (30, 3))
+    found = pair.intersect(project(far, xyz), project(near, xyz))
+    np.testing.assert_allclose(found.xyz, xyz, atol=1e-8)
