@@ -124,7 +124,7 @@ def _refine_part(
 ) -> PatchResult:
     """Refine at most 4000 matches (the coordinate maps stay small)."""
     half, iterations, reach = settings
-    known = np.isfinite(local).all(axis=(1, 2)) & np.isfinite(pixels2).all(axis=1)
+    known: BoolArray = np.isfinite(local.sum(axis=(1, 2)) + pixels2.sum(axis=1))
     local = np.where(known[:, None, None], local, np.eye(2))
     scale = np.sqrt(np.abs(np.linalg.det(local)))
     step = np.maximum(1.0, 1.0 / np.clip(scale, 0.1, 10.0))

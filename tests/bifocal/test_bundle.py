@@ -63,7 +63,7 @@ def test_resection_finds_the_camera_without_knowing_the_lens(photo) -> None:
 
 def test_control_points_determine_both_cameras_and_lenses() -> None:
     made = set_up(photos(), control=control(), site=SiteMeasures(sigma_pick=0.1))
-    # The lens is free within its prior: what is left is what the prior of the principal point pulls.
+    # The lens is free within its prior: what is left is the pull of the principal point.
     assert max(misplaced(made, (FAR, NEAR))) < 0.05
     assert made.gross == ()
 
@@ -146,7 +146,7 @@ def test_control_in_millimetres_is_told_by_the_tape() -> None:
     points = control()
     points.xyz[:] *= 1000
     points.sigma[:] *= 1000
-    with pytest.raises(InputError, match="are in mm: they put camera 1 1[56],"):
+    with pytest.raises(InputError, match=r"are in mm: they put camera 1 1[56],"):
         set_up(photos(), control=points, site=SiteMeasures(distance1=16.0))
 
 
@@ -208,7 +208,9 @@ def test_common_points_alone_need_a_tilt_or_a_tape_but_give_the_ratio_of_distanc
         measured={"distance1": (16.0, 0.01)},
         gauge=True,
     )
-    start = tuple(cam._replace(centre=cam.centre + [0.05, -0.05, 0.1]) for cam in (FAR, NEAR))
+    start = tuple(
+        cam._replace(centre=cam.centre + np.array([0.05, -0.05, 0.1])) for cam in (FAR, NEAR)
+    )
     solution = adjust(problem, start)
     assert solution.cameras[0].centre[2] == pytest.approx(16.0, abs=1e-3)
     assert solution.cameras[1].centre[2] == pytest.approx(9.0, abs=2e-3)

@@ -108,7 +108,7 @@ def test_two_shots_from_one_place_are_refused(views) -> None:
     again = photograph(FAR, noise=3.0)
     first, second = inputs(views)
     twin = PhotoInput(grey=again[:, :-40][:, 40:], interior=second.interior, name="again.jpg")
-    with pytest.raises(GeometryError, match="same|no parallax|one place"):
+    with pytest.raises(GeometryError, match=r"same|no parallax|one place"):
         set_up((first, twin), control=Control(), site=SiteMeasures(distance1=16.0))
 
 
