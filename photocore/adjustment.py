@@ -22,6 +22,8 @@ Equations = tuple[FloatArray, FloatArray] | None
 RANK_TOLERANCE = 1e-11
 #: Steps smaller than this share of what an unknown may vary by one sigma end the iteration.
 SETTLE = 1e-10
+#: Where a step brings this share of the drop foretold, the valley is straight enough.
+STRAIGHT = 0.9
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -145,6 +147,7 @@ def minimise(
         raise GeometryError(f"{what}: the start values are impossible.")
     residuals, jacobian = current
     damping, growth, cost = 1e-4, 2.0, float(residuals @ residuals)
+    curved = False
     settled, step_number = cost <= len(residuals) * rounding**2, 0
     for step_number in range(1, most + 1):
         length = np.sqrt((jacobian * jacobian).sum(axis=0))
@@ -157,7 +160,9 @@ def minimise(
         while True:
             share = values / (values**2 + damping * largest**2 + floor)
             step = -(right.T @ (share * target))
-            bend = _bend(state, equations, advance, residuals, jacobian, step / length)
+            bend = None
+            if curved:
+                bend = _bend(state, equations, advance, residuals, jacobian, step / length)
             if bend is not None:
                 correction = -0.5 * (right.T @ (share * (left.T @ bend)))
                 if np.linalg.norm(correction) < 0.75 * np.linalg.norm(step):
@@ -179,6 +184,7 @@ def minimise(
                     iterations=step_number,
                     settled=True,
                 )
+            curved = True
             damping = max(damping * growth, 1e-12)
             growth *= 2.0
         # Nielsen's rule: the damping follows how well the linear model foretold the drop.
@@ -186,7 +192,7 @@ def minimise(
         foretold -= float(residuals @ residuals - target @ target)
         ratio = (cost - new_cost) / foretold if foretold > 0 else 1.0
         damping *= max(0.1, 1.0 - (2.0 * min(ratio, 1.0) - 1.0) ** 3)
-        growth = 2.0
+        growth, curved = 2.0, ratio < STRAIGHT
         settled = small or cost - new_cost <= 1e-14 * cost
         state, (residuals, jacobian), cost = following, new, new_cost
         settled = (settled and damping < 1e-3) or cost <= len(residuals) * rounding**2
@@ -231,9 +237,11 @@ def undetermined(jacobian: FloatArray, names: Sequence[str]) -> list[str]:
     length = np.sqrt((jacobian * jacobian).sum(axis=0))
     silent = [name for name, size in zip(names, length, strict=True) if size == 0]
     scaled = jacobian / np.where(length == 0, 1.0, length)
-    _, values, right = svd(scaled, full_matrices=True, check_finite=False)
-    full = np.zeros(len(names))
-    full[: len(values)] = values
+    # Rows of zeros change nothing, and give every unknown its singular value.
+    square = scaled if len(scaled) >= len(names) else np.zeros((len(names), len(names)))
+    if square is not scaled:
+        square[: len(scaled)] = scaled
+    _, full, right = svd(square, full_matrices=False, check_finite=False)
     weak = right[full <= max(full.max(initial=0.0), 1e-300) * RANK_TOLERANCE]
     share = np.abs(weak).max(axis=0, initial=0.0)
     mixed = [name for name, part in zip(names, share, strict=True) if part > 0.05]
