@@ -152,9 +152,10 @@ def shift_ratio(
     radius, layers = _checked(radius, heights, indices)
     radius_bar, _, _ = solve(radius, layers, indices, tangent=False)
     limit = axis_ratio(layers, indices)
-    # Below 1e-150 the square of t is lost, and the limit is exact to the last digit anyway.
+    whole = sum(layers, np.zeros(()))
+    # The ratio leaves its limit with (R / whole)², which is beyond the last digit here.
     with np.errstate(divide="ignore", invalid="ignore"):
-        return np.where(radius > 1e-150, radius_bar / radius, limit)
+        return np.where(radius > 1e-9 * whole, radius_bar / radius, limit)
 
 
 def axis_ratio(heights: Sequence[ArrayLike], indices: Sequence[float]) -> FloatArray:

@@ -139,6 +139,15 @@ def test_the_axis_ratio_is_the_closed_limit() -> None:
     np.testing.assert_allclose(ratio, 710 / (500 + 10 / 1.5 + 200 / 1.34), rtol=4e-16)
 
 
+@pytest.mark.parametrize("scale", [1e-150, 1.0, 1e150])
+def test_the_ratio_is_continuous_towards_the_axis_in_any_unit(scale: float) -> None:
+    heights = [0.001 * scale, 1.0 * scale]
+    ratios = shift_ratio(np.logspace(-14, 1, 40) * scale, heights, [1.0, 1.34])
+    exact = shift_ratio(np.logspace(-14, 1, 40), [0.001, 1.0], [1.0, 1.34])
+    np.testing.assert_allclose(ratios, exact, rtol=2e-15)
+    assert (np.diff(ratios) >= -1e-15).all()
+
+
 def test_ratio_of_a_camera_that_touches_the_point_is_one() -> None:
     assert shift_ratio(0.0, [0.0, 0.0], [1.0, 1.337]) == 1.0
 
