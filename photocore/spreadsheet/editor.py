@@ -16,7 +16,7 @@ from photocore.errors import InputError
 from photocore.output import atomic_path
 from photocore.spreadsheet import formulas
 from photocore.spreadsheet.cellxml import CellInput
-from photocore.spreadsheet.grid import Grid, TableArea, cell_name
+from photocore.spreadsheet.grid import Grid, SheetFile, TableArea, cell_name
 from photocore.spreadsheet.newrows import NewColumn, NewRows, RowFormula
 from photocore.spreadsheet.package import check_header, open_package, read_part
 from photocore.spreadsheet.splice import SheetChanges, Spliced, splice_sheet
@@ -55,7 +55,7 @@ class WorkbookEditor:
     tables: list[TableArea] = field(init=False)
     changes: dict[str, SheetChanges] = field(init=False, default_factory=dict)
     grown: dict[str, tuple[TableArea, int]] = field(init=False, default_factory=dict)
-    _grids: dict[str, Grid] = field(init=False, default_factory=dict)
+    _file: SheetFile | None = field(init=False, default=None)
 
     def __post_init__(self) -> None:
         self.path = Path(self.path)
@@ -85,10 +85,10 @@ class WorkbookEditor:
 
     def grid(self, title: str) -> Grid:
         """Return a sheet's cells as they stand in the file."""
-        if title not in self._grids:
-            self._sheet(title)
-            self._grids[title] = open_xlsx(self.path, max_rows=2**20).grid(title)
-        return self._grids[title]
+        self._sheet(title)
+        if self._file is None:
+            self._file = open_xlsx(self.path, max_rows=2**20)
+        return self._file.grid(title)
 
     def set_value(self, title: str, row: int, column: int, value: CellInput) -> None:
         """Type a value into a cell; its format stays. None clears the cell."""
@@ -193,7 +193,7 @@ class WorkbookEditor:
         area, bottom = self._growing(table)
         where = f"{self.path.name} › {area.sheet}"
         results = results or {}
-        headings = self._headings(area)
+        headings = area.headings()
         unknown = [name for name in (*inputs, *results) if name not in headings]
         if unknown:
             raise InputError(f'{where}: the table {area.name} has no column "{unknown[0]}".')
@@ -318,12 +318,6 @@ class WorkbookEditor:
                 return sheet
         names = ", ".join(f'"{name}"' for name in self.titles)
         raise InputError(f'{self.path.name}: has no sheet "{title}"; it has {names}.')
-
-    def _headings(self, area: TableArea) -> dict[str, int]:
-        """Return heading -> column of a table."""
-        top, left, _, right = area.area
-        cells = self.grid(area.sheet).rows.get(top + area.header_rows - 1, {})
-        return {str(cells[c]): c for c in range(left, right + 1) if c in cells}
 
     def _refuse_occupied(self, area: TableArea, rows: Iterable[int]) -> None:
         cells = self.grid(area.sheet).rows

@@ -21,6 +21,8 @@ _RANGE = re.compile(
     r"(?P<c1>\$?[A-Z]{1,3})(?P<r1>\$?\d+):(?P<c2>\$?[A-Z]{1,3})(?P<r2>\$?\d+)(?![\w(])"
 )
 _AREA = re.compile(r"[A-Z]{1,3}\d{1,7}(:[A-Z]{1,3}\d{1,7})?")
+#: The row of a cell, but not a number within a name.
+_ROW_NUMBER = re.compile(r"(?<![\w.'])(\$?[A-Z]{1,3}\$?)\d+(?![\w.!'(])")
 #: Functions whose result may depend on any cell, whatever their text names.
 _FAR_REACHING = re.compile(r"\b(INDIRECT|OFFSET|CELL|INFO)\s*\(", re.IGNORECASE)
 
@@ -139,9 +141,9 @@ class References:
         return re.compile("|".join(words), re.IGNORECASE)
 
     def _formulas(self, sheet: Sheet) -> str:
-        """Return all formulas of a sheet as one text, repeated ones once."""
-        found: dict[str, None] = {}
+        """Return the formulas of a sheet as one text, those that differ in their row only once."""
         pieces: list[str] = []
+        shapes: set[str] = set()
         inside = False
 
         def start(name: str, attributes: dict[str, str]) -> None:  # noqa: ARG001
@@ -151,7 +153,7 @@ class References:
         def end(name: str) -> None:  # noqa: ARG001
             nonlocal inside
             if inside:
-                found["".join(pieces)] = None
+                shapes.add(_ROW_NUMBER.sub(r"\1", "".join(pieces)))
                 pieces.clear()
             inside = False
 
@@ -160,7 +162,7 @@ class References:
                 pieces.append(data)
 
         scan_part(self.path, self.package, sheet.part, start=start, end=end, text=collect)
-        return "\n".join(found)
+        return "\n".join(sorted(shapes))
 
     def grow(self, area: TableArea, bottom: int, parts: dict[str, bytes]) -> None:
         """Let a table, and all that reaches to its last row, reach down to a new one.

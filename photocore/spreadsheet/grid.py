@@ -64,6 +64,8 @@ class Grid:
         Merged ranges, both ends included.
     truncated : bool
         Whether reading stopped early because the sheet is too long.
+    labels : dict, optional
+        Where each text stands, by its plain form; filled in when single values are looked for.
     """
 
     title: str
@@ -71,6 +73,7 @@ class Grid:
     hidden: set[int] = field(default_factory=set)
     merged: list[tuple[int, int, int, int]] = field(default_factory=list)
     truncated: bool = False
+    labels: dict[str, tuple[int, int]] | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,6 +86,11 @@ class TableArea:
     header_rows: int = 1
     totals_rows: int = 0
     part: str = ""
+    columns: tuple[str, ...] = ()
+
+    def headings(self) -> dict[str, int]:
+        """Return the column number of each heading."""
+        return dict(zip(self.columns, range(self.area[1], self.area[3] + 1), strict=False))
 
 
 @dataclass(slots=True)

@@ -209,7 +209,7 @@ def _table_faults(
     """Yield faults of the named tables of a sheet."""
     for index, table in enumerate(tables):
         top, left, bottom, right = table.area
-        columns, filters = _table_columns(path, package, table)
+        columns, filters = table.columns, _filters(path, package, table)
         if bottom - top < table.header_rows + table.totals_rows:
             yield f"the table {table.name} has no row of data"
         if len(columns) != right - left + 1:
@@ -235,21 +235,16 @@ def _table_faults(
             yield f"the table {table.name} holds merged cells"
 
 
-def _table_columns(
-    path: Path, package: zipfile.ZipFile, table: TableArea
-) -> tuple[list[str], list[str]]:
-    """Return a table's column names and the range of its filter."""
-    names: list[str] = []
-    filters: list[str] = []
+def _filters(path: Path, package: zipfile.ZipFile, table: TableArea) -> list[str]:
+    """Return the range of a table's filter, if it has one."""
+    found: list[str] = []
 
     def start(name: str, attributes: dict[str, str]) -> None:
-        if local(name) == "tableColumn":
-            names.append(attributes.get("name", "").replace("_x000a_", "\n"))
-        elif local(name) == "autoFilter":
-            filters.append(attributes.get("ref", ""))
+        if local(name) == "autoFilter":
+            found.append(attributes.get("ref", ""))
 
     scan_part(path, package, table.part, start=start)
-    return names, filters
+    return found
 
 
 def _read(path: Path, package: zipfile.ZipFile, sheet: Sheet, shared: list[str]) -> _SheetFacts:

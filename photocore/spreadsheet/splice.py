@@ -295,6 +295,13 @@ class _Splicer:
         if formula is None:
             return  # the user put a value in its place: it stays
         kind, content = type_and_content(value, self.prefix, formula=True)
+        stored = self.child("v")
+        if stored and self.attributes.get("t", "") == kind:
+            # Only the value differs, if anything: by far the most frequent case.
+            new = content.encode()
+            if self.data[stored[0] : stored[1]] != new:
+                self.edits.append((*stored, new))
+            return
         self.edits.append(self.with_result(name, kind, content))
 
     def strip(self, name: str) -> None:

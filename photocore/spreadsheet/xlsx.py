@@ -188,30 +188,39 @@ def _relations(path: Path, package: zipfile.ZipFile, part: str) -> dict[str, tup
 def read_tables(path: Path, package: zipfile.ZipFile, sheet: Sheet) -> list[TableArea]:
     """Return the named tables of a sheet."""
     found: list[TableArea] = []
-
-    def start(name: str, attributes: dict[str, str]) -> None:
-        if local(name) == "table":
-            found.append(
-                TableArea(
-                    name=attributes.get("displayName") or attributes.get("name", ""),
-                    sheet=sheet.title,
-                    area=split_area(attributes["ref"]),
-                    header_rows=int(attributes.get("headerRowCount", "1")),
-                    totals_rows=int(attributes.get("totalsRowCount", "0")),
-                    part=target,
-                )
-            )
-        raise EnoughError
-
     for kind, target in sheet.relations.values():
         if kind == "table" and target in package.namelist():
             try:
-                scan_part(path, package, target, start=start)
-            except (KeyError, ValueError):
+                found.append(_table(path, package, sheet.title, target))
+            except (KeyError, ValueError) as error:
+                if isinstance(error, InputError):
+                    raise
                 raise InputError(
                     f"{path}: damaged, the table part {target} has no range."
                 ) from None
     return found
+
+
+def _table(path: Path, package: zipfile.ZipFile, title: str, part: str) -> TableArea:
+    root: dict[str, str] = {}
+    columns: list[str] = []
+
+    def start(name: str, attributes: dict[str, str]) -> None:
+        if local(name) == "table":
+            root.update(attributes)
+        elif local(name) == "tableColumn":
+            columns.append(unescape(attributes.get("name", "")))
+
+    scan_part(path, package, part, start=start)
+    return TableArea(
+        name=root.get("displayName") or root.get("name", ""),
+        sheet=title,
+        area=split_area(root["ref"]),
+        header_rows=int(root.get("headerRowCount", "1")),
+        totals_rows=int(root.get("totalsRowCount", "0")),
+        part=part,
+        columns=tuple(columns),
+    )
 
 
 def read_shared_strings(path: Path, package: zipfile.ZipFile, book: Workbook) -> list[str]:

@@ -21,6 +21,8 @@ from photocore.tables.rows import data_rows
 
 Source = Path | str | SheetFile | CsvFile
 
+#: Rows of a sheet in which labels of single values are looked for.
+_LABELLED = 400
 #: Rows with content that are read beyond the limit: titles, notes, headings above the table.
 _MARGIN = 1000
 
@@ -404,16 +406,24 @@ def _by_label(book: SheetFile, titles: Sequence[str], name: Column) -> tuple[str
     labels = {bare(name.key), *map(bare, name.aliases)}
     for title in titles:
         grid = book.grid(title)
-        headings, values = _value_column(grid)
-        for row in sorted(grid.rows):
-            cells = grid.rows[row]
-            if row == headings:
-                continue
-            for column in sorted(cells):
-                text = cells[column]
-                if isinstance(text, str) and bare(text) in labels:
-                    return title, row, _right_of(cells, column, values, name)
+        found = _labels(grid)
+        places = [found[label] for label in labels if label in found]
+        if places:
+            row, column = min(places)
+            return title, row, _right_of(grid.rows[row], column, _value_column(grid)[1], name)
     return None
+
+
+def _labels(grid: Grid) -> dict[str, tuple[int, int]]:
+    """Return the place of each text near the top of a sheet, the first one of its kind."""
+    if grid.labels is None:
+        headings = _value_column(grid)[0]
+        grid.labels = {}
+        for row in sorted(grid.rows)[:_LABELLED]:
+            for column, text in sorted(grid.rows[row].items()):
+                if isinstance(text, str) and row != headings:
+                    grid.labels.setdefault(bare(text), (row, column))
+    return grid.labels
 
 
 def _value_column(grid: Grid) -> tuple[int, int]:
