@@ -11,15 +11,15 @@ import numpy as np
 from bifocal.solvers.dense.frame import Float32Array, Frame, zoom_map
 
 #: Half width of a ramp. [px]
-REACH = 7
+REACH = 9
 #: Steps whose parallax is smaller than this are left as measured. [px]
-LEAST_STEP = 1.0
+LEAST_STEP = 0.5
 #: Differences of grey value and of its gradient beyond these count alike. [grey levels]
 GREY_LIMIT, GRADIENT_LIMIT, GREY_SHARE = 12.0, 8.0, 0.4
 #: Half window and regularisation of the guided filter (He et al. 2013). [px, grey levels²]
 WINDOW, SOFTNESS = 4, 100.0
 #: What the measured value is favoured by. [grey levels]
-FAVOUR = 0.1
+FAVOUR = 0.05
 
 
 def sharpen(frame: Frame, relief: Float32Array, lever: float) -> Float32Array:

@@ -10,8 +10,12 @@ from bifocal import rays
 from bifocal.solvers.dense.frame import Float32Array, Frame, zoom_map
 from photocore.arrays import BoolArray, ByteArray
 
-#: Weight of smoothness; OpenCV ships 20, walls are smoother (30 measured best on rendered ones).
-ALPHA = 30.0
+#: Weight of smoothness; 30 is as good before noise is taken out, 20 keeps more detail for it.
+ALPHA = 20.0
+#: Weight of constant grey value, against 10 for constant gradient.
+DELTA = 10.0
+#: Stride of the inverse search's patches: 2 is a little better and half as quick again. [px]
+STRIDE, FINE_STRIDE = 3, 2
 #: The pyramid starts this many halvings down: the seed replaces what lies above.
 COARSEST = 3
 #: Window and limits of the local error across the radius. [px]
@@ -41,7 +45,7 @@ class Measurement:
 
 
 def seeded_flow(
-    first: ByteArray, second: ByteArray, seed: Float32Array, *, finest: int
+    first: ByteArray, second: ByteArray, seed: Float32Array, *, finest: int, stride: int = STRIDE
 ) -> Float32Array:
     """Return the displacement of every pixel of one image in the other, (height, width, 2). [px]
 
@@ -52,6 +56,8 @@ def seeded_flow(
         First displacement; kept.
     finest : int
         0 runs to full resolution, 1 to half of it.
+    stride : int
+        Between patches. [px]
 
     Notes
     -----
@@ -63,11 +69,13 @@ def seeded_flow(
     flow = cv2.DISOpticalFlow.create(cv2.DISOPTICAL_FLOW_PRESET_MEDIUM)
     flow.setFinestScale(finest)
     flow.setVariationalRefinementAlpha(ALPHA)
+    flow.setVariationalRefinementDelta(DELTA)
+    flow.setPatchStride(stride)
     flow.setCoarsestScale(max(COARSEST, finest))
     return np.asarray(flow.calc(first, second, np.ascontiguousarray(seed)), dtype=np.float32)
 
 
-def measure(frame: Frame, coarse: Float32Array, *, finest: int) -> Measurement:
+def measure(frame: Frame, coarse: Float32Array, *, stride: int = STRIDE) -> Measurement:
     """Match both photos and return the relief of the pixels of photo 1."""
     import cv2
 
@@ -77,9 +85,9 @@ def measure(frame: Frame, coarse: Float32Array, *, finest: int) -> Measurement:
     x = np.arange(width, dtype=np.float32)[None, :]
     y = np.arange(height, dtype=np.float32)[:, None]
     flow = seeded_flow(
-        frame.image1, frame.image2, np.dstack([columns - x, rows - y]), finest=finest
+        frame.image1, frame.image2, np.dstack([columns - x, rows - y]), finest=0, stride=stride
     )
-    loop = _loop(frame, flow, finest=finest)
+    loop = _loop(frame, flow)
     relief, across = split(frame, flow)
     rms = cv2.blur(np.minimum(across * across, CLIP * CLIP), (WINDOW, WINDOW))
     return Measurement(
@@ -113,7 +121,7 @@ def sigma_of_relief(frame: Frame, relief: Float32Array, sigma_px: Float32Array) 
     return np.asarray(np.abs(rate) * sigma_px / reach, dtype=np.float32)
 
 
-def _loop(frame: Frame, flow: Float32Array, *, finest: int) -> Float32Array:
+def _loop(frame: Frame, flow: Float32Array) -> Float32Array:
     """Return how far a pixel lands from itself after the flow there and back. [px]"""
     import cv2
 
@@ -122,7 +130,7 @@ def _loop(frame: Frame, flow: Float32Array, *, finest: int) -> Float32Array:
     y = np.arange(height, dtype=np.float32)[:, None]
     there = (flow[..., 0] + x, flow[..., 1] + y)
     seed = _turned_round(flow)
-    back = seeded_flow(frame.image2, frame.image1, seed, finest=max(finest, 1))
+    back = seeded_flow(frame.image2, frame.image1, seed, finest=1)
     moved = cv2.remap(back, *there, cv2.INTER_LINEAR, borderValue=(1e3, 1e3))
     away: Float32Array = np.hypot(flow[..., 0] + moved[..., 0], flow[..., 1] + moved[..., 1])
     return away

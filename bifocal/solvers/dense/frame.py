@@ -80,37 +80,69 @@ def common_bounds(
     GeometryError
         If the photos have no common area on the plane.
     """
-    first = _footprint(pair.image1, shapes[0])
-    other = pair.image2.pixels_from_plane(first)
-    height, width = shapes[1][:2]
-    with np.errstate(invalid="ignore"):
-        inside = np.asarray(((other > -1) & (other < [width, height])).all(-1))
-    # The inverse homography also answers for plane points behind the camera: look back.
-    back = pair.image2.plane_from_pixels(np.where(inside[:, None], other, 0.0))
-    inside &= np.abs(back - first).max(-1) < 1e-3 * pair.image2.distance
-    if inside.sum() < 4:
+    places = []
+    for one, other, shape, across in (
+        (pair.image1, pair.image2, shapes[0], shapes[1]),
+        (pair.image2, pair.image1, shapes[1], shapes[0]),
+    ):
+        footprint = _footprint(one, shape)
+        places.append(footprint[_shows(other, across, footprint)])
+    both = np.concatenate(places)
+    if len(both) < 4:
         raise GeometryError(
             "the two photos have no common area on the reference plane: check that they show the "
             "same wall and that the pair file belongs to them."
         )
-    low, high = first[inside].min(0), first[inside].max(0)
+    (x_min, y_min), (x_max, y_max) = both.min(0).tolist(), both.max(0).tolist()
+    return x_min, y_min, x_max, y_max
+
+
+def zoomed_box(
+    pair: Pair, shape2: tuple[int, ...], box: tuple[float, float, float, float], relief: float
+) -> tuple[float, float, float, float]:
+    """Return a box grown to where photo 2 shows what stands out by a relief, as far as it does."""
+    d1, d2 = pair.image1.distance, pair.image2.distance
+    factor = d2 * (d1 - relief) / (d1 * (d2 - relief))
+    corners = np.array([[box[0], box[1]], [box[2], box[3]]])
+    grown = pair.zoom_centre + (corners - pair.zoom_centre) * factor
+    footprint = _footprint(pair.image2, shape2)
+    low = np.minimum(corners[0], np.maximum(grown[0], footprint.min(0)))
+    high = np.maximum(corners[1], np.minimum(grown[1], footprint.max(0)))
     return float(low[0]), float(low[1]), float(high[0]), float(high[1])
 
 
-def _footprint(photo: Photo, shape: tuple[int, ...]) -> FloatArray:
-    """Return plane positions of a raster of a photo's pixels, without its very oblique part."""
+def _shows(photo: Photo, shape: tuple[int, ...], places: FloatArray) -> BoolArray:
+    """Return which plane positions a photo shows, to a pixel."""
+    pixels = photo.pixels_from_plane(places)
     height, width = shape[:2]
-    columns = np.linspace(-0.5, width - 0.5, 65)
-    rows = np.linspace(-0.5, height - 0.5, 65)
-    pixels = np.stack(np.meshgrid(columns, rows), axis=-1).reshape(-1, 2)
-    places = photo.plane_from_pixels(pixels)
-    size = np.sqrt(np.abs(np.linalg.det(photo.metres_per_pixel(pixels))))
-    finest = native_gsd(photo, shape)
-    sign = np.sign(np.linalg.det(photo.metres_per_pixel(pixels)))
-    same_side = sign == np.sign(np.median(sign))
     with np.errstate(invalid="ignore"):
-        good = np.isfinite(places).all(-1) & (size < COARSEST_SHARE * finest) & same_side
-    return places[good]
+        inside = ((pixels > -1) & (pixels < [width, height])).all(-1)
+    return np.asarray(inside & _in_front(photo, shape, places))
+
+
+def _footprint(photo: Photo, shape: tuple[int, ...]) -> FloatArray:
+    """Return plane positions of a raster of a photo's pixels, without its very oblique part.
+
+    The raster is coarse inside and dense along the frame, where the common area ends.
+    """
+    height, width = shape[:2]
+    sides = []
+    for across, down in ((33, 33), (1025, 2), (2, 1025)):
+        columns, rows = (
+            np.linspace(-0.5, width - 0.5, across),
+            np.linspace(-0.5, height - 0.5, down),
+        )
+        sides.append(np.stack(np.meshgrid(columns, rows), axis=-1).reshape(-1, 2))
+    pixels = np.concatenate(sides)
+    places = photo.plane_from_pixels(pixels)
+    determinant = np.linalg.det(photo.metres_per_pixel(pixels))
+    middle = np.array([[(width - 1) / 2, (height - 1) / 2]])
+    sign = np.sign(np.linalg.det(photo.metres_per_pixel(middle)))
+    limit = (COARSEST_SHARE * native_gsd(photo, shape)) ** 2
+    with np.errstate(invalid="ignore"):
+        good = np.isfinite(places).all(-1) & (determinant * sign > 0)
+        good &= np.abs(determinant) < limit
+    return places[good & _in_front(photo, shape, places)]
 
 
 def working_grid(
@@ -174,8 +206,8 @@ def as_grey(image: NDArray[np.generic], name: str) -> ByteArray:
         return array
     if array.shape[2] == 1:
         return np.ascontiguousarray(array[..., 0])
-    code = cv2.COLOR_RGB2GRAY if array.shape[2] == 3 else cv2.COLOR_RGBA2GRAY
-    return np.asarray(cv2.cvtColor(array, code), dtype=np.uint8)
+    # The plain mean of the channels has less noise than the luminance, which is mostly green.
+    return np.asarray(cv2.transform(array[..., :3], np.full((1, 3), 1 / 3)), dtype=np.uint8)
 
 
 def _on_grid(photo: Photo, image: ByteArray, grid: Grid) -> tuple[ByteArray, BoolArray]:

@@ -7,7 +7,7 @@ import numpy as np
 from bifocal.solvers.dense.frame import Float32Array
 
 #: Half windows, small to large. [px]
-WINDOWS = (3, 8)
+WINDOWS = (8, 16)
 
 
 def shrink_noise(relief: Float32Array, sigma: Float32Array) -> Float32Array:

@@ -19,7 +19,9 @@ from bifocal.solvers.dense.frame import (
     make_frame,
     native_gsd,
     working_grid,
+    zoomed_box,
 )
+from bifocal.solvers.dense.radiometry import match_exposure
 from bifocal.solvers.dense.registration import Registration, check_registration
 from photocore.arrays import BoolArray, ByteArray
 from photocore.console import Progress, no_progress
@@ -29,8 +31,10 @@ Bounds = tuple[float, float, float, float]
 
 #: Coarsening of the working frame, and the most pixels it may have.
 QUALITIES = {"fast": (2.0, 3.2e6), "standard": (1.0, 9e6), "best": (1.0, 30e6)}
+#: Working frames of fewer pixels can afford the finer search.
+SMALL = 3e6
 #: Limits of a validated pixel: across the radius and there and back. [px]
-ACROSS_LIMIT, LOOP_LIMIT = 0.5, 0.6
+ACROSS_LIMIT, LOOP_LIMIT = 0.5, 0.8
 #: A measured relief is known better than this share of d2.
 SIGMA_SHARE = 0.01
 #: Relief maps of more pixels than this are refused: a unit has been mistaken.
@@ -148,8 +152,10 @@ def dense_relief(
     frame = make_frame(pair, grey1, grey2, work)
     progress(0.1, 1.0, "First relief")
     coarse, _ = seed.coarse_relief(frame, relief_range)
+    frame = match_exposure(frame, coarse)
     progress(0.2, 1.0, "Matching")
-    found = flow.measure(frame, coarse, finest=0)
+    small = quality != "fast" and work.width * work.height < SMALL
+    found = flow.measure(frame, coarse, stride=flow.FINE_STRIDE if small else flow.STRIDE)
     registration = check_registration(frame, found)
     progress(0.7, 1.0, "Edges")
     source, usable = _surfaces(frame, found, relief_range)
@@ -206,9 +212,11 @@ def _grids(
     fine = max(native * factor, np.sqrt(area / most), step / 2)
     if factor == 1.0 and fine < 1.01 * native:
         fine = native
-    work = working_grid(pair, images[0].shape, reach, fine)
+    wide = zoomed_box(pair, images[1].shape, reach, min(high, 0.6 * pair.image2.distance))
+    work = working_grid(pair, images[0].shape, wide, fine)
     if bounds is None and fine == native and gsd is None:
-        return work, work  # the map's pixels are those of the working frame
+        # The map's pixels are those of the working frame.
+        return working_grid(pair, images[0].shape, common, fine), work
     return Grid.from_bounds(box, gsd=max(step, fine)), work
 
 

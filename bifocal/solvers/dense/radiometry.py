@@ -1,0 +1,91 @@
+"""Exposure of photo 2 brought to that of photo 1, for matching only; no picture is changed."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import cv2
+import numpy as np
+
+from bifocal.solvers.dense.frame import Float32Array, Frame, zoom_map
+from photocore.arrays import ByteArray, FloatArray
+
+#: Grey values outside are clipped or dark noise and do not take part.
+DARKEST, BRIGHTEST = 12.0, 243.0
+#: Exposures that agree to this are left alone. [grey levels]
+WORTHWHILE = 1.0
+#: Pixels on a side of the comparison.
+SAMPLES = 160
+
+
+def match_exposure(frame: Frame, coarse: Float32Array) -> Frame:
+    """Return the frame with photo 2 exposed like photo 1.
+
+    Parameters
+    ----------
+    frame : Frame
+    coarse : ndarray of float32
+        First relief: says which pixels show the same. [m]
+
+    Notes
+    -----
+    ``log I1 = a + b x + c y + d (x² + y²) + e log I2``, robustly fitted to a few thousand blurred
+    pixels: gain, a gradient, vignetting and gamma. Only smooth differences are taken out, so no
+    texture is made or lost.
+    """
+    height, width = frame.grid.shape
+    x, y = _unit(width, height)
+    step_x, step_y = max(1, width // SAMPLES), max(1, height // SAMPLES)
+    part = (slice(step_y // 2, None, step_y), slice(step_x // 2, None, step_x))
+    relief = cv2.resize(coarse, (width, height), interpolation=cv2.INTER_LINEAR)
+    columns, rows = (axis[part] for axis in zoom_map(frame, relief))
+    first = cv2.blur(frame.image1, (9, 9))[part].astype(np.float64)
+    blurred = cv2.blur(frame.image2, (9, 9))
+    columns, rows = np.ascontiguousarray(columns), np.ascontiguousarray(rows)
+    second = cv2.remap(blurred, columns, rows, cv2.INTER_LINEAR).astype(np.float64)
+    content = cv2.remap(frame.seen2.astype(np.uint8), columns, rows, cv2.INTER_NEAREST) > 0
+    use = content & frame.seen1[part]
+    for grey in (first, second):
+        use &= (grey > DARKEST) & (grey < BRIGHTEST)
+    if use.sum() < 200:
+        return frame
+    # Vignetting belongs to photo 2's own pixels, so the terms are taken at its positions.
+    u, v = columns[use] / width * 2 - 1, rows[use] / height * 2 - 1
+    solution = _robust(_terms(u, v, np.log(second[use])), np.log(first[use]))
+    table = np.log(np.maximum(np.arange(256), 0.5))
+    change = np.abs(np.exp(_terms(u, v, np.log(second[use])) @ solution) - second[use])
+    if np.median(change) < WORTHWHILE:
+        return frame
+    smooth = np.exp(
+        solution[0] + solution[1] * x + solution[2] * y + solution[3] * (x * x + y * y)
+    ).astype(np.float32)
+    curve = np.exp(solution[4] * table).astype(np.float32)
+    exposed = np.clip(np.rint(curve[frame.image2] * smooth), 0, 255)
+    return replace(frame, image2=_bytes(exposed))
+
+
+def _bytes(values: np.ndarray) -> ByteArray:
+    """Return values as 8-bit."""
+    return values.astype(np.uint8)
+
+
+def _unit(width: int, height: int) -> tuple[FloatArray, FloatArray]:
+    """Return coordinates from -1 to 1, shapes (1, width) and (height, 1)."""
+    x = np.arange(width)[None, :] / width * 2 - 1
+    y = np.arange(height)[:, None] / height * 2 - 1
+    return x, y
+
+
+def _terms(u: np.ndarray, v: np.ndarray, log_grey: np.ndarray) -> FloatArray:
+    """Return the design matrix."""
+    return np.column_stack([np.ones_like(u), u, v, u * u + v * v, log_grey])
+
+
+def _robust(design: FloatArray, wanted: FloatArray) -> FloatArray:
+    """Return the solution of least absolute deviations by reweighting."""
+    weight: np.ndarray = np.ones(len(wanted))
+    solution = np.zeros(design.shape[1])
+    for _ in range(12):
+        solution = np.linalg.lstsq(design * weight[:, None], wanted * weight, rcond=None)[0]
+        weight = 1 / np.sqrt(np.maximum(np.abs(wanted - design @ solution), 0.01))
+    return np.asarray(solution)
