@@ -30,6 +30,8 @@ _TEXT, _FLAG = ("id", "code", "note"), ("use",)
 _SHARED = {"x1": "x", "y1": "y", "x2": "x", "y2": "y"} | {
     "col1": "col", "row1": "row", "col2": "col", "row2": "row"
 }  # fmt: skip
+#: Headings of image coordinates in other programs: i counts columns, j rows.
+_OTHER = {"col1": "i", "row1": "j", "col2": "i", "row2": "j"}
 _FAR_NEAR = {"1": ("far", "lontana", "fern"), "2": ("near", "vicina", "nah")}
 _TO_MM = {"mm": 1.0, "cm": 10.0, "um": 1e-3, "m": 1000.0}
 _TO_M = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "dm": 0.1}
@@ -100,22 +102,22 @@ class ReadOptions:
     visible_only: bool = False
 
 
-def point_columns(*, shared: bool = False) -> list[Column]:
+def point_columns(*, shared: Sequence[str] = ()) -> list[Column]:
     """Return the columns of measured points with every heading that is understood.
 
     Parameters
     ----------
-    shared : bool
-        Also take the headings "x y x y" and "col row col row" for photos 1 and 2. Tables of points
-        often hold X and Y on the wall too, so this is tried only where nothing else fits.
+    shared : sequence of str
+        Keys that also take the headings "x y x y" or "col row col row" of photos 1 and 2. Tables
+        of points often hold X and Y on the wall too, so this is tried where nothing else fits.
     """
     keys = ("id", *_XY, *_POLAR, *_PIXELS, *_FLAG, "code", "note", "r_measured")
     columns = []
     for key in keys:
         names = [name for name in COLUMNS.get(key, ("", "", "", ""))[1:] if name]
         names += ALIASES.get(key, ())
-        if shared and key in _SHARED:
-            names.append(_SHARED[key])
+        if key in shared:
+            names += [_SHARED[key], *([_OTHER[key]] if key in _OTHER else [])]
         if key in _PIXELS:
             axis = "x" if key.startswith("col") else "y"
             names += [f"{axis} {word} px" for word in _FAR_NEAR[key[-1]]]
@@ -198,7 +200,8 @@ def _read_points(book: SheetFile | CsvFile, options: ReadOptions, errors: list[C
     # In the workbook of a general pair x1..y2 are formulas that follow from the raw pixels.
     general = isinstance(book, SheetFile) and is_general(book)
     followed = {*_XY, *_POLAR} if general else set()
-    for shared in (False, True):
+    for shared in ((), _PIXELS, _XY):
+        last = shared == _XY
         found: list[CellError] = []
         try:
             table = read_table(
@@ -212,10 +215,11 @@ def _read_points(book: SheetFile | CsvFile, options: ReadOptions, errors: list[C
                 errors=found,
             )
         except InputError:
-            if shared:
+            if last:
                 raise
             continue
-        if shared or table.present & {*_XY, *_PIXELS, "s1", "s2"}:
+        given = table.present & {*_XY, *_PIXELS, "s1", "s2"}
+        if last or (given and (not shared or table.present.issuperset(shared))):
             break
     errors += found
     for key in followed:

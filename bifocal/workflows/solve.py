@@ -21,7 +21,7 @@ from bifocal.solvers.check_points import check_points
 from bifocal.solvers.georeference import georeference
 from bifocal.solvers.point_survey import solve_ideal, solve_pair
 from bifocal.solvers.setup_check import SetupCheck, check_setup
-from bifocal.workflows.units import refuse_wrong_unit
+from bifocal.workflows.units import refuse_millimetres, refuse_pixels, refuse_wrong_unit
 from photocore.arrays import FloatArray
 from photocore.errors import GeometryError, InputError
 
@@ -241,7 +241,9 @@ def _solve_general(
     exchanged = bool(pair.remarks)
     if exchanged:
         points = points.exchanged()
-    points = _as_pixels(pair, points, survey)
+    unit = str(options.setup.get("unit") or survey.unit or values.unit or "mm")
+    points = _as_pixels(pair, points, survey, unit)
+    refuse_millimetres(pair, points, _where(survey))
     sigma = options.sigma_px or values.sigma_px
     own = any(photo.sigma_pixel for photo in (pair.image1, pair.image2))
     if sigma is None and not own:
@@ -286,12 +288,14 @@ _TOO_FEW_PLANE_POINTS = (
 )
 
 
-def _as_pixels(pair: Pair, points: PointObservations, survey: SurveyInput) -> PointObservations:
+def _as_pixels(
+    pair: Pair, points: PointObservations, survey: SurveyInput, unit: str
+) -> PointObservations:
     """Return the points with raw pixels for every kind of input."""
     missing = ~points.has_pixels
     xy = points.is_cartesian & missing
     if xy.any():
-        if survey.unit == "px":
+        if unit == "px":
             pixels1, pixels2 = points.xy1, points.xy2
         else:
             pixels1, pixels2 = _pixels_of_mm(pair, points.xy1, points.xy2, survey)
@@ -337,6 +341,7 @@ def _pixels_of_mm(
                 f'add "principal_distance" [mm] to {key} in the pair file, or give pixels '
                 "(col1 row1 col2 row2)."
             )
+        refuse_pixels(xy, float(c), _where(survey))
         pixels.append(photo.pixels_from_plane(photo.nadir + xy * photo.distance / float(c)))
     return pixels[0], pixels[1]
 

@@ -5,7 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from bifocal.domain.observations import PointObservations
+from bifocal.domain.pair import Pair
 from bifocal.domain.setup import SurveySetup
+from photocore.arrays import FloatArray
 from photocore.errors import InputError
 
 #: No lens sees further to the side than this many principal distances (72 degrees off axis).
@@ -73,3 +75,39 @@ def refuse_wrong_unit(
                 f"{where}: all points lie within {reach:.3g} mm of the nadir: the coordinates look "
                 f"like millimetres, while {place} says px. Set the input unit to mm."
             )
+
+
+def refuse_pixels(xy: FloatArray, c: float, where: str) -> None:
+    """Refuse coordinates said to be in mm that no lens of principal distance c [mm] can see.
+
+    Raises
+    ------
+    InputError
+        Saying that they look like pixels.
+    """
+    known = np.abs(xy[~np.isnan(xy)])
+    if known.size and np.median(known) > WIDEST * c:
+        raise InputError(
+            f"{where}: coordinates of {np.median(known):.4g} mm lie outside any photo of principal "
+            f"distance {c:g} mm: they look like pixels. Head the columns col1 row1 col2 row2, or "
+            "say --unit px."
+        )
+
+
+def refuse_millimetres(pair: Pair, points: PointObservations, where: str) -> None:
+    """Refuse raw pixels that all lie in the corner of photos whose nadir is far from it.
+
+    Raises
+    ------
+    InputError
+        Saying that they look like millimetres.
+    """
+    pixels = np.hstack([points.pixels1, points.pixels2])[points.use]
+    if not np.isfinite(pixels).any() or float(np.nanmax(np.abs(pixels))) > CORNER_PX:
+        return
+    nadirs = [photo.pixels_from_plane(photo.nadir) for photo in (pair.image1, pair.image2)]
+    if np.nanmax(np.abs(nadirs)) > 2 * CORNER_PX:
+        raise InputError(
+            f"{where}: no pixel coordinate exceeds {np.nanmax(np.abs(pixels)):.4g} px: they look "
+            "like millimetres. Give raw pixels, or head the columns x1 [mm] ... y2 [mm]."
+        )

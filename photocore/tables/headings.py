@@ -305,12 +305,19 @@ def _without_heading(
     numeric = [number for key, number in fixed.items() if kinds[key] in ("number", "integer")]
     match = Match(columns=fixed, first=candidates[0] if candidates else 1, score=(len(fixed), 0, 1))
     previous: Mapping[int, Value] = {}
+
+    def count(row: int) -> int:
+        """Return how many numbers a row holds; none where a text stands among them."""
+        values = [grid.rows[row][number] for number in numeric if number in grid.rows[row]]
+        numbers = [v for v in values if not isinstance(v, str) or take_apart(v) is not None]
+        return len(numbers) if len(numbers) == len(values) else 0
+
+    # Headings may hold numbers too (that of the photo above x and y), but fewer than data do.
+    usual = max((count(row) for row in candidates[:50]), default=0)
     for row in candidates:
         cells = grid.rows[row]
-        values = [cells[number] for number in numeric if number in cells]
-        numbers = [v for v in values if not isinstance(v, str) or take_apart(v) is not None]
         lonely = len(cells) == 1 and len(numeric) > 1
-        if not numeric or (numbers and len(numbers) == len(values) and not lonely):
+        if not numeric or (count(row) and 2 * count(row) > usual and not lonely):
             match.first = row
             match.header = row - 1 if previous and not lonely else 0
             break

@@ -314,6 +314,55 @@ def test_millimetres_typed_where_pixels_are_expected(tmp_path):
     refused(fill(tmp_path / "s.xlsx", setup=setup), "look like millimetres")
 
 
+def test_millimetres_typed_as_raw_pixels_of_a_pair(tmp_path):
+    pair = write_pair(tmp_path / "wall.pair.json")
+    text = "id,col1,row1,col2,row2\n" + "\n".join(",".join(map(str, row)) for row in rows(POINTS))
+    points = write_csv(tmp_path / "p.csv", text)
+    refused(points, "look like millimetres", options=("--pair", pair))
+
+
+def test_pixels_typed_as_millimetres_of_a_pair(tmp_path):
+    pair = write_pair(
+        tmp_path / "w.pair.json", image1_principal_distance=35, image2_principal_distance=19
+    )
+    text = pixel_rows().replace("col1 [px],row1 [px],col2 [px],row2 [px]", "x1,y1,x2,y2")
+    points = write_csv(tmp_path / "p.csv", text)
+    refused(points, "look like pixels", options=("--pair", pair))
+    answer, _ = solved(points, "--pair", pair, "--unit", "px")
+    assert by_id(answer)["P1"]["r"] == pytest.approx(1.0, abs=1e-9)
+
+
+def test_two_heading_rows_and_shared_headings_are_understood(tmp_path):
+    lines = pixel_rows().splitlines()[1:]
+    text = "Nr;588;;589;\n;i;j;i;j\n" + "\n".join(lines).replace(",", ";")
+    pair = write_pair(tmp_path / "wall.pair.json")
+    answer, _ = solved(write_csv(tmp_path / "p.csv", text), "--pair", pair)
+    assert by_id(answer)["P1"]["r"] == pytest.approx(1.0, abs=1e-9)
+    text = "id,x,y,x,y\n" + "\n".join(",".join(map(str, row)) for row in rows(POINTS))
+    options = ("--d1", 17.5, "--d2", 9.5, "--c1", 35, "--c2", 19)
+    answer, _ = solved(write_csv(tmp_path / "q.csv", text), *options)
+    assert by_id(answer)["P2"]["r"] == pytest.approx(0.5, abs=1e-9)
+
+
+@pytest.mark.skipif("BIFOCAL_DATA" not in os.environ, reason="BIFOCAL_DATA is not set")
+def test_workbooks_as_found_are_read(tmp_path):
+    folder = Path(os.environ["BIFOCAL_DATA"]) / "spreadsheets"
+    pair = write_pair(tmp_path / "wall.pair.json")
+    two_rows, _ = solved(folder / "two_row_header_empty_sheets.xlsx", "--pair", pair)
+    assert len(two_rows["points"]) == 230
+    columns = "x1=A,y1=B,x2=C,y2=D"
+    blocks, _ = solved(
+        folder / "photo_number_rows.xlsx", "--columns", columns, "--unit", "px", "--pair", pair
+    )
+    assert len(blocks["points"]) == 8
+    options = ("--d1", 17.5, "--d2", 9.5)
+    repeated, _ = solved(folder / "repeated_column_names.xlsx", *options)
+    assert len(repeated["points"]) == 22
+    # Map coordinates are no radial distances; that each bad cell is named shows they were read.
+    columns = ("--columns", "id,s1,s2")
+    refused(folder / "no_header_xy.xlsx", "pontos23!B7 (s1)", options=(*columns, *options))
+
+
 def test_pixels_without_nadir_points(tmp_path):
     setup = {**SETUP, "input_unit": "px", "pitch": 0.0074}
     refused(fill(tmp_path / "s.xlsx", setup=setup), "nadir_1_col")
