@@ -27,8 +27,9 @@ INNER = 256
 #: Elements per call of the kernel, shared among the threads.
 OUTER = 1 << 18
 
-#: Below this the numpy kernel has finished before the compiled one is loaded (half a second).
-WORTHWHILE = 5_000_000
+#: Below this the numpy kernel has finished before the compiled one is ready: half a second from
+#: numba's cache, three when it is compiled for the first time.
+WORTHWHILE = 50_000_000
 
 _Kernel = Callable[
     [FloatArray, FloatArray, BoolArray, FloatArray, FloatArray, int, FloatArray, BoolArray], None

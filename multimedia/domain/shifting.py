@@ -32,7 +32,7 @@ def radial_shift(
         The media, any number and order.
     compiled : bool, optional
         Whether to use the machine code of the extra ``fast`` (``pip install "bifocal[fast]"``), on
-        all cores. By default where it is installed and pays: five million points and more.
+        all cores. By default where it is installed and pays: fifty million points and more.
 
     Returns
     -------
