@@ -162,7 +162,7 @@ def write_shift_csv(
     columns: dict[str, object] = {"id": list(points.ids)}
     with_xy = not np.isnan(points.xy).all()
     if with_xy:
-        columns |= {"X": points.xy[:, 0], "Y": points.xy[:, 1]}
+        columns |= {"X": points.xy[:, 0], "Y": points.xy[:, 1], "Z": 0.0 - points.depth}
     columns |= {"R": points.radius, "ZP": points.depth, "Rbar": result.radius_bar}
     columns["dR"] = result.radius_bar - points.radius
     if with_xy:

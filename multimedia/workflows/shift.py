@@ -37,6 +37,9 @@ class ShiftReport:
         points = [
             {
                 "id": name,
+                "X": self.points.xy[i, 0],
+                "Y": self.points.xy[i, 1],
+                "Z": 0.0 - self.points.depth[i],
                 "R": self.points.radius[i],
                 "ZP": self.points.depth[i],
                 "Rbar": self.result.radius_bar[i],

@@ -34,7 +34,7 @@ def test_csv_in_csv_out(points: Path, tmp_path: Path) -> None:
     result = run("shift", points, *TANK, "--out", out)
     assert result.exit_code == 0, result.stderr
     lines = out.read_text(encoding="utf-8").splitlines()
-    assert lines[0] == "id,X,Y,R,ZP,Rbar,dR,Xbar,Ybar,flag"
+    assert lines[0] == "id,X,Y,Z,R,ZP,Rbar,dR,Xbar,Ybar,flag"
     row = dict(zip(lines[0].split(","), lines[1].split(","), strict=True))
     # Camera 0.5 m above the glass; R = 0.5 (3-4-5), depth 0.2.
     exact = float(radial_shift(0.5, z0=0.5, zp=0.2, layers=LAYERS))
