@@ -112,12 +112,14 @@ def points_of(table: Table, nadir: tuple[float, float]) -> tuple[ShiftPoints, li
     x, y, z = (table.numbers(key) for key in ("X", "Y", "Z"))
     radius, depth = table.numbers("R").copy(), table.numbers("ZP").copy()
     from_xy, from_z = np.isnan(radius), np.isnan(depth)
-    radius[from_xy] = np.hypot(x - nadir[0], y - nadir[1])[from_xy]
+    off_nadir = np.hypot(x - nadir[0], y - nadir[1])
+    radius[from_xy] = off_nadir[from_xy]
     depth[from_z] = -z[from_z]
     every = np.stack([x, y, z, table.numbers("R"), table.numbers("ZP")])
     rows: list[int] = np.flatnonzero(~np.isnan(every).all(axis=0)).tolist()
     errors: list[CellError] = []
     for row in rows:
+        errors += _contradictions(table, row, (radius[row], off_nadir[row]), (depth[row], -z[row]))
         if np.isnan(radius[row]):
             key = "R" if "R" in table.present else "X"
             errors.append(table.error(row, key, "is blank; give X and Y, or R."))
@@ -148,6 +150,23 @@ def points_of(table: Table, nadir: tuple[float, float]) -> tuple[ShiftPoints, li
         xy=np.stack([x, y], axis=-1)[rows],
     )
     return points, rows
+
+
+def _contradictions(
+    table: Table, row: int, radii: tuple[float, float], depths: tuple[float, float]
+) -> list[CellError]:
+    """Return a complaint where a point is given in both ways and they differ."""
+    found = []
+    for key, other, (given, follows) in (("R", "X, Y and the camera", radii), ("ZP", "Z", depths)):
+        if abs(given - follows) > 1e-6 * max(abs(given), abs(follows)):
+            found.append(
+                table.error(
+                    row,
+                    key,
+                    f"found {given:.9g}, but {follows:.9g} follows from {other}; clear one of them.",
+                )
+            )
+    return found
 
 
 def write_shift_csv(

@@ -203,3 +203,14 @@ def test_a_table_without_coordinates_is_refused(tmp_path: Path) -> None:
     result = run("shift", path, *TANK, "--json")
     assert result.exit_code == 1
     assert "needs the columns X, Y, Z" in result.stderr
+
+
+def test_a_result_shifted_again_with_another_camera_is_refused(
+    points: Path, tmp_path: Path
+) -> None:
+    out = tmp_path / "out.csv"
+    assert run("shift", points, *TANK, "--out", out).exit_code == 0
+    assert run("shift", out, *TANK, "--json").exit_code == 0
+    other = run("shift", out, *TANK[:4], "--camera", "0,0,0.51", "--json")
+    assert other.exit_code == 1
+    assert "E2 (R): found 0.5, but 0.707106781 follows from X, Y and the camera" in other.stderr
