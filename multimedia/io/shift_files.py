@@ -163,7 +163,7 @@ def _contradictions(
                 table.error(
                     row,
                     key,
-                    f"found {given:.9g}, but {follows:.9g} follows from {other}; clear one of them.",
+                    f"found {given:.9g}, but {follows:.9g} follows from {other}; clear one.",
                 )
             )
     return found
