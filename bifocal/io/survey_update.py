@@ -124,12 +124,6 @@ def _result(value: CellValue) -> CellValue:
     return "" if value is None else value
 
 
-def _headings(editor: WorkbookEditor, area: TableArea) -> dict[str, int]:
-    top, left, _, right = area.area
-    cells = editor.grid(area.sheet).rows.get(top, {})
-    return {str(cells[column]): column for column in range(left, right + 1) if column in cells}
-
-
 def _table(
     editor: WorkbookEditor,
     built: BookBuilder,
@@ -141,7 +135,7 @@ def _table(
     area, content = editor.table(name), built.tables[name]
     if area is None:
         return
-    headings = _headings(editor, area)
+    headings = area.headings()
     first = area.area[0] + 1
     for column in content.columns:
         if column.key not in headings or column.kind == "input":
@@ -165,7 +159,7 @@ def _fixed_table(editor: WorkbookEditor, built: BookBuilder, name: str, key: str
     area, content = editor.table(name), built.tables[name]
     if area is None:
         return
-    headings = _headings(editor, area)
+    headings = area.headings()
     given = content.cells[key]
     grid = editor.grid(area.sheet).rows
     if key not in headings or _length(area) != len(given):
@@ -203,7 +197,7 @@ def _log(editor: WorkbookEditor, content: SurveyContent) -> None:
     area = editor.table("tblLog")
     if area is None or not content.log:
         return
-    headings = _headings(editor, area)
+    headings = area.headings()
     entry: Mapping[str, str] = dict(
         zip(("time", "program", "what", "file", "sha256"), content.log[-1], strict=True)
     )

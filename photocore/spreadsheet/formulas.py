@@ -21,8 +21,8 @@ _RANGE = re.compile(
     r"(?P<c1>\$?[A-Z]{1,3})(?P<r1>\$?\d+):(?P<c2>\$?[A-Z]{1,3})(?P<r2>\$?\d+)(?![\w(])"
 )
 _AREA = re.compile(r"[A-Z]{1,3}\d{1,7}(:[A-Z]{1,3}\d{1,7})?")
-#: The row of a cell, but not a number within a name.
-_ROW_NUMBER = re.compile(r"(?<![\w.'])(\$?[A-Z]{1,3}\$?)\d+(?![\w.!'(])")
+#: A cell without its sheet; all are alike when only sheets, tables and names matter.
+_ANY_CELL = re.compile(r"(?<![\w.'$])\$?[A-Z]{1,3}\$?\d+(?![\w.!'(])")
 #: Functions whose result may depend on any cell, whatever their text names.
 _FAR_REACHING = re.compile(r"\b(INDIRECT|OFFSET|CELL|INFO)\s*\(", re.IGNORECASE)
 
@@ -141,7 +141,7 @@ class References:
         return re.compile("|".join(words), re.IGNORECASE)
 
     def _formulas(self, sheet: Sheet) -> str:
-        """Return the formulas of a sheet as one text, those that differ in their row only once."""
+        """Return the formulas of a sheet as one text, those that differ only in cells once."""
         pieces: list[str] = []
         shapes: set[str] = set()
         inside = False
@@ -153,7 +153,7 @@ class References:
         def end(name: str) -> None:  # noqa: ARG001
             nonlocal inside
             if inside:
-                shapes.add(_ROW_NUMBER.sub(r"\1", "".join(pieces)))
+                shapes.add(_ANY_CELL.sub("#", "".join(pieces)))
                 pieces.clear()
             inside = False
 
