@@ -53,7 +53,8 @@ Examples:
     "--cameras",
     type=click.Path(path_type=Path),
     metavar="FILE",
-    help="Table id,X,Y,Z of projection centres [m]: rigorous correction of X, Y and Z. "
+    help="Table id,X,Y,Z of projection centres [m], or a project .toml: rigorous correction of X, "
+    "Y and Z. "
     "[default: none, every point as if seen from straight above]",
 )
 @click.option(

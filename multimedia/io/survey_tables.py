@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from multimedia.io.project_file import read_project
 from photocore.arrays import FloatArray
 from photocore.errors import CellError, InputError, WorkbookError
 from photocore.tables import Column, Table, read_table
@@ -51,13 +52,19 @@ class RayTable:
 
 
 def read_camera_positions(path: Path | str) -> CameraPositions:
-    """Read a table ``id, X, Y, Z`` of projection centres (.csv, .xlsx, .ods).
+    """Read a table ``id, X, Y, Z`` of projection centres (.csv, .xlsx, .ods), or a project file.
 
     Raises
     ------
     InputError
         If a column or a coordinate is missing, or a name stands twice.
     """
+    if Path(path).suffix.lower() == ".toml":
+        cameras = read_project(path).cameras
+        return CameraPositions(
+            ids=tuple(camera.name for camera in cameras),
+            centres=np.array([camera.centre for camera in cameras]),
+        )
     name = Column("id", ("camera", "image", "photo", "label", "name", "file"), kind="text")
     table = read_table(path, (name, *_XYZ))
     errors = table.repeated("id")

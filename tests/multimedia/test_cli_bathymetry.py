@@ -282,6 +282,20 @@ def test_cameras_correct_a_cloud_in_all_three_coordinates(tmp_path: Path) -> Non
     assert (table["sigma_Z"][true[:, 2] < LEVEL] > 1e-3).all()
 
 
+def test_cameras_may_come_from_a_project_file(tmp_path: Path) -> None:
+    from multimedia.io.project_file import write_project
+    from multimedia.io.survey_tables import read_camera_positions
+
+    cameras = tuple(
+        mm.Camera.from_angles(centre, 0.0, 0.0, 0.0, principal_distance=35.0, name=f"c{k}")
+        for k, centre in enumerate(CENTRES)
+    )
+    write_project(tmp_path / "rig.toml", mm.Project(cameras=cameras))
+    found = read_camera_positions(tmp_path / "rig.toml")
+    assert found.ids == ("c0", "c1", "c2", "c3", "c4")
+    np.testing.assert_array_equal(found.centres, CENTRES)
+
+
 @pytest.mark.parametrize("road", ["column", "table", "angle"])
 def test_only_the_cameras_that_saw_a_point_are_used(tmp_path: Path, road: str) -> None:
     true = positions(30)
