@@ -64,10 +64,8 @@ def main() -> None:
         assert (found.status == 0).all()
         assert miss < 1e-10
         per = 1e6 / count
-        print(
-            f"                {name:18s} {per * (middle - start):7.2f} us {per * (end - middle):9.2f} us"
-            f"  {miss:.1e} mm"
-        )
+        inverse, forward = per * (middle - start), per * (end - middle)
+        print(f"{'':16s}{name:18s} {inverse:7.2f} us {forward:9.2f} us  {miss:.1e} mm")
         if name == "parallel planes":
             radius = np.hypot(points[:, 0], points[:, 1])
             start = time.process_time()
@@ -77,9 +75,7 @@ def main() -> None:
             traced_shift = (510 - points[:, 2]) * np.hypot(*heading[:, :2].T) / -heading[:, 2]
             worst = np.abs(traced_shift / shift - 1).max()
             assert worst < 1e-12
-            print(
-                f"                {'(radial shift)':18s} {per * seconds:7.3f} us   agrees to {worst:.1e}"
-            )
+            print(f"{'':16s}{'(radial shift)':18s} {per * seconds:7.2f} us, agrees to {worst:.1e}")
 
 
 if __name__ == "__main__":
