@@ -31,10 +31,52 @@ def least_time_path(
 
     All surfaces must be planes that separate start and end.
     """
-    planes = [surface for surface in interfaces.surfaces if isinstance(surface, Plane)]
+    every = [surface for surface in interfaces.surfaces if isinstance(surface, Plane)]
+    kept = _apart(every, starts, ends)
+    planes = [every[number] for number in kept]
+    media = [0, *(number + 1 for number in kept)]
+    crossings, directions, good = _least_time(
+        starts, ends, planes, np.array(interfaces.indices)[media]
+    )
+    if len(kept) == len(every):
+        return crossings, directions, good
+    # Media of no thickness: the crossing is that of the next surface, Snell gives the direction.
+    at = np.searchsorted(kept, np.arange(len(every)))
+    full = np.empty((len(starts), len(every) + 1, 3))
+    full[:, media] = directions
+    for number in sorted(set(range(len(every) + 1)) - set(media)):
+        before = directions[:, at[number - 1]]
+        ratio = interfaces.indices[media[at[number - 1]]] / interfaces.indices[number]
+        normal = every[number - 1].normal
+        along = before @ normal
+        across = ratio * (before - along[:, None] * normal)
+        with np.errstate(invalid="ignore"):
+            up = np.copysign(np.sqrt(1 - (across * across).sum(-1)), along)
+        full[:, number] = across + up[:, None] * normal
+    return crossings[:, at], full, good
+
+
+def _apart(planes: list[Plane], starts: FloatArray, ends: FloatArray) -> list[int]:
+    """Return the last of each group of planes that coincide: no medium lies between those."""
+    size = float(np.abs(starts - ends).max(initial=0.0))
+    kept = []
+    for number, plane in enumerate(planes):
+        following = planes[number + 1] if number + 1 < len(planes) else None
+        if (
+            following is None
+            or abs(plane.normal @ following.normal) < 1 - 1e-15
+            or abs(float(plane.side(following.point))) > 1e-15 * size
+        ):
+            kept.append(number)
+    return kept
+
+
+def _least_time(
+    starts: FloatArray, ends: FloatArray, planes: list[Plane], indices: FloatArray
+) -> tuple[FloatArray, FloatArray, BoolArray]:
+    """Do the same for planes that lie apart."""
     count, total = len(planes), len(starts)
     bases = np.stack([_basis(plane.normal) for plane in planes])  # (k, 2, 3)
-    indices = np.array(interfaces.indices)
     scale = np.linalg.norm(ends - starts, axis=-1) + 1e-300
     crossings = np.empty((total, count, 3))
     for number, plane in enumerate(planes):
@@ -45,7 +87,7 @@ def least_time_path(
     for _ in range(MOST_STEPS):
         corners = _corners(starts[rows], crossings[rows], ends[rows])
         gradient, hessian, time = _time(corners, bases, indices, scale[rows])
-        step = -np.linalg.solve(hessian, gradient[..., None])[..., 0].reshape(-1, count, 2)
+        step = -_solve(hessian, gradient).reshape(-1, count, 2)
         move = np.einsum("nka,kai->nki", step, bases)
         slope = (gradient.reshape(step.shape) * step).sum((-1, -2))
         share = np.ones(len(rows))
@@ -83,6 +125,18 @@ def least_time_path(
         along = np.abs(directions[:, leg] @ plane.normal) < GRAZING
         good &= ~(touches & runs & along)
     return crossings, directions, np.asarray(good)
+
+
+def _solve(hessian: FloatArray, gradient: FloatArray) -> FloatArray:
+    """Solve stacked systems whose rows differ by many orders: scaled to a unit diagonal first."""
+    square = np.diagonal(hessian, axis1=-2, axis2=-1)
+    # A leg seen exactly end on has no stiffness left after rounding.
+    diagonal = np.sqrt(np.where(square > 0, square, square.max(-1, keepdims=True)))
+    scaled = hessian / (diagonal[:, :, None] * diagonal[:, None, :])
+    scaled += 1e-15 * np.eye(diagonal.shape[-1])
+    solution = np.linalg.solve(scaled, (gradient / diagonal)[..., None])[..., 0]
+    result: FloatArray = solution / diagonal
+    return result
 
 
 def _corners(starts: FloatArray, crossings: FloatArray, ends: FloatArray) -> FloatArray:

@@ -265,9 +265,10 @@ def _attempts(path: Interfaces) -> Iterator[Callable[[FloatArray, FloatArray], _
     yield partial(_by_stages, path=path, stages=1)
     if all(isinstance(surface, Plane) for surface in path.surfaces):
         yield partial(_by_least_time, path=path)
-        return
     for stages in STAGES:
         yield partial(_by_stages, path=path, stages=stages)
+    if all(isinstance(surface, Plane) for surface in path.surfaces):
+        return
     # Waves leave a few points whose straight start lies across a crest.
     for ring in RINGS:
         for bearing in range(RING_STARTS):
