@@ -79,12 +79,17 @@ def _print(found: Resected) -> None:
     from multimedia.workflows.cameras import resected_as_dict
 
     for camera in resected_as_dict(found)["cameras"]:
+        sigma0 = f"{camera['sigma0_um']:.3f} um" if camera["redundancy"] else "unknown"
         click.echo(
-            f"{camera['name']}: sigma0 {camera['sigma0_um']:.3f} um, {camera['points']} points, "
+            f"{camera['name']}: sigma0 {sigma0}, {camera['points']} points, "
             f"redundancy {camera['redundancy']}, {camera['iterations']} iterations"
         )
         rows = [
-            (name, f"{camera[name]:.8g}", f"{camera['sigma'][name]:.2g}")
+            (
+                name,
+                f"{camera[name]:.8g}",
+                f"{camera['sigma'][name]:.2g}" if camera["redundancy"] else "unknown",
+            )
             for name in camera["estimated"]
         ]
         click.echo(text_table(("parameter", "value", "sigma"), rows))

@@ -21,6 +21,7 @@ from multimedia.io.openptv_files import (
     read_camera,
     read_control,
     read_correspondences,
+    read_manual,
     read_targets,
 )
 from photocore.arrays import FloatArray, IntArray
@@ -30,6 +31,8 @@ from photocore.output import atomic_folder
 
 #: OpenPTV's usual places, in the order of search.
 _PARAMETERS = ("", "parameters", "parametersRun1", "parametersMultiPlane")
+#: A text file with fewer lines of four numbers is no calibration body.
+_FEWEST = 6
 _BODIES = ("target_on_a_side.txt", "calblock.txt", "calibration_target.txt", "target_file.txt")
 
 
@@ -48,6 +51,8 @@ class Experiment:
         frame found; empty without one.
     frame_targets : tuple of Targets or None
         Detections of that frame.
+    manual : tuple of (list of str, ndarray)
+        Points clicked by hand in each calibration image: ids and pixels; may be empty.
     """
 
     project: Project
@@ -55,6 +60,7 @@ class Experiment:
     particles: FloatArray
     particle_targets: IntArray
     frame_targets: tuple[Targets | None, ...]
+    manual: tuple[tuple[list[str], FloatArray], ...] = ()
 
 
 def read_experiment(folder: Path | str, *, swap_indices: bool = False) -> Experiment:
@@ -106,6 +112,7 @@ def read_experiment(folder: Path | str, *, swap_indices: bool = False) -> Experi
         particles=particles,
         particle_targets=numbers,
         frame_targets=frame,
+        manual=_manual(roots, len(cameras), remarks),
     )
 
 
@@ -310,8 +317,36 @@ def _body(roots: Sequence[Path], remarks: list[str]) -> tuple[ObjectPoints, str]
         if path is not None:
             ids, xyz = read_body(path)
             return ObjectPoints(ids=tuple(ids), xyz=xyz), path.name
+    for root in roots:
+        for path in sorted([*root.glob("*.txt"), *(root / "cal").glob("*.txt")]):
+            try:
+                ids, xyz = read_body(path)
+            except InputError:
+                # Some other text; the next may be the body.
+                continue
+            if len(ids) >= _FEWEST:
+                return ObjectPoints(ids=tuple(ids), xyz=xyz), path.name
     remarks.append("no calibration body (cal_ori.par names it) was found: no object points.")
     return ObjectPoints(), ""
+
+
+def _manual(
+    roots: Sequence[Path], cameras: int, remarks: list[str]
+) -> tuple[tuple[list[str], FloatArray], ...]:
+    """Return the points clicked by hand in each calibration image, if they were kept."""
+    points, pixels = _find(roots, "man_ori.par"), _find(roots, "man_ori.dat")
+    if points is None or pixels is None:
+        return ()
+    try:
+        ids, places = read_manual(points, pixels)
+    except InputError as error:
+        # Only a help for poor start values: an experiment is complete without it.
+        remarks.append(f"left out: {error}")
+        return ()
+    each = len(ids) // cameras
+    return tuple(
+        (ids[k * each : (k + 1) * each], places[k * each : (k + 1) * each]) for k in range(cameras)
+    )
 
 
 def _targets(roots: Sequence[Path], names: Sequence[str], field: int) -> Targets | None:

@@ -202,6 +202,31 @@ def read_body(path: Path) -> tuple[list[str], FloatArray]:
     return ids, np.array(points)
 
 
+def read_manual(points: Path, pixels: Path) -> tuple[list[str], FloatArray]:
+    """Read man_ori.par and man_ori.dat: the points clicked by hand in all calibration images.
+
+    Returns
+    -------
+    ids : list of str
+        Numbers of the control points, those of the first camera first.
+    pixels : ndarray, shape (n, 2)
+        Their columns and rows.
+
+    Raises
+    ------
+    InputError
+        If the two files do not belong together.
+    """
+    ids = _text(points).split()
+    values = np.array([_float(pixels, w, "man_ori") for w in _text(pixels).split()])
+    if values.size != 2 * len(ids):
+        raise InputError(
+            f"{pixels}: holds {values.size} numbers for the {len(ids)} points of {points.name}; "
+            "expected column and row of each."
+        )
+    return ids, values.reshape(-1, 2)
+
+
 def read_correspondences(path: Path) -> tuple[FloatArray, IntArray]:
     """Read an rt_is file: positions, shape (n, 3) [mm], and target numbers, shape (n, cameras).
 

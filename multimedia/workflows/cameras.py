@@ -125,6 +125,7 @@ def intersect_project(
         ]
     columns = {"id": list(ids), **columns}
     summary += _check(project, list(ids), xyz)
+    remarks = [*remarks, *_suspicious(project, columns["status"])]
     _write(out, columns, units, overwrite)
     return Table(columns=columns, remarks=(*project.remarks, *remarks), summary=tuple(summary))
 
@@ -224,6 +225,11 @@ def resect_project(
             camera, control, image, project.interface_of(k), estimate=estimate, sigma=sigma
         )
         results[camera.name] = result
+        if result.redundancy == 0:
+            remarks.append(
+                f"{camera.name}: {len(known)} points just determine {len(result.names)} "
+                "parameters; nothing checks them, and no precision can be given."
+            )
         used[camera.name] = tuple(objects.ids[at] for _, at in known)
         adjusted[k] = result.camera
         suspects = [
@@ -313,6 +319,18 @@ def _images(project: Project, points: Path | None) -> tuple[ImagePoints, list[st
     if not project.image_points.ids:
         raise InputError("the project names no image_points; give a table with --points.")
     return project.image_points, []
+
+
+def _suspicious(project: Project, status: Sequence[str]) -> list[str]:
+    """Return a guess why most points failed."""
+    good = sum(text == PointStatus.OK.label for text in status)
+    if 2 * good >= len(status):
+        return []
+    hints = ["were the cameras oriented (`multimedia resect`)?"]
+    angles = np.array([camera.angles for camera in project.cameras])
+    if (np.abs(np.degrees(angles)) < 3.2).all() and np.any(angles):
+        hints.append("are the angles of the project file in radians? It wants degrees.")
+    return [f"{len(status) - good} of {len(status)} points fail: " + " Or ".join(hints)]
 
 
 def _check(project: Project, ids: list[str], xyz: FloatArray) -> list[str]:

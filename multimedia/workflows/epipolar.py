@@ -15,6 +15,7 @@ from multimedia.io.epipolar_picture import draw_epipolar
 from multimedia.io.point_tables import write_columns
 from multimedia.io.project_file import read_project
 from multimedia.solvers.epipolar import epipolar_candidates, epipolar_curve
+from multimedia.solvers.intersection import intersect_pairs
 from photocore.arrays import FloatArray
 from photocore.errors import InputError
 from photocore.output import check_writable
@@ -113,6 +114,10 @@ def epipolar_project(
             f"{other} cannot see the whole ray of {', '.join(lost[:SHOWN])}: is the depth range "
             "on the object's side of the interface?"
         )
+    image_pairs = np.stack([image[near.curves], targets[near.targets]])
+    exact = intersect_pairs(
+        (first, second), image_pairs, (project.interface_of(one), project.interface_of(two))
+    )[0]
     candidates = [
         {
             "id": names[curve],
@@ -123,7 +128,7 @@ def epipolar_project(
             "Z": point[2],
         }
         for curve, target, distance, point in zip(
-            near.curves, near.targets, near.distance, near.points, strict=True
+            near.curves, near.targets, near.distance, exact, strict=True
         )
     ]
     if out is not None:

@@ -8,12 +8,15 @@ from pathlib import Path
 
 import numpy as np
 
+from multimedia.domain.camera import Camera
 from multimedia.domain.project import ImagePoints, Project
 from multimedia.io.openptv import Experiment, particle_points, read_experiment, write_experiment
 from multimedia.io.openptv_files import Targets
 from multimedia.io.project_file import read_project, write_project
+from multimedia.solvers.resection import resect
 from multimedia.solvers.target_matching import FIRST_RADIUS, match_targets
 from photocore.arrays import FloatArray
+from photocore.errors import PhotogrammetryError
 from photocore.output import check_writable
 
 #: Fewer control points than this cannot be called matched.
@@ -111,13 +114,19 @@ def _control(
     camera, body = project.cameras[k], project.object_points
     if targets is None or not body.ids or camera.sensor is None:
         return [], np.empty((0, 2))
-    best = _matched(project, k, targets, least_pixels, radius)
-    if (best >= 0).sum() < _FEWEST and least_pixels > 1:
-        remarks.append(
-            f"{camera.name}: hardly any of the targets of {least_pixels} px and more is a control "
-            "point; all targets were tried."
-        )
-        best = _matched(project, k, targets, 1, radius)
+    best = _matched(project, camera, k, targets, least_pixels, radius)
+    others = [(camera, 1, f"targets below {least_pixels} px were needed too.")]
+    if (best >= 0).sum() < 0.5 * len(body.ids):
+        clicked = _from_clicks(experiment, k)
+        if clicked is not None:
+            said = "started from the points clicked by hand (man_ori)."
+            others += [(clicked, size, said) for size in (least_pixels, 1)]
+    for start, size, said in others:
+        again = _matched(project, start, k, targets, size, radius)
+        # A few more may be noise that happens to lie near; a better start finds many.
+        if (again >= 0).sum() > 1.1 * (best >= 0).sum():
+            best = again
+            remarks.append(f"{camera.name}: {said}")
     seen = np.flatnonzero(best >= 0)
     if len(seen) < _FEWEST:
         remarks.append(
@@ -132,13 +141,33 @@ def _control(
     return [body.ids[row] for row in seen], image
 
 
+def _from_clicks(experiment: Experiment, k: int) -> Camera | None:
+    """Return the camera oriented from the points clicked by hand, None where that fails."""
+    project = experiment.project
+    camera, body = project.cameras[k], project.object_points
+    if not experiment.manual or camera.sensor is None:
+        return None
+    ids, pixels = experiment.manual[k]
+    place = np.array(body.rows(ids), dtype=np.int64)
+    known = place >= 0
+    try:
+        found = resect(
+            camera, body.xyz[place[known]], camera.sensor.image_from_pixel(pixels[known]),
+            project.interface_of(k),
+        )  # fmt: skip
+    except PhotogrammetryError:
+        # Clicks of another image, or too few: the stored orientation remains.
+        return None
+    return found.camera
+
+
 def _matched(
-    project: Project, k: int, targets: Targets, least_pixels: int, radius: float
+    project: Project, camera: Camera, k: int, targets: Targets, least_pixels: int, radius: float
 ) -> np.ndarray[tuple[int, ...], np.dtype[np.int64]]:
     """Return the target of each control point in the file's numbering, -1 for none."""
     large = np.flatnonzero(targets.counts >= least_pixels)
     found = match_targets(
-        project.cameras[k],
+        camera,
         project.object_points.xyz,
         targets.pixels[large],
         project.interface_of(k),

@@ -125,7 +125,7 @@ def test_epipolar_lists_candidates_and_draws_them(tank, tmp_path):
     found = json.loads(result.stdout)
     own = [c for c in found["candidates"] if c["target"] == "P5"]
     assert own[0]["distance"] < 5e-4
-    assert own[0]["Z"] == pytest.approx(POINTS[5, 2], abs=1.0)
+    assert own[0]["Z"] == pytest.approx(POINTS[5, 2], abs=1e-9)
     assert picture.read_bytes()[1:4] == b"PNG"
     assert len(table.read_text().splitlines()) == 1 + len(found["curves"][0]["image"])
     run("epipolar", tank, "--camera", "cam1", "--to", "cam3", "--at", "640,512")
@@ -191,3 +191,24 @@ def test_bad_input_is_one_message_and_status_1(tank, words, message):
 def test_wrong_usage_is_status_2(tank):
     run("epipolar", tank, "--camera", "cam1", "--to", "cam2", "--at", "middle", status=2)
     run("intersect", tank, "--method", "guess", status=2)
+
+
+def test_as_many_parameters_as_coordinates_leave_no_precision_and_that_is_said(tank):
+    table = tank.with_name("tank_image_points.csv")
+    lines = table.read_text().splitlines()
+    table.write_text("\n".join([lines[0], *lines[1:4]]) + "\n")
+    result = run("resect", tank, "--camera", "cam1")
+    assert "nothing checks them" in result.stderr
+    assert "sigma0 unknown" in result.stdout
+    assert "nan" not in result.stdout
+
+
+def test_radians_in_a_project_file_are_suspected(tank):
+    text = tank.read_text()
+    for name in ("omega", "phi", "kappa"):
+        text = re.sub(
+            rf"{name} = ([-\d.e]+)", lambda m, n=name: f"{n} = {np.radians(float(m[1]))!r}", text
+        )
+    tank.write_text(text.replace("np.float64(", "").replace(")", ""))
+    result = run("intersect", tank)
+    assert "in radians?" in result.stderr

@@ -273,3 +273,39 @@ def test_openptvs_scale_is_a_longer_principal_distance(tmp_path, tank_project):
     points = tank_project.object_points.xyz
     want = 1.01 * project(plain, points, tank_project.media["wall1"])
     assert np.abs(project(camera, points, tank_project.media["wall1"]) - want).max() < 1e-12
+
+
+def test_points_clicked_by_hand_replace_a_useless_orientation(tank_project, tmp_path):
+    folder = tmp_path / "exp"
+    write_experiment(folder, tank_project)
+    for camera in tank_project.cameras:
+        angles = " ".join(f"{v:.16g}" for v in camera.angles)
+        path = folder / "cal" / f"{camera.name}.tif.ori"
+        words = path.read_text().split()
+        turned = replace(camera, rotation=camera.rotation @ np.diag([-1.0, -1.0, 1.0]))
+        words[3:6] = [f"{v:.16g}" for v in turned.angles]
+        words[6:15] = [f"{v:.12f}" for v in turned.rotation.ravel()]
+        path.write_text(" ".join(words))
+        assert angles not in path.read_text()
+    assert max(import_openptv(folder, out=None).matched) < 25
+    rows = [0, 9, 19, 29]
+    clicks = [
+        tank_project.cameras[k]
+        .sensor.pixel_from_image(tank_project.image_points.image[50 * k : 50 * k + 50][rows])
+        .round()
+        for k in range(4)
+    ]
+    (folder / "parameters" / "man_ori.par").write_text("\n".join(["1", "10", "20", "30"] * 4))
+    np.savetxt(folder / "man_ori.dat", np.concatenate(clicks))
+    found = import_openptv(folder, out=None)
+    assert found.matched == (50,) * 4
+    assert any("clicked by hand" in remark for remark in found.project.remarks)
+
+
+def test_a_calibration_body_of_any_name_is_found(tank_project, tmp_path):
+    folder = tmp_path / "exp"
+    write_experiment(folder, tank_project)
+    (folder / "cal" / "calblock.txt").rename(folder / "cal" / "dots of 2019.txt")
+    (folder / "cal" / "a note.txt").write_text("made on a Monday\n")
+    found = read_experiment(folder).project.object_points
+    assert found.xyz == pytest.approx(tank_project.object_points.xyz)
