@@ -205,7 +205,8 @@ def solve_pair(
         columns=columns,
         flags=_flags(radius, standardised, np.isnan(q), r, sigma_r, limit, flag_sigmas),
         standardised=standardised,
-        carried=dict(zip(names, values, strict=True)) | {"k_q": k_q, "k_r": k_r},
+        carried=dict(zip(names, values, strict=True))
+        | {"k_q": k_q, "k_r": k_r, "misfit_px": solved.misfit},
         image_scale=scale_number if own else None,
     )
 

@@ -158,7 +158,7 @@ def solve_file(path: Path | str, options: SolveOptions | None = None) -> Solutio
     else:
         geometry = _solve_ideal(points, survey, values, options, remarks)
     table = geometry.table
-    remarks += _point_remarks(geometry.points, table, geometry.is_pair)
+    remarks += _point_remarks(geometry.points, table, geometry.setup)
     check = check_points(table, survey.known, options.rules)
     if check.missing:
         remarks.append(f"Check: no measured point is called {', '.join(check.missing[:10])}.")
@@ -201,11 +201,6 @@ class _Solved:
     adjusted: bool = False
     exchanged: bool = False
     new_sigma: bool = False
-
-    @property
-    def is_pair(self) -> bool:
-        """Whether the points were raw pixels."""
-        return self.pair is not None
 
 
 def _where(survey: SurveyInput) -> str:
@@ -459,22 +454,23 @@ def _image_mm(setup: SurveySetup, points: PointObservations) -> tuple[FloatArray
     return first, second
 
 
-def _point_remarks(points: PointObservations, table: ReliefTable, is_pair: bool) -> list[str]:
-    """Return a sentence for each kind of point that needs a look."""
-    remarks = []
+def _point_remarks(
+    points: PointObservations, table: ReliefTable, setup: SurveySetup | None
+) -> list[str]:
+    """Return a sentence for each mispicked point, worst first, with the size of the miss."""
     flags = np.array(table.flags)
-    off = [i for i in np.flatnonzero(flags == "OFF-RADIAL") if points.use[i]]
+    off = [int(i) for i in np.flatnonzero(flags == "OFF-RADIAL") if points.use[i]]
     off.sort(key=lambda i: -abs(table.standardised[i]))
-    for i in off[:10]:
-        size = abs(float(table["q"][i]))
-        unit = "mm"
-        if is_pair and "k_q" in table.carried:
-            size, unit = abs(float(table.standardised[i])), "sigma"
-        remarks.append(
-            f"{points.ids[i]}: the two picks miss each other by {size:.3g} {unit} across the radius"
-            + (f" ({abs(table.standardised[i]):.1f} sigma)" if unit == "mm" else "")
-            + "; measure it again."
-        )
+    misses, unit = table["q"], "mm"
+    if "misfit_px" in table.carried:
+        misses, unit = table.carried["misfit_px"], "px"
+    elif setup is not None and setup.pitch is not None:
+        misses, unit = table["q"] / setup.pitch, "px"
+    remarks = [
+        f"{points.ids[i]}: the two picks miss each other by {abs(misses[i]):.3g} {unit} across the "
+        f"radius ({abs(table.standardised[i]):.1f} sigma); measure it again."
+        for i in off[:10]
+    ]
     if len(off) > 10:
         remarks.append(f"... and {len(off) - 10} more OFF-RADIAL points.")
     return remarks
