@@ -217,6 +217,40 @@ def test_plane_points_reveal_and_mend_a_wrong_scale(tmp_path):
     assert right["setup_check"]["adjusted"] is True
 
 
+def test_the_corrected_survey_solves_to_the_same_again(tmp_path):
+    plane = [(f"W{i}", x, y, 0) for i, (x, y) in enumerate([(4, 2), (-4, 2), (4, -2), (-4, -2)])]
+    table = [
+        (name, x1, y1, x2 * 1.004 + 0.02, y2 * 1.004, None, None, None, None, code)
+        for (name, x1, y1, x2, y2), code in zip(
+            rows([*POINTS, *plane]), [""] * 4 + ["PIANO"] * 4, strict=True
+        )
+    ]
+    out = tmp_path / "out.xlsx"
+    result = run("solve", fill(tmp_path / "s.xlsx", table), "--adjust-setup", "--out", out)
+    assert result.exit_code == 0, result.stderr
+    assert "the set-up was corrected" in result.stderr
+    answer, _ = solved(out)
+    for name, x, y, r in POINTS:
+        found = by_id(answer)[name]
+        assert [found["X"], found["Y"], found["r"]] == pytest.approx([x, y, r], abs=1e-6)
+
+
+def test_plane_points_mend_a_pair_file_too(tmp_path):
+    plane = [(f"W{i}", x, y, 0) for i, (x, y) in enumerate([(4, 2), (-4, 2), (4, -2), (-4, -2)])]
+    lines = pixel_rows([*POINTS, *plane]).splitlines()
+    codes = ["code", *[""] * 4, *["PLANE"] * 4]
+    text = "\n".join(f"{line},{code}" for line, code in zip(lines, codes, strict=True))
+    wrong = [[0.00503, 0, -7.5], [0, -0.00503, 5.0], [0, 0, 1]]
+    pair = write_pair(tmp_path / "w.pair.json", image2_plane_from_pixel=wrong)
+    points = write_csv(tmp_path / "p.csv", text)
+    answer, _ = solved(points, "--pair", pair)
+    assert abs(by_id(answer)["P4"]["r"]) > 0.02
+    answer, _ = solved(points, "--pair", pair, "--adjust-setup")
+    for name, x, y, r in POINTS:
+        found = by_id(answer)[name]
+        assert [found["X"], found["Y"], found["r"]] == pytest.approx([x, y, r], abs=1e-6)
+
+
 def test_adjusting_needs_plane_points(tmp_path):
     result = run("solve", fill(tmp_path / "s.xlsx"), "--adjust-setup")
     assert result.exit_code == 1

@@ -10,6 +10,7 @@ import numpy as np
 import openpyxl
 import pytest
 
+from bifocal.domain.lens import Lens
 from bifocal.domain.observations import PointObservations
 from bifocal.domain.pair import Pair, Photo
 from bifocal.domain.reference import KnownPoints
@@ -22,6 +23,7 @@ from bifocal.solvers.georeference import georeference
 from bifocal.solvers.point_survey import solve_ideal, solve_pair
 from bifocal.workflows.survey import write_template
 from photocore.errors import InputError
+from photocore.spreadsheet.lint import lint
 from tests.recalculate import recalculated
 
 ROOT = Path(__file__).parents[2]
@@ -152,7 +154,7 @@ def ideal_content(rows=40, model="levelled", **more):
     )
 
 
-def pair_content(rows=60, principal_distance=None):
+def pair_content(rows=60, principal_distance=None, lens=None):
     rng = np.random.default_rng(9)
     extra = {} if principal_distance is None else {"principal_distance": principal_distance}
     first = np.array([[4e-3, 2e-4, -6.0], [1e-4, -4e-3, 4.0], [5e-6, 2e-6, 1.0]])
@@ -161,7 +163,7 @@ def pair_content(rows=60, principal_distance=None):
         image1=Photo(
             plane_from_pixel=first, nadir=np.array([0.4, -0.3]), distance=18.0, extra=extra
         ),
-        image2=Photo(plane_from_pixel=second, nadir=np.array([-0.2, 0.5]), distance=9.0),
+        image2=Photo(plane_from_pixel=second, nadir=np.array([-0.2, 0.5]), distance=9.0, lens=lens),
     )
     xyz = np.column_stack(
         [rng.uniform(-5, 5, rows), rng.uniform(-3, 3, rows), rng.uniform(-1, 1, rows)]
@@ -208,6 +210,17 @@ def test_every_formula_recalculated_by_libreoffice_equals_the_library(model, tmp
 def test_formulas_of_a_general_pair_equal_the_library(principal_distance, tmp_path):
     write_book(tmp_path / "pair.xlsx", pair_content(principal_distance=principal_distance))
     assert assert_recalculated_equals_cached(tmp_path / "pair.xlsx", tmp_path) > 2000
+
+
+@pytest.mark.office
+def test_formulas_follow_pixels_freed_of_lens_distortion(tmp_path):
+    lens = Lens(
+        camera_matrix=np.array([[3000.0, 0, 1536], [0, 3000, 1024], [0, 0, 1]]),
+        coefficients=np.array([-0.1, 0.02, 0, 0]),
+        image_size=(3072, 2048),
+    )
+    write_book(tmp_path / "lens.xlsx", pair_content(lens=lens))
+    assert assert_recalculated_equals_cached(tmp_path / "lens.xlsx", tmp_path) > 2000
 
 
 @pytest.mark.office
@@ -267,6 +280,12 @@ def test_a_formula_as_point_name_comes_out_as_text(tmp_path):
     cell = openpyxl.load_workbook(tmp_path / "r.xlsx")["Points"]["A7"]
     assert cell.data_type == "s"
     assert cell.value == '=HYPERLINK("http://x")'
+
+
+@pytest.mark.parametrize("make", [ideal_content, pair_content])
+def test_results_have_no_fault_that_makes_excel_repair_them(make, tmp_path):
+    write_book(tmp_path / "r.xlsx", make())
+    assert lint(tmp_path / "r.xlsx") == []
 
 
 def test_other_endings_are_refused(tmp_path):
