@@ -314,13 +314,19 @@ def _without_heading(
 
     # Headings may hold numbers too (that of the photo above x and y), but fewer than data do.
     usual = max((count(row) for row in candidates[:50]), default=0)
+    sparse = 0
     for row in candidates:
         cells = grid.rows[row]
         lonely = len(cells) == 1 and len(numeric) > 1
         if not numeric or (count(row) and 2 * count(row) > usual and not lonely):
-            match.first = row
-            match.header = row - 1 if previous and not lonely else 0
+            match.first = sparse or row
+            match.header = row - 1 if previous and not sparse else 0
             break
+        if count(row) and not lonely:
+            # Without headings below it, this is a point that is measured in part only.
+            sparse = sparse or row
+        elif any(isinstance(cells.get(number), str) for number in numeric):
+            sparse = 0
         previous = cells
     for key, number in fixed.items():
         above = grid.rows.get(match.first - 1, {}).get(number, "")

@@ -324,6 +324,14 @@ def test_the_same_heading_twice_needs_a_letter(book):
     assert read_table(path, POLAR, column_map={"s1": "D"}).numbers("s1").tolist() == [3.0]
 
 
+def test_a_first_point_measured_in_one_photo_only_is_kept_where_there_are_no_headings(book):
+    columns = (Column("id", kind="text"), *map(Column, ("x1", "y1", "x2", "y2")))
+    path = book([("P1", 1, 2, None, None), ("P2", 1, 2, 3, 4)])
+    table = read_table(path, columns, column_map=parse_column_map("id,x1,y1,x2,y2"))
+    assert table.texts("id") == ["P1", "P2"]
+    assert np.isnan(table.numbers("x2")[0])
+
+
 def test_a_column_map_names_headings_or_letters():
     assert parse_column_map("s1=my column, S2=C", ("s1", "s2")) == {"s1": "my column", "s2": "C"}
     with pytest.raises(InputError, match='no column "s3"; known are s1, s2'):
@@ -399,6 +407,12 @@ class TestSampleWorkbooks:
         assert table.blocks == ["27"] * 4 + ["28"] * 4
         assert table.numbers("x1").tolist()[3:5] == [15338.0, 7365.0]
         assert table.cell(4, "x1") == "A8"
+
+    def test_headings_above_columns_given_by_letter_are_passed_over(self, data_dir):
+        path = data_dir / "spreadsheets/two_row_header_empty_sheets.xlsx"
+        table = read_table(path, self.XY, column_map=parse_column_map("id,x1,y1,x2,y2"))
+        assert len(table) == 230
+        assert table.cell(0, "x1") == "B3"
 
     def test_headings_in_two_rows_are_read_together(self, data_dir):
         columns = (Column("id", kind="text"), Column("row1"), Column("col2"), Column("X"))
