@@ -14,7 +14,7 @@ import numpy as np
 
 from multimedia.io.clouds import CHUNK, Chunk, Cloud, CloudWriter
 from photocore.arrays import FloatArray
-from photocore.errors import CellError, InputError
+from photocore.errors import CellError, InputError, WorkbookError
 
 #: Headings of each coordinate and of the columns other commands ask for.
 HEADINGS: dict[str, tuple[str, ...]] = {
@@ -101,10 +101,15 @@ class CsvCloud(Cloud):
             if self._headed:
                 next(rows)
             while piece := list(islice(rows, CHUNK)):
+                keys = [*"XYZ", *(key for key in numbers if key in self._columns)]
+                errors: list[CellError] = []
+                values = {key: self._floats(piece, key, errors) for key in keys}
+                if errors:
+                    raise WorkbookError(errors)
                 yield Chunk(
-                    xyz=np.column_stack([self._floats(piece, key) for key in "XYZ"]),
+                    xyz=np.column_stack([values.pop(key) for key in "XYZ"]),
                     raw=[cells for _, cells in piece],
-                    numbers={k: self._floats(piece, k) for k in numbers if k in self._columns},
+                    numbers=values,
                     texts={
                         k: [cells[self._columns[k]] for _, cells in piece]
                         for k in texts
@@ -127,19 +132,24 @@ class CsvCloud(Cloud):
         except (csv.Error, UnicodeDecodeError) as error:
             raise InputError(f"{self.path}: cannot be read as a text table ({error}).") from None
 
-    def _floats(self, piece: list[tuple[int, list[str]]], key: str) -> FloatArray:
+    def _floats(
+        self, piece: list[tuple[int, list[str]]], key: str, errors: list[CellError]
+    ) -> FloatArray:
+        """Return a column; cells that are no numbers are complained of and become NaN."""
         place = self._columns[key]
         values = [_number(cells[place], self._comma) for _, cells in piece]
-        for (number, cells), value in zip(piece, values, strict=True):
-            if value is None:
-                raise CellError(
-                    f"found {cells[place]!r}, expected a number"
-                    f"{' with a decimal comma' if self._comma else ''}. Mend the cell.",
-                    file=str(self.path),
-                    cell=f"row {number}",
-                    column=self._names[place],
-                )
-        return np.array(values, dtype=np.float64)
+        errors += [
+            CellError(
+                f"found {cells[place]!r}, expected a number"
+                f"{' with a decimal comma' if self._comma else ''}. Mend the cell.",
+                file=str(self.path),
+                cell=f"row {number}",
+                column=self._names[place],
+            )
+            for (number, cells), value in zip(piece, values, strict=True)
+            if value is None
+        ]
+        return np.array([np.nan if value is None else value for value in values])
 
     @contextmanager
     def writer(self, path: Path, extra: Sequence[str]) -> Iterator[CloudWriter]:

@@ -388,8 +388,12 @@ def _correct_dem(job: Job, progress: Progress) -> Outcome:
             atomic_path(job.target, overwrite=job.overwrite) as temporary,
             dem.writer(temporary, bands=bands, tags=tags) as write,
         ):
+            margin = 0  # widened when a window needs more, and kept for the next
             for number, window in enumerate(windows, start=1):
-                write(window, _correct_window(job, dem, window, surface, centres, outcome))
+                bands_of, margin = _correct_window(
+                    job, dem, window, surface, centres, outcome, margin
+                )
+                write(window, bands_of)
                 progress(number, len(windows), "DEM windows")
             outcome.judge(surface, allow_dry=job.allow_dry)
         outcome.remarks[:0] = dem.remarks
@@ -403,9 +407,9 @@ def _correct_window(
     surface: WaterSurface,
     centres: FloatArray | None,
     outcome: Outcome,
-) -> FloatArray:
-    """Return the bands of one window, shape (bands, height, width)."""
-    margin = 0
+    margin: int,
+) -> tuple[FloatArray, int]:
+    """Return the bands of one window, shape (bands, height, width), and the margin it took."""
     while True:
         wide = Window(
             window.column - margin,
@@ -457,7 +461,7 @@ def _correct_window(
             xyz=result.xyz[counted], depth=result.depth[counted], status=result.status[counted]
         ),
     )
-    return bands[:, *inner]
+    return bands[:, *inner], margin
 
 
 def _correct_rays(job: Job) -> Outcome:

@@ -499,8 +499,10 @@ def test_bad_clouds_are_refused_in_plain_words(tmp_path: Path) -> None:
     assert "cannot be read as LAS" in refused(tmp_path, tmp_path / "text.las")
     (tmp_path / "head.csv").write_text("id,X,Y\n1,2,3\n", encoding="utf-8")
     assert "no column for Z" in refused(tmp_path, tmp_path / "head.csv")
-    (tmp_path / "bad.csv").write_text("X,Y,Z\n1,2,101\n1,zwei,101\n", encoding="utf-8")
-    assert "row 3" in refused(tmp_path, tmp_path / "bad.csv")
+    (tmp_path / "bad.csv").write_text("X,Y,Z\n1,2,-\n1,zwei,101\n", encoding="utf-8")
+    message = refused(tmp_path, tmp_path / "bad.csv")
+    assert "row 2 (Z): found '-'" in message
+    assert "row 3 (Y): found 'zwei'" in message
     (tmp_path / "mm.csv").write_text("X [mm],Y [mm],Z [mm]\n1,2,101\n", encoding="utf-8")
     assert "is in mm" in refused(tmp_path, tmp_path / "mm.csv")
     (tmp_path / "none.csv").write_text("X,Y,Z\n", encoding="utf-8")

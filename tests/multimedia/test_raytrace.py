@@ -354,6 +354,21 @@ def test_impossible_surfaces_are_refused_in_plain_words(make, message) -> None:
         make()
 
 
+def test_a_flat_ray_stops_at_the_first_crest_it_meets() -> None:
+    steep = mm.WaveSurface.sinusoid(0.0, amplitude=2.0, wavelength=10.0, direction=np.pi / 2)
+    rng = np.random.default_rng(6)
+    starts = np.column_stack([rng.uniform(-5, 5, 200), np.zeros(200), np.full(200, 4.0)])
+    angles = np.radians(rng.uniform(8, 60, 200))
+    headings = np.column_stack([np.cos(angles), np.zeros(200), -np.sin(angles)])
+    path = mm.trace_rays(starts, headings, mm.Interfaces(surfaces=(steep,), indices=(1.0, 1.0)))
+    # Dense sampling along each ray: the first sample under the surface.
+    distance = np.arange(0, 45, 0.002)
+    for start, heading, vertex in zip(starts, headings, path.vertices[:, 0], strict=True):
+        along = start + distance[:, None] * heading
+        under = np.flatnonzero(along[:, 2] < steep.height_at(along[:, :2]))[0]
+        assert np.linalg.norm(vertex - start) == pytest.approx(distance[under], abs=0.0021)
+
+
 def golden_shifts() -> list[dict]:
     """Return the 50-digit radial shifts: housings, thin gaps, critical angles, grazing rays."""
     path = Path(__file__).parents[1] / "golden" / "radial_shift.json"
