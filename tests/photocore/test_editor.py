@@ -314,6 +314,20 @@ def test_many_rows_are_added_by_columns_and_read_back_to_the_bit(rich, tmp_path)
     assert sheet.rows[5004][4] == s2[-1] - s1[-1]
 
 
+def test_another_reader_sees_the_stored_results(rich, tmp_path):
+    import python_calamine
+
+    editor = WorkbookEditor(rich)
+    editor.append_rows("tblPoints", [{"id": "=P3", "s1": 0.1, "s2": 1 / 3}], [{"ds": 7 / 30}])
+    editor.set_results("Points", 3, {4: [0.5, math.nan], 5: ["text", 1e-9]})
+    editor.save(tmp_path / "out.xlsm")
+    book = python_calamine.CalamineWorkbook.from_path(tmp_path / "out.xlsm")
+    rows = book.get_sheet_by_name("Points").to_python()[-3:]
+    assert rows[0][:5] == ["P1", 12.5, 13.25, 0.5, "text"]
+    assert rows[1][4] == 1e-9
+    assert rows[2][:4] == ["=P3", 0.1, 1 / 3, 7 / 30]
+
+
 def test_blocks_and_typed_cells_meet_in_rows_that_exist_or_not():
     from photocore.spreadsheet.newrows import NewColumn, NewRows, RowFormula
 

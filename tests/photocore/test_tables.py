@@ -376,6 +376,19 @@ class TestSampleWorkbooks:
         Column("y2", ("y",)),
     )
 
+    def test_every_cell_is_what_another_reader_finds(self, data_dir):
+        for path in sorted((data_dir / "spreadsheets").glob("*.xlsx")):
+            opened = open_tables(path)
+            book = openpyxl.load_workbook(path, data_only=True)
+            assert opened.titles == book.sheetnames
+            for sheet in book:
+                expected = {
+                    (c.row, c.column): c.value for row in sheet for c in row if c.value is not None
+                }
+                rows = opened.grid(sheet.title).rows
+                found = {(r, c): value for r, cells in rows.items() for c, value in cells.items()}
+                assert found == expected
+
     def test_without_headings_the_columns_are_given_by_order(self, data_dir):
         columns = (Column("id", kind="text"), Column("X"), Column("Y"))
         path = data_dir / "spreadsheets/no_header_xy.xlsx"
