@@ -12,7 +12,6 @@ from bifocal.domain.pair import Pair
 from bifocal.domain.relief_map import Quality, ReliefMap
 from bifocal.solvers.dense import edges, flow, seed, smooth, splat
 from bifocal.solvers.dense.frame import (
-    Float32Array,
     Frame,
     as_grey,
     common_bounds,
@@ -161,7 +160,7 @@ def dense_relief(
     source, usable = _surfaces(frame, found, relief_range)
     progress(0.85, 1.0, "Relief map")
     layer = splat.to_plane(frame, source, usable, target)
-    _complete(frame, layer, target, coarse)
+    layer = _complete(frame, layer, target)
     progress(1.0, 1.0)
     return _resampled(layer, target, gsd, bounds, registration, work.gsd, pair, grey1)
 
@@ -263,14 +262,13 @@ def _surfaces(
     return layer, usable
 
 
-def _complete(frame: Frame, layer: splat.Layer, grid: Grid, coarse: Float32Array) -> None:
-    """Fill strips hidden from photo 1 from the surface behind (in place)."""
-    del coarse
-    holes = ~np.isfinite(layer.r)
-    nadir = frame.pair.image1.nadir
+def _complete(frame: Frame, layer: splat.Layer, grid: Grid) -> splat.Layer:
+    """Return the map with strips hidden from photo 1 filled from the surface behind."""
     # Holes outside what both photos see stay unknown.
-    seen = _cover(frame, grid)
-    splat.fill_outwards(layer, holes & seen, grid, nadir)
+    holes = ~np.isfinite(layer.r) & _cover(frame, grid)
+    splat.fill_outwards(layer, holes, grid, frame.pair.image1.nadir)
+    splat.fill_small(layer, holes)
+    return layer._replace(r=smooth.tidy_steps(layer.r))
 
 
 def _cover(frame: Frame, grid: Grid) -> BoolArray:

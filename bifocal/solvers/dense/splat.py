@@ -18,6 +18,8 @@ AGREEMENT = 4e-4
 STRETCH = 1.3
 #: Steps outwards when a hidden strip is filled; 2**LEAPS steps of LEAP pixels are the most.
 LEAP, LEAPS = 3, 7
+#: Holes are filled from their nearest neighbour up to this depth. [px]
+DEEPEST_HOLE = 30.0
 
 
 class Layer(NamedTuple):
@@ -227,3 +229,25 @@ def _close(top: Float32Array) -> Float32Array:
     import cv2
 
     return np.asarray(cv2.morphologyEx(top, cv2.MORPH_CLOSE, np.ones((3, 3), dtype=np.uint8)))
+
+
+def fill_small(layer: Layer, holes: BoolArray) -> None:
+    """Fill what is left of holes from the nearest known pixel, a few pixels deep (in place)."""
+    import cv2
+
+    if not holes.any():
+        return
+    unknown = ~np.isfinite(layer.r)
+    distance, label = cv2.distanceTransformWithLabels(
+        unknown.astype(np.uint8), cv2.DIST_L2, 5, labelType=cv2.DIST_LABEL_PIXEL
+    )
+    fill = holes & unknown & (distance <= DEEPEST_HOLE)
+    known = np.flatnonzero(~unknown)
+    if not len(known) or not fill.any():
+        return
+    source_of_label = np.zeros(int(label.max()) + 1, dtype=np.int64)
+    source_of_label[label.ravel()[known]] = known
+    source = source_of_label[label[fill]]
+    layer.r[fill] = layer.r.ravel()[source]
+    layer.sigma[fill] = 5 * layer.sigma.ravel()[source]
+    layer.quality[fill] = Quality.INTERPOLATED
