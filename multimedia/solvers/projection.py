@@ -118,10 +118,10 @@ def project(camera: Camera, points: ArrayLike, layers: Media = None) -> FloatArr
         vectors = (flat[part] - camera.centre) @ camera.rotation
         seen = vectors if medium is None else image_vectors(vectors, medium)
         _central(seen, camera, out=image[part])
-    if camera.distortion.is_identity:
-        image += camera.principal_point
-    else:
-        image = camera.distortion.measured(image, camera.principal_point)
+        if camera.distortion.is_identity:
+            image[part] += camera.principal_point
+        else:
+            image[part] = camera.distortion.measured(image[part], camera.principal_point)
     return image.reshape(*xyz.shape[:-1], 2)
 
 

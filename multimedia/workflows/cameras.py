@@ -330,7 +330,14 @@ def _suspicious(project: Project, status: Sequence[str]) -> list[str]:
     angles = np.array([camera.angles for camera in project.cameras])
     if (np.abs(np.degrees(angles)) < 3.2).all() and np.any(angles):
         hints.append("are the angles of the project file in radians? It wants degrees.")
-    return [f"{len(status) - good} of {len(status)} points fail: " + " Or ".join(hints)]
+    if sum(text == PointStatus.GROSS_ERROR.label for text in status) > good:
+        hints.append(
+            "do the media and lenses of the cameras contradict each other (`multimedia adjust`)? "
+            "Positions stored by OpenPTV are means of pairs of rays whatever the rays do: compare "
+            "them with --method pairs."
+        )
+    hints = [hint[0].upper() + hint[1:] for hint in hints]
+    return [f"{len(status) - good} of {len(status)} points fail. " + " Or: ".join(hints)]
 
 
 def _check(project: Project, ids: list[str], xyz: FloatArray) -> list[str]:

@@ -10,6 +10,7 @@ from scipy.optimize import least_squares
 
 from multimedia.domain.interfaces import Interfaces
 from multimedia.domain.point_status import PointStatus
+from multimedia.domain.surfaces import Plane, Sphere
 from multimedia.solvers.intersection import intersect, intersect_pairs, intersect_rays
 from multimedia.solvers.object_rays import image_rays
 from multimedia.solvers.projection import project
@@ -152,3 +153,22 @@ def test_wrong_shapes_one_camera_and_pixels_are_named():
         intersect(VIEWS, EXACT / 0.012 + 640, LAYERS)
     with pytest.raises(InputError, match="above zero"):
         intersect(VIEWS, EXACT, LAYERS, sigma=0.0)
+
+
+def test_points_through_a_wedge_of_glass_and_behind_domes_are_exact():
+    wedge = Interfaces(
+        surfaces=(
+            Plane(point=(0, 0, 10), normal=(0.02, 0.01, 1)),
+            Plane(point=(0, 0, 0), normal=(0, 0, 1)),
+        ),
+        indices=(1.0, 1.5, 1.337),
+    )
+    dome = Interfaces(
+        surfaces=tuple(Sphere(centre=(2, -1, 5), radius=r) for r in (80, 85)),
+        indices=(1.0, 1.5, 1.337), with_camera=(True, True),
+    )  # fmt: skip
+    media = [wedge, dome, wedge]
+    image = np.stack([project(c, POINTS[:8], m) for c, m in zip(VIEWS[:3], media, strict=True)])
+    found = intersect(VIEWS[:3], image, media)
+    assert np.abs(found.xyz - POINTS[:8]).max() < 1e-9
+    assert (found.status == PointStatus.OK).all()

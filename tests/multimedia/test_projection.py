@@ -10,6 +10,7 @@ from multimedia.domain.camera import EXTERIOR, INTERIOR, Camera
 from multimedia.domain.flat_interface import FlatInterface
 from multimedia.domain.interfaces import Interfaces
 from multimedia.domain.layers import Layers
+from multimedia.domain.shifting import radial_shift
 from multimedia.domain.surfaces import Sphere
 from multimedia.solvers.projection import project, project_with_jacobian, projection_status
 from photocore.distortion import NAMES, Brown, Convention
@@ -243,3 +244,16 @@ def test_a_point_beyond_the_critical_angle_of_a_dome_or_off_it_has_a_reason():
     status = projection_status(camera_of(q), [POINTS[0], (0, 0, 0.3)], as_surfaces(q))
     assert status[0] == "ok"
     assert "sides" in status[1]
+
+
+def test_the_radial_shift_makes_collinearity_a_multimedia_model():
+    """Maas 2015: move the point by R_bar / R from the nadir, then project as in one medium."""
+    camera, layers = camera_of(PLAIN), interface_of(PLAIN).layers
+    points = np.array(POINTS)
+    offset = points[:, :2] - camera.centre[:2]
+    radius = np.hypot(*offset.T)
+    z0 = camera.centre[2] - layers.thicknesses[0]
+    shifted = radial_shift(radius, z0=z0, zp=-points[:, 2], layers=layers)
+    moved = points.copy()
+    moved[:, :2] = camera.centre[:2] + offset * (shifted / radius)[:, None]
+    assert np.abs(project(camera, moved) - project(camera, points, layers)).max() < 1e-11
