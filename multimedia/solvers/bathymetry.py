@@ -33,8 +33,9 @@ from photocore.errors import GeometryError, InputError
 BLOCK_RAYS = 400_000
 #: Newton needs 3 to 5 steps.
 MOST_STEPS = 30
-#: A point is found when a step moves it by less than this share of the scene size.
-TOLERANCE = 1e-13
+#: A step of this share of the scene size is the last: convergence is quadratic, so its square is
+#: what is left. The slopes of rasters and meshes have kinks; there the step itself must vanish.
+LAST_STEP, LAST_STEP_KINKED = 3e-8, 1e-12
 #: Step of the differences for the index, and for the level as a share of the camera height.
 DIFFERENCE = 1e-5
 #: Two rays of a smaller angle do not fix a point. [rad]
@@ -213,6 +214,7 @@ def _solve(task: _Task, start: FloatArray) -> tuple[FloatArray, BoolArray, BoolA
     ok = np.zeros(len(point), dtype=bool)
     weak = ok.copy()
     rows = np.arange(len(point))
+    last = LAST_STEP if isinstance(task.surface, Plane) else LAST_STEP_KINKED
     for step_number in range(MOST_STEPS):
         part = task.take(rows)
         balance, normal, change = _balance(part, point[rows])
@@ -228,9 +230,8 @@ def _solve(task: _Task, start: FloatArray) -> tuple[FloatArray, BoolArray, BoolA
         point[rows] += _kept_in_water(part.surface, point[rows], step)
         # Judged by the whole step: one that was shortened has not arrived.
         length = np.linalg.norm(step, axis=-1) / scale[rows]
-        # One step after a small one is exact: convergence is quadratic.
-        ok[rows] = length <= 1e-9
-        rows = rows[length > TOLERANCE]
+        ok[rows] = length <= LAST_STEP
+        rows = rows[length > last]
         if not rows.size:
             break
     return point + task.origin, ok, weak
