@@ -12,6 +12,7 @@ EXAMPLE = """\b
 Examples:
   bifocal template survey.xlsx
   bifocal template rilievo.xlsx --lang it
+  bifocal template large.xlsx --rows 1500
 """
 
 
@@ -21,13 +22,21 @@ Examples:
     "--lang", "language", type=click.Choice(["en", "it", "de"]), default="en", show_default=True,
     help="Language of labels and help.",
 )  # fmt: skip
+@click.option(
+    "--rows",
+    type=int,
+    default=300,
+    show_default=True,
+    metavar="N",
+    help="Rows prepared for points.",
+)
 @click.option("--overwrite", is_flag=True, help="Replace an existing file.")
-def command(out: Path, language: str, overwrite: bool) -> None:
+def command(out: Path, language: str, rows: int, overwrite: bool) -> None:
     """Write an empty survey workbook: type what you measured, relief appears beside it.
 
     Every result is a live formula; the workbook needs neither this program nor macros.
     """
     from bifocal.workflows.survey import write_template
 
-    write_template(out, language=language, overwrite=overwrite)
+    write_template(out, language=language, rows=rows, overwrite=overwrite)
     remark(f"{out}: fill in Setup and Points; then: bifocal solve {out} --out result.xlsx")

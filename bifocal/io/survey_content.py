@@ -17,7 +17,7 @@ from photocore.arrays import FloatArray
 from photocore.bookrows import CellValue
 
 #: Rows of the tables of an empty template.
-POINT_ROWS, CHECK_ROWS, CONTROL_ROWS, SPARE_ROWS = 100, 25, 12, 10
+POINT_ROWS, CHECK_ROWS, CONTROL_ROWS, SPARE_ROWS = 300, 25, 12, 10
 #: Beyond this many points formulas are written as A1 references, which are shorter.
 STRUCTURED_ROWS = 2000
 #: The charts show the first points only.
@@ -58,6 +58,8 @@ class SurveyContent:
         Limit of UNCERTAIN for a general pair; default 2 % of d2. [m]
     log : sequence of tuple of str
         Rows of the sheet `Log`: date, program, what, file, SHA-256.
+    rows : int
+        Rows of `Points` in an empty template.
     """
 
     language: str = "en"
@@ -77,6 +79,7 @@ class SurveyContent:
     flag_sigmas: tuple[float, float] = (OFF_RADIAL_SIGMAS, ON_PLANE_SIGMAS)
     sigma_r_max: float | None = None
     log: Sequence[tuple[str, str, str, str, str]] = ()
+    rows: int = POINT_ROWS
 
     @property
     def is_pair(self) -> bool:
@@ -100,7 +103,7 @@ class SurveyContent:
     @property
     def point_rows(self) -> int:
         """Rows of `Points`: an empty form, or the points and a few spare rows."""
-        return POINT_ROWS if self.points is None else len(self.points) + SPARE_ROWS
+        return self.rows if self.points is None else len(self.points) + SPARE_ROWS
 
     @property
     def check_rows(self) -> int:

@@ -16,13 +16,11 @@ from bifocal.solvers.check_points import check_points
 from bifocal.solvers.georeference import georeference
 from bifocal.solvers.point_survey import solve_ideal
 from bifocal.workflows.solve import Solution
-from bifocal.workflows.survey import log_row, relative_name
+from bifocal.workflows.survey import MOST_ROWS, log_row, relative_name
 from photocore.errors import InputError
 from photocore.jsonfile import to_text
 from photocore.tables import write_csv
 
-#: Beyond this many points a spreadsheet is no tool any more.
-MOST_ROWS = 100_000
 _NUMBERS = ("r", "e1", "e2", "s_c", "X", "Y", "Z", "q", "sigma_r")
 
 

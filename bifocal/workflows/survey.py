@@ -12,16 +12,20 @@ from bifocal.domain.observations import PointObservations
 from bifocal.domain.pair import Pair
 from bifocal.domain.setup import SurveySetup
 from bifocal.io.survey_book import write_book
-from bifocal.io.survey_content import SurveyContent
+from bifocal.io.survey_content import POINT_ROWS, SurveyContent
 from bifocal.io.survey_words import LANGUAGES
 from bifocal.solvers.point_survey import solve_ideal, solve_pair
 from photocore.errors import InputError
 from photocore.output import check_writable
 
+#: Beyond this many points a spreadsheet is no tool any more.
+MOST_ROWS = 100_000
 LogRow = tuple[str, str, str, str, str]
 
 
-def write_template(path: Path | str, *, language: str = "en", overwrite: bool = False) -> None:
+def write_template(
+    path: Path | str, *, language: str = "en", rows: int = POINT_ROWS, overwrite: bool = False
+) -> None:
     """Write an empty survey workbook with live formulas.
 
     Parameters
@@ -30,6 +34,8 @@ def write_template(path: Path | str, *, language: str = "en", overwrite: bool = 
         An ``.xlsx`` file.
     language : {"en", "it", "de"}
         Of labels and help; keys and flags are the same in all.
+    rows : int
+        Rows prepared for points.
     overwrite : bool
         Replace an existing file.
 
@@ -40,8 +46,10 @@ def write_template(path: Path | str, *, language: str = "en", overwrite: bool = 
     """
     if language not in LANGUAGES:
         raise InputError(f"language: {language!r} is none of {', '.join(LANGUAGES)}.")
+    if not 1 <= rows <= MOST_ROWS:
+        raise InputError(f"rows: must be 1 to {MOST_ROWS}, got {rows}.")
     check_book_path(path)
-    write_book(path, SurveyContent(language=language), overwrite=overwrite)
+    write_book(path, SurveyContent(language=language, rows=rows), overwrite=overwrite)
 
 
 def write_survey(

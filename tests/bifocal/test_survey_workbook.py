@@ -293,6 +293,15 @@ def test_other_endings_are_refused(tmp_path):
         write_template(tmp_path / "survey.ods")
 
 
+def test_rows_are_prepared_as_many_as_wanted(tmp_path):
+    write_template(tmp_path / "t.xlsx", rows=500)
+    sheet = openpyxl.load_workbook(tmp_path / "t.xlsx")["Points"]
+    assert sheet.tables["tblPoints"].ref.endswith("504")
+    assert sheet["L504"].data_type == "f"
+    with pytest.raises(InputError, match="rows"):
+        write_template(tmp_path / "u.xlsx", rows=0)
+
+
 def test_unknown_language_is_refused(tmp_path):
     with pytest.raises(InputError, match="fr"):
         write_template(tmp_path / "survey.xlsx", language="fr")
