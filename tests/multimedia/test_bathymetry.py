@@ -118,6 +118,42 @@ def test_map_coordinates_cost_no_accuracy() -> None:
     np.testing.assert_allclose(result.xyz - shift, true, atol=3e-8)
 
 
+@pytest.mark.parametrize("factor", [1000.0, 0.001])
+def test_the_unit_of_length_does_not_matter(factor: float) -> None:
+    true, cameras, apparent, visible = survey(SURFACES["tilted"], count=30)
+    plane = SURFACES["tilted"]
+    scaled = mm.Plane(point=factor * plane.point, normal=plane.normal)
+    result = mm.correct_bathymetry(
+        factor * apparent, water_level=scaled, index=N, cameras=factor * cameras, visible=visible
+    )
+    np.testing.assert_allclose(result.xyz / factor, true, atol=1e-9)
+
+
+def test_turning_the_scene_about_the_vertical_turns_the_result() -> None:
+    true, cameras, apparent, visible = survey(SURFACES["wavy"], count=15)
+    c, s = np.cos(0.7), np.sin(0.7)
+    turn = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])
+    wave = SURFACES["wavy"]
+    turned = mm.WaveSurface(
+        level=wave.level,
+        amplitude=wave.amplitude,
+        wave_vector=wave.wave_vector @ turn[:2, :2].T,
+        phase=wave.phase,
+    )
+    result = mm.correct_bathymetry(
+        apparent @ turn.T, water_level=turned, index=N, cameras=cameras @ turn.T, visible=visible
+    )
+    np.testing.assert_allclose(result.xyz, true @ turn.T, atol=1e-9)
+
+
+def test_cameras_in_one_line_of_sight_fix_no_point_and_are_not_used_to() -> None:
+    result = mm.correct_bathymetry(
+        [[0.0, 0.0, -1.0]], water_level=0.0, index=N, cameras=[[0, 0, 10.0], [0, 0, 20.0]]
+    )
+    assert result.status[0] == mm.BathymetryStatus.NADIR
+    assert result.xyz[0].tolist() == [0.0, 0.0, -N]
+
+
 def test_dry_points_stay_to_the_last_bit_and_shapes_are_kept() -> None:
     points = np.array([[[0.1, 0.2, 102.6], [0.3, 0.4, 100.1]], [[1, 2, 102.5], [3, 4, 103]]])
     result = mm.correct_bathymetry(points, water_level=102.5, index=N)
