@@ -10,7 +10,7 @@ import numpy as np
 
 from multimedia.domain.camera import Camera
 from multimedia.domain.flat_interface import FlatInterface
-from multimedia.domain.project import ImagePoints, ObjectPoints, Project
+from multimedia.domain.project import SHOWN, ImagePoints, ObjectPoints, Project
 from multimedia.io.openptv_files import (
     ControlParameters,
     Targets,
@@ -83,8 +83,10 @@ def read_experiment(folder: Path | str, *, swap_indices: bool = False) -> Experi
         raise InputError(f"{folder}: is no folder; give the folder of an OpenPTV experiment.")
     control_path = _control_path(folder)
     control = read_control(control_path)
-    roots = list(dict.fromkeys([control_path.parent, control_path.parent.parent, folder]))
+    roots = list(dict.fromkeys([control_path.parent, folder]))
     remarks: list[str] = []
+    if control_path.parent.name not in _PARAMETERS and control_path.parent != folder:
+        remarks.append(f"{folder}: has no ptv.par of its own; read {control_path}.")
     indices = _checked_indices(control, control_path.name, swap_indices, remarks)
     cameras, media, media_of = _cameras(control, roots, indices, remarks)
     body, source = _body(roots, remarks)
@@ -211,8 +213,11 @@ def _control_path(folder: Path) -> Path:
         if path.is_file():
             return path
     others = sorted(folder.glob("*/ptv.par"))
-    if others:
+    if len(others) == 1:
         return others[0]
+    if others:
+        found = ", ".join(str(path.parent) for path in others[:SHOWN])
+        raise InputError(f"{folder}: holds several experiments; name one of {found}.")
     if any(folder.glob("parameters*.y*ml")):
         raise InputError(
             f"{folder}: has its parameters as YAML only. Save them once as a parameters folder "
