@@ -187,6 +187,27 @@ def adjust(
     )
 
 
+def onto_plane(cameras: tuple[Pinhole, Pinhole], plane: FloatArray) -> tuple[Pinhole, Pinhole]:
+    """Return cameras in the frame of the plane z = a + b X + c Y, X and Y all but kept."""
+    normal = np.array([-plane[1], -plane[2], 1.0])
+    normal /= np.linalg.norm(normal)
+    # The rotation that takes the normal to the new Z axis, about their common perpendicular.
+    turn = rotation_matrix(np.array([normal[1], -normal[0], 0.0]))
+    base = np.array([0.0, 0.0, plane[0]])
+    moved = [
+        camera._replace(rotation=camera.rotation @ turn.T, centre=turn @ (camera.centre - base))
+        for camera in cameras
+    ]
+    return moved[0], moved[1]
+
+
+def evaluate(problem: Problem, solution: Solution) -> Solution:
+    """Return a solution's cameras with the misfits of another problem's ties, not adjusted."""
+    model = _Model(problem, solution.cameras)
+    theta = model.start(solution.radial, solution.plane)
+    return replace(solution, tie_misfit=model.epipolar(theta), wall_misfit=model.transfer(theta))
+
+
 def _least_squares(
     function: Callable[[FloatArray], FloatArray], count: int
 ) -> tuple[FloatArray, FloatArray, FloatArray]:

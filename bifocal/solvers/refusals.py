@@ -136,7 +136,7 @@ def check_determined(solution: Solution) -> None:
     for number, camera in enumerate(solution.cameras, start=1):
         distance = float(camera.centre[2])
         sigma = float(np.sqrt(covariance[11 * number - 2, 11 * number - 2]))
-        if sigma < 0.06 * distance:
+        if sigma < 0.25 * distance:
             continue
         missing = (
             "control points off the wall (a relief of 0.3 m or more), the focal lengths "

@@ -11,13 +11,28 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from bifocal.domain.alignment import Control, Interior, SiteMeasures
-from bifocal.pinhole import Pinhole, plane_transfer, tilt
+from bifocal.pinhole import Pinhole, plane_transfer, tilt, triangulate
 from bifocal.solvers import refusals
-from bifocal.solvers.bundle import Problem, Solution, adjust, ray_on_plane
+from bifocal.solvers.bundle import (
+    Problem,
+    Solution,
+    adjust,
+    evaluate,
+    onto_plane,
+    radial_shift,
+    ray_on_plane,
+)
 from bifocal.solvers.features import find_features
 from bifocal.solvers.relative import Ties, find_ties, first_cameras, plane_scale
 from bifocal.solvers.resection import resect
-from bifocal.solvers.tie_points import ROUGHNESS, classify, refine_ties, robust_sigma, settle
+from bifocal.solvers.tie_points import (
+    ROUGHNESS,
+    classify,
+    refine_ties,
+    robust_sigma,
+    settle,
+)
+from bifocal.solvers.wall_face import BAND, even_points, largest_plane
 from photocore.arrays import BoolArray, ByteArray, FloatArray
 from photocore.errors import GeometryError
 
@@ -27,8 +42,8 @@ SIGMA_PARALLEL = np.deg2rad(0.3)
 UNEVEN = 0.004
 #: A control point's misfit beyond this many standard deviations is a gross error.
 GROSS_LIMIT = 4.0
-#: The wall's ties and the control points must agree on the plane to this share of d1.
-PLANE_SHARE = 0.004
+#: Ties within about this share of d1 of the control points' plane are taken for the wall at first.
+PLANE_SHARE = 0.003
 
 Step = Callable[[str], None]
 
@@ -136,6 +151,7 @@ def set_up(
     refusals.check_determined(solution)
     refusals.check_movement(solution)
     _remark_on_control(control, known, problem, solution, notes)
+    _remark_on_distances(solution, notes)
     notes.assumed += _assumptions(problem, site)
     return SetUp(
         problem=problem,
@@ -362,6 +378,8 @@ def _adjusted(
     if len(problem.tie1) and images[0] is not None and images[1] is not None:
         problem, solution = settle(problem, solution)
         problem, solution = _unbent(problem, solution, notes)
+        if problem.gauge:
+            problem, solution = _on_main_face(problem, solution, (images[0], images[1]))
         step("refining the common points")
         for _ in range(2):  # the second pass searches around better places
             moved, good = refine_ties(problem, solution, (images[0], images[1]))
@@ -393,24 +411,19 @@ def _control_first(
     alone = adjust(replace(problem, tie_used=none, wall=none), cameras)
     if not len(problem.tie1):
         return problem, alone.cameras
-    d1 = alone.cameras[0].centre[2]
     # Control leaves the epipolar lines uncertain by some pixels: the majority shows by how much.
     sigma = max(robust_sigma(alone.tie_misfit), problem.sigma_tie)
-    joined = classify(problem, alone, share=4 * PLANE_SHARE, sigma=sigma)
-    joined = replace(joined, sigma_plane=PLANE_SHARE * d1, sigma_slope=2 * PLANE_SHARE)
-    solution = adjust(joined, alone.cameras)
-    offset = abs(solution.plane[0])
-    if joined.wall.sum() < 20 or offset > PLANE_SHARE * d1:
+    joined = classify(problem, alone, share=PLANE_SHARE, sigma=sigma)
+    if joined.wall.sum() < 20:
         notes.remarks.append(
-            "The control points' plane is not the face that most of the photos show "
-            f"(it lies {1000 * solution.plane[0]:+.0f} mm off); relief counts from the control "
-            "points."
+            "Hardly any detail lies on the control points' plane; relief counts from the control "
+            "points alone."
         )
-        return replace(joined, wall=none, sigma_plane=0.0), solution.cameras
+        return replace(joined, wall=none), alone.cameras
     flat = problem.control.sigma[np.abs(np.nan_to_num(problem.control.xyz[:, 2])) < 0.05, 2]
-    tight = float(np.median(flat)) if len(flat) else 0.003
-    tight = max(tight, 0.001)
-    return replace(joined, sigma_plane=tight, sigma_slope=2 * tight / d1), solution.cameras
+    tight = max(float(np.median(flat)) if len(flat) else 0.003, 0.001)
+    slope = 2 * tight / float(alone.cameras[0].centre[2])
+    return replace(joined, sigma_plane=tight, sigma_slope=slope), alone.cameras
 
 
 def _one_zoom(problem: Problem, solution: Solution) -> tuple[Problem, Solution]:
@@ -456,6 +469,48 @@ def _unbent(problem: Problem, solution: Solution, notes: _Notes) -> tuple[Proble
         + "). A calibrated lens (`bifocal calibrate`, --lens) is more reliable."
     )
     return trial, bent
+
+
+def _on_main_face(
+    problem: Problem, solution: Solution, images: tuple[ByteArray, ByteArray]
+) -> tuple[Problem, Solution]:
+    """Return the adjustment in the frame of the face that most of the area has."""
+    count = len(problem.tie1)
+    raw1, raw2 = even_points(problem, solution, images)
+    extra = len(raw1)
+    problem = replace(
+        problem,
+        tie1=np.concatenate([problem.tie1, problem.interiors[0].ideal(raw1)]),
+        tie2=np.concatenate([problem.tie2, problem.interiors[1].ideal(raw2)]),
+        tie_used=np.concatenate([problem.tie_used, np.ones(extra, dtype=bool)]),
+        wall=np.concatenate([problem.wall, np.zeros(extra, dtype=bool)]),
+        sigma_wall=np.concatenate([problem.sigma_wall, np.ones(extra)]),
+    )
+    # What the flow suggests is no observation until the patches agree.
+    moved, good = refine_ties(problem, solution, images)
+    even = np.arange(len(good)) >= count
+    problem = replace(
+        problem,
+        tie2=np.where((good & even)[:, None], moved, problem.tie2),
+        tie_used=problem.tie_used & (good | ~even),
+    )
+    straight = [
+        radial_shift(x, i, k)
+        for x, i, k in zip(
+            (problem.tie1, problem.tie2), problem.interiors, solution.radial, strict=True
+        )
+    ]
+    xyz = triangulate(*solution.cameras, *straight)
+    d1 = float(solution.cameras[0].centre[2])
+    fair = problem.tie_used & even & (np.abs(xyz[:, 2]) < 0.1 * d1)
+    if fair.sum() < 200:
+        return problem, adjust(problem, solution.cameras, radial=solution.radial)
+    plane = largest_plane(xyz[fair], band=BAND * d1)
+    start = evaluate(problem, replace(solution, cameras=onto_plane(solution.cameras, plane)))
+    sigma = max(robust_sigma(start.tie_misfit[problem.tie_used]), 0.03)
+    problem = classify(problem, start, share=ROUGHNESS[1], sigma=sigma)
+    solution = adjust(problem, start.cameras, radial=solution.radial)
+    return settle(problem, solution, shares=ROUGHNESS[1:])
 
 
 def _parallel_if_so(
@@ -558,6 +613,19 @@ def _remark_on_control(
             f"{count} control points; CIPA advises nine, spread over the photo, so that an error "
             "in one is found."
         )
+
+
+def _remark_on_distances(solution: Solution, notes: _Notes) -> None:
+    """Say so when a distance is poorly determined."""
+    for number, camera in enumerate(solution.cameras, start=1):
+        distance = float(camera.centre[2])
+        sigma = float(np.sqrt(solution.covariance[11 * number - 2, 11 * number - 2]))
+        if sigma > 0.03 * distance:
+            notes.remarks.append(
+                f"The distance of camera {number} is poorly determined ({distance:.2f} ± "
+                f"{sigma:.2f} m). Give the focal lengths, the distances, or more points off the "
+                "wall."
+            )
 
 
 def _assumptions(problem: Problem, site: SiteMeasures) -> list[str]:
