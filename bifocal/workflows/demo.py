@@ -29,6 +29,8 @@ SIZE, PIXEL = (1536, 1024), 0.00738
 #: Picks of a careful hand. [px]
 PICK_SIGMA = 0.2
 SEED = 20240601
+#: The part of the wall that both photos show whole, up to the top of the cornice. [m]
+BOUNDS = (-5.3, -3.45, 5.3, 3.42)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -102,12 +104,14 @@ def run_demo(
     progress(0.4, 1.0, "surveying targets in the workbook")
     ids, true, found, sigma, flags = _survey(folder, sample, rng)
     progress(0.5, 1.0, "measuring dense relief")
-    job = ReliefJob(out=folder / "relief.tif", preview=folder / "relief.png", overwrite=True)
+    job = ReliefJob(
+        out=folder / "relief.tif", preview=folder / "relief.png", bounds=BOUNDS, overwrite=True
+    )
     _, remarks = relief_of_pair(folder / "facade.pair.json", job)
     progress(0.85, 1.0, "making the orthophoto")
     make_ortho(
         folder / "facade.pair.json", folder / "ortho.tif",
-        OrthoTask(relief=folder / "relief.tif"), overwrite=True,
+        OrthoTask(relief=folder / "relief.tif", bounds=BOUNDS), overwrite=True,
     )  # fmt: skip
     _write_preview(folder / "ortho.png", folder / "ortho.tif")
     progress(1.0, 1.0, "done")
@@ -161,6 +165,10 @@ def _against_truth(relief: ReliefMap, sample: Rendering) -> tuple[float, float, 
     places = np.concatenate(
         [sample.truth.plane_positions(slice(k, k + 1)).reshape(-1, 2) for k in range(len(both))]
     )
+    west, south, east, north = BOUNDS
+    x, y = places.T
+    inside = (x > west) & (x < east) & (y > south) & (y < north)
+    both &= inside.reshape(both.shape)
     found = relief.sample(places).reshape(both.shape)
     known = both & np.isfinite(found)
     error = np.abs(found - sample.truth.r)[known]
