@@ -75,3 +75,17 @@ def test_mistakes_are_named(project, arguments, status, message):
     result = CliRunner().invoke(main, ["adjust", *full])
     assert result.exit_code == status
     assert message in result.stderr
+
+
+def test_the_real_cavity_is_adjusted_to_the_known_sigma0(data_dir, tmp_path):
+    out = tmp_path / "cavity.toml"
+    folder = str(data_dir / "openptv_cavity")
+    done = CliRunner().invoke(main, ["openptv", folder, "--swap-indices", "--out", str(out)])
+    assert done.exit_code == 0, done.stderr
+    done = CliRunner().invoke(
+        main, ["adjust", str(out), "--interior", "c,xh,yh,k1,p1,p2,scale", "--json"]
+    )
+    assert done.exit_code == 0, done.stderr
+    sigma0 = json.loads(done.stdout)["sigma0_mm_of"]
+    for camera, limit in (("cam1", 5.67), ("cam2", 3.54), ("cam3", 4.54), ("cam4", 3.54)):
+        assert sigma0[camera] * 1000 <= limit
