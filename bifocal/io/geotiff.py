@@ -32,7 +32,11 @@ LOCAL_CRS = (
     'LOCAL_CS["{name}",UNIT["metre",1,AUTHORITY["EPSG","9001"]],AXIS["X",EAST],AXIS["Y",NORTH]]'
 )
 #: Descriptions of the bands of a relief map.
-RELIEF_BANDS = ("relief [m]", "sigma [m]", "quality")
+RELIEF_BANDS = (
+    "relief [m]",
+    "sigma [m]",
+    "quality (1 measured, 2 interpolated, 3 hidden, 0 unknown)",
+)
 #: Metres per unit of the DPI tag.
 METRES_PER_INCH = 0.0254
 
@@ -299,7 +303,12 @@ def gsd_at_scale(dpi: float, scale: float) -> float:
 
 
 def write_relief(
-    path: Path | str, relief: ReliefMap, *, overwrite: bool = False, overviews: bool = False
+    path: Path | str,
+    relief: ReliefMap,
+    *,
+    overwrite: bool = False,
+    overviews: bool = False,
+    tags: dict[str, str] | None = None,
 ) -> None:
     """Write a relief map: relief, sigma, quality; NaN where unknown."""
     grid = relief.grid
@@ -312,6 +321,7 @@ def write_relief(
         names=RELIEF_BANDS,
         nodata=float("nan"),
         overviews=overviews,
+        tags=tags,
     ) as writer:
         for column, row, part in grid.tiles(4 * BLOCK):
             cut = np.s_[row : row + part.height, column : column + part.width]

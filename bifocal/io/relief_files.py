@@ -9,13 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bifocal.domain.relief_map import ReliefMap
-from bifocal.io.geotiff import RasterReader, create_raster
 from photocore.arrays import ByteArray, FloatArray
 from photocore.errors import InputError
 from photocore.output import atomic_path
 
 #: Bands of the GeoTIFF, in this order.
-BANDS = ("relief [m]", "sigma [m]", "quality (1 measured, 2 interpolated, 3 hidden, 0 unknown)")
 #: Longer side of a preview. [px]
 PREVIEW_SIDE = 2000
 _ROWS = 512
@@ -38,49 +36,6 @@ class Cloud(NamedTuple):
     colours: ByteArray
     sigma: FloatArray
     quality: ByteArray
-
-
-def write_relief_map(
-    path: Path | str, relief: ReliefMap, *, overwrite: bool = False, tags: dict[str, str]
-) -> None:
-    """Write relief, sigma and quality as a float32 GeoTIFF; NaN where unknown."""
-    with create_raster(
-        path,
-        relief.grid,
-        bands=3,
-        dtype=np.float32,
-        names=BANDS,
-        nodata=float("nan"),
-        tags=tags,
-        overwrite=overwrite,
-    ) as file:
-        for row in range(0, relief.shape[0], _ROWS):
-            part = slice(row, row + _ROWS)
-            bands = [relief.r[part], relief.sigma[part], relief.quality[part].astype(np.float32)]
-            file.write(np.stack(bands, axis=-1), row=row)
-
-
-def read_relief_map(path: Path | str) -> ReliefMap:
-    """Read a relief map; other programs' maps of one band count as measured with sigma 0.
-
-    Raises
-    ------
-    InputError
-        If the file is no raster in the plane frame.
-    """
-    with RasterReader(path) as file:
-        grid = file.grid
-        relief = file.read_floats(0, 0, grid.width, grid.height)
-        own = file.bands >= 3 and file.names[:1] == BANDS[:1]
-        others = file.read(0, 0, grid.width, grid.height, bands=[2, 3]) if own else None
-    if others is None:
-        return ReliefMap.from_relief(relief, plane_from_pixel=grid.plane_from_pixel)
-    return ReliefMap(
-        r=relief,
-        sigma=others[..., 0],
-        quality=np.nan_to_num(others[..., 1]).astype(np.uint8),
-        plane_from_pixel=grid.plane_from_pixel,
-    )
 
 
 def write_cloud(path: Path | str, cloud: Cloud, *, overwrite: bool = False) -> None:

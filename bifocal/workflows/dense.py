@@ -10,8 +10,9 @@ import numpy as np
 
 from bifocal.domain.pair import Pair
 from bifocal.domain.relief_map import ReliefMap
+from bifocal.io.geotiff import write_relief
 from bifocal.io.images import ImageArray, read_image, to_eight_bit
-from bifocal.io.relief_files import Cloud, write_cloud, write_preview, write_relief_map
+from bifocal.io.relief_files import Cloud, write_cloud, write_preview
 from bifocal.solvers.dense import DenseRelief, dense_relief
 from photocore.console import Progress, no_progress
 from photocore.errors import GeometryError, InputError
@@ -87,7 +88,7 @@ def relief_of_pair(
         "BIFOCAL_D2": f"{pair.image2.distance:.6g}",
         "BIFOCAL_PAIR": Path(pair_file).name,
     }
-    write_relief_map(job.out, result, overwrite=job.overwrite, tags=tags)
+    write_relief(job.out, result, overwrite=job.overwrite, tags=tags)
     written = [job.out]
     if job.preview is not None:
         write_preview(job.preview, result, overwrite=job.overwrite)

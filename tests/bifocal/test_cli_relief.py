@@ -13,8 +13,8 @@ from click.testing import CliRunner
 
 from bifocal import Pair
 from bifocal.cli.main import main
+from bifocal.io.geotiff import read_relief
 from bifocal.io.images import write_image
-from bifocal.io.relief_files import read_relief_map
 from bifocal.solvers.scene import bifocal_cameras, facade, render
 
 
@@ -53,7 +53,7 @@ def test_relief_writes_three_bands_and_says_what_guarantees_the_scale(folder, tm
     truth = np.load(folder / "truth.npy")
     assert np.nanmedian(np.abs(relief - truth)) < 0.04  # 30 mm pixels: nearly all are edges
     np.testing.assert_array_equal(np.isnan(relief), quality == 0)
-    assert read_relief_map(out).gsd == pytest.approx(0.0296)
+    assert read_relief(out).gsd == pytest.approx(0.0296)
 
 
 def test_json_preview_and_clouds(folder, tmp_path):
