@@ -13,7 +13,6 @@ from photocore.arrays import ByteArray, FloatArray
 from photocore.errors import InputError
 from photocore.output import atomic_path
 
-#: Bands of the GeoTIFF, in this order.
 #: Longer side of a preview. [px]
 PREVIEW_SIDE = 2000
 _ROWS = 512
