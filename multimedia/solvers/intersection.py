@@ -167,8 +167,12 @@ def intersect_rays(
         Exact for exact image points; else every ray counts alike, near or far.
     """
     image, placed = _checked(cameras, image_points, layers)
-    rays = [image_rays(c, p, m) for c, p, m in zip(cameras, image, placed, strict=True)]
-    return nearest_points([o for o, _ in rays], [d for _, d in rays])
+    xyz = np.empty((image.shape[1], 3))
+    for start in range(0, image.shape[1], BLOCK):
+        part = slice(start, start + BLOCK)
+        rays = [image_rays(c, p[part], m) for c, p, m in zip(cameras, image, placed, strict=True)]
+        xyz[part] = nearest_points([o for o, _ in rays], [d for _, d in rays])
+    return xyz
 
 
 def intersect_pairs(
@@ -190,22 +194,43 @@ def intersect_pairs(
         Mean distance between the rays of the pairs. [object unit]
     """
     image, placed = _checked(cameras, image_points, layers)
+    xyz, apart = np.empty((image.shape[1], 3)), np.empty(image.shape[1])
+    for start in range(0, image.shape[1], BLOCK):
+        part = slice(start, start + BLOCK)
+        xyz[part], apart[part] = _pair_block(cameras, image[:, part], placed)
+    return xyz, apart
+
+
+def _pair_block(
+    cameras: Sequence[Camera], image: FloatArray, placed: Sequence[Placed]
+) -> tuple[FloatArray, FloatArray]:
+    """Return mean midpoints and mean distances of all pairs of rays."""
     rays = [image_rays(c, p, m) for c, p, m in zip(cameras, image, placed, strict=True)]
     total, apart = np.zeros((image.shape[1], 3)), np.zeros(image.shape[1])
     count = np.zeros(image.shape[1])
-    for (o1, d1), (o2, d2) in combinations(rays, 2):
-        across = np.cross(d1, d2)
-        square = (across * across).sum(-1)
+    for k, j in combinations(range(len(rays)), 2):
+        (o1, d1), (o2, d2) = rays[k], rays[j]
+        between = o2 - o1
+        cosine = np.einsum("ni,ni->n", d1, d2)
+        one, two = np.einsum("ni,ni->n", between, d1), np.einsum("ni,ni->n", between, d2)
         with np.errstate(divide="ignore", invalid="ignore"):
-            along1 = (np.cross(o2 - o1, d2) * across).sum(-1) / square
-            along2 = (np.cross(o2 - o1, d1) * across).sum(-1) / square
-            one, two = o1 + along1[:, None] * d1, o2 + along2[:, None] * d2
-        good = np.isfinite(one[:, 0]) & np.isfinite(two[:, 0])
-        total[good] += 0.5 * (one + two)[good]
-        apart[good] += np.sqrt(((one - two) ** 2).sum(-1))[good]
+            # sin^2 of the angle; the product loses less than 1 - cos^2 where it is small.
+            square = (1.0 - cosine) * (1.0 + cosine)
+            along1, along2 = (one - cosine * two) / square, (cosine * one - two) / square
+        first, second = along1[:, None] * d1, along2[:, None] * d2
+        gap = between + second - first
+        middle = o1 + first + 0.5 * gap
+        distance = np.sqrt(np.einsum("ni,ni->n", gap, gap))
+        good = np.isfinite(distance)
+        if not good.all():
+            middle, distance = np.where(good[:, None], middle, 0.0), np.where(good, distance, 0.0)
+        total += middle
+        apart += distance
         count += good
     with np.errstate(divide="ignore", invalid="ignore"):
-        return total / count[:, None], apart / count
+        return np.where(count[:, None] > 0, total / count[:, None], np.nan), np.where(
+            count > 0, apart / count, np.nan
+        )
 
 
 def _block(
