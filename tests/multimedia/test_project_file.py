@@ -230,3 +230,23 @@ def test_a_missing_file_and_a_folder_are_named(tmp_path):
         read_project(tmp_path / "none.toml")
     with pytest.raises(InputError, match="multimedia openptv"):
         read_project(tmp_path)
+
+
+def test_both_tables_may_be_sheets_of_one_workbook(folder):
+    from openpyxl import Workbook
+
+    book = Workbook()
+    sheet = book.active
+    sheet.title = "ImagePoints"
+    sheet.append(["Measured on a Monday"])
+    for line in SEEN.splitlines():
+        sheet.append([float(v) if v[0].isdigit() else v for v in line.split(",")])
+    other = book.create_sheet("ObjectPoints")
+    for line in BODY.replace(",", ".").splitlines():
+        other.append([v if v[0].isalpha() else float(v) for v in line.split(";")])
+    book.save(folder / "points.xlsx")
+    changed(folder, '"body.csv"', '"points.xlsx"')
+    changed(folder, '"seen.csv"', '"points.xlsx"')
+    project = read_project(folder / "tank.toml")
+    assert project.object_points.xyz.tolist() == [[1.5, 2, -50], [0, 0, -60]]
+    assert project.image_points.image[0] == pytest.approx([-0.474, 0.138])
