@@ -126,7 +126,13 @@ def command(
     """
     from bifocal.workflows.solve import solve_file
     from bifocal.workflows.solve_options import solve_options
-    from bifocal.workflows.solve_output import point_rows, solution_json, summary, write_result
+    from bifocal.workflows.solve_output import (
+        length_unit,
+        point_rows,
+        solution_json,
+        summary,
+        write_result,
+    )
     from photocore.output import check_writable
 
     if out is not None:
@@ -140,8 +146,9 @@ def command(
     if as_json:
         click.echo(solution_json(solution))
         return
-    headings = ["id", "r [m]", "e1 [mm]", "e2 [mm]", "X [m]", "Y [m]", "sigma_r [m]", "flag"]
-    click.echo(text_table(headings, point_rows(solution, SHOWN)))
+    unit = length_unit(solution)
+    headings = ["id", "r [m]", f"e1 [{unit}]", f"e2 [{unit}]", "X [m]", "Y [m]", "sigma_r [m]"]
+    click.echo(text_table([*headings, "flag"], point_rows(solution, SHOWN)))
     if len(solution.table) > SHOWN:
         click.echo(f"... and {len(solution.table) - SHOWN} more points (--json or --out for all).")
     for line in summary(solution):

@@ -148,7 +148,7 @@ def _csv_columns(solution: Solution) -> dict[str, Any]:
     """Return the columns of the text table, headings with units."""
     table, world = solution.table, solution.world
     columns: dict[str, Any] = {"id": list(table.ids)}
-    units = {"e1": "mm", "e2": "mm", "s_c": "mm", "q": "mm"}
+    units = dict.fromkeys(("e1", "e2", "s_c", "q"), length_unit(solution))
     for key in ("X", "Y", "Z"):
         columns[f"{key} [m]"] = table[key]
     if solution.georeference is not None:
@@ -211,13 +211,13 @@ def _head(solution: Solution) -> dict[str, Any]:
         "georeference": _georeference(solution),
         "setup_check": _setup_check(solution),
         "sigma_px": solution.sigma_px,
-        "units": {"r": "m", "X": "m", "e1": _length_unit(solution), "sigma_r": "m"},
+        "units": {"r": "m", "X": "m", "e1": length_unit(solution), "sigma_r": "m"},
         "remarks": list(solution.remarks),
     }
     return head
 
 
-def _length_unit(solution: Solution) -> str:
+def length_unit(solution: Solution) -> str:
     """Return the unit of e1, e2, s_c and q: without an image scale they are on the wall."""
     known = solution.pair is None or solution.table.image_scale is not None
     return "mm" if known else "m"

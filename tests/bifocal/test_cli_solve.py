@@ -35,7 +35,7 @@ POINTS = [("P1", 2, 0, 1), ("P2", -3, 2, 0.5), ("P3", 4, -2, -0.4), ("P4", -4, -
 
 def fill(path, table=None, setup=SETUP, **sheets):
     """Fill in a template the way a user does, with openpyxl standing for Excel."""
-    assert run("template", path, "--overwrite").exit_code == 0
+    assert run("template", path, "--overwrite", "--rows", 20).exit_code == 0
     book = openpyxl.load_workbook(path)
     for name, value in setup.items():
         put(book, name, value)
@@ -175,6 +175,10 @@ def test_raw_pixels_with_a_pair_file_and_the_workbook_made_of_them(tmp_path):
     for name, x, y, r in POINTS:
         found = by_id(answer)[name]
         assert [found["X"], found["Y"], found["r"]] == pytest.approx([x, y, r], abs=1e-9)
+    # Without a principal distance displacements are on the wall, in metres.
+    assert answer["units"]["e1"] == "m"
+    assert by_id(answer)["P1"]["e1"] == pytest.approx(2 * 17.5 / 16.5 / 17.5, abs=1e-9)
+    assert "e1 [m]" in run("solve", points, "--pair", pair).stdout
     out = tmp_path / "survey.xlsx"
     assert run("solve", points, "--pair", pair, "--out", out).exit_code == 0
     again, _ = solved(out)

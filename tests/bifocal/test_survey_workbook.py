@@ -234,7 +234,7 @@ def test_long_tables_written_with_short_references_calculate_the_same(tmp_path, 
 
 @pytest.mark.office
 def test_an_empty_template_shows_no_error_anywhere(tmp_path):
-    write_template(tmp_path / "empty.xlsx")
+    write_template(tmp_path / "empty.xlsx", rows=15)
     book = recalculated(tmp_path / "empty.xlsx", tmp_path)
     for sheet in book:
         if sheet.title == "Charts":
@@ -246,7 +246,7 @@ def test_an_empty_template_shows_no_error_anywhere(tmp_path):
 
 @pytest.mark.office
 def test_changing_an_input_changes_relief_in_libreoffice(tmp_path):
-    write_template(tmp_path / "form.xlsx")
+    write_template(tmp_path / "form.xlsx", rows=15)
     book = openpyxl.load_workbook(tmp_path / "form.xlsx")
     for name, value in (("c_1", 35), ("c_2", 19), ("d_2", 9.5), ("delta_d", 8)):
         book["Setup"][book.defined_names[name].attr_text.split("!")[1].replace("$", "")] = value
