@@ -12,6 +12,7 @@ from bifocal.domain.pair import Pair
 from bifocal.domain.relief_map import Quality, ReliefMap
 from bifocal.solvers.dense import edges, flow, seed, smooth, splat
 from bifocal.solvers.dense.frame import (
+    LONGEST_SIDE,
     Frame,
     as_grey,
     common_bounds,
@@ -147,7 +148,7 @@ def dense_relief(
     grey1, grey2 = as_grey(image1, "image1"), as_grey(image2, "image2")
     if quality not in QUALITIES:
         raise InputError(f"quality: expected {', '.join(QUALITIES)}, got {quality!r}.")
-    target, work = _grids(pair, (grey1, grey2), gsd, bounds, quality, relief_range)
+    wanted, target, work = _grids(pair, (grey1, grey2), gsd, bounds, quality, relief_range)
     frame = make_frame(pair, grey1, grey2, work)
     progress(0.1, 1.0, "First relief")
     coarse, _ = seed.coarse_relief(frame, relief_range)
@@ -162,7 +163,16 @@ def dense_relief(
     layer = splat.to_plane(frame, source, usable, target)
     layer = _complete(frame, layer, target)
     progress(1.0, 1.0)
-    return _resampled(layer, target, gsd, bounds, registration, work.gsd, pair, grey1)
+    layer = _resampled(layer, target, wanted)
+    known = np.isfinite(layer.r)
+    return DenseRelief(
+        r=layer.r,
+        sigma=np.where(known, layer.sigma, np.float32(np.nan)),
+        quality=np.where(known, layer.quality, np.uint8(Quality.UNKNOWN)),
+        plane_from_pixel=wanted.plane_from_pixel,
+        registration=registration,
+        working_gsd=work.gsd,
+    )
 
 
 def _grids(
@@ -172,15 +182,15 @@ def _grids(
     bounds: Bounds | None,
     quality: str,
     relief_range: tuple[float, float] | None,
-) -> tuple[Grid, Grid]:
-    """Return the grid of the map (at working resolution at the finest) and the working grid."""
+) -> tuple[Grid, Grid, Grid]:
+    """Return the grid of the map, the same at working resolution at the finest, and the work's."""
     native = native_gsd(pair.image1, images[0].shape)
     common = common_bounds(pair, (images[0].shape, images[1].shape))
     step = native if gsd is None else float(gsd)
     box = common if bounds is None else bounds
     wanted = Grid.from_bounds(box, gsd=step)
     size = f"{box[2] - box[0]:.3g} x {box[3] - box[1]:.3g} m"
-    if wanted.width * wanted.height > LARGEST_MAP:
+    if wanted.width * wanted.height > LARGEST_MAP or max(wanted.shape) > LONGEST_SIDE:
         raise InputError(
             f"gsd: {step:g} m over {size} would be {wanted.width} x {wanted.height} px. Is the "
             f"unit right? The GSD is in metres; a pixel of the far photo is {native:.4g} m."
@@ -213,10 +223,11 @@ def _grids(
         fine = native
     wide = zoomed_box(pair, images[1].shape, reach, min(high, 0.6 * pair.image2.distance))
     work = working_grid(pair, images[0].shape, wide, fine)
-    if bounds is None and fine == native and gsd is None:
-        # The map's pixels are those of the working frame.
-        return working_grid(pair, images[0].shape, common, fine), work
-    return Grid.from_bounds(box, gsd=max(step, fine)), work
+    if bounds is None and gsd is None:
+        # The map's pixels are those of photo 1, where that is square to the wall.
+        wanted = working_grid(pair, images[0].shape, common, native)
+    target = wanted if step >= 0.999 * fine else Grid.from_bounds(wanted.bounds, gsd=fine)
+    return wanted, target, work
 
 
 def _seen_box(pair: Pair, box: Bounds, low: float, high: float) -> Bounds:
@@ -284,51 +295,30 @@ def _cover(frame: Frame, grid: Grid) -> BoolArray:
     )
 
 
-def _resampled(
-    layer: splat.Layer,
-    grid: Grid,
-    gsd: float | None,
-    bounds: Bounds | None,
-    registration: Registration,
-    working_gsd: float,
-    pair: Pair,
-    image1: ByteArray,
-) -> DenseRelief:
-    """Return the map at the GSD asked for, refined by interpolation if that is finer."""
+def _resampled(layer: splat.Layer, grid: Grid, wanted: Grid) -> splat.Layer:
+    """Return the map on the grid asked for, interpolated if that is finer."""
     import cv2
 
-    step = native_gsd(pair.image1, image1.shape) if gsd is None else float(gsd)
-    r, sigma, quality = layer
-    if step < 0.999 * grid.gsd:
-        box = grid.bounds if bounds is None else bounds
-        fine = Grid.from_bounds(box, gsd=step)
-        column, row = grid.pixel_of(np.array([fine.x0, fine.y0]))
-        ratio = fine.gsd / grid.gsd
-        matrix = np.array([[ratio, 0, column], [0, ratio, row]])
-        size = (fine.width, fine.height)
+    if wanted.gsd >= 0.999 * grid.gsd:
+        return layer
+    column, row = wanted.offset_in(grid)
+    ratio = wanted.gsd / grid.gsd
+    matrix = np.array([[ratio, 0, column], [0, ratio, row]])
 
-        def warp(band: np.ndarray, how: int) -> np.ndarray:
-            return np.asarray(
-                cv2.warpAffine(
-                    band,
-                    matrix,
-                    size,
-                    flags=how | cv2.WARP_INVERSE_MAP,
-                    borderMode=cv2.BORDER_REPLICATE,
-                )
+    def warp(band: np.ndarray, how: int) -> np.ndarray:
+        return np.asarray(
+            cv2.warpAffine(
+                band,
+                matrix,
+                (wanted.width, wanted.height),
+                flags=how | cv2.WARP_INVERSE_MAP,
+                borderMode=cv2.BORDER_REPLICATE,
             )
+        )
 
-        nearest = warp(r, cv2.INTER_NEAREST)
-        smoothed = warp(r, cv2.INTER_LINEAR)
-        r = np.where(np.isfinite(smoothed), smoothed, nearest)
-        sigma, quality = warp(sigma, cv2.INTER_NEAREST), warp(quality, cv2.INTER_NEAREST)
-        grid = fine
-    known = np.isfinite(r)
-    return DenseRelief(
-        r=r,
-        sigma=np.where(known, sigma, np.float32(np.nan)),
-        quality=np.where(known, quality, np.uint8(Quality.UNKNOWN)),
-        plane_from_pixel=grid.plane_from_pixel,
-        registration=registration,
-        working_gsd=working_gsd,
+    nearest, smoothed = warp(layer.r, cv2.INTER_NEAREST), warp(layer.r, cv2.INTER_LINEAR)
+    return splat.Layer(
+        np.where(np.isfinite(smoothed), smoothed, nearest),
+        warp(layer.sigma, cv2.INTER_NEAREST),
+        warp(layer.quality, cv2.INTER_NEAREST),
     )
