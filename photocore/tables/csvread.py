@@ -28,7 +28,9 @@ _GUARDED = re.compile(r"'+[=+\-@\t\r]")
 #: A text that may be a number with three decimals or one with thousands.
 _GROUPED = re.compile(r"[+-]?[1-9]\d{0,2}[.,]\d{3}")
 _SAMPLE = 200
+_SAMPLE_TEXT = 2**18
 _CHUNK = 50_000
+_STARTS = frozenset("0123456789-+.,")
 
 
 @dataclass(slots=True)
@@ -52,13 +54,21 @@ class CsvFile:
     remarks: list[str] = field(default_factory=list)
     delimiter: str = ""
 
-    def records(self, delimiter: str) -> Iterator[list[str]]:
-        """Yield the records, as many fields as each has."""
-        lines = io.StringIO(self.text, newline="")
+    def records(self, delimiter: str, *, sample: bool = False) -> Iterator[list[str]]:
+        """Yield the records, as many fields as each has; only the first ones for a sample."""
+        text = self.text
+        if sample and len(text) > _SAMPLE_TEXT:
+            text = text[: text.rfind("\n", 0, _SAMPLE_TEXT) + 1] or text
+        lines = io.StringIO(text, newline="")
         if self.delimiter:
             lines.readline()
             # The line that names the delimiter keeps its number, as spreadsheets count it.
             yield []
+        if delimiter != " " and '"' not in text:
+            # Without quotation marks a record is a line, which is quicker to take apart.
+            plain = io.StringIO(text[lines.tell() :], newline=None)
+            yield from (line.rstrip("\n").split(delimiter) for line in plain)
+            return
         try:
             yield from csv.reader(lines, delimiter=delimiter, skipinitialspace=delimiter == " ")
         except csv.Error as error:
@@ -70,7 +80,8 @@ class CsvFile:
     def grid(self, delimiter: str, *, most: int | None = _SAMPLE) -> Grid:
         """Return the first records as a grid of texts."""
         grid = Grid("")
-        for row, record in enumerate(islice(self.records(delimiter), most), start=1):
+        records = self.records(delimiter, sample=most == _SAMPLE)
+        for row, record in enumerate(islice(records, most), start=1):
             cells: dict[int, Value] = {
                 column: text for column, text in enumerate(record, start=1) if text.strip()
             }
@@ -196,7 +207,8 @@ def _find(
 
 def _consistency(file: CsvFile, delimiter: str) -> float:
     """Return the share of sample records with the commonest number of fields, 0 for one field."""
-    counts = [len(record) for record in islice(file.records(delimiter), _SAMPLE) if any(record)]
+    records = islice(file.records(delimiter, sample=True), _SAMPLE)
+    counts = [len(record) for record in records if any(record)]
     commonest = max(set(counts), key=counts.count, default=1)
     return counts.count(commonest) / len(counts) if commonest > 1 else 0.0
 
@@ -379,43 +391,74 @@ def _gather(
     if above and match.first - above[-1] <= 2:
         sorter.block = label(grid.rows[above[-1]][next(iter(grid.rows[above[-1]]))])
     width = max([*match.columns.values(), *headings], default=1)
-    padding = [""] * width
-    records: list[list[str]] = []
-    needed = [number - 1 for number in sorter.numeric]
-    for row, record in enumerate(file.records(delimiter), start=1):
-        if row < match.first:
-            continue
-        # Most records are plain data: full, directly below the last one, and not a heading.
-        if (
-            len(record) == width
-            and row == sorter.previous + 1
-            and "" not in record
-            and needed
-            and record[needed[0]][0] in "0123456789-+.,"
-        ):
-            sorter.previous = row
+    plain = _PlainChunks(sorter, width, headings)
+    source = file.records(delimiter)
+    first = 1 + sum(1 for _ in islice(source, match.first - 1))
+    while chunk := list(islice(source, _CHUNK)):
+        if plain.holds(first, chunk):
+            rows: Sequence[int] = range(first, first + len(chunk))
+            records = chunk
+            table.blocks += [sorter.block] * len(chunk)
+            sorter.previous = rows[-1]
         else:
-            cells: dict[int, Value] = {
-                column: text for column, text in enumerate(record, start=1) if text.strip()
-            }
-            if not cells or not sorter.is_data(row, cells):
-                continue
-            if headings and max(cells) > width:
-                where = cell_name(row, width + 1)
-                errors.append(
-                    CellError(
-                        f"the record has {max(cells)} fields, the headings {width}. If numbers "
-                        "have a decimal comma, separate the fields by semicolons.",
-                        file=file.label,
-                        cell=where,
-                    )
-                )
-            record = (record + padding)[:width]
-        records.append(record)
-        table.rows.append(row)
-        table.blocks.append(sorter.block)
-        if len(records) == _CHUNK:
-            gathered.add(records, width)
-            records = []
-    gathered.add(records, width)
+            rows, records = _sorted_out(file, first, chunk, width, sorter, table, errors)
+        table.rows += rows
+        gathered.add(records, width)
+        first += len(chunk)
+    if not gathered.numbers and not gathered.texts:
+        gathered.add([], width)
     table.remarks += sorter.remarks()
+
+
+@dataclass(slots=True)
+class _PlainChunks:
+    """Tells at a glance whether many records are all data, as most are."""
+
+    sorter: RowSorter
+    width: int
+    headings: Mapping[int, Value]
+
+    def holds(self, first: int, chunk: list[list[str]]) -> bool:
+        """Whether all records are full and numbers stand in two columns (or the only one)."""
+        numeric = sorted(self.sorter.numeric)
+        if first != self.sorter.previous + 1 or not numeric:
+            return False
+        if {*map(len, chunk)} != {self.width}:
+            return False
+        for number in numeric[:2]:
+            starts = {record[number - 1][:1] for record in chunk}
+            heading = str(self.headings.get(number, "x"))
+            if not starts <= _STARTS or heading[:1] in _STARTS:
+                return False
+        return True
+
+
+def _sorted_out(
+    file: CsvFile,
+    first: int,
+    chunk: list[list[str]],
+    width: int,
+    sorter: RowSorter,
+    table: Table,
+    errors: list[CellError],
+) -> tuple[list[int], list[list[str]]]:
+    """Return the rows and records of a chunk that are data, all of the same width."""
+    padding = [""] * width
+    rows, records = [], []
+    for row, record in enumerate(chunk, start=first):
+        cells: dict[int, Value] = {
+            column: text for column, text in enumerate(record, start=1) if text.strip()
+        }
+        if not cells or not sorter.is_data(row, cells):
+            continue
+        if sorter.headings and max(cells) > width:
+            message = (
+                f"the record has {max(cells)} fields, the headings {width}. If numbers have a "
+                "decimal comma, separate the fields by semicolons."
+            )
+            place = cell_name(row, width + 1)
+            errors.append(CellError(message, file=file.label, cell=place))
+        rows.append(row)
+        records.append((record + padding)[:width])
+        table.blocks.append(sorter.block)
+    return rows, records
