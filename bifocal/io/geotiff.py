@@ -144,6 +144,20 @@ class RasterReader:
             values = np.where(valid > 0, values, np.float32(np.nan))
         return values
 
+    def read_reduced(
+        self, width: int, height: int, *, bands: Sequence[int]
+    ) -> tuple[NDArray[Any], NDArray[np.bool_]]:
+        """Return the whole raster shrunk, shape (height, width, bands), and where it is valid."""
+        from rasterio.enums import Resampling
+
+        shape = (len(bands), height, width)
+        try:
+            image = self._file.read(list(bands), out_shape=shape, resampling=Resampling.average)
+            mask = self._file.dataset_mask(out_shape=(height, width))
+        except OSError as error:
+            raise InputError(f"{self.path}: cannot be read ({error}).") from error
+        return image.transpose(1, 2, 0), mask > 0
+
     def close(self) -> None:
         """Close the file."""
         self._stack.close()

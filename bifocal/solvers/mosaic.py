@@ -1,0 +1,384 @@
+"""Several rasters of one wall made one: seams, equal exposure, blending, window by window."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bifocal.domain.grid import SAME_PIXEL, Grid
+from bifocal.solvers.pull_push import fill_holes
+from photocore.arrays import BoolArray, FloatArray, IntArray
+from photocore.errors import InputError
+
+#: Side of the raster on which seams and exposure are worked out. [px]
+COARSE = 1600
+#: Levels of the blending pyramid; colours fade over about 2^(levels + 1) px, detail over two.
+LEVELS = 5
+#: Surroundings of a window that its blending needs; a multiple of 2^LEVELS. [px]
+HALO = 2 ** (LEVELS + 2)
+#: Seams keep this far from holes, which lie behind steps of the relief. [coarse px]
+_SHY = 6.0
+#: Relief that changes by more than this per metre is an edge to a seam.
+_EDGE_SLOPE = 0.5
+_LEAST_OVERLAP = 50
+
+
+class Layer(Protocol):
+    """One raster of a mosaic."""
+
+    @property
+    def grid(self) -> Grid:
+        """Where its pixels are."""
+
+    def read(
+        self, column: int, row: int, width: int, height: int
+    ) -> tuple[NDArray[Any], BoolArray]:
+        """Return a window, shape (h, w, bands), and its validity; empty beyond the edges."""
+
+    def reduced(self, width: int, height: int) -> tuple[NDArray[Any], BoolArray]:
+        """Return the whole raster shrunk to a size."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Plan:
+    """Who fills which part of a mosaic, worked out on a coarse grid.
+
+    Attributes
+    ----------
+    coarse : Grid
+    labels : ndarray of int, shape of coarse
+        Index of the layer from 0; -1 where there is none.
+    rank : ndarray of float32, shape (layers, h, w)
+        How deep within each layer a place lies: who comes next where the chosen one is empty.
+    gains : ndarray, shape (layers, bands)
+        Factors that make the colours equal.
+    differences : dict of (int, int) to float
+        Median difference of two layers on their overlap, before any gain; first band.
+    """
+
+    coarse: Grid
+    labels: IntArray
+    rank: NDArray[np.float32]
+    gains: FloatArray
+    differences: dict[tuple[int, int], float]
+
+
+def common_grid(
+    layers: Sequence[Layer],
+    *,
+    gsd: float | None = None,
+    bounds: tuple[float, float, float, float] | None = None,
+) -> Grid:
+    """Return a grid that covers all layers; on the lattice of the first of the finest if it can."""
+    finest = min(layers, key=lambda layer: layer.grid.gsd).grid
+    gsd = gsd or finest.gsd
+    if bounds is None:
+        boxes = np.array([layer.grid.bounds for layer in layers])
+        low, high = boxes.min(axis=0), boxes.max(axis=0)
+        bounds = (float(low[0]), float(low[1]), float(high[2]), float(high[3]))
+    if abs(gsd / finest.gsd - 1) > 1e-9:
+        return Grid.from_bounds(bounds, gsd=gsd)
+    left, _, _, top = finest.bounds
+    c0 = math.floor((bounds[0] - left) / gsd + SAME_PIXEL)
+    c1 = math.ceil((bounds[2] - left) / gsd - SAME_PIXEL)
+    r0 = math.floor((top - bounds[3]) / gsd + SAME_PIXEL)
+    r1 = math.ceil((top - bounds[1]) / gsd - SAME_PIXEL)
+    if c1 <= c0 or r1 <= r0:
+        raise InputError("bounds: the box is empty.")
+    return finest.window(c0, r0, c1 - c0, r1 - r0)
+
+
+def plan_mosaic(
+    layers: Sequence[Layer],
+    grid: Grid,
+    *,
+    priority: bool = False,
+    gain: bool = True,
+    relief: NDArray[np.float32] | None = None,
+    coarse: Grid | None = None,
+) -> Plan:
+    """Work out seams and gains.
+
+    Parameters
+    ----------
+    priority : bool
+        Earlier layers cover later ones; otherwise seams are sought.
+    gain : bool
+        Make the colours equal.
+    relief : ndarray, shape of coarse, optional
+        Relief of the wall: seams keep away from its edges. [m]
+    coarse : Grid, optional
+        As `coarse_grid` returns it.
+
+    Notes
+    -----
+    Each layer owns what it sees from deep within; between owners the seam is a watershed (after
+    Soille, "Morphological image compositing", 2006) that runs where the layers agree, away from
+    edges of the relief and from holes, which lie right behind such edges.
+    """
+    coarse = coarse or coarse_grid(grid)
+    images, valid = [], []
+    for layer in layers:
+        image, seen = _onto(layer, coarse)
+        images.append(image)
+        valid.append(seen)
+    depth = np.stack([_depth(seen) for seen in valid])
+    gains, differences = _gains(images, valid, wanted=gain)
+    if priority:
+        rank = np.stack(
+            [np.where(seen, np.float32(len(layers) - i), 0) for i, seen in enumerate(valid)]
+        ).astype(np.float32)
+        labels = np.where(rank.max(axis=0) > 0, rank.argmax(axis=0), -1)
+        rank = np.stack([np.full(coarse.shape, len(layers) - i) for i in range(len(layers))])
+        return Plan(coarse, labels, rank.astype(np.float32), gains, differences)
+    even = [image * factor for image, factor in zip(images, gains, strict=True)]
+    labels = _seams(even, valid, depth, relief, coarse.gsd)
+    return Plan(coarse, labels, depth, gains, differences)
+
+
+def coarse_grid(grid: Grid) -> Grid:
+    """Return the grid on which a mosaic is planned."""
+    factor = max(1.0, max(grid.shape) / COARSE)
+    return Grid.from_bounds(grid.bounds, gsd=grid.gsd * factor)
+
+
+def mosaic_window(
+    layers: Sequence[Layer], plan: Plan, window: Grid, *, blend: bool
+) -> tuple[NDArray[Any], IntArray]:
+    """Return a window of the mosaic, shape (h, w, bands), and the layer of each pixel, -1 none."""
+    halo = HALO if blend else 0
+    wide = window.window(-halo, -halo, window.width + 2 * halo, window.height + 2 * halo)
+    touching = [k for k, layer in enumerate(layers) if _overlap(layer.grid, wide)]
+    parts = {k: window_of(layers[k], wide) for k in touching}
+    owner = _owners(plan, wide, {k: seen for k, (_, seen) in parts.items()})
+    core = np.s_[halo : halo + window.height, halo : halo + window.width]
+    used = [k for k in touching if (owner == k).any()]
+    if not used:
+        bands = layers[0].read(0, 0, 1, 1)[0]
+        return np.zeros((*window.shape, bands.shape[2]), bands.dtype), owner[core]
+    dtype = parts[used[0]][0].dtype
+    if dtype.kind == "f":
+        # Values, not colours: never mixed, never scaled.
+        values = np.full((*wide.shape, parts[used[0]][0].shape[2]), np.nan, dtype)
+        for k in used:
+            values[owner == k] = parts[k][0][owner == k]
+        return values[core], owner[core]
+    images = {k: parts[k][0].astype(np.float32) * plan.gains[k].astype(np.float32) for k in used}
+    if blend and len(used) > 1:
+        mixed = _blended(images, {k: parts[k][1] for k in used}, owner)
+    else:
+        mixed = np.zeros_like(images[used[0]])
+        for k in used:
+            mixed[owner == k] = images[k][owner == k]
+    mixed[owner < 0] = 0
+    limit = np.iinfo(dtype).max
+    return np.clip(np.rint(mixed[core]), 0, limit).astype(dtype), owner[core]
+
+
+def window_of(layer: Layer, grid: Grid) -> tuple[NDArray[Any], BoolArray]:
+    """Return a layer on a window's pixels; resampled (cubic) only if its own lie elsewhere."""
+    import cv2
+
+    column, row = grid.offset_in(layer.grid)
+    step = grid.gsd / layer.grid.gsd
+    same = abs(step - 1) * max(grid.shape) < SAME_PIXEL
+    if same and max(abs(column - round(column)), abs(row - round(row))) < 10 * SAME_PIXEL:
+        return layer.read(round(column), round(row), grid.width, grid.height)
+    c0, r0 = math.floor(column) - 3, math.floor(row) - 3
+    c1 = math.ceil(column + (grid.width - 1) * step) + 4
+    r1 = math.ceil(row + (grid.height - 1) * step) + 4
+    image, seen = layer.read(c0, r0, c1 - c0, r1 - r0)
+    x = (column - c0 + step * np.arange(grid.width)).astype(np.float32)
+    y = (row - r0 + step * np.arange(grid.height)).astype(np.float32)
+    maps = (np.broadcast_to(x, grid.shape).copy(), np.broadcast_to(y[:, None], grid.shape).copy())
+    values = image.dtype.kind == "f"
+    if not values and not seen.all():
+        image, _ = fill_holes(image, seen, ~seen)  # no black from the holes into the rim
+    flag = cv2.INTER_NEAREST if values else cv2.INTER_CUBIC
+    found = cv2.remap(image, *maps, flag, borderMode=cv2.BORDER_REPLICATE)
+    inside = cv2.remap(seen.astype(np.uint8), *maps, cv2.INTER_NEAREST)
+    return found.reshape(*grid.shape, -1), inside > 0
+
+
+def _onto(layer: Layer, coarse: Grid) -> tuple[NDArray[np.float32], BoolArray]:
+    """Return a layer on the coarse grid, colours 0..1 (values stay as they are)."""
+    import cv2
+
+    own = layer.grid
+    width = max(1, round(own.width * own.gsd / coarse.gsd))
+    height = max(1, round(own.height * own.gsd / coarse.gsd))
+    image, seen = layer.reduced(width, height)
+    scale = 1.0 if image.dtype.kind == "f" else 1.0 / np.iinfo(image.dtype).max
+    xmin, _, _, ymax = own.bounds
+    column, row = (
+        ((a - xmin) / (own.width * own.gsd) * width - 0.5).astype(np.float32)
+        if k == 0
+        else ((ymax - a) / (own.height * own.gsd) * height - 0.5).astype(np.float32)
+        for k, a in enumerate((coarse.columns_x, coarse.rows_y))
+    )
+    maps = (
+        np.broadcast_to(column, coarse.shape).copy(),
+        np.broadcast_to(row[:, None], coarse.shape).copy(),
+    )
+    colours = np.nan_to_num(image.astype(np.float32)) * np.float32(scale)
+    found = cv2.remap(colours, *maps, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+    inside = cv2.remap(seen.astype(np.uint8), *maps, cv2.INTER_NEAREST, borderValue=0) > 0
+    return found.reshape(*coarse.shape, -1), inside
+
+
+def _depth(seen: BoolArray) -> NDArray[np.float32]:
+    """Return how far a place is from the rim of a layer, holes within it not counted. [px]"""
+    import cv2
+
+    # A rim of zeros: the edge of the raster is an edge of the layer as well.
+    padded = np.pad(seen.astype(np.uint8), 1)
+    closed = cv2.morphologyEx(padded, cv2.MORPH_CLOSE, np.ones((31, 31), np.uint8))
+    closed[[0, -1]], closed[:, [0, -1]] = 0, 0
+    depth = cv2.distanceTransform(closed, cv2.DIST_L2, 5)[1:-1, 1:-1]
+    return np.asarray(depth, dtype=np.float32)
+
+
+def _gains(
+    images: Sequence[NDArray[np.float32]], valid: Sequence[BoolArray], *, wanted: bool
+) -> tuple[FloatArray, dict[tuple[int, int], float]]:
+    """Return the factors that make common parts equal, by least squares over all overlaps."""
+    count, bands = len(images), images[0].shape[2]
+    normal = np.eye(count) * 1e-3
+    right = np.zeros((count, bands))
+    differences = {}
+    for i in range(count):
+        for j in range(i + 1, count):
+            both = valid[i] & valid[j]
+            if np.count_nonzero(both) < _LEAST_OVERLAP:
+                continue
+            a, b = images[i][both], images[j][both]
+            differences[i, j] = float(np.median(a[:, 0] - b[:, 0]))
+            usable = ((a > 0.02) & (a < 0.98) & (b > 0.02) & (b < 0.98)).all(axis=1)
+            if not wanted or np.count_nonzero(usable) < _LEAST_OVERLAP:
+                continue
+            ratio = np.median(np.log(a[usable]) - np.log(b[usable]), axis=0)
+            weight = math.sqrt(np.count_nonzero(usable))
+            normal[[i, j], [i, j]] += weight
+            normal[i, j] -= weight
+            normal[j, i] -= weight
+            right[i] -= weight * ratio
+            right[j] += weight * ratio
+    if not wanted:
+        return np.ones((count, bands)), differences
+    return np.exp(np.linalg.solve(normal, right)), differences
+
+
+def _seams(
+    images: Sequence[NDArray[np.float32]],
+    valid: Sequence[BoolArray],
+    depth: NDArray[np.float32],
+    relief: NDArray[np.float32] | None,
+    gsd: float,
+) -> IntArray:
+    """Return the layer of every place, with seams where they are seen least."""
+    import cv2
+    from skimage.segmentation import watershed
+
+    any_valid = np.logical_or.reduce(list(valid))
+    best = depth.argmax(axis=0)
+    second = np.partition(depth, -2, axis=0)[-2] if len(images) > 1 else np.zeros_like(depth[0])
+    # Undisputed: nobody else near, or clearly deeper within its own layer than within any other.
+    sure = (second <= 0) | (depth.max(axis=0) > 3 * second + 4)
+    markers = np.where(sure & (depth.max(axis=0) > 0), best + 1, 0).astype(np.int32)
+    cost = np.zeros(best.shape, np.float32)
+    for i in range(len(images)):
+        for j in range(i + 1, len(images)):
+            both = valid[i] & valid[j]
+            apart = np.abs(images[i] - images[j]).mean(axis=2)
+            cost = np.maximum(cost, np.where(both, apart, 0))
+    spread = float(np.percentile(cost[any_valid], 90)) if any_valid.any() else 0.0
+    cost = cv2.GaussianBlur(cost / max(spread, 1e-3), (0, 0), 1.5)
+    for seen in valid:
+        holes = cv2.morphologyEx(seen.astype(np.uint8), cv2.MORPH_CLOSE, np.ones((31, 31)))
+        near = cv2.distanceTransform((~((holes > 0) & ~seen)).astype(np.uint8), cv2.DIST_L2, 3)
+        cost += np.exp(-near / np.float32(_SHY))
+    if relief is not None:
+        dy, dx = np.gradient(np.nan_to_num(relief), gsd)
+        edge = (np.hypot(dx, dy) > _EDGE_SLOPE).astype(np.uint8)
+        near = cv2.distanceTransform(1 - edge, cv2.DIST_L2, 3)
+        cost += 2 * np.exp(-near / np.float32(_SHY))
+    # Watersheds run along crests, seams along the valleys of the cost: turn it over.
+    level = (1e4 / (0.05 + cost)).astype(np.int32)
+    flooded = watershed(level, markers, mask=any_valid)
+    labels = np.where(flooded > 0, flooded - 1, np.where(any_valid, best, -1))
+    return np.asarray(labels, dtype=np.int64)
+
+
+def _overlap(a: Grid, b: Grid) -> bool:
+    first, second = a.bounds, b.bounds
+    return not (
+        first[2] <= second[0]
+        or first[0] >= second[2]
+        or first[3] <= second[1]
+        or first[1] >= second[3]
+    )
+
+
+def _owners(plan: Plan, grid: Grid, seen: dict[int, BoolArray]) -> IntArray:
+    """Return the layer of every pixel: the planned one, or the next that sees it."""
+    coarse = plan.coarse
+    column = np.clip(
+        np.rint((grid.columns_x - coarse.x0) / coarse.gsd).astype(int), 0, coarse.width - 1
+    )
+    row = np.clip(np.rint((coarse.y0 - grid.rows_y) / coarse.gsd).astype(int), 0, coarse.height - 1)
+    at = np.ix_(row, column)
+    owner = plan.labels[at].copy()
+    good = np.zeros(grid.shape, bool)
+    for k, valid in seen.items():
+        good |= (owner == k) & valid
+    if good.all():
+        return owner
+    order = np.full(grid.shape, -1.0, np.float32)
+    next_best = np.full(grid.shape, -1, np.int64)
+    for k, valid in seen.items():
+        better = valid & (plan.rank[k][at] > order)
+        order = np.where(better, plan.rank[k][at], order)
+        next_best[better] = k
+    return np.where(good, owner, next_best)
+
+
+def _blended(
+    images: dict[int, NDArray[np.float32]], valid: dict[int, BoolArray], owner: IntArray
+) -> NDArray[np.float32]:
+    """Return the images mixed band by band (Burt and Adelson 1983)."""
+    import cv2
+
+    total: list[NDArray[np.float32]] = []
+    weights: list[NDArray[np.float32]] = []
+    for k, raw in images.items():
+        image = raw
+        if not valid[k].all():
+            image, _ = fill_holes(raw, valid[k], ~valid[k])
+            image = np.nan_to_num(image)
+        share = (owner == k).astype(np.float32)
+        for level in range(LEVELS + 1):
+            last = level == LEVELS
+            small = image if last else cv2.pyrDown(image)
+            size = (image.shape[1], image.shape[0])
+            detail = image if last else image - cv2.pyrUp(small, dstsize=size).reshape(image.shape)
+            part = detail * share[:, :, None]
+            if level == len(total):
+                total.append(part)
+                weights.append(share.copy())
+            else:
+                total[level] += part
+                weights[level] += share
+            if not last:
+                image = small.reshape(*small.shape[:2], -1)
+                share = cv2.pyrDown(share)
+    out = total[LEVELS] / np.maximum(weights[LEVELS], 1e-6)[:, :, None]
+    for level in range(LEVELS - 1, -1, -1):
+        detail = total[level] / np.maximum(weights[level], 1e-6)[:, :, None]
+        size = (detail.shape[1], detail.shape[0])
+        out = cv2.pyrUp(out, dstsize=size).reshape(detail.shape) + detail
+    return np.asarray(out, dtype=np.float32)
