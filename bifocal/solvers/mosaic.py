@@ -355,11 +355,14 @@ def _blended(
 
     total: list[NDArray[np.float32]] = []
     weights: list[NDArray[np.float32]] = []
+    # Beyond its rim a layer goes on as the plain mosaic: layers that agree blend into themselves.
+    plain = np.zeros_like(next(iter(images.values())))
     for k, raw in images.items():
-        image = raw
-        if not valid[k].all():
-            image, _ = fill_holes(raw, valid[k], ~valid[k])
-            image = np.nan_to_num(image)
+        plain[owner == k] = raw[owner == k]
+    if (owner < 0).any():
+        plain = np.nan_to_num(fill_holes(plain, owner >= 0, owner < 0)[0])
+    for k, raw in images.items():
+        image = np.where(valid[k][:, :, None], raw, plain)
         share = (owner == k).astype(np.float32)
         for level in range(LEVELS + 1):
             last = level == LEVELS
@@ -376,9 +379,9 @@ def _blended(
             if not last:
                 image = small.reshape(*small.shape[:2], -1)
                 share = cv2.pyrDown(share)
-    out = total[LEVELS] / np.maximum(weights[LEVELS], 1e-6)[:, :, None]
+    out = total[LEVELS] / np.maximum(weights[LEVELS], 1e-9)[:, :, None]
     for level in range(LEVELS - 1, -1, -1):
-        detail = total[level] / np.maximum(weights[level], 1e-6)[:, :, None]
+        detail = total[level] / np.maximum(weights[level], 1e-9)[:, :, None]
         size = (detail.shape[1], detail.shape[0])
         out = cv2.pyrUp(out, dstsize=size).reshape(detail.shape) + detail
     return np.asarray(out, dtype=np.float32)
