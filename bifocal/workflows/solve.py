@@ -97,6 +97,8 @@ class Solution:
         Whether images 1 and 2 were exchanged.
     overridden : bool
         Whether options took the place of what the workbook says.
+    rules : tuple of ToleranceRule
+        For the verdict.
     remarks : tuple of str
         What the user should know.
     """
@@ -115,6 +117,7 @@ class Solution:
     adjusted: bool
     exchanged: bool
     overridden: bool
+    rules: tuple[ToleranceRule, ...]
     remarks: tuple[str, ...]
 
     @property
@@ -184,6 +187,7 @@ def solve_file(path: Path | str, options: SolveOptions | None = None) -> Solutio
         adjusted=geometry.adjusted,
         exchanged=geometry.exchanged,
         overridden=bool(options.setup) or options.pair is not None or geometry.new_sigma,
+        rules=options.rules,
         remarks=tuple(dict.fromkeys(remarks)),
     )
 

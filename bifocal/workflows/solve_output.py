@@ -8,7 +8,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from bifocal.domain.tolerances import sentence
+from bifocal.domain.reference import KnownPoints
+from bifocal.domain.tolerances import RULES, sentence
 from bifocal.io.survey_book import write_book
 from bifocal.io.survey_content import SurveyContent
 from bifocal.io.survey_update import can_update, update_book
@@ -68,7 +69,7 @@ def write_result(
             f" Write a text table instead: --out {path.with_suffix('.csv').name}"
         )
     content = result_content(solution, path, language)
-    reason = _why_new(solution, path, language)
+    reason = _why_new(solution, language)
     if not reason:
         own = as_typed(solution, content)
         reason = can_update(solution.source, path, solution.survey, own)
@@ -84,7 +85,7 @@ def write_result(
     return f"a new workbook was made, since {reason}." if solution.survey.is_ours else ""
 
 
-def _why_new(solution: Solution, path: Path, language: str | None) -> str:
+def _why_new(solution: Solution, language: str | None) -> str:
     """Return why the survey's own workbook cannot take the results; empty if it can."""
     if not solution.survey.is_ours:
         return "the points do not come from a survey workbook"
@@ -96,25 +97,31 @@ def _why_new(solution: Solution, path: Path, language: str | None) -> str:
         return "the images were exchanged"
     if language not in (None, solution.survey.language):
         return "another language was asked for"
-    del path
+    if solution.rules != RULES:
+        return "other tolerance rules were asked for"
     return ""
 
 
 def as_typed(solution: Solution, content: SurveyContent) -> SurveyContent:
     """Return the content as the workbook's formulas see it: images in the order they were typed."""
-    if not solution.exchanged or solution.setup is None:
-        return content
-    setup, points = solution.setup.exchanged(), solution.points.exchanged()
-    table = solve_ideal(setup, points)
-    world = None
-    if solution.georeference is not None:
-        world = georeference(table, solution.survey.control, model=solution.georeference.model)
+    table, setup, points = solution.table, solution.setup, solution.points
+    world = solution.georeference
+    if solution.exchanged and setup is not None:
+        setup, points = setup.exchanged(), points.exchanged()
+        table = solve_ideal(setup, points)
+        if world is not None:
+            world = georeference(table, solution.survey.control, model=world.model)
+    # Relief given beside the points is checked too, but stands not on the sheet Check.
+    listed = len(solution.survey.known_rows)
+    whole = solution.survey.known
+    known = KnownPoints(ids=whole.ids[:listed], xyz=whole.xyz[:listed], use=whole.used[:listed])
     return replace(
         content,
         setup=setup,
         points=points,
         table=table,
-        check=check_points(table, solution.survey.known),
+        known=known,
+        check=check_points(table, known),
         georeference=world,
     )
 
@@ -137,6 +144,7 @@ def result_content(solution: Solution, path: Path, language: str | None) -> Surv
         control=solution.survey.control,
         georeference=solution.georeference,
         model=solution.survey.model,
+        rules=solution.rules,
         sensor=solution.survey.setup.sensor,
         flag_sigmas=solution.survey.setup.flag_sigmas,
         sigma_r_max=solution.survey.setup.sigma_r_max,

@@ -91,6 +91,19 @@ def test_check_sheet_gives_errors_and_a_verdict(tmp_path):
     assert "0.18 mm: holds 1:100 (18 mm), fails 1:50 (9 mm)" in answer["check"]["verdict"]
 
 
+def test_the_clients_own_tolerance_is_judged_and_written(tmp_path):
+    path = fill(tmp_path / "s.xlsx", Check=[("P1", None, None, 1.005)])
+    out = tmp_path / "r.xlsx"
+    result = run(
+        "solve", path, "--tolerance-rule", "0.2mm", "--tolerance-rule", "2cm", "--out", out
+    )
+    assert "0.2 mm: holds 1:50 (10 mm), fails 1:20 (4 mm)" in result.stdout
+    assert "2 cm: holds 1:10 (20 mm)" in result.stdout
+    sheet = openpyxl.load_workbook(out, data_only=True)["Check"]
+    assert [sheet["N13"].value, sheet["P15"].value, sheet["Q15"].value] == ["0.2 mm", 10.0, "holds"]
+    refused(path, "nor a length", options=("--tolerance-rule", "3 miles"))
+
+
 def test_georeference_sheet_gives_world_coordinates(tmp_path):
     world = [(name, 1000 + x, 2000 - r, 50 + y) for name, x, y, r in POINTS]
     path = fill(tmp_path / "s.xlsx", Georeference=world)
