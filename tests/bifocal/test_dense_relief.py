@@ -11,6 +11,7 @@ import pytest
 from bifocal import Pair, Quality, dense_relief
 from bifocal.solvers.dense import edges, flow, seed, smooth, splat
 from bifocal.solvers.dense.frame import as_grey, common_bounds, make_frame, working_grid
+from bifocal.solvers.dense.setup_sigma import setup_sigma
 from bifocal.solvers.scene import (
     RICH,
     Rendering,
@@ -228,6 +229,17 @@ def test_sigma_is_the_lever_times_the_matching_precision_over_the_radius():
     # By hand: 0.1 px * 20.78125 m / 300 px at 300 px to the right of the nadir (383.5, 255.5).
     x = 383.5 + 300.5
     assert sigma[255, int(x)] == pytest.approx(0.1 * 20.78125 / 300.5, rel=1e-4)
+
+
+def test_the_precision_of_the_set_up_is_added_where_it_is_stated():
+    setup = {"standard_deviations": {"scale": 1e-4, "distance1": 0.01, "distance2": 0.02}}
+    pair = replace(shot().pair, extra={"setup": setup})
+    sigma = setup_sigma(pair, np.array([0.0, 1.0], dtype=np.float32))
+    # By hand: B 1e-4 = 2.078 mm; per metre of relief 9.5 / (17.5 * 8) * 10 mm = 0.679 mm and
+    # 17.5 / (9.5 * 8) * 20 mm = 4.605 mm.
+    wanted = [2.078e-3, np.sqrt(2.078**2 + 0.679**2 + 4.605**2) * 1e-3]
+    np.testing.assert_allclose(sigma, wanted, rtol=1e-3)
+    assert setup_sigma(shot().pair, np.ones(2, np.float32)).tolist() == [0.0, 0.0]
 
 
 def test_flow_of_a_known_zoom_gives_its_relief_and_nothing_across():

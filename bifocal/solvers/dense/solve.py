@@ -23,6 +23,7 @@ from bifocal.solvers.dense.frame import (
 )
 from bifocal.solvers.dense.radiometry import match_exposure
 from bifocal.solvers.dense.registration import Registration, check_registration
+from bifocal.solvers.dense.setup_sigma import setup_sigma
 from photocore.arrays import BoolArray, ByteArray
 from photocore.console import Progress, no_progress
 from photocore.errors import InputError
@@ -167,7 +168,7 @@ def dense_relief(
     known = np.isfinite(layer.r)
     return DenseRelief(
         r=layer.r,
-        sigma=np.where(known, layer.sigma, np.float32(np.nan)),
+        sigma=np.where(known, np.hypot(layer.sigma, setup_sigma(pair, layer.r)), np.float32("nan")),
         quality=np.where(known, layer.quality, np.uint8(Quality.UNKNOWN)),
         plane_from_pixel=wanted.plane_from_pixel,
         registration=registration,
