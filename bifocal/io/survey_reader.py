@@ -13,6 +13,7 @@ from bifocal.domain.lens import Lens
 from bifocal.domain.observations import PointObservations
 from bifocal.domain.pair import Pair, Photo
 from bifocal.domain.reference import KnownPoints
+from bifocal.io.survey_known_reader import metres_of, read_known, unit_error, with_measured
 from bifocal.io.survey_setup_reader import SetupValues, is_general, read_setup
 from bifocal.io.survey_words import ALIASES, COLUMNS, LANGUAGES, WORDS
 from photocore.arrays import BoolArray, FloatArray
@@ -34,7 +35,6 @@ _SHARED = {"x1": "x", "y1": "y", "x2": "x", "y2": "y"} | {
 _OTHER = {"col1": "i", "row1": "j", "col2": "i", "row2": "j"}
 _FAR_NEAR = {"1": ("far", "lontana", "fern"), "2": ("near", "vicina", "nah")}
 _TO_MM = {"mm": 1.0, "cm": 10.0, "um": 1e-3, "m": 1000.0}
-_TO_M = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "dm": 0.1}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -165,8 +165,12 @@ def read_survey(path: Path | str, options: ReadOptions | None = None) -> SurveyI
     sheets = book if isinstance(book, SheetFile) else None
     setup = read_setup(Path(path), sheets, options.decimal, errors)
     remarks += setup.remarks
-    known, known_rows = _known(book, "Check", ("X_ref", "Y_ref", "Z_ref"), errors, remarks, options)
-    control, control_rows = _known(book, "Georeference", ("E", "N", "H"), errors, remarks, options)
+    known, known_rows = read_known(
+        book, "Check", ("X_ref", "Y_ref", "Z_ref"), errors, remarks, options.decimal
+    )
+    control, control_rows = read_known(
+        book, "Georeference", ("E", "N", "H"), errors, remarks, options.decimal
+    )
     model, language = "auto", "en"
     if isinstance(book, SheetFile):
         model = (
@@ -182,7 +186,7 @@ def read_survey(path: Path | str, options: ReadOptions | None = None) -> SurveyI
         points=points,
         setup=setup,
         unit=unit,
-        known=_with_measured(known, points),
+        known=with_measured(known, points),
         control=control,
         model=model,
         language=language,
@@ -279,15 +283,15 @@ def _observations(table: Table, errors: list[CellError]) -> tuple[PointObservati
     for i, key in enumerate(("s1", "s2")):
         symbol = table.units.get(key, "mm") or "mm"
         if symbol not in _TO_MM:
-            errors.append(_unit_error(table, key, symbol, "mm"))
+            errors.append(unit_error(table, key, symbol, "mm"))
         else:
             polar[:, i] *= _TO_MM[symbol]
     polar[:, 2] = _degrees(table, polar[:, 2], errors)
     pixels = _stack(table, _PIXELS)
     for key in _PIXELS:
         if table.units.get(key, "px") not in ("px", ""):
-            errors.append(_unit_error(table, key, table.units[key], "px"))
-    measured = table.numbers("r_measured") * _metres(table, "r_measured", errors)
+            errors.append(unit_error(table, key, table.units[key], "px"))
+    measured = table.numbers("r_measured") * metres_of(table, "r_measured", errors)
     _check_rows(table, ids, used, xy, polar, pixels, faulty, errors)
     if errors:
         ids = [name or f"row {row}" for name, row in zip(ids, table.rows, strict=True)]
@@ -332,26 +336,9 @@ def _unit_of_xy(table: Table, errors: list[CellError]) -> tuple[str, float]:
     if symbol == "px":
         return "px", 1.0
     if symbol not in _TO_MM:
-        errors.append(_unit_error(table, next(iter(said)), symbol, "mm or px"))
+        errors.append(unit_error(table, next(iter(said)), symbol, "mm or px"))
         return "", 1.0
     return "mm", _TO_MM[symbol]
-
-
-def _unit_error(table: Table, key: str, symbol: str, wanted: str) -> CellError:
-    return CellError(
-        f'the heading "{table.headings.get(key, key)}" says [{symbol}], expected [{wanted}].',
-        file=table.file,
-        sheet=table.sheet,
-        column=key,
-    )
-
-
-def _metres(table: Table, key: str, errors: list[CellError]) -> float:
-    symbol = table.units.get(key) or "m"
-    if symbol not in _TO_M:
-        errors.append(_unit_error(table, key, symbol, "m"))
-        return 1.0
-    return _TO_M[symbol]
 
 
 def _degrees(table: Table, theta: FloatArray, errors: list[CellError]) -> FloatArray:
@@ -361,7 +348,7 @@ def _degrees(table: Table, theta: FloatArray, errors: list[CellError]) -> FloatA
     if symbol == "rad":
         return np.degrees(theta)
     if symbol != "deg":
-        errors.append(_unit_error(table, "theta", symbol, "deg"))
+        errors.append(unit_error(table, "theta", symbol, "deg"))
     return theta
 
 
@@ -415,77 +402,6 @@ def _incomplete(name: str, keys: Sequence[str], lacking: Sequence[str]) -> str:
             f"{images.pop()} too, or set use = 0."
         )
     return f"point {name} lacks {', '.join(lacking)}; complete it, or set use = 0."
-
-
-def _known(
-    book: object,
-    sheet: str,
-    keys: tuple[str, str, str],
-    errors: list[CellError],
-    remarks: list[str],
-    options: ReadOptions,
-) -> tuple[KnownPoints, tuple[int, ...]]:
-    """Return check or control points of the sheet made for them, and their rows."""
-    if not isinstance(book, SheetFile):
-        return KnownPoints(), ()
-    names = {bare(sheet), bare(f"tbl{sheet}"), "tblgeo" if sheet == "Georeference" else ""}
-    areas = [area for area in book.tables if bare(area.name) in names]
-    titles = [title for title in book.titles if bare(title) in names]
-    if not areas and not titles:
-        return KnownPoints(), ()
-    columns = [_plain_column("id", "text")]
-    columns += [_plain_column(key, "number") for key in keys]
-    columns.append(_plain_column("use", "flag"))
-    table = read_table(
-        book,
-        columns,
-        name="Geo" if sheet == "Georeference" and areas else sheet,
-        sheet=areas[0].sheet if areas else titles[0],
-        decimal=options.decimal,
-        errors=errors,
-    )
-    remarks += [text for text in table.remarks if "rows directly below" not in text]
-    errors += table.repeated("id")
-    xyz = np.stack(
-        [table.numbers(key) * _metres(table, key, errors) for key in keys], axis=-1
-    ).reshape(-1, 3)
-    use = table.numbers("use")
-    rows = [i for i, name in enumerate(table.texts("id")) if name]
-    for i, name in enumerate(table.texts("id")):
-        if not name and not np.isnan(xyz[i]).all():
-            errors.append(table.error(i, "id", "coordinates without the name of a point."))
-    known = KnownPoints(
-        ids=tuple(table.texts("id")[i] for i in rows),
-        xyz=xyz[rows],
-        use=(np.isnan(use) | (use != 0))[rows],
-    )
-    return known, tuple(table.rows[i] for i in rows)
-
-
-def _plain_column(key: str, kind: Literal["number", "flag", "text"]) -> Column:
-    names = [name for name in COLUMNS[key][1:] if name] + list(ALIASES.get(key, ()))
-    if key in ("E", "N", "H"):
-        names += {"E": ["Easting", "Rechtswert"], "N": ["Northing", "Hochwert"],
-                  "H": ["Elevation", "Z world"]}[key]  # fmt: skip
-    return Column(key, tuple(names), kind=kind, required=key == "id")
-
-
-def _with_measured(known: KnownPoints, points: PointObservations) -> KnownPoints:
-    """Add relief measured on site, given beside the points, to the check points."""
-    rows = [
-        i
-        for i in np.flatnonzero(~np.isnan(points.r_measured) & points.use)
-        if points.ids[i] not in known.ids
-    ]
-    if not rows:
-        return known
-    nothing = np.full(len(rows), np.nan)
-    more = np.stack([nothing, nothing, points.r_measured[rows]], axis=-1)
-    return KnownPoints(
-        ids=(*known.ids, *(points.ids[i] for i in rows)),
-        xyz=np.vstack([known.xyz, more]),
-        use=np.concatenate([known.used, np.ones(len(rows), dtype=bool)]),
-    )
 
 
 def _language(book: SheetFile) -> str:

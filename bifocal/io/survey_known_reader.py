@@ -1,0 +1,108 @@
+"""Read what is known from outside: check points, control points, relief measured on site."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import numpy as np
+
+from bifocal.domain.observations import PointObservations
+from bifocal.domain.reference import KnownPoints
+from bifocal.io.survey_words import ALIASES, COLUMNS
+from photocore.errors import CellError
+from photocore.spreadsheet.grid import SheetFile
+from photocore.tables import Column, Table, read_table
+from photocore.tables.headings import bare
+from photocore.tables.numbers import Decimal
+
+_TO_M = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "dm": 0.1}
+
+
+def read_known(
+    book: object,
+    sheet: str,
+    keys: tuple[str, str, str],
+    errors: list[CellError],
+    remarks: list[str],
+    decimal: Decimal | None,
+) -> tuple[KnownPoints, tuple[int, ...]]:
+    """Return check or control points of the sheet made for them, and their rows."""
+    if not isinstance(book, SheetFile):
+        return KnownPoints(), ()
+    names = {bare(sheet), bare(f"tbl{sheet}"), "tblgeo" if sheet == "Georeference" else ""}
+    areas = [area for area in book.tables if bare(area.name) in names]
+    titles = [title for title in book.titles if bare(title) in names]
+    if not areas and not titles:
+        return KnownPoints(), ()
+    columns = [_plain_column("id", "text")]
+    columns += [_plain_column(key, "number") for key in keys]
+    columns.append(_plain_column("use", "flag"))
+    table = read_table(
+        book,
+        columns,
+        name="Geo" if sheet == "Georeference" and areas else sheet,
+        sheet=areas[0].sheet if areas else titles[0],
+        decimal=decimal,
+        errors=errors,
+    )
+    remarks += [text for text in table.remarks if "rows directly below" not in text]
+    errors += table.repeated("id")
+    xyz = np.stack(
+        [table.numbers(key) * metres_of(table, key, errors) for key in keys], axis=-1
+    ).reshape(-1, 3)
+    use = table.numbers("use")
+    rows = [i for i, name in enumerate(table.texts("id")) if name]
+    for i, name in enumerate(table.texts("id")):
+        if not name and not np.isnan(xyz[i]).all():
+            errors.append(table.error(i, "id", "coordinates without the name of a point."))
+    known = KnownPoints(
+        ids=tuple(table.texts("id")[i] for i in rows),
+        xyz=xyz[rows],
+        use=(np.isnan(use) | (use != 0))[rows],
+    )
+    return known, tuple(table.rows[i] for i in rows)
+
+
+def _plain_column(key: str, kind: Literal["number", "flag", "text"]) -> Column:
+    names = [name for name in COLUMNS[key][1:] if name] + list(ALIASES.get(key, ()))
+    if key in ("E", "N", "H"):
+        names += {"E": ["Easting", "Rechtswert"], "N": ["Northing", "Hochwert"],
+                  "H": ["Elevation", "Z world"]}[key]  # fmt: skip
+    return Column(key, tuple(names), kind=kind, required=key == "id")
+
+
+def with_measured(known: KnownPoints, points: PointObservations) -> KnownPoints:
+    """Add relief measured on site, given beside the points, to the check points."""
+    rows = [
+        i
+        for i in np.flatnonzero(~np.isnan(points.r_measured) & points.use)
+        if points.ids[i] not in known.ids
+    ]
+    if not rows:
+        return known
+    nothing = np.full(len(rows), np.nan)
+    more = np.stack([nothing, nothing, points.r_measured[rows]], axis=-1)
+    return KnownPoints(
+        ids=(*known.ids, *(points.ids[i] for i in rows)),
+        xyz=np.vstack([known.xyz, more]),
+        use=np.concatenate([known.used, np.ones(len(rows), dtype=bool)]),
+    )
+
+
+def metres_of(table: Table, key: str, errors: list[CellError]) -> float:
+    """Return metres per unit of a column, complaining about a unit that is no length."""
+    symbol = table.units.get(key) or "m"
+    if symbol not in _TO_M:
+        errors.append(unit_error(table, key, symbol, "m"))
+        return 1.0
+    return _TO_M[symbol]
+
+
+def unit_error(table: Table, key: str, symbol: str, wanted: str) -> CellError:
+    """Return the complaint about a heading with another unit than expected."""
+    return CellError(
+        f'the heading "{table.headings.get(key, key)}" says [{symbol}], expected [{wanted}].',
+        file=table.file,
+        sheet=table.sheet,
+        column=key,
+    )
