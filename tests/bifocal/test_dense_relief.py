@@ -186,6 +186,9 @@ def test_photos_without_common_area_are_refused():
         ({"gsd": -1.0}, "gsd"),
         ({"bounds": (50.0, 50.0, 60.0, 60.0)}, "lie outside what both photos see"),
         ({"bounds": (1.0, 0.0, -1.0, 2.0)}, "bounds"),
+        ({"gsd": 1.0}, "Is the unit"),
+        ({"relief_range": (1.0, -1.0)}, "least and the greatest"),
+        ({"relief_range": (0.0, 9.4)}, "below 90 % of d2"),
         ({"quality": "superb"}, "expected fast, standard, best"),
     ],
 )

@@ -40,6 +40,8 @@ ACROSS_LIMIT, LOOP_LIMIT = 0.5, 0.8
 SIGMA_SHARE = 0.01
 #: Relief maps of more pixels than this are refused: a unit has been mistaken.
 LARGEST_MAP = 400e6
+#: A GSD of more pixels of the far photo than this is taken for a slip, too.
+COARSEST_GSD = 64.0
 #: Error across the radius that counts as noise rather than as an edge, for smoothing. [px]
 NOISE_CLIP = 0.25
 
@@ -149,6 +151,8 @@ def dense_relief(
     grey1, grey2 = as_grey(image1, "image1"), as_grey(image2, "image2")
     if quality not in QUALITIES:
         raise InputError(f"quality: expected {', '.join(QUALITIES)}, got {quality!r}.")
+    if relief_range is not None:
+        _check_range(relief_range, pair.image2.distance)
     wanted, target, work = _grids(pair, (grey1, grey2), gsd, bounds, quality, relief_range)
     frame = make_frame(pair, grey1, grey2, work)
     progress(0.1, 1.0, "First relief")
@@ -196,7 +200,7 @@ def _grids(
             f"gsd: {step:g} m over {size} would be {wanted.width} x {wanted.height} px. Is the "
             f"unit right? The GSD is in metres; a pixel of the far photo is {native:.4g} m."
         )
-    if min(wanted.shape) < 2:
+    if min(wanted.shape) < 2 or step > COARSEST_GSD * native:
         raise InputError(
             f"gsd: {step:g} m over {size} leaves {wanted.width} x {wanted.height} px. Is the unit "
             f"right? The GSD is in metres; a pixel of the far photo is {native:.4g} m."
@@ -229,6 +233,16 @@ def _grids(
         wanted = working_grid(pair, images[0].shape, common, native)
     target = wanted if step >= 0.999 * fine else Grid.from_bounds(wanted.bounds, gsd=fine)
     return wanted, target, work
+
+
+def _check_range(relief_range: tuple[float, float], d2: float) -> None:
+    """Refuse a relief range that is none, or that reaches to the near camera."""
+    low, high = relief_range
+    if not (np.isfinite(relief_range).all() and low < high < 0.9 * d2):
+        raise InputError(
+            f"relief_range: expected two numbers, the least and the greatest relief [m], below "
+            f"90 % of d2 ({0.9 * d2:.2f} m); got {low:g}, {high:g}."
+        )
 
 
 def _seen_box(pair: Pair, box: Bounds, low: float, high: float) -> Bounds:
