@@ -11,7 +11,7 @@ import numpy as np
 from bifocal.domain.setup import OFF_RADIAL_SIGMAS, ON_PLANE_SIGMAS, SurveySetup
 from bifocal.io.survey_words import SETUP
 from photocore.arrays import FloatArray
-from photocore.errors import CellError, InputError
+from photocore.errors import CellError, GeometryError, InputError
 from photocore.spreadsheet.grid import SheetFile
 from photocore.tables import Column, NamedValues, read_named_values
 from photocore.tables.numbers import Decimal
@@ -100,6 +100,8 @@ class SetupValues:
                 off_radial_sigmas=self.flag_sigmas[0],
                 on_plane_sigmas=self.flag_sigmas[1],
             )
+        except GeometryError as error:
+            raise GeometryError(f"{self.where}: {error}") from None
         except InputError as error:
             raise InputError(f"{self.where}: {error}") from None
 

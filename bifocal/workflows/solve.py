@@ -380,7 +380,10 @@ def _solve_ideal(
     chosen = str(options.setup.get("unit") or "")
     unit = chosen or survey.unit or values.unit or "mm"
     setup = values.ideal(unit)
-    remark = setup.check_scales(options.scale_tolerance)
+    try:
+        remark = setup.check_scales(options.scale_tolerance)
+    except GeometryError as error:
+        raise GeometryError(f"{values.where}: {error}") from None
     if remark:
         remarks.append(remark)
     refuse_wrong_unit(setup, points, _where(survey), said=survey.unit)

@@ -329,7 +329,11 @@ def test_all_bad_cells_are_reported_at_once_with_sheet_and_cell(tmp_path):
 
 
 def test_equal_distances(tmp_path):
-    refused(fill(tmp_path / "s.xlsx", setup={**SETUP, "d_1": 9.5, "delta_d": None}), "both 9.5 m")
+    refused(
+        fill(tmp_path / "s.xlsx", setup={**SETUP, "d_1": 9.5, "delta_d": None}),
+        "s.xlsx › Setup",
+        "both 9.5 m",
+    )
 
 
 def test_distances_that_contradict_the_way_between_the_cameras(tmp_path):
@@ -337,7 +341,7 @@ def test_distances_that_contradict_the_way_between_the_cameras(tmp_path):
 
 
 def test_scales_that_do_not_match(tmp_path):
-    refused(fill(tmp_path / "s.xlsx", setup={**SETUP, "c_2": 28}), "differ by", "tolerance 2.0%")
+    refused(fill(tmp_path / "s.xlsx", setup={**SETUP, "c_2": 28}), "Setup: c_1/d_1", "differ by")
 
 
 def test_radial_distance_not_above_zero(tmp_path):
