@@ -98,6 +98,9 @@ def refine(
     Gain and offset are free. The gradient is photo 1's (inverse composition), so it is computed
     once. Samples are as far apart as a pixel of the coarser photo.
     """
+    if not len(pixels1):
+        none = np.zeros(0)
+        return PatchResult(np.zeros((0, 2)), none, none, np.zeros(0, dtype=bool))
     out = [
         _refine_part(
             image1,

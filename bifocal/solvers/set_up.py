@@ -137,6 +137,10 @@ def set_up(
     ties = _ties(photos, needed=not enough, notes=notes)
     step("setting up the cameras")
     cameras, agree, interiors = _start(photos, control, site, ties, enough, known)
+    if enough and ties is not None:
+        misfit = _contradiction(cameras, interiors, ties)
+        if misfit > 2 * ties.tolerance and _picks_exchanged(photos, control, site, ties, misfit):
+            return _other_photos(photos, control, site, step)
     if cameras[0].centre[2] < cameras[1].centre[2]:
         return _exchanged(photos, control, site, step)
     if enough:
@@ -161,6 +165,70 @@ def set_up(
         remarks=tuple(notes.remarks),
         gross=gross,
     )
+
+
+def _contradiction(
+    cameras: tuple[Pinhole, Pinhole], interiors: tuple[Interior, Interior], ties: Ties
+) -> float:
+    """Return how far the common points are from the cameras' epipolar lines. [px]"""
+    problem = _problem(interiors, Control(), SiteMeasures(), ties, np.zeros(0, bool), gauge=True)
+    blank = np.zeros(0)
+    solution = Solution(
+        cameras=cameras,
+        radial=(0.0, 0.0),
+        plane=np.zeros(3),
+        covariance=np.zeros((0, 0)),
+        sigma0=1.0,
+        control_residuals=np.zeros((0, 4)),
+        control_test=blank,
+        tie_misfit=blank,
+        wall_misfit=blank,
+    )
+    return robust_sigma(evaluate(problem, solution).tie_misfit)
+
+
+def _picks_exchanged(
+    photos: tuple[PhotoInput, PhotoInput],
+    control: Control,
+    site: SiteMeasures,
+    ties: Ties,
+    misfit: float,
+) -> bool:
+    """Return whether the picks of the two photos were exchanged.
+
+    Raises
+    ------
+    GeometryError
+        If they fit neither way round.
+    """
+    turned = control.exchanged()
+    known = np.isfinite(turned.xyz[:, 0]) & np.isfinite(turned.xyz[:, 1])
+    try:
+        cameras, _, interiors = _start(photos, turned, site, ties, True, known)
+        other = _contradiction(cameras, interiors, ties)
+    except GeometryError:
+        other = np.inf
+    if other < 0.5 * misfit:
+        return True
+    if misfit > 0.012 * max(photos[0].interior.image_size):
+        raise GeometryError(
+            "the control points' pixels do not fit the photos: the details common to both photos "
+            "contradict them. Check that col1, row1 are pixels of the first photo and col2, row2 "
+            "of the second, at full size."
+        )
+    return False
+
+
+def _other_photos(
+    photos: tuple[PhotoInput, PhotoInput], control: Control, site: SiteMeasures, step: Step
+) -> SetUp:
+    """Return the set-up with the picks of the two photos exchanged, saying so."""
+    made = set_up(photos, control=control.exchanged(), site=site, step=step)
+    note = (
+        f"col1, row1 of the control points are pixels of {photos[1].name}, col2, row2 of "
+        f"{photos[0].name}; the picks were exchanged."
+    )
+    return replace(made, remarks=(note, *made.remarks))
 
 
 def _exchanged(
@@ -378,8 +446,7 @@ def _adjusted(
     if len(problem.tie1) and images[0] is not None and images[1] is not None:
         problem, solution = settle(problem, solution)
         problem, solution = _unbent(problem, solution, notes)
-        if problem.gauge:
-            problem, solution = _on_main_face(problem, solution, (images[0], images[1]))
+        problem, solution = _with_even_points(problem, solution, (images[0], images[1]))
         step("refining the common points")
         for _ in range(2):  # the second pass searches around better places
             moved, good = refine_ties(problem, solution, (images[0], images[1]))
@@ -471,10 +538,13 @@ def _unbent(problem: Problem, solution: Solution, notes: _Notes) -> tuple[Proble
     return trial, bent
 
 
-def _on_main_face(
+def _with_even_points(
     problem: Problem, solution: Solution, images: tuple[ByteArray, ByteArray]
 ) -> tuple[Problem, Solution]:
-    """Return the adjustment in the frame of the face that most of the area has."""
+    """Return the adjustment with points from the whole area, on the face that has most of it.
+
+    Where control points define the plane, the frame stays theirs.
+    """
     count = len(problem.tie1)
     raw1, raw2 = even_points(problem, solution, images)
     extra = len(raw1)
@@ -500,6 +570,16 @@ def _on_main_face(
             (problem.tie1, problem.tie2), problem.interiors, solution.radial, strict=True
         )
     ]
+    if not problem.gauge:
+        sigma = max(robust_sigma(solution.tie_misfit[:count][problem.tie_used[:count]]), 0.03)
+        started = evaluate(problem, solution)
+        held = problem.wall.any()
+        problem = classify(problem, started, share=ROUGHNESS[1], sigma=sigma)
+        if not held:
+            problem = replace(problem, wall=np.zeros_like(problem.wall))
+        return problem, adjust(
+            problem, solution.cameras, radial=solution.radial, plane=solution.plane
+        )
     xyz = triangulate(*solution.cameras, *straight)
     d1 = float(solution.cameras[0].centre[2])
     fair = problem.tie_used & even & (np.abs(xyz[:, 2]) < 0.1 * d1)

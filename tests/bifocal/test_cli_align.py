@@ -1,0 +1,216 @@
+"""`bifocal align` and `bifocal match` from the command line."""
+
+import json
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from bifocal import Pair
+from bifocal.cli.main import main
+from bifocal.pinhole import project
+from tests.bifocal.layered_wall import camera, relief_at, take
+
+FAR = camera(16.0, turn_deg=(0.3, -0.2, 0.15))
+NEAR = camera(9.0, offset=(0.05, -0.04), turn_deg=(-0.2, 0.25, -0.2))
+SENSOR = 22.7
+#: Focal lengths of a sensor 22.7 mm wide. [mm]
+FOCAL = [str(cam.matrix[0, 0] * SENSOR / 960) for cam in (FAR, NEAR)]
+POINTS = {
+    "a": (-4.5, 2.9, 0), "b": (4.6, 3.0, 0), "c": (-0.9, -3.5, 0), "d": (1.2, 2.8, 0),
+    "e": (-4.6, -1, 0.35), "f": (4.5, 1, 0.35),
+}  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory) -> Path:
+    path = tmp_path_factory.mktemp("photos")
+    views = take(FAR, NEAR)
+    cv2.imwrite(str(path / "far.png"), views.far)
+    cv2.imwrite(str(path / "near.png"), views.near)
+    write_control(path / "control.csv")
+    result = align(path, "--control", "control.csv", *lens(), out="wall.pair.json")
+    assert result.exit_code == 0, result.output
+    return path
+
+
+def write_control(path: Path, *, unit: float = 1.0, heading: str = "") -> None:
+    rows = [f"id,X{heading},Y{heading},r{heading},col1,row1,col2,row2"]
+    for name, xyz in POINTS.items():
+        pixels = [*project(FAR, np.array([xyz]))[0], *project(NEAR, np.array([xyz]))[0]]
+        x, y, r = (str(v * unit) for v in xyz)
+        rows.append(",".join([name, x, y, r if xyz[2] else "", *(f"{v:.3f}" for v in pixels)]))
+    path.write_text("\n".join(rows), encoding="utf-8")
+
+
+def lens() -> list[str]:
+    return ["--focal1", FOCAL[0], "--focal2", FOCAL[1], "--sensor-width", str(SENSOR)]
+
+
+def align(folder: Path, *options: str, out: str, photos=("far.png", "near.png")):
+    paths = [str(folder / name) for name in photos]
+    given = [str(folder / o) if o.endswith(".csv") else o for o in options]
+    return CliRunner().invoke(main, ["align", *paths, *given, "--out", str(folder / out)])
+
+
+def test_control_points_give_a_pair_file_with_picture_and_diagnostics(folder) -> None:
+    pair = Pair.read(folder / "wall.pair.json")
+    for photo, cam in ((pair.image1, FAR), (pair.image2, NEAR)):
+        assert photo.distance == pytest.approx(cam.centre[2], rel=0.005)
+        np.testing.assert_allclose(photo.nadir, cam.centre[:2], atol=0.06)
+    assert pair.image1.file == "far.png"
+    assert pair.extra["setup"]["way"] == "control"
+    assert pair.extra["setup"]["standard_deviations"]["distance1"] < 0.5
+    assert pair.image1.extra["principal_distance"] == pytest.approx(float(FOCAL[0]), rel=0.01)
+    assert cv2.imread(str(folder / "wall.pair.png")).shape[1] > 1000
+
+
+def test_json_goes_to_stdout_alone(folder) -> None:
+    result = align(
+        folder, "--auto", "--distance1", "16", *lens(), "--json", "--no-picture", out="j.pair.json"
+    )
+    assert result.exit_code == 0, result.output
+    data = json.loads(result.stdout)
+    assert data["way"] == "auto"
+    assert data["distance2"] == pytest.approx(9.0, rel=0.02)
+    assert not (folder / "j.pair.png").exists()
+
+
+def test_a_photo_turned_by_exif_gives_the_same_pair(folder) -> None:
+    from PIL import Image
+
+    upright = Image.open(folder / "near.png").convert("L")
+    exif = Image.Exif()
+    exif[274] = 6  # shown turned clockwise by 90 degrees
+    upright.transpose(Image.Transpose.ROTATE_90).save(folder / "near.jpg", exif=exif, quality=97)
+    result = align(
+        folder, "--control", "control.csv", *lens(), "--no-picture", out="turned.pair.json",
+        photos=("far.png", "near.jpg"),
+    )  # fmt: skip
+    assert result.exit_code == 0, result.output
+    pair = Pair.read(folder / "turned.pair.json")
+    np.testing.assert_allclose(pair.image2.nadir, NEAR.centre[:2], atol=0.06)
+
+
+def test_a_lens_file_with_distortion_is_carried_into_the_pair(folder) -> None:
+    for name, cam in (("lens1.json", FAR), ("lens2.json", NEAR)):
+        data = {
+            "format": "bifocal-lens/1",
+            "camera_matrix": cam.matrix.tolist(),
+            "model": "opencv",
+            "coefficients": [1e-6, 0.0, 0.0, 0.0],
+            "image_size": [960, 640],
+        }
+        (folder / name).write_text(json.dumps(data), encoding="utf-8")
+    lenses = ["--lens1", str(folder / "lens1.json"), "--lens2", str(folder / "lens2.json")]
+    result = align(
+        folder, "--auto", "--distance1", "16", *lenses, "--no-picture", out="lens.pair.json"
+    )
+    assert result.exit_code == 0, result.output
+    pair = Pair.read(folder / "lens.pair.json")
+    assert pair.image1.lens is not None
+    assert pair.image2.distance == pytest.approx(9.0, rel=0.005)
+
+
+@pytest.mark.parametrize(("unit", "heading"), [(1000.0, " [mm]"), (100.0, " [cm]")])
+def test_units_in_the_headings_are_taken(folder, unit, heading) -> None:
+    write_control(folder / "unit.csv", unit=unit, heading=heading)
+    result = align(
+        folder, "--control", "unit.csv", *lens(), "--no-picture", "--overwrite", out="u.pair.json"
+    )
+    assert result.exit_code == 0, result.output
+    assert Pair.read(folder / "u.pair.json").image1.distance == pytest.approx(16.0, rel=0.005)
+
+
+def test_millimetres_without_saying_so_are_refused(folder) -> None:
+    write_control(folder / "mm.csv", unit=1000.0)
+    result = align(folder, "--control", "mm.csv", *lens(), out="mm.pair.json")
+    assert result.exit_code == 1
+    assert "in mm or cm" in result.stderr
+    assert not (folder / "mm.pair.json").exists()
+
+
+def test_picks_of_the_other_photo_are_exchanged_and_said(folder) -> None:
+    text = (folder / "control.csv").read_text(encoding="utf-8")
+    swapped = text.replace("col1,row1,col2,row2", "col2,row2,col1,row1")
+    (folder / "swapped.csv").write_text(swapped, encoding="utf-8")
+    result = align(folder, "--control", "swapped.csv", *lens(), "--no-picture", out="s.pair.json")
+    assert result.exit_code == 0, result.output
+    assert "the picks were exchanged" in result.stderr
+    assert Pair.read(folder / "s.pair.json").image1.distance == pytest.approx(16.0, rel=0.01)
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ([], "say how the pair is to be set up"),
+        (["--distance1", "16"], "say how the pair is to be set up"),
+        (["--auto"], "focal lengths are unknown"),
+        (["--auto", "--distance1", "-3"], "above zero"),
+        (["--control", "nowhere.csv"], "nowhere.csv"),
+        (["--distance1", "16", "--distance2", "9", "--delta-d", "7"], "give two of"),
+        (["--auto", "--lens", "absent.json", "--distance1", "16"], "absent.json"),
+    ],
+)
+def test_wrong_options_are_explained(folder, options, message) -> None:
+    result = align(folder, *options, out="wrong.pair.json")
+    assert result.exit_code == 1
+    assert message in result.stderr
+    assert "Traceback" not in result.stderr
+
+
+def test_an_existing_pair_is_kept(folder) -> None:
+    result = align(folder, "--auto", "--distance1", "16", *lens(), out="wall.pair.json")
+    assert result.exit_code == 1
+    assert "exists already" in result.stderr
+
+
+def test_half_a_pixel_and_a_double_name_are_named_by_cell(folder) -> None:
+    text = (folder / "control.csv").read_text(encoding="utf-8").splitlines()
+    fields = text[1].split(",")
+    text[1] = ",".join([*fields[:5], "", *fields[6:]])
+    text[2] = "a" + text[2][1:]
+    (folder / "bad.csv").write_text("\n".join(text), encoding="utf-8")
+    result = align(folder, "--control", "bad.csv", out="bad.pair.json")
+    assert result.exit_code == 1
+    assert "is blank although its partner is given" in result.stderr
+    assert "stands in A2 already" in result.stderr
+
+
+def test_matched_points_solve_to_the_boards(folder) -> None:
+    pair, out = str(folder / "wall.pair.json"), str(folder / "points.csv")
+    result = CliRunner().invoke(main, ["match", pair, "--out", out, "--count", "600", "--json"])
+    assert result.exit_code == 0, result.output
+    assert json.loads(result.stdout)["count"] > 300
+    solved = CliRunner().invoke(main, ["solve", out, "--pair", pair, "--json"])
+    assert solved.exit_code == 0, solved.output
+    points = json.loads(solved.stdout)["points"]
+    xyz = np.array([[p["X"], p["Y"], p["r"]] for p in points], dtype=float)
+    error = xyz[:, 2] - relief_at(xyz)
+    assert np.median(np.abs(error)) < 0.012
+
+
+def test_a_survey_workbook_is_written_and_solved(folder) -> None:
+    pair, out = str(folder / "wall.pair.json"), str(folder / "points.xlsx")
+    result = CliRunner().invoke(main, ["match", pair, "--out", out, "--count", "60"])
+    assert result.exit_code == 0, result.output
+    assert "points" in result.stdout
+    solved = CliRunner().invoke(main, ["solve", out, "--json"])
+    assert solved.exit_code == 0, solved.output
+    assert len(json.loads(solved.stdout)["points"]) >= 50
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (["--out", "points.txt"], "written as .xlsx"),
+        (["--out", "points.csv", "--relief-min", "0.8", "--relief-max", "0.9"], "points match"),
+    ],
+)
+def test_match_explains_what_it_cannot_do(folder, options, message, tmp_path) -> None:
+    options = [str(tmp_path / o) if o.startswith("points") else o for o in options]
+    result = CliRunner().invoke(main, ["match", str(folder / "wall.pair.json"), *options])
+    assert result.exit_code == 1
+    assert message in result.stderr
