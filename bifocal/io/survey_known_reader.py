@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Literal
 
 import numpy as np
@@ -15,6 +16,8 @@ from photocore.tables import Column, Table, read_table
 from photocore.tables.headings import bare
 from photocore.tables.numbers import Decimal
 
+#: No coordinate of a photo or a map is larger.
+LARGEST = 1e9
 _TO_M = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "dm": 0.1}
 
 
@@ -47,6 +50,7 @@ def read_known(
     )
     remarks += [text for text in table.remarks if "rows directly below" not in text]
     errors += table.repeated("id")
+    refuse_absurd(table, keys, errors)
     xyz = np.stack(
         [table.numbers(key) * metres_of(table, key, errors) for key in keys], axis=-1
     ).reshape(-1, 3)
@@ -87,6 +91,18 @@ def with_measured(known: KnownPoints, points: PointObservations) -> KnownPoints:
         xyz=np.vstack([known.xyz, more]),
         use=np.concatenate([known.used, np.ones(len(rows), dtype=bool)]),
     )
+
+
+def refuse_absurd(table: Table, keys: Sequence[str], errors: list[CellError]) -> None:
+    """Complain about numbers that no photo and no map can hold: a slip, or a broken formula."""
+    for key in keys:
+        with np.errstate(invalid="ignore"):
+            rows = np.flatnonzero(np.abs(table.numbers(key)) > LARGEST).tolist()
+        for row in rows:
+            value = table.numbers(key)[row]
+            errors.append(
+                table.error(row, key, f"found {value:g}, which is too large; correct it.")
+            )
 
 
 def metres_of(table: Table, key: str, errors: list[CellError]) -> float:

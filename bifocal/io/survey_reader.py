@@ -13,7 +13,13 @@ from bifocal.domain.lens import Lens
 from bifocal.domain.observations import PointObservations
 from bifocal.domain.pair import Pair, Photo
 from bifocal.domain.reference import KnownPoints
-from bifocal.io.survey_known_reader import metres_of, read_known, unit_error, with_measured
+from bifocal.io.survey_known_reader import (
+    metres_of,
+    read_known,
+    refuse_absurd,
+    unit_error,
+    with_measured,
+)
 from bifocal.io.survey_setup_reader import SetupValues, is_general, read_setup
 from bifocal.io.survey_words import ALIASES, COLUMNS, LANGUAGES, WORDS
 from photocore.arrays import BoolArray, FloatArray
@@ -275,6 +281,7 @@ def _observations(table: Table, errors: list[CellError]) -> tuple[PointObservati
         ids = [str(number) for number in range(1, len(table) + 1)]
     ids = [name or "" for name in ids]
     errors += table.repeated("id")
+    refuse_absurd(table, (*_XY, *_POLAR, *_PIXELS, "r_measured"), errors)
     use = table.numbers("use")
     used: BoolArray = np.isnan(use) | (use != 0)
     unit, factor = _unit_of_xy(table, errors)

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from bifocal.domain.setup import OFF_RADIAL_SIGMAS, ON_PLANE_SIGMAS, SurveySetup
+from bifocal.io.survey_known_reader import LARGEST
 from bifocal.io.survey_words import SETUP
 from photocore.arrays import FloatArray
 from photocore.errors import CellError, GeometryError, InputError
@@ -226,6 +227,8 @@ def _check_positive(
     for key, value in number.items():
         if value is not None and not key.startswith("nadir") and value <= 0:
             errors.append(values.error(key, f"found {value:g}, expected a number above zero."))
+        elif value is not None and not 1e-9 < abs(value or 1.0) < LARGEST:
+            errors.append(values.error(key, f"found {value:g}, which cannot be meant; correct it."))
 
 
 def _distance(

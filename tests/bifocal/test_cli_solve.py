@@ -328,6 +328,14 @@ def test_all_bad_cells_are_reported_at_once_with_sheet_and_cell(tmp_path):
     )  # fmt: skip
 
 
+def test_numbers_that_cannot_be_meant(tmp_path):
+    def change(book):
+        book["Points"]["B5"] = 1e300
+        put(book, "pitch", 1e-320)
+
+    refused(edited(fill(tmp_path / "s.xlsx"), change), "Points!B5 (x1)", "too large", "(pitch)")
+
+
 def test_equal_distances(tmp_path):
     refused(
         fill(tmp_path / "s.xlsx", setup={**SETUP, "d_1": 9.5, "delta_d": None}),
