@@ -116,7 +116,7 @@ def sigma_of_relief(frame: Frame, relief: Float32Array, sigma_px: Float32Array) 
     x, y = frame.from_centre()
     reach = np.maximum(np.sqrt(x * x + y * y), np.float32(0.5))
     d1, d2 = frame.distances
-    # dr/dk = -d1 d2 (d2 - d1) / (k d1 - d2)^2, with k d1 - d2 = d2 (d1 - d2) ... / (d2 - r).
+    # dr/dk = d1 d2 (d1 - d2) / (k d1 - d2)², and k d1 - d2 = d2 (d1 - d2) / (d2 - r).
     rate = (d2 - relief) ** 2 * np.float32(d1 / (d2 * (d1 - d2)))
     return np.asarray(np.abs(rate) * sigma_px / reach, dtype=np.float32)
 
