@@ -14,6 +14,8 @@ from bifocal.solvers.dense.frame import Float32Array, Frame, zoom_map
 REACH = 9
 #: Steps whose parallax is smaller than this are left as measured. [px]
 LEAST_STEP = 0.5
+#: Nor are steps of less than this many times the precision of matching: they are its noise.
+NOISE_STEPS = 4.0
 #: Differences of grey value and of its gradient beyond these count alike. [grey levels]
 GREY_LIMIT, GRADIENT_LIMIT, GREY_SHARE = 12.0, 8.0, 0.4
 #: Half window and regularisation of the guided filter (He et al. 2013). [px, grey levels²]
@@ -22,7 +24,9 @@ WINDOW, SOFTNESS = 4, 100.0
 FAVOUR = 0.05
 
 
-def sharpen(frame: Frame, relief: Float32Array, lever: float) -> Float32Array:
+def sharpen(
+    frame: Frame, relief: Float32Array, lever: float, sigma_px: float = 0.0
+) -> Float32Array:
     """Return the relief of photo 1 with ramps at steps replaced by one of the two surfaces.
 
     Parameters
@@ -32,6 +36,8 @@ def sharpen(frame: Frame, relief: Float32Array, lever: float) -> Float32Array:
         Measured relief. [m]
     lever : float
         B = d1 d2 / (d1 - d2). [m]
+    sigma_px : float
+        Precision of matching, typical of the frame. [px]
     """
     import cv2
 
@@ -40,7 +46,7 @@ def sharpen(frame: Frame, relief: Float32Array, lever: float) -> Float32Array:
     upper, lower = cv2.dilate(median, disc), cv2.erode(median, disc)
     x, y = frame.from_centre()
     parallax = (upper - lower) * np.sqrt(x * x + y * y) / np.float32(lever)
-    band = parallax > LEAST_STEP
+    band = parallax > max(LEAST_STEP, NOISE_STEPS * sigma_px)
     result = relief.copy()
     far, near = _features(frame.image1), _features(frame.image2)
     guide = _Guide(far[..., 0])
