@@ -101,6 +101,8 @@ def _named_cells(editor: WorkbookEditor, built: BookBuilder, content: SurveyCont
             _type(editor, place, shown if value is None else value)
         elif built.book[sheet][cell].data_type == "f" or name in TYPED_FORMULAS:
             editor.set_result(*place, _result(value))
+        if built.book[sheet][cell].data_type != "f" and name not in typed:
+            _make_number(editor, place, value)
 
 
 def _place(editor: WorkbookEditor, name: str) -> tuple[str, int, int] | None:
@@ -117,6 +119,14 @@ def _type(editor: WorkbookEditor, place: tuple[str, int, int], value: CellValue)
     """Type a value unless it stands there already."""
     sheet, row, column = place
     if editor.grid(sheet).rows.get(row, {}).get(column) != value:
+        editor.set_value(sheet, row, column, value)
+
+
+def _make_number(editor: WorkbookEditor, place: tuple[str, int, int], value: CellValue) -> None:
+    """Turn a number that was typed as text into a number: formulas do not see it otherwise."""
+    sheet, row, column = place
+    stands = editor.grid(sheet).rows.get(row, {}).get(column)
+    if isinstance(stands, str) and isinstance(value, int | float) and value == value:
         editor.set_value(sheet, row, column, value)
 
 
@@ -138,10 +148,15 @@ def _table(
     headings = area.headings()
     first = area.area[0] + 1
     for column in content.columns:
-        if column.key not in headings or column.kind == "input":
+        if column.key not in headings:
             continue
         given = content.cells.get(column.key, ())
         number = headings[column.key]
+        if column.kind == "input":
+            if column.key not in ("id", "code", "note"):
+                for row, value in zip(rows, given, strict=False):
+                    _make_number(editor, (area.sheet, first + row, number), value)
+            continue
         empty = blank if column.key in ("w", "cX", "cY", "cZ", "cE", "cN", "cH") else ""
         values: list[CellValue] = [empty] * _length(area)
         for row, value in zip(rows, given, strict=False):

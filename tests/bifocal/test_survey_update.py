@@ -32,6 +32,22 @@ def test_results_in_the_users_workbook_equal_its_formulas(tmp_path):
 
 
 @pytest.mark.office
+def test_numbers_typed_as_text_become_numbers_so_that_formulas_see_them(tmp_path):
+    path = survey(tmp_path / "s.xlsx")
+    book = openpyxl.load_workbook(path)
+    book["Points"]["B5"], book["Check"]["D13"] = "4,2424", "1,0052"
+    put(book, "d_2", "9,5")
+    book.save(path)
+    out = tmp_path / "out.xlsx"
+    result = run("solve", path, "--out", out)
+    assert result.exit_code == 0, result.stderr
+    assert_recalculated_equals_cached(out, tmp_path)
+    fresh = openpyxl.load_workbook(out)
+    assert [fresh["Points"]["B5"].value, fresh["Check"]["D13"].value] == [4.2424, 1.0052]
+    assert fresh["Setup"]["C7"].value == 9.5
+
+
+@pytest.mark.office
 def test_swapped_images_keep_the_columns_the_user_typed(tmp_path):
     swapped = [(name, x2, y2, x1, y1) for name, x1, y1, x2, y2 in rows(POINTS)]
     setup = {"c_1": 19, "c_2": 35, "d_1": 9.5, "d_2": 17.5}
