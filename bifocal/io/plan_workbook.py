@@ -62,11 +62,13 @@ def _stations_sheet(sheet: Any, plan: Plan) -> None:
         f"picks precise to {plan.sigma_px:g} px; area of uncertainty: sigma r above "
         f"{plan.sigma_r_max * 1000:.0f} mm"
     )
-    for column, (_, label, _) in enumerate(_COLUMNS, start=1):
-        cell = sheet.cell(4, column, label)
+    for column, (key, label, _) in enumerate(_COLUMNS, start=1):
+        # Labels for people above, stable keys for formulas as the table's headings.
+        sheet.cell(4, column, key).font = Font(color="808080", size=8)
+        cell = sheet.cell(3, column, label)
         cell.alignment = Alignment(wrap_text=True, vertical="top")
         sheet.column_dimensions[cell.column_letter].width = 44 if label == "Note" else 11
-    sheet.row_dimensions[4].height = 45
+    sheet.row_dimensions[3].height = 45
     for row, station in enumerate(plan.stations, start=5):
         sheet.row_dimensions[row].height = 30 if station.note else 15
         values = (

@@ -9,6 +9,7 @@ import pytest
 from click.testing import CliRunner
 
 from bifocal.cli.main import main
+from photocore.spreadsheet.lint import lint
 
 CANON = ["--sensor", "22.7x15.1", "--pixels", "3072x2048"]
 LENSES = ["--focal", "35", "--focal", "28", "--focal", "19"]
@@ -38,6 +39,7 @@ def test_the_workbook_holds_the_stations_and_two_charts_of_precision(tmp_path):
     assert book["Planning"]["B5"].value == pytest.approx(17.5)
     assert len(book["Planning"]._charts) == 1
     assert book["Sigma r"]["I9"].value == "nadir"
+    assert lint(out) == []
     again = run(*LENSES, *CANON, "--scale", "500", "--out", str(out))
     assert again.exit_code == 1
     assert "--overwrite" in again.stderr

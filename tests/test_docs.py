@@ -1,0 +1,113 @@
+"""Documentation is a contract: commands, options, examples and links."""
+
+from __future__ import annotations
+
+import doctest
+import importlib.util
+import re
+import shlex
+from pathlib import Path
+
+import click
+import pytest
+from click.testing import CliRunner
+
+ROOT = Path(__file__).parents[1]
+DOCS = ROOT / "docs"
+PAGES = sorted([ROOT / "README.md", *DOCS.glob("*.md")])
+
+
+def maker():
+    spec = importlib.util.spec_from_file_location("make_cli", DOCS / "make_cli.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+GROUPS = maker().groups()
+COMMANDS = [
+    pytest.param(program, name, command, id=f"{program} {name}")
+    for program, group in GROUPS.items()
+    for name, command in maker().commands(group).items()
+]
+
+
+def test_the_page_of_commands_is_up_to_date():
+    written = (DOCS / "cli.md").read_text(encoding="utf-8")
+    assert written == maker().page(), "run: python docs/make_cli.py"
+
+
+@pytest.mark.parametrize(("program", "name", "command"), COMMANDS)
+def test_every_command_has_a_summary_an_example_and_described_options(program, name, command):
+    assert command.short_help == GROUPS[program].summaries[name]
+    assert f"{program} {name}" in (command.epilog or ""), "the epilog needs an example"
+    for parameter in command.params:
+        if isinstance(parameter, click.Option):
+            assert parameter.help, f"{program} {name} {parameter.opts[0]} has no help"
+
+
+@pytest.mark.parametrize(("program", "name", "command"), COMMANDS)
+def test_every_command_explains_itself_outside_its_own_page(program, name, command):  # noqa: ARG001
+    text = "".join(p.read_text(encoding="utf-8") for p in PAGES if p.name != "cli.md")
+    assert f"{program} {name}" in text, f"no page but cli.md mentions {program} {name}"
+
+
+@pytest.mark.parametrize(("program", "name", "command"), COMMANDS)
+def test_help_is_printed_without_an_error(program, name, command):  # noqa: ARG001
+    result = CliRunner().invoke(GROUPS[program], [name, "--help"])
+    assert result.exit_code == 0
+    assert "Usage:" in result.stdout
+
+
+def options_used():
+    """Return every command line in the pages: (page, program, name, options)."""
+    found = []
+    for page in PAGES:
+        if page.name == "cli.md":
+            continue
+        text = page.read_text(encoding="utf-8").replace("\\\n", " ")
+        for line in re.findall(r"^[ \t]*(?:\$ )?((?:bifocal|multimedia) [a-z].*)$", text, re.M):
+            words = shlex.split(line, comments=True, posix=False)
+            program, name = words[0], words[1]
+            if name in GROUPS[program].summaries:
+                options = [w.split("=")[0] for w in words[2:] if re.match(r"--?[a-zA-Z]", w)]
+                found.append(pytest.param(program, name, options, id=f"{page.name}: {line[:60]}"))
+    return found
+
+
+@pytest.mark.parametrize(("program", "name", "options"), options_used())
+def test_command_lines_in_the_docs_use_options_that_exist(program, name, options):
+    group = GROUPS[program]
+    command = group.get_command(click.Context(group), name)
+    known = {opt for p in command.params for opt in (*p.opts, *p.secondary_opts)} | {"--help"}
+    assert set(options) <= known
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda p: p.name)
+def test_links_between_pages_lead_somewhere(page):
+    text = page.read_text(encoding="utf-8")
+    for target in re.findall(r"\]\(([^)#\s]+)[^)]*\)", text):
+        if not target.startswith(("http", "mailto")):
+            assert (page.parent / target).exists(), f"{page.name}: {target}"
+
+
+PAGES_WITH_PYTHON = [page for page in PAGES if "```python" in page.read_text(encoding="utf-8")]
+
+
+@pytest.mark.parametrize("page", PAGES_WITH_PYTHON, ids=lambda p: p.name)
+def test_python_examples_run(page, tmp_path, monkeypatch):
+    """Examples of a page run in order in an empty folder, its JSON examples written as files."""
+    text = page.read_text(encoding="utf-8")
+    for number, block in enumerate(re.findall(r"```json\n(.*?)```", text, re.S)):
+        name = "wall.pair.json" if "bifocal-pair" in block else f"example{number}.json"
+        (tmp_path / name).write_text(block, encoding="utf-8")
+    monkeypatch.chdir(tmp_path)
+    names = {"__name__": "example"}
+    for code in re.findall(r"```python\n(.*?)```", text, re.S):
+        if ">>>" in code:
+            example = doctest.DocTestParser().get_doctest(code, names, page.name, str(page), 0)
+            runner = doctest.DocTestRunner(optionflags=doctest.NORMALIZE_WHITESPACE)
+            assert runner.run(example, clear_globs=False).failed == 0
+            names |= example.globs
+        else:
+            exec(compile(code, str(page), "exec"), names)
