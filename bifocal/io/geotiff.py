@@ -427,7 +427,7 @@ def _add_overviews(path: Path, grid: Grid, *, categories: bool) -> None:
         return
     method = Resampling.nearest if categories else Resampling.average
     with (
-        rasterio.Env(COMPRESS_OVERVIEW="DEFLATE", PREDICTOR_OVERVIEW="2"),
+        rasterio.Env(COMPRESS_OVERVIEW="DEFLATE", PREDICTOR_OVERVIEW="2", ZLEVEL_OVERVIEW="1"),
         rasterio.open(path, "r+") as file,
     ):
         file.build_overviews(factors, method)

@@ -23,6 +23,8 @@ ImageArray = NDArray[np.uint8] | NDArray[np.uint16]
 
 #: Larger photos are refused: 400 MP is twice the largest camera, and 1.2 GB in memory.
 MAX_PIXELS = 400_000_000
+#: Larger photos are decoded some rows at a time, to hold them in memory once only.
+_BY_STRIPS = 60_000_000
 RAW_ENDINGS = frozenset(
     f".{ending}"
     for ending in (
@@ -134,6 +136,10 @@ def read_image(path: Path | str, *, grey: bool = False) -> ImageArray:
     import cv2
 
     info = image_info(path)
+    if info.size[0] * info.size[1] > _BY_STRIPS and not grey:
+        large = _read_by_strips(info)
+        if large is not None:
+            return turn_upright(large, info.orientation)
     flags = cv2.IMREAD_IGNORE_ORIENTATION | cv2.IMREAD_ANYDEPTH
     flags |= cv2.IMREAD_GRAYSCALE if grey else cv2.IMREAD_ANYCOLOR
     data = np.fromfile(info.path, dtype=np.uint8)  # imread itself fails on some Windows paths
@@ -149,9 +155,39 @@ def read_image(path: Path | str, *, grey: bool = False) -> ImageArray:
         raise InputError(f"{path}: the image cannot be decoded; open it and save it again.")
     if image.dtype not in (np.uint8, np.uint16):
         raise InputError(f"{path}: {image.dtype} pixels are not read; save it with 8 or 16 bits.")
+    del data
     if image.ndim == 3:
-        image = cv2.cvtColor(image, cv2.COLOR_BGR2RGB)
+        # Some rows at a time: a second copy of a photo of 100 MP would be 300 MB.
+        for top in range(0, len(image), 512):
+            part = image[top : top + 512]
+            part[:] = cv2.cvtColor(part, cv2.COLOR_BGR2RGB)
     return turn_upright(image, info.orientation)
+
+
+def _read_by_strips(info: ImageInfo) -> ImageArray | None:
+    """Return the stored pixels of a large photo in the memory of one copy; None if not plain RGB.
+
+    OpenCV decodes into a buffer and copies it: 600 MB for 100 megapixels.
+    """
+    import rasterio
+    from rasterio.errors import NotGeoreferencedWarning, RasterioError
+    from rasterio.windows import Window
+
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", NotGeoreferencedWarning)
+            with rasterio.Env(GDAL_CACHEMAX=64), rasterio.open(info.path) as file:
+                if file.count not in (3, 4) or file.dtypes[0] not in ("uint8", "uint16"):
+                    return None
+                image = np.empty((file.height, file.width, 3), file.dtypes[0])
+                for top in range(0, file.height, 256):
+                    height = min(256, file.height - top)
+                    window = Window(0, top, file.width, height)
+                    part = file.read([1, 2, 3], window=window)
+                    image[top : top + height] = part.transpose(1, 2, 0)
+    except RasterioError:
+        return None  # OpenCV may still read it, or say what is wrong
+    return image
 
 
 def turn_upright(image: Any, orientation: int) -> ImageArray:

@@ -27,6 +27,8 @@ _STEEP = 1.0
 #: Where a ray is compared with the relief: distances from the pixel, and from its occluder. [px]
 _BESIDE = (1.25, 1.75)
 _AROUND = (-2.0, -1.5, -1.0, -0.5, 0.0, 0.5, 1.0, 1.5, 2.0)
+#: Windows with surroundings of more pixels are halved, down to this side. [px]
+_LARGEST, _SMALLEST = 2_000_000, 200
 #: No more than this many points are inserted between two neighbours.
 _MOST_STEPS = 400
 
@@ -58,6 +60,13 @@ def hidden_from(surface: Surface, grid: Grid, camera: Foot, relief: ReliefArray)
     if limits is None:
         return np.zeros(grid.shape, bool)
     wide, column, row = limits
+    if wide.width * wide.height > _LARGEST and min(grid.shape) >= 2 * _SMALLEST:
+        # Far from the nadir of a fine orthophoto the surroundings outgrow the window: halve it.
+        hidden = np.zeros(grid.shape, bool)
+        for left, top, part in grid.tiles((max(grid.shape) + 1) // 2):
+            cut = np.s_[top : top + part.height, left : left + part.width]
+            hidden[cut] = hidden_from(surface, part, camera, relief[cut])
+        return hidden
     if wide.shape != grid.shape:
         relief_wide = surface.window(wide)
         relief_wide[row : row + grid.height, column : column + grid.width] = relief

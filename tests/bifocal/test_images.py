@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import cv2
 import numpy as np
 import pytest
@@ -108,3 +110,15 @@ def test_a_decompression_bomb_is_refused_by_its_header(tmp_path):
     Image.new("1", (30_000, 30_000)).save(path)
     with pytest.raises(InputError, match="400 MP"):
         read_image(path)
+
+
+@pytest.mark.parametrize("ending", [".png", ".tif"])
+def test_large_photos_are_read_by_strips_to_the_same_pixels(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, ending: str
+) -> None:
+    from bifocal.io import images
+
+    photo = np.random.default_rng(6).integers(0, 255, (600, 70, 3), dtype=np.uint8)
+    images.write_image(tmp_path / f"p{ending}", photo)
+    monkeypatch.setattr(images, "_BY_STRIPS", 1000)
+    np.testing.assert_array_equal(images.read_image(tmp_path / f"p{ending}"), photo)
