@@ -124,7 +124,7 @@ FILE = click.Path(path_type=Path)
 @click.option(
     "--sigma-distance",
     type=float,
-    default=0.01,
+    default=0.02,
     show_default=True,
     help="Precision of the measured distances [m].",
 )

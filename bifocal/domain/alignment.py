@@ -181,7 +181,7 @@ class SiteMeasures:
     distance1: float | None = None
     distance2: float | None = None
     delta_d: float | None = None
-    sigma: float = 0.01
+    sigma: float = 0.02
     parallel: bool = False
     sigma_control: float = 0.003
     sigma_pick: float = 0.5

@@ -1,0 +1,135 @@
+"""Real photos of a church: set up, match, solve, and compare with many-image coordinates."""
+
+import json
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+from scipy.spatial import cKDTree
+
+from bifocal import Pair
+from bifocal.domain.alignment import SiteMeasures
+from bifocal.solvers.match_points import MatchSettings
+from bifocal.workflows.align import AlignOptions, LensData, align_photos
+from bifocal.workflows.match import match_photos
+
+pytestmark = pytest.mark.acceptance
+#: Limits of the median error of relief. [m]
+LIMITS = {"church_1": 0.006, "church_2": 0.012}
+
+
+def reference(folder: Path):
+    table = np.genfromtxt(folder / "points.csv", delimiter=",", names=True)
+    xyz = np.column_stack([table["X_m"], table["Y_m"], table["relief_m"]])
+    far = np.column_stack([table["x_far_px"], table["y_far_px"]])
+    near = np.column_stack([table["x_near_px"], table["y_near_px"]])
+    return json.loads((folder / "geometry.json").read_text()), xyz, far, near
+
+
+def spread(points: np.ndarray, count: int) -> np.ndarray:
+    """Return indices of points far from each other."""
+    chosen = [0]
+    while len(chosen) < count:
+        away = np.linalg.norm(points[:, None] - points[chosen][None], axis=2).min(axis=1)
+        chosen.append(int(away.argmax()))
+    return np.array(chosen)
+
+
+def relief_error(pair_path: Path, geometry, xyz, far) -> np.ndarray:
+    """Return the error of matched points at the reference points more than 4 m from the nadir."""
+    pair = Pair.read(pair_path)
+    out = pair_path.with_suffix(".csv")
+    _, found = match_photos(pair_path, out, MatchSettings())
+    relief = pair.intersect(found.pixels1, found.pixels2).xyz[:, 2]
+    outside = np.hypot(*(xyz[:, :2] - geometry["near"]["nadir_wall_m"]).T) > 4
+    distance, nearest = cKDTree(found.pixels1).query(far)
+    close = (distance < 5) & outside
+    return relief[nearest[close]] - xyz[close, 2]
+
+
+@pytest.mark.parametrize("name", LIMITS)
+def test_eight_wall_points_and_four_others_set_up_the_church(data_dir, tmp_path, name) -> None:
+    folder = data_dir / "facade_pairs" / name
+    geometry, xyz, far, near = reference(folder)
+    wall = np.flatnonzero(np.abs(xyz[:, 2]) < 0.01)
+    off = np.flatnonzero(np.abs(xyz[:, 2]) > 0.3)
+    chosen = np.r_[wall[spread(xyz[wall, :2], 8)], off[spread(xyz[off, :2], 4)]]
+    lines = ["id,X [m],Y [m],r [m],col1 [px],row1 [px],col2 [px],row2 [px]"]
+    lines += [
+        ",".join([f"p{i}", *(f"{v:.4f}" for v in (*xyz[i], *far[i], *near[i]))]) for i in chosen
+    ]
+    control = tmp_path / "control.csv"
+    control.write_text("\n".join(lines))
+    out = tmp_path / "wall.pair.json"
+    made = align_photos(folder / "far.jpg", folder / "near.jpg", out, AlignOptions(control=control))
+    for photo, key in ((made.pair.image1, "far"), (made.pair.image2, "near")):
+        truth = geometry[key]
+        assert np.linalg.norm(photo.nadir - truth["nadir_wall_m"]) < 0.05
+        assert photo.distance == pytest.approx(truth["height_over_plane_m"], rel=0.005)
+    error = relief_error(out, geometry, xyz, far)
+    assert len(error) >= 800
+    assert np.median(np.abs(error)) < LIMITS[name]
+
+
+@pytest.mark.parametrize("name", LIMITS)
+def test_the_photos_alone_and_one_distance_set_up_the_church(data_dir, tmp_path, name) -> None:
+    folder = data_dir / "facade_pairs" / name
+    geometry, xyz, far, _ = reference(folder)
+    lens = tmp_path / "lens.json"
+    lens.write_text(
+        json.dumps(
+            {
+                "camera_matrix": geometry["far"]["K"],
+                "coefficients": [],
+                "image_size": geometry["far"]["size"],
+            }
+        )
+    )
+    out = tmp_path / "wall.pair.json"
+    options = AlignOptions(
+        auto=True,
+        lenses=(LensData(lens=lens), LensData(lens=lens)),
+        site=SiteMeasures(distance1=geometry["far"]["height_over_plane_m"]),
+    )
+    made = align_photos(folder / "far.jpg", folder / "near.jpg", out, options)
+    assert made.pair.image2.distance == pytest.approx(
+        geometry["near"]["height_over_plane_m"], rel=0.005
+    )
+    error = relief_error(out, geometry, xyz, far)
+    assert len(error) >= 800
+    assert np.median(np.abs(error)) < 1.5 * LIMITS[name]
+
+
+def test_an_exactly_bifocal_pair_is_recognised(data_dir, tmp_path) -> None:
+    folder = data_dir / "semireal_church"
+    lenses = tuple(LensData(focal=focal, sensor_width=22.7) for focal in (36, 18))
+    out = tmp_path / "wall.pair.json"
+    options = AlignOptions(auto=True, lenses=lenses, site=SiteMeasures(distance1=18.0))
+    pair = align_photos(folder / "d18.png", folder / "d9.png", out, options).pair
+    middle = np.array([[767.5, 511.5]])
+    scales = [
+        np.sqrt(np.linalg.det(photo.metres_per_pixel(middle)[0]) * -1)
+        for photo in (pair.image1, pair.image2)
+    ]
+    assert scales[0] / scales[1] == pytest.approx(1.0, abs=0.0002)
+    for photo in (pair.image1, pair.image2):
+        assert np.linalg.norm(photo.pixels_from_plane(photo.nadir) - middle) < 10
+    _, found = match_photos(out, tmp_path / "points.csv", MatchSettings())
+    relief = pair.intersect(found.pixels1, found.pixels2).xyz[:, 2]
+    # 0.1 mm steps from -3 m; only smooth, visible surface.
+    truth = cv2.imread(str(folder / "d18_relief.png"), cv2.IMREAD_UNCHANGED) / 10000.0 - 3.0
+    smooth = cv2.imread(str(folder / "d18_mask.png"), cv2.IMREAD_GRAYSCALE) == 255
+    column, row = np.round(found.pixels1).astype(int).T
+    away = np.linalg.norm(found.pixels1 - middle, axis=1) > 100
+    error = (relief - truth[row, column])[away & smooth[row, column]]
+    assert len(error) > 800
+    assert np.median(np.abs(error)) < 0.003
+
+
+def test_phone_photos_with_distortion_run(data_dir, tmp_path) -> None:
+    folder = data_dir / "facade_pairs" / "berlin_1"
+    out = tmp_path / "wall.pair.json"
+    options = AlignOptions(auto=True, site=SiteMeasures(distance1=27.02))
+    made = align_photos(folder / "far.jpg", folder / "near.jpg", out, options)
+    assert 14 < made.pair.image2.distance < 20.5
