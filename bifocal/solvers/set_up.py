@@ -719,6 +719,9 @@ def _assumptions(problem: Problem, site: SiteMeasures) -> list[str]:
                 f"principal point of photo {number} in its centre "
                 f"(within {interior.sigma_centre:.0f} px)"
             )
+    uncorrected = [i for i in problem.interiors if not i.is_calibrated and not i.sigma_radial]
+    if uncorrected:
+        out.append("photos free of lens distortion (else calibrate and give --lens)")
     if site.parallel:
         out.append("image planes parallel to the wall within 0.3°")
     if problem.sigma_zoom is not None:
