@@ -142,7 +142,9 @@ def command(
         remark(text)
     if out is not None:
         said = write_result(out, solution, language=language, overwrite=overwrite)
-        remark(f"{out}: {len(solution.table)} points written{'; ' + said if said else '.'}")
+        count = len(solution.table)
+        noun = "point" if count == 1 else "points"
+        remark(f"{out}: {count} {noun} written{'; ' + said if said else '.'}")
     if as_json:
         click.echo(solution_json(solution))
         return

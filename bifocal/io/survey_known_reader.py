@@ -27,6 +27,7 @@ def read_known(
     keys: tuple[str, str, str],
     errors: list[CellError],
     remarks: list[str],
+    text_cells: list[str],
     decimal: Decimal | None,
 ) -> tuple[KnownPoints, tuple[int, ...]]:
     """Return check or control points of the sheet made for them, and their rows."""
@@ -49,6 +50,7 @@ def read_known(
         errors=errors,
     )
     remarks += [text for text in table.remarks if "rows directly below" not in text]
+    text_cells += table.text_cells
     errors += table.repeated("id")
     refuse_absurd(table, keys, errors)
     xyz = np.stack(

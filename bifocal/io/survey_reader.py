@@ -171,12 +171,15 @@ def read_survey(path: Path | str, options: ReadOptions | None = None) -> SurveyI
     sheets = book if isinstance(book, SheetFile) else None
     setup = read_setup(Path(path), sheets, options.decimal, errors)
     remarks += setup.remarks
+    text_cells = [*table.text_cells, *setup.text_cells]
     known, known_rows = read_known(
-        book, "Check", ("X_ref", "Y_ref", "Z_ref"), errors, remarks, options.decimal
+        book, "Check", ("X_ref", "Y_ref", "Z_ref"), errors, remarks, text_cells, options.decimal
     )
     control, control_rows = read_known(
-        book, "Georeference", ("E", "N", "H"), errors, remarks, options.decimal
+        book, "Georeference", ("E", "N", "H"), errors, remarks, text_cells, options.decimal
     )
+    if text_cells:
+        remarks.append(_typed_as_text(text_cells))
     model, language = "auto", "en"
     if isinstance(book, SheetFile):
         model = (
@@ -202,6 +205,15 @@ def read_survey(path: Path | str, options: ReadOptions | None = None) -> SurveyI
         known_rows=known_rows,
         control_rows=control_rows,
         remarks=tuple(dict.fromkeys(remarks)),
+    )
+
+
+def _typed_as_text(cells: Sequence[str]) -> str:
+    """Return what is said about numbers that the formulas of a workbook do not see."""
+    more = f" and {len(cells) - 10} more" if len(cells) > 10 else ""
+    return (
+        f"{', '.join(cells[:10])}{more}: numbers typed as text. They were read, but formulas do "
+        "not see them: the result workbook (--out) holds them as numbers."
     )
 
 

@@ -39,7 +39,8 @@ _AGREE = 0.0015
 class SetupValues:
     """The cells of `Setup`; None where blank or absent.
 
-    Attributes are the named cells without underscore; ``places`` says where they stand.
+    Attributes are the named cells without underscore; ``where`` says where they stand,
+    ``text_cells`` which numbers were typed as text.
     """
 
     c1: float | None = None
@@ -60,6 +61,7 @@ class SetupValues:
     nadirs: tuple[FloatArray, FloatArray] = (np.zeros(2), np.zeros(2))
     where: str = ""
     remarks: tuple[str, ...] = ()
+    text_cells: tuple[str, ...] = ()
 
     def with_options(self, **options: float | str | None) -> SetupValues:
         """Return the values with those the user gave on the command line in their place."""
@@ -167,6 +169,7 @@ def read_setup(
         nadirs=plane_nadirs,
         where=where,
         remarks=tuple(values.remarks),
+        text_cells=tuple(values.text_cells),
     )
 
 

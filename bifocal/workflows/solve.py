@@ -21,6 +21,7 @@ from bifocal.solvers.check_points import check_points
 from bifocal.solvers.georeference import georeference
 from bifocal.solvers.point_survey import solve_ideal, solve_pair
 from bifocal.solvers.setup_check import SetupCheck, check_setup
+from bifocal.workflows.solve_remarks import georeference_remarks, point_remarks
 from bifocal.workflows.units import refuse_millimetres, refuse_pixels, refuse_wrong_unit
 from photocore.arrays import FloatArray
 from photocore.errors import GeometryError, InputError
@@ -161,17 +162,15 @@ def solve_file(path: Path | str, options: SolveOptions | None = None) -> Solutio
     else:
         geometry = _solve_ideal(points, survey, values, options, remarks)
     table = geometry.table
-    remarks += _point_remarks(geometry.points, table, geometry.setup)
+    remarks += point_remarks(geometry.points, table, geometry.setup)
     check = check_points(table, survey.known, options.rules)
     if check.missing:
         remarks.append(f"Check: no measured point is called {', '.join(check.missing[:10])}.")
     world = None
     if survey.control.used.any() and not np.isnan(survey.control.xyz).all():
-        world = georeference(table, survey.control, model=options.model or survey.model)
-        remarks += [
-            f"Georeference: {name} contradicts the other control points and was left out."
-            for name in world.bad
-        ]
+        model = options.model or survey.model
+        world = georeference(table, survey.control, model=model)
+        remarks += georeference_remarks(world, survey.control, table, is_auto=model == "auto")
     return Solution(
         source=path,
         survey=survey,
@@ -459,25 +458,3 @@ def _image_mm(setup: SurveySetup, points: PointObservations) -> tuple[FloatArray
     first = np.where(cartesian, setup.image_mm(points.xy1, 1), points.polar[:, :1] * direction)
     second = np.where(cartesian, setup.image_mm(points.xy2, 2), points.polar[:, 1:2] * direction)
     return first, second
-
-
-def _point_remarks(
-    points: PointObservations, table: ReliefTable, setup: SurveySetup | None
-) -> list[str]:
-    """Return a sentence for each mispicked point, worst first, with the size of the miss."""
-    flags = np.array(table.flags)
-    off = [int(i) for i in np.flatnonzero(flags == "OFF-RADIAL") if points.use[i]]
-    off.sort(key=lambda i: -abs(table.standardised[i]))
-    misses, unit = table["q"], "mm"
-    if "misfit_px" in table.carried:
-        misses, unit = table.carried["misfit_px"], "px"
-    elif setup is not None and setup.pitch is not None:
-        misses, unit = table["q"] / setup.pitch, "px"
-    remarks = [
-        f"{points.ids[i]}: the two picks miss each other by {abs(misses[i]):.3g} {unit} across the "
-        f"radius ({abs(table.standardised[i]):.1f} sigma); measure it again."
-        for i in off[:10]
-    ]
-    if len(off) > 10:
-        remarks.append(f"... and {len(off) - 10} more OFF-RADIAL points.")
-    return remarks

@@ -296,18 +296,23 @@ def summary(solution: Solution) -> list[str]:
     for axis, found in solution.check.axes.items():
         if found.n:
             lines.append(
-                f"Check {axis}: {found.n} points, RMSE {found.rmse:.4f} m, "
+                f"Check {axis}: {found.n} {_points(found.n)}, RMSE {found.rmse:.4f} m, "
                 f"mean {found.mean:+.4f} m, largest {found.max_abs:.4f} m"
             )
     lines += [f"Drawing scale, {line}" for line in verdict_lines(solution)]
     geo = solution.georeference
     if geo is not None:
+        used = int(geo.used.sum())
         spread = "no redundancy" if math.isnan(geo.sigma0) else f"sigma0 {geo.sigma0:.4f} m"
         lines.append(
-            f"Georeference: {geo.model}, {int(geo.used.sum())} points, {spread}, scale "
+            f"Georeference: {geo.model}, {used} {_points(used)}, {spread}, scale "
             f"{geo.world_from_wall.scale:.6f}"
         )
     return lines
+
+
+def _points(count: int) -> str:
+    return "point" if count == 1 else "points"
 
 
 def _shown(value: float, places: int) -> str:

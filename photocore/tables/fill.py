@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+import numpy as np
+
 from photocore.errors import CellError, InputError
 from photocore.spreadsheet.grid import CellDate, Grid, Value, cell_name, column_letters
 from photocore.tables import convert
@@ -69,6 +71,12 @@ def fill(
             )
             table.values[column.key] = numbers
             table.remarks += remarks
+            if table.sheet:
+                table.text_cells += [
+                    f"{table.sheet}!{table.cell(row, column.key)}"
+                    for row, value in enumerate(values)
+                    if isinstance(value, str) and np.isfinite(numbers[row])
+                ]
             if unit:
                 table.units[column.key] = unit
     errors += [error for _, _, error in sorted(gathered, key=lambda item: item[:2])]

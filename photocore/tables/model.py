@@ -69,6 +69,8 @@ class Table:
         one); empty where there are none.
     remarks : list of str
         What was done that the user should know: hidden rows used, rows left out, ...
+    text_cells : list of str
+        Cells of a sheet whose number was typed as text: formulas do not see such numbers.
     """
 
     file: str
@@ -81,6 +83,7 @@ class Table:
     headings: dict[str, str] = field(default_factory=dict)
     blocks: list[str] = field(default_factory=list)
     remarks: list[str] = field(default_factory=list)
+    text_cells: list[str] = field(default_factory=list)
 
     def __len__(self) -> int:
         return len(self.rows)
@@ -139,12 +142,15 @@ class NamedValues:
         Key to (sheet, cell) of every value whose place was found, blank or not.
     remarks : list of str
         What the user should know.
+    text_cells : list of str
+        Cells whose number was typed as text: formulas do not see such numbers.
     """
 
     file: str
     values: dict[str, float | str]
     places: dict[str, tuple[str, str]]
     remarks: list[str] = field(default_factory=list)
+    text_cells: list[str] = field(default_factory=list)
 
     def number(self, key: str) -> float:
         """Return a number, NaN where blank or absent."""

@@ -373,6 +373,8 @@ def read_named_values(
             found.append(result.error(key, message))
 
         result.values[name.key] = _single(name, value, decimal, complain)
+        if place and name.kind == "number" and isinstance(value, str) and result.has(name.key):
+            result.text_cells.append(f"{place[0]}!{result.cell(name.key)}")
     if errors is None and found:
         raise WorkbookError(found)
     faulty = {error.column for error in found}

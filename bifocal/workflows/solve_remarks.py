@@ -1,0 +1,86 @@
+"""What a surveyor should be told about the results: mispicks, exchanged photos, poor control."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from bifocal.domain.observations import PointObservations
+from bifocal.domain.reference import Georeference, KnownPoints
+from bifocal.domain.relief_table import ReliefTable
+from bifocal.domain.setup import SurveySetup
+
+#: A scale further from 1 than this is no matter of taping distances.
+SCALE_SHARE = 0.01
+#: Residuals of control points beyond this are named. [m]
+LARGEST_RESIDUAL = 0.10
+
+
+def georeference_remarks(
+    world: Georeference, control: KnownPoints, table: ReliefTable, *, is_auto: bool
+) -> list[str]:
+    """Return what is wrong or surprising about the world coordinates.
+
+    Parameters
+    ----------
+    world : Georeference
+        As found.
+    control : KnownPoints
+        As typed.
+    table : ReliefTable
+        Solved points.
+    is_auto : bool
+        Whether the data chose the model.
+    """
+    said = [f"{name} contradicts the other control points and was left out." for name in world.bad]
+    unknown = [name for name in control.ids if name not in table.ids]
+    if unknown:
+        said.append(f"no measured point is called {', '.join(unknown[:10])}; not used.")
+    if is_auto and world.model == "2D":
+        said.append("no heights H are given: the model 2D was taken, H stays blank.")
+    elif is_auto and world.model != "levelled":
+        lean = math.degrees(math.acos(min(1.0, float(world.world_from_wall.rotation[2, 1]))))
+        said.append(
+            f"auto took the model {world.model}, since levelled does not fit the control points as "
+            f"well; the wall's Y then leans {lean:.2f} deg from upright. If the photos were "
+            "levelled, check the control points, or say --georeference levelled."
+        )
+    scale = world.world_from_wall.scale
+    if abs(scale - 1.0) > SCALE_SHARE:
+        said.append(
+            f"WARNING: scale {scale:.4g} instead of 1: the control points lie {scale:.4g} times as "
+            "far apart as the survey says. Check the distances and principal distances in Setup, "
+            "that E, N, H are in metres, and that each name has its own coordinates."
+        )
+    sizes = np.where(world.used, np.sqrt(np.nansum(world.residuals**2, axis=1)), 0.0)
+    if sizes.size and sizes.max() > LARGEST_RESIDUAL:
+        worst = int(sizes.argmax())
+        said.append(
+            f"WARNING: residuals of up to {sizes[worst]:.2f} m, the largest at "
+            f"{world.ids[worst]}: the control points do not fit the survey. Check names and "
+            "coordinates; do not use E, N, H before."
+        )
+    return [f"Georeference: {text}" for text in said]
+
+
+def point_remarks(
+    points: PointObservations, table: ReliefTable, setup: SurveySetup | None
+) -> list[str]:
+    """Return a sentence for each mispicked point, worst first, with the size of the miss."""
+    flags = np.array(table.flags)
+    off = [int(i) for i in np.flatnonzero(flags == "OFF-RADIAL") if points.use[i]]
+    off.sort(key=lambda i: -abs(table.standardised[i]))
+    misses, unit = table["q"], "mm"
+    if "misfit_px" in table.carried:
+        misses, unit = table.carried["misfit_px"], "px"
+    elif setup is not None and setup.pitch is not None:
+        misses, unit = table["q"] / setup.pitch, "px"
+    remarks = [
+        f"{points.ids[i]}: the two picks miss each other by {abs(misses[i]):.3g} {unit} across the "
+        f"radius ({abs(table.standardised[i]):.1f} sigma); measure it again."
+        for i in off[:10]
+    ]
+    if len(off) > 10:
+        remarks.append(f"... and {len(off) - 10} more OFF-RADIAL points.")
+    return remarks
