@@ -67,6 +67,7 @@ def test_control_points_give_a_pair_file_with_picture_and_diagnostics(folder) ->
     assert cv2.imread(str(folder / "wall.pair.png")).shape[1] > 1000
 
 
+@pytest.mark.acceptance
 def test_json_goes_to_stdout_alone(folder) -> None:
     result = align(
         folder, "--auto", "--distance1", "16", *lens(), "--json", "--no-picture", out="j.pair.json"
@@ -78,6 +79,7 @@ def test_json_goes_to_stdout_alone(folder) -> None:
     assert not (folder / "j.pair.png").exists()
 
 
+@pytest.mark.acceptance
 def test_a_photo_turned_by_exif_gives_the_same_pair(folder) -> None:
     from PIL import Image
 
@@ -94,6 +96,7 @@ def test_a_photo_turned_by_exif_gives_the_same_pair(folder) -> None:
     np.testing.assert_allclose(pair.image2.nadir, NEAR.centre[:2], atol=0.06)
 
 
+@pytest.mark.acceptance
 def test_a_lens_file_with_distortion_is_carried_into_the_pair(folder) -> None:
     for name, cam in (("lens1.json", FAR), ("lens2.json", NEAR)):
         data = {
@@ -114,6 +117,7 @@ def test_a_lens_file_with_distortion_is_carried_into_the_pair(folder) -> None:
     assert pair.image2.distance == pytest.approx(9.0, rel=0.005)
 
 
+@pytest.mark.acceptance
 @pytest.mark.parametrize(("unit", "heading"), [(1000.0, " [mm]"), (100.0, " [cm]")])
 def test_units_in_the_headings_are_taken(folder, unit, heading) -> None:
     write_control(folder / "unit.csv", unit=unit, heading=heading)
@@ -132,6 +136,7 @@ def test_millimetres_without_saying_so_are_refused(folder) -> None:
     assert not (folder / "mm.pair.json").exists()
 
 
+@pytest.mark.acceptance
 def test_picks_of_the_other_photo_are_exchanged_and_said(folder) -> None:
     text = (folder / "control.csv").read_text(encoding="utf-8")
     swapped = text.replace("col1,row1,col2,row2", "col2,row2,col1,row1")
@@ -192,6 +197,7 @@ def test_matched_points_solve_to_the_boards(folder) -> None:
     assert np.median(np.abs(error)) < 0.012
 
 
+@pytest.mark.acceptance
 def test_a_survey_workbook_is_written_and_solved(folder) -> None:
     pair, out = str(folder / "wall.pair.json"), str(folder / "points.xlsx")
     result = CliRunner().invoke(main, ["match", pair, "--out", out, "--count", "60"])

@@ -52,6 +52,7 @@ def test_the_photos_alone_with_one_distance_give_the_relief(views) -> None:
     assert made.solution.cameras[1].centre[2] == pytest.approx(9.0, rel=0.01)
 
 
+@pytest.mark.acceptance
 def test_both_distances_square_to_the_wall_give_the_relief(views) -> None:
     site = SiteMeasures(distance1=16.0, distance2=9.0, parallel=True)
     made = set_up(inputs(views, sigma=0.02), control=Control(), site=site)
@@ -59,6 +60,7 @@ def test_both_distances_square_to_the_wall_give_the_relief(views) -> None:
     assert any("parallel" in text for text in made.assumed)
 
 
+@pytest.mark.acceptance
 def test_four_wall_points_and_one_relief_point_repair_the_set_up(views) -> None:
     xyz = np.array(
         [[-4.5, 2.9, 0], [4.6, 3.0, 0], [-0.9, -3.5, 0], [1.2, 2.8, 0], [-4.6, -1, 0.35]]
@@ -78,6 +80,7 @@ def test_four_wall_points_and_one_relief_point_repair_the_set_up(views) -> None:
         assert found.centre[2] == pytest.approx(true.centre[2], rel=0.02)
 
 
+@pytest.mark.acceptance
 def test_a_dark_photo_is_matched_all_the_same(views) -> None:
     dark = (views.near * 0.2 + 5).astype(np.uint8)
     first, second = inputs(views)
@@ -86,6 +89,7 @@ def test_a_dark_photo_is_matched_all_the_same(views) -> None:
     assert np.median(np.abs(relief_error(made))) < 0.012
 
 
+@pytest.mark.acceptance
 def test_exchanged_photos_are_noticed_when_the_lens_stayed_the_same() -> None:
     # With one lens the near photo simply shows everything larger.
     far, near = camera(16.0, focal=1400.0), camera(10.0, focal=1400.0, offset=(0.3, 0.0))
@@ -104,6 +108,7 @@ def test_one_photo_twice_is_refused(views) -> None:
         set_up((first, twin), control=Control(), site=SiteMeasures(distance1=16.0))
 
 
+@pytest.mark.acceptance
 def test_two_shots_from_one_place_are_refused(views) -> None:
     again = photograph(FAR, noise=3.0)
     first, second = inputs(views)
@@ -126,6 +131,7 @@ def test_zoom_without_walking_is_called_the_classic_mistake(views) -> None:
         set_up((first, second), control=Control(), site=SiteMeasures(distance1=16.0))
 
 
+@pytest.mark.acceptance
 def test_a_wall_without_relief_is_refused_by_auto_and_taken_with_both_distances() -> None:
     flat = take(FAR, NEAR, seed=5, boards=())
     with pytest.raises(GeometryError, match="no parallax: nothing in the photos stands out"):
@@ -157,6 +163,7 @@ def test_without_any_distance_there_is_no_scale(views) -> None:
         set_up(inputs(views), control=Control(), site=SiteMeasures())
 
 
+@pytest.mark.acceptance
 def test_a_length_on_the_wall_gives_the_scale(views) -> None:
     ends = np.array([[-4.5, 2.9, 0.0], [4.6, 3.0, 0.0]])
     unknown = np.array([[np.nan, np.nan, 0.0]] * 2)
@@ -172,6 +179,7 @@ def test_a_length_on_the_wall_gives_the_scale(views) -> None:
     assert made.solution.cameras[0].centre[2] == pytest.approx(16.0, rel=0.01)
 
 
+@pytest.mark.acceptance
 def test_equal_distances_are_refused(views) -> None:
     beside = camera(15.9, offset=(4.0, 0.0), turn_deg=(0.0, 14.0, 0.0))
     first, second = inputs(views)
