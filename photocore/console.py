@@ -2,15 +2,40 @@
 
 from __future__ import annotations
 
+import signal
 import sys
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from importlib import import_module
 from typing import Any, Protocol
 
 import click
 
 from photocore.errors import PhotogrammetryError
+
+
+class Number(click.ParamType):  # type: ignore[type-arg,unused-ignore]
+    """A number with a decimal point or comma."""
+
+    name = "number"
+
+    def convert(
+        self, value: object, param: click.Parameter | None, ctx: click.Context | None
+    ) -> float:
+        """Return the number."""
+        try:
+            return float(str(value).strip().replace(",", "."))
+        except ValueError:
+            self.fail(f"{value!r} is not a number; the unit is in the help.", param, ctx)
+
+
+#: Takes the place of click's FLOAT in every command.
+NUMBER = Number()
+
+
+def _stop(number: int, frame: object) -> None:  # noqa: ARG001
+    """End on a polite kill as on Ctrl-C, so that nothing half-written stays."""
+    raise KeyboardInterrupt
 
 
 class LazyGroup(click.Group):
@@ -41,6 +66,9 @@ class LazyGroup(click.Group):
             return None
         module = import_module(f"{self.commands_package}.{cmd_name.replace('-', '_')}")
         command: click.Command = module.command
+        for parameter in command.params:
+            if parameter.type is click.FLOAT:
+                parameter.type = NUMBER
         return command
 
     def resolve_command(
@@ -62,6 +90,8 @@ class LazyGroup(click.Group):
 
     def invoke(self, ctx: click.Context) -> Any:
         """Run a command; the one place where errors become messages and exit status 1."""
+        with suppress(ValueError):  # not in the main thread: somebody else handles signals there
+            signal.signal(signal.SIGTERM, _stop)
         try:
             return super().invoke(ctx)
         except PhotogrammetryError as error:

@@ -24,7 +24,7 @@ def check_writable(path: Path | str, *, overwrite: bool) -> Path:
     if path.is_dir():
         raise InputError(f"{path}: is a folder; name a file to write.")
     if path.exists() and not overwrite:
-        raise InputError(f"{path}: exists already; add --overwrite (overwrite=True) to replace it.")
+        raise InputError(f"{path}: exists already; add --overwrite to replace it.")
     folder = path.parent
     if not folder.is_dir():
         raise InputError(f"{path}: the folder {folder} does not exist; create it first.")
@@ -86,8 +86,7 @@ def atomic_folder(path: Path | str, *, overwrite: bool) -> Iterator[Path]:
         taken = [str(name) for name in made if (path / name).exists()]
         if taken and not overwrite:
             raise InputError(
-                f"{path}: holds {', '.join(sorted(taken)[:5])} already; "
-                "add --overwrite (overwrite=True) to replace."
+                f"{path}: holds {', '.join(sorted(taken)[:5])} already; add --overwrite to replace."
             )
         for name in made:
             (path / name).parent.mkdir(parents=True, exist_ok=True)

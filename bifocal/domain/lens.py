@@ -87,6 +87,8 @@ class Lens:
             foreign = read_foreign_lens(path)
             return cls(**foreign._asdict())
         data = read_object(path, what="lens file")
+        if str(data.get("format", "")).startswith("bifocal-pair"):
+            raise InputError(f"{path}: is a pair file, not a lens file; name the lens.json.")
         try:
             known = {
                 "camera_matrix": data.pop("camera_matrix"),

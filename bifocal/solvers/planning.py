@@ -16,6 +16,8 @@ from photocore.errors import InputError
 OVERLAP = 0.2
 #: Closer than this share of the far distance the two stations hardly differ.
 LEAST_RATIO = 1.05
+#: Nobody photographs a wall from closer than this. [m]
+NEAREST = 0.2
 
 
 def plan_stations(
@@ -111,6 +113,12 @@ def plan_stations(
         _station(c1, c2, scale_of(c1, c2), sensor, object_size, sigma_px, free_space)
         for c1, c2 in pairs
     ]
+    nearest = min(station.d2 for station in drafts)
+    if nearest < NEAREST:
+        raise InputError(
+            f"the near camera would stand {nearest * 100:.1f} cm from the wall: the wished scale "
+            "or pixel is too fine. Check its unit: GSD and sigma are given in mm, a scale as 1:N."
+        )
     drafts.sort(key=lambda s: (not s.feasible, s.sigma_r_rms, s.d1))
     limit = sigma_r_max or 3 * drafts[0].sigma_r_rms
     stations = tuple(_with_uncertainty(s, sigma_px, limit) for s in drafts)

@@ -10,19 +10,18 @@ from pathlib import Path
 
 import numpy as np
 
-from bifocal.domain.observations import PointObservations
 from bifocal.domain.relief_map import ReliefMap
 from bifocal.io.geotiff import RasterReader, read_relief, write_relief
 from bifocal.io.images import write_image
 from bifocal.solvers.scene import Rendering, bifocal_cameras, demo_scene, render
 from bifocal.workflows.dense import ReliefJob, relief_of_pair
 from bifocal.workflows.ortho import OrthoTask, make_ortho
-from bifocal.workflows.solve import solve_file
+from bifocal.workflows.solve import SolveOptions, solve_file
 from bifocal.workflows.solve_output import write_result
-from bifocal.workflows.survey import write_survey
 from photocore.arrays import FloatArray
 from photocore.console import Progress, no_progress
 from photocore.errors import InputError
+from photocore.tables import write_csv
 
 #: Photos of 1536 x 1024 px, 7.38 mm on the wall: a quarter of the paper's camera, quick to make.
 SIZE, PIXEL = (1536, 1024), 0.00738
@@ -126,8 +125,8 @@ _FILES: tuple[tuple[str, str], ...] = (
     ("far.png", "far photo, 35 mm from 17.5 m"),
     ("near.png", "near photo, 19 mm from 9.5 m"),
     ("facade.pair.json", "the pair: homographies, nadirs, distances"),
-    ("survey.xlsx", "picked targets in the survey workbook, live formulas"),
-    ("result.xlsx", "solved: relief, coordinates, precision, check"),
+    ("targets.csv", "picked targets in pixels, and their true relief to check"),
+    ("result.xlsx", "solved workbook, live formulas: relief, coordinates, precision, check"),
     ("relief.tif", "relief map: relief, sigma, quality"),
     ("relief.png", "the same as a picture"),
     ("ortho.tif", "orthophoto to scale"),
@@ -143,20 +142,21 @@ def _survey(
     targets = [target for target in sample.targets if target.seen]
     noise = rng.normal(0, PICK_SIGMA, (2, len(targets), 2))
     true = np.array([target.xyz[2] for target in targets])
-    points = PointObservations(
-        ids=tuple(target.name for target in targets),
-        pixels1=np.array([target.pixel1 for target in targets]) + noise[0],
-        pixels2=np.array([target.pixel2 for target in targets]) + noise[1],
-        r_measured=true,
-    )
-    write_survey(
-        folder / "survey.xlsx", points, pair=sample.pair, sigma_px=PICK_SIGMA,
-        pair_path=folder / "facade.pair.json", overwrite=True,
+    picks = np.array([(*target.pixel1, *target.pixel2) for target in targets])
+    picks[:, :2] += noise[0]
+    picks[:, 2:] += noise[1]
+    headings = ("col1 [px]", "row1 [px]", "col2 [px]", "row2 [px]")
+    columns = dict(zip(headings, np.round(picks, 3).T, strict=True))
+    ids = tuple(target.name for target in targets)
+    write_csv(
+        folder / "targets.csv", {"id": ids, **columns, "r measured [m]": np.round(true, 5)},
+        overwrite=True,
     )  # fmt: skip
-    solution = solve_file(folder / "survey.xlsx")
+    options = SolveOptions(pair=folder / "facade.pair.json", sigma_px=PICK_SIGMA)
+    solution = solve_file(folder / "targets.csv", options)
     write_result(folder / "result.xlsx", solution, overwrite=True)
     table = solution.table
-    return points.ids, true, table["r"], table["sigma_r"], table.flags
+    return ids, true, table["r"], table["sigma_r"], table.flags
 
 
 def _against_truth(relief: ReliefMap, sample: Rendering) -> tuple[float, float, float]:

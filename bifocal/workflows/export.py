@@ -6,6 +6,7 @@ from pathlib import Path
 
 from bifocal.io.exports import export_points
 from bifocal.io.point_tables import read_survey_points
+from photocore.errors import InputError
 from photocore.output import check_writable
 
 
@@ -14,6 +15,8 @@ def export(
     flavour: str = "plain", overwrite: bool = False,
 ) -> tuple[str, ...]:  # fmt: skip
     """Write the points of a result in the format the ending of ``out`` names; return remarks."""
+    if out.exists() and source.exists() and out.samefile(source):
+        raise InputError(f"{out}: is the survey itself; name another file to export to.")
     check_writable(out, overwrite=overwrite)
     points, remarks = read_survey_points(source)
     more = export_points(

@@ -10,6 +10,7 @@ from typing import Any
 from bifocal.domain.plan import Plan, Sensor
 from bifocal.io.plan_workbook import write_plan
 from bifocal.solvers.planning import plan_stations
+from photocore.errors import InputError
 from photocore.output import check_writable
 
 
@@ -26,6 +27,8 @@ def make_plan(
     ``wishes`` are the keyword arguments of `bifocal.solvers.planning.plan_stations`.
     """
     if out is not None:
+        if out.suffix.lower() != ".xlsx":
+            raise InputError(f"{out}: a plan is written as a workbook; name it .xlsx.")
         check_writable(out, overwrite=overwrite)
     plan = plan_stations(focal_lengths, sensor, **wishes)
     if out is not None:

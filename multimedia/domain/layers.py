@@ -15,6 +15,9 @@ from photocore.errors import GeometryError, InputError
 #: Diamond; nothing in front of a camera bends light more.
 HIGHEST_INDEX = 2.42
 
+#: Germanium, for infrared, is the last at 4.0.
+IMPOSSIBLE_INDEX = 4.1
+
 #: Anything above this is a liquid or a solid, not a gas (xenon at 10 bar: 1.007).
 THINNEST_LIQUID = 1.1
 
@@ -63,6 +66,11 @@ class Layers:
                 raise InputError(
                     f"indices: medium {place} has refractive index {index:g}; it must be at least "
                     "1 (air 1.0003, water 1.33 to 1.35, glass 1.45 to 1.9)."
+                )
+            if index > IMPOSSIBLE_INDEX:
+                raise InputError(
+                    f"indices: medium {place} has refractive index {index:g}; nothing transparent "
+                    "has. Is a decimal point missing (1.337, not 13.37)?"
                 )
         for place, thickness in enumerate(thicknesses, start=1):
             if not (np.isfinite(thickness) and thickness >= 0):

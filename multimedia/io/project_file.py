@@ -139,7 +139,8 @@ def _toml(path: Path) -> dict[str, Any]:
     except UnicodeDecodeError:
         raise InputError(f"{path}: is not a text file, expected a project file (TOML).") from None
     except tomllib.TOMLDecodeError as error:
-        raise InputError(f"{path}: is not valid TOML: {error}.") from None
+        hint = "" if path.suffix.lower() == ".toml" else " A project is a .toml file."
+        raise InputError(f"{path}: is not valid TOML: {error}.{hint}") from None
     except OSError as error:
         raise InputError(f"{path}: cannot be read ({error.strerror}).") from None
 

@@ -255,7 +255,7 @@ def _nothing_found(
         advice = (
             ""
             if empty
-            else ' Write them above the columns, or say which columns to use: --columns "id=A,...".'
+            else ' Write them above the columns, or, where it exists, use --columns "id=A,...".'
         )
         return InputError(f"{book.label}: {what} (looked in {_quoted(titles)}).{advice}")
     missing = ", ".join(near.match.missing(columns))

@@ -61,3 +61,20 @@ def test_mistakes_get_one_message_and_the_right_status(arguments, status, messag
     assert result.exit_code == status
     assert message in result.stderr
     assert "Traceback" not in result.stderr
+
+
+def test_units_and_endings_that_cannot_be_meant_are_named(tmp_path):
+    tiny = run(*LENSES, *CANON, "--gsd", "0.004")
+    assert tiny.exit_code == 1
+    assert "in mm" in tiny.stderr
+    ending = run(*LENSES, *CANON, "--scale", "500", "--out", str(tmp_path / "plan.pdf"))
+    assert ending.exit_code == 1
+    assert ".xlsx" in ending.stderr
+
+
+def test_numbers_take_a_decimal_comma_and_say_what_they_are_not():
+    comma = run("--focal", "35,0", "--focal", "19", *CANON, "--scale", "500")
+    assert comma.exit_code == 0
+    unit = run("--focal", "35mm", "--focal", "19", *CANON, "--scale", "500")
+    assert unit.exit_code == 2
+    assert "'35mm' is not a number" in unit.stderr

@@ -121,3 +121,12 @@ def test_the_command_takes_a_result_table_and_names_what_it_lacks(tmp_path):
     done = run(main, ["export", str(tmp_path / "none.xlsx"), "--out", str(tmp_path / "o.dxf")])
     assert done.exit_code == 1
     assert "none.xlsx" in done.stderr
+
+
+def test_a_survey_is_never_exported_onto_itself(tmp_path):
+    table = tmp_path / "result.csv"
+    table.write_text("Point,X,Y,Z\nA,1,2,3\n")
+    done = CliRunner().invoke(main, ["export", str(table), "--out", str(table), "--overwrite"])
+    assert done.exit_code == 1
+    assert "the survey itself" in done.stderr
+    assert table.read_text().startswith("Point")

@@ -88,3 +88,8 @@ def test_layers_survive_json() -> None:
 def test_a_bad_json_object_is_named() -> None:
     with pytest.raises(InputError, match=r"wall\.pair\.json, layers: indices: medium 2"):
         Layers.from_dict({"indices": [1.0, 0.5]}, where="wall.pair.json, layers")
+
+
+def test_an_index_without_its_decimal_point_is_refused():
+    with pytest.raises(InputError, match="decimal point"):
+        Layers(indices=(1.0, 13.37))
