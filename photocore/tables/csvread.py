@@ -199,7 +199,7 @@ def _find(
         shown = describe(grid, match)
         raise InputError(
             f"{file.label}: no column {', '.join(wanted)}; the headings are {shown or 'absent'}. "
-            f'Rename a heading, or, with commands that take it, say --columns "{wanted[0]}=HEADING" (or a '
+            f'Rename a heading, or, where it exists, use --columns "{wanted[0]}=HEADING" (or a '
             "column letter)."
         )
     return grid, match, delimiter
