@@ -27,7 +27,8 @@ photos, 2 interpolated, 3 hidden from a camera, 0 unknown).
 )
 @click.option(
     "--gsd", type=float, metavar="M",
-    help="Side of a pixel of the map on the plane [m].  [default: that of the far photo]",
+    help="Side of a pixel of the map on the plane [m], 0.2 at most; a coarse one is also matched "
+    "more coarsely.  [default: that of the far photo]",
 )  # fmt: skip
 @click.option(
     "--bounds", type=Numbers(4), metavar="XMIN,YMIN,XMAX,YMAX",

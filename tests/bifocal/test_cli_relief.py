@@ -112,6 +112,24 @@ def test_a_mistaken_gsd_is_asked_back(folder, tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.parametrize("gsd", ["5", "1", "0.25", "0.15"])
+def test_a_gsd_too_coarse_to_match_at_is_asked_back(folder, tmp_path, gsd):
+    code, _, told = run(folder / "wall.pair.json", "--out", tmp_path / "r.tif", "--gsd", gsd)
+    assert code == 1
+    assert "Is the unit right?" in told
+    assert "half the GSD" in told
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_bounds_too_small_for_a_quick_look_are_refused(folder, tmp_path):
+    code, _, told = run(
+        folder / "wall.pair.json", "--out", tmp_path / "r.tif", "--quality", "fast",
+        "--bounds", "-0.3,-0.3,0.3,0.3", "--relief-range", "-0.1,0.1",
+    )  # fmt: skip
+    assert code == 1
+    assert "at least 24 a side" in told
+
+
 def test_usage_errors_are_status_2(folder, tmp_path):
     code, _, told = run(folder / "wall.pair.json", "--out", tmp_path / "r.tif", "--bounds", "1,2")
     assert code == 2

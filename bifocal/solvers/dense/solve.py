@@ -40,8 +40,12 @@ ACROSS_LIMIT, LOOP_LIMIT = 0.5, 0.8
 SIGMA_SHARE = 0.01
 #: Relief maps of more pixels than this are refused: a unit has been mistaken.
 LARGEST_MAP = 400e6
-#: A GSD of more pixels of the far photo than this is taken for a slip, too.
-COARSEST_GSD = 64.0
+#: A GSD coarser than this, and coarser than twice the far photo's pixel, is a slip, too. [m]
+COARSEST_GSD = 0.2
+#: So is a GSD coarser than the photo's that leaves fewer pixels a side than this.
+FEWEST_PIXELS = 64
+#: Matching needs this many working pixels a side.
+SMALLEST_WORK = 24
 #: Error across the radius that counts as noise rather than as an edge, for smoothing. [px]
 NOISE_CLIP = 0.25
 
@@ -106,7 +110,8 @@ def dense_relief(
     image1, image2 : ndarray of uint8 or uint16, shape (height, width[, 3])
         Far and near photo as taken; lens distortion is removed on the way if the pair has lenses.
     gsd : float, optional
-        Pixel of the map; by default that of the far photo on the plane. [m]
+        Pixel of the map; by default that of the far photo on the plane. [m] The photos are
+        matched at half a coarser one, so it also costs detail and precision.
     bounds : tuple of float, optional
         X min, Y min, X max, Y max; by default all that both photos see of the plane. [m]
     quality : str
@@ -200,10 +205,13 @@ def _grids(
             f"gsd: {step:g} m over {size} would be {wanted.width} x {wanted.height} px. Is the "
             f"unit right? The GSD is in metres; a pixel of the far photo is {native:.4g} m."
         )
-    if min(wanted.shape) < 2 or step > COARSEST_GSD * native:
+    few = min(wanted.shape) < FEWEST_PIXELS and step > 1.01 * native
+    if few or min(wanted.shape) < 2 or step > max(COARSEST_GSD, 2 * native):
         raise InputError(
             f"gsd: {step:g} m over {size} leaves {wanted.width} x {wanted.height} px. Is the unit "
-            f"right? The GSD is in metres; a pixel of the far photo is {native:.4g} m."
+            f"right? The GSD is in metres; a pixel of the far photo is {native:.4g} m. The photos "
+            f"are matched at half the GSD, so it may be {COARSEST_GSD:g} m at most and must leave "
+            f"{FEWEST_PIXELS} px a side."
         )
     low, high = relief_range or (
         seed.DEEPEST * pair.image2.distance,
@@ -228,6 +236,12 @@ def _grids(
         fine = native
     wide = zoomed_box(pair, images[1].shape, reach, min(high, 0.6 * pair.image2.distance))
     work = working_grid(pair, images[0].shape, wide, fine)
+    if min(work.shape) < SMALLEST_WORK:
+        raise InputError(
+            f"the photos would be matched on {work.width} x {work.height} px of {fine:.3g} m; at "
+            f"least {SMALLEST_WORK} a side are needed. Give larger bounds, a finer gsd or quality "
+            "standard."
+        )
     if bounds is None and gsd is None:
         # The map's pixels are those of photo 1, where that is square to the wall.
         wanted = working_grid(pair, images[0].shape, common, native)
