@@ -21,8 +21,18 @@ from bifocal.solvers.check_points import check_points
 from bifocal.solvers.georeference import georeference
 from bifocal.solvers.point_survey import solve_ideal, solve_pair
 from bifocal.solvers.setup_check import SetupCheck, check_setup
-from bifocal.workflows.solve_remarks import georeference_remarks, point_remarks
-from bifocal.workflows.units import refuse_millimetres, refuse_pixels, refuse_wrong_unit
+from bifocal.workflows.solve_remarks import (
+    exchanged_remark,
+    georeference_remarks,
+    opposite_signs_remark,
+    point_remarks,
+)
+from bifocal.workflows.units import (
+    refuse_far_stations,
+    refuse_millimetres,
+    refuse_pixels,
+    refuse_wrong_unit,
+)
 from photocore.arrays import FloatArray
 from photocore.errors import GeometryError, InputError
 
@@ -155,6 +165,8 @@ def solve_file(path: Path | str, options: SolveOptions | None = None) -> Solutio
     survey = replace(survey, setup=values)
     if not len(survey.points):
         raise InputError(f"{_where(survey)}: there is no point. Fill in the measured points.")
+    if options.pair is None:
+        refuse_far_stations(values.d1, values.d2, values.where, options=set(options.setup))
     pair, pair_path = _pair(path, values, options, remarks)
     points = survey.points
     if pair is not None:
@@ -166,6 +178,7 @@ def solve_file(path: Path | str, options: SolveOptions | None = None) -> Solutio
     check = check_points(table, survey.known, options.rules)
     if check.missing:
         remarks.append(f"Check: no measured point is called {', '.join(check.missing[:10])}.")
+    remarks += opposite_signs_remark(table, survey.known)
     world = None
     if survey.control.used.any() and not np.isnan(survey.control.xyz).all():
         model = options.model or survey.model
@@ -388,10 +401,7 @@ def _solve_ideal(
     refuse_wrong_unit(setup, points, _where(survey), said=survey.unit)
     exchanged = setup.is_exchanged
     if exchanged:
-        remarks.append(
-            f"d_1 = {setup.d1:g} m is shorter than d_2 = {setup.d2:g} m: image 1 is the near "
-            "camera here (swapped images). The two were exchanged; results are right."
-        )
+        remarks.append(exchanged_remark(setup))
         setup, points = setup.exchanged(), points.exchanged()
     setup, points, check = _check_ideal(
         setup, points, adjust=options.adjust_setup, remarks=remarks, where=_where(survey)

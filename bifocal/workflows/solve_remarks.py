@@ -64,6 +64,44 @@ def georeference_remarks(
     return [f"Georeference: {text}" for text in said]
 
 
+def exchanged_remark(setup: SurveySetup) -> str:
+    """Return what is said of a set-up whose image 1 has the shorter distance."""
+    camera = "" if setup.c1 is None else f" with c = {setup.c1:g} mm"
+    nothing = (
+        " Neither c_1 nor c_2 is given, so nothing else tells which photo is the far one."
+        if setup.c1 is None
+        else ""
+    )
+    return (
+        f"d_1 = {setup.d1:g} m is shorter than d_2 = {setup.d2:g} m, so image 1 was taken for the "
+        "near photo (swapped images): photos 1 and 2 were exchanged together with their distances."
+        f"{nothing} This is right only if image 1 (x1 y1, s1) was measured on the photo taken from "
+        f"{setup.d1:g} m{camera}; if only the distances were typed the wrong way round, exchange "
+        "d_1 and d_2, else all relief is wrong."
+    )
+
+
+def opposite_signs_remark(table: ReliefTable, known: KnownPoints) -> list[str]:
+    """Return a warning where most points of known relief come out with the opposite sign."""
+    place = {name: row for row, name in enumerate(table.ids)}
+    pairs = [
+        (name, float(table["r"][place[name]]), float(z), float(table["sigma_r"][place[name]]))
+        for name, z, used in zip(known.ids, known.xyz[:, 2], known.used, strict=True)
+        if used and name in place
+    ]
+    # Signs tell nothing where relief is not different from zero.
+    clear = [(n, r, z) for n, r, z, sigma in pairs if min(abs(r), abs(z)) > 2 * sigma]
+    opposite = [(n, r, z) for n, r, z in clear if r * z < 0]
+    if len(opposite) < 2 or 2 * len(opposite) <= len(clear):
+        return []
+    name, r, z = max(opposite, key=lambda found: abs(found[2]))
+    return [
+        f"WARNING: relief has the wrong sign at {len(opposite)} of {len(clear)} points of known "
+        f"relief (at {name} {r:+.3f} m, measured {z:+.3f} m): photos 1 and 2 look exchanged. x1 y1 "
+        "belong to the far photo (d_1), x2 y2 to the near one; relief counts + towards the camera."
+    ]
+
+
 def point_remarks(
     points: PointObservations, table: ReliefTable, setup: SurveySetup | None
 ) -> list[str]:

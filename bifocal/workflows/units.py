@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
+
 import numpy as np
 
 from bifocal.domain.observations import PointObservations
@@ -16,6 +18,8 @@ WIDEST = 3.0
 LARGEST_MM = 150.0
 #: Pixels that all lie within this of the top-left corner are millimetres. [px]
 CORNER_PX = 60.0
+#: No wall is surveyed with a hand camera from further away. [m]
+FARTHEST = 500.0
 
 
 def refuse_wrong_unit(
@@ -75,6 +79,38 @@ def refuse_wrong_unit(
                 f"{where}: all points lie within {reach:.3g} mm of the nadir: the coordinates look "
                 f"like millimetres, while {place} says px. Set the input unit to mm."
             )
+
+
+def refuse_far_stations(
+    d1: float | None, d2: float | None, where: str, *, options: Collection[str] = ()
+) -> None:
+    """Refuse distances so long that they are in millimetres or centimetres.
+
+    Parameters
+    ----------
+    d1, d2 : float or None
+        As typed, to be in metres.
+    where : str
+        File and sheet, for the message.
+    options : collection of str
+        Those given by option, ``"d1"`` or ``"d2"``.
+
+    Raises
+    ------
+    InputError
+        Naming the distance and what was probably meant.
+    """
+    for key, value in (("d1", d1), ("d2", d2)):
+        if value is None or value <= FARTHEST:
+            continue
+        place = f"--{key}" if key in options else f"{where}: {key[0]}_{key[1]}"
+        # 9500 is 9.5 m in millimetres; 950 is 9.5 m in centimetres and 0.95 m in millimetres.
+        per_metre, unit = (1000.0, "millimetres") if value >= 2000.0 else (100.0, "centimetres")
+        raise InputError(
+            f"{place} = {value:g} m: distances to the wall are in metres (c in millimetres), and "
+            f"this looks like {unit}. Type {value / per_metre:g} if that is meant; d_1 also "
+            "counts delta_d."
+        )
 
 
 def refuse_pixels(xy: FloatArray, c: float, where: str) -> None:

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
-from tests.bifocal.test_cli_solve import POINTS, fill, rows, run, solved
+from tests.bifocal.test_cli_solve import POINTS, fill, rows, run, solved, write_csv
 
 WORLD = [(name, 1000 + x, 2000 - r, 50 + y) for name, x, y, r in POINTS]
 
@@ -54,3 +55,56 @@ def test_auto_says_when_it_leaves_the_levelled_model(tmp_path):
 def test_one_point_is_called_a_point(tmp_path):
     path = fill(tmp_path / "s.xlsx", Check=[("P1", None, None, 1.005)])
     assert "Check Z: 1 point, RMSE" in run("solve", path).stdout
+
+
+def as_csv(path, table):
+    """Points with measured relief, without principal distances."""
+    lines = ["id,x1,y1,x2,y2,r measured"]
+    known = {name: r for name, _, _, r in POINTS}
+    lines += [f"{row[0]},{','.join(map(str, row[1:]))},{known[row[0]]}" for row in table]
+    return write_csv(path, "\n".join(lines))
+
+
+def test_swapped_distances_alone_are_not_called_right(tmp_path):
+    path = as_csv(tmp_path / "p.csv", rows(POINTS))
+    _, said = solved(path, "--d1", 9.5, "--d2", 17.5)
+    assert "photos 1 and 2 were exchanged together with their distances" in said
+    assert "nothing else tells which photo is the far one" in said
+    assert "exchange d_1 and d_2" in said
+    assert "results are right" not in said
+
+
+def test_exchanged_coordinates_are_told_by_the_signs_of_known_relief(tmp_path):
+    table = [(name, x2, y2, x1, y1) for name, x1, y1, x2, y2 in rows(POINTS)]
+    _, said = solved(as_csv(tmp_path / "p.csv", table), "--d1", 17.5, "--d2", 9.5)
+    assert "relief has the wrong sign at 3 of 3 points" in said
+    assert "(at P1 -1.194 m, measured +1.000 m): photos 1 and 2 look exchanged" in said
+    right = solved(as_csv(tmp_path / "q.csv", rows(POINTS)), "--d1", 17.5, "--d2", 9.5)
+    assert "wrong sign" not in right[1]
+
+
+def test_one_wrong_sign_among_many_is_left_to_the_check(tmp_path):
+    checks = [("P1", None, None, -1.0), ("P2", None, None, 0.5), ("P3", None, None, -0.4)]
+    assert "wrong sign" not in solved(fill(tmp_path / "s.xlsx", Check=checks))[1]
+
+
+@pytest.mark.parametrize(
+    ("setup", "message"),
+    [
+        ({"c_1": 35, "c_2": 19, "d_2": 9500, "delta_d": 8000}, "d_1 = 17500 m"),
+        ({"c_1": 35, "c_2": 19, "d_2": 950, "d_1": 17.5}, "d_2 = 950 m"),
+        ({"c_1": 35, "c_2": 19, "d_2": 9.5, "delta_d": 8000}, "d_1 = 8009.5 m"),
+    ],
+)
+def test_distances_in_millimetres_are_refused(tmp_path, setup, message):
+    result = run("solve", fill(tmp_path / "s.xlsx", setup=setup))
+    assert result.exit_code == 1
+    assert f"Setup: {message}: distances to the wall are in metres" in result.stderr
+
+
+def test_options_in_millimetres_are_refused_by_name(tmp_path):
+    path = as_csv(tmp_path / "p.csv", rows(POINTS))
+    result = run("solve", path, "--d1", 17500, "--d2", 9500)
+    assert result.exit_code == 1
+    assert "--d1 = 17500 m" in result.stderr
+    assert "looks like millimetres. Type 17.5" in result.stderr
