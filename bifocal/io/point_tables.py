@@ -7,8 +7,9 @@ from pathlib import Path
 import numpy as np
 
 from bifocal.domain.points import SurveyPoints
-from photocore.errors import InputError
+from photocore.errors import CellError, InputError, WorkbookError
 from photocore.tables import Column, read_table
+from photocore.tables.convert import NOT_CALCULATED
 
 _COLUMNS = (
     Column("id", aliases=("Point", "Punto", "Punkt", "Name"), kind="text", required=True),
@@ -38,7 +39,16 @@ def read_survey_points(path: Path | str) -> tuple[SurveyPoints, tuple[str, ...]]
     InputError, WorkbookError
         If the table is missing or cells are unusable; the message names them.
     """
-    table = read_table(path, _COLUMNS, name="Results")
+    errors: list[CellError] = []
+    table = read_table(path, _COLUMNS, name="Results", errors=errors)
+    if any(NOT_CALCULATED in str(error) for error in errors):
+        name = Path(path).name
+        raise InputError(
+            f"{path}: its results have never been calculated. Solve it first: bifocal solve {name} "
+            "--out result.xlsx"
+        )
+    if errors:
+        raise WorkbookError(errors)
     if not {"X", "Y", "Z"} <= table.present and not {"E", "N", "H"} <= table.present:
         raise InputError(
             f"{path}: the table has neither X, Y, Z nor E, N, H; run `bifocal solve` first."

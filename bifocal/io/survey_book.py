@@ -149,7 +149,7 @@ def _setup_cell(
         name,
         ("", *(f"H{name[1]}({name[3]},{name[4]})",) * 3)
         if name.startswith("h")
-        else ("mm",) + (_PIXEL_MM,) * 3,
+        else ("mm", *_PIXEL_MM),
     )
     builder.text(sheet, f"A{row}", name)
     builder.text(sheet, f"B{row}", words[("en", "it", "de").index(builder.language)])
@@ -175,7 +175,11 @@ def _setup_cell(
         validate(sheet, cell)
 
 
-_PIXEL_MM = "One pixel at image scale, typical / un pixel alla scala della foto / ein Pixel"
+_PIXEL_MM = (
+    "One pixel at image scale, typical",
+    "Un pixel alla scala della foto, valore tipico",
+    "Ein Pixel im Bildmaßstab, typisch",
+)
 
 
 def _points(

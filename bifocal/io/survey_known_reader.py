@@ -51,6 +51,7 @@ def read_known(
     )
     remarks += [text for text in table.remarks if "rows directly below" not in text]
     text_cells += table.text_cells
+    faulty = {(error.sheet, error.cell) for error in errors}
     errors += table.repeated("id")
     refuse_absurd(table, keys, errors)
     xyz = np.stack(
@@ -59,7 +60,8 @@ def read_known(
     use = table.numbers("use")
     rows = [i for i, name in enumerate(table.texts("id")) if name]
     for i, name in enumerate(table.texts("id")):
-        if not name and not np.isnan(xyz[i]).all():
+        own_complaint = (table.sheet, table.cell(i, "id")) in faulty
+        if not name and not own_complaint and not np.isnan(xyz[i]).all():
             errors.append(table.error(i, "id", "coordinates without the name of a point."))
     known = KnownPoints(
         ids=tuple(table.texts("id")[i] for i in rows),

@@ -383,7 +383,7 @@ def _check_rows(
 ) -> None:
     """Complain about points without a name, measured on one photo only, or with s <= 0."""
     for row in range(len(table)):
-        if used[row] and not ids[row]:
+        if used[row] and not ids[row] and (table.cell(row, "id"), "id") not in faulty:
             errors.append(table.error(row, "id", "the point has no name; give it one."))
     groups = ((_XY, xy), (_PIXELS, pixels), (("s1", "s2"), polar[:, :2]))
     for keys, values in groups:

@@ -310,7 +310,9 @@ def set_up_print(
     sheet.oddFooter.right.text = f"{word('page', language)} &P / &N"
     margins = sheet.page_margins
     margins.left = margins.right = 0.5
-    margins.top = margins.bottom = 0.6
+    margins.top = 0.6
+    # The footer stands within the bottom margin: a line of text and what printers cannot reach.
+    margins.bottom, margins.footer = 0.9, 0.4
 
 
 def protect(sheet: Worksheet) -> None:

@@ -22,6 +22,8 @@ from photocore.tables.numbers import (
 
 Complain = Callable[[int, str], None]
 
+#: What every complaint about a formula without a stored result begins with.
+NOT_CALCULATED = "its formula has never been calculated"
 _YES = {"1", "yes", "y", "true", "x", "on", "si", "sì", "s", "vero", "ja", "j", "wahr"}
 _NO = {"0", "no", "n", "false", "off", "falso", "nein", "falsch"}
 
@@ -83,7 +85,7 @@ def numbers(
         more = f" (and {len(unfinished) - 1} more in this column)" if len(unfinished) > 1 else ""
         complain(
             unfinished[0],
-            f"its formula has never been calculated{more}. Open the file in the spreadsheet "
+            f"{NOT_CALCULATED}{more}. Open the file in the spreadsheet "
             "program, save it there, and try again.",
         )
     found = _typed_unit(texts, wanted, complain)
@@ -229,8 +231,8 @@ def _wrong_type(value: Value, unit: str) -> str:
         return f"holds the error {value.text}. Mend its formula, or clear the cell."
     if isinstance(value, NotCalculated):
         return (
-            "its formula has never been calculated. Open the file in the spreadsheet program, save "
-            "it there, and try again."
+            f"{NOT_CALCULATED}. Open the file in the spreadsheet program, save it there, and try "
+            "again."
         )
     if isinstance(value, CellDate):
         number = " or ".join(_before_the_date(value))

@@ -3,9 +3,19 @@
 from __future__ import annotations
 
 import numpy as np
+import openpyxl
 import pytest
 
-from tests.bifocal.test_cli_solve import POINTS, fill, rows, run, solved, write_csv
+from tests.bifocal.test_cli_solve import (
+    POINTS,
+    fill,
+    pixel_rows,
+    rows,
+    run,
+    solved,
+    write_csv,
+    write_pair,
+)
 
 WORLD = [(name, 1000 + x, 2000 - r, 50 + y) for name, x, y, r in POINTS]
 
@@ -108,3 +118,42 @@ def test_options_in_millimetres_are_refused_by_name(tmp_path):
     assert result.exit_code == 1
     assert "--d1 = 17500 m" in result.stderr
     assert "looks like millimetres. Type 17.5" in result.stderr
+
+
+def test_a_name_that_is_an_uncalculated_formula_is_said_once(tmp_path):
+    path = fill(tmp_path / "s.xlsx", Check=[("P1", None, None, 1.0)])
+    book = openpyxl.load_workbook(path)
+    book["Points"]["A6"], book["Check"]["A13"] = '="P"&2', '="P"&1'
+    book.save(path)
+    result = run("solve", path)
+    assert result.exit_code == 1
+    assert "Points!A6 (id): its formula has never been calculated" in result.stderr
+    assert "no name" not in result.stderr
+    assert "without the name" not in result.stderr
+
+
+def test_export_of_an_unsolved_survey_is_one_line(tmp_path):
+    result = run("export", fill(tmp_path / "en.xlsx"), "--out", tmp_path / "p.dxf")
+    assert result.exit_code == 1
+    assert "Solve it first: bifocal solve en.xlsx --out result.xlsx" in result.stderr
+    assert result.stderr.strip().count("\n") == 0
+    assert not (tmp_path / "p.dxf").exists()
+
+
+def test_the_footer_has_room_below_the_printed_table(tmp_path):
+    for sheet in openpyxl.load_workbook(fill(tmp_path / "s.xlsx")).worksheets:
+        margins = sheet.page_margins
+        assert margins.bottom - margins.footer >= 0.4
+
+
+@pytest.mark.parametrize(
+    ("language", "text"),
+    [("en", "One pixel at image scale, typical"), ("de", "Ein Pixel im Bildmaßstab, typisch")],
+)
+def test_setup_describes_the_pixel_in_one_language(tmp_path, language, text):
+    pair = write_pair(tmp_path / "w.pair.json")
+    points, out = write_csv(tmp_path / "p.csv", pixel_rows()), tmp_path / "r.xlsx"
+    assert run("solve", points, "--pair", pair, "--out", out, "--lang", language).exit_code == 0
+    sheet = openpyxl.load_workbook(out)["Setup"]
+    words = {row[0].value: row[1].value for row in sheet.iter_rows(min_row=5, max_col=2)}
+    assert words["pixel_mm"] == text
