@@ -38,6 +38,10 @@ def _stop(number: int, frame: object) -> None:  # noqa: ARG001
     raise KeyboardInterrupt
 
 
+#: Jobs shorter than this need no progress lines where stderr is no terminal. [s]
+SILENT_SECONDS = 2.0
+
+
 class LazyGroup(click.Group):
     """A group whose commands are imported only when they are used.
 
@@ -137,9 +141,12 @@ def no_progress(done: float, total: float, what: str = "") -> None:
 
 @contextmanager
 def progress_bar(title: str, *, quiet: bool = False) -> Iterator[Progress]:
-    """Yield a reporter that draws a bar on stderr when it is a terminal, and nothing otherwise."""
-    if quiet or not sys.stderr.isatty():
+    """Yield a reporter that draws a bar on stderr, or lines of a long job if it is no terminal."""
+    if quiet:
         yield no_progress
+        return
+    if not sys.stderr.isatty():
+        yield _progress_lines(title)
         return
     from rich.console import Console
     from rich.progress import BarColumn, TextColumn, TimeRemainingColumn
@@ -153,6 +160,24 @@ def progress_bar(title: str, *, quiet: bool = False) -> Iterator[Progress]:
             bar.update(task, completed=done, total=total, description=what or title)
 
         yield report
+
+
+def _progress_lines(title: str) -> Progress:
+    """Return a reporter that prints a line per tenth, of jobs that take their time."""
+    from time import monotonic
+
+    start, told = monotonic(), 0
+
+    def report(done: float, total: float, what: str = "") -> None:
+        nonlocal told
+        tenth = int(10 * done / total + 1e-9) if total > 0 else 0
+        # A restart counts anew; the end needs no line, for the result follows.
+        told = min(told, tenth)
+        if told < tenth < 10 and monotonic() - start > SILENT_SECONDS:
+            told = tenth
+            remark(f"{what or title}: {10 * tenth} %")
+
+    return report
 
 
 def text_table(headings: Sequence[str], rows: Sequence[Sequence[object]]) -> str:

@@ -162,8 +162,10 @@ def _points(model: Any, points: SurveyPoints | None, layer: str, height: float) 
     if points is None:
         return
     for name, place in zip(points.ids, points.xyz.tolist(), strict=True):
-        if not np.isfinite(place).all():
+        if not np.isfinite(place[:2]).all():
             continue
+        if not np.isfinite(place[2]):  # relief left blank: on the wall
+            place[2] = 0.0
         model.add_point(place, dxfattribs={"layer": layer})
         label = (place[0] + height / 2, place[1] + height / 2)
         _text(model, name, label, height, "BIFOCAL_NAMES" if layer == "BIFOCAL_POINTS" else layer)

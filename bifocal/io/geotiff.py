@@ -62,6 +62,8 @@ class RasterReader:
         from rasterio.errors import NotGeoreferencedWarning, RasterioError
 
         self.path = Path(path)
+        if self.path.is_dir():
+            raise InputError(f"{self.path}: is a folder; name the raster file in it.")
         if not self.path.is_file():
             raise InputError(f"{self.path}: no such raster file.")
         self._stack = contextlib.ExitStack()

@@ -29,6 +29,8 @@ from photocore.output import check_writable
 
 #: A pixel this many times finer or coarser than the photo's own is asked back about.
 FINEST, COARSEST = 1 / 16, 40.0
+#: So is one this much finer that makes so many pixels that it takes minutes.
+FINE, MANY_PIXELS = 1 / 5.5, 25_000_000
 #: So are orthophotos of more pixels than this.
 MOST_PIXELS = 4_000_000_000
 #: Orthophotos of more pixels get reduced copies inside the file, for fast display.
@@ -291,6 +293,7 @@ def _grid(pair: Pair, first: int, size: tuple[int, int], surface: Surface, task:
     ratio = grid.gsd / own
     pixels = grid.width * grid.height
     strange = not FINEST <= ratio <= COARSEST or pixels > MOST_PIXELS
+    strange = strange or (ratio < FINE and pixels > MANY_PIXELS)
     if strange and not task.any_size:
         raise InputError(
             f"a pixel of {grid.gsd * 1000:g} mm makes an orthophoto of {grid.width:,} x "

@@ -256,3 +256,30 @@ def test_wider_than_32767_pixels_works(wall: Path) -> None:
         assert (file.width, file.height) == (40000, 40)
         row = file.read(1, window=rasterio.windows.Window(0, 20, 4200, 1))
     assert row.any()
+
+
+def test_a_large_orthophoto_much_finer_than_the_photo_is_asked_back(wall: Path) -> None:
+    box = ("--bounds", "-2.1,-1.5,4.2,3")
+    done = run(wall, "--plane", "--gsd", "1mm", "--out", "o.tif", *box)  # 28 megapixels
+    assert done.exit_code == 1
+    assert "--any-size" in done.stderr
+    small = ("--bounds", "0,0,0.5,0.5")
+    assert run(wall, "--plane", "--gsd", "1mm", "--out", "o.tif", *small).exit_code == 0
+
+
+def test_a_folder_given_as_relief_is_called_a_folder(wall: Path) -> None:
+    (wall / "maps").mkdir()
+    done = run(wall, "--relief", "maps", "--out", "o.tif")
+    assert done.exit_code == 1
+    assert "maps: is a folder" in done.stderr
+
+
+def test_control_points_without_relief_are_drawn_on_the_wall(wall: Path) -> None:
+    (wall / "c.csv").write_text("id,X,Y,Z\nK1,-1.5,-1,\nK2,1.5,1,0.1\n")
+    done = run(wall, "--plane", "--deliver", "d", "--scale", "1:50", "--control", "c.csv")
+    assert done.exit_code == 0, done.output
+    model = ezdxf.readfile(wall / "d" / "Torre_est.dxf").modelspace()
+    points = model.query('POINT[layer=="BIFOCAL_CONTROL"]')
+    assert [tuple(point.dxf.location) for point in points] == [(-1.5, -1, 0), (1.5, 1, 0.1)]
+    names = {text.dxf.text for text in model.query('TEXT[layer=="BIFOCAL_CONTROL"]')}
+    assert names == {"K1", "K2"}
