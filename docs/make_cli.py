@@ -38,7 +38,10 @@ def page() -> str:
     for program, group in groups().items():
         parts.append(f"## {program}\n\n{group.help}\n")
         for name, command in commands(group).items():
-            context = click.Context(command, info_name=f"{program} {name}", max_content_width=100)
+            context = click.Context(
+                command, info_name=f"{program} {name}", max_content_width=100,
+                help_option_names=["-h", "--help"],
+            )  # fmt: skip
             context.terminal_width = 100
             text = "\n".join(line.rstrip() for line in command.get_help(context).splitlines())
             parts.append(f"### {program} {name}\n\n```text\n{text}\n```\n")
