@@ -153,6 +153,11 @@ def _deviations(covariance: FloatArray, cameras: tuple[Pinhole, Pinhole]) -> dic
     row[[0, PER_CAMERA]] = -1.0, 1.0
     row[9], row[PER_CAMERA + 9] = 1 / cameras[0].centre[2], -1 / cameras[1].centre[2]
     out["scale"] = float(np.sqrt(np.abs(row @ covariance @ row)))
+    # Relief is displacement over distance from the centre of zoom, divided by 1/d2 - 1/d1.
+    d1, d2 = (float(camera.centre[2]) for camera in cameras)
+    row = np.zeros(len(covariance))
+    row[9], row[PER_CAMERA + 9] = 1 / d1**2, -1 / d2**2
+    out["relief_scale"] = float(np.sqrt(np.abs(row @ covariance @ row)) / abs(1 / d2 - 1 / d1))
     return out
 
 

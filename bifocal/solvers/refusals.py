@@ -19,6 +19,8 @@ BLURRED = 0.15
 FARTHEST = 300.0
 #: The distances must differ by this share; relief errors grow with its inverse.
 LEAST_CHANGE = 0.03
+#: Lenses for façades bend less than this in the corner, as a share of the half diagonal.
+MOST_DISTORTION = 0.05
 
 
 class SamePhotoError(GeometryError):
@@ -109,6 +111,22 @@ def check_units(cameras: tuple[Pinhole, Pinhole], site: SiteMeasures) -> None:
         raise InputError(
             f"the control points put the cameras {d2:,.0f} and {d1:,.0f} m from the wall: they "
             "are in mm or cm. Write them in metres, or the unit into the headings (X [mm])."
+        )
+
+
+def check_distortion(k: float, interior: Interior) -> None:
+    """Refuse an estimated radial distortion that no lens for façades has."""
+    half = float(np.hypot(*interior.image_size)) / 2
+    bend = k * (half / interior.focal) ** 2
+    # r / (1 + bend), so that a bend of -1 and below folds the photo over.
+    moved = abs(bend / (1 + bend)) if bend > -0.9 else np.inf
+    if moved > MOST_DISTORTION:
+        raise GeometryError(
+            f"the common points fit only if the lens distorted the photo's corners by "
+            f"{min(100 * moved, 999):.0f} % of the half diagonal (k = {k:.2f}): the sensor width "
+            "or the focal length is probably wrong. Check --sensor-width (--pixel-size), --focal1 "
+            "and --focal2; a lens that does distort so much has to be calibrated (`bifocal "
+            "calibrate`, --lens)."
         )
 
 

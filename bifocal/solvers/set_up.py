@@ -528,6 +528,8 @@ def _unbent(problem: Problem, solution: Solution, notes: _Notes) -> tuple[Proble
     )
     if robust_sigma(bent.tie_misfit) > 0.85 * before or corner < 3.0:
         return problem, solution
+    for k, interior in zip(bent.radial, problem.interiors, strict=True):
+        refusals.check_distortion(k, interior)
     trial, bent = settle(trial, bent)
     notes.remarks.append(
         f"The photos show lens distortion of about {corner:.0f} px at the edge; it was estimated "

@@ -18,7 +18,8 @@ def set_up_words(
     cameras : pair of Pinhole
         Far and near camera.
     deviations : dict
-        Standard deviations of ``distance1``, ``distance2``. [m]
+        Standard deviations of ``distance1``, ``distance2`` [m], ``scale`` and ``relief_scale``
+        (relative).
     sigma_px : float
         Expected precision of a homologous point, for the precision of relief. [px]
     """
@@ -31,8 +32,8 @@ def set_up_words(
         _offset(far, near),
         *(_turn(name, camera) for name, camera in (("Far", far), ("Near", near))),
         _roll(far, near),
-        _scale(far, near, lever),
-        _zone(far, near, lever, sigma_px),
+        _scale(far, near, lever, deviations.get("scale", 0.0)),
+        _zone(far, near, lever, sigma_px, deviations.get("relief_scale", 0.0)),
     ]
     return tuple(word for word in words if word)
 
@@ -68,14 +69,15 @@ def _turn(name: str, camera: Pinhole) -> str:
     total = float(np.rad2deg(np.arccos(np.clip(-camera.rotation[2, 2], -1, 1))))
     if total < 0.05:
         return f"{name} camera square to the wall."
+    digits = 1 if total >= 0.2 else 2  # the greater part is at least 0.7 of the whole: it shows
     parts = [
-        f"{abs(value):.1f}° {words[int(value < 0)]}"
+        f"{abs(value):.{digits}f}° {words[int(value < 0)]}"
         for value, words in ((right, ("to the right", "to the left")), (up, ("up", "down")))
-        if abs(value) >= 0.05
+        if abs(value) >= 0.5 * 10.0**-digits
     ]
     return (
-        f"{name} camera tilted {total:.1f}°: it looks {' and '.join(parts)} (corrected by the "
-        "homography)."
+        f"{name} camera tilted {total:.{digits}f}°: it looks {' and '.join(parts)} (corrected by "
+        "the homography)."
     )
 
 
@@ -89,10 +91,12 @@ def _roll(far: Pinhole, near: Pinhole) -> str:
     return f"The near photo is turned {abs(turn):.1f}° {side} against the far one (corrected)."
 
 
-def _scale(far: Pinhole, near: Pinhole, lever: float) -> str:
-    """Say how far the photos are from one scale."""
+def _scale(far: Pinhole, near: Pinhole, lever: float, sigma: float) -> str:
+    """Say how far the photos are from one scale, where that is more than its own uncertainty."""
     ratio = (near.matrix[0, 0] / near.centre[2]) / (far.matrix[0, 0] / far.centre[2])
     off = ratio - 1.0
+    if abs(off) < max(2 * sigma, 1e-4):
+        return ""
     if abs(off) < 0.05:
         return (
             f"The scales differ by {100 * off:+.2f} % (would read as {1000 * abs(off) * lever:.0f} "
@@ -106,16 +110,23 @@ def _scale(far: Pinhole, near: Pinhole, lever: float) -> str:
     )
 
 
-def _zone(far: Pinhole, near: Pinhole, lever: float, sigma_px: float) -> str:
+def _zone(far: Pinhole, near: Pinhole, lever: float, sigma_px: float, relief_scale: float) -> str:
     """Say what precision to expect where."""
     pixel = max(far.centre[2] / far.matrix[0, 0], near.centre[2] / near.matrix[0, 0])
     sigma_m = sigma_px * pixel
     radius = sigma_m * lever / 0.01
     at = 0.25 * far.centre[2]
+    # All relief is too large or too small by one factor: what the distances leave open.
+    share = (
+        f", plus {1000 * relief_scale:.2g} mm for every metre of relief ({100 * relief_scale:.2g} "
+        "%: the distances are known no better)"
+        if relief_scale >= 5e-5
+        else ""
+    )
     return (
         f"With {sigma_px:.2g} px per point, relief is good to {1000 * sigma_m * lever / at:.1f} mm "
-        f"at {at:.1f} m from the centre of zoom; within {100 * radius:.0f} cm of it worse than 1 "
-        "cm (area of uncertainty)."
+        f"at {at:.1f} m from the centre of zoom{share}; within {100 * radius:.0f} cm of it worse "
+        "than 1 cm (area of uncertainty)."
     )
 
 

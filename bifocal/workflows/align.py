@@ -24,6 +24,8 @@ from photocore.output import check_writable
 
 #: A wall point given without r lies on the plane to this. [m]
 SIGMA_ON_WALL = 0.005
+#: Distances and lengths beyond this are taken for millimetres. [m]
+FARTHEST = 500.0
 #: Nominal focal lengths are rounded and change with focus; 35 mm equivalents are rounder still.
 SIGMA_NOMINAL, SIGMA_EQUIVALENT = 0.02, 0.04
 
@@ -94,7 +96,12 @@ def align_photos(
     InputError, GeometryError
         If files or options are at fault, or the photos do not make a pair.
     """
+    if out.suffix.lower() != ".json":
+        raise InputError(
+            f"{out.name}: a pair file ends in .json; write --out {out.stem}.pair.json."
+        )
     way, options = _way(options)
+    _check_metres(options)
     for path in (out, picture):
         if path is not None:
             check_writable(path, overwrite=overwrite)
@@ -164,6 +171,23 @@ def _way(options: AlignOptions) -> tuple[str, AlignOptions]:
     )
 
 
+def _check_metres(options: AlignOptions) -> None:
+    """Refuse distances and lengths in millimetres."""
+    site = options.site
+    given = {
+        "--distance1": site.distance1,
+        "--distance2": site.distance2,
+        "--delta-d": site.delta_d,
+        "--length": options.length[1] if options.length else None,
+    }
+    for name, value in given.items():
+        if value and value > FARTHEST:
+            raise InputError(
+                f"{name} {value:g} m is too far for a wall: is it in mm? Distances and lengths are "
+                f"in metres ({name} {value / 1000:g})."
+            )
+
+
 def _interiors(
     infos: tuple[ImageInfo, ImageInfo], lenses: tuple[LensData, LensData]
 ) -> tuple[Interior, Interior]:
@@ -186,12 +210,10 @@ def _interior(info: ImageInfo, data: LensData, number: int) -> Interior:
     if data.focal is not None:
         pitch = pitch or info.focal_plane_pitch or _pitch_from_exif(info)
         if pitch is None:
-            # 35 mm film's width: says little of the pixel, so the focal length stays weak.
-            return Interior.from_focal(
-                data.focal / 36.0 * max(info.size),
-                image_size=info.size,
-                sigma=0.3,
-                source=f"{data.focal:g} mm, a sensor 36 mm wide assumed (--sensor-width)",
+            raise InputError(
+                f"--focal{number} {data.focal:g} mm says nothing without the size of the sensor, "
+                f"which the EXIF data of {info.path.name} do not tell. Give --sensor-width (36 for "
+                "full frame, about 23 for APS-C) or --pixel-size."
             )
         return Interior.from_focal(
             data.focal / pitch,

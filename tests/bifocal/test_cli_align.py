@@ -10,7 +10,10 @@ from click.testing import CliRunner
 
 from bifocal import Pair
 from bifocal.cli.main import main
+from bifocal.domain.alignment import Interior
 from bifocal.pinhole import project
+from bifocal.solvers.refusals import check_distortion
+from photocore.errors import GeometryError
 from tests.bifocal.layered_wall import camera, relief_at, take
 
 FAR = camera(16.0, turn_deg=(0.3, -0.2, 0.15))
@@ -157,6 +160,9 @@ def test_picks_of_the_other_photo_are_exchanged_and_said(folder) -> None:
         (["--control", "nowhere.csv"], "nowhere.csv"),
         (["--distance1", "16", "--distance2", "9", "--delta-d", "7"], "give two of"),
         (["--auto", "--lens", "absent.json", "--distance1", "16"], "absent.json"),
+        (["--distance1", "16000", "--distance2", "9000"], "is it in mm?"),
+        (["--auto", "--length", "10,10,90,10,4215"], "--length 4215 m is too far"),
+        (["--distance1", "16", "--distance2", "9", "--focal1", "35"], "Give --sensor-width"),
     ],
 )
 def test_wrong_options_are_explained(folder, options, message) -> None:
@@ -164,6 +170,21 @@ def test_wrong_options_are_explained(folder, options, message) -> None:
     assert result.exit_code == 1
     assert message in result.stderr
     assert "Traceback" not in result.stderr
+
+
+def test_a_pair_file_ends_in_json(folder) -> None:
+    result = align(folder, "--control", "control.csv", *lens(), out="wallb.txt")
+    assert result.exit_code == 1
+    assert "a pair file ends in .json; write --out wallb.pair.json" in result.stderr
+    assert not (folder / "wallb.txt").exists()
+
+
+def test_distortion_no_lens_has_is_refused() -> None:
+    interior = Interior.from_focal(1500.0, image_size=(960, 640), sigma=0.02, source="test")
+    check_distortion(0.1, interior)
+    for k in (3.2, -3.2, -40.0):
+        with pytest.raises(GeometryError, match="sensor width or the focal length is probably"):
+            check_distortion(k, interior)
 
 
 def test_an_existing_pair_is_kept(folder) -> None:

@@ -1,0 +1,46 @@
+"""The sentences `align` prints: directions are named, noise is not, the whole error is."""
+
+import numpy as np
+import pytest
+
+from bifocal.solvers.set_up_words import set_up_words
+from tests.bifocal.layered_wall import camera
+
+SURE = {"distance1": 0.01, "distance2": 0.01, "scale": 1e-5, "relief_scale": 0.0}
+
+
+def words(far=None, near=None, **deviations: float) -> str:
+    cameras = (far or camera(16.0), near or camera(8.0))
+    return "\n".join(set_up_words(cameras, {**SURE, **deviations}, sigma_px=0.1))
+
+
+@pytest.mark.parametrize("turn", [(0.04, 0.04, 0.0), (0.1, 0.0, 0.0), (0.0, -0.3, 0.0)])
+def test_a_tilt_always_comes_with_its_direction(turn) -> None:
+    text = words(near=camera(8.0, turn_deg=turn))
+    assert "it looks 0." in text
+    assert "looks  (" not in text
+
+
+def test_a_difference_of_scale_within_its_uncertainty_is_not_mentioned() -> None:
+    near = camera(8.0, focal=8.0 / 0.013 * 1.002)
+    assert "The scales differ by +0.20 % (would read as 32 mm" in words(near=near)
+    assert "scales" not in words(near=near, scale=0.0015)
+    assert "scales" not in words()
+
+
+def test_uncertain_distances_are_part_of_the_precision_of_relief() -> None:
+    assert "plus 22 mm for every metre of relief (2.2 %" in words(relief_scale=0.022)
+    assert "for every metre" not in words()
+
+
+def test_relief_scale_is_the_spread_of_relief_under_the_distances_own() -> None:
+    from bifocal.solvers.alignment import _deviations
+
+    covariance = np.zeros((25, 25))
+    covariance[9, 9], covariance[20, 20] = 0.3**2, 0.05**2
+    covariance[9, 20] = covariance[20, 9] = 0.2 * 0.3 * 0.05
+    found = _deviations(covariance, (camera(16.0), camera(8.0)))["relief_scale"]
+    rng = np.random.default_rng(0)
+    drawn = rng.multivariate_normal([16, 8], covariance[np.ix_([9, 20], [9, 20])], 200_000)
+    spread = np.std(1 / (1 / drawn[:, 1] - 1 / drawn[:, 0])) / 16.0
+    assert found == pytest.approx(spread, rel=0.02)
