@@ -49,7 +49,9 @@ def _numbers(ctx: click.Context, param: click.Parameter, value: str | None) -> t
     help="Of media between [m].  [default: none]",
 )
 @click.option("--extent", type=Size(), help="Width x height of the object space [m].")
-@click.option("--depths", type=Size(), help="Least x largest depth of the object space [m].")
+@click.option(
+    "--depths", type=Size(), metavar="LEASTxLARGEST", help="Depths of the object space [m]."
+)
 @click.option(
     "--sigma", "sigma_image", type=float, default=0.001, show_default=True,
     help="Precision of an image coordinate [mm].",
@@ -140,4 +142,18 @@ def _print(result: Design) -> None:
                 ("case", "X", "Y", "Z", "sigma0 um"),
                 [(n, *(f"{v:.3g}" for v in e), f"{s * 1000:.2f}") for n, e, s in cases],
             )
+        )
+    if result.models:
+        click.echo(
+            f"\nSimplified models in place of the rigorous one, error across the ray [{unit}]"
+        )
+        click.echo(
+            text_table(
+                ("model", "RMS", "largest"),
+                [(name, f"{rms:.3g}", f"{largest:.3g}") for name, rms, largest in result.models],
+            )
+        )
+        click.echo(
+            f"Colour seam, red (650 nm) to blue (450 nm): up to {result.seam * 1000:.1f} um in the "
+            "image (camera square to the media)."
         )

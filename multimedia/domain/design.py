@@ -87,6 +87,11 @@ class Design:
     sensitivities : tuple of (unknown, step in words, (dX, dY, dZ))
     placements : tuple of Placement
     costs : CalibrationCosts or None
+    models : tuple of (model, RMS error, largest error)
+        What simplified refraction models would get wrong at the points, across the line of sight,
+        were the camera square to the media. [unit]
+    seam : float
+        Largest distance of red and blue in the image of the points. [mm]
     unit : str
     remarks : tuple of str
     """
@@ -96,5 +101,7 @@ class Design:
     sensitivities: tuple[tuple[str, str, tuple[float, ...]], ...]
     placements: tuple[Placement, ...]
     costs: CalibrationCosts | None
+    models: tuple[tuple[str, float, float], ...]
+    seam: float
     unit: str
     remarks: tuple[str, ...]

@@ -55,6 +55,10 @@ def write_design_workbook(path: Path | str, design: Design, *, overwrite: bool =
                 ("III water, calibrated in water", *costs.water, costs.sigma0[2]),
             ],
         )  # fmt: skip
+    _table(
+        book.create_sheet("Models"), ("model", "RMS", "largest"),
+        [*design.models, ("colour seam in the image, mm", design.seam, design.seam)],
+    )  # fmt: skip
     for item in book.worksheets:
         for cell in item[1]:
             cell.font = Font(bold=True)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +15,7 @@ from multimedia.domain.flat_interface import FlatInterface
 from multimedia.domain.layers import Layers
 from multimedia.io.design_files import write_design_plot, write_design_workbook
 from multimedia.io.project_file import read_project
+from multimedia.solvers.approximations import agrafiotis, lavest, telem
 from multimedia.solvers.design import (
     STEPS,
     calibration_costs,
@@ -22,6 +24,7 @@ from multimedia.solvers.design import (
     ring_of_cameras,
     study_setup,
 )
+from multimedia.solvers.dispersion import layers_per_colour, seam_width
 from photocore.arrays import FloatArray
 from photocore.errors import GeometryError, InputError
 from photocore.output import check_writable
@@ -105,10 +108,48 @@ def _design(
         (name, STEPS[name.rpartition(":")[2].rstrip("0123456789")][1], tuple(moved.tolist()))
         for name, moved in study.sensitivity.items()
     )
+    models, seam = _simplified(cameras[0], interface, points)
     return Design(
         study=study, by_depth=_by_depth(study), sensitivities=sensitivities,
-        placements=placements, costs=costs, unit=unit, remarks=tuple(notes),
+        placements=placements, costs=costs, models=models, seam=seam, unit=unit,
+        remarks=tuple(notes),
     )  # fmt: skip
+
+
+def _simplified(
+    camera: Camera, interface: Any, points: FloatArray
+) -> tuple[tuple[tuple[str, float, float], ...], float]:
+    """Return what simplified models get wrong for one camera, and the width of its colour seams.
+
+    Both hold for a camera square to the media: only its height and its nadir enter.
+    """
+    if not isinstance(interface, FlatInterface):
+        return (), float("nan")
+    layers, normal = interface.layers, interface.normal
+    height = float(normal @ (camera.centre - interface.point))
+    depth = -(points - interface.point) @ normal
+    offset = points - camera.centre
+    radius = np.linalg.norm(offset - np.outer(offset @ normal, normal), axis=1)
+    z0, c = height - layers.thickness, camera.principal_distance
+    models = []
+    for name, model in (
+        ("Lavest: f times n", lavest),
+        ("Agrafiotis: shares of air and water", agrafiotis),
+        ("Telem: absorbed by c, k1, k2, k3", telem),
+    ):
+        wrong = np.abs(
+            model(radius, z0=z0, zp=depth, layers=layers, principal_distance=c).object_error
+        )
+        models.append((name, float(np.sqrt(np.mean(wrong**2))), float(wrong.max())))
+    # Quan and Fry's water at 20 degrees for blue and red, in place of the last medium.
+    colours = [
+        replace(layers, indices=(*layers.indices[:-1], own.indices[-1]))
+        for own in layers_per_colour(wavelengths_nm=(650.0, 450.0))
+    ]
+    seam = seam_width(
+        radius, z0=z0, zp=depth, colours=colours, principal_distance=c, pixel_size=1.0
+    )
+    return tuple(models), float(np.max(seam))
 
 
 def _by_depth(study: Study) -> FloatArray:
@@ -168,5 +209,9 @@ def as_dict(design: Design) -> dict[str, Any]:
             "I_air": costs.air, "II_air_calibration_in_water": costs.air_calibration_in_water,
             "III_water": costs.water, "sigma0_mm": costs.sigma0,
         },
+        "simplified_models": [
+            {"model": name, "rms": rms, "largest": largest} for name, rms, largest in design.models
+        ],
+        "colour_seam_mm": design.seam,
         "remarks": design.remarks,
     }  # fmt: skip

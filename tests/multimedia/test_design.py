@@ -116,6 +116,10 @@ def test_the_command_prints_tables_and_writes_workbook_and_picture(tmp_path):
     assert openpyxl.load_workbook(out).sheetnames[:2] == ["Precision", "Sensitivity"]
     assert plot.read_bytes()[:4] == b"\x89PNG"
     data = json.loads(CliRunner().invoke(main, [*ARGUMENTS, "--json"]).stdout)
+    models = {m["model"].split(":")[0]: m["rms"] for m in data["simplified_models"]}
+    # Agrafiotis knows the share of air and water, Telem is fitted: each better than f times n.
+    assert models["Lavest"] > models["Agrafiotis"] > models["Telem"]
+    assert 0.001 < data["colour_seam_mm"] < 0.1
     assert data["by_depth"][0]["angle_deg"] < data["by_depth"][0]["angle_in_air_deg"]
     again = CliRunner().invoke(main, [*ARGUMENTS, "--out", str(out)])
     assert again.exit_code == 1
