@@ -95,6 +95,12 @@ FILE = click.Path(path_type=Path)
     help="A length on the wall: two points of the far photo [px] and metres.",
 )
 @click.option(
+    "--wall",
+    type=Numbers(2),
+    metavar="COL,ROW",
+    help="A spot of the wall in the far photo, where several planes compete [px].",
+)
+@click.option(
     "--horizontal",
     type=Numbers(4),
     metavar="COL,ROW,COL,ROW",
@@ -188,6 +194,7 @@ def _options(given: dict[str, Any]) -> Any:
             sigma=given["sigma_distance"],
             sigma_control=given["sigma_control"],
             sigma_pick=given["sigma_pick"],
+            wall=given["wall"],
         ),
         auto=given["auto"],
         control=given["control"],

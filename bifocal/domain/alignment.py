@@ -176,7 +176,10 @@ class Control:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SiteMeasures:
-    """Distances measured on site; None where not measured. [m]"""
+    """Distances measured on site, None where not measured [m], and a spot of the wall.
+
+    ``wall`` is a pixel (column, row) of the far photo that shows the wall. [px]
+    """
 
     distance1: float | None = None
     distance2: float | None = None
@@ -185,6 +188,7 @@ class SiteMeasures:
     parallel: bool = False
     sigma_control: float = 0.003
     sigma_pick: float = 0.5
+    wall: tuple[float, float] | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

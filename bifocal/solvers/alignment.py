@@ -17,6 +17,7 @@ from bifocal.solvers.facade_axes import facade_turn, turned
 from bifocal.solvers.set_up import PhotoInput, SetUp
 from bifocal.solvers.set_up_words import set_up_words
 from bifocal.solvers.tie_points import raw_pixels, robust_sigma
+from bifocal.solvers.wall_choice import rivals
 from photocore.arrays import FloatArray
 
 
@@ -54,6 +55,9 @@ def make_alignment(
         image2=_photo(cameras[1], problem.interiors[1], lenses[1]),
     )
     deviations = _deviations(solution.covariance, cameras)
+    others = rivals(list(made.faces))
+    if others and not made.wall_named:
+        deviations["relief_offset"] = max(abs(face.offset) for face in others)
     used = problem.tie_used
     sigma_tie = robust_sigma(solution.tie_misfit[used]) if used.any() else problem.sigma_pick
     words = set_up_words(cameras, deviations, sigma_px=max(sigma_tie, 0.05))
@@ -201,6 +205,10 @@ def _diagnostics(
             "on_wall": int((problem.wall & problem.tie_used).sum()),
             "sigma_px": sigma_tie,
         },
+        "planes": [
+            {"offset": face.offset, "share": face.share, "pixel": list(face.pixel)}
+            for face in made.faces
+        ],
         "assumed": assumed,
         "words": list(words),
     }

@@ -28,11 +28,13 @@ from bifocal.solvers.resection import resect
 from bifocal.solvers.tie_points import (
     ROUGHNESS,
     classify,
+    raw_pixels,
     refine_ties,
     robust_sigma,
     settle,
 )
-from bifocal.solvers.wall_face import BAND, even_points, largest_plane
+from bifocal.solvers.wall_choice import Face, choose_wall, rivals_in_words
+from bifocal.solvers.wall_face import even_points
 from photocore.arrays import BoolArray, ByteArray, FloatArray
 from photocore.errors import GeometryError
 
@@ -84,6 +86,10 @@ class SetUp:
     remarks : tuple of str
     gross : tuple of str
         Control points left out.
+    faces : tuple of Face
+        Where no control points define the plane: the wall, and the planes parallel to it.
+    wall_named : bool
+        Whether the user said which of them is the wall.
     """
 
     problem: Problem
@@ -92,6 +98,8 @@ class SetUp:
     assumed: tuple[str, ...]
     remarks: tuple[str, ...]
     gross: tuple[str, ...]
+    faces: tuple[Face, ...] = ()
+    wall_named: bool = False
 
 
 @dataclass(slots=True)
@@ -100,6 +108,7 @@ class _Notes:
 
     remarks: list[str] = field(default_factory=list)
     assumed: list[str] = field(default_factory=list)
+    faces: list[Face] = field(default_factory=list)
 
 
 def set_up(
@@ -150,7 +159,9 @@ def set_up(
             ties, interiors, (photos[0].name, photos[1].name), flat_is_fine=site.parallel
         )
     problem = _problem(interiors, control, site, ties, agree, gauge=known.sum() < 2)
-    problem, solution = _adjusted(problem, cameras, photos, step, with_control=enough, notes=notes)
+    problem, solution = _adjusted(
+        problem, cameras, photos, site, step, with_control=enough, notes=notes
+    )
     problem, solution, gross = _without_gross(problem, solution)
     refusals.check_determined(solution)
     refusals.check_movement(solution)
@@ -164,6 +175,8 @@ def set_up(
         assumed=tuple(notes.assumed),
         remarks=tuple(notes.remarks),
         gross=gross,
+        faces=tuple(notes.faces),
+        wall_named=site.wall is not None,
     )
 
 
@@ -235,6 +248,11 @@ def _exchanged(
     photos: tuple[PhotoInput, PhotoInput], control: Control, site: SiteMeasures, step: Step
 ) -> SetUp:
     """Return the set-up with the photos the other way round, saying so."""
+    if site.wall is not None:
+        raise GeometryError(
+            f"{photos[0].name} is the near photo. --wall is a spot of the far photo: give "
+            f"{photos[1].name} first, and the spot in it."
+        )
     if site.distance1 and site.distance2 and site.distance1 < site.distance2:
         site = replace(site, distance1=site.distance2, distance2=site.distance1)
     made = set_up((photos[1], photos[0]), control=control.exchanged(), site=site, step=step)
@@ -431,6 +449,7 @@ def _adjusted(
     problem: Problem,
     cameras: tuple[Pinhole, Pinhole],
     photos: tuple[PhotoInput, PhotoInput],
+    site: SiteMeasures,
     step: Step,
     *,
     with_control: bool,
@@ -446,7 +465,8 @@ def _adjusted(
     if len(problem.tie1) and images[0] is not None and images[1] is not None:
         problem, solution = settle(problem, solution)
         problem, solution = _unbent(problem, solution, notes)
-        problem, solution = _with_even_points(problem, solution, (images[0], images[1]))
+        pictures = images[0], images[1]
+        problem, solution = _with_even_points(problem, solution, pictures, site, notes)
         step("refining the common points")
         for _ in range(2):  # the second pass searches around better places
             moved, good = refine_ties(problem, solution, (images[0], images[1]))
@@ -541,9 +561,13 @@ def _unbent(problem: Problem, solution: Solution, notes: _Notes) -> tuple[Proble
 
 
 def _with_even_points(
-    problem: Problem, solution: Solution, images: tuple[ByteArray, ByteArray]
+    problem: Problem,
+    solution: Solution,
+    images: tuple[ByteArray, ByteArray],
+    site: SiteMeasures,
+    notes: _Notes,
 ) -> tuple[Problem, Solution]:
-    """Return the adjustment with points from the whole area, on the face that has most of it.
+    """Return the adjustment with points from the whole area, on the face that is the wall.
 
     Where control points define the plane, the frame stays theirs.
     """
@@ -587,7 +611,9 @@ def _with_even_points(
     fair = problem.tie_used & even & (np.abs(xyz[:, 2]) < 0.1 * d1)
     if fair.sum() < 200:
         return problem, adjust(problem, solution.cameras, radial=solution.radial)
-    plane = largest_plane(xyz[fair], band=BAND * d1)
+    seen = raw_pixels(problem.interiors[0], problem.tie1[fair])
+    plane, notes.faces = choose_wall(xyz[fair], seen, solution.cameras, problem.interiors, site)
+    notes.remarks += [text for text in [rivals_in_words(notes.faces, site)] if text]
     start = evaluate(problem, replace(solution, cameras=onto_plane(solution.cameras, plane)))
     sigma = max(robust_sigma(start.tie_misfit[problem.tie_used]), 0.03)
     problem = classify(problem, start, share=ROUGHNESS[1], sigma=sigma)

@@ -19,7 +19,7 @@ def set_up_words(
         Far and near camera.
     deviations : dict
         Standard deviations of ``distance1``, ``distance2`` [m], ``scale`` and ``relief_scale``
-        (relative).
+        (relative); ``relief_offset`` if another plane may be the wall [m].
     sigma_px : float
         Expected precision of a homologous point, for the precision of relief. [px]
     """
@@ -34,6 +34,7 @@ def set_up_words(
         _roll(far, near),
         _scale(far, near, lever, deviations.get("scale", 0.0)),
         _zone(far, near, lever, sigma_px, deviations.get("relief_scale", 0.0)),
+        _plane(deviations.get("relief_offset", 0.0)),
     ]
     return tuple(word for word in words if word)
 
@@ -127,6 +128,16 @@ def _zone(far: Pinhole, near: Pinhole, lever: float, sigma_px: float, relief_sca
         f"With {sigma_px:.2g} px per point, relief is good to {1000 * sigma_m * lever / at:.1f} mm "
         f"at {at:.1f} m from the centre of zoom{share}; within {100 * radius:.0f} cm of it worse "
         "than 1 cm (area of uncertainty)."
+    )
+
+
+def _plane(offset: float) -> str:
+    """Say that all relief may be off by one amount, if another plane may be the wall."""
+    if not offset:
+        return ""
+    return (
+        f"All relief counts from the plane taken for the wall: its zero is certain only to "
+        f"{1000 * offset:.0f} mm, because other planes compete (see the warning)."
     )
 
 

@@ -87,11 +87,18 @@ def largest_plane(xyz: FloatArray, *, band: float, seed: int = 7) -> FloatArray:
     scores = [
         np.maximum(1 - np.abs(sample[:, 2] - lifted @ plane) / band, 0).sum() for plane in planes
     ]
-    best = planes[int(np.argmax(scores))]
+    return refitted(sample, planes[int(np.argmax(scores))], band=band)
+
+
+def refitted(xyz: FloatArray, plane: FloatArray, *, band: float) -> FloatArray:
+    """Return the plane fitted to the points within a band of an approximate one."""
+    lifted = np.column_stack([np.ones(len(xyz)), xyz[:, :2]])
     for _ in range(3):
-        near = np.abs(sample[:, 2] - lifted @ best) < band
-        best = np.linalg.lstsq(lifted[near], sample[near, 2], rcond=None)[0]
-    return np.asarray(best)
+        near = np.abs(xyz[:, 2] - lifted @ plane) < band
+        if near.sum() < 3:
+            break
+        plane = np.linalg.lstsq(lifted[near], xyz[near, 2], rcond=None)[0]
+    return np.asarray(plane)
 
 
 def _grid(problem: Problem, solution: Solution) -> tuple[FloatArray, float]:

@@ -241,3 +241,15 @@ def test_match_explains_what_it_cannot_do(folder, options, message, tmp_path) ->
     result = CliRunner().invoke(main, ["match", str(folder / "wall.pair.json"), *options])
     assert result.exit_code == 1
     assert message in result.stderr
+
+
+def test_a_spot_on_a_board_makes_the_board_the_wall(folder) -> None:
+    spot = project(FAR, np.array([[4.6, -1.0, 0.35]]))[0]
+    result = align(
+        folder, "--distance1", "15.65", "--distance2", "8.65", *lens(), "--no-picture",
+        "--wall", f"{spot[0]:.0f},{spot[1]:.0f}", out="board.pair.json",
+    )  # fmt: skip
+    assert result.exit_code == 0, result.output
+    planes = Pair.read(folder / "board.pair.json").extra["setup"]["planes"]
+    assert planes[0]["offset"] == pytest.approx(0.0, abs=0.01)
+    assert min(abs(plane["offset"] + 0.35) for plane in planes) < 0.03

@@ -1,0 +1,196 @@
+"""Which of several parallel faces is the wall: their shares, the user's word, one scale, a warning.
+
+A plinth, pilasters and the wall between them are planes of almost the same extent. Taking another
+one shifts every relief by the same offset, and nothing in the photos says so.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from bifocal.domain.alignment import Interior, SiteMeasures
+from bifocal.pinhole import Pinhole
+from bifocal.solvers.wall_face import BAND, largest_plane, refitted
+from photocore.arrays import FloatArray
+from photocore.errors import GeometryError
+
+#: A face with this share of the chosen one's points may as well be the wall.
+RIVAL = 0.5
+#: With this share of the largest face's points, a face at one scale is preferred to it.
+COMPARABLE = 0.5
+#: Nominal scales this close mean that the photos were planned for one scale.
+ONE_SCALE = 0.02
+#: Faces nearer than this many bands are one face, unevenly built.
+APART = 3.0
+
+
+@dataclass(frozen=True, slots=True)
+class Face:
+    """A plane parallel to the reference plane on which points gather.
+
+    Attributes
+    ----------
+    offset : float
+        In front of the reference plane. [m]
+    share : float
+        Of all points.
+    pixel : tuple of float
+        A spot of the far photo in its midst. [px]
+    """
+
+    offset: float
+    share: float
+    pixel: tuple[float, float]
+
+
+def faces(heights: FloatArray, pixels: FloatArray, *, band: float) -> list[Face]:
+    """Return the faces on which points gather, the fullest first.
+
+    Parameters
+    ----------
+    heights : ndarray, shape (n,)
+        Above the reference plane. [m]
+    pixels : ndarray, shape (n, 2)
+        In the far photo. [px]
+    band : float
+        Half the thickness of a face. [m]
+    """
+    found: list[Face] = []
+    count, order = len(heights), np.argsort(heights)
+    heights, pixels = heights[order], pixels[order]
+    free = np.ones(count, dtype=bool)
+    while len(found) < 6 and free.any():
+        filled = np.concatenate([[0], np.cumsum(free)])
+        low = np.searchsorted(heights, heights - band)
+        high = np.searchsorted(heights, heights + band, side="right")
+        held = np.where(free, filled[high] - filled[low], 0)
+        at = heights[int(held.argmax())]
+        members = free & (np.abs(heights - at) <= band)
+        offset = float(np.median(heights[members]))
+        if members.sum() < 0.05 * count:
+            break
+        if all(abs(offset - other.offset) > APART * band for other in found):
+            found.append(
+                Face(offset, float(members.sum() / count), _midst(pixels, np.flatnonzero(members)))
+            )
+        free &= np.abs(heights - at) > band
+    return found
+
+
+def _midst(pixels: FloatArray, members: np.ndarray) -> tuple[float, float]:
+    """Return the member with the most other members, and the fewest strangers, around it."""
+    radius = 0.03 * float(np.linalg.norm(np.ptp(pixels, axis=0)))
+    some = members[:: max(1, len(members) // 400)]
+    close = np.linalg.norm(pixels[some, None] - pixels[None], axis=2) < radius
+    own = np.zeros(len(pixels))
+    own[members] = 1.0
+    best = pixels[some[int((close @ (2 * own - 1)).argmax())]]
+    return float(round(best[0])), float(round(best[1]))
+
+
+def choose_wall(
+    xyz: FloatArray,
+    pixels: FloatArray,
+    cameras: tuple[Pinhole, Pinhole],
+    interiors: tuple[Interior, Interior],
+    site: SiteMeasures,
+) -> tuple[FloatArray, list[Face]]:
+    """Return the wall's plane z = a + b X + c Y and all faces parallel to it, the wall first.
+
+    The spot the user named decides; else, where the photos were planned for one scale, the face of
+    comparable size on which the scales differ least; else the largest.
+
+    Parameters
+    ----------
+    xyz : ndarray, shape (n, 3)
+        Points spread evenly over the area.
+    pixels : ndarray, shape (n, 2)
+        The same in the far photo. [px]
+    cameras, interiors : pairs
+    site : SiteMeasures
+
+    Raises
+    ------
+    GeometryError
+        If no point lies near the spot named.
+    """
+    band = BAND * float(cameras[0].centre[2])
+    plane = largest_plane(xyz, band=band)
+    heights = _heights(xyz, plane)
+    offset = 0.0
+    if site.wall is not None:
+        offset = _height_at(heights, pixels, site.wall, interiors[0])
+    elif is_one_scale(interiors, site):
+        found = faces(heights, pixels, band=band)
+        fair = [f for f in found if f.share >= COMPARABLE * found[0].share]
+        if fair:
+            offset = min(fair, key=lambda f: abs(scale_difference(cameras, plane, f.offset))).offset
+    if offset:
+        plane = refitted(xyz, plane + np.array([offset, 0.0, 0.0]), band=band)
+        heights = _heights(xyz, plane)
+    found = faces(heights, pixels, band=band)
+    return plane, sorted(found, key=lambda face: (abs(face.offset) > band, -face.share))
+
+
+def is_one_scale(interiors: tuple[Interior, Interior], site: SiteMeasures) -> bool:
+    """Return whether focal lengths and distances say that both photos were meant for one scale."""
+    d1, d2, delta = site.distance1, site.distance2, site.delta_d
+    d1 = d1 or (d2 + delta if d2 and delta else None)
+    d2 = d2 or (d1 - delta if d1 and delta else None)
+    if not (site.parallel and d1 and d2) or any(interior.is_assumed for interior in interiors):
+        return False
+    ratio = interiors[1].focal / d2 * d1 / interiors[0].focal
+    return abs(float(np.log(ratio))) < ONE_SCALE
+
+
+def scale_difference(cameras: tuple[Pinhole, Pinhole], plane: FloatArray, offset: float) -> float:
+    """Return how far the near photo's scale is from the far one's on a plane moved by an offset."""
+    far, near = (camera.matrix[0, 0] / (camera.centre[2] - plane[0] - offset) for camera in cameras)
+    return float(np.log(near / far))
+
+
+def rivals(found: list[Face]) -> list[Face]:
+    """Return the faces that may as well be the wall."""
+    return [face for face in found[1:] if face.share >= RIVAL * found[0].share]
+
+
+def rivals_in_words(found: list[Face], site: SiteMeasures) -> str:
+    """Return the warning that other planes compete with the wall; empty if none does."""
+    others = rivals(found)
+    if not others or site.wall is not None:
+        return ""
+    named = "; ".join(
+        f"{1000 * face.offset:+.0f} mm, {100 * face.share:.0f} % (--wall {face.pixel[0]:.0f},"
+        f"{face.pixel[1]:.0f})"
+        for face in others
+    )
+    return (
+        f"CHECK THE WALL: only {100 * found[0].share:.0f} % of the details spread over both photos "
+        "lie on the plane taken for the wall (green in the picture), and other planes compete with "
+        f"it, at roughly: {named}. If the wall is one of these, every relief is off by that much: "
+        "name a spot of the wall in the far photo with --wall COL,ROW, or give control points."
+    )
+
+
+def _heights(xyz: FloatArray, plane: FloatArray) -> FloatArray:
+    return xyz[:, 2] - plane[0] - xyz[:, :2] @ plane[1:]
+
+
+def _height_at(
+    heights: FloatArray, pixels: FloatArray, spot: tuple[float, float], interior: Interior
+) -> float:
+    """Return the height of the face around a spot of the far photo: its nearest points' median."""
+    away = np.linalg.norm(pixels - np.array(spot), axis=1)
+    near = np.argsort(away)[:9]
+    if len(near) < 9 or away[near[4]] > 0.06 * max(interior.image_size):
+        raise GeometryError(
+            f"--wall {spot[0]:g},{spot[1]:g}: hardly any detail is common to both photos there. "
+            "Name a spot of the far photo (column, row) with texture that both photos show, away "
+            "from the centre of zoom (the photo's middle)."
+        )
+    return float(np.median(heights[near]))
+
+
+__all__ = ["Face", "choose_wall", "faces", "rivals", "rivals_in_words"]
