@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from bifocal.domain.relief_map import ReliefMap
+from bifocal.domain.relief_map import Quality, ReliefMap
 from photocore.arrays import ByteArray, FloatArray
 from photocore.errors import InputError
 from photocore.output import atomic_path
@@ -108,6 +108,8 @@ def write_preview(path: Path | str, relief: ReliefMap, *, overwrite: bool = Fals
     low, high = (float(v) for v in np.percentile(r[known], [0.5, 99.5]))
     scale = ScalarMappable(Normalize(low, max(high, low + 1e-3)), "viridis")
     picture = shaded(scale.to_rgba(r)[..., :3], r, relief.gsd * step)
+    guessed = known & (relief.quality[::step, ::step] != Quality.MEASURED)
+    picture = hatched(picture, guessed)
     picture[~known] = 1.0
     height, width = r.shape
     size = 12.0 if width >= height else 12.0 * width / height + 2.5
@@ -118,10 +120,25 @@ def write_preview(path: Path | str, relief: ReliefMap, *, overwrite: bool = Fals
     axes.imshow(picture, extent=(x_min, x_max, y_min, y_max), interpolation="antialiased")
     axes.set_xlabel("X [m]")
     axes.set_ylabel("Y [m]")
+    guess = (relief.quality > Quality.MEASURED) & relief.known
+    if guess.any():
+        axes.set_title(
+            f"hatched grey: not measured but interpolated or hidden, {guess.mean():.0%} of the map",
+            fontsize=9,
+        )
     bar = figure.colorbar(scale, ax=axes, fraction=0.035, pad=0.02)
     bar.set_label("relief r [m], positive towards the cameras")
     with atomic_path(path, overwrite=overwrite) as temporary:
         figure.savefig(temporary, bbox_inches="tight", format="png")
+
+
+def hatched(colours: NDArray[np.floating], where: NDArray[np.bool_]) -> FloatArray:
+    """Return colours greyed and hatched where relief is not measured, shape (h, w, 3)."""
+    rows, columns = np.nonzero(where)
+    result = np.array(colours, dtype=np.float64)
+    stripe = (rows + columns) % 8 < 2
+    result[where] = 0.2 * result[where] + np.where(stripe, 0.4, 0.62)[:, None]
+    return result
 
 
 def shaded(colours: NDArray[np.floating], r: NDArray[np.float32], gsd: float) -> FloatArray:

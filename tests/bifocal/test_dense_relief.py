@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from bifocal import Pair, Quality, dense_relief
+from bifocal.io.relief_files import hatched
 from bifocal.solvers.dense import edges, flow, seed, smooth, splat
 from bifocal.solvers.dense.frame import as_grey, common_bounds, make_frame, working_grid
 from bifocal.solvers.dense.setup_sigma import setup_sigma
@@ -299,3 +300,25 @@ def test_hidden_strips_take_the_surface_behind():
     assert filled[middle, 560:575].all()
     np.testing.assert_array_equal(layer.r[middle, 560:575], 0.0)
     assert (layer.quality[middle, 560:575] == Quality.HIDDEN).all()
+
+
+def test_relief_beyond_the_outermost_measured_is_forgotten_and_holes_are_kept():
+    quality = np.full((200, 200), 3, np.uint8)
+    quality[60:, :] = 1
+    quality[100:140, 80:120] = 2  # a window pane, surrounded
+    layer = splat.Layer(np.ones((200, 200), np.float32), np.ones((200, 200), np.float32), quality)
+    splat.forget_outside(layer)
+    assert np.isnan(layer.r[:50]).all()
+    assert (layer.quality[:50] == 0).all()
+    assert np.isnan(layer.sigma[:50]).all()
+    assert np.isfinite(layer.r[54:]).all()
+
+
+def test_a_preview_hatches_what_is_not_measured():
+    grey = np.full((40, 40, 3), [0.9, 0.1, 0.1])
+    where = np.zeros((40, 40), dtype=bool)
+    where[:, 20:] = True
+    picture = hatched(grey, where)
+    np.testing.assert_array_equal(picture[:, :20], grey[:, :20])
+    assert (np.ptp(picture[:, 20:], axis=-1) < 0.2).all()
+    assert len(np.unique(picture[:, 20:, 0])) == 2

@@ -309,7 +309,9 @@ def _complete(frame: Frame, layer: splat.Layer, grid: Grid) -> splat.Layer:
     holes = ~np.isfinite(layer.r) & _cover(frame, grid)
     splat.fill_outwards(layer, holes, grid, frame.pair.image1.nadir)
     splat.fill_small(layer, holes)
-    return layer._replace(r=smooth.tidy_steps(layer.r))
+    layer = layer._replace(r=smooth.tidy_steps(layer.r))
+    splat.forget_outside(layer)
+    return layer
 
 
 def _cover(frame: Frame, grid: Grid) -> BoolArray:

@@ -18,6 +18,8 @@ AGREEMENT = 4e-4
 STRETCH = 1.3
 #: Steps outwards when a hidden strip is filled; 2**LEAPS steps of LEAP pixels are the most.
 LEAP, LEAPS = 3, 7
+#: Relief hidden or interpolated farther than this from measured one must be surrounded by it. [px]
+FRINGE_HIDDEN, FRINGE_INTERPOLATED = 8.0, 24.0
 #: Holes are filled from their nearest neighbour up to this depth. [px]
 DEEPEST_HOLE = 30.0
 
@@ -251,3 +253,27 @@ def fill_small(layer: Layer, holes: BoolArray) -> None:
     layer.r[fill] = layer.r.ravel()[source]
     layer.sigma[fill] = 5 * layer.sigma.ravel()[source]
     layer.quality[fill] = Quality.INTERPOLATED
+
+
+def forget_outside(layer: Layer) -> None:
+    """Make unknown what measured relief does not surround, but for a fringe (in place).
+
+    Beyond the outermost thing both photos saw, a filled relief has nothing to lean on.
+    """
+    import cv2
+
+    measured = (layer.quality == Quality.MEASURED) & np.isfinite(layer.r)
+    grains = np.ones((3, 3), np.uint8)
+    solid = cv2.morphologyEx(measured.astype(np.uint8), cv2.MORPH_OPEN, grains)
+    distance = cv2.distanceTransform(1 - solid, cv2.DIST_L2, 3)
+    away = distance > FRINGE_HIDDEN
+    number, label = cv2.connectedComponents(away.astype(np.uint8), connectivity=4)
+    outer = np.zeros(number, dtype=bool)
+    for side in (label[0], label[-1], label[:, 0], label[:, -1]):
+        outer[side] = True
+    outer[0] = False  # near measured relief
+    far = (layer.quality == Quality.HIDDEN) | (distance > FRINGE_INTERPOLATED)
+    lost = outer[label] & far
+    layer.r[lost] = np.nan
+    layer.sigma[lost] = np.nan
+    layer.quality[lost] = Quality.UNKNOWN
