@@ -63,6 +63,24 @@ class Section:
         return [line[a:b] for a, b in edges.reshape(-1, 2).tolist() if b - a > 1]
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Legend:
+    """The colours of a relief.
+
+    Attributes
+    ----------
+    limits : tuple of float
+        Relief of the first and the last colour. [m]
+    colours : tuple of (red, green, blue), 0 to 255
+    guessed : float
+        Share of the picture whose relief was not measured; hatched.
+    """
+
+    limits: tuple[float, float]
+    colours: tuple[tuple[int, int, int], ...]
+    guessed: float = 0.0
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Drawing:
     """Everything on a drawing of one orthophoto.
@@ -80,6 +98,8 @@ class Drawing:
     sections : tuple of Section
     notes : tuple of str
         Lines for the title block.
+    legend : Legend, optional
+        Of a relief.
     """
 
     title: str
@@ -91,6 +111,7 @@ class Drawing:
     contours: tuple[tuple[float, FloatArray], ...] = ()
     sections: tuple[Section, ...] = ()
     notes: tuple[str, ...] = field(default=())
+    legend: Legend | None = None
 
     @property
     def paper_size(self) -> tuple[float, float]:

@@ -19,6 +19,8 @@ from photocore.output import atomic_path
 
 #: PDF's own unit in millimetres: 72 to the inch.
 _UNITS_PER_MM = 72 / 25.4
+#: Mean width of Helvetica's letters in its size; digits have exactly this.
+_WIDTH = 0.556
 
 
 def write_sheet(
@@ -132,6 +134,7 @@ class _Page:
         self._title()
         self._scale_bar()
         self._level()
+        self._legend()
         return "\n".join(self.parts) + "\n"
 
     def _place(self, x: float, y: float) -> tuple[float, float]:
@@ -207,9 +210,51 @@ class _Page:
         self.parts.append("0.1 0.2 0.8 RG")
         for cut in self.drawing.sections:
             self._line([self._place(x, y) for x, y in cut.path.tolist()], width=0.2)
+        for cut in self.drawing.sections:
+            x, y = self._place(*cut.path[0].tolist())
+            self._label(x + 0.8, y + 0.8, cut.name, size=2.4)
         self.parts.append("0 G")
 
+    def _label(self, x: float, y: float, text: str, *, size: float) -> None:
+        """Write on the picture, moved inwards where the frame would cut it."""
+        left, bottom, right, top = self.sheet.frame
+        wide = _WIDTH * size * len(text)
+        x = max(left + 1, min(x, right - 1 - wide))
+        y = max(bottom + STRIP + 1, min(y, top - 1 - size))
+        self.parts.append("1 G 0.7 w 1 Tr")  # white outline: legible on any colour
+        self._text(x, y, text, size=size)
+        self.parts.append("0 G 0 Tr")
+        self._text(x, y, text, size=size)
+
+    def _legend(self) -> None:
+        """Draw the colours of a relief, and what the hatching means."""
+        legend = self.drawing.legend
+        if legend is None:
+            return
+        left, bottom, _, _ = self.sheet.frame
+        x, y, wide, high = left + 6, bottom + 17.0, 36.0, 2.2
+        part = wide / len(legend.colours)
+        for number, colour in enumerate(legend.colours):
+            tint = " ".join(f"{value / 255:.3f}" for value in colour)
+            self.parts.append(
+                f"{tint} rg {x + number * part:.4f} {y} {part + 0.02:.4f} {high} re f"
+            )
+        self.parts.append("0 g")
+        self._box(x, y, wide, high)
+        low, top = legend.limits
+        for share, unit in ((0.0, ""), (0.5, ""), (1.0, " m")):
+            text = f"{low + share * (top - low):+.2f}{unit}"
+            self._text(x + share * wide, y + 3, text, size=2.2, middle=True)
+        if not legend.guessed:
+            return
+        x += wide + 5
+        self.parts.append(f"0.8 g {x:.4f} {y} 4 {high} re f 0 g")
+        for step in range(4):
+            self._line([(x + step, y), (x + step + 1, y + high)], width=0.25)
+        self._text(x + 5, y + 0.3, f"not measured {legend.guessed:.1%}", size=2.2)
+
     def _points(self) -> None:
+        edge = self.origin[0] + self.drawing.paper_size[0]
         for points, size in ((self.drawing.points, 1.0), (self.drawing.control, 1.6)):
             if points is None:
                 continue
@@ -223,17 +268,23 @@ class _Page:
                 else:
                     self._line([(px - size, py), (px + size, py)])
                     self._line([(px, py - size), (px, py + size)])
-                label = (px + size + 0.4, py + 0.4, name)
-                self.parts.append("1 G 0.7 w 1 Tr")  # white outline: legible on any colour
-                self._text(*label, size=2.0)
-                self.parts.append("0 G 0 Tr")
-                self._text(*label, size=2.0)
+                beside, wide = px + size + 0.4, _WIDTH * 2.0 * len(name)
+                if px <= edge < beside + wide:  # the edge of the picture would cut it
+                    beside = px - size - 0.4 - wide
+                self._label(beside, py + 0.4, name, size=2.0)
 
     def _title(self) -> None:
         left, bottom, right, _ = self.sheet.frame
         block = left + 0.44 * (right - left)
         self._line([(block, bottom), (block, bottom + STRIP)], width=0.35)
-        self._text(block + 3, bottom + STRIP - 8, self.drawing.title, size=5.0, bold=True)
+        room = right - block - 5
+
+        def fitting(text: str, size: float) -> float:
+            """Return the size at which a text does not run into the frame."""
+            return round(min(size, room / (1.08 * _WIDTH * max(len(text), 1))), 3)
+
+        title = self.drawing.title
+        self._text(block + 3, bottom + STRIP - 8, title, size=fitting(title, 5.0), bold=True)
         self._text(
             block + 3,
             bottom + STRIP - 14,
@@ -242,7 +293,7 @@ class _Page:
         )
         self._text(right - 30, bottom + 2.5, self.sheet.name, size=2.2)
         for number, note in enumerate(self.drawing.notes[:5]):
-            self._text(block + 3, bottom + STRIP - 19 - 3.2 * number, note, size=2.2)
+            self._text(block + 3, bottom + STRIP - 19 - 3.2 * number, note, size=fitting(note, 2.2))
 
     def _scale_bar(self) -> None:
         left, bottom, _, _ = self.sheet.frame

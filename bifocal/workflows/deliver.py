@@ -3,18 +3,21 @@
 from __future__ import annotations
 
 import unicodedata
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass, replace
 from datetime import date
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
-from bifocal.domain.drawing import Drawing, Sheet, round_step
+from bifocal.domain.drawing import Drawing, Legend, Sheet, round_step
 from bifocal.domain.grid import Grid
 from bifocal.domain.pair import Pair
 from bifocal.domain.points import SurveyPoints
-from bifocal.domain.surface import FlatSurface, Surface
+from bifocal.domain.relief_map import Quality
+from bifocal.domain.surface import FlatSurface, MapSurface, Surface
 from bifocal.io.drawings import write_drawing, write_section_dxf, write_section_svg
 from bifocal.io.geotiff import RasterReader, create_raster, dpi_at_scale, gsd_at_scale
 from bifocal.io.pdf_sheet import write_sheet
@@ -22,7 +25,7 @@ from bifocal.io.point_tables import read_survey_points
 from bifocal.io.strips import write_png
 from bifocal.solvers.compose import TILE
 from bifocal.solvers.sections import contours, section
-from bifocal.solvers.shading import shaded
+from bifocal.solvers.shading import shaded, tints
 from bifocal.workflows.ortho import OrthoResult, OrthoTask, make_ortho, open_surface, planned_grid
 from photocore.arrays import positive
 from photocore.console import Progress, no_progress
@@ -117,7 +120,15 @@ def deliver(
             )
             _pictures(place, name, drawing, sheet)
             if not isinstance(surface, FlatSurface):
-                _relief(place, f"{name}_relief", surface, drawing, sheet, wish)
+                with _measured(task, surface) as measured:
+                    share = _relief(
+                        place, f"{name}_relief", (surface, measured), drawing, sheet, wish
+                    )
+                if share:
+                    remarks.append(
+                        f"relief sheet: {share:.1%} of it was not measured but interpolated or "
+                        "hidden; hatched in grey and without contour lines."
+                    )
             for number, cut in enumerate(cuts, start=1):
                 for writer, ending in ((write_section_dxf, "dxf"), (write_section_svg, "svg")):
                     target = place / f"{name}_section{number}.{ending}"
@@ -150,14 +161,21 @@ def _pictures(place: Path, name: str, drawing: Drawing, sheet: Sheet) -> None:
 
 
 def _relief(
-    place: Path, name: str, surface: Surface, drawing: Drawing, sheet: Sheet, wish: DeliverTask
-) -> None:
-    """Write the relief as numbers, and shaded with contour lines as picture, drawing and sheet."""
+    place: Path, name: str, surfaces: tuple[Surface, Surface], drawing: Drawing, sheet: Sheet,
+    wish: DeliverTask,
+) -> float:  # fmt: skip
+    """Write the relief as numbers, and shaded with contour lines as picture, drawing and sheet.
+
+    Returns the share of the picture whose relief is known but was not measured.
+    """
     grid = drawing.grid
-    low, high = surface.extremes(grid.bounds)
+    surface, measured = surfaces
+    low, high = measured.extremes(grid.bounds)
+    if np.isnan(low):  # nothing measured in here
+        low, high = surface.extremes(grid.bounds)
     interval = wish.interval or round_step(max((high - low) / 12, 0.001))
     lines = contours(
-        surface, grid, interval=interval, detail=_CONTOUR_DETAIL / 1000 * drawing.scale
+        measured, grid, interval=interval, detail=_CONTOUR_DETAIL / 1000 * drawing.scale
     )
     with create_raster(
         place / f"{name}_values.tif", grid, bands=1, dtype=np.float32, nodata=float("nan"),
@@ -165,16 +183,46 @@ def _relief(
     ) as writer:  # fmt: skip
         for column, row, part in grid.tiles(TILE):
             writer.write(surface.window(part), column=column, row=row)
+    guessed = 0
     with create_raster(
         place / f"{name}.tif", grid, bands=3, dtype=np.uint8, colour=True, world_file=True,
         dpi=dpi_at_scale(grid.gsd, drawing.scale), overviews=True,
     ) as writer:  # fmt: skip
         for column, row, part in grid.tiles(TILE):
-            picture, known = shaded(surface, part, limits=(low, high))
+            picture, known = shaded(surface, part, limits=(low, high), measured=measured)
+            guessed += int(np.count_nonzero((known > 0) & np.isnan(measured.window(part))))
             writer.write(picture, column=column, row=row, mask=known > 0)
     notes = (f"relief {low:+.2f} to {high:+.2f} m, contour lines every {interval:g} m",)
-    drawing = replace(drawing, subtitle="Relief", contours=lines, notes=(*notes, *drawing.notes))
+    share = guessed / (grid.width * grid.height)
+    colours = np.rint(tints(np.linspace(low, high, 36), (low, high))).astype(int).tolist()
+    legend = Legend(
+        limits=(low, high), colours=tuple((r, g, b) for r, g, b in colours), guessed=share
+    )
+    drawing = replace(
+        drawing, subtitle="Relief", contours=lines, notes=(*notes, *drawing.notes), legend=legend
+    )
     _pictures(place, name, drawing, sheet)
+    return share
+
+
+@contextmanager
+def _measured(task: OrthoTask, surface: Surface) -> Iterator[Surface]:
+    """Yield the measured part of a relief map; the surface itself where no map tells."""
+    with ExitStack() as stack:
+        found = surface
+        if task.relief is not None:
+            reader = stack.enter_context(RasterReader(task.relief))
+            if reader.bands >= 3 and reader.names[2].startswith("quality"):
+
+                def fetch(column: int, row: int, width: int, height: int) -> NDArray[np.float32]:
+                    r = reader.read_floats(column, row, width, height)
+                    quality = reader.read(column, row, width, height, bands=[3])[:, :, 0]
+                    return np.where(quality == Quality.MEASURED, r, np.float32(np.nan))
+
+                # A map of which nothing was measured is drawn as it is, hatched by no one.
+                with suppress(InputError):
+                    found = MapSurface(reader.grid, fetch)
+        yield found
 
 
 def _points(path: Path | None, remarks: list[str]) -> SurveyPoints | None:

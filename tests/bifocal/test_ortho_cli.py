@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import json
 import os
+import re
+import zlib
+from dataclasses import replace
 from pathlib import Path
 
 import ezdxf
@@ -283,3 +286,42 @@ def test_control_points_without_relief_are_drawn_on_the_wall(wall: Path) -> None
     assert [tuple(point.dxf.location) for point in points] == [(-1.5, -1, 0), (1.5, 1, 0.1)]
     names = {text.dxf.text for text in model.query('TEXT[layer=="BIFOCAL_CONTROL"]')}
     assert names == {"K1", "K2"}
+
+
+def page_of(pdf: Path) -> str:
+    """Return the drawing commands of a sheet."""
+    data = pdf.read_bytes()
+    pieces = re.findall(rb"/Length \d+ 0 R >>\nstream\n(.*?)\nendstream", data, re.DOTALL)
+    return zlib.decompress(pieces[-1]).decode("cp1252")
+
+
+def test_the_relief_sheet_hatches_what_was_not_measured_and_has_a_legend(wall: Path) -> None:
+    relief = read_relief(wall / "relief.tif")
+    quality = relief.quality.copy()
+    quality[:, :84] = 2  # a fifth of the width
+    write_relief(wall / "relief.tif", replace(relief, quality=quality), overwrite=True)
+    (wall / "c.csv").write_text("id,X,Y,Z\nA_VERY_LONG_NAME_AT_THE_EDGE,2.09,1.4,0\n")
+    done = run(
+        wall, "--relief", "relief.tif", "--deliver", "d", "--scale", "1:25", "--paper", "A4",
+        "--control", "c.csv", "--section", "y=0.5", "--contours", "0.01",
+    )  # fmt: skip
+    assert done.exit_code == 0, done.output
+    assert "20.0% of it was not measured" in done.stderr
+    page = page_of(wall / "d" / "Torre_est_relief.pdf")
+    assert "(not measured 20.0%)" in page
+    assert "(+0.30 m)" in page
+    assert "(y=0.5)" in page
+    assert "(y=0.5)" in page_of(wall / "d" / "Torre_est.pdf")
+    assert "not measured" not in page_of(wall / "d" / "Torre_est.pdf")
+    # The name begins where it still ends inside the frame, 10 mm from the edge of 297 mm.
+    (start,) = set(re.findall(r"1 0 0 1 (\S+) \S+ Tm \(A_VERY_LONG", page))
+    assert float(start) + 28 * 0.556 * 2.0 < 297 - 10
+    with Image.open(wall / "d" / "Torre_est_relief.png") as picture:
+        pixels = np.asarray(picture)[:, :, :3]
+    guessed = pixels[:, : pixels.shape[1] // 5 - 2]
+    assert set(np.unique(guessed)) == {110, 205}
+    assert (np.ptp(pixels[:, pixels.shape[1] // 5 + 2 :], axis=-1) > 0).any()
+    model = ezdxf.readfile(wall / "d" / "Torre_est_relief.dxf").modelspace()
+    lines = model.query('LWPOLYLINE[layer=="BIFOCAL_CONTOURS"]')
+    assert len(lines) > 0
+    assert min(x for line in lines for x, *_ in line.get_points()) > -1.3
