@@ -19,7 +19,7 @@ STRETCH = 1.3
 #: Steps outwards when a hidden strip is filled; 2**LEAPS steps of LEAP pixels are the most.
 LEAP, LEAPS = 3, 7
 #: Relief hidden or interpolated farther than this from measured one must be surrounded by it. [px]
-FRINGE_HIDDEN, FRINGE_INTERPOLATED = 8.0, 24.0
+FRINGE_HIDDEN, FRINGE_INTERPOLATED = 24.0, 100.0
 #: Holes are filled from their nearest neighbour up to this depth. [px]
 DEEPEST_HOLE = 30.0
 
