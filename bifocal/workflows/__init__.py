@@ -1,1 +1,0 @@
-"""Path in, path out: where files meet solvers."""

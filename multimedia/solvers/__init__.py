@@ -1,1 +1,0 @@
-"""Domain objects and arrays in, results out; no files."""
