@@ -23,7 +23,7 @@ from multimedia import (
     project,
     ring_of_cameras,
 )
-from multimedia.solvers.projection import project_with_jacobian
+from multimedia.media.projection import project_with_jacobian
 
 
 def block(images: int, count: int) -> tuple[Project, np.ndarray]:

@@ -34,8 +34,8 @@ from multimedia import (
     project,
     resect,
 )
-from multimedia.domain.project import Project
-from multimedia.io.openptv import write_experiment
+from multimedia.openptv.experiment import write_experiment
+from multimedia.projects.model import Project
 
 RNG = np.random.default_rng(20240601)
 LAYERS = Layers(indices=(1.0, 1.5, 1.34), thicknesses=(10.0,))

@@ -21,9 +21,9 @@ import numpy as np
 import rasterio
 
 from bifocal import Pair, Photo
-from bifocal.domain.grid import Grid
-from bifocal.io.geotiff import create_raster
-from bifocal.io.images import write_image
+from bifocal.files.geotiff import create_raster
+from bifocal.files.images import write_image
+from bifocal.model.grid import Grid
 
 WIDTH, HEIGHT, GSD, D1, D2 = 6000, 4000, 0.00197, 17.5, 9.5
 

@@ -20,7 +20,7 @@ from importlib.util import find_spec
 import numpy as np
 
 from multimedia import Layers, ShiftTable, iterated_radius, radial_shift
-from multimedia.compiled import compiled_solve
+from multimedia.refraction.compiled import compiled_solve
 
 LAYERS = Layers(indices=(1.0, 1.5, 1.34), thicknesses=(10.0,))
 HEIGHT = 500.0

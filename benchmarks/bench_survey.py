@@ -26,7 +26,7 @@ def truth(rows):
 
 
 def observations(rows):
-    from bifocal.domain.observations import PointObservations
+    from bifocal.survey.observations import PointObservations
 
     xyz = truth(rows)
     images = [c * xyz[:, :2] / (d - xyz[:, 2:]) for c, d in ((C1, D1), (C2, D2))]
@@ -35,13 +35,13 @@ def observations(rows):
 
 
 def setup():
-    from bifocal.domain.setup import SurveySetup
+    from bifocal.survey.setup import SurveySetup
 
     return SurveySetup(d1=D1, d2=D2, c1=C1, c2=C2)
 
 
 def write_workbook(path, rows):
-    from bifocal.workflows.survey import write_survey
+    from bifocal.survey.template_workflow import write_survey
 
     points, geometry = observations(rows), setup()
     begin = time.process_time()
@@ -63,8 +63,8 @@ def write_openpyxl(path, rows):
 
 
 def solve(path, rows, out=None):
-    from bifocal.workflows.solve import SolveOptions, solve_file
-    from bifocal.workflows.solve_output import write_result
+    from bifocal.survey.output import write_result
+    from bifocal.survey.workflow import SolveOptions, solve_file
 
     options = SolveOptions()
     if path.suffix == ".csv":

@@ -66,7 +66,7 @@ def write_openpyxl(path):
 
 
 def write_ours(path):
-    from photocore.spreadsheet.editor import WorkbookEditor
+    from photocore.workbook.editor import WorkbookEditor
 
     first = path.with_name("first.xlsx")
     start(1).save(first)
@@ -114,9 +114,6 @@ def memory():
 
 def child(job, path):
     import openpyxl  # noqa: F401
-
-    import photocore.spreadsheet.editor
-    import photocore.tables  # noqa: F401
 
     base, begin = memory(), time.process_time()
     JOBS[job](path)

@@ -1,8 +1,3 @@
-from .domain.intersection import Intersection
-from .domain.lens import Lens
-from .domain.ortho_image import OrthoOptions, Orthophoto
-from .domain.pair import Pair, Photo
-from .domain.relief_map import Quality, ReliefMap
 from .equations import (
     plane_coordinates,
     relief,
@@ -10,8 +5,13 @@ from .equations import (
     relief_displacements,
     relief_from_displacement,
 )
-from .solvers.compose import orthophoto
-from .solvers.dense.solve import DenseRelief, dense_relief
+from .model.intersection import Intersection
+from .model.lens import Lens
+from .model.pair import Pair, Photo
+from .model.relief_map import Quality, ReliefMap
+from .orthophotos.compose import orthophoto
+from .orthophotos.ortho_image import OrthoOptions, Orthophoto
+from .relief_maps.dense_matching import DenseRelief, dense_relief
 
 __all__ = [
     "DenseRelief",

@@ -1,22 +1,55 @@
-from .domain.adjustment import Adjustment, ScaleBar, Unknowns
-from .domain.bathymetry import BathymetryStatus, CorrectedPoints, Precision
-from .domain.camera import Camera, Sensor
-from .domain.design import CalibrationCosts, Placement, Study
-from .domain.flat_interface import FlatInterface
-from .domain.height_field import RasterSurface, WaveSurface
-from .domain.interfaces import Interfaces
-from .domain.layers import Layers
-from .domain.mesh_surface import MeshSurface
-from .domain.point_status import PointStatus
-from .domain.project import ImagePoints, ObjectPoints, Project
-from .domain.ray_paths import RayPaths, RayStatus
-from .domain.shift_table import ShiftTable
-from .domain.shifting import radial_shift, radial_shift_derivatives, radial_shift_ratio
-from .domain.surfaces import Cylinder, Plane, Sphere
-from .io.openptv import read_experiment, write_experiment
-from .io.project_file import read_project, write_project
-from .iteration import ShiftIteration, best_over_compensation, iterated_radius
-from .materials import (
+from .adjustment.bundle import bundle_adjust
+from .adjustment.unknowns import Adjustment, ScaleBar, Unknowns
+from .bathymetry.corrected_points import BathymetryStatus, CorrectedPoints, Precision
+from .bathymetry.mean_water_level import WaterLevel, mean_water_level
+from .bathymetry.refracted_rays import (
+    RayIntersections,
+    correct_lidar_beams,
+    intersect_refracted_rays,
+)
+from .bathymetry.refraction_correction import correct_bathymetry
+from .bathymetry.waves import WaveEffect, wave_effect
+from .design.accuracy import (
+    calibration_costs,
+    compare_placements,
+    object_grid,
+    ring_of_cameras,
+    study_setup,
+)
+from .design.dispersion import (
+    colour_positions,
+    correct_dispersion,
+    layers_per_colour,
+    seam_width,
+    shift_per_colour,
+)
+from .design.simplified_models import Approximation, agrafiotis, lavest, telem
+from .design.studies import CalibrationCosts, Placement, Study
+from .media.camera import Camera, Sensor
+from .media.flat_interface import FlatInterface
+from .media.height_field import RasterSurface, WaveSurface
+from .media.interfaces import Interfaces
+from .media.mesh_surface import MeshSurface
+from .media.projection import project, projection_status
+from .media.ray_paths import RayPaths, RayStatus
+from .media.ray_tracing import aim_rays, trace_rays
+from .media.surfaces import Cylinder, Plane, Sphere
+from .openptv.experiment import read_experiment, write_experiment
+from .orientation.epipolar_curves import (
+    Candidates,
+    EpipolarCurves,
+    epipolar_candidates,
+    epipolar_curve,
+)
+from .orientation.intersection import Intersection, intersect, intersect_pairs, intersect_rays
+from .orientation.object_rays import image_rays
+from .orientation.point_status import PointStatus
+from .orientation.resection import Resection, resect
+from .projects.model import ImagePoints, ObjectPoints, Project
+from .projects.project_file import read_project, write_project
+from .refraction.iteration import ShiftIteration, best_over_compensation, iterated_radius
+from .refraction.layers import Layers
+from .refraction.materials import (
     ACRYLIC,
     FLOAT_GLASS,
     FUSED_SILICA,
@@ -26,35 +59,11 @@ from .materials import (
     Material,
     air_refractive_index,
 )
-from .shift import ShiftDerivatives
-from .snell import critical_angle, refracted_angle, refracted_direction
-from .solvers.approximations import Approximation, agrafiotis, lavest, telem
-from .solvers.bathymetry import correct_bathymetry
-from .solvers.bundle import bundle_adjust
-from .solvers.design import (
-    calibration_costs,
-    compare_placements,
-    object_grid,
-    ring_of_cameras,
-    study_setup,
-)
-from .solvers.dispersion import (
-    colour_positions,
-    correct_dispersion,
-    layers_per_colour,
-    seam_width,
-    shift_per_colour,
-)
-from .solvers.epipolar import Candidates, EpipolarCurves, epipolar_candidates, epipolar_curve
-from .solvers.intersection import Intersection, intersect, intersect_pairs, intersect_rays
-from .solvers.object_rays import image_rays
-from .solvers.projection import project, projection_status
-from .solvers.raytrace import aim_rays, trace_rays
-from .solvers.refracted_rays import RayIntersections, correct_lidar_beams, intersect_refracted_rays
-from .solvers.resection import Resection, resect
-from .solvers.water_surface import WaterLevel, mean_water_level
-from .solvers.waves import WaveEffect, wave_effect
-from .water import (
+from .refraction.shift import ShiftDerivatives
+from .refraction.shift_table import ShiftTable
+from .refraction.shifting import radial_shift, radial_shift_derivatives, radial_shift_ratio
+from .refraction.snell import critical_angle, refracted_angle, refracted_direction
+from .refraction.water import (
     HOEHLE,
     PARRISH,
     QUAN_FRY,

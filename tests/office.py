@@ -10,10 +10,10 @@ from pathlib import Path
 import openpyxl
 import pytest
 
-from photocore.spreadsheet.editor import rewrite_package
-from photocore.spreadsheet.package import open_package, read_part
-from photocore.spreadsheet.splice import SheetChanges, splice_sheet
-from photocore.spreadsheet.xlsx import read_directory
+from photocore.workbook.editor import rewrite_package
+from photocore.workbook.package import open_package, read_part
+from photocore.workbook.splice import SheetChanges, splice_sheet
+from photocore.workbook.xlsx import read_directory
 
 
 def strip_results(source: Path, target: Path) -> Path:

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from scipy.stats import f as f_distribution
 
-from bifocal.domain.lens import Lens
+from bifocal.model.lens import Lens
 from photocore.arrays import ByteArray, FloatArray, IntArray
 from photocore.errors import GeometryError, InputError
 

@@ -13,8 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from bifocal.domain.lens import Lens
-from bifocal.io.images import ImageInfo, image_info
+from bifocal.files.images import ImageInfo, image_info
+from bifocal.model.lens import Lens
 from photocore.arrays import FloatArray
 from photocore.errors import InputError, MissingExtraError
 

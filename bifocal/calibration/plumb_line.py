@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import least_squares
 
-from bifocal.domain.lens import Lens
+from bifocal.model.lens import Lens
 from photocore.arrays import ByteArray, FloatArray, as_points
 from photocore.errors import GeometryError, InputError
 

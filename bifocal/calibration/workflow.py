@@ -8,10 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from bifocal.domain.lens import Lens
-from bifocal.io.images import ImageArray, image_info, read_image, to_eight_bit, write_image
-from bifocal.io.lens_database import lens_from_database
-from bifocal.solvers.calibration import (
+from bifocal.calibration.board_calibration import (
     PATTERNS,
     BoardView,
     Calibration,
@@ -19,9 +16,12 @@ from bifocal.solvers.calibration import (
     detect_board,
     find_board_size,
 )
-from bifocal.solvers.plumbline import PlumbLine, calibrate_from_lines, find_straight_edges
+from bifocal.calibration.lens_database import lens_from_database
+from bifocal.calibration.plumb_line import PlumbLine, calibrate_from_lines, find_straight_edges
+from bifocal.files.images import ImageArray, image_info, read_image, to_eight_bit, write_image
+from bifocal.model.lens import Lens
 from photocore.arrays import ByteArray, FloatArray
-from photocore.console import Progress, no_progress
+from photocore.cli import Progress, no_progress
 from photocore.errors import InputError
 from photocore.output import check_writable
 from photocore.tables import Column, read_table

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from photocore.console import print_json, remark
+from photocore.cli import print_json, remark
 
 if TYPE_CHECKING:
-    from bifocal.domain.alignment import Alignment
+    from bifocal.orientation.alignment import Alignment
 
 EXAMPLE = """\b
 Examples:
@@ -148,7 +148,7 @@ def command(
     points measured on the wall (--control), distances measured on site with the cameras square to
     the wall (--distance1, --distance2), or the photos alone (--auto) and one distance or length.
     """
-    from bifocal.workflows.align import align_photos, alignment_as_dict
+    from bifocal.orientation.align_workflow import align_photos, alignment_as_dict
 
     if picture is None and not no_picture:
         picture = out.with_name(out.name.removesuffix(".json").removesuffix(".pair") + ".pair.png")
@@ -167,8 +167,8 @@ def command(
 
 def _options(given: dict[str, Any]) -> Any:
     """Return the workflow's options from the command line's."""
-    from bifocal.domain.alignment import SiteMeasures
-    from bifocal.workflows.align import AlignOptions, LensData
+    from bifocal.orientation.align_workflow import AlignOptions, LensData
+    from bifocal.orientation.alignment import SiteMeasures
     from photocore.arrays import positive
 
     for name, value in given.items():

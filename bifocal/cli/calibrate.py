@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from photocore.console import print_json, progress_bar, remark, text_table
+from photocore.cli import print_json, progress_bar, remark, text_table
 from photocore.options import Size
 
 if TYPE_CHECKING:
-    from bifocal.solvers.calibration import Calibration
+    from bifocal.calibration.board_calibration import Calibration
 
 EXAMPLE = """\b
 Examples:
@@ -70,7 +70,7 @@ def command(
     From ten or more photos of a flat board, tilted differently and filling every corner; or, where
     there is no board, from straight lines of a façade or from the lens database.
     """
-    from bifocal.workflows import lenses
+    from bifocal.calibration import workflow as lenses
 
     if sum([straight_edges or lines is not None, database]) > 1:
         raise click.UsageError("choose one of board photos, straight lines and --database.")

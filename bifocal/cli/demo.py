@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING
 
 import click
 
-from photocore.console import print_json, progress_bar, remark, text_table
+from photocore.cli import print_json, progress_bar, remark, text_table
 
 if TYPE_CHECKING:
-    from bifocal.workflows.demo import DemoResult
+    from bifocal.demo.workflow import DemoResult
 
 EXAMPLE = """\b
 Examples:
@@ -35,7 +35,7 @@ def command(out: Path, overwrite: bool, as_json: bool) -> None:
     Two photos of 35/19 mm from 17.5/9.5 m are rendered; targets picked on them go through the
     survey workbook; dense relief and the orthophoto follow. About half a minute.
     """
-    from bifocal.workflows.demo import run_demo
+    from bifocal.demo.workflow import run_demo
 
     with progress_bar("Demo", quiet=as_json) as bar:
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from photocore.console import remark
+from photocore.cli import remark
 
 EXAMPLE = """\b
 Examples:
@@ -36,7 +36,7 @@ def command(
     result: Path, out: Path, world: bool, order: str, csv_flavour: str, overwrite: bool
 ) -> None:
     """Write the points of a solved survey (RESULT: .xlsx, .ods or .csv) for other programs."""
-    from bifocal.workflows.export import export
+    from bifocal.survey.export_workflow import export
 
     for note in export(
         result, out, world=world, order=order, flavour=csv_flavour, overwrite=overwrite

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import click
 
-from photocore.console import LazyGroup
+from photocore.cli import LazyGroup
 
 #: Name and one-line help of every command, in the order of work.
 SUMMARIES: dict[str, str] = {

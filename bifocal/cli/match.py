@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from photocore.console import print_json, remark
+from photocore.cli import print_json, remark
 
 EXAMPLE = """\b
 Examples:
@@ -72,9 +72,9 @@ def command(
     Discs, chequers and coded markers are found and measured by their centres; natural detail is
     matched along the radial lines. Every point is checked by how far off its line it fits.
     """
-    from bifocal.domain.pair import Pair
-    from bifocal.solvers.match_points import MatchSettings
-    from bifocal.workflows.match import match_photos, match_summary
+    from bifocal.model.pair import Pair
+    from bifocal.orientation.match_workflow import match_photos, match_summary
+    from bifocal.orientation.matching import MatchSettings
 
     reliefs = None
     if relief_min is not None or relief_max is not None:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from photocore.console import print_json, progress_bar, remark
+from photocore.cli import print_json, progress_bar, remark
 from photocore.options import Length, Numbers
 
 EXAMPLE = """\b
@@ -55,7 +55,7 @@ def command(
     Seams run where the rasters agree, away from edges of the relief and from hidden places;
     exposure is made equal and colours fade into each other. Sizes are not limited.
     """
-    from bifocal.workflows.mosaic import make_mosaic
+    from bifocal.orthophotos.mosaic_workflow import make_mosaic
 
     with progress_bar("mosaic", quiet=as_json) as progress:
         result = make_mosaic(

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from photocore.console import print_json, progress_bar, remark
+from photocore.cli import print_json, progress_bar, remark
 from photocore.options import Length, Numbers, Scale
 
 EXAMPLE = """\b
@@ -114,9 +114,9 @@ def command(
     map, from measured points, or is none (--plane). What the camera cannot see stays empty; the
     last band says where each pixel comes from (0 nothing, 1 and 2 the photos, 3 both, 4 filled).
     """
-    from bifocal.domain.ortho_image import OrthoOptions
-    from bifocal.workflows.deliver import DeliverTask, deliver
-    from bifocal.workflows.ortho import OrthoTask, make_ortho
+    from bifocal.orthophotos.deliver_workflow import DeliverTask, deliver
+    from bifocal.orthophotos.ortho_image import OrthoOptions
+    from bifocal.orthophotos.ortho_workflow import OrthoTask, make_ortho
 
     if (out is None) == (folder is None):
         raise click.UsageError("Give either --out FILE or --deliver DIR.")

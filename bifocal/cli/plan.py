@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING
 
 import click
 
-from photocore.console import print_json, remark, text_table
+from photocore.cli import print_json, remark, text_table
 from photocore.options import Scale, Size
 
 if TYPE_CHECKING:
-    from bifocal.domain.plan import Plan
+    from bifocal.planning.camera_plan import Plan
 
 EXAMPLE = """\b
 Examples:
@@ -60,8 +60,8 @@ def command(
     Give the lenses and the camera, and one wish: the size of the wall, a scale, a pixel size on
     the wall, or a sigma of the relief.
     """
-    from bifocal.domain.plan import Sensor
-    from bifocal.workflows.plan import make_plan, plan_as_dict
+    from bifocal.planning.camera_plan import Sensor
+    from bifocal.planning.workflow import make_plan, plan_as_dict
 
     plan = make_plan(
         focal_lengths,

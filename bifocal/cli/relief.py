@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from photocore.console import print_json, progress_bar, remark
+from photocore.cli import print_json, progress_bar, remark
 from photocore.options import Numbers
 
 EXAMPLE = """\b
@@ -60,7 +60,7 @@ def command(
     Every pixel of the map gets its relief and the standard deviation of it, which comes from the
     photos themselves: points can only move along the radius, so what moves across it is error.
     """
-    from bifocal.workflows.dense import ReliefJob, relief_of_pair
+    from bifocal.relief_maps.workflow import ReliefJob, relief_of_pair
 
     job = ReliefJob(
         out=out, preview=preview, cloud=cloud, gsd=gsd, quality=quality, overwrite=overwrite,

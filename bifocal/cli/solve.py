@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from photocore.console import remark, text_table
+from photocore.cli import remark, text_table
 
 EXAMPLE = """\b
 Examples:
@@ -124,15 +124,9 @@ def command(
     SURVEY is a survey workbook, or any table (.xlsx, .xlsm, .ods, .csv) with the headings id and
     x1 y1 x2 y2, or s1 s2 theta, or col1 row1 col2 row2 (raw pixels, with --pair).
     """
-    from bifocal.workflows.solve import solve_file
-    from bifocal.workflows.solve_options import solve_options
-    from bifocal.workflows.solve_output import (
-        length_unit,
-        point_rows,
-        solution_json,
-        summary,
-        write_result,
-    )
+    from bifocal.survey.options import solve_options
+    from bifocal.survey.output import length_unit, point_rows, solution_json, summary, write_result
+    from bifocal.survey.workflow import solve_file
     from photocore.output import check_writable
 
     if out is not None:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from photocore.console import remark
+from photocore.cli import remark
 
 EXAMPLE = """\b
 Examples:
@@ -36,7 +36,7 @@ def command(out: Path, language: str, rows: int, overwrite: bool) -> None:
 
     Every result is a live formula; the workbook needs neither this program nor macros.
     """
-    from bifocal.workflows.survey import write_template
+    from bifocal.survey.template_workflow import write_template
 
     write_template(out, language=language, rows=rows, overwrite=overwrite)
     remark(f"{out}: fill in Setup and Points; then: bifocal solve {out} --out result.xlsx")

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from photocore.console import print_json, progress_bar, remark
+from photocore.cli import print_json, progress_bar, remark
 
 EXAMPLE = """\b
 Examples:
@@ -40,7 +40,7 @@ def command(
     focal: float | None, overwrite: bool, as_json: bool,
 ) -> None:  # fmt: skip
     """Write each photo without lens distortion as NAME_undistorted, same size and scale."""
-    from bifocal.workflows.lenses import undistort_images
+    from bifocal.calibration.workflow import undistort_images
 
     if out_dir is not None and not out_dir.is_dir():
         raise click.UsageError(f"--out-dir: the folder {out_dir} does not exist.")

@@ -10,16 +10,16 @@ from pathlib import Path
 
 import numpy as np
 
-from bifocal.domain.relief_map import ReliefMap
-from bifocal.io.geotiff import RasterReader, read_relief, write_relief
-from bifocal.io.images import write_image
-from bifocal.solvers.scene import Rendering, bifocal_cameras, demo_scene, render
-from bifocal.workflows.dense import ReliefJob, relief_of_pair
-from bifocal.workflows.ortho import OrthoTask, make_ortho
-from bifocal.workflows.solve import SolveOptions, solve_file
-from bifocal.workflows.solve_output import write_result
+from bifocal.demo.scene import Rendering, bifocal_cameras, demo_scene, render
+from bifocal.files.geotiff import RasterReader, read_relief, write_relief
+from bifocal.files.images import write_image
+from bifocal.model.relief_map import ReliefMap
+from bifocal.orthophotos.ortho_workflow import OrthoTask, make_ortho
+from bifocal.relief_maps.workflow import ReliefJob, relief_of_pair
+from bifocal.survey.output import write_result
+from bifocal.survey.workflow import SolveOptions, solve_file
 from photocore.arrays import FloatArray
-from photocore.console import Progress, no_progress
+from photocore.cli import Progress, no_progress
 from photocore.errors import InputError
 from photocore.tables import write_csv
 

@@ -1,1 +1,1 @@
-"""Files to domain objects and back; no mathematics."""
+"""Rasters, photos and point files that several rooms read and write; no mathematics."""

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from bifocal.domain.points import SurveyPoints
+from bifocal.model.points import SurveyPoints
 from photocore.arrays import BoolArray, FloatArray
 from photocore.errors import InputError
 from photocore.output import atomic_path

@@ -18,8 +18,8 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from bifocal.domain.grid import Grid
-from bifocal.domain.relief_map import Quality, ReliefMap
+from bifocal.model.grid import Grid
+from bifocal.model.relief_map import Quality, ReliefMap
 from photocore.errors import InputError
 from photocore.output import atomic_path, check_writable
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from bifocal.domain.points import SurveyPoints
+from bifocal.model.points import SurveyPoints
 from photocore.errors import CellError, InputError, WorkbookError
 from photocore.tables import Column, read_table
 from photocore.tables.convert import NOT_CALCULATED

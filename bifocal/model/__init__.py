@@ -1,1 +1,1 @@
-"""Frozen objects that describe the survey, checked when they are made."""
+"""Frozen objects every room speaks of: pair, photo, lens, grid, relief map, surface, points."""

@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bifocal import rays
-from bifocal.domain.intersection import Intersection
+from bifocal.model.intersection import Intersection
 from photocore.arrays import FloatArray
 from photocore.errors import InputError
 
 if TYPE_CHECKING:
-    from bifocal.domain.pair import Pair
+    from bifocal.model.pair import Pair
 
 
 def intersect_pair(
@@ -25,7 +25,7 @@ def intersect_pair(
     sigma_setup: tuple[float, float, float, float],
 ) -> Intersection:
     """Return points, covariances, misfits and flags; see `Pair.intersect`."""
-    from bifocal.domain.pair import BLUNDER_LIMIT, SIGMA_PIXEL, UNCERTAIN_SHARE
+    from bifocal.model.pair import BLUNDER_LIMIT, SIGMA_PIXEL, UNCERTAIN_SHARE
 
     sigmas = [sigma_px or photo.sigma_pixel or SIGMA_PIXEL for photo in (pair.image1, pair.image2)]
     if not all(np.isfinite(value) and value > 0 for value in sigmas):

@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from bifocal import rays
-from bifocal.domain.intersection import Intersection
-from bifocal.domain.lens import Lens
+from bifocal.model.intersection import Intersection
+from bifocal.model.lens import Lens
 from photocore.arrays import FloatArray, as_points, positive, read_only
 from photocore.errors import GeometryError, InputError
 from photocore.jsonfile import read_object, write_object
@@ -258,7 +258,7 @@ class Pair:
         Midulla's Eq. (6). The distances', scale's and nadirs' uncertainty is common to all points:
         it is in every point's covariance, but not independent from point to point.
         """
-        from bifocal.domain.intersect import intersect_pair
+        from bifocal.model.intersect import intersect_pair
 
         first = as_points(pixels1, "pixels1", dimension=2)
         second = as_points(pixels2, "pixels2", dimension=2)

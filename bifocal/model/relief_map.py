@@ -8,7 +8,7 @@ from enum import IntEnum
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from bifocal.domain.grid import Grid
+from bifocal.model.grid import Grid
 from photocore.arrays import ByteArray, FloatArray, as_points, read_only
 from photocore.errors import InputError
 

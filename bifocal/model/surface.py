@@ -9,7 +9,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from bifocal.domain.grid import SAME_PIXEL, Grid
+from bifocal.model.grid import SAME_PIXEL, Grid
 from photocore.arrays import FloatArray
 from photocore.errors import InputError
 

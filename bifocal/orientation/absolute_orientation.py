@@ -9,14 +9,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from bifocal.domain.alignment import Control, Interior, SiteMeasures
-from bifocal.pinhole import Pinhole
-from bifocal.solvers import refusals
-from bifocal.solvers.bundle import Problem, Solution, evaluate, ray_on_plane
-from bifocal.solvers.features import find_features
-from bifocal.solvers.relative import Ties, find_ties, first_cameras, plane_scale
-from bifocal.solvers.resection import resect
-from bifocal.solvers.set_up_stages import (
+from bifocal.orientation import validation as refusals
+from bifocal.orientation.alignment import Control, Interior, SiteMeasures
+from bifocal.orientation.bundle import Problem, Solution, evaluate, ray_on_plane
+from bifocal.orientation.features import find_features
+from bifocal.orientation.orientation_stages import (
     SIGMA_PARALLEL,
     Notes,
     PhotoInput,
@@ -25,8 +22,11 @@ from bifocal.solvers.set_up_stages import (
     silent,
     without_gross,
 )
-from bifocal.solvers.tie_points import robust_sigma
-from bifocal.solvers.wall_choice import Face
+from bifocal.orientation.pinhole import Pinhole
+from bifocal.orientation.reference_plane import Face
+from bifocal.orientation.relative_orientation import Ties, find_ties, first_cameras, plane_scale
+from bifocal.orientation.space_resection import resect
+from bifocal.orientation.tie_points import robust_sigma
 from photocore.arrays import BoolArray
 from photocore.errors import GeometryError
 

@@ -10,14 +10,14 @@ from typing import Any
 
 import numpy as np
 
-from bifocal.domain.alignment import Alignment, Control, Interior, SiteMeasures
-from bifocal.domain.lens import Lens
-from bifocal.domain.photo_lens import lens_of_photo
-from bifocal.io.alignment_picture import write_alignment_picture
-from bifocal.io.control import read_control, read_lengths
-from bifocal.io.images import ImageInfo, image_info, read_image, to_eight_bit
-from bifocal.solvers.alignment import make_alignment, with_files
-from bifocal.solvers.set_up import PhotoInput, set_up, silent
+from bifocal.files.images import ImageInfo, image_info, read_image, to_eight_bit
+from bifocal.model.lens import Lens
+from bifocal.orientation.absolute_orientation import PhotoInput, set_up, silent
+from bifocal.orientation.alignment import Alignment, Control, Interior, SiteMeasures
+from bifocal.orientation.alignment_picture import write_alignment_picture
+from bifocal.orientation.control import read_control, read_lengths
+from bifocal.orientation.oriented_pair import make_alignment, with_files
+from bifocal.orientation.photo_lens import lens_of_photo
 from photocore.arrays import ByteArray, FloatArray
 from photocore.errors import InputError
 from photocore.output import check_writable

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from bifocal.domain.lens import Lens
-from bifocal.domain.pair import Pair
+from bifocal.model.lens import Lens
+from bifocal.model.pair import Pair
 from photocore.arrays import BoolArray, FloatArray
 from photocore.errors import InputError
 

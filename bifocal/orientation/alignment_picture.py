@@ -9,9 +9,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from bifocal.domain.alignment import Alignment
-from bifocal.domain.pair import Photo
-from bifocal.io.images import write_image
+from bifocal.files.images import write_image
+from bifocal.model.pair import Photo
+from bifocal.orientation.alignment import Alignment
 from photocore.arrays import ByteArray, FloatArray
 
 #: Longer side of the picture. [px]

@@ -12,8 +12,8 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from bifocal.domain.alignment import Control, Interior
-from bifocal.pinhole import (
+from bifocal.orientation.alignment import Control, Interior
+from bifocal.orientation.pinhole import (
     Pinhole,
     camera_matrix,
     fundamental,

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from bifocal.domain.alignment import Control
+from bifocal.orientation.alignment import Control
 from photocore.arrays import FloatArray
 from photocore.errors import CellError, InputError, WorkbookError
 from photocore.tables import Column, Table, read_table

@@ -10,9 +10,9 @@ import cv2
 import numpy as np
 
 from bifocal import rays
-from bifocal.pinhole import project
-from bifocal.solvers.bundle import Problem, Solution, radial_shift, ray_on_plane
-from bifocal.solvers.tie_points import raw_pixels
+from bifocal.orientation.bundle import Problem, Solution, radial_shift, ray_on_plane
+from bifocal.orientation.pinhole import project
+from bifocal.orientation.tie_points import raw_pixels
 from photocore.arrays import ByteArray, FloatArray
 
 #: Pixels of the rectified photos.

@@ -5,8 +5,8 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-from bifocal.domain.alignment import Interior
-from bifocal.pinhole import Pinhole, plane_from_pixel
+from bifocal.orientation.alignment import Interior
+from bifocal.orientation.pinhole import Pinhole, plane_from_pixel
 from photocore.arrays import ByteArray, FloatArray
 
 #: Façade lines farther than this from the photo's own upright are not asked. [deg]

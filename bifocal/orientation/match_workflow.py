@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from bifocal.domain.observations import PointObservations
-from bifocal.domain.pair import Pair
-from bifocal.io.images import read_image, to_eight_bit
-from bifocal.solvers.match_points import Matches, MatchSettings, match_pair
-from bifocal.workflows.survey import write_survey
+from bifocal.files.images import read_image, to_eight_bit
+from bifocal.model.pair import Pair
+from bifocal.orientation.matching import Matches, MatchSettings, match_pair
+from bifocal.survey.observations import PointObservations
+from bifocal.survey.template_workflow import write_survey
 from photocore.arrays import ByteArray
 from photocore.errors import InputError
 from photocore.output import check_writable

@@ -12,17 +12,12 @@ from itertools import pairwise
 
 import numpy as np
 
-from bifocal.domain.pair import Pair, Photo, apply_homography
+from bifocal.model.pair import Pair, Photo, apply_homography
+from bifocal.orientation.features import Features, drop_repeated, find_features, match_along_lines
+from bifocal.orientation.patches import PatchResult, refine, same_scale
+from bifocal.orientation.targets import Targets, find_targets
+from bifocal.orientation.tie_points import robust_sigma
 from bifocal.rays import relief_of_rays, zoom_factor
-from bifocal.solvers.features import (
-    Features,
-    drop_repeated,
-    find_features,
-    match_along_lines,
-)
-from bifocal.solvers.patches import PatchResult, refine, same_scale
-from bifocal.solvers.targets import Targets, find_targets
-from bifocal.solvers.tie_points import robust_sigma
 from photocore.arrays import BoolArray, ByteArray, FloatArray, IntArray
 from photocore.errors import GeometryError
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from bifocal import rays
-from bifocal.pinhole import Pinhole, tilt
+from bifocal.orientation.pinhole import Pinhole, tilt
 
 
 def set_up_words(

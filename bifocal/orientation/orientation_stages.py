@@ -10,18 +10,13 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from bifocal.domain.alignment import Interior, SiteMeasures
-from bifocal.pinhole import Pinhole, plane_transfer, tilt, triangulate
-from bifocal.solvers import refusals
-from bifocal.solvers.bundle import (
-    Problem,
-    Solution,
-    adjust,
-    evaluate,
-    onto_plane,
-    radial_shift,
-)
-from bifocal.solvers.tie_points import (
+from bifocal.orientation import validation as refusals
+from bifocal.orientation.alignment import Interior, SiteMeasures
+from bifocal.orientation.bundle import Problem, Solution, adjust, evaluate, onto_plane, radial_shift
+from bifocal.orientation.dominant_plane import even_points
+from bifocal.orientation.pinhole import Pinhole, plane_transfer, tilt, triangulate
+from bifocal.orientation.reference_plane import Face, choose_wall, rivals_in_words
+from bifocal.orientation.tie_points import (
     ROUGHNESS,
     classify,
     raw_pixels,
@@ -29,8 +24,6 @@ from bifocal.solvers.tie_points import (
     robust_sigma,
     settle,
 )
-from bifocal.solvers.wall_choice import Face, choose_wall, rivals_in_words
-from bifocal.solvers.wall_face import even_points
 from photocore.arrays import ByteArray, FloatArray
 from photocore.errors import GeometryError
 

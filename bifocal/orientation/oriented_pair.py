@@ -8,16 +8,16 @@ from typing import Any
 
 import numpy as np
 
-from bifocal.domain.alignment import Alignment, Interior
-from bifocal.domain.lens import Lens
-from bifocal.domain.pair import Pair, Photo
-from bifocal.pinhole import Pinhole, plane_from_pixel, triangulate
-from bifocal.solvers.bundle import PER_CAMERA, radial_shift
-from bifocal.solvers.facade_axes import facade_turn, turned
-from bifocal.solvers.set_up import PhotoInput, SetUp
-from bifocal.solvers.set_up_words import set_up_words
-from bifocal.solvers.tie_points import raw_pixels, robust_sigma
-from bifocal.solvers.wall_choice import rivals
+from bifocal.model.lens import Lens
+from bifocal.model.pair import Pair, Photo
+from bifocal.orientation.absolute_orientation import PhotoInput, SetUp
+from bifocal.orientation.alignment import Alignment, Interior
+from bifocal.orientation.bundle import PER_CAMERA, radial_shift
+from bifocal.orientation.facade_axes import facade_turn, turned
+from bifocal.orientation.orientation_report import set_up_words
+from bifocal.orientation.pinhole import Pinhole, plane_from_pixel, triangulate
+from bifocal.orientation.reference_plane import rivals
+from bifocal.orientation.tie_points import raw_pixels, robust_sigma
 from photocore.arrays import FloatArray
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from bifocal.domain.lens import Lens
+from bifocal.model.lens import Lens
 from photocore.arrays import FloatArray
 from photocore.errors import InputError
 

@@ -10,9 +10,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bifocal.domain.alignment import Interior, SiteMeasures
-from bifocal.pinhole import Pinhole
-from bifocal.solvers.wall_face import BAND, largest_plane, refitted
+from bifocal.orientation.alignment import Interior, SiteMeasures
+from bifocal.orientation.dominant_plane import BAND, largest_plane, refitted
+from bifocal.orientation.pinhole import Pinhole
 from photocore.arrays import FloatArray
 from photocore.errors import GeometryError
 

@@ -11,9 +11,9 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from bifocal.domain.alignment import Interior
-from bifocal.pinhole import Pinhole, camera_matrix, fundamental, triangulate
-from bifocal.solvers.features import Features, drop_repeated, match_features
+from bifocal.orientation.alignment import Interior
+from bifocal.orientation.features import Features, drop_repeated, match_features
+from bifocal.orientation.pinhole import Pinhole, camera_matrix, fundamental, triangulate
 from photocore.arrays import BoolArray, FloatArray
 from photocore.errors import GeometryError
 

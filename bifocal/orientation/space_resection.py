@@ -7,8 +7,8 @@ from typing import Any
 import cv2
 import numpy as np
 
-from bifocal.domain.alignment import Interior
-from bifocal.pinhole import Pinhole, camera_matrix, project
+from bifocal.orientation.alignment import Interior
+from bifocal.orientation.pinhole import Pinhole, camera_matrix, project
 from photocore.arrays import BoolArray, FloatArray
 from photocore.errors import GeometryError
 

@@ -6,10 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from bifocal.domain.alignment import Interior
-from bifocal.pinhole import Pinhole, fundamental, projection_rows, triangulate
-from bifocal.solvers.bundle import Problem, Solution, adjust, radial_shift
-from bifocal.solvers.patches import refine, same_scale
+from bifocal.orientation.alignment import Interior
+from bifocal.orientation.bundle import Problem, Solution, adjust, radial_shift
+from bifocal.orientation.patches import refine, same_scale
+from bifocal.orientation.pinhole import Pinhole, fundamental, projection_rows, triangulate
 from photocore.arrays import BoolArray, ByteArray, FloatArray
 
 #: Ties of a wall that count as independent of each other.

@@ -5,11 +5,11 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-from bifocal.domain.alignment import Interior, SiteMeasures
-from bifocal.pinhole import Pinhole
-from bifocal.solvers.bundle import Solution
-from bifocal.solvers.features import sharpness
-from bifocal.solvers.relative import Ties, rotation_only, transferred
+from bifocal.orientation.alignment import Interior, SiteMeasures
+from bifocal.orientation.bundle import Solution
+from bifocal.orientation.features import sharpness
+from bifocal.orientation.pinhole import Pinhole
+from bifocal.orientation.relative_orientation import Ties, rotation_only, transferred
 from photocore.arrays import ByteArray
 from photocore.errors import GeometryError, InputError
 

@@ -9,14 +9,14 @@ from typing import NamedTuple, cast
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from bifocal.domain.grid import Grid
-from bifocal.domain.ortho_image import ImageArray, OrthoOptions, Orthophoto, Source
-from bifocal.domain.pair import Pair
-from bifocal.domain.relief_map import ReliefMap
-from bifocal.domain.surface import FlatSurface, MapSurface, ReliefArray, Surface
-from bifocal.solvers.orthorectify import View, footprint, native_gsd
-from bifocal.solvers.pull_push import fill_holes
-from bifocal.solvers.visibility import hidden_from
+from bifocal.model.grid import Grid
+from bifocal.model.pair import Pair
+from bifocal.model.relief_map import ReliefMap
+from bifocal.model.surface import FlatSurface, MapSurface, ReliefArray, Surface
+from bifocal.orthophotos.ortho_image import ImageArray, OrthoOptions, Orthophoto, Source
+from bifocal.orthophotos.pull_push import fill_holes
+from bifocal.orthophotos.rectify import View, footprint, native_gsd
+from bifocal.orthophotos.visibility import hidden_from
 from photocore.arrays import BoolArray, ByteArray
 from photocore.errors import InputError
 

@@ -12,23 +12,29 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from bifocal.domain.drawing import Drawing, Legend, Sheet, round_step
-from bifocal.domain.grid import Grid
-from bifocal.domain.pair import Pair
-from bifocal.domain.points import SurveyPoints
-from bifocal.domain.relief_map import Quality
-from bifocal.domain.surface import FlatSurface, MapSurface, Surface
-from bifocal.io.drawings import write_drawing, write_section_dxf, write_section_svg
-from bifocal.io.geotiff import RasterReader, create_raster, dpi_at_scale, gsd_at_scale
-from bifocal.io.pdf_sheet import write_sheet
-from bifocal.io.point_tables import read_survey_points
-from bifocal.io.strips import write_png
-from bifocal.solvers.compose import TILE
-from bifocal.solvers.sections import contours, section
-from bifocal.solvers.shading import shaded, tints
-from bifocal.workflows.ortho import OrthoResult, OrthoTask, make_ortho, open_surface, planned_grid
+from bifocal.files.geotiff import RasterReader, create_raster, dpi_at_scale, gsd_at_scale
+from bifocal.files.point_tables import read_survey_points
+from bifocal.files.strips import write_png
+from bifocal.model.grid import Grid
+from bifocal.model.pair import Pair
+from bifocal.model.points import SurveyPoints
+from bifocal.model.relief_map import Quality
+from bifocal.model.surface import FlatSurface, MapSurface, Surface
+from bifocal.orthophotos.compose import TILE
+from bifocal.orthophotos.drawing import Drawing, Legend, Sheet, round_step
+from bifocal.orthophotos.drawing_files import write_drawing, write_section_dxf, write_section_svg
+from bifocal.orthophotos.ortho_workflow import (
+    OrthoResult,
+    OrthoTask,
+    make_ortho,
+    open_surface,
+    planned_grid,
+)
+from bifocal.orthophotos.pdf_sheet import write_sheet
+from bifocal.orthophotos.sections import contours, section
+from bifocal.orthophotos.shading import shaded, tints
 from photocore.arrays import positive
-from photocore.console import Progress, no_progress
+from photocore.cli import Progress, no_progress
 from photocore.errors import InputError
 from photocore.output import atomic_folder
 

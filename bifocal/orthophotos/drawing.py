@@ -8,8 +8,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from bifocal.domain.grid import Grid
-from bifocal.domain.points import SurveyPoints
+from bifocal.model.grid import Grid
+from bifocal.model.points import SurveyPoints
 from photocore.arrays import FloatArray
 from photocore.errors import InputError
 

@@ -8,8 +8,8 @@ from xml.sax.saxutils import escape
 
 import numpy as np
 
-from bifocal.domain.drawing import Drawing, Section, round_step
-from bifocal.domain.points import SurveyPoints
+from bifocal.model.points import SurveyPoints
+from bifocal.orthophotos.drawing import Drawing, Section, round_step
 from photocore.output import atomic_path
 
 #: Layers and their colours (AutoCAD colour index).

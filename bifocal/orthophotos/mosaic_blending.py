@@ -10,8 +10,8 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from bifocal.domain.grid import SAME_PIXEL, Grid
-from bifocal.solvers.pull_push import fill_holes
+from bifocal.model.grid import SAME_PIXEL, Grid
+from bifocal.orthophotos.pull_push import fill_holes
 from photocore.arrays import BoolArray, FloatArray, IntArray
 from photocore.errors import InputError
 

@@ -11,10 +11,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bifocal.domain.grid import Grid
-from bifocal.domain.surface import MapSurface
-from bifocal.io.geotiff import RasterReader, check_relief, create_raster
-from bifocal.solvers.mosaic import (
+from bifocal.files.geotiff import RasterReader, check_relief, create_raster
+from bifocal.model.grid import Grid
+from bifocal.model.surface import MapSurface
+from bifocal.orthophotos.mosaic_blending import (
     Plan,
     coarse_grid,
     common_grid,
@@ -22,7 +22,7 @@ from bifocal.solvers.mosaic import (
     plan_mosaic,
 )
 from photocore.arrays import BoolArray
-from photocore.console import Progress, no_progress
+from photocore.cli import Progress, no_progress
 from photocore.errors import InputError
 from photocore.output import check_writable
 

@@ -9,7 +9,7 @@ from typing import Any, Literal
 
 from numpy.typing import NDArray
 
-from bifocal.domain.grid import Grid
+from bifocal.model.grid import Grid
 from photocore.arrays import BoolArray, ByteArray, FloatArray
 from photocore.errors import InputError
 

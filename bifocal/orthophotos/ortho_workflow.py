@@ -11,19 +11,19 @@ from typing import Any
 
 import numpy as np
 
-from bifocal.domain.grid import Grid
-from bifocal.domain.ortho_image import OrthoOptions, Source
-from bifocal.domain.pair import Pair, Photo
-from bifocal.domain.surface import Bounds, FlatSurface, MapSurface, Surface
-from bifocal.io.geotiff import RasterReader, check_relief, create_raster, dpi_at_scale
-from bifocal.io.images import ImageArray, image_info, read_image
-from bifocal.io.point_tables import read_survey_points
-from bifocal.solvers.compose import NOTHING_IN_COMMON, choose_grid, render
-from bifocal.solvers.orthorectify import View, native_gsd
-from bifocal.solvers.radiometry import correct_view, match_exposure
-from bifocal.solvers.triangles import TriangleSurface
+from bifocal.files.geotiff import RasterReader, check_relief, create_raster, dpi_at_scale
+from bifocal.files.images import ImageArray, image_info, read_image
+from bifocal.files.point_tables import read_survey_points
+from bifocal.model.grid import Grid
+from bifocal.model.pair import Pair, Photo
+from bifocal.model.surface import Bounds, FlatSurface, MapSurface, Surface
+from bifocal.orthophotos.compose import NOTHING_IN_COMMON, choose_grid, render
+from bifocal.orthophotos.ortho_image import OrthoOptions, Source
+from bifocal.orthophotos.radiometry import correct_view, match_exposure
+from bifocal.orthophotos.rectify import View, native_gsd
+from bifocal.orthophotos.triangles import TriangleSurface
 from photocore.arrays import ByteArray
-from photocore.console import Progress, no_progress
+from photocore.cli import Progress, no_progress
 from photocore.errors import InputError
 from photocore.output import check_writable
 

@@ -12,9 +12,9 @@ from typing import BinaryIO
 
 import numpy as np
 
-from bifocal.domain.drawing import BAND, STRIP, Drawing, Sheet, multiples
-from bifocal.io.geotiff import RasterReader
-from bifocal.io.strips import colour_strips, predicted
+from bifocal.files.geotiff import RasterReader
+from bifocal.files.strips import colour_strips, predicted
+from bifocal.orthophotos.drawing import BAND, STRIP, Drawing, Sheet, multiples
 from photocore.output import atomic_path
 
 #: PDF's own unit in millimetres: 72 to the inch.

@@ -13,12 +13,12 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from bifocal.domain.grid import Grid
-from bifocal.domain.ortho_image import ImageArray
-from bifocal.domain.pair import Photo
-from bifocal.domain.surface import Surface
-from bifocal.solvers.orthorectify import ChromaticShift, View, check_image, native_gsd
-from bifocal.solvers.visibility import hidden_from
+from bifocal.model.grid import Grid
+from bifocal.model.pair import Photo
+from bifocal.model.surface import Surface
+from bifocal.orthophotos.ortho_image import ImageArray
+from bifocal.orthophotos.rectify import ChromaticShift, View, check_image, native_gsd
+from bifocal.orthophotos.visibility import hidden_from
 from photocore.arrays import BoolArray, FloatArray
 from photocore.errors import InputError
 

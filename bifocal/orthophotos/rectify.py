@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from bifocal.domain.grid import Grid
-from bifocal.domain.ortho_image import ImageArray, Interpolation
-from bifocal.domain.pair import Photo, apply_homography
-from bifocal.domain.surface import ReliefArray
+from bifocal.model.grid import Grid
+from bifocal.model.pair import Photo, apply_homography
+from bifocal.model.surface import ReliefArray
+from bifocal.orthophotos.ortho_image import ImageArray, Interpolation
 from bifocal.rays import Foot
 from photocore.arrays import BoolArray, FloatArray
 from photocore.errors import GeometryError, InputError

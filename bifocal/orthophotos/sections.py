@@ -7,9 +7,9 @@ from itertools import pairwise
 
 import numpy as np
 
-from bifocal.domain.drawing import Section, multiples
-from bifocal.domain.grid import Grid
-from bifocal.domain.surface import Surface
+from bifocal.model.grid import Grid
+from bifocal.model.surface import Surface
+from bifocal.orthophotos.drawing import Section, multiples
 from photocore.arrays import FloatArray
 from photocore.errors import InputError
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from bifocal.domain.grid import Grid
-from bifocal.domain.surface import Surface
+from bifocal.model.grid import Grid
+from bifocal.model.surface import Surface
 from photocore.arrays import ByteArray
 
 #: Tints from far to near: dark blue, green-grey, sand, nearly white.

@@ -8,8 +8,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from bifocal.domain.grid import Grid
-from bifocal.domain.surface import Bounds, ReliefArray, Surface
+from bifocal.model.grid import Grid
+from bifocal.model.surface import Bounds, ReliefArray, Surface
 from bifocal.rays import Foot
 from photocore.arrays import BoolArray
 

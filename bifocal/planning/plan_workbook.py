@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from photocore.output import atomic_path
 
 if TYPE_CHECKING:
-    from bifocal.domain.plan import Plan
+    from bifocal.planning.camera_plan import Plan
 
 _COLUMNS: tuple[tuple[str, str, str], ...] = (
     ("pair", "Lenses", "@"),

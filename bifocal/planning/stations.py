@@ -7,7 +7,7 @@ from dataclasses import replace
 from itertools import combinations
 from math import ceil, hypot, sqrt
 
-from bifocal.domain.plan import Plan, Sensor, Station
+from bifocal.planning.camera_plan import Plan, Sensor, Station
 from bifocal.precision import lever_arm, uncertainty_radius
 from photocore.arrays import positive
 from photocore.errors import InputError

@@ -7,9 +7,9 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from bifocal.domain.plan import Plan, Sensor
-from bifocal.io.plan_workbook import write_plan
-from bifocal.solvers.planning import plan_stations
+from bifocal.planning.camera_plan import Plan, Sensor
+from bifocal.planning.plan_workbook import write_plan
+from bifocal.planning.stations import plan_stations
 from photocore.errors import InputError
 from photocore.output import check_writable
 
@@ -24,7 +24,7 @@ def make_plan(
 ) -> Plan:
     """Return a plan, and write it as a workbook when a path is given.
 
-    ``wishes`` are the keyword arguments of `bifocal.solvers.planning.plan_stations`.
+    ``wishes`` are the keyword arguments of `bifocal.planning.stations.plan_stations`.
     """
     if out is not None:
         if out.suffix.lower() != ".xlsx":

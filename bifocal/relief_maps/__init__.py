@@ -1,5 +1,5 @@
 """Dense relief from a bifocal pair of photos."""
 
-from bifocal.solvers.dense.solve import DenseRelief, dense_relief
+from bifocal.relief_maps.dense_matching import DenseRelief, dense_relief
 
 __all__ = ["DenseRelief", "dense_relief"]

@@ -7,11 +7,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from bifocal.domain.grid import Grid
-from bifocal.domain.pair import Pair
-from bifocal.domain.relief_map import Quality, ReliefMap
-from bifocal.solvers.dense import edges, flow, seed, smooth, splat
-from bifocal.solvers.dense.frame import (
+from bifocal.model.grid import Grid
+from bifocal.model.pair import Pair
+from bifocal.model.relief_map import Quality, ReliefMap
+from bifocal.relief_maps import edges, flow, seed
+from bifocal.relief_maps import forward_projection as splat
+from bifocal.relief_maps import smoothing as smooth
+from bifocal.relief_maps.exposure import match_exposure
+from bifocal.relief_maps.frame import (
     LONGEST_SIDE,
     Frame,
     as_grey,
@@ -21,11 +24,10 @@ from bifocal.solvers.dense.frame import (
     working_grid,
     zoomed_box,
 )
-from bifocal.solvers.dense.radiometry import match_exposure
-from bifocal.solvers.dense.registration import Registration, check_registration
-from bifocal.solvers.dense.setup_sigma import setup_sigma
+from bifocal.relief_maps.orientation_sigma import setup_sigma
+from bifocal.relief_maps.registration import Registration, check_registration
 from photocore.arrays import BoolArray, ByteArray
-from photocore.console import Progress, no_progress
+from photocore.cli import Progress, no_progress
 from photocore.errors import InputError
 
 Bounds = tuple[float, float, float, float]
@@ -146,7 +148,8 @@ def dense_relief(
 
     Examples
     --------
-    >>> from bifocal.solvers.scene import bifocal_cameras, facade, render
+    >>> from bifocal.demo.scene import bifocal_cameras, render
+    >>> from bifocal.demo.scene import facade
     >>> cameras = bifocal_cameras(size=(192, 128), pixel=0.059)
     >>> shot = render(facade(texel=0.04), cameras, rng=np.random.default_rng(1))
     >>> result = dense_relief(shot.pair, shot.image1, shot.image2)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from bifocal.solvers.dense.frame import Float32Array, Frame, zoom_map
+from bifocal.relief_maps.frame import Float32Array, Frame, zoom_map
 
 #: Half width of a ramp. [px]
 REACH = 9

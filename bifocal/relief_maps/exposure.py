@@ -7,7 +7,7 @@ from dataclasses import replace
 import cv2
 import numpy as np
 
-from bifocal.solvers.dense.frame import Float32Array, Frame, zoom_map
+from bifocal.relief_maps.frame import Float32Array, Frame, zoom_map
 from photocore.arrays import ByteArray, FloatArray
 
 #: Grey values outside are clipped or dark noise and do not take part.

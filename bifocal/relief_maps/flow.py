@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from bifocal import rays
-from bifocal.solvers.dense.frame import Float32Array, Frame, zoom_map
+from bifocal.relief_maps.frame import Float32Array, Frame, zoom_map
 from photocore.arrays import BoolArray, ByteArray
 
 #: Weight of smoothness; 30 is as good before noise is taken out, 20 keeps more detail for it.

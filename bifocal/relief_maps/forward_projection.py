@@ -6,10 +6,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from bifocal.domain.grid import Grid
-from bifocal.domain.relief_map import Quality
+from bifocal.model.grid import Grid
+from bifocal.model.relief_map import Quality
 from bifocal.rays import Foot
-from bifocal.solvers.dense.frame import Float32Array, Frame, zoom_map
+from bifocal.relief_maps.frame import Float32Array, Frame, zoom_map
 from photocore.arrays import BoolArray, ByteArray, FloatArray
 
 #: A relief agrees with the pixel it came from to this. [m], relative to d1

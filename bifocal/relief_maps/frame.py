@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bifocal import rays
-from bifocal.domain.grid import Grid
-from bifocal.domain.pair import Pair, Photo
+from bifocal.model.grid import Grid
+from bifocal.model.pair import Pair, Photo
 from photocore.arrays import BoolArray, ByteArray, FloatArray
 from photocore.errors import GeometryError, InputError
 

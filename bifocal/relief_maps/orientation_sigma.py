@@ -6,8 +6,8 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from bifocal.domain.pair import Pair
-from bifocal.solvers.dense.frame import Float32Array
+from bifocal.model.pair import Pair
+from bifocal.relief_maps.frame import Float32Array
 
 
 def setup_sigma(pair: Pair, relief: Float32Array) -> Float32Array:

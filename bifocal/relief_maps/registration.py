@@ -6,8 +6,8 @@ from dataclasses import asdict, dataclass
 
 import numpy as np
 
-from bifocal.solvers.dense.flow import Measurement
-from bifocal.solvers.dense.frame import Frame
+from bifocal.relief_maps.flow import Measurement
+from bifocal.relief_maps.frame import Frame
 from photocore.errors import GeometryError
 
 #: Pixels that come back to themselves within this are taken for matched. [px]

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from bifocal.domain.relief_map import Quality, ReliefMap
+from bifocal.model.relief_map import Quality, ReliefMap
 from photocore.arrays import ByteArray, FloatArray
 from photocore.errors import InputError
 from photocore.output import atomic_path

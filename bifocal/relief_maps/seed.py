@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from bifocal.solvers.dense.frame import Float32Array, Frame
+from bifocal.relief_maps.frame import Float32Array, Frame
 from photocore.arrays import BoolArray, ByteArray
 
 #: Width or height at which the sweep works; more brings little, costs squarely. [px]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from bifocal.solvers.dense.frame import Float32Array
+from bifocal.relief_maps.frame import Float32Array
 
 #: Half windows, small to large. [px]
 WINDOWS = (8, 16)

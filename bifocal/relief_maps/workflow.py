@@ -8,13 +8,13 @@ from typing import Any
 
 import numpy as np
 
-from bifocal.domain.pair import Pair
-from bifocal.domain.relief_map import ReliefMap
-from bifocal.io.geotiff import write_relief
-from bifocal.io.images import ImageArray, read_image, to_eight_bit
-from bifocal.io.relief_files import Cloud, write_cloud, write_preview
-from bifocal.solvers.dense import DenseRelief, dense_relief
-from photocore.console import Progress, no_progress
+from bifocal.files.geotiff import write_relief
+from bifocal.files.images import ImageArray, read_image, to_eight_bit
+from bifocal.model.pair import Pair
+from bifocal.model.relief_map import ReliefMap
+from bifocal.relief_maps import DenseRelief, dense_relief
+from bifocal.relief_maps.relief_files import Cloud, write_cloud, write_preview
+from photocore.cli import Progress, no_progress
 from photocore.errors import GeometryError, InputError
 from photocore.output import check_writable
 

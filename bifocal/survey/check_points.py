@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from bifocal.domain.reference import AxisErrors, CheckResult, KnownPoints
-from bifocal.domain.relief_table import ReliefTable
-from bifocal.domain.tolerances import RULES, ToleranceRule, judge
+from bifocal.survey.reference import AxisErrors, CheckResult, KnownPoints
+from bifocal.survey.relief_table import ReliefTable
+from bifocal.survey.tolerances import RULES, ToleranceRule, judge
 from photocore.arrays import FloatArray
 
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from bifocal.io.exports import export_points
-from bifocal.io.point_tables import read_survey_points
+from bifocal.files.exports import export_points
+from bifocal.files.point_tables import read_survey_points
 from photocore.errors import InputError
 from photocore.output import check_writable
 

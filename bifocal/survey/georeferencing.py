@@ -7,17 +7,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bifocal.domain.reference import Georeference, KnownPoints
-from bifocal.domain.relief_table import ReliefTable
+from bifocal.survey.reference import Georeference, KnownPoints
+from bifocal.survey.relief_table import ReliefTable
 from photocore.arrays import BoolArray, FloatArray
 from photocore.errors import GeometryError, InputError
-from photocore.similarity import (
-    Similarity,
-    fit_levelled,
-    fit_plane,
-    fit_similarity,
-    round_origin,
-)
+from photocore.similarity import Similarity, fit_levelled, fit_plane, fit_similarity, round_origin
 
 #: Chance of calling a good set of points bad, shared out over the points.
 ALPHA = 0.01

@@ -7,9 +7,9 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from bifocal.domain.tolerances import RULES, SCALES, ToleranceRule
-from bifocal.io.survey_reader import ReadOptions, point_columns
-from bifocal.workflows.solve import SolveOptions
+from bifocal.survey.tolerances import RULES, SCALES, ToleranceRule
+from bifocal.survey.workbook.reader import ReadOptions, point_columns
+from bifocal.survey.workflow import SolveOptions
 from photocore.errors import InputError
 from photocore.tables import parse_column_map
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from bifocal.domain.pair import SIGMA_PIXEL, Pair, apply_homography
+from bifocal.model.pair import SIGMA_PIXEL, Pair, apply_homography
 from photocore.arrays import BoolArray, FloatArray, as_points
 from photocore.errors import GeometryError, InputError
 

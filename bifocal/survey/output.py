@@ -8,16 +8,16 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from bifocal.domain.reference import KnownPoints
-from bifocal.domain.tolerances import RULES, sentence
-from bifocal.io.survey_book import write_book
-from bifocal.io.survey_content import SurveyContent
-from bifocal.io.survey_update import can_update, update_book
-from bifocal.solvers.check_points import check_points
-from bifocal.solvers.georeference import georeference
-from bifocal.solvers.point_survey import solve_ideal
-from bifocal.workflows.solve import Solution
-from bifocal.workflows.survey import MOST_ROWS, log_row, relative_name
+from bifocal.survey.check_points import check_points
+from bifocal.survey.georeferencing import georeference
+from bifocal.survey.point_survey import solve_ideal
+from bifocal.survey.reference import KnownPoints
+from bifocal.survey.template_workflow import MOST_ROWS, log_row, relative_name
+from bifocal.survey.tolerances import RULES, sentence
+from bifocal.survey.workbook.book import write_book
+from bifocal.survey.workbook.content import SurveyContent
+from bifocal.survey.workbook.update import can_update, update_book
+from bifocal.survey.workflow import Solution
 from photocore.errors import InputError
 from photocore.jsonfile import to_text
 from photocore.tables import write_csv

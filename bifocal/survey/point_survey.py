@@ -7,10 +7,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from bifocal import rays
-from bifocal.domain.observations import PointObservations
-from bifocal.domain.pair import SIGMA_PIXEL, UNCERTAIN_SHARE, Pair
-from bifocal.domain.relief_table import ReliefTable
-from bifocal.domain.setup import OFF_RADIAL_SIGMAS, ON_PLANE_SIGMAS, SurveySetup
+from bifocal.model.pair import SIGMA_PIXEL, UNCERTAIN_SHARE, Pair
+from bifocal.survey.observations import PointObservations
+from bifocal.survey.relief_table import ReliefTable
+from bifocal.survey.setup import OFF_RADIAL_SIGMAS, ON_PLANE_SIGMAS, SurveySetup
 from photocore.arrays import BoolArray, FloatArray
 
 

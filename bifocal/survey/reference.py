@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from bifocal.domain.tolerances import Verdict
+from bifocal.survey.tolerances import Verdict
 from photocore.arrays import BoolArray, FloatArray
 from photocore.errors import InputError
 from photocore.similarity import Similarity

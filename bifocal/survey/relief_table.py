@@ -27,7 +27,7 @@ class ReliefTable:
         The workbook's computed columns by key: ``s1_used s2_used ds e1 e2 s_c q`` [mm],
         ``theta_used`` [deg], ``den`` [mm/m], ``r X Y Z sigma_r`` [m]. NaN where undefined.
     flags : tuple of str, length n
-        One of `bifocal.domain.intersection.FLAGS` per point.
+        One of `bifocal.model.intersection.FLAGS` per point.
     standardised : ndarray, shape (n,)
         Misfit across the radius over its standard deviation; NaN where it cannot be tested.
     carried : mapping of str to ndarray, shape (n,)

@@ -6,10 +6,10 @@ import math
 
 import numpy as np
 
-from bifocal.domain.observations import PointObservations
-from bifocal.domain.reference import Georeference, KnownPoints
-from bifocal.domain.relief_table import ReliefTable
-from bifocal.domain.setup import SurveySetup
+from bifocal.survey.observations import PointObservations
+from bifocal.survey.reference import Georeference, KnownPoints
+from bifocal.survey.relief_table import ReliefTable
+from bifocal.survey.setup import SurveySetup
 
 #: A scale further from 1 than this is no matter of taping distances.
 SCALE_SHARE = 0.01

@@ -13,7 +13,7 @@ from photocore.errors import GeometryError, InputError
 SCALE_TOLERANCE = 0.02
 #: Precision of a careful pick [px], and of a radial distance where the pixel size is unknown [mm].
 SIGMA_PIXEL, SIGMA_RADIAL = 0.5, 0.004
-#: The flags' limits, as in `bifocal.domain.pair`: blunder [sigma], on-plane [sigma], share of d2.
+#: The flags' limits, as in `bifocal.model.pair`: blunder [sigma], on-plane [sigma], share of d2.
 OFF_RADIAL_SIGMAS, ON_PLANE_SIGMAS, UNCERTAIN_SHARE = 3.5, 2.0, 0.02
 UNITS = ("mm", "px")
 

@@ -8,13 +8,13 @@ from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
-from bifocal.domain.observations import PointObservations
-from bifocal.domain.pair import Pair
-from bifocal.domain.setup import SurveySetup
-from bifocal.io.survey_book import write_book
-from bifocal.io.survey_content import POINT_ROWS, SurveyContent
-from bifocal.io.survey_words import LANGUAGES
-from bifocal.solvers.point_survey import solve_ideal, solve_pair
+from bifocal.model.pair import Pair
+from bifocal.survey.observations import PointObservations
+from bifocal.survey.point_survey import solve_ideal, solve_pair
+from bifocal.survey.setup import SurveySetup
+from bifocal.survey.workbook.book import write_book
+from bifocal.survey.workbook.content import POINT_ROWS, SurveyContent
+from bifocal.survey.workbook.words import LANGUAGES
 from photocore.errors import InputError
 from photocore.output import check_writable
 

@@ -6,9 +6,9 @@ from collections.abc import Collection
 
 import numpy as np
 
-from bifocal.domain.observations import PointObservations
-from bifocal.domain.pair import Pair
-from bifocal.domain.setup import SurveySetup
+from bifocal.model.pair import Pair
+from bifocal.survey.observations import PointObservations
+from bifocal.survey.setup import SurveySetup
 from photocore.arrays import FloatArray
 from photocore.errors import InputError
 

@@ -9,30 +9,30 @@ from typing import Any
 
 import numpy as np
 
-from bifocal.domain.observations import PointObservations
-from bifocal.domain.pair import Pair, Photo, apply_homography
-from bifocal.domain.reference import CheckResult, Georeference
-from bifocal.domain.relief_table import ReliefTable
-from bifocal.domain.setup import SCALE_TOLERANCE, SurveySetup
-from bifocal.domain.tolerances import RULES, ToleranceRule
-from bifocal.io.survey_reader import ReadOptions, SurveyInput, pair_of, read_survey
-from bifocal.io.survey_setup_reader import SetupValues
-from bifocal.solvers.check_points import check_points
-from bifocal.solvers.georeference import georeference
-from bifocal.solvers.point_survey import solve_ideal, solve_pair
-from bifocal.solvers.setup_check import SetupCheck, check_setup
-from bifocal.workflows.solve_remarks import (
+from bifocal.model.pair import Pair, Photo, apply_homography
+from bifocal.survey.check_points import check_points
+from bifocal.survey.georeferencing import georeference
+from bifocal.survey.observations import PointObservations
+from bifocal.survey.orientation_check import SetupCheck, check_setup
+from bifocal.survey.point_survey import solve_ideal, solve_pair
+from bifocal.survey.reference import CheckResult, Georeference
+from bifocal.survey.relief_table import ReliefTable
+from bifocal.survey.remarks import (
     exchanged_remark,
     georeference_remarks,
     opposite_signs_remark,
     point_remarks,
 )
-from bifocal.workflows.units import (
+from bifocal.survey.setup import SCALE_TOLERANCE, SurveySetup
+from bifocal.survey.tolerances import RULES, ToleranceRule
+from bifocal.survey.units import (
     refuse_far_stations,
     refuse_millimetres,
     refuse_pixels,
     refuse_wrong_unit,
 )
+from bifocal.survey.workbook.reader import ReadOptions, SurveyInput, pair_of, read_survey
+from bifocal.survey.workbook.setup_reader import SetupValues
 from photocore.arrays import FloatArray
 from photocore.errors import GeometryError, InputError
 

@@ -7,20 +7,20 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from multimedia.domain.adjustment import Adjustment, Unknowns
-from multimedia.domain.camera import EXTERIOR, Camera
-from multimedia.domain.flat_interface import FlatInterface
-from multimedia.domain.project import ObjectPoints, Project
-from multimedia.solvers.bundle_dense import LARGEST, solve_dense
-from multimedia.solvers.bundle_problem import (
+from multimedia.adjustment.bundle_dense import LARGEST, solve_dense
+from multimedia.adjustment.bundle_problem import (
     Observations,
     Problem,
     State,
     place_columns,
     with_common_values,
 )
-from multimedia.solvers.bundle_sparse import redundancy_numbers, solve_sparse
-from multimedia.solvers.bundle_starts import start_points, start_poses
+from multimedia.adjustment.bundle_sparse import redundancy_numbers, solve_sparse
+from multimedia.adjustment.bundle_starts import start_points, start_poses
+from multimedia.adjustment.unknowns import Adjustment, Unknowns
+from multimedia.media.camera import EXTERIOR, Camera
+from multimedia.media.flat_interface import FlatInterface
+from multimedia.projects.model import ObjectPoints, Project
 from photocore.arrays import BoolArray, FloatArray, IntArray
 from photocore.errors import GeometryError, InputError
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from multimedia.solvers.bundle_problem import Linear, Problem, State
+from multimedia.adjustment.bundle_problem import Linear, Problem, State
 from photocore.adjustment import Fit, fit
 from photocore.arrays import FloatArray, IntArray
 

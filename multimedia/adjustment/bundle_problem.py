@@ -7,12 +7,12 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from multimedia.domain.adjustment import Unknowns
-from multimedia.domain.camera import EXTERIOR, Camera
-from multimedia.domain.flat_interface import FlatInterface
-from multimedia.domain.interfaces import Interfaces
-from multimedia.domain.project import Project
-from multimedia.solvers.projection import project_with_jacobian
+from multimedia.adjustment.unknowns import Unknowns
+from multimedia.media.camera import EXTERIOR, Camera
+from multimedia.media.flat_interface import FlatInterface
+from multimedia.media.interfaces import Interfaces
+from multimedia.media.projection import project_with_jacobian
+from multimedia.projects.model import Project
 from photocore.arrays import BoolArray, FloatArray, IntArray
 from photocore.errors import GeometryError, InputError
 from photocore.rotation import rotation_from_vector

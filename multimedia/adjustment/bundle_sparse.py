@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import sparse
 
-from multimedia.solvers.bundle_problem import Linear, Problem, State
+from multimedia.adjustment.bundle_problem import Linear, Problem, State
 from photocore.arrays import FloatArray
 from photocore.errors import ConvergenceError, GeometryError
 

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from multimedia.domain.project import Project
+from multimedia.projects.model import Project
 from photocore.arrays import FloatArray, IntArray
 from photocore.errors import GeometryError
 
@@ -82,7 +82,7 @@ def rigid_motion(source: FloatArray, target: FloatArray) -> Pose:
 
 def _intersected(project: Project, ids: Sequence[str]) -> FloatArray:
     """Return points intersected from the start orientations; NaN where that fails."""
-    from multimedia.solvers.intersection import intersect
+    from multimedia.orientation.intersection import intersect
 
     image, _ = project.image_points.grid(project.camera_names, ids)
     return intersect(project.cameras, image, project.interfaces).xyz

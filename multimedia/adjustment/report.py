@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from multimedia.domain.adjustment import Adjustment
+from multimedia.adjustment.unknowns import Adjustment
 from photocore.output import atomic_path
 
 #: Correlations from here on are printed bold: two unknowns that can hardly be told apart.

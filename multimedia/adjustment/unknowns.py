@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from multimedia.domain.camera import INTERIOR
-from multimedia.domain.project import Project
+from multimedia.media.camera import INTERIOR
+from multimedia.projects.model import Project
 from photocore.adjustment import correlations
 from photocore.arrays import FloatArray, positive
 from photocore.errors import InputError

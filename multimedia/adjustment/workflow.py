@@ -7,12 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from multimedia.domain.adjustment import Adjustment, ScaleBar, Unknowns
-from multimedia.domain.flat_interface import FlatInterface
-from multimedia.io.adjustment_report import write_adjustment_report
-from multimedia.io.project_file import read_project, write_project
-from multimedia.solvers.bundle import bundle_adjust
-from multimedia.water import salinity_from_index, water_index_derivatives
+from multimedia.adjustment.bundle import bundle_adjust
+from multimedia.adjustment.report import write_adjustment_report
+from multimedia.adjustment.unknowns import Adjustment, ScaleBar, Unknowns
+from multimedia.media.flat_interface import FlatInterface
+from multimedia.projects.project_file import read_project, write_project
+from multimedia.refraction.water import salinity_from_index, water_index_derivatives
 from photocore.errors import InputError
 from photocore.output import check_writable
 

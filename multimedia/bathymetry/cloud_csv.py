@@ -12,7 +12,7 @@ from typing import TextIO
 
 import numpy as np
 
-from multimedia.io.clouds import CHUNK, Chunk, Cloud, CloudWriter
+from multimedia.bathymetry.clouds import CHUNK, Chunk, Cloud, CloudWriter
 from photocore.arrays import FloatArray
 from photocore.errors import CellError, InputError, WorkbookError
 

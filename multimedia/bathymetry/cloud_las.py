@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from multimedia.io.clouds import CHUNK, MARK, Chunk, Cloud, CloudWriter
+from multimedia.bathymetry.clouds import CHUNK, MARK, Chunk, Cloud, CloudWriter
 from photocore.arrays import FloatArray
 from photocore.errors import InputError
 

@@ -11,7 +11,7 @@ from typing import Any, BinaryIO
 
 import numpy as np
 
-from multimedia.io.clouds import CHUNK, MARK, Chunk, Cloud, CloudWriter
+from multimedia.bathymetry.clouds import CHUNK, MARK, Chunk, Cloud, CloudWriter
 from photocore.arrays import FloatArray, IntArray
 from photocore.errors import InputError
 

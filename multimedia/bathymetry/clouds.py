@@ -77,9 +77,9 @@ def open_cloud(path: Path | str) -> Cloud:
     InputError
         If the file is missing, of an unknown kind, damaged or without points.
     """
-    from multimedia.io.cloud_csv import CsvCloud
-    from multimedia.io.cloud_las import LasCloud
-    from multimedia.io.cloud_ply import PlyCloud
+    from multimedia.bathymetry.cloud_csv import CsvCloud
+    from multimedia.bathymetry.cloud_las import LasCloud
+    from multimedia.bathymetry.cloud_ply import PlyCloud
 
     path = Path(path)
     if path.is_dir():

@@ -8,9 +8,9 @@ from enum import IntEnum
 import numpy as np
 from numpy.typing import ArrayLike
 
-from multimedia.domain.height_field import HeightField
-from multimedia.domain.interfaces import HIGHEST_INDEX
-from multimedia.domain.surfaces import Plane
+from multimedia.media.height_field import HeightField
+from multimedia.media.interfaces import HIGHEST_INDEX
+from multimedia.media.surfaces import Plane
 from photocore.arrays import FloatArray, IntArray, as_floats
 from photocore.errors import GeometryError, InputError
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from multimedia.domain.surfaces import Plane
+from multimedia.media.surfaces import Plane
 from photocore.arrays import BoolArray, FloatArray, as_points
 from photocore.errors import GeometryError, InputError
 

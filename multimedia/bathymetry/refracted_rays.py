@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from multimedia.domain.bathymetry import (
+from multimedia.bathymetry.corrected_points import (
     BathymetryStatus,
     CorrectedPoints,
     WaterSurface,
@@ -15,8 +15,8 @@ from multimedia.domain.bathymetry import (
     checked_index,
     height_of,
 )
-from multimedia.domain.interfaces import Interfaces
-from multimedia.solvers.raytrace import trace_rays
+from multimedia.media.interfaces import Interfaces
+from multimedia.media.ray_tracing import trace_rays
 from photocore.arrays import BoolArray, FloatArray, IntArray, as_points
 from photocore.errors import InputError
 

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from multimedia.domain.bathymetry import (
+from multimedia.bathymetry.corrected_points import (
     BathymetryStatus,
     CorrectedPoints,
     Precision,
@@ -21,11 +21,11 @@ from multimedia.domain.bathymetry import (
     checked_index,
     height_of,
 )
-from multimedia.domain.interfaces import Interfaces
-from multimedia.domain.layers import Layers
-from multimedia.domain.shifting import radial_shift_derivatives
-from multimedia.domain.surfaces import Plane
-from multimedia.solvers.raytrace import aim_rays
+from multimedia.media.interfaces import Interfaces
+from multimedia.media.ray_tracing import aim_rays
+from multimedia.media.surfaces import Plane
+from multimedia.refraction.layers import Layers
+from multimedia.refraction.shifting import radial_shift_derivatives
 from photocore.arrays import BoolArray, FloatArray, IntArray, as_points
 from photocore.errors import GeometryError, InputError
 

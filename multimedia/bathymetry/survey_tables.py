@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from multimedia.io.project_file import read_project
+from multimedia.projects.project_file import read_project
 from photocore.arrays import FloatArray
 from photocore.errors import CellError, InputError, WorkbookError
 from photocore.tables import Column, Table, read_table

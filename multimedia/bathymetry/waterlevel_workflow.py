@@ -7,9 +7,9 @@ from pathlib import Path
 
 import numpy as np
 
-from multimedia.io.clouds import open_cloud
-from multimedia.io.water_surfaces import FORMAT
-from multimedia.solvers.water_surface import WaterLevel, mean_water_level
+from multimedia.bathymetry.clouds import open_cloud
+from multimedia.bathymetry.mean_water_level import WaterLevel, mean_water_level
+from multimedia.bathymetry.water_surfaces import FORMAT
 from photocore.errors import InputError
 from photocore.jsonfile import write_object
 from photocore.output import check_writable

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from multimedia.domain.height_field import WaveSurface
-from multimedia.domain.interfaces import Interfaces
-from multimedia.solvers.raytrace import aim_rays
-from multimedia.solvers.refracted_rays import intersect_refracted_rays
+from multimedia.bathymetry.refracted_rays import intersect_refracted_rays
+from multimedia.media.height_field import WaveSurface
+from multimedia.media.interfaces import Interfaces
+from multimedia.media.ray_tracing import aim_rays
 from photocore.arrays import FloatArray, as_points
 from photocore.errors import InputError
 

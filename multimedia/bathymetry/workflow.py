@@ -9,7 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from multimedia.domain.bathymetry import (
+from multimedia.bathymetry.clouds import MARK, Chunk, Cloud, open_cloud
+from multimedia.bathymetry.corrected_points import (
     BathymetryStatus,
     CorrectedPoints,
     Precision,
@@ -17,22 +18,21 @@ from multimedia.domain.bathymetry import (
     checked_index,
     height_of,
 )
-from multimedia.domain.surfaces import Plane
-from multimedia.io.clouds import MARK, Chunk, Cloud, open_cloud
-from multimedia.io.dem import Dem, Window
-from multimedia.io.survey_tables import (
+from multimedia.bathymetry.dem import Dem, Window
+from multimedia.bathymetry.refracted_rays import correct_lidar_beams, intersect_refracted_rays
+from multimedia.bathymetry.refraction_correction import correct_bathymetry
+from multimedia.bathymetry.regrid import pull_back
+from multimedia.bathymetry.survey_tables import (
     CameraPositions,
     read_camera_positions,
     read_rays,
     read_trajectory,
     read_visibility,
 )
-from multimedia.io.water_surfaces import read_water_surface
-from multimedia.solvers.bathymetry import correct_bathymetry
-from multimedia.solvers.refracted_rays import correct_lidar_beams, intersect_refracted_rays
-from multimedia.solvers.regrid import pull_back
+from multimedia.bathymetry.water_surfaces import read_water_surface
+from multimedia.media.surfaces import Plane
 from photocore.arrays import BoolArray, FloatArray
-from photocore.console import Progress, no_progress
+from photocore.cli import Progress, no_progress
 from photocore.errors import GeometryError, InputError
 from photocore.output import atomic_path, check_writable
 from photocore.tables import write_csv

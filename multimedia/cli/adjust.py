@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING
 
 import click
 
-from photocore.console import print_json, remark, text_table
+from photocore.cli import print_json, remark, text_table
 
 if TYPE_CHECKING:
-    from multimedia.domain.adjustment import Adjustment
+    from multimedia.adjustment.unknowns import Adjustment
 
 EXAMPLE = """\b
 Examples:
@@ -83,8 +83,8 @@ def command(
     overwrite: bool, as_json: bool,
 ) -> None:  # fmt: skip
     """Adjust cameras, object points and the media of a project together."""
-    from multimedia.domain.adjustment import Unknowns
-    from multimedia.workflows import adjust
+    from multimedia.adjustment import workflow as adjust
+    from multimedia.adjustment.unknowns import Unknowns
 
     unknowns = Unknowns(
         fixed_cameras=fix_camera, interior=interior, shared_interior=shared_interior, media=media,

@@ -151,9 +151,9 @@ def command(
     """
     from math import radians
 
-    from multimedia.domain.bathymetry import Precision
-    from multimedia.workflows.bathymetry import Job, correct_file
-    from photocore.console import print_json, progress_bar, remark
+    from multimedia.bathymetry.corrected_points import Precision
+    from multimedia.bathymetry.workflow import Job, correct_file
+    from photocore.cli import print_json, progress_bar, remark
 
     if visibility and not cameras:
         raise click.UsageError("--visibility needs --cameras.")

@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING
 
 import click
 
-from photocore.console import print_json, remark, text_table
+from photocore.cli import print_json, remark, text_table
 from photocore.options import Size
 
 if TYPE_CHECKING:
-    from multimedia.domain.design import Design
+    from multimedia.design.studies import Design
 
 EXAMPLE = """\b
 Examples:
@@ -74,7 +74,7 @@ def command(
     """
     from math import radians
 
-    from multimedia.workflows import design
+    from multimedia.design import workflow as design
 
     if project is not None:
         result = design.design_project(project, seed=seed)

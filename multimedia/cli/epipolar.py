@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING
 
 import click
 
-from photocore.console import print_json, remark, text_table
+from photocore.cli import print_json, remark, text_table
 
 if TYPE_CHECKING:
-    from multimedia.workflows.epipolar import Curves
+    from multimedia.orientation.epipolar_workflow import Curves
 
 EXAMPLE = """\b
 Examples:
@@ -94,7 +94,7 @@ def command(
     whose chords stay within --chord. The image points of the other camera near it are listed with
     the object point each of them would give.
     """
-    from multimedia.workflows.epipolar import epipolar_project
+    from multimedia.orientation.epipolar_workflow import epipolar_project
 
     found = epipolar_project(
         project, camera=camera, other=other, ids=ids, at=at, z_range=z_range,

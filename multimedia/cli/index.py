@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import click
 
-from photocore.console import print_json, remark
+from photocore.cli import print_json, remark
 
 EXAMPLE = """\b
 Examples:
@@ -71,7 +71,7 @@ def command(
     """
     if (from_index is None) != (find is None):
         raise click.UsageError("--from-index and --find belong together.")
-    from multimedia.workflows.water import find_from_index, find_index
+    from multimedia.workbook.index_workflow import find_from_index, find_index
 
     if find is None or from_index is None:
         result = find_index(

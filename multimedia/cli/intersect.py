@@ -45,7 +45,7 @@ def command(
     sigma_image says), the camera to suspect where rays do not meet, and a status.
     """
     from multimedia.cli.tables import show
-    from multimedia.workflows.cameras import intersect_project
+    from multimedia.orientation.workflow import intersect_project
 
     table = intersect_project(project, points=points, out=out, method=method, overwrite=overwrite)
     places = dict.fromkeys(("X", "Y", "Z"), 4) | {"angle": 1, "sigma0": 2}

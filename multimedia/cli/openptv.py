@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from photocore.console import print_json, remark, text_table
+from photocore.cli import print_json, remark, text_table
 
 EXAMPLE = """\b
 Examples:
@@ -54,7 +54,7 @@ def command(
     the control points among the targets of the calibration images, starting from the stored
     orientation; and says what looks wrong, such as interchanged indices of glass and water.
     """
-    from multimedia.workflows.openptv import export_openptv, import_openptv
+    from multimedia.openptv.workflow import export_openptv, import_openptv
 
     if export is not None:
         written = export_openptv(source, export, overwrite=overwrite)

@@ -32,7 +32,7 @@ def command(
     see have a status that says why.
     """
     from multimedia.cli.tables import show
-    from multimedia.workflows.cameras import project_project
+    from multimedia.orientation.workflow import project_project
 
     table = project_project(project, points=points, out=out, overwrite=overwrite)
     show(table, as_json=as_json, out=out, digits={"x": 6, "y": 6, "col": 4, "row": 4})

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING
 
 import click
 
-from photocore.console import print_json, remark, text_table
+from photocore.cli import print_json, remark, text_table
 
 if TYPE_CHECKING:
-    from multimedia.workflows.cameras import Resected
+    from multimedia.orientation.workflow import Resected
 
 EXAMPLE = """\b
 Examples:
@@ -54,7 +54,7 @@ def command(
     may be as poor as you like. Prints every estimated parameter with its standard deviation;
     angles in degrees, image lengths in mm, object lengths in the unit of the project.
     """
-    from multimedia.workflows.cameras import resect_project, resected_as_dict
+    from multimedia.orientation.workflow import resect_project, resected_as_dict
 
     names = tuple(name.strip() for name in estimate.split(",") if name.strip())
     if names == ("all",):
@@ -76,7 +76,7 @@ def command(
 
 def _print(found: Resected) -> None:
     """Print parameters with their standard deviations."""
-    from multimedia.workflows.cameras import resected_as_dict
+    from multimedia.orientation.workflow import resected_as_dict
 
     for camera in resected_as_dict(found)["cameras"]:
         sigma0 = f"{camera['sigma0_um']:.3f} um" if camera["redundancy"] else "unknown"

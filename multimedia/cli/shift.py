@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from photocore.console import print_json, remark
+from photocore.cli import print_json, remark
 from photocore.options import Numbers
 
 EXAMPLE = """\b
@@ -68,7 +68,7 @@ def command(
         raise click.UsageError("give --out FILE, --json, or both.")
     if camera is not None and z0 is not None:
         raise click.UsageError("give --camera or --z0, not both.")
-    from multimedia.workflows.shift import shift_file
+    from multimedia.workbook.workflow import shift_file
 
     report = shift_file(
         source, out, camera=camera, z0=z0, indices=indices, thicknesses=thicknesses,

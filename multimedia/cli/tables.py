@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING
 
 import click
 
-from photocore.console import print_json, remark, text_table
+from photocore.cli import print_json, remark, text_table
 
 if TYPE_CHECKING:
-    from multimedia.workflows.cameras import Table
+    from multimedia.orientation.workflow import Table
 
 #: Rows printed when the table also goes into a file.
 _SHOWN = 10

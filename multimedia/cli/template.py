@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from photocore.console import remark
+from photocore.cli import remark
 
 EXAMPLE = """\b
 Examples:
@@ -32,7 +32,7 @@ def command(out: Path, rows: int, newton: int, overwrite: bool) -> None:
 
     No macros, no circular references: Excel, LibreOffice and others calculate it.
     """
-    from multimedia.workflows.shift import write_template
+    from multimedia.workbook.workflow import write_template
 
     write_template(out, rows=rows, steps=newton, overwrite=overwrite)
     remark(f"Workbook written to {out}")

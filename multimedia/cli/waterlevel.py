@@ -47,8 +47,8 @@ def command(
     POINTS is a table or point cloud (.csv .txt .xyz .ply .las .laz). The surface is the highest
     group of points of about one height; points on the bottom and blunders are rejected.
     """
-    from multimedia.workflows.waterlevel import fit_water_level
-    from photocore.console import print_json, remark
+    from multimedia.bathymetry.waterlevel_workflow import fit_water_level
+    from photocore.cli import print_json, remark
 
     fitted = fit_water_level(
         source, tilted=tilted, spread=spread, target=target, overwrite=overwrite

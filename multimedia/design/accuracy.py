@@ -11,14 +11,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from multimedia.domain.camera import EXTERIOR, Camera
-from multimedia.domain.design import CalibrationCosts, Placement, Study
-from multimedia.domain.flat_interface import FlatInterface
-from multimedia.domain.layers import Layers
-from multimedia.solvers.intersection import intersect
-from multimedia.solvers.object_rays import image_rays
-from multimedia.solvers.projection import project, project_with_jacobian
-from multimedia.solvers.resection import resect
+from multimedia.design.studies import CalibrationCosts, Placement, Study
+from multimedia.media.camera import EXTERIOR, Camera
+from multimedia.media.flat_interface import FlatInterface
+from multimedia.media.projection import project, project_with_jacobian
+from multimedia.orientation.intersection import intersect
+from multimedia.orientation.object_rays import image_rays
+from multimedia.orientation.resection import resect
+from multimedia.refraction.layers import Layers
 from photocore.arrays import BoolArray, FloatArray, as_points, positive
 from photocore.errors import GeometryError, InputError, PhotogrammetryError
 

@@ -10,7 +10,7 @@ import numpy as np
 from photocore.output import atomic_path
 
 if TYPE_CHECKING:
-    from multimedia.domain.design import Design
+    from multimedia.design.studies import Design
 
 
 def write_design_workbook(path: Path | str, design: Design, *, overwrite: bool = False) -> None:

@@ -16,11 +16,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from multimedia.domain.layers import Layers
-from multimedia.domain.shifting import radial_shift
-from multimedia.materials import Material
-from multimedia.snell import refracted_angle
-from multimedia.water import QUAN_FRY, WaterFormula, water_refractive_index
+from multimedia.refraction.layers import Layers
+from multimedia.refraction.materials import Material
+from multimedia.refraction.shifting import radial_shift
+from multimedia.refraction.snell import refracted_angle
+from multimedia.refraction.water import QUAN_FRY, WaterFormula, water_refractive_index
 from photocore.arrays import FloatArray, as_floats, as_points, positive
 from photocore.errors import InputError
 

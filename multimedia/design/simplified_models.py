@@ -1,8 +1,8 @@
 r"""Simplified models of the literature, each with the error it makes in the user's own set-up.
 
 All three hold for a camera that looks at right angles through the layers. They replace refraction
-by changes of the ordinary camera model; the exact shift (`multimedia.shift`) tells how far off
-that leaves the points.
+by changes of the ordinary camera model; the exact shift (`multimedia.refraction.shift`) tells how
+far off that leaves the points.
 
 References
 ----------
@@ -19,8 +19,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from multimedia.domain.layers import Layers
-from multimedia.domain.shifting import radial_shift_ratio
+from multimedia.refraction.layers import Layers
+from multimedia.refraction.shifting import radial_shift_ratio
 from photocore.arrays import FloatArray, as_floats, positive
 from photocore.errors import InputError
 

@@ -28,7 +28,7 @@ class Study:
         Cameras that see it.
     sensitivity : mapping of str to ndarray, shape (3,)
         Unknown of the media, e.g. ``tank:index3``, to the RMS error of X, Y, Z that one step of it
-        causes (steps as `multimedia.solvers.design.STEPS`). [object unit]
+        causes (steps as `multimedia.design.accuracy.STEPS`). [object unit]
     """
 
     points: FloatArray

@@ -9,14 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from multimedia.domain.camera import Camera
-from multimedia.domain.design import Design, Placement, Study
-from multimedia.domain.flat_interface import FlatInterface
-from multimedia.domain.layers import Layers
-from multimedia.io.design_files import write_design_plot, write_design_workbook
-from multimedia.io.project_file import read_project
-from multimedia.solvers.approximations import agrafiotis, lavest, telem
-from multimedia.solvers.design import (
+from multimedia.design.accuracy import (
     STEPS,
     calibration_costs,
     compare_placements,
@@ -24,7 +17,14 @@ from multimedia.solvers.design import (
     ring_of_cameras,
     study_setup,
 )
-from multimedia.solvers.dispersion import layers_per_colour, seam_width
+from multimedia.design.design_files import write_design_plot, write_design_workbook
+from multimedia.design.dispersion import layers_per_colour, seam_width
+from multimedia.design.simplified_models import agrafiotis, lavest, telem
+from multimedia.design.studies import Design, Placement, Study
+from multimedia.media.camera import Camera
+from multimedia.media.flat_interface import FlatInterface
+from multimedia.projects.project_file import read_project
+from multimedia.refraction.layers import Layers
 from photocore.arrays import FloatArray
 from photocore.errors import GeometryError, InputError
 from photocore.output import check_writable

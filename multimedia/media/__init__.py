@@ -1,1 +1,1 @@
-"""Frozen objects that describe the survey, checked when they are made."""
+"""Cameras and what lies between camera and object: interfaces, ray tracing, projection."""

@@ -26,7 +26,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from multimedia.shift import shift_ratio
+from multimedia.refraction.shift import shift_ratio
 from photocore.arrays import FloatArray
 
 

@@ -8,9 +8,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from multimedia.collinearity import Medium
-from multimedia.domain.camera import Camera
-from multimedia.domain.layers import Layers
+from multimedia.media.camera import Camera
+from multimedia.media.collinearity import Medium
+from multimedia.refraction.layers import Layers
 from photocore.arrays import FloatArray, as_floats, read_only
 from photocore.errors import GeometryError, InputError
 from photocore.rotation import rotation_from_vector

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from multimedia.domain.surfaces import Surface
+from multimedia.media.surfaces import Surface
 from photocore.arrays import BoolArray, FloatArray, as_floats, as_points, read_only
 from photocore.errors import InputError
 

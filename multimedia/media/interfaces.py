@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from multimedia.domain.layers import Layers
-from multimedia.domain.surfaces import Cylinder, Plane, Sphere, Surface
+from multimedia.media.surfaces import Cylinder, Plane, Sphere, Surface
+from multimedia.refraction.layers import Layers
 from photocore.arrays import BoolArray, FloatArray, as_floats, read_only
 from photocore.errors import GeometryError, InputError
 

@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from multimedia.domain.interfaces import Interfaces
-from multimedia.domain.surfaces import Plane
+from multimedia.media.interfaces import Interfaces
+from multimedia.media.surfaces import Plane
 from photocore.arrays import BoolArray, FloatArray
 
 #: A thin gap beside the critical angle gains a factor of 1.5 per step: 60 steps for 1e10.

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from multimedia.domain.height_field import HeightField
+from multimedia.media.height_field import HeightField
 from photocore.arrays import BoolArray, FloatArray, IntArray, as_floats, read_only
 from photocore.errors import InputError
 

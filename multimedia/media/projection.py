@@ -8,14 +8,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from multimedia.collinearity import Shifts, image_vectors, shifts
-from multimedia.domain.camera import EXTERIOR, INTERIOR, Camera
-from multimedia.domain.flat_interface import FlatInterface
-from multimedia.domain.interfaces import Interfaces
-from multimedia.domain.layers import Layers
-from multimedia.domain.ray_paths import RayStatus
-from multimedia.solvers.raytrace import aim_rays
-from multimedia.solvers.traced_projection import sight, sight_vectors
+from multimedia.media.camera import EXTERIOR, INTERIOR, Camera
+from multimedia.media.collinearity import Shifts, image_vectors, shifts
+from multimedia.media.flat_interface import FlatInterface
+from multimedia.media.interfaces import Interfaces
+from multimedia.media.ray_paths import RayStatus
+from multimedia.media.ray_tracing import aim_rays
+from multimedia.media.traced_projection import sight, sight_vectors
+from multimedia.refraction.layers import Layers
 from photocore.arrays import BoolArray, FloatArray, as_points
 from photocore.errors import InputError
 
@@ -86,7 +86,7 @@ def project(camera: Camera, points: ArrayLike, layers: Media = None) -> FloatArr
     Notes
     -----
     Collinearity with the radially shifted point, exact for any tilt and number of parallel
-    layers: Maas 2015, Sect. 2; see `multimedia.collinearity`.
+    layers: Maas 2015, Sect. 2; see `multimedia.media.collinearity`.
 
     References
     ----------

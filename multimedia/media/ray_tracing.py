@@ -15,10 +15,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from multimedia.domain.interfaces import Interfaces
-from multimedia.domain.ray_paths import RayPaths, RayStatus
-from multimedia.domain.surfaces import Plane
-from multimedia.solvers.least_time import least_time_path
+from multimedia.media.interfaces import Interfaces
+from multimedia.media.least_time import least_time_path
+from multimedia.media.ray_paths import RayPaths, RayStatus
+from multimedia.media.surfaces import Plane
 from photocore.arrays import BoolArray, FloatArray, IntArray, as_points
 
 #: Rays per block: keeps the working set of a block in the cache and memory constant.

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from multimedia.domain.camera import EXTERIOR, Camera
-from multimedia.domain.interfaces import Interfaces
-from multimedia.solvers.raytrace import aim_rays, trace_rays
+from multimedia.media.camera import EXTERIOR, Camera
+from multimedia.media.interfaces import Interfaces
+from multimedia.media.ray_tracing import aim_rays, trace_rays
 from photocore.arrays import FloatArray
 from photocore.errors import InputError
 

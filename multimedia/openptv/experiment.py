@@ -8,10 +8,9 @@ from pathlib import Path
 
 import numpy as np
 
-from multimedia.domain.camera import Camera
-from multimedia.domain.flat_interface import FlatInterface
-from multimedia.domain.project import SHOWN, ImagePoints, ObjectPoints, Project
-from multimedia.io.openptv_files import (
+from multimedia.media.camera import Camera
+from multimedia.media.flat_interface import FlatInterface
+from multimedia.openptv.openptv_files import (
     ControlParameters,
     Targets,
     addpar_text,
@@ -24,6 +23,7 @@ from multimedia.io.openptv_files import (
     read_manual,
     read_targets,
 )
+from multimedia.projects.model import SHOWN, ImagePoints, ObjectPoints, Project
 from photocore.arrays import FloatArray, IntArray
 from photocore.distortion import Brown, Convention
 from photocore.errors import InputError

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import numpy as np
 
-from multimedia.domain.camera import Camera, Sensor
-from multimedia.domain.flat_interface import FlatInterface
-from multimedia.domain.layers import Layers
+from multimedia.media.camera import Camera, Sensor
+from multimedia.media.flat_interface import FlatInterface
+from multimedia.refraction.layers import Layers
 from photocore.arrays import FloatArray, IntArray
 from photocore.distortion import Brown, Convention
 from photocore.errors import GeometryError, InputError

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from multimedia.domain.camera import Camera
-from multimedia.solvers.projection import Placed, project
-from multimedia.solvers.resection import resect
+from multimedia.media.camera import Camera
+from multimedia.media.projection import Placed, project
+from multimedia.orientation.resection import resect
 from photocore.arrays import FloatArray, IntArray
 from photocore.errors import ConvergenceError, GeometryError, InputError
 

@@ -8,13 +8,18 @@ from pathlib import Path
 
 import numpy as np
 
-from multimedia.domain.camera import Camera
-from multimedia.domain.project import ImagePoints, Project
-from multimedia.io.openptv import Experiment, particle_points, read_experiment, write_experiment
-from multimedia.io.openptv_files import Targets
-from multimedia.io.project_file import read_project, write_project
-from multimedia.solvers.resection import resect
-from multimedia.solvers.target_matching import FIRST_RADIUS, match_targets
+from multimedia.media.camera import Camera
+from multimedia.openptv.experiment import (
+    Experiment,
+    particle_points,
+    read_experiment,
+    write_experiment,
+)
+from multimedia.openptv.openptv_files import Targets
+from multimedia.openptv.target_matching import FIRST_RADIUS, match_targets
+from multimedia.orientation.resection import resect
+from multimedia.projects.model import ImagePoints, Project
+from multimedia.projects.project_file import read_project, write_project
 from photocore.arrays import FloatArray
 from photocore.errors import PhotogrammetryError
 from photocore.output import check_writable

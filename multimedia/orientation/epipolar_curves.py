@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from multimedia.domain.camera import Camera
-from multimedia.solvers.object_rays import image_rays
-from multimedia.solvers.projection import Media, as_interface, project
+from multimedia.media.camera import Camera
+from multimedia.media.projection import Media, as_interface, project
+from multimedia.orientation.object_rays import image_rays
 from photocore.arrays import FloatArray, IntArray, as_points
 from photocore.errors import InputError
 

@@ -9,13 +9,13 @@ from typing import Any
 
 import numpy as np
 
-from multimedia.domain.camera import Camera
-from multimedia.domain.project import SHOWN, ImagePoints, Project
-from multimedia.io.epipolar_picture import draw_epipolar
-from multimedia.io.point_tables import write_columns
-from multimedia.io.project_file import read_project
-from multimedia.solvers.epipolar import epipolar_candidates, epipolar_curve
-from multimedia.solvers.intersection import intersect_pairs
+from multimedia.media.camera import Camera
+from multimedia.orientation.epipolar_curves import epipolar_candidates, epipolar_curve
+from multimedia.orientation.epipolar_picture import draw_epipolar
+from multimedia.orientation.intersection import intersect_pairs
+from multimedia.projects.model import SHOWN, ImagePoints, Project
+from multimedia.projects.point_tables import write_columns
+from multimedia.projects.project_file import read_project
 from photocore.arrays import FloatArray
 from photocore.errors import InputError
 from photocore.output import check_writable

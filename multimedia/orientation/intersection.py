@@ -10,11 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.stats import chi2
 
-from multimedia.domain.camera import Camera
-from multimedia.domain.point_status import PointStatus
-from multimedia.domain.project import SIGMA_IMAGE, SIGMA_PIXEL
-from multimedia.solvers.object_rays import image_rays, inverse_3x3, nearest_points, times
-from multimedia.solvers.projection import (
+from multimedia.media.camera import Camera
+from multimedia.media.projection import (
     Media,
     Placed,
     as_interface,
@@ -22,6 +19,9 @@ from multimedia.solvers.projection import (
     project_with_jacobian,
     refuse_pixels,
 )
+from multimedia.orientation.object_rays import image_rays, inverse_3x3, nearest_points, times
+from multimedia.orientation.point_status import PointStatus
+from multimedia.projects.model import SIGMA_IMAGE, SIGMA_PIXEL
 from photocore.arrays import BoolArray, FloatArray, IntArray, as_points
 from photocore.errors import InputError
 

@@ -7,11 +7,11 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
-from multimedia.collinearity import rays_in_object_space
-from multimedia.domain.camera import Camera
-from multimedia.domain.interfaces import Interfaces
-from multimedia.solvers.projection import Media, as_interface
-from multimedia.solvers.traced_projection import object_rays as traced_rays
+from multimedia.media.camera import Camera
+from multimedia.media.collinearity import rays_in_object_space
+from multimedia.media.interfaces import Interfaces
+from multimedia.media.projection import Media, as_interface
+from multimedia.media.traced_projection import object_rays as traced_rays
 from photocore.arrays import FloatArray, as_points
 
 

@@ -6,12 +6,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from multimedia.collinearity import image_vectors
-from multimedia.domain.camera import Camera
-from multimedia.domain.flat_interface import FlatInterface
-from multimedia.domain.interfaces import Interfaces
-from multimedia.solvers.projection import Placed
-from multimedia.solvers.traced_projection import sight_vectors
+from multimedia.media.camera import Camera
+from multimedia.media.collinearity import image_vectors
+from multimedia.media.flat_interface import FlatInterface
+from multimedia.media.interfaces import Interfaces
+from multimedia.media.projection import Placed
+from multimedia.media.traced_projection import sight_vectors
 from photocore.arrays import FloatArray
 from photocore.errors import GeometryError
 

@@ -8,16 +8,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from multimedia.domain.camera import EXTERIOR, INTERIOR, Camera
-from multimedia.domain.flat_interface import FlatInterface
-from multimedia.solvers.pose_starts import pose_starts
-from multimedia.solvers.projection import (
+from multimedia.media.camera import EXTERIOR, INTERIOR, Camera
+from multimedia.media.flat_interface import FlatInterface
+from multimedia.media.projection import (
     Media,
     Placed,
     as_interface,
     project_with_jacobian,
     refuse_pixels,
 )
+from multimedia.orientation.pose_starts import pose_starts
 from photocore.adjustment import correlations, fit, minimise
 from photocore.arrays import BoolArray, FloatArray, as_points
 from photocore.errors import ConvergenceError, GeometryError, InputError

@@ -9,20 +9,20 @@ from typing import Any
 
 import numpy as np
 
-from multimedia.domain.camera import EXTERIOR, INTERIOR
-from multimedia.domain.point_status import PointStatus
-from multimedia.domain.project import SHOWN, ImagePoints, ObjectPoints, Project
-from multimedia.io.point_tables import read_image_points, read_object_points, write_columns
-from multimedia.io.project_file import read_project, write_project
-from multimedia.solvers.intersection import (
+from multimedia.media.camera import EXTERIOR, INTERIOR
+from multimedia.media.projection import project as project_points
+from multimedia.media.projection import projection_status
+from multimedia.orientation.intersection import (
     Intersection,
     intersect,
     intersect_pairs,
     intersect_rays,
 )
-from multimedia.solvers.projection import project as project_points
-from multimedia.solvers.projection import projection_status
-from multimedia.solvers.resection import Resection, resect
+from multimedia.orientation.point_status import PointStatus
+from multimedia.orientation.resection import Resection, resect
+from multimedia.projects.model import SHOWN, ImagePoints, ObjectPoints, Project
+from multimedia.projects.point_tables import read_image_points, read_object_points, write_columns
+from multimedia.projects.project_file import read_project, write_project
 from photocore.arrays import FloatArray
 from photocore.errors import InputError
 from photocore.output import check_writable

@@ -1,1 +1,1 @@
-"""Files to domain objects and back; no mathematics."""
+"""A photogrammetric project and its files: cameras, media, object points, image points."""

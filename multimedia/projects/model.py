@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from multimedia.domain.camera import Camera
-from multimedia.domain.flat_interface import FlatInterface
-from multimedia.domain.interfaces import Interfaces
+from multimedia.media.camera import Camera
+from multimedia.media.flat_interface import FlatInterface
+from multimedia.media.interfaces import Interfaces
 from photocore.arrays import FloatArray, read_only
 from photocore.errors import InputError
 

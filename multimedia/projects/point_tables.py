@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from multimedia.domain.camera import Camera
-from multimedia.domain.project import SHOWN, ImagePoints, ObjectPoints
+from multimedia.media.camera import Camera
+from multimedia.projects.model import SHOWN, ImagePoints, ObjectPoints
 from photocore.arrays import FloatArray
 from photocore.errors import CellError, InputError, WorkbookError
 from photocore.tables import Column, Table, open_tables, read_table, write_csv

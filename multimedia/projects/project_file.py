@@ -9,11 +9,11 @@ from typing import Any
 
 import numpy as np
 
-from multimedia.domain.camera import Camera, Sensor
-from multimedia.domain.flat_interface import FlatInterface
-from multimedia.domain.interfaces import Interfaces
-from multimedia.domain.layers import Layers
-from multimedia.domain.project import (
+from multimedia.media.camera import Camera, Sensor
+from multimedia.media.flat_interface import FlatInterface
+from multimedia.media.interfaces import Interfaces
+from multimedia.media.surfaces import Cylinder, Plane, Sphere, Surface
+from multimedia.projects.model import (
     SIGMA_IMAGE,
     SIGMA_PIXEL,
     ImagePoints,
@@ -21,8 +21,7 @@ from multimedia.domain.project import (
     Project,
     refuse_repeated,
 )
-from multimedia.domain.surfaces import Cylinder, Plane, Sphere, Surface
-from multimedia.io.point_tables import (
+from multimedia.projects.point_tables import (
     METRES,
     image_columns,
     object_columns,
@@ -30,6 +29,7 @@ from multimedia.io.point_tables import (
     read_object_points,
     write_columns,
 )
+from multimedia.refraction.layers import Layers
 from photocore.distortion import NAMES, Brown, Convention
 from photocore.errors import GeometryError, InputError
 from photocore.output import atomic_path, check_writable

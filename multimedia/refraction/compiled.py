@@ -1,6 +1,6 @@
 r"""The radial shift compiled to machine code, for hundreds of millions of points.
 
-The same mathematics as `multimedia.tangent`, in blocks small enough for the first-level cache,
+The same mathematics as `multimedia.refraction.tangent`, in blocks that fit the first-level cache,
 loops the compiler turns into vector instructions, and threads. Needs the extra ``fast`` (numba).
 Steep rays and absent layers are handed to the numpy kernel, so the results agree to the last digit
 or two.
@@ -17,7 +17,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from multimedia.tangent import solve
+from multimedia.refraction.tangent import solve
 from photocore.arrays import BoolArray, FloatArray
 from photocore.errors import MissingExtraError
 
@@ -48,7 +48,7 @@ def compiled_solve(
     *,
     threads: int | None = None,
 ) -> FloatArray:
-    """Return the shifted radius, as ``multimedia.tangent.solve``.
+    """Return the shifted radius, as ``multimedia.refraction.tangent.solve``.
 
     Parameters
     ----------
@@ -151,7 +151,7 @@ def _shift_blocks(
     out: FloatArray,
     unsure: BoolArray,
 ) -> None:
-    """Shift every element, in loops that the compiler vectorises; see `multimedia.tangent`."""
+    """Shift every element, in loops that the compiler vectorises."""
     layers = a.size
     t, value, slope = np.empty(inner), np.empty(inner), np.empty(inner)
     whole, straight = np.empty(inner), np.empty(inner)

@@ -1,7 +1,7 @@
 r"""The iteration of the papers, step by step as printed, with its epsilon and over-compensation.
 
-`multimedia.shift` solves the same equations to the last digit and for more set-ups. This module is
-for following the papers, for checking other programs, and for teaching.
+`multimedia.refraction.shift` solves the same equations to the last digit and for more set-ups. This
+module is for following the papers, for checking other programs, and for teaching.
 
 References
 ----------
@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from multimedia.shift import axis_ratio
+from multimedia.refraction.shift import axis_ratio
 from photocore.arrays import BoolArray, FloatArray, IntArray, as_floats, positive
 from photocore.errors import InputError
 
@@ -158,7 +158,7 @@ def best_over_compensation(
     -----
     The ideal factor is :math:`\partial\bar R/\partial R` at the solution. It is taken where
     paraxial optics puts the point, :math:`\bar R \approx R \sum h_i / \sum (h_i n_1 / n_i)`, with
-    the weights :math:`1 / \cos^3\beta_i` of `multimedia.shift.shift_derivatives`.
+    the weights :math:`1 / \cos^3\beta_i` of `multimedia.refraction.shift.shift_derivatives`.
 
     Examples
     --------

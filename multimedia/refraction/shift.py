@@ -30,8 +30,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from multimedia.compiled import WORTHWHILE, compiled_solve, is_available
-from multimedia.tangent import solve
+from multimedia.refraction.compiled import WORTHWHILE, compiled_solve, is_available
+from multimedia.refraction.tangent import solve
 from photocore.arrays import FloatArray, as_floats
 from photocore.errors import InputError
 

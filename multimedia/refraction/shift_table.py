@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.interpolate import CubicSpline
 
-from multimedia.domain.layers import Layers
-from multimedia.shift import shift_ratio, shifted_radius
+from multimedia.refraction.layers import Layers
+from multimedia.refraction.shift import shift_ratio, shifted_radius
 from photocore.arrays import FloatArray, as_floats, positive
 from photocore.errors import GeometryError, InputError
 

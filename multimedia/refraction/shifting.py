@@ -5,8 +5,13 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from multimedia.domain.layers import Layers
-from multimedia.shift import ShiftDerivatives, shift_derivatives, shift_ratio, shifted_radius
+from multimedia.refraction.layers import Layers
+from multimedia.refraction.shift import (
+    ShiftDerivatives,
+    shift_derivatives,
+    shift_ratio,
+    shifted_radius,
+)
 from photocore.arrays import FloatArray
 
 

@@ -1,6 +1,6 @@
 r"""Root of F(t) = R: the numerical core of the radial shift, in numpy.
 
-See `multimedia.shift` for the equations. Everything here works on rows of a few thousand elements
+See `multimedia.refraction.shift` for the equations. All works on rows of a few thousand elements
 with scratch that stays in the processor's cache.
 """
 
@@ -10,7 +10,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from photocore import twofold
+from photocore import double_double as twofold
 from photocore.arrays import FloatArray
 
 #: Elements worked on at a time: the dozen scratch rows stay in the processor's second-level cache.

@@ -52,7 +52,7 @@ def unrolled_shift(
     Parameters
     ----------
     radius, heights, indices
-        As in `multimedia.shift.shifted_radius`.
+        As in `multimedia.refraction.shift.shifted_radius`.
     steps : int
         Number of Newton steps.
 

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from multimedia.io.live_book import LiveBook, allow_between, headings
-from multimedia.water import (
+from multimedia.refraction.water import (
     QUAN_FRY,
     salinity_from_index,
     water_index_derivatives,
     water_refractive_index,
 )
+from multimedia.workbook.live_book import LiveBook, allow_between, headings
 
 
 def write_index_sheet(book: LiveBook) -> float:

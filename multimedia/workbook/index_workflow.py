@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from math import hypot
 from typing import Any
 
-from multimedia.water import (
+from multimedia.refraction.water import (
     WATER_FORMULAS,
     WaterFormula,
     salinity_from_index,

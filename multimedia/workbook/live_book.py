@@ -15,8 +15,8 @@ from openpyxl.worksheet.datavalidation import DataValidation
 from openpyxl.worksheet.worksheet import Worksheet
 
 from photocore.output import check_writable
-from photocore.spreadsheet.cellxml import CellInput
-from photocore.spreadsheet.editor import WorkbookEditor
+from photocore.workbook.cellxml import CellInput
+from photocore.workbook.editor import WorkbookEditor
 
 INPUT = PatternFill("solid", start_color="FFF9DB", end_color="FFF9DB")
 HEAD = PatternFill("solid", start_color="DCE6F1", end_color="DCE6F1")

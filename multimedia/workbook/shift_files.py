@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from multimedia.domain.layers import Layers
-from multimedia.domain.shift_points import ShiftPoints, ShiftResult, ShiftSetup
+from multimedia.refraction.layers import Layers
+from multimedia.workbook.shift_points import ShiftPoints, ShiftResult, ShiftSetup
 from photocore.errors import CellError, InputError, WorkbookError
 from photocore.tables import Column, Table, open_tables, read_named_values, read_table, write_csv
 

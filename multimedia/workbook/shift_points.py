@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from multimedia.domain.layers import Layers
-from multimedia.domain.shifting import radial_shift_ratio
+from multimedia.refraction.layers import Layers
+from multimedia.refraction.shifting import radial_shift_ratio
 from photocore.arrays import FloatArray
 from photocore.errors import InputError
 

@@ -7,14 +7,14 @@ from pathlib import Path
 
 import numpy as np
 
-from multimedia.domain.shift_points import ShiftPoints, ShiftResult, ShiftSetup
-from multimedia.io.shift_workbook import table_values
+from multimedia.workbook.shift_points import ShiftPoints, ShiftResult, ShiftSetup
+from multimedia.workbook.shift_workbook import table_values
 from photocore.arrays import FloatArray
 from photocore.errors import InputError
-from photocore.spreadsheet.cellxml import CellInput
-from photocore.spreadsheet.editor import WorkbookEditor
-from photocore.spreadsheet.grid import SheetFile, cell_name
 from photocore.tables import Table, open_tables
+from photocore.workbook.cellxml import CellInput
+from photocore.workbook.editor import WorkbookEditor
+from photocore.workbook.grid import SheetFile, cell_name
 
 #: Columns added to a table that has none of them yet.
 ADDED = ("Rbar", "dR", "Xbar", "Ybar", "flag")

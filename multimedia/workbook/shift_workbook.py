@@ -11,9 +11,9 @@ from openpyxl.styles import Alignment, Font, PatternFill
 from openpyxl.utils import get_column_letter
 from openpyxl.worksheet.table import Table, TableFormula, TableStyleInfo
 
-from multimedia.domain.shift_points import ShiftPoints, ShiftSetup
-from multimedia.io.index_sheet import write_index_sheet
-from multimedia.io.live_book import (
+from multimedia.refraction.unrolled import STEPS, TOLERANCE, unrolled_shift
+from multimedia.workbook.index_sheet import write_index_sheet
+from multimedia.workbook.live_book import (
     BOLD,
     HEAD,
     INPUT,
@@ -23,10 +23,10 @@ from multimedia.io.live_book import (
     allow_between,
     headings,
 )
-from multimedia.unrolled import STEPS, TOLERANCE, unrolled_shift
+from multimedia.workbook.shift_points import ShiftPoints, ShiftSetup
 from photocore.errors import InputError
 from photocore.output import check_writable
-from photocore.spreadsheet.cellxml import CellInput
+from photocore.workbook.cellxml import CellInput
 
 #: More rows make a workbook that is slow to open; text tables have no limit.
 MOST_ROWS = 20_000

@@ -6,11 +6,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from multimedia.domain.layers import Layers
-from multimedia.domain.shift_points import ShiftPoints, ShiftResult, ShiftSetup
-from multimedia.io.shift_files import points_of, read_shift_input, write_shift_csv
-from multimedia.io.shift_update import add_columns, is_template, update_template
-from multimedia.io.shift_workbook import write_shift_workbook
+from multimedia.refraction.layers import Layers
+from multimedia.workbook.shift_files import points_of, read_shift_input, write_shift_csv
+from multimedia.workbook.shift_points import ShiftPoints, ShiftResult, ShiftSetup
+from multimedia.workbook.shift_update import add_columns, is_template, update_template
+from multimedia.workbook.shift_workbook import write_shift_workbook
 from photocore.errors import InputError
 from photocore.output import check_writable
 

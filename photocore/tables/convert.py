@@ -8,7 +8,6 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 import numpy as np
 
 from photocore.arrays import FloatArray
-from photocore.spreadsheet.grid import CellDate, CellFault, NotCalculated, Value
 from photocore.tables.model import Column
 from photocore.tables.numbers import (
     Decimal,
@@ -19,6 +18,7 @@ from photocore.tables.numbers import (
     take_apart,
     unit_symbol,
 )
+from photocore.workbook.grid import CellDate, CellFault, NotCalculated, Value
 
 Complain = Callable[[int, str], None]
 

@@ -15,13 +15,13 @@ import numpy as np
 
 from photocore.arrays import FloatArray
 from photocore.errors import CellError, InputError
-from photocore.spreadsheet.grid import Grid, SheetFile, Value, cell_name
 from photocore.tables.convert import decimal_evidence
 from photocore.tables.fill import fill, refuse_doubles, take_unit_row
 from photocore.tables.headings import Match, describe, find_columns
 from photocore.tables.model import Column, Table
 from photocore.tables.numbers import Decimal
 from photocore.tables.rows import RowSorter, label
+from photocore.workbook.grid import Grid, SheetFile, Value, cell_name
 
 _DELIMITERS = (";", "\t", ",", "|", " ")
 _GUARDED = re.compile(r"'+[=+\-@\t\r]")

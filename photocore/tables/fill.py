@@ -7,11 +7,11 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from photocore.errors import CellError, InputError
-from photocore.spreadsheet.grid import CellDate, Grid, Value, cell_name, column_letters
 from photocore.tables import convert
 from photocore.tables.headings import Match
 from photocore.tables.model import Column, Table
 from photocore.tables.numbers import Decimal, unit_symbol
+from photocore.workbook.grid import CellDate, Grid, Value, cell_name, column_letters
 
 
 def fill(

@@ -7,9 +7,9 @@ import unicodedata
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
-from photocore.spreadsheet.grid import Grid, Value, cell_name, column_letters, column_number
 from photocore.tables.model import Column
 from photocore.tables.numbers import unit_symbol
+from photocore.workbook.grid import Grid, Value, cell_name, column_letters, column_number
 
 _UNIT = re.compile(r"\s*[\[(]\s*([^\])]*)\s*[\])]\s*$")
 _LOOSE_UNIT = re.compile(r"[\s_,]+(mm|cm|m|px|pixel|deg|°|gon|rad)$", re.IGNORECASE)

@@ -9,8 +9,6 @@ from pathlib import Path
 import numpy as np
 
 from photocore.errors import CellError, InputError, WorkbookError
-from photocore.spreadsheet.grid import Grid, SheetFile, TableArea, Value, cell_name
-from photocore.spreadsheet.package import check_header
 from photocore.tables import convert
 from photocore.tables.csvread import CsvFile, open_csv, read_csv_table
 from photocore.tables.fill import fill, refuse_doubles, take_unit_row
@@ -18,6 +16,8 @@ from photocore.tables.headings import Match, bare, describe, find_columns
 from photocore.tables.model import Column, NamedValues, Table
 from photocore.tables.numbers import Decimal, take_apart
 from photocore.tables.rows import data_rows
+from photocore.workbook.grid import Grid, SheetFile, TableArea, Value, cell_name
+from photocore.workbook.package import check_header
 
 Source = Path | str | SheetFile | CsvFile
 
@@ -51,11 +51,11 @@ def open_tables(path: Path | str, *, max_rows: int = 100_000) -> SheetFile | Csv
     if ending in (".xls", ".xlsb", ".numbers", ".fods"):
         raise InputError(f"{path}: {ending} files cannot be read; save the workbook as .xlsx.")
     if ending in (".ods", ".ots"):
-        from photocore.spreadsheet.ods import open_ods
+        from photocore.workbook.ods import open_ods
 
         return open_ods(path, max_rows=max_rows + _MARGIN)
     if ending in (".xlsx", ".xlsm", ".xltx", ".xltm"):
-        from photocore.spreadsheet.xlsx import open_xlsx
+        from photocore.workbook.xlsx import open_xlsx
 
         return open_xlsx(path, max_rows=max_rows + _MARGIN)
     check_header(path)

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
-from photocore.spreadsheet.grid import Grid, Value
 from photocore.tables.headings import Match, bare
 from photocore.tables.model import Column
+from photocore.workbook.grid import Grid, Value
 
 
 @dataclass(slots=True)

@@ -1,1 +1,1 @@
-"""Spreadsheet files as packages: safe reading, in-place changes, fast writing, lint."""
+"""Workbooks: cells read and changed in place, everything else byte for byte as it was."""

@@ -14,13 +14,13 @@ from numpy.typing import ArrayLike
 
 from photocore.errors import InputError
 from photocore.output import atomic_path
-from photocore.spreadsheet import formulas
-from photocore.spreadsheet.cellxml import CellInput
-from photocore.spreadsheet.grid import Grid, SheetFile, TableArea, cell_name
-from photocore.spreadsheet.newrows import NewColumn, NewRows, RowFormula
-from photocore.spreadsheet.package import check_header, open_package, read_part
-from photocore.spreadsheet.splice import SheetChanges, Spliced, splice_sheet
-from photocore.spreadsheet.xlsx import (
+from photocore.workbook import formulas
+from photocore.workbook.cellxml import CellInput
+from photocore.workbook.grid import Grid, SheetFile, TableArea, cell_name
+from photocore.workbook.newrows import NewColumn, NewRows, RowFormula
+from photocore.workbook.package import check_header, open_package, read_part
+from photocore.workbook.splice import SheetChanges, Spliced, splice_sheet
+from photocore.workbook.xlsx import (
     Sheet,
     Workbook,
     open_xlsx,

@@ -12,9 +12,9 @@ from xml.sax.saxutils import escape as escape_xml
 from xml.sax.saxutils import unescape as unescape_xml
 
 from photocore.errors import InputError
-from photocore.spreadsheet.grid import TableArea, cell_name, split_area, split_cell
-from photocore.spreadsheet.package import EnoughError, local, open_package, read_part, scan_part
-from photocore.spreadsheet.xlsx import Sheet, Workbook
+from photocore.workbook.grid import TableArea, cell_name, split_area, split_cell
+from photocore.workbook.package import EnoughError, local, open_package, read_part, scan_part
+from photocore.workbook.xlsx import Sheet, Workbook
 
 _RANGE = re.compile(
     r"(?P<sheet>(?:'(?:[^']|'')+'|[A-Za-z0-9_.À-ɏ]+)!)?"

@@ -13,9 +13,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from photocore.spreadsheet.grid import TableArea, cell_name, split_area, split_cell
-from photocore.spreadsheet.package import local, open_package, scan_part
-from photocore.spreadsheet.xlsx import Sheet, Workbook, read_directory, read_tables
+from photocore.workbook.grid import TableArea, cell_name, split_area, split_cell
+from photocore.workbook.package import local, open_package, scan_part
+from photocore.workbook.xlsx import Sheet, Workbook, read_directory, read_tables
 
 _LIKE_A_CELL = re.compile(r"[A-Za-z]{1,3}\d{1,7}|[rR]\d*[cC]\d*|[rR]\d*|[cC]\d*")
 _NAME = re.compile(r"[A-Za-z_\\À-ɏ][\w.\\]*")
@@ -302,7 +302,7 @@ def _read(path: Path, package: zipfile.ZipFile, sheet: Sheet, shared: list[str])
 
 
 def _strings(path: Path, package: zipfile.ZipFile, book: Workbook) -> list[str]:
-    from photocore.spreadsheet.xlsx import read_shared_strings
+    from photocore.workbook.xlsx import read_shared_strings
 
     return read_shared_strings(path, package, book)
 

@@ -6,14 +6,8 @@ import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 
-from photocore.spreadsheet.cellxml import (
-    CellInput,
-    cell_xml,
-    escape,
-    number_text,
-    type_and_content,
-)
-from photocore.spreadsheet.grid import cell_name, column_letters
+from photocore.workbook.cellxml import CellInput, cell_xml, escape, number_text, type_and_content
+from photocore.workbook.grid import cell_name, column_letters
 
 _CHUNK = 2000
 _CELL = r"(\$?[A-Z]{1,3})(\$?)(\d{1,7})"

@@ -8,8 +8,8 @@ from datetime import datetime
 from pathlib import Path
 
 from photocore.errors import InputError
-from photocore.spreadsheet.grid import CellDate, CellFault, Grid, SheetFile, Value, split_cell
-from photocore.spreadsheet.package import local, open_package, read_part, scan_part
+from photocore.workbook.grid import CellDate, CellFault, Grid, SheetFile, Value, split_cell
+from photocore.workbook.package import local, open_package, read_part, scan_part
 
 #: Repeated cells with content beyond these are a decompression bomb, not a survey.
 _MOST_COLUMNS = 16384

@@ -11,11 +11,11 @@ from xml.parsers import expat
 from xml.sax.saxutils import unescape as unescape_xml
 
 from photocore.errors import InputError
-from photocore.spreadsheet.cellxml import CellInput, escape_attribute, type_and_content
-from photocore.spreadsheet.grid import cell_name, column_number, split_area
-from photocore.spreadsheet.newrows import NewCell, NewRows, new_cell_xml
-from photocore.spreadsheet.package import local, new_parser
-from photocore.spreadsheet.xlsx import unescape
+from photocore.workbook.cellxml import CellInput, escape_attribute, type_and_content
+from photocore.workbook.grid import cell_name, column_number, split_area
+from photocore.workbook.newrows import NewCell, NewRows, new_cell_xml
+from photocore.workbook.package import local, new_parser
+from photocore.workbook.xlsx import unescape
 
 _TAG = re.compile(rb"""<[^\s/>]+(?:\s+[^\s=]+\s*=\s*(?:"[^"]*"|'[^']*'))*\s*(/?)>""")
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from photocore.errors import InputError
-from photocore.spreadsheet.grid import (
+from photocore.workbook.grid import (
     CellDate,
     CellFault,
     Grid,
@@ -22,7 +22,7 @@ from photocore.spreadsheet.grid import (
     split_area,
     split_cell,
 )
-from photocore.spreadsheet.package import EnoughError, local, open_package, scan_part
+from photocore.workbook.package import EnoughError, local, open_package, scan_part
 
 #: Number formats 14-22, 27-36, 45-47, 50-58 are dates and times in every language of Excel.
 _BUILT_IN_DATES = {

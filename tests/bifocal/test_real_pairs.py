@@ -9,10 +9,10 @@ import pytest
 from scipy.spatial import cKDTree
 
 from bifocal import Pair
-from bifocal.domain.alignment import SiteMeasures
-from bifocal.solvers.match_points import MatchSettings
-from bifocal.workflows.align import AlignOptions, LensData, align_photos
-from bifocal.workflows.match import match_photos
+from bifocal.orientation.align_workflow import AlignOptions, LensData, align_photos
+from bifocal.orientation.alignment import SiteMeasures
+from bifocal.orientation.match_workflow import match_photos
+from bifocal.orientation.matching import MatchSettings
 
 pytestmark = pytest.mark.acceptance
 #: Limits of the median error of relief. [m]

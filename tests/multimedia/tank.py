@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from multimedia.domain.camera import Camera, Sensor
-from multimedia.domain.layers import Layers
-from multimedia.solvers.projection import project
+from multimedia.media.camera import Camera, Sensor
+from multimedia.media.projection import project
+from multimedia.refraction.layers import Layers
 from photocore.distortion import Brown
 
 SENSOR = Sensor(width=1280, height=1024, pitch=np.array([0.012, 0.012]))

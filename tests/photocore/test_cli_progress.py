@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from photocore import console
+from photocore import cli as console
 
 
 def test_long_jobs_print_a_line_per_tenth(monkeypatch, capsys):

@@ -7,8 +7,8 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from photocore import twofold
-from photocore.twofold import Twofold
+from photocore import double_double as twofold
+from photocore.double_double import Twofold
 
 
 def fraction(value: Twofold) -> Fraction:

@@ -1,9 +1,9 @@
 """Synthetic façades with exact truth, ray cast: for the demo, tests and benchmarks."""
 
-from bifocal.solvers.scene.cameras import CameraPair, SceneCamera, SetupErrors, bifocal_cameras
-from bifocal.solvers.scene.facade import POOR, RICH, Palette, demo_scene, facade
-from bifocal.solvers.scene.rendering import Exposure, NamedPoint, Rendering, render
-from bifocal.solvers.scene.shapes import Material, Scene, Target
+from bifocal.demo.scene.cameras import CameraPair, SceneCamera, SetupErrors, bifocal_cameras
+from bifocal.demo.scene.facade import POOR, RICH, Palette, demo_scene, facade
+from bifocal.demo.scene.rendering import Exposure, NamedPoint, Rendering, render
+from bifocal.demo.scene.shapes import Material, Scene, Target
 
 __all__ = [
     "CameraPair",

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from bifocal.domain.pair import Pair, Photo
+from bifocal.model.pair import Pair, Photo
 from photocore.arrays import FloatArray
 
 

@@ -7,7 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from bifocal.solvers.scene.shapes import (
+from bifocal.demo.scene.shapes import (
     Convex,
     Material,
     Scene,

@@ -6,13 +6,13 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from bifocal.domain.pair import Pair
-from bifocal.domain.relief_map import ReliefMap
-from bifocal.solvers.scene.cameras import CameraPair, SceneCamera
-from bifocal.solvers.scene.shapes import Scene
-from bifocal.solvers.scene.texture import Painter
-from bifocal.solvers.scene.tracing import Faces, Parallel, Tracer
-from bifocal.solvers.scene.truth import look_square_on, relief_truth, sees, visible_from
+from bifocal.demo.scene.cameras import CameraPair, SceneCamera
+from bifocal.demo.scene.shapes import Scene
+from bifocal.demo.scene.texture import Painter
+from bifocal.demo.scene.tracing import Faces, Parallel, Tracer
+from bifocal.demo.scene.truth import look_square_on, relief_truth, sees, visible_from
+from bifocal.model.pair import Pair
+from bifocal.model.relief_map import ReliefMap
 from photocore.arrays import BoolArray, ByteArray, FloatArray, IntArray
 
 #: Rays per side of a pixel where surfaces meet.

@@ -11,7 +11,7 @@ from typing import NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from bifocal.solvers.scene.shapes import Convex, Material, Scene
+from bifocal.demo.scene.shapes import Convex, Material, Scene
 from photocore.arrays import BoolArray, FloatArray
 
 Faces = NDArray[np.int32]

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from bifocal.domain.grid import Grid
-from bifocal.domain.relief_map import ReliefMap
-from bifocal.solvers.scene.cameras import SceneCamera
-from bifocal.solvers.scene.tracing import Faces, Parallel, Tracer
+from bifocal.demo.scene.cameras import SceneCamera
+from bifocal.demo.scene.tracing import Faces, Parallel, Tracer
+from bifocal.model.grid import Grid
+from bifocal.model.relief_map import ReliefMap
 from photocore.arrays import BoolArray, FloatArray
 
 #: A point is seen if nothing lies this much before it. [m]

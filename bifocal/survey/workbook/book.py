@@ -9,9 +9,10 @@ from pathlib import Path
 from openpyxl.styles import Alignment
 from openpyxl.worksheet.worksheet import Worksheet
 
-from bifocal.io import survey_charts, survey_reference_sheets
-from bifocal.io.survey_columns import IDEAL_POINTS, LOG, RESULTS, pair_points
-from bifocal.io.survey_content import (
+from bifocal.survey.workbook import charts as survey_charts
+from bifocal.survey.workbook import reference_sheets as survey_reference_sheets
+from bifocal.survey.workbook.columns import IDEAL_POINTS, LOG, RESULTS, pair_points
+from bifocal.survey.workbook.content import (
     STRUCTURED_ROWS,
     SurveyContent,
     check_cells,
@@ -20,8 +21,8 @@ from bifocal.io.survey_content import (
     result_cells,
     setup_cells,
 )
-from bifocal.io.survey_defaults import IDEAL_FORMULAS, PAIR_FORMULAS
-from bifocal.io.survey_sheets import (
+from bifocal.survey.workbook.defaults import IDEAL_FORMULAS, PAIR_FORMULAS
+from bifocal.survey.workbook.sheets import (
     HEAD_FONT,
     LABEL_FONT,
     BookBuilder,
@@ -30,9 +31,9 @@ from bifocal.io.survey_sheets import (
     set_up_print,
     validate,
 )
-from bifocal.io.survey_words import README, SETUP, word
-from photocore.bookrows import CellValue, column_letters, finish_book
+from bifocal.survey.workbook.words import README, SETUP, word
 from photocore.output import atomic_path
+from photocore.workbook.bookrows import CellValue, column_letters, finish_book
 
 #: Row of the keys in `Points` and `Results`.
 HEAD = 4

@@ -8,11 +8,11 @@ from openpyxl.chart import BarChart, Reference, ScatterChart, Series
 from openpyxl.chart.shapes import GraphicalProperties
 from openpyxl.styles import Font
 
-from bifocal.io.survey_content import CHART_ROWS, SurveyContent
-from bifocal.io.survey_reference_sheets import CHECK_HEAD
-from bifocal.io.survey_sheets import LABEL_FONT, BookBuilder, protect, set_up_print
-from bifocal.io.survey_words import word
-from photocore.bookrows import CellValue, RowBlock, column_letters
+from bifocal.survey.workbook.content import CHART_ROWS, SurveyContent
+from bifocal.survey.workbook.reference_sheets import CHECK_HEAD
+from bifocal.survey.workbook.sheets import LABEL_FONT, BookBuilder, protect, set_up_print
+from bifocal.survey.workbook.words import word
+from photocore.workbook.bookrows import CellValue, RowBlock, column_letters
 
 #: Row of the headings of the chart data; text would break a scatter chart, so blanks are #N/A.
 HEAD = 4

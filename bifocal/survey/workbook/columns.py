@@ -10,7 +10,7 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 
-from bifocal.domain.setup import ON_PLANE_SIGMAS
+from bifocal.survey.setup import ON_PLANE_SIGMAS
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

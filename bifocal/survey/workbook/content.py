@@ -7,14 +7,14 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from bifocal.domain.observations import PointObservations
-from bifocal.domain.pair import SIGMA_PIXEL, UNCERTAIN_SHARE, Pair
-from bifocal.domain.reference import CheckResult, Georeference, KnownPoints
-from bifocal.domain.relief_table import ReliefTable
-from bifocal.domain.setup import OFF_RADIAL_SIGMAS, ON_PLANE_SIGMAS, SurveySetup
-from bifocal.domain.tolerances import RULES, SCALES, ToleranceRule
+from bifocal.model.pair import SIGMA_PIXEL, UNCERTAIN_SHARE, Pair
+from bifocal.survey.observations import PointObservations
+from bifocal.survey.reference import CheckResult, Georeference, KnownPoints
+from bifocal.survey.relief_table import ReliefTable
+from bifocal.survey.setup import OFF_RADIAL_SIGMAS, ON_PLANE_SIGMAS, SurveySetup
+from bifocal.survey.tolerances import RULES, SCALES, ToleranceRule
 from photocore.arrays import FloatArray
-from photocore.bookrows import CellValue
+from photocore.workbook.bookrows import CellValue
 
 #: Rows of the tables of an empty template.
 POINT_ROWS, CHECK_ROWS, CONTROL_ROWS, SPARE_ROWS = 300, 25, 12, 10

@@ -7,14 +7,14 @@ from typing import Literal
 
 import numpy as np
 
-from bifocal.domain.observations import PointObservations
-from bifocal.domain.reference import KnownPoints
-from bifocal.io.survey_words import ALIASES, COLUMNS
+from bifocal.survey.observations import PointObservations
+from bifocal.survey.reference import KnownPoints
+from bifocal.survey.workbook.words import ALIASES, COLUMNS
 from photocore.errors import CellError
-from photocore.spreadsheet.grid import SheetFile
 from photocore.tables import Column, Table, read_table
 from photocore.tables.headings import bare
 from photocore.tables.numbers import Decimal
+from photocore.workbook.grid import SheetFile
 
 #: No coordinate of a photo or a map is larger.
 LARGEST = 1e9

@@ -9,26 +9,26 @@ from typing import Literal
 
 import numpy as np
 
-from bifocal.domain.lens import Lens
-from bifocal.domain.observations import PointObservations
-from bifocal.domain.pair import Pair, Photo
-from bifocal.domain.reference import KnownPoints
-from bifocal.io.survey_known_reader import (
+from bifocal.model.lens import Lens
+from bifocal.model.pair import Pair, Photo
+from bifocal.survey.observations import PointObservations
+from bifocal.survey.reference import KnownPoints
+from bifocal.survey.workbook.known_reader import (
     metres_of,
     read_known,
     refuse_absurd,
     unit_error,
     with_measured,
 )
-from bifocal.io.survey_setup_reader import SetupValues, is_general, read_setup
-from bifocal.io.survey_words import ALIASES, COLUMNS, LANGUAGES, WORDS
+from bifocal.survey.workbook.setup_reader import SetupValues, is_general, read_setup
+from bifocal.survey.workbook.words import ALIASES, COLUMNS, LANGUAGES, WORDS
 from photocore.arrays import BoolArray, FloatArray
 from photocore.errors import CellError, InputError, WorkbookError
-from photocore.spreadsheet.grid import SheetFile
 from photocore.tables import Column, Table, open_tables, read_named_values, read_table
 from photocore.tables.csvread import CsvFile
 from photocore.tables.headings import bare
 from photocore.tables.numbers import Decimal
+from photocore.workbook.grid import SheetFile
 
 _XY, _POLAR = ("x1", "y1", "x2", "y2"), ("s1", "s2", "theta")
 _PIXELS = ("col1", "row1", "col2", "row2")

@@ -9,8 +9,8 @@ import numpy as np
 from openpyxl.formatting.rule import FormulaRule
 from openpyxl.styles import Alignment, Font, PatternFill
 
-from bifocal.domain.setup import ON_PLANE_SIGMAS
-from bifocal.io.survey_columns import (
+from bifocal.survey.setup import ON_PLANE_SIGMAS
+from bifocal.survey.workbook.columns import (
     CHECK,
     FRAME_SHARES,
     GEOREFERENCE,
@@ -19,8 +19,8 @@ from bifocal.io.survey_columns import (
     UNCERTAINTY,
     verdict_columns,
 )
-from bifocal.io.survey_content import SurveyContent, setup_cells, verdict_rows
-from bifocal.io.survey_sheets import (
+from bifocal.survey.workbook.content import SurveyContent, setup_cells, verdict_rows
+from bifocal.survey.workbook.sheets import (
     HEAD_FONT,
     LABEL_FONT,
     BookBuilder,
@@ -28,8 +28,8 @@ from bifocal.io.survey_sheets import (
     set_up_print,
     validate,
 )
-from bifocal.io.survey_words import word
-from photocore.bookrows import CellValue, column_letters
+from bifocal.survey.workbook.words import word
+from photocore.workbook.bookrows import CellValue, column_letters
 
 Cells = Mapping[str, list[CellValue]]
 #: Row of the keys of the two tables; statistics and parameters stand above.

@@ -8,14 +8,14 @@ from pathlib import Path
 
 import numpy as np
 
-from bifocal.domain.setup import OFF_RADIAL_SIGMAS, ON_PLANE_SIGMAS, SurveySetup
-from bifocal.io.survey_known_reader import LARGEST
-from bifocal.io.survey_words import SETUP
+from bifocal.survey.setup import OFF_RADIAL_SIGMAS, ON_PLANE_SIGMAS, SurveySetup
+from bifocal.survey.workbook.known_reader import LARGEST
+from bifocal.survey.workbook.words import SETUP
 from photocore.arrays import FloatArray
 from photocore.errors import CellError, GeometryError, InputError
-from photocore.spreadsheet.grid import SheetFile
 from photocore.tables import Column, NamedValues, read_named_values
 from photocore.tables.numbers import Decimal
+from photocore.workbook.grid import SheetFile
 
 _CAMERA = ("c_1", "c_2", "d_1", "d_2", "delta_d", "pitch")
 _PRECISION = ("sigma_s", "sigma_px", "sigma_r_max", "k_off", "k_plane")
@@ -199,9 +199,9 @@ def _number(values: NamedValues, key: str) -> float | None:
 
 def _formulas(path: Path, values: NamedValues) -> set[str]:
     """Return which cells hold the template's own formula instead of a typed number."""
-    from bifocal.io.survey_defaults import TYPED_FORMULAS
-    from photocore.spreadsheet.package import open_package
-    from photocore.spreadsheet.xlsx import read_directory
+    from bifocal.survey.workbook.defaults import TYPED_FORMULAS
+    from photocore.workbook.package import open_package
+    from photocore.workbook.xlsx import read_directory
 
     wanted = {key: values.places[key] for key in TYPED_FORMULAS if key in values.places}
     if path.suffix.lower() not in (".xlsx", ".xlsm", ".xltx", ".xltm") or not wanted:

@@ -1,4 +1,4 @@
-"""The sheets of a new survey workbook, built with openpyxl: see `bifocal.io.survey_book`."""
+"""The sheets of a new survey workbook, built with openpyxl: see `bifocal.survey.workbook.book`."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ from openpyxl.worksheet.datavalidation import DataValidation
 from openpyxl.worksheet.table import Table, TableFormula, TableStyleInfo
 from openpyxl.worksheet.worksheet import Worksheet
 
-from bifocal.io.survey_columns import Column, row_formula
-from bifocal.io.survey_words import label, word
-from photocore.bookrows import CellValue, RowBlock
+from bifocal.survey.workbook.columns import Column, row_formula
+from bifocal.survey.workbook.words import label, word
+from photocore.workbook.bookrows import CellValue, RowBlock
 
 INPUT_FILL = PatternFill("solid", start_color="FFF9DB", end_color="FFF9DB")
 HEAD_FILL = PatternFill("solid", start_color="DCE6F1", end_color="DCE6F1")

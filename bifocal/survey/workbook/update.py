@@ -6,15 +6,15 @@ import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from bifocal.io.survey_book import build
-from bifocal.io.survey_charts import HEAD, LEFT
-from bifocal.io.survey_content import SurveyContent
-from bifocal.io.survey_defaults import TYPED_FORMULAS
-from bifocal.io.survey_reader import SurveyInput
-from bifocal.io.survey_sheets import BookBuilder
-from photocore.bookrows import CellValue, RowBlock
-from photocore.spreadsheet.editor import WorkbookEditor
-from photocore.spreadsheet.grid import TableArea, split_cell
+from bifocal.survey.workbook.book import build
+from bifocal.survey.workbook.charts import HEAD, LEFT
+from bifocal.survey.workbook.content import SurveyContent
+from bifocal.survey.workbook.defaults import TYPED_FORMULAS
+from bifocal.survey.workbook.reader import SurveyInput
+from bifocal.survey.workbook.sheets import BookBuilder
+from photocore.workbook.bookrows import CellValue, RowBlock
+from photocore.workbook.editor import WorkbookEditor
+from photocore.workbook.grid import TableArea, split_cell
 
 
 def can_update(source: Path, target: Path, survey: SurveyInput, content: SurveyContent) -> str:

@@ -11,11 +11,16 @@ from click.testing import CliRunner
 from PIL import Image
 
 from bifocal import Lens
+from bifocal.calibration.board_calibration import (
+    BoardView,
+    calibrate,
+    detect_board,
+    find_board_size,
+)
+from bifocal.calibration.plumb_line import calibrate_from_lines, find_straight_edges
+from bifocal.calibration.workflow import undistorted
 from bifocal.cli.main import main
-from bifocal.io.images import read_image, write_image
-from bifocal.solvers.calibration import BoardView, calibrate, detect_board, find_board_size
-from bifocal.solvers.plumbline import calibrate_from_lines, find_straight_edges
-from bifocal.workflows.lenses import undistorted
+from bifocal.files.images import read_image, write_image
 from photocore.errors import InputError
 
 MATRIX = np.array([[900.0, 0, 511.5], [0, 905.0, 383.5], [0, 0, 1]])
@@ -316,7 +321,7 @@ def canon(path, focal=19.0, lens="Canon EF-S 18-55mm f/3.5-5.6", model="Canon EO
 
 def test_the_database_scale_on_the_axis_is_taken_out(tmp_path):
     pytest.importorskip("lensfunpy")
-    from bifocal.io.lens_database import lens_from_database
+    from bifocal.calibration.lens_database import lens_from_database
 
     for focal, axis in ((19.0, 1.035), (35.0, 1.007)):
         found = lens_from_database(canon(tmp_path / f"{focal}.jpg", focal))
@@ -330,7 +335,7 @@ def test_the_database_scale_on_the_axis_is_taken_out(tmp_path):
 
 def test_an_ambiguous_or_unknown_lens_is_offered_as_a_choice(tmp_path):
     pytest.importorskip("lensfunpy")
-    from bifocal.io.lens_database import lens_from_database
+    from bifocal.calibration.lens_database import lens_from_database
 
     with pytest.raises(InputError, match=r"Choose one[\s\S]*EF-S 18-55mm f/3.5-5.6"):
         lens_from_database(canon(tmp_path / "a.jpg", lens=""))

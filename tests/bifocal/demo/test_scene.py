@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from bifocal.solvers.scene import (
+from bifocal.demo.scene import (
     RICH,
     Exposure,
     Scene,
@@ -16,9 +16,9 @@ from bifocal.solvers.scene import (
     facade,
     render,
 )
-from bifocal.solvers.scene.shapes import boss, box, column, prism
-from bifocal.solvers.scene.tracing import Tracer
-from bifocal.solvers.scene.truth import look_square_on, relief_truth, visible_from
+from bifocal.demo.scene.shapes import boss, box, column, prism
+from bifocal.demo.scene.tracing import Tracer
+from bifocal.demo.scene.truth import look_square_on, relief_truth, visible_from
 
 PIXEL = 0.02
 SIZE = (320, 240)  # 6.4 x 4.8 m

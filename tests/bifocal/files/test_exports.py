@@ -12,8 +12,8 @@ import pytest
 from click.testing import CliRunner
 
 from bifocal.cli.main import main
-from bifocal.domain.points import SurveyPoints
-from bifocal.io.exports import export_points
+from bifocal.files.exports import export_points
+from bifocal.model.points import SurveyPoints
 from photocore.errors import InputError
 
 POINTS = SurveyPoints(

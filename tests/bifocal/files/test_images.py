@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from bifocal.io.images import image_info, read_image, to_eight_bit, turn_upright, write_image
+from bifocal.files.images import image_info, read_image, to_eight_bit, turn_upright, write_image
 from photocore.errors import InputError
 
 PICTURE = np.random.default_rng(7).integers(0, 255, (24, 36, 3), dtype=np.uint8)
@@ -116,7 +116,7 @@ def test_a_decompression_bomb_is_refused_by_its_header(tmp_path):
 def test_large_photos_are_read_by_strips_to_the_same_pixels(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, ending: str
 ) -> None:
-    from bifocal.io import images
+    from bifocal.files import images
 
     photo = np.random.default_rng(6).integers(0, 255, (600, 70, 3), dtype=np.uint8)
     images.write_image(tmp_path / f"p{ending}", photo)

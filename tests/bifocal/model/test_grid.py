@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from bifocal.domain.grid import Grid
+from bifocal.model.grid import Grid
 from photocore.errors import InputError
 
 

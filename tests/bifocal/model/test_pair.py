@@ -258,7 +258,7 @@ def test_what_is_no_pair_file_is_said(tmp_path):
 
 
 def example():
-    path = Path(__file__).parents[2] / "examples" / "pair_from_geometry.py"
+    path = Path(__file__).parents[3] / "examples" / "pair_from_geometry.py"
     spec = importlib.util.spec_from_file_location("pair_from_geometry", path)
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)

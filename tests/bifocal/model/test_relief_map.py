@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from bifocal.domain.grid import Grid
-from bifocal.domain.relief_map import Quality, ReliefMap
+from bifocal.model.grid import Grid
+from bifocal.model.relief_map import Quality, ReliefMap
 from photocore.errors import InputError
 
 GRID = Grid.from_bounds((0.0, 0.0, 4.0, 3.0), gsd=1.0).plane_from_pixel

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from bifocal.domain.grid import Grid
-from bifocal.domain.surface import FlatSurface, MapSurface
+from bifocal.model.grid import Grid
+from bifocal.model.surface import FlatSurface, MapSurface
 from photocore.errors import InputError
 
 GRID = Grid.from_bounds((0.0, 0.0, 3.0, 2.0), gsd=0.01)

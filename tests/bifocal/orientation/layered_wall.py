@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from bifocal.pinhole import Pinhole, camera_matrix, rotation_matrix
+from bifocal.orientation.pinhole import Pinhole, camera_matrix, rotation_matrix
 
 SIZE = (960, 640)
 #: Boards: x, y of the lower left corner, width, height, relief. [m]

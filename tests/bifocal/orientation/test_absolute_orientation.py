@@ -4,11 +4,11 @@ import cv2
 import numpy as np
 import pytest
 
-from bifocal.domain.alignment import Control, Interior, SiteMeasures
-from bifocal.pinhole import project, triangulate
-from bifocal.solvers.set_up import PhotoInput, set_up
+from bifocal.orientation.absolute_orientation import PhotoInput, set_up
+from bifocal.orientation.alignment import Control, Interior, SiteMeasures
+from bifocal.orientation.pinhole import project, triangulate
 from photocore.errors import GeometryError
-from tests.bifocal.layered_wall import BOARDS, SIZE, camera, photograph, relief_at, take
+from tests.bifocal.orientation.layered_wall import BOARDS, SIZE, camera, photograph, relief_at, take
 
 FAR = camera(16.0, turn_deg=(0.3, -0.2, 0.15), shift=(5.0, -4.0))
 NEAR = camera(9.0, offset=(0.05, -0.04), turn_deg=(-0.2, 0.25, -0.2), shift=(-4.0, 3.0))

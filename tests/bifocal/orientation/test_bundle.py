@@ -5,13 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bifocal.domain.alignment import Control, Interior, SiteMeasures
-from bifocal.pinhole import project
-from bifocal.solvers.bundle import Problem, adjust
-from bifocal.solvers.resection import resect
-from bifocal.solvers.set_up import PhotoInput, set_up
+from bifocal.orientation.absolute_orientation import PhotoInput, set_up
+from bifocal.orientation.alignment import Control, Interior, SiteMeasures
+from bifocal.orientation.bundle import Problem, adjust
+from bifocal.orientation.pinhole import project
+from bifocal.orientation.space_resection import resect
 from photocore.errors import GeometryError, InputError
-from tests.bifocal.layered_wall import SIZE, camera
+from tests.bifocal.orientation.layered_wall import SIZE, camera
 
 FAR = camera(16.0, offset=(0.4, -0.2), turn_deg=(8.0, -20.0, 1.0), shift=(4.0, -3.0))
 NEAR = camera(9.0, offset=(-0.3, 0.1), turn_deg=(-6.0, 15.0, -2.0), shift=(-3.0, 5.0))

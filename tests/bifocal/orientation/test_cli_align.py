@@ -10,11 +10,11 @@ from click.testing import CliRunner
 
 from bifocal import Pair
 from bifocal.cli.main import main
-from bifocal.domain.alignment import Interior
-from bifocal.pinhole import project
-from bifocal.solvers.refusals import check_distortion
+from bifocal.orientation.alignment import Interior
+from bifocal.orientation.pinhole import project
+from bifocal.orientation.validation import check_distortion
 from photocore.errors import GeometryError
-from tests.bifocal.layered_wall import camera, relief_at, take
+from tests.bifocal.orientation.layered_wall import camera, relief_at, take
 
 FAR = camera(16.0, turn_deg=(0.3, -0.2, 0.15))
 NEAR = camera(9.0, offset=(0.05, -0.04), turn_deg=(-0.2, 0.25, -0.2))

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from bifocal.solvers.set_up_words import set_up_words
-from tests.bifocal.layered_wall import camera
+from bifocal.orientation.orientation_report import set_up_words
+from tests.bifocal.orientation.layered_wall import camera
 
 SURE = {"distance1": 0.01, "distance2": 0.01, "scale": 1e-5, "relief_scale": 0.0}
 
@@ -34,7 +34,7 @@ def test_uncertain_distances_are_part_of_the_precision_of_relief() -> None:
 
 
 def test_relief_scale_is_the_spread_of_relief_under_the_distances_own() -> None:
-    from bifocal.solvers.alignment import _deviations
+    from bifocal.orientation.oriented_pair import _deviations
 
     covariance = np.zeros((25, 25))
     covariance[9, 9], covariance[20, 20] = 0.3**2, 0.05**2

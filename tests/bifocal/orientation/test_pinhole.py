@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from bifocal import Pair, Photo
-from bifocal.pinhole import (
+from bifocal.orientation.pinhole import (
     Pinhole,
     camera_matrix,
     fundamental,

@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from bifocal.domain.alignment import Interior, SiteMeasures
-from bifocal.pinhole import project
-from bifocal.solvers.set_up_words import set_up_words
-from bifocal.solvers.wall_choice import choose_wall, faces, rivals_in_words
+from bifocal.orientation.alignment import Interior, SiteMeasures
+from bifocal.orientation.orientation_report import set_up_words
+from bifocal.orientation.pinhole import project
+from bifocal.orientation.reference_plane import choose_wall, faces, rivals_in_words
 from photocore.errors import GeometryError
-from tests.bifocal.layered_wall import SIZE, camera
+from tests.bifocal.orientation.layered_wall import SIZE, camera
 
 CAMERAS = (camera(17.5), camera(9.5))
 SITE = SiteMeasures(distance1=17.5, distance2=9.5, parallel=True)

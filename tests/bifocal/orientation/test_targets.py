@@ -3,8 +3,8 @@
 import cv2
 import numpy as np
 
-from bifocal.solvers.match_points import spread_evenly
-from bifocal.solvers.targets import find_targets
+from bifocal.orientation.matching import spread_evenly
+from bifocal.orientation.targets import find_targets
 
 
 def board(*, noise: float = 1.5, dark: bool = True) -> tuple[np.ndarray, np.ndarray]:

@@ -18,10 +18,10 @@ from PIL import Image
 
 from bifocal import Pair, Photo
 from bifocal.cli.main import main
-from bifocal.domain.grid import Grid
-from bifocal.domain.relief_map import ReliefMap
-from bifocal.io.geotiff import create_raster, read_relief, write_relief
-from bifocal.io.images import write_image
+from bifocal.files.geotiff import create_raster, read_relief, write_relief
+from bifocal.files.images import write_image
+from bifocal.model.grid import Grid
+from bifocal.model.relief_map import ReliefMap
 
 SIZE = (420, 300)
 GSD = 0.01

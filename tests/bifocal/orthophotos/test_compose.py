@@ -7,10 +7,17 @@ import pytest
 
 import bifocal
 from bifocal import Lens, OrthoOptions, Pair, Photo
-from bifocal.domain.grid import Grid
-from bifocal.domain.relief_map import ReliefMap
+from bifocal.model.grid import Grid
+from bifocal.model.relief_map import ReliefMap
 from photocore.errors import GeometryError, InputError
-from tests.bifocal.wall_scene import colour_at, hidden_at, make_pair, photo_of, relief_at, wall_grid
+from tests.bifocal.orthophotos.wall_scene import (
+    colour_at,
+    hidden_at,
+    make_pair,
+    photo_of,
+    relief_at,
+    wall_grid,
+)
 
 GSD = 0.01
 

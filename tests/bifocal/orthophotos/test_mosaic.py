@@ -12,8 +12,8 @@ import rasterio
 from click.testing import CliRunner, Result
 
 from bifocal.cli.main import main
-from bifocal.domain.grid import Grid
-from bifocal.io.geotiff import create_raster
+from bifocal.files.geotiff import create_raster
+from bifocal.model.grid import Grid
 
 GSD = 0.005
 

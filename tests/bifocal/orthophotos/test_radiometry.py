@@ -7,10 +7,15 @@ import numpy as np
 import pytest
 
 from bifocal import Photo
-from bifocal.domain.grid import Grid
-from bifocal.domain.surface import FlatSurface
-from bifocal.solvers.orthorectify import View
-from bifocal.solvers.radiometry import chromatic_shift, correct_view, devignetted, match_exposure
+from bifocal.model.grid import Grid
+from bifocal.model.surface import FlatSurface
+from bifocal.orthophotos.radiometry import (
+    chromatic_shift,
+    correct_view,
+    devignetted,
+    match_exposure,
+)
+from bifocal.orthophotos.rectify import View
 from photocore.errors import InputError
 
 SIZE = (480, 360)

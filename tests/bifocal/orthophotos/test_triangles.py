@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from bifocal.domain.grid import Grid
-from bifocal.solvers.triangles import TriangleSurface
+from bifocal.model.grid import Grid
+from bifocal.orthophotos.triangles import TriangleSurface
 from photocore.errors import InputError
 
 CORNERS = np.array([[0, 0, 0], [2, 0, 0], [2, 2, 0], [0, 2, 0]], dtype=float)

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from bifocal.domain.grid import Grid
-from bifocal.domain.surface import FlatSurface, MapSurface, Surface
+from bifocal.model.grid import Grid
+from bifocal.model.surface import FlatSurface, MapSurface, Surface
+from bifocal.orthophotos.visibility import hidden_from
 from bifocal.rays import Foot
-from bifocal.solvers.visibility import hidden_from
-from tests.bifocal.wall_scene import hidden_at, make_pair, relief_at, wall_grid
+from tests.bifocal.orthophotos.wall_scene import hidden_at, make_pair, relief_at, wall_grid
 
 
 def of_tiles(surface: Surface, grid: Grid, camera: Foot, side: int) -> np.ndarray:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from bifocal import Pair, Photo
-from bifocal.domain.grid import Grid
+from bifocal.model.grid import Grid
 
 
 def relief_at(x: np.ndarray, y: np.ndarray) -> np.ndarray:

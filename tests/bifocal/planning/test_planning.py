@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from bifocal.domain.plan import Sensor
-from bifocal.solvers.planning import plan_stations
+from bifocal.planning.camera_plan import Sensor
+from bifocal.planning.stations import plan_stations
 from photocore.errors import InputError
 
 CANON = Sensor(width=22.7, height=15.1, columns=3072, rows=2048)

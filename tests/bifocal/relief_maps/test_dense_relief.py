@@ -9,20 +9,14 @@ import numpy as np
 import pytest
 
 from bifocal import Pair, Quality, dense_relief
-from bifocal.io.relief_files import hatched
-from bifocal.solvers.dense import edges, flow, seed, smooth, splat
-from bifocal.solvers.dense.frame import as_grey, common_bounds, make_frame, working_grid
-from bifocal.solvers.dense.setup_sigma import setup_sigma
-from bifocal.solvers.scene import (
-    RICH,
-    Rendering,
-    Scene,
-    SetupErrors,
-    bifocal_cameras,
-    facade,
-    render,
-)
-from bifocal.solvers.scene.shapes import box
+from bifocal.demo.scene import RICH, Rendering, Scene, SetupErrors, bifocal_cameras, facade, render
+from bifocal.demo.scene.shapes import box
+from bifocal.relief_maps import edges, flow, seed
+from bifocal.relief_maps import forward_projection as splat
+from bifocal.relief_maps import smoothing as smooth
+from bifocal.relief_maps.frame import as_grey, common_bounds, make_frame, working_grid
+from bifocal.relief_maps.orientation_sigma import setup_sigma
+from bifocal.relief_maps.relief_files import hatched
 from photocore.errors import GeometryError, InputError
 
 PIXEL = 0.0148

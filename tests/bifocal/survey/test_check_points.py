@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from bifocal.domain.reference import KnownPoints
-from bifocal.domain.relief_table import ReliefTable
-from bifocal.domain.tolerances import RULES, ToleranceRule, judge, sentence
-from bifocal.solvers.check_points import check_points
+from bifocal.survey.check_points import check_points
+from bifocal.survey.reference import KnownPoints
+from bifocal.survey.relief_table import ReliefTable
+from bifocal.survey.tolerances import RULES, ToleranceRule, judge, sentence
 from photocore.errors import InputError
 
 

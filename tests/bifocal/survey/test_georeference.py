@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from bifocal.domain.reference import KnownPoints
-from bifocal.domain.relief_table import ReliefTable
-from bifocal.solvers.georeference import georeference
+from bifocal.survey.georeferencing import georeference
+from bifocal.survey.reference import KnownPoints
+from bifocal.survey.relief_table import ReliefTable
 from photocore.errors import GeometryError, InputError
 
 RNG = np.random.default_rng(8)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from bifocal import Pair, Photo
-from bifocal.solvers.setup_check import check_setup
+from bifocal.survey.orientation_check import check_setup
 from photocore.errors import GeometryError, InputError
 
 METRES = np.array([[0.00369, 0, -5.67], [0, -0.00369, 3.78], [0, 0, 1.0]])

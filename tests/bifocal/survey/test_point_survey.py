@@ -7,10 +7,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bifocal.domain.observations import PointObservations
-from bifocal.domain.pair import Pair, Photo
-from bifocal.domain.setup import SurveySetup
-from bifocal.solvers.point_survey import solve_ideal, solve_pair
+from bifocal.model.pair import Pair, Photo
+from bifocal.survey.observations import PointObservations
+from bifocal.survey.point_survey import solve_ideal, solve_pair
+from bifocal.survey.setup import SurveySetup
 from photocore.errors import GeometryError, InputError
 
 SETUP = SurveySetup(d1=17.5, d2=9.5, c1=35.0, c2=19.0)

@@ -6,7 +6,7 @@ import numpy as np
 import openpyxl
 import pytest
 
-from tests.bifocal.test_cli_solve import (
+from tests.bifocal.survey.test_cli_solve import (
     POINTS,
     fill,
     pixel_rows,

@@ -9,8 +9,8 @@ import pytest
 from openpyxl.drawing.image import Image
 from PIL import Image as Picture
 
-from tests.bifocal.test_cli_solve import POINTS, SETUP, fill, put, rows, run, write_csv
-from tests.bifocal.test_survey_workbook import assert_recalculated_equals_cached, parts
+from tests.bifocal.survey.test_cli_solve import POINTS, SETUP, fill, put, rows, run, write_csv
+from tests.bifocal.survey.test_survey_workbook import assert_recalculated_equals_cached, parts
 
 WORLD = [(name, 1000 + x, 2000 - r, 50 + y) for name, x, y, r in POINTS]
 CHECKS = [("P1", 2.012, None, 1.005), ("P2", None, None, 0.497), ("P8", 1, 1, 1)]
@@ -61,7 +61,7 @@ def test_swapped_images_keep_the_columns_the_user_typed(tmp_path):
 
 @pytest.mark.office
 def test_a_survey_in_pixels_of_a_pair_is_updated_too(tmp_path):
-    from tests.bifocal.test_cli_solve import pixel_rows, write_pair
+    from tests.bifocal.survey.test_cli_solve import pixel_rows, write_pair
 
     pair, first = write_pair(tmp_path / "w.pair.json"), tmp_path / "first.xlsx"
     points = write_csv(tmp_path / "p.csv", pixel_rows())

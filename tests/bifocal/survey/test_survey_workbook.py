@@ -10,23 +10,23 @@ import numpy as np
 import openpyxl
 import pytest
 
-from bifocal.domain.lens import Lens
-from bifocal.domain.observations import PointObservations
-from bifocal.domain.pair import Pair, Photo
-from bifocal.domain.reference import KnownPoints
-from bifocal.domain.setup import SurveySetup
-from bifocal.io.survey_book import write_book
-from bifocal.io.survey_columns import GEOREFERENCE, IDEAL_POINTS, RESULTS, pair_points
-from bifocal.io.survey_content import SurveyContent
-from bifocal.solvers.check_points import check_points
-from bifocal.solvers.georeference import georeference
-from bifocal.solvers.point_survey import solve_ideal, solve_pair
-from bifocal.workflows.survey import write_template
+from bifocal.model.lens import Lens
+from bifocal.model.pair import Pair, Photo
+from bifocal.survey.check_points import check_points
+from bifocal.survey.georeferencing import georeference
+from bifocal.survey.observations import PointObservations
+from bifocal.survey.point_survey import solve_ideal, solve_pair
+from bifocal.survey.reference import KnownPoints
+from bifocal.survey.setup import SurveySetup
+from bifocal.survey.template_workflow import write_template
+from bifocal.survey.workbook.book import write_book
+from bifocal.survey.workbook.columns import GEOREFERENCE, IDEAL_POINTS, RESULTS, pair_points
+from bifocal.survey.workbook.content import SurveyContent
 from photocore.errors import InputError
-from photocore.spreadsheet.lint import lint
+from photocore.workbook.lint import lint
 from tests.recalculate import recalculated
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 SHEETS = ["Readme", "Setup", "Points", "Results", "Check", "Georeference", "Planning", "Charts",
           "Log"]  # fmt: skip
 NAMED = [
@@ -225,7 +225,7 @@ def test_formulas_follow_pixels_freed_of_lens_distortion(tmp_path):
 
 @pytest.mark.office
 def test_long_tables_written_with_short_references_calculate_the_same(tmp_path, monkeypatch):
-    monkeypatch.setattr("bifocal.io.survey_book.STRUCTURED_ROWS", 10)
+    monkeypatch.setattr("bifocal.survey.workbook.book.STRUCTURED_ROWS", 10)
     write_book(tmp_path / "long.xlsx", ideal_content())
     text = parts(tmp_path / "long.xlsx")["xl/worksheets/sheet3.xml"].decode()
     assert "#This Row" not in text

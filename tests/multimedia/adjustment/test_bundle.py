@@ -10,13 +10,13 @@ from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
 from multimedia import Camera, Layers
-from multimedia.domain.adjustment import ScaleBar, Unknowns
-from multimedia.domain.flat_interface import FlatInterface
-from multimedia.domain.project import ImagePoints, ObjectPoints, Project
-from multimedia.solvers.bundle import bundle_adjust, prepare
-from multimedia.solvers.bundle_dense import solve_dense
-from multimedia.solvers.bundle_sparse import redundancy_numbers, solve_sparse
-from multimedia.solvers.projection import project
+from multimedia.adjustment.bundle import bundle_adjust, prepare
+from multimedia.adjustment.bundle_dense import solve_dense
+from multimedia.adjustment.bundle_sparse import redundancy_numbers, solve_sparse
+from multimedia.adjustment.unknowns import ScaleBar, Unknowns
+from multimedia.media.flat_interface import FlatInterface
+from multimedia.media.projection import project
+from multimedia.projects.model import ImagePoints, ObjectPoints, Project
 from photocore.errors import GeometryError, InputError
 
 INDICES = (1.0, 1.49, 1.3365)

@@ -189,7 +189,7 @@ def test_a_las_cloud_keeps_every_attribute(tmp_path: Path, suffix: str) -> None:
 
 @pytest.mark.parametrize("form", ["ascii", "binary_little_endian", "binary_big_endian"])
 def test_a_ply_cloud_keeps_properties_faces_and_byte_order(tmp_path: Path, form: str) -> None:
-    from multimedia.io.cloud_ply import PlyCloud, read_ply_mesh
+    from multimedia.bathymetry.cloud_ply import PlyCloud, read_ply_mesh
 
     xyz = positions()
     write_ply(tmp_path / "in.ply", xyz, form)
@@ -264,7 +264,7 @@ def test_a_dem_seen_by_cameras_returns_to_the_true_bed(tmp_path: Path) -> None:
 
 
 def test_windows_leave_no_seams_in_the_dem(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    from multimedia.workflows import bathymetry as workflow
+    from multimedia.bathymetry import workflow
 
     x, y = np.meshgrid(
         500_000 + 0.5 * (np.arange(150) + 0.5), 5_200_000 - 0.5 * (np.arange(130) + 0.5)
@@ -302,8 +302,8 @@ def test_cameras_correct_a_cloud_in_all_three_coordinates(tmp_path: Path) -> Non
 
 
 def test_cameras_may_come_from_a_project_file(tmp_path: Path) -> None:
-    from multimedia.io.project_file import write_project
-    from multimedia.io.survey_tables import read_camera_positions
+    from multimedia.bathymetry.survey_tables import read_camera_positions
+    from multimedia.projects.project_file import write_project
 
     cameras = tuple(
         mm.Camera.from_angles(centre, 0.0, 0.0, 0.0, principal_distance=35.0, name=f"c{k}")

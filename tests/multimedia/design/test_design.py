@@ -11,7 +11,7 @@ from click.testing import CliRunner
 
 from multimedia import Camera, FlatInterface, Layers, intersect, project
 from multimedia.cli.main import main
-from multimedia.solvers.design import (
+from multimedia.design.accuracy import (
     calibration_costs,
     compare_placements,
     object_grid,

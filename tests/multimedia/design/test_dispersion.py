@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from multimedia import FLOAT_GLASS, Layers, radial_shift
-from multimedia.solvers.dispersion import (
+from multimedia.design.dispersion import (
     colour_positions,
     correct_dispersion,
     layers_per_colour,

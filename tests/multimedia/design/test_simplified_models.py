@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from multimedia import Layers, radial_shift
-from multimedia.solvers.approximations import agrafiotis, lavest, telem
+from multimedia.design.simplified_models import agrafiotis, lavest, telem
 from photocore.errors import InputError
 
 PORT = Layers(indices=(1.0, 1.49, 1.34), thicknesses=(0.008,))

@@ -6,13 +6,13 @@ import mpmath as mp
 import numpy as np
 import pytest
 
-from multimedia.domain.camera import EXTERIOR, INTERIOR, Camera
-from multimedia.domain.flat_interface import FlatInterface
-from multimedia.domain.interfaces import Interfaces
-from multimedia.domain.layers import Layers
-from multimedia.domain.shifting import radial_shift
-from multimedia.domain.surfaces import Sphere
-from multimedia.solvers.projection import project, project_with_jacobian, projection_status
+from multimedia.media.camera import EXTERIOR, INTERIOR, Camera
+from multimedia.media.flat_interface import FlatInterface
+from multimedia.media.interfaces import Interfaces
+from multimedia.media.projection import project, project_with_jacobian, projection_status
+from multimedia.media.surfaces import Sphere
+from multimedia.refraction.layers import Layers
+from multimedia.refraction.shifting import radial_shift
 from photocore.distortion import NAMES, Brown, Convention
 from photocore.errors import GeometryError, InputError
 from photocore.rotation import rotation_vector_from_angle_rates

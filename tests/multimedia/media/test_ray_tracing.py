@@ -371,7 +371,7 @@ def test_a_flat_ray_stops_at_the_first_crest_it_meets() -> None:
 
 def golden_shifts() -> list[dict]:
     """Return the 50-digit radial shifts: housings, thin gaps, critical angles, grazing rays."""
-    path = Path(__file__).parents[1] / "golden" / "radial_shift.json"
+    path = Path(__file__).parents[2] / "golden" / "radial_shift.json"
     return json.loads(path.read_text(encoding="utf-8"))
 
 

@@ -12,20 +12,20 @@ import pytest
 from click.testing import CliRunner
 
 from multimedia.cli.main import main
-from multimedia.domain.flat_interface import FlatInterface
-from multimedia.domain.project import ImagePoints, ObjectPoints, Project
-from multimedia.io.openptv import particle_points, read_experiment, write_experiment
-from multimedia.io.openptv_files import (
+from multimedia.media.flat_interface import FlatInterface
+from multimedia.media.projection import project
+from multimedia.openptv.experiment import particle_points, read_experiment, write_experiment
+from multimedia.openptv.openptv_files import (
     glass_interface,
     read_camera,
     read_control,
     read_correspondences,
     read_targets,
 )
-from multimedia.solvers.intersection import intersect, intersect_pairs
-from multimedia.solvers.projection import project
-from multimedia.solvers.resection import resect
-from multimedia.workflows.openptv import import_openptv
+from multimedia.openptv.workflow import import_openptv
+from multimedia.orientation.intersection import intersect, intersect_pairs
+from multimedia.orientation.resection import resect
+from multimedia.projects.model import ImagePoints, ObjectPoints, Project
 from photocore.distortion import Brown, Convention
 from photocore.errors import GeometryError, InputError
 from tests.multimedia.tank import LAYERS, SENSOR, cameras, control

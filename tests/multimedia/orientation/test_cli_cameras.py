@@ -12,9 +12,9 @@ import pytest
 from click.testing import CliRunner
 
 from multimedia.cli.main import SUMMARIES, main
-from multimedia.domain.flat_interface import FlatInterface
-from multimedia.domain.project import ImagePoints, ObjectPoints, Project
-from multimedia.io.project_file import read_project, write_project
+from multimedia.media.flat_interface import FlatInterface
+from multimedia.projects.model import ImagePoints, ObjectPoints, Project
+from multimedia.projects.project_file import read_project, write_project
 from tests.multimedia.tank import LAYERS, cameras, control, images
 
 COMMANDS = ("project", "intersect", "resect", "epipolar", "openptv")
@@ -142,7 +142,7 @@ def test_openptv_goes_there_and_back(tmp_path):
     ]  # fmt: skip
     wall = FlatInterface(layers=LAYERS, point=(0, 0, 100))
     body = ObjectPoints(ids=tuple(map(str, range(1, 31))), xyz=POINTS + np.array([0, 0, 100.0]))
-    from multimedia.solvers.projection import project
+    from multimedia.media.projection import project
 
     image = np.concatenate([project(c, body.xyz, wall) for c in views])
     write_project(

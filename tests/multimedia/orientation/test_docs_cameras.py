@@ -12,7 +12,7 @@ from click.testing import CliRunner
 
 from multimedia.cli.main import main
 
-PAGE = Path(__file__).parents[2] / "docs" / "underwater-cameras.md"
+PAGE = Path(__file__).parents[3] / "docs" / "underwater-cameras.md"
 TEXT = PAGE.read_text(encoding="utf-8")
 
 

@@ -7,8 +7,8 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from multimedia.solvers.epipolar import epipolar_candidates, epipolar_curve
-from multimedia.solvers.projection import project
+from multimedia.media.projection import project
+from multimedia.orientation.epipolar_curves import epipolar_candidates, epipolar_curve
 from photocore.errors import InputError
 from tests.multimedia.tank import LAYERS, cameras, control, images
 

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 from scipy.optimize import least_squares
 
-from multimedia.domain.interfaces import Interfaces
-from multimedia.domain.point_status import PointStatus
-from multimedia.domain.surfaces import Plane, Sphere
-from multimedia.solvers.intersection import intersect, intersect_pairs, intersect_rays
-from multimedia.solvers.object_rays import image_rays
-from multimedia.solvers.projection import project
+from multimedia.media.interfaces import Interfaces
+from multimedia.media.projection import project
+from multimedia.media.surfaces import Plane, Sphere
+from multimedia.orientation.intersection import intersect, intersect_pairs, intersect_rays
+from multimedia.orientation.object_rays import image_rays
+from multimedia.orientation.point_status import PointStatus
 from photocore.errors import InputError
 from tests.multimedia.tank import LAYERS, cameras, control, images
 

@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 from scipy.optimize import least_squares
 
-from multimedia.domain.camera import EXTERIOR, INTERIOR, Camera
-from multimedia.domain.flat_interface import FlatInterface
-from multimedia.domain.interfaces import Interfaces
-from multimedia.domain.layers import Layers
-from multimedia.domain.surfaces import Sphere
-from multimedia.solvers.projection import project
-from multimedia.solvers.resection import resect
+from multimedia.media.camera import EXTERIOR, INTERIOR, Camera
+from multimedia.media.flat_interface import FlatInterface
+from multimedia.media.interfaces import Interfaces
+from multimedia.media.projection import project
+from multimedia.media.surfaces import Sphere
+from multimedia.orientation.resection import resect
+from multimedia.refraction.layers import Layers
 from photocore.distortion import Brown
 from photocore.errors import ConvergenceError, GeometryError, InputError
 from photocore.rotation import rotation_from_vector, world_from_camera

@@ -8,12 +8,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from multimedia.domain.flat_interface import FlatInterface
-from multimedia.domain.interfaces import Interfaces
-from multimedia.domain.project import ImagePoints, ObjectPoints, Project
-from multimedia.domain.surfaces import Cylinder, Plane, Sphere
-from multimedia.io.point_tables import read_image_points, read_object_points
-from multimedia.io.project_file import read_project, write_project
+from multimedia.media.flat_interface import FlatInterface
+from multimedia.media.interfaces import Interfaces
+from multimedia.media.surfaces import Cylinder, Plane, Sphere
+from multimedia.projects.model import ImagePoints, ObjectPoints, Project
+from multimedia.projects.point_tables import read_image_points, read_object_points
+from multimedia.projects.project_file import read_project, write_project
 from photocore.errors import GeometryError, InputError
 from tests.multimedia.tank import LAYERS, cameras, control, images
 

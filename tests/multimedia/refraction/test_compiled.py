@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from multimedia import Layers, compiled, radial_shift
-from multimedia.shift import shifted_radius
+from multimedia import Layers, radial_shift
+from multimedia.refraction import compiled
+from multimedia.refraction.shift import shifted_radius
 from photocore.errors import InputError, MissingExtraError
 
 TANK = Layers(indices=(1.0, 1.5, 1.34), thicknesses=(10.0,))

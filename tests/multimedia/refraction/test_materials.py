@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from multimedia.materials import (
+from multimedia.refraction.materials import (
     ACRYLIC,
     FLOAT_GLASS,
     FUSED_SILICA,

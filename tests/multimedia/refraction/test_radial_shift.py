@@ -13,11 +13,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from multimedia import Layers, radial_shift, radial_shift_derivatives, radial_shift_ratio
-from multimedia.shift import shift_derivatives, shift_ratio, shifted_radius
+from multimedia.refraction.shift import shift_derivatives, shift_ratio, shifted_radius
 from photocore.errors import GeometryError, InputError
 
 GOLDEN = json.loads(
-    (Path(__file__).parents[1] / "golden" / "radial_shift.json").read_text(encoding="utf-8")
+    (Path(__file__).parents[2] / "golden" / "radial_shift.json").read_text(encoding="utf-8")
 )
 TANK = Layers(indices=(1.0, 1.5, 1.34), thicknesses=(10.0,))
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from multimedia.water import (
+from multimedia.refraction.water import (
     HOEHLE,
     PARRISH,
     QUAN_FRY,

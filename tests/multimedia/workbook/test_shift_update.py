@@ -13,7 +13,7 @@ from openpyxl.chart import ScatterChart
 
 from multimedia import Layers, radial_shift
 from multimedia.cli.main import main
-from photocore.spreadsheet.editor import WorkbookEditor
+from photocore.workbook.editor import WorkbookEditor
 from tests import office
 
 MEDIA = ("--indices", "1,1.5,1.34", "--thicknesses", "0.01", "--camera", "0,0,0.51")

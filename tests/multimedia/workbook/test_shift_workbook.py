@@ -10,12 +10,12 @@ import openpyxl
 import pytest
 
 from multimedia import QUAN_FRY, Layers, radial_shift, water_refractive_index
-from multimedia.domain.shift_points import ShiftPoints, ShiftSetup
-from multimedia.io.shift_workbook import write_shift_workbook
-from multimedia.unrolled import unrolled_shift
-from multimedia.workflows.shift import write_template
+from multimedia.refraction.unrolled import unrolled_shift
+from multimedia.workbook.shift_points import ShiftPoints, ShiftSetup
+from multimedia.workbook.shift_workbook import write_shift_workbook
+from multimedia.workbook.workflow import write_template
 from photocore.errors import InputError
-from photocore.spreadsheet.lint import lint
+from photocore.workbook.lint import lint
 from tests import office
 
 ORDERS = {
@@ -213,7 +213,7 @@ def test_impossible_sizes_are_refused(
 
 
 def test_the_committed_template_is_what_the_command_writes(tmp_path: Path) -> None:
-    committed = Path(__file__).parents[2] / "templates" / "multimedia.xlsx"
+    committed = Path(__file__).parents[3] / "templates" / "multimedia.xlsx"
     fresh = tmp_path / "fresh.xlsx"
     write_template(fresh, rows=50, steps=6, overwrite=False)
     assert office.formulas_of(fresh) == office.formulas_of(committed), (

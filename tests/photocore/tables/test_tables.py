@@ -8,13 +8,7 @@ import openpyxl
 import pytest
 
 from photocore.errors import InputError, WorkbookError
-from photocore.tables import (
-    Column,
-    open_tables,
-    parse_column_map,
-    read_named_values,
-    read_table,
-)
+from photocore.tables import Column, open_tables, parse_column_map, read_named_values, read_table
 
 POLAR = (
     Column("id", ("Point", "Punto", "Punkt", "Nr."), kind="text", required=True),

@@ -7,8 +7,8 @@ import io
 import openpyxl
 import pytest
 
-from photocore.bookrows import RowBlock, finish_book
 from photocore.errors import InputError
+from photocore.workbook.bookrows import RowBlock, finish_book
 
 
 def book():

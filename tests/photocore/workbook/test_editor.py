@@ -7,10 +7,10 @@ import openpyxl
 import pytest
 
 from photocore.errors import InputError
-from photocore.spreadsheet.editor import WorkbookEditor
-from photocore.spreadsheet.package import open_package
-from photocore.spreadsheet.splice import SheetChanges, splice_sheet
 from photocore.tables import Column, read_table
+from photocore.workbook.editor import WorkbookEditor
+from photocore.workbook.package import open_package
+from photocore.workbook.splice import SheetChanges, splice_sheet
 from tests import office
 from tests.golden import make_rich_workbook
 
@@ -329,7 +329,7 @@ def test_another_reader_sees_the_stored_results(rich, tmp_path):
 
 
 def test_blocks_and_typed_cells_meet_in_rows_that_exist_or_not():
-    from photocore.spreadsheet.newrows import NewColumn, NewRows, RowFormula
+    from photocore.workbook.newrows import NewColumn, NewRows, RowFormula
 
     before = '<w><sheetData><row r="3"><c r="A3" s="5"/><c r="C3"/></row></sheetData></w>'
     columns = [
@@ -359,7 +359,7 @@ def test_blocks_and_typed_cells_meet_in_rows_that_exist_or_not():
 def test_a_formula_copied_downwards_moves_its_relative_rows_only(formula, moved):
     from openpyxl.formula.translate import Translator
 
-    from photocore.spreadsheet.newrows import RowFormula
+    from photocore.workbook.newrows import RowFormula
 
     assert RowFormula(formula, 2).at(7) == moved
     if "_x" not in formula:

@@ -8,9 +8,9 @@ import zipfile
 import pytest
 
 from photocore.errors import InputError
-from photocore.spreadsheet import package
-from photocore.spreadsheet.editor import WorkbookEditor
 from photocore.tables import Column, read_named_values, read_table
+from photocore.workbook import package
+from photocore.workbook.editor import WorkbookEditor
 from tests.golden import make_rich_workbook
 
 COLUMNS = (Column("id", kind="text"), Column("s1", required=True), Column("s2"))

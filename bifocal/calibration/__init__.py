@@ -1,0 +1,1 @@
+"""Lenses: boards, straight lines, the lens database, undistorted photos."""

@@ -1,0 +1,1 @@
+"""Orientation of a pair: control, ties, cameras, reference plane, homologous points."""

@@ -1,0 +1,1 @@
+"""Orthophotos: rectification, visibility, composition, mosaics, drawings and print sheets."""

@@ -1,0 +1,1 @@
+"""Where to stand, with which lenses, and what precision to expect."""

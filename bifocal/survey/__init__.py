@@ -1,0 +1,1 @@
+"""The point survey: measured points to relief, coordinates, precision, world coordinates."""

@@ -1,0 +1,1 @@
+"""The survey workbook: its layout, reading it, writing it, updating it in place."""

@@ -1,0 +1,1 @@
+"""Refraction correction of depths, the water level, point clouds and elevation models."""

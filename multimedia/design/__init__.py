@@ -1,0 +1,1 @@
+"""Accuracy studies of a set-up before anyone gets wet."""

@@ -1,0 +1,1 @@
+"""OpenPTV experiments in and out."""

@@ -1,0 +1,1 @@
+"""Project, intersect, resect, epipolar curves: cameras and points through the media."""

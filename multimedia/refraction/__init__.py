@@ -1,0 +1,1 @@
+"""Refraction: Snell's law, the radial shift and its derivatives, refractive indices."""

@@ -1,0 +1,1 @@
+"""Radial shift and refractive index as tables and live workbooks."""
