@@ -76,7 +76,7 @@ def shifted_radius(
         Refractive index of each layer.
     compiled : bool, optional
         Whether to use the machine code of the extra ``fast``, on all cores. By default where it is
-        installed and there are so many points that it pays; the results agree to 1e-15.
+        installed and there are so many points that it pays; the results agree to 2e-15.
 
     Returns
     -------

@@ -23,6 +23,7 @@ from bifocal.precision import (
     uncertainty_radius,
 )
 from photocore.errors import GeometryError, InputError
+from tests.rounding import EPS
 
 PAIRS = {"35/19": (35.0, 17.5, 19.0, 9.5), "35/28": (35.0, 17.5, 28.0, 14.0)}
 
@@ -34,11 +35,11 @@ def seen(c1, d1, c2, d2, radius, r):
 
 def test_equation_1_by_hand():
     # s = 8 mm, r = 0.5 m, d = 10 m: e = 8 * 0.5 / 10 = 0.4 mm.
-    assert relief_displacement(8.0, 0.5, d=10.0) == pytest.approx(0.4, abs=1e-15)
+    assert relief_displacement(8.0, 0.5, d=10.0) == pytest.approx(0.4, rel=4 * EPS)
 
 
 def test_equation_2_is_the_inverse_of_equation_1():
-    assert relief_from_displacement(8.0, 0.4, d=10.0) == pytest.approx(0.5, abs=1e-15)
+    assert relief_from_displacement(8.0, 0.4, d=10.0) == pytest.approx(0.5, rel=4 * EPS)
 
 
 @pytest.mark.parametrize("pair", PAIRS)
@@ -65,7 +66,7 @@ def test_relief_equals_a_fifty_digit_solution(d2, gap, share, radius):
         exact = (mpmath.mpf(f2) - f1) / (mpmath.mpf(f2) / d2 - mpmath.mpf(f1) / d1)
         rate = abs(float(mpmath.mpf(f2) / d2 - mpmath.mpf(f1) / d1))
     # Rounding of s2/d2 - s1/d1 relative to its size is all that may be lost.
-    allowed = 4e-16 * (f2 / d2 + f1 / d1) / rate * (abs(float(exact)) + d2 * 1e-3) + 1e-15
+    allowed = 2 * EPS * (f2 / d2 + f1 / d1) / rate * (abs(float(exact)) + d2 * 1e-3) + 4 * EPS
     assert abs(float(relief(f1, f2, d1=d1, d2=d2)) - float(exact)) <= allowed
 
 
@@ -78,7 +79,7 @@ def test_equation_7_has_the_sine_with_x_because_theta_is_an_azimuth():
 
 def test_points_on_the_plane_have_the_same_coordinates_in_both_photos():
     s1, s2 = seen(*PAIRS["35/19"], np.linspace(0.1, 5, 9), 0.0)
-    np.testing.assert_allclose(s1, s2, rtol=1e-15)
+    np.testing.assert_allclose(s1, s2, rtol=4 * EPS)
     np.testing.assert_array_equal(relief(s1, s1, d1=17.5, d2=9.5), 0.0)
 
 

@@ -15,6 +15,7 @@ from PIL import Image
 from bifocal.files.geotiff import RasterReader, create_raster, dpi_at_scale, gsd_at_scale
 from bifocal.model.grid import Grid
 from photocore.errors import InputError
+from tests.rounding import EPS
 
 GRID = Grid.from_bounds((-2.0, -1.0, 1.5, 1.0), gsd=0.005)
 
@@ -60,7 +61,7 @@ def test_a_window_beyond_the_edge_is_filled(tmp_path: Path) -> None:
 
 
 def test_dpi_tag_and_world_file_make_1_to_50_at_254_dpi_five_millimetres(tmp_path: Path) -> None:
-    assert gsd_at_scale(254, 50) == pytest.approx(0.005, abs=1e-15)
+    assert gsd_at_scale(254, 50) == pytest.approx(0.005, rel=4 * EPS)
     write_colour(tmp_path / "o.tif", dpi=dpi_at_scale(GRID.gsd, 50), world_file=True)
     with Image.open(tmp_path / "o.tif") as image:
         assert image.info["dpi"] == pytest.approx((254.0, 254.0))

@@ -429,6 +429,7 @@ def test_json_says_what_was_done_and_nothing_else(tmp_path: Path) -> None:
     assert told["max_depth"] > 5
 
 
+@pytest.mark.acceptance
 def test_memory_stays_bounded_while_the_dem_grows(tmp_path: Path) -> None:
     peaks = []
     for rows in (1100, 3300):
