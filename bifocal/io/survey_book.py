@@ -32,7 +32,7 @@ from bifocal.io.survey_sheets import (
 )
 from bifocal.io.survey_words import README, SETUP, word
 from photocore.bookrows import CellValue, column_letters, finish_book
-from photocore.output import atomic_path
+from photocore.newbook import new_workbook
 
 #: Row of the keys in `Points` and `Results`.
 HEAD = 4
@@ -56,7 +56,7 @@ def write_book(path: Path | str, content: SurveyContent, *, overwrite: bool = Fa
     overwrite : bool
         Replace an existing file.
     """
-    with atomic_path(path, overwrite=overwrite) as temporary:
+    with new_workbook(path, overwrite=overwrite) as temporary:
         builder = build(content)
         package = io.BytesIO()
         builder.book.save(package)
