@@ -17,7 +17,7 @@ from bifocal.model.relief_map import ReliefMap
 from bifocal.orthophotos.ortho_workflow import OrthoTask, make_ortho
 from bifocal.relief_maps.workflow import ReliefJob, relief_of_pair
 from bifocal.survey.output import write_result
-from bifocal.survey.workflow import SolveOptions, solve_file
+from bifocal.survey.workflow import solve
 from photocore.arrays import FloatArray
 from photocore.cli import Progress, no_progress
 from photocore.errors import InputError
@@ -152,8 +152,7 @@ def _survey(
         folder / "targets.csv", {"id": ids, **columns, "r measured [m]": np.round(true, 5)},
         overwrite=True,
     )  # fmt: skip
-    options = SolveOptions(pair=folder / "facade.pair.json", sigma_px=PICK_SIGMA)
-    solution = solve_file(folder / "targets.csv", options)
+    solution = solve(folder / "targets.csv", pair=folder / "facade.pair.json", sigma_px=PICK_SIGMA)
     write_result(folder / "result.xlsx", solution, overwrite=True)
     table = solution.table
     return ids, true, table["r"], table["sigma_r"], table.flags

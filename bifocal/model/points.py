@@ -52,11 +52,6 @@ class SurveyPoints:
     def __len__(self) -> int:
         return len(self.ids)
 
-    @property
-    def is_georeferenced(self) -> bool:
-        """Whether any point has world coordinates."""
-        return self.world is not None and bool(np.isfinite(self.world).all(axis=1).any())
-
     def take(self, keep: BoolArray) -> SurveyPoints:
         """Return the points where ``keep`` is true."""
         return SurveyPoints(

@@ -18,7 +18,7 @@ ALPHA = 0.01
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Model:
+class TransformationModel:
     """A kind of transformation: how many parameters, how many points it needs, how it is found."""
 
     name: str
@@ -28,10 +28,12 @@ class Model:
     fit: Callable[[FloatArray, FloatArray], Similarity]
 
 
-MODELS: Mapping[str, Model] = {
-    "2D": Model(name="2D", parameters=4, needed=2, axes=2, fit=fit_plane),
-    "levelled": Model(name="levelled", parameters=5, needed=2, axes=3, fit=fit_levelled),
-    "3D": Model(name="3D", parameters=7, needed=3, axes=3, fit=fit_similarity),
+MODELS: Mapping[str, TransformationModel] = {
+    "2D": TransformationModel(name="2D", parameters=4, needed=2, axes=2, fit=fit_plane),
+    "levelled": TransformationModel(
+        name="levelled", parameters=5, needed=2, axes=3, fit=fit_levelled
+    ),
+    "3D": TransformationModel(name="3D", parameters=7, needed=3, axes=3, fit=fit_similarity),
 }
 
 
@@ -125,10 +127,10 @@ def georeference(table: ReliefTable, control: KnownPoints, *, model: str = "auto
     )
 
 
-_Fit = tuple[Model, Similarity, BoolArray, float, int]
+_Fit = tuple[TransformationModel, Similarity, BoolArray, float, int]
 
 
-def _fit(model: Model, found: FloatArray, world: FloatArray, used: BoolArray) -> _Fit:
+def _fit(model: TransformationModel, found: FloatArray, world: FloatArray, used: BoolArray) -> _Fit:
     """Return the fit to the chosen points with its sum of squares and redundancy."""
     target = world.copy()
     if model.axes == 2:
@@ -144,7 +146,9 @@ def _fit(model: Model, found: FloatArray, world: FloatArray, used: BoolArray) ->
     return model, transformation, used, float((residuals**2).sum()), redundancy
 
 
-def _robust(model: Model, found: FloatArray, control: KnownPoints, used: BoolArray) -> _Fit:
+def _robust(
+    model: TransformationModel, found: FloatArray, control: KnownPoints, used: BoolArray
+) -> _Fit:
     """Return the fit without the points that contradict the others."""
     best = _fit(model, found, control.xyz, used)
     size = float(np.abs(control.xyz[used]).max())

@@ -88,6 +88,13 @@ class CheckResult:
     missing: tuple[str, ...]
 
     @property
+    def remarks(self) -> tuple[str, ...]:
+        """What the user should know about the names."""
+        if not self.missing:
+            return ()
+        return (f"Check: no measured point is called {', '.join(self.missing[:10])}.",)
+
+    @property
     def accuracy(self) -> float:
         """The largest RMSE of the three axes; NaN without check points. [m]"""
         values = [axis.rmse for axis in self.axes.values() if axis.n]

@@ -65,11 +65,12 @@ def refuse_wrong_unit(
                 )
         return
     typed = np.hstack([points.xy1, points.xy2])[cartesian]
-    nadir = max(abs(value) for value in (*setup.nadir1, *setup.nadir2))
+    first, second = setup.nadir1 or (0.0, 0.0), setup.nadir2 or (0.0, 0.0)
+    nadir = max(abs(value) for value in (*first, *second))
     if typed.size and nadir > 2 * CORNER_PX and float(np.nanmax(np.abs(typed))) < CORNER_PX:
         raise InputError(
             f"{where}: no coordinate exceeds {np.nanmax(np.abs(typed)):.4g} px although the nadir "
-            f"points lie at ({setup.nadir1[0]:g}, {setup.nadir1[1]:g}) px: they look like "
+            f"points lie at ({first[0]:g}, {first[1]:g}) px: they look like "
             f"millimetres, while {place} says px. Set the input unit to mm."
         )
     if typed.size and nadir == 0 and setup.pitch is not None:

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+import re
 
 import numpy as np
-from openpyxl.formatting.rule import FormulaRule
-from openpyxl.styles import Alignment, Font, PatternFill
+from openpyxl.styles import Alignment
 
-from bifocal.survey.setup import ON_PLANE_SIGMAS
+from bifocal.model.flags import FlagLimits
+from bifocal.survey.tolerances import judge
 from bifocal.survey.workbook.columns import (
     CHECK,
     FRAME_SHARES,
@@ -19,11 +19,17 @@ from bifocal.survey.workbook.columns import (
     UNCERTAINTY,
     verdict_columns,
 )
-from bifocal.survey.workbook.content import SurveyContent, setup_cells, verdict_rows
+from bifocal.survey.workbook.content import (
+    SurveyContent,
+    check_cells,
+    control_cells,
+    setup_cells,
+)
 from bifocal.survey.workbook.sheets import (
     HEAD_FONT,
     LABEL_FONT,
     BookBuilder,
+    colour_words,
     protect,
     set_up_print,
     validate,
@@ -31,52 +37,38 @@ from bifocal.survey.workbook.sheets import (
 from bifocal.survey.workbook.words import word
 from photocore.workbook.bookrows import CellValue, column_letters
 
-Cells = Mapping[str, list[CellValue]]
 #: Row of the keys of the two tables; statistics and parameters stand above.
 CHECK_HEAD, CONTROL_HEAD = 12, 27
 #: First column of the verdict, beside the check table.
 VERDICT_LEFT = 14
 
 
-def check(builder: BookBuilder, content: SurveyContent, cells: Cells) -> None:
+def check(builder: BookBuilder, content: SurveyContent) -> None:
     """Write errors at check points, their statistics and the verdict."""
     language, rows = builder.language, content.check_rows
     sheet = builder.sheet("Check", word("Check", language), word("check_how", language))
-    for i, axis in enumerate("XYZ"):
-        builder.text(sheet, f"{'BCD'[i]}4", f"d{axis}", HEAD_FONT)
-    for row, key in enumerate(("n", "rmse", "mean", "max"), start=5):
+    for letter, axis in zip("BCD", "XYZ", strict=True):
+        builder.text(sheet, f"{letter}4", f"d{axis}", HEAD_FONT)
+    for row, (key, (body, attribute)) in enumerate(_STATISTICS.items(), start=5):
         builder.text(sheet, f"A{row}", word(key, language))
-        for i, axis in enumerate("XYZ"):
-            cell, column = f"{'BCD'[i]}{row}", f"tblCheck[d{axis}]"
-            found = content.check.axes[axis] if content.check is not None else None
-            count = found.n if found is not None else 0
-            text, value = {
-                "n": (f"COUNT({column})", count),
-                "rmse": (
-                    f'IF({"BCD"[i]}5=0,"",SQRT(SUMSQ({column})/{"BCD"[i]}5))',
-                    found.rmse if found is not None and count else None,
-                ),
-                "mean": (
-                    f'IF({"BCD"[i]}5=0,"",AVERAGE({column}))',
-                    found.mean if found is not None and count else None,
-                ),
-                "max": (
-                    f'IF({"BCD"[i]}5=0,"",MAX(MAX({column}),-MIN({column})))',
-                    found.max_abs if found is not None and count else None,
-                ),
-            }[key]
-            form = "0" if key == "n" else "0.0000"
-            builder.formula(sheet, cell, text, value, form=form, name=f"check_{key}_{axis}")
+        for letter, axis in zip("BCD", "XYZ", strict=True):
+            errors = None if content.check is None else content.check.axes[axis]
+            value: CellValue = 0 if key == "n" else None
+            if errors is not None and errors.n:
+                value = getattr(errors, attribute)
+            text = body.format(f"tblCheck[d{axis}]", f"{letter}5")
+            form, name = "0" if key == "n" else "0.0000", f"check_{key}_{axis}"
+            builder.formula(sheet, f"{letter}{row}", text, value, form=form, name=name)
     builder.text(sheet, "A9", word("worst", language))
     accuracy = content.check.accuracy if content.check is not None else math.nan
     worst = None if math.isnan(accuracy) else accuracy
     builder.formula(
         sheet, "B9", 'IF(COUNT(B6:D6)=0,"",MAX(B6:D6))', worst, form="0.0000", name="check_worst"
     )
-    sheet.column_dimensions["A"].width = 30
+    cells = check_cells(content)
     builder.table(sheet, "tblCheck", CHECK, at=(CHECK_HEAD, 1), rows=rows, cells=cells)
     sheet.column_dimensions["A"].width = 28
-    _verdict(builder, content, worst)
+    _verdict(builder, content, accuracy)
     first, last = CHECK_HEAD + 1, CHECK_HEAD + rows
     validate(sheet, f"B{first}:D{last}")
     validate(sheet, f"E{first}:E{last}", choices="1,0")
@@ -85,57 +77,56 @@ def check(builder: BookBuilder, content: SurveyContent, cells: Cells) -> None:
     protect(sheet)
 
 
-def _verdict(builder: BookBuilder, content: SurveyContent, accuracy: float | None) -> None:
+#: Statistics of errors: formula of their column and the cell of their number, attribute.
+_STATISTICS = {
+    "n": ("COUNT({0})", "n"),
+    "rmse": ('IF({1}=0,"",SQRT(SUMSQ({0})/{1}))', "rmse"),
+    "mean": ('IF({1}=0,"",AVERAGE({0}))', "mean"),
+    "max": ('IF({1}=0,"",MAX(MAX({0}),-MIN({0})))', "max_abs"),
+}
+
+
+def _verdict(builder: BookBuilder, content: SurveyContent, accuracy: float) -> None:
     """Write what drawing scales the accuracy holds, beside the check table."""
     sheet, language = builder.book["Check"], builder.language
     holds, fails = word("holds", language), word("fails", language)
-    rows = verdict_rows(content)
-    verdicts: list[CellValue] = [
-        None if accuracy is None else holds if accuracy <= limit else fails for *_, limit in rows
-    ]
+    verdicts = judge(accuracy, content.rules)
+    unknown = math.isnan(accuracy)
     builder.table(
         sheet,
         "tblVerdict",
         verdict_columns(holds, fails),
         at=(CHECK_HEAD, VERDICT_LEFT),
-        rows=len(rows),
+        rows=len(verdicts),
         cells={
-            "rule": [rule.name for rule, *_ in rows],
-            "scale": [scale for _, scale, _ in rows],
-            "tolerance": [limit * 1000.0 for *_, limit in rows],
-            "verdict": verdicts,
+            "rule": [verdict.rule.name for verdict in verdicts],
+            "scale": [verdict.scale for verdict in verdicts],
+            "tolerance": [verdict.tolerance * 1000.0 for verdict in verdicts],
+            "verdict": [
+                None if unknown else holds if verdict.holds else fails for verdict in verdicts
+            ],
         },
     )
-    first, last = CHECK_HEAD + 1, CHECK_HEAD + len(rows)
+    first, last = CHECK_HEAD + 1, CHECK_HEAD + len(verdicts)
     letter = column_letters(VERDICT_LEFT + 2)
-    for verb, fill, ink in ((holds, "E2F0D9", "1E5B12"), (fails, "F8CBCB", "8B0000")):
-        rule_ = FormulaRule(
-            formula=[f'${letter}{first}="{verb}"'],
-            fill=PatternFill("solid", start_color=fill, end_color=fill),
-            font=Font(color=ink),
-        )
-        sheet.conditional_formatting.add(f"{letter}{first}:{letter}{last}", rule_)
-
-
-def georeference(builder: BookBuilder, content: SurveyContent, cells: Cells) -> None:
-    """Write control points, the closed-form transformation and the residuals."""
-    language = builder.language
-    sheet = builder.sheet("Georeference", word("Georeference", language), word("geo_how", language))
-    _parameters(builder, content)
-    spare: dict[str, list[CellValue]] = {
-        key: [*cells.get(key, []), *[0] * content.control_rows]
-        for key in ("w", "cX", "cY", "cZ", "cE", "cN", "cH")
-    }
-    builder.table(
-        sheet,
-        "tblGeo",
-        GEOREFERENCE,
-        at=(CONTROL_HEAD, 1),
-        rows=content.control_rows,
-        cells=dict(cells) | spare,
+    colour_words(
+        sheet, letter, first, last, {holds: ("E2F0D9", "1E5B12"), fails: ("F8CBCB", "8B0000")}
     )
+
+
+def georeference(builder: BookBuilder, content: SurveyContent) -> None:
+    """Write control points, the closed-form transformation and the residuals."""
+    language, rows = builder.language, content.control_rows
+    sheet = builder.sheet("Georeference", word("Georeference", language), word("geo_how", language))
+    _model(builder, content)
+    _transformation(builder, content)
+    _centres(builder, content)
+    _rotation(builder, content)
+    _sums(builder, content)
+    cells = control_cells(content)
+    builder.table(sheet, "tblGeo", GEOREFERENCE, at=(CONTROL_HEAD, 1), rows=rows, cells=cells)
     sheet.column_dimensions["A"].width = 34
-    first, last = CONTROL_HEAD + 1, CONTROL_HEAD + content.control_rows
+    first, last = CONTROL_HEAD + 1, CONTROL_HEAD + rows
     validate(sheet, f"B{first}:D{last}", between=(-1e8, 1e8))
     validate(sheet, f"E{first}:E{last}", choices="1,0")
     sheet.freeze_panes = f"B{first}"
@@ -143,120 +134,84 @@ def georeference(builder: BookBuilder, content: SurveyContent, cells: Cells) -> 
     protect(sheet)
 
 
-def _sums(content: SurveyContent) -> dict[str, float]:
-    """Return the centred sums of the closed forms, as the sheet computes them."""
-    names = ("a2", "b2", "l2", "sq2", "aL", "bL", "lL", "sq3", "cYH")
-    geo = content.georeference
-    if geo is None:
-        return dict.fromkeys(names, 0.0)
-    used = geo.used
-    p = geo.found[used] - geo.world_from_wall.source_centre
-    world = content.control.xyz[used]
-    q = world - geo.origin
-    if geo.model == "2D":
-        q[:, 2] = 0.0
-    a2, b2 = (p[:, :2] * q[:, :2]).sum(), (p[:, 0] * q[:, 1] - p[:, 1] * q[:, 0]).sum()
-    a, b = (
-        (p[:, 0] * q[:, 0]).sum() - (p[:, 2] * q[:, 1]).sum(),
-        (p[:, 0] * q[:, 1]).sum() + (p[:, 2] * q[:, 0]).sum(),
-    )
-    values = (
-        a2,
-        b2,
-        np.sqrt(a2**2 + b2**2),
-        (p[:, :2] ** 2).sum(),
-        a,
-        b,
-        np.sqrt(a**2 + b**2),
-        (p**2).sum(),
-        (p[:, 1] * q[:, 2]).sum(),
-    )
-    return dict(zip(names, (float(value) for value in values), strict=True))
-
-
-def _parameters(builder: BookBuilder, content: SurveyContent) -> None:
-    """Write the transformation: closed forms live, the general one found by the program."""
+def _model(builder: BookBuilder, content: SurveyContent) -> None:
+    """Write which model is asked for, found and used."""
     sheet, language, geo = builder.book["Georeference"], builder.language, content.georeference
-    sums = _sums(content)
-    transformation = None if geo is None else geo.world_from_wall
-    used = 0 if geo is None else int(geo.used.sum())
-
-    def text(row: int, key: str) -> None:
+    for row, key in enumerate(("geo_model", "geo_auto", "geo_used"), start=4):
         builder.text(sheet, f"A{row}", word(key, language))
-
-    def formula(cell: str, name: str, body: str, value: CellValue, form: str = "0.0000") -> None:
-        builder.formula(sheet, cell, body, value, form=form, name=name)
-
-    text(4, "geo_model")
     sheet["A4"].alignment = Alignment(wrap_text=True)
     builder.input(sheet, "B4", content.model, name="g_model")
     validate(sheet, "B4", choices="auto,levelled,3D,2D")
-    text(5, "geo_auto")
     builder.input(sheet, "B5", None if geo is None else geo.model, name="g_auto")
-    text(6, "geo_used")
     flat = 'IF(COUNT(tblGeo[H])=0,IF(COUNT(tblGeo[E])=0,"levelled","2D"),'
-    kind = geo.model if geo is not None else "levelled"
-    formula(
-        "B6",
-        "g_used",
-        f'IF(g_model="auto",{flat}IF(g_auto="3D","3D","levelled")),g_model)',
-        kind if geo is not None or content.model == "auto" else content.model,
-        "General",
-    )
-    text(7, "geo_n")
-    formula("B7", "g_n", "SUM(tblGeo[w])", used, "0")
-    text(8, "geo_scale")
-    k = None if transformation is None else transformation.scale
-    formula(
-        "B8",
-        "g_k",
-        'IF(g_n<IF(g_used="3D",3,2),"",IF(g_used="3D",IF(COUNT(s3_k)=1,s3_k,""),'
-        'IF(g_used="2D",IF(g_sq2=0,"",g_l2/g_sq2),IF(g_lL=0,"",(g_lL+g_cYH)/g_sq3))))',
-        k,
-        "0.000000000",
-    )
-    text(9, "geo_sigma0")
+    used = f'IF(g_model="auto",{flat}IF(g_auto="3D","3D","levelled")),g_model)'
+    shown = "levelled" if content.model == "auto" else content.model
+    value = shown if geo is None else geo.model
+    builder.formula(sheet, "B6", used, value, form="General", name="g_used")
+
+
+def _transformation(builder: BookBuilder, content: SurveyContent) -> None:
+    """Write number of points, scale, precision and rotation in plan, live."""
+    sheet, geo = builder.book["Georeference"], content.georeference
     redundant = 'g_n*IF(g_used="2D",2,3)-IF(g_used="2D",4,IF(g_used="3D",7,5))'
-    squares = "SUMPRODUCT(tblGeo[w],tblGeo[v{0}],tblGeo[v{0}])"
-    formula(
-        "B9",
-        "g_sigma0",
-        f'IF(g_k="","",IF({redundant}<1,"",SQRT(({squares.format("E")}+{squares.format("N")}'
-        f'+IF(g_used="2D",0,{squares.format("H")}))/({redundant}))))',
-        None if geo is None or math.isnan(geo.sigma0) else geo.sigma0,
-    )
-    text(10, "geo_alpha")
-    angle = None
-    if transformation is not None:
-        angle = math.degrees(
-            math.atan2(transformation.rotation[1, 0], transformation.rotation[0, 0])
+    east, north, height = (f"SUMPRODUCT(tblGeo[w],tblGeo[v{n}],tblGeo[v{n}])" for n in "ENH")
+    values: tuple[CellValue, ...] = (0, None, None, None)
+    if geo is not None:
+        turn = geo.world_from_wall.rotation
+        values = (
+            int(geo.used.sum()),
+            geo.world_from_wall.scale,
+            None if math.isnan(geo.sigma0) else geo.sigma0,
+            math.degrees(math.atan2(turn[1, 0], turn[0, 0])),
         )
-    formula("B10", "g_alpha", 'IF(g_k="","",DEGREES(ATAN2(g_11,g_21)))', angle)
-    _centres(builder, content)
-    text(14, "geo_rotation")
+    lines = (
+        ("geo_n", "g_n", "SUM(tblGeo[w])", "0"),
+        (
+            "geo_scale",
+            "g_k",
+            'IF(g_n<IF(g_used="3D",3,2),"",IF(g_used="3D",IF(COUNT(s3_k)=1,s3_k,""),'
+            'IF(g_used="2D",IF(g_sq2=0,"",g_l2/g_sq2),IF(g_lL=0,"",(g_lL+g_cYH)/g_sq3))))',
+            "0.000000000",
+        ),
+        (
+            "geo_sigma0",
+            "g_sigma0",
+            f'IF(g_k="","",IF({redundant}<1,"",SQRT(({east}+{north}'
+            f'+IF(g_used="2D",0,{height}))/({redundant}))))',
+            "0.0000",
+        ),
+        ("geo_alpha", "g_alpha", 'IF(g_k="","",DEGREES(ATAN2(g_11,g_21)))', "0.0000"),
+    )
+    for row, ((key, name, body, form), value) in enumerate(zip(lines, values, strict=True), 7):
+        builder.text(sheet, f"A{row}", word(key, builder.language))
+        builder.formula(sheet, f"B{row}", body, value, form=form, name=name)
+
+
+#: Cosines of the closed forms, row by row: of the model 2D, of the levelled one.
+_COSINES = {
+    "11": ("g_a2/g_l2", "g_aL/g_lL"), "12": ("-g_b2/g_l2", "0"), "13": ("0", "g_bL/g_lL"),
+    "21": ("g_b2/g_l2", "g_bL/g_lL"), "22": ("g_a2/g_l2", "0"), "23": ("0", "-g_aL/g_lL"),
+    "31": ("0", "0"), "32": ("0", "1"), "33": ("1", "0"),
+}  # fmt: skip
+
+
+def _rotation(builder: BookBuilder, content: SurveyContent) -> None:
+    """Write the rotation: closed forms live, the general one found by the program."""
+    sheet, language, geo = builder.book["Georeference"], builder.language, content.georeference
+    builder.text(sheet, "A14", word("geo_rotation", language))
     builder.text(sheet, "J14", word("geo_solved", language))
-    cosines = {
-        "11": ("g_a2/g_l2", "g_aL/g_lL"), "12": ("-g_b2/g_l2", "0"), "13": ("0", "g_bL/g_lL"),
-        "21": ("g_b2/g_l2", "g_bL/g_lL"), "22": ("g_a2/g_l2", "0"), "23": ("0", "-g_aL/g_lL"),
-        "31": ("0", "0"), "32": ("0", "1"), "33": ("1", "0"),
-    }  # fmt: skip
-    for i in range(3):
-        for j in range(3):
-            key = f"{i + 1}{j + 1}"
-            entry = None if transformation is None else float(transformation.rotation[i, j])
-            plane, levelled = cosines[key]
-            formula(
-                f"{'BCD'[j]}{14 + i}",
-                f"g_{key}",
-                f'IF(g_k="","",IF(g_used="3D",s3_{key},IF(g_used="2D",{plane},{levelled})))',
-                entry,
-                "0.000000000",
-            )
-            solved = entry if kind == "3D" and geo is not None else None
-            builder.input(sheet, f"{'GHI'[j]}{14 + i}", solved, name=f"s3_{key}")
+    is_3d = geo is not None and geo.model == "3D"
+    for key, (plane, levelled) in _COSINES.items():
+        i, j = int(key[0]) - 1, int(key[1]) - 1
+        entry = None if geo is None else float(geo.world_from_wall.rotation[i, j])
+        body = f'IF(g_k="","",IF(g_used="3D",s3_{key},IF(g_used="2D",{plane},{levelled})))'
+        place = f"{'BCD'[j]}{14 + i}"
+        builder.formula(sheet, place, body, entry, form="0.000000000", name=f"g_{key}")
+        solved = entry if is_3d else None
+        builder.input(sheet, f"{'GHI'[j]}{14 + i}", solved, name=f"s3_{key}")
     builder.text(sheet, "J17", word("geo_scale", language))
-    builder.input(sheet, "G17", k if kind == "3D" else None, name="s3_k")
-    _write_sums(builder, sums)
+    scale = geo.world_from_wall.scale if geo is not None and is_3d else None
+    builder.input(sheet, "G17", scale, name="s3_k")
 
 
 def _centres(builder: BookBuilder, content: SurveyContent) -> None:
@@ -285,29 +240,38 @@ def _centres(builder: BookBuilder, content: SurveyContent) -> None:
         formula(f"{'GHI'[i]}13", f"g_{name}t", rest, offset[i])
 
 
-def _write_sums(builder: BookBuilder, sums: Mapping[str, float]) -> None:
-    """Write the sums the closed forms are made of."""
-    sheet = builder.book["Georeference"]
-
-    def product(*pairs: str) -> str:
-        return "+".join(f"SUMPRODUCT(tblGeo[c{pair[0]}],tblGeo[c{pair[1]}])" for pair in pairs)
-
-    bodies = {
-        "a2": product("XE", "YN"),
-        "b2": f"{product('XN')}-{product('YE')}",
-        "l2": "SQRT(g_a2^2+g_b2^2)",
-        "sq2": product("XX", "YY"),
-        "aL": f"{product('XE')}-{product('ZN')}",
-        "bL": product("XN", "ZE"),
-        "lL": "SQRT(g_aL^2+g_bL^2)",
-        "sq3": product("XX", "YY", "ZZ"),
-        "cYH": product("YH"),
-    }
-    for i, (name, body) in enumerate(bodies.items()):
-        row, letter = 19 + i % 5, "AC"[i // 5]
-        builder.text(sheet, f"{letter}{row}", f"g_{name}", LABEL_FONT)
-        value_cell = f"{chr(ord(letter) + 1)}{row}"
-        builder.formula(sheet, value_cell, body, sums[name], form="0.000000", name=f"g_{name}")
+def _sums(builder: BookBuilder, content: SurveyContent) -> None:
+    """Write the centred sums the closed forms are made of, with their values."""
+    sheet, geo = builder.book["Georeference"], content.georeference
+    centred = np.zeros((6, 0))
+    if geo is not None:
+        world = content.control.xyz[geo.used] - geo.origin
+        if geo.model == "2D":
+            world[:, 2] = 0.0
+        centred = np.hstack([geo.found[geo.used] - geo.world_from_wall.source_centre, world]).T
+    column = dict(zip("XYZENH", centred, strict=True))
+    products = {
+        "a2": "XE+YN", "b2": "XN-YE", "sq2": "XX+YY", "aL": "XE-ZN", "bL": "XN+ZE",
+        "sq3": "XX+YY+ZZ", "cYH": "YH",
+    }  # fmt: skip
+    bodies, values = {}, {}
+    for name, pairs in products.items():
+        signed = re.findall(r"([+-]?)(\w)(\w)", pairs)
+        bodies[name] = "".join(
+            f"{sign}SUMPRODUCT(tblGeo[c{one}],tblGeo[c{other}])" for sign, one, other in signed
+        )
+        values[name] = sum(
+            float(f"{sign}1") * float((column[one] * column[other]).sum())
+            for sign, one, other in signed
+        )
+    for kind in "2L":
+        bodies[f"l{kind}"] = f"SQRT(g_a{kind}^2+g_b{kind}^2)"
+        values[f"l{kind}"] = math.hypot(values[f"a{kind}"], values[f"b{kind}"])
+    for i, name in enumerate(("a2", "b2", "l2", "sq2", "aL", "bL", "lL", "sq3", "cYH")):
+        row, (left, right) = 19 + i % 5, ("AB", "CD")[i // 5]
+        builder.text(sheet, f"{left}{row}", f"g_{name}", LABEL_FONT)
+        place, form = f"{right}{row}", "0.000000"
+        builder.formula(sheet, place, bodies[name], values[name], form=form, name=f"g_{name}")
 
 
 def planning(builder: BookBuilder, content: SurveyContent) -> None:
@@ -374,11 +338,11 @@ def _uncertainty(
 ) -> dict[str, list[CellValue]]:
     """Return the radii inside which a relief is below twice its standard deviation."""
     cells: dict[str, list[CellValue]] = {"relief_cm": list(PLANNED_RELIEF)}
-    if content.distances is None or not sigma:
+    if content.pair is None or not sigma:
         return cells
-    d1, d2 = content.distances
+    d1, d2 = content.pair.d1, content.pair.d2
     radii = [
-        ON_PLANE_SIGMAS * math.sqrt(2) * float(sigma) * (d1 - cm / 100) * (d2 - cm / 100)
+        FlagLimits().on_plane * math.sqrt(2) * float(sigma) * (d1 - cm / 100) * (d2 - cm / 100)
         / (cm / 100 * abs(d1 - d2))
         for cm in PLANNED_RELIEF
     ]  # fmt: skip

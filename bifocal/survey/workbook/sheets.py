@@ -15,7 +15,7 @@ from openpyxl.worksheet.datavalidation import DataValidation
 from openpyxl.worksheet.table import Table, TableFormula, TableStyleInfo
 from openpyxl.worksheet.worksheet import Worksheet
 
-from bifocal.survey.workbook.columns import Column, row_formula
+from bifocal.survey.workbook.columns import TEXT_KEYS, SurveyColumn, row_formula
 from bifocal.survey.workbook.words import label, word
 from photocore.workbook.bookrows import CellValue, RowBlock
 
@@ -43,7 +43,7 @@ FLAG_COLOURS = {
 class TableContent:
     """A table as built: its columns and their values by key."""
 
-    columns: Sequence[Column]
+    columns: Sequence[SurveyColumn]
     cells: Mapping[str, Sequence[CellValue]]
 
 
@@ -134,7 +134,7 @@ class BookBuilder:
         self,
         sheet: Worksheet,
         name: str,
-        columns: Sequence[Column],
+        columns: Sequence[SurveyColumn],
         *,
         at: tuple[int, int],
         rows: int,
@@ -179,7 +179,7 @@ class BookBuilder:
         if repeat:
             self.blocks[sheet.title] = _block(name, columns, head + 1, rows, cells, letters, short)
 
-    def _cell(self, cell: object, table: str, column: Column, value: CellValue) -> None:
+    def _cell(self, cell: object, table: str, column: SurveyColumn, value: CellValue) -> None:
         """Write one cell of a table."""
         sheet, place = cell.parent, cell.coordinate  # type: ignore[attr-defined]
         form = _number_format(column)
@@ -194,7 +194,12 @@ class BookBuilder:
             sheet[place].alignment = Alignment(horizontal="center")
 
     def _add_table(
-        self, sheet: Worksheet, name: str, columns: Sequence[Column], at: tuple[int, int], rows: int
+        self,
+        sheet: Worksheet,
+        name: str,
+        columns: Sequence[SurveyColumn],
+        at: tuple[int, int],
+        rows: int,
     ) -> None:
         head, left = at
         last = get_column_letter(left + len(columns) - 1)
@@ -210,23 +215,23 @@ class BookBuilder:
         sheet.add_table(table)
 
 
-def _at(cells: Mapping[str, Sequence[CellValue]], column: Column, row: int) -> CellValue:
+def _at(cells: Mapping[str, Sequence[CellValue]], column: SurveyColumn, row: int) -> CellValue:
     values = cells.get(column.key, ())
-    return values[row - 1] if row <= len(values) else None
+    return values[row - 1] if row <= len(values) else column.spare
 
 
-def _number_format(column: Column) -> str:
+def _number_format(column: SurveyColumn) -> str:
     if column.places is not None:
         return "0." + "0" * column.places if column.places else "0"
     # Names typed as 1-2 must not turn into dates: text, but only where text is typed.
     if column.key == "scale":
         return '"1:"0'
-    return "@" if column.kind == "input" and column.key in ("id", "code", "note") else "General"
+    return "@" if column.kind == "input" and column.key in TEXT_KEYS else "General"
 
 
 def _block(
     table: str,
-    columns: Sequence[Column],
+    columns: Sequence[SurveyColumn],
     first: int,
     rows: int,
     cells: Mapping[str, Sequence[CellValue]],
@@ -259,12 +264,27 @@ def _short_formula(table: str, text: str, letters: Mapping[str, str], head: int)
 
 def flag_colours(sheet: Worksheet, letter: str, first: int, last: int) -> None:
     """Colour the flags of a column; the word tells the same."""
-    for flag, (fill, text) in FLAG_COLOURS.items():
+    bold = ("OFF-RADIAL", "NADIR", "CHECK")
+    colour_words(sheet, letter, first, last, FLAG_COLOURS, bold=bold, stop=True)
+
+
+def colour_words(
+    sheet: Worksheet,
+    letter: str,
+    first: int,
+    last: int,
+    colours: Mapping[str, tuple[str, str]],
+    *,
+    bold: Sequence[str] = (),
+    stop: bool | None = None,
+) -> None:
+    """Colour the cells of a column by the word they hold: word to fill and ink."""
+    for text, (fill, ink) in colours.items():
         rule = FormulaRule(
-            formula=[f'${letter}{first}="{flag}"'],
+            formula=[f'${letter}{first}="{text}"'],
             fill=PatternFill("solid", start_color=fill, end_color=fill),
-            font=Font(color=text, bold=flag in ("OFF-RADIAL", "NADIR", "CHECK")),
-            stopIfTrue=True,
+            font=Font(color=ink, bold=text in bold) if bold else Font(color=ink),
+            stopIfTrue=stop,
         )
         sheet.conditional_formatting.add(f"{letter}{first}:{letter}{last}", rule)
 
