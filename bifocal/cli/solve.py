@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import click
 
 from photocore.cli import remark, text_table
 
+Command = TypeVar("Command", bound=Callable[..., Any])
 EXAMPLE = """\b
 Examples:
   bifocal solve survey.xlsx --out result.xlsx
@@ -18,6 +20,11 @@ Examples:
 """
 #: Points shown on the screen; the files hold all.
 SHOWN = 40
+
+
+def _number(name: str, unit: str, text: str) -> Callable[[Command], Command]:
+    """Return an option that takes a number."""
+    return click.option(name, type=float, metavar=unit, help=text)
 
 
 @click.command(short_help="Relief, coordinates and precision of measured points.", epilog=EXAMPLE)
@@ -48,38 +55,25 @@ SHOWN = 40
     help="Decimal separator of numbers typed as text.  [default: found]",
 )
 @click.option("--visible-only", is_flag=True, help="Leave out hidden and filtered rows.")
-@click.option("--d1", type=float, metavar="M", help="Distance of camera 1 [m].  [default: Setup]")
-@click.option("--d2", type=float, metavar="M", help="Distance of camera 2 [m].  [default: Setup]")
-@click.option(
-    "--c1", type=float, metavar="MM", help="Principal distance of image 1 [mm].  [default: Setup]"
-)
-@click.option(
-    "--c2", type=float, metavar="MM", help="Principal distance of image 2 [mm].  [default: Setup]"
-)
-@click.option("--pitch", type=float, metavar="MM", help="Size of a pixel [mm].  [default: Setup]")
+@_number("--d1", "M", "Distance of camera 1 [m].  [default: Setup]")
+@_number("--d2", "M", "Distance of camera 2 [m].  [default: Setup]")
+@_number("--c1", "MM", "Principal distance of image 1 [mm].  [default: Setup]")
+@_number("--c2", "MM", "Principal distance of image 2 [mm].  [default: Setup]")
+@_number("--pitch", "MM", "Size of a pixel [mm].  [default: Setup]")
 @click.option(
     "--unit",
     type=click.Choice(["mm", "px"]),
     help="Unit of x1 y1 x2 y2.  [default: as headings or Setup say, else mm]",
 )
-@click.option(
-    "--sigma-s",
-    type=float,
-    metavar="MM",
-    help="Precision of an image coordinate [mm].  [default: Setup, else 0.5 px]",
-)
-@click.option(
+@_number("--sigma-s", "MM", "Precision of an image coordinate [mm].  [default: Setup, else 0.5 px]")
+@_number(
     "--sigma-px",
-    type=float,
-    metavar="PX",
-    help="Precision of a raw pixel [px].  [default: the pair file's, else from the misfits of 20 "
+    "PX",
+    "Precision of a raw pixel [px].  [default: the pair file's, else from the misfits of 20 "
     "or more points, else 0.5]",
 )
-@click.option(
-    "--sigma-r-max",
-    type=float,
-    metavar="M",
-    help="Sigma of r beyond which a point is UNCERTAIN [m].  [default: 2 % of d2]",
+@_number(
+    "--sigma-r-max", "M", "Sigma of r beyond which a point is UNCERTAIN [m].  [default: 2 % of d2]"
 )
 @click.option(
     "--adjust-setup",

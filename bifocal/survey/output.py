@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
@@ -220,16 +220,10 @@ def _number(value: float) -> str:
 def _head(solution: SolvedSurvey) -> dict[str, Any]:
     """Return all but the points."""
     axes = solution.check.axes
-    head: dict[str, Any] = {
+    return {
         "check": {
-            "n": axes["Z"].n,
-            "rmse": axes["Z"].rmse,
-            "max_abs": axes["Z"].max_abs,
-            "mean": axes["Z"].mean,
-            "axes": {
-                key: {"n": a.n, "rmse": a.rmse, "mean": a.mean, "max_abs": a.max_abs}
-                for key, a in axes.items()
-            },
+            **asdict(axes["Z"]),
+            "axes": {key: asdict(axis) for key, axis in axes.items()},
             "errors": [
                 {"id": name, "dX": e[0], "dY": e[1], "dZ": e[2]}
                 for name, e in zip(solution.check.ids, solution.check.errors, strict=True)
@@ -243,7 +237,6 @@ def _head(solution: SolvedSurvey) -> dict[str, Any]:
         "units": {"r": "m", "X": "m", "e1": length_unit(solution), "sigma_r": "m"},
         "remarks": list(solution.remarks),
     }
-    return head
 
 
 def length_unit(solution: SolvedSurvey) -> str:
@@ -281,16 +274,7 @@ def _orientation_check(solution: SolvedSurvey) -> dict[str, Any] | None:
         "sigma0": check.sigma0,
         "outliers": list(check.outliers),
         "adjusted": solution.adjusted,
-        "parameters": [
-            {
-                "name": p.name,
-                "value": p.value,
-                "sigma": p.sigma,
-                "unit": p.unit,
-                "false_relief": p.false_relief,
-            }
-            for p in check.parameters
-        ],
+        "parameters": [asdict(parameter) for parameter in check.parameters],
     }
 
 

@@ -14,7 +14,6 @@ from bifocal.model.pair import Pair, Photo, apply_homography
 from bifocal.survey.check_points import check_points
 from bifocal.survey.georeferencing import georeference
 from bifocal.survey.observations import PointObservations
-from bifocal.survey.options import SolveOptions, solve_options
 from bifocal.survey.orientation_check import OrientationCheck, check_orientation
 from bifocal.survey.point_survey import solve_points
 from bifocal.survey.reference import CheckResult, Georeference
@@ -26,16 +25,19 @@ from bifocal.survey.remarks import (
     point_remarks,
 )
 from bifocal.survey.setup import SCALE_TOLERANCE, SurveySetup
-from bifocal.survey.tolerances import ToleranceRule
+from bifocal.survey.tolerances import RULES, ToleranceRule, as_rule
 from bifocal.survey.units import (
     refuse_far_stations,
     refuse_millimetres,
     refuse_pixels,
     refuse_wrong_unit,
 )
-from bifocal.survey.workbook.reader import SurveyInput, read_survey
+from bifocal.survey.workbook.reader import ReadOptions, SurveyInput, column_map, read_survey
 from photocore.arrays import FloatArray
 from photocore.errors import GeometryError, InputError
+from photocore.tables.numbers import Decimal
+
+Source = Path | str | PointObservations | Mapping[str, Any]
 
 #: From this many points on, the picks' precision is taken from their misfits.
 MINIMUM_FOR_SIGMA = 20
@@ -106,7 +108,7 @@ class SolvedSurvey:
 
 
 def solve(
-    source: Path | str | PointObservations | Mapping[str, Any],
+    source: Source,
     *,
     pair: Pair | Path | str | None = None,
     d1: float | None = None,
@@ -124,7 +126,7 @@ def solve(
     rules: Sequence[str | ToleranceRule] = (),
     columns: str | None = None,
     sheet: str | None = None,
-    decimal: str | None = None,
+    decimal: Decimal | None = None,
     visible_only: bool = False,
 ) -> SolvedSurvey:
     r"""Solve measured points: relief, displacements, coordinates, precision, check, world.
@@ -195,41 +197,29 @@ def solve(
     >>> survey.table.xyz.round(9).tolist(), survey.table.flags
     ([[2.0, 0.0, 1.0]], ('OK',))
     """
-    return _solve(
-        source,
-        solve_options(
-            pair=pair,
-            setup={
-                "d1": d1, "d2": d2, "c1": c1, "c2": c2, "pitch": pitch, "unit": unit,
-                "sigma_s": sigma_s, "sigma_r_max": sigma_r_max,
-            },
-            sigma_px=sigma_px, adjust_setup=adjust_setup, model=model,
-            scale_tolerance=scale_tolerance, rules=rules,
-            columns=columns, sheet=sheet, decimal=decimal, visible_only=visible_only,
-        ),
-    )  # fmt: skip
-
-
-def _solve(
-    source: Path | str | PointObservations | Mapping[str, Any], options: SolveOptions
-) -> SolvedSurvey:
-    if isinstance(source, Mapping):
-        source = PointObservations.from_columns(source)
-    if isinstance(source, PointObservations):
-        survey, path = SurveyInput.of_points(source), Path("points")
-    else:
-        survey, path = read_survey(source, options.read), Path(source)
-    survey = replace(survey, setup=replace(survey.setup, **options.setup))
+    given = _checked(
+        d1=d1, d2=d2, c1=c1, c2=c2, pitch=pitch, sigma_s=sigma_s, sigma_r_max=sigma_r_max
+    )
+    _checked(sigma_px=sigma_px, scale_tolerance=scale_tolerance)
+    judged = tuple(as_rule(rule) for rule in rules) or RULES
+    options = ReadOptions(
+        columns=column_map(columns), sheet=sheet, decimal=decimal, visible_only=visible_only
+    )
+    survey, path = _measured(source, options)
+    setup = replace(survey.setup, **given, unit=unit or survey.unit or survey.setup.unit)
+    survey = replace(survey, setup=setup)
     if not len(survey.points):
         raise InputError(f"{survey.where}: there is no point. Fill in the measured points.")
-    if options.pair is None:
-        setup = survey.setup
-        refuse_far_stations(setup.d1, setup.d2, setup.where, options=set(options.setup))
-    pair, pair_path, pair_remarks = _given_pair(survey, path, options)
-    solved = _solve_ideal(survey, options) if pair is None else _solve_pair(pair, survey, options)
+    if pair is None:
+        refuse_far_stations(setup.d1, setup.d2, setup.where, options=given)
+    general, pair_path, pair_remarks = _given_pair(survey, path, pair)
+    if general is None:
+        solved = _solve_ideal(survey, scale_tolerance, adjust=adjust_setup)
+    else:
+        solved = _solve_pair(general, survey, sigma_px, adjust=adjust_setup)
     table = solved.table
-    check = check_points(table, survey.known, options.rules)
-    world, world_remarks = _placed(survey, table, options)
+    check = check_points(table, survey.known, judged)
+    world, world_remarks = _placed(survey, table, model or survey.model)
     remarks = (
         *survey.remarks,
         *pair_remarks,
@@ -251,21 +241,39 @@ def _solve(
         check=check,
         georeference=world,
         orientation_check=solved.check,
-        adjusted=options.adjust_setup,
-        overridden=bool(options.setup) or options.pair is not None or solved.new_sigma,
-        rules=options.rules,
+        adjusted=adjust_setup,
+        overridden=bool(given or unit or pair) or solved.sigma_px not in (None, setup.sigma_px),
+        rules=judged,
         remarks=tuple(dict.fromkeys(remarks)),
     )
 
 
+def _checked(**numbers: float | None) -> dict[str, Any]:
+    """Return the options that are given, refusing what is not above zero."""
+    given = {name: value for name, value in numbers.items() if value is not None}
+    for name, value in given.items():
+        if not value > 0:
+            option = f"--{name.replace('_', '-')}"
+            raise InputError(f"{option}: must be a number above zero, got {value:g}.")
+    return given
+
+
+def _measured(source: Source, options: ReadOptions) -> tuple[SurveyInput, Path]:
+    """Return what was measured, and the file it stands in."""
+    if isinstance(source, Mapping):
+        source = PointObservations.from_columns(source)
+    if isinstance(source, PointObservations):
+        return SurveyInput.of_points(source), Path("points")
+    return read_survey(source, options), Path(source)
+
+
 def _placed(
-    survey: SurveyInput, table: ReliefTable, options: SolveOptions
+    survey: SurveyInput, table: ReliefTable, model: str
 ) -> tuple[Georeference | None, list[str]]:
     """Return the wall in the world, where there are control points, and remarks on it."""
     control = survey.control
     if not control.used.any() or np.isnan(control.xyz).all():
         return None, []
-    model = options.model or survey.model
     world = georeference(table, control, model=model)
     return world, georeference_remarks(world, control, table, is_auto=model == "auto")
 
@@ -280,19 +288,18 @@ class _SolvedPoints:
     setup: SurveySetup | None = None
     sigma_px: float | None = None
     check: OrientationCheck | None = None
-    new_sigma: bool = False
     remarks: tuple[str, ...] = ()
 
 
 def _given_pair(
-    survey: SurveyInput, path: Path, options: SolveOptions
+    survey: SurveyInput, path: Path, pair: Pair | Path | str | None
 ) -> tuple[Pair | None, Path | None, list[str]]:
     """Return the pair asked for, or the one the workbook describes, its file, and remarks."""
-    if isinstance(options.pair, Pair):
-        return options.pair, None, list(options.pair.remarks)
-    if options.pair is not None:
-        pair = Pair.read(options.pair)
-        return pair, options.pair, [f"{options.pair}: {remark}" for remark in pair.remarks]
+    if isinstance(pair, Pair):
+        return pair, None, list(pair.remarks)
+    if pair is not None:
+        given = Pair.read(pair)
+        return given, Path(pair), [f"{pair}: {remark}" for remark in given.remarks]
     setup = survey.setup
     named = path.parent / setup.pair_file if setup.pair_file else None
     file = named if named is not None and named.is_file() else None
@@ -325,21 +332,20 @@ def _described_pair(setup: SurveySetup, file: Path | None, folder: Path) -> Pair
     return Pair(image1=photos[0], image2=photos[1], folder=folder)
 
 
-def _solve_pair(pair: Pair, survey: SurveyInput, options: SolveOptions) -> _SolvedPoints:
+def _solve_pair(
+    pair: Pair, survey: SurveyInput, sigma_px: float | None, *, adjust: bool
+) -> _SolvedPoints:
     """Solve raw pixels with a pair; coordinates in millimetres are carried to pixels first."""
     points = survey.points.exchanged() if pair.exchanged else survey.points
     setup = survey.setup
-    unit = str(options.setup.get("unit") or survey.unit or setup.unit)
-    points = _as_pixels(pair, points, survey.where, unit)
+    points = _as_pixels(pair, points, survey.where, setup.unit)
     refuse_millimetres(pair, points, survey.where)
-    sigma = options.sigma_px or setup.sigma_px
+    sigma = sigma_px or setup.sigma_px
     remarks: tuple[str, ...] = ()
     if sigma is None and not any(photo.sigma_pixel for photo in (pair.image1, pair.image2)):
         sigma, remarks = _sigma_from_misfits(pair, points)
-    check = _check_plane(
-        pair, points, (points.pixels1, points.pixels2), sigma, survey, options.adjust_setup
-    )
-    if check is not None and options.adjust_setup:
+    check = _check_plane(pair, points, (points.pixels1, points.pixels2), sigma, survey, adjust)
+    if check is not None and adjust:
         pair = check.corrected
     return _SolvedPoints(
         points=points,
@@ -347,7 +353,6 @@ def _solve_pair(pair: Pair, survey: SurveyInput, options: SolveOptions) -> _Solv
         pair=pair,
         sigma_px=sigma,
         check=check,
-        new_sigma=sigma != setup.sigma_px,
         remarks=(*remarks, *(check.remarks if check else ())),
     )
 
@@ -435,7 +440,7 @@ def _sigma_from_misfits(
     return sigma, (remark,)
 
 
-def _solve_ideal(survey: SurveyInput, options: SolveOptions) -> _SolvedPoints:
+def _solve_ideal(survey: SurveyInput, scale_tolerance: float, *, adjust: bool) -> _SolvedPoints:
     """Solve image coordinates or radial distances with the ideal pair of `Setup`."""
     points, setup = survey.points, survey.setup
     if points.has_pixels.any() and not points.is_cartesian.any():
@@ -446,20 +451,18 @@ def _solve_ideal(survey: SurveyInput, options: SolveOptions) -> _SolvedPoints:
             )
         points = replace(points, xy1=points.pixels1, xy2=points.pixels2)
         setup = replace(setup, unit="px")
-    unit = str(options.setup.get("unit") or survey.unit or setup.unit)
-    setup = replace(setup, unit=unit)
     pair = setup.pair()
-    remarks = [setup.check_scales(options.scale_tolerance)]
+    remarks = [setup.check_scales(scale_tolerance)]
     refuse_wrong_unit(setup, points, survey.where, said=survey.unit)
     if pair.exchanged:
         remarks.append(exchanged_remark(setup))
         setup, points = setup.exchanged(), points.exchanged()
     measured = setup.in_millimetres(points)
     xy1, xy2 = _all_xy(measured)
-    check = _check_plane(pair, points, (xy1, xy2), None, survey, options.adjust_setup)
+    check = _check_plane(pair, points, (xy1, xy2), None, survey, adjust)
     if check is not None:
         remarks += check.remarks
-        if options.adjust_setup:
+        if adjust:
             scale = pair.image1.plane_from_pixel[0, 0]
             moved = apply_homography(check.matrix, pair.image2.plane_from_pixels(xy2)) / scale
             only_theta = points.polar * np.array([np.nan, np.nan, 1.0])

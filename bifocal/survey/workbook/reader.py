@@ -23,7 +23,14 @@ from bifocal.survey.workbook.setup_reader import is_general, read_setup
 from bifocal.survey.workbook.words import LANGUAGES, word
 from photocore.arrays import BoolArray, FloatArray
 from photocore.errors import CellError, InputError, WorkbookError
-from photocore.tables import Column, Table, open_tables, read_named_values, read_table
+from photocore.tables import (
+    Column,
+    Table,
+    open_tables,
+    parse_column_map,
+    read_named_values,
+    read_table,
+)
 from photocore.tables.csvread import CsvFile
 from photocore.tables.headings import bare
 from photocore.tables.numbers import Decimal
@@ -147,6 +154,11 @@ def point_columns(*, shared: Sequence[str] = ()) -> list[Column]:
         more = [_SHARED[key], *([_OTHER[key]] if key in _OTHER else [])] if key in shared else []
         columns.append(understood(key, more=more, unit=_UNITS.get(key, "")))
     return columns
+
+
+def column_map(text: str | None) -> dict[str, str]:
+    """Return key to heading or column letter from what a user typed; empty for None."""
+    return parse_column_map(text, [column.key for column in point_columns()]) if text else {}
 
 
 def read_survey(path: Path | str, options: ReadOptions | None = None) -> SurveyInput:
