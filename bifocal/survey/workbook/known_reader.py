@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -21,7 +21,7 @@ from photocore.workbook.grid import SheetFile
 
 #: No coordinate of a photo or a map is larger.
 LARGEST = 1e9
-_TO_M = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "dm": 0.1}
+TO_M = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "dm": 0.1}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -70,7 +70,7 @@ def read_known(
     errors += table.repeated("id")
     refuse_absurd(table, keys, errors)
     xyz = np.stack(
-        [table.numbers(key) * metres_of(table, key, errors) for key in keys], axis=-1
+        [table.numbers(key) * factor_of(table, key, TO_M, errors) for key in keys], axis=-1
     ).reshape(-1, 3)
     use = table.numbers("use")
     rows = [i for i, name in enumerate(table.texts("id")) if name]
@@ -129,13 +129,15 @@ def refuse_absurd(table: Table, keys: Sequence[str], errors: list[CellError]) ->
             )
 
 
-def metres_of(table: Table, key: str, errors: list[CellError]) -> float:
-    """Return metres per unit of a column, complaining about a unit that is no length."""
-    symbol = table.units.get(key) or "m"
-    if symbol not in _TO_M:
-        errors.append(unit_error(table, key, symbol, "m"))
-        return 1.0
-    return _TO_M[symbol]
+def factor_of(
+    table: Table, key: str, factors: Mapping[str, float], errors: list[CellError]
+) -> float:
+    """Return what brings a column to the first of some units, complaining about any other."""
+    wanted = next(iter(factors))
+    symbol = table.units.get(key) or wanted
+    if symbol not in factors:
+        errors.append(unit_error(table, key, symbol, wanted))
+    return factors.get(symbol, 1.0)
 
 
 def unit_error(table: Table, key: str, symbol: str, wanted: str) -> CellError:

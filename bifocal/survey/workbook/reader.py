@@ -12,7 +12,8 @@ from bifocal.survey.observations import PointObservations
 from bifocal.survey.reference import KnownPoints
 from bifocal.survey.setup import SurveySetup
 from bifocal.survey.workbook.known_reader import (
-    metres_of,
+    TO_M,
+    factor_of,
     read_known,
     refuse_absurd,
     understood,
@@ -46,6 +47,7 @@ _SHARED = {"x1": "x", "y1": "y", "x2": "x", "y2": "y"} | {
 }  # fmt: skip
 #: Headings of image coordinates in other programs: i counts columns, j rows.
 _OTHER = {"col1": "i", "row1": "j", "col2": "i", "row2": "j"}
+_TO_DEGREES = {"deg": 1.0, "gon": 0.9, "rad": float(np.degrees(1.0))}
 _TO_MM = {"mm": 1.0, "cm": 10.0, "um": 1e-3, "m": 1000.0}
 
 
@@ -313,19 +315,14 @@ def _observations(table: Table, errors: list[CellError]) -> tuple[PointObservati
     used: BoolArray = np.isnan(use) | (use != 0)
     unit, factor = _unit_of_xy(table, errors)
     xy = _stack(table, _XY) * factor
-    polar = _stack(table, _POLAR)
-    for i, key in enumerate(("s1", "s2")):
-        symbol = table.units.get(key, "mm") or "mm"
-        if symbol not in _TO_MM:
-            errors.append(unit_error(table, key, symbol, "mm"))
-        else:
-            polar[:, i] *= _TO_MM[symbol]
-    polar[:, 2] = _degrees(table, polar[:, 2], errors)
+    scales = [_TO_MM, _TO_MM, _TO_DEGREES]
+    polar = _stack(table, _POLAR) * [
+        factor_of(table, key, factors, errors) for key, factors in zip(_POLAR, scales, strict=True)
+    ]
     pixels = _stack(table, _PIXELS)
     for key in _PIXELS:
-        if table.units.get(key, "px") not in ("px", ""):
-            errors.append(unit_error(table, key, table.units[key], "px"))
-    measured = table.numbers("r_measured") * metres_of(table, "r_measured", errors)
+        factor_of(table, key, {"px": 1.0}, errors)
+    measured = table.numbers("r_measured") * factor_of(table, "r_measured", TO_M, errors)
     _check_rows(table, ids, used, xy, polar, pixels, faulty, errors)
     if errors:
         ids = [name or f"row {row}" for name, row in zip(ids, table.rows, strict=True)]
@@ -381,17 +378,6 @@ def _unit_of_xy(table: Table, errors: list[CellError]) -> tuple[str, float]:
         errors.append(unit_error(table, next(iter(said)), symbol, "mm or px"))
         return "", 1.0
     return "mm", _TO_MM[symbol]
-
-
-def _degrees(table: Table, theta: FloatArray, errors: list[CellError]) -> FloatArray:
-    symbol = table.units.get("theta") or "deg"
-    if symbol == "gon":
-        return np.asarray(theta * 0.9)
-    if symbol == "rad":
-        return np.degrees(theta)
-    if symbol != "deg":
-        errors.append(unit_error(table, "theta", symbol, "deg"))
-    return theta
 
 
 def _check_rows(
