@@ -151,24 +151,11 @@ def as_typed(solution: SolvedSurvey, content: SurveyContent) -> SurveyContent:
 def result_content(solution: SolvedSurvey, path: Path, language: str | None) -> SurveyContent:
     """Return the content of a new result workbook."""
     what = "solved" + (", set-up corrected by plane points" if solution.adjusted else "")
-    return SurveyContent(
-        language=language or solution.survey.language,
-        setup=solution.setup,
-        pair=solution.pair,
-        pair_file=(
-            relative_name(solution.pair_path, path.parent) if solution.pair_path is not None else ""
-        ),
-        sigma_px=solution.sigma_px,
-        points=solution.points,
-        table=solution.table,
-        known=solution.survey.known,
-        check=solution.check,
-        control=solution.survey.control,
-        georeference=solution.georeference,
-        model=solution.survey.model,
-        rules=solution.rules,
-        sensor=solution.survey.setup.sensor,
-        limits=solution.survey.setup.limits,
+    pair_path = solution.pair_path
+    return replace(
+        solution,
+        language=language or solution.language,
+        pair_file="" if pair_path is None else relative_name(pair_path, path.parent),
         log=[log_row(what, solution.source)],
     )
 

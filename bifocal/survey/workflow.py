@@ -32,6 +32,7 @@ from bifocal.survey.units import (
     refuse_pixels,
     refuse_wrong_unit,
 )
+from bifocal.survey.workbook.content import SurveyContent
 from bifocal.survey.workbook.reader import ReadOptions, SurveyInput, column_map, read_survey
 from photocore.arrays import FloatArray
 from photocore.errors import GeometryError, InputError
@@ -46,57 +47,45 @@ BEST_SIGMA_PX = 0.02
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class SolvedSurvey:
-    """A solved survey.
+class SolvedSurvey(SurveyContent):
+    """A solved survey: what the workbook shows of it, and where it comes from.
 
     Attributes
     ----------
+    pair : Pair
+        The geometry; ``setup`` is that of an ideal pair, None for one given by homographies.
+    points : PointObservations
+        As solved: images exchanged where the user had them the other way round.
+    table : ReliefTable
+        What came out: relief, displacements, coordinates, precision, flags.
+    check : CheckResult
+        Errors at check points.
     source : Path
         The file it came from.
     survey : SurveyInput
         What was read, with the set-up as options left it.
-    points : PointObservations
-        As solved: images exchanged where the user had them the other way round.
-    table : ReliefTable
-        What came out.
-    setup : SurveySetup or None
-        Of an ideal pair; None for a pair given by homographies.
-    pair : Pair
-        The geometry.
     pair_path : Path or None
         The pair file.
-    sigma_px : float or None
-        Measuring precision of raw pixels. [px]
-    check : CheckResult
-        Errors at check points.
-    georeference : Georeference or None
-        World coordinates; None without control points.
     orientation_check : OrientationCheck or None
         What the points of the reference plane tell.
     adjusted : bool
         Whether the orientation was corrected by it.
     overridden : bool
         Whether options took the place of what the workbook says.
-    rules : tuple of ToleranceRule
-        For the verdict.
     remarks : tuple of str
         What the user should know.
     """
 
-    source: Path
-    survey: SurveyInput
+    pair: Pair
     points: PointObservations
     table: ReliefTable
-    setup: SurveySetup | None
-    pair: Pair
-    pair_path: Path | None
-    sigma_px: float | None
     check: CheckResult
-    georeference: Georeference | None
+    source: Path
+    survey: SurveyInput
+    pair_path: Path | None
     orientation_check: OrientationCheck | None
     adjusted: bool
     overridden: bool
-    rules: tuple[ToleranceRule, ...]
     remarks: tuple[str, ...]
 
     @property
@@ -230,6 +219,7 @@ def solve(
         *world_remarks,
     )
     return SolvedSurvey(
+        language=survey.language,
         source=path,
         survey=survey,
         points=solved.points,
@@ -238,8 +228,13 @@ def solve(
         pair=solved.pair,
         pair_path=pair_path,
         sigma_px=solved.sigma_px,
+        known=survey.known,
         check=check,
+        control=survey.control,
         georeference=world,
+        model=survey.model,
+        sensor=setup.sensor,
+        limits=setup.limits,
         orientation_check=solved.check,
         adjusted=adjust_setup,
         overridden=bool(given or unit or pair) or solved.sigma_px not in (None, setup.sigma_px),

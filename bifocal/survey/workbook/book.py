@@ -7,7 +7,6 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from openpyxl.styles import Alignment
-from openpyxl.worksheet.worksheet import Worksheet
 
 from bifocal.survey.workbook.charts import charts
 from bifocal.survey.workbook.columns import (
@@ -34,16 +33,15 @@ from bifocal.survey.workbook.setup_cells import (
     POSITIVE,
 )
 from bifocal.survey.workbook.sheets import (
+    FLAG_COLOURS,
     HEAD_FONT,
     LABEL_FONT,
     BookBuilder,
-    flag_colours,
-    protect,
-    set_up_print,
-    validate,
+    SheetBuilder,
 )
-from bifocal.survey.workbook.words import readme, term, word
-from photocore.workbook.bookrows import CellValue, column_letters, finish_book
+from bifocal.survey.workbook.words import readme, term
+from photocore.workbook.bookrows import CellValue, finish_book
+from photocore.workbook.grid import column_letters
 from photocore.workbook.newbook import new_workbook
 
 Cells = Mapping[str, Sequence[CellValue]]
@@ -93,41 +91,37 @@ def build(content: SurveyContent) -> BookBuilder:
 
 
 def _readme(builder: BookBuilder) -> None:
-    sheet = builder.sheet("Readme", word("Readme", builder.language))
-    sheet.column_dimensions["A"].width = 110
+    sheet = builder.sheet("Readme")
+    sheet.worksheet.column_dimensions["A"].width = 110
     for row, line in enumerate(readme(builder.language), start=3):
         heading = line.startswith("#")
-        builder.text(sheet, f"A{row}", line.lstrip("#"), HEAD_FONT if heading else None)
-    set_up_print(sheet, builder.language, landscape=False)
+        sheet.text(f"A{row}", line.lstrip("#"), HEAD_FONT if heading else None)
+    sheet.finish(guarded=False)
 
 
 def _setup(builder: BookBuilder, content: SurveyContent) -> None:
-    language = builder.language
-    sheet = builder.sheet("Setup", word("Setup", language), word("type", language))
+    sheet = builder.sheet("Setup", "type")
     for letter, key, width in (
         ("A", "name", 14),
         ("B", "description", 72),
         ("C", "value", 16),
         ("D", "unit", 10),
     ):
-        builder.text(sheet, f"{letter}4", word(key, language), HEAD_FONT)
-        sheet.column_dimensions[letter].width = width
+        sheet.word(f"{letter}4", key, HEAD_FONT)
+        sheet.worksheet.column_dimensions[letter].width = width
     cells = setup_cells(content)
     groups = PAIR_GROUPS if content.is_pair else IDEAL_GROUPS
     row = 5
     for group in groups:
         for name in group:
-            _setup_cell(builder, sheet, row, name, cells, content, typed=group is not groups[-1])
+            _setup_cell(sheet, row, name, cells, content, typed=group is not groups[-1])
             row += 1
         row += 1
-    sheet.freeze_panes = "A5"
-    set_up_print(sheet, language, landscape=False)
-    protect(sheet)
+    sheet.finish(freeze="A5")
 
 
 def _setup_cell(
-    builder: BookBuilder,
-    sheet: Worksheet,
+    sheet: SheetBuilder,
     row: int,
     name: str,
     cells: Mapping[str, CellValue],
@@ -138,10 +132,10 @@ def _setup_cell(
     """Write one named value with its description and unit."""
     known = term("setup", name)
     matrix = f"H{name[1]}({name[3:4]},{name[4:5]})"
-    builder.text(sheet, f"A{row}", name)
-    builder.text(sheet, f"B{row}", known.in_language(builder.language) if known else matrix)
-    builder.text(sheet, f"D{row}", known.unit if known else "", LABEL_FONT)
-    sheet[f"D{row}"].alignment = Alignment(indent=1)
+    sheet.text(f"A{row}", name)
+    sheet.text(f"B{row}", known.in_language(sheet.book.language) if known else matrix)
+    sheet.text(f"D{row}", known.unit if known else "", LABEL_FONT)
+    sheet.worksheet[f"D{row}"].alignment = Alignment(indent=1)
     cell, form, value = f"C{row}", FORMS.get(name, "General"), cells.get(name)
     formulas = PAIR_FORMULAS if content.is_pair else IDEAL_FORMULAS
     is_default = {
@@ -150,35 +144,36 @@ def _setup_cell(
         "sigma_r_max": content.limits.sigma_r_max is None,
     }
     if not typed or (name in formulas and is_default.get(name, False)):
-        builder.formula(sheet, cell, formulas[name], value, form=form, name=name, editable=typed)
+        sheet.formula(cell, formulas[name], value, form=form, name=name, editable=typed)
         return
-    builder.input(sheet, cell, value, form=form, name=name)
+    sheet.input(cell, value, form=form, name=name)
     if name == "input_unit":
-        sheet[cell].alignment = Alignment(horizontal="right")
-        validate(sheet, cell, choices="mm,px")
+        sheet.worksheet[cell].alignment = Alignment(horizontal="right")
+        sheet.validate(cell, choices="mm,px")
     elif name != "pair_file":
-        validate(sheet, cell, above_zero=name in POSITIVE)
+        sheet.validate(cell, above_zero=name in POSITIVE)
 
 
 def _points(builder: BookBuilder, content: SurveyContent, cells: Cells) -> None:
     columns = pair_points(undistorted=content.undistorted) if content.is_pair else IDEAL_POINTS
-    note = word("points_pair" if content.is_pair else "points_how", builder.language)
+    note = "points_pair" if content.is_pair else "points_how"
     sheet = _long_sheet(builder, "Points", note, columns, content.point_rows, cells)
-    rows = f"{HEAD + 1}", f"{HEAD + content.point_rows}"
-    letters = {column.key: column_letters(i) for i, column in enumerate(columns)}
-    first, last = ("col1", "row2") if content.is_pair else ("x1", "s2")
-    validate(sheet, f"{letters['use']}{rows[0]}:{letters['use']}{rows[1]}", choices="1,0")
-    validate(sheet, f"{letters[first]}{rows[0]}:{letters[last]}{rows[1]}")
+
+    def area(first: str, last: str) -> str:
+        keys = [column.key for column in columns]
+        left, right = (column_letters(keys.index(key) + 1) for key in (first, last))
+        return f"{left}{HEAD + 1}:{right}{HEAD + content.point_rows}"
+
+    sheet.validate(area("use", "use"), choices="1,0")
+    sheet.validate(area("col1", "row2") if content.is_pair else area("x1", "s2"))
     if not content.is_pair:
-        theta = letters["theta"]
-        validate(sheet, f"{theta}{rows[0]}:{theta}{rows[1]}", between=(-360, 360))
-    sheet.sheet_properties.outlinePr.summaryRight = True
+        sheet.validate(area("theta", "theta"), limit=360)
+    sheet.worksheet.sheet_properties.outlinePr.summaryRight = True
 
 
 def _results(builder: BookBuilder, content: SurveyContent, cells: Cells) -> None:
-    note = word("results_how", builder.language)
     results = result_cells(content, cells)
-    _long_sheet(builder, "Results", note, RESULTS, content.point_rows, results)
+    _long_sheet(builder, "Results", "results_how", RESULTS, content.point_rows, results)
 
 
 def _long_sheet(
@@ -188,31 +183,24 @@ def _long_sheet(
     columns: Sequence[SurveyColumn],
     rows: int,
     cells: Cells,
-) -> Worksheet:
+) -> SheetBuilder:
     """Write a sheet that is one table with a row per point, its flags coloured."""
-    sheet = builder.sheet(name, word(name, builder.language), note)
-    builder.table(
-        sheet,
-        f"tbl{name}",
-        columns,
-        at=(HEAD, 1),
-        rows=rows,
-        cells=cells,
-        repeat=True,
-        short=rows > STRUCTURED_ROWS,
+    sheet = builder.sheet(name, note)
+    short = rows > STRUCTURED_ROWS
+    sheet.table(
+        f"tbl{name}", columns, at=(HEAD, 1), rows=rows, cells=cells, repeat=True, short=short
     )
-    flag = column_letters([column.key for column in columns].index("flag"))
-    flag_colours(sheet, flag, HEAD + 1, HEAD + rows)
-    sheet.freeze_panes = f"B{HEAD + 1}"
+    flag = column_letters([column.key for column in columns].index("flag") + 1)
+    bold = ("OFF-RADIAL", "NADIR", "CHECK")
+    sheet.colour(f"{flag}{HEAD + 1}:{flag}{HEAD + rows}", FLAG_COLOURS, bold=bold, stop=True)
     repeat = f"{HEAD - 1}:{HEAD}"
-    set_up_print(sheet, builder.language, landscape=name == "Points", repeat=repeat)
-    protect(sheet)
+    sheet.finish(landscape=name == "Points", freeze=f"B{HEAD + 1}", repeat=repeat)
     return sheet
 
 
 def _log(builder: BookBuilder, content: SurveyContent) -> None:
-    sheet = builder.sheet("Log", word("Log", builder.language))
+    sheet = builder.sheet("Log")
     keys = [column.key for column in LOG]
     cells = {key: [row[i] for row in content.log] for i, key in enumerate(keys)}
-    builder.table(sheet, "tblLog", LOG, at=(HEAD, 1), rows=max(len(content.log), 1), cells=cells)
-    set_up_print(sheet, builder.language, landscape=True)
+    sheet.table("tblLog", LOG, at=(HEAD, 1), rows=max(len(content.log), 1), cells=cells)
+    sheet.finish(landscape=True, guarded=False)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from openpyxl.styles import Alignment
@@ -29,28 +30,28 @@ from bifocal.survey.workbook.sheets import (
     HEAD_FONT,
     LABEL_FONT,
     BookBuilder,
-    colour_words,
-    protect,
-    set_up_print,
-    validate,
+    SheetBuilder,
 )
 from bifocal.survey.workbook.words import word
-from photocore.workbook.bookrows import CellValue, column_letters
+from photocore.workbook.bookrows import CellValue
+from photocore.workbook.grid import column_letters
 
+Cells = Mapping[str, Sequence[CellValue]]
 #: Row of the keys of the two tables; statistics and parameters stand above.
 CHECK_HEAD, CONTROL_HEAD = 12, 27
+_SENSOR = ("sensor_w", "sensor_h")
 #: First column of the verdict, beside the check table.
 VERDICT_LEFT = 14
 
 
 def check(builder: BookBuilder, content: SurveyContent) -> None:
     """Write errors at check points, their statistics and the verdict."""
-    language, rows = builder.language, content.check_rows
-    sheet = builder.sheet("Check", word("Check", language), word("check_how", language))
+    rows = content.check_rows
+    sheet = builder.sheet("Check", "check_how")
     for letter, axis in zip("BCD", "XYZ", strict=True):
-        builder.text(sheet, f"{letter}4", f"d{axis}", HEAD_FONT)
+        sheet.text(f"{letter}4", f"d{axis}", HEAD_FONT)
     for row, (key, (body, attribute)) in enumerate(_STATISTICS.items(), start=5):
-        builder.text(sheet, f"A{row}", word(key, language))
+        sheet.word(f"A{row}", key)
         for letter, axis in zip("BCD", "XYZ", strict=True):
             errors = None if content.check is None else content.check.axes[axis]
             value: CellValue = 0 if key == "n" else None
@@ -58,23 +59,21 @@ def check(builder: BookBuilder, content: SurveyContent) -> None:
                 value = getattr(errors, attribute)
             text = body.format(f"tblCheck[d{axis}]", f"{letter}5")
             form, name = "0" if key == "n" else "0.0000", f"check_{key}_{axis}"
-            builder.formula(sheet, f"{letter}{row}", text, value, form=form, name=name)
-    builder.text(sheet, "A9", word("worst", language))
+            sheet.formula(f"{letter}{row}", text, value, form=form, name=name)
+    sheet.word("A9", "worst")
     accuracy = content.check.accuracy if content.check is not None else math.nan
     worst = None if math.isnan(accuracy) else accuracy
-    builder.formula(
-        sheet, "B9", 'IF(COUNT(B6:D6)=0,"",MAX(B6:D6))', worst, form="0.0000", name="check_worst"
+    sheet.formula(
+        "B9", 'IF(COUNT(B6:D6)=0,"",MAX(B6:D6))', worst, form="0.0000", name="check_worst"
     )
     cells = check_cells(content)
-    builder.table(sheet, "tblCheck", CHECK, at=(CHECK_HEAD, 1), rows=rows, cells=cells)
-    sheet.column_dimensions["A"].width = 28
-    _verdict(builder, content, accuracy)
+    sheet.table("tblCheck", CHECK, at=(CHECK_HEAD, 1), rows=rows, cells=cells)
+    sheet.worksheet.column_dimensions["A"].width = 28
+    _verdict(sheet, content, accuracy)
     first, last = CHECK_HEAD + 1, CHECK_HEAD + rows
-    validate(sheet, f"B{first}:D{last}")
-    validate(sheet, f"E{first}:E{last}", choices="1,0")
-    sheet.freeze_panes = f"B{first}"
-    set_up_print(sheet, language, landscape=True)
-    protect(sheet)
+    sheet.validate(f"B{first}:D{last}")
+    sheet.validate(f"E{first}:E{last}", choices="1,0")
+    sheet.finish(landscape=True, freeze=f"B{first}")
 
 
 #: Statistics of errors: formula of their column and the cell of their number, attribute.
@@ -86,14 +85,13 @@ _STATISTICS = {
 }
 
 
-def _verdict(builder: BookBuilder, content: SurveyContent, accuracy: float) -> None:
+def _verdict(sheet: SheetBuilder, content: SurveyContent, accuracy: float) -> None:
     """Write what drawing scales the accuracy holds, beside the check table."""
-    sheet, language = builder.book["Check"], builder.language
+    language = sheet.book.language
     holds, fails = word("holds", language), word("fails", language)
     verdicts = judge(accuracy, content.rules)
     unknown = math.isnan(accuracy)
-    builder.table(
-        sheet,
+    sheet.table(
         "tblVerdict",
         verdict_columns(holds, fails),
         at=(CHECK_HEAD, VERDICT_LEFT),
@@ -108,51 +106,50 @@ def _verdict(builder: BookBuilder, content: SurveyContent, accuracy: float) -> N
         },
     )
     first, last = CHECK_HEAD + 1, CHECK_HEAD + len(verdicts)
-    letter = column_letters(VERDICT_LEFT + 2)
-    colour_words(
-        sheet, letter, first, last, {holds: ("E2F0D9", "1E5B12"), fails: ("F8CBCB", "8B0000")}
+    letter = column_letters(VERDICT_LEFT + 3)
+    sheet.colour(
+        f"{letter}{first}:{letter}{last}",
+        {holds: ("E2F0D9", "1E5B12"), fails: ("F8CBCB", "8B0000")},
     )
 
 
 def georeference(builder: BookBuilder, content: SurveyContent) -> None:
     """Write control points, the closed-form transformation and the residuals."""
-    language, rows = builder.language, content.control_rows
-    sheet = builder.sheet("Georeference", word("Georeference", language), word("geo_how", language))
-    _model(builder, content)
-    _transformation(builder, content)
-    _centres(builder, content)
-    _rotation(builder, content)
-    _sums(builder, content)
+    rows = content.control_rows
+    sheet = builder.sheet("Georeference", "geo_how")
+    _model(sheet, content)
+    _transformation(sheet, content)
+    _centres(sheet, content)
+    _rotation(sheet, content)
+    _sums(sheet, content)
     cells = control_cells(content)
-    builder.table(sheet, "tblGeo", GEOREFERENCE, at=(CONTROL_HEAD, 1), rows=rows, cells=cells)
-    sheet.column_dimensions["A"].width = 34
+    sheet.table("tblGeo", GEOREFERENCE, at=(CONTROL_HEAD, 1), rows=rows, cells=cells)
+    sheet.worksheet.column_dimensions["A"].width = 34
     first, last = CONTROL_HEAD + 1, CONTROL_HEAD + rows
-    validate(sheet, f"B{first}:D{last}", between=(-1e8, 1e8))
-    validate(sheet, f"E{first}:E{last}", choices="1,0")
-    sheet.freeze_panes = f"B{first}"
-    set_up_print(sheet, language, landscape=True)
-    protect(sheet)
+    sheet.validate(f"B{first}:D{last}", limit=1e8)
+    sheet.validate(f"E{first}:E{last}", choices="1,0")
+    sheet.finish(landscape=True, freeze=f"B{first}")
 
 
-def _model(builder: BookBuilder, content: SurveyContent) -> None:
+def _model(sheet: SheetBuilder, content: SurveyContent) -> None:
     """Write which model is asked for, found and used."""
-    sheet, language, geo = builder.book["Georeference"], builder.language, content.georeference
+    geo = content.georeference
     for row, key in enumerate(("geo_model", "geo_auto", "geo_used"), start=4):
-        builder.text(sheet, f"A{row}", word(key, language))
-    sheet["A4"].alignment = Alignment(wrap_text=True)
-    builder.input(sheet, "B4", content.model, name="g_model")
-    validate(sheet, "B4", choices="auto,levelled,3D,2D")
-    builder.input(sheet, "B5", None if geo is None else geo.model, name="g_auto")
+        sheet.word(f"A{row}", key)
+    sheet.worksheet["A4"].alignment = Alignment(wrap_text=True)
+    sheet.input("B4", content.model, name="g_model")
+    sheet.validate("B4", choices="auto,levelled,3D,2D")
+    sheet.input("B5", None if geo is None else geo.model, name="g_auto")
     flat = 'IF(COUNT(tblGeo[H])=0,IF(COUNT(tblGeo[E])=0,"levelled","2D"),'
     used = f'IF(g_model="auto",{flat}IF(g_auto="3D","3D","levelled")),g_model)'
     shown = "levelled" if content.model == "auto" else content.model
     value = shown if geo is None else geo.model
-    builder.formula(sheet, "B6", used, value, form="General", name="g_used")
+    sheet.formula("B6", used, value, form="General", name="g_used")
 
 
-def _transformation(builder: BookBuilder, content: SurveyContent) -> None:
+def _transformation(sheet: SheetBuilder, content: SurveyContent) -> None:
     """Write number of points, scale, precision and rotation in plan, live."""
-    sheet, geo = builder.book["Georeference"], content.georeference
+    geo = content.georeference
     redundant = 'g_n*IF(g_used="2D",2,3)-IF(g_used="2D",4,IF(g_used="3D",7,5))'
     east, north, height = (f"SUMPRODUCT(tblGeo[w],tblGeo[v{n}],tblGeo[v{n}])" for n in "ENH")
     values: tuple[CellValue, ...] = (0, None, None, None)
@@ -183,8 +180,8 @@ def _transformation(builder: BookBuilder, content: SurveyContent) -> None:
         ("geo_alpha", "g_alpha", 'IF(g_k="","",DEGREES(ATAN2(g_11,g_21)))', "0.0000"),
     )
     for row, ((key, name, body, form), value) in enumerate(zip(lines, values, strict=True), 7):
-        builder.text(sheet, f"A{row}", word(key, builder.language))
-        builder.formula(sheet, f"B{row}", body, value, form=form, name=name)
+        sheet.word(f"A{row}", key)
+        sheet.formula(f"B{row}", body, value, form=form, name=name)
 
 
 #: Cosines of the closed forms, row by row: of the model 2D, of the levelled one.
@@ -195,38 +192,38 @@ _COSINES = {
 }  # fmt: skip
 
 
-def _rotation(builder: BookBuilder, content: SurveyContent) -> None:
+def _rotation(sheet: SheetBuilder, content: SurveyContent) -> None:
     """Write the rotation: closed forms live, the general one found by the program."""
-    sheet, language, geo = builder.book["Georeference"], builder.language, content.georeference
-    builder.text(sheet, "A14", word("geo_rotation", language))
-    builder.text(sheet, "J14", word("geo_solved", language))
+    geo = content.georeference
+    sheet.word("A14", "geo_rotation")
+    sheet.word("J14", "geo_solved")
     is_3d = geo is not None and geo.model == "3D"
     for key, (plane, levelled) in _COSINES.items():
         i, j = int(key[0]) - 1, int(key[1]) - 1
         entry = None if geo is None else float(geo.world_from_wall.rotation[i, j])
         body = f'IF(g_k="","",IF(g_used="3D",s3_{key},IF(g_used="2D",{plane},{levelled})))'
         place = f"{'BCD'[j]}{14 + i}"
-        builder.formula(sheet, place, body, entry, form="0.000000000", name=f"g_{key}")
+        sheet.formula(place, body, entry, form="0.000000000", name=f"g_{key}")
         solved = entry if is_3d else None
-        builder.input(sheet, f"{'GHI'[j]}{14 + i}", solved, name=f"s3_{key}")
-    builder.text(sheet, "J17", word("geo_scale", language))
+        sheet.input(f"{'GHI'[j]}{14 + i}", solved, name=f"s3_{key}")
+    sheet.word("J17", "geo_scale")
     scale = geo.world_from_wall.scale if geo is not None and is_3d else None
-    builder.input(sheet, "G17", scale, name="s3_k")
+    sheet.input("G17", scale, name="s3_k")
 
 
-def _centres(builder: BookBuilder, content: SurveyContent) -> None:
+def _centres(sheet: SheetBuilder, content: SurveyContent) -> None:
     """Write the centres of the control points in both systems, the world's in two parts.
 
     E0 = Er + Et with Er a whole number: differences of large coordinates stay exact.
     """
-    sheet, language, geo = builder.book["Georeference"], builder.language, content.georeference
-    builder.text(sheet, "A12", word("geo_centres", language))
+    geo = content.georeference
+    sheet.word("A12", "geo_centres")
     zero = np.zeros(3)
     wall = zero if geo is None else geo.world_from_wall.source_centre
     origin, offset = (zero, zero) if geo is None else (geo.origin, geo.offset)
 
     def formula(cell: str, name: str, body: str, value: float) -> None:
-        builder.formula(sheet, cell, body, float(value), form="0.0000", name=name)
+        sheet.formula(cell, body, float(value), form="0.0000", name=name)
 
     for i, (axis, name) in enumerate(zip("XYZ", "ENH", strict=True)):
         mean = "IF(g_n=0,0,SUMIF(tblGeo[w],1,tblGeo[{0}])/g_n)"
@@ -240,9 +237,9 @@ def _centres(builder: BookBuilder, content: SurveyContent) -> None:
         formula(f"{'GHI'[i]}13", f"g_{name}t", rest, offset[i])
 
 
-def _sums(builder: BookBuilder, content: SurveyContent) -> None:
+def _sums(sheet: SheetBuilder, content: SurveyContent) -> None:
     """Write the centred sums the closed forms are made of, with their values."""
-    sheet, geo = builder.book["Georeference"], content.georeference
+    geo = content.georeference
     centred = np.zeros((6, 0))
     if geo is not None:
         world = content.control.xyz[geo.used] - geo.origin
@@ -269,86 +266,64 @@ def _sums(builder: BookBuilder, content: SurveyContent) -> None:
         values[f"l{kind}"] = math.hypot(values[f"a{kind}"], values[f"b{kind}"])
     for i, name in enumerate(("a2", "b2", "l2", "sq2", "aL", "bL", "lL", "sq3", "cYH")):
         row, (left, right) = 19 + i % 5, ("AB", "CD")[i // 5]
-        builder.text(sheet, f"{left}{row}", f"g_{name}", LABEL_FONT)
+        sheet.text(f"{left}{row}", f"g_{name}", LABEL_FONT)
         place, form = f"{right}{row}", "0.000000"
-        builder.formula(sheet, place, bodies[name], values[name], form=form, name=f"g_{name}")
+        sheet.formula(place, bodies[name], values[name], form=form, name=f"g_{name}")
 
 
 def planning(builder: BookBuilder, content: SurveyContent) -> None:
     """Write what precision to expect over the frame and where relief cannot be told from zero."""
-    language, cells = builder.language, setup_cells(content)
-    sheet = builder.sheet("Planning", word("Planning", language), word("type", language))
-    width, height = content.sensor or (None, None)
-    for row, (key, value) in enumerate((("sensor_w", width), ("sensor_h", height)), start=4):
-        builder.text(sheet, f"A{row}", word(key, language))
-        builder.input(sheet, f"B{row}", value, form="0.00", name=key)
-        validate(sheet, f"B{row}", above_zero=True)
-    scale = cells.get("m_1")
-    for row, letter, size, value in ((6, "B", "sensor_w", width), (6, "C", "sensor_h", height)):
-        covered = value * float(scale) / 1000 if value and scale else None
-        builder.formula(
-            sheet,
-            f"{letter}{row}",
-            f'IF(COUNT({size},m_1)=2,{size}*m_1/1000,"")',
-            covered,
-            form="0.00",
-            name=size.replace("sensor", "covered"),
-        )
-    builder.text(sheet, "A6", word("footprint", language))
-    builder.text(sheet, "A7", word("gsd", language))
-    pitch = cells.get("pitch")
-    gsd = float(pitch) * float(scale) if pitch and scale else None
-    builder.formula(
-        sheet, "B7", 'IF(COUNT(pitch,m_1)=2,pitch*m_1,"")', gsd, form="0.00", name="gsd_mm"
+    sheet, cells = builder.sheet("Planning", "type"), setup_cells(content)
+    scale, pitch, sigma, base = (
+        float(cells.get(name) or math.nan) for name in ("m_1", "pitch", "sigma_s", "b_lever")
     )
-    diagonal = math.hypot(width, height) if width and height else None
-    sigma = cells.get("sigma_s")
-    builder.text(sheet, "A9", word("uncertainty", language), HEAD_FONT)
-    builder.table(
-        sheet,
-        "tblPlan",
-        UNCERTAINTY,
-        at=(11, 1),
-        rows=len(PLANNED_RELIEF),
-        cells=_uncertainty(content, sigma, scale, diagonal),
-    )
+    sizes = content.sensor or (math.nan, math.nan)
+    sheet.word("A6", "footprint")
+    for row, (name, size) in enumerate(zip(_SENSOR, sizes, strict=True), start=4):
+        sheet.word(f"A{row}", name)
+        sheet.input(f"B{row}", size, form="0.00", name=name)
+        sheet.validate(f"B{row}", above_zero=True)
+    for letter, name, size in zip("BC", _SENSOR, sizes, strict=True):
+        body, covered = f'IF(COUNT({name},m_1)=2,{name}*m_1/1000,"")', _known(size * scale / 1000)
+        named = name.replace("sensor", "covered")
+        sheet.formula(f"{letter}6", body, covered, form="0.00", name=named)
+    sheet.word("A7", "gsd")
+    body = 'IF(COUNT(pitch,m_1)=2,pitch*m_1,"")'
+    sheet.formula("B7", body, _known(pitch * scale), form="0.00", name="gsd_mm")
+    diagonal = math.hypot(*sizes)
+    sheet.word("A9", "uncertainty", HEAD_FONT)
+    shown = _uncertainty(content, sigma, scale, diagonal)
+    sheet.table("tblPlan", UNCERTAINTY, at=(11, 1), rows=len(PLANNED_RELIEF), cells=shown)
     head = 11 + len(PLANNED_RELIEF) + 4
-    builder.text(sheet, f"A{head - 2}", word("over_frame", language), HEAD_FONT)
-    radii = [None if diagonal is None else share / 200 * diagonal for share in FRAME_SHARES]
-    lever = cells.get("b_lever")
-    sigmas: list[CellValue] = [
-        math.sqrt(2) * float(sigma) * float(lever) / radius if radius and sigma and lever else None
-        for radius in radii
-    ]
-    builder.table(
-        sheet,
-        "tblFrame",
-        OVER_FRAME,
-        at=(head, 1),
-        rows=len(FRAME_SHARES),
-        cells={"share": list(FRAME_SHARES), "s_mm": list(radii), "sigma_r": sigmas},
-    )
-    sheet.column_dimensions["A"].width = 36
-    set_up_print(sheet, language, landscape=False)
-    protect(sheet)
+    sheet.word(f"A{head - 2}", "over_frame", HEAD_FONT)
+    radii = [share / 200 * diagonal for share in FRAME_SHARES]
+    over_frame: Cells = {
+        "share": FRAME_SHARES,
+        "s_mm": list(map(_known, radii)),
+        "sigma_r": [_known(math.sqrt(2) * sigma * base / radius) for radius in radii],
+    }
+    rows = len(FRAME_SHARES)
+    sheet.table("tblFrame", OVER_FRAME, at=(head, 1), rows=rows, cells=over_frame)
+    sheet.worksheet.column_dimensions["A"].width = 36
+    sheet.finish()
 
 
-def _uncertainty(
-    content: SurveyContent, sigma: CellValue, scale: CellValue, diagonal: float | None
-) -> dict[str, list[CellValue]]:
+def _known(value: float) -> float | None:
+    """Return a number; None where what it follows from is not given."""
+    return None if math.isnan(value) else value
+
+
+def _uncertainty(content: SurveyContent, sigma: float, scale: float, diagonal: float) -> Cells:
     """Return the radii inside which a relief is below twice its standard deviation."""
-    cells: dict[str, list[CellValue]] = {"relief_cm": list(PLANNED_RELIEF)}
-    if content.pair is None or not sigma:
-        return cells
-    d1, d2 = content.pair.d1, content.pair.d2
-    radii = [
-        FlagLimits().on_plane * math.sqrt(2) * float(sigma) * (d1 - cm / 100) * (d2 - cm / 100)
-        / (cm / 100 * abs(d1 - d2))
-        for cm in PLANNED_RELIEF
-    ]  # fmt: skip
-    cells["radius_mm"] = list(radii)
-    if scale:
-        cells["radius_m"] = [radius * float(scale) / 1000 for radius in radii]
-    if diagonal:
-        cells["share"] = [200 * radius / diagonal for radius in radii]
-    return cells
+    d1, d2 = (content.pair.d1, content.pair.d2) if content.pair else (math.nan, math.nan)
+    radii = []
+    for cm in PLANNED_RELIEF:
+        r = cm / 100
+        noise = FlagLimits().on_plane * math.sqrt(2) * sigma
+        radii.append(noise * (d1 - r) * (d2 - r) / (r * abs(d1 - d2)))
+    return {
+        "relief_cm": PLANNED_RELIEF,
+        "radius_mm": list(map(_known, radii)),
+        "radius_m": [_known(radius * scale / 1000) for radius in radii],
+        "share": [_known(200 * radius / diagonal) for radius in radii],
+    }
