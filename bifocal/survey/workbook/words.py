@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 LANGUAGES = ("en", "it", "de")
 
 
-class Term(NamedTuple):
+class Wording(NamedTuple):
     """One expression in every language, with the unit of what it names."""
 
     en: str
@@ -33,20 +33,20 @@ def _content() -> dict[str, dict[str, Any]]:
     return tomllib.loads(files(__package__).joinpath("words.toml").read_text(encoding="utf-8"))
 
 
-def term(section: str, key: str) -> Term | None:
+def term(section: str, key: str) -> Wording | None:
     """Return an entry of the sections ``columns``, ``setup`` or ``words``; None if absent."""
     entry = _content()[section].get(key)
-    return None if entry is None else Term(**entry)
+    return None if entry is None else Wording(**entry)
 
 
 def word(key: str, language: str) -> str:
     """Return a word of the workbook in a language."""
-    return Term(**_content()["words"][key]).in_language(language)
+    return Wording(**_content()["words"][key]).in_language(language)
 
 
 def label(key: str, language: str) -> str:
     """Return a column's label with its unit."""
-    column = Term(**_content()["columns"][key])
+    column = Wording(**_content()["columns"][key])
     name = column.in_language(language)
     return f"{name} [{column.unit}]" if column.unit else name
 
