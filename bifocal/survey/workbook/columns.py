@@ -56,6 +56,11 @@ def _f(key: str, formula: str, places: int | None = None, **more: object) -> Sur
     return SurveyColumn(key=key, kind="formula", formula=formula, places=places, **more)  # type: ignore[arg-type]
 
 
+def _of_r(key: str, formula: str) -> SurveyColumn:
+    """Return a column that is blank where relief is blank."""
+    return _f(key, f'IF([@r]="","",{formula})', 4)
+
+
 _XY = "[@x1],[@y1],[@x2],[@y2]"
 _X1, _Y1 = "([@x1]-off_x1)*unit_x", "([@y1]-off_y1)*unit_y"
 _X2, _Y2 = "([@x2]-off_x2)*unit_x", "([@y2]-off_y2)*unit_y"
@@ -110,31 +115,26 @@ IDEAL_POINTS: tuple[SurveyColumn, ...] = (
         folded=True,
     ),
     *_RELIEF,
-    _f("e1", 'IF([@r]="","",[@s1_used]*[@r]/d_1)', 4),
-    _f("e2", 'IF([@r]="","",[@s2_used]*[@r]/d_2)', 4),
-    _f("s_c", 'IF([@r]="","",[@s1_used]-[@e1])', 4),
-    _f(
-        "X",
-        'IF(OR([@den]="",[@theta_used]="",m_1=""),"",[@s_c]*SIN(RADIANS([@theta_used]))*m_1/1000)',
-        4,
+    _of_r("e1", "[@s1_used]*[@r]/d_1"),
+    _of_r("e2", "[@s2_used]*[@r]/d_2"),
+    _of_r("s_c", "[@s1_used]-[@e1]"),
+    *(
+        _f(
+            axis,
+            'IF(OR([@den]="",[@theta_used]="",m_1=""),"",'
+            f"[@s_c]*{turn}(RADIANS([@theta_used]))*m_1/1000)",
+            4,
+        )
+        for axis, turn in (("X", "SIN"), ("Y", "COS"))
     ),
-    _f(
-        "Y",
-        'IF(OR([@den]="",[@theta_used]="",m_1=""),"",[@s_c]*COS(RADIANS([@theta_used]))*m_1/1000)',
-        4,
-    ),
-    _f("Z", 'IF([@r]="","",[@r])', 4),
+    _of_r("Z", "[@r]"),
     _f(
         "q",
         f"IF(COUNT({_XY})=4,IF([@s1_used]>0,"
         f'(({_X1})*({_Y2})-({_Y1})*({_X2}))*k_12/[@s1_used],0),"")',
         5,
     ),
-    _f(
-        "sigma_r",
-        'IF([@r]="","",sigma_s*SQRT((1-[@r]/d_1)^2+(k_12*(1-[@r]/d_2))^2)/ABS([@den]))',
-        4,
-    ),
+    _of_r("sigma_r", "sigma_s*SQRT((1-[@r]/d_1)^2+(k_12*(1-[@r]/d_2))^2)/ABS([@den])"),
     _f(
         "flag",
         _flag(
@@ -170,22 +170,17 @@ def pair_points(*, undistorted: bool) -> tuple[SurveyColumn, ...]:
                     4,
                 )
             )
-    moved = {
-        f"{axis}{image}": f"([@{axis}{image}]-[@q]*[@g{image}{axis}])"
-        for image in (1, 2)
-        for axis in ("x", "y")
-    }
-    own = {
-        f"{axis}{image}": f"({moved[f'{axis}{image}']}-(n{image}_{axis}-e_{axis})*1000/m_1)"
-        for image in (1, 2)
-        for axis in ("x", "y")
-    }
+    moved, own = {}, {}
+    for image, axis in ((1, "x"), (1, "y"), (2, "x"), (2, "y")):
+        at = f"{axis}{image}"
+        moved[at] = f"([@{at}]-[@q]*[@g{image}{axis}])"
+        own[at] = f"({moved[at]}-(n{image}_{axis}-e_{axis})*1000/m_1)"
 
     def radius(image: int, parts: dict[str, str]) -> str:
         return f"SQRT({parts[f'x{image}']}^2+{parts[f'y{image}']}^2)"
 
     def place(axis: str) -> str:
-        return f'IF([@r]="","",e_{axis}+({moved[f"{axis}1"]}-{own[f"{axis}1"]}*[@r]/d_1)*m_1/1000)'
+        return f"e_{axis}+({moved[f'{axis}1']}-{own[f'{axis}1']}*[@r]/d_1)*m_1/1000"
 
     return (
         SurveyColumn(key="id", width=12),
@@ -218,13 +213,13 @@ def pair_points(*, undistorted: bool) -> tuple[SurveyColumn, ...]:
             folded=True,
         ),
         *_RELIEF,
-        _f("e1", f'IF([@r]="","",{radius(1, own)}*[@r]/d_1)', 4),
-        _f("e2", f'IF([@r]="","",{radius(2, own)}*[@r]/d_2)', 4),
-        _f("s_c", f'IF([@r]="","",{radius(1, own)}-[@e1])', 4),
-        _f("X", place("x"), 4),
-        _f("Y", place("y"), 4),
-        _f("Z", 'IF([@r]="","",[@r])', 4),
-        _f("sigma_r", 'IF([@r]="","",IF(ISNUMBER([@r]),sigma_px*[@k_r],NA()))', 4),
+        _of_r("e1", f"{radius(1, own)}*[@r]/d_1"),
+        _of_r("e2", f"{radius(2, own)}*[@r]/d_2"),
+        _of_r("s_c", f"{radius(1, own)}-[@e1]"),
+        _of_r("X", place("x")),
+        _of_r("Y", place("y")),
+        _of_r("Z", "[@r]"),
+        _of_r("sigma_r", "IF(ISNUMBER([@r]),sigma_px*[@k_r],NA())"),
         _f(
             "flag",
             _flag(_XY, "ABS(N([@q]))>k_off*sigma_px*N([@k_q])").replace(
