@@ -7,12 +7,12 @@ from itertools import product
 
 import numpy as np
 import pytest
-
-import multimedia as mm
-from multimedia import compiled
 from multimedia.iteration import best_over_compensation, iterated_radius
 from multimedia.shift import axis_ratio, shift_derivatives, shift_ratio, shifted_radius
 from multimedia.unrolled import unrolled_shift
+
+import multimedia as mm
+from multimedia import compiled
 from photocore.errors import GeometryError, InputError
 
 NAN = np.nan
