@@ -14,7 +14,7 @@ for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
 import pytest  # noqa: E402
 from hypothesis import settings  # noqa: E402
 
-from photocore import console  # noqa: E402
+from photocore import cli  # noqa: E402
 
 # The same examples on every machine and in every run: a red test is then a change of the code.
 settings.register_profile("same", derandomize=True, deadline=None)
@@ -35,7 +35,7 @@ def _observed_commands() -> Iterator[tuple[list[str], list[subprocess.Popen]]]:
     """Note what the last-resort handler says, and every process started, in the whole session."""
     said: list[str] = []
     started: list[subprocess.Popen] = []
-    message, start = console.unforeseen_message, subprocess.Popen.__init__
+    message, start = cli.unforeseen_message, subprocess.Popen.__init__
 
     def noted_message(task: str, error: BaseException) -> str:
         said.append(message(task, error))
@@ -46,7 +46,7 @@ def _observed_commands() -> Iterator[tuple[list[str], list[subprocess.Popen]]]:
         start(process, *args, **options)
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(console, "unforeseen_message", noted_message)
+        patch.setattr(cli, "unforeseen_message", noted_message)
         patch.setattr(subprocess.Popen, "__init__", noted_start)
         yield said, started
 
@@ -59,7 +59,7 @@ class Unforeseen:
 
     def taken(self) -> list[str]:
         """Return the messages and the processes of its exit status so far, and forget them."""
-        ended = [p for p in self._started if getattr(p, "returncode", None) == console.UNFORESEEN]
+        ended = [p for p in self._started if getattr(p, "returncode", None) == cli.UNFORESEEN]
         met = [*self._said, *(f"exit status {p.returncode}: {p.args}" for p in ended)]
         self._said.clear()
         self._started[:] = [p for p in self._started if getattr(p, "returncode", 0) is None]

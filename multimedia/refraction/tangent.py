@@ -248,7 +248,7 @@ def shift_blocks(
     t, value, slope = np.empty(inner), np.empty(inner), np.empty(inner)
     whole, straight, layer = np.empty(inner), np.empty(inner), np.empty((k.size, inner))
     for j in range(k.size):
-        layer[j, :] = heights[j, 0]
+        layer[j, :] = k[j] * heights[j, 0]
     for low in range(0, radius.size, inner):
         width = min(inner, radius.size - low)
         goal = radius[low : low + width]
@@ -257,13 +257,13 @@ def shift_blocks(
         for j in range(k.size):
             if moving[j]:
                 for i in range(width):
-                    layer[j, i] = heights[j, low + i]
-            lowest = 1.0 if q[j] == 0 else 0.0
+                    layer[j, i] = k[j] * heights[j, low + i]
+            n, lowest, half = 1.0 / k[j], 1.0 if q[j] == 0 else 0.0, 0.5 * q[j]
             for i in range(width):
-                whole[i] += layer[j, i]
+                whole[i] += n * layer[j, i]
                 straight[i] += lowest * layer[j, i]
-                slope[i] += k[j] * layer[j, i]
-                value[i] += 0.5 * q[j] * k[j] * layer[j, i]
+                slope[i] += layer[j, i]
+                value[i] += half * layer[j, i]
         for i in range(width):
             x = goal[i] / slope[i]
             t[i] = first_tangent(x, value[i] / slope[i] if x < NEAR_AXIS else 0.0)
@@ -273,7 +273,7 @@ def shift_blocks(
             for j in range(k.size):
                 if q[j] > 0:
                     for i in range(width):
-                        by_value, by_slope = layer_terms(t[i] * t[i], k[j] * layer[j, i], q[j])
+                        by_value, by_slope = layer_terms(t[i] * t[i], layer[j, i], q[j])
                         value[i] += by_value
                         slope[i] += by_slope
             open_ = 0

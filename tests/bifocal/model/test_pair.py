@@ -222,6 +222,9 @@ def test_swapped_images_are_exchanged_and_said():
     swapped = Pair(image1=pair.image2, image2=pair.image1)
     assert swapped.image1.distance == 17.5
     assert "exchanged" in swapped.remarks[0]
+    assert swapped.exchanged
+    assert not pair.exchanged
+    assert replace(swapped, remarks=()).exchanged
 
 
 @pytest.mark.parametrize(

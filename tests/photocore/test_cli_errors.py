@@ -12,7 +12,7 @@ from click.testing import CliRunner, Result
 
 import bifocal.cli.main
 import multimedia.cli.main
-from photocore import console
+from photocore import cli
 from photocore.errors import InputError
 
 pytest_plugins = ["pytester"]
@@ -30,8 +30,8 @@ def run(monkeypatch: pytest.MonkeyPatch):
             raise error
 
         module = SimpleNamespace(command=command)
-        monkeypatch.setattr(console, "import_module", lambda name: module)  # noqa: ARG005
-        group = console.LazyGroup(
+        monkeypatch.setattr(cli, "import_module", lambda name: module)  # noqa: ARG005
+        group = cli.LazyGroup(
             name="main", commands_package="multimedia.cli", summaries={"work": "Work."}
         )
         return CliRunner().invoke(group, words or ["work"])
@@ -122,14 +122,14 @@ FAULTY = """
 import sys
 from types import SimpleNamespace
 import click
-from photocore import console
+from photocore import cli
 
 @click.command()
 def command():
     raise KeyError("depth")
 
-console.import_module = lambda name: SimpleNamespace(command=command)
-console.LazyGroup(name="main", commands_package="bifocal.cli", summaries={"work": "."})(["work"])
+cli.import_module = lambda name: SimpleNamespace(command=command)
+cli.LazyGroup(name="main", commands_package="bifocal.cli", summaries={"work": "."})(["work"])
 """
 
 
@@ -155,8 +155,8 @@ def test_a_test_fails_that_ends_in_the_handler(pytester: pytest.Pytester, reques
 
         def test_in_this_process():
             names = {{"__name__": "faulty"}}
-            exec(FAULTY.rpartition("console.LazyGroup")[0], names)
-            group = names["console"].LazyGroup(
+            exec(FAULTY.rpartition("cli.LazyGroup")[0], names)
+            group = names["cli"].LazyGroup(
                 name="main", commands_package="bifocal.cli", summaries={{"work": "."}}
             )
             assert CliRunner().invoke(group, ["work"]).exit_code

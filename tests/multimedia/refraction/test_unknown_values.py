@@ -7,12 +7,12 @@ from itertools import product
 
 import numpy as np
 import pytest
-from multimedia.iteration import best_over_compensation, iterated_radius
-from multimedia.shift import axis_ratio, shift_derivatives, shift_ratio, shifted_radius
-from multimedia.unrolled import unrolled_shift
 
 import multimedia as mm
-from multimedia import compiled
+from multimedia.refraction import compiled
+from multimedia.refraction.iteration import best_over_compensation, iterated_radius
+from multimedia.refraction.shift import axis_ratio, shift_derivatives, shift_ratio, shifted_radius
+from multimedia.refraction.unrolled import unrolled_shift
 from photocore.errors import GeometryError, InputError
 
 NAN = np.nan
