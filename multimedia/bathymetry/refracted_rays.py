@@ -12,7 +12,7 @@ from multimedia.bathymetry.corrected_points import (
     CorrectedPoints,
     WaterSurface,
     as_water_surface,
-    checked_index,
+    checked_water_index,
     height_of,
 )
 from multimedia.media.interfaces import Interfaces
@@ -100,7 +100,7 @@ def intersect_refracted_rays(
     start, heading = np.broadcast_arrays(start, heading)
     if start.ndim != 3:
         raise InputError(f"origins: expected shape (points, rays, 3), found {start.shape}.")
-    surface, n_water = as_water_surface(water_level), checked_index(index)
+    surface, n_water = as_water_surface(water_level), checked_water_index(index)
     with np.errstate(invalid="ignore", divide="ignore"):
         heading = heading / np.linalg.norm(heading, axis=-1, keepdims=True)
     given = np.isfinite(start + heading).all(-1)
@@ -201,8 +201,8 @@ def correct_lidar_beams(
     )
     shape = echo.shape
     start, echo = start.reshape(-1, 3), echo.reshape(-1, 3)
-    surface, n_water = as_water_surface(water_level), checked_index(index)
-    slowed = n_water if group_index is None else checked_index(group_index)
+    surface, n_water = as_water_surface(water_level), checked_water_index(index)
+    slowed = n_water if group_index is None else checked_water_index(group_index)
     finite = np.asarray(np.isfinite(start + echo).all(-1))
     offset = np.round(echo[finite].mean(0)) if finite.any() else np.zeros(3)
     start, echo, local = start - offset, echo - offset, surface.shifted(-offset)

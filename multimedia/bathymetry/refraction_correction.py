@@ -18,7 +18,7 @@ from multimedia.bathymetry.corrected_points import (
     Precision,
     WaterSurface,
     as_water_surface,
-    checked_index,
+    checked_water_index,
     height_of,
 )
 from multimedia.media.interfaces import Interfaces
@@ -106,7 +106,7 @@ def correct_bathymetry(
     xyz = as_points(points, "points", dimension=3)
     shape = xyz.shape[:-1]
     flat = xyz.reshape(-1, 3)
-    surface, n_water = as_water_surface(water_level), checked_index(index)
+    surface, n_water = as_water_surface(water_level), checked_water_index(index)
     centres = _checked_cameras(cameras, surface)
     seen = _checked_visibility(visible, shape, len(centres))
     precision = precision or Precision()

@@ -15,7 +15,7 @@ from multimedia.bathymetry.corrected_points import (
     CorrectedPoints,
     Precision,
     WaterSurface,
-    checked_index,
+    checked_water_index,
     height_of,
 )
 from multimedia.bathymetry.dem import Dem, Window
@@ -176,7 +176,7 @@ def correct_file(job: Job, *, progress: Progress = no_progress) -> Outcome:
         If anything is wrong with the data; the target is then not written.
     """
     check_writable(job.target, overwrite=job.overwrite)
-    checked_index(job.index)
+    checked_water_index(job.index)
     if job.source.resolve() == job.target.resolve():
         raise InputError(f"{job.target}: is the input itself; name another file for --out.")
     if job.rays:

@@ -9,12 +9,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from multimedia.media.surfaces import Cylinder, Plane, Sphere, Surface
-from multimedia.refraction.layers import Layers
-from photocore.arrays import BoolArray, FloatArray, as_floats, read_only
+from multimedia.refraction.layers import Layers, checked_indices
+from photocore.arrays import BoolArray, FloatArray, read_only
 from photocore.errors import GeometryError, InputError
-
-#: Beyond diamond (2.42) an index is a typing error.
-HIGHEST_INDEX = 3.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -164,21 +161,3 @@ class Interfaces:
             product = surface.side(starts) * surface.side(ends)
             good &= (product <= 0) if crossings % 2 else (product >= 0)
         return good
-
-
-def checked_indices(indices: Sequence[float]) -> tuple[float, ...]:
-    """Return refractive indices as floats.
-
-    Raises
-    ------
-    InputError
-        If one is below 1 (nothing is optically thinner than vacuum) or absurdly high.
-    """
-    values = tuple(float(value) for value in as_floats(indices, "indices").reshape(-1))
-    for place, value in enumerate(values, start=1):
-        if not 1.0 <= value <= HIGHEST_INDEX:
-            raise InputError(
-                f"indices: medium {place} has refractive index {value:g}; expected 1 (vacuum, air) "
-                f"to {HIGHEST_INDEX:g}. Water is about 1.33 to 1.35, glass 1.46 to 1.9."
-            )
-    return values

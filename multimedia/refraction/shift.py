@@ -6,14 +6,7 @@ the angle :math:`\beta_i` to the normal in each (Maas 2015, Eqs. 1 to 3):
 .. math:: R = \sum_i h_i \tan\beta_i, \qquad \bar R = \Bigl(\sum_i h_i\Bigr) \tan\beta_1, \qquad
           n_1 \sin\beta_1 = n_2 \sin\beta_2 = \dots
 
-The unknown here is :math:`t = \tan\beta` in the layer of the *lowest* index, because there the
-angle is largest and R runs through all values as t does:
-
-.. math:: F(t) = \sum_i \frac{h_i t}{\sqrt{a_i + b_i t^2}} = R, \qquad
-          a_i = n_i^2 / n_{min}^2, \quad b_i = a_i - 1 .
-
-F increases and is concave, so Newton's method approaches the root from below whatever the set-up:
-it cannot diverge, overshoot into total reflection, or stop at a wrong value.
+`multimedia.refraction.tangent` finds the root of the first equation, exactly.
 
 All heights and radii share one unit, any.
 

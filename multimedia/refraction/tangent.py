@@ -19,7 +19,6 @@ the workbook's columns (`multimedia.refraction.unrolled`).
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from typing import TypeVar
 
 import numpy as np
 
@@ -47,22 +46,21 @@ Height = float | FloatArray
 #: Shifted radius, t, and the index of the layer t belongs to, of one row.
 Row = tuple[FloatArray, FloatArray, Height]
 RowSolver = Callable[[FloatArray, list[Height], Sequence[float]], Row]
-_Value = TypeVar("_Value", float, FloatArray)
 
 
-def layer_terms(square: _Value, reduced: _Value, bend: float) -> tuple[_Value, _Value]:
+def layer_terms(square: FloatArray, reduced: Height, bend: float) -> tuple[FloatArray, FloatArray]:
     """Return what a layer adds to F(t) / t and to F'(t), from t², h k and q."""
     cosine2 = 1.0 / (1.0 + bend * square)
     value = reduced * np.sqrt(cosine2)
     return value, value * cosine2
 
 
-def first_tangent(x: _Value, bulge: _Value | float) -> _Value:
+def first_tangent(x: FloatArray, bulge: Height) -> FloatArray:
     """Return t from x = R / A, F(t) = A t - B t³ + ..., to third order: x + (B / A) x³."""
     return x * (1.0 + x * x * bulge)
 
 
-def apparent_radius(t: _Value, whole: _Value, k: float, q: float) -> _Value:
+def apparent_radius(t: FloatArray, whole: Height, k: float, q: float) -> FloatArray:
     """Return R bar from t, the height of all layers, and k and q of the first: Maas Eq. (2)."""
     return whole * (k * t / np.sqrt(1.0 + q * t * t))
 
@@ -145,10 +143,10 @@ def solve_row(radius: FloatArray, heights: list[Height], indices: Sequence[float
 
 def ray_sums(
     t: FloatArray, straight: Height, bent: Iterable[tuple[Height, float]]
-) -> tuple[Height, Height]:
-    """Return F(t) / t and F'(t), from the height of the lowest layers and (h k, q) of the others."""
+) -> tuple[FloatArray, FloatArray]:
+    """Return F(t) / t and F'(t) from the height of straight layers and (h k, q) of bending ones."""
     square = t * t
-    value = slope = straight
+    value = slope = np.asarray(straight)
     for reduced, bend in bent:
         by_value, by_slope = layer_terms(square, reduced, bend)
         value = value + by_value
@@ -156,9 +154,7 @@ def ray_sums(
     return value, slope
 
 
-def _root(
-    radius: FloatArray, straight: Height, bent: list[tuple[Height, float]]
-) -> FloatArray:
+def _root(radius: FloatArray, straight: Height, bent: list[tuple[Height, float]]) -> FloatArray:
     """Return the root t of F(t) = radius; NaN where none is."""
     if not bent:
         return radius / straight
@@ -205,7 +201,7 @@ def _finish_ill_conditioned(
         return height[where] if isinstance(height, np.ndarray) else height
 
     layers, bends = [(part(h), n) for h, n in present], [(part(h), q) for h, q in bent]
-    root, goal, slope = t[where], radius[where], part(slope)
+    root, goal, slope = t[where], radius[where], slope[where]
     for _ in range(8):
         step = _residual(root, goal, layers, lowest) / slope
         root = root + step
