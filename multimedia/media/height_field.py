@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from multimedia.media.surfaces import Surface
+from multimedia.media.surfaces import RefractingSurface
 from photocore.arrays import BoolArray, FloatArray, as_floats, as_points, read_only
 from photocore.errors import InputError
 
@@ -23,7 +23,7 @@ STEEPENING = 1.9
 SAMPLES_PER_FEATURE = 8
 
 
-class HeightField(Surface):
+class HeightField(RefractingSurface):
     """A surface Z = f(X, Y); normals point up. Subclasses say what f is.
 
     Attributes of every subclass: ``lowest`` and ``highest`` bound f, ``steepest`` bounds its

@@ -15,9 +15,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from multimedia.media.interfaces import Interfaces
 from multimedia.media.least_time import least_time_path
 from multimedia.media.ray_paths import RayPaths, RayStatus
+from multimedia.media.surface_sequence import SurfaceSequence
 from multimedia.media.surfaces import Plane
 from photocore.arrays import BoolArray, FloatArray, IntArray, as_points
 
@@ -53,7 +53,7 @@ class _March(NamedTuple):
 _Found = tuple[_March, BoolArray]
 
 
-def trace_rays(origins: ArrayLike, directions: ArrayLike, interfaces: Interfaces) -> RayPaths:
+def trace_rays(origins: ArrayLike, directions: ArrayLike, interfaces: SurfaceSequence) -> RayPaths:
     """Trace rays from the camera through every interface.
 
     Parameters
@@ -62,7 +62,7 @@ def trace_rays(origins: ArrayLike, directions: ArrayLike, interfaces: Interfaces
         Starts, usually the projection centre. [m, or any unit of the interfaces]
     directions : array_like, shape (..., 3)
         Directions in the first medium, of any length; broadcast against the origins.
-    interfaces : Interfaces
+    interfaces : SurfaceSequence
         Surfaces and indices, all in the frame of the origins (see `Interfaces.seen_from`).
 
     Returns
@@ -84,6 +84,7 @@ def trace_rays(origins: ArrayLike, directions: ArrayLike, interfaces: Interfaces
     --------
     A ray that meets water at 45 degrees goes on at asin(sin 45 / 1.3333) = 32.03 degrees:
 
+    >>> from multimedia import Interfaces
     >>> water = Interfaces.flat_water(0.0, index=4 / 3)
     >>> path = trace_rays([0.0, 0.0, 1.0], [1.0, 0.0, -1.0], water)
     >>> path.vertices.round(9).tolist(), np.degrees(np.arcsin(path.directions[1, 0])).round(2)
@@ -108,7 +109,7 @@ def trace_rays(origins: ArrayLike, directions: ArrayLike, interfaces: Interfaces
 
 
 def aim_rays(
-    centres: ArrayLike, points: ArrayLike, interfaces: Interfaces, *, jacobian: bool = False
+    centres: ArrayLike, points: ArrayLike, interfaces: SurfaceSequence, *, jacobian: bool = False
 ) -> RayPaths:
     """Find the ray from each projection centre that reaches each object point.
 
@@ -118,7 +119,7 @@ def aim_rays(
         Projection centres; broadcast against the points. [m, or any unit of the interfaces]
     points : array_like, shape (..., 3)
         Object points behind the last interface.
-    interfaces : Interfaces
+    interfaces : SurfaceSequence
         Surfaces and indices, all in the frame of the points (see `Interfaces.seen_from`).
     jacobian : bool
         Also return how the direction at the camera changes with the point.
@@ -142,6 +143,7 @@ def aim_rays(
     --------
     A point 1.5 m deep, seen from 1 m above the water: the ray of `trace_rays` goes through it.
 
+    >>> from multimedia import Interfaces
     >>> water = Interfaces.flat_water(0.0, index=4 / 3)
     >>> point = [1 + 1.5 * np.tan(np.arcsin(np.sin(np.pi / 4) * 0.75)), 0, -1.5]
     >>> aim_rays([0, 0, 1], point, water).vertices.round(12).tolist()
@@ -175,7 +177,7 @@ def aim_rays(
 def _march(
     origins: FloatArray,
     directions: FloatArray,
-    interfaces: Interfaces,
+    interfaces: SurfaceSequence,
     *,
     derivatives: bool = True,
     frame: FloatArray | None = None,
@@ -231,7 +233,7 @@ def _march(
 
 
 def _aim_block(
-    centre: FloatArray, target: FloatArray, interfaces: Interfaces
+    centre: FloatArray, target: FloatArray, interfaces: SurfaceSequence
 ) -> tuple[FloatArray, FloatArray, IntArray]:
     """Return vertices, directions and status of the rays from centre to target."""
     count = len(interfaces.surfaces)
@@ -260,7 +262,7 @@ def _aim_block(
     return vertices, directions, status
 
 
-def _attempts(path: Interfaces) -> Iterator[Callable[[FloatArray, FloatArray], _Found]]:
+def _attempts(path: SurfaceSequence) -> Iterator[Callable[[FloatArray, FloatArray], _Found]]:
     """Yield ways to find a ray, the cheap one first; each is tried on what the others left."""
     yield partial(_by_stages, path=path, stages=1)
     if all(isinstance(surface, Plane) for surface in path.surfaces):
@@ -276,19 +278,19 @@ def _attempts(path: Interfaces) -> Iterator[Callable[[FloatArray, FloatArray], _
             yield partial(_from_ring, path=path, ring=ring, angle=angle)
 
 
-def _by_stages(start: FloatArray, end: FloatArray, *, path: Interfaces, stages: int) -> _Found:
+def _by_stages(start: FloatArray, end: FloatArray, *, path: SurfaceSequence, stages: int) -> _Found:
     """Start along the straight line and bring the refraction in by stages."""
     heading = _unit(end - start)
     for stage in range(1, stages):
         # Geometric mean of "no refraction" and the real indices.
         share = stage / stages
         indices = [path.indices[0] ** (1 - share) * index**share for index in path.indices]
-        heading = _newton(start, end, heading, path.with_indices(indices))[0]
+        heading = _newton(start, end, heading, path.between(indices))[0]
     _, march, _, reached = _newton(start, end, heading, path)
     return march, reached
 
 
-def _by_least_time(start: FloatArray, end: FloatArray, *, path: Interfaces) -> _Found:
+def _by_least_time(start: FloatArray, end: FloatArray, *, path: SurfaceSequence) -> _Found:
     """Take the path of least time, for planes only."""
     vertices, directions, reached = least_time_path(start, end, path)
     # Shooting along that direction gains the last digits, where it can follow.
@@ -302,7 +304,7 @@ def _by_least_time(start: FloatArray, end: FloatArray, *, path: Interfaces) -> _
 
 
 def _from_ring(
-    start: FloatArray, end: FloatArray, *, path: Interfaces, ring: float, angle: float
+    start: FloatArray, end: FloatArray, *, path: SurfaceSequence, ring: float, angle: float
 ) -> _Found:
     """Start beside the best direction that the straight start leads to."""
     best, _, size, _ = _newton(start, end, _unit(end - start), path)
@@ -313,7 +315,7 @@ def _from_ring(
 
 
 def _newton(
-    start: FloatArray, end: FloatArray, heading: FloatArray, path: Interfaces
+    start: FloatArray, end: FloatArray, heading: FloatArray, path: SurfaceSequence
 ) -> tuple[FloatArray, _March, FloatArray, BoolArray]:
     """Turn start directions until the traced rays pass through the end points."""
     scale = np.linalg.norm(end - start, axis=-1) + np.abs(end).max(-1) + np.abs(start).max(-1)
@@ -397,7 +399,7 @@ def _sensitivity(end: FloatArray, march: _March) -> tuple[FloatArray, FloatArray
 
 
 def _pointing_derivative(
-    centre: FloatArray, target: FloatArray, heading: FloatArray, interfaces: Interfaces
+    centre: FloatArray, target: FloatArray, heading: FloatArray, interfaces: SurfaceSequence
 ) -> FloatArray:
     """Return the derivative of the unit direction at the camera by the object point."""
     frame = _across(heading)

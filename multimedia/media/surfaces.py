@@ -18,8 +18,10 @@ from photocore.arrays import FloatArray, as_floats, positive, read_only
 from photocore.errors import GeometryError
 
 
-class Surface(ABC):
+class RefractingSurface(ABC):
     """What ray tracing asks of an interface. All arrays are float64, points on the last axis."""
+
+    __slots__ = ()
 
     @abstractmethod
     def side(self, points: FloatArray) -> FloatArray:
@@ -51,8 +53,30 @@ class Surface(ABC):
         """Return the surface moved by a vector."""
 
 
+class RigidSurface(RefractingSurface):
+    """A surface that can be fixed to a camera: it is known wherever it is moved and turned."""
+
+    __slots__ = ()
+
+    @abstractmethod
+    def moved(self, rotation: FloatArray, translation: FloatArray) -> Self:
+        """Return the surface of one frame as seen in another, x' = rotation x + translation."""
+
+    def shifted(self, vector: ArrayLike) -> Self:
+        """Return the surface moved by a vector."""
+        return self.moved(np.eye(3), as_floats(vector, "vector"))
+
+
+def tangents_of(normal: FloatArray) -> FloatArray:
+    """Return two unit vectors at right angles to a unit normal and to each other, shape (2, 3)."""
+    axis = np.eye(3)[np.argmin(np.abs(normal))]
+    first = np.cross(normal, axis)
+    first /= np.linalg.norm(first)
+    return np.stack([first, np.cross(normal, first)])
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Plane(Surface):
+class Plane(RigidSurface):
     """A plane of any tilt.
 
     Attributes
@@ -74,7 +98,7 @@ class Plane(Surface):
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "point", read_only(self.point, "point", shape=(3,)))
-        object.__setattr__(self, "normal", _unit(self.normal, "normal"))
+        object.__setattr__(self, "normal", unit_vector(self.normal, "normal"))
 
     @classmethod
     def level(cls, height: float) -> Plane:
@@ -113,17 +137,13 @@ class Plane(Surface):
         """Return zero: the normal of a plane never turns."""
         return np.zeros_like(steps)
 
-    def shifted(self, vector: ArrayLike) -> Plane:
-        """Return the plane moved by a vector."""
-        return replace(self, point=self.point + as_floats(vector, "vector"))
-
     def moved(self, rotation: FloatArray, translation: FloatArray) -> Plane:
         """Return the plane given in one frame as seen in another, x' = rotation x + translation."""
         return Plane(point=rotation @ self.point + translation, normal=rotation @ self.normal)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Sphere(Surface):
+class Sphere(RigidSurface):
     """A sphere, such as the inner or outer face of a dome port; normals point outwards.
 
     Attributes
@@ -163,17 +183,13 @@ class Sphere(Surface):
         """Return the steps over the radius."""
         return steps / self.radius
 
-    def shifted(self, vector: ArrayLike) -> Sphere:
-        """Return the sphere moved by a vector."""
-        return replace(self, centre=self.centre + as_floats(vector, "vector"))
-
     def moved(self, rotation: FloatArray, translation: FloatArray) -> Sphere:
         """Return the sphere given in one frame as seen in another."""
         return replace(self, centre=rotation @ self.centre + translation)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Cylinder(Surface):
+class Cylinder(RigidSurface):
     """An endless circular cylinder, such as one wall of a glass tube; normals point outwards.
 
     Attributes
@@ -192,7 +208,7 @@ class Cylinder(Surface):
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "point", read_only(self.point, "point", shape=(3,)))
-        object.__setattr__(self, "axis", _unit(self.axis, "axis"))
+        object.__setattr__(self, "axis", unit_vector(self.axis, "axis"))
         object.__setattr__(self, "radius", positive(self.radius, "radius"))
 
     def _across(self, vectors: FloatArray) -> FloatArray:
@@ -222,10 +238,6 @@ class Cylinder(Surface):
     ) -> FloatArray:
         """Return the part of the steps across the axis, over the radius."""
         return self._across(steps) / self.radius
-
-    def shifted(self, vector: ArrayLike) -> Cylinder:
-        """Return the cylinder moved by a vector."""
-        return replace(self, point=self.point + as_floats(vector, "vector"))
 
     def moved(self, rotation: FloatArray, translation: FloatArray) -> Cylinder:
         """Return the cylinder given in one frame as seen in another."""
@@ -257,7 +269,7 @@ def _hop_round(
     return np.where(np.isfinite(distance), distance, np.nan)
 
 
-def _unit(vector: ArrayLike, name: str) -> FloatArray:
+def unit_vector(vector: ArrayLike, name: str) -> FloatArray:
     """Return a read-only unit vector."""
     given = read_only(vector, name, shape=(3,))
     length = float(np.linalg.norm(given))
