@@ -228,7 +228,10 @@ def _central(seen: FloatArray, camera: Camera) -> FloatArray:
         factor = -camera.principal_distance / depth
     if not (depth < 0).all():
         factor = np.where(depth < 0, factor, np.nan)
-    return seen[:, :2] * factor[:, None]
+    image: FloatArray = np.empty((len(seen), 2))
+    np.multiply(seen[:, 0], factor, out=image[:, 0])
+    np.multiply(seen[:, 1], factor, out=image[:, 1])
+    return image
 
 
 def refuse_pixels(camera: Camera, image: FloatArray) -> None:
