@@ -439,28 +439,30 @@ def _sum_of_terms(terms: tuple[Term, ...], given: tuple[FloatArray, ...]) -> Flo
     return np.asarray(total)
 
 
-def _checked(
-    wavelength_nm: ArrayLike,
-    temperature_c: ArrayLike,
-    salinity_percent: ArrayLike,
-    depth: ArrayLike,
-) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Return the four as arrays, refusing what cannot be meant in their units."""
-    nm = as_floats(wavelength_nm, "wavelength_nm")
-    celsius = as_floats(temperature_c, "temperature_c")
-    percent = as_floats(salinity_percent, "salinity_percent")
-    metres = as_floats(depth, "depth")
-    _within(nm, "wavelength_nm", 180, 1200, "is light in nm; 0.52 µm is 520 nm")
-    _within(celsius, "temperature_c", -5, 100, "is liquid water in °C; 295 K is 22 °C")
-    _within(percent, "salinity_percent", 0, 30, "is salt in per cent; sea water is 3.5, not 35")
-    _within(metres, "depth", 0, 11000, "is a depth in m, positive downwards")
-    return nm, celsius, percent, metres
+#: What can be meant: name, lowest, highest, meaning.
+_LIMITS = (
+    ("wavelength_nm", 180, 1200, "is light in nm; 0.52 µm is 520 nm"),
+    ("temperature_c", -5, 100, "is liquid water in °C; 295 K is 22 °C"),
+    ("salinity_percent", 0, 30, "is salt in per cent; sea water is 3.5, not 35"),
+    ("depth", 0, 11000, "is a depth in m, positive downwards"),
+)
 
 
-def _within(values: FloatArray, name: str, low: float, high: float, meaning: str) -> None:
-    """Raise InputError if a value is outside, saying what the argument means."""
-    wrong = (values < low) | (values > high)
-    if wrong.any():
-        raise InputError(
-            f"{name}: found {values[wrong].flat[0]:g}; only {low:g} to {high:g} {meaning}."
-        )
+def _checked(*given: ArrayLike) -> tuple[FloatArray, ...]:
+    """Return wavelength, temperature, salinity and depth as arrays.
+
+    Raises
+    ------
+    InputError
+        If a value cannot be meant in its unit; the message says what the argument means.
+    """
+    arrays = []
+    for value, (name, low, high, meaning) in zip(given, _LIMITS, strict=True):
+        values = as_floats(value, name)
+        wrong = (values < low) | (values > high)
+        if wrong.any():
+            raise InputError(
+                f"{name}: found {values[wrong].flat[0]:g}; only {low:g} to {high:g} {meaning}."
+            )
+        arrays.append(values)
+    return tuple(arrays)
