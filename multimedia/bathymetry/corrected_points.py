@@ -129,15 +129,6 @@ def as_water_surface(level: float | WaterSurface) -> WaterSurface:
     return Plane.level(float(height))
 
 
-def height_of(surface: WaterSurface, xy: FloatArray) -> FloatArray:
-    """Return the height of the water above positions, shape (...); NaN outside the surface."""
-    if isinstance(surface, HeightField):
-        return surface.height_at(xy)
-    slope = surface.normal[:2] / surface.normal[2]
-    offset: FloatArray = (xy - surface.point[:2]) @ slope
-    return surface.point[2] - offset
-
-
 def checked_water_index(index: ArrayLike) -> float:
     """Return the refractive index of water.
 

@@ -19,13 +19,11 @@ from multimedia.bathymetry.corrected_points import (
     WaterSurface,
     as_water_surface,
     checked_water_index,
-    height_of,
 )
-from multimedia.media.interfaces import Interfaces
+from multimedia.media.collinearity import Medium, shifts
 from multimedia.media.ray_tracing import aim_rays
+from multimedia.media.surface_sequence import SurfaceSequence
 from multimedia.media.surfaces import Plane
-from multimedia.refraction.layers import Layers
-from multimedia.refraction.shifting import radial_shift_derivatives
 from photocore.arrays import BoolArray, FloatArray, IntArray, as_points
 from photocore.errors import GeometryError, InputError
 
@@ -38,6 +36,8 @@ MOST_STEPS = 30
 LAST_STEP, LAST_STEP_KINKED = 3e-8, 1e-12
 #: Step of the differences for the index, and for the level as a share of the camera height.
 DIFFERENCE = 1e-5
+#: Least depth of a point under a plane, as a share of the camera's height: a few roundings.
+JUST_UNDER = 1e-13
 #: Two rays of a smaller angle do not fix a point. [rad]
 SMALLEST_ANGLE = 1e-4
 
@@ -142,7 +142,7 @@ def _correct_block(
     precision: Precision,
 ) -> tuple[FloatArray, FloatArray, IntArray, FloatArray]:
     """Return position, depth, status and covariance of one block of points."""
-    level = height_of(surface, apparent[:, :2])
+    level = surface.height_at(apparent[:, :2])
     below = level - apparent[:, 2]
     status = np.where(below > 0, BathymetryStatus.NADIR, BathymetryStatus.DRY).astype(np.int64)
     status[np.isnan(below)] = BathymetryStatus.NO_SURFACE
@@ -170,7 +170,7 @@ def _correct_block(
             if precision.is_given:
                 good = np.flatnonzero(ok & ~weak)
                 covariance[rows[good]] = _propagate(task.take(good), found[good], precision)
-    depth = np.maximum(height_of(surface, xyz[:, :2]) - xyz[:, 2], 0.0)
+    depth = np.maximum(surface.height_at(xyz[:, :2]) - xyz[:, 2], 0.0)
     covariance[status == BathymetryStatus.FAILED] = np.nan
     return xyz, depth, status, covariance
 
@@ -239,8 +239,8 @@ def _solve(task: _Task, start: FloatArray) -> tuple[FloatArray, BoolArray, BoolA
 
 def _kept_in_water(surface: WaterSurface, point: FloatArray, step: FloatArray) -> FloatArray:
     """Shorten steps that would more than halve or double a depth: rays that hardly differ."""
-    depth = height_of(surface, point[:, :2]) - point[:, 2]
-    change = height_of(surface, point[:, :2] + step[:, :2]) - point[:, 2] - step[:, 2] - depth
+    depth = surface.height_at(point[:, :2]) - point[:, 2]
+    change = surface.height_at(point[:, :2] + step[:, :2]) - point[:, 2] - step[:, 2] - depth
     with np.errstate(invalid="ignore", divide="ignore"):
         share = np.fmin(1.0, np.where(change < 0, 0.5, 1.0) * depth / np.abs(change))
     return step * share[:, None]
@@ -271,44 +271,22 @@ def _pointing(
     task: _Task, point: FloatArray, row: IntArray, camera: IntArray
 ) -> tuple[FloatArray, FloatArray]:
     """Return directions in air of the rays of pairs, (k, 3), and their derivatives (k, 3, 3)."""
-    if isinstance(task.surface, Plane):
-        return _pointing_at_plane(task, task.surface, point, row, camera)
-    water = Interfaces(surfaces=(task.surface,), indices=(1.0, task.n_water))
-    path = aim_rays(task.centres[camera], point[row], water, jacobian=True)
-    return path.directions[:, 0], np.asarray(path.jacobian)
-
-
-def _pointing_at_plane(
-    task: _Task, plane: Plane, point: FloatArray, row: IntArray, camera: IntArray
-) -> tuple[FloatArray, FloatArray]:
-    """Return the same for a flat surface of any tilt, by Maas's radial shift in its frame."""
-    up = plane.normal
-    height = plane.side(task.centres)[camera]
-    # A point that Newton lifts out of the water for a moment is treated as if on the surface.
-    depth = np.maximum(-plane.side(point), 0.0)[row]
-    offset = point[row] - task.centres[camera]
-    across = offset - (offset @ up)[:, None] * up
-    radius = np.sqrt((across * across).sum(-1))
-    shift = radial_shift_derivatives(
-        radius, z0=height, zp=depth, layers=Layers(indices=(1.0, task.n_water))
-    )
-    small = radius < 1e-9 * (height + depth)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        outward = np.where(small[:, None], 0.0, across / radius[:, None])
-        ratio = np.where(small, shift.d_radius, shift.radius_bar / radius)
-    # Straight ray in air: radius_bar outwards, height + depth down.
-    ray = ratio[:, None] * across - (height + depth)[:, None] * up
-    # Its derivative: sideways by the ratio, outwards by radius and depth, down by the depth.
-    derivative = (
-        ratio[:, None, None] * (np.eye(3) - np.outer(up, up))
-        + outward[:, :, None]
-        * ((shift.d_radius - ratio)[:, None] * outward - shift.d_heights[:, 1, None] * up)[
-            :, None, :
-        ]
-        + np.outer(up, up)
-    )
+    if not isinstance(task.surface, Plane):
+        water = SurfaceSequence(surfaces=(task.surface,), indices=(1.0, task.n_water))
+        path = aim_rays(task.centres[camera], point[row], water, jacobian=True)
+        return path.directions[:, 0], np.asarray(path.jacobian)
+    up = task.surface.normal
+    height = task.surface.side(task.centres)[camera]
+    vectors = point[row] - task.centres[camera]
+    # A point that Newton lifts out of the water for a moment is treated as if just under it.
+    above = vectors @ up + height * (1 + JUST_UNDER)
+    vectors -= np.maximum(above, 0.0)[:, None] * up
+    medium = Medium(normal=up, height=height, thicknesses=(), indices=(1.0, task.n_water))
+    shift = shifts(vectors, medium, media=False)
+    ray = vectors + shift.g[:, None] * up
     length = np.sqrt((ray * ray).sum(-1))[:, None]
     heading = ray / length
+    derivative = np.eye(3) + up[:, None] * shift.gradient(vectors, medium)[:, None, :]
     # Only what is at right angles to the ray turns it.
     derivative -= heading[:, :, None] * (heading[:, None, :] @ derivative)
     return heading, derivative / length[:, :, None]
@@ -322,27 +300,20 @@ def _propagate(task: _Task, found: FloatArray, precision: Precision) -> FloatArr
     covariance: FloatArray = precision.point**2 * by_point @ by_point.transpose(0, 2, 1)
     step = DIFFERENCE * float(np.abs(task.centres[:, 2] - task.apparent[:, 2].mean()).max())
     lift = np.array([0.0, 0.0, step])
-    variants = (
-        (
-            precision.index,
-            DIFFERENCE,
-            {"n_water": task.n_water + DIFFERENCE},
-            {"n_water": task.n_water - DIFFERENCE},
-        ),
-        (
-            precision.level,
-            step,
-            {"surface": task.surface.shifted(lift)},
-            {"surface": task.surface.shifted(-lift)},
-        ),
-    )
-    for sigma, width, more, less in variants:
-        if sigma == 0:
-            continue
-        ahead, _, _ = _balance(task._replace(**more), point)
-        behind, _, _ = _balance(task._replace(**less), point)
-        rate = np.linalg.solve(change, ((ahead - behind) / (2 * width))[..., None])
-        covariance += sigma**2 * rate @ rate.transpose(0, 2, 1)
+
+    def changed(sign: float) -> dict[str, _Task]:
+        return {
+            "index": task._replace(n_water=task.n_water + sign * DIFFERENCE),
+            "level": task._replace(surface=task.surface.shifted(sign * lift)),
+        }
+
+    more, less = changed(1.0), changed(-1.0)
+    for name, width in (("index", DIFFERENCE), ("level", step)):
+        sigma = getattr(precision, name)
+        if sigma > 0:
+            difference = _balance(more[name], point)[0] - _balance(less[name], point)[0]
+            rate = np.linalg.solve(change, (difference / (2 * width))[..., None])
+            covariance += sigma**2 * rate @ rate.transpose(0, 2, 1)
     return covariance
 
 

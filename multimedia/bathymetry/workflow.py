@@ -16,7 +16,6 @@ from multimedia.bathymetry.corrected_points import (
     Precision,
     WaterSurface,
     checked_water_index,
-    height_of,
 )
 from multimedia.bathymetry.dem import Dem, Window
 from multimedia.bathymetry.refracted_rays import correct_lidar_beams, intersect_refracted_rays
@@ -137,7 +136,7 @@ class Outcome:
     def judge(self, surface: WaterSurface, *, allow_dry: bool) -> None:
         """Raise GeometryError when nothing lies under water; note what looks like millimetres."""
         if not self._wet and not allow_dry:
-            level = _typical_level(surface)
+            level = surface.middle
             hint = ""
             if 0 < self.lowest / 2 <= 1000 * level <= 2 * self.highest:
                 hint = " The heights look like millimetres, the water level like metres."
@@ -149,7 +148,7 @@ class Outcome:
         span = self.highest - self.lowest
         if self.max_depth > DEEPEST and 0 < span < self.max_depth / MIXED_UNITS:
             raise GeometryError(
-                f"the water level {_typical_level(surface):g} lies {self.max_depth:g} above "
+                f"the water level {surface.middle:g} lies {self.max_depth:g} above "
                 f"heights that span only {span:g}: are they in different units (mm and m)?"
             )
         if self.max_depth > DEEPEST:
@@ -478,7 +477,7 @@ def _correct_rays(job: Job) -> Outcome:
         sigma_direction=job.sigma_direction,
     )
     outcome = Outcome()
-    depth = np.maximum(height_of(surface, found.xyz[:, :2]) - found.xyz[:, 2], 0.0)
+    depth = np.maximum(surface.height_at(found.xyz[:, :2]) - found.xyz[:, 2], 0.0)
     result = CorrectedPoints(xyz=found.xyz, depth=depth, status=found.status)
     outcome.add(found.xyz, result)
     outcome.judge(surface, allow_dry=job.allow_dry)
@@ -498,10 +497,3 @@ def _correct_rays(job: Job) -> Outcome:
 def _varies(surface: WaterSurface) -> bool:
     """Return whether the water is anything but level."""
     return not (isinstance(surface, Plane) and abs(surface.normal[2]) == 1.0)
-
-
-def _typical_level(surface: WaterSurface) -> float:
-    """Return one height of the surface, for messages."""
-    if isinstance(surface, Plane):
-        return float(surface.point[2])
-    return (surface.lowest + surface.highest) / 2

@@ -197,10 +197,7 @@ class FlatInterface(OpticalMedia):
         def derivatives(by_seen: FloatArray) -> SightDerivatives:
             # u = a + g(rho^2, w) m: the change of g adds a product of two vectors to the identity.
             along = (by_seen.reshape(-1, 3) @ medium.normal).reshape(-1, 2)  # d(image)/dg
-            twice = 2.0 * shift.by_rho2
-            gradient = twice[:, None] * vectors
-            gradient += (shift.by_w - twice * shift.w)[:, None] * medium.normal
-            by_vector = along[:, :, None] * gradient[:, None, :]
+            by_vector = along[:, :, None] * shift.gradient(vectors, medium)[:, None, :]
             by_vector += by_seen
             # Before faces that stand still rho and depth do not change with the rotation: the
             # whole seen vector turns; and the height changes with the centre.

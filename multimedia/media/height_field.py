@@ -37,6 +37,11 @@ class HeightField(RefractingSurface):
     steepest: float
     feature: float
 
+    @property
+    def middle(self) -> float:
+        """Half way between the lowest and the highest point."""
+        return (self.lowest + self.highest) / 2
+
     @abstractmethod
     def heights(self, xy: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return f and its gradient, shapes (n,) and (n, 2); continued beyond the border."""
@@ -61,7 +66,7 @@ class HeightField(RefractingSurface):
         flat = points.reshape(-1, 3)
         height = self.heights(flat[:, :2])[0]
         # Over a hole of the raster only the range of heights is known; cameras are far above it.
-        height = np.where(np.isnan(height), (self.lowest + self.highest) / 2, height)
+        height = np.where(np.isnan(height), self.middle, height)
         return (flat[:, 2] - height).reshape(points.shape[:-1])
 
     def hop(self, origins: FloatArray, directions: FloatArray, beyond: FloatArray) -> FloatArray:

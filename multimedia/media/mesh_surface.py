@@ -40,7 +40,7 @@ class MeshSurface(HeightField):
     _corner: FloatArray = field(init=False, repr=False)
     _to_corners: FloatArray = field(init=False, repr=False)
     _corner_slopes: FloatArray = field(init=False, repr=False)
-    _grid: _Grid = field(init=False, repr=False)
+    _grid: TriangleCells = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         set_ = object.__setattr__
@@ -87,7 +87,7 @@ class MeshSurface(HeightField):
         real = np.abs(area) > 1e-2 * np.median(np.abs(area))
         set_(self, "steepest", float(np.hypot(*self._facet[real].T).max()))
         set_(self, "feature", float(np.sqrt(np.median(np.abs(area)))))
-        set_(self, "_grid", _Grid.over(corners[..., :2]))
+        set_(self, "_grid", TriangleCells.over(corners[..., :2]))
 
     def _locate(self, xy: FloatArray) -> tuple[IntArray, FloatArray]:
         """Return the triangle below each position (-1: none) and its barycentric coordinates."""
@@ -118,7 +118,7 @@ class MeshSurface(HeightField):
         gradient = np.where(found[:, None], self._facet[triangle], 0.0)
         corner = self._corner[triangle]
         height = corner[:, 2] + (gradient * (xy - corner[:, :2])).sum(-1)
-        return np.where(found, height, (self.lowest + self.highest) / 2), gradient
+        return np.where(found, height, self.middle), gradient
 
     def slopes(self, xy: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return the slope between the vertices' slopes, and its derivative."""
@@ -135,7 +135,7 @@ class MeshSurface(HeightField):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Grid:
+class TriangleCells:
     """Square cells, each with the triangles whose bounding box touches it."""
 
     low: FloatArray
@@ -145,7 +145,7 @@ class _Grid:
     members: IntArray
 
     @classmethod
-    def over(cls, corners: FloatArray) -> _Grid:
+    def over(cls, corners: FloatArray) -> TriangleCells:
         """Sort triangles, shape (m, 3, 2), into about as many cells as there are triangles."""
         low, high = corners.min((0, 1)), corners.max((0, 1))
         extent = high - low

@@ -113,6 +113,16 @@ class Plane(RigidSurface):
             normal=(-slope_x, -slope_y, 1.0),  # type: ignore[arg-type]
         )
 
+    @property
+    def middle(self) -> float:
+        """The height of its point."""
+        return float(self.point[2])
+
+    def height_at(self, xy: FloatArray) -> FloatArray:
+        """Return the height above each position, shape (...); no plane that stands on edge."""
+        offset: FloatArray = (xy - self.point[:2]) @ (self.normal[:2] / self.normal[2])
+        return self.point[2] - offset
+
     def side(self, points: FloatArray) -> FloatArray:
         """Return the signed distance to the plane."""
         distance: FloatArray = (points - self.point) @ self.normal
