@@ -178,13 +178,5 @@ def write_shift_csv(
     overwrite: bool = False,
 ) -> None:
     """Write shifted points as text, numbers to the last bit."""
-    columns: dict[str, object] = {"id": list(points.ids)}
-    with_xy = not np.isnan(points.xy).all()
-    if with_xy:
-        columns |= {"X": points.xy[:, 0], "Y": points.xy[:, 1], "Z": 0.0 - points.depth}
-    columns |= {"R": points.radius, "ZP": points.depth, "Rbar": result.radius_bar}
-    columns["dR"] = result.radius_bar - points.radius
-    if with_xy:
-        columns |= {"Xbar": result.xy_bar[:, 0], "Ybar": result.xy_bar[:, 1]}
-    columns["flag"] = list(result.flags)
+    columns = {key: list(values) for key, values in result.columns(points).items()}
     write_csv(path, columns, flavour=flavour, overwrite=overwrite)
