@@ -152,8 +152,46 @@ class Plane(RigidSurface):
         return Plane(point=rotation @ self.point + translation, normal=rotation @ self.normal)
 
 
+class _Round(RigidSurface):
+    """What spheres and cylinders share; normals point outwards. Subclasses say what is radial."""
+
+    __slots__ = ()
+
+    radius: float
+
+    @abstractmethod
+    def _radial(self, vectors: FloatArray) -> FloatArray:
+        """Return the part of vectors in which the surface is a circle."""
+
+    @abstractmethod
+    def _offset(self, points: FloatArray) -> FloatArray:
+        """Return the radial part of the vectors from the centre to points."""
+
+    def side(self, points: FloatArray) -> FloatArray:
+        """Return the distance outside the surface, negative inside."""
+        distance: FloatArray = np.linalg.norm(self._offset(points), axis=-1) - self.radius
+        return distance
+
+    def hop(self, origins: FloatArray, directions: FloatArray, beyond: FloatArray) -> FloatArray:
+        """Return the distance to the next meeting with the surface; NaN where there is none."""
+        return _hop_round(self._offset(origins), self._radial(directions), self.radius, beyond)
+
+    def normals(self, points: FloatArray) -> FloatArray:
+        """Return the outward radii."""
+        return self._offset(points) / self.radius
+
+    def turn(
+        self,
+        points: FloatArray,  # noqa: ARG002
+        normals: FloatArray,  # noqa: ARG002
+        steps: FloatArray,
+    ) -> FloatArray:
+        """Return the radial part of the steps, over the radius."""
+        return self._radial(steps) / self.radius
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Sphere(RigidSurface):
+class Sphere(_Round):
     """A sphere, such as the inner or outer face of a dome port; normals point outwards.
 
     Attributes
@@ -171,27 +209,13 @@ class Sphere(RigidSurface):
         object.__setattr__(self, "centre", read_only(self.centre, "centre", shape=(3,)))
         object.__setattr__(self, "radius", positive(self.radius, "radius"))
 
-    def side(self, points: FloatArray) -> FloatArray:
-        """Return the distance outside the sphere, negative inside."""
-        distance: FloatArray = np.linalg.norm(points - self.centre, axis=-1) - self.radius
-        return distance
+    def _radial(self, vectors: FloatArray) -> FloatArray:
+        """Return the vectors."""
+        return vectors
 
-    def hop(self, origins: FloatArray, directions: FloatArray, beyond: FloatArray) -> FloatArray:
-        """Return the distance to the next meeting with the sphere; NaN where there is none."""
-        return _hop_round(origins - self.centre, directions, self.radius, beyond)
-
-    def normals(self, points: FloatArray) -> FloatArray:
-        """Return the outward radii."""
-        return (points - self.centre) / self.radius
-
-    def turn(
-        self,
-        points: FloatArray,  # noqa: ARG002
-        normals: FloatArray,  # noqa: ARG002
-        steps: FloatArray,
-    ) -> FloatArray:
-        """Return the steps over the radius."""
-        return steps / self.radius
+    def _offset(self, points: FloatArray) -> FloatArray:
+        """Return the vectors from the centre."""
+        return points - self.centre
 
     def moved(self, rotation: FloatArray, translation: FloatArray) -> Sphere:
         """Return the sphere given in one frame as seen in another."""
@@ -199,7 +223,7 @@ class Sphere(RigidSurface):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Cylinder(RigidSurface):
+class Cylinder(_Round):
     """An endless circular cylinder, such as one wall of a glass tube; normals point outwards.
 
     Attributes
@@ -221,33 +245,13 @@ class Cylinder(RigidSurface):
         object.__setattr__(self, "axis", unit_vector(self.axis, "axis"))
         object.__setattr__(self, "radius", positive(self.radius, "radius"))
 
-    def _across(self, vectors: FloatArray) -> FloatArray:
+    def _radial(self, vectors: FloatArray) -> FloatArray:
         """Return the part of vectors at right angles to the axis."""
         return vectors - (vectors @ self.axis)[..., None] * self.axis
 
-    def side(self, points: FloatArray) -> FloatArray:
-        """Return the distance outside the cylinder, negative inside."""
-        across = self._across(points - self.point)
-        distance: FloatArray = np.linalg.norm(across, axis=-1) - self.radius
-        return distance
-
-    def hop(self, origins: FloatArray, directions: FloatArray, beyond: FloatArray) -> FloatArray:
-        """Return the distance to the next meeting with the wall; NaN where there is none."""
-        across, along = self._across(origins - self.point), self._across(directions)
-        return _hop_round(across, along, self.radius, beyond)
-
-    def normals(self, points: FloatArray) -> FloatArray:
-        """Return the outward radii, at right angles to the axis."""
-        return self._across(points - self.point) / self.radius
-
-    def turn(
-        self,
-        points: FloatArray,  # noqa: ARG002
-        normals: FloatArray,  # noqa: ARG002
-        steps: FloatArray,
-    ) -> FloatArray:
-        """Return the part of the steps across the axis, over the radius."""
-        return self._across(steps) / self.radius
+    def _offset(self, points: FloatArray) -> FloatArray:
+        """Return the shortest vectors from the axis."""
+        return self._radial(points - self.point)
 
     def moved(self, rotation: FloatArray, translation: FloatArray) -> Cylinder:
         """Return the cylinder given in one frame as seen in another."""
