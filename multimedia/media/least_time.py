@@ -91,17 +91,13 @@ def _least_time(
         move = np.einsum("nka,kai->nki", step, bases)
         slope = (gradient.reshape(step.shape) * step).sum((-1, -2))
         share = np.ones(len(rows))
-        waiting = np.arange(len(rows))
+        # Near the minimum rounding of the time hides the gain: a full step is right there.
+        waiting = np.abs(slope) >= 1e-12 * time
         for _ in range(MOST_HALVINGS):
-            tried = crossings[rows[waiting]] + share[waiting, None, None] * move[waiting]
-            later = _lengths(
-                _corners(starts[rows[waiting]], tried, ends[rows[waiting]]), scale[rows[waiting]]
-            )
-            enough = time[waiting] + 1e-4 * share[waiting] * slope[waiting]
-            # Near the minimum rounding of the time hides the gain: a full step is right there.
-            hidden = np.abs(slope[waiting]) < 1e-12 * time[waiting]
-            waiting = waiting[(later @ indices > enough) & ~hidden]
-            if not waiting.size:
+            tried = crossings[rows] + share[:, None, None] * move
+            later = _lengths(_corners(starts[rows], tried, ends[rows]), scale[rows]) @ indices
+            waiting &= later > time + 1e-4 * share * slope
+            if not waiting.any():
                 break
             share[waiting] *= 0.5
         crossings[rows] += share[:, None, None] * move
