@@ -7,6 +7,7 @@ follows rigorously, without them its depth is stretched by the refractive index.
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -110,26 +111,21 @@ def correct_bathymetry(
     centres = _checked_cameras(cameras, surface)
     seen = _checked_visibility(visible, shape, len(centres))
     precision = precision or Precision()
+    count = len(flat)
+    result = (
+        np.empty((count, 3)), np.empty(count), np.empty(count, np.int64), np.empty((count, 3, 3))
+    )  # fmt: skip
     block = max(BLOCK_RAYS // max(len(centres), 1), 1)
-    parts = [
-        _correct_block(
-            flat[first : first + block],
-            surface,
-            n_water,
-            centres,
-            None if seen is None else seen[first : first + block],
-            precision,
-        )
-        for first in range(0, max(len(flat), 1), block)
-    ]
-    covariance = None
-    if precision.is_given:
-        covariance = np.concatenate([part[3] for part in parts]).reshape(*shape, 3, 3)
+    for first in range(0, count, block):
+        part = slice(first, first + block)
+        corrected = _correct_block(flat[part], surface, n_water, centres, seen[part], precision)
+        for whole, piece in zip(result, corrected, strict=True):
+            whole[part] = piece
     return CorrectedPoints(
-        xyz=np.concatenate([part[0] for part in parts]).reshape(xyz.shape),
-        depth=np.concatenate([part[1] for part in parts]).reshape(shape),
-        status=np.concatenate([part[2] for part in parts]).reshape(shape),
-        covariance=covariance,
+        xyz=result[0].reshape(xyz.shape),
+        depth=result[1].reshape(shape),
+        status=result[2].reshape(shape),
+        covariance=result[3].reshape(*shape, 3, 3) if precision.is_given else None,
     )
 
 
@@ -138,7 +134,7 @@ def _correct_block(
     surface: WaterSurface,
     index: float,
     centres: FloatArray,
-    seen: BoolArray | None,
+    seen: BoolArray,
     precision: Precision,
 ) -> tuple[FloatArray, FloatArray, IntArray, FloatArray]:
     """Return position, depth, status and covariance of one block of points."""
@@ -156,20 +152,15 @@ def _correct_block(
         + (below[wet] * precision.index) ** 2
         + ((1 - index) * precision.level) ** 2
     )
-    if len(centres) and wet.size:
-        mask = np.ones((len(wet), len(centres)), bool) if seen is None else seen[wet]
-        enough = mask.sum(-1) >= 2
-        rows = wet[enough]
-        if rows.size:
-            task = _Task.near(apparent[rows], centres, mask[enough], surface, index)
-            found, ok, weak = _solve(task, xyz[rows])
-            xyz[rows[~weak]] = np.where(ok[~weak, None], found[~weak], np.nan)
-            status[rows[~weak]] = np.where(
-                ok[~weak], BathymetryStatus.RAYS, BathymetryStatus.FAILED
-            )
-            if precision.is_given:
-                good = np.flatnonzero(ok & ~weak)
-                covariance[rows[good]] = _propagate(task.take(good), found[good], precision)
+    rows = wet[seen[wet].sum(-1) >= 2]
+    if rows.size:
+        task = _Task.near(apparent[rows], centres, seen[rows], surface, index)
+        points, ok, weak = _solve(task, xyz[rows])
+        xyz[rows[~weak]] = np.where(ok[~weak, None], points[~weak], np.nan)
+        status[rows[~weak]] = np.where(ok[~weak], BathymetryStatus.RAYS, BathymetryStatus.FAILED)
+        if precision.is_given:
+            good = np.flatnonzero(ok & ~weak)
+            covariance[rows[good]] = _propagate(task.take(good), points[good], precision)
     depth = np.maximum(surface.height_at(xyz[:, :2]) - xyz[:, 2], 0.0)
     covariance[status == BathymetryStatus.FAILED] = np.nan
     return xyz, depth, status, covariance
@@ -292,9 +283,9 @@ def _pointing(
     return heading, derivative / length[:, :, None]
 
 
-def _propagate(task: _Task, found: FloatArray, precision: Precision) -> FloatArray:
+def _propagate(task: _Task, points: FloatArray, precision: Precision) -> FloatArray:
     """Return the covariance of true positions from index, level and apparent points."""
-    point = found - task.origin
+    point = points - task.origin
     _, normal, change = _balance(task, point)
     by_point = np.linalg.solve(change, normal + _weight_change(task, point))
     covariance: FloatArray = precision.point**2 * by_point @ by_point.transpose(0, 2, 1)
@@ -349,12 +340,10 @@ def _checked_cameras(cameras: ArrayLike | None, surface: WaterSurface) -> FloatA
     return centres
 
 
-def _checked_visibility(
-    visible: ArrayLike | None, shape: tuple[int, ...], count: int
-) -> BoolArray | None:
+def _checked_visibility(visible: ArrayLike | None, shape: tuple[int, ...], count: int) -> BoolArray:
     """Return which camera saw which point, shape (n, m)."""
     if visible is None:
-        return None
+        return np.broadcast_to(np.True_, (math.prod(shape), count))
     seen = np.asarray(visible, dtype=bool)
     if seen.shape != (*shape, count):
         raise InputError(

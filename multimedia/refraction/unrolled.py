@@ -15,6 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from multimedia.refraction.shift import as_layers
 from multimedia.refraction.tangent import apparent_radius, ratios, ray_sums
 from photocore.arrays import FloatArray, as_floats
 
@@ -66,7 +67,7 @@ def unrolled_shift(
     [0.457139, 0.462022, 0.462023, 0.462023]
     """
     r = as_floats(radius, "radius")
-    layers = [as_floats(height, f"heights[{i}]") for i, height in enumerate(heights)]
+    layers = as_layers(heights, indices)
     factors = [ratios(index, min(indices)) for index in indices]
     bent = [(h * k, q) for h, (k, q) in zip(layers, factors, strict=True)]
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):

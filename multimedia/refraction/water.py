@@ -9,6 +9,7 @@ that index, derivatives and inverses come from the same coefficients.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -260,7 +261,7 @@ def water_index_derivatives(
             if power:
                 powers[variable] = power - 1
                 terms.append(Term(coefficient * power, *powers))
-        parts.append(_sum_of_terms(tuple(terms), given))
+        parts.append(_sum_of_terms(terms, given))
     return WaterIndexDerivatives(_sum_of_terms(formula.terms, given), *parts)
 
 
@@ -418,16 +419,15 @@ def _powers_of(
     variable: int, formula: WaterFormula, given: tuple[FloatArray, ...]
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return the coefficients of the powers 0, 1, 2 of one variable, the others given."""
-    parts = []
-    for power in range(3):
-        terms = [t for t in formula.terms if t[1 + variable] == power]
-        reduced = [Term(t[0], *(0 if i == variable else p for i, p in enumerate(t[1:])))
-                   for t in terms]  # fmt: skip
-        parts.append(_sum_of_terms(tuple(reduced), given))
-    return parts[0], parts[1], parts[2]
+    name = Term._fields[1 + variable]
+    first, second, third = (
+        [term._replace(**{name: 0}) for term in formula.terms if term[1 + variable] == power]
+        for power in range(3)
+    )
+    return _sum_of_terms(first, given), _sum_of_terms(second, given), _sum_of_terms(third, given)
 
 
-def _sum_of_terms(terms: tuple[Term, ...], given: tuple[FloatArray, ...]) -> FloatArray:
+def _sum_of_terms(terms: Iterable[Term], given: tuple[FloatArray, ...]) -> FloatArray:
     """Return the sum of the terms in the shape all variables broadcast to."""
     total = np.zeros(np.broadcast_shapes(*(g.shape for g in given)))
     for coefficient, *powers in terms:
