@@ -152,7 +152,7 @@ class Plane(RigidSurface):
         return Plane(point=rotation @ self.point + translation, normal=rotation @ self.normal)
 
 
-class _Round(RigidSurface):
+class _RoundSurface(RigidSurface):
     """What spheres and cylinders share; normals point outwards. Subclasses say what is radial."""
 
     __slots__ = ()
@@ -191,7 +191,7 @@ class _Round(RigidSurface):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Sphere(_Round):
+class Sphere(_RoundSurface):
     """A sphere, such as the inner or outer face of a dome port; normals point outwards.
 
     Attributes
@@ -223,7 +223,7 @@ class Sphere(_Round):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Cylinder(_Round):
+class Cylinder(_RoundSurface):
     """An endless circular cylinder, such as one wall of a glass tube; normals point outwards.
 
     Attributes
