@@ -337,7 +337,7 @@ def _correct_rays(job: Job) -> Outcome:
         raise InputError(f"{job.target}: intersected rays are written as .csv.")
     table = read_rays(job.source)
     surface = read_water_surface(job.water_level)
-    found = intersect_refracted_rays(
+    points = intersect_refracted_rays(
         table.origins,
         table.directions,
         water_level=surface,
@@ -345,17 +345,17 @@ def _correct_rays(job: Job) -> Outcome:
         sigma_direction=job.sigma_direction,
     )
     outcome = Outcome()
-    depth = np.maximum(surface.height_at(found.xyz[:, :2]) - found.xyz[:, 2], 0.0)
-    result = CorrectedPoints(xyz=found.xyz, depth=depth, status=found.status)
-    outcome.add(found.xyz, result)
+    depth = np.maximum(surface.height_at(points.xyz[:, :2]) - points.xyz[:, 2], 0.0)
+    result = CorrectedPoints(xyz=points.xyz, depth=depth, status=points.status)
+    outcome.add(points.xyz, result)
     outcome.judge(surface, allow_dry=job.allow_dry)
     columns: dict[str, Any] = {"id": list(table.ids)}
-    columns |= dict(zip("XYZ", found.xyz.T, strict=True))
-    columns |= dict(zip(("sigma_X", "sigma_Y", "sigma_Z"), found.sigma.T, strict=True))
+    columns |= dict(zip("XYZ", points.xyz.T, strict=True))
+    columns |= dict(zip(("sigma_X", "sigma_Y", "sigma_Z"), points.sigma.T, strict=True))
     columns |= {
-        "misfit": found.misfit,
-        "rays": found.rays,
-        MARK: [BathymetryStatus(int(code)).label for code in found.status],
+        "misfit": points.misfit,
+        "rays": points.rays,
+        MARK: [BathymetryStatus(int(code)).label for code in points.status],
         "water_depth": depth,
     }
     write_csv(job.target, columns, overwrite=job.overwrite)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -95,7 +96,7 @@ class FlatInterface(OpticalMedia):
         source = self.layers.indices if kind == "index" else self.layers.thicknesses
         return float(source[number])
 
-    def stepped(self, names: Sequence[str], step: ArrayLike) -> FlatInterface:
+    def stepped(self, names: Sequence[str], step: ArrayLike) -> Self:
         """Return the interface after adding ``step`` to the named parameters.
 
         Raises

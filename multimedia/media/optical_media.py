@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from multimedia.media.camera import Camera
 from photocore.arrays import FloatArray
@@ -43,8 +43,18 @@ class OpticalMedia(ABC):
 
     @property
     def parameter_names(self) -> tuple[str, ...]:
-        """Names of everything that an adjustment may estimate."""
+        """Names of everything that an adjustment may estimate; none unless a subclass says so."""
         return ()
+
+    def value(self, name: str) -> float:
+        """Return the value of a parameter."""
+        raise InputError(f"interface parameter {name}: these media have none to estimate.")
+
+    def stepped(self, names: Sequence[str], step: ArrayLike) -> Self:  # noqa: ARG002
+        """Return the media after adding ``step`` to the named parameters."""
+        if names:
+            raise InputError(f"interface parameter {names[0]}: these media have none to estimate.")
+        return self
 
     @abstractmethod
     def apparent_vectors(self, camera: Camera, points: FloatArray) -> FloatArray:

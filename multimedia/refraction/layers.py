@@ -141,20 +141,20 @@ class Layers:
     @property
     def remarks(self) -> tuple[str, ...]:
         """What looks like a slip though it is possible; empty when nothing does."""
-        found = []
+        doubts = []
         outer = max(self.indices[0], self.indices[-1])
         for place, index in enumerate(self.indices[1:-1], start=2):
             if THINNEST_LIQUID < index < outer:
-                found.append(
+                doubts.append(
                     f"medium {place} (n = {index:g}) bends light less than the liquid next to it "
                     f"(n = {outer:g}), which no glass does: are the two indices swapped?"
                 )
         for place, index in enumerate(self.indices, start=1):
             if index > DIAMOND:
-                found.append(f"medium {place} has index {index:g}, more than diamond's {DIAMOND}.")
+                doubts.append(f"medium {place} has index {index:g}, more than diamond's {DIAMOND}.")
         if len(set(self.indices)) == 1:
-            found.append("all media have the same index: nothing is refracted.")
-        return tuple(found)
+            doubts.append("all media have the same index: nothing is refracted.")
+        return tuple(doubts)
 
     def remarks_about(self, *, z0: ArrayLike, zp: ArrayLike) -> tuple[str, ...]:
         """Return `remarks` and what looks like millimetres mixed with metres.
@@ -166,19 +166,19 @@ class Layers:
         """
         distance = float(np.nanmax(as_floats(z0, "z0"), initial=0.0))
         distance += float(np.nanmax(as_floats(zp, "zp"), initial=0.0))
-        found = list(self.remarks)
+        doubts = list(self.remarks)
         thick = max(self.thicknesses, default=0.0)
         if thick > 10 * distance > 0:
-            found.append(
+            doubts.append(
                 f"a layer is {thick:g} thick, but camera and point are only {distance:g} apart "
                 "beside it: are the thicknesses in mm and the rest in m?"
             )
         if 0 < thick < 2e-6 * distance:
-            found.append(
+            doubts.append(
                 f"the thickest layer is {thick:g}, a {distance / thick:.0e}th of the distance "
                 f"{distance:g}: are the thicknesses in m and the rest in mm?"
             )
-        return tuple(found)
+        return tuple(doubts)
 
 
 def checked_indices(value: Sequence[float]) -> tuple[float, ...]:

@@ -62,8 +62,8 @@ def unrolled_shift(
 
     Examples
     --------
-    >>> found = unrolled_shift(300.0, [500.0, 10.0, 200.0], [1.0, 1.5, 1.337])
-    >>> [round(float(u), 6) for u in found.u[:4]]
+    >>> shift = unrolled_shift(300.0, [500.0, 10.0, 200.0], [1.0, 1.5, 1.337])
+    >>> [round(float(u), 6) for u in shift.u[:4]]
     [0.457139, 0.462022, 0.462023, 0.462023]
     """
     r = as_floats(radius, "radius")

@@ -86,21 +86,21 @@ class WaterFormula:
         given = _checked(wavelength_nm, temperature_c, salinity_percent, depth)
         allowed = (self.wavelength_nm, self.temperature_c, self.salinity_percent, self.depth)
         names = ("wavelength", "temperature", "salinity", "depth")
-        found = []
+        outside = []
         for name, unit, values, (low, high) in zip(
             names, ("nm", "°C", "%", "m"), given, allowed, strict=True
         ):
             if name == "depth" and not any(term.depth for term in self.terms):
                 if (values > 10).any():
-                    found.append(
+                    outside.append(
                         f"{self.name} has no term for depth: the value is that of the surface, "
                         f"about {1.4e-6 * float(values.max()):.1g} too low."
                     )
             elif ((values < low) | (values > high)).any():
-                found.append(
+                outside.append(
                     f"{name} is outside the range of {self.name}, {low:g} to {high:g} {unit}."
                 )
-        return tuple(found)
+        return tuple(outside)
 
 
 #: Maas 2015, Eq. (4), with the signs that the web text lost (docs/errata.md), multiplied out:
