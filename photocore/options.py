@@ -29,6 +29,8 @@ class Number(click.ParamType):  # type: ignore[type-arg,unused-ignore]
         Open limits.
     least, most : float, optional
         Closed limits.
+    finite : bool
+        Refuse NaN, infinity and what is beyond `LARGEST`.
     whole : bool
         Refuse fractions, and return int.
     to : callable, optional
@@ -43,12 +45,14 @@ class Number(click.ParamType):  # type: ignore[type-arg,unused-ignore]
         *,
         above: float | None = None,
         below: float | None = None,
-        least: float = -LARGEST,
-        most: float = LARGEST,
+        least: float | None = None,
+        most: float | None = None,
+        finite: bool = True,
         whole: bool = False,
         to: Callable[[float], float] = float,
     ) -> None:
         self.above, self.below, self.least, self.most = above, below, least, most
+        self.finite = finite
         self.to = int if whole else to
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
@@ -74,17 +78,19 @@ class Number(click.ParamType):  # type: ignore[type-arg,unused-ignore]
 
     def fault(self, number: float) -> str | None:
         """Return what is wrong with a number."""
-        if not abs(number) <= LARGEST:
+        if self.finite and not abs(number) <= LARGEST:
             return f"must be a finite number, not beyond {LARGEST:g}"
         if self.to is int and number != int(number):
             return "must be a whole number"
-        if self.above is not None and number <= self.above:
-            return f"must be above {self.above:g}"
-        if self.below is not None and number >= self.below:
-            return f"must be below {self.below:g}"
-        if number < self.least:
-            return f"must be {self.least:g} or more"
-        return f"must be {self.most:g} or less" if number > self.most else None
+        for limit, outside, words in (
+            (self.above, float.__le__, "above {}"),
+            (self.below, float.__ge__, "below {}"),
+            (self.least, float.__lt__, "{} or more"),
+            (self.most, float.__gt__, "{} or less"),
+        ):
+            if limit is not None and outside(number, float(limit)):
+                return f"must be {words.format('zero' if limit == 0 else f'{limit:g}')}"
+        return None
 
 
 #: Takes the place of click's FLOAT in every command.
@@ -171,3 +177,17 @@ class Length(Number):
             if text.endswith(unit):
                 return [float(text.removesuffix(unit)) / parts]
         return [float(text)]
+
+
+class Names(click.ParamType):  # type: ignore[type-arg,unused-ignore]
+    """Names with commas between them."""
+
+    name = "text"
+
+    def convert(
+        self, value: Any, param: click.Parameter | None, ctx: click.Context | None  # noqa: ARG002
+    ) -> tuple[str, ...]:  # fmt: skip
+        """Return the names; none for an empty text."""
+        if isinstance(value, tuple):
+            return value
+        return tuple(part.strip() for part in value.split(",") if part.strip())

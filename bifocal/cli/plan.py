@@ -101,8 +101,8 @@ def _lines(plan: Plan) -> Iterator[str]:
     )
     x, y, sigma = plan.sigma_grid(best, columns=7, rows=5)
     yield f"\nsigma of r [mm] over its photo, picks of {plan.sigma_px:g} px:"
-    rows = [
+    grid = [
         (f"{v:.1f}", *("nadir" if s != s else f"{s * 1000:.0f}" for s in row))
         for v, row in zip(y, sigma, strict=True)
     ]
-    yield text_table(("Y \\ X [m]", *(f"{v:.1f}" for v in x)), rows)
+    yield text_table(("Y \\ X [m]", *(f"{v:.1f}" for v in x)), grid)

@@ -191,7 +191,6 @@ def test_a_level_section_shows_the_relief_where_it_is(wall: Path) -> None:
         (("--relief", "picture.tif"), "picture rather than relief"),
         (("--points", "far.png"), "far.png"),
         (("--plane", "--vignetting", "much"), "cos4"),
-        (("--plane", "--feather", "-1"), "feather"),
     ],
 )
 def test_what_cannot_be_meant_is_asked_back(
