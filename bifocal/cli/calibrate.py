@@ -93,14 +93,14 @@ def command(
         data = found.lens.to_dict()
     else:
         with progress_bar("Calibrating", quiet=as_json) as progress:
-            result, without = lenses.calibrate_from_boards(
+            result = lenses.calibrate_from_boards(
                 images, out, pattern=pattern, board=board, model=model, overwrite=overwrite,
                 progress=progress,
             )  # fmt: skip
-        notes = tuple(f"{name}: the board was not found; left out" for name in without)
+        notes = tuple(f"{name}: the board was not found; left out" for name in result.without_board)
         data = result.lens.to_dict() | {
-            "photo_rms": result.photo_rms, "dropped": result.dropped, "without_board": without,
-            "suspicious": result.suspicious, "tried": dict(result.tried),
+            "photo_rms": result.photo_rms, "dropped": result.dropped, "tried": dict(result.tried),
+            "without_board": result.without_board, "suspicious": result.suspicious,
         }  # fmt: skip
         text = _board_text(result)
     print_result(data, text, as_json=as_json, remarks=notes)
