@@ -26,6 +26,7 @@ The whole wall
     orthophoto, Orthophoto    the photo to scale, moved by its relief
     OrthoOptions              how an orthophoto is rendered
     mosaic, Mosaic            several orthophotos or relief maps made one
+    MosaicOptions             how they are joined
 
 Files in, files out: the command `bifocal`. Errors are ValueErrors with one message that says what
 is wrong, where, and how to mend it.

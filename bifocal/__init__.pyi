@@ -16,7 +16,7 @@ from .orientation.homologous_points import match
 from .orientation.matching import Matches, MatchSettings
 from .orientation.photo_alignment import align
 from .orthophotos.compose import orthophoto
-from .orthophotos.mosaic_in_memory import Mosaic, mosaic
+from .orthophotos.mosaic_in_memory import Mosaic, MosaicOptions, mosaic
 from .orthophotos.ortho_image import OrthoOptions, Orthophoto
 from .relief_maps.dense_matching import DenseRelief, dense_relief
 
@@ -33,6 +33,7 @@ __all__ = [
     "MatchSettings",
     "Matches",
     "Mosaic",
+    "MosaicOptions",
     "OrthoOptions",
     "Orthophoto",
     "Pair",

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Literal
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -20,8 +22,7 @@ def align(
     interiors: tuple[Interior | None, Interior | None] = (None, None),
     control: Control | None = None,
     site: SiteMeasures | None = None,
-    level: ArrayLike | None = None,
-    upright: ArrayLike | None = None,
+    line: tuple[Literal["level", "upright"], ArrayLike] | None = None,
 ) -> Alignment:
     r"""Orient a pair of photos: where both cameras stood, how they looked, at which scale.
 
@@ -38,9 +39,9 @@ def align(
         calibrated.
     site : SiteMeasures, optional
         Distances to the wall [m], and whether the cameras were square to it (``parallel``).
-    level, upright : array_like, shape (2, 2), optional
-        Two pixels of the far photo on a level or an upright line of the wall, for the direction
-        of X and Y where no control points give it. [px]
+    line : ("level" or "upright", array_like of shape (2, 2)), optional
+        Two pixels of the far photo on such a line of the wall, for the direction of X and Y where
+        no control points give it. [px]
 
     Returns
     -------
@@ -82,13 +83,12 @@ def align(
     >>> round(pair.image1.distance, 3), round(pair.image2.distance, 3)
     (17.5, 9.5)
     """
-    if level is not None and upright is not None:
-        raise InputError("level, upright: give one of the two lines.")
+    if line is not None and line[0] not in ("level", "upright"):
+        raise InputError(f"line: expected level or upright and two pixels, got {line[0]!r}.")
     site = site or SiteMeasures()
     photos = (_photo(image1, interiors[0], "image1"), _photo(image2, interiors[1], "image2"))
     oriented = set_up(photos, control=control or Control(), site=site)
-    line = upright if level is None else level
-    direction = None if line is None else (as_points(line, "line", dimension=2), level is None)
+    direction = line and (as_points(line[1], "line", dimension=2), line[0] == "upright")
     way = "control" if control is not None else "site" if site.parallel else "auto"
     ordered = (photos[1], photos[0]) if oriented.exchanged else photos
     return make_alignment(oriented, ordered, way=way, direction=direction)

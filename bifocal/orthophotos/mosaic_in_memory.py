@@ -24,6 +24,25 @@ from photocore.arrays import BoolArray, ByteArray, FloatArray
 from photocore.errors import InputError
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MosaicOptions:
+    """How rasters are joined.
+
+    Attributes
+    ----------
+    priority : bool
+        Earlier rasters cover later ones; otherwise seams run where the rasters agree.
+    gain : bool
+        Make the exposures equal (colours only).
+    blend : bool
+        Fade colours over the seams; relief values are never mixed.
+    """
+
+    priority: bool = False
+    gain: bool = True
+    blend: bool = True
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Mosaic:
     """One raster made of several.
@@ -94,9 +113,7 @@ def mosaic(
     gsd: float | None = None,
     bounds: Bounds | None = None,
     relief: ReliefMap | None = None,
-    priority: bool = False,
-    gain: bool = True,
-    blend: bool = True,
+    options: MosaicOptions | None = None,
 ) -> Mosaic:
     """Join orthophotos, or relief maps, of one wall.
 
@@ -110,12 +127,8 @@ def mosaic(
         X min, Y min, X max, Y max; by default the box around all. [m]
     relief : ReliefMap, optional
         Seams keep away from its edges.
-    priority : bool
-        Earlier rasters cover later ones; otherwise seams run where the rasters agree.
-    gain : bool
-        Make the exposures equal (colours only).
-    blend : bool
-        Fade colours over the seams; relief values are never mixed.
+    options : MosaicOptions, optional
+        Seams or priority, equal exposure, blending.
 
     Returns
     -------
@@ -139,6 +152,7 @@ def mosaic(
     >>> whole.image.shape, np.unique(whole.image).tolist()
     ((50, 150, 3), [98])
     """
+    options = options or MosaicOptions()
     layers = [_ArrayLayer(raster) for raster in rasters]
     if len({(layer.image.dtype, layer.image.shape[2]) for layer in layers}) != 1 or len(layers) < 2:
         raise InputError("a mosaic needs two rasters or more, all of one kind.")
@@ -147,9 +161,10 @@ def mosaic(
     coarse = coarse_grid(grid)
     edges = None if relief is None else as_surface(relief).window(coarse)
     plan = plan_mosaic(
-        layers, grid, priority=priority, gain=gain and not values, relief=edges, coarse=coarse
-    )
-    image, owner = mosaic_window(layers, plan, grid, blend=blend)
+        layers, grid, priority=options.priority, gain=options.gain and not values, relief=edges,
+        coarse=coarse,
+    )  # fmt: skip
+    image, owner = mosaic_window(layers, plan, grid, blend=options.blend)
     if (owner < 0).all():
         raise InputError("none of the rasters shows anything within the bounds.")
     return Mosaic(

@@ -70,7 +70,7 @@ def test_photos_square_to_a_wall_at_known_distances() -> None:
         near,
         interiors=(lens(17.5), lens(1.1 * 9.5)),
         site=site,
-        level=[[10, 150], [390, 150]],
+        line=("level", [[10, 150], [390, 150]]),
     )
     assert alignment.way == "site"
     assert alignment.pair.image1.distance == pytest.approx(17.5, abs=0.02)
@@ -83,8 +83,8 @@ def test_what_cannot_be_meant_is_refused() -> None:
     small, line = bifocal.Interior.unknown((400, 300)), [[0, 0], [9, 9]]
     with pytest.raises(InputError, match="image2: is 401 x 301 px"):
         bifocal.align(noise(), noise(), interiors=(None, small))
-    with pytest.raises(InputError, match="one of the two"):
-        bifocal.align(noise(), noise(), level=line, upright=line)
+    with pytest.raises(InputError, match="level or upright"):
+        bifocal.align(noise(), noise(), line=("along", line))
     with pytest.raises(InputError, match=r"image1: expected shape \(height, width"):
         bifocal.match(PAIR, np.zeros(7, np.uint8), noise())
 

@@ -29,7 +29,7 @@ def ortho(bounds, *, factor: float = 1.0, hole: bool = False) -> bifocal.Orthoph
 
 def test_parts_of_one_picture_become_the_picture_again() -> None:
     left, right = ortho((0, 0, 2, 1)), ortho((1, 0, 3, 1))
-    whole = bifocal.mosaic([left, right], gain=False)
+    whole = bifocal.mosaic([left, right], options=bifocal.MosaicOptions(gain=False))
     expected = ortho((0, 0, 3, 1))
     assert whole.grid.bounds == pytest.approx((0, 0, 3, 1))
     assert np.abs(whole.image.astype(int) - expected.image).max() <= 1
@@ -48,7 +48,7 @@ def test_exposures_are_made_equal() -> None:
 
 def test_what_one_does_not_show_the_other_fills_and_the_rest_stays_empty() -> None:
     holed, part = ortho((0, 0, 2, 1), hole=True), ortho((0, 0.5, 1, 1))
-    whole = bifocal.mosaic([holed, part], gain=False, blend=False)
+    whole = bifocal.mosaic([holed, part], options=bifocal.MosaicOptions(gain=False, blend=False))
     assert (whole.source[:25, :50] == 2).all()
     assert (whole.source[:25, 50:] == 0).all()
     assert (whole.image[:25, 50:] == 0).all()
@@ -63,7 +63,7 @@ def test_relief_maps_are_joined_and_never_mixed() -> None:
             (0.3, Grid.from_bounds((1, 0, 3, 1), gsd=0.1)),
         )
     ]
-    whole = bifocal.mosaic(maps, priority=True)
+    whole = bifocal.mosaic(maps, options=bifocal.MosaicOptions(priority=True))
     assert whole.image.shape == (10, 30)
     np.testing.assert_array_equal(np.unique(whole.image), np.float32([0.1, 0.3]))
     assert (whole.source[:, :20] == 1).all()
