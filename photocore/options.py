@@ -8,10 +8,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import click
 
+Command = TypeVar("Command", bound=Callable[..., Any])
 #: Nothing measured is larger, and squares of squares of it still are numbers.
 LARGEST = 1e15
 FILE = click.Path(path_type=Path)
@@ -98,6 +99,15 @@ NUMBER = Number()
 POSITIVE, NOT_NEGATIVE = Number(above=0), Number(least=0)
 #: Millimetres or micrometres, handed on as metres or millimetres.
 THOUSANDTHS = Number(above=0, to=lambda value: value / 1000)
+
+
+def number(
+    name: str, unit: str, text: str, *, type: Number = POSITIVE, **more: Any
+) -> Callable[[Command], Command]:
+    """Return an option that takes one number: its unit, its help, and a default that is shown."""
+    return click.option(
+        name, type=type, metavar=unit, help=text, show_default="default" in more, **more
+    )
 
 
 class Numbers(Number):

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from photocore.cli import print_result, remark
-from photocore.options import FILE, POSITIVE, Numbers, as_json, overwrite
+from photocore.options import FILE, Numbers, as_json, number, overwrite
 
 if TYPE_CHECKING:
     from bifocal.orientation.alignment import Alignment
@@ -33,29 +33,17 @@ points.csv, one line per control point; r blank = on the wall; pixels in both ph
 @click.option("--out", type=FILE, required=True, help="Pair file to write (*.pair.json).")
 @click.option("--control", type=FILE, help="Table of control points: id, X, Y, r [m] and pixels.")
 @click.option("--auto", is_flag=True, help="From the photos alone; needs one distance or length.")
-@click.option("--distance1", type=POSITIVE, metavar="M", help="Far camera to the wall [m].")
-@click.option("--distance2", type=POSITIVE, metavar="M", help="Near camera to the wall [m].")
-@click.option("--delta-d", type=POSITIVE, metavar="M", help="Difference of the two distances [m].")
-@click.option(
-    "--focal1", type=POSITIVE, metavar="MM", help="Focal length, far photo [mm].  [default: EXIF]"
-)
-@click.option(
-    "--focal2", type=POSITIVE, metavar="MM", help="Focal length, near photo [mm].  [default: EXIF]"
-)
-@click.option(
-    "--sensor-width", type=POSITIVE, metavar="MM",
-    help="Longer side of the sensor, both photos [mm].",
-)  # fmt: skip
-@click.option("--sensor-width1", type=POSITIVE, metavar="MM", help="The same, far photo only [mm].")
-@click.option(
-    "--sensor-width2", type=POSITIVE, metavar="MM", help="The same, near photo only [mm]."
-)
-@click.option(
-    "--pixel-size", type=POSITIVE, metavar="MM",
-    help="Instead of the sensor width: one pixel, both photos [mm].",
-)  # fmt: skip
-@click.option("--pixel-size1", type=POSITIVE, metavar="MM", help="The same, far photo only [mm].")
-@click.option("--pixel-size2", type=POSITIVE, metavar="MM", help="The same, near photo only [mm].")
+@number("--distance1", "M", "Far camera to the wall [m].")
+@number("--distance2", "M", "Near camera to the wall [m].")
+@number("--delta-d", "M", "Difference of the two distances [m].")
+@number("--focal1", "MM", "Focal length, far photo [mm].  [default: EXIF]")
+@number("--focal2", "MM", "Focal length, near photo [mm].  [default: EXIF]")
+@number("--sensor-width", "MM", "Longer side of the sensor, both photos [mm].")
+@number("--sensor-width1", "MM", "The same, far photo only [mm].")
+@number("--sensor-width2", "MM", "The same, near photo only [mm].")
+@number("--pixel-size", "MM", "Instead of the sensor width: one pixel, both photos [mm].")
+@number("--pixel-size1", "MM", "The same, far photo only [mm].")
+@number("--pixel-size2", "MM", "The same, near photo only [mm].")
 @click.option("--lens", type=FILE, help="Lens file of both photos.")
 @click.option("--lens1", type=FILE, help="Lens file of the far photo.")
 @click.option("--lens2", type=FILE, help="Lens file of the near photo.")
@@ -82,17 +70,9 @@ points.csv, one line per control point; r blank = on the wall; pixels in both ph
     "--unit", type=click.Choice(["m", "cm", "mm"]),
     help="Unit of the control coordinates.  [default: the headings', else m]",
 )  # fmt: skip
-@click.option(
-    "--sigma-pick", type=POSITIVE, default=0.5, show_default=True, help="Precision of a pick [px]."
-)
-@click.option(
-    "--sigma-control", type=POSITIVE, default=0.003, show_default=True,
-    help="Precision of a control coordinate [m].",
-)  # fmt: skip
-@click.option(
-    "--sigma-distance", type=POSITIVE, default=0.02, show_default=True,
-    help="Precision of the measured distances [m].",
-)  # fmt: skip
+@number("--sigma-pick", "PX", "Precision of a pick [px].", default=0.5)
+@number("--sigma-control", "M", "Precision of a control coordinate [m].", default=0.003)
+@number("--sigma-distance", "M", "Precision of the measured distances [m].", default=0.02)
 @click.option("--picture", type=FILE, help="Picture of the set-up.  [default: beside OUT, .png]")
 @click.option("--no-picture", is_flag=True, help="Do not draw the picture.")
 @overwrite

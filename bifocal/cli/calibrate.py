@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 from photocore.cli import print_result, progress_bar, remark, text_table
-from photocore.options import FILE, POSITIVE, Size, as_json, overwrite
+from photocore.options import FILE, Size, as_json, number, overwrite
 
 if TYPE_CHECKING:
     from bifocal.calibration.board_calibration import Calibration
@@ -51,13 +51,11 @@ One lens file holds for one lens at one focus and one zoom mark.
     "--lines", type=FILE,
     help="No board: points picked along straight lines; headings line, col [px], row [px].",
 )  # fmt: skip
-@click.option("--focal-px", type=POSITIVE, help="With lines: principal distance [px].")
+@number("--focal-px", "PX", "With lines: principal distance [px].")
 @click.option("--database", is_flag=True, help="Take the lens database's data for this photo.")
 @click.option("--camera-name", default="", help="With --database: camera, if EXIF lacks it.")
 @click.option("--lens-name", default="", help="With --database: lens, if EXIF lacks it.")
-@click.option(
-    "--focal", type=POSITIVE, help="With --database: focal length [mm], if EXIF lacks it."
-)
+@number("--focal", "MM", "With --database: focal length [mm], if EXIF lacks it.")
 @overwrite
 @as_json
 def command(

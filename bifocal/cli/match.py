@@ -9,7 +9,7 @@ from typing import Any
 import click
 
 from photocore.cli import print_result, remark
-from photocore.options import FILE, NUMBER, as_json, overwrite
+from photocore.options import FILE, NUMBER, as_json, number, overwrite
 
 EXAMPLE = """\b
 Examples:
@@ -35,13 +35,13 @@ Then:
     "--what", type=click.Choice(["all", "features", "targets"]), default="all", show_default=True,
     help="Natural detail, survey targets, or both.",
 )  # fmt: skip
-@click.option(
-    "--relief-min", type=NUMBER, metavar="M",
-    help="Lowest relief looked for [m].  [default: -0.5 x near distance]",
+@number(
+    "--relief-min", "M", "Lowest relief looked for [m].  [default: -0.5 x near distance]",
+    type=NUMBER,
 )  # fmt: skip
-@click.option(
-    "--relief-max", type=NUMBER, metavar="M",
-    help="Highest relief looked for [m].  [default: 0.4 x near distance]",
+@number(
+    "--relief-max", "M", "Highest relief looked for [m].  [default: 0.4 x near distance]",
+    type=NUMBER,
 )  # fmt: skip
 @click.option(
     "--lang", type=click.Choice(["en", "it", "de"]), default="en", show_default=True,

@@ -8,16 +8,7 @@ from typing import Any
 import click
 
 from photocore.cli import print_result, progress_bar, remark
-from photocore.options import (
-    FILE,
-    NOT_NEGATIVE,
-    POSITIVE,
-    Length,
-    Numbers,
-    Scale,
-    as_json,
-    overwrite,
-)
+from photocore.options import FILE, NOT_NEGATIVE, Length, Numbers, Scale, as_json, number, overwrite
 
 EXAMPLE = """\b
 Examples:
@@ -74,18 +65,19 @@ Examples:
     help="Undo the fall-off of light to the corners.  [default: off]",
 )  # fmt: skip
 @click.option("--chromatic", is_flag=True, help="Measure and undo red and blue fringes.")
-@click.option(
-    "--feather", type=NOT_NEGATIVE, default=8.0, show_default=True,
-    help="Width of the transition between the photos [px].",
+@number(
+    "--feather", "PX", "Width of the transition between the photos [px].",
+    type=NOT_NEGATIVE, default=8.0,
 )  # fmt: skip
 @click.option(
     "--deliver", "folder", type=FILE, metavar="DIR",
     help="Write GeoTIFF, PNG, DXF and PDF, of the relief too, into a folder. Needs --scale.",
 )  # fmt: skip
 @click.option("--scale", type=Scale(), help="Scale of the drawing 1:N, e.g. 1:50.")
-@click.option(
-    "--dpi", type=POSITIVE, default=254.0, show_default=True,
-    help="Pixels per inch of paper; at 1:50 and 254 dpi a pixel is 5.00 mm. With --deliver.",
+@number(
+    "--dpi", "N",
+    "Pixels per inch of paper; at 1:50 and 254 dpi a pixel is 5.00 mm. With --deliver.",
+    default=254.0,
 )  # fmt: skip
 @click.option("--title", default="", help="Title of the drawing.  [default: the pair's name]")
 @click.option(

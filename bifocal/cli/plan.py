@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from photocore.cli import print_result, remark, text_table
-from photocore.options import FILE, POSITIVE, THOUSANDTHS, Scale, Size, as_json, overwrite
+from photocore.options import FILE, POSITIVE, THOUSANDTHS, Scale, Size, as_json, number, overwrite
 
 if TYPE_CHECKING:
     from bifocal.planning.camera_plan import Plan
@@ -36,20 +36,17 @@ Examples:
 )  # fmt: skip
 @click.option("--object", "object_size", type=Size(above=0), help="Width x height of the wall [m].")
 @click.option("--scale", "scale_number", type=Scale(), help="Wanted scale of the photo, 1:N.")
-@click.option("--gsd", type=THOUSANDTHS, metavar="MM", help="Wanted pixel on the wall [mm].")
-@click.option(
-    "--sigma-r", type=THOUSANDTHS, metavar="MM",
-    help="Wanted sigma of the relief at the RMS radius of the photo [mm].",
+@number("--gsd", "MM", "Wanted pixel on the wall [mm].", type=THOUSANDTHS)
+@number(
+    "--sigma-r", "MM", "Wanted sigma of the relief at the RMS radius of the photo [mm].",
+    type=THOUSANDTHS,
 )  # fmt: skip
-@click.option(
-    "--sigma-px", type=POSITIVE, default=0.5, show_default=True, help="Precision of a pick [px]."
-)
-@click.option(
-    "--sigma-r-max", type=THOUSANDTHS, metavar="MM",
-    help="Area of uncertainty: sigma of the relief above this [mm].  "
-    "[default: 3 x that of the best pair]",
+@number("--sigma-px", "PX", "Precision of a pick [px].", default=0.5)
+@number(
+    "--sigma-r-max", "MM", "Area of uncertainty: sigma of the relief above this [mm].  "
+    "[default: 3 x that of the best pair]", type=THOUSANDTHS,
 )  # fmt: skip
-@click.option("--free-space", type=POSITIVE, metavar="M", help="Room in front of the wall [m].")
+@number("--free-space", "M", "Room in front of the wall [m].")
 @click.option("--out", type=FILE, help="Also write the plan as .xlsx.")
 @overwrite
 @as_json

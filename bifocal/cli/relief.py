@@ -9,7 +9,7 @@ from typing import Any
 import click
 
 from photocore.cli import print_result, progress_bar
-from photocore.options import FILE, POSITIVE, Numbers, as_json, overwrite
+from photocore.options import FILE, Numbers, as_json, number, overwrite
 
 EXAMPLE = """\b
 Examples:
@@ -25,9 +25,9 @@ photos, 2 interpolated, 3 hidden from a camera, 0 unknown).
 @click.command(epilog=EXAMPLE)
 @click.argument("pair_file", metavar="PAIR.pair.json", type=FILE)
 @click.option("--out", required=True, type=FILE, help="Relief map to write (.tif).")
-@click.option(
-    "--gsd", type=POSITIVE, metavar="M",
-    help="Side of a pixel of the map on the plane [m], 0.2 at most; a coarse one is also matched "
+@number(
+    "--gsd", "M",
+    "Side of a pixel of the map on the plane [m], 0.2 at most; a coarse one is also matched "
     "more coarsely.  [default: that of the far photo]",
 )  # fmt: skip
 @click.option(

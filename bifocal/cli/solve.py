@@ -8,7 +8,7 @@ from typing import Any
 import click
 
 from photocore.cli import remark, text_table
-from photocore.options import FILE, POSITIVE, as_json, overwrite
+from photocore.options import FILE, as_json, number, overwrite
 
 EXAMPLE = """\b
 Examples:
@@ -43,40 +43,24 @@ SHOWN = 40
     help="Decimal separator of numbers typed as text.  [default: found]",
 )  # fmt: skip
 @click.option("--visible-only", is_flag=True, help="Leave out hidden and filtered rows.")
-@click.option(
-    "--d1", type=POSITIVE, metavar="M", help="Distance of camera 1 [m].  [default: Setup]"
-)
-@click.option(
-    "--d2", type=POSITIVE, metavar="M", help="Distance of camera 2 [m].  [default: Setup]"
-)
-@click.option(
-    "--c1", type=POSITIVE, metavar="MM",
-    help="Principal distance of image 1 [mm].  [default: Setup]",
-)  # fmt: skip
-@click.option(
-    "--c2", type=POSITIVE, metavar="MM",
-    help="Principal distance of image 2 [mm].  [default: Setup]",
-)  # fmt: skip
-@click.option(
-    "--pitch", type=POSITIVE, metavar="MM", help="Size of a pixel [mm].  [default: Setup]"
-)
+@number("--d1", "M", "Distance of camera 1 [m].  [default: Setup]")
+@number("--d2", "M", "Distance of camera 2 [m].  [default: Setup]")
+@number("--c1", "MM", "Principal distance of image 1 [mm].  [default: Setup]")
+@number("--c2", "MM", "Principal distance of image 2 [mm].  [default: Setup]")
+@number("--pitch", "MM", "Size of a pixel [mm].  [default: Setup]")
 @click.option(
     "--unit", type=click.Choice(["mm", "px"]),
     help="Unit of x1 y1 x2 y2.  [default: as headings or Setup say, else mm]",
 )  # fmt: skip
-@click.option(
-    "--sigma-s", type=POSITIVE, metavar="MM",
-    help="Precision of an image coordinate [mm].  [default: Setup, else 0.5 px]",
-)  # fmt: skip
-@click.option(
-    "--sigma-px", type=POSITIVE, metavar="PX",
-    help="Precision of a raw pixel [px].  [default: the pair file's, else from the misfits of 20 "
+@number("--sigma-s", "MM", "Precision of an image coordinate [mm].  [default: Setup, else 0.5 px]")
+@number(
+    "--sigma-px", "PX",
+    "Precision of a raw pixel [px].  [default: the pair file's, else from the misfits of 20 "
     "or more points, else 0.5]",
 )  # fmt: skip
-@click.option(
-    "--sigma-r-max", type=POSITIVE, metavar="M",
-    help="Sigma of r beyond which a point is UNCERTAIN [m].  [default: 2 % of d2]",
-)  # fmt: skip
+@number(
+    "--sigma-r-max", "M", "Sigma of r beyond which a point is UNCERTAIN [m].  [default: 2 % of d2]"
+)
 @click.option(
     "--adjust-setup", is_flag=True,
     help="Correct the set-up by points of the reference plane (code PLANE, r = 0).",
@@ -85,9 +69,9 @@ SHOWN = 40
     "--georeference", "model", type=click.Choice(["auto", "levelled", "3D", "2D"]),
     help="Model of the roto-translation.  [default: the workbook's, else auto]",
 )  # fmt: skip
-@click.option(
-    "--scale-tolerance", type=POSITIVE, default=0.02, show_default=True, metavar="SHARE",
-    help="Share by which the scales of both photos may differ.",
+@number(
+    "--scale-tolerance", "SHARE", "Share by which the scales of both photos may differ.",
+    default=0.02,
 )  # fmt: skip
 @click.option(
     "--tolerance-rule", "rules", multiple=True, metavar="RULE",

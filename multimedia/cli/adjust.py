@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from photocore.cli import print_result, tell_written, text_table
-from photocore.options import FILE, NUMBER, POSITIVE, Names, as_json, overwrite
+from photocore.options import FILE, NUMBER, Names, as_json, number, overwrite
 
 if TYPE_CHECKING:
     from multimedia.adjustment.unknowns import Adjustment
@@ -58,13 +58,12 @@ NAME:index3 for one media of several. Labels for --prior are those of the result
     "--prior", multiple=True, metavar="LABEL=SIGMA",
     help="Standard deviation of an unknown's start value [its unit]; repeat it.",
 )  # fmt: skip
-@click.option(
-    "--robust", type=POSITIVE, metavar="K",
-    help="Huber weights beyond K standard deviations.  [default: plain least squares]",
-)  # fmt: skip
-@click.option("--wavelength", type=POSITIVE, help="For the salinity: light [nm].")
-@click.option("--temperature", type=NUMBER, help="For the salinity: water temperature [deg C].")
-@click.option("--depth", type=NUMBER, default=0.0, show_default=True, help="Its depth [m].")
+@number(
+    "--robust", "K", "Huber weights beyond K standard deviations.  [default: plain least squares]"
+)
+@number("--wavelength", "NM", "For the salinity: light [nm].")
+@number("--temperature", "C", "For the salinity: water temperature [deg C].", type=NUMBER)
+@number("--depth", "M", "Its depth [m].", type=NUMBER, default=0.0)
 @click.option("--out", type=FILE, help="Write the adjusted project (.toml).")
 @click.option("--report", type=FILE, help="Write a report (.html).")
 @overwrite

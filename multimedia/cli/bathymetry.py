@@ -9,7 +9,7 @@ from typing import Any
 import click
 
 from photocore.cli import print_result, progress_bar
-from photocore.options import FILE, NOT_NEGATIVE, POSITIVE, Number, as_json, overwrite
+from photocore.options import FILE, NOT_NEGATIVE, Number, as_json, number, overwrite
 
 EXAMPLE = """\b
 Examples:
@@ -36,9 +36,9 @@ Examples:
     help="Height of the water [m]; or its surface as a .tif raster, a .ply triangle mesh or the "
     ".json of `multimedia waterlevel`.",
 )  # fmt: skip
-@click.option(
-    "--index", required=True, type=POSITIVE, metavar="N",
-    help="Refractive index of the water relative to the air [-], about 1.33 to 1.35.",
+@number(
+    "--index", "N", "Refractive index of the water relative to the air [-], about 1.33 to 1.35.",
+    required=True,
 )  # fmt: skip
 @click.option("--out", "target", required=True, type=FILE, help="Corrected file, same kind as IN.")
 @click.option(
@@ -55,18 +55,17 @@ Examples:
     "--max-angle", type=Number(above=0, most=89.9, to=radians), metavar="DEG",
     help="A camera sees only points within this angle from its vertical [deg]. [default: any]",
 )  # fmt: skip
-@click.option(
-    "--sigma-index", type=NOT_NEGATIVE, default=0.0, show_default=True,
-    help="Standard deviation of the index [-].",
+@number(
+    "--sigma-index", "N", "Standard deviation of the index [-].", type=NOT_NEGATIVE, default=0.0
+)
+@number(
+    "--sigma-level", "M", "Standard deviation of the water level [m].",
+    type=NOT_NEGATIVE, default=0.0,
 )  # fmt: skip
-@click.option(
-    "--sigma-level", type=NOT_NEGATIVE, default=0.0, show_default=True,
-    help="Standard deviation of the water level [m].",
-)  # fmt: skip
-@click.option(
-    "--sigma-point", type=NOT_NEGATIVE, default=0.0, show_default=True,
-    help="Standard deviation of the coordinates in IN [m]. Any sigma adds sigma columns or a "
-    "second band.",
+@number(
+    "--sigma-point", "M",
+    "Standard deviation of the coordinates in IN [m]. Any sigma adds sigma columns or a "
+    "second band.", type=NOT_NEGATIVE, default=0.0,
 )  # fmt: skip
 @click.option("--beams", is_flag=True, help="IN holds lidar echoes with columns X0, Y0, Z0. [off]")
 @click.option(
@@ -74,10 +73,7 @@ Examples:
     help="Table time,X,Y,Z of the lidar sensor [s, m], for echoes with gps_time; implies --beams. "
     "[default: none]",
 )  # fmt: skip
-@click.option(
-    "--group-index", type=POSITIVE, metavar="N",
-    help="Index that slows the laser pulse [-]. [default: as --index]",
-)  # fmt: skip
+@number("--group-index", "N", "Index that slows the laser pulse [-]. [default: as --index]")
 @click.option("--rays", is_flag=True, help="IN is a table of measured rays. [off]")
 @click.option(
     "--sigma-direction", type=Number(above=0, to=radians), default=0.0057, show_default=True,

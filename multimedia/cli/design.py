@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from photocore.cli import print_result, tell_written, text_table
-from photocore.options import FILE, POSITIVE, Number, Numbers, Size, as_json, overwrite
+from photocore.options import FILE, POSITIVE, Number, Numbers, Size, as_json, number, overwrite
 
 if TYPE_CHECKING:
     from multimedia.design.studies import Design
@@ -29,7 +29,7 @@ Examples:
     "--cameras", "count", type=click.IntRange(min=1), default=4, show_default=True,
     help="Cameras on the cone.",
 )  # fmt: skip
-@click.option("--distance", type=POSITIVE, help="From the last face to each camera [m].")
+@number("--distance", "M", "From the last face to each camera [m].")
 @click.option(
     "--half-angle", type=Number(above=0, below=90, to=radians), default=30.0, show_default=True,
     help="Half opening of the cone of cameras, in air [deg].",

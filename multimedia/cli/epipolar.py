@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from photocore.cli import print_result, tell_written, text_table
-from photocore.options import FILE, THOUSANDTHS, Numbers, as_json, overwrite
+from photocore.options import FILE, THOUSANDTHS, Numbers, as_json, number, overwrite
 
 if TYPE_CHECKING:
     from multimedia.orientation.epipolar_workflow import Curves
@@ -45,9 +45,9 @@ Examples:
     type=int,
     help="Fixed number of vertices instead of --chord.  [default: as needed]",
 )
-@click.option(
-    "--tolerance", type=THOUSANDTHS, default=10.0, show_default=True,
-    metavar="UM", help="Half width of the band in which candidates are looked for [um].",
+@number(
+    "--tolerance", "UM", "Half width of the band in which candidates are looked for [um].",
+    type=THOUSANDTHS, default=10.0,
 )  # fmt: skip
 @click.option("--out", type=FILE, help="Vertices as .csv or .xlsx.")
 @click.option("--picture", type=FILE, help="Picture of the curves: .png, .svg or .pdf.")

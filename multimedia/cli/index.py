@@ -5,7 +5,7 @@ from __future__ import annotations
 import click
 
 from photocore.cli import print_result, remark
-from photocore.options import NOT_NEGATIVE, NUMBER, POSITIVE, as_json
+from photocore.options import NOT_NEGATIVE, NUMBER, as_json, number
 
 EXAMPLE = """\b
 Examples:
@@ -17,44 +17,33 @@ Examples:
 
 
 @click.command(epilog=EXAMPLE)
-@click.option(
-    "--wavelength", type=POSITIVE, default=550.0, show_default=True, metavar="NM",
-    help="Wavelength of the light [nm]; blue 460, green 550, red 620.",
+@number(
+    "--wavelength", "NM", "Wavelength of the light [nm]; blue 460, green 550, red 620.",
+    default=550.0,
 )  # fmt: skip
-@click.option(
-    "--temperature", type=NUMBER, default=20.0, show_default=True, metavar="C",
-    help="Water temperature [°C].",
-)  # fmt: skip
-@click.option(
-    "--salinity", type=NUMBER, default=0.0, show_default=True, metavar="PERCENT",
-    help="Salinity [%]; sea water has 3.5.",
-)  # fmt: skip
-@click.option(
-    "--depth", type=NUMBER, default=0.0, show_default=True, metavar="M", help="Water depth [m]."
-)
+@number("--temperature", "C", "Water temperature [°C].", type=NUMBER, default=20.0)
+@number("--salinity", "PERCENT", "Salinity [%]; sea water has 3.5.", type=NUMBER, default=0.0)
+@number("--depth", "M", "Water depth [m].", type=NUMBER, default=0.0)
 @click.option(
     "--formula", type=click.Choice(["hoehle", "quan-fry", "parrish"]), default="hoehle",
     show_default=True, help="Published formula; hoehle is that of the multimedia papers.",
 )  # fmt: skip
-@click.option(
-    "--sigma-wavelength", type=NOT_NEGATIVE, default=0.0, show_default=True, metavar="NM",
-    help="Standard deviation of the wavelength [nm].",
+@number(
+    "--sigma-wavelength", "NM", "Standard deviation of the wavelength [nm].",
+    type=NOT_NEGATIVE, default=0.0,
 )  # fmt: skip
-@click.option(
-    "--sigma-temperature", type=NOT_NEGATIVE, default=0.0, show_default=True, metavar="C",
-    help="Standard deviation of the temperature [°C].",
+@number(
+    "--sigma-temperature", "C", "Standard deviation of the temperature [°C].",
+    type=NOT_NEGATIVE, default=0.0,
 )  # fmt: skip
-@click.option(
-    "--sigma-salinity", type=NOT_NEGATIVE, default=0.0, show_default=True, metavar="PERCENT",
-    help="Standard deviation of the salinity [%].",
+@number(
+    "--sigma-salinity", "PERCENT", "Standard deviation of the salinity [%].",
+    type=NOT_NEGATIVE, default=0.0,
 )  # fmt: skip
-@click.option(
-    "--from-index", type=POSITIVE, metavar="N",
-    help="A measured refractive index: the inverse; needs --find.",
-)  # fmt: skip
-@click.option(
-    "--sigma-index", type=NOT_NEGATIVE, default=0.0, show_default=True, metavar="N",
-    help="Standard deviation of the measured index.",
+@number("--from-index", "N", "A measured refractive index: the inverse; needs --find.")
+@number(
+    "--sigma-index", "N", "Standard deviation of the measured index.",
+    type=NOT_NEGATIVE, default=0.0,
 )  # fmt: skip
 @click.option(
     "--find", type=click.Choice(["salinity", "temperature"]),

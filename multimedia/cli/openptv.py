@@ -8,7 +8,7 @@ from typing import Any
 import click
 
 from photocore.cli import print_json, print_result, remark, text_table
-from photocore.options import FILE, POSITIVE, as_json, overwrite
+from photocore.options import FILE, as_json, number, overwrite
 
 EXAMPLE = """\b
 Examples:
@@ -30,9 +30,9 @@ Examples:
     "--min-pixels", "least_pixels", type=click.IntRange(min=1), default=15, show_default=True,
     help="Smaller targets are no dots of the calibration body [px].",
 )  # fmt: skip
-@click.option(
-    "--radius", type=POSITIVE, default=25.0, show_default=True,
-    help="Farthest a target may lie from where the stored orientation expects it [px].",
+@number(
+    "--radius", "PX",
+    "Farthest a target may lie from where the stored orientation expects it [px].", default=25.0,
 )  # fmt: skip
 @click.option(
     "--export", type=FILE,

@@ -8,7 +8,7 @@ from typing import Any
 import click
 
 from photocore.cli import print_json, remark
-from photocore.options import FILE, NUMBER, Numbers, as_json, overwrite
+from photocore.options import FILE, NUMBER, Numbers, as_json, number, overwrite
 
 EXAMPLE = """\b
 Examples:
@@ -26,9 +26,9 @@ Examples:
     "--camera", type=Numbers(3), metavar="X,Y,Z",
     help="Camera, in the unit of the points; Z = 0 is the interface on the water side.",
 )  # fmt: skip
-@click.option(
-    "--z0", type=NUMBER, metavar="LENGTH",
-    help="Instead of --camera: its distance from the first interface, nadir at X = Y = 0.",
+@number(
+    "--z0", "LENGTH",
+    "Instead of --camera: its distance from the first interface, nadir at X = Y = 0.", type=NUMBER,
 )  # fmt: skip
 @click.option(
     "--indices", type=Numbers(), metavar="N,N,...",

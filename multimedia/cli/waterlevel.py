@@ -8,7 +8,7 @@ from typing import Any
 import click
 
 from photocore.cli import print_result
-from photocore.options import FILE, POSITIVE, as_json, overwrite
+from photocore.options import FILE, as_json, number, overwrite
 
 EXAMPLE = """\b
 Examples:
@@ -21,10 +21,9 @@ Examples:
 @click.command(epilog=EXAMPLE)
 @click.argument("source", metavar="POINTS", type=FILE)
 @click.option("--tilted", is_flag=True, help="Fit a tilted plane instead of a height. [off]")
-@click.option(
-    "--spread", type=POSITIVE, metavar="M",
-    help="Expected standard deviation of a surface point, waves included [m]. "
-    "[default: from the data]",
+@number(
+    "--spread", "M",
+    "Expected standard deviation of a surface point, waves included [m]. [default: from the data]",
 )  # fmt: skip
 @click.option(
     "--out", "target", type=FILE,
