@@ -15,7 +15,7 @@ from multimedia.workbook.shift_points import ShiftPoints, ShiftSetup
 from multimedia.workbook.shift_workbook import write_shift_workbook
 from multimedia.workbook.workflow import write_template
 from photocore.errors import InputError
-from photocore.workbook.lint import lint
+from tests.workbook_lint import lint
 from tests import office
 
 ORDERS = {
