@@ -21,7 +21,7 @@ from photocore.tables.headings import Match, describe, find_columns
 from photocore.tables.model import Column, Table
 from photocore.tables.numbers import Decimal
 from photocore.tables.rows import RowSorter, label
-from photocore.workbook.grid import Grid, SheetFile, Value, cell_name
+from photocore.workbook.grid import CellGrid, SheetFile, Value, cell_name
 
 _DELIMITERS = (";", "\t", ",", "|", " ")
 _GUARDED = re.compile(r"'+[=+\-@\t\r]")
@@ -77,9 +77,9 @@ class CsvFile:
                 "that is opened but not closed."
             ) from None
 
-    def grid(self, delimiter: str, *, most: int | None = _SAMPLE) -> Grid:
+    def grid(self, delimiter: str, *, most: int | None = _SAMPLE) -> CellGrid:
         """Return the first records as a grid of texts."""
-        grid = Grid("")
+        grid = CellGrid("")
         records = self.records(delimiter, sample=most == _SAMPLE)
         for row, record in enumerate(islice(records, most), start=1):
             cells: dict[int, Value] = {
@@ -181,9 +181,9 @@ def read_csv_table(
 
 def _find(
     file: CsvFile, columns: Sequence[Column], column_map: Mapping[str, str] | None
-) -> tuple[Grid, Match, str]:
+) -> tuple[CellGrid, Match, str]:
     """Return the delimiter with which the most headings are found, and where they are."""
-    best: tuple[tuple[float, ...], Grid, Match | None, str] | None = None
+    best: tuple[tuple[float, ...], CellGrid, Match | None, str] | None = None
     for rank, delimiter in enumerate(file.delimiter or _DELIMITERS):
         grid = file.grid(delimiter)
         match = find_columns(grid, columns, column_map=column_map)
@@ -378,7 +378,7 @@ def _unguarded(text: str) -> str | None:
 def _gather(
     file: CsvFile,
     delimiter: str,
-    grid: Grid,
+    grid: CellGrid,
     table: Table,
     gathered: _Gathered,
     errors: list[CellError],

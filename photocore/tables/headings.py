@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 
 from photocore.tables.model import Column
 from photocore.tables.numbers import unit_symbol
-from photocore.workbook.grid import Grid, Value, cell_name, column_letters, column_number
+from photocore.workbook.grid import CellGrid, Value, cell_name, column_letters, column_number
 
 _UNIT = re.compile(r"\s*[\[(]\s*([^\])]*)\s*[\])]\s*$")
 _LOOSE_UNIT = re.compile(r"[\s_,]+(mm|cm|m|px|pixel|deg|°|gon|rad)$", re.IGNORECASE)
@@ -77,7 +77,7 @@ def unit_of(text: str) -> str:
 
 
 def find_columns(
-    grid: Grid,
+    grid: CellGrid,
     columns: Sequence[Column],
     *,
     column_map: Mapping[str, str] | None = None,
@@ -88,7 +88,7 @@ def find_columns(
 
     Parameters
     ----------
-    grid : Grid
+    grid : CellGrid
         The sheet.
     columns : sequence of Column
         What is looked for.
@@ -117,7 +117,7 @@ def find_columns(
 
 
 def _apply_map(
-    grid: Grid,
+    grid: CellGrid,
     columns: Sequence[Column],
     column_map: Mapping[str, str] | None,
     candidates: Sequence[int],
@@ -151,7 +151,7 @@ def _apply_map(
 
 
 def _heading_texts(
-    grid: Grid, row: int, span: tuple[int, int] | None
+    grid: CellGrid, row: int, span: tuple[int, int] | None
 ) -> list[tuple[dict[int, list[str]], int]]:
     """Return the headings that a row, alone or with the next, gives each column."""
 
@@ -194,7 +194,7 @@ def _numbered(text: str, digit: str) -> str:
 
 
 def _filled_right(
-    grid: Grid, row: int, upper: Mapping[int, str], lower: Mapping[int, str]
+    grid: CellGrid, row: int, upper: Mapping[int, str], lower: Mapping[int, str]
 ) -> dict[int, str]:
     """Return the upper headings, each reaching right over its merged or empty cells."""
     reach = {left: right for top, left, _, right in grid.merged if top == row}
@@ -267,7 +267,7 @@ def _assign(
     return match
 
 
-def _take_nameless(grid: Grid, match: Match, columns: Sequence[Column]) -> None:
+def _take_nameless(grid: CellGrid, match: Match, columns: Sequence[Column]) -> None:
     """Take the column left of the others for the point names when only its heading is missing."""
     name = next((column for column in columns if column.kind == "text"), None)
     if name is None or name.key != "id" or name.key in match.columns or not match.columns:
@@ -296,7 +296,7 @@ def _forms(variants: Sequence[str]) -> list[str]:
 
 
 def _without_heading(
-    grid: Grid, columns: Sequence[Column], fixed: dict[str, int], candidates: Sequence[int]
+    grid: CellGrid, columns: Sequence[Column], fixed: dict[str, int], candidates: Sequence[int]
 ) -> Match:
     """Return where the data begin in a table whose columns are known by letter."""
     from photocore.tables.numbers import take_apart
@@ -337,7 +337,7 @@ def _without_heading(
     return match
 
 
-def describe(grid: Grid, match: Match | None) -> str:
+def describe(grid: CellGrid, match: Match | None) -> str:
     """Return a few words on the headings found nearest, for a message."""
     row = match.header if match else next(iter(sorted(grid.rows)), 0)
     cells = grid.rows.get(row, {})

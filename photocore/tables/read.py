@@ -16,7 +16,7 @@ from photocore.tables.headings import Match, bare, describe, find_columns
 from photocore.tables.model import Column, NamedValues, Table
 from photocore.tables.numbers import Decimal, take_apart
 from photocore.tables.rows import data_rows
-from photocore.workbook.grid import Grid, SheetFile, TableArea, Value, cell_name
+from photocore.workbook.grid import CellGrid, SheetFile, TableArea, Value, cell_name
 from photocore.workbook.package import check_header
 
 Source = Path | str | SheetFile | CsvFile
@@ -132,7 +132,7 @@ def read_table(
 class _Place:
     """A table in a workbook: its sheet, its columns, and its named area if it has one."""
 
-    grid: Grid
+    grid: CellGrid
     match: Match
     area: TableArea | None = None
 
@@ -209,7 +209,7 @@ def _in_area(
     return _Place(grid, match, area)
 
 
-def _reach_below(grid: Grid, match: Match, bottom: int) -> None:
+def _reach_below(grid: CellGrid, match: Match, bottom: int) -> None:
     """Take in rows typed directly below a named table that did not grow with them."""
     used = set(match.columns.values())
     row = bottom
@@ -306,7 +306,7 @@ def _read_grid(
     return table
 
 
-def _refuse_merged(table: Table, grid: Grid, errors: list[CellError]) -> None:
+def _refuse_merged(table: Table, grid: CellGrid, errors: list[CellError]) -> None:
     """Complain about merged cells among the data: they hide values."""
     used = {number: key for key, number in table.columns.items()}
     index_of = {row: index for index, row in enumerate(table.rows)}
@@ -416,7 +416,7 @@ def _by_label(book: SheetFile, titles: Sequence[str], name: Column) -> tuple[str
     return None
 
 
-def _labels(grid: Grid) -> dict[str, tuple[int, int]]:
+def _labels(grid: CellGrid) -> dict[str, tuple[int, int]]:
     """Return the place of each text near the top of a sheet, the first one of its kind."""
     if grid.labels is None:
         headings = _value_column(grid)[0]
@@ -428,7 +428,7 @@ def _labels(grid: Grid) -> dict[str, tuple[int, int]]:
     return grid.labels
 
 
-def _value_column(grid: Grid) -> tuple[int, int]:
+def _value_column(grid: CellGrid) -> tuple[int, int]:
     """Return row and column of the heading "value", zeros where there is none."""
     for row in sorted(grid.rows)[:20]:
         for column, text in grid.rows[row].items():

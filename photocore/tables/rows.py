@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 from photocore.tables.headings import Match, bare
 from photocore.tables.model import Column
-from photocore.workbook.grid import Grid, Value
+from photocore.workbook.grid import CellGrid, Value
 
 
 @dataclass(slots=True)
@@ -96,13 +96,13 @@ def label(value: Value) -> str:
 
 
 def data_rows(
-    grid: Grid, match: Match, columns: Sequence[Column], *, visible_only: bool
+    grid: CellGrid, match: Match, columns: Sequence[Column], *, visible_only: bool
 ) -> DataRows:
     """Return the rows of a table that hold data.
 
     Parameters
     ----------
-    grid : Grid
+    grid : CellGrid
         The sheet.
     match : Match
         Where the table's columns and headings are.

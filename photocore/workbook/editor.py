@@ -16,12 +16,12 @@ from photocore.errors import InputError
 from photocore.output import atomic_path, check_writable, free_path
 from photocore.workbook import formulas
 from photocore.workbook.cellxml import CellInput
-from photocore.workbook.grid import Grid, SheetFile, TableArea, cell_name
+from photocore.workbook.grid import CellGrid, SheetFile, TableArea, cell_name
 from photocore.workbook.newrows import NewColumn, NewRows, RowFormula
 from photocore.workbook.package import check_header, open_package, read_part
 from photocore.workbook.splice import SheetChanges, Spliced, splice_sheet
 from photocore.workbook.xlsx import (
-    Sheet,
+    SheetPart,
     Workbook,
     open_xlsx,
     read_directory,
@@ -83,7 +83,7 @@ class WorkbookEditor:
         found = (t for t in self.tables if t.name.casefold() == name.casefold())
         return next(found, None)
 
-    def grid(self, title: str) -> Grid:
+    def grid(self, title: str) -> CellGrid:
         """Return a sheet's cells as they stand in the file."""
         self._sheet(title)
         if self._file is None:
@@ -202,8 +202,9 @@ class WorkbookEditor:
         new_rows = list(range(bottom + 1, bottom + 1 + count))
         if not new_rows:
             return []
-        _, left, last, right = area.area
-        model = formulas.row_cells(self.path, self._sheet(area.sheet), last, left, right)
+        last = area.area[2]
+        with open_package(self.path) as package:
+            model = formulas.model_cells(self.path, package, self._sheet(area.sheet), last)
         self._refuse_occupied(area, new_rows)
         columns = []
         for name, column in headings.items():
@@ -321,7 +322,7 @@ class WorkbookEditor:
         self._sheet(title)
         return self.changes.setdefault(title, SheetChanges())
 
-    def _sheet(self, title: str) -> Sheet:
+    def _sheet(self, title: str) -> SheetPart:
         for sheet in self.book.sheets:
             if sheet.title == title:
                 return sheet

@@ -47,7 +47,7 @@ Value = float | str | bool | CellDate | CellFault | NotCalculated
 
 
 @dataclass(slots=True)
-class Grid:
+class CellGrid:
     """The cells of one sheet that hold something.
 
     Rows and columns are counted from 1, as spreadsheets do.
@@ -115,13 +115,13 @@ class SheetFile:
 
     label: str
     titles: list[str]
-    load: Callable[[str], Grid]
+    load: Callable[[str], CellGrid]
     tables: Sequence[TableArea] = ()
     names: dict[str, tuple[str, int, int]] = field(default_factory=dict)
     remarks: list[str] = field(default_factory=list)
-    _grids: dict[str, Grid] = field(default_factory=dict)
+    _grids: dict[str, CellGrid] = field(default_factory=dict)
 
-    def grid(self, title: str) -> Grid:
+    def grid(self, title: str) -> CellGrid:
         """Return the cells of one sheet."""
         if title not in self._grids:
             self._grids[title] = self.load(title)
