@@ -23,7 +23,8 @@ LARGEST_TOTAL = 512 * 2**20
 MOST_MEMBERS = 10_000
 _RATIO_MATTERS_FROM = 2**20
 _OLE = b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1"
-_CHUNK = 2**18
+#: Small, since the elements of a chunk are made before the first is looked at.
+_CHUNK = 2**15
 #: What unpacking a damaged member may raise.
 _UNPACKING = (
     zipfile.BadZipFile,
@@ -183,10 +184,11 @@ def xml_elements(path: Path, package: zipfile.ZipFile, name: str, *kinds: str) -
     """Yield the elements of some kinds of one XML part, emptied when the next one is asked for."""
     wanted: dict[str, bool] = {}
     for _, element in xml_events(path, package, name, "end"):
-        tag = element.tag
-        if tag not in wanted:
-            wanted[tag] = local(tag) in kinds
-        if wanted[tag]:
+        try:
+            is_wanted = wanted[element.tag]
+        except KeyError:
+            is_wanted = wanted[element.tag] = local(element.tag) in kinds
+        if is_wanted:
             yield element
             element.clear()
 

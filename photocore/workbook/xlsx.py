@@ -277,11 +277,10 @@ def _single_cells(book: Workbook) -> dict[str, tuple[str, int, int]]:
 def row_cells(row: Element) -> Iterator[tuple[int, Element]]:
     """Yield the cells of a row with their column numbers."""
     column = 0
-    for cell in row:
-        if local(cell.tag) == "c":
-            reference = cell.get("r")
-            column = column + 1 if reference is None else _column(reference.rstrip("0123456789"))
-            yield column, cell
+    for cell in row.iter(row.tag.removesuffix("row") + "c"):
+        reference = cell.get("r")
+        column = column + 1 if reference is None else _column(reference.rstrip("0123456789"))
+        yield column, cell
 
 
 @lru_cache(maxsize=4096)
@@ -316,8 +315,7 @@ class _SheetReader:
                 row = int(element.get("r", row + 1))
                 if element.get("hidden", "0") in _YES:
                     grid.hidden.add(row)
-                values = ((column, self.value(cell)) for column, cell in row_cells(element))
-                cells = {column: value for column, value in values if value is not None}
+                cells = self.cells(element)
                 if cells and len(grid.rows) >= self.max_rows:
                     grid.truncated = True
                     break
@@ -325,33 +323,30 @@ class _SheetReader:
                     grid.rows[row] = cells
         return grid
 
-    def value(self, cell: Element) -> Value | None:
-        """Return the typed value of one cell, None when it is blank."""
-        text, formula = "", None
-        for child in cell:
-            kind = local(child.tag)
-            if kind == "v":
-                text = child.text or ""
-            elif kind == "is":
-                text = _rich_text(child)
-            elif kind == "f":
-                formula = child.text or ""
-        kind = cell.get("t", "n")
-        if kind == "s" and text:
-            return self.strings[int(text)] or None
-        if not text:
-            # Text formulas store an empty result as no text at all; other types mean "never run".
-            return None if formula is None or kind == "str" else NotCalculated(formula)
+    def cells(self, row: Element) -> dict[int, Value]:
+        """Return the typed values of a row by column number, without those that are blank."""
+        cells: dict[int, Value] = {}
+        v = row.tag.removesuffix("row") + "v"
+        for column, cell in row_cells(row):
+            text, kind = cell.findtext(v, ""), cell.get("t", "n")
+            value = self.value(text, kind, cell) if text else _without_text(kind, cell)
+            if value is not None:
+                cells[column] = value
+        return cells
+
+    def value(self, text: str, kind: str, cell: Element) -> Value | None:
+        """Return the typed value of a cell that holds a text."""
         if kind == "n":
-            number = float(text)
             style = self.dates.get(cell.get("s", ""))
-            return number if style is None else self.date(number, style)
+            return float(text) if style is None else self.date(float(text), style)
+        if kind == "s":
+            return self.strings[int(text)] or None
         if kind == "b":
             return text.strip() in ("1", "true")
         if kind == "e":
             return CellFault(text)
         if kind == "d":
-            return self.iso(text)
+            return _iso_date(text)
         return unescape(text)
 
     def date(self, number: float, style: str) -> Value:
@@ -361,9 +356,21 @@ class _SheetReader:
         except (OverflowError, ValueError):
             return number
 
-    def iso(self, text: str) -> Value:
-        """Return a date stored as ISO text (strict workbooks)."""
-        try:
-            return CellDate(datetime.fromisoformat(text.strip().removesuffix("Z")), "d.m.yyyy")
-        except ValueError:
-            return text
+
+def _without_text(kind: str, cell: Element) -> Value | None:
+    """Return what a cell without stored value holds: a text of its own, or a new formula."""
+    for child in cell:
+        if local(child.tag) == "is":
+            return unescape(_rich_text(child)) or None
+        # Text formulas store an empty result as no text at all; other types mean "never run".
+        if local(child.tag) == "f" and kind != "str":
+            return NotCalculated(child.text or "")
+    return None
+
+
+def _iso_date(text: str) -> Value:
+    """Return a date stored as ISO text (strict workbooks)."""
+    try:
+        return CellDate(datetime.fromisoformat(text.strip().removesuffix("Z")), "d.m.yyyy")
+    except ValueError:
+        return text
