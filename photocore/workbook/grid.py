@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from datetime import datetime, timedelta
+from functools import lru_cache
 
 
 @dataclass(frozen=True, slots=True)
@@ -128,6 +129,7 @@ class SheetFile:
         return self._grids[title]
 
 
+@lru_cache(maxsize=2**15)
 def column_letters(column: int) -> str:
     """Return the letters of a column counted from 1.
 
@@ -141,6 +143,7 @@ def column_letters(column: int) -> str:
     return letters
 
 
+@lru_cache(maxsize=2**15)
 def column_number(letters: str) -> int:
     """Return the number, counted from 1, of a column's letters.
 

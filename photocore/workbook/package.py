@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import lzma
+import os
 import zipfile
 import zlib
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from functools import lru_cache
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, BinaryIO, Literal
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 from xml.parsers import expat
@@ -144,6 +145,28 @@ def read_part(path: Path, package: zipfile.ZipFile, name: str) -> bytes:
         raise InputError(f"{path}: is not a workbook, the part {name} is missing.") from None
     except _UNPACKING as error:
         raise _damaged(path, name) from error
+
+
+def rewrite_package(
+    source: Path | BinaryIO,
+    target: Path,
+    parts: Mapping[str, bytes],
+    *,
+    date: tuple[int, int, int, int, int, int] | None = None,
+) -> None:
+    """Copy a zip package with some parts replaced; order, methods and (without one) dates stay."""
+    with zipfile.ZipFile(source) as old, target.open("wb") as file:
+        with zipfile.ZipFile(file, "w", compresslevel=4) as new:
+            new.comment = old.comment
+            for info in old.infolist():
+                data = parts.get(info.filename)
+                copy = zipfile.ZipInfo(info.filename, date or info.date_time)
+                stored = info.compress_type == zipfile.ZIP_STORED
+                copy.compress_type = zipfile.ZIP_STORED if stored else zipfile.ZIP_DEFLATED
+                copy.external_attr, copy.create_system = info.external_attr, info.create_system
+                new.writestr(copy, read_part(target, old, info.filename) if data is None else data)
+        file.flush()
+        os.fsync(file.fileno())
 
 
 def xml_events(

@@ -8,7 +8,7 @@ import zipfile
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from datetime import datetime
-from functools import lru_cache, partial
+from functools import partial
 from pathlib import Path
 from xml.etree.ElementTree import Element
 
@@ -279,13 +279,8 @@ def row_cells(row: Element) -> Iterator[tuple[int, Element]]:
     column = 0
     for cell in row.iter(row.tag.removesuffix("row") + "c"):
         reference = cell.get("r")
-        column = column + 1 if reference is None else _column(reference.rstrip("0123456789"))
+        column = column + 1 if reference is None else column_number(reference.rstrip("0123456789"))
         yield column, cell
-
-
-@lru_cache(maxsize=4096)
-def _column(letters: str) -> int:
-    return column_number(letters)
 
 
 @dataclass(slots=True)
