@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from photocore.errors import InputError
-from photocore.workbook.grid import cell_name
+from photocore.workbook.grid import column_letters
 
 #: Most characters of a cell; Excel cuts or repairs longer ones.
 LONGEST_TEXT = 32767
@@ -54,6 +54,8 @@ def type_and_content(value: CellValue, prefix: str, *, formula: bool) -> tuple[s
     InputError
         If a number is infinite or a text is longer than a cell can hold.
     """
+    if type(value) is float and value - value == 0.0:  # finite, by far the most frequent
+        return "", f"<{prefix}v>{repr(value).removesuffix('.0')}</{prefix}v>"
     if value is None:
         return "", ""
     if isinstance(value, str):
@@ -74,14 +76,14 @@ def type_and_content(value: CellValue, prefix: str, *, formula: bool) -> tuple[s
     elif math.isinf(value):
         raise InputError("an infinite number cannot be written to a cell.")
     else:
-        kind, text = "", repr(float(value)).removesuffix(".0")
+        return type_and_content(float(value), prefix, formula=formula)
     return kind, f"<{prefix}v>{text}</{prefix}v>"
 
 
 def cell_xml(
-    reference: str, value: CellValue, formula: str = "", *, prefix: str = "", style: str = ""
+    reference: str, value: CellValue, formula: str = "", prefix: str = "", style: str = ""
 ) -> str:
-    """Return the XML of a new cell.
+    """Return the XML of a new cell, empty where nothing would stand in it.
 
     Parameters
     ----------
@@ -101,13 +103,13 @@ def cell_xml(
     '<c r="B3" s="2"><f>A3*3</f><v>1.5</v></c>'
     """
     kind, content = type_and_content(value, prefix, formula=bool(formula))
-    if formula:
-        content = f"<{prefix}f>{formula}</{prefix}f>{content}"
     attributes = f' s="{style}"' if style else ""
     if kind:
         attributes += f' t="{kind}"'
-    if not content:
-        return f'<{prefix}c r="{reference}"{attributes}/>'
+    if formula:
+        content = f"<{prefix}f>{formula}</{prefix}f>{content}"
+    elif not content:
+        return f'<{prefix}c r="{reference}"{attributes}/>' if style else ""
     return f'<{prefix}c r="{reference}"{attributes}>{content}</{prefix}c>'
 
 
@@ -162,13 +164,6 @@ class NewCell(NamedTuple):
     style: str = ""
     is_typed: bool = True
 
-    def xml(self, row: int, column: int, prefix: str) -> str:
-        """Return the cell's XML, empty where nothing would stand in it."""
-        value, formula, style, _ = self
-        if (value is None or value == "") and not formula and not style:
-            return ""
-        return cell_xml(cell_name(row, column), value, formula, prefix=prefix, style=style)
-
 
 class NewColumn(NamedTuple):
     """One column of new rows: values, or a formula with its results.
@@ -192,7 +187,7 @@ class NewColumn(NamedTuple):
 
 
 class NewRows(NamedTuple):
-    """Rows to be added to a sheet: the first one, how many, and what they hold."""
+    """Rows to be added to a sheet: the first one, how many, their columns from left to right."""
 
     first: int
     size: int
@@ -207,3 +202,19 @@ class NewRows(NamedTuple):
             column: NewCell(values[index], formula(row) if formula else "", style, False)
             for column, values, style, formula in self.columns
         }
+
+    def xml(self, row: int, prefix: str) -> str:
+        """Return the XML of the cells of one of the rows."""
+        index = row - self.first
+        return "".join(
+            [
+                cell_xml(
+                    f"{column_letters(column)}{row}",
+                    values[index],
+                    formula(row) if formula else "",
+                    prefix,
+                    style,
+                )
+                for column, values, style, formula in self.columns
+            ]
+        )

@@ -12,7 +12,7 @@ from xml.sax.saxutils import quoteattr
 from xml.sax.saxutils import unescape as unescape_xml
 
 from photocore.errors import InputError
-from photocore.workbook.cells import CellValue, NewCell, NewRows, type_and_content
+from photocore.workbook.cells import CellValue, NewCell, NewRows, cell_xml, type_and_content
 from photocore.workbook.grid import cell_name, column_number, split_area
 from photocore.workbook.package import local, new_parser, understood
 from photocore.workbook.xlsx import unescape
@@ -53,7 +53,8 @@ class SheetChanges:
 
     def cells(self, row: int) -> dict[int, NewCell]:
         """Return the cells to be typed or added in one row, in order."""
-        cells = {column: NewCell(value) for column, value in self.inputs.get(row, {}).items()}
+        typed = self.inputs.get(row, {}).items()
+        cells = {column: NewCell(None if value == "" else value) for column, value in typed}
         for block in self.added:
             cells |= block.cells(row)
         return dict(sorted(cells.items()))
@@ -270,7 +271,7 @@ class _Splicer:
         if new.is_typed and self.holds(new.value):
             return
         new = new._replace(style=self.attributes.get("s", "") or new.style)
-        edit = new.xml(self.row, self.column, self.prefix).encode()
+        edit = self.xml(self.column, new).encode()
         self.edits.append((self.cell_start, self.element_end(name, self.cell_start), edit))
         self.result.inputs_changed = True
 
@@ -341,16 +342,23 @@ class _Splicer:
     def add_cells(self, before: int, place: tuple[int, int, str, str]) -> None:
         """Insert the new cells of this row whose columns lie before one."""
         columns = [column for column in self.new if column < before]
-        cells = [self.new.pop(column).xml(self.row, column, self.prefix) for column in columns]
-        self.insert("".join(cells), place)
+        self.insert("".join([self.xml(c, self.new.pop(c)) for c in columns]), place)
+
+    def xml(self, column: int, cell: NewCell, row: int = 0) -> str:
+        """Return the XML of a cell of this row, or of another one."""
+        reference = cell_name(row or self.row, column)
+        return cell_xml(reference, cell.value, cell.formula, self.prefix, cell.style)
 
     def add_rows(self, before: int, place: tuple[int, int, str, str]) -> None:
         """Insert the new rows whose numbers lie before one."""
         pieces: list[str] = []
         while self.new_rows and self.new_rows[0] < before:
             row = self.new_rows.popleft()
-            new = self.changes.cells(row)
-            cells = "".join([cell.xml(row, column, self.prefix) for column, cell in new.items()])
+            if len(self.changes.added) == 1 and row not in self.changes.inputs:
+                cells = self.changes.added[0].xml(row, self.prefix)
+            else:
+                new = self.changes.cells(row).items()
+                cells = "".join([self.xml(column, cell, row) for column, cell in new])
             if cells:
                 pieces.append(f'<{self.prefix}row r="{row}">{cells}</{self.prefix}row>')
         self.insert("".join(pieces), place)
