@@ -113,15 +113,7 @@ def data_rows(
     """
     found = DataRows()
     sorter = RowSorter(match, columns, grid.rows.get(match.header, {}))
-    above = [row for row in grid.rows if row < min(match.header or match.first, match.first)]
-    if match.header and above:
-        cells = grid.rows[max(above)]
-        if len(cells) == 1 and not isinstance(next(iter(cells.values())), str):
-            sorter.block = label(next(iter(cells.values())))
-    elif above:
-        for row in sorted(above)[-2:]:
-            if len(grid.rows[row]) == 1:
-                sorter.block = label(next(iter(grid.rows[row].values())))
+    sorter.block = block_above(grid, match)
     hidden = 0
     for row in sorted(grid.rows):
         if not match.first <= row <= match.last or not sorter.is_data(row, grid.rows[row]):
@@ -137,3 +129,13 @@ def data_rows(
         what = "were left out" if visible_only else "are used too; --visible-only leaves them out"
         found.remarks.append(f"{hidden} hidden or filtered rows {what}.")
     return found
+
+
+def block_above(grid: CellGrid, match: Match) -> str:
+    """Return the label of the first block, which stands alone above the headings or the data."""
+    top = min(match.header or match.first, match.first)
+    for row in sorted(row for row in grid.rows if row < top)[-1 if match.header else -2 :]:
+        value = next(iter(grid.rows[row].values()))
+        if len(grid.rows[row]) == 1 and not (match.header and isinstance(value, str)):
+            return label(value)
+    return ""
