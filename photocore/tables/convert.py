@@ -121,6 +121,8 @@ def flags(values: Sequence[Value | None], complain: Complain) -> FloatArray:
 
 def texts(values: Sequence[Value | None], complain: Complain) -> list[str]:
     """Return a column's texts; whole numbers lose the decimal point, so that 1.0 is ``"1"``."""
+    if {*map(type, values)} == {str}:
+        return [*map(str.strip, values)]  # type: ignore[arg-type]
     result = []
     for index, value in enumerate(values):
         if isinstance(value, float):

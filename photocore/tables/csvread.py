@@ -24,7 +24,8 @@ _DELIMITERS = (";", "\t", ",", "|", " ")
 _GUARDED = re.compile(r"'+[=+\-@\t\r]")
 _SAMPLE = 200
 _SAMPLE_TEXT = 2**18
-_CHUNK = 50_000
+#: Few enough records to stay in the processor's cache.
+_CHUNK = 2000
 
 
 @dataclass(slots=True)
@@ -58,11 +59,6 @@ class CsvFile:
             lines.readline()
             # The line that names the delimiter keeps its number, as spreadsheets count it.
             yield []
-        if delimiter != " " and '"' not in text:
-            # Without quotation marks a record is a line, which is quicker to take apart.
-            plain = io.StringIO(text[lines.tell() :], newline=None)
-            yield from (line.rstrip("\n").split(delimiter) for line in plain)
-            return
         try:
             yield from csv.reader(lines, delimiter=delimiter, skipinitialspace=delimiter == " ")
         except csv.Error as error:
@@ -140,7 +136,11 @@ def find_in_text(
         If a required column is missing.
     """
     best: tuple[tuple[float, ...], CellGrid, Match | None, str] | None = None
-    for rank, delimiter in enumerate(file.delimiter or _DELIMITERS):
+    sample = file.text[:_SAMPLE_TEXT]
+    # Those that do not occur all show the same: one field.
+    absent = [mark for mark in _DELIMITERS if mark not in sample][1:]
+    likely = [mark for mark in _DELIMITERS if mark not in absent]
+    for rank, delimiter in enumerate(file.delimiter or likely):
         grid = file.grid(delimiter)
         match = find_columns(grid, columns, column_map=column_map)
         score = match.score[0] if match else 0
@@ -224,7 +224,7 @@ def plain_rows(
     proven: dict[str, set[str]] = {key: set() for key in quick}
     texts: dict[str, list[str]] = {key: [] for key in others}
     last = match.first - 1
-    for chunk in _full_chunks(islice(file.records(delimiter), last, None), width):
+    for chunk in _full_chunks(file, delimiter, last, width):
         if chunk is None:
             return None
         fields = {key: chunk[number - 1] for key, number in match.columns.items()}
@@ -237,7 +237,7 @@ def plain_rows(
             chunks[key].append(plain[0])
             proven[key] |= plain[1]
         filled = np.sum([~np.isnan(chunks[key][-1]) for key in quick], axis=0)
-        for index in np.flatnonzero(filled < min(2, len(numeric))):
+        for index in np.flatnonzero(filled < min(2, len(numeric))).tolist():
             if not filled[index] or not any(fields[key][index].strip() for key in others):
                 return None
         for key in others:
@@ -261,16 +261,29 @@ def plain_rows(
 
 
 def _full_chunks(
-    records: Iterator[list[str]], width: int
-) -> Iterator[list[tuple[str, ...]] | None]:
+    file: CsvFile, delimiter: str, skipped: int, width: int
+) -> Iterator[list[Sequence[str]] | None]:
     """Yield many records at a time, turned into columns; None where one is not full."""
-    while chunk := list(islice(records, _CHUNK)):
-        while len(chunk) < _CHUNK and chunk and not any(chunk[-1]):
-            chunk.pop()  # blank lines at the end of the file
-        if {*map(len, chunk)} - {width}:
-            yield None
-        if chunk:
+    if delimiter == " " or '"' in file.text:
+        records = islice(file.records(delimiter), skipped, None)
+        while chunk := list(islice(records, _CHUNK)):
+            if {*map(len, chunk)} != {width}:
+                yield None
             yield list(zip(*chunk, strict=True))
+        return
+    # Without quotation marks a record is a line, and many lines are taken apart at once.
+    text = file.text.rstrip("\r\n").replace("\r\n", "\n").replace("\r", "\n")
+    start = 0
+    for _ in range(skipped):
+        start = text.find("\n", start) + 1 or len(text)
+    while start < len(text):
+        end = text.find("\n", start + 40 * _CHUNK)
+        part = text[start : end if end > 0 else None]
+        if {line.count(delimiter) for line in part.split("\n")} != {width - 1}:
+            yield None
+        fields = part.replace("\n", delimiter).split(delimiter)
+        yield [fields[number::width] for number in range(width)]
+        start += len(part) + 1
 
 
 def too_wide(file: CsvFile, grid: CellGrid, width: int, rows: Iterable[int]) -> Iterator[CellError]:
@@ -284,6 +297,6 @@ def too_wide(file: CsvFile, grid: CellGrid, width: int, rows: Iterable[int]) -> 
             yield CellError(message, file=file.label, cell=cell_name(row, width + 1))
 
 
-def unguarded(text: Value | None) -> Value | None:
+def unguarded(text: str | None) -> str | None:
     """Take off the apostrophe that keeps spreadsheets from running a text as a formula."""
-    return text[1:] if isinstance(text, str) and _GUARDED.match(text) else text
+    return text[1:] if text and text[0] == "'" and _GUARDED.match(text) else text

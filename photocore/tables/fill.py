@@ -52,7 +52,7 @@ def fill(
 
         if column.kind == "text":
             table.values[column.key] = convert.texts(values, complain)
-            dated = sum(isinstance(value, CellDate) for value in values)
+            dated = table.sheet and sum(isinstance(value, CellDate) for value in values)
             if dated:
                 table.remarks.append(
                     f"{column.key}: {dated} cells hold dates; type a name like 3-4 as '3-4."

@@ -193,7 +193,7 @@ def plain_numbers(texts: Sequence[str]) -> tuple[FloatArray, set[str]] | None:
     with np.errstate(over="ignore"):
         thousandths = (np.rint(numbers * 1000) / 1000 == numbers) | ~np.isfinite(numbers)
     proven = set() if thousandths.all() else {decimal}
-    for index in np.flatnonzero(thousandths):
+    for index in np.flatnonzero(thousandths).tolist():
         if decimal in proven:
             break
         if mark in texts[index]:

@@ -305,11 +305,11 @@ def _read_text(
         count = len(plain.rows)
         rows = DataRows([*plain.rows], [block_above(place.grid, match)] * count)
         table = _new_table(file, place, rows)
-        cells, proven = plain.texts, plain.proven
+        cells, proven = {**plain.texts}, plain.proven
         table.values |= plain.numbers
     for column in columns:
         if column.kind in ("text", "flag") and column.key in cells:
-            cells[column.key] = [*map(unguarded, cells[column.key])]
+            cells[column.key] = [unguarded(text) for text in cells[column.key]]  # type: ignore[arg-type]
     rest = [column for column in columns if column.key not in table.values]
     fill(table, rest, cells, decimal, errors, proven=proven)
     return table
