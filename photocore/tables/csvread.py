@@ -25,7 +25,7 @@ _GUARDED = re.compile(r"'+[=+\-@\t\r]")
 _SAMPLE = 200
 _SAMPLE_TEXT = 2**18
 #: Few enough records to stay in the processor's cache.
-_CHUNK = 2000
+_CHUNK = 4000
 
 
 @dataclass(slots=True)
