@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Literal
 
@@ -233,6 +233,3 @@ def _known(key: str, keys: Sequence[str]) -> str:
     if len(alike) == 1:
         return alike[0]
     raise InputError(f'--columns: there is no column "{key}"; known are {", ".join(keys)}.')
-
-
-ColumnMap = Mapping[str, str]

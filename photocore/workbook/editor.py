@@ -229,9 +229,7 @@ class WorkbookEditor:
             )
         return self.grown.get(area.name, (area, area.area[2]))
 
-    def save(
-        self, target: Path | str | None = None, *, overwrite: bool = False, backup: bool = True
-    ) -> Path | None:
+    def save(self, target: Path | str | None = None, *, overwrite: bool = False) -> Path | None:
         """Write the changed workbook.
 
         Parameters
@@ -242,8 +240,6 @@ class WorkbookEditor:
             backup is ever replaced.
         overwrite : bool
             Whether to replace another existing file.
-        backup : bool
-            Whether to keep the old file.
 
         Returns
         -------
@@ -267,7 +263,7 @@ class WorkbookEditor:
         kept: Path | None = None
         with atomic_path(target, overwrite=overwrite or in_place) as temporary:
             rewrite_package(self.path, temporary, parts)
-            if in_place and backup:
+            if in_place:
                 kept = free_path(self.path.parent, f"{self.path.name}.bak")
                 shutil.copy2(self.path, kept)
         return kept

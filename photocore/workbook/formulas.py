@@ -147,7 +147,7 @@ class References:
 
         def replace(match: re.Match[bytes]) -> bytes:
             text = unescape_xml(match[2].decode("utf-8"), {"&quot;": '"', "&apos;": "'"})
-            new = grown_reference(text, area, bottom, own_sheet=False)
+            new = grown_reference(text, area, bottom)
             return match[0] if new == text else match[1] + escape_xml(new).encode() + match[3]
 
         changed = pattern.sub(replace, data)
@@ -155,7 +155,7 @@ class References:
             parts[name] = changed
 
 
-def grown_reference(text: str, area: TableArea, bottom: int, *, own_sheet: bool) -> str:
+def grown_reference(text: str, area: TableArea, bottom: int) -> str:
     """Return a reference with each range that ends in the table's last row reaching further.
 
     Parameters
@@ -166,24 +166,24 @@ def grown_reference(text: str, area: TableArea, bottom: int, *, own_sheet: bool)
         The table.
     bottom : int
         Its new last row.
-    own_sheet : bool
-        Whether ranges without a sheet name lie on the table's sheet.
     """
-    top, left, last, right = area.area
 
     def grow(match: re.Match[str]) -> str:
         title = (match["sheet"] or "").removesuffix("!").strip("'").replace("''", "'")
-        if title != area.sheet and not (own_sheet and not title):
-            return match[0]
         plain = f"{match['c1']}{match['r1']}:{match['c2']}{match['r2']}"
-        first_row, first_column, last_row, last_column = split_area(plain)
-        inside = left <= first_column and last_column <= right and first_row >= top
-        if last_row != last or not inside:
+        if title != area.sheet or not _ends_with(area, plain):
             return match[0]
         dollar = "$" if match["r2"].startswith("$") else ""
         return f"{match[0][: -len(match['r2'])]}{dollar}{bottom}"
 
     return _RANGE.sub(grow, text)
+
+
+def _ends_with(area: TableArea, reference: str) -> bool:
+    """Whether a range lies inside a table and ends in its last row."""
+    top, left, bottom, right = split_area(reference)
+    inside = area.area[1] <= left and right <= area.area[3] and top >= area.area[0]
+    return inside and bottom == area.area[2]
 
 
 def _grown_table(data: bytes, area: TableArea, bottom: int) -> bytes:
@@ -198,23 +198,15 @@ def _grown_table(data: bytes, area: TableArea, bottom: int) -> bytes:
 
 def _grown_sheet(data: bytes, area: TableArea, bottom: int) -> bytes:
     """Return a sheet whose conditional formats and validations reach to a new last row."""
-    top, left, last, right = area.area
 
     def grown(reference: str) -> str:
-        pieces = []
-        for piece in reference.split():
-            if not _AREA.fullmatch(piece):
-                pieces.append(piece)
-                continue
-            first_row, first_column, last_row, last_column = split_area(piece)
-            inside = left <= first_column and last_column <= right
-            if inside and last_row == last and first_row >= top:
-                piece = f"{cell_name(first_row, first_column)}:{cell_name(bottom, last_column)}"
-            pieces.append(piece)
-        return " ".join(pieces)
+        if not _AREA.fullmatch(reference) or not _ends_with(area, reference):
+            return reference
+        top, left, _, right = split_area(reference)
+        return f"{cell_name(top, left)}:{cell_name(bottom, right)}"
 
     def attribute(match: re.Match[bytes]) -> bytes:
-        return match[1] + grown(match[2].decode()).encode() + match[3]
+        return match[1] + " ".join(map(grown, match[2].decode().split())).encode() + match[3]
 
     def element(match: re.Match[bytes]) -> bytes:
         return re.sub(rb"""(\ssqref\s*=\s*["'])([^"']*)(["'])""", attribute, match[0])
