@@ -88,7 +88,7 @@ def numbers(
             f"{NOT_CALCULATED}{more}. Open the file in the spreadsheet "
             "program, save it there, and try again.",
         )
-    found = _typed_unit(texts, wanted, complain, has_bare=bool(np.isfinite(result).any()))
+    common_unit = _typed_unit(texts, wanted, complain, has_bare=bool(np.isfinite(result).any()))
     _read_texts(result, texts, decimal, elsewhere, complain)
     remarks = []
     typed = sum(bool(part.unit) for part in texts.values())
@@ -97,7 +97,7 @@ def numbers(
     if column.kind == "integer":
         for broken in np.flatnonzero(np.isfinite(result) & (result != np.floor(result))):
             complain(int(broken), f"found {result[broken]:.15g}, expected a whole number.")
-    return result, found or unit, remarks
+    return result, common_unit or unit, remarks
 
 
 def flags(values: Sequence[Value | None], complain: Complain) -> FloatArray:

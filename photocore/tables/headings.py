@@ -72,8 +72,8 @@ def unit_of(text: str) -> str:
     >>> unit_of("s1 [mm]"), unit_of("theta"), unit_of("x far px")
     ('mm', '', 'px')
     """
-    found = _UNIT.search(text) or _LOOSE_UNIT.search(text)
-    return unit_symbol(found[1]) if found else ""
+    unit = _UNIT.search(text) or _LOOSE_UNIT.search(text)
+    return unit_symbol(unit[1]) if unit else ""
 
 
 def find_columns(
@@ -169,7 +169,7 @@ def _heading_texts(
         for column, value in grid.rows[row].items()
         if isinstance(value, str) and value.strip() and column in upper
     }
-    found = [(single, row)] if single else []
+    headings = [(single, row)] if single else []
     cells = grid.rows.get(row + 1, {})
     lower = {c: v for c, v in inside(cells).items() if isinstance(cells[c], str) and v.strip()}
     if lower and len(lower) >= 2:
@@ -183,8 +183,8 @@ def _heading_texts(
                 double[column] = [*numbered, f"{group} {own}".strip(), own]
             else:
                 double[column] = [upper[column]]
-        found.append((double, row + 1))
-    return found
+        headings.append((double, row + 1))
+    return headings
 
 
 def _numbered(text: str, digit: str) -> str:

@@ -116,7 +116,7 @@ def read_table(
     """
     if decimal not in (None, "point", "comma"):
         raise InputError(f'decimal: expected "point" or "comma", found {decimal!r}.')
-    found = errors if errors is not None else []
+    complaints = errors if errors is not None else []
     book = (
         source
         if isinstance(source, SheetFile | CsvFile)
@@ -129,7 +129,7 @@ def read_table(
     refuse_doubles(book.label, place.grid.title, place.match)
     take_unit_row(place.grid, place.match)
     if isinstance(book, CsvFile):
-        table = _read_text(book, place, columns, decimal, found)
+        table = _read_text(book, place, columns, decimal, complaints)
     else:
         rows = data_rows(place.grid, place.match, columns, visible_only=visible_only)
         if place.grid.truncated or len(rows.rows) > max_rows:
@@ -138,10 +138,10 @@ def read_table(
                 "as .csv and use that file; text tables have no limit."
             )
         table = _new_table(book, place, rows)
-        _refuse_merged(table, place.grid, found)
-        fill(table, columns, _cells(place, rows), decimal, found)
-    if errors is None and found:
-        raise WorkbookError(found)
+        _refuse_merged(table, place.grid, complaints)
+        fill(table, columns, _cells(place, rows), decimal, complaints)
+    if errors is None and complaints:
+        raise WorkbookError(complaints)
     return table
 
 
@@ -392,7 +392,7 @@ def read_named_values(
     book = source if isinstance(source, SheetFile | CsvFile) else open_tables(source)
     if isinstance(book, CsvFile):
         book = book.as_sheets()
-    found = errors if errors is not None else []
+    complaints = errors if errors is not None else []
     titles = sorted(book.titles, key=lambda title: bare(title) != bare(sheet or ""))
     result = NamedValues(file=book.label, values={}, places={})
     for name in names:
@@ -404,14 +404,14 @@ def read_named_values(
             value = book.grid(title).rows.get(row, {}).get(column)
 
         def complain(_: int, message: str, key: str = name.key) -> None:
-            found.append(result.error(key, message))
+            complaints.append(result.error(key, message))
 
         result.values[name.key] = _single(name, value, decimal, complain)
         if place and name.kind == "number" and isinstance(value, str) and result.has(name.key):
             result.text_cells.append(f"{place[0]}!{result.cell(name.key)}")
-    if errors is None and found:
-        raise WorkbookError(found)
-    faulty = {error.column for error in found}
+    if errors is None and complaints:
+        raise WorkbookError(complaints)
+    faulty = {error.column for error in complaints}
     missing = [n.key for n in names if n.required and not result.has(n.key) and n.key not in faulty]
     if missing:
         where = f"{book.label} › {sheet}" if sheet else book.label
@@ -442,8 +442,8 @@ def _by_label(book: SheetFile, titles: Sequence[str], name: Column) -> tuple[str
     labels = {bare(name.key), *map(bare, name.aliases)}
     for title in titles:
         grid = book.grid(title)
-        found = _labels(grid)
-        places = [found[label] for label in labels if label in found]
+        texts = _labels(grid)
+        places = [texts[label] for label in labels if label in texts]
         if places:
             row, column = min(places)
             return title, row, _right_of(grid.rows[row], column, _value_column(grid)[1], name)

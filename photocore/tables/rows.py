@@ -111,7 +111,7 @@ def data_rows(
     visible_only : bool
         Leave hidden rows out.
     """
-    found = DataRows()
+    data = DataRows()
     sorter = RowSorter(match, columns, grid.rows.get(match.header, {}))
     sorter.block = block_above(grid, match)
     hidden = 0
@@ -122,13 +122,13 @@ def data_rows(
             hidden += 1
             if visible_only:
                 continue
-        found.rows.append(row)
-        found.blocks.append(sorter.block)
-    found.remarks += sorter.remarks()
+        data.rows.append(row)
+        data.blocks.append(sorter.block)
+    data.remarks += sorter.remarks()
     if hidden:
         what = "were left out" if visible_only else "are used too; --visible-only leaves them out"
-        found.remarks.append(f"{hidden} hidden or filtered rows {what}.")
-    return found
+        data.remarks.append(f"{hidden} hidden or filtered rows {what}.")
+    return data
 
 
 def block_above(grid: CellGrid, match: Match) -> str:

@@ -78,8 +78,8 @@ class WorkbookEditor:
 
     def table(self, name: str) -> TableArea | None:
         """Return a named table, None where there is none; upper and lower case are alike."""
-        found = (t for t in self.tables if t.name.casefold() == name.casefold())
-        return next(found, None)
+        tables = (t for t in self.tables if t.name.casefold() == name.casefold())
+        return next(tables, None)
 
     def grid(self, title: str) -> CellGrid:
         """Return a sheet's cells as they stand in the file."""
@@ -278,14 +278,14 @@ class WorkbookEditor:
             parts: dict[str, bytes] = {}
             stripped = False
             for sheet in self.book.sheets:
-                found = spliced.get(sheet.title)
-                if found is None and sheet.title in stale:
+                changed = spliced.get(sheet.title)
+                if changed is None and sheet.title in stale:
                     data = read_part(self.path, package, sheet.part)
-                    found = splice_sheet(self.path, sheet.part, data, SheetChanges())
-                if found is not None:
+                    changed = splice_sheet(self.path, sheet.part, data, SheetChanges())
+                if changed is not None:
                     strip = sheet.title in stale
-                    parts[sheet.part] = found.joined(strip=strip)
-                    stripped |= strip and bool(found.strips)
+                    parts[sheet.part] = changed.joined(strip=strip)
+                    stripped |= strip and bool(changed.strips)
             for area, bottom in self.grown.values():
                 references.grow(area, bottom, parts)
             if stripped:

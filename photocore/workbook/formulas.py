@@ -221,13 +221,13 @@ def recalculate_on_load(
 ) -> None:
     """Tell spreadsheet programs to calculate all formulas when they open the workbook."""
     data = parts.get(book.part) or read_part(path, package, book.part)
-    found = re.search(rb"<(?:\w+:)?calcPr(?:\s[^>]*)?>", data)
-    if found:
-        tag = re.sub(rb"""\sfullCalcOnLoad\s*=\s*("[^"]*"|'[^']*')""", b"", found[0])
+    element = re.search(rb"<(?:\w+:)?calcPr(?:\s[^>]*)?>", data)
+    if element:
+        tag = re.sub(rb"""\sfullCalcOnLoad\s*=\s*("[^"]*"|'[^']*')""", b"", element[0])
         head = re.match(rb"<(?:\w+:)?calcPr", tag)
         end = head.end() if head else 0
         tag = tag[:end] + b' fullCalcOnLoad="1"' + tag[end:]
-        parts[book.part] = data[: found.start()] + tag + data[found.end() :]
+        parts[book.part] = data[: element.start()] + tag + data[element.end() :]
         return
     # The schema fixes the order of the elements; calcPr comes before these.
     later = (

@@ -313,10 +313,10 @@ class _Splicer:
     def holds(self, value: CellValue) -> bool:
         """Whether this cell holds the value already."""
         kind = self.attributes.get("t", "n")
-        found = self.child("v") or self.child("is")
-        if found is None:
+        content = self.child("v") or self.child("is")
+        if content is None:
             return value is None or value == ""
-        inner = self.data[self.tag_end(found[0]) : self.data.rfind(b"<", found[0], found[1])]
+        inner = self.data[self.tag_end(content[0]) : self.data.rfind(b"<", content[0], content[1])]
         text = unescape_xml(inner.decode("utf-8"), {"&quot;": '"', "&apos;": "'"})
         try:
             if kind == "n" and not isinstance(value, str | bool) and value is not None:
@@ -334,8 +334,8 @@ class _Splicer:
 
     def child(self, kind: str) -> tuple[int, int] | None:
         """Return where a direct child of this cell lies."""
-        for found, start, end in self.children:
-            if found == kind:
+        for own, start, end in self.children:
+            if own == kind:
                 return start, end
         return None
 

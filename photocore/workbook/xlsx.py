@@ -265,13 +265,13 @@ def unescape(text: str) -> str:
 
 def _single_cells(book: Workbook) -> dict[str, tuple[str, int, int]]:
     """Return the defined names that stand for one cell."""
-    found = {}
+    places = {}
     for name, reference in book.names.items():
         match = re.fullmatch(r"(?:'((?:[^']|'')+)'|([^'!:]+))!(\$?[A-Z]{1,3}\$?\d+)", reference)
         if match:
             title = match[1].replace("''", "'") if match[1] else match[2]
-            found[name.casefold()] = (title, *split_cell(match[3]))
-    return found
+            places[name.casefold()] = (title, *split_cell(match[3]))
+    return places
 
 
 def row_cells(row: Element) -> Iterator[tuple[int, Element]]:
