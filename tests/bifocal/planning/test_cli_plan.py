@@ -9,7 +9,7 @@ import pytest
 from click.testing import CliRunner
 
 from bifocal.cli.main import main
-from photocore.workbook.lint import lint
+from tests.workbook_lint import lint
 
 CANON = ["--sensor", "22.7x15.1", "--pixels", "3072x2048"]
 LENSES = ["--focal", "35", "--focal", "28", "--focal", "19"]
