@@ -40,9 +40,9 @@ from bifocal.survey.workbook.sheets import (
     SheetBuilder,
 )
 from bifocal.survey.workbook.words import readme, term
-from photocore.workbook.bookrows import CellValue, finish_book
+from photocore.workbook.cells import CellValue
 from photocore.workbook.grid import column_letters
-from photocore.workbook.newbook import new_workbook
+from photocore.workbook.newbook import finish_book, new_workbook
 
 Cells = Mapping[str, Sequence[CellValue]]
 #: Row of the keys in `Points` and `Results`.

@@ -12,8 +12,9 @@ from bifocal.survey.workbook.content import CHART_ROWS, SurveyContent
 from bifocal.survey.workbook.reference_sheets import CHECK_HEAD
 from bifocal.survey.workbook.sheets import LABEL_FONT, BookBuilder
 from bifocal.survey.workbook.words import word
-from photocore.workbook.bookrows import CellValue, RowBlock
+from photocore.workbook.cells import CellValue
 from photocore.workbook.grid import column_letters
+from photocore.workbook.newbook import RowBlock
 
 #: Row of the headings of the chart data; text would break a scatter chart, so blanks are #N/A.
 HEAD = 4

@@ -16,7 +16,7 @@ from bifocal.survey.setup import SurveySetup
 from bifocal.survey.tolerances import RULES, ToleranceRule
 from bifocal.survey.workbook.setup_cells import MATRICES, NADIRS
 from photocore.arrays import FloatArray
-from photocore.workbook.bookrows import CellValue
+from photocore.workbook.cells import CellValue
 
 #: Rows of the tables of an empty template.
 POINT_ROWS, CHECK_ROWS, CONTROL_ROWS, SPARE_ROWS = 300, 25, 12, 10

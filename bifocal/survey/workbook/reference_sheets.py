@@ -33,7 +33,7 @@ from bifocal.survey.workbook.sheets import (
     SheetBuilder,
 )
 from bifocal.survey.workbook.words import word
-from photocore.workbook.bookrows import CellValue
+from photocore.workbook.cells import CellValue
 from photocore.workbook.grid import column_letters
 
 Cells = Mapping[str, Sequence[CellValue]]
