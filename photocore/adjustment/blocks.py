@@ -59,7 +59,7 @@ class BlockEquations:
         """Normal matrix of the unknowns (u, u), with the points (u, p, 3), of them (p, 3, 3)."""
         count = len(self.free)
         own = (self.design.T @ self.design).toarray()
-        mixed = (self.design.T @ self.eliminated).toarray().reshape(-1, count, 3)
+        mixed = (self.design.T @ self.eliminated).toarray().reshape(own.shape[0], count, 3)
         square = (self.eliminated.T @ self.eliminated).tobsr((3, 3))
         blocks = np.zeros((count, 3, 3))
         blocks[square.indices] = square.data
@@ -80,7 +80,8 @@ class BlockEquations:
         inverse = np.linalg.inv(blocks * (1.0 + damping * np.eye(3)))
         solved = np.einsum("upi,pij->upj", mixed, inverse)
         schur = own + damping * np.diag(np.diag(own))
-        schur -= solved.reshape(len(own), -1) @ mixed.reshape(len(own), -1).T
+        shape = (len(own), self.free.size)
+        schur -= solved.reshape(shape) @ mixed.reshape(shape).T
         return inverse, solved, schur
 
     def step(self, damping: float, misfit: FloatArray | None = None) -> FloatArray:
@@ -143,7 +144,7 @@ class BlockEquations:
         count = self.design.shape[1]
         rows, columns = hstack([self.design, self.eliminated], "csr"), self.design.tocsc()
         spread = _own_spread(self.eliminated, self.block_cofactor)
-        mixed = self._mixed_cofactor.reshape(count, -1)
+        mixed = self._mixed_cofactor.reshape(count, self.free.size)
         for column in range(count):
             part = slice(*columns.indptr[column : column + 2])
             row = columns.indices[part]
