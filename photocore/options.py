@@ -43,7 +43,7 @@ class Numbers(click.ParamType):  # type: ignore[type-arg,unused-ignore]
         if isinstance(value, tuple):
             return value
         try:
-            numbers = tuple(float(part) for part in str(value).split(","))
+            numbers = tuple(float(part) for part in str(value).replace(";", ",").split(","))
         except ValueError:
             self.fail(f"{value!r} is not a list of numbers with commas between them", param, ctx)
         if self.count is not None and len(numbers) != self.count:

@@ -9,7 +9,7 @@ import numpy as np
 
 from multimedia.media.camera import INTERIOR
 from multimedia.projects.model import Project
-from photocore.adjustment import correlations
+from photocore.adjustment import OUTLIER_LIMIT, correlations, standardised
 from photocore.arrays import FloatArray, positive
 from photocore.errors import InputError
 
@@ -166,11 +166,9 @@ class Adjustment:
 
         Baarda's internal reliability: 4.13 sigma / sqrt(redundancy number).
         """
-        with np.errstate(divide="ignore", invalid="ignore"):
-            ratio = np.where(self.redundancy_numbers > 1e-9, self.redundancy_numbers, np.nan)
-            return 4.13 * self.sigma0 / np.sqrt(ratio)
+        return standardised(4.13 * self.sigma0, self.redundancy_numbers)
 
-    def suspects(self, limit: float = 3.5) -> list[str]:
+    def suspects(self, limit: float = OUTLIER_LIMIT) -> list[str]:
         """Return a sentence for each image point that looks like a gross error, worst first."""
         worst = np.abs(np.nan_to_num(self.standardised)).max(axis=1, initial=0.0)
         points = self.project.image_points

@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING
 import click
 
 from photocore.cli import print_json, remark, text_table
+from photocore.options import Numbers
 
 if TYPE_CHECKING:
-    from multimedia.orientation.epipolar_workflow import Curves
+    from multimedia.orientation.epipolar_workflow import EpipolarResult
 
 EXAMPLE = """\b
 Examples:
@@ -18,24 +19,6 @@ Examples:
   multimedia epipolar tank.toml --camera cam1 --to cam3 --at 640.5,371.2 --z-range -20,20
   multimedia epipolar tank.toml --camera cam1 --to cam2 --picture curves.png --photo cam2.tif
 """
-
-
-class Numbers(click.ParamType):  # type: ignore[type-arg,unused-ignore]
-    """Two numbers with a comma."""
-
-    name = "A,B"
-
-    def convert(
-        self, value: object, param: click.Parameter | None, ctx: click.Context | None
-    ) -> tuple[float, float]:
-        """Return both."""
-        if isinstance(value, tuple):
-            return value
-        try:
-            one, two = (float(part) for part in str(value).replace(";", ",").split(","))
-        except ValueError:
-            self.fail(f"{value!r} is not two numbers with a comma, e.g. 640.5,371.2", param, ctx)
-        return one, two
 
 
 @click.command(short_help="Epipolar curves and the candidates along them.", epilog=EXAMPLE)
@@ -46,9 +29,9 @@ class Numbers(click.ParamType):  # type: ignore[type-arg,unused-ignore]
     "--point", "ids", multiple=True, metavar="ID",
     help="Image point of --camera; repeatable.  [default: all of them]",
 )  # fmt: skip
-@click.option("--at", type=Numbers(), help="Column, row of a point instead [px].")
+@click.option("--at", type=Numbers(2), metavar="A,B", help="Column, row of a point instead [px].")
 @click.option(
-    "--z-range", type=Numbers(),
+    "--z-range", type=Numbers(2), metavar="A,B",
     help="Depth range of the object, Z from and to [unit of the project].  [default: that of the "
     "object points and a quarter more]",
 )  # fmt: skip
@@ -96,38 +79,38 @@ def command(
     """
     from multimedia.orientation.epipolar_workflow import epipolar_project
 
-    found = epipolar_project(
+    result = epipolar_project(
         project, camera=camera, other=other, ids=ids, at=at, z_range=z_range,
         chord_error=chord / 1000.0, vertices=vertices, tolerance=tolerance / 1000.0, out=out,
         picture=picture, photo=photo, overwrite=overwrite,
     )  # fmt: skip
-    for line in found.remarks:
+    for line in result.remarks:
         remark(f"Note: {line}")
     if as_json:
         print_json(
-            {"z_range": found.z_range, "curves": found.curves, "candidates": found.candidates}
+            {"z_range": result.z_range, "curves": result.curves, "candidates": result.candidates}
         )
     else:
-        _print(found)
+        _print(result)
     for file in (out, picture):
         if file is not None:
             remark(f"Written: {file}")
 
 
-def _print(found: Curves) -> None:
+def _print(result: EpipolarResult) -> None:
     """Print the curves if they are few, and the candidates."""
-    if len(found.curves) <= 3:
+    if len(result.curves) <= 3:
         rows = [
             (c["id"], *(f"{v:.5f}" for v in xy), *(f"{v:.4f}" for v in xyz))
-            for c in found.curves
+            for c in result.curves
             for xy, xyz in zip(c["image"], c["points"], strict=True)
         ]
         click.echo(text_table(("point", "x mm", "y mm", "X", "Y", "Z"), rows))
     else:
-        click.echo(f"{len(found.curves)} curves; --out writes their vertices.")
+        click.echo(f"{len(result.curves)} curves; --out writes their vertices.")
     rows = [
         (c["id"], c["target"], f"{c['distance'] * 1000:.2f}", *(f"{c[k]:.4f}" for k in "XYZ"))
-        for c in found.candidates
+        for c in result.candidates
     ]
     click.echo(f"\n{len(rows)} candidates")
     if rows:

@@ -11,14 +11,14 @@ import click
 from photocore.cli import print_json, remark, text_table
 
 if TYPE_CHECKING:
-    from multimedia.orientation.workflow import Table
+    from multimedia.orientation.workflow import PointTable
 
 #: Rows printed when the table also goes into a file.
 _SHOWN = 10
 
 
 def show(
-    table: Table,
+    table: PointTable,
     *,
     as_json: bool,
     out: Path | None,

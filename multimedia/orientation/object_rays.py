@@ -12,7 +12,7 @@ from multimedia.media.collinearity import rays_in_object_space
 from multimedia.media.interfaces import Interfaces
 from multimedia.media.projection import Media, as_interface
 from multimedia.media.traced_projection import object_rays as traced_rays
-from photocore.arrays import FloatArray, as_points
+from photocore.arrays import BoolArray, FloatArray, as_points
 
 
 def image_rays(
@@ -82,26 +82,14 @@ def nearest_points(origins: Sequence[FloatArray], directions: Sequence[FloatArra
     normal, right = np.zeros((6, n)), np.zeros((3, n))
     for origin, direction in zip(origins, directions, strict=True):
         seen = np.isfinite(direction[:, 0])
-        o, d = (origin, direction) if seen.all() else (origin[seen], direction[seen])
+        use: slice | BoolArray = slice(None) if seen.all() else seen
+        o, d = origin[use], direction[use]
         x, y, z = d.T
         part = np.stack([1 - x * x, -x * y, -x * z, 1 - y * y, -y * z, 1 - z * z])
         along = np.einsum("ni,ni->n", o, d)
-        foot = (o - along[:, None] * d).T
-        if seen.all():
-            normal += part
-            right += foot
-        else:
-            normal[:, seen] += part
-            right[:, seen] += foot
-    return solve_3x3(normal, right).T
-
-
-def solve_3x3(normal: FloatArray, right: FloatArray) -> FloatArray:
-    """Solve symmetric 3 x 3 systems, shape (3, n); NaN where singular.
-
-    ``normal`` holds the rows xx, xy, xz, yy, yz, zz.
-    """
-    return times(inverse_3x3(normal), right)
+        normal[:, use] += part
+        right[:, use] += (o - along[:, None] * d).T
+    return times(inverse_3x3(normal), right).T
 
 
 def inverse_3x3(normal: FloatArray) -> FloatArray:

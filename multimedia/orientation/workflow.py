@@ -13,7 +13,7 @@ from multimedia.media.camera import EXTERIOR, INTERIOR
 from multimedia.media.projection import project as project_points
 from multimedia.media.projection import projection_status
 from multimedia.orientation.intersection import (
-    Intersection,
+    IntersectedPoints,
     intersect,
     intersect_pairs,
     intersect_rays,
@@ -27,13 +27,9 @@ from photocore.arrays import FloatArray
 from photocore.errors import InputError
 from photocore.output import check_writable
 
-#: How points may be intersected.
-METHODS = ("rigorous", "rays", "pairs")
-_ANGLES = ("omega", "phi", "kappa")
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Table:
+class PointTable:
     """Columns to print or write, with what to say about them."""
 
     columns: dict[str, Any]
@@ -50,37 +46,32 @@ class Table:
 
 def project_project(
     path: Path, *, points: Path | None, out: Path | None, overwrite: bool = False
-) -> Table:
+) -> PointTable:
     """Project the object points of a project, or of another table, into all its cameras."""
     if out is not None:
         check_writable(out, overwrite=overwrite)
     project = read_project(path)
     objects, remarks = _objects(project, points)
-    names: list[str] = []
-    parts: list[FloatArray] = []
-    pixels: list[FloatArray] = []
-    status: list[str] = []
-    for camera, media in zip(project.cameras, project.interfaces, strict=True):
-        image = project_points(camera, objects.xyz, media)
-        parts.append(image)
-        names += [camera.name] * len(objects.ids)
-        status += projection_status(camera, objects.xyz, media)
-        if camera.sensor is not None:
-            pixels.append(camera.sensor.pixel_from_image(image))
-    image = np.concatenate(parts)
+    views = list(zip(project.cameras, project.interfaces, strict=True))
+    images = [project_points(camera, objects.xyz, media) for camera, media in views]
+    pixels = [
+        camera.sensor.pixel_from_image(image)
+        for camera, image in zip(project.cameras, images, strict=True)
+        if camera.sensor is not None
+    ]
     columns: dict[str, Any] = {
-        "camera": names,
-        "id": list(objects.ids) * len(project.cameras),
-        "x": image[:, 0],
-        "y": image[:, 1],
+        "camera": np.repeat(project.camera_names, len(objects.ids)).tolist(),
+        "id": list(objects.ids) * len(views),
     }
-    if len(pixels) == len(parts):
-        both = np.concatenate(pixels)
-        columns |= {"col": both[:, 0], "row": both[:, 1]}
-    columns["status"] = status
+    columns |= dict(zip("xy", np.concatenate(images).T, strict=True))
+    if len(pixels) == len(views):
+        columns |= dict(zip(("col", "row"), np.concatenate(pixels).T, strict=True))
+    columns["status"] = [
+        text for camera, media in views for text in projection_status(camera, objects.xyz, media)
+    ]
     units = {"x": "mm", "y": "mm", "col": "px", "row": "px"}
     _write(out, columns, units, overwrite)
-    return Table(columns=columns, remarks=(*project.remarks, *remarks))
+    return PointTable(columns=columns, remarks=(*project.remarks, *remarks))
 
 
 def intersect_project(
@@ -90,7 +81,7 @@ def intersect_project(
     out: Path | None,
     method: str = "rigorous",
     overwrite: bool = False,
-) -> Table:
+) -> PointTable:
     """Intersect the image points of a project, or of another table."""
     if out is not None:
         check_writable(out, overwrite=overwrite)
@@ -101,9 +92,9 @@ def intersect_project(
     sigma = np.where(np.isnan(sigma), project.sigma_image, sigma)
     u = project.unit
     if method == "rigorous":
-        found = intersect(project.cameras, image, project.interfaces, sigma=sigma)
-        columns, units, summary = _intersection_columns(project, found, u)
-        xyz = found.xyz
+        solved = intersect(project.cameras, image, project.interfaces, sigma=sigma)
+        columns, units, summary = _intersection_columns(project, solved, u)
+        xyz = solved.xyz
     else:
         if method == "rays":
             xyz = intersect_rays(project.cameras, image, project.interfaces)
@@ -127,41 +118,41 @@ def intersect_project(
     summary += _check(project, list(ids), xyz)
     remarks = [*remarks, *_suspicious(project, columns["status"])]
     _write(out, columns, units, overwrite)
-    return Table(columns=columns, remarks=(*project.remarks, *remarks), summary=tuple(summary))
+    return PointTable(columns=columns, remarks=(*project.remarks, *remarks), summary=tuple(summary))
 
 
 def _intersection_columns(
-    project: Project, found: Intersection, unit: str
+    project: Project, solved: IntersectedPoints, unit: str
 ) -> tuple[dict[str, Any], dict[str, str], list[str]]:
     """Return the columns of a rigorous intersection, their units, and a summary."""
-    sigma = found.sigma
-    worst = found.worst_camera
-    doubtful = found.status == PointStatus.GROSS_ERROR
+    sigma = solved.sigma
+    worst = solved.worst_camera
+    doubtful = solved.status == PointStatus.GROSS_ERROR
     columns: dict[str, Any] = {
-        **{axis: found.xyz[:, k] for k, axis in enumerate("XYZ")},
+        **{axis: solved.xyz[:, k] for k, axis in enumerate("XYZ")},
         **{f"sigma_{axis}": sigma[:, k] for k, axis in enumerate("XYZ")},
-        "rays": found.rays,
-        "angle": np.degrees(found.angle),
-        "sigma0": found.sigma0,
+        "rays": solved.rays,
+        "angle": np.degrees(solved.angle),
+        "sigma0": solved.sigma0,
         "suspect": [
             project.cameras[camera].name if bad and camera >= 0 else ""
             for camera, bad in zip(worst.tolist(), doubtful.tolist(), strict=True)
         ],
-        "status": [PointStatus(code).label for code in found.status.tolist()],
+        "status": [PointStatus(code).label for code in solved.status.tolist()],
     }
     units = dict.fromkeys(("X", "Y", "Z", "sigma_X", "sigma_Y", "sigma_Z"), unit) | {"angle": "deg"}
-    good = np.isfinite(found.xyz[:, 0])
+    good = np.isfinite(solved.xyz[:, 0])
     summary = [f"{int(good.sum())} points"]
-    controlled = np.isfinite(found.sigma0)
+    controlled = np.isfinite(solved.sigma0)
     if controlled.any():
-        weights = np.maximum(2 * found.rays[controlled] - 3, 1)
-        overall = np.sqrt((found.sigma0[controlled] ** 2 * weights).sum() / weights.sum())
+        weights = np.maximum(2 * solved.rays[controlled] - 3, 1)
+        overall = np.sqrt((solved.sigma0[controlled] ** 2 * weights).sum() / weights.sum())
         summary[0] += (
             f", sigma0 {overall:.3g} (1 expected with image coordinates of "
             f"{project.sigma_image * 1000:g} um)"
         )
     for code in PointStatus:
-        count = int((found.status == code).sum())
+        count = int((solved.status == code).sum())
         if count and code != PointStatus.OK:
             summary.append(f"{count} points: {code.label}")
     return columns, units, summary
@@ -257,17 +248,14 @@ def residual_columns(
     return {
         "camera": [name for name in names for _ in used[name]],
         "id": [point for name in names for point in used[name]],
-        "vx": v[:, 0],
-        "vy": v[:, 1],
-        "wx": w[:, 0],
-        "wy": w[:, 1],
+        **dict(zip(("vx", "vy", "wx", "wy"), np.hstack([v, w]).T, strict=True)),
     }
 
 
-def resected_as_dict(found: Resected) -> dict[str, Any]:
+def resected_as_dict(resected: Resected) -> dict[str, Any]:
     """Return resections as plain data for ``--json``; angles in degrees."""
     cameras = []
-    for name, result in found.results.items():
+    for name, result in resected.results.items():
         values = {p: _shown(p, result.camera.value(p)) for p in EXTERIOR + INTERIOR}
         sigmas = {p: _shown(p, s) for p, s in result.sigmas.items()}
         cameras.append(
@@ -275,7 +263,7 @@ def resected_as_dict(found: Resected) -> dict[str, Any]:
                 "name": name,
                 "sigma0": result.sigma0,
                 "sigma0_um": result.sigma0 * 1000.0,
-                "points": len(found.used[name]),
+                "points": len(resected.used[name]),
                 "redundancy": result.redundancy,
                 "iterations": result.iterations,
                 "estimated": list(result.names),
@@ -283,15 +271,15 @@ def resected_as_dict(found: Resected) -> dict[str, Any]:
                 "sigma": sigmas,
                 "correlations": result.correlations,
                 "suspects": [
-                    p for p, bad in zip(found.used[name], result.suspects, strict=True) if bad
+                    p for p, bad in zip(resected.used[name], result.suspects, strict=True) if bad
                 ],
             }
         )
-    return {"unit": found.project.unit, "cameras": cameras, "remarks": list(found.remarks)}
+    return {"unit": resected.project.unit, "cameras": cameras, "remarks": list(resected.remarks)}
 
 
 def _shown(name: str, value: float) -> float:
-    return float(np.degrees(value)) if name in _ANGLES else value
+    return float(np.degrees(value)) if name in EXTERIOR[3:] else value
 
 
 def _image_sigma(project: Project, rows: Sequence[int]) -> FloatArray | None:

@@ -13,7 +13,7 @@ CONTROLLED = 1e-9
 
 
 def standardised(
-    residuals: FloatArray, redundancy_numbers: FloatArray, sigma0: float | FloatArray = 1.0
+    residuals: FloatArray | float, redundancy_numbers: FloatArray, sigma0: float = 1.0
 ) -> FloatArray:
     """Return weighted residuals over their own standard deviations (Baarda's data snooping).
 
