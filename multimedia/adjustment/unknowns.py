@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from multimedia.media.camera import INTERIOR
+from multimedia.media.camera import EXTERIOR, INTERIOR
 from multimedia.projects.model import Project
 from photocore.adjustment import OUTLIER_LIMIT, correlations, standardised
 from photocore.arrays import FloatArray, positive
@@ -154,6 +154,15 @@ class Adjustment:
         """Return the standard deviation of one unknown by its label."""
         row = self.names.index(name)
         return float(np.sqrt(self.covariance[row, row]))
+
+    def rows(self) -> list[tuple[str, float, float, str]]:
+        """Return name, value, sigma and unit of every unknown; angles in degrees."""
+        table = []
+        for k, name in enumerate(self.names):
+            turns = name.rsplit(":", 1)[-1] in (*EXTERIOR[3:], "tilt1", "tilt2")
+            factor, unit = (float(np.degrees(1.0)), "deg") if turns else (1.0, "")
+            table.append((name, float(self.values[k]) * factor, self.sigma(name) * factor, unit))
+        return table
 
     @property
     def correlations(self) -> FloatArray:

@@ -20,7 +20,13 @@ from multimedia.media.projection import (
     project_with_jacobian,
     refuse_pixels,
 )
-from multimedia.orientation.object_rays import image_rays, inverse_3x3, nearest_points, times
+from multimedia.orientation.object_rays import (
+    image_rays,
+    inverse_3x3,
+    largest_angle,
+    nearest_points,
+    times,
+)
 from multimedia.orientation.point_status import PointStatus
 from multimedia.projects.model import SIGMA_IMAGE, SIGMA_PIXEL
 from photocore.adjustment import standardised
@@ -245,7 +251,7 @@ def _block(
     seen: BoolArray = np.asarray(np.isfinite(image).all(axis=-1))
     rays = [image_rays(c, p, i) for c, p, i in zip(cameras, image, placed, strict=True)]
     xyz = nearest_points([o for o, _ in rays], [d for _, d in rays])
-    angle = _largest_angle([d for _, d in rays])
+    angle = largest_angle([d for _, d in rays])
     status = np.where(np.isfinite(xyz).all(axis=1), PointStatus.NOT_CONVERGED, PointStatus.WEAK)
     count = seen.sum(axis=0)
     normal: FloatArray = np.full((6, n), np.nan)
@@ -353,17 +359,6 @@ def _assembled(
         angle=angle,
         status=status.astype(np.int64),
     )
-
-
-def _largest_angle(directions: Sequence[FloatArray]) -> FloatArray:
-    """Return the largest angle between two rays of each point; NaN with fewer than two."""
-    widest = np.full(len(directions[0]), np.nan)
-    for one, two in combinations(directions, 2):
-        # The chord keeps small angles exact where the cosine would lose them.
-        gap = one - two
-        chord = np.sqrt(np.einsum("ni,ni->n", gap, gap))
-        widest = np.fmax(widest, chord)
-    return 2.0 * np.arcsin(np.minimum(0.5 * widest, 1.0))
 
 
 def _checked(

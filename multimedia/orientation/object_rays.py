@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import combinations
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -111,3 +112,14 @@ def times(inverse: FloatArray, right: FloatArray) -> FloatArray:
     xx, xy, xz, yy, yz, zz = inverse
     a, b, c = right
     return np.stack([xx * a + xy * b + xz * c, xy * a + yy * b + yz * c, xz * a + yz * b + zz * c])
+
+
+def largest_angle(directions: Sequence[FloatArray]) -> FloatArray:
+    """Return the largest angle between two rays of each point; NaN with fewer than two."""
+    widest = np.full(len(directions[0]), np.nan)
+    for one, two in combinations(directions, 2):
+        # The chord keeps small angles exact where the cosine would lose them.
+        gap = one - two
+        chord = np.sqrt(np.einsum("ni,ni->n", gap, gap))
+        widest = np.fmax(widest, chord)
+    return 2.0 * np.arcsin(np.minimum(0.5 * widest, 1.0))
