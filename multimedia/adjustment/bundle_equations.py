@@ -154,10 +154,10 @@ class Bundle:
         image = np.empty(seen.image.shape)
         design, eliminated = _Entries(), _Entries()
         for k, rows in enumerate(seen.rows):
-            found = self._camera_rows(state, k, rows, design, eliminated)
-            if found is None:
+            projected = self._camera_rows(state, k, rows, design, eliminated)
+            if projected is None:
                 return None
-            image[rows] = found
+            image[rows] = projected
         misses = [((image - seen.image) / seen.sigma).ravel()]
         count = misses[0].size
         for miss, columns, values, points, by_points in self._extra_rows(state):

@@ -63,38 +63,40 @@ def command(
             print_json({"folder": export, "cameras": list(written.camera_names)})
         return
     target = out if out is not None else Path(f"{source.resolve().name}.toml")
-    found = import_openptv(
+    imported = import_openptv(
         source, out=target, overwrite=overwrite, swap_indices=swap_indices,
         least_pixels=min_pixels, radius=radius,
     )  # fmt: skip
-    for line in found.project.remarks:
+    for line in imported.project.remarks:
         remark(f"Note: {line}")
-    cameras = found.project.cameras
+    cameras = imported.project.cameras
     if as_json:
         print_json(
             {
                 "project": target,
-                "files": list(found.files),
-                "unit": found.project.unit,
+                "files": list(imported.files),
+                "unit": imported.project.unit,
                 "cameras": [
                     {"name": camera.name, "control_points": count, "media": media}
                     for camera, count, media in zip(
-                        cameras, found.matched, found.project.media_of, strict=True
+                        cameras, imported.matched, imported.project.media_of, strict=True
                     )
                 ],
-                "object_points": len(found.project.object_points.ids),
-                "particles": found.particles,
-                "remarks": list(found.project.remarks),
+                "object_points": len(imported.project.object_points.ids),
+                "particles": imported.particles,
+                "remarks": list(imported.project.remarks),
             }
         )
         return
-    total = len(found.project.object_points.ids)
+    total = len(imported.project.object_points.ids)
     rows = [
         (camera.name, media or "none", f"{count} of {total}")
-        for camera, count, media in zip(cameras, found.matched, found.project.media_of, strict=True)
+        for camera, count, media in zip(
+            cameras, imported.matched, imported.project.media_of, strict=True
+        )
     ]
     click.echo(text_table(("camera", "looks through", "control points"), rows))
-    if found.particles:
-        click.echo(f"{found.particles} particles of the stored frame")
-    for file in found.files:
+    if imported.particles:
+        click.echo(f"{imported.particles} particles of the stored frame")
+    for file in imported.files:
         click.echo(f"Written: {file}")

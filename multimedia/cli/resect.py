@@ -59,26 +59,26 @@ def command(
     names = tuple(name.strip() for name in estimate.split(",") if name.strip())
     if names == ("all",):
         names = ("c", "xh", "yh", "k1", "k2", "k3", "p1", "p2", "scale", "shear")
-    found = resect_project(
+    resected = resect_project(
         project, estimate=names, cameras=cameras, out=out, residuals=residuals, overwrite=overwrite
     )
-    for line in found.remarks:
+    for line in resected.remarks:
         remark(f"Note: {line}")
     if as_json:
-        print_json(resected_as_dict(found))
+        print_json(resected_as_dict(resected))
     else:
-        _print(found)
+        _print(resected)
     if out is not None:
         remark(f"Project written to {out}")
     if residuals is not None:
         remark(f"Residuals written to {residuals}")
 
 
-def _print(found: Resected) -> None:
+def _print(resected: Resected) -> None:
     """Print parameters with their standard deviations."""
     from multimedia.orientation.workflow import resected_as_dict
 
-    for camera in resected_as_dict(found)["cameras"]:
+    for camera in resected_as_dict(resected)["cameras"]:
         sigma0 = f"{camera['sigma0_um']:.3f} um" if camera["redundancy"] else "unknown"
         click.echo(
             f"{camera['name']}: sigma0 {sigma0}, {camera['points']} points, "

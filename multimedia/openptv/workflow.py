@@ -83,16 +83,16 @@ def import_openptv(
     project = experiment.project
     if swap_indices:
         project = read_experiment(folder, swap_indices=True).project
-    found = [_control(experiment, k, least_pixels, radius) for k in range(len(project.cameras))]
-    matched = tuple(len(ids) for ids, _, _ in found)
+    control = [_control(experiment, k, least_pixels, radius) for k in range(len(project.cameras))]
+    matched = tuple(len(ids) for ids, _, _ in control)
     _, particles = particle_points(experiment)
     images = ImagePoints(
         cameras=(*np.repeat(project.camera_names, matched).tolist(), *particles.cameras),
-        ids=(*(name for ids, _, _ in found for name in ids), *particles.ids),
-        image=np.concatenate([*(image for _, image, _ in found), particles.image]),
+        ids=(*(name for ids, _, _ in control for name in ids), *particles.ids),
+        image=np.concatenate([*(image for _, image, _ in control), particles.image]),
         groups=("control",) * sum(matched) + ("particles",) * len(particles.ids),
     )
-    remarks = (*project.remarks, *(text for _, _, said in found for text in said))
+    remarks = (*project.remarks, *(text for _, _, said in control for text in said))
     project = replace(project, image_points=images, remarks=remarks)
     files = () if out is None else tuple(write_project(out, project, overwrite=overwrite))
     return Import(

@@ -23,7 +23,7 @@ from multimedia.orientation.resection import Resection, resect
 from multimedia.projects.model import SHOWN, ImagePoints, ObjectPoints, Project
 from multimedia.projects.point_tables import read_image_points, read_object_points, write_columns
 from multimedia.projects.project_file import read_project, write_project
-from photocore.arrays import FloatArray
+from photocore.arrays import FloatArray, IntArray
 from photocore.errors import InputError
 from photocore.output import check_writable
 
@@ -96,20 +96,18 @@ def intersect_project(
         columns, units, summary = _intersection_columns(project, solved, u)
         xyz = solved.xyz
     else:
+        extra: dict[str, Any] = {}
         if method == "rays":
             xyz = intersect_rays(project.cameras, image, project.interfaces)
-            extra: dict[str, Any] = {}
         else:
-            xyz, distance = intersect_pairs(project.cameras, image, project.interfaces)
-            extra = {"ray_distance": distance}
+            xyz, extra["ray_distance"] = intersect_pairs(project.cameras, image, project.interfaces)
         rays = np.isfinite(image).all(axis=-1).sum(axis=0)
         lost = [PointStatus.NO_RAY, PointStatus.ONE_RAY]
         status = [
             PointStatus.OK.label if good else (lost[n] if n < 2 else PointStatus.WEAK).label
             for good, n in zip(np.isfinite(xyz[:, 0]), rays.tolist(), strict=True)
         ]
-        columns = {"X": xyz[:, 0], "Y": xyz[:, 1], "Z": xyz[:, 2], **extra}
-        columns |= {"rays": rays, "status": status}
+        columns = dict(zip("XYZ", xyz.T, strict=True)) | extra | {"rays": rays, "status": status}
         units = dict.fromkeys(("X", "Y", "Z", "ray_distance"), u)
         summary = [
             f"{int(np.isfinite(xyz[:, 0]).sum())} points from {len(images.ids)} image points"
@@ -125,18 +123,16 @@ def _intersection_columns(
     project: Project, solved: IntersectedPoints, unit: str
 ) -> tuple[dict[str, Any], dict[str, str], list[str]]:
     """Return the columns of a rigorous intersection, their units, and a summary."""
-    sigma = solved.sigma
-    worst = solved.worst_camera
     doubtful = solved.status == PointStatus.GROSS_ERROR
     columns: dict[str, Any] = {
-        **{axis: solved.xyz[:, k] for k, axis in enumerate("XYZ")},
-        **{f"sigma_{axis}": sigma[:, k] for k, axis in enumerate("XYZ")},
+        **dict(zip("XYZ", solved.xyz.T, strict=True)),
+        **dict(zip(("sigma_X", "sigma_Y", "sigma_Z"), solved.sigma.T, strict=True)),
         "rays": solved.rays,
         "angle": np.degrees(solved.angle),
         "sigma0": solved.sigma0,
         "suspect": [
             project.cameras[camera].name if bad and camera >= 0 else ""
-            for camera, bad in zip(worst.tolist(), doubtful.tolist(), strict=True)
+            for camera, bad in zip(solved.worst_camera.tolist(), doubtful.tolist(), strict=True)
         ],
         "status": [PointStatus(code).label for code in solved.status.tolist()],
     }
@@ -184,9 +180,9 @@ def resect_project(
     project = read_project(path)
     unknown = [name for name in cameras if name not in project.camera_names]
     if unknown:
+        have = ", ".join(project.camera_names)
         raise InputError(
-            f"--camera: no camera is called {', '.join(unknown)}; the project has "
-            f"{', '.join(project.camera_names)}."
+            f"--camera: no camera is called {', '.join(unknown)}; the project has {have}."
         )
     objects = project.object_points
     if not objects.ids:
@@ -194,46 +190,48 @@ def resect_project(
     remarks = list(project.remarks)
     results: dict[str, Resection] = {}
     used: dict[str, tuple[str, ...]] = {}
-    adjusted = list(project.cameras)
-    for k, camera in enumerate(project.cameras):
-        if cameras and camera.name not in cameras:
-            continue
-        rows = project.image_points.of_camera(camera.name)
-        ids = [project.image_points.ids[row] for row in rows]
-        place = objects.rows(ids)
-        known = [(row, at) for row, at in zip(rows, place, strict=True) if at >= 0]
-        strange = [name for name, at in zip(ids, place, strict=True) if at < 0]
-        if strange:
-            more = " ..." if len(strange) > SHOWN else ""
-            remarks.append(
-                f"{camera.name}: {len(strange)} image points have no object point of their name "
-                f"and were left out: {', '.join(strange[:SHOWN])}{more}"
-            )
-        image = project.image_points.image[[row for row, _ in known]]
-        sigma = _image_sigma(project, [row for row, _ in known])
-        control = objects.xyz[[at for _, at in known]]
-        result = resect(
-            camera, control, image, project.interface_of(k), estimate=estimate, sigma=sigma
-        )
-        results[camera.name] = result
-        if result.redundancy == 0:
-            remarks.append(
-                f"{camera.name}: {len(known)} points just determine {len(result.names)} "
-                "parameters; nothing checks them, and no precision can be given."
-            )
-        used[camera.name] = tuple(objects.ids[at] for _, at in known)
-        adjusted[k] = result.camera
-        suspects = [
-            name for name, bad in zip(used[camera.name], result.suspects, strict=True) if bad
-        ]
-        if suspects:
-            remarks.append(f"{camera.name}: gross errors? points {', '.join(suspects[:SHOWN])}")
+    for k, name in enumerate(project.camera_names):
+        if not cameras or name in cameras:
+            results[name], used[name], odd = _resected(project, k, estimate)
+            remarks += [f"{name}: {text}" for text in odd]
+    adjusted = [results[c.name].camera if c.name in results else c for c in project.cameras]
     project = replace(project, cameras=tuple(adjusted))
     if residuals is not None:
         _write(residuals, residual_columns(results, used), {"vx": "mm", "vy": "mm"}, overwrite)
     if out is not None:
         write_project(out, project, overwrite=overwrite)
     return Resected(project=project, results=results, used=used, remarks=tuple(remarks))
+
+
+def _resected(
+    project: Project, k: int, estimate: Sequence[str]
+) -> tuple[Resection, tuple[str, ...], list[str]]:
+    """Return the resection of one camera, the points it used, and remarks."""
+    images, objects, remarks = project.image_points, project.object_points, []
+    rows = np.array(images.of_camera(project.camera_names[k]), dtype=np.int64)
+    place = np.array(objects.rows([images.ids[row] for row in rows]), dtype=np.int64)
+    strange = [images.ids[row] for row in rows[place < 0]]
+    if strange:
+        more = " ..." if len(strange) > SHOWN else ""
+        remarks.append(
+            f"{len(strange)} image points have no object point of their name and were left out: "
+            f"{', '.join(strange[:SHOWN])}{more}"
+        )
+    rows, place = rows[place >= 0], place[place >= 0]
+    result = resect(
+        project.cameras[k], objects.xyz[place], images.image[rows], project.interface_of(k),
+        estimate=estimate, sigma=_image_sigma(project, rows),
+    )  # fmt: skip
+    if result.redundancy == 0:
+        remarks.append(
+            f"{len(rows)} points just determine {len(result.names)} parameters; nothing checks "
+            "them, and no precision can be given."
+        )
+    names = tuple(objects.ids[at] for at in place)
+    suspects = [name for name, bad in zip(names, result.suspects, strict=True) if bad]
+    if suspects:
+        remarks.append(f"gross errors? points {', '.join(suspects[:SHOWN])}")
+    return result, names, remarks
 
 
 def residual_columns(
@@ -282,12 +280,10 @@ def _shown(name: str, value: float) -> float:
     return float(np.degrees(value)) if name in EXTERIOR[3:] else value
 
 
-def _image_sigma(project: Project, rows: Sequence[int]) -> FloatArray | None:
+def _image_sigma(project: Project, rows: IntArray) -> FloatArray | None:
     """Return standard deviations of image points, None if all are alike."""
-    sigma = project.image_points.sigma
-    if sigma is None or not rows:
-        return None
-    given = sigma[list(rows)]
+    assert project.image_points.sigma is not None
+    given = project.image_points.sigma[rows]
     if np.isnan(given).all():
         return None
     return np.where(np.isnan(given), project.sigma_image, given)

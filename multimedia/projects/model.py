@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -202,10 +202,6 @@ class Project:
                 f"no camera is called {name!r}; the project has {', '.join(self.camera_names)}."
             )
         return self.camera_names.index(name)
-
-    def with_cameras(self, cameras: Sequence[Camera]) -> Project:
-        """Return the project with other orientations of the same cameras."""
-        return replace(self, cameras=tuple(cameras))
 
 
 def refuse_repeated(names: Sequence[str], what: str) -> None:

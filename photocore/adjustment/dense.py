@@ -58,10 +58,10 @@ class DenseEquations:
         # The triangle of matrix and residuals holds all a step needs: no large factor is formed.
         table = np.column_stack([self.jacobian / self.scale, self.residuals])
         triangle = qr(table, mode="r", overwrite_a=True, check_finite=False)[0][:count]
-        left, found, right = svd(triangle[:, :count], check_finite=False)
+        left, some, right = svd(triangle[:, :count], check_finite=False)
         values, target = np.zeros(count), np.zeros(count)
-        values[: len(found)] = found
-        target[: len(found)] = (left.T @ triangle[:, count])[: len(found)]
+        values[: len(some)] = some
+        target[: len(some)] = (left.T @ triangle[:, count])[: len(some)]
         return values, right, target
 
     def step(self, damping: float, misfit: FloatArray | None = None) -> FloatArray:
