@@ -290,6 +290,7 @@ class Bundle:
         rows = right[values <= _DEFECT * np.linalg.norm(parts)] @ motion.T
         if linear.unknowns > LARGEST:
             rows[:, stay:] = 0.0
+            rows[:, self.columns.points[self.columns.points >= 0]] = 0.0
         else:
             rows[:, :stay] = 0.0
         # As heavy as the columns it holds, so that their scaling does not suffer.

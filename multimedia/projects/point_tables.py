@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -193,20 +194,25 @@ def write_columns(
     if path.suffix.lower() != ".xlsx":
         raise InputError(f"{path}: tables are written as .csv or .xlsx; give one of these endings.")
     from openpyxl import Workbook
-    from openpyxl.styles import Font
 
     from photocore.workbook.newbook import new_workbook
 
     book = Workbook()
-    sheet = book.active
-    sheet.append(list(columns))
-    for cell in sheet[1]:
-        cell.font = Font(bold=True)
-    for row in zip(*columns.values(), strict=True):
-        sheet.append([_cell(value) for value in row])
-    sheet.freeze_panes = "A2"
+    fill_sheet(book.active, list(columns), zip(*columns.values(), strict=True))
     with new_workbook(path, overwrite=overwrite) as temporary:
         book.save(temporary)
+
+
+def fill_sheet(sheet: Any, headings: Sequence[str], rows: Iterable[Sequence[object]]) -> None:
+    """Write a table into an empty sheet: bold headings that stay in sight, then the rows."""
+    from openpyxl.styles import Font
+
+    sheet.append(list(headings))
+    for cell in sheet[1]:
+        cell.font = Font(bold=True)
+    for row in rows:
+        sheet.append([_cell(value) for value in row])
+    sheet.freeze_panes = "A2"
 
 
 def _cell(value: object) -> object:

@@ -326,6 +326,23 @@ def test_a_free_network_neither_shifts_nor_turns_its_points():
     assert np.isfinite(result.point_covariance).all()
 
 
+def test_a_large_free_network_neither_shifts_nor_turns_its_cameras():
+    points = some_points(150)
+    given = with_true_cameras(a_project(points=points, noise=0.0005))
+    # The scale is all but free too, since only the thickness of the glass holds it: bars do.
+    bars = tuple(
+        ScaleBar(first=a, second=b, length=float(np.linalg.norm(points[int(a)] - points[int(b)])),
+                 sigma=0.001)
+        for a, b in (("0", "1"), ("2", "3"), ("4", "5"))
+    )  # fmt: skip
+    result = bundle_adjust(given, Unknowns(control="free", scale_bars=bars))
+    before = np.array([camera.centre for camera in given.cameras])
+    moved = np.array([camera.centre for camera in result.project.cameras]) - before
+    # The glass lies in the plane Z = 0: only shifts along it are not felt.
+    np.testing.assert_allclose(moved[:, :2].mean(axis=0), 0, atol=1e-7)
+    assert np.abs(result.project.object_points.xyz - points).max() < 1.0
+
+
 def test_a_plate_of_known_shape_finds_its_pose():
     flat = np.column_stack([np.mgrid[-60:61:30, -60:61:30].reshape(2, -1).T, np.zeros(25)])
     turn = Rotation.from_euler("xyz", [0.2, -0.1, 0.4]).as_matrix()
