@@ -12,7 +12,7 @@ import numpy as np
 from multimedia.media.camera import EXTERIOR, Camera, Sensor
 from multimedia.media.flat_interface import FlatInterface
 from multimedia.media.interfaces import Interfaces
-from multimedia.media.surfaces import Cylinder, Plane, Sphere, Surface
+from multimedia.media.surfaces import Cylinder, Plane, RefractingSurface, Sphere
 from multimedia.projects.model import (
     SIGMA_IMAGE,
     SIGMA_PIXEL,
@@ -37,7 +37,7 @@ from photocore.output import atomic_path, check_writable
 
 FORMAT = "multimedia-project/1"
 #: Each kind of ray-traced surface and its keys.
-_KINDS: Mapping[str, tuple[Callable[..., Surface], tuple[str, ...]]] = {
+_KINDS: Mapping[str, tuple[Callable[..., RefractingSurface], tuple[str, ...]]] = {
     "plane": (Plane, ("point", "normal")),
     "sphere": (Sphere, ("centre", "radius")),
     "cylinder": (Cylinder, ("point", "axis", "radius")),
@@ -226,7 +226,7 @@ def _surfaces(value: Mapping[str, Any], where: str) -> Interfaces:
     listed = value["surfaces"]
     if not isinstance(listed, list) or not listed:
         raise InputError(f"{where}: surfaces must be a list of sections, camera side first.")
-    surfaces: list[Surface] = []
+    surfaces: list[RefractingSurface] = []
     moving: list[bool] = []
     for number, item in enumerate(listed, start=1):
         place = f"{where}, surface {number}"
@@ -265,7 +265,7 @@ def _media_data(media: FlatInterface | Interfaces) -> dict[str, Any]:
     return data
 
 
-def _surface_data(surface: Surface) -> dict[str, Any]:
+def _surface_data(surface: RefractingSurface) -> dict[str, Any]:
     for kind, (form, keys) in _KINDS.items():
         if type(surface) is form:
             return {"kind": kind} | {k: np.asarray(getattr(surface, k)).tolist() for k in keys}
