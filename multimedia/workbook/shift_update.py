@@ -11,7 +11,7 @@ from multimedia.workbook.shift_points import ShiftPoints, ShiftResult, ShiftSetu
 from multimedia.workbook.shift_workbook import table_values
 from photocore.errors import InputError
 from photocore.tables import Table, open_tables
-from photocore.workbook.cellxml import CellInput
+from photocore.workbook.cells import CellValue
 from photocore.workbook.editor import WorkbookEditor
 from photocore.workbook.grid import SheetFile, cell_name
 
@@ -130,7 +130,7 @@ def add_columns(
             column = last
             editor.set_value(table.sheet, head, column, key)
         for position, row in enumerate(rows):
-            value: CellInput = values[position]
+            value: CellValue = values[position]
             if not isinstance(value, str):
                 value = None if np.isnan(values[position]) else float(values[position])
             editor.set_value(table.sheet, table.rows[row], column, value)

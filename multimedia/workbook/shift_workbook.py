@@ -28,7 +28,7 @@ from multimedia.workbook.shift_points import IN_PLANE, ShiftPoints, ShiftResult,
 from photocore.arrays import BoolArray
 from photocore.errors import InputError
 from photocore.output import check_writable
-from photocore.workbook.cellxml import CellInput
+from photocore.workbook.cells import CellValue
 
 #: More rows make a workbook that is slow to open; text tables have no limit.
 MOST_ROWS = 20_000
@@ -289,10 +289,10 @@ def _columns(layers: int, steps: int) -> list[tuple[str, str, str]]:
 
 def table_values(
     setup: ShiftSetup, points: ShiftPoints | None, count: int, steps: int
-) -> dict[str, list[CellInput]]:
+) -> dict[str, list[CellValue]]:
     """Return what every column shows, blank rows included."""
     keys = [key for key, _, _ in _columns(len(setup.layers.indices), steps)]
-    values: dict[str, list[CellInput]] = {key: [None] * count for key in keys[:6]}
+    values: dict[str, list[CellValue]] = {key: [None] * count for key in keys[:6]}
     values |= {key: [""] * count for key in keys[6:]}
     if points is None:
         return values
