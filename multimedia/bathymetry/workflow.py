@@ -18,7 +18,7 @@ from multimedia.bathymetry.corrected_points import (
     checked_index,
     height_of,
 )
-from multimedia.bathymetry.dem import Dem, Window
+from multimedia.bathymetry.dem import Dem
 from multimedia.bathymetry.refracted_rays import correct_lidar_beams, intersect_refracted_rays
 from multimedia.bathymetry.refraction_correction import correct_bathymetry
 from multimedia.bathymetry.regrid import pull_back
@@ -35,6 +35,7 @@ from photocore.arrays import BoolArray, FloatArray
 from photocore.cli import Progress, no_progress
 from photocore.errors import GeometryError, InputError
 from photocore.output import atomic_path, check_writable
+from photocore.raster import Window
 from photocore.tables import write_csv
 
 #: Side of the windows in which a DEM is corrected: 8 MB of heights. [cells]
@@ -384,10 +385,7 @@ def _correct_dem(job: Job, progress: Progress) -> Outcome:
         tags = {"REFRACTION_INDEX": f"{job.index:g}", "REFRACTION_WATER_LEVEL": job.water_level}
         bands = ("height", "sigma") if job.precision.is_given else ("height",)
         windows = list(dem.windows(WINDOW))
-        with (
-            atomic_path(job.target, overwrite=job.overwrite) as temporary,
-            dem.writer(temporary, bands=bands, tags=tags) as write,
-        ):
+        with dem.copy(job.target, bands=bands, tags=tags, overwrite=job.overwrite) as write:
             margin = 0  # widened when a window needs more, and kept for the next
             for number, window in enumerate(windows, start=1):
                 bands_of, margin = _correct_window(
@@ -412,12 +410,10 @@ def _correct_window(
     """Return the bands of one window, shape (bands, height, width), and the margin it took."""
     while True:
         wide = Window(
-            window.column - margin,
-            window.row - margin,
-            window.width + 2 * margin,
-            window.height + 2 * margin,
-        )
-        given = np.concatenate([dem.positions(wide), dem.read(wide)[..., None]], axis=-1)
+            window.column - margin, window.row - margin,
+            window.width + 2 * margin, window.height + 2 * margin,
+        )  # fmt: skip
+        given = np.concatenate([dem.positions(wide), dem.heights(wide)[..., None]], axis=-1)
         known = np.isfinite(given[..., 2])
         points = given[known]
         visible = None
@@ -432,7 +428,7 @@ def _correct_window(
             precision=job.precision,
         )
         move = np.full((*known.shape, 2), np.nan)
-        move[known] = (result.xyz - points)[:, :2] @ np.linalg.inv(dem.xy_from_cell[:, :2]).T
+        move[known] = (result.xyz - points)[:, :2] @ np.linalg.inv(dem.xy_from_pixel[:, :2]).T
         reach = int(np.ceil(np.nanmax(np.abs(move), initial=0.0)))
         needed = reach + 2 if reach else 0
         if needed <= margin or centres is None:

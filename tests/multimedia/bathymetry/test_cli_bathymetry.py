@@ -494,7 +494,7 @@ def test_bad_dems_are_refused_in_plain_words(tmp_path: Path) -> None:
     assert "25 cells hold 0" in refused(tmp_path, tmp_path / "zero.tif")
     (tmp_path / "text.tif").write_text("no raster", encoding="utf-8")
     assert "not a raster file" in refused(tmp_path, tmp_path / "text.tif")
-    assert "no such file" in refused(tmp_path, tmp_path / "absent.tif")
+    assert "no such raster file" in refused(tmp_path, tmp_path / "absent.tif")
     write_dem(tmp_path / "nowhere.tif", heights, transform=None, crs=None)
     message = refused(tmp_path, tmp_path / "nowhere.tif", "--cameras", tmp_path / "cameras.csv")
     assert "no geotransform" in message
@@ -550,7 +550,7 @@ def test_units_levels_and_sides_that_cannot_be_are_refused(tmp_path: Path) -> No
         (50.0, "no point lies under the water surface"),
         (102_500, "different units"),
         ("low.txt", "neither a height"),
-        ("low.tif", "no such file"),
+        ("low.tif", "no such raster file"),
     ):
         code, _, err = run(*call, "--water-level", level)
         assert code == 1
