@@ -7,12 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from multimedia.bathymetry.cloud_ply import read_ply_mesh
 from multimedia.bathymetry.corrected_points import WaterSurface
 from multimedia.bathymetry.dem import Dem
 from multimedia.media.height_field import RasterSurface
 from multimedia.media.mesh_surface import MeshSurface
 from multimedia.media.surfaces import Plane
+from photocore.cloud.ply import read_ply_mesh
 from photocore.errors import InputError
 from photocore.jsonfile import read_object
 from photocore.raster import Window

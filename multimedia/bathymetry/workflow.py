@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 
-from multimedia.bathymetry.clouds import MARK, Chunk, Cloud, open_cloud
 from multimedia.bathymetry.corrected_points import (
     BathymetryStatus,
     CorrectedPoints,
@@ -33,11 +32,21 @@ from multimedia.bathymetry.water_surfaces import read_water_surface
 from multimedia.media.surfaces import Plane
 from photocore.arrays import BoolArray, FloatArray
 from photocore.cli import Progress, no_progress
+from photocore.cloud import open_cloud
+from photocore.cloud.model import Cloud, CloudPiece
 from photocore.errors import GeometryError, InputError
 from photocore.output import atomic_path, check_writable
 from photocore.raster import Window
 from photocore.tables import write_csv
 
+#: Attribute that marks a cloud this package has corrected.
+MARK = "refraction"
+#: What a corrected cloud gains: numpy type and description.
+_GAINED = {
+    MARK: ("u1", "0 dry 1 nadir 2 rays 3 4 none"),
+    "water_depth": ("f4", "true depth under water"),
+    **dict.fromkeys(("sigma_X", "sigma_Y", "sigma_Z"), ("f4", "standard deviation")),
+}
 #: Side of the windows in which a DEM is corrected: 8 MB of heights. [cells]
 WINDOW = 1024
 #: Widest planimetric shift that is followed across a window's edge. [cells]
@@ -203,26 +212,27 @@ def _correct_cloud(job: Job, progress: Progress) -> Outcome:
     surface = read_water_surface(job.water_level)
     outcome = Outcome(remarks=list(cloud.remarks))
     correct = _corrector(job, cloud, surface, outcome)
-    sigmas = ("sigma_X", "sigma_Y", "sigma_Z") if job.precision.is_given and not job.beams else ()
+    is_precise = job.precision.is_given and not job.beams
+    gained = {
+        name: kind for name, kind in _GAINED.items() if is_precise or not name.startswith("sigma")
+    }
     spoken = job.source.suffix.lower() not in (".ply", ".las", ".laz")
     numbers = ("X0", "Y0", "Z0", "gps_time") if job.beams else ()
     texts = ("id", "cameras") if job.cameras else ()
     done = 0
     with (
         atomic_path(job.target, overwrite=job.overwrite) as temporary,
-        cloud.writer(temporary, (MARK, "water_depth", *sigmas)) as writer,
+        cloud.copy(temporary, gained) as write,
     ):
-        for chunk in cloud.chunks(numbers=numbers, texts=texts):
-            result = correct(chunk)
-            outcome.add(chunk.xyz, result)
+        for piece in cloud.pieces(numbers=numbers, texts=texts):
+            result = correct(piece)
+            outcome.add(piece.xyz, result)
             status: Any = result.status
             if spoken:
                 status = [BathymetryStatus(int(code)).label for code in result.status]
-            extra = {MARK: status, "water_depth": result.depth}
-            if sigmas and result.sigma is not None:
-                extra |= dict(zip(sigmas, result.sigma.T, strict=True))
-            writer.write(chunk, result.xyz, extra)
-            done += len(chunk.xyz)
+            sigma = () if result.sigma is None else result.sigma.T
+            write(piece, result.xyz, dict(zip(gained, (status, result.depth, *sigma), strict=True)))
+            done += len(piece.xyz)
             progress(done, done + 1, f"{done} points")
         outcome.judge(surface, allow_dry=job.allow_dry)
     return outcome
@@ -230,20 +240,20 @@ def _correct_cloud(job: Job, progress: Progress) -> Outcome:
 
 def _corrector(
     job: Job, cloud: Cloud, surface: WaterSurface, outcome: Outcome
-) -> Callable[[Chunk], CorrectedPoints]:
+) -> Callable[[CloudPiece], CorrectedPoints]:
     """Return the function that corrects one piece of a cloud."""
     if job.beams:
         sensor = _sensor_positions(job, cloud)
-        return lambda chunk: correct_lidar_beams(
-            sensor(chunk),
-            chunk.xyz,
+        return lambda piece: correct_lidar_beams(
+            sensor(piece),
+            piece.xyz,
             water_level=surface,
             index=job.index,
             group_index=job.group_index,
         )
     if job.cameras is None:
-        return lambda chunk: correct_bathymetry(
-            chunk.xyz, water_level=surface, index=job.index, precision=job.precision
+        return lambda piece: correct_bathymetry(
+            piece.xyz, water_level=surface, index=job.index, precision=job.precision
         )
     cameras = read_camera_positions(job.cameras)
     pairs = read_visibility(job.visibility) if job.visibility else None
@@ -257,14 +267,14 @@ def _corrector(
             "--visibility, a column 'cameras' or --max-angle do better."
         )
 
-    def correct(chunk: Chunk) -> CorrectedPoints:
-        _check_camera_unit(chunk.xyz, cameras.centres, job)
+    def correct(piece: CloudPiece) -> CorrectedPoints:
+        _check_camera_unit(piece.xyz, cameras.centres, job)
         return correct_bathymetry(
-            chunk.xyz,
+            piece.xyz,
             water_level=surface,
             index=job.index,
             cameras=cameras.centres,
-            visible=_visible(chunk, cameras, pairs, job),
+            visible=_visible(piece, cameras, pairs, job),
             precision=job.precision,
         )
 
@@ -272,17 +282,17 @@ def _corrector(
 
 
 def _visible(
-    chunk: Chunk, cameras: CameraPositions, pairs: Mapping[str, set[str]] | None, job: Job
+    piece: CloudPiece, cameras: CameraPositions, pairs: Mapping[str, set[str]] | None, job: Job
 ) -> BoolArray:
     """Return which camera saw which point: by table, by column, by angle, or all."""
-    seen = np.ones((len(chunk.xyz), len(cameras.ids)), dtype=bool)
+    seen = np.ones((len(piece.xyz), len(cameras.ids)), dtype=bool)
     if pairs is not None:
-        sets = [pairs.get(name, set()) for name in chunk.texts["id"]]
+        sets = [pairs.get(name, set()) for name in piece.texts["id"]]
         seen = np.array([[camera in names for camera in cameras.ids] for names in sets])
-    elif "cameras" in chunk.texts:
+    elif "cameras" in piece.texts:
         place = {name: k for k, name in enumerate(cameras.ids)}
         seen[:] = False
-        for number, text in enumerate(chunk.texts["cameras"]):
+        for number, text in enumerate(piece.texts["cameras"]):
             names = text.replace(";", " ").replace(",", " ").replace("|", " ").split()
             unknown = [name for name in names if name not in place]
             if unknown:
@@ -292,7 +302,7 @@ def _visible(
                 )
             seen[number, [place[name] for name in names]] = True
     if job.max_angle is not None:
-        seen &= _within_angle(chunk.xyz, cameras.centres, job.max_angle)
+        seen &= _within_angle(piece.xyz, cameras.centres, job.max_angle)
     return seen
 
 
@@ -326,7 +336,7 @@ def _check_pairs(pairs: Mapping[str, set[str]], cameras: CameraPositions, job: J
         )
 
 
-def _sensor_positions(job: Job, cloud: Cloud) -> Callable[[Chunk], FloatArray]:
+def _sensor_positions(job: Job, cloud: Cloud) -> Callable[[CloudPiece], FloatArray]:
     """Return the function that finds where the sensor was for the points of a piece."""
     if job.trajectory is None:
         if not all(cloud.has(name) for name in ("X0", "Y0", "Z0")):
@@ -334,13 +344,13 @@ def _sensor_positions(job: Job, cloud: Cloud) -> Callable[[Chunk], FloatArray]:
                 f"{job.source}: lidar beams need the sensor position of each point: columns X0, Y0 "
                 "and Z0, or --trajectory with times."
             )
-        return lambda chunk: np.column_stack([chunk.numbers[n] for n in ("X0", "Y0", "Z0")])
+        return lambda piece: np.column_stack([piece.numbers[n] for n in ("X0", "Y0", "Z0")])
     if not cloud.has("gps_time"):
         raise InputError(f"{job.source}: --trajectory needs a time (gps_time) for each point.")
     times, positions = read_trajectory(job.trajectory)
 
-    def at_time(chunk: Chunk) -> FloatArray:
-        when = chunk.numbers["gps_time"]
+    def at_time(piece: CloudPiece) -> FloatArray:
+        when = piece.numbers["gps_time"]
         if when.min() < times[0] or when.max() > times[-1]:
             raise InputError(
                 f"{job.trajectory}: covers times {times[0]:g} to {times[-1]:g}, the points need "

@@ -1,25 +1,22 @@
-"""Point clouds of any size, read and written in pieces with every attribute kept."""
+"""Point clouds read and copied in pieces with every attribute kept."""
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 from photocore.arrays import FloatArray
-from photocore.errors import InputError
 
 #: Points per piece: some 100 MB at the most, whatever the attributes.
-CHUNK = 200_000
-#: Attribute that marks a cloud this package has corrected.
-MARK = "refraction"
+PIECE = 200_000
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Chunk:
+class CloudPiece:
     """A piece of a cloud.
 
     Attributes
@@ -30,7 +27,7 @@ class Chunk:
     texts : dict of str to list of str
         Further text columns that were asked for and exist.
     raw : object
-        What the writer needs to give every attribute back.
+        What a copy needs to give every attribute back.
     """
 
     xyz: FloatArray
@@ -39,65 +36,36 @@ class Chunk:
     texts: Mapping[str, list[str]] = field(default_factory=dict)
 
 
-class CloudWriter(Protocol):
-    """Takes corrected pieces."""
-
-    def write(self, chunk: Chunk, xyz: FloatArray, extra: Mapping[str, FloatArray]) -> None:
-        """Write a piece with new positions; rows whose position is unchanged stay bit for bit.
-
-        ``extra`` holds the new attributes named when the writer was made.
-        """
+#: Writes a piece with new positions and the values of the new attributes, by name; rows whose
+#: position is unchanged stay bit for bit.
+PieceWriter = Callable[[CloudPiece, FloatArray, Mapping[str, Any]], None]
+#: New attributes of a copy: name to numpy type without byte order, and a description.
+NewAttributes = Mapping[str, tuple[str, str]]
 
 
 class Cloud(ABC):
-    """An open point cloud."""
+    """An open point cloud.
 
-    path: Path
-    #: What the user should know about the file.
-    remarks: list[str]
+    Attributes
+    ----------
+    path : Path
+    remarks : list of str
+        What the user should know about the file.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path, self.remarks = path, list[str]()
 
     @abstractmethod
-    def chunks(self, *, numbers: Sequence[str] = (), texts: Sequence[str] = ()) -> Iterator[Chunk]:
+    def pieces(
+        self, *, numbers: Sequence[str] = (), texts: Sequence[str] = ()
+    ) -> Iterator[CloudPiece]:
         """Yield the cloud in pieces, with the further columns asked for."""
 
     @abstractmethod
-    def writer(self, path: Path, extra: Sequence[str]) -> AbstractContextManager[CloudWriter]:
-        """Return a writer of the same format with new attributes of these names."""
+    def copy(self, path: Path, extra: NewAttributes) -> AbstractContextManager[PieceWriter]:
+        """Return a writer of the same format with new attributes; call it within `atomic_path`."""
 
     @abstractmethod
     def has(self, name: str) -> bool:
         """Return whether the cloud has an attribute of that name."""
-
-
-def open_cloud(path: Path | str) -> Cloud:
-    """Open a point cloud by its ending.
-
-    Raises
-    ------
-    InputError
-        If the file is missing, of an unknown kind, damaged or without points.
-    """
-    from multimedia.bathymetry.cloud_csv import CsvCloud
-    from multimedia.bathymetry.cloud_las import LasCloud
-    from multimedia.bathymetry.cloud_ply import PlyCloud
-
-    path = Path(path)
-    if path.is_dir():
-        raise InputError(f"{path}: is a folder; name a point cloud (.csv .ply .las .laz).")
-    if not path.is_file():
-        raise InputError(f"{path}: no such file.")
-    kinds: dict[str, type[Cloud]] = {
-        ".csv": CsvCloud,
-        ".txt": CsvCloud,
-        ".xyz": CsvCloud,
-        ".ply": PlyCloud,
-        ".las": LasCloud,
-        ".laz": LasCloud,
-    }
-    kind = kinds.get(path.suffix.lower())
-    if kind is None:
-        raise InputError(
-            f'{path}: the ending "{path.suffix}" is not known; a DEM is a .tif, a point cloud a '
-            ".csv, .txt, .xyz, .ply, .las or .laz file."
-        )
-    return kind(path)  # type: ignore[call-arg]

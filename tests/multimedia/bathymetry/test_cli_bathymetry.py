@@ -192,13 +192,13 @@ def test_a_las_cloud_keeps_every_attribute(tmp_path: Path, suffix: str) -> None:
 
 @pytest.mark.parametrize("form", ["ascii", "binary_little_endian", "binary_big_endian"])
 def test_a_ply_cloud_keeps_properties_faces_and_byte_order(tmp_path: Path, form: str) -> None:
-    from multimedia.bathymetry.cloud_ply import PlyCloud, read_ply_mesh
+    from photocore.cloud.ply import PlyCloud, read_ply_mesh
 
     xyz = positions()
     write_ply(tmp_path / "in.ply", xyz, form)
     assert bathymetry(tmp_path / "in.ply", tmp_path / "out.ply")[0] == 0
     cloud = PlyCloud(tmp_path / "out.ply")
-    chunk = next(cloud.chunks(numbers=["q", "water_depth"]))
+    chunk = next(cloud.pieces(numbers=["q", "water_depth"]))
     np.testing.assert_allclose(chunk.xyz, nadir(xyz), atol=1e-12)
     np.testing.assert_array_equal(chunk.numbers["q"], np.arange(len(xyz)) % 251)
     content = (tmp_path / "out.ply").read_bytes()
