@@ -8,8 +8,9 @@ from __future__ import annotations
 import csv
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from itertools import islice
+from math import isfinite
 from pathlib import Path
 from typing import Any, TextIO
 
@@ -134,16 +135,20 @@ class TextCloud(Cloud):
         self, piece: list[tuple[int, list[str]]], place: int, errors: list[CellError]
     ) -> FloatArray:
         """Return a column; cells that are no numbers are complained of and become NaN."""
-        values = [self._number(cells[place]) for _, cells in piece]
+        texts = [cells[place] for _, cells in piece]
+        with suppress(ValueError):  # all filled, as most are
+            plain = [text.replace(",", ".") for text in texts] if self._comma else texts
+            return np.array(list(map(float, plain)))
+        values = list(map(self._number, texts))
         decimal = " with a decimal comma" if self._comma else ""
         errors += [
             CellError(
-                f"found {cells[place]!r}, expected a number{decimal}. Mend the cell.",
+                f"found {text!r}, expected a number{decimal}. Mend the cell.",
                 file=str(self.path),
                 cell=f"row {number}",
                 column=self._names[place],
             )
-            for (number, cells), value in zip(piece, values, strict=True)
+            for (number, _), text, value in zip(piece, texts, values, strict=True)
             if value is None
         ]
         return np.array(values, dtype=np.float64)  # None becomes NaN
@@ -167,22 +172,25 @@ class TextCloud(Cloud):
 
             def write(piece: CloudPiece, xyz: FloatArray, values: Mapping[str, Any]) -> None:
                 rows = [list(cells) for cells in piece.raw]
-                for number, axis in np.argwhere(xyz != piece.xyz).tolist():
-                    rows[number][places[axis]] = self._text(xyz[number, axis])
+                for axis, place in enumerate(places):
+                    moved = np.flatnonzero(xyz[:, axis] != piece.xyz[:, axis])
+                    for number, text in zip(moved, self._texts(xyz[moved, axis]), strict=True):
+                        rows[number][place] = text
                 for column in values.values():
-                    for row, value in zip(rows, column, strict=True):
-                        row.append(self._text(value))
+                    for row, text in zip(rows, self._texts(column), strict=True):
+                        row.append(text)
                 writer.writerows(rows)
 
             yield write
 
-    def _text(self, value: float | str) -> str:
-        if isinstance(value, str):
-            return value
-        if not np.isfinite(value):
-            return ""
-        text = repr(round(float(value), DECIMALS))
-        return text.replace(".", ",") if self._comma else text
+    def _texts(self, values: FloatArray | list[str]) -> list[str]:
+        """Return the cells of a column; unknown numbers are blank."""
+        if isinstance(values, list):
+            return values
+        texts = [
+            repr(round(value, DECIMALS)) if value == value else "" for value in values.tolist()
+        ]
+        return [text.replace(".", ",") for text in texts] if self._comma else texts
 
 
 def _encoding_of(path: Path) -> str:
