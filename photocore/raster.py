@@ -34,6 +34,11 @@ class Window(NamedTuple):
     width: int
     height: int
 
+    def widened(self, margin: int) -> Window:
+        """Return the window with so many pixels more on every side."""
+        column, row, width, height = self
+        return Window(column - margin, row - margin, width + 2 * margin, height + 2 * margin)
+
 
 class RasterFile(ExitStack):
     """An open raster; windows may reach beyond its edges. Closed by ``with`` or `close`.

@@ -3,21 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from multimedia.bathymetry.corrected_points import (
-    BathymetryStatus,
     CorrectedPoints,
-    Precision,
     WaterSurface,
     checked_index,
     height_of,
+    status_labels,
 )
 from multimedia.bathymetry.dem import Dem
+from multimedia.bathymetry.job import MIXED_UNITS, Job, Outcome
 from multimedia.bathymetry.refracted_rays import correct_lidar_beams, intersect_refracted_rays
 from multimedia.bathymetry.refraction_correction import correct_bathymetry
 from multimedia.bathymetry.regrid import pull_back
@@ -35,7 +32,7 @@ from photocore.cli import Progress, no_progress
 from photocore.cloud import open_cloud
 from photocore.cloud.model import Cloud, CloudPiece
 from photocore.errors import GeometryError, InputError
-from photocore.output import atomic_path, check_writable
+from photocore.output import check_writable
 from photocore.raster import Window
 from photocore.tables import write_csv
 
@@ -51,130 +48,6 @@ _GAINED = {
 WINDOW = 1024
 #: Widest planimetric shift that is followed across a window's edge. [cells]
 WIDEST_MARGIN = 4096
-#: Deeper than any photo sees: most likely millimetres. [m]
-DEEPEST = 200.0
-#: Lengths that differ by more than this are most likely in different units.
-MIXED_UNITS = 1000.0
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Job:
-    """What `correct_file` is asked to do.
-
-    Attributes
-    ----------
-    source, target : Path
-    water_level : str
-        A height [m] or a file, see `read_water_surface`.
-    index : float
-    cameras, visibility, trajectory : Path or None
-        Camera positions; who saw what; sensor positions over time (lidar).
-    max_angle : float or None
-        A camera sees a point only within this angle from the vertical. [rad]
-    precision : Precision
-    group_index : float or None
-    beams : bool
-        The points are lidar echoes with columns X0, Y0, Z0 or a trajectory.
-    rays : bool
-        The source is a table of measured rays.
-    sigma_direction : float
-        Of measured rays. [rad]
-    nodata : float or None
-    allow_dry : bool
-        Accept data without a single point under water.
-    overwrite : bool
-    """
-
-    source: Path
-    target: Path
-    water_level: str
-    index: float
-    cameras: Path | None = None
-    visibility: Path | None = None
-    trajectory: Path | None = None
-    max_angle: float | None = None
-    precision: Precision = field(default_factory=Precision)
-    group_index: float | None = None
-    beams: bool = False
-    rays: bool = False
-    sigma_direction: float = 1e-4
-    nodata: float | None = None
-    allow_dry: bool = False
-    overwrite: bool = False
-
-
-@dataclass(slots=True)
-class Outcome:
-    """What was done, for the user.
-
-    Attributes
-    ----------
-    counts : dict of str to int
-        Points per treatment.
-    max_depth, mean_change : float
-        Largest true depth and mean change of Z under water. [m]
-    lowest, highest : float
-        Range of the given heights. [m]
-    remarks : list of str
-    """
-
-    counts: dict[str, int] = field(default_factory=dict)
-    max_depth: float = 0.0
-    mean_change: float = 0.0
-    lowest: float = np.inf
-    highest: float = -np.inf
-    remarks: list[str] = field(default_factory=list)
-    _sum: float = 0.0
-    _wet: int = 0
-
-    def add(self, given: FloatArray, result: CorrectedPoints) -> None:
-        """Count a piece."""
-        for status in BathymetryStatus:
-            count = int((result.status == status).sum())
-            if count:
-                self.counts[status.label] = self.counts.get(status.label, 0) + count
-        finite = given[..., 2][np.isfinite(given[..., 2])]
-        if finite.size:
-            self.lowest = min(self.lowest, float(finite.min()))
-            self.highest = max(self.highest, float(finite.max()))
-        wet = np.isin(result.status, (BathymetryStatus.NADIR, BathymetryStatus.RAYS))
-        if wet.any():
-            self._wet += int(wet.sum())
-            self._sum += float((result.xyz - given)[..., 2][wet].sum())
-            self.mean_change = self._sum / self._wet
-            self.max_depth = max(self.max_depth, float(result.depth[wet].max()))
-
-    def judge(self, surface: WaterSurface, *, allow_dry: bool) -> None:
-        """Raise GeometryError when nothing lies under water; note what looks like millimetres."""
-        if not self._wet and not allow_dry:
-            level = _typical_level(surface)
-            hint = ""
-            if 0 < self.lowest / 2 <= 1000 * level <= 2 * self.highest:
-                hint = " The heights look like millimetres, the water level like metres."
-            raise GeometryError(
-                f"no point lies under the water surface: heights {self.lowest:g} to "
-                f"{self.highest:g}, water level {level:g}.{hint} Check level and unit, or say "
-                "--allow-dry if that is right."
-            )
-        span = self.highest - self.lowest
-        if self.max_depth > DEEPEST and 0 < span < self.max_depth / MIXED_UNITS:
-            raise GeometryError(
-                f"the water level {_typical_level(surface):g} lies {self.max_depth:g} above "
-                f"heights that span only {span:g}: are they in different units (mm and m)?"
-            )
-        if self.max_depth > DEEPEST:
-            self.remarks.append(
-                f"The deepest point lies {self.max_depth:.0f} m under water, deeper than photos "
-                "see: are the heights in millimetres, or is the water level wrong?"
-            )
-        failed = self.counts.get(BathymetryStatus.FAILED.label, 0)
-        if failed:
-            self.remarks.append(f"{failed} points could not be corrected and are marked so.")
-        outside = self.counts.get(BathymetryStatus.NO_SURFACE.label, 0)
-        if outside:
-            self.remarks.append(
-                f"{outside} points lie outside the modelled water surface and were left as given."
-            )
 
 
 def correct_file(job: Job, *, progress: Progress = no_progress) -> Outcome:
@@ -220,16 +93,11 @@ def _correct_cloud(job: Job, progress: Progress) -> Outcome:
     numbers = ("X0", "Y0", "Z0", "gps_time") if job.beams else ()
     texts = ("id", "cameras") if job.cameras else ()
     done = 0
-    with (
-        atomic_path(job.target, overwrite=job.overwrite) as temporary,
-        cloud.copy(temporary, gained) as write,
-    ):
+    with cloud.copy(job.target, gained, overwrite=job.overwrite) as write:
         for piece in cloud.pieces(numbers=numbers, texts=texts):
             result = correct(piece)
             outcome.add(piece.xyz, result)
-            status: Any = result.status
-            if spoken:
-                status = [BathymetryStatus(int(code)).label for code in result.status]
+            status = status_labels(result.status) if spoken else result.status
             sigma = () if result.sigma is None else result.sigma.T
             write(piece, result.xyz, dict(zip(gained, (status, result.depth, *sigma), strict=True)))
             done += len(piece.xyz)
@@ -419,10 +287,7 @@ def _correct_window(
 ) -> tuple[FloatArray, int]:
     """Return the bands of one window, shape (bands, height, width), and the margin it took."""
     while True:
-        wide = Window(
-            window.column - margin, window.row - margin,
-            window.width + 2 * margin, window.height + 2 * margin,
-        )  # fmt: skip
+        wide = window.widened(margin)
         given = np.concatenate([dem.positions(wide), dem.heights(wide)[..., None]], axis=-1)
         known = np.isfinite(given[..., 2])
         points = given[known]
@@ -476,7 +341,7 @@ def _correct_rays(job: Job) -> Outcome:
         raise InputError(f"{job.target}: intersected rays are written as .csv.")
     table = read_rays(job.source)
     surface = read_water_surface(job.water_level)
-    found = intersect_refracted_rays(
+    points = intersect_refracted_rays(
         table.origins,
         table.directions,
         water_level=surface,
@@ -484,17 +349,16 @@ def _correct_rays(job: Job) -> Outcome:
         sigma_direction=job.sigma_direction,
     )
     outcome = Outcome()
-    depth = np.maximum(height_of(surface, found.xyz[:, :2]) - found.xyz[:, 2], 0.0)
-    result = CorrectedPoints(xyz=found.xyz, depth=depth, status=found.status)
-    outcome.add(found.xyz, result)
+    depth = np.maximum(height_of(surface, points.xyz[:, :2]) - points.xyz[:, 2], 0.0)
+    outcome.add(points.xyz, CorrectedPoints(xyz=points.xyz, depth=depth, status=points.status))
     outcome.judge(surface, allow_dry=job.allow_dry)
-    columns: dict[str, Any] = {"id": list(table.ids)}
-    columns |= dict(zip("XYZ", found.xyz.T, strict=True))
-    columns |= dict(zip(("sigma_X", "sigma_Y", "sigma_Z"), found.sigma.T, strict=True))
-    columns |= {
-        "misfit": found.misfit,
-        "rays": found.rays,
-        MARK: [BathymetryStatus(int(code)).label for code in found.status],
+    columns = {
+        "id": list(table.ids),
+        **dict(zip("XYZ", points.xyz.T, strict=True)),
+        **dict(zip(("sigma_X", "sigma_Y", "sigma_Z"), points.sigma.T, strict=True)),
+        "misfit": points.misfit,
+        "rays": points.rays,
+        MARK: status_labels(points.status),
         "water_depth": depth,
     }
     write_csv(job.target, columns, overwrite=job.overwrite)
@@ -504,10 +368,3 @@ def _correct_rays(job: Job) -> Outcome:
 def _varies(surface: WaterSurface) -> bool:
     """Return whether the water is anything but level."""
     return not (isinstance(surface, Plane) and abs(surface.normal[2]) == 1.0)
-
-
-def _typical_level(surface: WaterSurface) -> float:
-    """Return one height of the surface, for messages."""
-    if isinstance(surface, Plane):
-        return float(surface.point[2])
-    return (surface.lowest + surface.highest) / 2

@@ -152,7 +152,8 @@ def command(
     from math import radians
 
     from multimedia.bathymetry.corrected_points import Precision
-    from multimedia.bathymetry.workflow import Job, correct_file
+    from multimedia.bathymetry.job import Job
+    from multimedia.bathymetry.workflow import correct_file
     from photocore.cli import print_json, progress_bar, remark
 
     if visibility and not cameras:

@@ -79,7 +79,7 @@ class LasCloud(Cloud):
             )
 
     @contextmanager
-    def copy(self, path: Path, extra: NewAttributes) -> Iterator[PieceWriter]:
+    def _written(self, path: Path, extra: NewAttributes) -> Iterator[PieceWriter]:
         """Yield a writer with the same header, records and point format plus new dimensions."""
         import laspy
 

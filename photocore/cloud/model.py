@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import AbstractContextManager
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from photocore.arrays import FloatArray
+from photocore.output import atomic_path
 
 #: Points per piece: some 100 MB at the most, whatever the attributes.
 PIECE = 200_000
@@ -62,9 +63,18 @@ class Cloud(ABC):
     ) -> Iterator[CloudPiece]:
         """Yield the cloud in pieces, with the further columns asked for."""
 
+    @contextmanager
+    def copy(self, path: Path, extra: NewAttributes, *, overwrite: bool) -> Iterator[PieceWriter]:
+        """Yield a writer of the same format with new attributes; whole or not at all."""
+        with (
+            atomic_path(path, overwrite=overwrite) as temporary,
+            self._written(temporary, extra) as write,
+        ):
+            yield write
+
     @abstractmethod
-    def copy(self, path: Path, extra: NewAttributes) -> AbstractContextManager[PieceWriter]:
-        """Return a writer of the same format with new attributes; call it within `atomic_path`."""
+    def _written(self, path: Path, extra: NewAttributes) -> AbstractContextManager[PieceWriter]:
+        """Yield the writer of a file that is empty yet."""
 
     @abstractmethod
     def has(self, name: str) -> bool:

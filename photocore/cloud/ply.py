@@ -112,7 +112,7 @@ class PlyCloud(Cloud):
         return rows
 
     @contextmanager
-    def copy(self, path: Path, extra: NewAttributes) -> Iterator[PieceWriter]:
+    def _written(self, path: Path, extra: NewAttributes) -> Iterator[PieceWriter]:
         """Yield a writer; what follows the vertices in the file is copied when it closes."""
         more = np.dtype([(name, self._order + kind) for name, (kind, _) in extra.items()])
         dtype = np.dtype([*self._dtype.descr, *more.descr])

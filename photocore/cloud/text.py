@@ -10,7 +10,6 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from itertools import islice
-from math import isfinite
 from pathlib import Path
 from typing import Any, TextIO
 
@@ -161,7 +160,7 @@ class TextCloud(Cloud):
             return None if text.strip() else np.nan
 
     @contextmanager
-    def copy(self, path: Path, extra: NewAttributes) -> Iterator[PieceWriter]:
+    def _written(self, path: Path, extra: NewAttributes) -> Iterator[PieceWriter]:
         """Yield a writer of the same dialect; a cell whose number did not change keeps its text."""
         encoding = "utf-8-sig" if self._encoding == "utf-8-sig" else "utf-8"
         places = [self._columns[key] for key in "XYZ"]

@@ -12,7 +12,6 @@ import pytest
 from photocore.cloud import open_cloud, write_cloud
 from photocore.cloud.ply import read_ply_mesh
 from photocore.errors import InputError
-from photocore.output import atomic_path
 
 POINTS = "element vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
 FACES = "element face 1\nproperty list uchar int vertex_indices\n"
@@ -181,10 +180,7 @@ def test_a_copy_moves_only_what_moved(tmp_path: Path, ending: str) -> None:
     (piece,) = cloud.pieces()
     assert piece.xyz.tolist() == [[2, 1.5, 3], [5, 4, 6]]
     moved = piece.xyz + np.array([[0, 0, 0.25], [0, 0, 0]])
-    with (
-        atomic_path(target, overwrite=False) as place,
-        cloud.copy(place, {"depth": ("f4", "")}) as write,
-    ):
+    with cloud.copy(target, {"depth": ("f4", "")}, overwrite=False) as write:
         write(piece, moved, {"depth": np.array([0.5, 0.0])})
     (again,) = open_cloud(target).pieces(numbers=["depth"])
     assert again.xyz.tolist() == moved.tolist()
