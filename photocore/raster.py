@@ -376,10 +376,10 @@ def check_whole(path: Path, *, width: int, height: int, bands: int) -> None:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", NotGeoreferencedWarning)
             with rasterio.open(path) as file:
-                found = (file.width, file.height, file.count)
-                if found != (width, height, bands):
+                shape = (file.width, file.height, file.count)
+                if shape != (width, height, bands):
                     raise OSError(
-                        f"the file is incomplete: {found[0]} x {found[1]} px in {found[2]} bands "
+                        f"the file is incomplete: {shape[0]} x {shape[1]} px in {shape[2]} bands "
                         f"instead of {width} x {height} in {bands}"
                     )
                 _check_blocks(file, size)
