@@ -121,9 +121,7 @@ def test_a_damaged_raster_is_refused_where_it_cannot_be_read(tmp_path: Path) -> 
     (tmp_path / "cut.tif").write_bytes(data[: len(data) // 2])
     with (
         RasterFile(tmp_path / "cut.tif") as file,
-        pytest.raises(
-            InputError, match=r"cut\.tif: cannot be read at column 0, row 0; the"
-        ),
+        pytest.raises(InputError, match=r"cut\.tif: cannot be read at column 0, row 0; the"),
     ):
         file.read(-5, -5, WIDTH, HEIGHT + 5)
 
