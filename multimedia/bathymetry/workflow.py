@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from functools import partial
 
 import numpy as np
 
 from multimedia.bathymetry.corrected_points import (
     CorrectedPoints,
     WaterSurface,
-    checked_index,
-    height_of,
+    checked_water_index,
     status_labels,
 )
+from multimedia.bathymetry.correction_job import MIXED_UNITS, Job, Outcome
 from multimedia.bathymetry.dem import Dem
-from multimedia.bathymetry.job import MIXED_UNITS, Job, Outcome
 from multimedia.bathymetry.refracted_rays import correct_lidar_beams, intersect_refracted_rays
 from multimedia.bathymetry.refraction_correction import correct_bathymetry
 from multimedia.bathymetry.regrid import pull_back
@@ -59,7 +59,7 @@ def correct_file(job: Job, *, progress: Progress = no_progress) -> Outcome:
         If anything is wrong with the data; the target is then not written.
     """
     check_writable(job.target, overwrite=job.overwrite)
-    checked_index(job.index)
+    checked_water_index(job.index)
     if job.source.resolve() == job.target.resolve():
         raise InputError(f"{job.target}: is the input itself; name another file for --out.")
     if job.rays:
@@ -83,8 +83,8 @@ def _correct_cloud(job: Job, progress: Progress) -> Outcome:
             "the original, or remove the attribute."
         )
     surface = read_water_surface(job.water_level)
-    outcome = Outcome(remarks=list(cloud.remarks))
-    correct = _corrector(job, cloud, surface, outcome)
+    correct, remarks = _corrector(job, cloud, surface)
+    outcome = Outcome(remarks=[*cloud.remarks, *remarks])
     is_precise = job.precision.is_given and not job.beams
     gained = {
         name: kind for name, kind in _GAINED.items() if is_precise or not name.startswith("sigma")
@@ -107,22 +107,21 @@ def _correct_cloud(job: Job, progress: Progress) -> Outcome:
 
 
 def _corrector(
-    job: Job, cloud: Cloud, surface: WaterSurface, outcome: Outcome
-) -> Callable[[CloudPiece], CorrectedPoints]:
-    """Return the function that corrects one piece of a cloud."""
+    job: Job, cloud: Cloud, surface: WaterSurface
+) -> tuple[Callable[[CloudPiece], CorrectedPoints], list[str]]:
+    """Return the function that corrects one piece of a cloud, and what the user should know."""
+    nadir = partial(
+        correct_bathymetry, water_level=surface, index=job.index, precision=job.precision
+    )
     if job.beams:
         sensor = _sensor_positions(job, cloud)
-        return lambda piece: correct_lidar_beams(
-            sensor(piece),
-            piece.xyz,
-            water_level=surface,
-            index=job.index,
-            group_index=job.group_index,
+        beams = partial(
+            correct_lidar_beams, water_level=surface, index=job.index, group_index=job.group_index
         )
+        return lambda piece: beams(sensor(piece), piece.xyz), []
     if job.cameras is None:
-        return lambda piece: correct_bathymetry(
-            piece.xyz, water_level=surface, index=job.index, precision=job.precision
-        )
+        return lambda piece: nadir(piece.xyz), []
+    remarks = []
     cameras = read_camera_positions(job.cameras)
     pairs = read_visibility(job.visibility) if job.visibility else None
     if pairs is not None:
@@ -130,23 +129,17 @@ def _corrector(
         if not cloud.has("id"):
             raise InputError(f"{job.source}: --visibility needs a column id in the point cloud.")
     elif not cloud.has("cameras") and job.max_angle is None:
-        outcome.remarks.append(
+        remarks.append(
             "Nothing says which camera saw which point; every camera is taken to see every point. "
             "--visibility, a column 'cameras' or --max-angle do better."
         )
 
     def correct(piece: CloudPiece) -> CorrectedPoints:
         _check_camera_unit(piece.xyz, cameras.centres, job)
-        return correct_bathymetry(
-            piece.xyz,
-            water_level=surface,
-            index=job.index,
-            cameras=cameras.centres,
-            visible=_visible(piece, cameras, pairs, job),
-            precision=job.precision,
-        )
+        visible = _visible(piece, cameras, pairs, job)
+        return nadir(piece.xyz, cameras=cameras.centres, visible=visible)
 
-    return correct
+    return correct, remarks
 
 
 def _visible(
@@ -349,7 +342,7 @@ def _correct_rays(job: Job) -> Outcome:
         sigma_direction=job.sigma_direction,
     )
     outcome = Outcome()
-    depth = np.maximum(height_of(surface, points.xyz[:, :2]) - points.xyz[:, 2], 0.0)
+    depth = np.maximum(surface.height_at(points.xyz[:, :2]) - points.xyz[:, 2], 0.0)
     outcome.add(points.xyz, CorrectedPoints(xyz=points.xyz, depth=depth, status=points.status))
     outcome.judge(surface, allow_dry=job.allow_dry)
     columns = {

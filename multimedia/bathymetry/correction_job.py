@@ -1,4 +1,4 @@
-"""What a correction of files is asked to do, and what it did."""
+"""What a refraction correction of files is asked for, and what it tells the user afterwards."""
 
 from __future__ import annotations
 
@@ -13,7 +13,6 @@ from multimedia.bathymetry.corrected_points import (
     Precision,
     WaterSurface,
 )
-from multimedia.media.surfaces import Plane
 from photocore.arrays import FloatArray
 from photocore.errors import GeometryError
 
@@ -113,7 +112,7 @@ class Outcome:
     def judge(self, surface: WaterSurface, *, allow_dry: bool) -> None:
         """Raise GeometryError when nothing lies under water; note what looks like millimetres."""
         if not self._wet and not allow_dry:
-            level = _typical_level(surface)
+            level = surface.middle
             hint = ""
             if 0 < self.lowest / 2 <= 1000 * level <= 2 * self.highest:
                 hint = " The heights look like millimetres, the water level like metres."
@@ -125,7 +124,7 @@ class Outcome:
         span = self.highest - self.lowest
         if self.max_depth > DEEPEST and 0 < span < self.max_depth / MIXED_UNITS:
             raise GeometryError(
-                f"the water level {_typical_level(surface):g} lies {self.max_depth:g} above "
+                f"the water level {surface.middle:g} lies {self.max_depth:g} above "
                 f"heights that span only {span:g}: are they in different units (mm and m)?"
             )
         if self.max_depth > DEEPEST:
@@ -141,10 +140,3 @@ class Outcome:
             self.remarks.append(
                 f"{outside} points lie outside the modelled water surface and were left as given."
             )
-
-
-def _typical_level(surface: WaterSurface) -> float:
-    """Return one height of the surface, for messages."""
-    if isinstance(surface, Plane):
-        return float(surface.point[2])
-    return (surface.lowest + surface.highest) / 2
