@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from photocore.arrays import ByteArray
 from photocore.errors import InputError
 from photocore.output import atomic_path
+from photocore.raster import RasterFile
 
 ImageArray = NDArray[np.uint8] | NDArray[np.uint16]
 
@@ -170,23 +171,15 @@ def _read_by_strips(info: ImageInfo) -> ImageArray | None:
 
     OpenCV decodes into a buffer and copies it: 600 MB for 100 megapixels.
     """
-    import rasterio
-    from rasterio.errors import NotGeoreferencedWarning, RasterioError
-    from rasterio.windows import Window
-
     try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", NotGeoreferencedWarning)
-            with rasterio.Env(GDAL_CACHEMAX=64), rasterio.open(info.path) as file:
-                if file.count not in (3, 4) or file.dtypes[0] not in ("uint8", "uint16"):
-                    return None
-                image = np.empty((file.height, file.width, 3), file.dtypes[0])
-                for top in range(0, file.height, 256):
-                    height = min(256, file.height - top)
-                    window = Window(0, top, file.width, height)
-                    part = file.read([1, 2, 3], window=window)
-                    image[top : top + height] = part.transpose(1, 2, 0)
-    except RasterioError:
+        with RasterFile(info.path) as file:
+            if file.bands not in (3, 4) or file.dtype not in (np.uint8, np.uint16):
+                return None
+            image = np.empty((file.height, file.width, 3), file.dtype)
+            for top in range(0, file.height, 256):
+                height = min(256, file.height - top)
+                image[top : top + height] = file.read(0, top, file.width, height, bands=[1, 2, 3])
+    except InputError:
         return None  # OpenCV may still read it, or say what is wrong
     return image
 

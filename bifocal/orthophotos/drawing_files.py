@@ -8,6 +8,7 @@ from xml.sax.saxutils import escape
 
 import numpy as np
 
+from bifocal.files.dxf import add_text, new_drawing
 from bifocal.model.points import SurveyPoints
 from bifocal.orthophotos.drawing import Drawing, Section, round_step
 from photocore.output import atomic_path
@@ -56,7 +57,7 @@ def write_drawing(path: Path, drawing: Drawing, image_name: str | None, *, overw
             ((x, y - 2 * paper), (x, y + 2 * paper)),
         ):
             model.add_line(a, b, dxfattribs={"layer": "BIFOCAL_GRID"})
-        _text(
+        add_text(
             model, f"{x:g} / {y:g}", (x + 0.5 * paper, y + 0.5 * paper), 1.6 * paper, "BIFOCAL_GRID"
         )
     _scale_bar(model, drawing, paper)
@@ -68,11 +69,11 @@ def write_drawing(path: Path, drawing: Drawing, image_name: str | None, *, overw
         )
         if len(line) > 60:
             place = tuple(line[len(line) // 2].tolist())
-            _text(model, f"{level:+.2f}", place, 1.4 * paper, "BIFOCAL_CONTOUR_TEXT")
+            add_text(model, f"{level:+.2f}", place, 1.4 * paper, "BIFOCAL_CONTOUR_TEXT")
     for cut in drawing.sections:
         model.add_lwpolyline(cut.path.tolist(), dxfattribs={"layer": "BIFOCAL_SECTION_LINES"})
         place = tuple(cut.path[0].tolist())
-        _text(model, cut.name, place, 2.5 * paper, "BIFOCAL_SECTION_LINES")
+        add_text(model, cut.name, place, 2.5 * paper, "BIFOCAL_SECTION_LINES")
     document.set_modelspace_vport(
         height=1.15 * (ymax - ymin), center=((xmin + xmax) / 2, (ymin + ymax) / 2)
     )
@@ -88,7 +89,7 @@ def write_section_dxf(path: Path, cut: Section, *, scale: float, overwrite: bool
     start, end = float(cut.place.min()), float(cut.place.max())
     ends = ((0.0, start), (0.0, end)) if cut.axis == "x" else ((start, 0.0), (end, 0.0))
     model.add_line(*ends, dxfattribs={"layer": "BIFOCAL_GRID"})
-    _text(model, f"section {cut.name}", ends[0], 3 * scale / 1000, "BIFOCAL_SECTIONS")
+    add_text(model, f"section {cut.name}", ends[0], 3 * scale / 1000, "BIFOCAL_SECTIONS")
     with atomic_path(path, overwrite=overwrite) as temporary:
         document.saveas(temporary)
 
@@ -140,22 +141,8 @@ def write_section_svg(path: Path, cut: Section, *, scale: float, overwrite: bool
 
 
 def _new(scale: float) -> tuple[Any, Any]:
-    import ezdxf
-    from ezdxf import units
-
-    document = ezdxf.new("R2010", setup=True)
-    document.units = units.M
-    document.header["$PDMODE"] = 34  # points drawn as a cross in a circle
-    document.header["$PDSIZE"] = 3 * scale / 1000  # 3 mm on paper
-    for layer, colour in LAYERS.items():
-        document.layers.add(layer, color=colour)
-    return document, document.modelspace()
-
-
-def _text(model: Any, text: str, place: tuple[float, ...], height: float, layer: str) -> None:
-    model.add_text(
-        text.replace("\n", " "), height=height, dxfattribs={"layer": layer, "insert": place}
-    )
+    """Return a drawing whose points are crosses in circles of 3 mm on paper."""
+    return new_drawing(LAYERS, point_style=34, point_size=3 * scale / 1000)
 
 
 def _points(model: Any, points: SurveyPoints | None, layer: str, height: float) -> None:
@@ -168,14 +155,17 @@ def _points(model: Any, points: SurveyPoints | None, layer: str, height: float) 
             place[2] = 0.0
         model.add_point(place, dxfattribs={"layer": layer})
         label = (place[0] + height / 2, place[1] + height / 2)
-        _text(model, name, label, height, "BIFOCAL_NAMES" if layer == "BIFOCAL_POINTS" else layer)
+        add_text(
+            model, name, label, height, "BIFOCAL_NAMES" if layer == "BIFOCAL_POINTS" else layer
+        )
 
 
 def _scale_bar(model: Any, drawing: Drawing, paper: float) -> None:
     xmin, ymin, _, _ = drawing.grid.bounds
     length = drawing.bar_length()
     y, high = ymin - 10 * paper, 2 * paper
-    style = {"layer": "BIFOCAL_SCALEBAR"}
+    layer = "BIFOCAL_SCALEBAR"
+    style = {"layer": layer}
     for part in range(5):
         a, b = xmin + length * part / 5, xmin + length * (part + 1) / 5
         corners = [(a, y), (b, y), (b, y + high), (a, y + high)]
@@ -183,8 +173,10 @@ def _scale_bar(model: Any, drawing: Drawing, paper: float) -> None:
             model.add_solid([corners[0], corners[1], corners[3], corners[2]], dxfattribs=style)
         model.add_lwpolyline(corners, close=True, dxfattribs=style)
     for share, text in ((0.0, "0"), (0.2, f"{length / 5:g}"), (1.0, f"{length:g} m")):
-        _text(model, text, (xmin + length * share, y + 1.5 * high), 2.4 * paper, "BIFOCAL_SCALEBAR")
-    _text(
+        add_text(
+            model, text, (xmin + length * share, y + 1.5 * high), 2.4 * paper, "BIFOCAL_SCALEBAR"
+        )
+    add_text(
         model, f"{drawing.title}, 1:{drawing.scale:g}", (xmin, y - 4 * paper), 2.4 * paper,
         "BIFOCAL_SCALEBAR",
     )  # fmt: skip

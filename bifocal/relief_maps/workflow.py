@@ -7,14 +7,17 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from bifocal.files.geotiff import write_relief
 from bifocal.files.images import ImageArray, read_image, to_eight_bit
 from bifocal.model.pair import Pair
 from bifocal.model.relief_map import ReliefMap
 from bifocal.relief_maps import DenseRelief, dense_relief
-from bifocal.relief_maps.relief_files import Cloud, write_cloud, write_preview
+from bifocal.relief_maps.relief_files import write_preview
+from photocore.arrays import FloatArray
 from photocore.cli import Progress, no_progress
+from photocore.cloud import write_cloud
 from photocore.errors import GeometryError, InputError
 from photocore.output import check_writable
 
@@ -94,49 +97,52 @@ def relief_of_pair(
         write_preview(job.preview, result, overwrite=job.overwrite)
         written.append(job.preview)
     if job.cloud is not None:
-        write_cloud(job.cloud, coloured_cloud(result, pair, image1), overwrite=job.overwrite)
+        xyz, attributes = coloured_cloud(result, pair, image1)
+        write_cloud(
+            job.cloud, xyz, attributes, comment="metres, plane frame",
+            descriptions={"sigma": "sigma of relief, m"}, overwrite=job.overwrite,
+        )  # fmt: skip
         written.append(job.cloud)
     summary = result.summary() | {"written": [str(path) for path in written]}
     return summary, (*pair.remarks, *_remarks(result))
 
 
-def coloured_cloud(relief: ReliefMap, pair: Pair, image1: ImageArray) -> Cloud:
-    """Return the known points of a relief map with the colours of photo 1."""
+def coloured_cloud(
+    relief: ReliefMap, pair: Pair, image1: ImageArray
+) -> tuple[FloatArray, dict[str, NDArray[Any]]]:
+    """Return the known points of a relief map with the colours of photo 1.
+
+    Returns
+    -------
+    xyz : ndarray, shape (n, 3)
+        X, Y, relief. [m]
+    attributes : dict of str to ndarray, shape (n,)
+        ``red``, ``green``, ``blue`` (8 bits), ``sigma`` of the relief [m], ``quality``.
+    """
     import cv2
 
     picture = to_eight_bit(image1)
     if picture.ndim == 2:
         picture = np.repeat(picture[..., None], 3, axis=2)
-    parts = []
+    positions, colours = [], []
     for row in range(0, relief.shape[0], _ROWS):
         rows = slice(row, row + _ROWS)
         known = relief.known[rows]
-        xyz = np.concatenate(
-            [relief.plane_positions(rows)[known], relief.r[rows][known][:, None]], axis=1
-        )
-        if not len(xyz):
+        if not known.any():
             continue
+        xyz = np.column_stack([relief.plane_positions(rows)[known], relief.r[rows][known]])
+        positions.append(xyz)
         pixels = pair.image1.project(xyz).astype(np.float32)
-        colours = np.concatenate(
-            [
-                cv2.remap(
-                    picture,
-                    np.ascontiguousarray(some[None, :, 0]),
-                    np.ascontiguousarray(some[None, :, 1]),
-                    cv2.INTER_LINEAR,
-                )[0]
-                for some in np.array_split(pixels, len(pixels) // 30000 + 1)
-            ]
-        )
-        parts.append(
-            Cloud(
-                xyz,
-                colours,
-                relief.sigma[rows][known].astype(np.float64),
-                relief.quality[rows][known],
-            )
-        )
-    return Cloud(*(np.concatenate(bands) for bands in zip(*parts, strict=True)))
+        for some in np.array_split(pixels, len(pixels) // 30000 + 1):
+            columns, lines = np.ascontiguousarray(some.T[:, None])
+            colours.append(cv2.remap(picture, columns, lines, cv2.INTER_LINEAR)[0])
+    known = relief.known
+    attributes = dict(zip(("red", "green", "blue"), np.concatenate(colours).T, strict=True))
+    attributes |= {
+        "sigma": relief.sigma[known].astype(np.float32),
+        "quality": relief.quality[known],
+    }
+    return np.concatenate(positions), attributes
 
 
 def _check_outputs(job: ReliefJob) -> None:
