@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from typing import Any
 
 import numpy as np
@@ -26,8 +27,21 @@ def as_floats(value: ArrayLike, name: str) -> FloatArray:
     """
     try:
         return np.asarray(value, dtype=np.float64)
+    except OverflowError as error:
+        largest = sys.float_info.max
+        raise InputError(f"{name}: holds a whole number above {largest:.2g}.") from error
     except (TypeError, ValueError) as error:
         raise InputError(f"{name}: expected numbers, found {value!r:.60}.") from error
+
+
+def is_finite_number(value: object) -> bool:
+    """Tell whether value, as read from a file, is a number that float64 can hold; no bool is."""
+    # A comparison takes whole numbers of any length, which float() and numpy do not; NaN fails it.
+    return (
+        isinstance(value, int | float)
+        and not isinstance(value, bool)
+        and abs(value) <= sys.float_info.max
+    )
 
 
 def as_points(value: ArrayLike, name: str, *, dimension: int) -> FloatArray:
@@ -71,7 +85,10 @@ def positive(value: float, name: str, *, unit: str = "") -> float:
     InputError
         Otherwise.
     """
-    number = float(as_floats(value, name))
+    array = as_floats(value, name)
+    if array.size != 1:
+        raise InputError(f"{name}: expected one number, found shape {array.shape}.")
+    number = float(array.item())
     if not (np.isfinite(number) and number > 0):
         raise InputError(f"{name}: must be above zero{unit and f' [{unit}]'}, got {value}.")
     return number

@@ -38,6 +38,48 @@ def _stop(number: int, frame: object) -> None:  # noqa: ARG001
     raise KeyboardInterrupt
 
 
+#: Exit status of a fault of the program: EX_SOFTWARE of sysexits.h, which Windows' os lacks.
+UNFORESEEN = 70
+
+_DEBUG = "photocore.debug"
+
+
+def _debug_option() -> click.Option:
+    """Return the option that every command and both programs have."""
+
+    def remember(ctx: click.Context, param: click.Parameter, value: bool) -> None:  # noqa: ARG001
+        # Commands share this dictionary with their group; given before or after, it holds.
+        ctx.meta[_DEBUG] = ctx.meta.get(_DEBUG, False) or value
+
+    return click.Option(
+        ["--debug"],
+        is_flag=True,
+        is_eager=True,
+        expose_value=False,
+        callback=remember,
+        help="Show the technical details of an error.",
+    )
+
+
+def unforeseen_message(task: str, error: BaseException) -> str:
+    """Return one line about an error that nobody foresaw while a command was at work.
+
+    Parameters
+    ----------
+    task : str
+        Program and command.
+    error : BaseException
+        What ended it.
+    """
+    said = " ".join(str(error).split())
+    said = f"{type(error).__name__}: {said}" if said else type(error).__name__
+    return (
+        f"Error: {task} failed on something nobody foresaw ({said:.300}). The fault is the "
+        "program's, not yours: please report this line, your command and what it prints with "
+        "--debug to its authors."
+    )
+
+
 #: Jobs shorter than this need no progress lines where stderr is no terminal. [s]
 SILENT_SECONDS = 2.0
 
@@ -58,6 +100,7 @@ class LazyGroup(click.Group):
         self, *args: Any, commands_package: str, summaries: Mapping[str, str], **kwargs: Any
     ) -> None:
         super().__init__(*args, **kwargs)
+        self.params.append(_debug_option())
         self.commands_package, self.summaries = commands_package, dict(summaries)
 
     def list_commands(self, ctx: click.Context) -> list[str]:  # noqa: ARG002
@@ -73,6 +116,8 @@ class LazyGroup(click.Group):
         for parameter in command.params:
             if parameter.type is click.FLOAT:
                 parameter.type = NUMBER
+        if not any("--debug" in parameter.opts for parameter in command.params):
+            command.params.append(_debug_option())
         return command
 
     def resolve_command(
@@ -93,12 +138,18 @@ class LazyGroup(click.Group):
             formatter.write_dl(list(self.summaries.items()))
 
     def invoke(self, ctx: click.Context) -> Any:
-        """Run a command; the one place where errors become messages and exit status 1."""
+        """Run a command; the one place where errors become messages and an exit status.
+
+        1: the input, the disk or the user ended it. 70: a fault of the program.
+        """
         with suppress(ValueError):  # not in the main thread: somebody else handles signals there
             signal.signal(signal.SIGTERM, _stop)
         try:
             return super().invoke(ctx)
+        except (click.ClickException, click.exceptions.Exit, click.Abort):
+            raise
         except PhotogrammetryError as error:
+            _show_details(ctx)
             click.echo(f"Error: {error}", err=True)
         except KeyboardInterrupt:
             click.echo("Stopped by the user; nothing was left half-written.", err=True)
@@ -111,9 +162,24 @@ class LazyGroup(click.Group):
             # The reader of our output went away (``| head``): not our failure, nothing to say.
             sys.stderr.close()
         except OSError as error:
+            _show_details(ctx)
             name = f"{error.filename}: " if error.filename else ""
             click.echo(f"Error: {name}{error.strerror or error}.", err=True)
+        except Exception as error:  # the last resort; the tests let nobody get here
+            _show_details(ctx)
+            program = self.commands_package.partition(".")[0]
+            task = f"{program} {ctx.invoked_subcommand or ''}".rstrip()
+            click.echo(unforeseen_message(task, error), err=True)
+            ctx.exit(UNFORESEEN)
         return ctx.exit(1)
+
+
+def _show_details(ctx: click.Context) -> None:
+    """Print the traceback of the error at hand where --debug asks for it."""
+    if ctx.meta.get(_DEBUG):
+        from traceback import format_exc
+
+        click.echo(format_exc(), err=True)
 
 
 def print_json(value: Any) -> None:

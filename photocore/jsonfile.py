@@ -45,6 +45,8 @@ def read_object(path: Path | str, *, what: str) -> dict[str, Any]:
         raise InputError(
             f"{path}: not valid JSON at line {error.lineno}, column {error.colno}: {error.msg}."
         ) from None
+    except ValueError:  # Python reads no whole number of more than 4300 digits
+        raise InputError(f"{path}: holds a whole number of thousands of digits.") from None
     except RecursionError:
         raise InputError(f"{path}: nested too deeply for a {what}.") from None
     if not isinstance(value, dict):

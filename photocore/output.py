@@ -7,6 +7,7 @@ import shutil
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
+from itertools import count
 from pathlib import Path
 
 from photocore.errors import InputError
@@ -18,7 +19,8 @@ def check_writable(path: Path | str, *, overwrite: bool) -> Path:
     Raises
     ------
     InputError
-        If it exists and ``overwrite`` is false, is a folder, or its folder is missing or read-only.
+        If it exists and ``overwrite`` is false, is a folder, is open in a spreadsheet program, or
+        its folder is missing or read-only.
     """
     path = Path(path)
     if path.is_dir():
@@ -30,7 +32,39 @@ def check_writable(path: Path | str, *, overwrite: bool) -> Path:
         raise InputError(f"{path}: the folder {folder} does not exist; create it first.")
     if not os.access(folder, os.W_OK):
         raise InputError(f"{path}: the folder {folder} is read-only; choose another place.")
+    check_not_open(path)
     return path
+
+
+def check_not_open(path: Path) -> None:
+    """Refuse a file that a spreadsheet program has open.
+
+    Raises
+    ------
+    InputError
+        Naming the program and the way out.
+    """
+    locks = {"Excel": f"~${path.name}", "LibreOffice": f".~lock.{path.name}#"}
+    for program, name in locks.items():
+        if (path.parent / name).exists():
+            raise InputError(
+                f"{path}: is open in {program}. Close it there and try again, or write to another "
+                f"file with --out. (If it is not open, delete the left-over file {name}.)"
+            )
+
+
+def free_path(folder: Path, stem: str, ending: str = "") -> Path:
+    """Return the first of ``stem``, ``stem2``, ``stem3`` ... that does not exist in a folder.
+
+    Parameters
+    ----------
+    folder : Path
+        Where to look.
+    stem, ending : str
+        The name; the number goes between them.
+    """
+    names = (f"{stem}{number if number > 1 else ''}{ending}" for number in count(1))
+    return next(path for path in map(folder.joinpath, names) if not os.path.lexists(path))
 
 
 @contextmanager
@@ -88,6 +122,8 @@ def atomic_folder(path: Path | str, *, overwrite: bool) -> Iterator[Path]:
             raise InputError(
                 f"{path}: holds {', '.join(sorted(taken)[:5])} already; add --overwrite to replace."
             )
+        for name in made:
+            check_not_open(path / name)
         for name in made:
             (path / name).parent.mkdir(parents=True, exist_ok=True)
             (temporary / name).replace(path / name)

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+import subprocess
+from collections.abc import Iterator
 from pathlib import Path
 
 # Tests run one process per core: threads inside each would only get in each other's way.
@@ -11,6 +13,8 @@ for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
 
 import pytest  # noqa: E402
 from hypothesis import settings  # noqa: E402
+
+from photocore import cli  # noqa: E402
 
 # The same examples on every machine and in every run: a red test is then a change of the code.
 settings.register_profile("same", derandomize=True, deadline=None)
@@ -24,3 +28,50 @@ def data_dir() -> Path:
     if not folder:
         pytest.skip("BIFOCAL_DATA is not set")
     return Path(folder)
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _observed_commands() -> Iterator[tuple[list[str], list[subprocess.Popen]]]:
+    """Note what the last-resort handler says, and every process started, in the whole session."""
+    said: list[str] = []
+    started: list[subprocess.Popen] = []
+    message, start = cli.unforeseen_message, subprocess.Popen.__init__
+
+    def noted_message(task: str, error: BaseException) -> str:
+        said.append(message(task, error))
+        return said[-1]
+
+    def noted_start(process: subprocess.Popen, *args: object, **options: object) -> None:
+        started.append(process)
+        start(process, *args, **options)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(cli, "unforeseen_message", noted_message)
+        patch.setattr(subprocess.Popen, "__init__", noted_start)
+        yield said, started
+
+
+class Unforeseen:
+    """What the last-resort handler of the commands had to say in a test; none may be left."""
+
+    def __init__(self, said: list[str], started: list[subprocess.Popen]) -> None:
+        self._said, self._started = said, started
+
+    def taken(self) -> list[str]:
+        """Return the messages and the processes of its exit status so far, and forget them."""
+        ended = [p for p in self._started if getattr(p, "returncode", None) == cli.UNFORESEEN]
+        met = [*self._said, *(f"exit status {p.returncode}: {p.args}" for p in ended)]
+        self._said.clear()
+        self._started[:] = [p for p in self._started if getattr(p, "returncode", 0) is None]
+        return met
+
+
+@pytest.fixture(autouse=True)
+def unforeseen(
+    _observed_commands: tuple[list[str], list[subprocess.Popen]],
+) -> Iterator[Unforeseen]:
+    """Fail a test whose commands, here or in other processes, end in the last-resort handler."""
+    met = Unforeseen(*_observed_commands)
+    yield met
+    left = met.taken()
+    assert not left, "\n".join(["a command ended in the handler of unforeseen errors:", *left])

@@ -12,8 +12,8 @@ another order. A tolerance is therefore a multiple of EPS times the magnitude of
 16 EPS
     A few formulas in a row, an inverse, or products of matrices.
 
-`.ci/processors` runs the tests as other processors compute them; more than half of a tolerance
-was used there by nothing. A fault of the code is thousands of times larger.
+`.ci/processors` runs the tests as other processors compute them; none used more than half of its
+tolerance there. A fault in a formula is thousands of times larger than any of these.
 """
 
 import numpy as np

@@ -13,6 +13,7 @@ from photocore.arrays import BoolArray, FloatArray
 from photocore.errors import InputError
 from photocore.output import atomic_path
 from photocore.tables import write_csv
+from photocore.workbook.newbook import new_workbook
 
 #: Point lists as surveyors name them: P point, N north, E east, Z height, D description.
 ORDERS = ("PNEZD", "PENZD")
@@ -89,7 +90,8 @@ def export_points(
         missing = [name for name, wanted in zip(points.ids, keep, strict=True) if not wanted]
         shown = ", ".join(missing[:10]) + (" ..." if len(missing) > 10 else "")
         remarks.append(f"{len(missing)} point(s) without coordinates left out: {shown}")
-    with atomic_path(path, overwrite=overwrite) as temporary:
+    output = new_workbook if path.suffix.lower() == ".xlsx" else atomic_path
+    with output(path, overwrite=overwrite) as temporary:
         writer(temporary, points.take(keep), coordinates[keep])
     return tuple(remarks)
 

@@ -7,7 +7,6 @@ engineering system in metres, so GIS programs put them neither on the equator no
 from __future__ import annotations
 
 import contextlib
-import os
 import shutil
 import warnings
 from collections.abc import Iterator, Sequence
@@ -22,6 +21,7 @@ from bifocal.model.grid import Grid
 from bifocal.model.relief_map import Quality, ReliefMap
 from photocore.errors import InputError
 from photocore.output import atomic_path, check_writable
+from photocore.raster import written_whole
 
 #: Side of a tile of the file; GDAL's and most viewers' sweet spot. [px]
 BLOCK = 512
@@ -234,7 +234,6 @@ def create_raster(
     """
     import rasterio
     from rasterio.crs import CRS
-    from rasterio.errors import RasterioIOError
 
     path = check_writable(path, overwrite=overwrite)
     world = path.with_suffix(".tfw")
@@ -264,24 +263,22 @@ def create_raster(
         options["photometric"] = "RGB"
     with atomic_path(path, overwrite=overwrite) as temporary, _gdal():
         try:
-            with rasterio.open(temporary, "w", **options) as file:
-                if dpi is not None:
-                    file.update_tags(
-                        TIFFTAG_XRESOLUTION=f"{dpi:.10g}",
-                        TIFFTAG_YRESOLUTION=f"{dpi:.10g}",
-                        TIFFTAG_RESOLUTIONUNIT="2",
+            with written_whole(temporary, width=grid.width, height=grid.height, bands=bands):
+                with rasterio.open(temporary, "w", **options) as file:
+                    if dpi is not None:
+                        file.update_tags(
+                            TIFFTAG_XRESOLUTION=f"{dpi:.10g}",
+                            TIFFTAG_YRESOLUTION=f"{dpi:.10g}",
+                            TIFFTAG_RESOLUTIONUNIT="2",
+                        )
+                    file.update_tags(TIFFTAG_SOFTWARE="bifocal", **(tags or {}))
+                    for number, name in enumerate(names, start=1):
+                        file.set_band_description(number, name)
+                    yield RasterWriter(file, grid)
+                if overviews:
+                    _add_overviews(
+                        temporary, grid, categories=not colour and np.dtype(dtype).kind == "u"
                     )
-                file.update_tags(TIFFTAG_SOFTWARE="bifocal", **(tags or {}))
-                for number, name in enumerate(names, start=1):
-                    file.set_band_description(number, name)
-                yield RasterWriter(file, grid)
-            if overviews:
-                _add_overviews(
-                    temporary, grid, categories=not colour and np.dtype(dtype).kind == "u"
-                )
-            _check_whole(temporary)
-        except RasterioIOError as error:
-            raise OSError("writing failed; is the disk full?") from error
         finally:
             for extra in (".ovr", ".msk", ".aux.xml"):
                 temporary.with_name(temporary.name + extra).unlink(missing_ok=True)
@@ -445,21 +442,3 @@ def _check_space(path: Path, grid: Grid, bytes_per_pixel: int) -> None:
             f"{path}: {grid.width} x {grid.height} px need more than {needed / 1e9:.1f} GB and "
             f"{free / 1e9:.1f} GB are free. Choose another disk, a coarser --gsd or --bounds."
         )
-
-
-def _check_whole(path: Path) -> None:
-    """Raise OSError if a tile of the file is missing: GDAL can lose a full disk on closing."""
-    import rasterio
-    from rasterio.errors import RasterioError
-
-    size = os.stat(path).st_size  # noqa: PTH116
-    try:
-        with rasterio.open(path) as file:
-            rows, columns = -(-file.height // BLOCK), -(-file.width // BLOCK)
-            last = f"BLOCK_OFFSET_{columns - 1}_{rows - 1}"
-            offset = file.get_tag_item(last, "TIFF", bidx=1)
-            length = file.get_tag_item(last.replace("OFFSET", "SIZE"), "TIFF", bidx=1)
-    except RasterioError as error:
-        raise OSError(f"the file is incomplete: {error}") from error
-    if offset is None or int(offset) + int(length or 0) > size:
-        raise OSError("the file is incomplete; is the disk full?")

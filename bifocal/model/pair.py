@@ -130,6 +130,9 @@ class Pair:
         Other keys of the pair file; kept.
     remarks : tuple of str
         What the user should be told, e.g. that the images were exchanged.
+    exchanged : bool
+        Whether the images stand the other way round than they were given: measurements in the
+        order given have to be exchanged too.
     """
 
     image1: Photo
@@ -137,6 +140,7 @@ class Pair:
     folder: Path = Path()
     extra: Mapping[str, Any] = field(default_factory=dict)
     remarks: tuple[str, ...] = ()
+    exchanged: bool = False
 
     def __post_init__(self) -> None:
         d1, d2 = self.image1.distance, self.image2.distance
@@ -149,6 +153,7 @@ class Pair:
             far, near = self.image2, self.image1
             object.__setattr__(self, "image1", far)
             object.__setattr__(self, "image2", near)
+            object.__setattr__(self, "exchanged", not self.exchanged)
             note = f"image1 was the near camera ({d1:g} m < {d2:g} m); the two were exchanged."
             object.__setattr__(self, "remarks", (*self.remarks, note))
 

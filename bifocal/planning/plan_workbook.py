@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from photocore.output import atomic_path
+from photocore.workbook.newbook import new_workbook
 
 if TYPE_CHECKING:
     from bifocal.planning.camera_plan import Plan
@@ -43,7 +43,7 @@ def write_plan(path: Path | str, plan: Plan, *, overwrite: bool = False) -> None
     book = Workbook()
     _stations_sheet(book.active, plan)
     _grid_sheet(book.create_sheet("Sigma r"), plan)
-    with atomic_path(path, overwrite=overwrite) as temporary:
+    with new_workbook(path, overwrite=overwrite) as temporary:
         book.save(temporary)
 
 

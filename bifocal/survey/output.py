@@ -21,6 +21,7 @@ from bifocal.survey.workflow import Solution
 from photocore.errors import InputError
 from photocore.jsonfile import to_text
 from photocore.tables import write_csv
+from photocore.workbook.newbook import is_untouched, other_name
 
 _NUMBERS = ("r", "e1", "e2", "s_c", "X", "Y", "Z", "q", "sigma_r")
 
@@ -44,21 +45,26 @@ def write_result(
     Returns
     -------
     str
-        Why the survey's own workbook was not carried over; empty where there is nothing to say.
+        Where the old state of a workbook changed in place is kept, or why the survey's own
+        workbook was not carried over; empty where there is nothing to say.
 
     Notes
     -----
     A survey workbook is carried over with all the user put into it, results filled in; any other
-    table gives a new workbook.
+    table gives a new workbook. That never replaces the survey, nor a workbook that holds anything
+    but what this program wrote.
 
     Raises
     ------
     InputError
-        If the ending is another, or there are too many points for a workbook.
+        If the ending is another, there are too many points for a workbook, or a new workbook would
+        replace the user's own.
     """
     path = Path(path)
     ending = path.suffix.lower()
     if ending == ".csv":
+        if _is_same_file(path, solution.source):
+            raise InputError(f"{path}: is the survey itself; name another file to write to.")
         write_csv(path, _csv_columns(solution), overwrite=overwrite)
         return ""
     if ending not in (".xlsx", ".xlsm"):
@@ -74,15 +80,24 @@ def write_result(
         own = as_typed(solution, content)
         reason = can_update(solution.source, path, solution.survey, own)
         if not reason:
-            update_book(solution.source, path, solution.survey, own, overwrite=overwrite)
-            return ""
+            kept = update_book(solution.source, path, solution.survey, own, overwrite=overwrite)
+            return f"the workbook as it was is kept as {kept.name}." if kept else ""
     if ending == ".xlsm":
         raise InputError(
             f"{path}: the macros of {solution.source.name} cannot be carried over, since {reason}. "
             "Write the result as .xlsx."
         )
+    if _is_same_file(path, solution.source) or not is_untouched(path):
+        raise InputError(
+            f"{path}: would be replaced by a new workbook, since {reason}, and all else it holds "
+            f"would be lost. Write to another file: --out {other_name(path).name}"
+        )
     write_book(path, content, overwrite=overwrite)
     return f"a new workbook was made, since {reason}." if solution.survey.is_ours else ""
+
+
+def _is_same_file(path: Path, source: Path) -> bool:
+    return path.exists() and source.exists() and path.samefile(source)
 
 
 def _why_new(solution: Solution, language: str | None) -> str:

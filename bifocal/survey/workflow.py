@@ -249,7 +249,7 @@ def _solve_general(
     remarks: list[str],
 ) -> _Solved:
     """Solve raw pixels with a pair; coordinates in millimetres are carried to pixels first."""
-    exchanged = bool(pair.remarks)
+    exchanged = pair.exchanged
     if exchanged:
         points = points.exchanged()
     unit = str(options.setup.get("unit") or survey.unit or values.unit or "mm")

@@ -14,6 +14,7 @@ import numpy as np
 
 from photocore.arrays import FloatArray
 from photocore.errors import InputError
+from photocore.raster import written_whole
 
 #: GDAL keeps no more than this of a raster in memory; its own default is 5 % of the machine. [MB]
 CACHE_MB = 64
@@ -180,6 +181,11 @@ class Dem:
         """Yield a function (window, array of shape (bands, height, width)) that writes a copy.
 
         Grid, reference system, no-data value and tags are those of this model.
+
+        Raises
+        ------
+        OSError
+            If the copy is not whole: the disk is full.
         """
         import rasterio
         from rasterio.errors import NotGeoreferencedWarning
@@ -203,20 +209,21 @@ class Dem:
             "width": self.width, "height": self.height,
             "nodata": nodata, "compress": "deflate", "predictor": 3, "bigtiff": "if_safer",
         }  # fmt: skip
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", NotGeoreferencedWarning)
-            out = rasterio.open(path, "w", **profile, **tiles)
-        with out:
-            out.update_tags(**{**self.tags, **tags})
-            for number, name in enumerate(bands, start=1):
-                out.set_band_description(number, name)
+        with written_whole(path, width=self.width, height=self.height, bands=len(bands)):
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore", NotGeoreferencedWarning)
+                out = rasterio.open(path, "w", **profile, **tiles)
+            with out:
+                out.update_tags(**{**self.tags, **tags})
+                for number, name in enumerate(bands, start=1):
+                    out.set_band_description(number, name)
 
-            def write(window: Window, values: FloatArray) -> None:
-                block = np.where(np.isfinite(values), values, nodata).astype(kind)
-                place = RasterWindow(window.column, window.row, window.width, window.height)
-                out.write(block, window=place)
+                def write(window: Window, values: FloatArray) -> None:
+                    block = np.where(np.isfinite(values), values, nodata).astype(kind)
+                    place = RasterWindow(window.column, window.row, window.width, window.height)
+                    out.write(block, window=place)
 
-            yield write
+                yield write
 
     def close(self) -> None:
         """Close the file."""

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from photocore.output import atomic_path
+from photocore.workbook.newbook import new_workbook
 
 if TYPE_CHECKING:
     from multimedia.design.studies import Design
@@ -64,7 +65,7 @@ def write_design_workbook(path: Path | str, design: Design, *, overwrite: bool =
             cell.font = Font(bold=True)
             item.column_dimensions[cell.column_letter].width = 18
         item.freeze_panes = "A2"
-    with atomic_path(path, overwrite=overwrite) as temporary:
+    with new_workbook(path, overwrite=overwrite) as temporary:
         book.save(temporary)
 
 

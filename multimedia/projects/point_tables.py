@@ -198,7 +198,7 @@ def write_columns(
     from openpyxl import Workbook
     from openpyxl.styles import Font
 
-    from photocore.output import atomic_path
+    from photocore.workbook.newbook import new_workbook
 
     book = Workbook()
     sheet = book.active
@@ -208,7 +208,7 @@ def write_columns(
     for row in zip(*columns.values(), strict=True):
         sheet.append([_cell(value) for value in row])
     sheet.freeze_panes = "A2"
-    with atomic_path(path, overwrite=overwrite) as temporary:
+    with new_workbook(path, overwrite=overwrite) as temporary:
         book.save(temporary)
 
 

@@ -30,6 +30,7 @@ from multimedia.projects.point_tables import (
     write_columns,
 )
 from multimedia.refraction.layers import Layers
+from photocore.arrays import is_finite_number
 from photocore.distortion import NAMES, Brown, Convention
 from photocore.errors import GeometryError, InputError
 from photocore.output import atomic_path, check_writable
@@ -141,6 +142,10 @@ def _toml(path: Path) -> dict[str, Any]:
     except tomllib.TOMLDecodeError as error:
         hint = "" if path.suffix.lower() == ".toml" else " A project is a .toml file."
         raise InputError(f"{path}: is not valid TOML: {error}.{hint}") from None
+    except ValueError:  # Python reads no whole number of more than 4300 digits
+        raise InputError(f"{path}: holds a whole number of thousands of digits.") from None
+    except RecursionError:
+        raise InputError(f"{path}: nested too deeply for a project file.") from None
     except OSError as error:
         raise InputError(f"{path}: cannot be read ({error.strerror}).") from None
 
@@ -350,7 +355,7 @@ def _sensor(value: Any, where: str) -> Sensor:
 def _distortion(value: Any, where: str, c: float) -> Brown:
     where = f"{where}, distortion"
     _only(value, where, ("convention", *NAMES))
-    convention = value.get("convention", Convention.BROWN.value)
+    convention = str(value.get("convention", Convention.BROWN.value))
     terms = {name: _number(value, name, where) for name in NAMES if name in value}
     if convention == "opencv":
         given = [terms.get(name, 0.0) for name in ("k1", "k2", "p1", "p2", "k3")]
@@ -382,7 +387,7 @@ def _number(value: Mapping[str, Any], key: str, where: str) -> float:
     if key not in value:
         raise InputError(f"{where}: the key {key!r} is missing.")
     found = value[key]
-    if isinstance(found, bool) or not isinstance(found, int | float) or not np.isfinite(found):
+    if not is_finite_number(found):
         raise InputError(f"{where}: {key} must be a number, found {found!r:.40}.")
     return float(found)
 
@@ -399,7 +404,7 @@ def _vector(
     if (
         not isinstance(found, list)
         or len(found) != size
-        or not all(isinstance(v, int | float) and np.isfinite(v) for v in found)
+        or not all(is_finite_number(v) for v in found)
     ):
         raise InputError(f"{where}: {key} must be {size} numbers, found {found!r:.60}.")
     return np.array(found, dtype=np.float64)

@@ -152,7 +152,7 @@ def best_over_compensation(
     -------
     factor : ndarray, shape (...)
         Estimate of :math:`\partial\bar R/\partial R`: 1 in one medium, about 1.34 in pure water,
-        larger for oblique rays.
+        larger for oblique rays, NaN where radius or a height is NaN.
 
     Notes
     -----
@@ -177,4 +177,5 @@ def best_over_compensation(
         ]
         factor = whole / (1 - sine**2) ** 1.5 / sum(steps[1:], steps[0])
     # Beyond total reflection the estimate fails, and so will the iteration; start it safely.
-    return np.where(np.isfinite(factor), factor, on_axis)
+    factor = np.where(np.isfinite(factor), factor, on_axis)
+    return np.where(np.isnan(as_floats(radius, "radius") * whole), np.nan, factor)

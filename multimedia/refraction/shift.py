@@ -81,8 +81,9 @@ def shifted_radius(
     Returns
     -------
     radius_bar : ndarray, shape (...)
-        Shifted radius. NaN only where no ray exists: a camera that touches the first interface
-        (z0 = 0) from the thinnest medium sees nothing beyond a largest radius. [unit of radius]
+        Shifted radius. NaN where radius, a height or an index is NaN, and where no ray exists: a
+        camera that touches the first interface (z0 = 0) from the thinnest medium sees nothing
+        beyond a largest radius. [unit of radius]
 
     Raises
     ------
@@ -154,8 +155,9 @@ def shift_ratio(
     limit = axis_ratio(layers, indices)
     whole = sum(layers, np.zeros(()))
     # The ratio leaves its limit with (R / whole)², which is beyond the last digit here.
+    # "Not far" rather than "near", so that an unknown radius or height (NaN) gets no limit.
     with np.errstate(divide="ignore", invalid="ignore"):
-        return np.where(radius > 1e-9 * whole, radius_bar / radius, limit)
+        return np.where(radius <= 1e-9 * whole, limit, radius_bar / radius)
 
 
 def axis_ratio(heights: Sequence[ArrayLike], indices: Sequence[float]) -> FloatArray:
@@ -166,7 +168,7 @@ def axis_ratio(heights: Sequence[ArrayLike], indices: Sequence[float]) -> FloatA
         np.zeros(()),
     )
     with np.errstate(divide="ignore", invalid="ignore"):
-        return np.where(reduced > 0, whole / reduced, 1.0)
+        return np.where(reduced == 0, 1.0, whole / reduced)
 
 
 def shift_derivatives(
@@ -182,7 +184,7 @@ def shift_derivatives(
     Returns
     -------
     ShiftDerivatives
-        Where no ray exists everything is NaN.
+        Where no ray exists, or radius or a height is NaN, everything is NaN.
 
     Raises
     ------
@@ -216,12 +218,16 @@ def shift_derivatives(
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         d_radius, d_heights, d_indices = _derivatives(t, lowest, layers, indices)
     shape = radius_bar.shape
-    return ShiftDerivatives(
+    found = ShiftDerivatives(
         radius_bar,
         np.broadcast_to(d_radius, shape).copy(),
         np.stack([np.broadcast_to(d, shape) for d in d_heights], axis=-1),
         np.stack([np.broadcast_to(d, shape) for d in d_indices], axis=-1),
     )
+    unknown = np.isnan(radius_bar)
+    for derivative in found[1:]:
+        derivative[unknown] = np.nan
+    return found
 
 
 def _derivatives(
@@ -274,6 +280,9 @@ def _checked(
             f"{len(layers)} heights and {len(indices)} indices."
         )
     for name, array in [("radius", radius), *((f"heights[{i}]", h) for i, h in enumerate(layers))]:
-        if array.size and array.min() < 0:
-            raise InputError(f"{name}: a distance cannot be negative, found {array.min():g}.")
+        least = np.fmin.reduce(array, axis=None, initial=np.inf)
+        if least < 0:
+            raise InputError(f"{name}: a distance cannot be negative, found {least:g}.")
+    if np.isnan(np.asarray(indices, dtype=np.float64)).any():
+        radius = np.full_like(radius, np.nan)
     return radius, layers

@@ -92,6 +92,8 @@ class ShiftTable:
         rows, columns = self.shape
         near, far = (float(depth) for depth in self.depths)
         positive(self.max_radius, "max_radius")
+        if not np.isfinite(self.z0):
+            raise InputError(f"z0: must be a finite number, found {self.z0}.")
         if self.degree not in (1, 3):
             raise InputError(f"degree: 1 (bilinear) or 3 (bicubic in R²), found {self.degree}.")
         if not far > near:
@@ -143,7 +145,7 @@ class ShiftTable:
         Returns
         -------
         radius_bar : ndarray, shape (...)
-            [m]
+            NaN where radius, z0 or zp is NaN. [m]
 
         Raises
         ------
@@ -152,12 +154,16 @@ class ShiftTable:
         """
         if layers is not None and layers != self.layers:
             raise GeometryError("layers: the table was built for other media; build another one.")
-        if z0 is not None and (as_floats(z0, "z0") != self.z0).any():
+        height = as_floats(self.z0 if z0 is None else z0, "z0")
+        unknown = np.isnan(height)
+        if not (unknown | (height == self.z0)).all():
             raise GeometryError(
                 f"z0: the table was built for a camera {self.z0:g} above the interface; every "
                 "camera needs its own table."
             )
         r, depth = as_floats(radius, "radius"), as_floats(zp, "zp")
+        if unknown.any():
+            r = np.where(unknown, np.nan, r)
         self._refuse_outside(r, "radius", 0.0, self.max_radius)
         self._refuse_outside(depth, "zp", *self.depths)
         shape = np.broadcast_shapes(r.shape, depth.shape)

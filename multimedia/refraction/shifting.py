@@ -43,8 +43,9 @@ def radial_shift(
     -------
     radius_bar : ndarray, shape (...)
         Shifted radius; replace (X, Y) by nadir + (X - X0, Y - Y0) R_bar / R in the collinearity
-        equations. NaN only where no ray exists (a camera of z0 = 0 looking into denser media
-        beyond its circle of vision). A lazy dask array if radius, z0 or zp is one. [m]
+        equations. NaN where radius, z0 or zp is NaN and where no ray exists (a camera of z0 = 0
+        looking into denser media beyond its circle of vision). A lazy dask array if radius, z0 or
+        zp is one. [m]
 
     Raises
     ------

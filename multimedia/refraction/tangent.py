@@ -65,8 +65,9 @@ def _solve_row(
     radius: FloatArray, heights: list[_Height], indices: Sequence[float]
 ) -> tuple[FloatArray, FloatArray, float | FloatArray]:
     """Return shifted radius, t and the lowest index for one row of elements."""
+    # Only zero is absent: an unknown height (NaN) stays, and makes the result unknown.
     present = [
-        (h, n) for h, n in zip(heights, indices, strict=True) if not isinstance(h, float) or h > 0
+        (h, n) for h, n in zip(heights, indices, strict=True) if not isinstance(h, float) or h != 0
     ]
     lowest = min([indices[0], *(n for _, n in present)])
     straight = sum((h for h, n in present if n == lowest), 0.0)
@@ -118,7 +119,7 @@ def _tangent_of_lowest(
     linear = straight + sum(h * a**-0.5 for h, a, _ in bent)
     inverse = 1.0 / linear
     x = radius * inverse
-    steepest = x.max(initial=0.0)
+    steepest = _largest(x)
     t = x * x
     if steepest < 0.6:
         t *= sum(h * (0.5 * b * a**-1.5) for h, a, b in bent)
@@ -171,7 +172,7 @@ def _finish_ill_conditioned(
     ``R / (t F')`` is the condition number of t. It exceeds `BENIGN` only at steep t, so ordinary
     blocks leave after one comparison.
     """
-    if not t.max(initial=0.0) ** 2 > BENIGN:
+    if not _largest(t) ** 2 > BENIGN:
         return
     slope = np.full(t.shape, 0.0)
     for height, n in present:
@@ -191,6 +192,11 @@ def _finish_ill_conditioned(
         if not (np.abs(step) > 1e-12 * root).any():
             break
     t[where] = root
+
+
+def _largest(values: FloatArray) -> float:
+    """Return the largest value, at least 0; one NaN must not decide how its neighbours fare."""
+    return float(np.fmax.reduce(values, initial=0.0))
 
 
 def _cosine_ratio(t: FloatArray, n: float, lowest: float) -> FloatArray:

@@ -14,9 +14,9 @@ from openpyxl.workbook.defined_name import DefinedName
 from openpyxl.worksheet.datavalidation import DataValidation
 from openpyxl.worksheet.worksheet import Worksheet
 
-from photocore.output import check_writable
 from photocore.workbook.cellxml import CellInput
-from photocore.workbook.editor import WorkbookEditor
+from photocore.workbook.editor import WorkbookEditor, rewrite_package
+from photocore.workbook.newbook import new_workbook
 
 INPUT = PatternFill("solid", start_color="FFF9DB", end_color="FFF9DB")
 HEAD = PatternFill("solid", start_color="DCE6F1", end_color="DCE6F1")
@@ -71,8 +71,10 @@ class LiveBook:
 
     def save(self, path: Path, *, overwrite: bool) -> None:
         """Write the workbook, then put the values into its formula cells."""
-        check_writable(path, overwrite=overwrite)
-        with tempfile.TemporaryDirectory() as folder:
+        with (
+            new_workbook(path, overwrite=overwrite) as temporary,
+            tempfile.TemporaryDirectory() as folder,
+        ):
             plain = Path(folder) / "plain.xlsx"
             self.book.save(plain)
             editor = WorkbookEditor(plain)
@@ -80,7 +82,7 @@ class LiveBook:
                 editor.set_value(title, row, column, number)
             for title, row, column, value in self.results:
                 editor.set_result(title, row, column, value)
-            editor.save(path, overwrite=overwrite)
+            rewrite_package(plain, temporary, editor.changed_parts())
 
 
 def headings(sheet: Worksheet, row: int, words: Sequence[str]) -> None:

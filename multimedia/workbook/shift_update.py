@@ -35,7 +35,7 @@ def update_template(
     points: ShiftPoints,
     *,
     overwrite: bool,
-) -> None:
+) -> Path | None:
     """Store the results of the formulas, and the set-up where options changed it.
 
     Parameters
@@ -52,6 +52,11 @@ def update_template(
         The points.
     overwrite : bool
         Replace an existing file.
+
+    Returns
+    -------
+    Path or None
+        The backup of a workbook changed in place.
 
     Raises
     ------
@@ -77,7 +82,7 @@ def update_template(
         for position, row in enumerate(rows):
             if key in values and key not in ("id", "X", "Y", "Z", "R", "ZP"):
                 editor.set_result(area.sheet, table.rows[row], column, values[key][position])
-    editor.save(out, overwrite=overwrite)
+    return editor.save(out, overwrite=overwrite)
 
 
 def add_columns(
@@ -89,7 +94,7 @@ def add_columns(
     result: ShiftResult,
     *,
     overwrite: bool,
-) -> None:
+) -> Path | None:
     """Write the shifted points beside the user's table, in columns of their own.
 
     Columns called Rbar, dR, Xbar, Ybar or flag are filled; those that are missing are added to
@@ -101,6 +106,11 @@ def add_columns(
         As in `update_template`.
     result : ShiftResult
         The shifted points.
+
+    Returns
+    -------
+    Path or None
+        As `update_template`.
 
     Raises
     ------
@@ -131,7 +141,7 @@ def add_columns(
             if not isinstance(value, str):
                 value = None if np.isnan(values[position]) else float(values[position])
             editor.set_value(table.sheet, table.rows[row], column, value)
-    editor.save(out, overwrite=overwrite)
+    return editor.save(out, overwrite=overwrite)
 
 
 def _store_setup(editor: WorkbookEditor, setup: ShiftSetup, own: ShiftSetup) -> None:

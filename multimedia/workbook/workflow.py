@@ -111,15 +111,20 @@ def shift_file(
     points, rows = points_of(given.table, setup.nadir)
     result = points.shifted(setup)
     table, kind = given.table, Path(path).suffix.lower()
+    kept: Path | None = None
     if out is not None and out.suffix.lower() == ".csv":
         write_shift_csv(out, points, result, flavour=flavour, overwrite=overwrite)
     elif out is not None and (new or kind not in (".xlsx", ".xlsm")):
         write_shift_workbook(out, setup, points, rows=1, overwrite=overwrite)
     elif out is not None and given.setup is not None and is_template(path):
-        update_template(path, out, table, rows, setup, given.setup, points, overwrite=overwrite)
+        kept = update_template(
+            path, out, table, rows, setup, given.setup, points, overwrite=overwrite
+        )
     elif out is not None:
-        add_columns(path, out, table, rows, points, result, overwrite=overwrite)
+        kept = add_columns(path, out, table, rows, points, result, overwrite=overwrite)
     remarks = [*given.table.remarks]
+    if kept is not None:
+        remarks.append(f"{out}: the workbook as it was is kept as {kept.name}.")
     remarks += setup.layers.remarks_about(z0=setup.z0, zp=points.depth)
     unseen = [name for name, flag in zip(points.ids, result.flags, strict=True) if flag != "OK"]
     if unseen:

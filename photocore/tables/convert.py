@@ -88,7 +88,7 @@ def numbers(
             f"{NOT_CALCULATED}{more}. Open the file in the spreadsheet "
             "program, save it there, and try again.",
         )
-    found = _typed_unit(texts, wanted, complain)
+    found = _typed_unit(texts, wanted, complain, has_bare=bool(np.isfinite(result).any()))
     _read_texts(result, texts, decimal, elsewhere, complain)
     remarks = []
     typed = sum(bool(part.unit) for part in texts.values())
@@ -173,15 +173,25 @@ def _read_texts(
             result[index] = value
 
 
-def _typed_unit(parts: dict[int, NumberText], wanted: str, complain: Complain) -> str:
-    """Check the units typed into cells; return the common one where the heading says none."""
+def _typed_unit(
+    parts: dict[int, NumberText], wanted: str, complain: Complain, *, has_bare: bool
+) -> str:
+    """Check the units typed into cells; return the one all have where the heading says none.
+
+    Bad cells are taken out of ``parts``. ``has_bare`` tells that the column holds numbers besides:
+    the unit of one cell says nothing about them.
+    """
     symbols = {index: unit_symbol(part.unit) for index, part in parts.items() if part.unit}
     if not symbols:
         return ""
     if not wanted and "" not in symbols.values():
-        common = set(symbols.values())
-        if len(common) == 1 and len(symbols) == len(parts):
-            return common.pop()
+        has_bare |= len(symbols) < len(parts)
+        if len(set(symbols.values())) == 1 and not has_bare:
+            return next(iter(symbols.values()))
+        complain(min(symbols), _unlike_units(parts, symbols, has_bare=has_bare))
+        for index in symbols:
+            del parts[index]
+        return ""
     for index, symbol in symbols.items():
         part = parts[index]
         if symbol and symbol == wanted:
@@ -200,6 +210,19 @@ def _typed_unit(parts: dict[int, NumberText], wanted: str, complain: Complain) -
         )
         del parts[index]
     return ""
+
+
+def _unlike_units(parts: dict[int, NumberText], symbols: dict[int, str], *, has_bare: bool) -> str:
+    """Return the complaint about a column of unknown unit whose cells do not all say the same."""
+    first = parts[min(symbols)]
+    shown = f'found "{_short(f"{first.digits} {first.unit}")}"'
+    if len(symbols) > 1:
+        shown += f" (and {len(symbols) - 1} more with a unit in this column)"
+    others = sorted({*symbols.values()} - {symbols[min(symbols)]})
+    while_ = f"other cells say {', '.join(others)}" if others else "other cells say no unit"
+    if others and has_bare:
+        while_ += " or none"
+    return f"{shown}, while {while_}. Type all numbers in one unit and write it into the heading."
 
 
 def _mixed(part: NumberText, agreed: Decimal) -> str:

@@ -78,6 +78,8 @@ def fill(
                     if isinstance(value, str) and np.isfinite(numbers[row])
                 ]
             if unit:
+                if column.key not in table.units:
+                    table.typed_units.add(column.key)
                 table.units[column.key] = unit
     errors += [error for _, _, error in sorted(gathered, key=lambda item: item[:2])]
 

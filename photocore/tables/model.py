@@ -69,6 +69,8 @@ class Table:
         one); empty where there are none.
     remarks : list of str
         What was done that the user should know: hidden rows used, rows left out, ...
+    typed_units : set of str
+        Keys whose unit every cell says itself, and no heading.
     text_cells : list of str
         Cells of a sheet whose number was typed as text: formulas do not see such numbers.
     """
@@ -83,6 +85,7 @@ class Table:
     headings: dict[str, str] = field(default_factory=dict)
     blocks: list[str] = field(default_factory=list)
     remarks: list[str] = field(default_factory=list)
+    typed_units: set[str] = field(default_factory=set)
     text_cells: list[str] = field(default_factory=list)
 
     def __len__(self) -> int:

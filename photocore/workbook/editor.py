@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from photocore.errors import InputError
-from photocore.output import atomic_path
+from photocore.output import atomic_path, check_writable, free_path
 from photocore.workbook import formulas
 from photocore.workbook.cellxml import CellInput
 from photocore.workbook.grid import Grid, SheetFile, TableArea, cell_name
@@ -233,18 +233,24 @@ class WorkbookEditor:
 
     def save(
         self, target: Path | str | None = None, *, overwrite: bool = False, backup: bool = True
-    ) -> None:
+    ) -> Path | None:
         """Write the changed workbook.
 
         Parameters
         ----------
         target : path, optional
             Where to; the workbook itself when None. Then the old file is kept beside it with
-            ``.bak`` added to its name.
+            ``.bak`` added to its name, or ``.bak2``, ``.bak3`` ... where that is taken: no
+            backup is ever replaced.
         overwrite : bool
             Whether to replace another existing file.
         backup : bool
-            Whether to keep the ``.bak``.
+            Whether to keep the old file.
+
+        Returns
+        -------
+        Path or None
+            The backup, None where none was made.
 
         Raises
         ------
@@ -258,12 +264,15 @@ class WorkbookEditor:
                 f"{target}: must end in {self.path.suffix} like {self.path.name}, so that macros "
                 "stay what they are."
             )
-        check_not_open(target)
+        check_writable(target, overwrite=overwrite or in_place)
         parts = self.changed_parts()
+        kept: Path | None = None
         with atomic_path(target, overwrite=overwrite or in_place) as temporary:
             rewrite_package(self.path, temporary, parts)
             if in_place and backup:
-                shutil.copy2(self.path, self.path.with_name(f"{self.path.name}.bak"))
+                kept = free_path(self.path.parent, f"{self.path.name}.bak")
+                shutil.copy2(self.path, kept)
+        return kept
 
     def changed_parts(self) -> dict[str, bytes]:
         """Return the parts of the package that change, with their new content."""
@@ -334,23 +343,6 @@ class WorkbookEditor:
 def _plain(values: ArrayLike | Sequence[CellInput]) -> Sequence[CellInput]:
     """Return values as Python objects."""
     return values.tolist() if isinstance(values, np.ndarray) else list(values)  # type: ignore[arg-type]
-
-
-def check_not_open(path: Path) -> None:
-    """Refuse a file that a spreadsheet program has open.
-
-    Raises
-    ------
-    InputError
-        Naming the program and the way out.
-    """
-    locks = {"Excel": f"~${path.name}", "LibreOffice": f".~lock.{path.name}#"}
-    for program, name in locks.items():
-        if (path.parent / name).exists():
-            raise InputError(
-                f"{path}: is open in {program}. Close it there and try again, or write to another "
-                f"file with --out. (If it is not open, delete the left-over file {name}.)"
-            )
 
 
 def rewrite_package(source: Path, target: Path, parts: Mapping[str, bytes]) -> None:

@@ -35,9 +35,9 @@ def test_the_conventions_apply_the_formula_where_they_say():
     size = np.abs(GRID).max()
     assert np.abs(about_point - (plain + POINT)).max() < 4 * EPS * size
     certificate = Brown(**LENS, convention=Convention.PHOTOGRAMMETRIC)
-    assert np.abs(certificate.ideal(GRID + POINT, POINT[0]) - plain).max() < 16 * EPS * size
+    assert np.abs(certificate.ideal(GRID + POINT, POINT[0]) - plain).max() < 4 * EPS * size
     sensor = Brown(**LENS, convention=Convention.OPENPTV)
-    assert np.abs(sensor.measured(GRID - POINT, POINT[0]) - plain).max() < 16 * EPS * size
+    assert np.abs(sensor.measured(GRID - POINT, POINT[0]) - plain).max() < 4 * EPS * size
 
 
 def test_opencv_coefficients_give_opencvs_pixels():

@@ -32,8 +32,8 @@ from bifocal.survey.workbook.sheets import (
     validate,
 )
 from bifocal.survey.workbook.words import README, SETUP, word
-from photocore.output import atomic_path
 from photocore.workbook.bookrows import CellValue, column_letters, finish_book
+from photocore.workbook.newbook import new_workbook
 
 #: Row of the keys in `Points` and `Results`.
 HEAD = 4
@@ -57,7 +57,7 @@ def write_book(path: Path | str, content: SurveyContent, *, overwrite: bool = Fa
     overwrite : bool
         Replace an existing file.
     """
-    with atomic_path(path, overwrite=overwrite) as temporary:
+    with new_workbook(path, overwrite=overwrite) as temporary:
         builder = build(content)
         package = io.BytesIO()
         builder.book.save(package)

@@ -352,6 +352,14 @@ def _unit_of_xy(table: Table, errors: list[CellError]) -> tuple[str, float]:
         )
         return "", 1.0
     symbol = kinds.pop()
+    bare_keys = [k for k in _XY if k not in said and not np.isnan(table.numbers(k)).all()]
+    for key in sorted(table.typed_units.intersection(said)) if bare_keys else ():
+        row = int(np.flatnonzero(~np.isnan(table.numbers(key)))[0])
+        message = (
+            f"is in {symbol} by the unit typed into the cell, while {', '.join(bare_keys)} says no "
+            "unit. Write the unit of the coordinates into their headings, the cells without it."
+        )
+        errors.append(table.error(row, key, message))
     if symbol == "px":
         return "px", 1.0
     if symbol not in _TO_MM:

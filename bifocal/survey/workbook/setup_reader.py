@@ -184,7 +184,8 @@ def _columns() -> list[Column]:
         words = SETUP.get(key, ("",))[1:]
         kind = "text" if key in ("input_unit", "pair_file") else "number"
         aliases = (*words, *_LABELS.get(key, ()))
-        columns.append(Column(key, aliases, kind=kind))  # type: ignore[arg-type]
+        unit = SETUP.get(key, ("",))[0] if kind == "number" else ""
+        columns.append(Column(key, aliases, kind=kind, unit=unit))  # type: ignore[arg-type]
     return columns
 
 

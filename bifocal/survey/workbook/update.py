@@ -46,7 +46,7 @@ def update_book(
     content: SurveyContent,
     *,
     overwrite: bool = False,
-) -> None:
+) -> Path | None:
     """Copy a survey workbook with fresh results in its formula cells; all else byte for byte.
 
     Parameters
@@ -54,13 +54,18 @@ def update_book(
     source : Path
         The workbook.
     target : Path
-        Where to; the same path changes it in place and keeps one ``.bak``.
+        Where to; the same path changes it in place and keeps the old file.
     survey : SurveyInput
         What was read from it.
     content : SurveyContent
         What came out, evaluated as the workbook's own formulas do.
     overwrite : bool
         Replace an existing file.
+
+    Returns
+    -------
+    Path or None
+        The backup of a workbook changed in place.
     """
     editor, built = WorkbookEditor(source), build(content)
     _named_cells(editor, built, content)
@@ -79,7 +84,7 @@ def update_book(
         _fixed_table(editor, built, name, key)
     _charts(editor, built, rows)
     _log(editor, content)
-    editor.save(target, overwrite=overwrite)
+    return editor.save(target, overwrite=overwrite)
 
 
 def _length(area: TableArea) -> int:

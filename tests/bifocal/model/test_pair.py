@@ -222,6 +222,9 @@ def test_swapped_images_are_exchanged_and_said():
     swapped = Pair(image1=pair.image2, image2=pair.image1)
     assert swapped.image1.distance == 17.5
     assert "exchanged" in swapped.remarks[0]
+    assert swapped.exchanged
+    assert not pair.exchanged
+    assert replace(swapped, remarks=()).exchanged
 
 
 @pytest.mark.parametrize(
@@ -233,6 +236,9 @@ def test_swapped_images_are_exchanged_and_said():
         ({"nadir": [0, None]}, InputError, "nadir"),
         ({"distance": 0}, InputError, "distance"),
         ({"distance": 9.5}, GeometryError, "same distance"),
+        ({"distance": [1, 2]}, InputError, "distance: expected one number"),
+        ({"distance": 10**400}, InputError, "distance: holds a whole number above"),
+        ({"nadir": [0, 10**400]}, InputError, "nadir: holds a whole number above"),
         ({"file": 3}, InputError, "file"),
         ({"lens": "none.json"}, InputError, "lens file"),
     ],

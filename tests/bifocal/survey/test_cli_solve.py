@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import zipfile
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +14,7 @@ import pytest
 from click.testing import CliRunner
 
 from bifocal.cli.main import main
+from bifocal.model.pair import Pair
 
 SETUP = {"c_1": 35, "c_2": 19, "d_2": 9.5, "delta_d": 8}
 
@@ -179,6 +181,69 @@ def pixel_rows(points=POINTS):
             cells += [(qx + 7.5) / 0.005, (5.0 - qy) / 0.005]
         lines.append(",".join([name, *map(repr, cells)]))
     return "\n".join(lines) + "\n"
+
+
+def test_a_remark_on_a_pair_does_not_exchange_its_images(tmp_path, monkeypatch):
+    points = write_csv(tmp_path / "p.csv", pixel_rows())
+    pair = replace(Pair.read(write_pair(tmp_path / "w.pair.json")), remarks=("the lens is old.",))
+    monkeypatch.setattr(Pair, "read", lambda _: pair)
+    answer, said = solved(points, "--pair", tmp_path / "w.pair.json")
+    assert "the lens is old" in said
+    for name, _, _, r in POINTS:
+        assert by_id(answer)[name]["r"] == pytest.approx(r, abs=1e-9)
+
+
+def xy_rows(*heading):
+    return [("id", *(heading or ("x1", "y1", "x2", "y2"))), *rows(POINTS)]
+
+
+def as_file(table, path):
+    """Write a table as text or as a workbook, numbers as numbers."""
+    if path.suffix == ".csv":
+        lines = [";".join(map(str, row)) for row in table]
+        return write_csv(path, "\n".join(lines) + "\n")
+    book = openpyxl.Workbook()
+    for row in table:
+        book.active.append(row)
+    book.save(path)
+    return path
+
+
+DISTANCES = ("--d1", 17.5, "--d2", 9.5, "--c1", 35, "--c2", 19)
+
+
+@pytest.mark.parametrize("ending", [".csv", ".xlsx"])
+def test_the_unit_of_one_cell_is_not_that_of_bare_numbers(tmp_path, ending):
+    table = xy_rows()
+    table[2] = (table[2][0], "12.4 cm", *table[2][2:])
+    result = run("solve", as_file(table, tmp_path / f"p{ending}"), *DISTANCES)
+    assert result.exit_code == 1
+    assert 'B3 (x1): found "12.4 cm"' in result.stderr
+    assert "write it into the heading" in result.stderr
+    assert result.stderr.count("found") == 1
+
+
+@pytest.mark.parametrize("ending", [".csv", ".xlsx"])
+def test_the_unit_of_one_column_of_cells_is_not_that_of_the_others(tmp_path, ending):
+    table = [xy_rows()[0], *((n, f"{x1 / 10!r} cm", *more) for n, x1, *more in rows(POINTS))]
+    result = run("solve", as_file(table, tmp_path / f"p{ending}"), *DISTANCES)
+    assert result.exit_code == 1
+    assert "(x1): is in cm by the unit typed into the cell, while y1, x2, y2" in result.stderr
+
+
+def test_a_unit_typed_into_every_cell_is_that_of_the_coordinates(tmp_path):
+    table = [(n, *(f"{value / 10!r} cm" for value in more)) for n, *more in rows(POINTS)]
+    answer, _ = solved(as_file([xy_rows()[0], *table], tmp_path / "p.xlsx"), *DISTANCES)
+    for name, _, _, r in POINTS:
+        assert by_id(answer)[name]["r"] == pytest.approx(r, abs=1e-9)
+
+
+def test_another_unit_in_a_cell_of_the_set_up_is_said_and_not_dropped(tmp_path):
+    result = run("solve", fill(tmp_path / "s.xlsx", setup={**SETUP, "c_1": "3,5 cm"}))
+    assert result.exit_code == 1
+    assert 'found "3,5 cm", expected a number in mm. Write 35' in result.stderr
+    answer, _ = solved(fill(tmp_path / "t.xlsx", setup={**SETUP, "c_1": "35 mm"}))
+    assert by_id(answer)["P1"]["X"] == pytest.approx(2, abs=1e-9)
 
 
 def test_raw_pixels_with_a_pair_file_and_the_workbook_made_of_them(tmp_path):

@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import json
+import subprocess
+import sys
+import textwrap
 import tracemalloc
 import warnings
 from pathlib import Path
@@ -596,3 +599,40 @@ def test_tables_that_do_not_fit_each_other_are_named(tmp_path: Path) -> None:
     assert "sensor position" in refused(tmp_path, tmp_path / "in.csv", "--beams")
     assert run("bathymetry", "a.csv", "--out", "b.csv", "--water-level", 1, "--index", N,
                "--rays", "--beams")[0] == 2  # fmt: skip
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="file size limits are POSIX")
+@pytest.mark.parametrize(
+    ("width", "height", "limit"),
+    [(30, 20, 0), (30, 20, 1_000), (500, 400, 5_000), (500, 400, 400_000)],
+)
+def test_a_full_disk_leaves_the_old_model_as_it_was(
+    tmp_path: Path, width: int, height: int, limit: int
+) -> None:
+    # A file-size limit stands in for the full disk: GDAL's writes fail the same way. It writes a
+    # small model when the file is closed, and then fails without a word.
+    heights = np.random.default_rng(1).uniform(95, 102, (height, width)).astype("float32")
+    source, target = tmp_path / "dem.tif", tmp_path / "bed.tif"
+    profile = {"driver": "GTiff", "dtype": "float32", "count": 1, "width": width, "height": height,
+               "transform": rasterio.Affine(2, 0, 0, 0, -2, 0), "nodata": -9999.0}  # fmt: skip
+    with rasterio.open(source, "w", **profile) as file:
+        file.write(heights, 1)
+    old = source.read_bytes()
+    target.write_bytes(old)
+    command = ["bathymetry", source, "--out", target, "--water-level", LEVEL, "--index", N,
+               "--overwrite"]  # fmt: skip
+    script = f"""
+        import resource, signal
+        from multimedia.cli.main import main
+        signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+        resource.setrlimit(resource.RLIMIT_FSIZE, ({limit}, {limit}))
+        main({[str(word) for word in command]!r})
+    """
+    done = subprocess.run(
+        [sys.executable, "-c", textwrap.dedent(script)], capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 1, done.stderr
+    assert "bed.tif: could not be written" in done.stderr
+    assert "Traceback" not in done.stderr
+    assert target.read_bytes() == old
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["bed.tif", "dem.tif"]

@@ -251,3 +251,33 @@ def test_both_tables_may_be_sheets_of_one_workbook(folder):
     project = read_project(folder / "tank.toml")
     assert project.object_points.xyz.tolist() == [[1.5, 2, -50], [0, 0, -60]]
     assert project.image_points.image[0] == pytest.approx([-0.474, 0.138])
+
+
+HUGE = "1" + "0" * 400
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("", "note = " + "9" * 5000 + "\n", "holds a whole number of thousands of digits"),
+        ("", "note = " + "[" * 5000 + "]" * 5000 + "\n", "nested too deeply for a project file"),
+        ('unit = "mm"', f'unit = "mm"\nsigma_image = {HUGE}', "sigma_image must be a number"),
+        ("[1.0, 1.5, 1.337]", f"[1.0, 1.5, {HUGE}]", "indices: holds a whole number above"),
+        ("[10.0]", f"[{HUGE}]", "thicknesses: holds a whole number above"),
+        ("[[camera]]", f"[[camera]]\ncentre = [0, 0, {HUGE}]", "must be"),
+        ("[[camera]]", '[[camera]]\ndistortion = { convention = ["brown"] }', "is not known"),
+    ],
+    ids=["digits", "depth", "sigma", "index", "thickness", "centre", "convention"],
+)
+def test_numbers_and_nesting_beyond_reason_are_refused(tmp_path, old, new, message):
+    (path := tmp_path / "tank.toml").write_text(
+        'format = "multimedia-project/1"\nunit = "mm"\n[media.tank]\nindices = [1.0, 1.5, 1.337]\n'
+        "thicknesses = [10.0]\n[[camera]]\nomega = 0\nphi = 0\nkappa = 0\nc = 8.0\n"
+        + ("" if "centre" in new else "centre = [0, 0, 500]\n"),
+        encoding="utf-8",
+    )
+    text = path.read_text(encoding="utf-8")
+    path.write_text(text.replace(old, new) if old else new + text, encoding="utf-8")
+    with pytest.raises(InputError, match=message) as told:
+        read_project(path)
+    assert str(told.value).startswith(f"{path}: ")

@@ -75,6 +75,27 @@ def test_a_second_run_fills_the_same_columns_and_keeps_a_backup(own: Path) -> No
     assert own.with_name("becken.xlsx.bak").exists()
 
 
+def test_the_backup_is_named_and_never_replaced(own: Path) -> None:
+    before = own.read_bytes()
+    assert "is kept as becken.xlsx.bak." in run(own, *MEDIA, "--out", own, "--overwrite").stderr
+    assert "is kept as becken.xlsx.bak2." in run(own, *MEDIA, "--out", own, "--overwrite").stderr
+    assert own.with_name("becken.xlsx.bak").read_bytes() == before
+
+
+def test_a_new_workbook_replaces_only_what_this_program_wrote(own: Path, tmp_path: Path) -> None:
+    before, out = own.read_bytes(), tmp_path / "live.xlsx"
+    result = run(own, *MEDIA, "--out", own, "--new", "--overwrite")
+    assert result.exit_code == 1
+    assert "becken-result.xlsx" in result.stderr
+    assert own.read_bytes() == before
+    for _ in range(2):
+        assert run(own, *MEDIA, "--out", out, "--new", "--overwrite").exit_code == 0
+    (tmp_path / "~$live.xlsx").touch()
+    result = run(own, *MEDIA, "--out", out, "--new", "--overwrite")
+    assert result.exit_code == 1
+    assert "open in Excel" in result.stderr
+
+
 def test_a_new_workbook_has_live_formulas(own: Path, tmp_path: Path) -> None:
     out = tmp_path / "live.xlsx"
     assert run(own, *MEDIA, "--out", out, "--new").exit_code == 0

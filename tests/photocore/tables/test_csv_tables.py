@@ -37,6 +37,12 @@ def test_delimiter_and_line_ends_are_found_out(file, delimiter, end):
     assert table.numbers("s2").tolist() == [-2.0, 300.0]
 
 
+def test_the_unit_of_a_cell_is_not_that_of_a_hundred_thousand_bare_numbers(file):
+    lines = ["id,s1", "P0,12.4 cm", *(f"P{i},{i}.5" for i in range(1, 100_000))]
+    with pytest.raises(WorkbookError, match=r'\(s1\): found "12.4 cm", while other cells say no'):
+        read_table(file("\n".join(lines)), COLUMNS[:2])
+
+
 @pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16", "cp1252"])
 def test_letters_of_any_usual_encoding_are_read(file, encoding):
     table = read_table(file("Punto,s1\nà è,1\n", encoding=encoding), COLUMNS)

@@ -153,6 +153,26 @@ def test_a_wrong_unit_in_a_cell_is_refused_with_the_converted_number(book):
 
 
 @pytest.mark.parametrize(
+    ("cells", "message"),
+    [
+        (
+            ["12,4 cm", 3.5, 4.5],
+            r'Sheet1!B2 \(s1\): found "12,4 cm", while other cells say no unit',
+        ),
+        ([3.5, "12,4 cm", "7 cm"], r'B3 \(s1\): found "12,4 cm" \(and 1 more with a unit'),
+        (["12,4 cm", "7 mm"], r'B2 \(s1\): found "12,4 cm" \(and 1 more .* other cells say mm\.'),
+        (["12,4 cm", "7 mm", 3.0], r"B2 .* other cells say mm or none\. Type all numbers in one"),
+    ],
+)
+def test_the_unit_of_a_cell_is_never_applied_to_the_others(book, cells, message):
+    columns = [POLAR[0], Column("s1")]
+    rows = [("id", "s1"), *((f"P{i}", cell) for i, cell in enumerate(cells))]
+    with pytest.raises(WorkbookError, match=message) as caught:
+        read_table(book(rows), columns)
+    assert str(caught.value).count("Sheet1!") == 1
+
+
+@pytest.mark.parametrize(
     ("cell", "message"),
     [
         ("abc", 'found "abc", expected a number in mm'),

@@ -1,0 +1,172 @@
+"""What the commands say when something goes wrong that nobody foresaw."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from types import SimpleNamespace
+
+import click
+import pytest
+from click.testing import CliRunner, Result
+
+import bifocal.cli.main
+import multimedia.cli.main
+from photocore import cli
+from photocore.errors import InputError
+
+pytest_plugins = ["pytester"]
+
+PROGRAMS = {"bifocal": bifocal.cli.main.main, "multimedia": multimedia.cli.main.main}
+
+
+@pytest.fixture
+def run(monkeypatch: pytest.MonkeyPatch):
+    """Return a function that runs ``work`` as a command of a program."""
+
+    def run_command(error: BaseException, *words: str) -> Result:
+        @click.command()
+        def command() -> None:
+            raise error
+
+        module = SimpleNamespace(command=command)
+        monkeypatch.setattr(cli, "import_module", lambda name: module)  # noqa: ARG005
+        group = cli.LazyGroup(
+            name="main", commands_package="multimedia.cli", summaries={"work": "Work."}
+        )
+        return CliRunner().invoke(group, words or ["work"])
+
+    return run_command
+
+
+FAULTS = [
+    KeyError("depth"),
+    ZeroDivisionError("division by zero"),
+    AssertionError(),
+    RecursionError("maximum recursion depth exceeded"),
+    RuntimeError("first line\nsecond line"),
+    UserWarning("w"),
+]
+
+
+@pytest.mark.parametrize("error", FAULTS, ids=lambda e: type(e).__name__)
+def test_a_fault_of_the_program_is_one_line_that_owns_it(run, unforeseen, error) -> None:
+    result = run(error)
+    assert result.exit_code == 70
+    assert isinstance(result.exception, SystemExit)
+    assert result.stdout == ""
+    (line,) = result.stderr.splitlines()
+    assert line.startswith(f"Error: multimedia work failed on something nobody foresaw ("
+                           f"{type(error).__name__}")  # fmt: skip
+    assert "The fault is the program's, not yours" in line
+    assert "--debug" in line
+    assert " ".join(str(error).split()) in line
+    assert len(unforeseen.taken()) == 1
+
+
+@pytest.mark.parametrize("words", [("--debug", "work"), ("work", "--debug")])
+def test_debug_shows_where_it_happened(run, unforeseen, words: tuple[str, str]) -> None:
+    result = run(KeyError("depth"), *words)
+    assert result.exit_code == 70
+    assert result.stderr.startswith("Traceback (most recent call last):")
+    assert "in command" in result.stderr
+    assert result.stderr.splitlines()[-1].startswith("Error: multimedia work failed")
+    assert unforeseen.taken()
+
+
+def test_a_very_long_error_stays_one_readable_line(run, unforeseen) -> None:
+    result = run(ValueError("x" * 100_000))
+    assert len(result.stderr) < 600
+    assert unforeseen.taken()
+
+
+@pytest.mark.parametrize(
+    ("error", "status", "message"),
+    [
+        (InputError("a.csv: no."), 1, "Error: a.csv: no."),
+        (FileNotFoundError(2, "No such file", "b.csv"), 1, "Error: b.csv: No such file."),
+        (KeyboardInterrupt(), 1, "Stopped by the user"),
+        (MemoryError(), 1, "not enough memory"),
+        (click.UsageError("no such thing"), 2, "no such thing"),
+        (click.Abort(), 1, "Aborted"),
+        (click.exceptions.Exit(0), 0, ""),
+    ],
+    ids=lambda v: type(v).__name__ if isinstance(v, BaseException) else "",
+)
+def test_what_was_foreseen_keeps_its_message_and_status(run, error, status, message) -> None:
+    result = run(error)
+    assert result.exit_code == status
+    assert message in result.stderr
+    assert "nobody foresaw" not in result.stderr
+    assert "Traceback" not in result.stderr
+
+
+def test_debug_shows_where_bad_input_was_met_too(run) -> None:
+    result = run(InputError("a.csv: no."), "work", "--debug")
+    assert result.exit_code == 1
+    assert "Traceback" in result.stderr
+    assert result.stderr.endswith("Error: a.csv: no.\n")
+
+
+@pytest.mark.parametrize("program", PROGRAMS)
+def test_every_command_has_the_option_once(program: str) -> None:
+    group = PROGRAMS[program]
+    for _ in range(2):
+        for name in group.summaries:
+            command = group.get_command(click.Context(group), name)
+            assert sum("--debug" in p.opts for p in command.params) == 1, name
+    assert "--debug" in CliRunner().invoke(group, ["--help"]).stdout
+
+
+FAULTY = """
+import sys
+from types import SimpleNamespace
+import click
+from photocore import cli
+
+@click.command()
+def command():
+    raise KeyError("depth")
+
+cli.import_module = lambda name: SimpleNamespace(command=command)
+cli.LazyGroup(name="main", commands_package="bifocal.cli", summaries={"work": "."})(["work"])
+"""
+
+
+def test_a_process_that_ends_so_is_noticed_by_every_test(unforeseen) -> None:
+    done = subprocess.run(
+        [sys.executable, "-c", FAULTY], capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 70
+    assert done.stderr.startswith("Error: bifocal work failed")
+    (met,) = unforeseen.taken()
+    assert met.startswith("exit status 70")
+
+
+def test_a_test_fails_that_ends_in_the_handler(pytester: pytest.Pytester, request) -> None:
+    conftest = request.config.rootpath / "tests" / "conftest.py"
+    pytester.makeconftest(conftest.read_text(encoding="utf-8"))
+    pytester.makepyfile(
+        f"""
+        import subprocess, sys
+        from click.testing import CliRunner
+
+        FAULTY = {FAULTY!r}
+
+        def test_in_this_process():
+            names = {{"__name__": "faulty"}}
+            exec(FAULTY.rpartition("cli.LazyGroup")[0], names)
+            group = names["cli"].LazyGroup(
+                name="main", commands_package="bifocal.cli", summaries={{"work": "."}}
+            )
+            assert CliRunner().invoke(group, ["work"]).exit_code
+
+        def test_in_another_process():
+            assert subprocess.run([sys.executable, "-c", FAULTY]).returncode
+
+        def test_that_has_nothing_to_do_with_it():
+            pass
+        """
+    )
+    result = pytester.runpytest_subprocess("-p", "no:randomly", "-n", "0")
+    result.assert_outcomes(passed=3, errors=2)
