@@ -12,7 +12,8 @@ from bifocal.files.geotiff import write_relief
 from bifocal.files.images import ImageArray, read_image, to_eight_bit
 from bifocal.model.pair import Pair
 from bifocal.model.relief_map import ReliefMap
-from bifocal.relief_maps import DenseRelief, dense_relief
+from bifocal.relief_maps import dense_relief
+from bifocal.relief_maps.frame import values_at
 from bifocal.relief_maps.relief_files import Cloud, write_cloud, write_preview
 from photocore.cli import Progress, no_progress
 from photocore.errors import GeometryError, InputError
@@ -71,10 +72,7 @@ def relief_of_pair(
     """
     _check_outputs(job)
     pair = Pair.read(pair_file)
-    image1, image2 = (
-        _photo(pair, file, key)
-        for file, key in ((pair.image1.file, "image1"), (pair.image2.file, "image2"))
-    )
+    image1, image2 = (read_image(pair.photo_file(number)) for number in (1, 2))
     result = dense_relief(
         pair, image1, image2, gsd=job.gsd, bounds=job.bounds, quality=job.quality,
         relief_range=job.relief_range, progress=progress,
@@ -97,7 +95,7 @@ def relief_of_pair(
         write_cloud(job.cloud, coloured_cloud(result, pair, image1), overwrite=job.overwrite)
         written.append(job.cloud)
     summary = result.summary() | {"written": [str(path) for path in written]}
-    return summary, (*pair.remarks, *_remarks(result))
+    return summary, (*pair.remarks, *result.registration.remarks)
 
 
 def coloured_cloud(relief: ReliefMap, pair: Pair, image1: ImageArray) -> Cloud:
@@ -116,18 +114,7 @@ def coloured_cloud(relief: ReliefMap, pair: Pair, image1: ImageArray) -> Cloud:
         )
         if not len(xyz):
             continue
-        pixels = pair.image1.project(xyz).astype(np.float32)
-        colours = np.concatenate(
-            [
-                cv2.remap(
-                    picture,
-                    np.ascontiguousarray(some[None, :, 0]),
-                    np.ascontiguousarray(some[None, :, 1]),
-                    cv2.INTER_LINEAR,
-                )[0]
-                for some in np.array_split(pixels, len(pixels) // 30000 + 1)
-            ]
-        )
+        colours = values_at(picture, pair.image1.project(xyz), cv2.INTER_LINEAR)
         parts.append(
             Cloud(
                 xyz,
@@ -141,26 +128,12 @@ def coloured_cloud(relief: ReliefMap, pair: Pair, image1: ImageArray) -> Cloud:
 
 def _check_outputs(job: ReliefJob) -> None:
     """Refuse, before any work, outputs that could not be written."""
-    check_writable(job.out, overwrite=job.overwrite)
-    if job.out.suffix.lower() not in {".tif", ".tiff"}:
-        raise InputError(f"{job.out}: the relief map is written as .tif.")
-    if job.preview is not None:
-        check_writable(job.preview, overwrite=job.overwrite)
-        if job.preview.suffix.lower() != ".png":
-            raise InputError(f"{job.preview}: the preview is written as .png.")
-    if job.cloud is not None:
-        check_writable(job.cloud, overwrite=job.overwrite)
-        if job.cloud.suffix.lower() not in {".ply", ".las", ".laz"}:
-            raise InputError(f"{job.cloud}: point clouds are written as .ply, .las or .laz.")
-
-
-def _photo(pair: Pair, file: str, key: str) -> ImageArray:
-    """Read a photo named in a pair file."""
-    if not file:
-        raise InputError(f'the pair file names no photo for "{key}": add its "file".')
-    return read_image(pair.folder / file)
-
-
-def _remarks(result: DenseRelief) -> tuple[str, ...]:
-    """Return what the registration tells the user."""
-    return result.registration.remarks
+    for path, endings, rule in (
+        (job.out, {".tif", ".tiff"}, "the relief map is written as .tif."),
+        (job.preview, {".png"}, "the preview is written as .png."),
+        (job.cloud, {".ply", ".las", ".laz"}, "point clouds are written as .ply, .las or .laz."),
+    ):
+        if path is not None:
+            check_writable(path, overwrite=job.overwrite)
+            if path.suffix.lower() not in endings:
+                raise InputError(f"{path}: {rule}")
