@@ -149,7 +149,7 @@ class ReliefMap:
 
         pixels = self.pixels_from_plane(positions)
         with np.errstate(invalid="ignore"):
-            inside = ((pixels >= -0.5) & (pixels < np.array(self.shape[::-1]) - 0.5)).all(-1)
+            inside = np.all((pixels >= -0.5) & (pixels < np.array(self.shape[::-1]) - 0.5), -1)
         at = np.where(inside[..., None], pixels, 0.0).reshape(-1, 2).T[::-1]
         values = map_coordinates(band, at, np.float64, order=order, mode="nearest")
         return values.reshape(inside.shape), inside

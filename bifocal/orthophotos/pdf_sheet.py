@@ -14,7 +14,7 @@ import numpy as np
 
 from bifocal.files.geotiff import RasterReader
 from bifocal.files.strips import colour_strips, predicted
-from bifocal.orthophotos.drawing import BAND, STRIP, Drawing, Sheet, multiples
+from bifocal.orthophotos.drawing import BAND, STRIP, Drawing, PrintSheet, multiples
 from photocore.output import atomic_path
 
 #: PDF's own unit in millimetres: 72 to the inch.
@@ -24,7 +24,7 @@ _WIDTH = 0.556
 
 
 def write_sheet(
-    path: Path, drawing: Drawing, sheet: Sheet, reader: RasterReader, *, overwrite: bool
+    path: Path, drawing: Drawing, sheet: PrintSheet, reader: RasterReader, *, overwrite: bool
 ) -> None:
     """Write a drawing on a sheet; empty pixels are white."""
     with atomic_path(path, overwrite=overwrite) as temporary, temporary.open("wb") as file:
@@ -83,7 +83,7 @@ class _Pdf:
         self.file.write(f"{number} 0 obj\n".encode("ascii"))
         return number
 
-    def finish(self, commands: str, picture: int, sheet: Sheet) -> None:
+    def finish(self, commands: str, picture: int, sheet: PrintSheet) -> None:
         """Write page, catalogue and table of objects."""
         content = self.begin_stream("")
         self.add(commands.encode("cp1252", errors="replace"))
@@ -116,7 +116,7 @@ class _Pdf:
 class _Page:
     """The drawing commands of a sheet, in millimetres."""
 
-    def __init__(self, drawing: Drawing, sheet: Sheet) -> None:
+    def __init__(self, drawing: Drawing, sheet: PrintSheet) -> None:
         self.drawing, self.sheet = drawing, sheet
         self.parts = [f"{_UNITS_PER_MM:.8f} 0 0 {_UNITS_PER_MM:.8f} 0 0 cm"]
         self.origin = sheet.origin(drawing)

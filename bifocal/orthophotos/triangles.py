@@ -9,8 +9,8 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from bifocal.model.grid import Grid
-from bifocal.model.surface import Bounds, ReliefArray
+from bifocal.model.grid import Bounds, Grid
+from bifocal.model.surface import ReliefArray
 from photocore.arrays import FloatArray, IntArray, as_points
 from photocore.errors import InputError
 

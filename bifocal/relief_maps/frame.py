@@ -286,7 +286,6 @@ def values_at(band: NDArray[Any], places: NDArray[np.floating], how: int) -> NDA
     # cv2.remap counts the places of one call in 16 bits.
     for part in np.array_split(places.astype(np.float32), len(places) // 30000 + 1):
         if len(part):
-            maps = (np.ascontiguousarray(part[None, :, axis]) for axis in (0, 1))
-            border = {"borderMode": cv2.BORDER_CONSTANT, "borderValue": outside}
-            values.append(cv2.remap(band, *maps, how, **border)[0])
+            columns, rows = (np.ascontiguousarray(part[None, :, axis]) for axis in (0, 1))
+            values.append(cv2.remap(band, columns, rows, how, borderValue=outside)[0])
     return np.concatenate(values)

@@ -155,7 +155,7 @@ def least_absolute(
 
     Residuals below ``floor`` count as it: they would be weighted without bound.
     """
-    weight = np.ones(len(wanted))
+    weight: FloatArray = np.ones(len(wanted))
     solution = np.zeros(design.shape[1])
     for _ in range(rounds):
         solution = np.linalg.lstsq(design * weight[:, None], wanted * weight, rcond=None)[0]
