@@ -156,7 +156,7 @@ def least_absolute(
     Residuals below ``floor`` count as it: they would be weighted without bound.
     """
     weight: FloatArray = np.ones(len(wanted))
-    solution = np.zeros(design.shape[1])
+    solution: FloatArray = np.zeros(design.shape[1])
     for _ in range(rounds):
         solution = np.linalg.lstsq(design * weight[:, None], wanted * weight, rcond=None)[0]
         weight = 1 / np.sqrt(np.maximum(np.abs(wanted - design @ solution), floor))
