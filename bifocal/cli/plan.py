@@ -60,12 +60,14 @@ def command(
     Give the lenses and the camera, and one wish: the size of the wall, a scale, a pixel size on
     the wall, or a sigma of the relief.
     """
-    from bifocal.planning.camera_plan import Sensor
+    from bifocal.planning.camera_plan import CameraSensor
     from bifocal.planning.workflow import make_plan, plan_as_dict
 
     plan = make_plan(
         focal_lengths,
-        Sensor(width=sensor[0], height=sensor[1], columns=int(pixels[0]), rows=int(pixels[1])),
+        CameraSensor(
+            width=sensor[0], height=sensor[1], columns=int(pixels[0]), rows=int(pixels[1])
+        ),
         out=out, overwrite=overwrite, object_size=object_size, scale_number=scale_number,
         gsd=gsd and gsd / 1000, sigma_r=sigma_r and sigma_r / 1000, sigma_px=sigma_px,
         sigma_r_max=sigma_r_max and sigma_r_max / 1000, free_space=free_space,

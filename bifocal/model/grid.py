@@ -201,6 +201,46 @@ class Grid:
         return (c0, r0, c1 - c0, r1 - r0), *np.meshgrid(x, y)
 
 
+class Gridded:
+    """An image on the reference plane that knows where its pixels are.
+
+    Attributes
+    ----------
+    plane_from_pixel : ndarray, shape (3, 3)
+        Affine map from (column, row, 1) to (X, Y, 1): square pixels, rows downwards. [m]
+    """
+
+    __slots__ = ()
+    plane_from_pixel: FloatArray
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Height and width. [px]"""
+        raise NotImplementedError
+
+    @property
+    def grid(self) -> Grid:
+        """Where the pixels are."""
+        return Grid.from_affine(self.plane_from_pixel, self.shape)
+
+    @property
+    def gsd(self) -> float:
+        """Side of a pixel on the plane. [m]"""
+        return float(self.plane_from_pixel[0, 0])
+
+    @property
+    def bounds(self) -> Bounds:
+        """Outer edges (X min, Y min, X max, Y max). [m]"""
+        return self.grid.bounds
+
+
+def bounds_of(positions: FloatArray) -> Bounds:
+    """Return the box around plane positions, shape (..., 2). [m]"""
+    flat = positions.reshape(-1, 2)
+    (xmin, ymin), (xmax, ymax) = flat.min(axis=0).tolist(), flat.max(axis=0).tolist()
+    return xmin, ymin, xmax, ymax
+
+
 def cut(array: NDArray[Any], window: Window, fill: Any = 0) -> NDArray[Any]:
     """Return the part of an array at (column, row, width, height); ``fill`` beyond its edges."""
     column, row, width, height = window

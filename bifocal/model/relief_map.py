@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from bifocal.model.grid import Bounds, Grid
+from bifocal.model.grid import Grid, Gridded
 from photocore.arrays import BoolArray, ByteArray, FloatArray, as_points, read_only
 from photocore.errors import InputError
 
@@ -26,7 +26,7 @@ class Quality(IntEnum):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class ReliefMap:
+class ReliefMap(Gridded):
     """Relief of a wall as seen square on: pixel (column, row) is a point (X, Y) of the plane.
 
     Attributes
@@ -97,28 +97,9 @@ class ReliefMap:
         return self.r.shape[0], self.r.shape[1]
 
     @property
-    def grid(self) -> Grid:
-        """Where the pixels are."""
-        return Grid.from_affine(self.plane_from_pixel, self.r.shape)
-
-    @property
-    def gsd(self) -> float:
-        """Side of a pixel on the plane. [m]"""
-        return float(self.plane_from_pixel[0, 0])
-
-    @property
-    def bounds(self) -> Bounds:
-        """Outer edges (X min, Y min, X max, Y max). [m]"""
-        return self.grid.bounds
-
-    @property
     def known(self) -> NDArray[np.bool_]:
         """Pixels whose relief is known, shape (height, width)."""
         return np.isfinite(self.r)
-
-    def pixels_from_plane(self, positions: ArrayLike) -> FloatArray:
-        """Return (column, row) of plane positions (X, Y), shape (..., 2). [px]"""
-        return self.grid.pixel_of(as_points(positions, "positions", dimension=2))
 
     def plane_positions(self, rows: slice = slice(None)) -> FloatArray:
         """Return (X, Y) of the pixel centres of some rows, shape (n, width, 2). [m]"""
@@ -147,7 +128,7 @@ class ReliefMap:
         """Return a band at positions, nearest (order 0) or bilinear, and which are inside."""
         from scipy.ndimage import map_coordinates
 
-        pixels = self.pixels_from_plane(positions)
+        pixels = self.grid.pixel_of(as_points(positions, "positions", dimension=2))
         with np.errstate(invalid="ignore"):
             inside = np.all((pixels >= -0.5) & (pixels < np.array(self.shape[::-1]) - 0.5), -1)
         at = np.where(inside[..., None], pixels, 0.0).reshape(-1, 2).T[::-1]

@@ -14,6 +14,8 @@ from photocore.arrays import FloatArray
 from photocore.errors import InputError
 
 ReliefArray = NDArray[np.float32]
+#: A box without end.
+EVERYWHERE: Bounds = (-math.inf, -math.inf, math.inf, math.inf)
 #: Returns relief for (column, row, width, height) of a map, NaN beyond its edges.
 Fetch = Callable[[int, int, int, int], ReliefArray]
 
@@ -112,19 +114,14 @@ class MapSurface:
     def _scan(self) -> tuple[FloatArray, FloatArray]:
         """Return the extremes of every block."""
         rows, columns = (-(-length // _BLOCK) for length in self.grid.shape)
-        lowest = np.full((rows, columns), np.nan)
-        highest = np.full((rows, columns), np.nan)
-        strip = 4 * _BLOCK  # whole tiles of the file at a time
-        for top in range(0, self.grid.height, strip):
-            height = min(strip, self.grid.height - top)
-            values = self._fetch(0, top, self.grid.width, height)
-            for first in range(0, height, _BLOCK):
-                block = values[first : first + _BLOCK]
-                starts = np.arange(0, self.grid.width, _BLOCK)
-                index = (top + first) // _BLOCK
-                # fmin and fmax skip NaN without a warning where all is NaN.
-                lowest[index] = np.fmin.reduceat(np.fmin.reduce(block, axis=0), starts)
-                highest[index] = np.fmax.reduceat(np.fmax.reduce(block, axis=0), starts)
+        lowest, highest = np.full((2, rows, columns), np.nan)
+        for top in range(0, rows, 4):  # whole tiles of the file at a time
+            count = min(4, rows - top)
+            values = self._fetch(0, top * _BLOCK, columns * _BLOCK, count * _BLOCK)
+            blocks = values.reshape(count, _BLOCK, columns, _BLOCK)
+            # fmin and fmax skip NaN without a warning where all is NaN.
+            for result, extreme in ((lowest, np.fmin), (highest, np.fmax)):
+                result[top : top + count] = extreme.reduce(extreme.reduce(blocks, axis=1), axis=-1)
         if np.isinf(lowest).any() or np.isinf(highest).any():
             raise InputError("the relief map holds infinite values; mark unknown pixels as NaN.")
         return lowest, highest

@@ -10,10 +10,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from bifocal.model.grid import Bounds, Grid
+from bifocal.model.image import ImageArray
 from bifocal.model.pair import Pair
 from bifocal.model.relief_map import ReliefMap
 from bifocal.model.surface import FlatSurface, MapSurface, ReliefArray, Surface
-from bifocal.orthophotos.ortho_image import ImageArray, OrthoOptions, Orthophoto, Source
+from bifocal.orthophotos.ortho_image import OrthoOptions, Orthophoto, Source
 from bifocal.orthophotos.pull_push import fill_holes
 from bifocal.orthophotos.rectify import SourcePhoto, footprint
 from bifocal.orthophotos.visibility import hidden_from
@@ -234,7 +235,7 @@ def _look(
         return _Look(np.zeros(shape, view.image.dtype), inside, np.zeros(grid.shape, bool))
     hidden = np.zeros(grid.shape, bool)
     if options.mask_hidden:
-        hidden = hidden_from(surface, grid, view.foot, relief) & inside
+        hidden = hidden_from(surface, grid, view.photo.foot, relief) & inside
     return _Look(view.sample(column, row, options.interpolation), inside, hidden)
 
 

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import unicodedata
-from collections.abc import Iterator, Sequence
-from contextlib import ExitStack, contextmanager, suppress
+from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from datetime import date
 from pathlib import Path
@@ -110,7 +110,7 @@ def deliver(
     points, remarks = _points(wish.marked or task.points)
     control, notes_on_control = _points(wish.control)
     remarks += notes_on_control
-    with open_surface(task, pair) as (surface, _):
+    with open_surface(task, pair) as (surface, reader, _):
         # Everything that can be refused is, before the work.
         grid = planned_grid(pair, surface, task)
         notes = _notes(pair, grid, wish, task)
@@ -126,10 +126,8 @@ def deliver(
             )
             _pictures(place, name, drawing, sheet)
             if not isinstance(surface, FlatSurface):
-                with _measured(task, surface) as measured:
-                    share = _relief(
-                        place, f"{name}_relief", (surface, measured), drawing, sheet, wish
-                    )
+                surfaces = (surface, _measured(reader) or surface)
+                share = _relief(place, f"{name}_relief", surfaces, drawing, sheet, wish)
                 if share:
                     remarks += (
                         f"relief sheet: {share:.1%} of it was not measured but interpolated or "
@@ -211,24 +209,19 @@ def _relief(
     return share
 
 
-@contextmanager
-def _measured(task: OrthoTask, surface: Surface) -> Iterator[Surface]:
-    """Yield the measured part of a relief map; the surface itself where no map tells."""
-    with ExitStack() as stack:
-        measured = surface
-        if task.relief is not None:
-            reader = stack.enter_context(RasterReader(task.relief))
-            if reader.bands >= 3 and reader.names[2].startswith("quality"):
+def _measured(reader: RasterReader | None) -> Surface | None:
+    """Return the measured part of a relief map; None where no map tells, or nothing was."""
+    if reader is None or reader.bands < 3 or not reader.names[2].startswith("quality"):
+        return None
 
-                def fetch(column: int, row: int, width: int, height: int) -> NDArray[np.float32]:
-                    r = reader.read_floats(column, row, width, height)
-                    quality = reader.read(column, row, width, height, bands=[3])[:, :, 0]
-                    return np.where(quality == Quality.MEASURED, r, np.float32(np.nan))
+    def fetch(*window: int) -> NDArray[np.float32]:
+        quality = reader.read(*window, bands=[3])[:, :, 0]
+        return np.where(quality == Quality.MEASURED, reader.read_floats(*window), np.float32("nan"))
 
-                # A map of which nothing was measured is drawn as it is, hatched by no one.
-                with suppress(InputError):
-                    measured = MapSurface(reader.grid, fetch)
-        yield measured
+    # A map of which nothing was measured is drawn as it is, hatched by no one.
+    with suppress(InputError):
+        return MapSurface(reader.grid, fetch)
+    return None
 
 
 def _points(path: Path | None) -> tuple[SurveyPoints | None, tuple[str, ...]]:

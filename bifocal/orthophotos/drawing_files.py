@@ -50,15 +50,12 @@ def write_drawing(path: Path, drawing: Drawing, image_name: str | None, *, overw
             dxfattribs={"layer": "BIFOCAL_IMAGE"},
         )
     paper = drawing.scale / 1000.0  # metres on the wall per millimetre on paper
+    style, arm = {"layer": "BIFOCAL_GRID"}, 2 * paper
     for x, y in drawing.crosses().tolist():
-        for a, b in (
-            ((x - 2 * paper, y), (x + 2 * paper, y)),
-            ((x, y - 2 * paper), (x, y + 2 * paper)),
-        ):
-            model.add_line(a, b, dxfattribs={"layer": "BIFOCAL_GRID"})
-        _text(
-            model, f"{x:g} / {y:g}", (x + 0.5 * paper, y + 0.5 * paper), 1.6 * paper, "BIFOCAL_GRID"
-        )
+        model.add_line((x - arm, y), (x + arm, y), dxfattribs=style)
+        model.add_line((x, y - arm), (x, y + arm), dxfattribs=style)
+        beside = (x + 0.5 * paper, y + 0.5 * paper)
+        _text(model, f"{x:g} / {y:g}", beside, 1.6 * paper, "BIFOCAL_GRID")
     _scale_bar(model, drawing, paper)
     _points(model, drawing.points, "BIFOCAL_POINTS", 2.0 * paper)
     _points(model, drawing.control, "BIFOCAL_CONTROL", 2.0 * paper)
@@ -111,9 +108,8 @@ def write_section_svg(path: Path, cut: Section, *, scale: float, overwrite: bool
         f'<polyline points="{" ".join(place(x, y) for x, y in piece.tolist())}"/>'
         for piece in pieces
     )
-    along = 1 if cut.axis == "x" else 0
-    ends = [np.array([0.0, 0.0]), np.array([0.0, 0.0])]
-    ends[0][along], ends[1][along] = every[:, along].min(), every[:, along].max()
+    along = np.array([0.0, 1.0] if cut.axis == "x" else [1.0, 0.0])  # the reference line
+    ends = (function(every @ along) * along for function in (np.min, np.max))
     zero = " ".join(place(*end.tolist()) for end in ends)
     y = height - 6
     tenth = bar * factor / 5
@@ -153,9 +149,8 @@ def _new(scale: float) -> tuple[Any, Any]:
 
 
 def _text(model: Any, text: str, place: tuple[float, ...], height: float, layer: str) -> None:
-    model.add_text(
-        text.replace("\n", " "), height=height, dxfattribs={"layer": layer, "insert": place}
-    )
+    style = {"layer": layer, "insert": place}
+    model.add_text(text.replace("\n", " "), height=height, dxfattribs=style)
 
 
 def _points(model: Any, points: SurveyPoints | None, layer: str, height: float) -> None:
@@ -164,9 +159,8 @@ def _points(model: Any, points: SurveyPoints | None, layer: str, height: float) 
     for name, place in zip(points.ids, points.xyz.tolist(), strict=True):
         if not np.isfinite(place[:2]).all():
             continue
-        if not np.isfinite(place[2]):  # relief left blank: on the wall
-            place[2] = 0.0
-        model.add_point(place, dxfattribs={"layer": layer})
+        relief = place[2] if np.isfinite(place[2]) else 0.0  # left blank: on the wall
+        model.add_point((*place[:2], relief), dxfattribs={"layer": layer})
         label = (place[0] + height / 2, place[1] + height / 2)
         _text(model, name, label, height, "BIFOCAL_NAMES" if layer == "BIFOCAL_POINTS" else layer)
 
@@ -184,7 +178,5 @@ def _scale_bar(model: Any, drawing: Drawing, paper: float) -> None:
         model.add_lwpolyline(corners, close=True, dxfattribs=style)
     for share, text in ((0.0, "0"), (0.2, f"{length / 5:g}"), (1.0, f"{length:g} m")):
         _text(model, text, (xmin + length * share, y + 1.5 * high), 2.4 * paper, "BIFOCAL_SCALEBAR")
-    _text(
-        model, f"{drawing.title}, 1:{drawing.scale:g}", (xmin, y - 4 * paper), 2.4 * paper,
-        "BIFOCAL_SCALEBAR",
-    )  # fmt: skip
+    title = f"{drawing.title}, 1:{drawing.scale:g}"
+    _text(model, title, (xmin, y - 4 * paper), 2.4 * paper, "BIFOCAL_SCALEBAR")

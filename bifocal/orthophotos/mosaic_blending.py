@@ -5,12 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import combinations
 from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from bifocal.model.grid import SAME_PIXEL, Bounds, Grid
+from bifocal.model.grid import SAME_PIXEL, Bounds, Grid, bounds_of
 from bifocal.orthophotos.pull_push import fill_holes
 from photocore.arrays import BoolArray, FloatArray, IntArray
 from photocore.errors import InputError
@@ -78,9 +79,7 @@ def common_grid(
     finest = min(layers, key=lambda layer: layer.grid.gsd).grid
     gsd = gsd or finest.gsd
     if bounds is None:
-        boxes = np.array([layer.grid.bounds for layer in layers])
-        low, high = boxes.min(axis=0), boxes.max(axis=0)
-        bounds = (float(low[0]), float(low[1]), float(high[2]), float(high[3]))
+        bounds = bounds_of(np.array([layer.grid.bounds for layer in layers]))
     if abs(gsd / finest.gsd - 1) > 1e-9:
         return Grid.from_bounds(bounds, gsd=gsd)
     left, _, _, top = finest.bounds
@@ -231,23 +230,20 @@ def _gains(
     normal = np.eye(count) * 1e-3
     right = np.zeros((count, bands))
     differences = {}
-    for i in range(count):
-        for j in range(i + 1, count):
-            both = valid[i] & valid[j]
-            if np.count_nonzero(both) < _LEAST_OVERLAP:
-                continue
-            a, b = images[i][both], images[j][both]
-            differences[i, j] = float(np.median(a[:, 0] - b[:, 0]))
-            usable = ((a > 0.02) & (a < 0.98) & (b > 0.02) & (b < 0.98)).all(axis=1)
-            if not wanted or np.count_nonzero(usable) < _LEAST_OVERLAP:
-                continue
-            ratio = np.median(np.log(a[usable]) - np.log(b[usable]), axis=0)
-            weight = math.sqrt(np.count_nonzero(usable))
-            normal[[i, j], [i, j]] += weight
-            normal[i, j] -= weight
-            normal[j, i] -= weight
-            right[i] -= weight * ratio
-            right[j] += weight * ratio
+    for i, j in combinations(range(count), 2):
+        both = valid[i] & valid[j]
+        if np.count_nonzero(both) < _LEAST_OVERLAP:
+            continue
+        a, b = images[i][both], images[j][both]
+        differences[i, j] = float(np.median(a[:, 0] - b[:, 0]))
+        usable = ((a > 0.02) & (a < 0.98) & (b > 0.02) & (b < 0.98)).all(axis=1)
+        if not wanted or np.count_nonzero(usable) < _LEAST_OVERLAP:
+            continue
+        ratio = np.median(np.log(a[usable]) - np.log(b[usable]), axis=0)
+        weight = math.sqrt(np.count_nonzero(usable))
+        normal[np.ix_([i, j], [i, j])] += weight * np.array([[1, -1], [-1, 1]])
+        right[i] -= weight * ratio
+        right[j] += weight * ratio
     if not wanted:
         return np.ones((count, bands)), differences
     return np.exp(np.linalg.solve(normal, right)), differences
@@ -271,11 +267,9 @@ def _seams(
     sure = (second <= 0) | (depth.max(axis=0) > 3 * second + 4)
     markers = np.where(sure & (depth.max(axis=0) > 0), best + 1, 0).astype(np.int32)
     cost = np.zeros(best.shape, np.float32)
-    for i in range(len(images)):
-        for j in range(i + 1, len(images)):
-            both = valid[i] & valid[j]
-            apart = np.abs(images[i] - images[j]).mean(axis=2)
-            cost = np.maximum(cost, np.where(both, apart, 0))
+    for i, j in combinations(range(len(images)), 2):
+        apart = np.abs(images[i] - images[j]).mean(axis=2)
+        cost = np.maximum(cost, np.where(valid[i] & valid[j], apart, 0))
     spread = float(np.percentile(cost[any_valid], 90)) if any_valid.any() else 0.0
     cost = cv2.GaussianBlur(cost / max(spread, 1e-3), (0, 0), 1.5)
     for seen in valid:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
@@ -15,7 +14,7 @@ from bifocal.files.images import ImageArray, image_info, read_image
 from bifocal.files.point_tables import read_survey_points
 from bifocal.model.grid import Bounds, Grid
 from bifocal.model.pair import Pair
-from bifocal.model.surface import FlatSurface, MapSurface, Surface
+from bifocal.model.surface import EVERYWHERE, FlatSurface, MapSurface, Surface
 from bifocal.orthophotos.compose import NOTHING_IN_COMMON, choose_grid, render
 from bifocal.orthophotos.ortho_image import OrthoOptions, Source
 from bifocal.orthophotos.radiometry import corrected_photo, match_exposure
@@ -107,7 +106,7 @@ def make_ortho(
     if out.suffix.lower() not in {".tif", ".tiff"}:
         raise InputError(f"{out}: an orthophoto is written as GeoTIFF; name it .tif.")
     pair = Pair.read(pair_path)
-    with open_surface(task, pair) as (surface, remarks):
+    with open_surface(task, pair) as (surface, _, remarks):
         numbers = {"1": (1,), "2": (2,), "both": (1, 2)}[task.image]
         images = {number: read_image(pair.photo_file(number)) for number in numbers}
         height, width = images[numbers[0]].shape[:2]
@@ -151,28 +150,26 @@ def make_ortho(
 
 
 @contextmanager
-def open_surface(task: OrthoTask, pair: Pair) -> Iterator[tuple[Surface, tuple[str, ...]]]:
-    """Yield the relief asked for, checked against the cameras' distances, and remarks on it."""
+def open_surface(
+    task: OrthoTask, pair: Pair
+) -> Iterator[tuple[Surface, RasterReader | None, tuple[str, ...]]]:
+    """Yield the relief asked for, checked against the cameras' distances, its map, and remarks."""
     with ExitStack() as stack:
-        surface: Surface
+        surface: Surface = FlatSurface(task.plane)
+        reader: RasterReader | None = None
         remarks: tuple[str, ...] = ()
-        box = (-math.inf, -math.inf, math.inf, math.inf)
         if task.relief is not None and task.points is not None:
             raise InputError("give either a relief map or points, not both.")
         if task.relief is not None:
             reader = stack.enter_context(RasterReader(task.relief))
             check_relief(reader)
-            box = reader.grid.bounds
             try:
                 surface = MapSurface(reader.grid, reader.read_floats)
             except InputError as error:
                 raise InputError(f"{task.relief}: {error}") from None
         elif task.points is not None:
             surface, remarks = _triangles(task.points, task.breaklines)
-            box = surface.bounds
-        else:
-            surface = FlatSurface(task.plane)
-        low, high = surface.extremes(box)
+        low, high = surface.extremes(EVERYWHERE)
         nearest = min(pair.image1.distance, pair.image2.distance)
         if high >= nearest or low < -20 * pair.image1.distance:
             raise InputError(
@@ -180,7 +177,7 @@ def open_surface(task: OrthoTask, pair: Pair) -> Iterator[tuple[Surface, tuple[s
                 f"but the near camera stands {nearest:g} m from the plane. It must be in metres, "
                 "positive towards the cameras, and belong to this pair."
             )
-        yield surface, remarks
+        yield surface, reader, remarks
 
 
 def _triangles(

@@ -14,10 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bifocal.model.grid import Grid
+from bifocal.model.image import ImageArray, as_photo
 from bifocal.model.pair import Photo
 from bifocal.model.surface import Surface
-from bifocal.orthophotos.ortho_image import ImageArray
-from bifocal.orthophotos.rectify import ChromaticShift, SourcePhoto, check_image
+from bifocal.orthophotos.rectify import ChromaticShift, SourcePhoto
 from bifocal.orthophotos.visibility import hidden_from
 from photocore.arrays import BoolArray, FloatArray
 from photocore.errors import InputError
@@ -47,7 +47,7 @@ def corrected_photo(
         Measure the radial shift of red and blue against green.
     """
     notes = []
-    image = check_image(image)
+    image = as_photo(image)
     if vignetting:
         image = devignetted(image, photo, vignetting)
         notes.append(f"vignetting corrected ({vignetting}).")
@@ -155,7 +155,7 @@ def match_exposure(
     limit = float(np.iinfo(first.image.dtype).max)
     for view in (first, second):
         column, row = view.pixel_map(coarse, relief)
-        usable &= view.inside(column, row) & ~hidden_from(surface, coarse, view.foot, relief)
+        usable &= view.inside(column, row) & ~hidden_from(surface, coarse, view.photo.foot, relief)
         colours = view.sample(column, row, "linear").astype(np.float64) / limit
         samples.append(colours.reshape(*coarse.shape, -1))
         positions.append((column, row))

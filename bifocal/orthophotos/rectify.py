@@ -9,11 +9,12 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from bifocal.model.grid import Bounds, Grid, PixelMap
+from bifocal.model.grid import Bounds, Grid, PixelMap, bounds_of
+from bifocal.model.image import ImageArray, as_photo
 from bifocal.model.pair import Photo, apply_homography
 from bifocal.model.surface import ReliefArray
-from bifocal.orthophotos.ortho_image import ImageArray, Interpolation
-from bifocal.rays import Foot, magnification
+from bifocal.orthophotos.ortho_image import Interpolation
+from bifocal.rays import magnification
 from photocore.arrays import BoolArray, FloatArray
 from photocore.errors import GeometryError, InputError
 
@@ -88,7 +89,7 @@ class SourcePhoto:
         InputError
             If the image is not a photo of 8 or 16 bits per channel.
         """
-        image = check_image(image)
+        image = as_photo(image)
         size = (image.shape[1], image.shape[0])
         factor = 1
         if gsd is not None:
@@ -101,11 +102,6 @@ class SourcePhoto:
             photo=photo, image=image, factor=factor, size=size, number=number, lens=lens,
             chromatic=chromatic,
         )  # fmt: skip
-
-    @property
-    def foot(self) -> Foot:
-        """Nadir and distance of the camera."""
-        return self.photo.foot
 
     def pixel_map(self, grid: Grid, relief: ReliefArray) -> tuple[PixelMap, PixelMap]:
         """Return column and row of the photo for every pixel of a window; NaN where none."""
@@ -159,32 +155,6 @@ class SourcePhoto:
         return cv2.remap(image, column, row, flag, borderMode=cv2.BORDER_REPLICATE)
 
 
-def check_image(image: ImageArray) -> ImageArray:
-    """Return an array that is a photo: 8 or 16 bits, grey or RGB; alpha is dropped.
-
-    Raises
-    ------
-    InputError
-        Otherwise.
-    """
-    image = np.asarray(image)
-    if image.dtype not in (np.uint8, np.uint16):
-        raise InputError(
-            f"image: expected 8 or 16 bits per channel (uint8, uint16), found {image.dtype}."
-        )
-    if image.ndim == 3 and image.shape[2] == 4:
-        image = image[:, :, :3]
-    if image.ndim == 3 and image.shape[2] == 1:
-        image = image[:, :, 0]
-    if not (image.ndim == 2 or (image.ndim == 3 and image.shape[2] == 3)):
-        raise InputError(f"image: expected shape (h, w) or (h, w, 3), found {image.shape}.")
-    if min(image.shape[:2]) < 2:
-        raise InputError(
-            f"image: {image.shape[1]} x {image.shape[0]} px is not a photo; check the file."
-        )
-    return np.ascontiguousarray(image)
-
-
 def footprint(photo: Photo, size: tuple[int, int]) -> Bounds:
     """Return the box on the reference plane that a photo covers: xmin, ymin, xmax, ymax. [m]
 
@@ -203,8 +173,7 @@ def footprint(photo: Photo, size: tuple[int, int]) -> Bounds:
             "the photo looks past the horizon of the reference plane, so it covers no finite "
             "part of it. Say which part is wanted: --bounds XMIN,YMIN,XMAX,YMAX."
         )
-    low, high = plane.min(0), plane.max(0)
-    return float(low[0]), float(low[1]), float(high[0]), float(high[1])
+    return bounds_of(plane)
 
 
 def _rim(size: tuple[int, int], *, outwards: float, points: int) -> FloatArray:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bifocal.model.grid import Bounds, Grid
-from bifocal.model.surface import ReliefArray, Surface
+from bifocal.model.surface import EVERYWHERE, ReliefArray, Surface
 from bifocal.rays import Foot, magnification
 from photocore.arrays import BoolArray
 
@@ -73,7 +73,7 @@ def hidden_from(surface: Surface, grid: Grid, camera: Foot, relief: ReliefArray)
     else:
         relief_wide = relief
     # The same cells for every window, so that windows fit together.
-    _, high = surface.extremes((-math.inf, -math.inf, math.inf, math.inf))
+    _, high = surface.extremes(EVERYWHERE)
     largest = float(magnification(high, camera.distance))
     return _hidden(relief_wide, wide, camera, (column, row), grid.shape, largest)
 

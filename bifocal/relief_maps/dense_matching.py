@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from bifocal.model.grid import Bounds, Grid
+from bifocal.model.grid import Bounds, Grid, bounds_of
 from bifocal.model.pair import Pair
 from bifocal.model.relief_map import Quality, ReliefMap
 from bifocal.rays import plane_position
@@ -210,7 +210,7 @@ def _grids(
     low, high = relief_range or seed.usual_range(pair.image2.distance)
     reach = _seen_box(pair, box, low, high) if bounds is not None else box
     lower, upper = np.maximum(reach[:2], common[:2]), np.minimum(reach[2:], common[2:])
-    reach = (float(lower[0]), float(lower[1]), float(upper[0]), float(upper[1]))
+    reach = (*lower.tolist(), *upper.tolist())
     if reach[2] - reach[0] < 16 * native or reach[3] - reach[1] < 16 * native:
         raise InputError(
             f"bounds: {box} m lie outside what both photos see, "
@@ -252,9 +252,7 @@ def _seen_box(pair: Pair, box: Bounds, low: float, high: float) -> Bounds:
     corners = (box[:2], box[2:])
     reliefs = (low, 0.0, min(high, 0.6 * foot.distance))
     xyz = np.array([[x, y, r] for r in reliefs for x, y in corners])
-    seen = plane_position(xyz, foot)
-    (a, b), (c, d) = seen.min(0).tolist(), seen.max(0).tolist()
-    return a, b, c, d
+    return bounds_of(plane_position(xyz, foot))
 
 
 def _surfaces(

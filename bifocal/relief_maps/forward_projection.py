@@ -166,13 +166,19 @@ def fill_outwards(bands: MapBands, holes: BoolArray, grid: Grid, nadir: FloatArr
         hop = number[target]
         target = np.where(hop >= 0, target[np.maximum(hop, 0)], target)
     good = np.isfinite(bands.r.ravel()[target]) & (number[target] < 0)
-    at, source = (row * width + column)[good], target[good]
-    bands.r.ravel()[at] = bands.r.ravel()[source]
-    bands.sigma.ravel()[at] = 3 * bands.sigma.ravel()[source]
-    bands.quality.ravel()[at] = Quality.HIDDEN
-    filled = np.zeros(height * width, dtype=bool)
-    filled[at] = True
-    return filled.reshape(height, width)
+    filled = np.zeros_like(holes)
+    filled[row[good], column[good]] = True
+    _fill(bands, filled, target[good], 3, Quality.HIDDEN)
+    return filled
+
+
+def _fill(
+    bands: MapBands, holes: BoolArray, source: IntArray, factor: float, quality: Quality
+) -> None:
+    """Fill holes, in order of rows, from flat indices; their sigma grows (in place)."""
+    bands.r[holes] = bands.r.ravel()[source]
+    bands.sigma[holes] = factor * bands.sigma.ravel()[source]
+    bands.quality[holes] = quality
 
 
 def hidden_in_second(frame: Frame, relief: Float32Array, step: Float32Array) -> BoolArray:
@@ -218,10 +224,7 @@ def fill_small(bands: MapBands, holes: BoolArray) -> None:
         return
     source_of_label = np.zeros(int(label.max()) + 1, dtype=np.int64)
     source_of_label[label.ravel()[known]] = known
-    source = source_of_label[label[fill]]
-    bands.r[fill] = bands.r.ravel()[source]
-    bands.sigma[fill] = 5 * bands.sigma.ravel()[source]
-    bands.quality[fill] = Quality.INTERPOLATED
+    _fill(bands, fill, source_of_label[label[fill]], 5, Quality.INTERPOLATED)
 
 
 def forget_outside(bands: MapBands) -> None:

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import permutations
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bifocal import rays
-from bifocal.model.grid import Bounds, Grid, cut
+from bifocal.model.grid import Bounds, Grid, bounds_of, cut
+from bifocal.model.image import as_photo
 from bifocal.model.pair import Pair, Photo
 from photocore.arrays import BoolArray, ByteArray, FloatArray
 from photocore.errors import GeometryError, InputError
@@ -80,10 +82,8 @@ def common_bounds(pair: Pair, shapes: tuple[tuple[int, ...], tuple[int, ...]]) -
         If the photos have no common area on the plane.
     """
     places = []
-    for one, other, shape, across in (
-        (pair.image1, pair.image2, shapes[0], shapes[1]),
-        (pair.image2, pair.image1, shapes[1], shapes[0]),
-    ):
+    photos = zip((pair.image1, pair.image2), shapes, strict=True)
+    for (one, shape), (other, across) in permutations(photos):
         footprint = _footprint(one, shape)
         places.append(footprint[_shows(other, across, footprint)])
     both = np.concatenate(places)
@@ -92,19 +92,18 @@ def common_bounds(pair: Pair, shapes: tuple[tuple[int, ...], tuple[int, ...]]) -
             "the two photos have no common area on the reference plane: check that they show the "
             "same wall and that the pair file belongs to them."
         )
-    (x_min, y_min), (x_max, y_max) = both.min(0).tolist(), both.max(0).tolist()
-    return x_min, y_min, x_max, y_max
+    return bounds_of(both)
 
 
 def zoomed_box(pair: Pair, shape2: tuple[int, ...], box: Bounds, relief: float) -> Bounds:
     """Return a box grown to where photo 2 shows what stands out by a relief, as far as it does."""
     factor = rays.zoom_factor(relief, d1=pair.image1.distance, d2=pair.image2.distance)
-    corners = np.array([[box[0], box[1]], [box[2], box[3]]])
+    corners = np.reshape(box, (2, 2))
     grown = pair.zoom_centre + (corners - pair.zoom_centre) * factor
     footprint = _footprint(pair.image2, shape2)
     low = np.minimum(corners[0], np.maximum(grown[0], footprint.min(0)))
     high = np.maximum(corners[1], np.minimum(grown[1], footprint.max(0)))
-    return float(low[0]), float(low[1]), float(high[0]), float(high[1])
+    return bounds_of(np.stack([low, high]))
 
 
 def _shows(photo: Photo, shape: tuple[int, ...], places: FloatArray) -> BoolArray:
@@ -182,24 +181,12 @@ def as_grey(image: NDArray[np.generic], name: str) -> ByteArray:
     """
     import cv2
 
-    array = np.asarray(image)
-    if array.ndim not in (2, 3) or (array.ndim == 3 and array.shape[2] not in (1, 3, 4)):
-        raise InputError(f"{name}: expected shape (height, width[, 3]), found {array.shape}.")
-    if min(array.shape[:2]) < 16:
-        raise InputError(
-            f"{name}: {array.shape[1]} x {array.shape[0]} px is too small to match; "
-            "at least 16 px a side are needed."
-        )
+    small = "is too small to match; at least 16 px a side are needed."
+    array = as_photo(image, name, smallest=16, fault=small)
     if array.dtype == np.uint16:
         array = (array >> 8).astype(np.uint8)
-    if array.dtype != np.uint8:
-        raise InputError(f"{name}: expected 8 or 16 bits per channel, found {array.dtype}.")
-    if array.ndim == 2:
-        return array
-    if array.shape[2] == 1:
-        return np.ascontiguousarray(array[..., 0])
     # The plain mean of the channels has less noise than the luminance, which is mostly green.
-    return np.asarray(cv2.transform(array[..., :3], np.full((1, 3), 1 / 3)), dtype=np.uint8)
+    return array if array.ndim == 2 else cv2.transform(array, np.full((1, 3), 1 / 3))
 
 
 def _on_grid(photo: Photo, image: ByteArray, grid: Grid) -> tuple[ByteArray, BoolArray]:
