@@ -89,16 +89,15 @@ class TriangleSurface:
         fixed = np.rint(corners * 2**_BITS).astype(np.int32)
         for index, triangle in zip(touched.tolist(), fixed, strict=True):
             cv2.fillConvexPoly(owner, triangle, float(index), lineType=cv2.LINE_8, shift=_BITS)
-        found = owner >= 0
-        plane = self._planes[np.where(found, owner, 0)]
+        index = np.maximum(owner, 0)
+        plane = self._planes[index]
         x, y = grid.columns_x[None, :], grid.rows_y[:, None]
         relief = plane[..., 0] * x + plane[..., 1] * y + plane[..., 2]
         # Pixels on an edge may belong to the triangle beside; steep ones must not shoot out of it.
-        index = np.where(found, owner, 0)
         low, high = self._low[index, 2], self._high[index, 2]
         slack = 0.02 * (high - low)
         relief = np.clip(relief, low - slack, high + slack)
-        return np.where(found, relief, np.nan).astype(np.float32)
+        return np.where(owner >= 0, relief, np.nan).astype(np.float32)
 
     def extremes(self, bounds: Bounds) -> tuple[float, float]:
         """Return the extremes over the triangles that touch a box."""

@@ -232,8 +232,8 @@ def _sharpen(around: _Surroundings, buffer: _Buffer) -> BoolArray:
 
     core, rho = around.core, around.rho[around.core]
     ahead = rho - buffer.nearest[buffer.cells]
-    found = ahead > np.float32(_MARGIN)
-    flags, square = found.astype(np.uint8), np.ones((3, 3), np.uint8)
+    hidden = ahead > np.float32(_MARGIN)
+    flags, square = hidden.astype(np.uint8), np.ones((3, 3), np.uint8)
     sure = (cv2.erode(flags, square) > 0) & (ahead > np.float32(_SURE))
     unsure = (cv2.dilate(flags, square) > 0) & ~sure
     known = np.where(np.isnan(around.relief), np.float32(-1e9), around.relief)
@@ -241,13 +241,13 @@ def _sharpen(around: _Surroundings, buffer: _Buffer) -> BoolArray:
     unsure |= rise * rho > np.float32(_LEAST_SHADOW) * (around.distance - around.relief[core])
     row, column = np.nonzero(unsure & ~sure)
     if not len(row):
-        return found
+        return hidden
     cell = buffer.cells[row, column].astype(np.int64)
     occluder = buffer.nearest[cell]
     for shift in [i * buffer.columns + j for i in (-1, 0, 1) for j in (-1, 0, 1)]:
         # At a rim the occluder may lie just beside the pixel's own cell.
         occluder = np.fmin(occluder, buffer.nearest[np.clip(cell + shift, 0, cell.max())])
-    occluder = np.where(found[row, column], buffer.nearest[cell], occluder)
+    occluder = np.where(hidden[row, column], buffer.nearest[cell], occluder)
     sure[row, column] = _above_ray(around, row + core[0].start, column + core[1].start, occluder)
     return sure
 
