@@ -16,6 +16,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from bifocal.model.image import as_photo
+from photocore.arrays import ByteArray
 from photocore.errors import InputError
 from photocore.output import atomic_path
 
@@ -207,6 +209,24 @@ def to_eight_bit(image: ImageArray) -> NDArray[np.uint8]:
     if image.dtype == np.uint8:
         return image.astype(np.uint8, copy=False)
     return ((image.astype(np.uint32) + 128) // 257).astype(np.uint8)
+
+
+def as_grey(image: NDArray[np.generic], name: str) -> ByteArray:
+    """Return a photo as 8-bit grey values, shape (height, width).
+
+    Raises
+    ------
+    InputError
+        If it is not an image of 8 or 16 bits, or smaller than 16 pixels a side.
+    """
+    import cv2
+
+    small = "is too small to match; at least 16 px a side are needed."
+    array = as_photo(image, name, smallest=16, fault=small)
+    if array.dtype == np.uint16:
+        array = (array >> 8).astype(np.uint8)
+    # The plain mean of the channels has less noise than the luminance, which is mostly green.
+    return array if array.ndim == 2 else cv2.transform(array, np.full((1, 3), 1 / 3))
 
 
 def write_image(path: Path | str, image: ImageArray, *, overwrite: bool = False) -> None:

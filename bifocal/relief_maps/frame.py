@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 
 from bifocal import rays
 from bifocal.model.grid import Bounds, Grid, bounds_of, cut
-from bifocal.model.image import as_photo
 from bifocal.model.pair import Pair, Photo
 from photocore.arrays import BoolArray, ByteArray, FloatArray
 from photocore.errors import GeometryError, InputError
@@ -169,24 +168,6 @@ def make_frame(
             "photos show the same wall."
         )
     return Frame(grid=grid, image1=first, image2=second, seen1=seen1, seen2=seen2, pair=pair)
-
-
-def as_grey(image: NDArray[np.generic], name: str) -> ByteArray:
-    """Return a photo as 8-bit grey values, shape (height, width).
-
-    Raises
-    ------
-    InputError
-        If it is not an image of 8 or 16 bits, or smaller than 16 pixels a side.
-    """
-    import cv2
-
-    small = "is too small to match; at least 16 px a side are needed."
-    array = as_photo(image, name, smallest=16, fault=small)
-    if array.dtype == np.uint16:
-        array = (array >> 8).astype(np.uint8)
-    # The plain mean of the channels has less noise than the luminance, which is mostly green.
-    return array if array.ndim == 2 else cv2.transform(array, np.full((1, 3), 1 / 3))
 
 
 def _on_grid(photo: Photo, image: ByteArray, grid: Grid) -> tuple[ByteArray, BoolArray]:
