@@ -51,15 +51,12 @@ def write_drawing(path: Path, drawing: Drawing, image_name: str | None, *, overw
             dxfattribs={"layer": "BIFOCAL_IMAGE"},
         )
     paper = drawing.scale / 1000.0  # metres on the wall per millimetre on paper
+    style, arm = {"layer": "BIFOCAL_GRID"}, 2 * paper
     for x, y in drawing.crosses().tolist():
-        for a, b in (
-            ((x - 2 * paper, y), (x + 2 * paper, y)),
-            ((x, y - 2 * paper), (x, y + 2 * paper)),
-        ):
-            model.add_line(a, b, dxfattribs={"layer": "BIFOCAL_GRID"})
-        add_text(
-            model, f"{x:g} / {y:g}", (x + 0.5 * paper, y + 0.5 * paper), 1.6 * paper, "BIFOCAL_GRID"
-        )
+        model.add_line((x - arm, y), (x + arm, y), dxfattribs=style)
+        model.add_line((x, y - arm), (x, y + arm), dxfattribs=style)
+        beside = (x + 0.5 * paper, y + 0.5 * paper)
+        add_text(model, f"{x:g} / {y:g}", beside, 1.6 * paper, "BIFOCAL_GRID")
     _scale_bar(model, drawing, paper)
     _points(model, drawing.points, "BIFOCAL_POINTS", 2.0 * paper)
     _points(model, drawing.control, "BIFOCAL_CONTROL", 2.0 * paper)
@@ -112,9 +109,8 @@ def write_section_svg(path: Path, cut: Section, *, scale: float, overwrite: bool
         f'<polyline points="{" ".join(place(x, y) for x, y in piece.tolist())}"/>'
         for piece in pieces
     )
-    along = 1 if cut.axis == "x" else 0
-    ends = [np.array([0.0, 0.0]), np.array([0.0, 0.0])]
-    ends[0][along], ends[1][along] = every[:, along].min(), every[:, along].max()
+    along = np.array([0.0, 1.0] if cut.axis == "x" else [1.0, 0.0])  # the reference line
+    ends = (function(every @ along) * along for function in (np.min, np.max))
     zero = " ".join(place(*end.tolist()) for end in ends)
     y = height - 6
     tenth = bar * factor / 5
@@ -151,9 +147,8 @@ def _points(model: Any, points: SurveyPoints | None, layer: str, height: float) 
     for name, place in zip(points.ids, points.xyz.tolist(), strict=True):
         if not np.isfinite(place[:2]).all():
             continue
-        if not np.isfinite(place[2]):  # relief left blank: on the wall
-            place[2] = 0.0
-        model.add_point(place, dxfattribs={"layer": layer})
+        relief = place[2] if np.isfinite(place[2]) else 0.0  # left blank: on the wall
+        model.add_point((*place[:2], relief), dxfattribs={"layer": layer})
         label = (place[0] + height / 2, place[1] + height / 2)
         add_text(
             model, name, label, height, "BIFOCAL_NAMES" if layer == "BIFOCAL_POINTS" else layer
@@ -176,7 +171,5 @@ def _scale_bar(model: Any, drawing: Drawing, paper: float) -> None:
         add_text(
             model, text, (xmin + length * share, y + 1.5 * high), 2.4 * paper, "BIFOCAL_SCALEBAR"
         )
-    add_text(
-        model, f"{drawing.title}, 1:{drawing.scale:g}", (xmin, y - 4 * paper), 2.4 * paper,
-        "BIFOCAL_SCALEBAR",
-    )  # fmt: skip
+    title = f"{drawing.title}, 1:{drawing.scale:g}"
+    add_text(model, title, (xmin, y - 4 * paper), 2.4 * paper, "BIFOCAL_SCALEBAR")

@@ -13,7 +13,8 @@ from bifocal.files.geotiff import write_relief
 from bifocal.files.images import ImageArray, read_image, to_eight_bit
 from bifocal.model.pair import Pair
 from bifocal.model.relief_map import ReliefMap
-from bifocal.relief_maps import DenseRelief, dense_relief
+from bifocal.relief_maps import dense_relief
+from bifocal.relief_maps.frame import values_at
 from bifocal.relief_maps.relief_files import write_preview
 from photocore.arrays import FloatArray
 from photocore.cli import Progress, no_progress
@@ -74,10 +75,7 @@ def relief_of_pair(
     """
     _check_outputs(job)
     pair = Pair.read(pair_file)
-    image1, image2 = (
-        _photo(pair, file, key)
-        for file, key in ((pair.image1.file, "image1"), (pair.image2.file, "image2"))
-    )
+    image1, image2 = (read_image(pair.photo_file(number)) for number in (1, 2))
     result = dense_relief(
         pair, image1, image2, gsd=job.gsd, bounds=job.bounds, quality=job.quality,
         relief_range=job.relief_range, progress=progress,
@@ -104,7 +102,7 @@ def relief_of_pair(
         )  # fmt: skip
         written.append(job.cloud)
     summary = result.summary() | {"written": [str(path) for path in written]}
-    return summary, (*pair.remarks, *_remarks(result))
+    return summary, (*pair.remarks, *result.registration.remarks)
 
 
 def coloured_cloud(
@@ -132,10 +130,7 @@ def coloured_cloud(
             continue
         xyz = np.column_stack([relief.plane_positions(rows)[known], relief.r[rows][known]])
         positions.append(xyz)
-        pixels = pair.image1.project(xyz).astype(np.float32)
-        for some in np.array_split(pixels, len(pixels) // 30000 + 1):
-            columns, lines = np.ascontiguousarray(some.T[:, None])
-            colours.append(cv2.remap(picture, columns, lines, cv2.INTER_LINEAR)[0])
+        colours.append(values_at(picture, pair.image1.project(xyz), cv2.INTER_LINEAR))
     known = relief.known
     attributes = dict(zip(("red", "green", "blue"), np.concatenate(colours).T, strict=True))
     attributes |= {
@@ -147,26 +142,12 @@ def coloured_cloud(
 
 def _check_outputs(job: ReliefJob) -> None:
     """Refuse, before any work, outputs that could not be written."""
-    check_writable(job.out, overwrite=job.overwrite)
-    if job.out.suffix.lower() not in {".tif", ".tiff"}:
-        raise InputError(f"{job.out}: the relief map is written as .tif.")
-    if job.preview is not None:
-        check_writable(job.preview, overwrite=job.overwrite)
-        if job.preview.suffix.lower() != ".png":
-            raise InputError(f"{job.preview}: the preview is written as .png.")
-    if job.cloud is not None:
-        check_writable(job.cloud, overwrite=job.overwrite)
-        if job.cloud.suffix.lower() not in {".ply", ".las", ".laz"}:
-            raise InputError(f"{job.cloud}: point clouds are written as .ply, .las or .laz.")
-
-
-def _photo(pair: Pair, file: str, key: str) -> ImageArray:
-    """Read a photo named in a pair file."""
-    if not file:
-        raise InputError(f'the pair file names no photo for "{key}": add its "file".')
-    return read_image(pair.folder / file)
-
-
-def _remarks(result: DenseRelief) -> tuple[str, ...]:
-    """Return what the registration tells the user."""
-    return result.registration.remarks
+    for path, endings, rule in (
+        (job.out, {".tif", ".tiff"}, "the relief map is written as .tif."),
+        (job.preview, {".png"}, "the preview is written as .png."),
+        (job.cloud, {".ply", ".las", ".laz"}, "point clouds are written as .ply, .las or .laz."),
+    ):
+        if path is not None:
+            check_writable(path, overwrite=job.overwrite)
+            if path.suffix.lower() not in endings:
+                raise InputError(f"{path}: {rule}")
