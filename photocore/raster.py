@@ -198,6 +198,11 @@ class RasterWriter:
     def __init__(self, file: Any) -> None:
         self._file = file
 
+    @property
+    def pixels(self) -> int:
+        """How many pixels the whole raster has."""
+        return int(self._file.width * self._file.height)
+
     def write(
         self, array: NDArray[Any], *, column: int = 0, row: int = 0, mask: Any = None
     ) -> None:

@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bifocal.files.geotiff import RasterWriter
 from bifocal.model.grid import Grid
 from photocore.arrays import IntArray
 from photocore.cli import Progress
+from photocore.raster import RasterWriter
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -69,12 +69,11 @@ def write_tiles(
         Write a validity mask; relief maps say by NaN where they are empty.
     """
     counts = np.zeros(sources, np.int64)
-    total = writer.grid.width * writer.grid.height
     for column, row, image, source in tiles:
         mask = source > 0 if masked else None
         writer.write(with_band(image, source), column=column, row=row, mask=mask)
         counts += np.bincount(source.ravel(), minlength=sources)
-        progress(int(counts.sum()), total, what)
+        progress(int(counts.sum()), writer.pixels, what)
     return counts
 
 
