@@ -63,14 +63,12 @@ def write_openpyxl(path, rows):
 
 
 def solve(path, rows, out=None):
+    from bifocal.survey import workflow
     from bifocal.survey.output import write_result
-    from bifocal.survey.workflow import SolveOptions, solve_file
 
-    options = SolveOptions()
-    if path.suffix == ".csv":
-        options = SolveOptions(setup={"d1": D1, "d2": D2, "c1": C1, "c2": C2})
+    options = {"d1": D1, "d2": D2, "c1": C1, "c2": C2} if path.suffix == ".csv" else {}
     begin = time.process_time()
-    solution = solve_file(path, options)
+    solution = workflow.solve(path, **options)
     if out is not None:
         write_result(out, solution, overwrite=True)
     seconds = time.process_time() - begin

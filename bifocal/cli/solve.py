@@ -92,14 +92,13 @@ def command(
     SURVEY is a survey workbook, or any table (.xlsx, .xlsm, .ods, .csv) with the headings id and
     x1 y1 x2 y2, or s1 s2 theta, or col1 row1 col2 row2 (raw pixels, with --pair).
     """
-    from bifocal.survey.options import solve_options
     from bifocal.survey.output import length_unit, point_rows, solution_json, summary, write_result
-    from bifocal.survey.workflow import solve_file
+    from bifocal.survey.workflow import solve
     from photocore.output import check_writable
 
     if out is not None:
         check_writable(out, overwrite=overwrite)
-    solution = solve_file(survey, solve_options(**options))
+    solution = solve(survey, **options)
     for text in solution.remarks:
         remark(text)
     if out is not None:

@@ -19,7 +19,7 @@ from bifocal.model.relief_map import ReliefMap
 from bifocal.orthophotos.ortho_workflow import OrthoTask, make_ortho
 from bifocal.relief_maps.workflow import ReliefJob, relief_of_pair
 from bifocal.survey.output import write_result
-from bifocal.survey.workflow import SolveOptions, solve_file
+from bifocal.survey.workflow import solve
 from photocore.arrays import FloatArray
 from photocore.cli import Progress, no_progress
 from photocore.errors import InputError
@@ -137,8 +137,7 @@ def _survey(
     """Solve the picked targets into the workbook; return ids, true and found relief, sigma."""
     with (folder / "targets.csv").open(encoding="utf-8", newline="") as file:
         true = np.array([float(row["r measured [m]"]) for row in csv.DictReader(file)])
-    options = SolveOptions(pair=folder / "facade.pair.json", sigma_px=PICK_SIGMA)
-    solution = solve_file(folder / "targets.csv", options)
+    solution = solve(folder / "targets.csv", pair=folder / "facade.pair.json", sigma_px=PICK_SIGMA)
     write_result(folder / "result.xlsx", solution, overwrite=True)
     table = solution.table
     return table.ids, true, table["r"], table["sigma_r"], table.flags

@@ -1,16 +1,41 @@
-"""The result of intersecting a bifocal pair's rays: points, covariance, misfits, flags."""
+"""Intersecting a bifocal pair's rays by least squares: points, covariances, misfits, flags."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from bifocal import rays
+from bifocal.model.flags import FlagLimits, point_flags
 from photocore.arrays import FloatArray
 
-#: Flags from bad to good; a point gets the first that applies.
-FLAGS = ("NADIR", "OFF-RADIAL", "CHECK", "UNCERTAIN", "WEAK", "ON-PLANE", "OK")
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class PlanePicks:
+    """Picks in one photo, carried to the reference plane.
+
+    Attributes
+    ----------
+    positions : ndarray, shape (n, 2)
+        Where the rays meet the plane; NaN where there is no pick. [m]
+    metres_per_pixel : ndarray, shape (n, 2, 2)
+        Derivative of the position by the pixel. [m/px]
+    sigma_px : float
+        Measuring precision per coordinate. [px]
+    foot : Foot
+        Nadir and distance of the camera.
+    """
+
+    positions: FloatArray
+    metres_per_pixel: FloatArray
+    sigma_px: float
+    foot: rays.Foot
+
+    @property
+    def covariance(self) -> FloatArray:
+        """Covariance of the positions, shape (n, 2, 2). [m²]"""
+        return _square(self.metres_per_pixel) * self.sigma_px**2
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -31,8 +56,10 @@ class Intersection:
         Misfit over its standard deviation; beyond 3.5 a pick is called a blunder.
     e1, e2 : ndarray, shape (n,)
         Relief displacements on the reference plane, outwards positive. [m]
+    adjusted1, adjusted2 : ndarray, shape (n, 2)
+        Adjusted positions of both picks on the reference plane, on one radial line. [m]
     flags : tuple of str, length n
-        One of `FLAGS` per point.
+        One of `bifocal.model.flags.FLAGS` per point.
     sigma_px : float
         Measuring precision per coordinate that the covariance rests on. [px]
     """
@@ -44,12 +71,15 @@ class Intersection:
     standardised: FloatArray
     e1: FloatArray
     e2: FloatArray
+    adjusted1: FloatArray
+    adjusted2: FloatArray
     flags: tuple[str, ...]
     sigma_px: float
 
     def __post_init__(self) -> None:
-        for name in ("xyz", "covariance", "residuals", "misfit", "standardised", "e1", "e2"):
-            getattr(self, name).setflags(write=False)
+        for name in self.__slots__:
+            if isinstance(array := getattr(self, name), np.ndarray):
+                array.setflags(write=False)
 
     def __len__(self) -> int:
         return len(self.xyz)
@@ -59,12 +89,151 @@ class Intersection:
         """Standard deviations of X, Y and r, shape (n, 3). [m]"""
         return np.sqrt(np.diagonal(self.covariance, axis1=1, axis2=2))
 
-    def blunders(self, names: Sequence[str]) -> list[str]:
-        """Return one sentence for each mispicked point, worst first."""
-        bad = [i for i, flag in enumerate(self.flags) if flag == "OFF-RADIAL"]
-        bad.sort(key=lambda i: -abs(self.standardised[i]))
-        return [
-            f"{names[i]}: the two picks miss each other by {abs(self.misfit[i]):.1f} px across the "
-            f"radius ({abs(self.standardised[i]):.1f} sigma); measure it again."
-            for i in bad
-        ]
+
+def intersect(
+    far: PlanePicks,
+    near: PlanePicks,
+    *,
+    limits: FlagLimits,
+    sigma_orientation: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0),
+) -> Intersection:
+    """Intersect the rays of the same picks in both photos; see `bifocal.Pair.intersect`.
+
+    Parameters
+    ----------
+    far, near : PlanePicks
+        The same points in both photos.
+    limits : FlagLimits
+        Where the flags begin.
+    sigma_orientation : tuple of float
+        Standard deviations of d1 [m], d2 [m], the relative scale, each nadir coordinate [m].
+    """
+    q1, q2 = far.positions, near.positions
+    centre = rays.zoom_centre(far.foot, near.foot)
+    cov1, cov2 = far.covariance, near.covariance
+    a1, a2, standardised = rays.adjust_onto_epipolar_line(q1, q2, cov1, cov2, centre)
+    relief = rays.relief_of_rays(a1, a2, far.foot, near.foot)
+    # A point at or behind the near camera cannot be in the photo: the rays diverge there.
+    relief = np.where(relief < near.foot.distance, relief, np.nan)
+    xyz = rays.point_on_ray(a1, relief, far.foot)
+    covariance = _covariance(xyz, a2, cov1, cov2, far.foot, near.foot, sigma_orientation)
+    radius = q1 - centre
+    residuals = [_pixels(far.metres_per_pixel, q1 - a1), _pixels(near.metres_per_pixel, q2 - a2)]
+    return Intersection(
+        xyz=xyz,
+        covariance=covariance,
+        residuals=np.concatenate(residuals, axis=1),
+        misfit=_misfit(q1, q2, near.metres_per_pixel, centre),
+        standardised=standardised,
+        e1=_outward(a1 - xyz[:, :2], xyz[:, :2] - far.foot.nadir),
+        e2=_outward(a2 - xyz[:, :2], xyz[:, :2] - near.foot.nadir),
+        adjusted1=a1,
+        adjusted2=a2,
+        flags=point_flags(
+            at_nadir=np.all(radius == 0, axis=1),
+            standardised=standardised,
+            incomplete=np.isnan(np.hstack([q1, q2])).any(axis=1),
+            relief=relief,
+            sigma_r=np.sqrt(covariance[:, 2, 2]),
+            near_distance=near.foot.distance,
+            limits=limits,
+        ),
+        sigma_px=float(np.hypot(far.sigma_px, near.sigma_px) / np.sqrt(2.0)),
+    )
+
+
+def _square(jacobian: FloatArray) -> FloatArray:
+    """Return J J^T for every point."""
+    product: FloatArray = jacobian @ jacobian.transpose(0, 2, 1)
+    return product
+
+
+def _inverse2(matrix: FloatArray) -> FloatArray:
+    """Return the inverses of 2x2 matrices; NaN where singular."""
+    a, b, c, d = matrix[:, 0, 0], matrix[:, 0, 1], matrix[:, 1, 0], matrix[:, 1, 1]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        factor = 1.0 / (a * d - b * c)
+    inverse = np.empty_like(matrix)
+    inverse[:, 0, 0], inverse[:, 0, 1] = d * factor, -b * factor
+    inverse[:, 1, 0], inverse[:, 1, 1] = -c * factor, a * factor
+    return inverse
+
+
+def _inverse3(matrix: FloatArray) -> FloatArray:
+    """Return the inverses of symmetric 3x3 matrices by cofactors; NaN where singular."""
+    m = matrix
+    cofactor = np.empty_like(m)
+    cofactor[:, 0, 0] = m[:, 1, 1] * m[:, 2, 2] - m[:, 1, 2] ** 2
+    cofactor[:, 0, 1] = m[:, 0, 2] * m[:, 1, 2] - m[:, 0, 1] * m[:, 2, 2]
+    cofactor[:, 0, 2] = m[:, 0, 1] * m[:, 1, 2] - m[:, 0, 2] * m[:, 1, 1]
+    cofactor[:, 1, 1] = m[:, 0, 0] * m[:, 2, 2] - m[:, 0, 2] ** 2
+    cofactor[:, 1, 2] = m[:, 0, 1] * m[:, 0, 2] - m[:, 0, 0] * m[:, 1, 2]
+    cofactor[:, 2, 2] = m[:, 0, 0] * m[:, 1, 1] - m[:, 0, 1] ** 2
+    cofactor[:, 1, 0], cofactor[:, 2, 0] = cofactor[:, 0, 1], cofactor[:, 0, 2]
+    cofactor[:, 2, 1] = cofactor[:, 1, 2]
+    determinant = (
+        m[:, 0, 0] * cofactor[:, 0, 0]
+        + m[:, 0, 1] * cofactor[:, 0, 1]
+        + m[:, 0, 2] * cofactor[:, 0, 2]
+    )
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.where(determinant > 0, 1.0 / determinant, np.nan)[:, None, None] * cofactor
+
+
+def _covariance(
+    xyz: FloatArray,
+    a2: FloatArray,
+    cov1: FloatArray,
+    cov2: FloatArray,
+    far: rays.Foot,
+    near: rays.Foot,
+    sigma_orientation: tuple[float, float, float, float],
+) -> FloatArray:
+    """Return the covariance of (X, Y, r) from pixels and, where given, from the orientation."""
+    weighted = []
+    normal = np.zeros((len(xyz), 3, 3))
+    for camera, cov in ((far, cov1), (near, cov2)):
+        rows = rays.design_rows(xyz, camera)
+        product = rows.transpose(0, 2, 1) @ _inverse2(cov)
+        weighted.append(product)
+        normal += product @ rows
+    covariance = _inverse3(normal)
+    sigma_d1, sigma_d2, sigma_scale, sigma_nadir = sigma_orientation
+    if not any(sigma_orientation):
+        return covariance
+    relief = xyz[:, 2]
+    effects = []
+    for camera, product, sigma_d in ((far, weighted[0], sigma_d1), (near, weighted[1], sigma_d2)):
+        # Derivatives of q = N + (P - N) d / (d - r) with respect to d and to N.
+        depth = camera.distance - relief
+        by_distance = -(xyz[:, :2] - camera.nadir) * (relief / depth**2)[:, None]
+        effects.append(product @ (by_distance * sigma_d)[:, :, None])
+        effects.append(product * (-relief / depth * sigma_nadir)[:, None, None])
+    # A scale error of image 2 stretches the measured positions about its nadir.
+    effects.append(weighted[1] @ ((a2 - near.nadir) * sigma_scale)[:, :, None])
+    effect = covariance @ np.concatenate(effects, axis=2)
+    return covariance + _square(effect)
+
+
+def _pixels(metres: FloatArray, shift: FloatArray) -> FloatArray:
+    """Return a shift on the plane in pixels of the image."""
+    shift_px: FloatArray = (_inverse2(metres) @ shift[:, :, None])[:, :, 0]
+    return shift_px
+
+
+def _misfit(q1: FloatArray, q2: FloatArray, metres2: FloatArray, centre: FloatArray) -> FloatArray:
+    """Return the signed distance of pick 2 from the radial line through pick 1. [px]"""
+    v1, v2 = q1 - centre, q2 - centre
+    radius = np.hypot(v1[:, 0], v1[:, 1])
+    with np.errstate(divide="ignore", invalid="ignore"):
+        across = (v1[:, 0] * v2[:, 1] - v1[:, 1] * v2[:, 0]) / radius
+        normal = np.stack([-v1[:, 1], v1[:, 0]], axis=-1) / radius[:, None]
+    return np.copysign(np.linalg.norm(_pixels(metres2, normal * across[:, None]), axis=1), across)
+
+
+def _outward(shift: FloatArray, direction: FloatArray) -> FloatArray:
+    """Return the length of a displacement along the outward direction."""
+    length = np.hypot(direction[:, 0], direction[:, 1])
+    with np.errstate(divide="ignore", invalid="ignore"):
+        along = (shift * direction).sum(axis=1) / length
+    return np.where(length > 0, along, np.where(np.isnan(shift[:, 0]), np.nan, 0.0))

@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from bifocal import rays
-from bifocal.model.intersection import Intersection
+from bifocal.model.flags import SIGMA_PIXEL, FlagLimits
+from bifocal.model.intersection import Intersection, PlanePicks, intersect
 from bifocal.model.lens import Lens
 from bifocal.precision import base_factor
 from photocore.arrays import FloatArray, as_points, positive, read_only
@@ -19,12 +20,10 @@ from photocore.errors import GeometryError, InputError
 from photocore.jsonfile import read_object, write_object
 
 FORMAT = "bifocal-pair/1"
-#: Default measuring precision of a careful pick. [px]
-SIGMA_PIXEL = 0.5
-#: A cross-radial misfit beyond this many sigma is a blunder (one honest pick in 2000).
-BLUNDER_LIMIT = 3.5
-#: Beyond this share of d2 the standard deviation of r makes a point UNCERTAIN, beyond half WEAK.
-UNCERTAIN_SHARE = 0.02
+
+
+#: Numbers of a photo that the pair file may hold, with their units.
+_OPTIONAL = {"sigma_pixel": "px", "principal_distance": "mm", "pixel_size": "mm"}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -45,6 +44,8 @@ class Photo:
         Distortion of the pixels; None if they are free of it.
     sigma_pixel : float or None
         Measuring precision. [px]
+    principal_distance, pixel_size : float or None
+        Of the camera, for lengths in millimetres of the image. [mm]
     extra : mapping
         Keys of the pair file this class does not use; kept.
     """
@@ -55,6 +56,8 @@ class Photo:
     file: str = ""
     lens: Lens | None = None
     sigma_pixel: float | None = None
+    principal_distance: float | None = None
+    pixel_size: float | None = None
     extra: Mapping[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -70,13 +73,20 @@ class Photo:
         set_(self, "plane_from_pixel", matrix)
         set_(self, "nadir", read_only(self.nadir, "nadir", shape=(2,)))
         set_(self, "distance", positive(self.distance, "distance", unit="m"))
-        if self.sigma_pixel is not None:
-            set_(self, "sigma_pixel", positive(self.sigma_pixel, "sigma_pixel", unit="px"))
+        for name, unit in _OPTIONAL.items():
+            value = getattr(self, name)
+            set_(self, name, None if value is None else positive(value, name, unit=unit))
 
     @property
     def foot(self) -> rays.Foot:
         """Nadir and distance."""
         return rays.Foot(self.nadir, self.distance)
+
+    @property
+    def scale_number(self) -> float | None:
+        """Scale number m = 1000 d / c of the photo; None without a principal distance."""
+        c = self.principal_distance
+        return None if c is None else 1000.0 * self.distance / c
 
     def plane_from_pixels(self, pixels: ArrayLike) -> FloatArray:
         """Return where the rays of (raw) pixels meet the reference plane, shape (..., 2). [m]
@@ -98,6 +108,19 @@ class Photo:
         """Return the (raw) pixels of points (X, Y, r), shape (..., 2); NaN behind the camera."""
         points = as_points(xyz, "xyz", dimension=3)
         return self.pixels_from_plane(rays.plane_position(points, self.foot))
+
+    def precision(self, sigma_px: float | None = None) -> float:
+        """Return the measuring precision: as given, else the photo's own, else 0.5. [px]"""
+        return positive(sigma_px or self.sigma_pixel or SIGMA_PIXEL, "sigma_px", unit="px")
+
+    def picks(self, pixels: FloatArray, sigma_px: float | None = None) -> PlanePicks:
+        """Return picks carried to the plane, of the given precision or else the photo's own."""
+        return PlanePicks(
+            positions=self.plane_from_pixels(pixels),
+            metres_per_pixel=self.metres_per_pixel(pixels),
+            sigma_px=self.precision(sigma_px),
+            foot=self.foot,
+        )
 
     def metres_per_pixel(self, pixels: FloatArray) -> FloatArray:
         """Return the derivative of the plane position by the pixel, shape (n, 2, 2). [m/px]"""
@@ -129,8 +152,7 @@ class Photo:
             "nadir": self.nadir,
             "distance": self.distance,
         }
-        if self.sigma_pixel is not None:
-            data["sigma_pixel"] = self.sigma_pixel
+        data |= {name: value for name in _OPTIONAL if (value := getattr(self, name)) is not None}
         return data | dict(self.extra)
 
 
@@ -174,6 +196,79 @@ class Pair:
             object.__setattr__(self, "exchanged", not self.exchanged)
             note = f"image1 was the near camera ({d1:g} m < {d2:g} m); the two were exchanged."
             object.__setattr__(self, "remarks", (*self.remarks, note))
+
+    @classmethod
+    def ideal(
+        cls,
+        *,
+        d1: float,
+        d2: float,
+        c1: float | None = None,
+        c2: float | None = None,
+        pitch: float | None = None,
+        nadir1: ArrayLike = (0.0, 0.0),
+        nadir2: ArrayLike = (0.0, 0.0),
+        sigma: float | None = None,
+    ) -> Pair:
+        """Return the pair of two photos taken square to the plane from one nadir point.
+
+        Parameters
+        ----------
+        d1, d2 : float
+            Distances of the projection centres to the reference plane. [m]
+        c1, c2 : float, optional
+            Principal distances; without both, image millimetres count as metres on the wall. [mm]
+        pitch : float, optional
+            Size of a pixel. Without it, image coordinates are millimetres from the nadir point,
+            y up; with it they are pixels (column, row). [mm/px]
+        nadir1, nadir2 : array_like, shape (2,)
+            (column, row) of the nadir points; used with ``pitch``. [px]
+        sigma : float, optional
+            Measuring precision of an image coordinate. [px, or mm without ``pitch``]
+
+        Raises
+        ------
+        InputError
+            If a value is not a number above zero, or only one principal distance is given.
+        GeometryError
+            If both distances are equal.
+
+        Notes
+        -----
+        For picks on one radius `intersect` is Midulla's closed form, Eqs. (5) to (7); a misfit
+        across the radius changes relief in second order only.
+
+        Examples
+        --------
+        A point 2 m right of the nadir, 1 m before the wall, measured in millimetres:
+
+        >>> pair = Pair.ideal(d1=17.5, d2=9.5, c1=35, c2=19)
+        >>> pair.intersect([[35 * 2 / 16.5, 0]], [[19 * 2 / 8.5, 0]]).xyz.round(9).tolist()
+        [[2.0, 0.0, 1.0]]
+        """
+        if (c1 is None) != (c2 is None):
+            raise InputError("c1, c2: give both principal distances or none.")
+        photos = []
+        for d, c, nadir in ((d1, c1, nadir1), (d2, c2, nadir2)):
+            metres = 1.0 if c is None else positive(d, "d", unit="m") / positive(c, "c", unit="mm")
+            matrix = np.diag([metres, metres, 1.0])
+            if pitch is not None:
+                scale = metres * positive(pitch, "pitch", unit="mm")
+                column, row = as_points(nadir, "nadir", dimension=2)
+                matrix = np.array(
+                    [[scale, 0, -scale * column], [0, -scale, scale * row], [0, 0, 1]]
+                )
+            photos.append(
+                Photo(
+                    plane_from_pixel=matrix,
+                    nadir=np.zeros(2),
+                    distance=d,
+                    sigma_pixel=sigma,
+                    principal_distance=c,
+                    pixel_size=pitch,
+                )
+            )
+        return cls(image1=photos[0], image2=photos[1])
 
     @classmethod
     def read(cls, path: Path | str) -> Pair:
@@ -227,9 +322,19 @@ class Pair:
         return rays.zoom_centre(self.image1.foot, self.image2.foot)
 
     @property
+    def d1(self) -> float:
+        """Distance of the far camera to the reference plane. [m]"""
+        return self.image1.distance
+
+    @property
+    def d2(self) -> float:
+        """Distance of the near camera to the reference plane. [m]"""
+        return self.image2.distance
+
+    @property
     def base_factor(self) -> float:
         """B = d1 d2 / (d1 - d2): metres of relief per unit of relative radial shift. [m]"""
-        return base_factor(d1=self.image1.distance, d2=self.image2.distance)
+        return base_factor(d1=self.d1, d2=self.d2)
 
     def photo(self, number: int) -> Photo:
         """Return image 1 or 2."""
@@ -247,6 +352,11 @@ class Pair:
         if not file:
             raise InputError(f'the pair file names no photo for "image{number}": add its "file".')
         return self.folder / file
+
+    @property
+    def as_given(self) -> tuple[Photo, Photo]:
+        """The photos in the order they were given, not far before near."""
+        return (self.image2, self.image1) if self.exchanged else (self.image1, self.image2)
 
     def project(self, xyz: ArrayLike) -> tuple[FloatArray, FloatArray]:
         """Return the pixels of points (X, Y, r) in both photos, each of shape (..., 2)."""
@@ -297,21 +407,17 @@ class Pair:
         Midulla's Eq. (6). The distances', scale's and nadirs' uncertainty is common to all points:
         it is in every point's covariance, but not independent from point to point.
         """
-        from bifocal.model.intersect import intersect_pair
-
         first = as_points(pixels1, "pixels1", dimension=2)
         second = as_points(pixels2, "pixels2", dimension=2)
         if first.shape != second.shape or first.ndim != 2:
             raise InputError(
                 f"pixels1 {first.shape} and pixels2 {second.shape} must both have shape (n, 2)."
             )
-        return intersect_pair(
-            self,
-            first,
-            second,
-            sigma_px=sigma_px,
-            sigma_r_max=sigma_r_max,
-            sigma_setup=(sigma_d1, sigma_d2, sigma_scale, sigma_nadir),
+        return intersect(
+            self.image1.picks(first, sigma_px),
+            self.image2.picks(second, sigma_px),
+            limits=FlagLimits(sigma_r_max=sigma_r_max),
+            sigma_orientation=(sigma_d1, sigma_d2, sigma_scale, sigma_nadir),
         )
 
 
@@ -357,7 +463,7 @@ def _photo_from_dict(data: Any, key: str, folder: Path) -> Photo:
             plane_from_pixel=data.pop("plane_from_pixel"),
             nadir=data.pop("nadir"),
             distance=data.pop("distance"),
-            sigma_pixel=data.pop("sigma_pixel", None),
+            **{name: data.pop(name, None) for name in _OPTIONAL},
             extra=data,
         )
     except GeometryError as error:

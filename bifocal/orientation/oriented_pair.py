@@ -127,16 +127,14 @@ def _lens_of(interior: Interior, k: float) -> Lens | None:
 
 
 def _photo(camera: Pinhole, interior: Interior, lens: Lens | None) -> Photo:
-    extra: dict[str, Any] = {}
-    if interior.pixel_size is not None:
-        extra["principal_distance"] = camera.matrix[0, 0] * interior.pixel_size
-        extra["pixel_size"] = interior.pixel_size
+    pitch = interior.pixel_size
     return Photo(
         plane_from_pixel=plane_from_pixel(camera),
         nadir=camera.centre[:2],
         distance=float(camera.centre[2]),
         lens=lens,
-        extra=extra,
+        principal_distance=None if pitch is None else float(camera.matrix[0, 0]) * pitch,
+        pixel_size=pitch,
     )
 
 

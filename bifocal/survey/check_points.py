@@ -4,20 +4,19 @@ from __future__ import annotations
 
 import numpy as np
 
-from bifocal.survey.reference import AxisErrors, CheckResult, KnownPoints
-from bifocal.survey.relief_table import ReliefTable
+from bifocal.survey.reference import AxisErrors, CheckResult, KnownPoints, NamedPoints
 from bifocal.survey.tolerances import RULES, ToleranceRule, judge
 from photocore.arrays import FloatArray
 
 
 def check_points(
-    table: ReliefTable, known: KnownPoints, rules: tuple[ToleranceRule, ...] = RULES
+    table: NamedPoints, known: KnownPoints, rules: tuple[ToleranceRule, ...] = RULES
 ) -> CheckResult:
     """Compare solved points with what was measured on site.
 
     Parameters
     ----------
-    table : ReliefTable
+    table : NamedPoints
         Solved points.
     known : KnownPoints
         Check points; any coordinate may be NaN.
@@ -29,20 +28,17 @@ def check_points(
     CheckResult
         RMSE is ``sqrt(sum(error^2)/n)``: no mean is taken off, a bias counts in full.
     """
-    place = {name: row for row, name in enumerate(table.ids)}
-    rows = [place.get(name, -1) for name in known.ids]
-    xyz = np.vstack([table.xyz, np.full((1, 3), np.nan)])
-    found = xyz[rows] if rows else np.zeros((0, 3))
-    errors = np.where(known.used[:, None], found - known.xyz, np.nan)
+    solved = known.coordinates_in(table)
+    errors = np.where(known.used[:, None], solved - known.xyz, np.nan)
     axes = {name: _statistics(errors[:, i]) for i, name in enumerate("XYZ")}
     accuracy = max((axis.rmse for axis in axes.values() if axis.n), default=float("nan"))
     return CheckResult(
         ids=known.ids,
-        found=found,
+        found=solved,
         errors=errors,
         axes=axes,
         verdicts=judge(accuracy, rules) if np.isfinite(accuracy) else (),
-        missing=tuple(name for name, row in zip(known.ids, rows, strict=True) if row < 0),
+        missing=known.missing_in(table),
     )
 
 

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
-from bifocal.survey.reference import Georeference, KnownPoints
-from bifocal.survey.relief_table import ReliefTable
+from bifocal.survey.reference import Georeference, KnownPoints, NamedPoints
 from photocore.arrays import BoolArray, FloatArray
 from photocore.errors import GeometryError, InputError
 from photocore.similarity import Similarity, fit_levelled, fit_plane, fit_similarity, round_origin
@@ -18,7 +18,7 @@ ALPHA = 0.01
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Model:
+class TransformationModel:
     """A kind of transformation: how many parameters, how many points it needs, how it is found."""
 
     name: str
@@ -28,32 +28,45 @@ class Model:
     fit: Callable[[FloatArray, FloatArray], Similarity]
 
 
-MODELS: Mapping[str, Model] = {
-    "2D": Model(name="2D", parameters=4, needed=2, axes=2, fit=fit_plane),
-    "levelled": Model(name="levelled", parameters=5, needed=2, axes=3, fit=fit_levelled),
-    "3D": Model(name="3D", parameters=7, needed=3, axes=3, fit=fit_similarity),
+MODELS: Mapping[str, TransformationModel] = {
+    "2D": TransformationModel(name="2D", parameters=4, needed=2, axes=2, fit=fit_plane),
+    "levelled": TransformationModel(
+        name="levelled", parameters=5, needed=2, axes=3, fit=fit_levelled
+    ),
+    "3D": TransformationModel(name="3D", parameters=7, needed=3, axes=3, fit=fit_similarity),
 }
 
 
-def georeference(table: ReliefTable, control: KnownPoints, *, model: str = "auto") -> Georeference:
+def georeference(
+    points: NamedPoints | Mapping[str, Any],
+    control: KnownPoints | Mapping[str, Any],
+    *,
+    model: str = "auto",
+) -> Georeference:
     """Find the roto-translation with scale from the wall to the world.
 
     Parameters
     ----------
-    table : ReliefTable
-        Solved points.
-    control : KnownPoints
-        Control points with E, N, H; H may be blank everywhere for the model ``2D``.
-    model : str
+    points : NamedPoints or mapping
+        Solved points, e.g. the ``table`` of `bifocal.solve`, or columns ``id X Y Z`` of shape
+        (n,). [m]
+    control : KnownPoints or mapping
+        Control points, names as in ``points``: columns ``id E N H`` of shape (m,); H may be blank
+        everywhere for the model ``2D``. [m]
+    model : {"auto", "levelled", "3D", "2D"}
         ``auto`` takes 2D without heights, else ``levelled`` (Y upright: the photos were levelled),
         unless the residuals say that it does not fit and three or more points allow ``3D``.
 
     Returns
     -------
     Georeference
+        ``world_from_wall(xyz)`` gives E, N, H of shape (n, 3) [m]; with residuals, sigma0 and the
+        names of points left out.
 
     Raises
     ------
+    InputError
+        If the model is unknown or columns differ in length.
     GeometryError
         If there are fewer points than the model needs, or they lie too badly.
 
@@ -62,13 +75,25 @@ def georeference(table: ReliefTable, control: KnownPoints, *, model: str = "auto
     A point is called bad when leaving it out lowers the sum of squares by more than chance allows
     (F test of the point's own coordinates against the rest, 1 % shared out over the points), worst
     first, and as long as the rest is still redundant.
+
+    Examples
+    --------
+    A wall facing south, its origin at E 100 m, N 200 m, H 50 m:
+
+    >>> wall = {"id": ["A", "B", "C"], "X": [0, 4, 4], "Y": [0, 0, 3], "Z": [0, 0, 0.5]}
+    >>> known = {"id": ["A", "B", "C"], "E": [100, 104, 104], "N": [200, 200, 199.5],
+    ...          "H": [50, 50, 53]}
+    >>> placed = georeference(wall, known)
+    >>> placed.model, (placed.world_from_wall([2, 1, 0]).round(6) + 0.0).tolist()
+    ('levelled', [102.0, 200.0, 51.0])
     """
     if model != "auto" and model not in MODELS:
         raise InputError(f"georeference: model {model!r} is none of auto, {', '.join(MODELS)}.")
-    place = {name: row for row, name in enumerate(table.ids)}
-    xyz = np.vstack([table.xyz, np.full((1, 3), np.nan)])
-    rows = [place.get(name, -1) for name in control.ids]
-    found = xyz[rows] if rows else np.zeros((0, 3))
+    if isinstance(points, Mapping):
+        points = KnownPoints.from_columns(points, "XYZ")
+    if isinstance(control, Mapping):
+        control = KnownPoints.from_columns(control, "ENH")
+    found = control.coordinates_in(points)
     flat = bool(np.isnan(control.xyz[:, 2]).all())
     simplest = ("2D",) if flat else ("levelled", "3D")
     names = simplest if model == "auto" else (model,)
@@ -80,7 +105,7 @@ def georeference(table: ReliefTable, control: KnownPoints, *, model: str = "auto
     }
     first = MODELS[names[0]]
     if usable[names[0]].sum() < first.needed:
-        missing = [name for name, row in zip(control.ids, rows, strict=True) if row < 0]
+        missing = control.missing_in(points)
         hint = f" Not among the measured points: {', '.join(missing[:5])}." if missing else ""
         raise GeometryError(
             f"Georeference: {int(usable[names[0]].sum())} usable control point(s), the model "
@@ -125,10 +150,10 @@ def georeference(table: ReliefTable, control: KnownPoints, *, model: str = "auto
     )
 
 
-_Fit = tuple[Model, Similarity, BoolArray, float, int]
+_Fit = tuple[TransformationModel, Similarity, BoolArray, float, int]
 
 
-def _fit(model: Model, found: FloatArray, world: FloatArray, used: BoolArray) -> _Fit:
+def _fit(model: TransformationModel, found: FloatArray, world: FloatArray, used: BoolArray) -> _Fit:
     """Return the fit to the chosen points with its sum of squares and redundancy."""
     target = world.copy()
     if model.axes == 2:
@@ -144,7 +169,9 @@ def _fit(model: Model, found: FloatArray, world: FloatArray, used: BoolArray) ->
     return model, transformation, used, float((residuals**2).sum()), redundancy
 
 
-def _robust(model: Model, found: FloatArray, control: KnownPoints, used: BoolArray) -> _Fit:
+def _robust(
+    model: TransformationModel, found: FloatArray, control: KnownPoints, used: BoolArray
+) -> _Fit:
     """Return the fit without the points that contradict the others."""
     best = _fit(model, found, control.xyz, used)
     size = float(np.abs(control.xyz[used]).max())

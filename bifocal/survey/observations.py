@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
-from photocore.arrays import BoolArray, FloatArray
+from photocore.arrays import BoolArray, FloatArray, as_floats
 from photocore.errors import InputError
 
+#: Columns of numbers and of texts, by key.
+NUMBERS = (
+    *("x1", "y1", "x2", "y2", "s1", "s2", "theta"),
+    *("col1", "row1", "col2", "row2", "r_measured"),
+)
+TEXTS = ("id", "code", "note")
 #: Codes that mark a point as lying on the reference plane (r = 0), for the set-up check.
 PLANE_CODES = ("PLANE", "PIANO", "EBENE")
 
@@ -21,6 +27,11 @@ _ABSENT: Any = None
 
 def _blank(points: int, columns: int) -> FloatArray:
     return np.full((points, columns), np.nan)
+
+
+def _any_given(*columns: FloatArray) -> BoolArray:
+    """Return which rows hold any number, shape (n,)."""
+    return np.asarray(~np.isnan(np.hstack(columns)).all(axis=1))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -77,20 +88,60 @@ class PointObservations:
         if any(len(getattr(self, name)) != n for name in ("use", "code", "note", "r_measured")):
             raise InputError(f"use, code, note and r_measured must have one value per id ({n}).")
 
+    @classmethod
+    def from_columns(cls, columns: Mapping[str, Any]) -> PointObservations:
+        """Return the observations of columns by key, each of shape (n,); see `bifocal.solve`.
+
+        Raises
+        ------
+        InputError
+            If a key is unknown, or columns differ in length.
+        """
+        n = len(next(iter(columns.values()), ()))
+        unknown = [key for key in columns if key not in (*NUMBERS, *TEXTS, "use")]
+        if unknown:
+            known = ", ".join((*TEXTS, *NUMBERS, "use"))
+            raise InputError(f"points: there is no column {unknown[0]!r}; known are {known}.")
+        uneven = [key for key, column in columns.items() if len(column) != n]
+        if uneven:
+            raise InputError(f"{uneven[0]}: has {len(columns[uneven[0]])} values, expected {n}.")
+        table = np.stack([as_floats(columns.get(k, np.full(n, np.nan)), k) for k in NUMBERS], -1)
+        return cls(
+            ids=tuple(map(str, columns.get("id", range(1, n + 1)))),
+            xy1=table[:, 0:2],
+            xy2=table[:, 2:4],
+            polar=table[:, 4:7],
+            pixels1=table[:, 7:9],
+            pixels2=table[:, 9:11],
+            r_measured=table[:, 11],
+            use=columns.get("use", np.ones(n, dtype=bool)),
+            code=tuple(columns.get("code", ())),
+            note=tuple(columns.get("note", ())),
+        )
+
     def __len__(self) -> int:
         return len(self.ids)
 
     @property
     def is_cartesian(self) -> BoolArray:
         """Which points have any image coordinate, shape (n,)."""
-        given: BoolArray = ~np.isnan(np.hstack([self.xy1, self.xy2])).all(axis=1)
-        return given
+        return _any_given(self.xy1, self.xy2)
 
     @property
     def has_pixels(self) -> BoolArray:
         """Which points have any raw pixel, shape (n,)."""
-        given: BoolArray = ~np.isnan(np.hstack([self.pixels1, self.pixels2])).all(axis=1)
-        return given
+        return _any_given(self.pixels1, self.pixels2)
+
+    @property
+    def is_polar(self) -> BoolArray:
+        """Which points have any radial distance, shape (n,)."""
+        return _any_given(self.polar[:, :2])
+
+    def polar_xy(self) -> tuple[FloatArray, FloatArray]:
+        """Return the radial distances as x and y on both photos, each of shape (n, 2). [mm]"""
+        angle = np.radians(self.polar[:, 2])
+        direction = np.stack([np.sin(angle), np.cos(angle)], axis=-1)
+        return self.polar[:, :1] * direction, self.polar[:, 1:2] * direction
 
     @property
     def on_plane(self) -> BoolArray:
@@ -108,12 +159,3 @@ class PointObservations:
             pixels2=self.pixels1,
             polar=self.polar[:, [1, 0, 2]],
         )
-
-    def take(self, rows: Sequence[int] | BoolArray) -> PointObservations:
-        """Return the chosen rows."""
-        index = np.arange(len(self))[np.asarray(rows)]
-        arrays = ("xy1", "xy2", "polar", "pixels1", "pixels2", "use", "r_measured")
-        words = ("ids", "code", "note")
-        chosen: dict[str, Any] = {name: getattr(self, name)[index] for name in arrays}
-        chosen |= {name: tuple(getattr(self, name)[i] for i in index) for name in words}
-        return replace(self, **chosen)

@@ -1,4 +1,4 @@
-"""What points on the reference plane tell about the set-up, and the correction that follows.
+"""What points on the reference plane tell about the orientation, and the correction that follows.
 
 A point with r = 0 has the same plane position in both photos. Where marked points disagree, the
 photos differ in scale, rotation, shift or tilt; each of these reads as false relief.
@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from bifocal.model.pair import SIGMA_PIXEL, Pair, apply_homography
+from bifocal.model.pair import Pair, apply_homography
 from photocore.arrays import BoolArray, FloatArray, as_points
 from photocore.errors import GeometryError, InputError
 
@@ -23,7 +23,7 @@ MINIMUM_FOR_TILT = 5
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class SetupParameter:
+class OrientationParameter:
     """One difference between the photos.
 
     Attributes
@@ -52,12 +52,12 @@ class SetupParameter:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class SetupCheck:
+class OrientationCheck:
     """Differences of the photos, found from points on the reference plane.
 
     Attributes
     ----------
-    parameters : tuple of SetupParameter
+    parameters : tuple of OrientationParameter
     matrix : ndarray, shape (3, 3)
         Homography on the plane that brings positions of image 2 onto those of image 1.
     residuals : ndarray, shape (n, 2)
@@ -72,7 +72,7 @@ class SetupCheck:
         The pair with image 2 corrected.
     """
 
-    parameters: tuple[SetupParameter, ...]
+    parameters: tuple[OrientationParameter, ...]
     matrix: FloatArray
     residuals: FloatArray
     outliers: tuple[str, ...]
@@ -80,8 +80,9 @@ class SetupCheck:
     sigma0: float
     corrected: Pair
 
-    def sentences(self) -> list[str]:
-        """Return the findings in words a surveyor acts on."""
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """The findings in words a surveyor acts on."""
         lines = [
             f"{p.name}: {p.value:+.3g} {p.unit} (sigma {p.sigma:.2g}); "
             + (
@@ -96,23 +97,23 @@ class SetupCheck:
                 f"tilt: not determined; mark at least {MINIMUM_FOR_TILT} plane points, well spread."
             )
         lines += [f"{name}: marked as on the plane, but does not fit it." for name in self.outliers]
-        return lines
+        return tuple(f"Set-up: {line}" for line in lines)
 
 
-def check_setup(
+def check_orientation(
     pair: Pair,
     pixels1: ArrayLike,
     pixels2: ArrayLike,
     *,
     names: Sequence[str] | None = None,
     sigma_px: float | None = None,
-) -> SetupCheck:
+) -> OrientationCheck:
     """Find scale mismatch, rotation, shift and tilt between the photos from plane points.
 
     Parameters
     ----------
     pair : Pair
-        The set-up as assumed.
+        The orientation as assumed.
     pixels1, pixels2 : array_like, shape (n, 2)
         The same points of the reference plane (r = 0) in both photos, n >= 2. [px]
     names : sequence of str, optional
@@ -122,7 +123,7 @@ def check_setup(
 
     Returns
     -------
-    SetupCheck
+    OrientationCheck
 
     Raises
     ------
@@ -152,7 +153,7 @@ def check_setup(
     origin = pair.image2.nadir
     q1 = pair.image1.plane_from_pixels(first) - origin
     q2 = pair.image2.plane_from_pixels(second) - origin
-    sigma = sigma_px or pair.image2.sigma_pixel or pair.image1.sigma_pixel or SIGMA_PIXEL
+    sigma = pair.image2.precision(sigma_px or pair.image2.sigma_pixel or pair.image1.sigma_pixel)
     weight = _root_weights(pair, first, second, sigma)
     used = measured.copy()
     while True:
@@ -168,7 +169,7 @@ def check_setup(
     sigma0 = float(np.sqrt((scaled[used] ** 2).sum() / redundancy)) if redundancy > 0 else 1.0
     radius = float(np.hypot(*q2[used].T).max())
     corrected = replace(pair.image2, plane_from_pixel=plane @ pair.image2.plane_from_pixel)
-    return SetupCheck(
+    return OrientationCheck(
         parameters=_parameters(values, np.sqrt(np.diag(covariance)), pair, radius),
         matrix=plane,
         residuals=left,
@@ -257,7 +258,7 @@ def _worst(scaled: FloatArray, used: BoolArray) -> tuple[int | None, float]:
 
 def _parameters(
     values: FloatArray, sigmas: FloatArray, pair: Pair, radius: float
-) -> tuple[SetupParameter, ...]:
+) -> tuple[OrientationParameter, ...]:
     """Return the parameters in a surveyor's units with the false relief each one causes."""
     base_factor, distance = pair.base_factor, pair.image2.distance
     inner = radius / 5
@@ -272,7 +273,7 @@ def _parameters(
         ("tilt Y", float(np.degrees(distance)), "deg", -base_factor * radius),
     ]
     return tuple(
-        SetupParameter(
+        OrientationParameter(
             name=name,
             value=float(-value * factor),
             sigma=float(sigma * factor),

@@ -4,20 +4,20 @@ from __future__ import annotations
 
 import json
 import math
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
 from bifocal.survey.check_points import check_points
 from bifocal.survey.georeferencing import georeference
-from bifocal.survey.point_survey import solve_ideal
+from bifocal.survey.point_survey import solve_points
 from bifocal.survey.reference import KnownPoints
 from bifocal.survey.template_workflow import MOST_ROWS, log_row, relative_name
 from bifocal.survey.tolerances import RULES, sentence
 from bifocal.survey.workbook.book import write_book
 from bifocal.survey.workbook.content import SurveyContent
 from bifocal.survey.workbook.update import can_update, update_book
-from bifocal.survey.workflow import Solution
+from bifocal.survey.workflow import SolvedSurvey
 from photocore.errors import InputError
 from photocore.jsonfile import to_text
 from photocore.tables import write_csv
@@ -27,7 +27,11 @@ _NUMBERS = ("r", "e1", "e2", "s_c", "X", "Y", "Z", "q", "sigma_r")
 
 
 def write_result(
-    path: Path | str, solution: Solution, *, language: str | None = None, overwrite: bool = False
+    path: Path | str,
+    solution: SolvedSurvey,
+    *,
+    language: str | None = None,
+    overwrite: bool = False,
 ) -> str:
     """Write a solved survey as a workbook (.xlsx, .xlsm) or a text table (.csv).
 
@@ -35,7 +39,7 @@ def write_result(
     ----------
     path : path
         Its ending says which.
-    solution : Solution
+    solution : SolvedSurvey
         What was solved.
     language : str, optional
         Of the workbook; default that of the survey.
@@ -100,7 +104,7 @@ def _is_same_file(path: Path, source: Path) -> bool:
     return path.exists() and source.exists() and path.samefile(source)
 
 
-def _why_new(solution: Solution, language: str | None) -> str:
+def _why_new(solution: SolvedSurvey, language: str | None) -> str:
     """Return why the survey's own workbook cannot take the results; empty if it can."""
     if not solution.survey.is_ours:
         return "the points do not come from a survey workbook"
@@ -108,7 +112,7 @@ def _why_new(solution: Solution, language: str | None) -> str:
         return "the set-up was corrected"
     if solution.overridden:
         return "the set-up was given by options"
-    if solution.exchanged and solution.pair is not None:
+    if solution.pair.exchanged and solution.setup is None:
         return "the images were exchanged"
     if language not in (None, solution.survey.language):
         return "another language was asked for"
@@ -117,13 +121,15 @@ def _why_new(solution: Solution, language: str | None) -> str:
     return ""
 
 
-def as_typed(solution: Solution, content: SurveyContent) -> SurveyContent:
+def as_typed(solution: SolvedSurvey, content: SurveyContent) -> SurveyContent:
     """Return the content as the workbook's formulas see it: images in the order they were typed."""
     table, setup, points = solution.table, solution.setup, solution.points
-    world = solution.georeference
-    if solution.exchanged and setup is not None:
+    world, exchanged = solution.georeference, solution.pair.exchanged
+    if exchanged and setup is not None:
         setup, points = setup.exchanged(), points.exchanged()
-        table = solve_ideal(setup, points)
+        table = solve_points(
+            solution.pair, setup.in_millimetres(points), limits=setup.limits, as_given=True
+        )
         if world is not None:
             world = georeference(table, solution.survey.control, model=world.model)
     # Relief given beside the points is checked too, but stands not on the sheet Check.
@@ -133,6 +139,7 @@ def as_typed(solution: Solution, content: SurveyContent) -> SurveyContent:
     return replace(
         content,
         setup=setup,
+        as_given=exchanged,
         points=points,
         table=table,
         known=known,
@@ -141,33 +148,19 @@ def as_typed(solution: Solution, content: SurveyContent) -> SurveyContent:
     )
 
 
-def result_content(solution: Solution, path: Path, language: str | None) -> SurveyContent:
+def result_content(solution: SolvedSurvey, path: Path, language: str | None) -> SurveyContent:
     """Return the content of a new result workbook."""
     what = "solved" + (", set-up corrected by plane points" if solution.adjusted else "")
-    return SurveyContent(
-        language=language or solution.survey.language,
-        setup=solution.setup,
-        pair=solution.pair,
-        pair_file=(
-            relative_name(solution.pair_path, path.parent) if solution.pair_path is not None else ""
-        ),
-        sigma_px=solution.sigma_px,
-        points=solution.points,
-        table=solution.table,
-        known=solution.survey.known,
-        check=solution.check,
-        control=solution.survey.control,
-        georeference=solution.georeference,
-        model=solution.survey.model,
-        rules=solution.rules,
-        sensor=solution.survey.setup.sensor,
-        flag_sigmas=solution.survey.setup.flag_sigmas,
-        sigma_r_max=solution.survey.setup.sigma_r_max,
+    pair_path = solution.pair_path
+    return replace(
+        solution,
+        language=language or solution.language,
+        pair_file="" if pair_path is None else relative_name(pair_path, path.parent),
         log=[log_row(what, solution.source)],
     )
 
 
-def _csv_columns(solution: Solution) -> dict[str, Any]:
+def _csv_columns(solution: SolvedSurvey) -> dict[str, Any]:
     """Return the columns of the text table, headings with units."""
     table, world = solution.table, solution.world
     columns: dict[str, Any] = {"id": list(table.ids)}
@@ -184,7 +177,7 @@ def _csv_columns(solution: Solution) -> dict[str, Any]:
     return columns
 
 
-def solution_json(solution: Solution) -> str:
+def solution_json(solution: SolvedSurvey) -> str:
     """Return everything as the text of one JSON object; undefined numbers are null."""
     head = to_text(_head(solution))
     # A million points: each record is put together as text, not as a tree of objects.
@@ -192,7 +185,7 @@ def solution_json(solution: Solution) -> str:
     return f'{{"points": [{records}], {head[1:]}'
 
 
-def _records(solution: Solution) -> list[str]:
+def _records(solution: SolvedSurvey) -> list[str]:
     table = solution.table
     columns = [table[key].tolist() for key in _NUMBERS]
     world = [solution.world[:, i].tolist() for i in range(3)] if solution.georeference else []
@@ -211,19 +204,13 @@ def _number(value: float) -> str:
     return repr(value) if math.isfinite(value) else "null"
 
 
-def _head(solution: Solution) -> dict[str, Any]:
+def _head(solution: SolvedSurvey) -> dict[str, Any]:
     """Return all but the points."""
     axes = solution.check.axes
-    head: dict[str, Any] = {
+    return {
         "check": {
-            "n": axes["Z"].n,
-            "rmse": axes["Z"].rmse,
-            "max_abs": axes["Z"].max_abs,
-            "mean": axes["Z"].mean,
-            "axes": {
-                key: {"n": a.n, "rmse": a.rmse, "mean": a.mean, "max_abs": a.max_abs}
-                for key, a in axes.items()
-            },
+            **asdict(axes["Z"]),
+            "axes": {key: asdict(axis) for key, axis in axes.items()},
             "errors": [
                 {"id": name, "dX": e[0], "dY": e[1], "dZ": e[2]}
                 for name, e in zip(solution.check.ids, solution.check.errors, strict=True)
@@ -232,21 +219,20 @@ def _head(solution: Solution) -> dict[str, Any]:
             "missing": list(solution.check.missing),
         },
         "georeference": _georeference(solution),
-        "setup_check": _setup_check(solution),
+        "setup_check": _orientation_check(solution),
         "sigma_px": solution.sigma_px,
         "units": {"r": "m", "X": "m", "e1": length_unit(solution), "sigma_r": "m"},
         "remarks": list(solution.remarks),
     }
-    return head
 
 
-def length_unit(solution: Solution) -> str:
+def length_unit(solution: SolvedSurvey) -> str:
     """Return the unit of e1, e2, s_c and q: without an image scale they are on the wall."""
-    known = solution.pair is None or solution.table.image_scale is not None
+    known = solution.setup is not None or solution.table.image_scale is not None
     return "mm" if known else "m"
 
 
-def _georeference(solution: Solution) -> dict[str, Any] | None:
+def _georeference(solution: SolvedSurvey) -> dict[str, Any] | None:
     geo = solution.georeference
     if geo is None:
         return None
@@ -266,8 +252,8 @@ def _georeference(solution: Solution) -> dict[str, Any] | None:
     }
 
 
-def _setup_check(solution: Solution) -> dict[str, Any] | None:
-    check = solution.setup_check
+def _orientation_check(solution: SolvedSurvey) -> dict[str, Any] | None:
+    check = solution.orientation_check
     if check is None:
         return None
     return {
@@ -275,27 +261,18 @@ def _setup_check(solution: Solution) -> dict[str, Any] | None:
         "sigma0": check.sigma0,
         "outliers": list(check.outliers),
         "adjusted": solution.adjusted,
-        "parameters": [
-            {
-                "name": p.name,
-                "value": p.value,
-                "sigma": p.sigma,
-                "unit": p.unit,
-                "false_relief": p.false_relief,
-            }
-            for p in check.parameters
-        ],
+        "parameters": [asdict(parameter) for parameter in check.parameters],
     }
 
 
-def verdict_lines(solution: Solution) -> list[str]:
+def verdict_lines(solution: SolvedSurvey) -> list[str]:
     """Return one sentence per tolerance rule."""
     verdicts = solution.check.verdicts
     rules = list(dict.fromkeys(verdict.rule.key for verdict in verdicts))
     return [sentence(tuple(v for v in verdicts if v.rule.key == key)) for key in rules]
 
 
-def point_rows(solution: Solution, most: int) -> list[tuple[str, ...]]:
+def point_rows(solution: SolvedSurvey, most: int) -> list[tuple[str, ...]]:
     """Return the first points as rows of text: id, r, e1, e2, X, Y, sigma_r, flag."""
     table = solution.table
     rows = []
@@ -305,7 +282,7 @@ def point_rows(solution: Solution, most: int) -> list[tuple[str, ...]]:
     return rows
 
 
-def summary(solution: Solution) -> list[str]:
+def summary(solution: SolvedSurvey) -> list[str]:
     """Return check points, verdict and georeference in words."""
     lines = []
     for axis, found in solution.check.axes.items():

@@ -2,256 +2,247 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
 
-from bifocal import rays
-from bifocal.model.pair import SIGMA_PIXEL, UNCERTAIN_SHARE, Pair
+from bifocal.equations import plane_coordinates, relief, relief_displacement
+from bifocal.model.flags import FlagLimits, point_flags
+from bifocal.model.intersection import PlanePicks, intersect
+from bifocal.model.pair import Pair, Photo
+from bifocal.precision import sigma_relief
+from bifocal.rays import zoom_centre
 from bifocal.survey.observations import PointObservations
 from bifocal.survey.relief_table import ReliefTable
-from bifocal.survey.setup import OFF_RADIAL_SIGMAS, ON_PLANE_SIGMAS, SurveySetup
 from photocore.arrays import BoolArray, FloatArray
 
 
-def solve_ideal(setup: SurveySetup, points: PointObservations) -> ReliefTable:
-    """Solve an ideal pair from image coordinates or radial distances.
+def solve_points(
+    pair: Pair,
+    points: PointObservations,
+    *,
+    sigma_px: float | None = None,
+    limits: FlagLimits | None = None,
+    as_given: bool = False,
+) -> ReliefTable:
+    """Solve points measured on both photos of a pair.
 
     Parameters
     ----------
-    setup : SurveySetup
-        Distances, principal distances, unit.
+    pair : Pair
+        Any pair for raw pixels; for image coordinates and radial distances an ideal one, whose
+        image coordinates are millimetres (`bifocal.Pair.ideal` without ``pitch``).
     points : PointObservations
-        With ``xy1, xy2`` or ``polar``.
+        With ``pixels1, pixels2``, or else with ``xy1, xy2`` or ``polar`` in millimetres.
+    sigma_px : float, optional
+        Measuring precision; default the pair's own, else 0.5. [px, or mm for an ideal pair]
+    limits : FlagLimits, optional
+        Where the flags begin.
+    as_given : bool
+        Count from the photos in the order in which an exchanged ideal pair was given, as the
+        formulas of the user's workbook do.
 
     Returns
     -------
     ReliefTable
         NaN where undefined: relief at the nadir and where the rays do not meet before the near
-        camera; X, Y where no direction or no principal distance is known.
+        camera; X, Y where no direction, or for image coordinates no principal distance, is known.
 
     Notes
     -----
-    Midulla's Eqs. (5)-(7) in closed form, one workbook column after the other:
-    ``r = (s2 - s1) / (s2/d2 - s1/d1)``, ``e = s r / d``, ``s' = s1 - e1``, ``X = s' sin(theta)
-    m_1 / 1000``. Image 2 is first brought to the scale of image 1 by ``k_12``. First-order
-    precision: ``sigma_r = sigma_s sqrt((1 - r/d1)^2 + (k_12 (1 - r/d2))^2) / |den|``.
+    Midulla's Eqs. (1) to (7) on radial distances at the scale of image 1, one workbook column
+    after the other. Radial distances of an ideal pair are taken as measured, the misfit across the
+    radius stays in ``q``. For any pair ``q2 - e = k(r) (q1 - e)`` about the zoom centre e, so
+    Eq. (6) gives r exactly from radii about e; pixels are first moved onto one radial line by
+    least squares, so that the result equals `Pair.intersect`; ``e1``, ``e2`` and ``s_c`` count
+    from each camera's own nadir.
 
     Examples
     --------
     A point 1 m before the wall and 2 m right of the nadir, 35 mm / 17.5 m and 19 mm / 9.5 m:
 
     >>> points = PointObservations(ids=("P1",), xy1=[[35 * 2 / 16.5, 0]], xy2=[[19 * 2 / 8.5, 0]])
-    >>> table = solve_ideal(SurveySetup(d1=17.5, d2=9.5, c1=35, c2=19), points)
+    >>> pair = Pair.ideal(d1=17.5, d2=9.5, c1=35, c2=19, sigma=0.004)
+    >>> table = solve_points(pair, points)
     >>> table.xyz.round(9).tolist(), table.flags
     ([[2.0, 0.0, 1.0]], ('OK',))
     """
-    d1, d2, k12 = setup.d1, setup.d2, setup.scale_ratio
-    xy1, xy2 = setup.image_mm(points.xy1, 1), setup.image_mm(points.xy2, 2)
-    cartesian = points.is_cartesian
-    s1 = np.where(cartesian, np.sqrt(xy1[:, 0] ** 2 + xy1[:, 1] ** 2), points.polar[:, 0])
-    s2 = np.where(cartesian, np.sqrt(xy2[:, 0] ** 2 + xy2[:, 1] ** 2), points.polar[:, 1]) * k12
-    incomplete = np.isnan(s1) | np.isnan(s2)
-    s1, s2 = np.where(incomplete, np.nan, s1), np.where(incomplete, np.nan, s2)
-    bearing = np.degrees(np.arctan2(xy1[:, 0], xy1[:, 1]))
-    theta = np.where(cartesian, np.where(s1 == 0, 0.0, bearing), points.polar[:, 2])
-    theta = np.where(incomplete, np.nan, theta)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        across = (xy1[:, 0] * xy2[:, 1] - xy1[:, 1] * xy2[:, 0]) * k12 / s1
-        q = np.where(s1 > 0, across, np.where(cartesian & ~incomplete, 0.0, np.nan))
-        spread = setup.precision * np.sqrt(1.0 + (s2 / s1) ** 2)
-        standardised = q / np.where(s1 > 0, spread, np.nan)
-    columns = _relief_columns(s1, s2, d1, d2)
-    r = columns["r"]
-    scale = np.nan if setup.scale_number is None else setup.scale_number
-    angle = np.radians(theta)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        e1 = s1 * r / d1
-        s_c = s1 - e1
-        sigma_r = (
-            setup.precision
-            * np.sqrt((1 - r / d1) ** 2 + (k12 * (1 - r / d2)) ** 2)
-            / np.abs(columns["den"])
-        )
-    columns |= {
-        "theta_used": theta,
-        "q": q,
-        "e1": e1,
-        "e2": s2 * r / d2,
-        "s_c": s_c,
-        "X": s_c * np.sin(angle) * scale / 1000,
-        "Y": s_c * np.cos(angle) * scale / 1000,
-        "Z": r,
-        "sigma_r": sigma_r,
-    }
+    first, second = pair.as_given if as_given else (pair.image1, pair.image2)
+    limits = limits or FlagLimits()
+    if points.has_pixels.any():
+        radii = _adjusted_radii(first, second, points, sigma_px, limits)
+    else:
+        radii = _measured_radii(first, second, points, sigma_px)
+    s1, s2, d1, d2 = radii.s1, radii.s2, first.distance, second.distance
+    den = s2 / d2 - s1 / d1
+    # den > 0 is the same as r < d2: r - d2 = -s1 (d1 - d2) / (d1 den).
+    meet = (s1 > 0) & (den * (d1 - d2) > 0)
+    r = np.where(meet, relief(s1, s2, d1=d1, d2=d2), np.nan)  # Eq. (6)
+    e1, e2 = (  # Eqs. (1) and (3)
+        relief_displacement(own, r, d=d) for own, d in ((radii.own1, d1), (radii.own2, d2))
+    )
+    x, y = plane_coordinates(radii.own1, e1, np.radians(radii.own_theta))  # Eq. (7)
+    sigma_r = np.where(np.isnan(r), np.nan, radii.sigma_r)
     return ReliefTable(
         ids=points.ids,
-        columns=columns,
-        flags=_flags(
-            s1,
-            standardised,
-            incomplete,
-            r,
-            sigma_r,
-            setup.relief_limit,
-            (setup.off_radial_sigmas, setup.on_plane_sigmas),
+        columns={
+            "s1_used": s1,
+            "s2_used": s2,
+            "theta_used": radii.theta,
+            "ds": s2 - s1,
+            "den": den,
+            "r": r,
+            "e1": e1,
+            "e2": e2,
+            "s_c": radii.own1 - e1,
+            "X": first.nadir[0] + x * radii.scale_number / 1000,
+            "Y": first.nadir[1] + y * radii.scale_number / 1000,
+            "Z": r,
+            "q": radii.q,
+            "sigma_r": sigma_r,
+        },
+        flags=point_flags(
+            at_nadir=radii.at_nadir,
+            standardised=radii.standardised,
+            incomplete=np.isnan(s1),
+            relief=r,
+            sigma_r=sigma_r,
+            near_distance=pair.d2,
+            limits=limits,
         ),
-        standardised=standardised,
-        carried={},
-        image_scale=setup.scale_number,
+        standardised=radii.standardised,
+        carried=radii.carried,
+        image_scale=first.scale_number,
     )
 
 
-def solve_pair(
-    pair: Pair,
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Radii:
+    """Points as radial distances [mm at the scale of image 1] and directions [deg], shape (n,).
+
+    ``s1, s2, theta`` count from the zoom centre, ``own1, own2, own_theta`` from each camera's
+    nadir; ``q`` is the misfit across the radius, ``standardised`` in its sigma.
+    """
+
+    scale_number: float
+    s1: FloatArray
+    s2: FloatArray
+    theta: FloatArray
+    own1: FloatArray
+    own2: FloatArray
+    own_theta: FloatArray
+    q: FloatArray
+    standardised: FloatArray
+    at_nadir: BoolArray
+    sigma_r: FloatArray
+    carried: Mapping[str, FloatArray] = field(default_factory=dict)
+
+
+def _measured_radii(
+    first: Photo, second: Photo, points: PointObservations, sigma: float | None
+) -> _Radii:
+    """Return radial distances as measured on the photos of an ideal pair."""
+    scale_number = first.scale_number
+    k12 = 1.0
+    if scale_number is not None and second.scale_number is not None:
+        k12 = second.scale_number / scale_number  # brings image 2 to the scale of image 1
+    (x1, y1), (x2, y2) = points.xy1.T, points.xy2.T
+    cartesian = points.is_cartesian
+    s1 = np.where(cartesian, np.sqrt(x1**2 + y1**2), points.polar[:, 0])
+    s2 = np.where(cartesian, np.sqrt(x2**2 + y2**2), points.polar[:, 1]) * k12
+    incomplete = np.isnan(s1) | np.isnan(s2)
+    s1, s2 = np.where(incomplete, np.nan, s1), np.where(incomplete, np.nan, s2)
+    bearing = np.where(s1 == 0, 0.0, np.degrees(np.arctan2(x1, y1)))
+    theta = np.where(incomplete, np.nan, np.where(cartesian, bearing, points.polar[:, 2]))
+    sigma = first.precision(sigma)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        across = (x1 * y2 - y1 * x2) * k12 / s1
+        q = np.where(s1 > 0, across, np.where(cartesian & ~incomplete, 0.0, np.nan))
+        spread = sigma * np.sqrt(1.0 + (s2 / s1) ** 2)
+        standardised = q / np.where(s1 > 0, spread, np.nan)
+    return _Radii(
+        scale_number=np.nan if scale_number is None else scale_number,
+        s1=s1,
+        s2=s2,
+        theta=theta,
+        own1=s1,
+        own2=s2,
+        own_theta=theta,
+        q=q,
+        standardised=standardised,
+        at_nadir=s1 == 0,
+        sigma_r=sigma_relief(
+            s1, s2, d1=first.distance, d2=second.distance, sigma_1=sigma, sigma_2=k12 * sigma
+        ),
+    )
+
+
+def _adjusted_radii(
+    first: Photo,
+    second: Photo,
     points: PointObservations,
-    *,
-    sigma_px: float | None = None,
-    sigma_r_max: float | None = None,
-    principal_distance: float | None = None,
-    flag_sigmas: tuple[float, float] = (OFF_RADIAL_SIGMAS, ON_PLANE_SIGMAS),
-) -> ReliefTable:
-    """Solve points measured in raw pixels of any pair, tilted or offset.
+    sigma_px: float | None,
+    limits: FlagLimits,
+) -> _Radii:
+    """Return radial distances of raw pixels after least squares moved them onto one line.
 
-    Parameters
-    ----------
-    pair : Pair
-        The pair.
-    points : PointObservations
-        With ``pixels1`` and ``pixels2``.
-    sigma_px : float, optional
-        Measuring precision; default the pair's own, else 0.5. [px]
-    sigma_r_max : float, optional
-        Points of less precise relief are UNCERTAIN; default 2 % of d2. [m]
-    principal_distance : float, optional
-        Of image 1, for columns in image millimetres; default the pair's own. Without one the scale
-        is 1:1000, so that image millimetres read as metres on the wall. [mm]
-    flag_sigmas : tuple of float
-        Beyond how many sigma a point is OFF-RADIAL, below how many ON-PLANE.
-
-    Returns
-    -------
-    ReliefTable
-        Equal to `Pair.intersect`; ``e1``, ``e2`` and ``s_c`` are counted from each camera's own
-        nadir, ``s1_used`` and ``s2_used`` from the zoom centre.
-
-    Notes
-    -----
-    For any pair ``q2 - e = k(r) (q1 - e)`` about the zoom centre e, so Eq. (5) gives r exactly
-    from radii about e. The picks are first moved onto one radial line by least squares; the
-    movement is kept as gains (movement per millimetre of misfit q), which lets the workbook's
+    The movement is kept as gains (movement per millimetre of misfit q), which lets the workbook's
     formulas follow a changed pick.
     """
-    far, near = pair.image1, pair.image2
-    solved = pair.intersect(
-        points.pixels1, points.pixels2, sigma_px=sigma_px, sigma_r_max=sigma_r_max
-    )
-    d1, d2, centre = far.distance, near.distance, pair.zoom_centre
-    own = principal_distance or far.extra.get("principal_distance")
-    scale_number = 1000.0 * d1 / float(own) if own else 1000.0
+    picks = first.picks(points.pixels1, sigma_px), second.picks(points.pixels2, sigma_px)
+    solved = intersect(*picks, limits=limits)
+    centre = zoom_centre(first.foot, second.foot)
+    scale_number = first.scale_number or 1000.0
     to_mm = 1000.0 / scale_number
-    sigmas = [sigma_px or photo.sigma_pixel or SIGMA_PIXEL for photo in (far, near)]
-    positions, spreads = [], []
-    for photo, pixels, sigma in (
-        (far, points.pixels1, sigmas[0]),
-        (near, points.pixels2, sigmas[1]),
-    ):
-        jacobian = photo.metres_per_pixel(pixels)
-        positions.append(photo.plane_from_pixels(pixels))
-        spreads.append(jacobian @ jacobian.transpose(0, 2, 1) * sigma**2)
-    a1, a2, _ = rays.adjust_onto_epipolar_line(
-        positions[0], positions[1], spreads[0], spreads[1], centre
-    )
-    x1, x2 = ((p - centre) * to_mm for p in positions)
+    x1, x2 = ((pick.positions - centre) * to_mm for pick in picks)
     radius = np.hypot(x1[:, 0], x1[:, 1])
     with np.errstate(divide="ignore", invalid="ignore"):
         q = np.where(radius > 0, (x1[:, 0] * x2[:, 1] - x1[:, 1] * x2[:, 0]) / radius, 0.0)
         q = np.where(np.isnan(x1[:, 0]) | np.isnan(x2[:, 0]), np.nan, q)
         gain1, gain2 = (
-            np.where((q != 0)[:, None], (x - (a - centre) * to_mm) / q[:, None], 0.0)
-            for x, a in ((x1, a1), (x2, a2))
+            np.where((q != 0)[:, None], (x - (adjusted - centre) * to_mm) / q[:, None], 0.0)
+            for x, adjusted in ((x1, solved.adjusted1), (x2, solved.adjusted2))
         )
-        k_q = _misfit_spread(x1, x2, spreads, to_mm) / solved.sigma_px
-    moved1, moved2 = x1 - q[:, None] * gain1, x2 - q[:, None] * gain2
-    s1, s2 = np.sqrt((moved1**2).sum(axis=1)), np.sqrt((moved2**2).sum(axis=1))
-    columns = _relief_columns(s1, s2, d1, d2)
-    r = columns["r"]
-    from1, from2 = (moved1 - (far.nadir - centre) * to_mm, moved2 - (near.nadir - centre) * to_mm)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        radius1, radius2 = np.sqrt((from1**2).sum(axis=1)), np.sqrt((from2**2).sum(axis=1))
-        e1, k_r = radius1 * r / d1, solved.sigma[:, 2] / solved.sigma_px
-    k_r = np.where(np.isnan(r), np.nan, k_r)
-    xy = centre + (moved1 - from1 * (r / d1)[:, None]) * scale_number / 1000
-    theta = np.where(s1 == 0, 0.0, np.degrees(np.arctan2(moved1[:, 0], moved1[:, 1])))
-    sigma_r = solved.sigma_px * k_r
-    columns |= {
-        "theta_used": np.where(np.isnan(s1), np.nan, theta),
-        "q": q,
-        "e1": e1,
-        "e2": radius2 * r / d2,
-        "s_c": radius1 - e1,
-        "X": xy[:, 0],
-        "Y": xy[:, 1],
-        "Z": r,
-        "sigma_r": sigma_r,
-    }
-    with np.errstate(divide="ignore", invalid="ignore"):
+        k_q = _misfit_spread(x1, x2, picks, to_mm) / solved.sigma_px
+        k_r = solved.sigma[:, 2] / solved.sigma_px
         standardised = q / (solved.sigma_px * k_q)
-    limit = sigma_r_max or UNCERTAIN_SHARE * d2
+    moved1, moved2 = x1 - q[:, None] * gain1, x2 - q[:, None] * gain2
+    own1, own2 = (
+        moved - (photo.nadir - centre) * to_mm
+        for moved, photo in ((moved1, first), (moved2, second))
+    )
     names = ("x1", "y1", "x2", "y2", "g1x", "g1y", "g2x", "g2y")
-    values = np.hstack([x1, x2, gain1, gain2]).T
-    return ReliefTable(
-        ids=points.ids,
-        columns=columns,
-        flags=_flags(radius, standardised, np.isnan(q), r, sigma_r, limit, flag_sigmas),
+    carried = dict(zip(names, np.hstack([x1, x2, gain1, gain2]).T, strict=True))
+    s1 = _length(moved1)
+    return _Radii(
+        scale_number=scale_number,
+        s1=s1,
+        s2=_length(moved2),
+        theta=np.where(s1 == 0, 0.0, np.degrees(np.arctan2(moved1[:, 0], moved1[:, 1]))),
+        own1=_length(own1),
+        own2=_length(own2),
+        own_theta=np.degrees(np.arctan2(own1[:, 0], own1[:, 1])),
+        q=q,
         standardised=standardised,
-        carried=dict(zip(names, values, strict=True))
-        | {"k_q": k_q, "k_r": k_r, "misfit_px": solved.misfit},
-        image_scale=scale_number if own else None,
+        at_nadir=radius == 0,
+        sigma_r=solved.sigma_px * k_r,
+        carried=carried | {"k_q": k_q, "k_r": k_r, "misfit_px": solved.misfit},
     )
 
 
-def _relief_columns(s1: FloatArray, s2: FloatArray, d1: float, d2: float) -> dict[str, FloatArray]:
-    """Return s1, s2, ds, den and r; r is NaN unless the rays meet before the near camera."""
-    ds, den = s2 - s1, s2 / d2 - s1 / d1
-    with np.errstate(divide="ignore", invalid="ignore"):
-        # den > 0 is the same as r < d2: r - d2 = -s1 (d1 - d2) / (d1 den).
-        r = np.where((s1 > 0) & (den * (d1 - d2) > 0), ds / den, np.nan)
-    return {"s1_used": s1, "s2_used": s2, "ds": ds, "den": den, "r": r}
+def _length(vectors: FloatArray) -> FloatArray:
+    return np.asarray(np.sqrt((vectors**2).sum(axis=1)))
 
 
 def _misfit_spread(
-    x1: FloatArray, x2: FloatArray, spreads: Sequence[FloatArray], to_mm: float
+    x1: FloatArray, x2: FloatArray, picks: tuple[PlanePicks, PlanePicks], to_mm: float
 ) -> FloatArray:
     """Return the standard deviation of q. [mm]"""
     g1 = np.stack([x2[:, 1], -x2[:, 0]], axis=-1)
     g2 = np.stack([-x1[:, 1], x1[:, 0]], axis=-1)
     variance = sum(
-        np.einsum("ni,nij,nj->n", g, cov, g) for g, cov in ((g1, spreads[0]), (g2, spreads[1]))
+        np.einsum("ni,nij,nj->n", g, pick.covariance, g)
+        for g, pick in zip((g1, g2), picks, strict=True)
     )
-    radius = np.sqrt((x1**2).sum(axis=1))
-    spread: FloatArray = np.sqrt(variance) * to_mm / radius
-    return spread
-
-
-def _flags(
-    s1: FloatArray,
-    standardised: FloatArray,
-    incomplete: BoolArray,
-    r: FloatArray,
-    sigma_r: FloatArray,
-    limit: float,
-    sigmas: tuple[float, float],
-) -> tuple[str, ...]:
-    """Return the first flag that applies, in the order of the workbook's formula."""
-    with np.errstate(invalid="ignore"):
-        conditions = [
-            s1 == 0,
-            np.abs(standardised) > sigmas[0],
-            incomplete,
-            np.isnan(r) | (sigma_r > limit),
-            sigma_r > limit / 2,
-            np.abs(r) < sigmas[1] * sigma_r,
-        ]
-    names = ["NADIR", "OFF-RADIAL", "CHECK", "UNCERTAIN", "WEAK", "ON-PLANE"]
-    return tuple(np.select(conditions, names, default="OK").tolist())
+    return np.asarray(np.sqrt(variance) * to_mm / _length(x1))

@@ -4,13 +4,26 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Any, Protocol
 
 import numpy as np
 
 from bifocal.survey.tolerances import Verdict
-from photocore.arrays import BoolArray, FloatArray
+from photocore.arrays import BoolArray, FloatArray, IntArray, as_floats
 from photocore.errors import InputError
 from photocore.similarity import Similarity
+
+
+class NamedPoints(Protocol):
+    """Anything with names and coordinates, shape (n, 3)."""
+
+    @property
+    def ids(self) -> tuple[str, ...]:
+        """Names."""
+
+    @property
+    def xyz(self) -> FloatArray:
+        """Coordinates. [m]"""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -40,8 +53,36 @@ class KnownPoints:
         object.__setattr__(self, "xyz", xyz)
         object.__setattr__(self, "use", use)
 
+    @classmethod
+    def from_columns(cls, columns: Mapping[str, Any], axes: str) -> KnownPoints:
+        """Return the points of columns by key: ``id`` and one of shape (n,) for each axis. [m]"""
+        names = tuple(map(str, columns.get("id", ())))
+        blank = np.full(len(names), np.nan)
+        xyz = [as_floats(columns.get(axis, blank), axis) for axis in axes]
+        uneven = [
+            axis for axis, column in zip(axes, xyz, strict=True) if column.shape != blank.shape
+        ]
+        if uneven:
+            raise InputError(f"{uneven[0]}: expected {len(names)} values, one for each id.")
+        return cls(ids=names, xyz=np.stack(xyz, axis=-1))
+
     def __len__(self) -> int:
         return len(self.ids)
+
+    def rows_in(self, points: NamedPoints) -> IntArray:
+        """Return the row of each name among other points, -1 where it is not there, shape (n,)."""
+        place = {name: row for row, name in enumerate(points.ids)}
+        return np.array([place.get(name, -1) for name in self.ids], dtype=np.int64)
+
+    def coordinates_in(self, points: NamedPoints) -> FloatArray:
+        """Return the coordinates of the same names among other points, NaN if absent, (n, 3)."""
+        with_blank = np.vstack([points.xyz, np.full((1, 3), np.nan)])
+        return np.asarray(with_blank[self.rows_in(points)])
+
+    def missing_in(self, points: NamedPoints) -> tuple[str, ...]:
+        """Return the names that are not among other points."""
+        known = set(points.ids)
+        return tuple(name for name in self.ids if name not in known)
 
     @property
     def used(self) -> BoolArray:
@@ -86,6 +127,13 @@ class CheckResult:
     axes: Mapping[str, AxisErrors]
     verdicts: tuple[Verdict, ...]
     missing: tuple[str, ...]
+
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """What the user should know about the names."""
+        if not self.missing:
+            return ()
+        return (f"Check: no measured point is called {', '.join(self.missing[:10])}.",)
 
     @property
     def accuracy(self) -> float:

@@ -9,11 +9,6 @@ import numpy as np
 
 from photocore.arrays import FloatArray
 
-#: The computed columns in the order of the workbook; `flag` follows.
-COMPUTED = (
-    "s1_used s2_used theta_used ds den r e1 e2 s_c X Y Z q sigma_r".split()  # noqa: SIM905
-)
-
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class ReliefTable:
@@ -27,7 +22,7 @@ class ReliefTable:
         The workbook's computed columns by key: ``s1_used s2_used ds e1 e2 s_c q`` [mm],
         ``theta_used`` [deg], ``den`` [mm/m], ``r X Y Z sigma_r`` [m]. NaN where undefined.
     flags : tuple of str, length n
-        One of `bifocal.model.intersection.FLAGS` per point.
+        One of `bifocal.model.flags.FLAGS` per point.
     standardised : ndarray, shape (n,)
         Misfit across the radius over its standard deviation; NaN where it cannot be tested.
     carried : mapping of str to ndarray, shape (n,)

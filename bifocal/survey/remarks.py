@@ -34,7 +34,7 @@ def georeference_remarks(
         Whether the data chose the model.
     """
     said = [f"{name} contradicts the other control points and was left out." for name in world.bad]
-    unknown = [name for name in control.ids if name not in table.ids]
+    unknown = control.missing_in(table)
     if unknown:
         said.append(f"no measured point is called {', '.join(unknown[:10])}; not used.")
     if is_auto and world.model == "2D":
@@ -83,22 +83,21 @@ def exchanged_remark(setup: SurveySetup) -> str:
 
 def opposite_signs_remark(table: ReliefTable, known: KnownPoints) -> list[str]:
     """Return a warning where most points of known relief come out with the opposite sign."""
-    place = {name: row for row, name in enumerate(table.ids)}
-    pairs = [
-        (name, float(table["r"][place[name]]), float(z), float(table["sigma_r"][place[name]]))
-        for name, z, used in zip(known.ids, known.xyz[:, 2], known.used, strict=True)
-        if used and name in place
-    ]
+    rows = known.rows_in(table)
+    here = known.used & (rows >= 0)
+    r, z, sigma = table["r"][rows[here]], known.xyz[here, 2], table["sigma_r"][rows[here]]
     # Signs tell nothing where relief is not different from zero.
-    clear = [(n, r, z) for n, r, z, sigma in pairs if min(abs(r), abs(z)) > 2 * sigma]
-    opposite = [(n, r, z) for n, r, z in clear if r * z < 0]
-    if len(opposite) < 2 or 2 * len(opposite) <= len(clear):
+    clear = np.minimum(np.abs(r), np.abs(z)) > 2 * sigma
+    opposite = np.flatnonzero(clear & (r * z < 0))
+    if len(opposite) < 2 or 2 * len(opposite) <= clear.sum():
         return []
-    name, r, z = max(opposite, key=lambda found: abs(found[2]))
+    worst = opposite[np.abs(z[opposite]).argmax()]
+    name = np.array(known.ids)[here][worst]
     return [
-        f"WARNING: relief has the wrong sign at {len(opposite)} of {len(clear)} points of known "
-        f"relief (at {name} {r:+.3f} m, measured {z:+.3f} m): photos 1 and 2 look exchanged. x1 y1 "
-        "belong to the far photo (d_1), x2 y2 to the near one; relief counts + towards the camera."
+        f"WARNING: relief has the wrong sign at {len(opposite)} of {int(clear.sum())} points of "
+        f"known relief (at {name} {r[worst]:+.3f} m, measured {z[worst]:+.3f} m): photos 1 and 2 "
+        "look exchanged. x1 y1 belong to the far photo (d_1), x2 y2 to the near one; relief counts "
+        "+ towards the camera."
     ]
 
 

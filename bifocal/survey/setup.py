@@ -3,28 +3,32 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
-from photocore.arrays import positive
+from bifocal.model.flags import SIGMA_PIXEL, FlagLimits
+from bifocal.model.pair import Pair
+from bifocal.precision import false_relief_of_scale
+from bifocal.survey.observations import PointObservations
+from photocore.arrays import FloatArray, positive
 from photocore.errors import GeometryError, InputError
 
 #: Scales of the two photos may differ by this share; what remains is taken out by `k_12`.
 SCALE_TOLERANCE = 0.02
-#: Precision of a careful pick [px], and of a radial distance where the pixel size is unknown [mm].
-SIGMA_PIXEL, SIGMA_RADIAL = 0.5, 0.004
-#: The flags' limits, as in `bifocal.model.pair`: blunder [sigma], on-plane [sigma], share of d2.
-OFF_RADIAL_SIGMAS, ON_PLANE_SIGMAS, UNCERTAIN_SHARE = 3.5, 2.0, 0.02
+#: Precision of an image coordinate where the pixel size is unknown. [mm]
+SIGMA_RADIAL = 0.004
 UNITS = ("mm", "px")
+Place = tuple[float, float]
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class SurveySetup:
-    """An ideal bifocal pair as the workbook's `Setup` sheet describes it.
+    """Two cameras as the workbook's `Setup` sheet, or options in its place, describe them.
 
     Attributes
     ----------
-    d1, d2 : float
+    d1, d2 : float or None
         Distances of the projection centres to the reference plane. [m]
     c1, c2 : float or None
         Principal distances; both or none. Without them there is relief but no X and Y. [mm]
@@ -32,64 +36,55 @@ class SurveySetup:
         Size of a pixel; needed when coordinates are in pixels. [mm/px]
     sigma_s : float or None
         Precision of a measured image coordinate; default 0.5 px, or 0.004 mm. [mm]
-    nadir1, nadir2 : tuple of float
-        (column, row) of the nadir points; used when coordinates are in pixels. [px]
+    sigma_px : float or None
+        Precision of a raw pixel. [px]
+    nadir1, nadir2 : tuple of float or None
+        (column, row) of the nadir points; needed when coordinates are in pixels. [px]
     unit : str
         ``"mm"``: x, y from the nadir, y up. ``"px"``: (column, row) of the image.
     sigma_r_max : float or None
         Points of less precise relief are UNCERTAIN; default 2 % of the shorter distance. [m]
-    off_radial_sigmas, on_plane_sigmas : float
+    k_off, k_plane : float
         Beyond how many sigma a point is OFF-RADIAL, below how many ON-PLANE.
+    sensor : tuple of float or None
+        Width and height. [mm]
+    pair_file : str
+        Pair file, as seen from the workbook.
+    matrices, nadirs : tuple of ndarray
+        Homographies (3, 3) to the wall, None for an ideal pair, and nadir points (2,) on it. [m]
+    where : str
+        File and sheet, for messages.
+    remarks, text_cells : tuple of str
+        What the user should know; which numbers were typed as text.
     """
 
-    d1: float
-    d2: float
+    d1: float | None = None
+    d2: float | None = None
     c1: float | None = None
     c2: float | None = None
     pitch: float | None = None
     sigma_s: float | None = None
-    nadir1: tuple[float, float] = (0.0, 0.0)
-    nadir2: tuple[float, float] = (0.0, 0.0)
+    sigma_px: float | None = None
+    nadir1: Place | None = None
+    nadir2: Place | None = None
     unit: str = "mm"
     sigma_r_max: float | None = None
-    off_radial_sigmas: float = OFF_RADIAL_SIGMAS
-    on_plane_sigmas: float = ON_PLANE_SIGMAS
-
-    def __post_init__(self) -> None:
-        for name in ("d1", "d2"):
-            object.__setattr__(self, name, positive(getattr(self, name), name, unit="m"))
-        for name in ("c1", "c2", "pitch", "sigma_s", "sigma_r_max"):
-            value = getattr(self, name)
-            if value is not None:
-                object.__setattr__(self, name, positive(value, name))
-        if self.d1 == self.d2:
-            raise GeometryError(
-                f"d_1 and d_2 are both {self.d1:g} m: relief cannot be told from two photos taken "
-                "at the same distance. Check d_1, d_2 and delta_d."
-            )
-        if (self.c1 is None) != (self.c2 is None):
-            raise InputError("c_1 and c_2: give both principal distances or none.")
-        if self.unit not in UNITS:
-            raise InputError(f"input unit: {self.unit!r} is neither mm nor px.")
-        if self.unit == "px" and self.pitch is None:
-            raise InputError("pitch: the size of a pixel [mm/px] is needed to read pixels.")
+    k_off: float = FlagLimits().off_radial
+    k_plane: float = FlagLimits().on_plane
+    sensor: Place | None = None
+    pair_file: str = ""
+    matrices: tuple[FloatArray, FloatArray] | None = None
+    nadirs: tuple[FloatArray, FloatArray] = (np.zeros(2), np.zeros(2))
+    where: str = ""
+    remarks: tuple[str, ...] = ()
+    text_cells: tuple[str, ...] = ()
 
     @property
-    def is_exchanged(self) -> bool:
-        """Whether image 1 is the near camera, against the convention."""
-        return self.d1 < self.d2
-
-    @property
-    def scale_number(self) -> float | None:
-        """Scale number m_1 = 1000 d1 / c1 of image 1."""
-        return None if self.c1 is None else 1000.0 * self.d1 / self.c1
-
-    @property
-    def scale_ratio(self) -> float:
-        """k_12 = m_2 / m_1, which brings image 2 to the scale of image 1."""
-        if self.c1 is None or self.c2 is None:
-            return 1.0
-        return (1000.0 * self.d2 / self.c2) / (1000.0 * self.d1 / self.c1)
+    def limits(self) -> FlagLimits:
+        """Where the flags begin."""
+        return FlagLimits(
+            off_radial=self.k_off, on_plane=self.k_plane, sigma_r_max=self.sigma_r_max
+        )
 
     @property
     def precision(self) -> float:
@@ -98,22 +93,71 @@ class SurveySetup:
             return self.sigma_s
         return SIGMA_PIXEL * self.pitch if self.pitch is not None else SIGMA_RADIAL
 
-    @property
-    def relief_limit(self) -> float:
-        """Standard deviation of r beyond which a point is UNCERTAIN. [m]"""
-        return self.sigma_r_max or UNCERTAIN_SHARE * min(self.d1, self.d2)
+    def pair(self) -> Pair:
+        """Return the ideal pair, whose image coordinates are millimetres from the nadir, y up.
+
+        Raises
+        ------
+        InputError, GeometryError
+            If a value is missing, or values contradict each other, naming the file.
+        """
+        try:
+            return self._pair()
+        except GeometryError as error:
+            raise GeometryError(self._said(str(error))) from None
+        except InputError as error:
+            raise InputError(self._said(str(error))) from None
+
+    def _pair(self) -> Pair:
+        missing = [name for name, value in (("d_1", self.d1), ("d_2", self.d2)) if value is None]
+        if self.d1 is None or self.d2 is None:
+            raise InputError(
+                f"no value for {', '.join(missing)}. Fill in the sheet Setup (d_2 and delta_d, or "
+                "d_1), or give --d1 and --d2 in metres, or a pair file with --pair."
+            )
+        if self.unit not in UNITS:
+            raise InputError(f"input unit: {self.unit!r} is neither mm nor px.")
+        if self.unit == "px" and self.pitch is None:
+            raise InputError("pitch: the size of a pixel [mm/px] is needed to read pixels.")
+        if self.unit == "px" and (self.nadir1 is None or self.nadir2 is None):
+            raise InputError(
+                "coordinates in pixels need the nadir points of both images (nadir_1_col, "
+                "nadir_1_row, nadir_2_col, nadir_2_row); fill them in."
+            )
+        if self.d1 == self.d2:
+            raise GeometryError(
+                f"d_1 and d_2 are both {self.d1:g} m: relief cannot be told from two photos taken "
+                "at the same distance. Check d_1, d_2 and delta_d."
+            )
+        if (self.c1 is None) != (self.c2 is None):
+            raise InputError("c_1 and c_2: give both principal distances or none.")
+        for name in ("pitch", "sigma_r_max"):
+            if (value := getattr(self, name)) is not None:
+                positive(value, name)
+        return Pair.ideal(d1=self.d1, d2=self.d2, c1=self.c1, c2=self.c2, sigma=self.precision)
+
+    def _said(self, text: str) -> str:
+        return f"{self.where}: {text}" if self.where else text
+
+    def in_millimetres(self, points: PointObservations) -> PointObservations:
+        """Return the points as image coordinates of `pair`, without raw pixels."""
+        typed = (points.xy1, points.xy2)
+        if self.unit == "px" and self.pitch is not None:
+            flip = np.array([self.pitch, -self.pitch])
+            nadirs = (self.nadir1 or (0.0, 0.0), self.nadir2 or (0.0, 0.0))
+            typed = ((typed[0] - nadirs[0]) * flip, (typed[1] - nadirs[1]) * flip)
+        blank = np.full((len(points), 2), np.nan)
+        return replace(points, xy1=typed[0], xy2=typed[1], pixels1=blank, pixels2=blank)
 
     def exchanged(self) -> SurveySetup:
         """Return the same set-up with the images exchanged."""
-        return replace(
-            self,
-            d1=self.d2,
-            d2=self.d1,
-            c1=self.c2,
-            c2=self.c1,
-            nadir1=self.nadir2,
-            nadir2=self.nadir1,
-        )
+        other = {"1": "2", "2": "1"}
+        swapped: dict[str, Any] = {
+            f"{name}{image}": getattr(self, f"{name}{other[image]}")
+            for name in ("d", "c", "nadir")
+            for image in "12"
+        }
+        return replace(self, **swapped)
 
     def check_scales(self, tolerance: float = SCALE_TOLERANCE) -> str:
         """Return a remark on the scales of the photos; empty where they agree.
@@ -123,28 +167,24 @@ class SurveySetup:
         GeometryError
             If they differ by more than the tolerance: not a bifocal pair, or a wrong c or d.
         """
-        if self.c1 is None or self.c2 is None:
+        if self.c1 is None or self.c2 is None or self.d1 is None or self.d2 is None:
             return ""
-        share = self.scale_ratio - 1.0
+        share = (1000.0 * self.d2 / self.c2) / (1000.0 * self.d1 / self.c1) - 1.0
         if abs(share) > tolerance:
             raise GeometryError(
-                f"c_1/d_1 = {self.c1 / self.d1:.4g} and c_2/d_2 = {self.c2 / self.d2:.4g} differ "
-                f"by {abs(share):.1%}: a bifocal pair has the same scale in both photos. Check "
-                f"c_1, c_2, d_1 and d_2 (tolerance {tolerance:.1%}, --scale-tolerance)."
+                self._said(
+                    f"c_1/d_1 = {self.c1 / self.d1:.4g} and c_2/d_2 = {self.c2 / self.d2:.4g} "
+                    f"differ by {abs(share):.1%}: a bifocal pair has the same scale in both "
+                    "photos. Check c_1, c_2, d_1 and d_2 "
+                    f"(tolerance {tolerance:.1%}, --scale-tolerance)."
+                )
             )
         if abs(share) < 1e-4:
             return ""
-        lever = self.d1 * self.d2 / abs(self.d1 - self.d2)
+        far, near = max(self.d1, self.d2), min(self.d1, self.d2)
         return (
             f"the scales of the photos differ by {share:+.2%}; image 2 is brought to the scale of "
-            f"image 1 (k_12). If c or d is wrong instead, this is {abs(share) * lever:.3f} m of "
-            "false relief: points of known relief tell."
+            "image 1 (k_12). If c or d is wrong instead, this is "
+            f"{float(false_relief_of_scale(abs(share), d1=far, d2=near)):.3f} m of false relief: "
+            "points of known relief tell."
         )
-
-    def image_mm(self, xy: np.ndarray, image: int) -> np.ndarray:
-        """Return typed coordinates as millimetres from the nadir, y up, shape (n, 2)."""
-        if self.unit == "mm" or self.pitch is None:
-            return xy
-        nadir = np.asarray(self.nadir1 if image == 1 else self.nadir2)
-        scaled: np.ndarray = (xy - nadir) * np.array([self.pitch, -self.pitch])
-        return scaled

@@ -8,9 +8,10 @@ from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
+from bifocal.model.flags import FlagLimits
 from bifocal.model.pair import Pair
 from bifocal.survey.observations import PointObservations
-from bifocal.survey.point_survey import solve_ideal, solve_pair
+from bifocal.survey.point_survey import solve_points
 from bifocal.survey.setup import SurveySetup
 from bifocal.survey.workbook.book import write_book
 from bifocal.survey.workbook.content import POINT_ROWS, SurveyContent
@@ -102,19 +103,22 @@ def write_survey(
         raise InputError("write_survey: give a pair or a set-up, one of them.")
     path = check_book_path(path)
     check_writable(path, overwrite=overwrite)
-    if pair is not None:
-        table = solve_pair(pair, points, sigma_px=sigma_px)
-    else:
-        assert setup is not None
-        table = solve_ideal(setup, points)
+    measured, limits = points, FlagLimits()
+    if setup is not None:
+        pair, measured, limits = setup.pair(), setup.in_millimetres(points), setup.limits
+    assert pair is not None
     content = SurveyContent(
         language=language,
         setup=setup,
         pair=pair,
+        as_given=setup is not None,
+        limits=limits,
         pair_file=relative_name(pair_path, path.parent) if pair_path is not None else "",
         sigma_px=sigma_px,
         points=points,
-        table=table,
+        table=solve_points(
+            pair, measured, sigma_px=sigma_px, limits=limits, as_given=setup is not None
+        ),
         log=[log_row(what, pair_path)],
     )
     write_book(path, content, overwrite=overwrite)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
@@ -129,3 +130,34 @@ def sentence(verdicts: tuple[Verdict, ...]) -> str:
         if verdict is not None:
             parts.append(f"{verb} 1:{verdict.scale} ({verdict.tolerance * 1000:g} mm)")
     return f"{verdicts[0].rule.name}: " + ", ".join(parts)
+
+
+def as_rule(rule: str | ToleranceRule) -> ToleranceRule:
+    """Return a rule as it is, a named one, or one made of a number of mm at scale or of fixed cm.
+
+    Examples
+    --------
+    >>> as_rule("0.2mm").tolerance(50)
+    0.01
+    >>> as_rule("2 cm").tolerance(50)
+    0.02
+    """
+    if isinstance(rule, ToleranceRule):
+        return rule
+    text = rule
+    for known in RULES:
+        if text.strip().casefold() in (known.key, known.name.casefold()):
+            return known
+    length = re.fullmatch(r"\s*(\d+(?:[.,]\d+)?)\s*(mm|cm)\s*", text, re.IGNORECASE)
+    value = float(length[1].replace(",", ".")) if length else 0.0
+    if length is None or value <= 0:
+        names = ", ".join(known.key for known in RULES)
+        raise InputError(
+            f"--tolerance-rule: {text!r} is none of {names}, nor a length like 0.2mm (at drawing "
+            "scale) or 2cm (on the wall)."
+        )
+    if length[2].lower() == "mm":
+        return ToleranceRule(key=text, name=f"{value:g} mm", line_mm=value, source="user")
+    return ToleranceRule(
+        key=text, name=f"{value:g} cm", fixed_cm=dict.fromkeys(SCALES, value), source="user"
+    )

@@ -43,42 +43,50 @@ def refuse_wrong_unit(
     InputError
         Naming the unit that the numbers seem to be in.
     """
-    used = points.use
-    cartesian = used & points.is_cartesian
+    cartesian = points.use & points.is_cartesian
     place = "the headings" if said else "Setup (input_unit)"
+    typed = np.hstack([points.xy1, points.xy2])[cartesian]
     if setup.unit == "mm":
         limit = LARGEST_MM if setup.c1 is None else WIDEST * max(setup.c1, setup.c2 or 0.0)
-        typed = np.hstack([points.xy1, points.xy2])[cartesian]
-        radial = points.polar[used & ~points.is_cartesian][:, :2]
-        for values, what in ((typed, "coordinates"), (radial, "radial distances")):
-            known = np.abs(values[~np.isnan(values)])
-            if known.size and np.median(known) > limit:
+        radial = points.polar[points.use & ~points.is_cartesian][:, :2]
+        for values, what, mend in (
+            (
+                typed,
+                "coordinates",
+                "Set the input unit to px and fill in pitch and the nadir points.",
+            ),
+            (radial, "radial distances", "Multiply them by the size of a pixel [mm/px]."),
+        ):
+            size = _typical(values)
+            if size > limit:
                 raise InputError(
-                    f"{where}: {what} of {np.median(known):.4g} mm lie outside any photo taken "
-                    f"with this lens (limit {limit:.4g} mm): they look like pixels, while "
-                    f"{place} says mm. "
-                    + (
-                        "Set the input unit to px and fill in pitch and the nadir points."
-                        if what == "coordinates"
-                        else "Multiply them by the size of a pixel [mm/px]."
-                    )
+                    f"{where}: {what} of {size:.4g} mm lie outside any photo taken with this lens "
+                    f"(limit {limit:.4g} mm): they look like pixels, while {place} says mm. {mend}"
                 )
         return
-    typed = np.hstack([points.xy1, points.xy2])[cartesian]
-    nadir = max(abs(value) for value in (*setup.nadir1, *setup.nadir2))
-    if typed.size and nadir > 2 * CORNER_PX and float(np.nanmax(np.abs(typed))) < CORNER_PX:
-        raise InputError(
-            f"{where}: no coordinate exceeds {np.nanmax(np.abs(typed)):.4g} px although the nadir "
-            f"points lie at ({setup.nadir1[0]:g}, {setup.nadir1[1]:g}) px: they look like "
-            f"millimetres, while {place} says px. Set the input unit to mm."
+    first, second = setup.nadir1 or (0.0, 0.0), setup.nadir2 or (0.0, 0.0)
+    nadir = max(abs(value) for value in (*first, *second))
+    largest = float(np.nanmax(np.abs(typed))) if typed.size else np.inf
+    reach = largest * (setup.pitch or np.inf)
+    sight = ""
+    if nadir > 2 * CORNER_PX and largest < CORNER_PX:
+        sight = (
+            f"no coordinate exceeds {largest:.4g} px although the nadir points lie at "
+            f"({first[0]:g}, {first[1]:g}) px: they"
         )
-    if typed.size and nadir == 0 and setup.pitch is not None:
-        reach = float(np.nanmax(np.abs(typed))) * setup.pitch
-        if reach < 0.01 * (setup.c1 or 20.0):
-            raise InputError(
-                f"{where}: all points lie within {reach:.3g} mm of the nadir: the coordinates look "
-                f"like millimetres, while {place} says px. Set the input unit to mm."
-            )
+    elif nadir == 0 and reach < 0.01 * (setup.c1 or 20.0):
+        sight = f"all points lie within {reach:.3g} mm of the nadir: the coordinates"
+    if sight:
+        raise InputError(
+            f"{where}: {sight} look like millimetres, while {place} says px. Set the input unit "
+            "to mm."
+        )
+
+
+def _typical(values: FloatArray) -> float:
+    """Return the median size of the numbers given; 0 where there are none."""
+    known = np.abs(values[~np.isnan(values)])
+    return float(np.median(known)) if known.size else 0.0
 
 
 def refuse_far_stations(
@@ -121,10 +129,10 @@ def refuse_pixels(xy: FloatArray, c: float, where: str) -> None:
     InputError
         Saying that they look like pixels.
     """
-    known = np.abs(xy[~np.isnan(xy)])
-    if known.size and np.median(known) > WIDEST * c:
+    size = _typical(xy)
+    if size > WIDEST * c:
         raise InputError(
-            f"{where}: coordinates of {np.median(known):.4g} mm lie outside any photo of principal "
+            f"{where}: coordinates of {size:.4g} mm lie outside any photo of principal "
             f"distance {c:g} mm: they look like pixels. Head the columns col1 row1 col2 row2, or "
             "say --unit px."
         )

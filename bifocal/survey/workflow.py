@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from bifocal.model.lens import Lens
 from bifocal.model.pair import Pair, Photo, apply_homography
 from bifocal.survey.check_points import check_points
 from bifocal.survey.georeferencing import georeference
 from bifocal.survey.observations import PointObservations
-from bifocal.survey.orientation_check import SetupCheck, check_setup
-from bifocal.survey.point_survey import solve_ideal, solve_pair
+from bifocal.survey.orientation_check import OrientationCheck, check_orientation
+from bifocal.survey.point_survey import solve_points
 from bifocal.survey.reference import CheckResult, Georeference
 from bifocal.survey.relief_table import ReliefTable
 from bifocal.survey.remarks import (
@@ -24,17 +25,20 @@ from bifocal.survey.remarks import (
     point_remarks,
 )
 from bifocal.survey.setup import SCALE_TOLERANCE, SurveySetup
-from bifocal.survey.tolerances import RULES, ToleranceRule
+from bifocal.survey.tolerances import RULES, ToleranceRule, as_rule
 from bifocal.survey.units import (
     refuse_far_stations,
     refuse_millimetres,
     refuse_pixels,
     refuse_wrong_unit,
 )
-from bifocal.survey.workbook.reader import ReadOptions, SurveyInput, pair_of, read_survey
-from bifocal.survey.workbook.setup_reader import SetupValues
+from bifocal.survey.workbook.content import SurveyContent
+from bifocal.survey.workbook.reader import ReadOptions, SurveyInput, column_map, read_survey
 from photocore.arrays import FloatArray
 from photocore.errors import GeometryError, InputError
+from photocore.tables.numbers import Decimal
+
+Source = Path | str | PointObservations | Mapping[str, Any]
 
 #: From this many points on, the picks' precision is taken from their misfits.
 MINIMUM_FOR_SIGMA = 20
@@ -42,93 +46,46 @@ MINIMUM_FOR_SIGMA = 20
 BEST_SIGMA_PX = 0.02
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class SolveOptions:
-    """What the user may choose.
-
-    Attributes
-    ----------
-    read : ReadOptions
-        How to read the table.
-    pair : Path or None
-        Pair file, for raw pixels.
-    setup : mapping
-        Values in place of those of `Setup`: ``d1 d2 c1 c2 pitch sigma_s sigma_r_max unit``.
-    sigma_px : float or None
-        Measuring precision of raw pixels; default the pair's, else found from the misfits. [px]
-    adjust_setup : bool
-        Correct the set-up by points of the reference plane.
-    model : str or None
-        Georeference model in place of the workbook's.
-    scale_tolerance : float
-        Share by which the scales of both photos may differ.
-    rules : tuple of ToleranceRule
-        For the verdict.
-    """
-
-    read: ReadOptions = field(default_factory=ReadOptions)
-    pair: Path | None = None
-    setup: Mapping[str, Any] = field(default_factory=dict)
-    sigma_px: float | None = None
-    adjust_setup: bool = False
-    model: str | None = None
-    scale_tolerance: float = SCALE_TOLERANCE
-    rules: tuple[ToleranceRule, ...] = RULES
-
-
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Solution:
-    """A solved survey.
+class SolvedSurvey(SurveyContent):
+    """A solved survey: what the workbook shows of it, and where it comes from.
 
     Attributes
     ----------
-    source : Path
-        The file it came from.
-    survey : SurveyInput
-        What was read.
+    pair : Pair
+        The geometry; ``setup`` is that of an ideal pair, None for one given by homographies.
     points : PointObservations
         As solved: images exchanged where the user had them the other way round.
     table : ReliefTable
-        What came out.
-    setup, pair : SurveySetup or None, Pair or None
-        The geometry: an ideal pair or any pair.
-    pair_path : Path or None
-        The pair file.
-    sigma_px : float or None
-        Measuring precision of raw pixels. [px]
+        What came out: relief, displacements, coordinates, precision, flags.
     check : CheckResult
         Errors at check points.
-    georeference : Georeference or None
-        World coordinates; None without control points.
-    setup_check : SetupCheck or None
+    source : Path
+        The file it came from.
+    survey : SurveyInput
+        What was read, with the set-up as options left it.
+    pair_path : Path or None
+        The pair file.
+    orientation_check : OrientationCheck or None
         What the points of the reference plane tell.
     adjusted : bool
-        Whether the set-up was corrected by it.
-    exchanged : bool
-        Whether images 1 and 2 were exchanged.
+        Whether the orientation was corrected by it.
     overridden : bool
         Whether options took the place of what the workbook says.
-    rules : tuple of ToleranceRule
-        For the verdict.
     remarks : tuple of str
         What the user should know.
     """
 
-    source: Path
-    survey: SurveyInput
+    pair: Pair
     points: PointObservations
     table: ReliefTable
-    setup: SurveySetup | None
-    pair: Pair | None
-    pair_path: Path | None
-    sigma_px: float | None
     check: CheckResult
-    georeference: Georeference | None
-    setup_check: SetupCheck | None
+    source: Path
+    survey: SurveyInput
+    pair_path: Path | None
+    orientation_check: OrientationCheck | None
     adjusted: bool
-    exchanged: bool
     overridden: bool
-    rules: tuple[ToleranceRule, ...]
     remarks: tuple[str, ...]
 
     @property
@@ -139,332 +96,393 @@ class Solution:
         return self.georeference.world_from_wall(self.table.xyz)
 
 
-def solve_file(path: Path | str, options: SolveOptions | None = None) -> Solution:
-    """Read and solve a survey.
+def solve(
+    source: Source,
+    *,
+    pair: Pair | Path | str | None = None,
+    d1: float | None = None,
+    d2: float | None = None,
+    c1: float | None = None,
+    c2: float | None = None,
+    pitch: float | None = None,
+    unit: str | None = None,
+    sigma_s: float | None = None,
+    sigma_px: float | None = None,
+    sigma_r_max: float | None = None,
+    adjust_setup: bool = False,
+    model: str | None = None,
+    scale_tolerance: float = SCALE_TOLERANCE,
+    rules: Sequence[str | ToleranceRule] = (),
+    columns: str | None = None,
+    sheet: str | None = None,
+    decimal: Decimal | None = None,
+    visible_only: bool = False,
+) -> SolvedSurvey:
+    r"""Solve measured points: relief, displacements, coordinates, precision, check, world.
 
     Parameters
     ----------
-    path : path
-        Workbook or text table with measured points.
-    options : SolveOptions, optional
-        What the user chose.
+    source : path, mapping or PointObservations
+        A survey workbook or table (``.xlsx .xlsm .ods .csv``), or columns by key: ``id`` and
+        ``x1 y1 x2 y2`` [mm or px], or ``s1 s2`` [mm] and ``theta`` [deg], or ``col1 row1 col2
+        row2`` [px]; each of shape (n,), NaN where blank.
+    pair : Pair or path, optional
+        Pair or pair file, for raw pixels; default the workbook's own set-up.
+    d1, d2 : float, optional
+        Distances of the projection centres to the reference plane, d1 > d2, in place of those of
+        `Setup`, as all that follow. [m]
+    c1, c2 : float, optional
+        Principal distances; without them X and Y stay NaN. [mm]
+    pitch : float, optional
+        Size of a pixel. [mm/px]
+    unit : {"mm", "px"}, optional
+        Of ``x1 y1 x2 y2``; default as headings or `Setup` say, else mm.
+    sigma_s, sigma_px : float, optional
+        Precision of an image coordinate [mm], default 0.5 px, and of a raw pixel [px], default the
+        pair's, else found from the misfits of 20 or more points, else 0.5.
+    sigma_r_max : float, optional
+        Points of less precise relief are UNCERTAIN; default 2 % of d2. [m]
+    adjust_setup : bool
+        Correct the orientation by points of the reference plane (code PLANE, r = 0).
+    model : {"auto", "levelled", "3D", "2D"}, optional
+        Of the roto-translation to the world; default the workbook's, else auto.
+    scale_tolerance : float
+        Share by which the scales of both photos may differ.
+    rules : sequence of str or ToleranceRule
+        For the verdict on drawing scales: names, ``"0.2mm"`` at scale, ``"2cm"`` on the wall.
+    columns, sheet, decimal : str, optional
+        Which column is which (``"id=A,s1=My heading"``), the sheet of the points, the separator
+        (``point`` or ``comma``) of numbers typed as text; all found by default.
+    visible_only : bool
+        Leave out hidden and filtered rows.
 
     Returns
     -------
-    Solution
+    SolvedSurvey
+        ``table`` holds the columns of the sheet `Points` by key (``table["r"]``, ``table.xyz`` of
+        shape (n, 3), ``table.flags``), NaN where undefined; ``remarks`` what the user should know.
 
     Raises
     ------
+    WorkbookError
+        Naming every bad cell.
     InputError, GeometryError
-        If a cell, the set-up or the geometry is at fault.
+        If an option, the set-up or the geometry is at fault.
+
+    Notes
+    -----
+    Eqs. (1) to (7) of [1]_; see `bifocal.survey.point_survey.solve_points`.
+
+    References
+    ----------
+    .. [1] Midulla, "Bifocal pairs of images for low-cost survey in close range photogrammetry".
+
+    Examples
+    --------
+    A point 2 m right of the nadir and 1 m before the wall, 35 mm / 17.5 m and 19 mm / 9.5 m:
+
+    >>> picks = {"id": ["P1"], "s1": [35 * 2 / 16.5], "s2": [19 * 2 / 8.5], "theta": [90]}
+    >>> survey = solve(picks, d1=17.5, d2=9.5, c1=35, c2=19)
+    >>> survey.table.xyz.round(9).tolist(), survey.table.flags
+    ([[2.0, 0.0, 1.0]], ('OK',))
     """
-    options, path = options or SolveOptions(), Path(path)
-    survey = read_survey(path, options.read)
-    remarks = list(survey.remarks)
-    values = survey.setup.with_options(**options.setup)
-    survey = replace(survey, setup=values)
+    given = _checked(
+        d1=d1, d2=d2, c1=c1, c2=c2, pitch=pitch, sigma_s=sigma_s, sigma_r_max=sigma_r_max
+    )
+    _checked(sigma_px=sigma_px, scale_tolerance=scale_tolerance)
+    judged = tuple(as_rule(rule) for rule in rules) or RULES
+    options = ReadOptions(
+        columns=column_map(columns), sheet=sheet, decimal=decimal, visible_only=visible_only
+    )
+    survey, path = _measured(source, options)
+    setup = replace(survey.setup, **given, unit=unit or survey.unit or survey.setup.unit)
+    survey = replace(survey, setup=setup)
     if not len(survey.points):
-        raise InputError(f"{_where(survey)}: there is no point. Fill in the measured points.")
-    if options.pair is None:
-        refuse_far_stations(values.d1, values.d2, values.where, options=set(options.setup))
-    pair, pair_path = _pair(path, values, options, remarks)
-    points = survey.points
-    if pair is not None:
-        geometry = _solve_general(pair, points, survey, values, options, remarks)
+        raise InputError(f"{survey.where}: there is no point. Fill in the measured points.")
+    if pair is None:
+        refuse_far_stations(setup.d1, setup.d2, setup.where, options=given)
+    general, pair_path, pair_remarks = _given_pair(survey, path, pair)
+    if general is None:
+        solved = _solve_ideal(survey, scale_tolerance, adjust=adjust_setup)
     else:
-        geometry = _solve_ideal(points, survey, values, options, remarks)
-    table = geometry.table
-    remarks += point_remarks(geometry.points, table, geometry.setup)
-    check = check_points(table, survey.known, options.rules)
-    if check.missing:
-        remarks.append(f"Check: no measured point is called {', '.join(check.missing[:10])}.")
-    remarks += opposite_signs_remark(table, survey.known)
-    world = None
-    if survey.control.used.any() and not np.isnan(survey.control.xyz).all():
-        model = options.model or survey.model
-        world = georeference(table, survey.control, model=model)
-        remarks += georeference_remarks(world, survey.control, table, is_auto=model == "auto")
-    return Solution(
+        solved = _solve_pair(general, survey, sigma_px, adjust=adjust_setup)
+    table = solved.table
+    check = check_points(table, survey.known, judged)
+    world, world_remarks = _placed(survey, table, model or survey.model)
+    remarks = (
+        *survey.remarks,
+        *pair_remarks,
+        *solved.remarks,
+        *point_remarks(solved.points, table, solved.setup),
+        *check.remarks,
+        *opposite_signs_remark(table, survey.known),
+        *world_remarks,
+    )
+    return SolvedSurvey(
+        language=survey.language,
         source=path,
         survey=survey,
-        points=geometry.points,
+        points=solved.points,
         table=table,
-        setup=geometry.setup,
-        pair=geometry.pair,
+        setup=solved.setup,
+        pair=solved.pair,
         pair_path=pair_path,
-        sigma_px=geometry.sigma_px,
+        sigma_px=solved.sigma_px,
+        known=survey.known,
         check=check,
+        control=survey.control,
         georeference=world,
-        setup_check=geometry.check,
-        adjusted=geometry.adjusted,
-        exchanged=geometry.exchanged,
-        overridden=bool(options.setup) or options.pair is not None or geometry.new_sigma,
-        rules=options.rules,
+        model=survey.model,
+        sensor=setup.sensor,
+        limits=setup.limits,
+        orientation_check=solved.check,
+        adjusted=adjust_setup,
+        overridden=bool(given or unit or pair) or solved.sigma_px not in (None, setup.sigma_px),
+        rules=judged,
         remarks=tuple(dict.fromkeys(remarks)),
     )
 
 
+def _checked(**numbers: float | None) -> dict[str, Any]:
+    """Return the options that are given, refusing what is not above zero."""
+    given = {name: value for name, value in numbers.items() if value is not None}
+    for name, value in given.items():
+        if not value > 0:
+            option = f"--{name.replace('_', '-')}"
+            raise InputError(f"{option}: must be a number above zero, got {value:g}.")
+    return given
+
+
+def _measured(source: Source, options: ReadOptions) -> tuple[SurveyInput, Path]:
+    """Return what was measured, and the file it stands in."""
+    if isinstance(source, Mapping):
+        source = PointObservations.from_columns(source)
+    if isinstance(source, PointObservations):
+        return SurveyInput.of_points(source), Path("points")
+    return read_survey(source, options), Path(source)
+
+
+def _placed(
+    survey: SurveyInput, table: ReliefTable, model: str
+) -> tuple[Georeference | None, list[str]]:
+    """Return the wall in the world, where there are control points, and remarks on it."""
+    control = survey.control
+    if not control.used.any() or np.isnan(control.xyz).all():
+        return None, []
+    world = georeference(table, control, model=model)
+    return world, georeference_remarks(world, control, table, is_auto=model == "auto")
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class _Solved:
+class _SolvedPoints:
     """Points solved with one geometry."""
 
     points: PointObservations
     table: ReliefTable
+    pair: Pair
     setup: SurveySetup | None = None
-    pair: Pair | None = None
     sigma_px: float | None = None
-    check: SetupCheck | None = None
-    adjusted: bool = False
-    exchanged: bool = False
-    new_sigma: bool = False
+    check: OrientationCheck | None = None
+    remarks: tuple[str, ...] = ()
 
 
-def _where(survey: SurveyInput) -> str:
-    table = survey.table
-    return f"{table.file} › {table.sheet}" if table.sheet else table.file
-
-
-def _pair(
-    path: Path, values: SetupValues, options: SolveOptions, remarks: list[str]
-) -> tuple[Pair | None, Path | None]:
-    """Return the pair asked for, or the one the workbook describes, with its file."""
-    if options.pair is not None:
-        given = Pair.read(options.pair)
-        remarks += [f"{options.pair}: {remark}" for remark in given.remarks]
-        return given, options.pair
-    pair = pair_of(values, path.parent)
-    named = path.parent / values.pair_file if values.pair_file else None
+def _given_pair(
+    survey: SurveyInput, path: Path, pair: Pair | Path | str | None
+) -> tuple[Pair | None, Path | None, list[str]]:
+    """Return the pair asked for, or the one the workbook describes, its file, and remarks."""
+    if isinstance(pair, Pair):
+        return pair, None, list(pair.remarks)
     if pair is not None:
-        remarks += [f"{values.where}: {remark}" for remark in pair.remarks]
-        return pair, named if named is not None and named.is_file() else None
-    return None, None
+        given = Pair.read(pair)
+        return given, Path(pair), [f"{pair}: {remark}" for remark in given.remarks]
+    setup = survey.setup
+    named = path.parent / setup.pair_file if setup.pair_file else None
+    file = named if named is not None and named.is_file() else None
+    described = _described_pair(setup, file, path.parent)
+    if described is None:
+        return None, None, []
+    return described, file, [f"{setup.where}: {remark}" for remark in described.remarks]
 
 
-def _solve_general(
-    pair: Pair,
-    points: PointObservations,
-    survey: SurveyInput,
-    values: SetupValues,
-    options: SolveOptions,
-    remarks: list[str],
-) -> _Solved:
-    """Solve raw pixels with a pair; coordinates in millimetres are carried to pixels first."""
-    exchanged = pair.exchanged
-    if exchanged:
-        points = points.exchanged()
-    unit = str(options.setup.get("unit") or survey.unit or values.unit or "mm")
-    points = _as_pixels(pair, points, survey, unit)
-    refuse_millimetres(pair, points, _where(survey))
-    sigma = options.sigma_px or values.sigma_px
-    own = any(photo.sigma_pixel for photo in (pair.image1, pair.image2))
-    if sigma is None and not own:
-        sigma = _sigma_from_misfits(pair, points, remarks)
-    check, adjusted = None, False
-    if points.on_plane.sum() >= 2:
-        names = [name for name, on in zip(points.ids, points.on_plane, strict=True) if on]
-        check = check_setup(
-            pair,
-            points.pixels1[points.on_plane],
-            points.pixels2[points.on_plane],
-            names=names,
-            sigma_px=sigma,
+def _described_pair(setup: SurveySetup, file: Path | None, folder: Path) -> Pair | None:
+    """Return the pair whose homographies `Setup` holds, with the lenses of its pair file."""
+    if setup.matrices is None or setup.d1 is None or setup.d2 is None:
+        return None
+    lenses: list[Lens | None] = [None, None]
+    if file is not None:
+        try:
+            given = Pair.read(file)
+            lenses = [given.image1.lens, given.image2.lens]
+        except InputError:
+            lenses = [None, None]
+    photos = [
+        Photo(
+            plane_from_pixel=matrix, nadir=nadir, distance=d, lens=lens, principal_distance=c
         )
-        remarks += [f"Set-up: {line}" for line in check.sentences()]
-        if options.adjust_setup:
-            pair, adjusted = check.corrected, True
-    elif options.adjust_setup:
-        raise InputError(_TOO_FEW_PLANE_POINTS.format(where=_where(survey)))
-    table = solve_pair(
-        pair,
-        points,
-        sigma_px=sigma,
-        sigma_r_max=values.sigma_r_max,
-        flag_sigmas=values.flag_sigmas,
-    )
-    return _Solved(
+        for matrix, nadir, d, lens, c in zip(
+            setup.matrices, setup.nadirs, (setup.d1, setup.d2), lenses, (setup.c1, setup.c2),
+            strict=True,
+        )
+    ]  # fmt: skip
+    return Pair(image1=photos[0], image2=photos[1], folder=folder)
+
+
+def _solve_pair(
+    pair: Pair, survey: SurveyInput, sigma_px: float | None, *, adjust: bool
+) -> _SolvedPoints:
+    """Solve raw pixels with a pair; coordinates in millimetres are carried to pixels first."""
+    points = survey.points.exchanged() if pair.exchanged else survey.points
+    setup = survey.setup
+    points = _as_pixels(pair, points, survey.where, setup.unit)
+    refuse_millimetres(pair, points, survey.where)
+    sigma = sigma_px or setup.sigma_px
+    remarks: tuple[str, ...] = ()
+    if sigma is None and not any(photo.sigma_pixel for photo in (pair.image1, pair.image2)):
+        sigma, remarks = _sigma_from_misfits(pair, points)
+    check = _check_plane(pair, points, (points.pixels1, points.pixels2), sigma, survey, adjust)
+    if check is not None and adjust:
+        pair = check.corrected
+    return _SolvedPoints(
         points=points,
-        table=table,
+        table=solve_points(pair, points, sigma_px=sigma, limits=setup.limits),
         pair=pair,
         sigma_px=sigma,
         check=check,
-        adjusted=adjusted,
-        exchanged=exchanged,
-        new_sigma=sigma != values.sigma_px,
+        remarks=(*remarks, *(check.remarks if check else ())),
     )
 
 
-_TOO_FEW_PLANE_POINTS = (
-    "{where}: --adjust-setup needs two or more points that lie on the reference plane; mark them "
-    "with the code PLANE."
-)
+def _check_plane(
+    pair: Pair,
+    points: PointObservations,
+    pixels: tuple[FloatArray, FloatArray],
+    sigma: float | None,
+    survey: SurveyInput,
+    needed: bool,
+) -> OrientationCheck | None:
+    """Return what points of the reference plane tell; None where there are fewer than two."""
+    rows = points.on_plane
+    if rows.sum() < 2:
+        if needed:
+            raise InputError(
+                f"{survey.where}: --adjust-setup needs two or more points that lie on the "
+                "reference plane; mark them with the code PLANE."
+            )
+        return None
+    names = [name for name, on in zip(points.ids, rows, strict=True) if on]
+    return check_orientation(pair, pixels[0][rows], pixels[1][rows], names=names, sigma_px=sigma)
 
 
-def _as_pixels(
-    pair: Pair, points: PointObservations, survey: SurveyInput, unit: str
-) -> PointObservations:
+def _as_pixels(pair: Pair, points: PointObservations, where: str, unit: str) -> PointObservations:
     """Return the points with raw pixels for every kind of input."""
     missing = ~points.has_pixels
-    xy = points.is_cartesian & missing
-    if xy.any():
-        if unit == "px":
-            pixels1, pixels2 = points.xy1, points.xy2
-        else:
-            pixels1, pixels2 = _pixels_of_mm(pair, points.xy1, points.xy2, survey)
-    else:
-        polar = missing & ~np.isnan(points.polar[:, :2]).all(axis=1)
-        if not polar.any():
+    rows = points.is_cartesian & missing
+    xy1, xy2 = points.xy1, points.xy2
+    if not rows.any():
+        rows, unit = missing & points.is_polar, "mm"
+        if not rows.any():
             return points
-        if np.isnan(points.polar[polar & points.use, 2]).any():
+        if np.isnan(points.polar[rows & points.use, 2]).any():
             raise InputError(
-                f"{_where(survey)}: theta is needed beside s1 and s2 to use them with a pair file."
+                f"{where}: theta is needed beside s1 and s2 to use them with a pair file."
             )
         if not np.allclose(pair.image1.nadir, pair.image2.nadir, atol=1e-9):
             raise GeometryError(
-                f"{_where(survey)}: the cameras of this pair have different nadir points, so s1 and"
+                f"{where}: the cameras of this pair have different nadir points, so s1 and"
                 " s2 do not share one direction theta; measure x1 y1 x2 y2 or pixels."
             )
-        angle = np.radians(points.polar[:, 2])
-        direction = np.stack([np.sin(angle), np.cos(angle)], axis=-1)
-        pixels1, pixels2 = _pixels_of_mm(
-            pair,
-            points.polar[:, :1] * direction,
-            points.polar[:, 1:2] * direction,
-            survey,
+        xy1, xy2 = points.polar_xy()
+    if unit != "px":
+        xy1, xy2 = (
+            _pixels_of_mm(photo, key, xy, where)
+            for key, photo, xy in (("image1", pair.image1, xy1), ("image2", pair.image2, xy2))
         )
-        xy = polar
     return replace(
         points,
-        pixels1=np.where(xy[:, None], pixels1, points.pixels1),
-        pixels2=np.where(xy[:, None], pixels2, points.pixels2),
+        pixels1=np.where(rows[:, None], xy1, points.pixels1),
+        pixels2=np.where(rows[:, None], xy2, points.pixels2),
     )
 
 
-def _pixels_of_mm(
-    pair: Pair, xy1: FloatArray, xy2: FloatArray, survey: SurveyInput
-) -> tuple[FloatArray, FloatArray]:
-    """Return pixels of image coordinates in mm from each nadir, y up."""
-    pixels = []
-    for key, photo, xy in (("image1", pair.image1, xy1), ("image2", pair.image2, xy2)):
-        c = photo.extra.get("principal_distance")
-        if not c:
-            raise InputError(
-                f"{_where(survey)}: coordinates in mm need the principal distance of each photo; "
-                f'add "principal_distance" [mm] to {key} in the pair file, or give pixels '
-                "(col1 row1 col2 row2)."
-            )
-        refuse_pixels(xy, float(c), _where(survey))
-        pixels.append(photo.pixels_from_plane(photo.nadir + xy * photo.distance / float(c)))
-    return pixels[0], pixels[1]
+def _pixels_of_mm(photo: Photo, key: str, xy: FloatArray, where: str) -> FloatArray:
+    """Return pixels of image coordinates in mm from the nadir, y up."""
+    c = photo.principal_distance
+    if c is None:
+        raise InputError(
+            f"{where}: coordinates in mm need the principal distance of each photo; "
+            f'add "principal_distance" [mm] to {key} in the pair file, or give pixels '
+            "(col1 row1 col2 row2)."
+        )
+    refuse_pixels(xy, c, where)
+    return photo.pixels_from_plane(photo.nadir + xy * photo.distance / c)
 
 
-def _sigma_from_misfits(pair: Pair, points: PointObservations, remarks: list[str]) -> float | None:
+def _sigma_from_misfits(
+    pair: Pair, points: PointObservations
+) -> tuple[float | None, tuple[str, ...]]:
     """Return the picks' precision from their misfits across the radius, robustly; None if few."""
     rows = points.use & ~np.isnan(np.hstack([points.pixels1, points.pixels2])).any(axis=1)
     if rows.sum() < MINIMUM_FOR_SIGMA:
-        return None
-    found = pair.intersect(points.pixels1[rows], points.pixels2[rows], sigma_px=1.0)
+        return None, ()
+    trial = pair.intersect(points.pixels1[rows], points.pixels2[rows], sigma_px=1.0)
     # 1.4826 x median of |N(0, s)| is s: half of the points may be blunders.
-    spread = 1.4826 * float(np.nanmedian(np.abs(found.standardised)))
+    spread = 1.4826 * float(np.nanmedian(np.abs(trial.standardised)))
     sigma = max(spread, BEST_SIGMA_PX)
-    remarks.append(
+    remark = (
         f"sigma_px = {sigma:.3g} px, found from the misfits of {int(rows.sum())} points across the "
         "radius; --sigma-px sets it."
     )
-    return sigma
+    return sigma, (remark,)
 
 
-def _solve_ideal(
-    points: PointObservations,
-    survey: SurveyInput,
-    values: SetupValues,
-    options: SolveOptions,
-    remarks: list[str],
-) -> _Solved:
+def _solve_ideal(survey: SurveyInput, scale_tolerance: float, *, adjust: bool) -> _SolvedPoints:
     """Solve image coordinates or radial distances with the ideal pair of `Setup`."""
+    points, setup = survey.points, survey.setup
     if points.has_pixels.any() and not points.is_cartesian.any():
-        if values.pitch is None:
+        if setup.pitch is None:
             raise InputError(
-                f"{_where(survey)}: raw pixels (col1 row1 col2 row2) need a pair file: --pair "
+                f"{survey.where}: raw pixels (col1 row1 col2 row2) need a pair file: --pair "
                 "PAIR.pair.json."
             )
         points = replace(points, xy1=points.pixels1, xy2=points.pixels2)
-        values = replace(values, unit="px")
-    chosen = str(options.setup.get("unit") or "")
-    unit = chosen or survey.unit or values.unit or "mm"
-    setup = values.ideal(unit)
-    try:
-        remark = setup.check_scales(options.scale_tolerance)
-    except GeometryError as error:
-        raise GeometryError(f"{values.where}: {error}") from None
-    if remark:
-        remarks.append(remark)
-    refuse_wrong_unit(setup, points, _where(survey), said=survey.unit)
-    exchanged = setup.is_exchanged
-    if exchanged:
+        setup = replace(setup, unit="px")
+    pair = setup.pair()
+    remarks = [setup.check_scales(scale_tolerance)]
+    refuse_wrong_unit(setup, points, survey.where, said=survey.unit)
+    if pair.exchanged:
         remarks.append(exchanged_remark(setup))
         setup, points = setup.exchanged(), points.exchanged()
-    setup, points, check = _check_ideal(
-        setup, points, adjust=options.adjust_setup, remarks=remarks, where=_where(survey)
-    )
+    measured = setup.in_millimetres(points)
+    xy1, xy2 = _all_xy(measured)
+    check = _check_plane(pair, points, (xy1, xy2), None, survey, adjust)
+    if check is not None:
+        remarks += check.remarks
+        if adjust:
+            scale = pair.image1.plane_from_pixel[0, 0]
+            moved = apply_homography(check.matrix, pair.image2.plane_from_pixels(xy2)) / scale
+            only_theta = points.polar * np.array([np.nan, np.nan, 1.0])
+            points = measured = replace(measured, xy1=xy1, xy2=moved, polar=only_theta)
+            c2 = None if setup.c1 is None else setup.c1 * pair.d2 / pair.d1
+            setup = replace(setup, unit="mm", c2=c2)
+            pair = setup.pair()
+            remarks.append(
+                "Set-up: image 2 was corrected by the points of the reference plane; its "
+                "coordinates are now in mm at the scale of image 1."
+            )
     if setup.c1 is None:
         remarks.append("c_1 and c_2 are not given: relief is solved, X and Y are not.")
-    return _Solved(
+    return _SolvedPoints(
         points=points,
-        table=solve_ideal(setup, points),
+        table=solve_points(pair, measured, limits=setup.limits),
+        pair=pair,
         setup=setup,
         check=check,
-        adjusted=options.adjust_setup,
-        exchanged=exchanged,
+        remarks=tuple(filter(None, remarks)),
     )
 
 
-def _check_ideal(
-    setup: SurveySetup, points: PointObservations, *, adjust: bool, remarks: list[str], where: str
-) -> tuple[SurveySetup, PointObservations, SetupCheck | None]:
-    """Report what points of the plane tell; when asked, bring image 2 onto image 1 by it."""
-    rows = points.on_plane
-    if rows.sum() < 2:
-        if adjust:
-            raise InputError(_TOO_FEW_PLANE_POINTS.format(where=where))
-        return setup, points, None
-    xy1, xy2 = _image_mm(setup, points)
-    scale = (setup.scale_number or 1000.0) / 1000.0
-    # A pair whose pixels are millimetres: one check serves both kinds of survey.
-    photos = [
-        Photo(plane_from_pixel=np.diag([factor, factor, 1.0]), nadir=np.zeros(2), distance=d)
-        for factor, d in ((scale, setup.d1), (scale * setup.scale_ratio, setup.d2))
-    ]
-    check = check_setup(
-        Pair(image1=photos[0], image2=photos[1]),
-        xy1[rows],
-        xy2[rows],
-        names=[name for name, on in zip(points.ids, rows, strict=True) if on],
-        sigma_px=setup.precision,
-    )
-    remarks += [f"Set-up: {line}" for line in check.sentences()]
-    if not adjust:
-        return setup, points, check
-    on_wall = xy2 * scale * setup.scale_ratio
-    moved = apply_homography(check.matrix, on_wall) / scale
-    c2 = None if setup.c1 is None else setup.c1 * setup.d2 / setup.d1
-    remarks.append(
-        "Set-up: image 2 was corrected by the points of the reference plane; its coordinates are "
-        "now in mm at the scale of image 1."
-    )
-    nothing = np.full_like(points.polar, np.nan)
-    nothing[:, 2] = points.polar[:, 2]
-    return (
-        replace(setup, unit="mm", c2=c2),
-        replace(points, xy1=xy1, xy2=moved, polar=nothing),
-        check,
-    )
-
-
-def _image_mm(setup: SurveySetup, points: PointObservations) -> tuple[FloatArray, FloatArray]:
-    """Return image coordinates in mm of all points, radial distances turned into x and y."""
-    angle = np.radians(points.polar[:, 2:])
-    direction = np.concatenate([np.sin(angle), np.cos(angle)], axis=1)
+def _all_xy(points: PointObservations) -> tuple[FloatArray, FloatArray]:
+    """Return image coordinates of all points, radial distances turned into x and y."""
     cartesian = points.is_cartesian[:, None]
-    first = np.where(cartesian, setup.image_mm(points.xy1, 1), points.polar[:, :1] * direction)
-    second = np.where(cartesian, setup.image_mm(points.xy2, 2), points.polar[:, 1:2] * direction)
-    return first, second
+    first, second = points.polar_xy()
+    return np.where(cartesian, points.xy1, first), np.where(cartesian, points.xy2, second)

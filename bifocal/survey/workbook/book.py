@@ -3,47 +3,50 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from openpyxl.styles import Alignment
-from openpyxl.worksheet.worksheet import Worksheet
 
-from bifocal.survey.workbook import charts as survey_charts
-from bifocal.survey.workbook import reference_sheets as survey_reference_sheets
-from bifocal.survey.workbook.columns import IDEAL_POINTS, LOG, RESULTS, pair_points
+from bifocal.survey.workbook.charts import charts
+from bifocal.survey.workbook.columns import (
+    IDEAL_POINTS,
+    LOG,
+    RESULTS,
+    SurveyColumn,
+    pair_points,
+)
 from bifocal.survey.workbook.content import (
     STRUCTURED_ROWS,
     SurveyContent,
-    check_cells,
-    control_cells,
     point_cells,
     result_cells,
     setup_cells,
 )
-from bifocal.survey.workbook.defaults import IDEAL_FORMULAS, PAIR_FORMULAS
+from bifocal.survey.workbook.reference_sheets import check, georeference, planning
+from bifocal.survey.workbook.setup_cells import (
+    FORMS,
+    IDEAL_FORMULAS,
+    IDEAL_GROUPS,
+    PAIR_FORMULAS,
+    PAIR_GROUPS,
+    POSITIVE,
+)
 from bifocal.survey.workbook.sheets import (
+    FLAG_COLOURS,
     HEAD_FONT,
     LABEL_FONT,
     BookBuilder,
-    flag_colours,
-    protect,
-    set_up_print,
-    validate,
+    SheetBuilder,
 )
-from bifocal.survey.workbook.words import README, SETUP, word
+from bifocal.survey.workbook.words import readme, term
 from photocore.workbook.cells import CellValue
 from photocore.workbook.grid import column_letters
 from photocore.workbook.newbook import finish_book, new_workbook
 
+Cells = Mapping[str, Sequence[CellValue]]
 #: Row of the keys in `Points` and `Results`.
 HEAD = 4
-_TYPED = "c_1 c_2 d_2 delta_d d_1 input_unit pitch nadir_1_col nadir_1_row nadir_2_col nadir_2_row"
-_LIMITS = "sigma_s sigma_r_max k_off k_plane"
-_DERIVED = "m_1 m_2 k_12 b_lever unit_x unit_y off_x1 off_y1 off_x2 off_y2"
-_FORMS = {"d_1": "0.000", "d_2": "0.000", "delta_d": "0.000", "pitch": "0.000000"}
-_FORMS |= {"m_1": "0.00", "m_2": "0.00", "k_12": "0.000000", "b_lever": "0.000"}
-_FORMS |= {"sigma_s": "0.000000", "sigma_r_max": "0.0000"}
 
 
 def write_book(path: Path | str, content: SurveyContent, *, overwrite: bool = False) -> None:
@@ -75,10 +78,10 @@ def build(content: SurveyContent) -> BookBuilder:
     cells = point_cells(content)
     _points(builder, content, cells)
     _results(builder, content, cells)
-    survey_reference_sheets.check(builder, content, check_cells(content))
-    survey_reference_sheets.georeference(builder, content, control_cells(content))
-    survey_reference_sheets.planning(builder, content)
-    survey_charts.charts(builder, content, cells)
+    check(builder, content)
+    georeference(builder, content)
+    planning(builder, content)
+    charts(builder, content, cells)
     _log(builder, content)
     builder.book.active = builder.book.sheetnames.index("Points" if content.points else "Readme")
     for sheet in builder.book.worksheets:
@@ -88,157 +91,116 @@ def build(content: SurveyContent) -> BookBuilder:
 
 
 def _readme(builder: BookBuilder) -> None:
-    sheet = builder.sheet("Readme", word("Readme", builder.language))
-    sheet.column_dimensions["A"].width = 110
-    for row, line in enumerate(README[builder.language], start=3):
+    sheet = builder.sheet("Readme")
+    sheet.worksheet.column_dimensions["A"].width = 110
+    for row, line in enumerate(readme(builder.language), start=3):
         heading = line.startswith("#")
-        builder.text(sheet, f"A{row}", line.lstrip("#"), HEAD_FONT if heading else None)
-    set_up_print(sheet, builder.language, landscape=False)
+        sheet.text(f"A{row}", line.lstrip("#"), HEAD_FONT if heading else None)
+    sheet.finish(guarded=False)
 
 
 def _setup(builder: BookBuilder, content: SurveyContent) -> None:
-    language = builder.language
-    sheet = builder.sheet("Setup", word("Setup", language), word("type", language))
+    sheet = builder.sheet("Setup", "type")
     for letter, key, width in (
         ("A", "name", 14),
         ("B", "description", 72),
         ("C", "value", 16),
         ("D", "unit", 10),
     ):
-        builder.text(sheet, f"{letter}4", word(key, language), HEAD_FONT)
-        sheet.column_dimensions[letter].width = width
+        sheet.word(f"{letter}4", key, HEAD_FONT)
+        sheet.worksheet.column_dimensions[letter].width = width
     cells = setup_cells(content)
-    if content.is_pair:
-        groups = _pair_groups()
-        formulas = PAIR_FORMULAS
-    else:
-        groups = [_TYPED.split(), _LIMITS.split(), _DERIVED.split()]
-        formulas = IDEAL_FORMULAS
-    derived = set(groups[-1])
+    groups = PAIR_GROUPS if content.is_pair else IDEAL_GROUPS
     row = 5
     for group in groups:
         for name in group:
-            typed = name not in derived
-            _setup_cell(builder, sheet, row, name, cells, formulas, typed=typed, content=content)
+            _setup_cell(sheet, row, name, cells, content, typed=group is not groups[-1])
             row += 1
         row += 1
-    sheet.freeze_panes = "A5"
-    set_up_print(sheet, language, landscape=False)
-    protect(sheet)
-
-
-def _pair_groups() -> list[list[str]]:
-    nadirs = [f"n{image}_{axis}" for image in "12" for axis in "xy"]
-    matrices = [[f"h{k}_{i}{j}" for i in "123" for j in "123"] for k in "12"]
-    head = ["pair_file", "d_2", "delta_d", "d_1", *nadirs, "c_1", "c_2", "pitch", "input_unit"]
-    limits = ["sigma_px", "sigma_r_max", "k_off", "k_plane", "pixel_mm"]
-    return [head, limits, *matrices, ["m_1", "b_lever", "e_x", "e_y", "sigma_s"]]
+    sheet.finish(freeze="A5")
 
 
 def _setup_cell(
-    builder: BookBuilder,
-    sheet: Worksheet,
+    sheet: SheetBuilder,
     row: int,
     name: str,
-    cells: dict[str, CellValue],
-    formulas: Mapping[str, str],
+    cells: Mapping[str, CellValue],
+    content: SurveyContent,
     *,
     typed: bool,
-    content: SurveyContent,
 ) -> None:
     """Write one named value with its description and unit."""
-    unit, *words = SETUP.get(
-        name,
-        ("", *(f"H{name[1]}({name[3]},{name[4]})",) * 3)
-        if name.startswith("h")
-        else ("mm", *_PIXEL_MM),
-    )
-    builder.text(sheet, f"A{row}", name)
-    builder.text(sheet, f"B{row}", words[("en", "it", "de").index(builder.language)])
-    builder.text(sheet, f"D{row}", unit, LABEL_FONT)
-    sheet[f"D{row}"].alignment = Alignment(indent=1)
-    cell, form, value = f"C{row}", _FORMS.get(name, "General"), cells.get(name)
-    own = content.setup
+    known = term("setup", name)
+    matrix = f"H{name[1]}({name[3:4]},{name[4:5]})"
+    sheet.text(f"A{row}", name)
+    sheet.text(f"B{row}", known.in_language(sheet.book.language) if known else matrix)
+    sheet.text(f"D{row}", known.unit if known else "", LABEL_FONT)
+    sheet.worksheet[f"D{row}"].alignment = Alignment(indent=1)
+    cell, form, value = f"C{row}", FORMS.get(name, "General"), cells.get(name)
+    formulas = PAIR_FORMULAS if content.is_pair else IDEAL_FORMULAS
     is_default = {
-        "d_1": content.distances is None,
-        "sigma_s": own is None or own.sigma_s is None,
-        "sigma_r_max": content.sigma_r_max is None and (own is None or own.sigma_r_max is None),
+        "d_1": content.pair is None,
+        "sigma_s": content.setup is None or content.setup.sigma_s is None,
+        "sigma_r_max": content.limits.sigma_r_max is None,
     }
     if not typed or (name in formulas and is_default.get(name, False)):
-        builder.formula(sheet, cell, formulas[name], value, form=form, name=name, editable=typed)
+        sheet.formula(cell, formulas[name], value, form=form, name=name, editable=typed)
         return
-    builder.input(sheet, cell, value, form=form, name=name)
+    sheet.input(cell, value, form=form, name=name)
     if name == "input_unit":
-        sheet[cell].alignment = Alignment(horizontal="right")
-        validate(sheet, cell, choices="mm,px")
-    elif name in ("c_1", "c_2", "d_1", "d_2", "pitch", "sigma_s", "sigma_px", "sigma_r_max"):
-        validate(sheet, cell, above_zero=True)
+        sheet.worksheet[cell].alignment = Alignment(horizontal="right")
+        sheet.validate(cell, choices="mm,px")
     elif name != "pair_file":
-        validate(sheet, cell)
+        sheet.validate(cell, above_zero=name in POSITIVE)
 
 
-_PIXEL_MM = (
-    "One pixel at image scale, typical",
-    "Un pixel alla scala della foto, valore tipico",
-    "Ein Pixel im Bildmaßstab, typisch",
-)
-
-
-def _points(
-    builder: BookBuilder, content: SurveyContent, cells: dict[str, list[CellValue]]
-) -> None:
-    language, rows = builder.language, content.point_rows
+def _points(builder: BookBuilder, content: SurveyContent, cells: Cells) -> None:
     columns = pair_points(undistorted=content.undistorted) if content.is_pair else IDEAL_POINTS
-    help_key = "points_pair" if content.is_pair else "points_how"
-    sheet = builder.sheet("Points", word("Points", language), word(help_key, language))
-    builder.table(
-        sheet,
-        "tblPoints",
-        columns,
-        at=(HEAD, 1),
-        rows=rows,
-        cells=cells,
-        repeat=True,
-        short=rows > STRUCTURED_ROWS,
-    )
-    first, last = HEAD + 1, HEAD + rows
-    letters = {column.key: column_letters(i + 1) for i, column in enumerate(columns)}
-    flag_colours(sheet, letters["flag"], first, last)
-    validate(sheet, f"{letters['use']}{first}:{letters['use']}{last}", choices="1,0")
-    measured = ("col1", "row2") if content.is_pair else ("x1", "s2")
-    validate(sheet, f"{letters[measured[0]]}{first}:{letters[measured[1]]}{last}")
+    note = "points_pair" if content.is_pair else "points_how"
+    sheet = _long_sheet(builder, "Points", note, columns, content.point_rows, cells)
+
+    def area(first: str, last: str) -> str:
+        keys = [column.key for column in columns]
+        left, right = (column_letters(keys.index(key) + 1) for key in (first, last))
+        return f"{left}{HEAD + 1}:{right}{HEAD + content.point_rows}"
+
+    sheet.validate(area("use", "use"), choices="1,0")
+    sheet.validate(area("col1", "row2") if content.is_pair else area("x1", "s2"))
     if not content.is_pair:
-        validate(sheet, f"{letters['theta']}{first}:{letters['theta']}{last}", between=(-360, 360))
-    sheet.freeze_panes = f"B{first}"
-    sheet.sheet_properties.outlinePr.summaryRight = True
-    set_up_print(sheet, language, landscape=True, repeat=f"{HEAD - 1}:{HEAD}")
-    protect(sheet)
+        sheet.validate(area("theta", "theta"), limit=360)
+    sheet.worksheet.sheet_properties.outlinePr.summaryRight = True
 
 
-def _results(
-    builder: BookBuilder, content: SurveyContent, cells: dict[str, list[CellValue]]
-) -> None:
-    language, rows = builder.language, content.point_rows
-    sheet = builder.sheet("Results", word("Results", language), word("results_how", language))
-    builder.table(
-        sheet,
-        "tblResults",
-        RESULTS,
-        at=(HEAD, 1),
-        rows=rows,
-        cells=result_cells(content, cells),
-        repeat=True,
-        short=rows > STRUCTURED_ROWS,
+def _results(builder: BookBuilder, content: SurveyContent, cells: Cells) -> None:
+    results = result_cells(content, cells)
+    _long_sheet(builder, "Results", "results_how", RESULTS, content.point_rows, results)
+
+
+def _long_sheet(
+    builder: BookBuilder,
+    name: str,
+    note: str,
+    columns: Sequence[SurveyColumn],
+    rows: int,
+    cells: Cells,
+) -> SheetBuilder:
+    """Write a sheet that is one table with a row per point, its flags coloured."""
+    sheet = builder.sheet(name, note)
+    short = rows > STRUCTURED_ROWS
+    sheet.table(
+        f"tbl{name}", columns, at=(HEAD, 1), rows=rows, cells=cells, repeat=True, short=short
     )
-    flag_colours(sheet, "I", HEAD + 1, HEAD + rows)
-    sheet.freeze_panes = f"B{HEAD + 1}"
-    set_up_print(sheet, language, landscape=False, repeat=f"{HEAD - 1}:{HEAD}")
-    protect(sheet)
+    flag = column_letters([column.key for column in columns].index("flag") + 1)
+    bold = ("OFF-RADIAL", "NADIR", "CHECK")
+    sheet.colour(f"{flag}{HEAD + 1}:{flag}{HEAD + rows}", FLAG_COLOURS, bold=bold, stop=True)
+    repeat = f"{HEAD - 1}:{HEAD}"
+    sheet.finish(landscape=name == "Points", freeze=f"B{HEAD + 1}", repeat=repeat)
+    return sheet
 
 
 def _log(builder: BookBuilder, content: SurveyContent) -> None:
-    sheet = builder.sheet("Log", word("Log", builder.language))
+    sheet = builder.sheet("Log")
     keys = [column.key for column in LOG]
     cells = {key: [row[i] for row in content.log] for i, key in enumerate(keys)}
-    builder.table(sheet, "tblLog", LOG, at=(HEAD, 1), rows=max(len(content.log), 1), cells=cells)
-    set_up_print(sheet, builder.language, landscape=True)
+    sheet.table("tblLog", LOG, at=(HEAD, 1), rows=max(len(content.log), 1), cells=cells)
+    sheet.finish(landscape=True, guarded=False)

@@ -10,7 +10,7 @@ from openpyxl.styles import Font
 
 from bifocal.survey.workbook.content import CHART_ROWS, SurveyContent
 from bifocal.survey.workbook.reference_sheets import CHECK_HEAD
-from bifocal.survey.workbook.sheets import LABEL_FONT, BookBuilder, protect, set_up_print
+from bifocal.survey.workbook.sheets import LABEL_FONT, BookBuilder
 from bifocal.survey.workbook.words import word
 from photocore.workbook.cells import CellValue
 from photocore.workbook.grid import column_letters
@@ -29,19 +29,19 @@ def charts(
     """Write the chart data and three charts."""
     language = builder.language
     rows = min(content.point_rows, CHART_ROWS)
-    sheet = builder.sheet("Charts", word("Charts", language))
+    sheet = builder.sheet("Charts")
     note = word("chart_data", language).format(n=rows)
-    builder.text(sheet, f"{column_letters(LEFT + 1)}{HEAD - 2}", note, LABEL_FONT)
+    sheet.text(f"{column_letters(LEFT + 1)}{HEAD - 2}", note, LABEL_FONT)
     columns: list[list[CellValue]] = [[] for _ in range(LEFT)]
     for i, key in enumerate(_KEYS):
-        letter = column_letters(LEFT + i + 1)
-        builder.text(sheet, f"{letter}{HEAD}", key, LABEL_FONT)
+        letter = column_letters(LEFT + 1 + i)
+        sheet.text(f"{letter}{HEAD}", key, LABEL_FONT)
         at = f"ROW()-{HEAD}"
         found = f"INDEX(tblPoints[{key}],{at})"
-        builder.formula(
-            sheet, f"{letter}{HEAD + 1}", f"IF(ISNUMBER({found}),{found},NA())", None, form="0.000"
+        sheet.formula(
+            f"{letter}{HEAD + 1}", f"IF(ISNUMBER({found}),{found},NA())", None, form="0.000"
         )
-        sheet[f"{letter}{HEAD + 1}"].font = Font(name="Calibri", color="A6A6A6", size=8)
+        sheet.worksheet[f"{letter}{HEAD + 1}"].font = Font(name="Calibri", color="A6A6A6", size=8)
         listed: list[CellValue] = [
             value if isinstance(value, int | float) else float("nan")
             for value in cells.get(key, [])[:rows]
@@ -50,20 +50,19 @@ def charts(
     builder.blocks["Charts"] = RowBlock(row=HEAD + 1, columns=columns)
     last = HEAD + rows
     data = [
-        Reference(sheet, min_col=LEFT + 1 + i, min_row=HEAD + 1, max_row=last)
+        Reference(sheet.worksheet, min_col=LEFT + 1 + i, min_row=HEAD + 1, max_row=last)
         for i in range(len(_KEYS))
     ]
     plan = _scatter(word("chart_plan", language), "X [m]", "Y [m]", data[0], data[1])
     _equal_scales(plan, cells)
-    sheet.add_chart(plan, "A3")
+    sheet.worksheet.add_chart(plan, "A3")
     sigma = _scatter(word("chart_sigma", language), "s' [mm]", "sigma_r [m]", data[2], data[3])
     sigma.height, sigma.width = 8, 16
-    sheet.add_chart(sigma, "A30")
+    sheet.worksheet.add_chart(sigma, "A30")
     _errors(builder, content)
-    set_up_print(sheet, language, landscape=False)
-    sheet.print_area = "A1:J66"
-    sheet.page_setup.fitToHeight = 1
-    protect(sheet)
+    sheet.finish()
+    sheet.worksheet.print_area = "A1:J66"
+    sheet.worksheet.page_setup.fitToHeight = 1
 
 
 def _scatter(title: str, x_title: str, y_title: str, x: Reference, y: Reference) -> ScatterChart:

@@ -10,11 +10,14 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 
-from bifocal.survey.setup import ON_PLANE_SIGMAS
+from bifocal.model.flags import FlagLimits
+
+#: Columns of names and words, not of numbers.
+TEXT_KEYS = ("id", "code", "note")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Column:
+class SurveyColumn:
     """One column of a table.
 
     Attributes
@@ -31,6 +34,8 @@ class Column:
         In characters.
     folded : bool
         Whether the column is grouped and folded away: a step on the way, not a result.
+    spare : int or None
+        What the formula shows in rows that hold no point; None where it shows nothing.
     """
 
     key: str
@@ -39,6 +44,7 @@ class Column:
     places: int | None = None
     width: float = 10.0
     folded: bool = False
+    spare: int | None = None
 
 
 def row_formula(table: str, text: str) -> str:
@@ -46,8 +52,13 @@ def row_formula(table: str, text: str) -> str:
     return "=" + re.sub(r"\[@(\w+)\]", rf"{table}[[#This Row],[\1]]", text)
 
 
-def _f(key: str, formula: str, places: int | None = None, **more: object) -> Column:
-    return Column(key=key, kind="formula", formula=formula, places=places, **more)  # type: ignore[arg-type]
+def _f(key: str, formula: str, places: int | None = None, **more: object) -> SurveyColumn:
+    return SurveyColumn(key=key, kind="formula", formula=formula, places=places, **more)  # type: ignore[arg-type]
+
+
+def _of_r(key: str, formula: str) -> SurveyColumn:
+    """Return a column that is blank where relief is blank."""
+    return _f(key, f'IF([@r]="","",{formula})', 4)
 
 
 _XY = "[@x1],[@y1],[@x2],[@y2]"
@@ -87,13 +98,13 @@ _RELIEF = (
 )
 
 #: The `Points` table of an ideal pair.
-IDEAL_POINTS: tuple[Column, ...] = (
-    Column(key="id", width=12),
-    *(Column(key=key, places=4) for key in ("x1", "y1", "x2", "y2", "s1", "s2")),
-    Column(key="theta", places=4, width=11),
-    Column(key="use", width=6),
-    Column(key="code", width=10),
-    Column(key="note", width=18),
+IDEAL_POINTS: tuple[SurveyColumn, ...] = (
+    SurveyColumn(key="id", width=12),
+    *(SurveyColumn(key=key, places=4) for key in ("x1", "y1", "x2", "y2", "s1", "s2")),
+    SurveyColumn(key="theta", places=4, width=11),
+    SurveyColumn(key="use", width=6),
+    SurveyColumn(key="code", width=10),
+    SurveyColumn(key="note", width=18),
     _f("s1_used", _radius(_X1, _Y1, "[@s1]", ""), 4, folded=True),
     _f("s2_used", _radius(_X2, _Y2, "[@s2]", "*k_12"), 4, folded=True),
     _f(
@@ -104,31 +115,26 @@ IDEAL_POINTS: tuple[Column, ...] = (
         folded=True,
     ),
     *_RELIEF,
-    _f("e1", 'IF([@r]="","",[@s1_used]*[@r]/d_1)', 4),
-    _f("e2", 'IF([@r]="","",[@s2_used]*[@r]/d_2)', 4),
-    _f("s_c", 'IF([@r]="","",[@s1_used]-[@e1])', 4),
-    _f(
-        "X",
-        'IF(OR([@den]="",[@theta_used]="",m_1=""),"",[@s_c]*SIN(RADIANS([@theta_used]))*m_1/1000)',
-        4,
+    _of_r("e1", "[@s1_used]*[@r]/d_1"),
+    _of_r("e2", "[@s2_used]*[@r]/d_2"),
+    _of_r("s_c", "[@s1_used]-[@e1]"),
+    *(
+        _f(
+            axis,
+            'IF(OR([@den]="",[@theta_used]="",m_1=""),"",'
+            f"[@s_c]*{turn}(RADIANS([@theta_used]))*m_1/1000)",
+            4,
+        )
+        for axis, turn in (("X", "SIN"), ("Y", "COS"))
     ),
-    _f(
-        "Y",
-        'IF(OR([@den]="",[@theta_used]="",m_1=""),"",[@s_c]*COS(RADIANS([@theta_used]))*m_1/1000)',
-        4,
-    ),
-    _f("Z", 'IF([@r]="","",[@r])', 4),
+    _of_r("Z", "[@r]"),
     _f(
         "q",
         f"IF(COUNT({_XY})=4,IF([@s1_used]>0,"
         f'(({_X1})*({_Y2})-({_Y1})*({_X2}))*k_12/[@s1_used],0),"")',
         5,
     ),
-    _f(
-        "sigma_r",
-        'IF([@r]="","",sigma_s*SQRT((1-[@r]/d_1)^2+(k_12*(1-[@r]/d_2))^2)/ABS([@den]))',
-        4,
-    ),
+    _of_r("sigma_r", "sigma_s*SQRT((1-[@r]/d_1)^2+(k_12*(1-[@r]/d_2))^2)/ABS([@den])"),
     _f(
         "flag",
         _flag(
@@ -140,7 +146,7 @@ IDEAL_POINTS: tuple[Column, ...] = (
 )
 
 
-def pair_points(*, undistorted: bool) -> tuple[Column, ...]:
+def pair_points(*, undistorted: bool) -> tuple[SurveyColumn, ...]:
     """Return the `Points` table of a general pair measured in raw pixels.
 
     Parameters
@@ -164,31 +170,26 @@ def pair_points(*, undistorted: bool) -> tuple[Column, ...]:
                     4,
                 )
             )
-    moved = {
-        f"{axis}{image}": f"([@{axis}{image}]-[@q]*[@g{image}{axis}])"
-        for image in (1, 2)
-        for axis in ("x", "y")
-    }
-    own = {
-        f"{axis}{image}": f"({moved[f'{axis}{image}']}-(n{image}_{axis}-e_{axis})*1000/m_1)"
-        for image in (1, 2)
-        for axis in ("x", "y")
-    }
+    moved, own = {}, {}
+    for image, axis in ((1, "x"), (1, "y"), (2, "x"), (2, "y")):
+        at = f"{axis}{image}"
+        moved[at] = f"([@{at}]-[@q]*[@g{image}{axis}])"
+        own[at] = f"({moved[at]}-(n{image}_{axis}-e_{axis})*1000/m_1)"
 
     def radius(image: int, parts: dict[str, str]) -> str:
         return f"SQRT({parts[f'x{image}']}^2+{parts[f'y{image}']}^2)"
 
     def place(axis: str) -> str:
-        return f'IF([@r]="","",e_{axis}+({moved[f"{axis}1"]}-{own[f"{axis}1"]}*[@r]/d_1)*m_1/1000)'
+        return f"e_{axis}+({moved[f'{axis}1']}-{own[f'{axis}1']}*[@r]/d_1)*m_1/1000"
 
     return (
-        Column(key="id", width=12),
-        *(Column(key=key, places=3) for key in ("col1", "row1", "col2", "row2")),
-        Column(key="use", width=6),
-        Column(key="code", width=10),
-        Column(key="note", width=18),
+        SurveyColumn(key="id", width=12),
+        *(SurveyColumn(key=key, places=3) for key in ("col1", "row1", "col2", "row2")),
+        SurveyColumn(key="use", width=6),
+        SurveyColumn(key="code", width=10),
+        SurveyColumn(key="note", width=18),
         *(
-            Column(key=f"u{key}", kind="value", places=3, folded=True)
+            SurveyColumn(key=f"u{key}", kind="value", places=3, folded=True)
             for key in ("col1", "row1", "col2", "row2")
             if undistorted
         ),
@@ -200,7 +201,7 @@ def pair_points(*, undistorted: bool) -> tuple[Column, ...]:
             5,
         ),
         *(
-            Column(key=key, kind="value", places=6, folded=True)
+            SurveyColumn(key=key, kind="value", places=6, folded=True)
             for key in ("g1x", "g1y", "g2x", "g2y", "k_q", "k_r")
         ),
         _f("s1_used", f'IF([@q]="","",{radius(1, moved)})', 4, folded=True),
@@ -212,13 +213,13 @@ def pair_points(*, undistorted: bool) -> tuple[Column, ...]:
             folded=True,
         ),
         *_RELIEF,
-        _f("e1", f'IF([@r]="","",{radius(1, own)}*[@r]/d_1)', 4),
-        _f("e2", f'IF([@r]="","",{radius(2, own)}*[@r]/d_2)', 4),
-        _f("s_c", f'IF([@r]="","",{radius(1, own)}-[@e1])', 4),
-        _f("X", place("x"), 4),
-        _f("Y", place("y"), 4),
-        _f("Z", 'IF([@r]="","",[@r])', 4),
-        _f("sigma_r", 'IF([@r]="","",IF(ISNUMBER([@r]),sigma_px*[@k_r],NA()))', 4),
+        _of_r("e1", f"{radius(1, own)}*[@r]/d_1"),
+        _of_r("e2", f"{radius(2, own)}*[@r]/d_2"),
+        _of_r("s_c", f"{radius(1, own)}-[@e1]"),
+        _of_r("X", place("x")),
+        _of_r("Y", place("y")),
+        _of_r("Z", "[@r]"),
+        _of_r("sigma_r", "IF(ISNUMBER([@r]),sigma_px*[@k_r],NA())"),
         _f(
             "flag",
             _flag(_XY, "ABS(N([@q]))>k_off*sigma_px*N([@k_q])").replace(
@@ -247,7 +248,7 @@ def _world(row: int, name: str) -> str:
     return f'IF(AND(ISNUMBER(g_k),COUNT([@X],[@Y],[@Z])=3),g_{name}0+g_k*({turned}),"")'
 
 
-RESULTS: tuple[Column, ...] = (
+RESULTS: tuple[SurveyColumn, ...] = (
     _f("id", _text_from_points("id"), width=12),
     *(_f(key, _from_points(key), 3, width=9) for key in "XYZ"),
     *(_f(name, _world(row, name), 3, width=13) for row, name in enumerate("ENH", start=1)),
@@ -264,10 +265,10 @@ def _look_up(axis: str) -> str:
     return f'IF([@id]="","",IFERROR(IF(ISNUMBER({cell}),{cell},""),""))'
 
 
-CHECK: tuple[Column, ...] = (
-    Column(key="id", width=12),
-    *(Column(key=f"{axis}_ref", places=4, width=11) for axis in "XYZ"),
-    Column(key="use", width=6),
+CHECK: tuple[SurveyColumn, ...] = (
+    SurveyColumn(key="id", width=12),
+    *(SurveyColumn(key=f"{axis}_ref", places=4, width=11) for axis in "XYZ"),
+    SurveyColumn(key="use", width=6),
     *(_f(axis, _look_up(axis), 4) for axis in "XYZ"),
     *(
         _f(
@@ -280,11 +281,11 @@ CHECK: tuple[Column, ...] = (
     ),
 )
 
-GEOREFERENCE: tuple[Column, ...] = (
-    Column(key="id", width=12),
-    *(Column(key=axis, places=4, width=14) for axis in "ENH"),
-    Column(key="use", width=6),
-    Column(key="found_bad", kind="value", width=9),
+GEOREFERENCE: tuple[SurveyColumn, ...] = (
+    SurveyColumn(key="id", width=12),
+    *(SurveyColumn(key=axis, places=4, width=14) for axis in "ENH"),
+    SurveyColumn(key="use", width=6),
+    SurveyColumn(key="found_bad", kind="value", width=9),
     *(_f(axis, _look_up(axis), 4) for axis in "XYZ"),
     _f(
         "w",
@@ -292,11 +293,18 @@ GEOREFERENCE: tuple[Column, ...] = (
         'COUNT([@X],[@Y],[@Z],[@E],[@N])=5,OR(g_used="2D",COUNT([@H])=1)),1,0)',
         width=7,
         folded=True,
+        spare=0,
     ),
-    *(_f(f"c{axis}", f"IF([@w]=1,[@{axis}]-g_{axis}0,0)", 4, folded=True) for axis in "XYZ"),
     # From a whole-metre origin: exact, whatever the size of the coordinates.
-    *(_f(f"c{axis}", f"IF([@w]=1,[@{axis}]-g_{axis}r,0)", 4, folded=True) for axis in "EN"),
-    _f("cH", 'IF(AND([@w]=1,g_used<>"2D"),[@H]-g_Hr,0)', 4, folded=True),
+    *(
+        _f(f"c{axis}", f"IF({used},[@{axis}]-g_{axis}{origin},0)", 4, folded=True, spare=0)
+        for axes, origin, used in (
+            ("XYZ", "0", "[@w]=1"),
+            ("EN", "r", "[@w]=1"),
+            ("H", "r", 'AND([@w]=1,g_used<>"2D")'),
+        )
+        for axis in axes
+    ),
     *(
         _f(
             f"v{name}",
@@ -312,11 +320,11 @@ GEOREFERENCE: tuple[Column, ...] = (
 
 #: Relief whose area of uncertainty the sheet `Planning` shows. [cm]
 PLANNED_RELIEF = (1, 2, 5, 10, 20, 50, 100)
-UNCERTAINTY: tuple[Column, ...] = (
-    Column(key="relief_cm", width=13),
+UNCERTAINTY: tuple[SurveyColumn, ...] = (
+    SurveyColumn(key="relief_cm", width=13),
     _f(
         "radius_mm",
-        f'IF(COUNT(d_1,d_2)<2,"",{ON_PLANE_SIGMAS:g}*SQRT(2)*sigma_s*(d_1-[@relief_cm]/100)*'
+        f'IF(COUNT(d_1,d_2)<2,"",{FlagLimits().on_plane:g}*SQRT(2)*sigma_s*(d_1-[@relief_cm]/100)*'
         "(d_2-[@relief_cm]/100)/([@relief_cm]/100*ABS(d_1-d_2)))",
         2,
         width=18,
@@ -331,8 +339,8 @@ UNCERTAINTY: tuple[Column, ...] = (
     ),
 )
 FRAME_SHARES = (10, 20, 30, 40, 50, 60, 70, 80, 90, 100)
-OVER_FRAME: tuple[Column, ...] = (
-    Column(key="share", width=13),
+OVER_FRAME: tuple[SurveyColumn, ...] = (
+    SurveyColumn(key="share", width=13),
     _f(
         "s_mm",
         'IF(COUNT(sensor_w,sensor_h)<2,"",[@share]/200*SQRT(sensor_w^2+sensor_h^2))',
@@ -348,12 +356,12 @@ OVER_FRAME: tuple[Column, ...] = (
 )
 
 
-def verdict_columns(holds: str, fails: str) -> tuple[Column, ...]:
+def verdict_columns(holds: str, fails: str) -> tuple[SurveyColumn, ...]:
     """Return the table of verdicts with its two words in the workbook's language."""
     return (
-        Column(key="rule", width=16),
-        Column(key="scale", width=9),
-        Column(key="tolerance", places=1, width=11),
+        SurveyColumn(key="rule", width=16),
+        SurveyColumn(key="scale", width=9),
+        SurveyColumn(key="tolerance", places=1, width=11),
         _f(
             "verdict",
             f'IF(check_worst="","",IF(check_worst<=[@tolerance]/1000,"{holds}","{fails}"))',
@@ -362,7 +370,7 @@ def verdict_columns(holds: str, fails: str) -> tuple[Column, ...]:
     )
 
 
-LOG: tuple[Column, ...] = tuple(
-    Column(key=key, kind="value", width=width)
+LOG: tuple[SurveyColumn, ...] = tuple(
+    SurveyColumn(key=key, kind="value", width=width)
     for key, width in (("time", 12), ("program", 16), ("what", 40), ("file", 30), ("sha256", 68))
 )

@@ -7,12 +7,14 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from bifocal.model.pair import SIGMA_PIXEL, UNCERTAIN_SHARE, Pair
+from bifocal.model.flags import FlagLimits
+from bifocal.model.pair import Pair, Photo
 from bifocal.survey.observations import PointObservations
 from bifocal.survey.reference import CheckResult, Georeference, KnownPoints
 from bifocal.survey.relief_table import ReliefTable
-from bifocal.survey.setup import OFF_RADIAL_SIGMAS, ON_PLANE_SIGMAS, SurveySetup
-from bifocal.survey.tolerances import RULES, SCALES, ToleranceRule
+from bifocal.survey.setup import SurveySetup
+from bifocal.survey.tolerances import RULES, ToleranceRule
+from bifocal.survey.workbook.setup_cells import MATRICES, NADIRS
 from photocore.arrays import FloatArray
 from photocore.workbook.cells import CellValue
 
@@ -35,7 +37,9 @@ class SurveyContent:
     setup : SurveySetup or None
         Of an ideal pair; None in an empty template and for a general pair.
     pair : Pair or None
-        For points measured in raw pixels.
+        The geometry; None in an empty template.
+    as_given : bool
+        Whether points and set-up stand in the order in which an exchanged pair was given.
     pair_file : str
         Its file, as seen from the workbook.
     sigma_px : float or None
@@ -52,10 +56,8 @@ class SurveyContent:
         For the verdict.
     sensor : tuple of float or None
         Width and height. [mm]
-    flag_sigmas : tuple of float
-        Limits of OFF-RADIAL and ON-PLANE. [sigma]
-    sigma_r_max : float or None
-        Limit of UNCERTAIN for a general pair; default 2 % of d2. [m]
+    limits : FlagLimits
+        Where the flags begin.
     log : sequence of tuple of str
         Rows of the sheet `Log`: date, program, what, file, SHA-256.
     rows : int
@@ -65,6 +67,7 @@ class SurveyContent:
     language: str = "en"
     setup: SurveySetup | None = None
     pair: Pair | None = None
+    as_given: bool = False
     pair_file: str = ""
     sigma_px: float | None = None
     points: PointObservations | None = None
@@ -76,29 +79,26 @@ class SurveyContent:
     model: str = "auto"
     rules: tuple[ToleranceRule, ...] = RULES
     sensor: tuple[float, float] | None = None
-    flag_sigmas: tuple[float, float] = (OFF_RADIAL_SIGMAS, ON_PLANE_SIGMAS)
-    sigma_r_max: float | None = None
+    limits: FlagLimits = field(default_factory=FlagLimits)
     log: Sequence[tuple[str, str, str, str, str]] = ()
     rows: int = POINT_ROWS
 
     @property
     def is_pair(self) -> bool:
         """Whether the points are raw pixels of a general pair."""
-        return self.pair is not None
+        return self.pair is not None and self.setup is None
+
+    @property
+    def photos(self) -> tuple[Photo, ...]:
+        """Both photos in the order of the workbook; none in an empty template."""
+        if self.pair is None:
+            return ()
+        return self.pair.as_given if self.as_given else (self.pair.image1, self.pair.image2)
 
     @property
     def undistorted(self) -> bool:
         """Whether raw pixels are freed of lens distortion beside the raw ones."""
-        return self.pair is not None and any(
-            photo.lens is not None for photo in (self.pair.image1, self.pair.image2)
-        )
-
-    @property
-    def distances(self) -> tuple[float, float] | None:
-        """d1 and d2. [m]"""
-        if self.pair is not None:
-            return self.pair.image1.distance, self.pair.image2.distance
-        return None if self.setup is None else (self.setup.d1, self.setup.d2)
+        return any(photo.lens is not None for photo in self.photos)
 
     @property
     def point_rows(self) -> int:
@@ -127,14 +127,6 @@ def name_cell(name: str) -> CellValue:
     return int(name) if name.isdecimal() and len(name) < 10 and str(int(name)) == name else name
 
 
-def numbers(values: FloatArray, blank: Sequence[bool] | None = None) -> list[CellValue]:
-    """Return cell values; blank where asked for, #N/A where NaN otherwise."""
-    listed: list[CellValue] = values.tolist()
-    if blank is None:
-        return listed
-    return [None if empty else value for value, empty in zip(listed, blank, strict=True)]
-
-
 def inputs(values: FloatArray) -> list[CellValue]:
     """Return typed numbers; blank where NaN."""
     return [None if value != value else value for value in values.tolist()]
@@ -151,39 +143,38 @@ def point_cells(content: SurveyContent) -> dict[str, list[CellValue]]:
         "code": list(points.code),
         "note": list(points.note),
     }
-    groups = (
+    groups = [
         (("x1", "y1"), points.xy1),
         (("x2", "y2"), points.xy2),
         (("s1", "s2", "theta"), points.polar),
         (("col1", "row1"), points.pixels1),
         (("col2", "row2"), points.pixels2),
-    )
+    ]
+    if content.undistorted:
+        for image, photo, raw in zip(
+            "12", content.photos, (points.pixels1, points.pixels2), strict=True
+        ):
+            ideal = raw if photo.lens is None else photo.lens.undistort(raw)
+            groups.append(((f"ucol{image}", f"urow{image}"), ideal))
     for keys, array in groups:
         cells |= {key: inputs(array[:, i]) for i, key in enumerate(keys)}
-    if content.undistorted and content.pair is not None:
-        both = (
-            (content.pair.image1, points.pixels1, "1"),
-            (content.pair.image2, points.pixels2, "2"),
-        )
-        for photo, raw, image in both:
-            ideal = raw if photo.lens is None else photo.lens.undistort(raw)
-            cells |= {f"ucol{image}": inputs(ideal[:, 0]), f"urow{image}": inputs(ideal[:, 1])}
     if table is None:
         return cells
-    incomplete = np.isnan(table["s1_used"]).tolist()
+    # A formula shows nothing where a measurement is missing, #N/A where relief is undefined.
+    incomplete = np.isnan(table["s1_used"])
+    placeless = incomplete | np.isnan(table["theta_used"])
+    if not content.is_pair and table.image_scale is None:
+        placeless[:] = True
     for key, values in table.columns.items():
-        cells[key] = numbers(values, incomplete)
-    if table.carried:
-        for key, values in table.carried.items():
-            cells[key] = inputs(values)
-        cells["q"] = inputs(table["q"])
-    else:
-        cells["q"] = inputs(table["q"])
-        no_direction = np.isnan(table["theta_used"])
-        cells["theta_used"] = inputs(table["theta_used"])
-        lost = no_direction | np.isnan(table["s1_used"]) | (table.image_scale is None)
-        cells |= {key: numbers(table[key], lost.tolist()) for key in ("X", "Y")}
-    typed = points.has_pixels | points.is_cartesian | ~np.isnan(points.polar[:, :2]).all(axis=1)
+        blank = placeless if key in ("X", "Y") else incomplete
+        if key in ("q", "theta_used"):
+            blank = np.isnan(values)
+        cells[key] = [
+            None if empty else value
+            for empty, value in zip(blank.tolist(), values.tolist(), strict=True)
+        ]
+    cells |= {key: inputs(values) for key, values in table.carried.items()}
+    typed = points.has_pixels | points.is_cartesian | points.is_polar
     cells["flag"] = [
         flag if given else None for flag, given in zip(table.flags, typed, strict=True)
     ]
@@ -191,8 +182,8 @@ def point_cells(content: SurveyContent) -> dict[str, list[CellValue]]:
 
 
 def result_cells(
-    content: SurveyContent, cells: Mapping[str, list[CellValue]]
-) -> dict[str, list[CellValue]]:
+    content: SurveyContent, cells: Mapping[str, Sequence[CellValue]]
+) -> dict[str, Sequence[CellValue]]:
     """Return every column of `Results` by key."""
     if content.table is None:
         return {}
@@ -235,17 +226,16 @@ def control_cells(content: SurveyContent) -> dict[str, list[CellValue]]:
     if geo is None:
         return cells
     cells["found_bad"] = [0 if name in geo.bad else None for name in geo.ids]
-    used = geo.used
-    source = np.where(used[:, None], geo.found - geo.world_from_wall.source_centre, 0.0)
-    target = np.where(used[:, None], control.xyz - geo.origin, 0.0)
+    used, fit = geo.used, geo.world_from_wall
+    centred = geo.found - fit.source_centre
+    near = control.xyz - geo.origin
+    residuals = near - (geo.offset + fit.scale * (centred @ fit.rotation.T))
     if geo.model == "2D":
-        target[:, 2] = 0.0
-    turned = (geo.found - geo.world_from_wall.source_centre) @ geo.world_from_wall.rotation.T
-    residuals = control.xyz - geo.origin - (geo.offset + geo.world_from_wall.scale * turned)
+        near[:, 2] = 0.0
     for i, (axis, world) in enumerate(zip("XYZ", "ENH", strict=True)):
         cells[axis] = inputs(geo.found[:, i])
-        cells[f"c{axis}"] = inputs(source[:, i])
-        cells[f"c{world}"] = inputs(target[:, i])
+        cells[f"c{axis}"] = inputs(np.where(used, centred[:, i], 0.0))
+        cells[f"c{world}"] = inputs(np.where(used, near[:, i], 0.0))
         cells[f"v{world}"] = inputs(residuals[:, i])
     cells["w"] = [int(value) for value in used]
     return cells
@@ -253,84 +243,63 @@ def control_cells(content: SurveyContent) -> dict[str, list[CellValue]]:
 
 def setup_cells(content: SurveyContent) -> dict[str, CellValue]:
     """Return the value of every named cell of `Setup`; what is absent is blank."""
-    setup, pair = content.setup, content.pair
-    off, near = content.flag_sigmas
-    cells: dict[str, CellValue] = {"input_unit": "mm", "k_off": off, "k_plane": near}
-    ratio = 1.0
-    if setup is not None:
+    limits, setup = content.limits, content.setup
+    cells: dict[str, CellValue] = {
+        "input_unit": "mm", "k_off": limits.off_radial, "k_plane": limits.on_plane,
+        "unit_x": 1, "unit_y": 1, "k_12": 1.0,
+        **{f"off_{axis}{image}": 0 for axis in "xy" for image in "12"},
+    }  # fmt: skip
+    if content.pair is None:
+        return cells
+    for image, photo in enumerate(content.photos, start=1):
         cells |= {
-            "c_1": setup.c1,
-            "c_2": setup.c2,
-            "pitch": setup.pitch,
-            "input_unit": setup.unit,
-            "sigma_s": setup.precision,
-            "sigma_r_max": setup.relief_limit,
-            "m_1": setup.scale_number,
+            f"d_{image}": photo.distance,
+            f"c_{image}": photo.principal_distance,
+            f"m_{image}": photo.scale_number,
         }
-        for image, nadir in ((1, setup.nadir1), (2, setup.nadir2)):
-            cells |= {f"nadir_{image}_col": nadir[0], f"nadir_{image}_row": nadir[1]}
-        if setup.c2 is not None:
-            cells["m_2"] = 1000.0 * setup.d2 / setup.c2
-        ratio = setup.scale_ratio
-    if pair is not None:
-        cells |= _pair_cells(content, pair)
-    pixels = cells["input_unit"] == "px" and setup is not None
-    pitch = setup.pitch if setup is not None and setup.pitch is not None else 0.0
-    cells |= {"unit_x": pitch if pixels else 1, "unit_y": -pitch if pixels else 1, "k_12": ratio}
-    for image in (1, 2):
-        for axis, part in (("x", "col"), ("y", "row")):
-            value = cells.get(f"nadir_{image}_{part}")
-            cells[f"off_{axis}{image}"] = (value or 0) if pixels else 0
-    if content.distances is not None:
-        d1, d2 = content.distances
-        cells |= {"d_1": d1, "d_2": d2, "b_lever": d1 * d2 / (d1 - d2)}
+    first, second = content.photos
+    d1, d2 = first.distance, second.distance
+    cells |= {
+        "b_lever": d1 * d2 / (d1 - d2),
+        "sigma_r_max": limits.relief_limit(content.pair.d2),
+    }
+    if setup is None:
+        return cells | _pair_cells(content, first, second)
+    if first.scale_number is not None and second.scale_number is not None:
+        cells["k_12"] = second.scale_number / first.scale_number
+    cells |= {"pitch": setup.pitch, "input_unit": setup.unit, "sigma_s": setup.precision}
+    if setup.unit == "px" and setup.pitch is not None:
+        cells |= {"unit_x": setup.pitch, "unit_y": -setup.pitch}
+    for image, nadir in ((1, setup.nadir1), (2, setup.nadir2)):
+        column, row = nadir or (0.0, 0.0)
+        cells |= {f"nadir_{image}_col": column, f"nadir_{image}_row": row}
+        if setup.unit == "px":
+            cells |= {f"off_x{image}": column, f"off_y{image}": row}
     return cells
 
 
-def _pair_cells(content: SurveyContent, pair: Pair) -> dict[str, CellValue]:
+def _pair_cells(content: SurveyContent, first: Photo, second: Photo) -> dict[str, CellValue]:
     """Return the cells of `Setup` that only a general pair has."""
-    far, near = pair.image1, pair.image2
-    scale = content.table.image_scale if content.table is not None else None
-    own = far.extra.get("principal_distance")
-    if scale is None and own:
-        scale = 1000.0 * far.distance / float(own)
-    sigma = content.sigma_px or far.sigma_pixel or near.sigma_pixel or SIGMA_PIXEL
-    centre = pair.zoom_centre.tolist()
+    assert content.pair is not None
+    scale = first.scale_number or 1000.0
+    sigma = first.precision(content.sigma_px or first.sigma_pixel or second.sigma_pixel)
     cells: dict[str, CellValue] = {
         "pair_file": content.pair_file,
         "input_unit": "px",
-        "c_1": None if scale is None else 1000.0 * far.distance / scale,
-        "c_2": near.extra.get("principal_distance"),
-        "pitch": far.extra.get("pixel_size"),
+        "pitch": first.pixel_size,
         "sigma_px": sigma,
-        "sigma_r_max": content.sigma_r_max or UNCERTAIN_SHARE * near.distance,
-        "m_1": 1000.0 if scale is None else scale,
-        "e_x": centre[0],
-        "e_y": centre[1],
+        "m_1": scale,
     }
+    cells |= dict(zip(("e_x", "e_y"), content.pair.zoom_centre.tolist(), strict=True))
     spacing = []
-    for image, photo in ((1, far), (2, near)):
-        cells |= {f"n{image}_{axis}": float(photo.nadir[i]) for i, axis in enumerate("xy")}
-        for i in range(3):
-            for j in range(3):
-                cells[f"h{image}_{i + 1}{j + 1}"] = float(photo.plane_from_pixel[i, j])
+    for image, photo in enumerate((first, second)):
+        cells |= dict(zip(NADIRS[image], photo.nadir.tolist(), strict=True))
+        cells |= dict(zip(MATRICES[image], photo.plane_from_pixel.ravel().tolist(), strict=True))
         if content.points is not None and len(content.points):
-            pixels = content.points.pixels1 if image == 1 else content.points.pixels2
+            pixels = content.points.pixels2 if image else content.points.pixels1
             jacobian = photo.metres_per_pixel(pixels[~np.isnan(pixels).any(axis=1)])
             if len(jacobian):
                 spacing.append(float(np.median(np.sqrt((jacobian**2).sum(axis=(1, 2)) / 2))))
     # What one pixel is on the wall, typically, in millimetres of the image scale.
-    typical = sum(spacing) / len(spacing) if spacing else 0.0
-    cells["pixel_mm"] = typical * 1000.0 / float(cells["m_1"] or 1000.0)
-    cells["sigma_s"] = sigma * float(cells["pixel_mm"] or 0.0)
-    return cells
-
-
-def verdict_rows(content: SurveyContent) -> list[tuple[ToleranceRule, int, float]]:
-    """Return rule, scale and tolerance [m] of every row of the verdict."""
-    return [
-        (rule, scale, limit)
-        for rule in content.rules
-        for scale in SCALES
-        if (limit := rule.tolerance(scale)) is not None
-    ]
+    pixel = (sum(spacing) / len(spacing) if spacing else 0.0) * 1000.0 / scale
+    return cells | {"pixel_mm": pixel, "sigma_s": sigma * pixel}

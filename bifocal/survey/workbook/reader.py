@@ -5,26 +5,33 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Literal
 
 import numpy as np
 
-from bifocal.model.lens import Lens
-from bifocal.model.pair import Pair, Photo
 from bifocal.survey.observations import PointObservations
 from bifocal.survey.reference import KnownPoints
+from bifocal.survey.setup import SurveySetup
 from bifocal.survey.workbook.known_reader import (
-    metres_of,
+    TO_M,
+    factor_of,
     read_known,
     refuse_absurd,
+    understood,
     unit_error,
     with_measured,
 )
-from bifocal.survey.workbook.setup_reader import SetupValues, is_general, read_setup
-from bifocal.survey.workbook.words import ALIASES, COLUMNS, LANGUAGES, WORDS
+from bifocal.survey.workbook.setup_reader import is_general, read_setup
+from bifocal.survey.workbook.words import LANGUAGES, word
 from photocore.arrays import BoolArray, FloatArray
 from photocore.errors import CellError, InputError, WorkbookError
-from photocore.tables import Column, Table, open_tables, read_named_values, read_table
+from photocore.tables import (
+    Column,
+    Table,
+    open_tables,
+    parse_column_map,
+    read_named_values,
+    read_table,
+)
 from photocore.tables.csvread import CsvFile
 from photocore.tables.headings import bare
 from photocore.tables.numbers import Decimal
@@ -32,14 +39,15 @@ from photocore.workbook.grid import SheetFile
 
 _XY, _POLAR = ("x1", "y1", "x2", "y2"), ("s1", "s2", "theta")
 _PIXELS = ("col1", "row1", "col2", "row2")
-_TEXT, _FLAG = ("id", "code", "note"), ("use",)
+#: Units expected where neither heading nor cell says one; that of x1..y2 depends on `Setup`.
+_UNITS = {"theta": "deg", "r_measured": "m", "s1": "mm", "s2": "mm"} | dict.fromkeys(_PIXELS, "px")
 #: Coordinates of both photos under one heading each, in the order of the photos.
 _SHARED = {"x1": "x", "y1": "y", "x2": "x", "y2": "y"} | {
     "col1": "col", "row1": "row", "col2": "col", "row2": "row"
 }  # fmt: skip
 #: Headings of image coordinates in other programs: i counts columns, j rows.
 _OTHER = {"col1": "i", "row1": "j", "col2": "i", "row2": "j"}
-_FAR_NEAR = {"1": ("far", "lontana", "fern"), "2": ("near", "vicina", "nah")}
+_TO_DEGREES = {"deg": 1.0, "gon": 0.9, "rad": float(np.degrees(1.0))}
 _TO_MM = {"mm": 1.0, "cm": 10.0, "um": 1e-3, "m": 1000.0}
 
 
@@ -51,7 +59,7 @@ class SurveyInput:
     ----------
     points : PointObservations
         Measured points.
-    setup : SetupValues
+    setup : SurveySetup
         The cells of `Setup` that were found.
     unit : str
         Unit of x1..y2 that the headings say; empty where they say none.
@@ -73,7 +81,7 @@ class SurveyInput:
     """
 
     points: PointObservations
-    setup: SetupValues
+    setup: SurveySetup
     unit: str
     known: KnownPoints
     control: KnownPoints
@@ -84,6 +92,27 @@ class SurveyInput:
     known_rows: tuple[int, ...] = ()
     control_rows: tuple[int, ...] = ()
     remarks: tuple[str, ...] = ()
+
+    @classmethod
+    def of_points(cls, points: PointObservations) -> SurveyInput:
+        """Return a survey that holds nothing but measured points."""
+        table = Table(file="points", sheet="", values={}, present=frozenset(), rows=[], columns={})
+        return cls(
+            points=points,
+            setup=SurveySetup(where="points"),
+            unit="",
+            known=with_measured(KnownPoints(), points),
+            control=KnownPoints(),
+            model="auto",
+            language="en",
+            is_ours=False,
+            table=table,
+        )
+
+    @property
+    def where(self) -> str:
+        """File and sheet of the points, for messages."""
+        return where_of(self.table)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -108,6 +137,11 @@ class ReadOptions:
     visible_only: bool = False
 
 
+def where_of(table: Table) -> str:
+    """Return file and sheet of a table, for messages."""
+    return f"{table.file} › {table.sheet}" if table.sheet else table.file
+
+
 def point_columns(*, shared: Sequence[str] = ()) -> list[Column]:
     """Return the columns of measured points with every heading that is understood.
 
@@ -117,27 +151,16 @@ def point_columns(*, shared: Sequence[str] = ()) -> list[Column]:
         Keys that also take the headings "x y x y" or "col row col row" of photos 1 and 2. Tables
         of points often hold X and Y on the wall too, so this is tried where nothing else fits.
     """
-    keys = ("id", *_XY, *_POLAR, *_PIXELS, *_FLAG, "code", "note", "r_measured")
     columns = []
-    for key in keys:
-        names = [name for name in COLUMNS.get(key, ("", "", "", ""))[1:] if name]
-        names += ALIASES.get(key, ())
-        if key in shared:
-            names += [_SHARED[key], *([_OTHER[key]] if key in _OTHER else [])]
-        if key in _PIXELS:
-            axis = "x" if key.startswith("col") else "y"
-            names += [f"{axis} {word} px" for word in _FAR_NEAR[key[-1]]]
-            names += [f"{key[:3]} {word}" for word in _FAR_NEAR[key[-1]]]
-        kind: Literal["number", "flag", "text"] = "number"
-        if key in _TEXT:
-            kind = "text"
-        elif key in _FLAG:
-            kind = "flag"
-        unit = {"theta": "deg", "r_measured": "m", "s1": "mm", "s2": "mm"}.get(key, "")
-        if key in _PIXELS:
-            unit = "px"
-        columns.append(Column(key, tuple(dict.fromkeys(names)), kind=kind, unit=unit))
+    for key in ("id", *_XY, *_POLAR, *_PIXELS, "use", "code", "note", "r_measured"):
+        more = [_SHARED[key], *([_OTHER[key]] if key in _OTHER else [])] if key in shared else []
+        columns.append(understood(key, more=more, unit=_UNITS.get(key, "")))
     return columns
+
+
+def column_map(text: str | None) -> dict[str, str]:
+    """Return key to heading or column letter from what a user typed; empty for None."""
+    return parse_column_map(text, [column.key for column in point_columns()]) if text else {}
 
 
 def read_survey(path: Path | str, options: ReadOptions | None = None) -> SurveyInput:
@@ -167,54 +190,48 @@ def read_survey(path: Path | str, options: ReadOptions | None = None) -> SurveyI
     table = _read_points(book, options, errors)
     _require_coordinates(table, book, path)
     points, unit = _observations(table, errors)
-    remarks = list(table.remarks)
     sheets = book if isinstance(book, SheetFile) else None
     setup = read_setup(Path(path), sheets, options.decimal, errors)
-    remarks += setup.remarks
-    text_cells = [*table.text_cells, *setup.text_cells]
-    known, known_rows = read_known(
-        book, "Check", ("X_ref", "Y_ref", "Z_ref"), errors, remarks, text_cells, options.decimal
-    )
-    control, control_rows = read_known(
-        book, "Georeference", ("E", "N", "H"), errors, remarks, text_cells, options.decimal
-    )
-    if text_cells:
-        remarks.append(_typed_as_text(text_cells))
-    model, language = "auto", "en"
-    if isinstance(book, SheetFile):
-        model = (
-            read_named_values(
-                book, [Column("g_model", kind="text")], sheet="Georeference", errors=errors
-            ).text("g_model")
-            or "auto"
+    check = read_known(book, "Check", ("X_ref", "Y_ref", "Z_ref"), errors, options.decimal)
+    control = read_known(book, "Georeference", ("E", "N", "H"), errors, options.decimal)
+    parts = (table, setup, check, control)
+    model, language, is_ours = "auto", "en", False
+    if sheets is not None:
+        asked = read_named_values(
+            sheets, [Column("g_model", kind="text")], sheet="Georeference", errors=errors
         )
-        language = _language(book)
+        model = asked.text("g_model") or "auto"
+        language = _language(sheets)
+        is_ours = any(area.name == "tblPoints" for area in sheets.tables)
     if errors:
         raise WorkbookError(errors)
+    remarks = [remark for part in parts for remark in part.remarks]
+    remarks += _typed_as_text([cell for part in parts for cell in part.text_cells])
     return SurveyInput(
         points=points,
         setup=setup,
         unit=unit,
-        known=with_measured(known, points),
-        control=control,
+        known=with_measured(check.points, points),
+        control=control.points,
         model=model,
         language=language,
-        is_ours=isinstance(book, SheetFile)
-        and any(area.name == "tblPoints" for area in book.tables),
+        is_ours=is_ours,
         table=table,
-        known_rows=known_rows,
-        control_rows=control_rows,
+        known_rows=check.rows,
+        control_rows=control.rows,
         remarks=tuple(dict.fromkeys(remarks)),
     )
 
 
-def _typed_as_text(cells: Sequence[str]) -> str:
+def _typed_as_text(cells: Sequence[str]) -> list[str]:
     """Return what is said about numbers that the formulas of a workbook do not see."""
+    if not cells:
+        return []
     more = f" and {len(cells) - 10} more" if len(cells) > 10 else ""
-    return (
+    return [
         f"{', '.join(cells[:10])}{more}: numbers typed as text. They were read, but formulas do "
         "not see them: the result workbook (--out) holds them as numbers."
-    )
+    ]
 
 
 def _read_points(book: SheetFile | CsvFile, options: ReadOptions, errors: list[CellError]) -> Table:
@@ -267,7 +284,7 @@ def _require_coordinates(table: Table, book: object, path: Path | str) -> None:
     )
     if not broken and any(have.issuperset(keys) for keys in kinds):
         return
-    where = f"{table.file} › {table.sheet}" if table.sheet else table.file
+    where = where_of(table)
     ours = isinstance(book, SheetFile) and bare(table.sheet) != "points"
     if ours and not any(bare(title) == "points" for title in book.titles):  # type: ignore[attr-defined]
         shown = ", ".join(f'"{title}"' for title in book.titles)  # type: ignore[attr-defined]
@@ -298,19 +315,14 @@ def _observations(table: Table, errors: list[CellError]) -> tuple[PointObservati
     used: BoolArray = np.isnan(use) | (use != 0)
     unit, factor = _unit_of_xy(table, errors)
     xy = _stack(table, _XY) * factor
-    polar = _stack(table, _POLAR)
-    for i, key in enumerate(("s1", "s2")):
-        symbol = table.units.get(key, "mm") or "mm"
-        if symbol not in _TO_MM:
-            errors.append(unit_error(table, key, symbol, "mm"))
-        else:
-            polar[:, i] *= _TO_MM[symbol]
-    polar[:, 2] = _degrees(table, polar[:, 2], errors)
+    scales = [_TO_MM, _TO_MM, _TO_DEGREES]
+    polar = _stack(table, _POLAR) * [
+        factor_of(table, key, factors, errors) for key, factors in zip(_POLAR, scales, strict=True)
+    ]
     pixels = _stack(table, _PIXELS)
     for key in _PIXELS:
-        if table.units.get(key, "px") not in ("px", ""):
-            errors.append(unit_error(table, key, table.units[key], "px"))
-    measured = table.numbers("r_measured") * metres_of(table, "r_measured", errors)
+        factor_of(table, key, {"px": 1.0}, errors)
+    measured = table.numbers("r_measured") * factor_of(table, "r_measured", TO_M, errors)
     _check_rows(table, ids, used, xy, polar, pixels, faulty, errors)
     if errors:
         ids = [name or f"row {row}" for name, row in zip(ids, table.rows, strict=True)]
@@ -366,17 +378,6 @@ def _unit_of_xy(table: Table, errors: list[CellError]) -> tuple[str, float]:
         errors.append(unit_error(table, next(iter(said)), symbol, "mm or px"))
         return "", 1.0
     return "mm", _TO_MM[symbol]
-
-
-def _degrees(table: Table, theta: FloatArray, errors: list[CellError]) -> FloatArray:
-    symbol = table.units.get("theta") or "deg"
-    if symbol == "gon":
-        return np.asarray(theta * 0.9)
-    if symbol == "rad":
-        return np.degrees(theta)
-    if symbol != "deg":
-        errors.append(unit_error(table, "theta", symbol, "deg"))
-    return theta
 
 
 def _check_rows(
@@ -436,44 +437,7 @@ def _language(book: SheetFile) -> str:
     title = next((name for name in book.titles if bare(name) == "points"), None)
     if title is not None:
         words = {str(cell) for cell in book.grid(title).rows.get(1, {}).values()}
-        for language, text in zip(LANGUAGES, WORDS["Points"], strict=True):
-            if text in words:
+        for language in LANGUAGES:
+            if word("Points", language) in words:
                 return language
     return "en"
-
-
-def pair_of(values: SetupValues, folder: Path) -> Pair | None:
-    """Return the general pair that a workbook's `Setup` describes; None if it describes none.
-
-    Parameters
-    ----------
-    values : SetupValues
-        The cells of `Setup`.
-    folder : Path
-        Where the workbook lies; a pair file with lens distortion is looked for from there.
-    """
-    matrices = values.matrices
-    if matrices is None or values.d1 is None or values.d2 is None:
-        return None
-    lenses: list[Lens | None] = [None, None]
-    file = folder / values.pair_file if values.pair_file else None
-    if file is not None and file.is_file():
-        try:
-            given = Pair.read(file)
-            lenses = [given.image1.lens, given.image2.lens]
-        except InputError:
-            lenses = [None, None]
-    photos = [
-        Photo(
-            plane_from_pixel=matrix,
-            nadir=nadir,
-            distance=distance,
-            lens=lens,
-            extra={} if c is None else {"principal_distance": c},
-        )
-        for matrix, nadir, distance, lens, c in zip(
-            matrices, values.nadirs, (values.d1, values.d2), lenses, (values.c1, values.c2),
-            strict=True,
-        )
-    ]  # fmt: skip
-    return Pair(image1=photos[0], image2=photos[1], folder=folder)

@@ -9,13 +9,13 @@ from dataclasses import dataclass, field
 from openpyxl import Workbook
 from openpyxl.formatting.rule import FormulaRule
 from openpyxl.styles import Alignment, Border, Font, PatternFill, Protection, Side
-from openpyxl.utils import get_column_letter
+from openpyxl.utils import absolute_coordinate, get_column_letter
 from openpyxl.workbook.defined_name import DefinedName
 from openpyxl.worksheet.datavalidation import DataValidation
 from openpyxl.worksheet.table import Table, TableFormula, TableStyleInfo
 from openpyxl.worksheet.worksheet import Worksheet
 
-from bifocal.survey.workbook.columns import Column, row_formula
+from bifocal.survey.workbook.columns import TEXT_KEYS, SurveyColumn, row_formula
 from bifocal.survey.workbook.words import label, word
 from photocore.workbook.cells import CellValue
 from photocore.workbook.newbook import RowBlock
@@ -44,7 +44,7 @@ FLAG_COLOURS = {
 class TableContent:
     """A table as built: its columns and their values by key."""
 
-    columns: Sequence[Column]
+    columns: Sequence[SurveyColumn]
     cells: Mapping[str, Sequence[CellValue]]
 
 
@@ -58,84 +58,76 @@ class BookBuilder:
     blocks: dict[str, RowBlock] = field(default_factory=dict)
     tables: dict[str, TableContent] = field(default_factory=dict)
 
-    def sheet(self, name: str, title: str, note: str = "") -> Worksheet:
-        """Add a sheet with its title and one line of help."""
+    def sheet(self, name: str, note: str = "") -> SheetBuilder:
+        """Add a sheet with its title and, by its key, one line of help."""
         first = len(self.book.sheetnames) == 1 and not self.results
         sheet = self.book.active if first else self.book.create_sheet()
         assert sheet is not None
         sheet.title = name
         self.results[name] = {}
-        sheet["A1"], sheet["A1"].font = title, TITLE_FONT
+        sheet["A1"], sheet["A1"].font = word(name, self.language), TITLE_FONT
         if note:
-            sheet["A2"], sheet["A2"].font = note, NOTE_FONT
+            sheet["A2"], sheet["A2"].font = word(note, self.language), NOTE_FONT
         sheet.sheet_view.showGridLines = False
         sheet.sheet_view.zoomScale = 100
-        return sheet
+        return SheetBuilder(book=self, worksheet=sheet)
 
-    def name(self, name: str, sheet: str, cell: str) -> None:
-        """Give a cell a name."""
-        absolute = re.sub(r"([A-Z]+)(\d+)", r"$\1$\2", cell)
-        self.book.defined_names[name] = DefinedName(name, attr_text=f"'{sheet}'!{absolute}")
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class SheetBuilder:
+    """One sheet of a workbook under construction."""
+
+    book: BookBuilder
+    worksheet: Worksheet
+
+    def text(self, cell: str, value: str, font: Font | None = None) -> None:
+        """Write a text."""
+        self.worksheet[cell].value = value
+        self.worksheet[cell].data_type = "s"
+        if font is not None:
+            self.worksheet[cell].font = font
+
+    def word(self, cell: str, key: str, font: Font | None = None) -> None:
+        """Write a word in the language of the workbook."""
+        self.text(cell, word(key, self.book.language), font)
 
     def formula(
-        self,
-        sheet: Worksheet,
-        cell: str,
-        text: str,
-        value: CellValue,
-        *,
-        form: str = "",
-        name: str = "",
+        self, cell: str, text: str, value: CellValue, *, form: str = "", name: str = "",
         editable: bool = False,
-    ) -> None:
+    ) -> None:  # fmt: skip
         """Write a formula with its value."""
-        target = sheet[cell]
+        target = self.worksheet[cell]
         target.value, target.font = "=" + text, FORMULA_FONT
-        if form:
-            target.number_format = form
-        if editable:
-            target.fill, target.border = INPUT_FILL, INPUT_EDGE
-            target.protection = Protection(locked=False)
-        self.results[sheet.title][cell] = value
-        if name:
-            self.name(name, sheet.title, cell)
+        self.book.results[self.worksheet.title][cell] = value
+        self._dress(cell, form, name, editable=editable)
 
-    def input(
-        self,
-        sheet: Worksheet,
-        cell: str,
-        value: CellValue,
-        *,
-        form: str = "",
-        name: str = "",
-    ) -> None:
+    def input(self, cell: str, value: CellValue, *, form: str = "", name: str = "") -> None:
         """Write a cell that the user fills in."""
-        target = sheet[cell]
+        target = self.worksheet[cell]
         if value is not None and value == value and value != "":
             target.value = value
             if isinstance(value, str):
                 target.data_type = "s"
             else:
-                self.results[sheet.title][cell] = float(value)
-        target.fill, target.border = INPUT_FILL, INPUT_EDGE
-        target.protection = Protection(locked=False)
+                self.book.results[self.worksheet.title][cell] = float(value)
+        self._dress(cell, form, name, editable=True)
+
+    def _dress(self, cell: str, form: str, name: str, *, editable: bool) -> None:
+        """Give a cell its number format, its name, and the look of one that may be changed."""
+        target = self.worksheet[cell]
+        if editable:
+            target.fill, target.border = INPUT_FILL, INPUT_EDGE
+            target.protection = Protection(locked=False)
         if form:
             target.number_format = form
         if name:
-            self.name(name, sheet.title, cell)
-
-    def text(self, sheet: Worksheet, cell: str, value: str, font: Font | None = None) -> None:
-        """Write a word."""
-        sheet[cell].value = value
-        sheet[cell].data_type = "s"
-        if font is not None:
-            sheet[cell].font = font
+            place = f"'{self.worksheet.title}'!{absolute_coordinate(cell)}"
+            self.book.book.defined_names[name] = DefinedName(name, attr_text=place)
 
     def table(
         self,
-        sheet: Worksheet,
         name: str,
-        columns: Sequence[Column],
+        columns: Sequence[SurveyColumn],
         *,
         at: tuple[int, int],
         rows: int,
@@ -160,11 +152,11 @@ class BookBuilder:
             Write formulas as A1 references.
         """
         head, left = at
-        self.tables[name] = TableContent(columns=columns, cells=cells)
+        sheet, self.book.tables[name] = self.worksheet, TableContent(columns=columns, cells=cells)
         letters = {c.key: get_column_letter(left + i) for i, c in enumerate(columns)}
         for i, column in enumerate(columns):
             above, key = sheet.cell(head - 1, left + i), sheet.cell(head, left + i)
-            above.value, above.font = label(column.key, self.language), LABEL_FONT
+            above.value, above.font = label(column.key, self.book.language), LABEL_FONT
             above.alignment = Alignment(wrap_text=True, vertical="bottom", horizontal="center")
             key.value, key.font, key.fill = column.key, HEAD_FONT, HEAD_FILL
             key.alignment = Alignment(horizontal="center")
@@ -174,31 +166,30 @@ class BookBuilder:
                 width.outlineLevel, width.hidden = 1, True
             for row in range(head + 1, head + 1 + (1 if repeat else rows)):
                 cell = sheet.cell(row, left + i)
-                self._cell(cell, name, column, None if repeat else _at(cells, column, row - head))
+                value = None if repeat else _at(cells, column, row - head)
+                self._cell(cell.coordinate, name, column, value)
         sheet.row_dimensions[head - 1].height = 38
-        self._add_table(sheet, name, columns, at, rows)
+        self._add_table(name, columns, at, rows)
         if repeat:
             block = _block(name, columns, head + 1, rows, cells, letters, short)
-            self.blocks[sheet.title] = block
+            self.book.blocks[sheet.title] = block
             for i, formula in block.formulas.items():
                 sheet.cell(head + 1, left + i).value = f"={formula(head + 1)}"
 
-    def _cell(self, cell: object, table: str, column: Column, value: CellValue) -> None:
+    def _cell(self, place: str, table: str, column: SurveyColumn, value: CellValue) -> None:
         """Write one cell of a table."""
-        sheet, place = cell.parent, cell.coordinate  # type: ignore[attr-defined]
-        form = _number_format(column)
+        form, cell = _number_format(column), self.worksheet[place]
         if column.kind == "formula":
-            self.formula(sheet, place, row_formula(table, column.formula)[1:], value, form=form)
-        elif column.kind == "input":
-            self.input(sheet, place, value, form=form)
+            self.formula(place, row_formula(table, column.formula)[1:], value, form=form)
         else:
-            self.input(sheet, place, value, form=form)
-            sheet[place].fill, sheet[place].protection = PatternFill(), Protection(locked=True)
+            self.input(place, value, form=form)
+        if column.kind == "value":
+            cell.fill, cell.protection = PatternFill(), Protection(locked=True)
         if column.key in ("flag", "use", "verdict"):
-            sheet[place].alignment = Alignment(horizontal="center")
+            cell.alignment = Alignment(horizontal="center")
 
     def _add_table(
-        self, sheet: Worksheet, name: str, columns: Sequence[Column], at: tuple[int, int], rows: int
+        self, name: str, columns: Sequence[SurveyColumn], at: tuple[int, int], rows: int
     ) -> None:
         head, left = at
         last = get_column_letter(left + len(columns) - 1)
@@ -211,26 +202,88 @@ class BookBuilder:
                 text = row_formula(name, column.formula)[1:]
                 described.calculatedColumnFormula = TableFormula(attr_text=text)
         table.tableStyleInfo = TableStyleInfo(name="TableStyleLight1", showRowStripes=False)
-        sheet.add_table(table)
+        self.worksheet.add_table(table)
+
+    def colour(
+        self,
+        area: str,
+        colours: Mapping[str, tuple[str, str]],
+        *,
+        bold: Sequence[str] = (),
+        stop: bool | None = None,
+    ) -> None:
+        """Colour the cells of a column by the word they hold, which tells the same."""
+        for text, (fill, ink) in colours.items():
+            rule = FormulaRule(
+                formula=[f'${area.partition(":")[0]}="{text}"'],
+                fill=PatternFill("solid", start_color=fill, end_color=fill),
+                font=Font(color=ink, bold=text in bold) if bold else Font(color=ink),
+                stopIfTrue=stop,
+            )
+            self.worksheet.conditional_formatting.add(area, rule)
+
+    def validate(
+        self, cells: str, *, choices: str = "", above_zero: bool = False, limit: float = 1e7
+    ) -> None:
+        """Refuse what cannot be meant."""
+        if choices:
+            rule = DataValidation(type="list", formula1=f'"{choices}"', allow_blank=True)
+        elif above_zero:
+            rule = DataValidation(type="decimal", operator="greaterThan", formula1="0")
+        else:
+            low, high = f"{-limit:.0f}", f"{limit:.0f}"
+            rule = DataValidation(type="decimal", operator="between", formula1=low, formula2=high)
+        rule.allow_blank, rule.showErrorMessage = True, True
+        rule.add(cells)
+        self.worksheet.add_data_validation(rule)
+
+    def finish(
+        self, *, landscape: bool = False, freeze: str = "", repeat: str = "", guarded: bool = True
+    ) -> None:
+        """Set A4, one page wide, repeated headings, a footer with the page number; protect.
+
+        Protection is against slips, without a password; filters and widths stay free.
+        """
+        sheet = self.worksheet
+        if freeze:
+            sheet.freeze_panes = freeze
+        sheet.page_setup.paperSize = sheet.PAPERSIZE_A4
+        sheet.page_setup.orientation = "landscape" if landscape else "portrait"
+        sheet.sheet_properties.pageSetUpPr.fitToPage = True
+        sheet.page_setup.fitToWidth, sheet.page_setup.fitToHeight = 1, 0
+        if repeat:
+            sheet.print_title_rows = repeat
+        sheet.oddFooter.left.text = "&F · &A"
+        sheet.oddFooter.right.text = f"{word('page', self.book.language)} &P / &N"
+        margins = sheet.page_margins
+        margins.left = margins.right = 0.5
+        margins.top = 0.6
+        # The footer stands within the bottom margin: text and what printers cannot reach.
+        margins.bottom, margins.footer = 0.9, 0.4
+        guard = sheet.protection
+        if guarded:
+            guard.sheet = True
+            guard.formatCells = guard.formatColumns = guard.formatRows = False
+            guard.sort = guard.autoFilter = False
 
 
-def _at(cells: Mapping[str, Sequence[CellValue]], column: Column, row: int) -> CellValue:
+def _at(cells: Mapping[str, Sequence[CellValue]], column: SurveyColumn, row: int) -> CellValue:
     values = cells.get(column.key, ())
-    return values[row - 1] if row <= len(values) else None
+    return values[row - 1] if row <= len(values) else column.spare
 
 
-def _number_format(column: Column) -> str:
+def _number_format(column: SurveyColumn) -> str:
     if column.places is not None:
         return "0." + "0" * column.places if column.places else "0"
     # Names typed as 1-2 must not turn into dates: text, but only where text is typed.
     if column.key == "scale":
         return '"1:"0'
-    return "@" if column.kind == "input" and column.key in ("id", "code", "note") else "General"
+    return "@" if column.kind == "input" and column.key in TEXT_KEYS else "General"
 
 
 def _block(
     table: str,
-    columns: Sequence[Column],
+    columns: Sequence[SurveyColumn],
     first: int,
     rows: int,
     cells: Mapping[str, Sequence[CellValue]],
@@ -259,69 +312,3 @@ def _short_formula(table: str, text: str, letters: Mapping[str, str], head: int)
         return joined.replace("\0", str(row - head))
 
     return formula
-
-
-def flag_colours(sheet: Worksheet, letter: str, first: int, last: int) -> None:
-    """Colour the flags of a column; the word tells the same."""
-    for flag, (fill, text) in FLAG_COLOURS.items():
-        rule = FormulaRule(
-            formula=[f'${letter}{first}="{flag}"'],
-            fill=PatternFill("solid", start_color=fill, end_color=fill),
-            font=Font(color=text, bold=flag in ("OFF-RADIAL", "NADIR", "CHECK")),
-            stopIfTrue=True,
-        )
-        sheet.conditional_formatting.add(f"{letter}{first}:{letter}{last}", rule)
-
-
-def validate(
-    sheet: Worksheet,
-    cells: str,
-    *,
-    choices: str = "",
-    above_zero: bool = False,
-    between: tuple[float, float] | None = None,
-    prompt: str = "",
-) -> None:
-    """Refuse what cannot be meant."""
-    if choices:
-        rule = DataValidation(type="list", formula1=f'"{choices}"', allow_blank=True)
-    elif above_zero:
-        rule = DataValidation(type="decimal", operator="greaterThan", formula1="0")
-    else:
-        low, high = between or (-1e7, 1e7)
-        rule = DataValidation(
-            type="decimal", operator="between", formula1=f"{low:.0f}", formula2=f"{high:.0f}"
-        )
-    rule.allow_blank, rule.showErrorMessage = True, True
-    if prompt:
-        rule.promptTitle, rule.prompt, rule.showInputMessage = "bifocal", prompt[:250], True
-    rule.add(cells)
-    sheet.add_data_validation(rule)
-
-
-def set_up_print(
-    sheet: Worksheet, language: str, *, landscape: bool, repeat: str = "", fit: bool = True
-) -> None:
-    """Set A4, one page wide, repeated headings and a footer with the page number."""
-    sheet.page_setup.paperSize = sheet.PAPERSIZE_A4
-    sheet.page_setup.orientation = "landscape" if landscape else "portrait"
-    if fit:
-        sheet.sheet_properties.pageSetUpPr.fitToPage = True
-        sheet.page_setup.fitToWidth, sheet.page_setup.fitToHeight = 1, 0
-    if repeat:
-        sheet.print_title_rows = repeat
-    sheet.oddFooter.left.text = "&F · &A"
-    sheet.oddFooter.right.text = f"{word('page', language)} &P / &N"
-    margins = sheet.page_margins
-    margins.left = margins.right = 0.5
-    margins.top = 0.6
-    # The footer stands within the bottom margin: a line of text and what printers cannot reach.
-    margins.bottom, margins.footer = 0.9, 0.4
-
-
-def protect(sheet: Worksheet) -> None:
-    """Protect formula cells against slips, without a password; filters and widths stay free."""
-    guard = sheet.protection
-    guard.sheet = True
-    guard.formatCells = guard.formatColumns = guard.formatRows = False
-    guard.sort = guard.autoFilter = False

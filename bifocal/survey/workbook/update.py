@@ -8,9 +8,10 @@ from pathlib import Path
 
 from bifocal.survey.workbook.book import build
 from bifocal.survey.workbook.charts import HEAD, LEFT
+from bifocal.survey.workbook.columns import TEXT_KEYS
 from bifocal.survey.workbook.content import SurveyContent
-from bifocal.survey.workbook.defaults import TYPED_FORMULAS
 from bifocal.survey.workbook.reader import SurveyInput
+from bifocal.survey.workbook.setup_cells import TYPED_FORMULAS
 from bifocal.survey.workbook.sheets import BookBuilder
 from photocore.workbook.cells import CellValue
 from photocore.workbook.editor import WorkbookEditor
@@ -79,8 +80,7 @@ def update_book(
     for name, sheet_rows in (("tblCheck", survey.known_rows), ("tblGeo", survey.control_rows)):
         own = editor.table(name)
         if own is not None:
-            blank = 0.0 if name == "tblGeo" else ""
-            _table(editor, built, name, [row - own.area[0] - 1 for row in sheet_rows], blank)
+            _table(editor, built, name, [row - own.area[0] - 1 for row in sheet_rows])
     for name, key in (("tblPlan", "relief_cm"), ("tblFrame", "share"), ("tblVerdict", "tolerance")):
         _fixed_table(editor, built, name, key)
     _charts(editor, built, rows)
@@ -145,7 +145,6 @@ def _table(
     built: BookBuilder,
     name: str,
     rows: Sequence[int],
-    blank: CellValue = "",
 ) -> None:
     """Store the results of a table; ``rows`` counts from its first row, the others are blank."""
     area, content = editor.table(name), built.tables[name]
@@ -159,12 +158,11 @@ def _table(
         given = content.cells.get(column.key, ())
         number = headings[column.key]
         if column.kind == "input":
-            if column.key not in ("id", "code", "note"):
+            if column.key not in TEXT_KEYS:
                 for row, value in zip(rows, given, strict=False):
                     _make_number(editor, (area.sheet, first + row, number), value)
             continue
-        empty = blank if column.key in ("w", "cX", "cY", "cZ", "cE", "cN", "cH") else ""
-        values: list[CellValue] = [empty] * _length(area)
+        values: list[CellValue] = [_result(column.spare)] * _length(area)
         for row, value in zip(rows, given, strict=False):
             if 0 <= row < len(values):
                 values[row] = _result(value)

@@ -1,532 +1,62 @@
-"""Every word of the survey workbook in English, Italian and German; keys are never translated."""
+"""Every word of the survey workbook in English, Italian and German: read from `words.toml`."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import tomllib
+from functools import cache
+from importlib.resources import files
+from typing import Any, NamedTuple
 
 LANGUAGES = ("en", "it", "de")
 
-#: key -> (unit, English, Italian, German); the label above a column, and an accepted heading.
-COLUMNS: Mapping[str, tuple[str, str, str, str]] = {
-    "id": ("", "Point", "Punto", "Punkt"),
-    "x1": ("mm | px", "x image 1", "x foto 1", "x Bild 1"),
-    "y1": ("mm | px", "y image 1", "y foto 1", "y Bild 1"),
-    "x2": ("mm | px", "x image 2", "x foto 2", "x Bild 2"),
-    "y2": ("mm | px", "y image 2", "y foto 2", "y Bild 2"),
-    "s1": ("mm", "Radial distance 1", "Distanza radiale 1", "Radialdistanz 1"),
-    "s2": ("mm", "Radial distance 2", "Distanza radiale 2", "Radialdistanz 2"),
-    "theta": ("deg", "Direction from +y, clockwise", "Direzione da +y, oraria", "Richtung ab +y"),
-    "use": ("1 | 0", "Use", "Usa", "Verwenden"),
-    "code": ("", "Code", "Codice", "Code"),
-    "note": ("", "Note", "Nota", "Bemerkung"),
-    "col1": ("px", "Column image 1", "Colonna foto 1", "Spalte Bild 1"),
-    "row1": ("px", "Row image 1", "Riga foto 1", "Zeile Bild 1"),
-    "col2": ("px", "Column image 2", "Colonna foto 2", "Spalte Bild 2"),
-    "row2": ("px", "Row image 2", "Riga foto 2", "Zeile Bild 2"),
-    "s1_used": ("mm", "s1 used", "s1 usata", "s1 verwendet"),
-    "s2_used": ("mm", "s2 used (scale of 1)", "s2 usata (scala di 1)", "s2 verwendet (Maßstab 1)"),
-    "theta_used": ("deg", "Direction used", "Direzione usata", "Richtung verwendet"),
-    "ds": ("mm", "s2 - s1", "s2 - s1", "s2 - s1"),
-    "den": ("mm/m", "s2/d2 - s1/d1", "s2/d2 - s1/d1", "s2/d2 - s1/d1"),
-    "r": ("m", "Relief", "Rilievo", "Relief"),
-    "e1": ("mm", "Displacement 1", "Spostamento 1", "Versatz 1"),
-    "e2": ("mm", "Displacement 2", "Spostamento 2", "Versatz 2"),
-    "s_c": ("mm", "Corrected s' = s1 - e1", "s' corretta = s1 - e1", "Korrigiert s' = s1 - e1"),
-    "X": ("m", "X right", "X destra", "X rechts"),
-    "Y": ("m", "Y up", "Y alto", "Y oben"),
-    "Z": ("m", "Z = relief", "Z = rilievo", "Z = Relief"),
-    "q": ("mm", "Miss across the radius", "Scarto dal raggio", "Querabweichung"),
-    "sigma_r": ("m", "Sigma of relief", "Sigma del rilievo", "Sigma des Reliefs"),
-    "flag": ("", "Flag", "Esito", "Kennzeichen"),
-    "E": ("m", "East", "Est", "Ost"),
-    "N": ("m", "North", "Nord", "Nord"),
-    "H": ("m", "Height", "Quota", "Höhe"),
-    "X_ref": ("m", "X measured", "X misurata", "X gemessen"),
-    "Y_ref": ("m", "Y measured", "Y misurata", "Y gemessen"),
-    "Z_ref": ("m", "Relief measured", "Rilievo misurato", "Relief gemessen"),
-    "dX": ("m", "Error X", "Errore X", "Fehler X"),
-    "dY": ("m", "Error Y", "Errore Y", "Fehler Y"),
-    "dZ": ("m", "Error Z", "Errore Z", "Fehler Z"),
-    "vE": ("m", "Residual E", "Scarto E", "Restfehler E"),
-    "vN": ("m", "Residual N", "Scarto N", "Restfehler N"),
-    "vH": ("m", "Residual H", "Scarto H", "Restfehler H"),
-    "found_bad": ("0 = bad", "Program's verdict", "Giudizio del programma", "Urteil des Programms"),
-    "w": ("", "Takes part", "Partecipa", "Nimmt teil"),
-    "cX": ("m", "X centred", "X centrata", "X zentriert"),
-    "cY": ("m", "Y centred", "Y centrata", "Y zentriert"),
-    "cZ": ("m", "Z centred", "Z centrata", "Z zentriert"),
-    "cE": ("m", "E centred", "E centrata", "E zentriert"),
-    "cN": ("m", "N centred", "N centrata", "N zentriert"),
-    "cH": ("m", "H centred", "H centrata", "H zentriert"),
-    "g1x": ("mm/mm", "Move x1 per q", "Corr. x1 per q", "Verb. x1 je q"),
-    "g1y": ("mm/mm", "Move y1 per q", "Corr. y1 per q", "Verb. y1 je q"),
-    "g2x": ("mm/mm", "Move x2 per q", "Corr. x2 per q", "Verb. x2 je q"),
-    "g2y": ("mm/mm", "Move y2 per q", "Corr. y2 per q", "Verb. y2 je q"),
-    "k_q": ("mm/px", "Sigma of q per px", "Sigma di q per px", "Sigma von q je px"),
-    "k_r": ("m/px", "Sigma of r per px", "Sigma di r per px", "Sigma von r je px"),
-    "ucol1": ("px", "Column 1, undistorted", "Colonna 1 corretta", "Spalte 1 entzerrt"),
-    "urow1": ("px", "Row 1, undistorted", "Riga 1 corretta", "Zeile 1 entzerrt"),
-    "ucol2": ("px", "Column 2, undistorted", "Colonna 2 corretta", "Spalte 2 entzerrt"),
-    "urow2": ("px", "Row 2, undistorted", "Riga 2 corretta", "Zeile 2 entzerrt"),
-    "relief_cm": ("cm", "Relief", "Rilievo", "Relief"),
-    "radius_mm": ("mm", "Radius in the image", "Raggio nella foto", "Radius im Bild"),
-    "radius_m": ("m", "Radius on the wall", "Raggio sul muro", "Radius auf der Wand"),
-    "share": ("%", "Share of half diagonal", "Quota semidiagonale", "Anteil Halbdiagonale"),
-    "s_mm": ("mm", "Distance from nadir", "Distanza dal nadir", "Abstand vom Nadir"),
-    "rule": ("", "Rule", "Regola", "Regel"),
-    "scale": ("1:", "Drawing scale", "Scala del disegno", "Zeichnungsmaßstab"),
-    "tolerance": ("mm", "Tolerance", "Tolleranza", "Toleranz"),
-    "verdict": ("", "Verdict", "Verdetto", "Urteil"),
-    "time": ("", "Date", "Data", "Datum"),
-    "program": ("", "Program", "Programma", "Programm"),
-    "what": ("", "What", "Operazione", "Was"),
-    "file": ("", "File", "File", "Datei"),
-    "sha256": ("", "SHA-256", "SHA-256", "SHA-256"),
-}
 
-#: Further headings people write for the same columns, any case; see `photocore` tables.
-ALIASES: Mapping[str, tuple[str, ...]] = {
-    "id": (
-        "point id",
-        "point no",
-        "name",
-        "nr",
-        "no",
-        "num",
-        "pto",
-        "pt",
-        "pkt",
-        "pktnr",
-        "punktnummer",
-        "nome",
-        "nome punto",
-        "numero",
-        "point name",
-        "punktname",
-    ),
-    "theta": ("theta deg", "angle", "angolo", "anomalia", "richtung", "winkel", "θ"),
-    "use": ("used", "attivo", "aktiv"),
-    "note": ("notes", "remark", "note punto", "notiz", "comment"),
-    "r_measured": (
-        "r measured",
-        "r misurato",
-        "r gemessen",
-        "relief measured",
-        "measured relief",
-        "rilievo misurato",
-        "relief gemessen",
-        "r_ref",
-        "r site",
-    ),
-    "s1": ("s_1", "radial distance 1", "distanza radiale 1", "radialdistanz 1"),
-    "s2": ("s_2", "radial distance 2", "distanza radiale 2", "radialdistanz 2"),
-    "col1": ("column1", "col_1", "column 1"),
-    "row1": ("row_1", "row 1"),
-    "col2": ("column2", "col_2", "column 2"),
-    "row2": ("row_2", "row 2"),
-}
+class Wording(NamedTuple):
+    """One expression in every language, with the unit of what it names."""
 
-#: Name -> (unit, English, Italian, German) of the cells of the sheet `Setup`.
-SETUP: Mapping[str, tuple[str, str, str, str]] = {
-    "c_1": (
-        "mm",
-        "Principal distance of image 1 (far camera, long lens)",
-        "Distanza principale della foto 1 (camera lontana, focale lunga)",
-        "Kammerkonstante von Bild 1 (ferne Kamera, lange Brennweite)",
-    ),
-    "c_2": (
-        "mm",
-        "Principal distance of image 2 (near camera, short lens)",
-        "Distanza principale della foto 2 (camera vicina, focale corta)",
-        "Kammerkonstante von Bild 2 (nahe Kamera, kurze Brennweite)",
-    ),
-    "d_2": (
-        "m",
-        "Distance of camera 2 to the reference plane",
-        "Distanza della camera 2 dal piano di riferimento",
-        "Abstand der Kamera 2 von der Bezugsebene",
-    ),
-    "delta_d": (
-        "m",
-        "Way from camera 2 back to camera 1, measured on site",
-        "Tratto dalla camera 2 alla camera 1, misurato sul posto",
-        "Strecke von Kamera 2 zurück zu Kamera 1, vor Ort gemessen",
-    ),
-    "d_1": (
-        "m",
-        "Distance of camera 1 (= d_2 + delta_d, or type it)",
-        "Distanza della camera 1 (= d_2 + delta_d, o scriverla)",
-        "Abstand der Kamera 1 (= d_2 + delta_d, oder eintippen)",
-    ),
-    "input_unit": (
-        "",
-        "Unit of x1 y1 x2 y2: mm from the nadir, y up; or px (column, row)",
-        "Unità di x1 y1 x2 y2: mm dal nadir, y in alto; o px (colonna, riga)",
-        "Einheit von x1 y1 x2 y2: mm vom Nadir, y oben; oder px (Spalte, Zeile)",
-    ),
-    "pitch": ("mm/px", "Size of a pixel", "Dimensione del pixel", "Größe eines Pixels"),
-    "nadir_1_col": (
-        "px",
-        "Nadir point of image 1, column",
-        "Nadir della foto 1, colonna",
-        "Nadirpunkt Bild 1, Spalte",
-    ),
-    "nadir_1_row": (
-        "px",
-        "Nadir point of image 1, row",
-        "Nadir della foto 1, riga",
-        "Nadirpunkt Bild 1, Zeile",
-    ),
-    "nadir_2_col": (
-        "px",
-        "Nadir point of image 2, column",
-        "Nadir della foto 2, colonna",
-        "Nadirpunkt Bild 2, Spalte",
-    ),
-    "nadir_2_row": (
-        "px",
-        "Nadir point of image 2, row",
-        "Nadir della foto 2, riga",
-        "Nadirpunkt Bild 2, Zeile",
-    ),
-    "sigma_s": (
-        "mm",
-        "Precision of a measured image coordinate (half a pixel, or type it)",
-        "Precisione di una coordinata immagine (mezzo pixel, o scriverla)",
-        "Genauigkeit einer Bildkoordinate (halbes Pixel, oder eintippen)",
-    ),
-    "sigma_px": (
-        "px",
-        "Precision of a measured pixel",
-        "Precisione di un pixel misurato",
-        "Genauigkeit eines gemessenen Pixels",
-    ),
-    "sigma_r_max": (
-        "m",
-        "Sigma of r beyond which a point is UNCERTAIN",
-        "Sigma di r oltre il quale il punto è UNCERTAIN",
-        "Sigma von r, ab dem ein Punkt UNCERTAIN ist",
-    ),
-    "k_off": (
-        "sigma",
-        "Misses across the radius beyond this are OFF-RADIAL",
-        "Scarti dal raggio oltre questo valore sono OFF-RADIAL",
-        "Querabweichungen darüber sind OFF-RADIAL",
-    ),
-    "k_plane": (
-        "sigma",
-        "Relief smaller than this is ON-PLANE",
-        "Rilievi minori di questo sono ON-PLANE",
-        "Kleineres Relief ist ON-PLANE",
-    ),
-    "m_1": (
-        "1:",
-        "Scale number of image 1 = 1000 d_1 / c_1",
-        "Denominatore di scala della foto 1 = 1000 d_1 / c_1",
-        "Maßstabszahl von Bild 1 = 1000 d_1 / c_1",
-    ),
-    "m_2": (
-        "1:",
-        "Scale number of image 2 = 1000 d_2 / c_2",
-        "Denominatore di scala della foto 2 = 1000 d_2 / c_2",
-        "Maßstabszahl von Bild 2 = 1000 d_2 / c_2",
-    ),
-    "k_12": (
-        "",
-        "m_2 / m_1: brings image 2 to the scale of image 1",
-        "m_2 / m_1: porta la foto 2 alla scala della foto 1",
-        "m_2 / m_1: bringt Bild 2 auf den Maßstab von Bild 1",
-    ),
-    "b_lever": (
-        "m",
-        "B = d_1 d_2 / (d_1 - d_2): sigma_r = sigma B / s'",
-        "B = d_1 d_2 / (d_1 - d_2): sigma_r = sigma B / s'",
-        "B = d_1 d_2 / (d_1 - d_2): sigma_r = sigma B / s'",
-    ),
-    "unit_x": (
-        "",
-        "x in mm = (x - off_x) unit_x",
-        "x in mm = (x - off_x) unit_x",
-        "x in mm = (x - off_x) unit_x",
-    ),
-    "unit_y": (
-        "",
-        "y in mm = (y - off_y) unit_y",
-        "y in mm = (y - off_y) unit_y",
-        "y in mm = (y - off_y) unit_y",
-    ),
-    "off_x1": ("", "Subtracted from x1", "Sottratto da x1", "Von x1 abgezogen"),
-    "off_y1": ("", "Subtracted from y1", "Sottratto da y1", "Von y1 abgezogen"),
-    "off_x2": ("", "Subtracted from x2", "Sottratto da x2", "Von x2 abgezogen"),
-    "off_y2": ("", "Subtracted from y2", "Sottratto da y2", "Von y2 abgezogen"),
-    "pair_file": ("", "Pair file", "File della coppia", "Paardatei"),
-    "n1_x": (
-        "m",
-        "Nadir of camera 1 on the wall, X",
-        "Nadir della camera 1 sul muro, X",
-        "Nadir der Kamera 1 auf der Wand, X",
-    ),
-    "n1_y": (
-        "m",
-        "Nadir of camera 1 on the wall, Y",
-        "Nadir della camera 1 sul muro, Y",
-        "Nadir der Kamera 1 auf der Wand, Y",
-    ),
-    "n2_x": (
-        "m",
-        "Nadir of camera 2 on the wall, X",
-        "Nadir della camera 2 sul muro, X",
-        "Nadir der Kamera 2 auf der Wand, X",
-    ),
-    "n2_y": (
-        "m",
-        "Nadir of camera 2 on the wall, Y",
-        "Nadir della camera 2 sul muro, Y",
-        "Nadir der Kamera 2 auf der Wand, Y",
-    ),
-    "e_x": (
-        "m",
-        "Zoom centre e = (d_1 N_2 - d_2 N_1)/(d_1 - d_2), X",
-        "Centro di zoom e = (d_1 N_2 - d_2 N_1)/(d_1 - d_2), X",
-        "Zoomzentrum e = (d_1 N_2 - d_2 N_1)/(d_1 - d_2), X",
-    ),
-    "e_y": ("m", "Zoom centre, Y", "Centro di zoom, Y", "Zoomzentrum, Y"),
-}
+    en: str
+    it: str
+    de: str
+    unit: str = ""
 
-#: Other words: key -> (English, Italian, German).
-WORDS: Mapping[str, tuple[str, str, str]] = {
-    "Readme": (
-        "How this workbook works",
-        "Come funziona questa cartella",
-        "Wie diese Arbeitsmappe funktioniert",
-    ),
-    "Setup": ("The two cameras", "Le due camere", "Die beiden Kameras"),
-    "Points": (
-        "Measured points and their relief",
-        "Punti misurati e loro rilievo",
-        "Gemessene Punkte und ihr Relief",
-    ),
-    "Results": ("Results", "Risultati", "Ergebnisse"),
-    "Check": ("Check points", "Punti di controllo", "Kontrollpunkte"),
-    "Georeference": (
-        "World coordinates: roto-translation with scale",
-        "Coordinate esterne: rototraslazione con scala",
-        "Weltkoordinaten: Drehung, Verschiebung, Maßstab",
-    ),
-    "Planning": ("What to expect", "Che cosa aspettarsi", "Was zu erwarten ist"),
-    "Charts": ("Charts", "Grafici", "Diagramme"),
-    "Log": ("What the program did", "Che cosa ha fatto il programma", "Was das Programm tat"),
-    "name": ("Name", "Nome", "Name"),
-    "description": ("Description", "Descrizione", "Beschreibung"),
-    "value": ("Value", "Valore", "Wert"),
-    "unit": ("Unit", "Unità", "Einheit"),
-    "type": (
-        "Type in the yellow cells; blue text is calculated.",
-        "Scrivere nelle celle gialle; il testo blu è calcolato.",
-        "Gelbe Zellen ausfüllen; blaue Schrift wird berechnet.",
-    ),
-    "points_how": (
-        "Give x1 y1 x2 y2 (both photos) or s1 s2 theta. Code PLANE = lies on the reference plane.",
-        "Dare x1 y1 x2 y2 (due foto) o s1 s2 theta. Codice PIANO = sul piano di riferimento.",
-        "x1 y1 x2 y2 (beide Bilder) oder s1 s2 theta. Code EBENE = liegt auf der Bezugsebene.",
-    ),
-    "points_pair": (
-        "Measured in pixels of a pair of photos; x1..y2 follow by the homographies of Setup.",
-        "Misurati in pixel di una coppia di foto; x1..y2 seguono dalle omografie di Setup.",
-        "In Pixeln eines Bildpaars gemessen; x1..y2 folgen aus den Homographien in Setup.",
-    ),
-    "results_how": (
-        "Filled by itself from Points and Georeference.",
-        "Si compila da sé da Points e Georeference.",
-        "Füllt sich selbst aus Points und Georeference.",
-    ),
-    "check_how": (
-        "Type the name of a point and what was measured on site; blanks are allowed.",
-        "Scrivere il nome del punto e le misure sul posto; ammesse celle vuote.",
-        "Punktname und Messung vor Ort eintragen; leere Zellen sind erlaubt.",
-    ),
-    "geo_how": (
-        "Names of points of Points with their world coordinates; use = 0 leaves a point out.",
-        "Nomi di punti di Points con le coordinate esterne; use = 0 esclude un punto.",
-        "Punktnamen aus Points mit ihren Weltkoordinaten; use = 0 lässt einen Punkt weg.",
-    ),
-    "geo_model": (
-        "Model: auto, levelled (wall upright), 3D, 2D (X Y to E N)",
-        "Modello: auto, levelled (muro a piombo), 3D, 2D (X Y in E N)",
-        "Modell: auto, levelled (Wand lotrecht), 3D, 2D (X Y nach E N)",
-    ),
-    "geo_auto": (
-        "Model found by the program",
-        "Modello trovato dal programma",
-        "Vom Programm gefundenes Modell",
-    ),
-    "geo_used": ("Model used", "Modello usato", "Verwendetes Modell"),
-    "geo_n": ("Control points used", "Punti d'appoggio usati", "Verwendete Passpunkte"),
-    "geo_scale": ("Scale", "Scala", "Maßstab"),
-    "geo_alpha": (
-        "Rotation in plan [deg]",
-        "Rotazione in pianta [gradi]",
-        "Drehung im Grundriss [Grad]",
-    ),
-    "geo_sigma0": ("sigma0 [m]", "sigma0 [m]", "sigma0 [m]"),
-    "geo_rotation": ("Rotation matrix", "Matrice di rotazione", "Drehmatrix"),
-    "geo_solved": (
-        "Found by the program for 3D",
-        "Trovata dal programma per 3D",
-        "Vom Programm für 3D gefunden",
-    ),
-    "geo_centres": (
-        "Centre (wall | world) [m]",
-        "Baricentro (muro | esterno) [m]",
-        "Schwerpunkt (Wand | Welt) [m]",
-    ),
-    "n": ("Number", "Numero", "Anzahl"),
-    "rmse": ("RMSE [m]", "RMSE [m]", "RMSE [m]"),
-    "mean": ("Mean [m]", "Media [m]", "Mittel [m]"),
-    "max": ("Largest [m]", "Massimo [m]", "Größter [m]"),
-    "worst": (
-        "Largest RMSE of X, Y, Z [m]",
-        "RMSE massimo di X, Y, Z [m]",
-        "Größter RMSE von X, Y, Z [m]",
-    ),
-    "holds": ("holds", "tiene", "hält"),
-    "fails": ("fails", "non tiene", "verfehlt"),
-    "sensor_w": ("Sensor width [mm]", "Larghezza del sensore [mm]", "Sensorbreite [mm]"),
-    "sensor_h": ("Sensor height [mm]", "Altezza del sensore [mm]", "Sensorhöhe [mm]"),
-    "footprint": (
-        "Wall covered, width x height [m]",
-        "Muro ripreso, larghezza x altezza [m]",
-        "Erfasste Wand, Breite x Höhe [m]",
-    ),
-    "gsd": ("Pixel on the wall [mm]", "Pixel sul muro [mm]", "Pixel auf der Wand [mm]"),
-    "uncertainty": (
-        "Area of uncertainty: nearer to the nadir a relief cannot be told from zero",
-        "Area di incertezza: più vicino al nadir il rilievo non si distingue da zero",
-        "Unsicherheitsbereich: näher am Nadir ist das Relief nicht von null zu trennen",
-    ),
-    "over_frame": (
-        "Precision over the frame",
-        "Precisione sul fotogramma",
-        "Genauigkeit über das Bild",
-    ),
-    "chart_plan": ("Points on the wall [m]", "Punti sul muro [m]", "Punkte auf der Wand [m]"),
-    "chart_sigma": (
-        "Sigma of relief against distance from the nadir",
-        "Sigma del rilievo e distanza dal nadir",
-        "Sigma des Reliefs über dem Abstand vom Nadir",
-    ),
-    "chart_error": (
-        "Errors at check points [m]",
-        "Errori sui punti di controllo [m]",
-        "Fehler an den Kontrollpunkten [m]",
-    ),
-    "chart_data": (
-        "Data of the charts (the first {n} points)",
-        "Dati dei grafici (i primi {n} punti)",
-        "Daten der Diagramme (die ersten {n} Punkte)",
-    ),
-    "page": ("Page", "Pagina", "Seite"),
-}
+    def in_language(self, language: str) -> str:
+        """Return the expression in a language."""
+        return self[LANGUAGES.index(language)]
 
-#: The text of the sheet `Readme`, paragraph by paragraph; "#" marks a heading.
-README: Mapping[str, tuple[str, ...]] = {
-    "en": (
-        "#Order of work",
-        "1  Setup: type the principal distances and the distances of both cameras.",
-        "2  Points: type the points measured on both photos; relief r appears beside them.",
-        "3  Results: names, coordinates, precision; ready to print.",
-        "4  Check: type what was measured on site; RMSE and verdict appear.",
-        "5  Georeference: type world coordinates of a few points; Results gets E, N, H.",
-        "6  Planning and Charts follow by themselves. Log tells what the program wrote.",
-        "#Colours",
-        "Yellow cells are yours. Blue text is calculated: change an input and it follows.",
-        "Sheets are protected without a password, only against slips: Review > Unprotect Sheet.",
-        "#Conventions",
-        "Image 1 is the far camera with the long lens, image 2 the near one: d_1 > d_2.",
-        "r (Z) is positive towards the cameras; X right, Y up, in metres on the reference plane.",
-        "theta is counted clockwise from +y: x = s sin theta, y = s cos theta.",
-        "Pixels: (column, row), (0, 0) is the centre of the top-left pixel, rows run down.",
-        "#Formulas (P. Midulla, Bifocal pairs of images)",
-        "ds = s2 - s1;   den = s2/d_2 - s1/d_1;   r = ds/den   (Eqs. 5, 6)",
-        "e1 = s1 r/d_1;   e2 = s2 r/d_2   (Eqs. 1, 3);   s' = s1 - e1",
-        "X = s' sin theta m_1/1000;   Y = s' cos theta m_1/1000   (Eq. 7)",
-        "sigma_r = sigma_s sqrt((1 - r/d_1)^2 + (k_12 (1 - r/d_2))^2) / |den|",
-        "#Flags",
-        "OK   good.      ON-PLANE   relief not different from zero.",
-        "WEAK   less precise than half the limit sigma_r_max.      UNCERTAIN   beyond it.",
-        "NADIR   at the nadir point there is no relief.      CHECK   a coordinate is missing.",
-        "OFF-RADIAL   the two picks are not on one radius: one of them is another point.",
-        "#With the program",
-        "bifocal solve SURVEY.xlsx --out RESULT.xlsx checks the cells and fills in everything.",
-    ),
-    "it": (
-        "#Ordine di lavoro",
-        "1  Setup: scrivere le distanze principali e le distanze delle due camere.",
-        "2  Points: scrivere i punti misurati su ambedue le foto; accanto compare il rilievo r.",
-        "3  Results: nomi, coordinate, precisione; pronto per la stampa.",
-        "4  Check: scrivere le misure fatte sul posto; compaiono RMSE e verdetto.",
-        "5  Georeference: coordinate esterne di alcuni punti; Results riceve E, N, H.",
-        "6  Planning e Charts seguono da soli. Log dice che cosa ha scritto il programma.",
-        "#Colori",
-        "Le celle gialle sono vostre. Il testo blu è calcolato: segue ogni modifica.",
-        "I fogli sono protetti senza password, solo contro le sviste: Revisione > Rimuovi.",
-        "#Convenzioni",
-        "La foto 1 è la camera lontana con la focale lunga, la 2 la vicina: d_1 > d_2.",
-        "r (Z) è positivo verso le camere; X a destra, Y in alto, in metri sul piano.",
-        "theta si conta in senso orario da +y: x = s sen theta, y = s cos theta.",
-        "Pixel: (colonna, riga), (0, 0) è il centro del pixel in alto a sinistra.",
-        "#Formule (P. Midulla, Bifocal pairs of images)",
-        "ds = s2 - s1;   den = s2/d_2 - s1/d_1;   r = ds/den   (Eq. 5, 6)",
-        "e1 = s1 r/d_1;   e2 = s2 r/d_2   (Eq. 1, 3);   s' = s1 - e1",
-        "X = s' sen theta m_1/1000;   Y = s' cos theta m_1/1000   (Eq. 7)",
-        "sigma_r = sigma_s radq((1 - r/d_1)^2 + (k_12 (1 - r/d_2))^2) / |den|",
-        "#Esiti",
-        "OK   buono.      ON-PLANE   rilievo non diverso da zero.",
-        "WEAK   meno preciso di metà del limite sigma_r_max.      UNCERTAIN   oltre il limite.",
-        "NADIR   nel nadir non c'è spostamento.      CHECK   manca una coordinata.",
-        "OFF-RADIAL   le due collimazioni non stanno su un raggio: una è un altro punto.",
-        "#Con il programma",
-        "bifocal solve SURVEY.xlsx --out RESULT.xlsx controlla le celle e riempie tutto.",
-    ),
-    "de": (
-        "#Reihenfolge der Arbeit",
-        "1  Setup: Kammerkonstanten und Abstände beider Kameras eintragen.",
-        "2  Points: auf beiden Bildern gemessene Punkte eintragen; daneben erscheint das Relief r.",
-        "3  Results: Namen, Koordinaten, Genauigkeit; fertig zum Drucken.",
-        "4  Check: Messungen vor Ort eintragen; RMSE und Urteil erscheinen.",
-        "5  Georeference: Weltkoordinaten einiger Punkte; Results erhält E, N, H.",
-        "6  Planning und Charts folgen von selbst. Log sagt, was das Programm schrieb.",
-        "#Farben",
-        "Gelbe Zellen gehören Ihnen. Blaue Schrift wird berechnet und folgt jeder Änderung.",
-        "Die Blätter sind ohne Kennwort geschützt, nur gegen Versehen: Überprüfen > Blattschutz.",
-        "#Vereinbarungen",
-        "Bild 1 ist die ferne Kamera mit langer Brennweite, Bild 2 die nahe: d_1 > d_2.",
-        "r (Z) ist zu den Kameras hin positiv; X rechts, Y oben, in Metern auf der Bezugsebene.",
-        "theta zählt im Uhrzeigersinn ab +y: x = s sin theta, y = s cos theta.",
-        "Pixel: (Spalte, Zeile), (0, 0) ist die Mitte des Pixels links oben.",
-        "#Formeln (P. Midulla, Bifocal pairs of images)",
-        "ds = s2 - s1;   den = s2/d_2 - s1/d_1;   r = ds/den   (Gl. 5, 6)",
-        "e1 = s1 r/d_1;   e2 = s2 r/d_2   (Gl. 1, 3);   s' = s1 - e1",
-        "X = s' sin theta m_1/1000;   Y = s' cos theta m_1/1000   (Gl. 7)",
-        "sigma_r = sigma_s Wurzel((1 - r/d_1)^2 + (k_12 (1 - r/d_2))^2) / |den|",
-        "#Kennzeichen",
-        "OK   gut.      ON-PLANE   Relief nicht von null verschieden.",
-        "WEAK   ungenauer als die halbe Grenze sigma_r_max.      UNCERTAIN   darüber.",
-        "NADIR   im Nadir gibt es keinen Versatz.      CHECK   eine Koordinate fehlt.",
-        "OFF-RADIAL   die beiden Messungen liegen nicht auf einem Radius: anderer Punkt.",
-        "#Mit dem Programm",
-        "bifocal solve SURVEY.xlsx --out RESULT.xlsx prüft die Zellen und füllt alles aus.",
-    ),
-}
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The expression in all languages."""
+        return self[: len(LANGUAGES)]
+
+
+@cache
+def _content() -> dict[str, dict[str, Any]]:
+    return tomllib.loads(files(__package__).joinpath("words.toml").read_text(encoding="utf-8"))
+
+
+def term(section: str, key: str) -> Wording | None:
+    """Return an entry of the sections ``columns``, ``setup`` or ``words``; None if absent."""
+    entry = _content()[section].get(key)
+    return None if entry is None else Wording(**entry)
 
 
 def word(key: str, language: str) -> str:
     """Return a word of the workbook in a language."""
-    return WORDS[key][LANGUAGES.index(language)]
+    return Wording(**_content()["words"][key]).in_language(language)
 
 
 def label(key: str, language: str) -> str:
     """Return a column's label with its unit."""
-    unit, *names = COLUMNS[key]
-    name = names[LANGUAGES.index(language)]
-    return f"{name} [{unit}]" if unit else name
+    column = Wording(**_content()["columns"][key])
+    name = column.in_language(language)
+    return f"{name} [{column.unit}]" if column.unit else name
+
+
+def headings(section: str, key: str) -> tuple[str, ...]:
+    """Return every heading of a column, or label of a cell of ``setup``, that is understood."""
+    known = term(section, key)
+    return (*(known.names if known else ()), *_content()["headings"].get(key, ()))
+
+
+def readme(language: str) -> list[str]:
+    """Return the paragraphs of the sheet `Readme`; "#" marks a heading."""
+    return str(_content()["readme"][language]).splitlines()

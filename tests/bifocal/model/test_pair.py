@@ -12,6 +12,9 @@ import numpy as np
 import pytest
 
 from bifocal import Lens, Pair, Photo, rays, relief
+from bifocal.survey.observations import PointObservations
+from bifocal.survey.point_survey import solve_points
+from bifocal.survey.remarks import point_remarks
 from photocore.errors import GeometryError, InputError
 
 GSD = 0.00369
@@ -141,9 +144,11 @@ def test_a_mispicked_point_is_named_with_its_size_in_pixels():
     found = pair.intersect(first, second, sigma_px=0.5)
     assert found.flags[7] == "OFF-RADIAL"
     assert abs(found.misfit[7]) == pytest.approx(8.0, abs=0.05)
-    (sentence,) = found.blunders([f"P{i}" for i in range(50)])
-    assert sentence.startswith("P7: ")
-    assert "8.0 px" in sentence
+    points = PointObservations(ids=tuple(f"P{i}" for i in range(50)), pixels1=first, pixels2=second)
+    (sentence,) = point_remarks(points, solve_points(pair, points, sigma_px=0.5), None)
+    assert sentence.startswith(
+        f"P7: the two picks miss each other by {abs(found.misfit[7]):.3g} px"
+    )
 
 
 def test_near_the_nadir_points_are_uncertain_and_finite_and_on_it_undefined():
@@ -241,6 +246,12 @@ def test_swapped_images_are_exchanged_and_said():
         ({"nadir": [0, 10**400]}, InputError, "nadir: holds a whole number above"),
         ({"file": 3}, InputError, "file"),
         ({"lens": "none.json"}, InputError, "lens file"),
+        (
+            {"principal_distance": "abc"},
+            InputError,
+            '"image1": principal_distance: expected numbers',
+        ),
+        ({"pixel_size": -1}, InputError, '"image1": pixel_size: must be above zero'),
     ],
 )
 def test_every_bad_value_is_named_with_file_and_key(tmp_path, changes, error, message):

@@ -66,7 +66,7 @@ def test_control_points_give_a_pair_file_with_picture_and_diagnostics(folder) ->
     assert pair.image1.file == "far.png"
     assert pair.extra["setup"]["way"] == "control"
     assert pair.extra["setup"]["standard_deviations"]["distance1"] < 0.5
-    assert pair.image1.extra["principal_distance"] == pytest.approx(float(FOCAL[0]), rel=0.01)
+    assert pair.image1.principal_distance == pytest.approx(float(FOCAL[0]), rel=0.01)
     assert cv2.imread(str(folder / "wall.pair.png")).shape[1] > 1000
 
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from bifocal import Pair, Photo
-from bifocal.survey.orientation_check import check_setup
+from bifocal.survey.orientation_check import check_orientation
 from photocore.errors import GeometryError, InputError
 
 METRES = np.array([[0.00369, 0, -5.67], [0, -0.00369, 3.78], [0, 0, 1.0]])
@@ -36,7 +36,7 @@ def by_name(check):
 
 
 def test_a_scale_mismatch_is_found_and_read_as_false_relief():
-    check = check_setup(IDEAL, *picks(np.diag([1.01, 1.01, 1.0])))
+    check = check_orientation(IDEAL, *picks(np.diag([1.01, 1.01, 1.0])))
     scale = by_name(check)["scale"]
     assert scale.value == pytest.approx(1.0, abs=1e-6)
     assert scale.false_relief == pytest.approx(0.21, abs=0.01)
@@ -52,7 +52,7 @@ def test_rotation_shift_and_tilt_are_found_together():
             [p[0], p[1], 1.0],
         ]
     )
-    check = check_setup(IDEAL, *picks(distortion))
+    check = check_orientation(IDEAL, *picks(distortion))
     found = by_name(check)
     assert found["rotation"].value == pytest.approx(0.2, abs=2e-3)
     assert found["rotation"].false_relief == 0
@@ -66,7 +66,7 @@ def test_rotation_shift_and_tilt_are_found_together():
 
 def test_the_corrected_pair_gives_no_relief_on_the_plane():
     first, second = picks(np.array([[1.01, 0.003, 0.02], [-0.003, 1.01, 0.01], [4e-4, 0, 1.0]]))
-    check = check_setup(IDEAL, first, second)
+    check = check_orientation(IDEAL, first, second)
     away = np.hypot(*IDEAL.image1.plane_from_pixels(first).T) > 1
     assert np.abs(IDEAL.intersect(first, second).xyz[away, 2]).max() > 0.1
     assert np.abs(check.corrected.intersect(first, second).xyz[away, 2]).max() < 5e-4
@@ -75,7 +75,7 @@ def test_the_corrected_pair_gives_no_relief_on_the_plane():
 def test_formal_sigmas_match_the_spread_of_repeated_picks():
     pulls = []
     for seed in range(150):
-        check = check_setup(IDEAL, *picks(np.eye(3), seed=seed, noise=0.5), sigma_px=0.5)
+        check = check_orientation(IDEAL, *picks(np.eye(3), seed=seed, noise=0.5), sigma_px=0.5)
         pulls.append([p.value / p.sigma for p in check.parameters])
     spread = np.sqrt(np.mean(np.square(pulls), axis=0))
     np.testing.assert_allclose(spread, 1.0, atol=0.25)
@@ -84,23 +84,25 @@ def test_formal_sigmas_match_the_spread_of_repeated_picks():
 def test_a_point_that_is_not_on_the_plane_is_named_and_left_out():
     first, second = picks(np.diag([1.002, 1.002, 1.0]), noise=0.2)
     second[4] += 25
-    check = check_setup(IDEAL, first, second, names=[f"P{i}" for i in range(12)], sigma_px=0.2)
+    check = check_orientation(
+        IDEAL, first, second, names=[f"P{i}" for i in range(12)], sigma_px=0.2
+    )
     assert check.outliers == ("P4",)
     assert by_name(check)["scale"].value == pytest.approx(0.2, abs=0.02)
-    assert any("P4" in line for line in check.sentences())
+    assert any("P4" in line for line in check.remarks)
 
 
 def test_few_points_say_that_tilt_is_not_determined():
-    check = check_setup(IDEAL, *picks(np.eye(3), count=3))
+    check = check_orientation(IDEAL, *picks(np.eye(3), count=3))
     assert len(check.parameters) == 4
-    assert any("tilt: not determined" in line for line in check.sentences())
+    assert any("tilt: not determined" in line for line in check.remarks)
 
 
 def test_one_point_is_refused():
     with pytest.raises(InputError, match="at least 2"):
-        check_setup(IDEAL, [[10, 10]], [[10, 10]])
+        check_orientation(IDEAL, [[10, 10]], [[10, 10]])
 
 
 def test_coinciding_points_are_refused():
     with pytest.raises(GeometryError, match="spread over the photo"):
-        check_setup(IDEAL, np.full((6, 2), 300.0), np.full((6, 2), 301.0))
+        check_orientation(IDEAL, np.full((6, 2), 300.0), np.full((6, 2), 301.0))

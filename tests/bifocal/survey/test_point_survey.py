@@ -9,9 +9,14 @@ from hypothesis import strategies as st
 
 from bifocal.model.pair import Pair, Photo
 from bifocal.survey.observations import PointObservations
-from bifocal.survey.point_survey import solve_ideal, solve_pair
+from bifocal.survey.point_survey import solve_points
 from bifocal.survey.setup import SurveySetup
 from photocore.errors import GeometryError, InputError
+
+
+def solve_ideal(setup, points):
+    return solve_points(setup.pair(), setup.in_millimetres(points), limits=setup.limits)
+
 
 SETUP = SurveySetup(d1=17.5, d2=9.5, c1=35.0, c2=19.0)
 
@@ -165,7 +170,7 @@ def test_general_pair_gives_what_intersecting_its_rays_gives():
     points = PointObservations(
         ids=tuple(map(str, range(len(xyz)))), pixels1=pixels[0], pixels2=pixels[1]
     )
-    table, expected = solve_pair(pair, points), pair.intersect(*pixels)
+    table, expected = solve_points(pair, points), pair.intersect(*pixels)
     assert table.xyz == pytest.approx(expected.xyz, rel=1e-9, abs=1e-9)
     assert table["sigma_r"] == pytest.approx(expected.sigma[:, 2], rel=1e-9)
     assert table["e1"] == pytest.approx(expected.e1, rel=1e-9, abs=1e-9)  # scale 1:1000: mm = m
@@ -178,12 +183,12 @@ def test_exact_picks_of_an_offset_tilted_pair_give_the_points_back():
     pair, xyz = general_pair(), grid()
     first, second = pair.project(xyz)
     points = PointObservations(ids=tuple(map(str, range(200))), pixels1=first, pixels2=second)
-    assert solve_pair(pair, points).xyz == pytest.approx(xyz, abs=1e-8)
+    assert solve_points(pair, points).xyz == pytest.approx(xyz, abs=1e-8)
 
 
 def test_equal_distances_are_refused():
     with pytest.raises(GeometryError, match="same distance"):
-        SurveySetup(d1=9.5, d2=9.5)
+        SurveySetup(d1=9.5, d2=9.5).pair()
 
 
 def test_scales_that_differ_too_much_are_refused_with_the_size_of_the_fault():
@@ -193,4 +198,4 @@ def test_scales_that_differ_too_much_are_refused_with_the_size_of_the_fault():
 
 def test_pixels_without_the_size_of_a_pixel_are_refused():
     with pytest.raises(InputError, match="pitch"):
-        SurveySetup(d1=17.5, d2=9.5, unit="px")
+        SurveySetup(d1=17.5, d2=9.5, unit="px").pair()

@@ -15,7 +15,7 @@ from bifocal.model.pair import Pair, Photo
 from bifocal.survey.check_points import check_points
 from bifocal.survey.georeferencing import georeference
 from bifocal.survey.observations import PointObservations
-from bifocal.survey.point_survey import solve_ideal, solve_pair
+from bifocal.survey.point_survey import solve_points
 from bifocal.survey.reference import KnownPoints
 from bifocal.survey.setup import SurveySetup
 from bifocal.survey.template_workflow import write_template
@@ -125,7 +125,7 @@ def ideal_content(rows=40, model="levelled", **more):
     points = PointObservations(
         ids=tuple(ids), xy1=xy1, xy2=xy2, polar=polar, note=("café\nline <&>",) * rows
     )
-    table = solve_ideal(setup, points)
+    table = solve_points(setup.pair(), setup.in_millimetres(points))
     nothing = np.nan
     known = KnownPoints(
         ids=("7", "007", "P4", "P8", "nowhere"),
@@ -144,6 +144,7 @@ def ideal_content(rows=40, model="levelled", **more):
     control = KnownPoints(ids=tuple(ids[i] for i in chosen), xyz=world)
     return SurveyContent(
         setup=setup,
+        pair=setup.pair(),
         points=points,
         table=table,
         known=known,
@@ -156,12 +157,14 @@ def ideal_content(rows=40, model="levelled", **more):
 
 def pair_content(rows=60, principal_distance=None, lens=None):
     rng = np.random.default_rng(9)
-    extra = {} if principal_distance is None else {"principal_distance": principal_distance}
     first = np.array([[4e-3, 2e-4, -6.0], [1e-4, -4e-3, 4.0], [5e-6, 2e-6, 1.0]])
     second = np.array([[4e-3, -1e-4, -6.0], [3e-4, -4e-3, 4.0], [-3e-6, 2e-6, 1.0]])
     pair = Pair(
         image1=Photo(
-            plane_from_pixel=first, nadir=np.array([0.4, -0.3]), distance=18.0, extra=extra
+            plane_from_pixel=first,
+            nadir=np.array([0.4, -0.3]),
+            distance=18.0,
+            principal_distance=principal_distance,
         ),
         image2=Photo(plane_from_pixel=second, nadir=np.array([-0.2, 0.5]), distance=9.0, lens=lens),
     )
@@ -174,7 +177,7 @@ def pair_content(rows=60, principal_distance=None, lens=None):
     points = PointObservations(
         ids=tuple(map(str, range(rows))), pixels1=pixels[0], pixels2=pixels[1]
     )
-    table = solve_pair(pair, points, sigma_px=0.4)
+    table = solve_points(pair, points, sigma_px=0.4)
     return SurveyContent(pair=pair, points=points, table=table, sigma_px=0.4)
 
 

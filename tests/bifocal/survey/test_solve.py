@@ -1,0 +1,122 @@
+"""`solve` and `georeference` from Python, and the ideal pair as a pair like any other."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from bifocal import Pair, relief
+from bifocal.survey.georeferencing import georeference
+from bifocal.survey.workflow import solve
+from photocore.errors import GeometryError, InputError
+
+LENSES = {"d1": 17.5, "d2": 9.5, "c1": 35.0, "c2": 19.0}
+
+
+def seen(xyz, *, c, d):
+    """Image coordinates [mm] of points in front of a camera at the nadir: similar triangles."""
+    xyz = np.asarray(xyz, dtype=float)
+    return c * xyz[:, :2] / (d - xyz[:, 2:])
+
+
+def columns(xyz):
+    first, second = seen(xyz, c=35, d=17.5), seen(xyz, c=19, d=9.5)
+    return dict(zip(("x1", "y1", "x2", "y2"), np.hstack([first, second]).T, strict=True))
+
+
+XYZ = np.array([[2.0, 0.0, 1.0], [-3.0, 2.0, 0.5], [4.0, -2.0, -0.4], [-4.0, -1.5, 0.0]])
+
+
+def test_columns_of_coordinates_give_the_points_back():
+    survey = solve({"id": ["A", "B", "C", "D"], **columns(XYZ)}, **LENSES)
+    assert survey.table.xyz == pytest.approx(XYZ, abs=1e-12)
+    assert survey.table.ids == ("A", "B", "C", "D")
+    assert survey.pair.d1 == 17.5
+
+
+def test_columns_of_pixels_with_a_pair_give_the_points_back():
+    nadirs = {"nadir1": (1536.25, 1023.75), "nadir2": (1530.0, 1020.5)}
+    pair = Pair.ideal(**LENSES, pitch=0.0074, **nadirs)
+    picks = dict(zip(("col1", "row1", "col2", "row2"), np.hstack(pair.project(XYZ)).T, strict=True))
+    survey = solve(picks, pair=pair)
+    assert survey.table.xyz == pytest.approx(XYZ, abs=1e-11)
+    # By hand: 35 mm * 2 m / 16.5 m right of the nadir, in pixels of 0.0074 mm.
+    assert picks["col1"][0] == pytest.approx(1536.25 + 35 * 2 / 16.5 / 0.0074)
+
+
+def test_plane_points_correct_the_orientation_from_python_too():
+    wall = np.array([[4.0, 2.0, 0.0], [-4.0, 2.0, 0.0], [4.0, -2.0, 0.0], [-4.0, -2.0, 0.0]])
+    picks = columns(np.vstack([XYZ, wall]))
+    picks |= {"x2": picks["x2"] * 1.01, "y2": picks["y2"] * 1.01}
+    picks |= {"code": [""] * 4 + ["PLANE"] * 4}
+    survey = solve(picks, **LENSES, adjust_setup=True)
+    assert survey.table.xyz[:4] == pytest.approx(XYZ, abs=1e-6)
+    assert any("scale: +1 %" in remark for remark in survey.remarks)
+
+
+@given(
+    st.floats(0.5, 6), st.floats(0, 2 * np.pi), st.floats(-3, 5), st.floats(2, 9), st.floats(1, 9)
+)
+def test_table_intersection_and_equation_agree(radius, direction, r, base, d2):
+    d1 = d2 + base
+    if r > 0.8 * d2:
+        return
+    xyz = np.array([[radius * np.sin(direction), radius * np.cos(direction), r]])
+    c1, c2 = 2.0 * d1, 2.0 * d2
+    first, second = seen(xyz, c=c1, d=d1), seen(xyz, c=c2, d=d2)
+    pair = Pair.ideal(d1=d1, d2=d2, c1=c1, c2=c2)
+    table = solve(
+        dict(zip(("x1", "y1", "x2", "y2"), np.hstack([first, second])[0][:, None], strict=True)),
+        d1=d1, d2=d2, c1=c1, c2=c2,
+    ).table  # fmt: skip
+    closed = relief(np.hypot(*first.T), np.hypot(*second.T), d1=d1, d2=d2)
+    assert table["r"] == pytest.approx(closed, rel=1e-12, abs=1e-12)
+    assert pair.intersect(first, second).xyz == pytest.approx(table.xyz, rel=1e-9, abs=1e-9)
+
+
+def test_an_exchanged_ideal_pair_keeps_the_order_it_was_given_in():
+    pair = Pair.ideal(d1=9.5, d2=17.5, c1=19, c2=35)
+    assert (pair.d1, pair.d2, pair.exchanged) == (17.5, 9.5, True)
+    assert [photo.principal_distance for photo in pair.as_given] == [19, 35]
+    assert [photo.scale_number for photo in pair.as_given] == pytest.approx([500, 500])
+
+
+@pytest.mark.parametrize(
+    ("changes", "error", "message"),
+    [
+        ({"c2": None}, InputError, "both principal distances or none"),
+        ({"d2": 17.5}, GeometryError, "same"),
+        ({"d1": -1.0}, InputError, "above zero"),
+        ({"rules": ["three miles"]}, InputError, "nor a length"),
+        ({"columns": "id=A,q=B"}, InputError, "no column"),
+    ],
+)
+def test_options_that_cannot_be_used_are_named(changes, error, message):
+    with pytest.raises(error, match=message):
+        solve(columns(XYZ), **(LENSES | changes))
+
+
+@pytest.mark.parametrize(
+    ("table", "message"),
+    [
+        ({"x9": [1.0]}, "no column 'x9'"),
+        ({"x1": [1.0, 2.0], "y1": [1.0]}, "y1: has 1 values, expected 2"),
+        ({"x1": ["a"], "y1": [1.0], "x2": [1.0], "y2": [1.0]}, "x1: expected numbers"),
+        ({}, "there is no point"),
+    ],
+)
+def test_columns_that_cannot_be_used_are_named(table, message):
+    with pytest.raises(InputError, match=message):
+        solve(table, **LENSES)
+
+
+def test_solved_points_are_placed_by_columns_of_control_points():
+    survey = solve({"id": ["A", "B", "C", "D"], **columns(XYZ)}, **LENSES)
+    control = {"id": ["A", "B", "C"], "E": 100 + XYZ[:3, 0], "N": 200 - XYZ[:3, 2],
+               "H": 50 + XYZ[:3, 1]}  # fmt: skip
+    placed = georeference(survey.table, control)
+    assert placed.world_from_wall(survey.table.xyz)[3] == pytest.approx([96, 200, 48.5], abs=1e-9)
+    with pytest.raises(InputError, match="N: expected 3 values"):
+        georeference(survey.table, control | {"N": [1.0]})
