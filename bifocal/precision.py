@@ -1,7 +1,7 @@
 r"""Precision in closed form: error propagation through Midulla's equations.
 
 Symbols as in `bifocal.equations`. ``sigma_1`` and ``sigma_2`` are the standard deviations of the
-radial distances s1 and s2, in the unit of s; ``B = d1 d2 / (d1 - d2)`` is the lever arm.
+radial distances s1 and s2, in the unit of s; ``B = d1 d2 / (d1 - d2)`` is the base factor.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ class Sigmas(NamedTuple):
     y: FloatArray
 
 
-def lever_arm(*, d1: float, d2: float) -> float:
+def base_factor(*, d1: float, d2: float) -> float:
     """Return B = d1 d2 / (d1 - d2): metres of relief per unit of relative radial shift.
 
     Raises
@@ -38,7 +38,7 @@ def lever_arm(*, d1: float, d2: float) -> float:
     --------
     The paper's pairs, 35/19 mm and 35/28 mm:
 
-    >>> round(lever_arm(d1=17.5, d2=9.5), 2), round(lever_arm(d1=17.5, d2=14), 2)
+    >>> round(base_factor(d1=17.5, d2=9.5), 2), round(base_factor(d1=17.5, d2=14), 2)
     (20.78, 70.0)
     """
     d1, d2 = positive(d1, "d1", unit="m"), positive(d2, "d2", unit="m")
@@ -181,7 +181,7 @@ def uncertainty_radius(
     """
     wanted = as_floats(sigma_r_max, "sigma_r_max")
     r = as_floats(r, "r")
-    lever_arm(d1=d1, d2=d2)
+    base_factor(d1=d1, d2=d2)
     # Equal parts of sigma_m in both images, as sigma_relief with s_i = s' d_i / (d_i - r).
     spread = np.hypot(1 - r / d1, 1 - r / d2) / np.sqrt(2.0)
     factor = (d1 - r) * (d2 - r) / (d1 - d2) * spread
@@ -201,4 +201,4 @@ def false_relief_of_scale(mismatch: ArrayLike, *, d1: float, d2: float) -> Float
     >>> round(float(false_relief_of_scale(0.01, d1=17.5, d2=14)), 2)
     0.7
     """
-    return np.asarray(as_floats(mismatch, "mismatch") * lever_arm(d1=d1, d2=d2))
+    return np.asarray(as_floats(mismatch, "mismatch") * base_factor(d1=d1, d2=d2))

@@ -25,7 +25,7 @@ points.csv, one line per control point; r blank = on the wall; pixels in both ph
 """
 
 
-class Numbers(click.ParamType):  # type: ignore[type-arg,unused-ignore]
+class NumberList(click.ParamType):  # type: ignore[type-arg,unused-ignore]
     """Numbers separated by commas."""
 
     name = "numbers"
@@ -90,25 +90,25 @@ FILE = click.Path(path_type=Path)
 )
 @click.option(
     "--length",
-    type=Numbers(5),
+    type=NumberList(5),
     metavar="COL,ROW,COL,ROW,M",
     help="A length on the wall: two points of the far photo [px] and metres.",
 )
 @click.option(
     "--wall",
-    type=Numbers(2),
+    type=NumberList(2),
     metavar="COL,ROW",
     help="A spot of the wall in the far photo, where several planes compete [px].",
 )
 @click.option(
     "--horizontal",
-    type=Numbers(4),
+    type=NumberList(4),
     metavar="COL,ROW,COL,ROW",
     help="Two points of the far photo on a level line of the wall [px].",
 )
 @click.option(
     "--vertical",
-    type=Numbers(4),
+    type=NumberList(4),
     metavar="COL,ROW,COL,ROW",
     help="Two points of the far photo on an upright line of the wall [px].",
 )
@@ -167,15 +167,15 @@ def command(
 
 def _options(given: dict[str, Any]) -> Any:
     """Return the workflow's options from the command line's."""
-    from bifocal.orientation.align_workflow import AlignOptions, LensData
-    from bifocal.orientation.alignment import SiteMeasures
+    from bifocal.orientation.align_workflow import AlignOptions, KnownLens
+    from bifocal.orientation.control_points import SiteMeasures
     from photocore.arrays import positive
 
     for name, value in given.items():
         if isinstance(value, float):
             positive(value, f"--{name.replace('_', '-')}")
     lenses = tuple(
-        LensData(
+        KnownLens(
             lens=given[f"lens{n}"] or given["lens"],
             focal=given[f"focal{n}"],
             pixel_size=given[f"pixel_size{n}"] or given["pixel_size"],

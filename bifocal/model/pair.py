@@ -209,7 +209,7 @@ class Pair:
         return rays.zoom_centre(self.image1.foot, self.image2.foot)
 
     @property
-    def lever(self) -> float:
+    def base_factor(self) -> float:
         """B = d1 d2 / (d1 - d2): metres of relief per unit of relative radial shift. [m]"""
         d1, d2 = self.image1.distance, self.image2.distance
         return d1 * d2 / (d1 - d2)

@@ -12,12 +12,12 @@ import numpy as np
 
 from bifocal.files.images import ImageInfo, image_info, read_image, to_eight_bit
 from bifocal.model.lens import Lens
-from bifocal.orientation.absolute_orientation import PhotoInput, set_up, silent
-from bifocal.orientation.alignment import Alignment, Control, Interior, SiteMeasures
+from bifocal.orientation.absolute_orientation import orient_pair
+from bifocal.orientation.alignment import Alignment, make_alignment, with_files
 from bifocal.orientation.alignment_picture import write_alignment_picture
-from bifocal.orientation.control import read_control, read_lengths
-from bifocal.orientation.oriented_pair import make_alignment, with_files
-from bifocal.orientation.photo_lens import lens_of_photo
+from bifocal.orientation.control_points import Control, SiteMeasures, read_control, read_lengths
+from bifocal.orientation.interior_orientation import Interior, lens_of_photo
+from bifocal.orientation.orientation_stages import PhotoInput, silent
 from photocore.arrays import ByteArray, FloatArray
 from photocore.errors import InputError
 from photocore.output import check_writable
@@ -31,7 +31,7 @@ SIGMA_NOMINAL, SIGMA_EQUIVALENT = 0.02, 0.04
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class LensData:
+class KnownLens:
     """What is known of one photo's lens; None where the EXIF data are to be used.
 
     Attributes
@@ -56,7 +56,7 @@ class AlignOptions:
 
     Attributes
     ----------
-    lenses : pair of LensData
+    lenses : pair of KnownLens
     site : SiteMeasures
     auto : bool
     control, lengths : Path or None
@@ -69,7 +69,7 @@ class AlignOptions:
         Unit of the control coordinates; empty: as the headings say, else metres.
     """
 
-    lenses: tuple[LensData, LensData] = field(default_factory=lambda: (LensData(), LensData()))
+    lenses: tuple[KnownLens, KnownLens] = field(default_factory=lambda: (KnownLens(), KnownLens()))
     site: SiteMeasures = field(default_factory=SiteMeasures)
     auto: bool = False
     control: Path | None = None
@@ -107,20 +107,20 @@ def align_photos(
             check_writable(path, overwrite=overwrite)
     infos = image_info(far), image_info(near)
     interiors = _interiors(infos, options.lenses)
-    control = _control(options, interiors[0].image_size)
+    control = _control(options, (interiors[0].image_size, interiors[1].image_size))
     photos = tuple(
         PhotoInput(grey=_grey(info.path), interior=interior, name=info.path.name)
         for info, interior in zip(infos, interiors, strict=True)
     )
     given = (photos[0], photos[1])
-    made = set_up(given, control=control, site=options.site, step=step)
+    oriented = orient_pair(given, control=control, site=options.site, step=step)
     paths, ordered = (far, near), given
-    if made.exchanged:
+    if oriented.exchanged:
         paths, ordered = (near, far), (given[1], given[0])
     line = None
     if options.line is not None:
         line = (np.array(options.line[0], dtype=np.float64).reshape(2, 2), options.line[1])
-    alignment = make_alignment(made, ordered, way=way, direction=line)
+    alignment = make_alignment(oriented, ordered, way=way, direction=line)
     if picture is not None:
         step("drawing the picture")
         images: list[ByteArray] = [photo.grey for photo in ordered if photo.grey is not None]
@@ -189,7 +189,7 @@ def _check_metres(options: AlignOptions) -> None:
 
 
 def _interiors(
-    infos: tuple[ImageInfo, ImageInfo], lenses: tuple[LensData, LensData]
+    infos: tuple[ImageInfo, ImageInfo], lenses: tuple[KnownLens, KnownLens]
 ) -> tuple[Interior, Interior]:
     """Return both interior orientations."""
     first, second = (
@@ -199,7 +199,7 @@ def _interiors(
     return first, second
 
 
-def _interior(info: ImageInfo, data: LensData, number: int) -> Interior:
+def _interior(info: ImageInfo, data: KnownLens, number: int) -> Interior:
     """Return the best that is known of a photo's interior orientation."""
     if data.lens is not None:
         lens = lens_of_photo(Lens.read(data.lens), info.size, orientation=info.orientation)
@@ -248,7 +248,7 @@ def _pitch_from_exif(info: ImageInfo) -> float | None:
     return None
 
 
-def _control(options: AlignOptions, size: tuple[int, int]) -> Control:
+def _control(options: AlignOptions, sizes: tuple[tuple[int, int], tuple[int, int]]) -> Control:
     """Return the control points and lengths the options name."""
     control = Control()
     if options.control is not None:
@@ -264,8 +264,9 @@ def _control(options: AlignOptions, size: tuple[int, int]) -> Control:
         control = read_lengths(options.lengths, control)
     if options.length is not None:
         control = _with_length(control, options.length, options.site.sigma_control)
-    for pixels, number in ((control.pixels1, 1), (control.pixels2, 2)):
-        _check_inside(control, pixels, size if number == 1 else None)
+    picks = (control.pixels1, control.pixels2)
+    for pixels, size, photo in zip(picks, sizes, ("far", "near"), strict=True):
+        _check_inside(control, pixels, size, photo)
     return control
 
 
@@ -287,18 +288,16 @@ def _with_length(
     )
 
 
-def _check_inside(control: Control, pixels: FloatArray, size: tuple[int, int] | None) -> None:
-    """Refuse picks far outside the photo: they belong to another photo or another size."""
-    if size is None:
-        return
+def _check_inside(control: Control, pixels: FloatArray, size: tuple[int, int], photo: str) -> None:
+    """Refuse picks outside the photo: they belong to another photo or another size."""
     width, height = size
     outside = (pixels < -0.5).any(axis=1) | (pixels > [width, height]).any(axis=1)
     if outside.any():
         name = control.ids[int(np.flatnonzero(outside)[0])]
         raise InputError(
-            f'control point "{name}" and {int(outside.sum()) - 1} more lie outside the far photo '
-            f"({width} x {height} px). Were the picks made on a photo of another size, or are far "
-            "and near exchanged?"
+            f'control point "{name}" and {int(outside.sum()) - 1} more lie outside the '
+            f"{photo} photo ({width} x {height} px). Were the picks made on a photo of another "
+            "size, or are far and near exchanged?"
         )
 
 

@@ -1,28 +1,79 @@
-"""From adjusted cameras to a pair: axes, photos, lens files, standard deviations, words."""
+"""From an oriented pair to a pair file: axes, photos, lens files, standard deviations, words."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
+import cv2
 import numpy as np
 
 from bifocal.model.lens import Lens
-from bifocal.model.pair import Pair, Photo
-from bifocal.orientation.absolute_orientation import PhotoInput, SetUp
-from bifocal.orientation.alignment import Alignment, Interior
-from bifocal.orientation.bundle import PER_CAMERA, radial_shift
-from bifocal.orientation.facade_axes import facade_turn, turned
-from bifocal.orientation.orientation_report import set_up_words
-from bifocal.orientation.pinhole import Pinhole, plane_from_pixel, triangulate
+from bifocal.model.pair import Pair, Photo, apply_homography
+from bifocal.orientation.interior_orientation import Interior
+from bifocal.orientation.orientation_report import orientation_in_words
+from bifocal.orientation.orientation_stages import OrientedPair, PhotoInput
+from bifocal.orientation.pair_adjustment import NAMES, AdjustedPair, at
 from bifocal.orientation.reference_plane import rivals
-from bifocal.orientation.tie_points import raw_pixels, robust_sigma
-from photocore.arrays import FloatArray
+from bifocal.orientation.tie_points import robust_sigma
+from photocore.arrays import BoolArray, ByteArray, FloatArray
+from photocore.camera import Pinhole, camera_matrix, plane_from_pixel, triangulate
+from photocore.distortion import RadialDivision
+
+#: Façade lines farther than this from the photo's own upright are not asked. [deg]
+WIDEST = 20.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Alignment:
+    """A pair oriented, with what stands behind it.
+
+    Attributes
+    ----------
+    pair : Pair
+    way : str
+        ``control``, ``site`` or ``auto``.
+    deviations : mapping of str to float
+        Standard deviations: ``distance1`` ... [m], ``focal1`` ... [px], ``scale`` (relative).
+    control_ids : tuple of str
+    control_residuals : ndarray, shape (n, 4)
+        Observed minus computed column 1, row 1, column 2, row 2; NaN where not picked. [px]
+    control_used : ndarray of bool, shape (n,)
+    control_test : ndarray, shape (n,)
+        Each point's misfit over its standard deviation.
+    tie1, tie2 : ndarray, shape (m, 2)
+        Homologous points found automatically, raw pixels. [px]
+    tie_relief : ndarray, shape (m,)
+        Their relief. [m]
+    wall : ndarray of bool, shape (m,)
+        Which of them lie on the wall.
+    setup : mapping
+        Diagnostics for the pair file.
+    words : tuple of str
+        The set-up in sentences.
+    remarks : tuple of str
+        What the user should be warned of.
+    """
+
+    pair: Pair
+    way: str
+    deviations: Mapping[str, float]
+    control_ids: tuple[str, ...]
+    control_residuals: FloatArray
+    control_used: BoolArray
+    control_test: FloatArray
+    tie1: FloatArray
+    tie2: FloatArray
+    tie_relief: FloatArray
+    wall: BoolArray
+    setup: Mapping[str, Any]
+    words: tuple[str, ...]
+    remarks: tuple[str, ...] = ()
 
 
 def make_alignment(
-    made: SetUp,
+    oriented: OrientedPair,
     photos: tuple[PhotoInput, PhotoInput],
     *,
     way: str,
@@ -32,51 +83,48 @@ def make_alignment(
 
     Parameters
     ----------
-    made : SetUp
+    oriented : OrientedPair
     photos : pair of PhotoInput
-        Far one first, as in ``made``.
+        Far one first, as in ``oriented``.
     way : str
         ``control``, ``site`` or ``auto``.
     direction : (pixels (2, 2), is_vertical), optional
         Two points of photo 1 on a level or upright line of the wall, where the frame is free.
     """
-    problem, solution = made.problem, made.solution
-    remarks, assumed = list(made.remarks), list(made.assumed)
-    cameras = solution.cameras
-    if problem.gauge:
+    observations, adjusted = oriented.observations, oriented.adjusted
+    cameras = adjusted.cameras
+    if observations.free_datum:
         cameras, note = _in_facade_axes(cameras, photos[0], direction)
-        assumed.append(note)
-    lenses = tuple(
-        _lens_of(interior, k)
-        for interior, k in zip(problem.interiors, solution.radial, strict=True)
+        oriented = replace(oriented, assumed=(*oriented.assumed, note))
+    far, near = (
+        _photo(camera, interior, _lens_of(interior, k))
+        for camera, interior, k in zip(
+            cameras, observations.interiors, adjusted.radial, strict=True
+        )
     )
-    pair = Pair(
-        image1=_photo(cameras[0], problem.interiors[0], lenses[0]),
-        image2=_photo(cameras[1], problem.interiors[1], lenses[1]),
-    )
-    deviations = _deviations(solution.covariance, cameras)
-    others = rivals(list(made.faces))
-    if others and not made.wall_named:
+    deviations = standard_deviations(adjusted)
+    others = rivals(oriented.faces)
+    if others and not oriented.wall_named:
         deviations["relief_offset"] = max(abs(face.offset) for face in others)
-    used = problem.tie_used
-    sigma_tie = robust_sigma(solution.tie_misfit[used]) if used.any() else problem.sigma_pick
-    words = set_up_words(cameras, deviations, sigma_px=max(sigma_tie, 0.05))
-    tie1, tie2, relief = _ties(made, cameras)
+    used = observations.tie_used
+    sigma_tie = robust_sigma(adjusted.tie_misfit[used]) if used.any() else observations.sigma_pick
+    words = orientation_in_words(cameras, deviations, sigma_px=max(sigma_tie, 0.05))
+    tie1, tie2, relief = _ties(oriented, cameras)
     return Alignment(
-        pair=pair,
+        pair=Pair(image1=far, image2=near),
         way=way,
         deviations=deviations,
-        control_ids=problem.control.ids,
-        control_residuals=solution.control_residuals,
-        control_used=problem.pick_used,
-        control_test=solution.control_test,
+        control_ids=observations.control.ids,
+        control_residuals=adjusted.control_residuals,
+        control_used=observations.pick_used,
+        control_test=adjusted.control_test,
         tie1=tie1[used],
         tie2=tie2[used],
         tie_relief=relief[used],
-        wall=problem.wall[used],
-        setup=_diagnostics(made, cameras, deviations, way, assumed, words, sigma_tie),
+        wall=observations.wall[used],
+        setup=_diagnostics(oriented, cameras, deviations, way, words, sigma_tie),
         words=words,
-        remarks=tuple(remarks),
+        remarks=oriented.remarks,
     )
 
 
@@ -89,21 +137,64 @@ def _in_facade_axes(
     far = cameras[0]
     if direction is not None:
         pixels, vertical = direction
-        ends = Photo(
-            plane_from_pixel=plane_from_pixel(far), nadir=far.centre[:2], distance=far.centre[2]
-        ).plane_from_pixels(photo.interior.ideal(pixels))
+        ends = apply_homography(plane_from_pixel(far), photo.interior.ideal(pixels))
         along = ends[1] - ends[0]
         angle = float(np.arctan2(along[1], along[0])) - (np.pi / 2 if vertical else 0.0)
         turn = (angle + np.pi / 2) % np.pi - np.pi / 2
         note = f"{'Y' if vertical else 'X'} axis along the line given"
     else:
         turn, share = (
-            (0.0, 0.0) if photo.grey is None else facade_turn(photo.grey, far, photo.interior)
+            (0.0, 0.0) if photo.grey is None else _facade_turn(photo.grey, far, photo.interior)
         )
         note = "axes along the façade's straight lines"
         if share < 0.25:
             turn, note = 0.0, "Y axis as upright as the far photo"
-    return (turned(far, turn, far.centre[:2]), turned(cameras[1], turn, far.centre[:2])), note
+    cosine, sine = np.cos(turn), np.sin(turn)
+    axes = np.array([[cosine, sine, 0.0], [-sine, cosine, 0.0], [0.0, 0.0, 1.0]])
+    origin = far.centre * [1.0, 1.0, 0.0]
+    return (far.moved(axes, origin), cameras[1].moved(axes, origin)), note
+
+
+def _facade_turn(image: ByteArray, camera: Pinhole, interior: Interior) -> tuple[float, float]:
+    """Return the turn that makes the façade's lines upright and level, and their agreement.
+
+    Parameters
+    ----------
+    image : ndarray, shape (h, w)
+    camera : Pinhole
+    interior : Interior
+
+    Returns
+    -------
+    turn : float
+        Counter-clockwise turn to apply to the plane frame's axes. [rad]
+    share : float
+        Share of line length within 1° of it or of its perpendicular; below 0.25 trust nothing.
+    """
+    reduction = max(1.0, float(np.sqrt(image.size / 1.5e6)))
+    size = (round(image.shape[1] / reduction), round(image.shape[0] / reduction))
+    small = cv2.resize(image, size, interpolation=cv2.INTER_AREA)
+    lines = cv2.createLineSegmentDetector().detect(small)[0]
+    if lines is None:
+        return 0.0, 0.0
+    ends: FloatArray = (np.asarray(lines, dtype=np.float64).reshape(-1, 2) + 0.5) * reduction - 0.5
+    ends = apply_homography(plane_from_pixel(camera), interior.ideal(ends)).reshape(-1, 2, 2)
+    reach = 6 * camera.centre[2]
+    ends = ends[(np.linalg.norm(ends - camera.centre[:2], axis=2) < reach).all(axis=1)]
+    along = ends[:, 1] - ends[:, 0]
+    length = np.hypot(along[:, 0], along[:, 1])
+    degrees = (np.rad2deg(np.arctan2(along[:, 1], along[:, 0])) + 45.0) % 90.0 - 45.0
+    near = (np.abs(degrees) < WIDEST) & (length > 0.01 * camera.centre[2])
+    degrees, weight = degrees[near], length[near] ** 1.5
+    if len(degrees) < 20:
+        return 0.0, 0.0
+    trial = np.arange(-WIDEST, WIDEST, 0.05)
+    votes = np.exp(-0.5 * ((trial[:, None] - degrees) / 0.4) ** 2) @ weight
+    best = trial[votes.argmax()]
+    for _ in range(3):
+        close = np.abs(degrees - best) < 1.0
+        best = float(np.average(degrees[close], weights=weight[close]))
+    return float(np.deg2rad(best)), float(weight[close].sum() / weight.sum())
 
 
 def _lens_of(interior: Interior, k: float) -> Lens | None:
@@ -113,13 +204,12 @@ def _lens_of(interior: Interior, k: float) -> Lens | None:
     # r_u = r_d / (1 + k r_d²) turned round: r_d / r_u as an even polynomial of r_u.
     reach = np.hypot(*interior.image_size) / 2 / interior.focal
     seen = np.linspace(0, reach, 200)[1:]
-    ideal = seen / (1 + k * seen**2)
+    along = np.column_stack([seen, np.zeros_like(seen)])
+    ideal = RadialDivision(k, np.zeros(2), 1.0).undistort(along)[:, 0]
     powers = np.stack([ideal**2, ideal**4, ideal**6], axis=1)
     terms = np.linalg.lstsq(powers * ideal[:, None], seen - ideal, rcond=None)[0]
-    matrix = np.diag([interior.focal, interior.focal, 1.0])
-    matrix[:2, 2] = interior.centre
     return Lens(
-        camera_matrix=matrix,
+        camera_matrix=camera_matrix(interior.focal, 1.0, *interior.centre),
         coefficients=np.array([terms[0], terms[1], 0.0, 0.0, terms[2]]),
         image_size=interior.image_size,
         source="estimated from the pair's common points",
@@ -140,94 +230,85 @@ def _photo(camera: Pinhole, interior: Interior, lens: Lens | None) -> Photo:
     )
 
 
-def _deviations(covariance: FloatArray, cameras: tuple[Pinhole, Pinhole]) -> dict[str, float]:
+def standard_deviations(adjusted: AdjustedPair) -> dict[str, float]:
     """Return standard deviations of what a surveyor asks for."""
-    sigma = np.sqrt(np.diag(covariance))
     out: dict[str, float] = {}
-    for number, camera in enumerate(cameras, start=1):
-        at = PER_CAMERA * (number - 1)
-        out[f"distance{number}"] = float(sigma[at + 9])
-        out[f"nadir{number}"] = float(np.hypot(sigma[at + 7], sigma[at + 8]) / np.sqrt(2))
-        out[f"focal{number}"] = float(sigma[at] * camera.matrix[0, 0])
-        out[f"tilt{number}_deg"] = float(
-            np.rad2deg(np.hypot(sigma[at + 4], sigma[at + 5]) / np.sqrt(2))
-        )
-    # Relative scale of the photos on the wall: ln f2 - ln d2 - ln f1 + ln d1.
-    row = np.zeros(len(covariance))
-    row[[0, PER_CAMERA]] = -1.0, 1.0
-    row[9], row[PER_CAMERA + 9] = 1 / cameras[0].centre[2], -1 / cameras[1].centre[2]
-    out["scale"] = float(np.sqrt(np.abs(row @ covariance @ row)))
-    # Relief is displacement over distance from the centre of zoom, divided by 1/d2 - 1/d1.
-    d1, d2 = (float(camera.centre[2]) for camera in cameras)
-    row = np.zeros(len(covariance))
-    row[9], row[PER_CAMERA + 9] = 1 / d1**2, -1 / d2**2
-    out["relief_scale"] = float(np.sqrt(np.abs(row @ covariance @ row)) / abs(1 / d2 - 1 / d1))
-    return out
+    # Of the relative scale of the photos on the wall, ln f2 - ln d2 - ln f1 + ln d1, and of
+    # 1/d2 - 1/d1, which relief is divided by.
+    by_scale, by_relief = np.zeros(len(NAMES)), np.zeros(len(NAMES))
+    for number, (camera, sign) in enumerate(
+        zip(adjusted.cameras, (-1.0, 1.0), strict=True), start=1
+    ):
+        distance = float(camera.centre[2])
+        nadir = np.hypot(adjusted.sigma("X", number), adjusted.sigma("Y", number))
+        tilt = np.hypot(adjusted.sigma("turn X", number), adjusted.sigma("turn Y", number))
+        out[f"distance{number}"] = adjusted.sigma("Z", number)
+        out[f"nadir{number}"] = float(nadir / np.sqrt(2))
+        out[f"focal{number}"] = adjusted.sigma("focal length", number) * camera.matrix[0, 0]
+        out[f"tilt{number}_deg"] = float(np.rad2deg(tilt / np.sqrt(2)))
+        by_scale[at("focal length", number)] = sign
+        by_scale[at("Z", number)] = -sign / distance
+        by_relief[at("Z", number)] = -sign / distance**2
+    d1, d2 = (float(camera.centre[2]) for camera in adjusted.cameras)
+    scale, relief = (
+        float(np.sqrt(np.abs(row @ adjusted.covariance @ row))) for row in (by_scale, by_relief)
+    )
+    return out | {"scale": scale, "relief_scale": relief / abs(1 / d2 - 1 / d1)}
 
 
 def _ties(
-    made: SetUp, cameras: tuple[Pinhole, Pinhole]
+    oriented: OrientedPair, cameras: tuple[Pinhole, Pinhole]
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return the ties as raw pixels, and their relief."""
-    problem = made.problem
-    straight = [
-        radial_shift(x, i, k)
-        for x, i, k in zip(
-            (problem.tie1, problem.tie2), problem.interiors, made.solution.radial, strict=True
-        )
-    ]
-    relief = triangulate(*cameras, *straight)[:, 2] if len(problem.tie1) else np.zeros(0)
-    first, second = problem.interiors
-    return raw_pixels(first, problem.tie1), raw_pixels(second, problem.tie2), relief
+    observations = oriented.observations
+    straight = observations.straight_ties(oriented.adjusted.radial)
+    first, second = observations.interiors
+    raw1, raw2 = first.raw(observations.tie1), second.raw(observations.tie2)
+    return raw1, raw2, triangulate(*cameras, *straight)[:, 2]
 
 
 def _diagnostics(
-    made: SetUp,
+    oriented: OrientedPair,
     cameras: tuple[Pinhole, Pinhole],
     deviations: Mapping[str, float],
     way: str,
-    assumed: list[str],
     words: tuple[str, ...],
     sigma_tie: float,
 ) -> dict[str, Any]:
     """Return the free diagnostics of the pair file."""
-    problem, solution = made.problem, made.solution
-    control = problem.control
+    observations, adjusted = oriented.observations, oriented.adjusted
+    control = observations.control
     out: dict[str, Any] = {
         "way": way,
         "standard_deviations": dict(deviations),
-        "sigma0": solution.sigma0,
+        "sigma0": adjusted.sigma0,
         "focal_px": [float(camera.matrix[0, 0]) for camera in cameras],
         "principal_point_px": [camera.matrix[:2, 2] for camera in cameras],
-        "interior": [interior.source for interior in problem.interiors],
+        "interior": [interior.source for interior in observations.interiors],
         "common_points": {
-            "count": int(problem.tie_used.sum()),
-            "on_wall": int((problem.wall & problem.tie_used).sum()),
+            "count": int(observations.tie_used.sum()),
+            "on_wall": int((observations.wall & observations.tie_used).sum()),
             "sigma_px": sigma_tie,
         },
         "planes": [
             {"offset": face.offset, "share": face.share, "pixel": list(face.pixel)}
-            for face in made.faces
+            for face in oriented.faces
         ],
-        "assumed": assumed,
+        "assumed": oriented.assumed,
         "words": list(words),
     }
     if control.ids:
         out["control"] = [
             {
                 "id": name,
-                "residual_px": solution.control_residuals[index],
-                "test": solution.control_test[index],
-                "used": bool(problem.pick_used[index]),
+                "residual_px": adjusted.control_residuals[index],
+                "test": adjusted.control_test[index],
+                "used": bool(observations.pick_used[index]),
             }
             for index, name in enumerate(control.ids)
         ]
-        seen = Photo(
-            plane_from_pixel=plane_from_pixel(cameras[0]),
-            nadir=cameras[0].centre[:2],
-            distance=float(cameras[0].centre[2]),
-        ).plane_from_pixels(control.pixels1)
-        out["control_positions"] = seen
+        positions = apply_homography(plane_from_pixel(cameras[0]), control.pixels1)
+        out["control_positions"] = positions
     return out
 
 

@@ -87,8 +87,8 @@ def _rectified(
     if reduction > 1:
         image = cv2.blur(image, (reduction, reduction)).astype(np.uint8)
     maps = np.nan_to_num(pixels, nan=-10.0).astype(np.float32)
-    found: Any = cv2.remap(image, maps[..., 0], maps[..., 1], cv2.INTER_LINEAR, borderValue=0)
-    return np.asarray(found, dtype=np.uint8)
+    plane: Any = cv2.remap(image, maps[..., 0], maps[..., 1], cv2.INTER_LINEAR, borderValue=0)
+    return np.asarray(plane, dtype=np.uint8)
 
 
 def _pixel_steps(pixels: FloatArray) -> float:

@@ -1,17 +1,22 @@
-"""What goes into setting up a pair, and what comes out: all plain, checked data."""
+"""What is known of a photo's interior orientation before its pair is set up."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
-from typing import Any
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from bifocal.model.lens import Lens
-from bifocal.model.pair import Pair
-from photocore.arrays import BoolArray, FloatArray
+from photocore.arrays import FloatArray
+from photocore.camera import camera_matrix
+from photocore.distortion import RadialDivision
 from photocore.errors import InputError
+
+#: Upright pixel from stored pixel for each EXIF orientation: the linear part.
+_TURNS = {
+    1: ((1, 0), (0, 1)), 2: ((-1, 0), (0, 1)), 3: ((-1, 0), (0, -1)), 4: ((1, 0), (0, -1)),
+    5: ((0, 1), (1, 0)), 6: ((0, -1), (1, 0)), 7: ((0, -1), (-1, 0)), 8: ((0, 1), (-1, 0)),
+}  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -127,112 +132,92 @@ class Interior:
         """Whether nothing but experience stands behind the principal distance."""
         return self.sigma_focal > 0.15
 
+    @property
+    def matrix(self) -> FloatArray:
+        """Camera matrix, shape (3, 3). [px]"""
+        return camera_matrix(self.focal, self.aspect, *self.centre)
+
     def ideal(self, pixels: FloatArray) -> FloatArray:
         """Return pixels freed of the lens's distortion. [px]"""
-        return pixels.copy() if self.lens is None else np.asarray(self.lens.undistort(pixels))
+        return pixels.copy() if self.lens is None else self.lens.undistort(pixels)
+
+    def raw(self, ideal: FloatArray) -> FloatArray:
+        """Return where ideal pixels are seen in the photo as it is. [px]"""
+        return ideal.copy() if self.lens is None else self.lens.distort(ideal)
+
+    def raw_by_ideal(self, ideal: FloatArray) -> FloatArray:
+        """Return the derivative of raw pixels by ideal ones, shape (n, 2, 2)."""
+        if self.lens is None:
+            return np.broadcast_to(np.eye(2), (len(ideal), 2, 2))
+        return self.lens.distorted_by_ideal(ideal)
+
+    def radial(self, k: float) -> RadialDivision:
+        """Return the model of an unknown radial distortion k, on top of the lens's."""
+        return RadialDivision(k, self.centre, self.focal)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Control:
-    """Control points: what was measured on site, and where it is seen.
+def lens_of_photo(lens: Lens, size: tuple[int, int], *, orientation: int = 1) -> Lens:
+    """Return the lens for an upright photo of a given size.
 
-    Attributes
+    Parameters
     ----------
-    ids : tuple of str
-    xyz : ndarray, shape (n, 3)
-        X, Y, r in the plane frame; NaN where not measured. [m]
-    sigma : ndarray, shape (n, 3)
-        Standard deviations of xyz. [m]
-    pixels1, pixels2 : ndarray, shape (n, 2)
-        Picks in the far and the near photo; NaN where not picked. [px]
-    lengths : tuple of (int, int, float)
-        Taped distances between two of the points: indices and metres.
+    lens : Lens
+        Calibrated on photos as the sensor gives them, or upright ones of the same size.
+    size : tuple of int
+        Width and height of the upright photo. [px]
+    orientation : int
+        EXIF orientation of the stored photo.
+
+    Raises
+    ------
+    InputError
+        If the photo is not a resized or turned version of the calibrated format.
     """
-
-    ids: tuple[str, ...] = ()
-    xyz: FloatArray = field(default_factory=lambda: np.zeros((0, 3)))
-    sigma: FloatArray = field(default_factory=lambda: np.zeros((0, 3)))
-    pixels1: FloatArray = field(default_factory=lambda: np.zeros((0, 2)))
-    pixels2: FloatArray = field(default_factory=lambda: np.zeros((0, 2)))
-    lengths: tuple[tuple[int, int, float], ...] = ()
-
-    def __post_init__(self) -> None:
-        count = len(self.ids)
-        shapes = [self.xyz.shape, self.sigma.shape, self.pixels1.shape, self.pixels2.shape]
-        if shapes != [(count, 3), (count, 3), (count, 2), (count, 2)]:
-            raise InputError(f"control: {count} ids but arrays of shape {shapes}.")
-
-    def exchanged(self) -> Control:
-        """Return the same points with far and near photo exchanged."""
-        return Control(
-            ids=self.ids,
-            xyz=self.xyz,
-            sigma=self.sigma,
-            pixels1=self.pixels2,
-            pixels2=self.pixels1,
-            lengths=self.lengths,
+    if size == lens.image_size:
+        return lens
+    stored = (size[1], size[0]) if orientation >= 5 else size
+    factor = stored[0] / lens.image_size[0]
+    if abs(stored[1] / lens.image_size[1] / factor - 1) > 0.002:
+        raise InputError(
+            f"the lens was calibrated on photos of {lens.image_size[0]} x {lens.image_size[1]} px, "
+            f"this photo has {size[0]} x {size[1]}: it was cropped, or is of another camera. Use "
+            "the uncropped photo, or calibrate with photos like this one."
         )
+    matrix = np.diag([factor, factor, 1.0]) @ lens.camera_matrix
+    matrix[:2, 2] += (factor - 1.0) / 2.0  # pixel centres are at integers
+    turn = np.array(_TURNS[orientation], dtype=np.float64)
+    coefficients = np.array(lens.coefficients)
+    if orientation != 1:
+        matrix = _turned_matrix(matrix, turn, size)
+        coefficients = _turned_coefficients(lens, coefficients, turn)
+    return replace(
+        lens,
+        camera_matrix=matrix,
+        coefficients=coefficients,
+        image_size=size,
+        source=f"{lens.source} (resized or turned)".strip(),
+        extra={},
+    )
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class SiteMeasures:
-    """Distances measured on site, None where not measured [m], and a spot of the wall.
-
-    ``wall`` is a pixel (column, row) of the far photo that shows the wall. [px]
-    """
-
-    distance1: float | None = None
-    distance2: float | None = None
-    delta_d: float | None = None
-    sigma: float = 0.02
-    parallel: bool = False
-    sigma_control: float = 0.003
-    sigma_pick: float = 0.5
-    wall: tuple[float, float] | None = None
+def _turned_matrix(matrix: FloatArray, turn: FloatArray, size: tuple[int, int]) -> FloatArray:
+    """Return the camera matrix after turning the pixels about the photo's middle."""
+    last = np.array([size[0] - 1.0, size[1] - 1.0])
+    stored_last = np.abs(turn.T) @ last
+    centre = turn @ (matrix[:2, 2] - stored_last / 2) + last / 2
+    focal = np.abs(turn) @ np.diag(matrix)[:2]
+    return camera_matrix(focal[0], focal[1] / focal[0], *centre)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Alignment:
-    """A pair set up, with what stands behind it.
-
-    Attributes
-    ----------
-    pair : Pair
-    way : str
-        ``control``, ``site`` or ``auto``.
-    deviations : mapping of str to float
-        Standard deviations: ``distance1`` ... [m], ``focal1`` ... [px], ``scale`` (relative).
-    control_ids : tuple of str
-    control_residuals : ndarray, shape (n, 4)
-        Observed minus computed column 1, row 1, column 2, row 2; NaN where not picked. [px]
-    control_used : ndarray of bool, shape (n,)
-    control_test : ndarray, shape (n,)
-        Each point's misfit over its standard deviation.
-    tie1, tie2 : ndarray, shape (m, 2)
-        Homologous points found automatically, raw pixels. [px]
-    tie_relief : ndarray, shape (m,)
-        Their relief. [m]
-    wall : ndarray of bool, shape (m,)
-        Which of them lie on the wall.
-    setup : mapping
-        Diagnostics for the pair file.
-    words : tuple of str
-        The set-up in sentences.
-    remarks : tuple of str
-        What the user should be warned of.
-    """
-
-    pair: Pair
-    way: str
-    deviations: Mapping[str, float]
-    control_ids: tuple[str, ...]
-    control_residuals: FloatArray
-    control_used: BoolArray
-    control_test: FloatArray
-    tie1: FloatArray
-    tie2: FloatArray
-    tie_relief: FloatArray
-    wall: BoolArray
-    setup: Mapping[str, Any]
-    words: tuple[str, ...]
-    remarks: tuple[str, ...] = ()
+def _turned_coefficients(lens: Lens, coefficients: FloatArray, turn: FloatArray) -> FloatArray:
+    """Return coefficients after turning: radial ones stay, (p2, p1) turns like a vector."""
+    if lens.model == "fisheye" or not len(coefficients):
+        return coefficients
+    if len(coefficients) > 8:
+        raise InputError(
+            "a lens with thin-prism or tilt terms cannot be turned with an EXIF-turned photo; "
+            "calibrate with photos turned the same way."
+        )
+    tangential = turn @ np.array([coefficients[3], coefficients[2]])
+    coefficients[2], coefficients[3] = tangential[1], tangential[0]
+    return coefficients

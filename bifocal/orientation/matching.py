@@ -15,7 +15,7 @@ import numpy as np
 from bifocal.model.pair import Pair, Photo, apply_homography
 from bifocal.orientation.features import Features, drop_repeated, find_features, match_along_lines
 from bifocal.orientation.patches import PatchResult, refine, same_scale
-from bifocal.orientation.targets import Targets, find_targets
+from bifocal.orientation.targets import SurveyTargets, find_targets
 from bifocal.orientation.tie_points import robust_sigma
 from bifocal.rays import relief_of_rays, zoom_factor
 from photocore.arrays import BoolArray, ByteArray, FloatArray, IntArray
@@ -199,7 +199,7 @@ def _target_matches(
 
 
 def pair_targets(
-    pair: Pair, first: Targets, second: Targets, reliefs: tuple[float, float]
+    pair: Pair, first: SurveyTargets, second: SurveyTargets, reliefs: tuple[float, float]
 ) -> tuple[IntArray, IntArray]:
     """Return indices of the same targets in both photos.
 
@@ -213,7 +213,6 @@ def pair_targets(
     x2 = np.tile(second.pixels, (count1, 1))
     relief = relief_at(pair, x1, x2)
     fits = np.isfinite(relief) & (relief > reliefs[0]) & (relief < reliefs[1])
-    fits[~fits] = False
     usable = np.clip(np.nan_to_num(relief), *reliefs)
     off = np.linalg.norm(seen_at(pair, x1, usable) - x2, axis=1)
     zoom = np.sqrt(np.abs(np.linalg.det(local_zoom(pair, x1, usable))))

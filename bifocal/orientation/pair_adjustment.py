@@ -7,35 +7,53 @@ prior, and the covariance says so.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from bifocal.orientation.alignment import Control, Interior
-from bifocal.orientation.pinhole import (
+from bifocal.orientation.control_points import Control
+from bifocal.orientation.interior_orientation import Interior
+from photocore import adjustment
+from photocore.arrays import BoolArray, FloatArray
+from photocore.camera import (
+    PARAMETERS,
     Pinhole,
-    camera_matrix,
-    fundamental,
-    pinhole_from_plane,
-    plane_transfer,
+    fundamental_with_jacobian,
+    homogeneous,
+    plane_transfer_with_jacobian,
     project,
-    projection_rows,
-    rotation_matrix,
-    tilt,
+    project_with_jacobian,
+    ray_on_plane,
     triangulate,
 )
-from photocore.arrays import BoolArray, FloatArray
 from photocore.errors import GeometryError
 
-#: Parameters of a camera: ln f, ln aspect, column, row, three rotations, X, Y, Z, radial k.
-PER_CAMERA = 11
+#: Parameters of one camera of the pair, and of the ties' wall.
+CAMERA = (*PARAMETERS, "radial")
+WALL = ("wall height", "wall slope X", "wall slope Y")
+#: All parameters, in the order of the covariance.
+NAMES = (*(f"{name} {number}" for number in (1, 2) for name in CAMERA), *WALL)
 #: A coordinate that was not measured, as a standard deviation. [m]
 UNKNOWN = 1e3
+#: Rounding error of pixels and metres, as a share of their standard deviations.
+ROUNDING = 1e-9
+#: Relative standard deviation with which one camera body has one aspect.
+SIGMA_ASPECT = 2e-4
+
+
+def at(name: str, camera: int) -> int:
+    """Return where a parameter of camera 1 or 2 stands in `NAMES`.
+
+    Examples
+    --------
+    >>> NAMES[at("Z", 2)]
+    'Z 2'
+    """
+    return NAMES.index(f"{name} {camera}")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Problem:
+class PairObservations:
     """Everything observed. Pixels are free of the lens file's distortion.
 
     Attributes
@@ -65,7 +83,7 @@ class Problem:
         ``distance1``, ``distance2``, ``delta_d``. [m]
     sigma_tilt : float or None
         Standard deviation of "image plane parallel to the wall". [rad]
-    gauge : bool
+    free_datum : bool
         Whether origin and turn of the plane frame are free and must be held.
     """
 
@@ -85,12 +103,31 @@ class Problem:
     sigma_slope: float = 0.0
     measured: dict[str, tuple[float, float]] = field(default_factory=dict)
     sigma_tilt: float | None = None
-    gauge: bool = False
+    free_datum: bool = False
+
+    @property
+    def estimated(self) -> BoolArray:
+        """Which of `NAMES` are estimated, the others being held."""
+        free = np.ones(len(NAMES), dtype=bool)
+        for number, interior in enumerate(self.interiors, start=1):
+            free[at("radial", number)] = interior.sigma_radial > 0
+            free[at("aspect", number)] = interior.sigma_aspect > 0
+        if self.free_datum:
+            free[[at(name, 1) for name in ("turn Z", "X", "Y")]] = False
+        free[-len(WALL) :] = self.sigma_plane > 0 and bool((self.wall & self.tie_used).any())
+        return free
+
+    def straight_ties(self, radial: tuple[float, float]) -> tuple[FloatArray, FloatArray]:
+        """Return the ties in both photos freed of the estimated radial distortion."""
+        first, second = (
+            interior.radial(k) for interior, k in zip(self.interiors, radial, strict=True)
+        )
+        return first.undistort(self.tie1), second.undistort(self.tie2)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Solution:
-    """Adjusted cameras.
+class PairUnknowns:
+    """What is adjusted.
 
     Attributes
     ----------
@@ -99,8 +136,40 @@ class Solution:
         Radial distortion k of either photo.
     plane : ndarray, shape (3,)
         The ties' wall, z = a + b X + c Y. [m, -, -]
+    """
+
+    cameras: tuple[Pinhole, Pinhole]
+    radial: tuple[float, float] = (0.0, 0.0)
+    plane: FloatArray = field(default_factory=lambda: np.zeros(3))
+
+    def stepped(self, step: FloatArray) -> PairUnknowns:
+        """Return the unknowns after a step of all `NAMES`."""
+        parts = step[: -len(WALL)].reshape(2, len(CAMERA))
+        first, second = (c.stepped(p) for c, p in zip(self.cameras, parts, strict=True))
+        return PairUnknowns(
+            cameras=(first, second),
+            radial=(self.radial[0] + float(parts[0, -1]), self.radial[1] + float(parts[1, -1])),
+            plane=self.plane + step[-len(WALL) :],
+        )
+
+    def values(self) -> FloatArray:
+        """Return the unknowns in the order of `NAMES`, turns counted from here."""
+        parts: list[float] = []
+        for camera, k in zip(self.cameras, self.radial, strict=True):
+            focal, aspect = camera.matrix[0, 0], camera.matrix[1, 1] / camera.matrix[0, 0]
+            parts += [np.log(focal), np.log(aspect), *camera.matrix[:2, 2], 0.0, 0.0, 0.0]
+            parts += [*camera.centre, k]
+        return np.array([*parts, *self.plane])
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class AdjustedPair(PairUnknowns):
+    """Adjusted cameras.
+
+    Attributes
+    ----------
     covariance : ndarray, shape (25, 25)
-        Of all parameters (two cameras of `PER_CAMERA`, the plane); zero where held.
+        Of all `NAMES`; zero where held.
     sigma0 : float
         Standard deviation of unit weight.
     control_residuals : ndarray, shape (n, 4)
@@ -111,13 +180,8 @@ class Solution:
         Epipolar distance of all ties. [px]
     wall_misfit : ndarray, shape (m,)
         Distance of all ties from where the wall plane puts them, along the line. [px]
-    start : parameters
-        Internal: where the next adjustment may start.
     """
 
-    cameras: tuple[Pinhole, Pinhole]
-    radial: tuple[float, float]
-    plane: FloatArray
     covariance: FloatArray
     sigma0: float
     control_residuals: FloatArray
@@ -125,405 +189,384 @@ class Solution:
     tie_misfit: FloatArray
     wall_misfit: FloatArray
 
+    def sigma(self, name: str, camera: int) -> float:
+        """Return the standard deviation of a parameter of camera 1 or 2."""
+        index = at(name, camera)
+        return float(np.sqrt(self.covariance[index, index]))
 
-def adjust(
-    problem: Problem,
-    cameras: tuple[Pinhole, Pinhole],
-    *,
-    radial: tuple[float, float] = (0.0, 0.0),
-    plane: FloatArray | None = None,
-) -> Solution:
+
+def adjust(observations: PairObservations, start: PairUnknowns) -> AdjustedPair:
     """Return the adjusted cameras.
 
     Parameters
     ----------
-    problem : Problem
-    cameras : pair of Pinhole
-        Approximate cameras.
-    radial, plane : optional
-        Approximate distortion and wall plane.
+    observations : PairObservations
+    start : PairUnknowns
+        Approximate cameras, distortion and wall plane.
 
     Raises
     ------
     GeometryError
         If the observations leave a parameter undetermined.
     """
-    model = _Model(problem, cameras)
-    theta = model.start(radial, np.zeros(3) if plane is None else plane)
-    active = model.active
-    steps = model.steps[active]
+    free = observations.estimated
 
-    def residuals(free: FloatArray) -> FloatArray:
-        full = theta.copy()
-        full[active] = free * steps + theta[active]
-        return model.residuals(full)
+    def equations(state: PairUnknowns) -> tuple[FloatArray, FloatArray]:
+        residuals, jacobian = _equations(observations, state)
+        return residuals, jacobian[:, free]
 
-    free, fun, jac = _least_squares(residuals, len(steps))
-    theta[active] += free * steps
-    normal = jac.T @ jac
-    scale = np.sqrt(np.diag(normal))
-    if not (scale > 0).all() or np.linalg.cond(normal / np.outer(scale, scale)) > 1e15:
+    def advance(state: PairUnknowns, step: FloatArray) -> PairUnknowns:
+        whole = np.zeros(len(NAMES))
+        whole[free] = step
+        return state.stepped(whole)
+
+    names = [name for name, estimated in zip(NAMES, free, strict=True) if estimated]
+    start = PairUnknowns(cameras=start.cameras, radial=start.radial, plane=start.plane)
+    try:
+        fit = adjustment.fit(
+            start, equations, advance, names=names, what="the pair", rounding=ROUNDING
+        )
+    except GeometryError:
         raise GeometryError(
             "the observations do not determine the cameras. Measure more control points, spread "
             "over the photo and off the wall plane, or give the distances."
-        )
-    inverse = np.linalg.inv(normal / np.outer(scale, scale)) / np.outer(scale, scale)
-    redundancy = max(len(fun) - len(steps), 1)
-    sigma0 = float(np.sqrt((fun @ fun) / redundancy))
-    covariance = np.zeros((len(theta), len(theta)))
-    covariance[np.ix_(active, active)] = inverse * np.outer(steps, steps) * max(sigma0, 1.0) ** 2
-    final, k, flat = model.unpack(theta)
-    problem_control = model.control_picks(theta)
-    return Solution(
-        cameras=final,
-        radial=k,
-        plane=flat,
-        covariance=covariance,
+        ) from None
+    redundancy = max(fit.redundancy, 1)
+    sigma0 = float(np.sqrt((fit.residuals @ fit.residuals) / redundancy))
+    covariance = np.zeros((len(NAMES), len(NAMES)))
+    covariance[np.ix_(free, free)] = fit.cofactor
+    state = fit.state
+    return AdjustedPair(
+        cameras=state.cameras,
+        radial=state.radial,
+        plane=state.plane,
+        covariance=covariance * max(sigma0, 1.0) ** 2,
         sigma0=sigma0,
-        control_residuals=problem_control,
-        control_test=_control_test(model, theta, jac, inverse),
-        tie_misfit=model.epipolar(theta),
-        wall_misfit=model.transfer(theta),
+        control_residuals=_control_residuals(observations, state),
+        control_test=_control_test(observations, state, covariance),
+        tie_misfit=tie_misfit(observations, state),
+        wall_misfit=wall_misfit(observations, state),
     )
 
 
-def onto_plane(cameras: tuple[Pinhole, Pinhole], plane: FloatArray) -> tuple[Pinhole, Pinhole]:
-    """Return cameras in the frame of the plane z = a + b X + c Y, X and Y all but kept."""
-    normal = np.array([-plane[1], -plane[2], 1.0])
-    normal /= np.linalg.norm(normal)
-    # The rotation that takes the normal to the new Z axis, about their common perpendicular.
-    turn = rotation_matrix(np.array([normal[1], -normal[0], 0.0]))
-    base = np.array([0.0, 0.0, plane[0]])
-    moved = [
-        camera._replace(rotation=camera.rotation @ turn.T, centre=turn @ (camera.centre - base))
-        for camera in cameras
-    ]
-    return moved[0], moved[1]
+def tie_misfit(observations: PairObservations, state: PairUnknowns) -> FloatArray:
+    """Return the signed distance of all ties from their epipolar lines, shape (m,). [px]"""
+    return _epipolar(observations, state, np.ones(len(observations.tie1), dtype=bool))[0]
 
 
-def evaluate(problem: Problem, solution: Solution) -> Solution:
-    """Return a solution's cameras with the misfits of another problem's ties, not adjusted."""
-    model = _Model(problem, solution.cameras)
-    theta = model.start(solution.radial, solution.plane)
-    return replace(solution, tie_misfit=model.epipolar(theta), wall_misfit=model.transfer(theta))
+def wall_misfit(observations: PairObservations, state: PairUnknowns) -> FloatArray:
+    """Return how far all ties lie from the wall plane's transfer, shape (m,). [px]"""
+    return _transfer(observations, state, np.ones(len(observations.tie1), dtype=bool))[0]
 
 
-def _least_squares(
-    function: Callable[[FloatArray], FloatArray], count: int
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return the minimum of a sum of squares from zero, its residuals and their Jacobian.
-
-    Levenberg and Marquardt on the normal equations: a few thousand residuals of some twenty
-    well-scaled parameters, for which an orthogonal decomposition would cost ten times as much.
-    """
-    free, damping = np.zeros(count), 1e-5
-    value = function(free)
-    cost = float(value @ value)
-    jacobian = _jacobian(function, free, value)
-    for _ in range(60):
-        normal, slope = jacobian.T @ jacobian, jacobian.T @ value
-        diagonal = np.maximum(np.diag(normal), 1e-12)
-        before = cost
-        for _ in range(12):
-            step = np.linalg.solve(normal + np.diag(damping * diagonal), -slope)
-            trial = function(free + step)
-            trial_cost = float(trial @ trial)
-            if trial_cost <= cost:
-                break
-            damping *= 10.0
-        else:
-            return free, value, jacobian
-        free, value, cost = free + step, trial, trial_cost
-        damping = max(damping / 10.0, 1e-12)
-        jacobian = _jacobian(function, free, value)
-        # Steps are in typical corrections, themselves far above any standard deviation asked for.
-        if before - cost <= 1e-9 * (1.0 + before) or np.abs(step).max() < 1e-9:
-            break
-    return free, value, jacobian
+def evaluated(observations: PairObservations, adjusted: AdjustedPair) -> AdjustedPair:
+    """Return an adjusted pair with the misfits of other observations' ties, not adjusted."""
+    return replace(
+        adjusted,
+        tie_misfit=tie_misfit(observations, adjusted),
+        wall_misfit=wall_misfit(observations, adjusted),
+    )
 
 
-def _jacobian(
-    function: Callable[[FloatArray], FloatArray], free: FloatArray, here: FloatArray
-) -> FloatArray:
-    """Return forward differences; parameters are scaled so that 1e-5 is a tiny step of each."""
-    columns = []
-    for index in range(len(free)):
-        step = np.zeros(len(free))
-        step[index] = 1e-5
-        columns.append((function(free + step) - here) / 1e-5)
-    return np.stack(columns, axis=1)
+def _equations(
+    observations: PairObservations, state: PairUnknowns
+) -> tuple[FloatArray, FloatArray]:
+    """Return everything observed against computed in standard deviations, and derivatives."""
+    used, wall = observations.tie_used, observations.tie_used & observations.wall
+    parts = [_priors(observations, state)]
+    if used.any():
+        values, by = _epipolar(observations, state, used)
+        parts.append((values / observations.sigma_tie, by / observations.sigma_tie))
+    if wall.any():
+        values, by = _transfer(observations, state, wall)
+        sigma = observations.sigma_wall[wall]
+        parts.append((values / sigma, by / sigma[:, None]))
+    if observations.control.ids:
+        control = _control(observations, state)
+        parts.append((control.white.ravel(), control.by_unknowns.reshape(-1, len(NAMES))))
+        parts.append(_lengths(observations, state, control))
+    residuals = np.concatenate([values for values, _ in parts])
+    jacobian = np.concatenate([by for _, by in parts])
+    lost = ~np.isfinite(residuals)
+    residuals[lost], jacobian[lost] = 1e3, 0.0
+    return residuals, jacobian
 
 
-class _Model:
-    """Residuals of a `Problem` as a function of the parameter vector."""
-
-    def __init__(self, problem: Problem, cameras: tuple[Pinhole, Pinhole]) -> None:
-        self.problem, self.cameras = problem, cameras
-        first, second = problem.interiors
-        self.steps = np.concatenate(
-            [self._steps(c, i) for c, i in zip(cameras, (first, second), strict=True)]
-        )
-        depth = cameras[0].centre[2]
-        self.steps = np.append(self.steps, [1e-3 * depth, 1e-3, 1e-3])
-        self.active = np.ones(2 * PER_CAMERA + 3, dtype=bool)
-        for number, interior in enumerate((first, second)):
-            self.active[PER_CAMERA * number + 10] = interior.sigma_radial > 0
-            self.active[PER_CAMERA * number + 1] = interior.sigma_aspect > 0
-        if problem.gauge:
-            self.active[[6, 7, 8]] = False
-        on_wall = bool((problem.wall & problem.tie_used).any())
-        self.active[-3:] = on_wall and problem.sigma_plane > 0
-
-    @staticmethod
-    def _steps(camera: Pinhole, interior: Interior) -> FloatArray:
-        """Return a typical size of each parameter's correction."""
-        depth = camera.centre[2]
-        centre = max(interior.sigma_centre, 0.1)
-        return np.array([1e-3, 1e-3, centre, centre, *[1e-3] * 3, *[1e-3 * depth] * 3, 1e-2])
-
-    def start(self, radial: tuple[float, float], plane: FloatArray) -> FloatArray:
-        """Return the parameter vector of the approximate cameras; rotations are increments."""
-        parts = []
-        for camera, k in zip(self.cameras, radial, strict=True):
-            focal = camera.matrix[0, 0]
-            aspect = camera.matrix[1, 1] / focal
-            parts += [np.log(focal), np.log(aspect), *camera.matrix[:2, 2], 0.0, 0.0, 0.0]
-            parts += [*camera.centre, k]
-        return np.array([*parts, *plane])
-
-    def unpack(
-        self, theta: FloatArray
-    ) -> tuple[tuple[Pinhole, Pinhole], tuple[float, float], FloatArray]:
-        """Return cameras, radial distortions and wall plane."""
-        made = []
-        for number, start in enumerate(self.cameras):
-            p = theta[PER_CAMERA * number : PER_CAMERA * (number + 1)]
-            matrix = camera_matrix(float(np.exp(p[0])), float(np.exp(p[1])), p[2], p[3])
-            made.append(Pinhole(matrix, start.rotation @ rotation_matrix(p[4:7]), p[7:10]))
-        radial = (float(theta[PER_CAMERA - 1]), float(theta[2 * PER_CAMERA - 1]))
-        return (made[0], made[1]), radial, theta[-3:]
-
-    def straight(self, pixels: FloatArray, number: int, theta: FloatArray) -> FloatArray:
-        """Return pixels freed of the radial distortion under estimation."""
-        k = theta[PER_CAMERA * number + 10]
-        return pixels if k == 0 else radial_shift(pixels, self.problem.interiors[number], k)
-
-    def residuals(self, theta: FloatArray) -> FloatArray:
-        """Return everything observed minus computed, in standard deviations."""
-        problem = self.problem
-        parts = [self._priors(theta)]
-        if problem.tie_used.any():
-            parts.append(self.epipolar(theta, problem.tie_used) / problem.sigma_tie)
-            on = problem.tie_used & problem.wall
-            if on.any():
-                parts.append(self.transfer(theta, on) / problem.sigma_wall[on])
-        white, _ = self.control_white(theta)
-        parts += [white.ravel(), self._lengths(theta)]
-        return np.nan_to_num(np.concatenate(parts), nan=1e3, posinf=1e3, neginf=-1e3)
-
-    def _priors(self, theta: FloatArray) -> FloatArray:
-        """Return the lens's, the tape's and the plane's observations."""
-        problem = self.problem
-        cameras, _, plane = self.unpack(theta)
-        out = []
-        for number, interior in enumerate(problem.interiors):
-            p = theta[PER_CAMERA * number : PER_CAMERA * (number + 1)]
-            out.append((p[0] - np.log(interior.focal)) / interior.sigma_focal)
-            if interior.sigma_aspect > 0:
-                out.append((p[1] - np.log(interior.aspect)) / interior.sigma_aspect)
-            out += list((p[2:4] - interior.centre) / interior.sigma_centre)
-            if interior.sigma_radial > 0:
-                out.append(p[10] / interior.sigma_radial)
-            if problem.sigma_tilt is not None:
-                out += list(tilt(cameras[number]) / problem.sigma_tilt)
-        a, b = theta[:PER_CAMERA], theta[PER_CAMERA : 2 * PER_CAMERA]
-        if problem.sigma_body is not None:
-            out.append((a[1] - b[1]) / 2e-4)
-            out += list((a[2:4] - b[2:4]) / problem.sigma_body)
-        if problem.sigma_zoom is not None:
-            out.append((a[0] - b[0]) / problem.sigma_zoom)
-        d1, d2 = cameras[0].centre[2], cameras[1].centre[2]
-        values = {"distance1": d1, "distance2": d2, "delta_d": d1 - d2}
-        for name, (value, sigma) in problem.measured.items():
-            out.append((values[name] - value) / sigma)
-        if self.active[-1]:
-            slope = problem.sigma_slope
-            out += list(plane / np.array([problem.sigma_plane, slope, slope]))
-        return np.array(out)
-
-    def epipolar(self, theta: FloatArray, which: BoolArray | None = None) -> FloatArray:
-        """Return the signed (Sampson) distance of ties from their epipolar lines. [px]"""
-        chosen = slice(None) if which is None else which
-        cameras, _, _ = self.unpack(theta)
-        x1 = _homogeneous(self.straight(self.problem.tie1[chosen], 0, theta))
-        x2 = _homogeneous(self.straight(self.problem.tie2[chosen], 1, theta))
-        matrix = fundamental(*cameras)
-        line2, line1 = x1 @ matrix.T, x2 @ matrix
-        size = (line2[:, :2] ** 2).sum(1) + (line1[:, :2] ** 2).sum(1)
-        return (x2 * line2).sum(1) / np.sqrt(np.maximum(size, 1e-300))
-
-    def transfer(self, theta: FloatArray, which: BoolArray | None = None) -> FloatArray:
-        """Return how far ties lie from the wall plane's transfer, along the epipolar line. [px]"""
-        chosen = slice(None) if which is None else which
-        cameras, _, plane = self.unpack(theta)
-        x1 = _homogeneous(self.straight(self.problem.tie1[chosen], 0, theta))
-        x2 = self.straight(self.problem.tie2[chosen], 1, theta)
-        mapped = x1 @ plane_transfer(*cameras, plane).T
-        line = x1 @ fundamental(*cameras).T
-        with np.errstate(divide="ignore", invalid="ignore"):
-            shift = x2 - mapped[:, :2] / mapped[:, 2:]
-            return (shift[:, 1] * line[:, 0] - shift[:, 0] * line[:, 1]) / np.hypot(
-                line[:, 0], line[:, 1]
-            )
-
-    def control_white(self, theta: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return whitened pick residuals (n, 4) and the adjusted points (n, 3).
-
-        The points' own uncertainty is eliminated: it widens the picks' covariance by
-        J Σ Jᵀ, so a metre known to 3 mm pulls less than a pick known to half a pixel.
-        """
-        problem, control = self.problem, self.problem.control
-        if not control.ids:
-            return np.zeros((0, 4)), np.zeros((0, 3))
-        cameras, _, _ = self.unpack(theta)
-        picks = np.concatenate(
-            [self.straight(control.pixels1, 0, theta), self.straight(control.pixels2, 1, theta)],
-            axis=1,
-        )
-        xyz, sigma, known = self._points(cameras, picks)
-        seen = np.isfinite(picks) & problem.pick_used[:, None]
-        for _ in range(3):
-            rows = np.concatenate([projection_rows(c, xyz) for c in cameras], axis=1)
-            misfit = picks - np.concatenate([project(c, xyz) for c in cameras], axis=1)
-            rows = np.where(seen[:, :, None], np.nan_to_num(rows), 0.0)
-            misfit = np.where(seen, np.nan_to_num(misfit, nan=1e4), 0.0)
-            misfit = misfit - np.einsum("nij,nj->ni", rows, known - xyz)
-            spread = rows * sigma[:, None, :] ** 2
-            covariance = spread @ rows.transpose(0, 2, 1)
-            covariance += problem.sigma_pick**2 * np.eye(4)
-            gain = np.linalg.solve(covariance, misfit[..., None])
-            xyz = known + np.einsum("nij,nik->nj", spread, gain)
-        lower = np.linalg.cholesky(covariance)
-        white = np.linalg.solve(lower, misfit[..., None])[..., 0]
-        return np.where(seen, white, 0.0), xyz
-
-    def _points(
-        self, cameras: tuple[Pinhole, Pinhole], picks: FloatArray
-    ) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return approximate points, their standard deviations and their known coordinates."""
-        control = self.problem.control
-        both = triangulate(*cameras, picks[:, :2], picks[:, 2:])
-        on_plane = [
-            ray_on_plane(c, p) for c, p in zip(cameras, (picks[:, :2], picks[:, 2:]), strict=True)
+def _priors(observations: PairObservations, state: PairUnknowns) -> tuple[FloatArray, FloatArray]:
+    """Return the lens's, the tape's and the plane's observations: all but the tilts are linear."""
+    values = state.values()
+    linear: list[tuple[dict[int, float], float, float]] = []
+    tilts, by_tilts = [], []
+    for number, (interior, camera) in enumerate(
+        zip(observations.interiors, state.cameras, strict=True), start=1
+    ):
+        known = [
+            ("focal length", np.log(interior.focal), interior.sigma_focal),
+            ("aspect", np.log(interior.aspect), interior.sigma_aspect),
+            ("column", interior.centre[0], interior.sigma_centre),
+            ("row", interior.centre[1], interior.sigma_centre),
+            ("radial", 0.0, interior.sigma_radial),
         ]
-        single = np.where(np.isfinite(on_plane[0]), on_plane[0], on_plane[1])
-        guess = np.where(np.isfinite(both), both, single)
-        flat = control.sigma[:, 2:] < UNKNOWN  # relief known: the plane fixes X and Y better
-        guess = np.where(flat & np.isfinite(single) & (control.xyz[:, 2:] == 0), single, guess)
-        known = np.where(np.isfinite(control.xyz), control.xyz, np.nan_to_num(guess))
-        sigma = np.where(np.isfinite(control.xyz), control.sigma, UNKNOWN)
-        return known.copy(), sigma, known
+        linear += [({at(name, number): 1.0}, value, sigma) for name, value, sigma in known]
+        if observations.sigma_tilt is not None:
+            axis, turn = camera.rotation[2], at("turn X", number)
+            by_turn = np.cross(axis, np.eye(3))
+            by = np.zeros((2, len(NAMES)))
+            by[:, turn : turn + 3] = (
+                -(by_turn[:, :2].T + np.outer(camera.tilt, by_turn[:, 2])) / axis[2]
+            )
+            tilts.append(camera.tilt / observations.sigma_tilt)
+            by_tilts.append(by / observations.sigma_tilt)
+    body = observations.sigma_body
+    same = [("focal length", observations.sigma_zoom), ("column", body), ("row", body)]
+    same += [("aspect", None if body is None else SIGMA_ASPECT)]
+    linear += [
+        ({at(name, 1): 1.0, at(name, 2): -1.0}, 0.0, sigma)
+        for name, sigma in same
+        if sigma is not None
+    ]
+    distances = {
+        "distance1": {at("Z", 1): 1.0},
+        "distance2": {at("Z", 2): 1.0},
+        "delta_d": {at("Z", 1): 1.0, at("Z", 2): -1.0},
+    }
+    linear += [(distances[name], *known) for name, known in observations.measured.items()]
+    if observations.estimated[-1]:
+        sigmas = (observations.sigma_plane, observations.sigma_slope, observations.sigma_slope)
+        linear += [({NAMES.index(name): 1.0}, 0.0, s) for name, s in zip(WALL, sigmas, strict=True)]
+    linear = [row for row in linear if row[2] > 0]
+    jacobian = np.zeros((len(linear), len(NAMES)))
+    for row, (terms, _, sigma) in enumerate(linear):
+        jacobian[row, list(terms)] = np.array(list(terms.values())) / sigma
+    wanted = np.array([value / sigma for _, value, sigma in linear])
+    return (
+        np.concatenate([jacobian @ values - wanted, *tilts]),
+        np.concatenate([jacobian, *by_tilts]),
+    )
 
-    def control_picks(self, theta: FloatArray) -> FloatArray:
-        """Return picks minus the projection of the control points as given, shape (n, 4). [px]"""
-        control = self.problem.control
-        if not control.ids:
-            return np.zeros((0, 4))
-        cameras, _, _ = self.unpack(theta)
-        _, adjusted = self.control_white(theta)
-        xyz = np.where(np.isfinite(control.xyz), control.xyz, adjusted)
-        parts = []
-        for number, pixels in enumerate((control.pixels1, control.pixels2)):
-            parts.append(self.straight(pixels, number, theta) - project(cameras[number], xyz))
-        return np.concatenate(parts, axis=1)
 
-    def _lengths(self, theta: FloatArray) -> FloatArray:
-        """Return the taped distances' residuals; the picks' own noise is part of their weight."""
-        problem, control = self.problem, self.problem.control
-        if not control.lengths:
-            return np.zeros(0)
-        cameras, _, _ = self.unpack(theta)
-        _, xyz = self.control_white(theta)
-        out = []
-        for a, b, length in control.lengths:
-            if not (problem.pick_used[a] and problem.pick_used[b]):
-                continue
-            ground = cameras[0].centre[2] / cameras[0].matrix[0, 0] * problem.sigma_pick
-            sigma = np.hypot(problem.control.sigma.min(initial=0.003), 1.41 * ground)
-            out.append((np.linalg.norm(xyz[a] - xyz[b]) - length) / sigma)
-        return np.array(out)
+def _straight(
+    observations: PairObservations, state: PairUnknowns, which: BoolArray
+) -> tuple[tuple[FloatArray, FloatArray], tuple[FloatArray, FloatArray]]:
+    """Return ties freed of the radial distortion, homogeneous, and their derivatives by k."""
+    models = [i.radial(k) for i, k in zip(observations.interiors, state.radial, strict=True)]
+    ties = (observations.tie1[which], observations.tie2[which])
+    straight = [homogeneous(m.undistort(x)) for m, x in zip(models, ties, strict=True)]
+    by_k = [m.undistorted_by_k(x) for m, x in zip(models, ties, strict=True)]
+    return (straight[0], straight[1]), (by_k[0], by_k[1])
 
 
-def radial_shift(pixels: FloatArray, interior: Interior, k: float) -> FloatArray:
-    """Return pixels moved to where they would be without distortion: c + (x - c) / (1 + k ρ²).
+def _epipolar(
+    observations: PairObservations, state: PairUnknowns, which: BoolArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return the signed (Sampson) distance of ties from their epipolar lines, by `NAMES`. [px]
 
-    ρ is the distorted radius over the principal distance.
+    Notes
+    -----
+    ``e = x2ᵀ F x1 / |(F x1, Fᵀ x2)|``, of the lines' first two components.
     """
-    away = pixels - interior.centre
-    square = (away**2).sum(-1, keepdims=True) / interior.focal**2
-    return interior.centre + away / (1.0 + k * square)
+    (x1, x2), (x1_by_k, x2_by_k) = _straight(observations, state, which)
+    matrix, by_cameras = fundamental_with_jacobian(*state.cameras)
+    line2, line1 = (x1 @ matrix.T)[:, :2], (x2 @ matrix)[:, :2]
+    length = np.sqrt(np.maximum((line2**2).sum(1) + (line1**2).sum(1), 1e-300))[:, None]
+    misfit = ((x2 @ matrix) * x1).sum(1) / length[:, 0]
+    # e = s / n, so de = (ds - e dn) / n, with dn = (line . d line) / n.
+    share2, share1 = misfit[:, None] * line2 / length, misfit[:, None] * line1 / length
+    left, right = x2.copy(), x1.copy()
+    left[:, :2] -= share2
+    by_matrix = left[:, :, None] * right[:, None, :]
+    by_matrix[:, :, :2] -= x2[:, :, None] * share1[:, None, :]
+    by_matrix /= length[:, :, None]
+    by = np.zeros((len(x1), len(NAMES)))
+    by[:, _CAMERAS] = by_matrix.reshape(-1, 9) @ by_cameras.reshape(-1, 9).T
+    by_x1, by_x2 = line1 - share2 @ matrix[:2, :2], line2 - share1 @ matrix[:2, :2].T
+    by[:, at("radial", 1)] = (by_x1 * x1_by_k).sum(1) / length[:, 0]
+    by[:, at("radial", 2)] = (by_x2 * x2_by_k).sum(1) / length[:, 0]
+    return misfit, by
 
 
-def _homogeneous(pixels: FloatArray) -> FloatArray:
-    return np.concatenate([pixels, np.ones((len(pixels), 1))], axis=1)
-
-
-def ray_on_plane(camera: Pinhole, pixels: FloatArray) -> FloatArray:
-    """Return where rays meet the reference plane, as points of relief zero, shape (n, 3)."""
-    ideal = _homogeneous(pixels) @ np.linalg.inv(camera.matrix).T
-    ray = ideal @ camera.rotation
+def _transfer(
+    observations: PairObservations, state: PairUnknowns, which: BoolArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return how far ties lie from the wall plane's transfer along the line, by `NAMES`. [px]"""
+    (x1, x2), (x1_by_k, x2_by_k) = _straight(observations, state, which)
+    matrix, by_cameras = fundamental_with_jacobian(*state.cameras)
+    transfer, by_transfer = plane_transfer_with_jacobian(*state.cameras, state.plane)
+    line = (x1 @ matrix.T)[:, :2]
+    carried = x1 @ transfer.T
     with np.errstate(divide="ignore", invalid="ignore"):
-        reach = np.where(ray[:, 2] < 0, -camera.centre[2] / ray[:, 2], np.nan)
-    points = camera.centre + reach[:, None] * ray
-    points[:, 2] = np.where(np.isfinite(points[:, 0]), 0.0, np.nan)
-    return points
+        mapped = carried[:, :2] / carried[:, 2:]
+        length = np.hypot(line[:, 0], line[:, 1])[:, None]
+        along = np.column_stack([-line[:, 1], line[:, 0]]) / length
+        shift = x2[:, :2] - mapped
+        misfit = (shift * along).sum(1)
+        by_line = np.column_stack([shift[:, 1], -shift[:, 0]]) - misfit[:, None] * line / length
+        by_line /= length
+        by_carried = -np.column_stack([along, -(along * mapped).sum(1)]) / carried[:, 2:]
+    by = np.zeros((len(x1), len(NAMES)))
+    by_matrix = (by_line[:, :, None] * x1[:, None, :]).reshape(-1, 6)
+    by[:, _CAMERAS] = by_matrix @ by_cameras[:, :2].reshape(-1, 6).T
+    by_matrix = (by_carried[:, :, None] * x1[:, None, :]).reshape(-1, 9)
+    by[:, _CAMERAS_AND_WALL] += by_matrix @ by_transfer.reshape(-1, 9).T
+    by_x1 = (by_line @ matrix[:2] + by_carried @ transfer)[:, :2]
+    by[:, at("radial", 1)] = (by_x1 * x1_by_k).sum(1)
+    by[:, at("radial", 2)] = (along * x2_by_k).sum(1)
+    return misfit, by
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _AdjustedControl:
+    """Control points of one state.
+
+    Attributes
+    ----------
+    white : ndarray, shape (n, 4)
+        Pick residuals in standard deviations; zero where not picked or not used.
+    by_unknowns : ndarray, shape (n, 4, 25)
+    xyz : ndarray, shape (n, 3)
+        Adjusted points. [m]
+    xyz_by_unknowns : ndarray, shape (n, 3, 25)
+    """
+
+    white: FloatArray
+    by_unknowns: FloatArray
+    xyz: FloatArray
+    xyz_by_unknowns: FloatArray
+
+
+def _control(
+    observations: PairObservations, state: PairUnknowns, used: BoolArray | None = None
+) -> _AdjustedControl:
+    """Return whitened picks and adjusted points with their derivatives.
+
+    The points' own uncertainty is eliminated: it widens the picks' covariance by
+    J Σ Jᵀ, so a metre known to 3 mm pulls less than a pick known to half a pixel.
+
+    Notes
+    -----
+    The points minimise the square sum of their part, so its derivative by the cameras is that at
+    points held: only the projection is differentiated, not the weights nor the points.
+    """
+    control = observations.control
+    used = observations.pick_used if used is None else used
+    models = [i.radial(k) for i, k in zip(observations.interiors, state.radial, strict=True)]
+    raw = (control.pixels1, control.pixels2)
+    picks = np.concatenate([m.undistort(x) for m, x in zip(models, raw, strict=True)], axis=1)
+    known, sigma = _known_points(observations, state.cameras, picks)
+    xyz = known
+    seen = np.isfinite(picks) & used[:, None]
+    for _ in range(3):
+        views = [project_with_jacobian(camera, xyz) for camera in state.cameras]
+        rows = np.concatenate([view.by_point for view in views], axis=1)
+        misfit = picks - np.concatenate([view.pixels for view in views], axis=1)
+        rows = np.where(seen[:, :, None], np.nan_to_num(rows), 0.0)
+        misfit = np.where(seen, np.nan_to_num(misfit, nan=1e4), 0.0)
+        misfit = misfit - np.einsum("nij,nj->ni", rows, known - xyz)
+        spread = rows * sigma[:, None, :] ** 2
+        covariance = spread @ rows.transpose(0, 2, 1)
+        covariance += observations.sigma_pick**2 * np.eye(4)
+        gain = spread.transpose(0, 2, 1) @ np.linalg.inv(covariance)
+        xyz = known + np.einsum("nij,nj->ni", gain, misfit)
+    by = np.zeros((len(xyz), 4, len(NAMES)))
+    for number, (view, model, x) in enumerate(zip(views, models, raw, strict=True)):
+        half, first = slice(2 * number, 2 * number + 2), number * len(CAMERA)
+        by[:, half, first : first + len(PARAMETERS)] = -view.by_camera
+        by[:, half, first + len(PARAMETERS)] = model.undistorted_by_k(x)
+    by = np.where(seen[:, :, None], np.nan_to_num(by), 0.0)
+    lower = np.linalg.inv(np.linalg.cholesky(covariance))
+    return _AdjustedControl(
+        white=np.where(seen, np.einsum("nij,nj->ni", lower, misfit), 0.0),
+        by_unknowns=lower @ by,
+        xyz=xyz,
+        xyz_by_unknowns=gain @ by,
+    )
+
+
+def _known_points(
+    observations: PairObservations, cameras: tuple[Pinhole, Pinhole], picks: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return control points, what was not measured filled in roughly, and their sigmas."""
+    control = observations.control
+    both = triangulate(*cameras, picks[:, :2], picks[:, 2:])
+    first, second = (
+        ray_on_plane(c, p) for c, p in zip(cameras, (picks[:, :2], picks[:, 2:]), strict=True)
+    )
+    single = np.where(np.isfinite(first), first, second)
+    guess = np.where(np.isfinite(both), both, single)
+    flat = control.sigma[:, 2:] < UNKNOWN  # relief known: the plane fixes X and Y better
+    guess = np.where(flat & np.isfinite(single) & (control.xyz[:, 2:] == 0), single, guess)
+    known = np.where(np.isfinite(control.xyz), control.xyz, np.nan_to_num(guess))
+    return known, np.where(np.isfinite(control.xyz), control.sigma, UNKNOWN)
+
+
+def _control_residuals(observations: PairObservations, state: PairUnknowns) -> FloatArray:
+    """Return picks minus the projection of the control points as given, shape (n, 4). [px]"""
+    control = observations.control
+    if not control.ids:
+        return np.zeros((0, 4))
+    xyz = np.where(np.isfinite(control.xyz), control.xyz, _control(observations, state).xyz)
+    parts = [
+        interior.radial(k).undistort(pixels) - project(camera, xyz)
+        for interior, k, pixels, camera in zip(
+            observations.interiors, state.radial, (control.pixels1, control.pixels2),
+            state.cameras, strict=True,
+        )
+    ]  # fmt: skip
+    return np.concatenate(parts, axis=1)
+
+
+def _lengths(
+    observations: PairObservations, state: PairUnknowns, control: _AdjustedControl
+) -> tuple[FloatArray, FloatArray]:
+    """Return the taped distances' residuals; the picks' own noise is part of their weight."""
+    used, far = observations.pick_used, state.cameras[0]
+    lengths = [(a, b, c) for a, b, c in observations.control.lengths if used[a] and used[b]]
+    if not lengths:
+        return np.zeros(0), np.zeros((0, len(NAMES)))
+    first, second, taped = (np.array(column) for column in zip(*lengths, strict=True))
+    between = control.xyz[first] - control.xyz[second]
+    between_by = control.xyz_by_unknowns[first] - control.xyz_by_unknowns[second]
+    length = np.linalg.norm(between, axis=1)
+    pick = 1.41 * far.centre[2] / far.matrix[0, 0] * observations.sigma_pick
+    sigma = float(np.hypot(observations.control.sigma.min(initial=0.003), pick))
+    misfit = (length - taped) / sigma
+    by = np.einsum("ni,nik->nk", between / length[:, None], between_by) / sigma
+    # A pixel on the wall is distance over principal distance; so is the picks' share of sigma.
+    by[:, at("Z", 1)] -= misfit * (pick / sigma) ** 2 / far.centre[2]
+    by[:, at("focal length", 1)] += misfit * (pick / sigma) ** 2
+    return misfit, by
 
 
 def _control_test(
-    model: _Model, theta: FloatArray, jacobian: FloatArray, inverse: FloatArray
+    observations: PairObservations, state: PairUnknowns, cofactor: FloatArray
 ) -> FloatArray:
     """Return each control point's misfit in standard deviations, as if it had been left out.
 
     With residual block w, its Jacobian A and the cofactor Q of the parameters,
     ``T² = wᵀ (I - A Q Aᵀ)⁻¹ w`` per coordinate; unused points are tested against the others.
     """
-    control, problem = model.problem.control, model.problem
-    count = len(control.ids)
-    if not count:
-        return np.zeros(0)
-    tail = len([1 for a, b, _ in control.lengths if problem.pick_used[a] and problem.pick_used[b]])
-    end = len(jacobian) - tail
-    rows = jacobian[end - 4 * count : end].reshape(count, 4, -1)
-    white, _ = model.control_white(theta)
-    everyone = replace(problem, pick_used=np.ones(count, dtype=bool))
-    unused, _ = _Model(everyone, model.cameras).control_white(theta)
-    out = np.zeros(count)
-    for index in range(count):
-        seen = np.isfinite(np.concatenate([control.pixels1[index], control.pixels2[index]]))
-        if not seen.any():
+    control, out = observations.control, np.zeros(len(observations.control.ids))
+    if not control.ids:
+        return out
+    adjusted = _control(observations, state)
+    others = _control(observations, state, np.ones(len(control.ids), dtype=bool)).white
+    picked = np.isfinite(np.concatenate([control.pixels1, control.pixels2], axis=1))
+    for index in np.flatnonzero(picked.any(axis=1)):
+        seen = picked[index]
+        if not observations.pick_used[index]:
+            out[index] = np.linalg.norm(others[index][seen]) / np.sqrt(seen.sum())
             continue
-        if not problem.pick_used[index]:
-            out[index] = np.linalg.norm(unused[index][seen]) / np.sqrt(seen.sum())
-            continue
-        block = rows[index][seen]
-        freedom = np.eye(int(seen.sum())) - block @ inverse @ block.T
+        block = adjusted.by_unknowns[index][seen]
+        freedom = np.eye(int(seen.sum())) - block @ cofactor @ block.T
         # A point that alone determines something has no redundancy: its test says nothing.
         values, vectors = np.linalg.eigh(freedom)
-        parts = (vectors.T @ white[index][seen]) ** 2
+        parts = (vectors.T @ adjusted.white[index][seen]) ** 2
         usable = values > 0.02
         if usable.any():
             out[index] = np.sqrt((parts[usable] / values[usable]).sum() / usable.sum())
     return out
 
 
-def photo_camera(matrix: FloatArray, nadir: FloatArray, distance: float) -> Pinhole:
-    """Return the camera of a photo of a pair, skew dropped."""
-    camera = pinhole_from_plane(matrix, nadir, distance)
-    return camera._replace(
-        matrix=camera_matrix(
-            camera.matrix[0, 0],
-            camera.matrix[1, 1] / camera.matrix[0, 0],
-            camera.matrix[0, 2],
-            camera.matrix[1, 2],
-        )
-    )
+#: Where the cameras' `PARAMETERS` stand in `NAMES`, without and with the wall's.
+_CAMERAS = [at(name, number) for number in (1, 2) for name in PARAMETERS]
+_CAMERAS_AND_WALL = [*_CAMERAS, *(NAMES.index(name) for name in WALL)]

@@ -7,9 +7,9 @@ from typing import Any
 import cv2
 import numpy as np
 
-from bifocal.orientation.alignment import Interior
-from bifocal.orientation.pinhole import Pinhole, camera_matrix, project
+from bifocal.orientation.interior_orientation import Interior
 from photocore.arrays import BoolArray, FloatArray
+from photocore.camera import Pinhole, camera_matrix, project
 from photocore.errors import GeometryError
 
 #: Picks that miss by more than this share of the image width are gross, whatever the lens.
@@ -79,7 +79,7 @@ def _candidates(
     xyz: FloatArray, pixels: FloatArray, matrix: FloatArray, generator: np.random.Generator
 ) -> list[Pinhole]:
     """Return cameras from all points and from small random subsets."""
-    found = _solve(xyz, pixels, matrix)
+    cameras = _solve(xyz, pixels, matrix)
     if len(xyz) >= 6:
         subsets = [generator.choice(len(xyz), 5, replace=False) for _ in range(12)]
     elif len(xyz) == 5:
@@ -87,8 +87,8 @@ def _candidates(
     else:
         subsets = []
     for subset in subsets:
-        found += _solve(xyz[subset], pixels[subset], matrix)
-    return found
+        cameras += _solve(xyz[subset], pixels[subset], matrix)
+    return cameras
 
 
 def _solve(xyz: FloatArray, pixels: FloatArray, matrix: FloatArray) -> list[Pinhole]:

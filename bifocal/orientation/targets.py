@@ -20,7 +20,7 @@ FAMILIES = ("DICT_4X4_250", "DICT_5X5_250", "DICT_6X6_250", "DICT_APRILTAG_36h11
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Targets:
+class SurveyTargets:
     """Targets found in one photo.
 
     Attributes
@@ -44,7 +44,7 @@ class Targets:
     codes: tuple[str, ...]
 
 
-def find_targets(image: ByteArray) -> Targets:
+def find_targets(image: ByteArray) -> SurveyTargets:
     """Return every target of a grey photo.
 
     Parameters
@@ -61,7 +61,7 @@ def find_targets(image: ByteArray) -> Targets:
     codes, names, sizes = _codes(image)
     pixels = np.concatenate([part[0] for part in parts] + [codes])
     counts = [len(part[0]) for part in parts]
-    return Targets(
+    return SurveyTargets(
         pixels=pixels,
         size=np.concatenate([part[1] for part in parts] + [sizes]),
         dark=np.repeat([True, False, True, True], [*counts, len(codes)]),

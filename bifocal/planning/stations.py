@@ -8,7 +8,7 @@ from itertools import combinations
 from math import ceil, hypot, sqrt
 
 from bifocal.planning.camera_plan import Plan, Sensor, Station
-from bifocal.precision import lever_arm, uncertainty_radius
+from bifocal.precision import base_factor, uncertainty_radius
 from photocore.arrays import positive
 from photocore.errors import InputError
 
@@ -136,7 +136,7 @@ def _station(
     half_diagonal = hypot(*footprint) / 2
     # Mean square radius of a rectangle about its centre is diagonal² / 12.
     rms = hypot(*footprint) / sqrt(12)
-    noise = sqrt(2) * sigma_px * gsd * lever_arm(d1=d1, d2=d2)
+    noise = sqrt(2) * sigma_px * gsd * base_factor(d1=d1, d2=d2)
     feasible = free_space is None or d1 <= free_space
     note = ""
     if not feasible:

@@ -280,7 +280,7 @@ def _surfaces(
 ) -> tuple[splat.Layer, BoolArray]:
     """Return relief, sigma and quality of the pixels of photo 1, and which of them to use."""
     d2 = frame.distances[1]
-    lever = frame.pair.lever
+    lever = frame.pair.base_factor
     low, high = relief_range or (seed.DEEPEST * d2, seed.HIGHEST * d2)
     margin = 0.1 * (high - low)
     relief = np.clip(np.nan_to_num(found.r), low - margin, high + margin).astype(np.float32)

@@ -24,7 +24,7 @@ def setup_sigma(pair: Pair, relief: Float32Array) -> Float32Array:
     d1, d2 = pair.image1.distance, pair.image2.distance
     rate1, rate2 = d2 / (d1 * (d1 - d2)), d1 / (d2 * (d1 - d2))
     per_metre = np.hypot(rate1 * sigma1, rate2 * sigma2)
-    return np.hypot(np.float32(pair.lever * scale), relief * np.float32(per_metre))
+    return np.hypot(np.float32(pair.base_factor * scale), relief * np.float32(per_metre))
 
 
 def _stated(pair: Pair, name: str) -> float:

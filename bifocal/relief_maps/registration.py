@@ -86,7 +86,7 @@ def check_registration(frame: Frame, found: Measurement) -> Registration:
         px[use], py[use], across[use].astype(np.float64)
     )
     wall = _mode(relief[use])
-    per_scale = 1e-3 * frame.pair.lever
+    per_scale = 1e-3 * frame.pair.base_factor
     remarks = _remarks(median, systematic, shift, rotation, wall, per_scale, share)
     if median > REFUSE_PX:
         raise GeometryError(

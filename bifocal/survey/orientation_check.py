@@ -259,17 +259,17 @@ def _parameters(
     values: FloatArray, sigmas: FloatArray, pair: Pair, radius: float
 ) -> tuple[SetupParameter, ...]:
     """Return the parameters in a surveyor's units with the false relief each one causes."""
-    lever, distance = pair.lever, pair.image2.distance
+    base, distance = pair.base_factor, pair.image2.distance
     inner = radius / 5
     # The correction maps image 2 onto image 1: image 2 itself deviates by the opposite.
     values = np.concatenate([[values[0] / (1 + values[0])], values[1:]])
     table = [
-        ("scale", 100.0, "%", lever),
+        ("scale", 100.0, "%", base),
         ("rotation", float(np.degrees(1.0)), "deg", 0.0),
-        ("shift X", 1000.0, "mm", lever / inner),
-        ("shift Y", 1000.0, "mm", lever / inner),
-        ("tilt X", float(np.degrees(distance)), "deg", -lever * radius),
-        ("tilt Y", float(np.degrees(distance)), "deg", -lever * radius),
+        ("shift X", 1000.0, "mm", base / inner),
+        ("shift Y", 1000.0, "mm", base / inner),
+        ("tilt X", float(np.degrees(distance)), "deg", -base * radius),
+        ("tilt Y", float(np.degrees(distance)), "deg", -base * radius),
     ]
     return tuple(
         SetupParameter(

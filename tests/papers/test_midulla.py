@@ -16,8 +16,8 @@ from bifocal import (
     relief_from_displacement,
 )
 from bifocal.precision import (
+    base_factor,
     false_relief_of_scale,
-    lever_arm,
     sigma_relief,
     sigmas,
     uncertainty_radius,
@@ -128,7 +128,7 @@ def test_one_pixel_picks_at_the_rms_radius_give_the_known_sigma(pair, expected):
     assert found == pytest.approx(expected, rel=0.01)
 
 
-def test_sigma_at_the_plane_is_the_lever_arm_over_the_radius():
+def test_sigma_at_the_plane_is_the_base_factor_over_the_radius():
     found = sigma_relief(2.0, 2.0, d1=17.5, d2=9.5, sigma_1=0.0, sigma_2=0.003)
     assert found == pytest.approx(0.003 * 17.5 * 9.5 / 8 / 2.0, rel=1e-14)
 
@@ -159,7 +159,7 @@ def test_sigma_r_of_both_forms_agrees():
 
 
 def test_strongly_different_lenses_are_preferable():
-    assert lever_arm(d1=17.5, d2=9.5) < lever_arm(d1=17.5, d2=14.0) / 3
+    assert base_factor(d1=17.5, d2=9.5) < base_factor(d1=17.5, d2=14.0) / 3
 
 
 @pytest.mark.parametrize(("d2", "expected"), [(9.5, 0.21), (14.0, 0.70)])
@@ -188,4 +188,4 @@ def test_the_area_of_uncertainty_of_the_papers_camera_matches_the_field():
 
 def test_precision_refuses_a_near_camera_farther_than_the_far_one():
     with pytest.raises(GeometryError, match="greater"):
-        lever_arm(d1=9.5, d2=17.5)
+        base_factor(d1=9.5, d2=17.5)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from bifocal import Pair, Photo
-from bifocal.orientation.pinhole import (
+from photocore.camera import (
     Pinhole,
     camera_matrix,
     fundamental,
@@ -13,11 +13,10 @@ from bifocal.orientation.pinhole import (
     plane_from_pixel,
     plane_transfer,
     project,
-    projection_rows,
-    rotation_matrix,
-    tilt,
+    project_with_jacobian,
     triangulate,
 )
+from photocore.rotation import rotation_from_vector
 from tests.rounding import EPS
 
 SQUARE_ON = np.diag([1.0, -1.0, -1.0])
@@ -25,7 +24,7 @@ SQUARE_ON = np.diag([1.0, -1.0, -1.0])
 
 def make(seed: int, distance: float) -> Pinhole:
     rng = np.random.default_rng(seed)
-    turn = rotation_matrix(rng.uniform(-0.5, 0.5, 3))
+    turn = rotation_from_vector(rng.uniform(-0.5, 0.5, 3))
     return Pinhole(
         camera_matrix(2500.0 + 100 * seed, 1.001, 1510.0, 1000.0),
         turn @ SQUARE_ON,
@@ -65,7 +64,7 @@ def test_square_on_camera_by_hand() -> None:
     np.testing.assert_allclose(project(camera, np.array([[1.0, 0.5, 0.0]])), [[300.0, -20.0]])
     # 2 m of relief at 10 m: 10 / 8 times as far from the nadir.
     np.testing.assert_allclose(project(camera, np.array([[1.0, 0.0, 2.0]])), [[350.0, 80.0]])
-    np.testing.assert_allclose(tilt(camera), [0.0, 0.0])
+    np.testing.assert_allclose(camera.tilt, [0.0, 0.0])
     np.testing.assert_allclose(
         pixel_from_plane(camera) @ [1.0, 0.5, 1.0] / -10.0, [-300.0, 20.0, -1.0]
     )
@@ -77,7 +76,7 @@ def test_a_camera_turned_to_the_right_has_positive_tilt() -> None:
     turn = np.array([[np.cos(a), 0, np.sin(a)], [0, 1, 0], [-np.sin(a), 0, np.cos(a)]])
     camera = Pinhole(np.eye(3), SQUARE_ON @ turn, np.array([0.0, 0.0, 1.0]))
     np.testing.assert_allclose(camera.rotation[2], [np.sin(a), 0, -np.cos(a)], atol=4 * EPS)
-    np.testing.assert_allclose(tilt(camera), [np.tan(a), 0.0], atol=4 * EPS)
+    np.testing.assert_allclose(camera.tilt, [np.tan(a), 0.0], atol=4 * EPS)
 
 
 def test_projection_rows_are_the_derivative() -> None:
@@ -87,7 +86,9 @@ def test_projection_rows_are_the_derivative() -> None:
         step = np.zeros(3)
         step[axis] = 1e-6
         slope = (project(camera, xyz + step) - project(camera, xyz - step)) / 2e-6
-        np.testing.assert_allclose(projection_rows(camera, xyz)[:, :, axis], slope, rtol=1e-6)
+        np.testing.assert_allclose(
+            project_with_jacobian(camera, xyz).by_point[:, :, axis], slope, rtol=1e-6
+        )
 
 
 def test_rays_meet_where_the_point_is_and_obey_the_fundamental_matrix() -> None:
@@ -111,7 +112,7 @@ def test_a_plane_is_carried_from_photo_to_photo_also_when_it_slopes() -> None:
 
 
 def test_rotation_of_nothing_is_exactly_nothing() -> None:
-    assert (rotation_matrix(np.zeros(3)) == np.eye(3)).all()
+    assert (rotation_from_vector(np.zeros(3)) == np.eye(3)).all()
 
 
 def test_pair_of_two_pinholes_intersects_their_points() -> None:

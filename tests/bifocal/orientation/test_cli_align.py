@@ -10,9 +10,9 @@ from click.testing import CliRunner
 
 from bifocal import Pair
 from bifocal.cli.main import main
-from bifocal.orientation.alignment import Interior
-from bifocal.orientation.pinhole import project
+from bifocal.orientation.interior_orientation import Interior
 from bifocal.orientation.validation import check_distortion
+from photocore.camera import project
 from photocore.errors import GeometryError
 from tests.bifocal.orientation.layered_wall import camera, relief_at, take
 

@@ -277,7 +277,7 @@ def test_a_ramp_over_a_step_is_made_sharp():
     slab = (x > 0.8) & (x < 2.2) & (-y > 0.6) & (-y < 1.6)
     relief = np.where(slab, 0.3, 0.0).astype(np.float32)
     blurred = cv2.GaussianBlur(relief, (0, 0), 2.0)
-    sharp = edges.sharpen(frame, blurred, frame.pair.lever)
+    sharp = edges.sharpen(frame, blurred, frame.pair.base_factor)
     assert np.abs(sharp - relief).mean() < 0.75 * np.abs(blurred - relief).mean()
 
 
