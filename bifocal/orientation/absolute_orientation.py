@@ -22,7 +22,8 @@ from bifocal.orientation.orientation_stages import (
     silent,
     without_gross,
 )
-from bifocal.orientation.pair_adjustment import PairObservations, PairUnknowns, tie_misfit
+from bifocal.orientation.pair_adjustment import tie_misfit
+from bifocal.orientation.pair_observations import PairObservations, PairUnknowns
 from bifocal.orientation.relative_orientation import Ties, find_ties, first_cameras, plane_scale
 from bifocal.orientation.space_resection import resect
 from bifocal.orientation.tie_points import robust_sigma

@@ -14,7 +14,8 @@ from bifocal.model.pair import Pair, Photo, apply_homography
 from bifocal.orientation.interior_orientation import Interior
 from bifocal.orientation.orientation_report import orientation_in_words
 from bifocal.orientation.orientation_stages import OrientedPair, PhotoInput
-from bifocal.orientation.pair_adjustment import NAMES, AdjustedPair, at
+from bifocal.orientation.pair_adjustment import AdjustedPair
+from bifocal.orientation.pair_observations import NAMES, at
 from bifocal.orientation.reference_plane import rivals
 from bifocal.orientation.tie_points import robust_sigma
 from photocore.arrays import BoolArray, ByteArray, FloatArray
@@ -129,9 +130,7 @@ def make_alignment(
 
 
 def _in_facade_axes(
-    cameras: tuple[Pinhole, Pinhole],
-    photo: PhotoInput,
-    direction: tuple[FloatArray, bool] | None,
+    cameras: tuple[Pinhole, Pinhole], photo: PhotoInput, direction: tuple[FloatArray, bool] | None
 ) -> tuple[tuple[Pinhole, Pinhole], str]:
     """Return cameras in axes along the façade, origin in the far nadir, and what they rest on."""
     far = cameras[0]

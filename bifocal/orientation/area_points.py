@@ -10,7 +10,8 @@ import cv2
 import numpy as np
 
 from bifocal import rays
-from bifocal.orientation.pair_adjustment import AdjustedPair, PairObservations
+from bifocal.orientation.pair_adjustment import AdjustedPair
+from bifocal.orientation.pair_observations import PairObservations
 from photocore.arrays import BoolArray, ByteArray, FloatArray
 from photocore.camera import project, ray_on_plane
 

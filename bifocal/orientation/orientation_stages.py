@@ -15,13 +15,8 @@ from bifocal.orientation import validation
 from bifocal.orientation.area_points import even_points
 from bifocal.orientation.control_points import SiteMeasures
 from bifocal.orientation.interior_orientation import Interior
-from bifocal.orientation.pair_adjustment import (
-    AdjustedPair,
-    PairObservations,
-    PairUnknowns,
-    adjust,
-    evaluated,
-)
+from bifocal.orientation.pair_adjustment import AdjustedPair, adjust, evaluated
+from bifocal.orientation.pair_observations import PairObservations, PairUnknowns
 from bifocal.orientation.reference_plane import Face, choose_wall, rivals_in_words
 from bifocal.orientation.tie_points import ROUGHNESS, classify, refine_ties, robust_sigma
 from photocore.arrays import ByteArray, FloatArray

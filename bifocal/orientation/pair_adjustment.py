@@ -7,12 +7,18 @@ prior, and the covariance says so.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from bifocal.orientation.control_points import Control
-from bifocal.orientation.interior_orientation import Interior
+from bifocal.orientation.pair_observations import (
+    CAMERA,
+    NAMES,
+    WALL,
+    PairObservations,
+    PairUnknowns,
+    at,
+)
 from photocore import adjustment
 from photocore.arrays import BoolArray, FloatArray
 from photocore.camera import (
@@ -28,138 +34,12 @@ from photocore.camera import (
 )
 from photocore.errors import GeometryError
 
-#: Parameters of one camera of the pair, and of the ties' wall.
-CAMERA = (*PARAMETERS, "radial")
-WALL = ("wall height", "wall slope X", "wall slope Y")
-#: All parameters, in the order of the covariance.
-NAMES = (*(f"{name} {number}" for number in (1, 2) for name in CAMERA), *WALL)
 #: A coordinate that was not measured, as a standard deviation. [m]
-UNKNOWN = 1e3
+UNKNOWN = 1e6
 #: Rounding error of pixels and metres, as a share of their standard deviations.
 ROUNDING = 1e-9
 #: Relative standard deviation with which one camera body has one aspect.
 SIGMA_ASPECT = 2e-4
-
-
-def at(name: str, camera: int) -> int:
-    """Return where a parameter of camera 1 or 2 stands in `NAMES`.
-
-    Examples
-    --------
-    >>> NAMES[at("Z", 2)]
-    'Z 2'
-    """
-    return NAMES.index(f"{name} {camera}")
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class PairObservations:
-    """Everything observed. Pixels are free of the lens file's distortion.
-
-    Attributes
-    ----------
-    interiors : pair of Interior
-    control : Control
-    pick_used : ndarray of bool, shape (n,)
-        Control points that take part.
-    sigma_pick : float
-        Precision of control picks. [px]
-    tie1, tie2 : ndarray, shape (m, 2)
-    sigma_tie : float
-        Precision of a tie point's coordinate. [px]
-    tie_used, wall : ndarray of bool, shape (m,)
-        Ties that take part; ties that lie on the wall plane.
-    sigma_wall : ndarray, shape (m,)
-        How precisely a tie of the wall lies where the plane puts it: its own precision and the
-        wall's roughness, seen in photo 2. [px]
-    sigma_body, sigma_zoom : float or None
-        Both photos come from one body (same principal point [px], same aspect), or with one
-        unchanged lens (same principal distance, relative).
-    sigma_plane : float
-        How far the ties' wall may lie from the reference plane; zero: they define it. [m]
-    sigma_slope : float
-        The same for the slope between the two. [m/m]
-    measured : mapping of str to (value, sigma)
-        ``distance1``, ``distance2``, ``delta_d``. [m]
-    sigma_tilt : float or None
-        Standard deviation of "image plane parallel to the wall". [rad]
-    free_datum : bool
-        Whether origin and turn of the plane frame are free and must be held.
-    """
-
-    interiors: tuple[Interior, Interior]
-    control: Control = field(default_factory=Control)
-    pick_used: BoolArray = field(default_factory=lambda: np.zeros(0, dtype=bool))
-    sigma_pick: float = 0.5
-    tie1: FloatArray = field(default_factory=lambda: np.zeros((0, 2)))
-    tie2: FloatArray = field(default_factory=lambda: np.zeros((0, 2)))
-    sigma_tie: float = 0.5
-    tie_used: BoolArray = field(default_factory=lambda: np.zeros(0, dtype=bool))
-    wall: BoolArray = field(default_factory=lambda: np.zeros(0, dtype=bool))
-    sigma_wall: FloatArray = field(default_factory=lambda: np.zeros(0))
-    sigma_body: float | None = None
-    sigma_zoom: float | None = None
-    sigma_plane: float = 0.0
-    sigma_slope: float = 0.0
-    measured: dict[str, tuple[float, float]] = field(default_factory=dict)
-    sigma_tilt: float | None = None
-    free_datum: bool = False
-
-    @property
-    def estimated(self) -> BoolArray:
-        """Which of `NAMES` are estimated, the others being held."""
-        free = np.ones(len(NAMES), dtype=bool)
-        for number, interior in enumerate(self.interiors, start=1):
-            free[at("radial", number)] = interior.sigma_radial > 0
-            free[at("aspect", number)] = interior.sigma_aspect > 0
-        if self.free_datum:
-            free[[at(name, 1) for name in ("turn Z", "X", "Y")]] = False
-        free[-len(WALL) :] = self.sigma_plane > 0 and bool((self.wall & self.tie_used).any())
-        return free
-
-    def straight_ties(self, radial: tuple[float, float]) -> tuple[FloatArray, FloatArray]:
-        """Return the ties in both photos freed of the estimated radial distortion."""
-        first, second = (
-            interior.radial(k) for interior, k in zip(self.interiors, radial, strict=True)
-        )
-        return first.undistort(self.tie1), second.undistort(self.tie2)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class PairUnknowns:
-    """What is adjusted.
-
-    Attributes
-    ----------
-    cameras : pair of Pinhole
-    radial : pair of float
-        Radial distortion k of either photo.
-    plane : ndarray, shape (3,)
-        The ties' wall, z = a + b X + c Y. [m, -, -]
-    """
-
-    cameras: tuple[Pinhole, Pinhole]
-    radial: tuple[float, float] = (0.0, 0.0)
-    plane: FloatArray = field(default_factory=lambda: np.zeros(3))
-
-    def stepped(self, step: FloatArray) -> PairUnknowns:
-        """Return the unknowns after a step of all `NAMES`."""
-        parts = step[: -len(WALL)].reshape(2, len(CAMERA))
-        first, second = (c.stepped(p) for c, p in zip(self.cameras, parts, strict=True))
-        return PairUnknowns(
-            cameras=(first, second),
-            radial=(self.radial[0] + float(parts[0, -1]), self.radial[1] + float(parts[1, -1])),
-            plane=self.plane + step[-len(WALL) :],
-        )
-
-    def values(self) -> FloatArray:
-        """Return the unknowns in the order of `NAMES`, turns counted from here."""
-        parts: list[float] = []
-        for camera, k in zip(self.cameras, self.radial, strict=True):
-            focal, aspect = camera.matrix[0, 0], camera.matrix[1, 1] / camera.matrix[0, 0]
-            parts += [np.log(focal), np.log(aspect), *camera.matrix[:2, 2], 0.0, 0.0, 0.0]
-            parts += [*camera.centre, k]
-        return np.array([*parts, *self.plane])
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -212,7 +92,7 @@ def adjust(observations: PairObservations, start: PairUnknowns) -> AdjustedPair:
     free = observations.estimated
 
     def equations(state: PairUnknowns) -> tuple[FloatArray, FloatArray]:
-        residuals, jacobian = _equations(observations, state)
+        residuals, jacobian = pair_equations(observations, state)
         return residuals, jacobian[:, free]
 
     def advance(state: PairUnknowns, step: FloatArray) -> PairUnknowns:
@@ -268,7 +148,7 @@ def evaluated(observations: PairObservations, adjusted: AdjustedPair) -> Adjuste
     )
 
 
-def _equations(
+def pair_equations(
     observations: PairObservations, state: PairUnknowns
 ) -> tuple[FloatArray, FloatArray]:
     """Return everything observed against computed in standard deviations, and derivatives."""
@@ -283,7 +163,7 @@ def _equations(
         parts.append((values / sigma, by / sigma[:, None]))
     if observations.control.ids:
         control = _control(observations, state)
-        parts.append((control.white.ravel(), control.by_unknowns.reshape(-1, len(NAMES))))
+        parts.append((control.misfit.ravel(), control.by_unknowns.reshape(-1, len(NAMES))))
         parts.append(_lengths(observations, state, control))
     residuals = np.concatenate([values for values, _ in parts])
     jacobian = np.concatenate([by for _, by in parts])
@@ -420,15 +300,16 @@ class _AdjustedControl:
 
     Attributes
     ----------
-    white : ndarray, shape (n, 4)
-        Pick residuals in standard deviations; zero where not picked or not used.
+    misfit : ndarray, shape (n, 4)
+        What picks and coordinates contradict each other, in four independent directions; zero in
+        those of picks that are missing or not used. [standard deviations]
     by_unknowns : ndarray, shape (n, 4, 25)
     xyz : ndarray, shape (n, 3)
         Adjusted points. [m]
     xyz_by_unknowns : ndarray, shape (n, 3, 25)
     """
 
-    white: FloatArray
+    misfit: FloatArray
     by_unknowns: FloatArray
     xyz: FloatArray
     xyz_by_unknowns: FloatArray
@@ -437,17 +318,17 @@ class _AdjustedControl:
 def _control(
     observations: PairObservations, state: PairUnknowns, used: BoolArray | None = None
 ) -> _AdjustedControl:
-    """Return whitened picks and adjusted points with their derivatives.
+    """Return adjusted points, what their picks leave of misfit, and derivatives.
 
-    The points' own uncertainty is eliminated: it widens the picks' covariance by
-    J Σ Jᵀ, so a metre known to 3 mm pulls less than a pick known to half a pixel.
+    Four picks and three measured coordinates meet in the point's three unknowns, which are
+    eliminated: so a metre known to 3 mm pulls less than a pick known to half a pixel.
 
     Notes
     -----
-    The points minimise the square sum of their part, so its derivative by the cameras is that at
-    points held: only the projection is differentiated, not the weights nor the points.
+    An orthogonal turn of the seven equations leaves four without the point. The point minimises
+    the square sum of its part, so that its derivative by the cameras is that at the point held.
     """
-    control = observations.control
+    control, sigma_pick = observations.control, observations.sigma_pick
     used = observations.pick_used if used is None else used
     models = [i.radial(k) for i, k in zip(observations.interiors, state.radial, strict=True)]
     raw = (control.pixels1, control.pixels2)
@@ -455,30 +336,28 @@ def _control(
     known, sigma = _known_points(observations, state.cameras, picks)
     xyz = known
     seen = np.isfinite(picks) & used[:, None]
+    held = np.eye(3) / sigma[:, :, None]
     for _ in range(3):
         views = [project_with_jacobian(camera, xyz) for camera in state.cameras]
-        rows = np.concatenate([view.by_point for view in views], axis=1)
-        misfit = picks - np.concatenate([view.pixels for view in views], axis=1)
+        rows = np.concatenate([view.by_point for view in views], axis=1) / sigma_pick
+        misfit = (picks - np.concatenate([view.pixels for view in views], axis=1)) / sigma_pick
         rows = np.where(seen[:, :, None], np.nan_to_num(rows), 0.0)
         misfit = np.where(seen, np.nan_to_num(misfit, nan=1e4), 0.0)
-        misfit = misfit - np.einsum("nij,nj->ni", rows, known - xyz)
-        spread = rows * sigma[:, None, :] ** 2
-        covariance = spread @ rows.transpose(0, 2, 1)
-        covariance += observations.sigma_pick**2 * np.eye(4)
-        gain = spread.transpose(0, 2, 1) @ np.linalg.inv(covariance)
-        xyz = known + np.einsum("nij,nj->ni", gain, misfit)
+        base, triangle = np.linalg.qr(np.concatenate([rows, held], axis=1), mode="complete")
+        turn, triangle = base.transpose(0, 2, 1), triangle[:, :3]
+        split = turn @ np.concatenate([misfit, (known - xyz) / sigma], axis=1)[..., None]
+        xyz = xyz + np.linalg.solve(triangle, split[:, :3])[..., 0]
     by = np.zeros((len(xyz), 4, len(NAMES)))
     for number, (view, model, x) in enumerate(zip(views, models, raw, strict=True)):
         half, first = slice(2 * number, 2 * number + 2), number * len(CAMERA)
         by[:, half, first : first + len(PARAMETERS)] = -view.by_camera
         by[:, half, first + len(PARAMETERS)] = model.undistorted_by_k(x)
-    by = np.where(seen[:, :, None], np.nan_to_num(by), 0.0)
-    lower = np.linalg.inv(np.linalg.cholesky(covariance))
+    split_by = turn[:, :, :4] @ np.where(seen[:, :, None], np.nan_to_num(by / sigma_pick), 0.0)
     return _AdjustedControl(
-        white=np.where(seen, np.einsum("nij,nj->ni", lower, misfit), 0.0),
-        by_unknowns=lower @ by,
+        misfit=split[:, 3:, 0],
+        by_unknowns=split_by[:, 3:],
         xyz=xyz,
-        xyz_by_unknowns=gain @ by,
+        xyz_by_unknowns=np.linalg.solve(triangle, split_by[:, :3]),
     )
 
 
@@ -549,21 +428,20 @@ def _control_test(
     if not control.ids:
         return out
     adjusted = _control(observations, state)
-    others = _control(observations, state, np.ones(len(control.ids), dtype=bool)).white
-    picked = np.isfinite(np.concatenate([control.pixels1, control.pixels2], axis=1))
-    for index in np.flatnonzero(picked.any(axis=1)):
-        seen = picked[index]
+    others = _control(observations, state, np.ones(len(control.ids), dtype=bool)).misfit
+    missing = np.isnan(np.concatenate([control.pixels1, control.pixels2], axis=1)).sum(axis=1)
+    for index in np.flatnonzero(missing < 4):
         if not observations.pick_used[index]:
-            out[index] = np.linalg.norm(others[index][seen]) / np.sqrt(seen.sum())
+            out[index] = np.linalg.norm(others[index]) / np.sqrt(4 - missing[index])
             continue
-        block = adjusted.by_unknowns[index][seen]
-        freedom = np.eye(int(seen.sum())) - block @ cofactor @ block.T
+        block = adjusted.by_unknowns[index]
         # A point that alone determines something has no redundancy: its test says nothing.
-        values, vectors = np.linalg.eigh(freedom)
-        parts = (vectors.T @ adjusted.white[index][seen]) ** 2
+        values, vectors = np.linalg.eigh(np.eye(4) - block @ cofactor @ block.T)
+        parts = (vectors.T @ adjusted.misfit[index]) ** 2
         usable = values > 0.02
-        if usable.any():
-            out[index] = np.sqrt((parts[usable] / values[usable]).sum() / usable.sum())
+        count = int(usable.sum() - missing[index])
+        if count > 0:
+            out[index] = np.sqrt((parts[usable] / values[usable]).sum() / count)
     return out
 
 

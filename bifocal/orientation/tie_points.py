@@ -7,7 +7,8 @@ from dataclasses import replace
 import numpy as np
 
 from bifocal.orientation.interior_orientation import Interior
-from bifocal.orientation.pair_adjustment import AdjustedPair, PairObservations
+from bifocal.orientation.pair_adjustment import AdjustedPair
+from bifocal.orientation.pair_observations import PairObservations
 from bifocal.orientation.patches import refine, same_scale
 from photocore.arrays import BoolArray, ByteArray, FloatArray
 from photocore.camera import Pinhole, project_with_jacobian, triangulate

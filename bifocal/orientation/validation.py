@@ -55,11 +55,7 @@ def check_different(name1: str, name2: str, images: tuple[ByteArray, ByteArray])
 
 
 def check_parallax(
-    ties: Ties,
-    interiors: tuple[Interior, Interior],
-    names: tuple[str, str],
-    *,
-    flat_is_fine: bool,
+    ties: Ties, interiors: tuple[Interior, Interior], names: tuple[str, str], *, flat_is_fine: bool
 ) -> None:
     """Refuse photos in which nothing moves against the wall.
 

@@ -5,13 +5,16 @@ import pytest
 
 from bifocal import Pair, Photo
 from photocore.camera import (
+    PARAMETERS,
     Pinhole,
     camera_matrix,
     fundamental,
+    fundamental_with_jacobian,
     pinhole_from_plane,
     pixel_from_plane,
     plane_from_pixel,
     plane_transfer,
+    plane_transfer_with_jacobian,
     project,
     project_with_jacobian,
     triangulate,
@@ -121,3 +124,37 @@ def test_pair_of_two_pinholes_intersects_their_points() -> None:
     xyz = np.random.default_rng(6).uniform(-1, 1, (30, 3))
     found = pair.intersect(project(far, xyz), project(near, xyz))
     np.testing.assert_allclose(found.xyz, xyz, atol=1e-8)
+
+
+@pytest.mark.parametrize("index", range(len(PARAMETERS)), ids=PARAMETERS)
+def test_every_parameter_moves_pixels_lines_and_planes_as_its_derivative_says(index: int) -> None:
+    far, near = make(3, 14.0), make(2, 8.0)
+    plane = np.array([0.1, 0.02, -0.03])
+    xyz = np.array([[0.3, -0.4, 0.5], [-1.0, 0.2, -0.3]])
+    step = np.zeros(len(PARAMETERS))
+    step[index] = h = 1e-3 if PARAMETERS[index] in ("column", "row", "X", "Y", "Z") else 1e-6
+    ahead, behind = far.stepped(step), far.stepped(-step)
+    for value, by in (
+        (lambda cam: project(cam, xyz), project_with_jacobian(far, xyz).by_camera[..., index]),
+        (lambda cam: fundamental(cam, near), fundamental_with_jacobian(far, near)[1][index]),
+        (lambda cam: fundamental(near, cam), fundamental_with_jacobian(near, far)[1][10 + index]),
+        (
+            lambda cam: plane_transfer(cam, near, plane),
+            plane_transfer_with_jacobian(far, near, plane)[1][index],
+        ),
+        (
+            lambda cam: plane_transfer(near, cam, plane),
+            plane_transfer_with_jacobian(near, far, plane)[1][10 + index],
+        ),
+    ):
+        slope = (value(ahead) - value(behind)) / (2 * h)
+        np.testing.assert_allclose(by, slope, atol=1e-6 * np.abs(slope).max())
+
+
+@pytest.mark.parametrize("index", range(3))
+def test_a_moved_plane_moves_its_transfer(index: int) -> None:
+    far, near = make(1, 14.0), make(2, 8.0)
+    plane, step = np.array([0.1, 0.02, -0.03]), 1e-6 * np.eye(3)[index]
+    slope = plane_transfer(far, near, plane + step) - plane_transfer(far, near, plane - step)
+    by = plane_transfer_with_jacobian(far, near, plane)[1][20 + index]
+    np.testing.assert_allclose(by, slope / 2e-6, atol=2e-7 * np.abs(by).max())

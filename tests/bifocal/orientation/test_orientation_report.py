@@ -5,7 +5,8 @@ import pytest
 
 from bifocal.orientation.alignment import standard_deviations
 from bifocal.orientation.orientation_report import orientation_in_words
-from bifocal.orientation.pair_adjustment import AdjustedPair, at
+from bifocal.orientation.pair_adjustment import AdjustedPair
+from bifocal.orientation.pair_observations import at
 from tests.bifocal.orientation.layered_wall import camera
 
 SURE = {"distance1": 0.01, "distance2": 0.01, "scale": 1e-5, "relief_scale": 0.0}

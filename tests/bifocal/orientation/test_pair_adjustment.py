@@ -9,7 +9,8 @@ from bifocal.orientation.absolute_orientation import orient_pair
 from bifocal.orientation.control_points import Control, SiteMeasures
 from bifocal.orientation.interior_orientation import Interior
 from bifocal.orientation.orientation_stages import PhotoInput
-from bifocal.orientation.pair_adjustment import PairObservations, PairUnknowns, adjust, at
+from bifocal.orientation.pair_adjustment import adjust, pair_equations
+from bifocal.orientation.pair_observations import NAMES, PairObservations, PairUnknowns, at
 from bifocal.orientation.space_resection import resect
 from photocore.camera import project
 from photocore.errors import GeometryError, InputError
@@ -220,3 +221,65 @@ def test_common_points_alone_need_a_tilt_or_a_tape_but_give_the_ratio_of_distanc
     offset = solution.cameras[1].centre - solution.cameras[0].centre
     np.testing.assert_allclose(np.linalg.norm(offset), np.linalg.norm(NEAR.centre - FAR.centre),
                                rtol=1e-3)  # fmt: skip
+
+
+def everything() -> tuple[PairObservations, PairUnknowns]:
+    """Return one of every kind of observation, control exact and ties not, and the truth."""
+    rng = np.random.default_rng(8)
+    xyz = np.column_stack([rng.uniform(-3, 3, (60, 2)), np.zeros(60)])
+    xyz[40:, 2] = rng.uniform(-0.6, 0.6, 20)
+    bent = tuple(replace(interior(focal=cam.matrix[0, 0]), sigma_radial=0.1) for cam in (FAR, NEAR))
+    radial, plane = (0.02, -0.03), np.array([0.01, 0.002, -0.001])
+    seen = [
+        i.radial(k).distort(project(cam, POINTS))
+        for i, k, cam in zip(bent, radial, (FAR, NEAR), strict=True)
+    ]
+    points = replace(
+        control(), pixels1=seen[0], pixels2=seen[1], lengths=((1, 2, 3.99), (4, 10, 2.5))
+    )
+    points.xyz[2, :2] = points.xyz[9] = points.xyz[10, 2] = np.nan
+    points.pixels1[3] = points.pixels2[8] = np.nan
+    observations = PairObservations(
+        interiors=bent,
+        control=points,
+        pick_used=np.arange(len(POINTS)) != 6,
+        tie1=project(FAR, xyz) + rng.normal(0, 2, (60, 2)),
+        tie2=project(NEAR, xyz) + rng.normal(0, 2, (60, 2)),
+        tie_used=np.arange(60) % 7 > 0,
+        wall=xyz[:, 2] == 0,
+        sigma_wall=rng.uniform(0.5, 2.0, 60),
+        sigma_body=3.0,
+        sigma_zoom=0.01,
+        sigma_plane=0.01,
+        sigma_slope=0.002,
+        measured={"distance1": (16.1, 0.01), "delta_d": (7.0, 0.02)},
+        sigma_tilt=0.01,
+    )
+    return observations, PairUnknowns(cameras=(FAR, NEAR), radial=radial, plane=plane)
+
+
+def test_the_jacobian_is_the_derivative_by_every_name() -> None:
+    observations, state = everything()
+    jacobian = pair_equations(observations, state)[1]
+    for column, name in enumerate(NAMES):
+        step = np.zeros(len(NAMES))
+        # Pixels and metres, against logarithms, radians and k.
+        step[column] = 1e-4 if name.split()[0] in ("column", "row", "X", "Y", "Z") else 1e-6
+        ahead, behind = (pair_equations(observations, state.stepped(s))[0] for s in (step, -step))
+        slope = (ahead - behind) / (2 * step[column])
+        np.testing.assert_allclose(
+            jacobian[:, column], slope, atol=1e-6 * np.abs(slope).max(), err_msg=name
+        )
+
+
+def test_points_measured_in_part_tell_less_than_measured_whole() -> None:
+    # Differences of residuals once made a point of unknown X and Y look like certain knowledge.
+    whole, part = control(sigma_px=0.3), control(sigma_px=0.3)
+    part.xyz[5, :2] = part.xyz[9] = np.nan
+    part.pixels1[3] = np.nan
+    inputs = photos(far=FAR.matrix[0, 0], near=NEAR.matrix[0, 0])
+    sigmas = [
+        orient_pair(inputs, control=points, site=SiteMeasures()).adjusted.sigma("Z", 1)
+        for points in (whole, part)
+    ]
+    assert sigmas[1] > sigmas[0]
