@@ -5,7 +5,7 @@ One adjustment serves all three ways; they differ in what is observed. See docs/
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -33,6 +33,26 @@ from photocore.errors import GeometryError
 from photocore.similarity import Similarity, fit_plane
 
 
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Given:
+    """What `orient_pair` is given."""
+
+    photos: tuple[PhotoInput, PhotoInput]
+    control: Control
+    site: SiteMeasures
+    step: Step
+
+    @property
+    def names(self) -> tuple[str, str]:
+        """Names of the photos."""
+        return self.photos[0].name, self.photos[1].name
+
+    @property
+    def interiors(self) -> tuple[Interior, Interior]:
+        """Interior orientations of the photos."""
+        return self.photos[0].interior, self.photos[1].interior
+
+
 def orient_pair(
     photos: tuple[PhotoInput, PhotoInput],
     *,
@@ -58,38 +78,34 @@ def orient_pair(
     GeometryError
         If the photos and measurements do not make a pair; the message says why and what to do.
     """
+    given = _Given(photos=photos, control=control, site=site, step=step)
     known = control.positioned
     enough = all(
         (known & np.isfinite(pixels).all(axis=1)).sum() >= 4
         for pixels in (control.pixels1, control.pixels2)
     )
     step("looking for common points")
-    ties, remarks = _ties(photos, needed=not enough)
+    ties, remarks = _ties(given, needed=not enough)
     step("setting up the cameras")
-    cameras, agree, interiors = _start(photos, control, site, ties, enough)
+    cameras, agree, interiors = _start(given, ties, enough)
     if enough and ties is not None:
         misfit = _contradiction(cameras, interiors, ties)
-        if misfit > 2 * ties.tolerance and _picks_exchanged(photos, control, site, ties, misfit):
-            return _other_photos(photos, control, site, step)
+        if misfit > 2 * ties.tolerance and _picks_exchanged(given, ties, misfit):
+            return _with_picks_exchanged(given)
     if cameras[0].centre[2] < cameras[1].centre[2]:
-        return _exchanged(photos, control, site, step)
+        return _with_photos_exchanged(given)
     if enough:
         validation.check_units(cameras, site)
     elif ties is not None:
-        validation.check_parallax(
-            ties, interiors, (photos[0].name, photos[1].name), flat_is_fine=site.parallel
-        )
-    observations = _observations(interiors, control, site, ties, agree, free_datum=known.sum() < 2)
+        validation.check_parallax(ties, interiors, given.names, flat_is_fine=site.parallel)
+    observations = _observations(given, interiors, ties, agree)
     pair = oriented_in_stages(observations, cameras, photos, site, step, with_control=enough)
     pair = without_gross(pair)
     validation.check_determined(pair.adjusted)
     validation.check_movement(pair.adjusted)
-    pair = pair.told(*_control_remarks(control, pair), *_distance_remarks(pair))
-    return replace(
-        pair,
-        remarks=(*remarks, *pair.remarks),
-        assumed=(*pair.assumed, *_assumptions(pair.observations, site)),
-    )
+    told = (*remarks, *pair.remarks, *_control_remarks(control, pair), *_distance_remarks(pair))
+    assumed = (*pair.assumed, *_assumptions(pair.observations, site))
+    return replace(pair, remarks=told, assumed=assumed)
 
 
 def _contradiction(
@@ -100,13 +116,7 @@ def _contradiction(
     return robust_sigma(tie_misfit(observations, PairUnknowns(cameras=cameras)))
 
 
-def _picks_exchanged(
-    photos: tuple[PhotoInput, PhotoInput],
-    control: Control,
-    site: SiteMeasures,
-    ties: Ties,
-    misfit: float,
-) -> bool:
+def _picks_exchanged(given: _Given, ties: Ties, misfit: float) -> bool:
     """Return whether the picks of the two photos were exchanged.
 
     Raises
@@ -115,13 +125,14 @@ def _picks_exchanged(
         If they fit neither way round.
     """
     try:
-        cameras, _, interiors = _start(photos, control.exchanged(), site, ties, True)
+        turned = replace(given, control=given.control.exchanged())
+        cameras, _, interiors = _start(turned, ties, True)
         other = _contradiction(cameras, interiors, ties)
     except GeometryError:
         other = np.inf
     if other < 0.5 * misfit:
         return True
-    if misfit > 0.012 * max(photos[0].interior.image_size):
+    if misfit > 0.012 * max(given.interiors[0].image_size):
         raise GeometryError(
             "the control points' pixels do not fit the photos: the details common to both photos "
             "contradict them. Check that col1, row1 are pixels of the first photo and col2, row2 "
@@ -130,55 +141,49 @@ def _picks_exchanged(
     return False
 
 
-def _other_photos(
-    photos: tuple[PhotoInput, PhotoInput], control: Control, site: SiteMeasures, step: Step
-) -> OrientedPair:
+def _with_picks_exchanged(given: _Given) -> OrientedPair:
     """Return the pair with the picks of the two photos exchanged, saying so."""
-    pair = orient_pair(photos, control=control.exchanged(), site=site, step=step)
+    pair = orient_pair(
+        given.photos, control=given.control.exchanged(), site=given.site, step=given.step
+    )
     note = (
-        f"col1, row1 of the control points are pixels of {photos[1].name}, col2, row2 of "
-        f"{photos[0].name}; the picks were exchanged."
+        f"col1, row1 of the control points are pixels of {given.names[1]}, col2, row2 of "
+        f"{given.names[0]}; the picks were exchanged."
     )
     return replace(pair, remarks=(note, *pair.remarks))
 
 
-def _exchanged(
-    photos: tuple[PhotoInput, PhotoInput], control: Control, site: SiteMeasures, step: Step
-) -> OrientedPair:
+def _with_photos_exchanged(given: _Given) -> OrientedPair:
     """Return the pair with the photos the other way round, saying so."""
+    (near, far), site = given.names, given.site
     if site.wall is not None:
         raise GeometryError(
-            f"{photos[0].name} is the near photo. --wall is a spot of the far photo: give "
-            f"{photos[1].name} first, and the spot in it."
+            f"{near} is the near photo. --wall is a spot of the far photo: give {far} first, and "
+            "the spot in it."
         )
     if site.distance1 and site.distance2 and site.distance1 < site.distance2:
         site = replace(site, distance1=site.distance2, distance2=site.distance1)
-    pair = orient_pair((photos[1], photos[0]), control=control.exchanged(), site=site, step=step)
+    pair = orient_pair(
+        given.photos[::-1], control=given.control.exchanged(), site=site, step=given.step
+    )
     note = (
-        f"{photos[0].name} is the near photo; the two were exchanged. Image 1 of the pair file is "
-        f"{photos[1].name}, and --distance1 means its distance."
+        f"{near} is the near photo; the two were exchanged. Image 1 of the pair file is {far}, and "
+        "--distance1 means its distance."
     )
     return replace(pair, exchanged=True, remarks=(note, *pair.remarks))
 
 
-def _ties(
-    photos: tuple[PhotoInput, PhotoInput], *, needed: bool
-) -> tuple[Ties | None, tuple[str, ...]]:
+def _ties(given: _Given, *, needed: bool) -> tuple[Ties | None, tuple[str, ...]]:
     """Return the photos' common points and remarks; none only if control points suffice."""
-    images = photos[0].grey, photos[1].grey
-    if images[0] is None or images[1] is None:
+    far, near = given.photos[0].grey, given.photos[1].grey
+    if far is None or near is None:
         return None, ()
     try:
-        validation.check_sharp(photos[0].name, images[0])
-        validation.check_sharp(photos[1].name, images[1])
-        validation.check_different(photos[0].name, photos[1].name, (images[0], images[1]))
-        ties = find_ties(
-            find_features(images[0]),
-            find_features(images[1]),
-            (photos[0].interior, photos[1].interior),
-            (photos[0].name, photos[1].name),
-        )
-        return ties, ()
+        for name, image in zip(given.names, (far, near), strict=True):
+            validation.check_sharp(name, image)
+        validation.check_different(*given.names, (far, near))
+        features = find_features(far), find_features(near)
+        return find_ties(*features, given.interiors, given.names), ()
     except GeometryError as error:
         if needed or isinstance(error, validation.SamePhotoError):
             raise
@@ -187,18 +192,14 @@ def _ties(
 
 
 def _start(
-    photos: tuple[PhotoInput, PhotoInput],
-    control: Control,
-    site: SiteMeasures,
-    ties: Ties | None,
-    enough: bool,
+    given: _Given, ties: Ties | None, enough: bool
 ) -> tuple[tuple[Pinhole, Pinhole], BoolArray, tuple[Interior, Interior]]:
     """Return approximate cameras, the control points that agree, and the interiors used."""
-    interiors = (photos[0].interior, photos[1].interior)
+    control, interiors = given.control, given.interiors
     agree = np.ones(len(control.ids), dtype=bool)
     if enough:
         cameras = []
-        for pixels, photo in zip((control.pixels1, control.pixels2), photos, strict=True):
+        for pixels, photo in zip((control.pixels1, control.pixels2), given.photos, strict=True):
             seen = control.positioned & np.isfinite(pixels).all(axis=1)
             xyz = np.nan_to_num(control.xyz[seen])
             try:
@@ -210,9 +211,8 @@ def _start(
         return (cameras[0], cameras[1]), agree, interiors
     if ties is None:
         raise GeometryError("too few control points, and no common points to go with them.")
-    interiors = _plausible_focals(interiors, ties, site)
-    cameras_unit = first_cameras(ties, interiors)
-    return _scaled(cameras_unit, control, site, interiors), agree, interiors
+    interiors = _plausible_focals(interiors, ties, given.site)
+    return _scaled(first_cameras(ties, interiors), given, interiors), agree, interiors
 
 
 def _plausible_focals(
@@ -236,12 +236,10 @@ def _plausible_focals(
 
 
 def _scaled(
-    cameras: tuple[Pinhole, Pinhole],
-    control: Control,
-    site: SiteMeasures,
-    interiors: tuple[Interior, Interior],
+    cameras: tuple[Pinhole, Pinhole], given: _Given, interiors: tuple[Interior, Interior]
 ) -> tuple[Pinhole, Pinhole]:
     """Return cameras of far distance 1 brought to metres and, where known, to X and Y."""
+    control, site = given.control, given.site
     near, scale = cameras[1].centre[2], 0.0
     positions = ray_on_plane(cameras[0], interiors[0].ideal(control.pixels1))
     points = np.flatnonzero(control.positioned & np.isfinite(positions).all(axis=1))
@@ -277,20 +275,11 @@ def _scaled(
 
 
 def _observations(
-    interiors: tuple[Interior, Interior],
-    control: Control,
-    site: SiteMeasures,
-    ties: Ties | None,
-    agree: BoolArray,
-    *,
-    free_datum: bool,
+    given: _Given, interiors: tuple[Interior, Interior], ties: Ties | None, agree: BoolArray
 ) -> PairObservations:
     """Return everything observed, ideal pixels throughout."""
-    control = replace(
-        control,
-        pixels1=interiors[0].ideal(control.pixels1),
-        pixels2=interiors[1].ideal(control.pixels2),
-    )
+    control, site = given.control, given.site
+    pixels1, pixels2 = interiors[0].ideal(control.pixels1), interiors[1].ideal(control.pixels2)
     measured = {
         name: (value, site.sigma)
         for name in ("distance1", "distance2", "delta_d")
@@ -298,12 +287,12 @@ def _observations(
     }
     base = PairObservations(
         interiors=interiors,
-        control=control,
+        control=replace(control, pixels1=pixels1, pixels2=pixels2),
         pick_used=agree,
         sigma_pick=site.sigma_pick,
         measured=measured,
         sigma_tilt=SIGMA_PARALLEL if site.parallel else None,
-        free_datum=free_datum,
+        free_datum=control.positioned.sum() < 2,
         sigma_body=_same_body(interiors),
     )
     if ties is None:
