@@ -38,40 +38,40 @@ def match_photos(
     check_writable(out, overwrite=overwrite)
     pair = Pair.read(pair_path)
     images = (_photo(pair, 1), _photo(pair, 2))
-    found = match_pair(pair, images, settings)
-    sigma = precision(found)
+    matches = match_pair(pair, images, settings)
+    sigma = precision(matches)
     if out.suffix.lower() == ".csv":
-        write_csv(out, csv_columns(found), formats=_FORMATS, overwrite=overwrite)
+        write_csv(out, csv_columns(matches), formats=_FORMATS, overwrite=overwrite)
     else:
         write_survey(
             out,
             PointObservations(
-                ids=found.ids,
-                pixels1=np.round(found.pixels1, 4),
-                pixels2=np.round(found.pixels2, 4),
-                code=found.kinds,
+                ids=matches.ids,
+                pixels1=np.round(matches.pixels1, 4),
+                pixels2=np.round(matches.pixels2, 4),
+                code=matches.kinds,
                 note=tuple(
                     f"sigma {s:.2f} px, misfit {abs(m):.2f} px"
-                    for s, m in zip(found.sigma, found.misfit, strict=True)
+                    for s, m in zip(matches.sigma, matches.misfit, strict=True)
                 ),
             ),
             pair=pair,
             pair_path=pair_path,
             sigma_px=round(sigma, 3),
             language=language,
-            what=f"{len(found.ids)} points found by bifocal match",
+            what=f"{len(matches.ids)} points found by bifocal match",
             overwrite=overwrite,
         )
-    return pair, found
+    return pair, matches
 
 
-def precision(found: Matches) -> float:
+def precision(matches: Matches) -> float:
     """Return the precision of the points: what the patches say, or the misfits if worse. [px]
 
     A misfit holds the noise of both photos and what the set-up leaves.
     """
-    misfit = 1.4826 * float(np.median(np.abs(found.misfit))) / np.sqrt(2.0)
-    return float(np.clip(max(float(np.median(found.sigma)), misfit), 0.01, 2.0))
+    misfit = 1.4826 * float(np.median(np.abs(matches.misfit))) / np.sqrt(2.0)
+    return float(np.clip(max(float(np.median(matches.sigma)), misfit), 0.01, 2.0))
 
 
 _FORMATS = {
@@ -85,32 +85,32 @@ _FORMATS = {
 }
 
 
-def csv_columns(found: Matches) -> dict[str, Any]:
+def csv_columns(matches: Matches) -> dict[str, Any]:
     """Return the columns of the text table, in order."""
     return {
-        "id": list(found.ids),
-        "col1 [px]": found.pixels1[:, 0],
-        "row1 [px]": found.pixels1[:, 1],
-        "col2 [px]": found.pixels2[:, 0],
-        "row2 [px]": found.pixels2[:, 1],
-        "sigma [px]": found.sigma,
-        "misfit [px]": found.misfit,
-        "agreement": found.agreement,
-        "code": list(found.kinds),
+        "id": list(matches.ids),
+        "col1 [px]": matches.pixels1[:, 0],
+        "row1 [px]": matches.pixels1[:, 1],
+        "col2 [px]": matches.pixels2[:, 0],
+        "row2 [px]": matches.pixels2[:, 1],
+        "sigma [px]": matches.sigma,
+        "misfit [px]": matches.misfit,
+        "agreement": matches.agreement,
+        "code": list(matches.kinds),
     }
 
 
-def match_summary(pair: Pair, found: Matches) -> dict[str, Any]:
+def match_summary(pair: Pair, matches: Matches) -> dict[str, Any]:
     """Return what `match` reports."""
-    solved = pair.intersect(found.pixels1, found.pixels2, sigma_px=precision(found))
+    solved = pair.intersect(matches.pixels1, matches.pixels2, sigma_px=precision(matches))
     relief = solved.xyz[:, 2]
     sigma = np.sqrt(solved.covariance[:, 2, 2])
-    kinds = {kind: found.kinds.count(kind) for kind in sorted(set(found.kinds))}
+    kinds = {kind: matches.kinds.count(kind) for kind in sorted(set(matches.kinds))}
     return {
-        "count": len(found.ids),
+        "count": len(matches.ids),
         "kinds": kinds,
-        "sigma_px": float(np.median(found.sigma)),
-        "misfit_px": float(np.median(np.abs(found.misfit)) * 1.4826),
+        "sigma_px": float(np.median(matches.sigma)),
+        "misfit_px": float(np.median(np.abs(matches.misfit)) * 1.4826),
         "relief_range": np.nanpercentile(relief, [1, 99]),
         "sigma_r_median": float(np.nanmedian(sigma)),
     }
