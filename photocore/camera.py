@@ -105,35 +105,6 @@ def plane_from_pixel(camera: Pinhole) -> FloatArray:
     return matrix / matrix[2, 2] if abs(matrix[2, 2]) > 1e-12 else matrix
 
 
-def pinhole_from_plane(matrix: FloatArray, nadir: FloatArray, distance: float) -> Pinhole:
-    """Return the camera of a plane-from-pixel homography, nadir and distance.
-
-    Notes
-    -----
-    ``K R = inv(H) inv([e1 e2 -C])`` up to scale; its RQ decomposition with a positive diagonal and
-    det R = +1 is unique.
-
-    Examples
-    --------
-    >>> camera = Pinhole(camera_matrix(2000.0, 1.0, 50.0, 40.0), np.diag([1.0, -1.0, -1.0]),
-    ...                  np.array([1.0, 2.0, 10.0]))
-    >>> back = pinhole_from_plane(plane_from_pixel(camera), np.array([1.0, 2.0]), 10.0)
-    >>> float(abs(back.matrix - camera.matrix).max()) < 1e-9
-    True
-    """
-    from scipy.linalg import rq
-
-    centre = np.array([nadir[0], nadir[1], distance])
-    columns = np.eye(3)
-    columns[:, 2] = -centre
-    upper, rotation = rq(np.linalg.inv(matrix) @ np.linalg.inv(columns))
-    signs = np.sign(np.diag(upper))
-    upper, rotation = upper * signs, signs[:, None] * rotation
-    if np.linalg.det(rotation) < 0:  # the homography's sign is free, the camera's is not
-        rotation = -rotation
-    return Pinhole(upper / upper[2, 2], rotation, centre)
-
-
 def project(camera: Pinhole, xyz: FloatArray) -> FloatArray:
     """Return pixels of points (..., 3), shape (..., 2); NaN for points behind the camera."""
     seen = (xyz - camera.centre) @ (camera.matrix @ camera.rotation).T

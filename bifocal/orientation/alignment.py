@@ -19,7 +19,7 @@ from bifocal.orientation.pair_observations import NAMES, at
 from bifocal.orientation.reference_plane import rivals
 from bifocal.orientation.tie_points import robust_sigma
 from photocore.arrays import BoolArray, ByteArray, FloatArray
-from photocore.camera import Pinhole, camera_matrix, plane_from_pixel, triangulate
+from photocore.camera import Pinhole, camera_matrix, plane_from_pixel
 from photocore.distortion import RadialDivision
 
 #: Façade lines farther than this from the photo's own upright are not asked. [deg]
@@ -38,6 +38,8 @@ class Alignment:
     deviations : mapping of str to float
         Standard deviations: ``distance1`` ... [m], ``focal1`` ... [px], ``scale`` (relative).
     control_ids : tuple of str
+    control_positions : ndarray, shape (n, 2)
+        Where the far photo shows them on the plane. [m]
     control_residuals : ndarray, shape (n, 4)
         Observed minus computed column 1, row 1, column 2, row 2; NaN where not picked. [px]
     control_used : ndarray of bool, shape (n,)
@@ -45,8 +47,6 @@ class Alignment:
         Each point's misfit over its standard deviation.
     tie1, tie2 : ndarray, shape (m, 2)
         Homologous points found automatically, raw pixels. [px]
-    tie_relief : ndarray, shape (m,)
-        Their relief. [m]
     wall : ndarray of bool, shape (m,)
         Which of them lie on the wall.
     setup : mapping
@@ -61,12 +61,12 @@ class Alignment:
     way: str
     deviations: Mapping[str, float]
     control_ids: tuple[str, ...]
+    control_positions: FloatArray
     control_residuals: FloatArray
     control_used: BoolArray
     control_test: FloatArray
     tie1: FloatArray
     tie2: FloatArray
-    tie_relief: FloatArray
     wall: BoolArray
     setup: Mapping[str, Any]
     words: tuple[str, ...]
@@ -110,18 +110,19 @@ def make_alignment(
     used = observations.tie_used
     sigma_tie = robust_sigma(adjusted.tie_misfit[used]) if used.any() else observations.sigma_pick
     words = orientation_in_words(cameras, deviations, sigma_px=max(sigma_tie, 0.05))
-    tie1, tie2, relief = _ties(oriented, cameras)
+    first, second = observations.interiors
+    homography = plane_from_pixel(cameras[0])
     return Alignment(
         pair=Pair(image1=far, image2=near),
         way=way,
         deviations=deviations,
         control_ids=observations.control.ids,
+        control_positions=apply_homography(homography, observations.control.pixels1),
         control_residuals=adjusted.control_residuals,
         control_used=observations.pick_used,
         control_test=adjusted.control_test,
-        tie1=tie1[used],
-        tie2=tie2[used],
-        tie_relief=relief[used],
+        tie1=first.raw(observations.tie1[used]),
+        tie2=second.raw(observations.tie2[used]),
         wall=observations.wall[used],
         setup=_diagnostics(oriented, cameras, deviations, way, words, sigma_tie),
         words=words,
@@ -255,17 +256,6 @@ def standard_deviations(adjusted: AdjustedPair) -> dict[str, float]:
     return out | {"scale": scale, "relief_scale": relief / abs(1 / d2 - 1 / d1)}
 
 
-def _ties(
-    oriented: OrientedPair, cameras: tuple[Pinhole, Pinhole]
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return the ties as raw pixels, and their relief."""
-    observations = oriented.observations
-    straight = observations.straight_ties(oriented.adjusted.radial)
-    first, second = observations.interiors
-    raw1, raw2 = first.raw(observations.tie1), second.raw(observations.tie2)
-    return raw1, raw2, triangulate(*cameras, *straight)[:, 2]
-
-
 def _diagnostics(
     oriented: OrientedPair,
     cameras: tuple[Pinhole, Pinhole],
@@ -306,8 +296,6 @@ def _diagnostics(
             }
             for index, name in enumerate(control.ids)
         ]
-        positions = apply_homography(plane_from_pixel(cameras[0]), control.pixels1)
-        out["control_positions"] = positions
     return out
 
 
@@ -321,6 +309,7 @@ def with_files(
             (alignment.pair.image1, alignment.pair.image2), names, lenses, strict=True
         )
     ]
-    setup = {key: value for key, value in alignment.setup.items() if key != "control_positions"}
-    pair = replace(alignment.pair, image1=photos[0], image2=photos[1], extra={"setup": setup})
+    pair = replace(
+        alignment.pair, image1=photos[0], image2=photos[1], extra={"setup": alignment.setup}
+    )
     return replace(alignment, pair=pair)

@@ -39,7 +39,7 @@ def even_points(
     """
     far, near = adjusted.cameras
     grid, gsd = _grid(observations, adjusted)
-    first, second = (_rectified(observations, adjusted, images[n], grid, n) for n in (0, 1))
+    first, second = (resampled(images[n], _pixels(observations, adjusted, grid, n)) for n in (0, 1))
     flow = _flow(first, second)
     # Rows run down, Y up.
     q2 = grid + flow * np.array([gsd, -gsd])
@@ -49,9 +49,8 @@ def even_points(
     chosen = np.zeros_like(trusted)
     chosen[step // 2 :: step, step // 2 :: step] = True
     chosen &= trusted
-    flat = np.zeros((int(chosen.sum()), 1))
-    pixels1 = _pixels(observations, adjusted, np.concatenate([grid[chosen], flat], axis=1), 0)
-    pixels2 = _pixels(observations, adjusted, np.concatenate([q2[chosen], flat], axis=1), 1)
+    pixels1 = _pixels(observations, adjusted, grid[chosen], 0)
+    pixels2 = _pixels(observations, adjusted, q2[chosen], 1)
     fine = np.isfinite(pixels1).all(axis=1) & np.isfinite(pixels2).all(axis=1)
     return pixels1[fine], pixels2[fine]
 
@@ -68,26 +67,20 @@ def _grid(observations: PairObservations, adjusted: AdjustedPair) -> tuple[Float
 
 
 def _pixels(
-    observations: PairObservations, adjusted: AdjustedPair, xyz: FloatArray, number: int
+    observations: PairObservations, adjusted: AdjustedPair, positions: FloatArray, number: int
 ) -> FloatArray:
-    """Return raw pixels of points."""
+    """Return raw pixels of positions on the reference plane, shape (..., 2)."""
+    xyz = np.concatenate([positions, np.zeros((*positions.shape[:-1], 1))], axis=-1)
     ideal = project(adjusted.cameras[number], xyz)
     interior = observations.interiors[number]
     return interior.raw(interior.radial(adjusted.radial[number]).distort(ideal))
 
 
-def _rectified(
-    observations: PairObservations,
-    adjusted: AdjustedPair,
-    image: ByteArray,
-    grid: FloatArray,
-    number: int,
-) -> ByteArray:
-    """Return a photo on the plane, reduced without aliasing."""
-    xyz = np.concatenate([grid, np.zeros((*grid.shape[:2], 1))], axis=-1)
-    pixels = _pixels(observations, adjusted, xyz.reshape(-1, 3), number).reshape(grid.shape)
+def resampled(image: ByteArray, pixels: FloatArray) -> ByteArray:
+    """Return a photo's grey values at pixels (h, w, 2), reduced without aliasing; 0 outside."""
     steps = np.linalg.norm(np.diff(pixels, axis=1), axis=-1)
-    reduction = max(1, round(float(np.nanmedian(steps))))
+    steps = steps[np.isfinite(steps)]
+    reduction = max(1, round(float(np.median(steps)))) if len(steps) else 1
     if reduction > 1:
         image = cv2.blur(image, (reduction, reduction)).astype(np.uint8)
     maps = np.nan_to_num(pixels, nan=-10.0).astype(np.float32)

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.linalg import rq
 
 from bifocal import Pair, Photo
 from photocore.camera import (
@@ -10,7 +11,6 @@ from photocore.camera import (
     camera_matrix,
     fundamental,
     fundamental_with_jacobian,
-    pinhole_from_plane,
     pixel_from_plane,
     plane_from_pixel,
     plane_transfer,
@@ -41,6 +41,19 @@ def photo_of(camera: Pinhole) -> Photo:
         nadir=camera.centre[:2],
         distance=camera.centre[2],
     )
+
+
+def pinhole_from_plane(matrix, nadir, distance) -> Pinhole:
+    """Return the camera that a homography, a nadir and a distance are, by an RQ decomposition."""
+    centre = np.array([nadir[0], nadir[1], distance])
+    columns = np.eye(3)
+    columns[:, 2] = -centre
+    upper, rotation = rq(np.linalg.inv(matrix) @ np.linalg.inv(columns))
+    signs = np.sign(np.diag(upper))
+    upper, rotation = upper * signs, signs[:, None] * rotation
+    if np.linalg.det(rotation) < 0:  # the homography's sign is free, the camera's is not
+        rotation = -rotation
+    return Pinhole(upper / upper[2, 2], rotation, centre)
 
 
 @pytest.mark.parametrize("seed", range(5))
