@@ -74,15 +74,8 @@ def precision(matches: Matches) -> float:
     return float(np.clip(max(float(np.median(matches.sigma)), misfit), 0.01, 2.0))
 
 
-_FORMATS = {
-    "col1 [px]": ".4f",
-    "row1 [px]": ".4f",
-    "col2 [px]": ".4f",
-    "row2 [px]": ".4f",
-    "sigma [px]": ".3f",
-    "misfit [px]": ".3f",
-    "agreement": ".3f",
-}
+_FORMATS = dict.fromkeys(("col1 [px]", "row1 [px]", "col2 [px]", "row2 [px]"), ".4f")
+_FORMATS |= dict.fromkeys(("sigma [px]", "misfit [px]", "agreement"), ".3f")
 
 
 def csv_columns(matches: Matches) -> dict[str, Any]:
@@ -121,5 +114,4 @@ def _photo(pair: Pair, number: int) -> ByteArray:
     photo = pair.image1 if number == 1 else pair.image2
     if not photo.file:
         raise InputError(f'the pair file names no photo for image{number}; add "file" to it.')
-    image = read_image(pair.folder / photo.file, grey=True)
-    return np.asarray(to_eight_bit(image), dtype=np.uint8)
+    return to_eight_bit(read_image(pair.folder / photo.file, grey=True))
