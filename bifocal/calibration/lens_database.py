@@ -16,6 +16,7 @@ import numpy as np
 from bifocal.files.images import ImageInfo, image_info
 from bifocal.model.lens import Lens
 from photocore.arrays import FloatArray
+from photocore.camera import camera_matrix
 from photocore.errors import InputError, MissingExtraError
 
 #: Nodes of the tabulated profile; with 65 a cubic spline follows the map to 0.001 px.
@@ -32,8 +33,8 @@ class DatabaseLens:
     ----------
     lens : Lens
         Model ``radial``, scale 1 on the axis.
-    camera, name : str
-        As the database calls them.
+    name : str
+        As the database calls it.
     axis_scale : float
         Scale that the database's own map has on the axis; it was taken out.
     corner_shift : float
@@ -41,7 +42,6 @@ class DatabaseLens:
     """
 
     lens: Lens
-    camera: str
     name: str
     axis_scale: float
     corner_shift: float
@@ -95,8 +95,8 @@ def lens_from_database(
     # The crop factor refers to the diagonal of 36 x 24 mm.
     pixels *= 36.0 / np.hypot(36.0, 24.0)
     centre = (width - 1) / 2, (height - 1) / 2
-    found = Lens(
-        camera_matrix=np.array([[pixels, 0, centre[0]], [0, pixels, centre[1]], [0, 0, 1]]),
+    lens = Lens(
+        camera_matrix=camera_matrix(pixels, 1.0, *centre),
         coefficients=profile,
         model="radial",
         image_size=info.size,
@@ -104,10 +104,8 @@ def lens_from_database(
         extra={"axis_scale_removed": axis_scale},
     )
     corner = np.array([[0.0, 0.0]])
-    shift = float(np.linalg.norm(found.distort(corner) - corner))
-    return DatabaseLens(
-        lens=found, camera=body.model, name=glass.model, axis_scale=axis_scale, corner_shift=shift
-    )
+    shift = float(np.linalg.norm(lens.distort(corner) - corner))
+    return DatabaseLens(lens=lens, name=glass.model, axis_scale=axis_scale, corner_shift=shift)
 
 
 def _camera(database: Any, info: ImageInfo, wanted: str) -> Any:
