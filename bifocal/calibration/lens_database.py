@@ -46,6 +46,14 @@ class DatabaseLens:
     axis_scale: float
     corner_shift: float
 
+    @property
+    def remark(self) -> str:
+        """What the database gave and what was taken out."""
+        return (
+            f"{self.name}: {self.corner_shift:.1f} px in the corner; the database's scale on the "
+            f"axis ({(self.axis_scale - 1) * 100:+.2f} %) was taken out"
+        )
+
 
 def lens_from_database(
     path: Path | str,

@@ -82,7 +82,7 @@ def find_ties(
             "same wall."
         )
     x1, x2 = x1[agree], x2[agree]
-    homography, on_plane = _plane(x1, x2, tolerance)
+    homography, on_plane = _dominant_plane(x1, x2, 1.5 * tolerance, 8000)
     if on_plane.sum() < max(FEWEST_ON_PLANE * count, 20):
         raise GeometryError(
             f"no plane: only {int(on_plane.sum())} of {count} common points lie on one plane. The "
@@ -99,25 +99,23 @@ def _one_geometry(x1: FloatArray, x2: FloatArray, tolerance: float) -> BoolArray
     if len(x1) < 8:
         return np.zeros(len(x1), dtype=bool)
     cv2.setRNGSeed(7)
-    _, flat = cv2.findHomography(
-        x1, x2, cv2.USAC_MAGSAC, tolerance, maxIters=4000, confidence=0.9999
-    )
+    _, on_plane = _dominant_plane(x1, x2, tolerance, 4000)
     matrix, mask = cv2.findFundamentalMat(x1, x2, cv2.USAC_MAGSAC, tolerance, 0.9999, 4000)
-    on_plane = np.zeros(len(x1), bool) if flat is None else flat.ravel().astype(bool)
     agree = np.zeros(len(x1), bool) if matrix is None else mask.ravel().astype(bool)
     # A flat scene leaves F free: there the homography is the better witness.
     return agree if agree.sum() > 1.1 * on_plane.sum() else agree | on_plane
 
 
-def _plane(x1: FloatArray, x2: FloatArray, tolerance: float) -> tuple[FloatArray, BoolArray]:
-    """Return the dominant homography and its points, refitted."""
+def _dominant_plane(
+    x1: FloatArray, x2: FloatArray, tolerance: float, iterations: int
+) -> tuple[FloatArray, BoolArray]:
+    """Return the dominant homography and its points."""
     matrix, mask = cv2.findHomography(
-        x1, x2, cv2.USAC_MAGSAC, 1.5 * tolerance, maxIters=8000, confidence=0.9999
+        x1, x2, cv2.USAC_MAGSAC, tolerance, maxIters=iterations, confidence=0.9999
     )
     if matrix is None:
         return np.eye(3), np.zeros(len(x1), dtype=bool)
-    on_plane = mask.ravel().astype(bool)
-    return np.asarray(matrix, dtype=np.float64), on_plane
+    return np.asarray(matrix, dtype=np.float64), mask.ravel().astype(bool)
 
 
 def plane_scale(ties: Ties, image_size: tuple[int, int]) -> float:
@@ -142,21 +140,18 @@ def first_cameras(ties: Ties, interiors: tuple[Interior, Interior]) -> tuple[Pin
     _, turns, shifts, normals = cv2.decomposeHomographyMat(
         np.linalg.inv(matrices[1]) @ ties.homography @ matrices[0], np.eye(3)
     )
-    best: tuple[float, tuple[Pinhole, Pinhole] | None] = (np.inf, None)
-    for turn, shift, normal in zip(turns, shifts, normals, strict=True):
-        for sign in (1.0, -1.0):
-            cameras = _in_plane_frame(matrices, turn, sign * shift.ravel(), sign * normal.ravel())
-            if cameras is None:
-                continue
-            cost = _cost(ties, cameras)
-            if cost < best[0]:
-                best = (cost, cameras)
-    if best[1] is None:
+    cameras = [
+        _in_plane_frame(matrices, turn, sign * shift.ravel(), sign * normal.ravel())
+        for turn, shift, normal in zip(turns, shifts, normals, strict=True)
+        for sign in (1.0, -1.0)
+    ]
+    possible = [pair for pair in cameras if pair is not None]
+    if not possible:
         raise GeometryError(
             "the two photos give no camera in front of the wall. Check the focal lengths "
             "(--focal1, --focal2) and that both photos show the same wall."
         )
-    return best[1]
+    return min(possible, key=lambda pair: _cost(ties, pair))
 
 
 def _in_plane_frame(
