@@ -16,7 +16,7 @@ import cv2
 import numpy as np
 
 from bifocal import Quality, dense_relief
-from bifocal.demo.scene import bifocal_cameras, facade, render
+from tests.scenes import bifocal_cameras, facade, render
 
 
 def cpu(job):

@@ -9,7 +9,7 @@ from PIL import Image, ImageDraw, ImageFont
 
 HERE = Path(__file__).parent
 PANELS = (
-    ("near.png", "two photos (here the near one)"),
+    ("near.jpg", "two photos (here the near one)"),
     ("relief.png", "relief map"),
     ("ortho.png", "orthophoto to scale"),
 )

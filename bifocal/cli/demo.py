@@ -30,10 +30,10 @@ Examples:
 @click.option("--overwrite", is_flag=True, help="Replace the results of an earlier demo.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 def command(out: Path, overwrite: bool, as_json: bool) -> None:
-    """Photograph a sample façade, survey it, and compare with the exact truth.
+    """Survey a sample façade from two photos, and compare with the exact truth.
 
-    Two photos of 35/19 mm from 17.5/9.5 m are rendered; targets picked on them go through the
-    survey workbook; dense relief and the orthophoto follow. About half a minute.
+    The photos, 35/19 mm from 17.5/9.5 m, come with the package; targets picked on them go through
+    the survey workbook; dense relief and the orthophoto follow. About a quarter of a minute.
     """
     from bifocal.demo.workflow import run_demo
 

@@ -1,1 +1,9 @@
-"""The whole workflow on a rendered sample pair with exact truth."""
+"""The whole workflow on a sample pair with exact truth."""
+
+from pathlib import Path
+
+#: Where the sample lies: far.jpg, near.jpg, facade.pair.json, targets.csv, the exact relief
+#: truth.tif, and seen.png, white where both cameras see the wall.
+SAMPLE = Path(__file__).with_name("sample")
+
+__all__ = ["SAMPLE"]

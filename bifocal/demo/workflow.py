@@ -1,18 +1,20 @@
 """The whole workflow on the sample pair: photos, points, workbook, relief map, orthophoto.
 
-The sample is rendered by the package's own ray caster, so everything about it is known exactly.
+The sample lies in the folder ``sample`` beside this module. It was rendered by a ray caster
+(``tests/scenes/make_sample.py``), so everything about it is known exactly.
 """
 
 from __future__ import annotations
 
+import csv
 from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 
-from bifocal.demo.scene import Rendering, bifocal_cameras, demo_scene, render
-from bifocal.files.geotiff import RasterReader, read_relief, write_relief
-from bifocal.files.images import write_image
+from bifocal.demo import SAMPLE
+from bifocal.files.geotiff import RasterReader, read_relief
+from bifocal.files.images import read_image, write_image
 from bifocal.model.relief_map import ReliefMap
 from bifocal.orthophotos.ortho_workflow import OrthoTask, make_ortho
 from bifocal.relief_maps.workflow import ReliefJob, relief_of_pair
@@ -21,13 +23,10 @@ from bifocal.survey.workflow import SolveOptions, solve_file
 from photocore.arrays import FloatArray
 from photocore.cli import Progress, no_progress
 from photocore.errors import InputError
-from photocore.tables import write_csv
+from photocore.output import atomic_path
 
-#: Photos of 1536 x 1024 px, 7.38 mm on the wall: a quarter of the paper's camera, quick to make.
-SIZE, PIXEL = (1536, 1024), 0.00738
-#: Picks of a careful hand. [px]
+#: Precision of the sample's picks, those of a careful hand. [px]
 PICK_SIGMA = 0.2
-SEED = 20240601
 #: The part of the wall that both photos show whole, up to the top of the cornice. [m]
 BOUNDS = (-5.3, -3.45, 5.3, 3.42)
 
@@ -75,7 +74,7 @@ class DemoResult:
 def run_demo(
     folder: Path, *, overwrite: bool = False, progress: Progress = no_progress
 ) -> DemoResult:
-    """Render the sample pair, survey it in every way, and compare with the truth.
+    """Survey the sample pair in every way, and compare with the truth.
 
     Raises
     ------
@@ -93,16 +92,12 @@ def run_demo(
             f"{folder}: holds {', '.join(taken[:3])} ... already; add --overwrite, or name another "
             "folder with --out."
         )
-    progress(0.0, 1.0, "photographing the sample façade")
-    rng = np.random.default_rng(SEED)
-    sample = render(demo_scene(), bifocal_cameras(size=SIZE, pixel=PIXEL), rng=rng)
-    write_image(folder / "far.png", sample.image1, overwrite=True)
-    write_image(folder / "near.png", sample.image2, overwrite=True)
-    sample.pair.write(folder / "facade.pair.json", overwrite=True)
-    write_relief(folder / "truth.tif", sample.truth, overwrite=True)
-    progress(0.4, 1.0, "surveying targets in the workbook")
-    ids, true, found, sigma, flags = _survey(folder, sample, rng)
-    progress(0.5, 1.0, "measuring dense relief")
+    progress(0.0, 1.0, "surveying targets in the workbook")
+    for name in _GIVEN:
+        with atomic_path(folder / name, overwrite=True) as path:
+            path.write_bytes((SAMPLE / name).read_bytes())
+    ids, true, relief, sigma, flags = _survey(folder)
+    progress(0.2, 1.0, "measuring dense relief")
     job = ReliefJob(
         out=folder / "relief.tif", preview=folder / "relief.png", bounds=BOUNDS, overwrite=True
     )
@@ -114,16 +109,16 @@ def run_demo(
     )  # fmt: skip
     _write_preview(folder / "ortho.png", folder / "ortho.tif")
     progress(1.0, 1.0, "done")
-    median, share, known = _against_truth(read_relief(folder / "relief.tif"), sample)
+    median, share, known = _against_truth(read_relief(folder / "relief.tif"))
     return DemoResult(
-        folder=folder, files=_FILES, ids=ids, true=true, found=found, sigma=sigma, flags=flags,
+        folder=folder, files=_FILES, ids=ids, true=true, found=relief, sigma=sigma, flags=flags,
         map_median=median, map_share=share, map_known=known, remarks=remarks,
     )  # fmt: skip
 
 
 _FILES: tuple[tuple[str, str], ...] = (
-    ("far.png", "far photo, 35 mm from 17.5 m"),
-    ("near.png", "near photo, 19 mm from 9.5 m"),
+    ("far.jpg", "far photo, 35 mm from 17.5 m"),
+    ("near.jpg", "near photo, 19 mm from 9.5 m"),
     ("facade.pair.json", "the pair: homographies, nadirs, distances"),
     ("targets.csv", "picked targets in pixels, and their true relief to check"),
     ("result.xlsx", "solved workbook, live formulas: relief, coordinates, precision, check"),
@@ -133,45 +128,36 @@ _FILES: tuple[tuple[str, str], ...] = (
     ("ortho.png", "the same as a picture"),
     ("truth.tif", "the exact relief, to compare"),
 )
+_GIVEN = ("far.jpg", "near.jpg", "facade.pair.json", "targets.csv", "truth.tif")
 
 
 def _survey(
-    folder: Path, sample: Rendering, rng: np.random.Generator
+    folder: Path,
 ) -> tuple[tuple[str, ...], FloatArray, FloatArray, FloatArray, tuple[str, ...]]:
-    """Pick targets as a careful hand would, solve the workbook; return ids, true, found."""
-    targets = [target for target in sample.targets if target.seen]
-    noise = rng.normal(0, PICK_SIGMA, (2, len(targets), 2))
-    true = np.array([target.xyz[2] for target in targets])
-    picks = np.array([(*target.pixel1, *target.pixel2) for target in targets])
-    picks[:, :2] += noise[0]
-    picks[:, 2:] += noise[1]
-    headings = ("col1 [px]", "row1 [px]", "col2 [px]", "row2 [px]")
-    columns = dict(zip(headings, np.round(picks, 3).T, strict=True))
-    ids = tuple(target.name for target in targets)
-    write_csv(
-        folder / "targets.csv", {"id": ids, **columns, "r measured [m]": np.round(true, 5)},
-        overwrite=True,
-    )  # fmt: skip
+    """Solve the picked targets into the workbook; return ids, true and found relief, sigma."""
+    with (folder / "targets.csv").open(encoding="utf-8", newline="") as file:
+        true = np.array([float(row["r measured [m]"]) for row in csv.DictReader(file)])
     options = SolveOptions(pair=folder / "facade.pair.json", sigma_px=PICK_SIGMA)
     solution = solve_file(folder / "targets.csv", options)
     write_result(folder / "result.xlsx", solution, overwrite=True)
     table = solution.table
-    return ids, true, table["r"], table["sigma_r"], table.flags
+    return table.ids, true, table["r"], table["sigma_r"], table.flags
 
 
-def _against_truth(relief: ReliefMap, sample: Rendering) -> tuple[float, float, float]:
+def _against_truth(relief: ReliefMap) -> tuple[float, float, float]:
     """Return median error, share beyond 3 cm and share known, where both cameras see the wall."""
-    both = sample.visible1 & sample.visible2 & np.isfinite(sample.truth.r)
+    truth = read_relief(SAMPLE / "truth.tif")
+    both = read_image(SAMPLE / "seen.png") > 0
     places = np.concatenate(
-        [sample.truth.plane_positions(slice(k, k + 1)).reshape(-1, 2) for k in range(len(both))]
+        [truth.plane_positions(slice(k, k + 1)).reshape(-1, 2) for k in range(len(both))]
     )
     west, south, east, north = BOUNDS
     x, y = places.T
     inside = (x > west) & (x < east) & (y > south) & (y < north)
     both &= inside.reshape(both.shape)
-    found = relief.sample(places).reshape(both.shape)
-    known = both & np.isfinite(found)
-    error = np.abs(found - sample.truth.r)[known]
+    measured = relief.sample(places).reshape(both.shape)
+    known = both & np.isfinite(measured)
+    error = np.abs(measured - truth.r)[known]
     share = float(known.sum() / both.sum())
     return float(np.median(error)), float((error > 0.03).mean()), share
 

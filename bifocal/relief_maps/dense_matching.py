@@ -148,13 +148,13 @@ def dense_relief(
 
     Examples
     --------
-    >>> from bifocal.demo.scene import bifocal_cameras, render
-    >>> from bifocal.demo.scene import facade
-    >>> cameras = bifocal_cameras(size=(192, 128), pixel=0.059)
-    >>> shot = render(facade(texel=0.04), cameras, rng=np.random.default_rng(1))
-    >>> result = dense_relief(shot.pair, shot.image1, shot.image2)
+    >>> from bifocal.demo import SAMPLE
+    >>> from bifocal.files.images import read_image
+    >>> photos = [read_image(SAMPLE / name) for name in ("far.jpg", "near.jpg")]
+    >>> pair = Pair.read(SAMPLE / "facade.pair.json")
+    >>> result = dense_relief(pair, *photos, gsd=0.06, bounds=(-3, -2, 3, 2))
     >>> result.shape, round(result.gsd, 6)
-    ((128, 192), 0.059)
+    ((67, 100), 0.06)
     """
     grey1, grey2 = as_grey(image1, "image1"), as_grey(image2, "image2")
     if quality not in QUALITIES:

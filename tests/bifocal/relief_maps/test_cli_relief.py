@@ -13,9 +13,9 @@ from click.testing import CliRunner
 
 from bifocal import Pair
 from bifocal.cli.main import main
-from bifocal.demo.scene import bifocal_cameras, facade, render
 from bifocal.files.geotiff import read_relief
 from bifocal.files.images import write_image
+from tests.scenes import bifocal_cameras, facade, render
 
 
 @pytest.fixture(scope="module")

@@ -9,8 +9,6 @@ import numpy as np
 import pytest
 
 from bifocal import Pair, Quality, dense_relief
-from bifocal.demo.scene import RICH, Rendering, Scene, SetupErrors, bifocal_cameras, facade, render
-from bifocal.demo.scene.shapes import box
 from bifocal.relief_maps import edges, flow, seed
 from bifocal.relief_maps import forward_projection as splat
 from bifocal.relief_maps import smoothing as smooth
@@ -18,6 +16,8 @@ from bifocal.relief_maps.frame import as_grey, common_bounds, make_frame, workin
 from bifocal.relief_maps.orientation_sigma import setup_sigma
 from bifocal.relief_maps.relief_files import hatched
 from photocore.errors import GeometryError, InputError
+from tests.scenes import RICH, Rendering, Scene, SetupErrors, bifocal_cameras, facade, render
+from tests.scenes.shapes import box
 
 PIXEL = 0.0148
 

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from bifocal import Pair, Quality, dense_relief
-from bifocal.demo.scene import POOR, RICH, Exposure, bifocal_cameras, facade, render
 from bifocal.files.images import read_image
+from tests.scenes import POOR, RICH, Exposure, bifocal_cameras, facade, render
 
 pytestmark = pytest.mark.acceptance
 

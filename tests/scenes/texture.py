@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from bifocal.demo.scene.shapes import Material, Scene
-from bifocal.demo.scene.tracing import Faces, Tracer
 from photocore.arrays import BoolArray, FloatArray
+from tests.scenes.shapes import Material, Scene
+from tests.scenes.tracing import Faces, Tracer
 
 #: Side of the noise tile; it repeats after this many texels (several metres). [texel]
 TILE = 2048
@@ -46,7 +46,7 @@ class Painter:
         """Return the face each target is painted on: what a look square on the wall meets."""
         if not self.scene.targets:
             return np.zeros(0, dtype=np.int32)
-        from bifocal.demo.scene.truth import look_square_on
+        from tests.scenes.truth import look_square_on
 
         _, face = look_square_on(
             self.tracer, np.array([target.position for target in self.scene.targets])

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from bifocal.demo.scene.cameras import SceneCamera
-from bifocal.demo.scene.tracing import Faces, Parallel, Tracer
 from bifocal.model.grid import Grid
 from bifocal.model.relief_map import ReliefMap
 from photocore.arrays import BoolArray, FloatArray
+from tests.scenes.cameras import SceneCamera
+from tests.scenes.tracing import Faces, Parallel, Tracer
 
 #: A point is seen if nothing lies this much before it. [m]
 CLEARANCE = 1e-4

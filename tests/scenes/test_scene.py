@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from bifocal.demo.scene import (
+from tests.scenes import (
     RICH,
     Exposure,
     Scene,
@@ -16,9 +16,9 @@ from bifocal.demo.scene import (
     facade,
     render,
 )
-from bifocal.demo.scene.shapes import boss, box, column, prism
-from bifocal.demo.scene.tracing import Tracer
-from bifocal.demo.scene.truth import look_square_on, relief_truth, visible_from
+from tests.scenes.shapes import boss, box, column, prism
+from tests.scenes.tracing import Tracer
+from tests.scenes.truth import look_square_on, relief_truth, visible_from
 
 PIXEL = 0.02
 SIZE = (320, 240)  # 6.4 x 4.8 m

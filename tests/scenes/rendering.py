@@ -6,14 +6,14 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from bifocal.demo.scene.cameras import CameraPair, SceneCamera
-from bifocal.demo.scene.shapes import Scene
-from bifocal.demo.scene.texture import Painter
-from bifocal.demo.scene.tracing import Faces, Parallel, Tracer
-from bifocal.demo.scene.truth import look_square_on, relief_truth, sees, visible_from
 from bifocal.model.pair import Pair
 from bifocal.model.relief_map import ReliefMap
 from photocore.arrays import BoolArray, ByteArray, FloatArray, IntArray
+from tests.scenes.cameras import CameraPair, SceneCamera
+from tests.scenes.shapes import Scene
+from tests.scenes.texture import Painter
+from tests.scenes.tracing import Faces, Parallel, Tracer
+from tests.scenes.truth import look_square_on, relief_truth, sees, visible_from
 
 #: Rays per side of a pixel where surfaces meet.
 SUBSAMPLES = 3

@@ -7,7 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from bifocal.demo.scene.shapes import (
+from tests.scenes.shapes import (
     Convex,
     Material,
     Scene,

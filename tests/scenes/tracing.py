@@ -11,8 +11,8 @@ from typing import NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from bifocal.demo.scene.shapes import Convex, Material, Scene
 from photocore.arrays import BoolArray, FloatArray
+from tests.scenes.shapes import Convex, Material, Scene
 
 Faces = NDArray[np.int32]
 
