@@ -108,8 +108,8 @@ def detect_board(
         return _detect_charuco(image, name, size)
     if pattern == "chessboard":
         flags = cv2.CALIB_CB_ADAPTIVE_THRESH | cv2.CALIB_CB_NORMALIZE_IMAGE
-        found, corners = cv2.findChessboardCorners(_reduced(image)[0], size, flags=flags)
-        if not found:
+        seen, corners = cv2.findChessboardCorners(_reduced(image)[0], size, flags=flags)
+        if not seen:
             return None
         corners = corners.reshape(-1, 2) * _reduced(image)[1]
         corners = _refined(image, corners.astype(np.float32), size)
@@ -117,10 +117,10 @@ def detect_board(
     else:
         asymmetric = pattern == "asymmetric-circles"
         flags = cv2.CALIB_CB_ASYMMETRIC_GRID if asymmetric else cv2.CALIB_CB_SYMMETRIC_GRID
-        found, corners = cv2.findCirclesGrid(image, size, flags=flags)
-        if not found:
-            found, corners = cv2.findCirclesGrid(image, size, flags=flags | cv2.CALIB_CB_CLUSTERING)
-        if not found:
+        seen, corners = cv2.findCirclesGrid(image, size, flags=flags)
+        if not seen:
+            seen, corners = cv2.findCirclesGrid(image, size, flags=flags | cv2.CALIB_CB_CLUSTERING)
+        if not seen:
             return None
         board = np.mgrid[0:columns, 0:rows].T.reshape(-1, 2)
         if asymmetric:

@@ -121,13 +121,13 @@ def _camera(database: Any, info: ImageInfo, wanted: str) -> Any:
     maker, model = (info.make, wanted or info.model)
     if not model:
         raise InputError(f"{info.path}: EXIF names no camera; give --camera-name.")
-    found = database.find_cameras(maker or None, model, loose_search=True)
+    bodies = database.find_cameras(maker or None, model, loose_search=True)
     # The search is by likeness ("iPhone 12" finds an iPhone 5): only the same name is the camera.
     same = {model.lower(), f"{maker} {model}".lower()}
-    exact = [item for item in found if item.model.lower() in same]
-    if exact or (wanted and found):
-        return (exact or found)[0]
-    near = ", ".join(sorted({item.model for item in found[:8]})) or "nothing similar"
+    exact = [item for item in bodies if item.model.lower() in same]
+    if exact or (wanted and bodies):
+        return (exact or bodies)[0]
+    near = ", ".join(sorted({item.model for item in bodies[:8]})) or "nothing similar"
     raise InputError(
         f"{info.path}: the camera {maker} {model} is not in the lens database (it has: {near}). "
         "Name one with --camera-name, or calibrate the lens yourself with `bifocal calibrate`."
@@ -138,14 +138,14 @@ def _lens(database: Any, body: Any, info: ImageInfo, wanted: str, focal: float) 
     """Return the one lens that EXIF or the user names; list the choice when it is ambiguous."""
     name = wanted or info.lens
     if name:
-        found = database.find_lenses(body, None, name)
-        exact = [item for item in found if item.model.lower() == name.lower()]
-        found = exact or found
+        lenses = database.find_lenses(body, None, name)
+        exact = [item for item in lenses if item.model.lower() == name.lower()]
+        lenses = exact or lenses
     else:
-        found = database.find_lenses(body)
-        if len({item.model for item in found}) == 1:
-            found = found[:1]  # a compact camera or telephone: the lens is part of it
-    fitting = [item for item in found if item.min_focal - 0.5 <= focal <= item.max_focal + 0.5]
+        lenses = database.find_lenses(body)
+        if len({item.model for item in lenses}) == 1:
+            lenses = lenses[:1]  # a compact camera or telephone: the lens is part of it
+    fitting = [item for item in lenses if item.min_focal - 0.5 <= focal <= item.max_focal + 0.5]
     if not fitting:
         raise InputError(
             f"{info.path}: no lens {name or '(EXIF names none)'} for {body.model} at {focal:g} mm "

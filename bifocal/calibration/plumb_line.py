@@ -139,10 +139,10 @@ def find_straight_edges(image: ByteArray, *, most: int = 80) -> list[FloatArray]
     import cv2
 
     blurred = cv2.GaussianBlur(image, (0, 0), 1.0)
-    found = cv2.createLineSegmentDetector().detect(blurred)[0]
-    if found is None:
+    detected = cv2.createLineSegmentDetector().detect(blurred)[0]
+    if detected is None:
         return []
-    segments = np.asarray(found, dtype=np.float64).reshape(-1, 2, 2)
+    segments = np.asarray(detected, dtype=np.float64).reshape(-1, 2, 2)
     length = np.linalg.norm(segments[:, 1] - segments[:, 0], axis=1)
     least = LEAST_LENGTH * image.shape[1]
     segments = segments[length > least / 12]

@@ -62,11 +62,11 @@ def faces(heights: FloatArray, pixels: FloatArray, *, band: float) -> list[Face]
     band : float
         Half the thickness of a face. [m]
     """
-    found: list[Face] = []
+    planes: list[Face] = []
     count, order = len(heights), np.argsort(heights)
     heights, pixels = heights[order], pixels[order]
     free = np.ones(count, dtype=bool)
-    while len(found) < 6 and free.any():
+    while len(planes) < 6 and free.any():
         filled = np.concatenate([[0], np.cumsum(free)])
         low = np.searchsorted(heights, heights - band)
         high = np.searchsorted(heights, heights + band, side="right")
@@ -76,12 +76,12 @@ def faces(heights: FloatArray, pixels: FloatArray, *, band: float) -> list[Face]
         offset = float(np.median(heights[members]))
         if members.sum() < 0.05 * count:
             break
-        if all(abs(offset - other.offset) > APART * band for other in found):
-            found.append(
+        if all(abs(offset - other.offset) > APART * band for other in planes):
+            planes.append(
                 Face(offset, float(members.sum() / count), _midst(pixels, np.flatnonzero(members)))
             )
         free &= np.abs(heights - at) > band
-    return found
+    return planes
 
 
 def _midst(pixels: FloatArray, members: IntArray) -> tuple[float, float]:
@@ -128,15 +128,15 @@ def choose_wall(
     if site.wall is not None:
         offset = _height_at(heights, pixels, site.wall, interiors[0])
     elif is_one_scale(interiors, site):
-        found = faces(heights, pixels, band=band)
-        fair = [f for f in found if f.share >= COMPARABLE * found[0].share]
+        planes = faces(heights, pixels, band=band)
+        fair = [f for f in planes if f.share >= COMPARABLE * planes[0].share]
         if fair:
             offset = min(fair, key=lambda f: abs(scale_difference(cameras, plane, f.offset))).offset
     if offset:
         plane = refitted(xyz, plane + np.array([offset, 0.0, 0.0]), band=band)
         heights = _heights(xyz, plane)
-    found = faces(heights, pixels, band=band)
-    return plane, sorted(found, key=lambda face: (abs(face.offset) > band, -face.share))
+    planes = faces(heights, pixels, band=band)
+    return plane, sorted(planes, key=lambda face: (abs(face.offset) > band, -face.share))
 
 
 def largest_plane(xyz: FloatArray, *, band: float, seed: int = 7) -> FloatArray:
@@ -195,14 +195,14 @@ def scale_difference(cameras: tuple[Pinhole, Pinhole], plane: FloatArray, offset
     return float(np.log(near / far))
 
 
-def rivals(found: Sequence[Face]) -> list[Face]:
+def rivals(planes: Sequence[Face]) -> list[Face]:
     """Return the faces that may as well be the wall."""
-    return [face for face in found[1:] if face.share >= RIVAL * found[0].share]
+    return [face for face in planes[1:] if face.share >= RIVAL * planes[0].share]
 
 
-def rivals_in_words(found: Sequence[Face], site: SiteMeasures) -> str:
+def rivals_in_words(planes: Sequence[Face], site: SiteMeasures) -> str:
     """Return the warning that other planes compete with the wall; empty if none does."""
-    others = rivals(found)
+    others = rivals(planes)
     if not others or site.wall is not None:
         return ""
     named = "; ".join(
@@ -211,10 +211,11 @@ def rivals_in_words(found: Sequence[Face], site: SiteMeasures) -> str:
         for face in others
     )
     return (
-        f"CHECK THE WALL: only {100 * found[0].share:.0f} % of the details spread over both photos "
-        "lie on the plane taken for the wall (green in the picture), and other planes compete with "
-        f"it, at roughly: {named}. If the wall is one of these, every relief is off by that much: "
-        "name a spot of the wall in the far photo with --wall COL,ROW, or give control points."
+        f"CHECK THE WALL: only {100 * planes[0].share:.0f} % of the details spread over both "
+        "photos lie on the plane taken for the wall (green in the picture), and other planes "
+        f"compete with it, at roughly: {named}. If the wall is one of these, every relief is off "
+        "by that much: name a spot of the wall in the far photo with --wall COL,ROW, or give "
+        "control points."
     )
 
 
