@@ -74,7 +74,7 @@ class Pinhole(NamedTuple):
         )
 
 
-class Projection(NamedTuple):
+class ProjectedPoints(NamedTuple):
     """Pixels (n, 2) and their derivatives by the point (n, 2, 3) and by `PARAMETERS` (n, 2, 10)."""
 
     pixels: FloatArray
@@ -113,7 +113,7 @@ def project(camera: Pinhole, xyz: FloatArray) -> FloatArray:
         return np.where(depth > 0, seen[..., :2] / depth, np.nan)
 
 
-def project_with_jacobian(camera: Pinhole, xyz: FloatArray) -> Projection:
+def project_with_jacobian(camera: Pinhole, xyz: FloatArray) -> ProjectedPoints:
     """Return pixels of points (n, 3) with their derivatives; all NaN behind the camera."""
     mapped = camera.matrix @ camera.rotation
     away = xyz - camera.centre
@@ -129,7 +129,7 @@ def project_with_jacobian(camera: Pinhole, xyz: FloatArray) -> Projection:
     # Turned by a small v the camera sees R (P - C + v x (P - C)): row . (v x a) = (a x row) . v.
     by_camera[:, :, 4:7] = np.cross(away[:, None], by_point)
     by_camera[:, :, 7:] = -by_point
-    return Projection(pixels, by_point, by_camera)
+    return ProjectedPoints(pixels, by_point, by_camera)
 
 
 def ray_on_plane(camera: Pinhole, pixels: FloatArray) -> FloatArray:
