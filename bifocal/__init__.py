@@ -1,5 +1,37 @@
-"""Relief, coordinates and orthophotos from bifocal pairs of photos."""
+"""Relief, coordinates and orthophotos from bifocal pairs of photos.
 
-import lazy_loader
+Two photos of a wall along one line, image 1 from afar with a long lens, image 2 from near with a
+short one, at the same scale: what stands out or lies back is shifted, and the shift gives the
+relief. X runs right, Y up, relief r towards the cameras [m]; pixels are (column, row).
 
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
+By hand, the equations
+    relief                    r from the radial distances of a point on both photos, Eq. (6)
+    relief_from_displacement  r from one displacement, Eq. (2)
+    relief_displacement       the displacement on one photo, Eq. (1)
+    relief_displacements      those on both, from the distances, Eq. (5)
+    plane_coordinates         x, y from radial distance and angle, Eq. (7)
+The pair
+    Pair, Photo               both cameras; read and write pair files, intersect and project points
+    Intersection              what `Pair.intersect` returns: X, Y, r, covariance, flags
+    Lens                      principal distance, principal point and distortion of a lens
+    calibrate, Calibration    a lens from photos of a board
+    align, Alignment          a pair from two photos and what was measured on site
+    Control, Interior, SiteMeasures   what `align` is told
+Points
+    match, Matches            homologous points found automatically, with their precision
+    MatchSettings             what `match` looks for
+The whole wall
+    dense_relief, DenseRelief measured relief with its precision, pixel by pixel
+    ReliefMap, Quality        relief on a grid, and where each pixel's comes from
+    orthophoto, Orthophoto    the photo to scale, moved by its relief
+    OrthoOptions              how an orthophoto is rendered
+    mosaic, Mosaic            several orthophotos or relief maps made one
+    MosaicOptions             how they are joined
+
+Files in, files out: the command `bifocal`. Errors are ValueErrors with one message that says what
+is wrong, where, and how to mend it.
+"""
+
+from photocore.public_names import public_names
+
+__getattr__, __dir__, __all__ = public_names(__name__, __file__)

@@ -1,3 +1,5 @@
+from .calibration.board_calibration import Calibration
+from .calibration.board_photos import calibrate
 from .equations import (
     plane_coordinates,
     relief,
@@ -9,21 +11,43 @@ from .model.intersection import Intersection
 from .model.lens import Lens
 from .model.pair import Pair, Photo
 from .model.relief_map import Quality, ReliefMap
+from .orientation.alignment import Alignment
+from .orientation.control_points import Control, SiteMeasures
+from .orientation.homologous_points import match
+from .orientation.interior_orientation import Interior
+from .orientation.matching import Matches, MatchSettings
+from .orientation.photo_alignment import align
 from .orthophotos.compose import orthophoto
+from .orthophotos.mosaic_in_memory import Mosaic, MosaicOptions, mosaic
 from .orthophotos.ortho_image import OrthoOptions, Orthophoto
 from .relief_maps.dense_matching import DenseRelief, dense_relief
 
+__version__: str
+
 __all__ = [
+    "Alignment",
+    "Calibration",
+    "Control",
     "DenseRelief",
+    "Interior",
     "Intersection",
     "Lens",
+    "MatchSettings",
+    "Matches",
+    "Mosaic",
+    "MosaicOptions",
     "OrthoOptions",
     "Orthophoto",
     "Pair",
     "Photo",
     "Quality",
     "ReliefMap",
+    "SiteMeasures",
+    "align",
+    "calibrate",
     "dense_relief",
+    "match",
+    "mosaic",
     "orthophoto",
     "plane_coordinates",
     "relief",

@@ -1,5 +1,62 @@
-"""Photogrammetry through air, glass and water: the refraction model of Maas and its tools."""
+"""Photogrammetry through air, glass and water: the refraction model of Maas and its tools.
 
-import lazy_loader
+Z = 0 is the interface on the water side, Z up, cameras at Z > 0, points in water at Z < 0; heights
+and depths handed to the formulas are positive distances. Lengths in one unit, any; angles in rad.
 
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
+The media
+    Layers                    plane-parallel media: indices and thicknesses
+    water_refractive_index    of water, from wavelength, temperature, salinity and depth
+    water_index_derivatives, water_index_sigma, WaterIndexDerivatives   its precision
+    salinity_from_index, temperature_from_index      the other way round
+    WaterFormula: HOEHLE, QUAN_FRY, PARRISH          the published formulas
+    air_refractive_index      of air
+    Material: FLOAT_GLASS, N_BK7, FUSED_SILICA, ACRYLIC, POLYCARBONATE, SAPPHIRE   of ports
+    critical_angle, refracted_angle, refracted_direction   Snell's law
+Radial shift
+    radial_shift              where straight rays would see a point
+    radial_shift_ratio        the same, relative
+    radial_shift_derivatives, ShiftDerivatives       with derivatives
+    ShiftTable                look-up table, same call
+    iterated_radius, best_over_compensation, ShiftIteration   the iteration as published
+Surfaces and rays
+    FlatInterface, Interfaces what lies between camera and object
+    Plane, Sphere, Cylinder, RasterSurface, MeshSurface, WaveSurface   of any shape
+    trace_rays, aim_rays      rays from the camera, and to a given point
+    RayPaths, RayStatus       their way, and why one has none
+Cameras
+    Camera, Sensor            exterior and interior orientation
+    project, projection_status   image coordinates through the media, and why there are none
+    image_rays                the ray of an image point in the object's medium
+    resect, Resection         a camera from control points
+    intersect, Intersection   points from image points, least squares
+    intersect_rays, intersect_pairs   fast ways without precision
+    PointStatus               why a point is missing or doubtful
+    epipolar_curve, EpipolarCurves    where a ray runs in another image
+    epipolar_candidates, Candidates   image points near it
+    bundle_adjust, Adjustment cameras, points and media together
+    Unknowns, ScaleBar        what it estimates and is told
+Bathymetry
+    correct_bathymetry, CorrectedPoints   points from above the water
+    correct_lidar_beams       laser echoes
+    intersect_refracted_rays, RayIntersections       measured rays
+    mean_water_level, WaterLevel      the level from tie points
+    wave_effect, WaveEffect   what waves do to points taken for flat water's
+    Precision, BathymetryStatus       what goes in, what became of a point
+Colours
+    shift_per_colour, layers_per_colour, colour_positions, seam_width, correct_dispersion
+Planning and simplified models
+    study_setup, Study        precision, ray angles, sensitivities
+    compare_placements, Placement, ring_of_cameras, object_grid   where to put cameras
+    calibration_costs, CalibrationCosts   calibrating in air or in water
+    lavest, agrafiotis, telem, Approximation   models without rays, and their error
+Files
+    read_project, write_project, Project, ImagePoints, ObjectPoints
+    read_experiment, write_experiment     OpenPTV folders
+
+Files in, files out: the command `multimedia`. Errors are ValueErrors with one message that says
+what is wrong, where, and how to mend it.
+"""
+
+from photocore.public_names import public_names
+
+__getattr__, __dir__, __all__ = public_names(__name__, __file__)

@@ -76,6 +76,8 @@ from .refraction.water import (
     water_refractive_index,
 )
 
+__version__: str
+
 __all__ = [
     "ACRYLIC",
     "Adjustment",

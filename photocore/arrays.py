@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -92,3 +93,22 @@ def positive(value: float, name: str, *, unit: str = "") -> float:
     if not (np.isfinite(number) and number > 0):
         raise InputError(f"{name}: must be above zero{unit and f' [{unit}]'}, got {value}.")
     return number
+
+
+def contiguous_rows(
+    inputs: Sequence[FloatArray], outputs: Sequence[FloatArray], *, size: int
+) -> Iterator[tuple[FloatArray, ...]]:
+    """Walk through arrays that broadcast together, in contiguous rows of at most ``size`` elements.
+
+    Rows of the inputs come first, then those of the outputs, to be filled with ``row[...] =``. No
+    input is ever expanded as a whole, and the scratch of a row stays in the processor's cache.
+    """
+    operands = [*(np.broadcast_to(a, outputs[0].shape) for a in inputs), *outputs]
+    flags = [["readonly"]] * len(inputs) + [["writeonly"]] * len(outputs)
+    with np.nditer(
+        operands,
+        flags=["external_loop", "buffered", "zerosize_ok"],
+        op_flags=flags,  # type: ignore[arg-type]  # numpy wants literals
+        buffersize=size,
+    ) as rows:
+        yield from rows

@@ -4,33 +4,16 @@ from __future__ import annotations
 
 import signal
 import sys
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from importlib import import_module
+from pathlib import Path
 from typing import Any, Protocol
 
 import click
 
 from photocore.errors import PhotogrammetryError
-
-
-class Number(click.ParamType):  # type: ignore[type-arg,unused-ignore]
-    """A number with a decimal point or comma."""
-
-    name = "number"
-
-    def convert(
-        self, value: object, param: click.Parameter | None, ctx: click.Context | None
-    ) -> float:
-        """Return the number."""
-        try:
-            return float(str(value).strip().replace(",", "."))
-        except ValueError:
-            self.fail(f"{value!r} is not a number; the unit is in the help.", param, ctx)
-
-
-#: Takes the place of click's FLOAT in every command.
-NUMBER = Number()
+from photocore.options import NUMBER
 
 
 def _stop(number: int, frame: object) -> None:  # noqa: ARG001
@@ -99,6 +82,7 @@ class LazyGroup(click.Group):
     def __init__(
         self, *args: Any, commands_package: str, summaries: Mapping[str, str], **kwargs: Any
     ) -> None:
+        kwargs.setdefault("context_settings", {"help_option_names": ["-h", "--help"]})
         super().__init__(*args, **kwargs)
         self.params.append(_debug_option())
         self.commands_package, self.summaries = commands_package, dict(summaries)
@@ -113,6 +97,7 @@ class LazyGroup(click.Group):
             return None
         module = import_module(f"{self.commands_package}.{cmd_name.replace('-', '_')}")
         command: click.Command = module.command
+        command.short_help = self.summaries[cmd_name]
         for parameter in command.params:
             if parameter.type is click.FLOAT:
                 parameter.type = NUMBER
@@ -192,6 +177,26 @@ def print_json(value: Any) -> None:
 def remark(message: str) -> None:
     """Print a remark on stderr, so that results on stdout stay clean."""
     click.echo(message, err=True)
+
+
+def print_result(
+    data: object, lines: Iterable[str], *, as_json: bool, remarks: Iterable[str] = ()
+) -> None:
+    """Print remarks on stderr, then the result on stdout: as JSON, or the lines for people."""
+    for message in remarks:
+        remark(message)
+    if as_json:
+        print_json(data)
+    else:
+        for line in lines:
+            click.echo(line)
+
+
+def tell_written(*paths: Path | None) -> None:
+    """Say on stderr which files were written; None stands for one that was not asked for."""
+    for path in paths:
+        if path is not None:
+            remark(f"Written: {path}")
 
 
 class Progress(Protocol):

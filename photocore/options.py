@@ -1,93 +1,203 @@
-"""Option types shared by the commands of both packages."""
+"""Option types and options shared by the commands of both packages.
+
+Every number on a command line passes through `Number`, the one place that refuses what is not
+finite or not possible, as wrong usage that names the option.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, TypeVar
+
 import click
 
+Command = TypeVar("Command", bound=Callable[..., Any])
+#: Nothing measured is larger, and squares of squares of it still are numbers.
+LARGEST = 1e15
+FILE = click.Path(path_type=Path)
 
-class Size(click.ParamType):  # type: ignore[type-arg,unused-ignore]
-    """Two numbers as WIDTHxHEIGHT; decimal commas are understood."""
+overwrite = click.option("--overwrite", is_flag=True, help="Replace existing files.")
+as_json = click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 
-    name = "WxH"
 
-    def convert(
-        self, value: object, param: click.Parameter | None, ctx: click.Context | None
-    ) -> tuple[float, float]:
-        """Return width and height."""
+class Number(click.ParamType):  # type: ignore[type-arg,unused-ignore]
+    """A finite number with a decimal point or comma.
+
+    Parameters
+    ----------
+    above, below : float, optional
+        Open limits.
+    least, most : float, optional
+        Closed limits.
+    finite : bool
+        Refuse NaN, infinity and what is beyond `LARGEST`.
+    whole : bool
+        Refuse fractions, and return int.
+    to : callable, optional
+        Turns the number into the unit of the program, e.g. `math.radians`.
+    """
+
+    name = "number"
+    described = "a number; the unit is in the help."
+
+    def __init__(
+        self,
+        *,
+        above: float | None = None,
+        below: float | None = None,
+        least: float | None = None,
+        most: float | None = None,
+        finite: bool = True,
+        whole: bool = False,
+        to: Callable[[float], float] = float,
+    ) -> None:
+        self.above, self.below, self.least, self.most = above, below, least, most
+        self.finite = finite
+        self.to = int if whole else to
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """Return the number, or a tuple of them, in the unit of the program."""
         if isinstance(value, tuple):
             return value
-        parts = str(value).lower().replace("*", "x").replace("×", "x").replace(",", ".").split("x")
         try:
-            width, height = (float(part) for part in parts)
+            numbers = self.parse(str(value).strip())
         except ValueError:
-            self.fail(f"{value!r} is not WIDTHxHEIGHT, e.g. 22.7x15.1", param, ctx)
-        return width, height
+            self.fail(f"{value!r} is not {self.described}", param, ctx)
+        fault = next(filter(None, map(self.fault, numbers)), None)
+        if fault:
+            self.fail(f"{fault}, got {value}.", param, ctx)
+        return self.result(tuple(self.to(number) for number in numbers))
+
+    def parse(self, text: str) -> list[float]:
+        """Return the numbers a text holds; ValueError where it is something else."""
+        return [float(text.replace(",", "."))]
+
+    def result(self, numbers: tuple[float, ...]) -> Any:
+        """Return what the option gives."""
+        return numbers[0]
+
+    def fault(self, number: float) -> str | None:
+        """Return what is wrong with a number."""
+        if self.finite and not abs(number) <= LARGEST:
+            return f"must be a finite number, not beyond {LARGEST:g}"
+        if self.to is int and number != int(number):
+            return "must be a whole number"
+        for limit, outside, words in (
+            (self.above, float.__le__, "above {}"),
+            (self.below, float.__ge__, "below {}"),
+            (self.least, float.__lt__, "{} or more"),
+            (self.most, float.__gt__, "{} or less"),
+        ):
+            if limit is not None and outside(number, float(limit)):
+                return f"must be {words.format('zero' if limit == 0 else f'{limit:g}')}"
+        return None
 
 
-class Numbers(click.ParamType):  # type: ignore[type-arg,unused-ignore]
-    """So many numbers with commas between them; decimal points.
+#: Takes the place of click's FLOAT in every command.
+NUMBER = Number()
+POSITIVE, NOT_NEGATIVE = Number(above=0), Number(least=0)
+#: Millimetres or micrometres, handed on as metres or millimetres.
+THOUSANDTHS = Number(above=0, to=lambda value: value / 1000)
+
+
+def number(
+    name: str, unit: str, text: str, *, type: Number = POSITIVE, **more: Any
+) -> Callable[[Command], Command]:
+    """Return an option that takes one number: its unit, its help, and a default that is shown."""
+    return click.option(
+        name, type=type, metavar=unit, help=text, show_default="default" in more, **more
+    )
+
+
+class Numbers(Number):
+    """So many numbers with commas or semicolons between them; decimal points.
 
     Parameters
     ----------
     count : int, optional
         How many; any number of them when None.
+    limits
+        As for `Number`; they hold for each.
     """
 
-    def __init__(self, count: int | None = None) -> None:
-        self.count, self.name = count, "numbers"
+    name = "numbers"
 
-    def convert(
-        self, value: object, param: click.Parameter | None, ctx: click.Context | None
-    ) -> tuple[float, ...]:
-        """Return the numbers."""
-        if isinstance(value, tuple):
-            return value
-        try:
-            numbers = tuple(float(part) for part in str(value).split(","))
-        except ValueError:
-            self.fail(f"{value!r} is not a list of numbers with commas between them", param, ctx)
-        if self.count is not None and len(numbers) != self.count:
-            self.fail(f"{value!r} is not {self.count} numbers with commas between them", param, ctx)
+    def __init__(self, count: int | None = None, **limits: Any) -> None:
+        super().__init__(**limits)
+        self.count = count
+        many = "a list of" if count is None else count
+        self.described = f"{many} numbers with commas between them"
+
+    def parse(self, text: str) -> list[float]:
+        """Split at the separators; a list may end in one."""
+        parts = text.replace(";", ",").split(",")
+        numbers = [float(part) for part in parts if part.strip() or self.count is not None]
+        if self.count not in (None, len(numbers)):
+            raise ValueError(text)
+        return numbers
+
+    def result(self, numbers: tuple[float, ...]) -> tuple[float, ...]:
+        """Return all of them."""
         return numbers
 
 
-class Scale(click.ParamType):  # type: ignore[type-arg,unused-ignore]
+class Size(Number):
+    """Two numbers as WIDTHxHEIGHT; decimal commas are understood."""
+
+    name = "WxH"
+    described = "WIDTHxHEIGHT, e.g. 22.7x15.1"
+
+    def parse(self, text: str) -> list[float]:
+        """Return width and height."""
+        parts = text.lower().replace("*", "x").replace("×", "x").replace(",", ".").split("x")
+        width, height = (float(part) for part in parts)
+        return [width, height]
+
+    def result(self, numbers: tuple[float, ...]) -> tuple[float, ...]:
+        """Return both."""
+        return numbers
+
+
+class Scale(Number):
     """A scale 1:N."""
 
     name = "1:N"
+    described = "a scale, e.g. 1:500"
 
-    def convert(
-        self, value: object, param: click.Parameter | None, ctx: click.Context | None
-    ) -> float:
+    def __init__(self) -> None:
+        super().__init__(above=0)
+
+    def parse(self, text: str) -> list[float]:
         """Return N."""
-        text = str(value).strip().removeprefix("1:")
-        try:
-            return float(text)
-        except ValueError:
-            self.fail(f"{value!r} is not a scale, e.g. 1:500", param, ctx)
+        return [float(text.removeprefix("1:"))]
 
 
-class Length(click.ParamType):  # type: ignore[type-arg,unused-ignore]
+class Length(Number):
     """A length in metres, or with its unit: 0.005, 5mm, 0.5 cm."""
 
     name = "M"
+    described = "a length, e.g. 0.005 or 5mm"
+
+    def parse(self, text: str) -> list[float]:
+        """Return metres."""
+        text = text.lower().replace(",", ".")
+        # 5 * 1e-3 is 0.005 exactly, 3.69 * 1e-3 is not 0.00369: divide instead.
+        for unit, parts in (("mm", 1000.0), ("cm", 100.0), ("m", 1.0)):
+            if text.endswith(unit):
+                return [float(text.removesuffix(unit)) / parts]
+        return [float(text)]
+
+
+class Names(click.ParamType):  # type: ignore[type-arg,unused-ignore]
+    """Names with commas between them."""
+
+    name = "text"
 
     def convert(
-        self, value: object, param: click.Parameter | None, ctx: click.Context | None
-    ) -> float:
-        """Return metres."""
-        if isinstance(value, float):
+        self, value: Any, param: click.Parameter | None, ctx: click.Context | None  # noqa: ARG002
+    ) -> tuple[str, ...]:  # fmt: skip
+        """Return the names; none for an empty text."""
+        if isinstance(value, tuple):
             return value
-        text = str(value).strip().lower().replace(",", ".")
-        for unit, metres in (("mm", 1e-3), ("cm", 1e-2), ("m", 1.0)):
-            if text.endswith(unit):
-                text, factor = text.removesuffix(unit), metres
-                break
-        else:
-            factor = 1.0
-        try:
-            number = float(text)
-        except ValueError:
-            self.fail(f"{value!r} is not a length, e.g. 0.005 or 5mm", param, ctx)
-        # 5 * 1e-3 is 0.005 exactly, 3.69 * 1e-3 is not 0.00369: divide instead.
-        return number / (1 / factor) if factor < 1 else number
+        return tuple(part.strip() for part in value.split(",") if part.strip())

@@ -10,8 +10,7 @@ from pathlib import Path
 import openpyxl
 import pytest
 
-from photocore.workbook.editor import rewrite_package
-from photocore.workbook.package import open_package, read_part
+from photocore.workbook.package import open_package, read_part, rewrite_package
 from photocore.workbook.splice import SheetChanges, splice_sheet
 from photocore.workbook.xlsx import read_directory
 

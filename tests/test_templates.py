@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from photocore.workbook.lint import lint
+from tests.workbook_lint import lint
 
 TEMPLATES = sorted((Path(__file__).parents[1] / "templates").glob("*.xlsx"))
 

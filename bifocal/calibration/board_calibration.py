@@ -61,6 +61,8 @@ class Calibration:
     tried : tuple of (model name, rms)
     verdict : str
         In words.
+    without_board : tuple of str
+        Photos in which the board was not found.
     """
 
     lens: Lens
@@ -71,6 +73,7 @@ class Calibration:
     coverage: IntArray
     tried: tuple[tuple[str, float], ...]
     verdict: str
+    without_board: tuple[str, ...] = ()
 
 
 def _distortion_terms() -> dict[str, tuple[int, tuple[str, ...]]]:
@@ -205,7 +208,7 @@ def _detect_charuco(image: ByteArray, name: str, size: tuple[int, int]) -> Board
     return best
 
 
-def calibrate(
+def lens_of_views(
     views: Sequence[BoardView], image_size: tuple[int, int], *, model: str = "auto"
 ) -> Calibration:
     """Return the lens that explains the views.

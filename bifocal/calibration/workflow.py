@@ -8,14 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from bifocal.calibration.board_calibration import (
-    PATTERNS,
-    BoardView,
-    Calibration,
-    calibrate,
-    detect_board,
-    find_board_size,
-)
+from bifocal.calibration.board_calibration import Calibration
+from bifocal.calibration.board_photos import calibrate
 from bifocal.calibration.lens_database import lens_from_database
 from bifocal.calibration.plumb_line import PlumbLine, calibrate_from_lines, find_straight_edges
 from bifocal.files.images import ImageArray, image_info, read_image, to_eight_bit, write_image
@@ -31,37 +25,16 @@ def calibrate_from_boards(
     images: Sequence[Path],
     out: Path,
     *,
-    pattern: str = "chessboard",
-    board: tuple[int, int] | None = None,
-    model: str = "auto",
     overwrite: bool = False,
     progress: Progress = no_progress,
-) -> tuple[Calibration, tuple[str, ...]]:
-    """Calibrate from board photos and write the lens file.
-
-    Returns
-    -------
-    calibration : Calibration
-    without : tuple of str
-        Photos in which the board was not found.
-    """
+    **board: Any,
+) -> Calibration:
+    """Calibrate from board photos and write the lens file; ``board`` as for `calibrate`."""
     check_writable(out, overwrite=overwrite)
-    if pattern not in PATTERNS:
-        raise InputError(f"pattern: {pattern!r} is not one of {', '.join(PATTERNS)}.")
-    if board is None and pattern != "chessboard":
-        raise InputError(f"give the size of the {pattern} board, e.g. --board 7x5.")
-    size = _common_size(images)
-    names = _unique_names(images)
-    if board is None:
-        board = find_board_size([_grey(path) for path in images[:8]])
-    views: dict[str, BoardView | None] = {}
-    for done, (path, name) in enumerate(zip(images, names, strict=True)):
-        progress(done, len(images), f"searching {name}")
-        views[name] = detect_board(_grey(path), name, pattern=pattern, size=board)
-    progress(len(images), len(images), "adjusting")
-    result = calibrate([view for view in views.values() if view], size, model=model)
+    _common_size(images)
+    result = calibrate(map(_grey, images), names=_unique_names(images), progress=progress, **board)
     result.lens.write(out, overwrite=overwrite)
-    return result, tuple(name for name, view in views.items() if view is None)
+    return result
 
 
 def calibrate_from_edges(

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from photocore.cli import print_json, remark
+from photocore.cli import print_result, remark
+from photocore.options import FILE, Numbers, as_json, number, overwrite
 
 if TYPE_CHECKING:
     from bifocal.orientation.alignment import Alignment
@@ -25,63 +27,23 @@ points.csv, one line per control point; r blank = on the wall; pixels in both ph
 """
 
 
-class NumberList(click.ParamType):  # type: ignore[type-arg,unused-ignore]
-    """Numbers separated by commas."""
-
-    name = "numbers"
-
-    def __init__(self, count: int) -> None:
-        self.count = count
-
-    def convert(self, value: Any, param: Any, ctx: Any) -> Any:
-        """Return a tuple of floats."""
-        if isinstance(value, tuple):
-            return value
-        try:
-            found = tuple(float(part) for part in value.split(","))
-        except ValueError:
-            found = ()
-        if len(found) != self.count:
-            self.fail(
-                f"expected {self.count} numbers separated by commas, got {value!r}", param, ctx
-            )
-        return found
-
-
-FILE = click.Path(path_type=Path)
-
-
-@click.command(
-    short_help="A pair file from two photos: control points, site distances or automatic.",
-    epilog=EXAMPLE,
-)
+@click.command(epilog=EXAMPLE)
 @click.argument("far", type=FILE)
 @click.argument("near", type=FILE)
 @click.option("--out", type=FILE, required=True, help="Pair file to write (*.pair.json).")
 @click.option("--control", type=FILE, help="Table of control points: id, X, Y, r [m] and pixels.")
 @click.option("--auto", is_flag=True, help="From the photos alone; needs one distance or length.")
-@click.option("--distance1", type=float, metavar="M", help="Far camera to the wall [m].")
-@click.option("--distance2", type=float, metavar="M", help="Near camera to the wall [m].")
-@click.option("--delta-d", type=float, metavar="M", help="Difference of the two distances [m].")
-@click.option(
-    "--focal1", type=float, metavar="MM", help="Focal length, far photo [mm].  [default: EXIF]"
-)
-@click.option(
-    "--focal2", type=float, metavar="MM", help="Focal length, near photo [mm].  [default: EXIF]"
-)
-@click.option(
-    "--sensor-width", type=float, metavar="MM", help="Longer side of the sensor, both photos [mm]."
-)
-@click.option("--sensor-width1", type=float, metavar="MM", help="The same, far photo only [mm].")
-@click.option("--sensor-width2", type=float, metavar="MM", help="The same, near photo only [mm].")
-@click.option(
-    "--pixel-size",
-    type=float,
-    metavar="MM",
-    help="Instead of the sensor width: one pixel, both photos [mm].",
-)
-@click.option("--pixel-size1", type=float, metavar="MM", help="The same, far photo only [mm].")
-@click.option("--pixel-size2", type=float, metavar="MM", help="The same, near photo only [mm].")
+@number("--distance1", "M", "Far camera to the wall [m].")
+@number("--distance2", "M", "Near camera to the wall [m].")
+@number("--delta-d", "M", "Difference of the two distances [m].")
+@number("--focal1", "MM", "Focal length, far photo [mm].  [default: EXIF]")
+@number("--focal2", "MM", "Focal length, near photo [mm].  [default: EXIF]")
+@number("--sensor-width", "MM", "Longer side of the sensor, both photos [mm].")
+@number("--sensor-width1", "MM", "The same, far photo only [mm].")
+@number("--sensor-width2", "MM", "The same, near photo only [mm].")
+@number("--pixel-size", "MM", "Instead of the sensor width: one pixel, both photos [mm].")
+@number("--pixel-size1", "MM", "The same, far photo only [mm].")
+@number("--pixel-size2", "MM", "The same, near photo only [mm].")
 @click.option("--lens", type=FILE, help="Lens file of both photos.")
 @click.option("--lens1", type=FILE, help="Lens file of the far photo.")
 @click.option("--lens2", type=FILE, help="Lens file of the near photo.")
@@ -89,55 +51,32 @@ FILE = click.Path(path_type=Path)
     "--lengths", type=FILE, help="Table of lengths between control points: from, to, length [m]."
 )
 @click.option(
-    "--length",
-    type=NumberList(5),
-    metavar="COL,ROW,COL,ROW,M",
+    "--length", type=Numbers(5), metavar="COL,ROW,COL,ROW,M",
     help="A length on the wall: two points of the far photo [px] and metres.",
-)
+)  # fmt: skip
 @click.option(
-    "--wall",
-    type=NumberList(2),
-    metavar="COL,ROW",
+    "--wall", type=Numbers(2), metavar="COL,ROW",
     help="A spot of the wall in the far photo, where several planes compete [px].",
-)
+)  # fmt: skip
 @click.option(
-    "--horizontal",
-    type=NumberList(4),
-    metavar="COL,ROW,COL,ROW",
+    "--horizontal", type=Numbers(4), metavar="COL,ROW,COL,ROW",
     help="Two points of the far photo on a level line of the wall [px].",
-)
+)  # fmt: skip
 @click.option(
-    "--vertical",
-    type=NumberList(4),
-    metavar="COL,ROW,COL,ROW",
+    "--vertical", type=Numbers(4), metavar="COL,ROW,COL,ROW",
     help="Two points of the far photo on an upright line of the wall [px].",
-)
+)  # fmt: skip
 @click.option(
-    "--unit",
-    type=click.Choice(["m", "cm", "mm"]),
+    "--unit", type=click.Choice(["m", "cm", "mm"]),
     help="Unit of the control coordinates.  [default: the headings', else m]",
-)
-@click.option(
-    "--sigma-pick", type=float, default=0.5, show_default=True, help="Precision of a pick [px]."
-)
-@click.option(
-    "--sigma-control",
-    type=float,
-    default=0.003,
-    show_default=True,
-    help="Precision of a control coordinate [m].",
-)
-@click.option(
-    "--sigma-distance",
-    type=float,
-    default=0.02,
-    show_default=True,
-    help="Precision of the measured distances [m].",
-)
+)  # fmt: skip
+@number("--sigma-pick", "PX", "Precision of a pick [px].", default=0.5)
+@number("--sigma-control", "M", "Precision of a control coordinate [m].", default=0.003)
+@number("--sigma-distance", "M", "Precision of the measured distances [m].", default=0.02)
 @click.option("--picture", type=FILE, help="Picture of the set-up.  [default: beside OUT, .png]")
 @click.option("--no-picture", is_flag=True, help="Do not draw the picture.")
-@click.option("--overwrite", is_flag=True, help="Replace existing files.")
-@click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
+@overwrite
+@as_json
 def command(
     far: Path, near: Path, out: Path, picture: Path | None, no_picture: bool, overwrite: bool,
     as_json: bool, **given: Any,
@@ -156,24 +95,19 @@ def command(
         far, near, out, _options(given),
         picture=None if no_picture else picture, overwrite=overwrite,
     )  # fmt: skip
-    for text in (*alignment.remarks, *alignment.pair.remarks):
-        remark(text)
-    if as_json:
-        print_json(alignment_as_dict(alignment))
-        return
-    _print(alignment)
-    remark(f"Pair written to {out}" + (f", picture to {picture}" if not no_picture else ""))
+    print_result(
+        alignment_as_dict(alignment), _lines(alignment), as_json=as_json,
+        remarks=(*alignment.remarks, *alignment.pair.remarks),
+    )  # fmt: skip
+    if not as_json:
+        remark(f"Pair written to {out}" + (f", picture to {picture}" if not no_picture else ""))
 
 
 def _options(given: dict[str, Any]) -> Any:
     """Return the workflow's options from the command line's."""
     from bifocal.orientation.align_workflow import AlignOptions, KnownLens
     from bifocal.orientation.control_points import SiteMeasures
-    from photocore.arrays import positive
 
-    for name, value in given.items():
-        if isinstance(value, float):
-            positive(value, f"--{name.replace('_', '-')}")
     lenses = tuple(
         KnownLens(
             lens=given[f"lens{n}"] or given["lens"],
@@ -205,21 +139,20 @@ def _options(given: dict[str, Any]) -> Any:
     )
 
 
-def _print(alignment: Alignment) -> None:
-    """Print the set-up for people."""
-    for text in alignment.words:
-        click.echo(text)
+def _lines(alignment: Alignment) -> Iterator[str]:
+    """Yield the set-up for people."""
+    yield from alignment.words
     ties = alignment.setup["common_points"]
     if ties["count"]:
-        click.echo(
+        yield (
             f"{ties['count']} common points, {ties['on_wall']} of them on the wall, precise to "
             f"{ties['sigma_px']:.2f} px."
         )
     if alignment.control_ids:
-        click.echo("Control point residuals [px]: far column, row; near column, row; test")
+        yield "Control point residuals [px]: far column, row; near column, row; test"
         for index, name in enumerate(alignment.control_ids):
             values = "  ".join(f"{value:7.2f}" for value in alignment.control_residuals[index])
             mark = "" if alignment.control_used[index] else "   LEFT OUT"
-            click.echo(f"  {name:>12}  {values}  {alignment.control_test[index]:6.1f}{mark}")
+            yield f"  {name:>12}  {values}  {alignment.control_test[index]:6.1f}{mark}"
     for text in alignment.setup["assumed"]:
-        click.echo(f"Assumed: {text}.")
+        yield f"Assumed: {text}."

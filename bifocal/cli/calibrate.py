@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
-from photocore.cli import print_json, progress_bar, remark, text_table
-from photocore.options import Size
+from photocore.cli import print_result, progress_bar, remark, text_table
+from photocore.options import FILE, Size, as_json, number, overwrite
 
 if TYPE_CHECKING:
     from bifocal.calibration.board_calibration import Calibration
@@ -25,18 +25,16 @@ One lens file holds for one lens at one focus and one zoom mark.
 """
 
 
-@click.command(short_help="Lens calibration from board photos or straight lines.", epilog=EXAMPLE)
-@click.argument(
-    "images", nargs=-1, required=True, metavar="IMAGE...", type=click.Path(path_type=Path)
-)
-@click.option("--out", type=click.Path(path_type=Path), required=True, help="The lens file.")
+@click.command(epilog=EXAMPLE)
+@click.argument("images", nargs=-1, required=True, metavar="IMAGE...", type=FILE)
+@click.option("--out", type=FILE, required=True, help="The lens file.")
 @click.option(
     "--pattern", default="chessboard", show_default=True,
     type=click.Choice(["chessboard", "circles", "asymmetric-circles", "charuco"]),
     help="What is on the board.",
 )  # fmt: skip
 @click.option(
-    "--board", type=Size(),
+    "--board", type=Size(least=1, whole=True),
     help="Inner corners of a chessboard, circles of a grid, squares of a ChArUco board, across x "
     "up.  [default: chessboard recognised by itself]",
 )  # fmt: skip
@@ -50,18 +48,18 @@ One lens file holds for one lens at one focus and one zoom mark.
     help="No board: use the straight edges of a façade (radial terms only).",
 )  # fmt: skip
 @click.option(
-    "--lines", type=click.Path(path_type=Path),
+    "--lines", type=FILE,
     help="No board: points picked along straight lines; headings line, col [px], row [px].",
 )  # fmt: skip
-@click.option("--focal-px", type=float, help="With lines: principal distance [px].")
+@number("--focal-px", "PX", "With lines: principal distance [px].")
 @click.option("--database", is_flag=True, help="Take the lens database's data for this photo.")
 @click.option("--camera-name", default="", help="With --database: camera, if EXIF lacks it.")
 @click.option("--lens-name", default="", help="With --database: lens, if EXIF lacks it.")
-@click.option("--focal", type=float, help="With --database: focal length [mm], if EXIF lacks it.")
-@click.option("--overwrite", is_flag=True, help="Replace an existing file.")
-@click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
+@number("--focal", "MM", "With --database: focal length [mm], if EXIF lacks it.")
+@overwrite
+@as_json
 def command(
-    images: tuple[Path, ...], out: Path, pattern: str, board: tuple[float, float] | None,
+    images: tuple[Path, ...], out: Path, pattern: str, board: tuple[int, int] | None,
     model: str, straight_edges: bool, lines: Path | None, focal_px: float | None, database: bool,
     camera_name: str, lens_name: str, focal: float | None, overwrite: bool, as_json: bool,
 ) -> None:  # fmt: skip
@@ -79,7 +77,7 @@ def command(
             images[0], out, overwrite=overwrite, camera_name=camera_name, lens_name=lens_name,
             focal_length=focal,
         )  # fmt: skip
-        _tell(as_json, lens.to_dict(), [f"Lens: {lens.source}"], notes)
+        data, text = lens.to_dict(), [f"Lens: {lens.source}"]
     elif straight_edges or lines is not None:
         found, notes = lenses.calibrate_from_edges(
             images, out, lines=lines, focal_px=focal_px, overwrite=overwrite
@@ -90,31 +88,21 @@ def command(
             f"{found.rms_after:.2f} px after the correction",
             f"k1 = {k1:+.5f} (sigma {found.sigma_k1:.5f}), k2 = {k2:+.5f} ({found.sigma_k2:.5f})",
         ]
-        _tell(as_json, found.lens.to_dict(), text, notes)
+        data = found.lens.to_dict()
     else:
-        size = (int(board[0]), int(board[1])) if board else None
         with progress_bar("Calibrating", quiet=as_json) as progress:
-            result, without = lenses.calibrate_from_boards(
-                images, out, pattern=pattern, board=size, model=model, overwrite=overwrite,
+            result = lenses.calibrate_from_boards(
+                images, out, pattern=pattern, board=board, model=model, overwrite=overwrite,
                 progress=progress,
             )  # fmt: skip
-        notes = tuple(f"{name}: the board was not found; left out" for name in without)
+        notes = tuple(f"{name}: the board was not found; left out" for name in result.without_board)
         data = result.lens.to_dict() | {
-            "photo_rms": result.photo_rms, "dropped": result.dropped, "without_board": without,
-            "suspicious": result.suspicious, "tried": dict(result.tried),
+            "photo_rms": result.photo_rms, "dropped": result.dropped, "tried": dict(result.tried),
+            "without_board": result.without_board, "suspicious": result.suspicious,
         }  # fmt: skip
-        _tell(as_json, data, _board_text(result), notes)
+        text = _board_text(result)
+    print_result(data, text, as_json=as_json, remarks=notes)
     remark(f"Lens file written to {out}")
-
-
-def _tell(as_json: bool, data: dict[str, Any], text: list[str], notes: tuple[str, ...]) -> None:
-    """Print the result, and remarks on stderr."""
-    for note in notes:
-        remark(note)
-    if as_json:
-        print_json(data)
-    else:
-        click.echo("\n".join(text))
 
 
 def _board_text(result: Calibration) -> list[str]:

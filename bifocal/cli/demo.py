@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
-from photocore.cli import print_json, progress_bar, remark, text_table
+from photocore.cli import print_result, progress_bar, remark, text_table
+from photocore.options import FILE, as_json, overwrite
 
 if TYPE_CHECKING:
     from bifocal.demo.workflow import DemoResult
@@ -19,16 +21,13 @@ Examples:
 """
 
 
-@click.command(
-    short_help="The whole workflow on the sample pair that ships with the package.",
-    epilog=EXAMPLE,
-)
+@click.command(epilog=EXAMPLE)
 @click.option(
-    "--out", type=click.Path(path_type=Path), default=Path("bifocal-demo"), show_default=True,
+    "--out", type=FILE, default=Path("bifocal-demo"), show_default=True,
     help="Folder for the results; it is made.",
 )  # fmt: skip
-@click.option("--overwrite", is_flag=True, help="Replace the results of an earlier demo.")
-@click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
+@overwrite
+@as_json
 def command(out: Path, overwrite: bool, as_json: bool) -> None:
     """Survey a sample façade from two photos, and compare with the exact truth.
 
@@ -45,27 +44,23 @@ def command(out: Path, overwrite: bool, as_json: bool) -> None:
                 remark(f"... {what}")
 
         result = run_demo(out, overwrite=overwrite, progress=tell)
-    if as_json:
-        print_json(
-            {
-                "folder": result.folder, "rmse_targets": result.rmse,
-                "map_median": result.map_median, "map_beyond_3cm": result.map_share,
-                "map_known": result.map_known, "files": [name for name, _ in result.files],
-                "points": [
-                    {"id": i, "r_true": t, "r": r, "sigma_r": s, "flag": f}
-                    for i, t, r, s, f in zip(
-                        result.ids, result.true, result.found, result.sigma, result.flags,
-                        strict=True,
-                    )
-                ],
-            }
-        )  # fmt: skip
-    else:
-        _print(result)
+    points = zip(
+        result.ids, result.true, result.found, result.sigma, result.flags, strict=True
+    )  # fmt: skip
+    data = {
+        "folder": result.folder, "rmse_targets": result.rmse,
+        "map_median": result.map_median, "map_beyond_3cm": result.map_share,
+        "map_known": result.map_known, "files": [name for name, _ in result.files],
+        "points": [
+            dict(zip(("id", "r_true", "r", "sigma_r", "flag"), point, strict=True))
+            for point in points
+        ],
+    }  # fmt: skip
+    print_result(data, _lines(result), as_json=as_json)
 
 
-def _print(result: DemoResult) -> None:
-    """Print found against true relief and where the results lie."""
+def _lines(result: DemoResult) -> Iterator[str]:
+    """Yield found against true relief and where the results lie."""
     rows = []
     order = sorted(range(len(result.ids)), key=lambda k: float(result.true[k]))
     for k in order[:: max(1, len(order) // 12)]:
@@ -76,13 +71,13 @@ def _print(result: DemoResult) -> None:
                 f"{error * 1000:+.1f}", f"{result.sigma[k] * 1000:.1f}", result.flags[k],
             )
         )  # fmt: skip
-    click.echo("\nRelief of targets picked to 0.2 px (a dozen of them)")
-    click.echo(text_table(("target", "true m", "found m", "error mm", "sigma mm", "flag"), rows))
-    click.echo(f"\nAll {len(result.ids)} targets: RMS error {result.rmse * 1000:.1f} mm")
-    click.echo(
+    yield "\nRelief of targets picked to 0.2 px (a dozen of them)"
+    yield text_table(("target", "true m", "found m", "error mm", "sigma mm", "flag"), rows)
+    yield f"\nAll {len(result.ids)} targets: RMS error {result.rmse * 1000:.1f} mm"
+    yield (
         f"Relief map: median error {result.map_median * 1000:.1f} mm, "
         f"{result.map_share:.1%} beyond 3 cm, {result.map_known:.1%} of the visible wall known"
     )
-    click.echo(f"\nResults in {result.folder}/")
-    click.echo(text_table(("file", "content"), result.files))
-    click.echo("\nOpen ortho.png, relief.png and result.xlsx first.")
+    yield f"\nResults in {result.folder}/"
+    yield text_table(("file", "content"), result.files)
+    yield "\nOpen ortho.png, relief.png and result.xlsx first."

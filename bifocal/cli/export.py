@@ -7,6 +7,7 @@ from pathlib import Path
 import click
 
 from photocore.cli import remark
+from photocore.options import FILE, overwrite
 
 EXAMPLE = """\b
 Examples:
@@ -16,10 +17,10 @@ Examples:
 """
 
 
-@click.command(short_help="Points as DXF, PLY, LAS, CSV, GeoJSON or workbook.", epilog=EXAMPLE)
-@click.argument("result", type=click.Path(path_type=Path))
+@click.command(epilog=EXAMPLE)
+@click.argument("result", type=FILE)
 @click.option(
-    "--out", type=click.Path(path_type=Path), required=True,
+    "--out", type=FILE, required=True,
     help="File to write; its ending chooses the format: .dxf .ply .las .laz .csv .geojson .xlsx",
 )  # fmt: skip
 @click.option("--world", is_flag=True, help="E, N, H instead of the wall's X, Y, relief [m].")
@@ -31,7 +32,7 @@ Examples:
     "--csv-flavour", type=click.Choice(["plain", "excel-it", "excel-de"]), default="plain",
     show_default=True, help="Separator, decimal sign and encoding of a .csv.",
 )  # fmt: skip
-@click.option("--overwrite", is_flag=True, help="Replace an existing file.")
+@overwrite
 def command(
     result: Path, out: Path, world: bool, order: str, csv_flavour: str, overwrite: bool
 ) -> None:

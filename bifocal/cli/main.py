@@ -35,7 +35,6 @@ First steps:
     commands_package="bifocal.cli",
     summaries=SUMMARIES,
     epilog=EPILOG,
-    context_settings={"help_option_names": ["-h", "--help"]},
 )
 @click.version_option(package_name="bifocal", prog_name="bifocal")
 def main() -> None:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import click
 
-from photocore.cli import print_json, remark
+from photocore.cli import print_result, remark
+from photocore.options import FILE, NUMBER, as_json, number, overwrite
 
 EXAMPLE = """\b
 Examples:
@@ -20,49 +22,33 @@ Then:
 """
 
 
-@click.command(
-    short_help="Homologous points found automatically, as a survey workbook.", epilog=EXAMPLE
-)
-@click.argument("pair", type=click.Path(path_type=Path))
+@click.command(epilog=EXAMPLE)
+@click.argument("pair", type=FILE)
 @click.option(
-    "--out", type=click.Path(path_type=Path), required=True,
-    help="Survey workbook (.xlsx) or table (.csv) to write.",
+    "--out", type=FILE, required=True, help="Survey workbook (.xlsx) or table (.csv) to write."
+)
+@click.option(
+    "--count", type=click.IntRange(1, 100_000), default=4000, show_default=True,
+    help="About so many feature points, spread evenly.",
 )  # fmt: skip
 @click.option(
-    "--count",
-    type=click.IntRange(1, 100_000),
-    default=4000,
-    show_default=True,
-    help="About so many feature points, spread evenly.",
-)
-@click.option(
-    "--what",
-    type=click.Choice(["all", "features", "targets"]),
-    default="all",
-    show_default=True,
+    "--what", type=click.Choice(["all", "features", "targets"]), default="all", show_default=True,
     help="Natural detail, survey targets, or both.",
-)
+)  # fmt: skip
+@number(
+    "--relief-min", "M", "Lowest relief looked for [m].  [default: -0.5 x near distance]",
+    type=NUMBER,
+)  # fmt: skip
+@number(
+    "--relief-max", "M", "Highest relief looked for [m].  [default: 0.4 x near distance]",
+    type=NUMBER,
+)  # fmt: skip
 @click.option(
-    "--relief-min",
-    type=float,
-    metavar="M",
-    help="Lowest relief looked for [m].  [default: -0.5 x near distance]",
-)
-@click.option(
-    "--relief-max",
-    type=float,
-    metavar="M",
-    help="Highest relief looked for [m].  [default: 0.4 x near distance]",
-)
-@click.option(
-    "--lang",
-    type=click.Choice(["en", "it", "de"]),
-    default="en",
-    show_default=True,
+    "--lang", type=click.Choice(["en", "it", "de"]), default="en", show_default=True,
     help="Language of the workbook.",
-)
-@click.option("--overwrite", is_flag=True, help="Replace an existing file.")
-@click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
+)  # fmt: skip
+@overwrite
+@as_json
 def command(
     pair: Path, out: Path, count: int, what: str, relief_min: float | None,
     relief_max: float | None, lang: str, overwrite: bool, as_json: bool,
@@ -91,23 +77,21 @@ def command(
     )
     found = match_photos(pair, out, settings, language=lang, overwrite=overwrite)
     summary = match_summary(*found)
-    if as_json:
-        print_json({**summary, "out": out})
-        return
-    _print(summary)
-    remark(f"Points written to {out}")
+    print_result({**summary, "out": out}, _lines(summary), as_json=as_json)
+    if not as_json:
+        remark(f"Points written to {out}")
 
 
-def _print(summary: dict[str, Any]) -> None:
-    """Print what was found."""
+def _lines(summary: dict[str, Any]) -> Iterator[str]:
+    """Yield what was found."""
     kinds = ", ".join(f"{number} {kind}" for kind, number in summary["kinds"].items())
     low, high = summary["relief_range"]
-    click.echo(f"{summary['count']} points ({kinds}).")
-    click.echo(
+    yield f"{summary['count']} points ({kinds})."
+    yield (
         f"Precision {summary['sigma_px']:.2f} px along the radial lines, misfit across them "
         f"{summary['misfit_px']:.2f} px."
     )
-    click.echo(
+    yield (
         f"Relief from {low:.2f} to {high:.2f} m, sigma of r {1000 * summary['sigma_r_median']:.1f} "
         "mm at the median."
     )

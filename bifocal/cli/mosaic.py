@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import click
 
-from photocore.cli import print_json, progress_bar, remark
-from photocore.options import Length, Numbers
+from photocore.cli import print_result, progress_bar
+from photocore.options import FILE, Length, Numbers, as_json, overwrite
 
 EXAMPLE = """\b
 Examples:
@@ -18,19 +19,19 @@ Examples:
 The last band of the result says which input every pixel comes from: 1, 2, ... in the order given.
 """
 
-_file = click.Path(path_type=Path)
 
-
-@click.command(short_help="One orthophoto from several.", epilog=EXAMPLE)
-@click.argument("rasters", nargs=-1, required=True, metavar="ORTHO.tif...", type=_file)
-@click.option("--out", required=True, type=_file, help="GeoTIFF to write.")
-@click.option("--gsd", type=Length(), help="Pixel [m] or 5mm.  [default: that of the finest]")
+@click.command(epilog=EXAMPLE)
+@click.argument("rasters", nargs=-1, required=True, metavar="ORTHO.tif...", type=FILE)
+@click.option("--out", required=True, type=FILE, help="GeoTIFF to write.")
+@click.option(
+    "--gsd", type=Length(above=0), help="Pixel [m] or 5mm.  [default: that of the finest]"
+)
 @click.option(
     "--bounds", type=Numbers(4), metavar="XMIN,YMIN,XMAX,YMAX",
     help="Part of the wall [m].  [default: all of it]",
 )  # fmt: skip
 @click.option(
-    "--relief", multiple=True, type=_file,
+    "--relief", multiple=True, type=FILE,
     help="Relief map: seams keep away from its edges; repeat it.",
 )  # fmt: skip
 @click.option("--priority", is_flag=True, help="Earlier files cover later ones; no seam is sought.")
@@ -43,13 +44,9 @@ _file = click.Path(path_type=Path)
     "--overviews/--no-overviews", default=True, show_default=True,
     help="Reduced copies in the file, for fast display.",
 )  # fmt: skip
-@click.option("--overwrite", is_flag=True, help="Replace an existing file.")
-@click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
-def command(
-    rasters: tuple[Path, ...], out: Path, gsd: float | None, bounds: tuple[float, ...] | None,
-    relief: tuple[Path, ...], priority: bool, gain: bool, blend: bool, overviews: bool,
-    overwrite: bool, as_json: bool,
-) -> None:  # fmt: skip
+@overwrite
+@as_json
+def command(rasters: tuple[Path, ...], out: Path, as_json: bool, **options: Any) -> None:
     """Join orthophotos, or relief maps, of one wall.
 
     Seams run where the rasters agree, away from edges of the relief and from hidden places;
@@ -58,18 +55,8 @@ def command(
     from bifocal.orthophotos.mosaic_workflow import make_mosaic
 
     with progress_bar("mosaic", quiet=as_json) as progress:
-        result = make_mosaic(
-            rasters, out, gsd=gsd,
-            bounds=(bounds[0], bounds[1], bounds[2], bounds[3]) if bounds else None,
-            relief=relief, priority=priority, gain=gain, blend=blend, overviews=overviews,
-            overwrite=overwrite, progress=progress,
-        )  # fmt: skip
-    for text in result.remarks:
-        remark(text)
-    if as_json:
-        print_json(result.to_dict())
-        return
+        result = make_mosaic(rasters, out, progress=progress, **options)
     grid = result.grid
-    click.echo(f"{out}: {grid.width} x {grid.height} px of {grid.gsd * 1000:g} mm")
-    for name, share in result.shares.items():
-        click.echo(f"  {100 * share:5.1f} %  {name}")
+    lines = [f"{out}: {grid.width} x {grid.height} px of {grid.gsd * 1000:g} mm"]
+    lines += [f"  {100 * share:5.1f} %  {name}" for name, share in result.shares.items()]
+    print_result(result.to_dict(), lines, as_json=as_json, remarks=result.remarks)

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import click
 
-from photocore.cli import print_json, progress_bar, remark
-from photocore.options import Length, Numbers, Scale
+from photocore.cli import print_result, progress_bar, remark
+from photocore.options import FILE, NOT_NEGATIVE, Length, Numbers, Scale, as_json, number, overwrite
 
 EXAMPLE = """\b
 Examples:
@@ -19,14 +20,12 @@ Examples:
                 --control control.csv --section x=1.5 --section y=2 --contours 0.05
 """
 
-_file = click.Path(path_type=Path)
 
-
-@click.command(short_help="Orthophoto to scale, and everything a drawing needs.", epilog=EXAMPLE)
-@click.argument("pair", type=_file)
-@click.option("--out", type=_file, help="GeoTIFF to write.")
-@click.option("--relief", type=_file, help="Relief map of `bifocal relief`.")
-@click.option("--points", type=_file, help="Result of `bifocal solve`: relief between its points.")
+@click.command(epilog=EXAMPLE)
+@click.argument("pair", type=FILE)
+@click.option("--out", type=FILE, help="GeoTIFF to write.")
+@click.option("--relief", type=FILE, help="Relief map of `bifocal relief`.")
+@click.option("--points", type=FILE, help="Result of `bifocal solve`: relief between its points.")
 @click.option(
     "--breakline", "breaklines", multiple=True, metavar="ID,ID,...",
     help="Points along an edge that no triangle may cross; repeat it. With --points.",
@@ -40,7 +39,7 @@ _file = click.Path(path_type=Path)
     help="Photo that gives the colours: 1 far, 2 near, both: 1 where it sees the wall, else 2.",
 )  # fmt: skip
 @click.option(
-    "--gsd", type=Length(),
+    "--gsd", type=Length(above=0),
     help="Pixel of the orthophoto [m], or with its unit: 5mm.  [default: that of the relief map "
     "or the photo]",
 )  # fmt: skip
@@ -66,47 +65,48 @@ _file = click.Path(path_type=Path)
     help="Undo the fall-off of light to the corners.  [default: off]",
 )  # fmt: skip
 @click.option("--chromatic", is_flag=True, help="Measure and undo red and blue fringes.")
-@click.option(
-    "--feather", type=float, default=8.0, show_default=True,
-    help="Width of the transition between the photos [px].",
+@number(
+    "--feather", "PX", "Width of the transition between the photos [px].",
+    type=NOT_NEGATIVE, default=8.0,
 )  # fmt: skip
 @click.option(
-    "--deliver", "folder", type=_file, metavar="DIR",
+    "--deliver", "folder", type=FILE, metavar="DIR",
     help="Write GeoTIFF, PNG, DXF and PDF, of the relief too, into a folder. Needs --scale.",
 )  # fmt: skip
 @click.option("--scale", type=Scale(), help="Scale of the drawing 1:N, e.g. 1:50.")
-@click.option(
-    "--dpi", type=float, default=254.0, show_default=True,
-    help="Pixels per inch of paper; at 1:50 and 254 dpi a pixel is 5.00 mm. With --deliver.",
+@number(
+    "--dpi", "N",
+    "Pixels per inch of paper; at 1:50 and 254 dpi a pixel is 5.00 mm. With --deliver.",
+    default=254.0,
 )  # fmt: skip
 @click.option("--title", default="", help="Title of the drawing.  [default: the pair's name]")
 @click.option(
     "--paper", type=click.Choice(["A4", "A3", "A2", "A1", "A0"], case_sensitive=False),
     help="Sheet of paper.  [default: the smallest that fits]",
 )  # fmt: skip
-@click.option("--mark", type=_file, help="Table of points to draw.  [default: --points]")
-@click.option("--control", type=_file, help="Table of control points to draw.")
+@click.option("--mark", type=FILE, help="Table of points to draw.  [default: --points]")
+@click.option("--control", type=FILE, help="Table of control points to draw.")
 @click.option(
     "--section", "sections", multiple=True, metavar="x=M|y=M|'X,Y X,Y ...'",
     help="Section of the relief as DXF and SVG [m]; repeat it. With --deliver.",
 )  # fmt: skip
-@click.option("--contours", type=Length(), help="Between contour lines [m].  [default: by relief]")
+@click.option(
+    "--contours", type=Length(above=0), help="Between contour lines [m].  [default: by relief]"
+)
 @click.option(
     "--overviews/--no-overviews", default=None,
     help="Reduced copies in the file.  [default: above 50 megapixels]",
 )  # fmt: skip
 @click.option("--tfw", is_flag=True, help="Also write the world file beside it.")
 @click.option("--any-size", is_flag=True, help="Do not ask back about an unusual size.")
-@click.option("--overwrite", is_flag=True, help="Replace existing files.")
-@click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
+@overwrite
+@as_json
 def command(
     pair: Path, out: Path | None, relief: Path | None, points: Path | None,
-    breaklines: tuple[str, ...], plane: float | None, image: str, gsd: float | None,
-    bounds: tuple[float, ...] | None, interpolation: str, mask: bool, fill: bool,
-    match: bool, vignetting: str, chromatic: bool, feather: float, folder: Path | None,
-    scale: float | None, dpi: float, title: str, paper: str | None, mark: Path | None,
-    control: Path | None, sections: tuple[str, ...], contours: float | None,
-    overviews: bool | None, tfw: bool, any_size: bool, overwrite: bool, as_json: bool,
+    breaklines: tuple[str, ...], plane: float | None, interpolation: str, mask: bool, fill: bool,
+    feather: float, folder: Path | None, scale: float | None, dpi: float, title: str,
+    paper: str | None, mark: Path | None, control: Path | None, sections: tuple[str, ...],
+    contours: float | None, tfw: bool, overwrite: bool, as_json: bool, **choices: Any,
 ) -> None:  # fmt: skip
     """Make the orthophoto of a wall from the photos of a PAIR file.
 
@@ -128,14 +128,11 @@ def command(
         remark("No relief given: the wall is taken as flat (as with --plane).")
     task = OrthoTask(
         relief=relief, points=points, breaklines=[line.split(",") for line in breaklines],
-        plane=plane or 0.0, image=image, gsd=gsd,
-        bounds=(bounds[0], bounds[1], bounds[2], bounds[3]) if bounds else None, scale=scale,
+        plane=plane or 0.0, scale=scale, **choices,
         options=OrthoOptions(
             interpolation=interpolation,  # type: ignore[arg-type]
             mask_hidden=mask, fill=fill, feather=feather,
         ),
-        match=match, vignetting=vignetting, chromatic=chromatic, any_size=any_size,
-        overviews=overviews,
     )  # fmt: skip
     files: dict[str, object] = {}
     with progress_bar("orthophoto", quiet=as_json) as progress:
@@ -152,15 +149,11 @@ def command(
                 pair, out or Path("ortho.tif"), task, overwrite=overwrite, world_file=tfw,
                 progress=progress,
             )  # fmt: skip
-    for text in result.remarks:
-        remark(text)
-    if as_json:
-        print_json(result.to_dict() | files)
-        return
     grid, shares = result.grid, result.shares
-    click.echo(
+    lines = [
         f"{result.path}: {grid.width} x {grid.height} px of {grid.gsd * 1000:g} mm; "
         f"{100 * (1 - shares['none']):.1f} % covered, {100 * shares['hidden']:.1f} % hidden"
-    )
+    ]
     if files:
-        click.echo(f"{folder}: {', '.join(done.files)} (sheet {done.sheet})")
+        lines.append(f"{folder}: {', '.join(done.files)} (sheet {done.sheet})")
+    print_result(result.to_dict() | files, lines, as_json=as_json, remarks=result.remarks)

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from photocore.cli import print_json, remark, text_table
-from photocore.options import Scale, Size
+from photocore.cli import print_result, remark, text_table
+from photocore.options import FILE, POSITIVE, THOUSANDTHS, Scale, Size, as_json, number, overwrite
 
 if TYPE_CHECKING:
     from bifocal.planning.camera_plan import Plan
@@ -21,39 +22,37 @@ Examples:
 """
 
 
-@click.command(
-    short_help="Camera stations, scale and expected precision for given lenses.", epilog=EXAMPLE
-)
+@click.command(epilog=EXAMPLE)
 @click.option(
-    "--focal", "focal_lengths", type=float, multiple=True, required=True, metavar="MM",
+    "--focal", "focal_lengths", type=POSITIVE, multiple=True, required=True, metavar="MM",
     help="A focal length at hand [mm]; repeat it for every lens or zoom mark.",
 )  # fmt: skip
-@click.option("--sensor", type=Size(), required=True, help="Width x height of the sensor [mm].")
-@click.option("--pixels", type=Size(), required=True, help="Columns x rows of the photo [px].")
-@click.option("--object", "object_size", type=Size(), help="Width x height of the wall [m].")
-@click.option("--scale", "scale_number", type=Scale(), help="Wanted scale of the photo, 1:N.")
-@click.option("--gsd", type=float, metavar="MM", help="Wanted pixel on the wall [mm].")
 @click.option(
-    "--sigma-r", type=float, metavar="MM",
-    help="Wanted sigma of the relief at the RMS radius of the photo [mm].",
-)  # fmt: skip
-@click.option(
-    "--sigma-px", type=float, default=0.5, show_default=True, help="Precision of a pick [px]."
+    "--sensor", type=Size(above=0), required=True, help="Width x height of the sensor [mm]."
 )
 @click.option(
-    "--sigma-r-max", type=float, metavar="MM",
-    help="Area of uncertainty: sigma of the relief above this [mm].  "
-    "[default: 3 x that of the best pair]",
+    "--pixels", type=Size(least=1, whole=True), required=True,
+    help="Columns x rows of the photo [px].",
 )  # fmt: skip
-@click.option("--free-space", type=float, metavar="M", help="Room in front of the wall [m].")
-@click.option("--out", type=click.Path(path_type=Path), help="Also write the plan as .xlsx.")
-@click.option("--overwrite", is_flag=True, help="Replace an existing file.")
-@click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
+@click.option("--object", "object_size", type=Size(above=0), help="Width x height of the wall [m].")
+@click.option("--scale", "scale_number", type=Scale(), help="Wanted scale of the photo, 1:N.")
+@number("--gsd", "MM", "Wanted pixel on the wall [mm].", type=THOUSANDTHS)
+@number(
+    "--sigma-r", "MM", "Wanted sigma of the relief at the RMS radius of the photo [mm].",
+    type=THOUSANDTHS,
+)  # fmt: skip
+@number("--sigma-px", "PX", "Precision of a pick [px].", default=0.5)
+@number(
+    "--sigma-r-max", "MM", "Area of uncertainty: sigma of the relief above this [mm].  "
+    "[default: 3 x that of the best pair]", type=THOUSANDTHS,
+)  # fmt: skip
+@number("--free-space", "M", "Room in front of the wall [m].")
+@click.option("--out", type=FILE, help="Also write the plan as .xlsx.")
+@overwrite
+@as_json
 def command(
-    focal_lengths: tuple[float, ...], sensor: tuple[float, float], pixels: tuple[float, float],
-    object_size: tuple[float, float] | None, scale_number: float | None, gsd: float | None,
-    sigma_r: float | None, sigma_px: float, sigma_r_max: float | None, free_space: float | None,
-    out: Path | None, overwrite: bool, as_json: bool,
+    focal_lengths: tuple[float, ...], sensor: tuple[float, float], pixels: tuple[int, int],
+    out: Path | None, as_json: bool, **wishes: Any,
 ) -> None:  # fmt: skip
     """Compare pairs of lenses: where to stand, what a photo covers, how precise it gets.
 
@@ -63,23 +62,15 @@ def command(
     from bifocal.planning.camera_plan import Sensor
     from bifocal.planning.workflow import make_plan, plan_as_dict
 
-    plan = make_plan(
-        focal_lengths,
-        Sensor(width=sensor[0], height=sensor[1], columns=int(pixels[0]), rows=int(pixels[1])),
-        out=out, overwrite=overwrite, object_size=object_size, scale_number=scale_number,
-        gsd=gsd and gsd / 1000, sigma_r=sigma_r and sigma_r / 1000, sigma_px=sigma_px,
-        sigma_r_max=sigma_r_max and sigma_r_max / 1000, free_space=free_space,
-    )  # fmt: skip
-    if as_json:
-        print_json(plan_as_dict(plan))
-    else:
-        _print(plan)
+    camera = Sensor(width=sensor[0], height=sensor[1], columns=pixels[0], rows=pixels[1])
+    plan = make_plan(focal_lengths, camera, out=out, **wishes)
+    print_result(plan_as_dict(plan), _lines(plan), as_json=as_json)
     if out is not None:
         remark(f"Plan written to {out}")
 
 
-def _print(plan: Plan) -> None:
-    """Print the stations and the precision over the frame of the best pair."""
+def _lines(plan: Plan) -> Iterator[str]:
+    """Yield the stations and the precision over the frame of the best pair."""
     rows = [
         (
             f"{s.c1:g}/{s.c2:g}", f"{s.d1:.2f}", f"{s.d2:.2f}", f"{s.delta_d:.2f}",
@@ -95,24 +86,20 @@ def _print(plan: Plan) -> None:
         "lenses mm", "d1 m", "d2 m", "delta_d m", "scale", "pixel mm", "covers m", "photos",
         "sigma r mm", "in corner", "ortho mm", "uncertain m", "fits",
     )  # fmt: skip
-    click.echo(text_table(headings, rows))
+    yield text_table(headings, rows)
     for station in plan.stations:
         if station.note:
-            click.echo(f"{station.c1:g}/{station.c2:g} mm: {station.note}")
+            yield f"{station.c1:g}/{station.c2:g} mm: {station.note}"
     best = plan.best
-    click.echo(
+    yield (
         f"\nBest: {best.c1:g} mm from {best.d1:.2f} m and {best.c2:g} mm from {best.d2:.2f} m."
         if best.feasible
         else "\nNo pair of lenses fits into the free space."
     )
     x, y, sigma = plan.sigma_grid(best, columns=7, rows=5)
-    click.echo(f"\nsigma of r [mm] over its photo, picks of {plan.sigma_px:g} px:")
-    click.echo(
-        text_table(
-            ("Y \\ X [m]", *(f"{v:.1f}" for v in x)),
-            [
-                (f"{v:.1f}", *("nadir" if s != s else f"{s * 1000:.0f}" for s in row))
-                for v, row in zip(y, sigma, strict=True)
-            ],
-        )
-    )
+    yield f"\nsigma of r [mm] over its photo, picks of {plan.sigma_px:g} px:"
+    grid = [
+        (f"{v:.1f}", *("nadir" if s != s else f"{s * 1000:.0f}" for s in row))
+        for v, row in zip(y, sigma, strict=True)
+    ]
+    yield text_table(("Y \\ X [m]", *(f"{v:.1f}" for v in x)), grid)

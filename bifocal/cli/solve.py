@@ -8,6 +8,7 @@ from typing import Any
 import click
 
 from photocore.cli import remark, text_table
+from photocore.options import FILE, as_json, number, overwrite
 
 EXAMPLE = """\b
 Examples:
@@ -20,101 +21,68 @@ Examples:
 SHOWN = 40
 
 
-@click.command(short_help="Relief, coordinates and precision of measured points.", epilog=EXAMPLE)
-@click.argument("survey", type=click.Path(path_type=Path), metavar="SURVEY")
+@click.command(epilog=EXAMPLE)
+@click.argument("survey", type=FILE, metavar="SURVEY")
 @click.option(
-    "--out",
-    type=click.Path(path_type=Path),
-    metavar="FILE",
+    "--out", type=FILE, metavar="FILE",
     help="Result: a workbook (.xlsx, .xlsm) or a text table (.csv).  [default: none]",
-)
+)  # fmt: skip
 @click.option(
-    "--pair",
-    type=click.Path(path_type=Path),
-    metavar="PAIR.pair.json",
+    "--pair", type=FILE, metavar="PAIR.pair.json",
     help="Pair file, for points in raw pixels.  [default: the workbook's own set-up]",
-)
-@click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
+)  # fmt: skip
+@as_json
 @click.option(
-    "--columns",
-    metavar="MAP",
+    "--columns", metavar="MAP",
     help='Which column is which: "id=A,s1=My heading" or "id,x1,y1,x2,y2" for tables without '
     "headings.  [default: found by heading]",
-)
+)  # fmt: skip
 @click.option("--sheet", metavar="NAME", help="Sheet of the points.  [default: found]")
 @click.option(
-    "--decimal",
-    type=click.Choice(["point", "comma"]),
+    "--decimal", type=click.Choice(["point", "comma"]),
     help="Decimal separator of numbers typed as text.  [default: found]",
-)
+)  # fmt: skip
 @click.option("--visible-only", is_flag=True, help="Leave out hidden and filtered rows.")
-@click.option("--d1", type=float, metavar="M", help="Distance of camera 1 [m].  [default: Setup]")
-@click.option("--d2", type=float, metavar="M", help="Distance of camera 2 [m].  [default: Setup]")
+@number("--d1", "M", "Distance of camera 1 [m].  [default: Setup]")
+@number("--d2", "M", "Distance of camera 2 [m].  [default: Setup]")
+@number("--c1", "MM", "Principal distance of image 1 [mm].  [default: Setup]")
+@number("--c2", "MM", "Principal distance of image 2 [mm].  [default: Setup]")
+@number("--pitch", "MM", "Size of a pixel [mm].  [default: Setup]")
 @click.option(
-    "--c1", type=float, metavar="MM", help="Principal distance of image 1 [mm].  [default: Setup]"
-)
-@click.option(
-    "--c2", type=float, metavar="MM", help="Principal distance of image 2 [mm].  [default: Setup]"
-)
-@click.option("--pitch", type=float, metavar="MM", help="Size of a pixel [mm].  [default: Setup]")
-@click.option(
-    "--unit",
-    type=click.Choice(["mm", "px"]),
+    "--unit", type=click.Choice(["mm", "px"]),
     help="Unit of x1 y1 x2 y2.  [default: as headings or Setup say, else mm]",
-)
-@click.option(
-    "--sigma-s",
-    type=float,
-    metavar="MM",
-    help="Precision of an image coordinate [mm].  [default: Setup, else 0.5 px]",
-)
-@click.option(
-    "--sigma-px",
-    type=float,
-    metavar="PX",
-    help="Precision of a raw pixel [px].  [default: the pair file's, else from the misfits of 20 "
+)  # fmt: skip
+@number("--sigma-s", "MM", "Precision of an image coordinate [mm].  [default: Setup, else 0.5 px]")
+@number(
+    "--sigma-px", "PX",
+    "Precision of a raw pixel [px].  [default: the pair file's, else from the misfits of 20 "
     "or more points, else 0.5]",
+)  # fmt: skip
+@number(
+    "--sigma-r-max", "M", "Sigma of r beyond which a point is UNCERTAIN [m].  [default: 2 % of d2]"
 )
 @click.option(
-    "--sigma-r-max",
-    type=float,
-    metavar="M",
-    help="Sigma of r beyond which a point is UNCERTAIN [m].  [default: 2 % of d2]",
-)
-@click.option(
-    "--adjust-setup",
-    is_flag=True,
+    "--adjust-setup", is_flag=True,
     help="Correct the set-up by points of the reference plane (code PLANE, r = 0).",
-)
+)  # fmt: skip
 @click.option(
-    "--georeference",
-    "model",
-    type=click.Choice(["auto", "levelled", "3D", "2D"]),
+    "--georeference", "model", type=click.Choice(["auto", "levelled", "3D", "2D"]),
     help="Model of the roto-translation.  [default: the workbook's, else auto]",
-)
-@click.option(
-    "--scale-tolerance",
-    type=float,
+)  # fmt: skip
+@number(
+    "--scale-tolerance", "SHARE", "Share by which the scales of both photos may differ.",
     default=0.02,
-    show_default=True,
-    metavar="SHARE",
-    help="Share by which the scales of both photos may differ.",
-)
+)  # fmt: skip
 @click.option(
-    "--tolerance-rule",
-    "rules",
-    multiple=True,
-    metavar="RULE",
+    "--tolerance-rule", "rules", multiple=True, metavar="RULE",
     help="Rule for the verdict: line-0.18, print-0.25, eckstein, a number of mm at scale "
     "(0.2mm) or fixed cm (2cm); repeat it.  [default: the three named]",
-)
+)  # fmt: skip
 @click.option(
-    "--lang",
-    "language",
-    type=click.Choice(["en", "it", "de"]),
+    "--lang", "language", type=click.Choice(["en", "it", "de"]),
     help="Language of a new workbook.  [default: the survey's, else en]",
-)
-@click.option("--overwrite", is_flag=True, help="Replace an existing file.")
+)  # fmt: skip
+@overwrite
 def command(
     survey: Path, out: Path | None, as_json: bool, language: str | None, overwrite: bool,
     **options: Any,

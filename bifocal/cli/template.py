@@ -7,6 +7,7 @@ from pathlib import Path
 import click
 
 from photocore.cli import remark
+from photocore.options import FILE, overwrite
 
 EXAMPLE = """\b
 Examples:
@@ -16,21 +17,17 @@ Examples:
 """
 
 
-@click.command(short_help="An empty survey workbook with live formulas.", epilog=EXAMPLE)
-@click.argument("out", type=click.Path(path_type=Path), metavar="OUT.xlsx")
+@click.command(epilog=EXAMPLE)
+@click.argument("out", type=FILE, metavar="OUT.xlsx")
 @click.option(
     "--lang", "language", type=click.Choice(["en", "it", "de"]), default="en", show_default=True,
     help="Language of labels and help.",
 )  # fmt: skip
 @click.option(
-    "--rows",
-    type=int,
-    default=300,
-    show_default=True,
-    metavar="N",
+    "--rows", type=int, default=300, show_default=True, metavar="N",
     help="Rows prepared for points.",
-)
-@click.option("--overwrite", is_flag=True, help="Replace an existing file.")
+)  # fmt: skip
+@overwrite
 def command(out: Path, language: str, rows: int, overwrite: bool) -> None:
     """Write an empty survey workbook: type what you measured, relief appears beside it.
 

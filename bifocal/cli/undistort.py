@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import click
 
-from photocore.cli import print_json, progress_bar, remark
+from photocore.cli import print_result, progress_bar
+from photocore.options import FILE, POSITIVE, as_json, overwrite
 
 EXAMPLE = """\b
 Examples:
@@ -18,27 +20,25 @@ photos beforehand only for other programs.
 """
 
 
-@click.command(short_help="Photos freed of lens distortion.", epilog=EXAMPLE)
-@click.argument(
-    "images", nargs=-1, required=True, metavar="IMAGE...", type=click.Path(path_type=Path)
-)
+@click.command(epilog=EXAMPLE)
+@click.argument("images", nargs=-1, required=True, metavar="IMAGE...", type=FILE)
 @click.option(
     "--lens", required=True, metavar="FILE|exif",
     help="Lens file (lens.json, COLMAP cameras.txt, Metashape .xml, OpenCV .yml), or exif for the "
     "lens database.",
 )  # fmt: skip
-@click.option(
-    "--out-dir", type=click.Path(path_type=Path), help="Folder to write to.  [default: the photo's]"
-)
+@click.option("--out-dir", type=FILE, help="Folder to write to.  [default: the photo's]")
 @click.option("--camera-name", default="", help="With exif: camera, if EXIF lacks it.")
 @click.option("--lens-name", default="", help="With exif: lens, if EXIF lacks it.")
-@click.option("--focal", type=float, help="With exif: focal length [mm], if EXIF lacks it.")
-@click.option("--overwrite", is_flag=True, help="Replace existing files.")
-@click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
+@click.option(
+    "--focal", "focal_length", type=POSITIVE,
+    help="With exif: focal length [mm], if EXIF lacks it.",
+)  # fmt: skip
+@overwrite
+@as_json
 def command(
-    images: tuple[Path, ...], lens: str, out_dir: Path | None, camera_name: str, lens_name: str,
-    focal: float | None, overwrite: bool, as_json: bool,
-) -> None:  # fmt: skip
+    images: tuple[Path, ...], lens: str, out_dir: Path | None, as_json: bool, **options: Any
+) -> None:
     """Write each photo without lens distortion as NAME_undistorted, same size and scale."""
     from bifocal.calibration.workflow import undistort_images
 
@@ -46,13 +46,7 @@ def command(
         raise click.UsageError(f"--out-dir: the folder {out_dir} does not exist.")
     with progress_bar("Undistorting", quiet=as_json) as progress:
         written, notes = undistort_images(
-            images, lens, folder=out_dir, overwrite=overwrite, progress=progress,
-            camera_name=camera_name, lens_name=lens_name, focal_length=focal,
-        )  # fmt: skip
-    for note in notes:
-        remark(note)
-    if as_json:
-        print_json({"written": written, "remarks": notes})
-    else:
-        for path in written:
-            click.echo(path)
+            images, lens, folder=out_dir, progress=progress, **options
+        )
+    data = {"written": written, "remarks": notes}
+    print_result(data, map(str, written), as_json=as_json, remarks=notes)

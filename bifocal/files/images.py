@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from photocore.arrays import ByteArray
 from photocore.errors import InputError
 from photocore.output import atomic_path
 
@@ -207,6 +208,36 @@ def to_eight_bit(image: ImageArray) -> NDArray[np.uint8]:
     if image.dtype == np.uint8:
         return image.astype(np.uint8, copy=False)
     return ((image.astype(np.uint32) + 128) // 257).astype(np.uint8)
+
+
+def as_grey(image: NDArray[np.generic], name: str) -> ByteArray:
+    """Return a photo as 8-bit grey values, shape (height, width).
+
+    Raises
+    ------
+    InputError
+        If it is not an image of 8 or 16 bits, or smaller than 16 pixels a side.
+    """
+    import cv2
+
+    array = np.asarray(image)
+    if array.ndim not in (2, 3) or (array.ndim == 3 and array.shape[2] not in (1, 3, 4)):
+        raise InputError(f"{name}: expected shape (height, width[, 3]), found {array.shape}.")
+    if min(array.shape[:2]) < 16:
+        raise InputError(
+            f"{name}: {array.shape[1]} x {array.shape[0]} px is too small to match; "
+            "at least 16 px a side are needed."
+        )
+    if array.dtype == np.uint16:
+        array = (array >> 8).astype(np.uint8)
+    if array.dtype != np.uint8:
+        raise InputError(f"{name}: expected 8 or 16 bits per channel, found {array.dtype}.")
+    if array.ndim == 2:
+        return array
+    if array.shape[2] == 1:
+        return np.ascontiguousarray(array[..., 0])
+    # The plain mean of the channels has less noise than the luminance, which is mostly green.
+    return np.asarray(cv2.transform(array[..., :3], np.full((1, 3), 1 / 3)), dtype=np.uint8)
 
 
 def write_image(path: Path | str, image: ImageArray, *, overwrite: bool = False) -> None:

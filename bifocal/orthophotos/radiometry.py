@@ -84,6 +84,8 @@ def devignetted(image: ImageArray, photo: Photo, model: str) -> ImageArray:
         return _scaled(image, lambda square: (1 + np.float32(share) * square) ** 2)
     try:
         k1, k2, k3 = (np.float32(value) for value in model.split(","))
+        if not np.isfinite(k1 + k2 + k3):
+            raise ValueError(model)
     except ValueError:
         raise InputError(
             f"vignetting: {model!r} is neither cos4 nor three numbers k1,k2,k3."

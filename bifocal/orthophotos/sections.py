@@ -113,19 +113,18 @@ def sample(surface: Surface, points: FloatArray, *, gsd: float) -> FloatArray:
 def _path(name: str, grid: Grid) -> tuple[str, FloatArray]:
     xmin, ymin, xmax, ymax = grid.bounds
     text = name.replace(" ", "").lower()
+    kind = text[0] if text.startswith(("x=", "y=")) else "line"
     try:
-        if text.startswith("x="):
-            x = float(text[2:])
-            return "x", np.array([[x, ymin], [x, ymax]])
-        if text.startswith("y="):
-            y = float(text[2:])
-            return "y", np.array([[xmin, y], [xmax, y]])
-        numbers = [float(value) for value in name.replace(",", " ").replace(";", " ").split()]
+        if kind == "line":
+            numbers = [float(value) for value in name.replace(",", " ").replace(";", " ").split()]
+        else:
+            at = float(text[2:])
+            numbers = [at, ymin, at, ymax] if kind == "x" else [xmin, at, xmax, at]
     except ValueError:
         numbers = []
-    if len(numbers) < 4 or len(numbers) % 2:
+    if len(numbers) < 4 or len(numbers) % 2 or not np.isfinite(numbers).all():
         raise InputError(
             f'section {name!r}: write x=1.5 (upright), y=2.0 (level) or corners "0,1 2,1 2,3" '
             "in metres."
         )
-    return "line", np.array(numbers).reshape(-1, 2)
+    return kind, np.array(numbers).reshape(-1, 2)

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from bifocal.files.images import as_grey
 from bifocal.model.grid import Grid
 from bifocal.model.pair import Pair
 from bifocal.model.relief_map import Quality, ReliefMap
@@ -17,7 +18,6 @@ from bifocal.relief_maps.exposure import match_exposure
 from bifocal.relief_maps.frame import (
     LONGEST_SIDE,
     Frame,
-    as_grey,
     common_bounds,
     make_frame,
     native_gsd,

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from multimedia.media.height_field import HeightField
-from multimedia.media.interfaces import HIGHEST_INDEX
 from multimedia.media.surfaces import Plane
+from multimedia.refraction.layers import checked_index
 from photocore.arrays import FloatArray, IntArray, as_floats
 from photocore.errors import GeometryError, InputError
 
@@ -129,27 +129,13 @@ def as_water_surface(level: float | WaterSurface) -> WaterSurface:
     return Plane.level(float(height))
 
 
-def height_of(surface: WaterSurface, xy: FloatArray) -> FloatArray:
-    """Return the height of the water above positions, shape (...); NaN outside the surface."""
-    if isinstance(surface, HeightField):
-        return surface.height_at(xy)
-    slope = surface.normal[:2] / surface.normal[2]
-    offset: FloatArray = (xy - surface.point[:2]) @ slope
-    return surface.point[2] - offset
-
-
-def checked_index(index: ArrayLike) -> float:
+def checked_water_index(index: ArrayLike) -> float:
     """Return the refractive index of water.
 
     Raises
     ------
     InputError
-        If it is no index of a liquid; the message says what it may be instead.
+        If nothing transparent has it.
     """
     value = float(as_floats(index, "index"))
-    if not 1.0 <= value <= HIGHEST_INDEX:
-        raise InputError(
-            f"index: {value:g} is no refractive index of water; expected about 1.33 to 1.35 "
-            "(`multimedia index` computes it from temperature, salinity and wavelength)."
-        )
-    return value
+    return checked_index(value, f"index: {value:g} is no refractive index of water")

@@ -120,18 +120,15 @@ def mean_water_level(
     if tilted:
         design = np.column_stack([design, xyz[:, :2] - centre])
     used = finite & (np.abs(xyz[:, 2] - start) <= REJECT * width)
+    floor = 1e-9 * max(1.0, float(np.abs(heights).max()))
     for _ in range(ROUNDS):
-        _refuse_few(used, design.shape[1])
-        solution, residual = _fit(design, xyz[:, 2], used)
-        single = _single_sigma(residual[used], design.shape[1])
-        floor = 1e-9 * max(1.0, float(np.abs(heights).max()))
+        solution, residual, single = _fit(design, xyz[:, 2], used)
         chosen = finite & (np.abs(residual) <= REJECT * max(single, floor))
         if (chosen == used).all():
             break
         used = chosen
-    _refuse_few(used, design.shape[1])
-    solution, residual = _fit(design, xyz[:, 2], used)
-    single = _single_sigma(residual[used], design.shape[1])
+    else:
+        solution, residual, single = _fit(design, xyz[:, 2], used)
     cofactor = np.linalg.inv(design[used].T @ design[used])
     sigma = single * np.sqrt(np.diag(cofactor))
     slope = solution[1:] if tilted else np.zeros(2)
@@ -139,7 +136,7 @@ def mean_water_level(
     return WaterLevel(
         level=float(solution[0]),
         sigma=float(sigma[0]),
-        spread=float(single),
+        spread=single,
         used=used,
         below=int((finite & ~used & (residual < 0)).sum()),
         above=int((finite & ~used & (residual > 0)).sum()),
@@ -167,13 +164,8 @@ def _highest_group(heights: FloatArray, spread: float | None) -> tuple[float, fl
     first = edges[0] + step / 2 + reach[0]
     place = first + step * np.arange(len(density))
     peaks = np.flatnonzero((density[1:-1] >= density[:-2]) & (density[1:-1] > density[2:])) + 1
-    sizes = np.array(
-        [
-            np.searchsorted(ordered, place[k] + 2 * width, side="right")
-            - np.searchsorted(ordered, place[k] - 2 * width, side="left")
-            for k in peaks
-        ]
-    )
+    sizes = np.searchsorted(ordered, place[peaks] + 2 * width, side="right")
+    sizes = sizes - np.searchsorted(ordered, place[peaks] - 2 * width, side="left")
     good = peaks[sizes >= max(FEWEST, SMALLEST_SHARE * sizes.max(initial=0))]
     if not good.size:
         raise GeometryError(
@@ -205,21 +197,24 @@ def _bandwidth(ordered: FloatArray) -> float:
     return min(max(2 * shortest, 2 * rounding, extent / 500), extent / 6)
 
 
-def _fit(design: FloatArray, heights: FloatArray, used: BoolArray) -> tuple[FloatArray, FloatArray]:
-    """Return the least-squares solution of the used rows and the residuals of all."""
-    solution = np.linalg.lstsq(design[used], heights[used], rcond=None)[0]
-    return solution, heights - design @ solution
+def _fit(
+    design: FloatArray, heights: FloatArray, used: BoolArray
+) -> tuple[FloatArray, FloatArray, float]:
+    """Return the least-squares solution of the used rows, all residuals, and one point's sigma.
 
-
-def _single_sigma(residual: FloatArray, unknowns: int) -> float:
-    """Return the standard deviation of one point, allowing for the cut at 3 sigma."""
-    return float(np.sqrt((residual**2).sum() / (len(residual) - unknowns))) / CUT_SIGMA
-
-
-def _refuse_few(used: BoolArray, unknowns: int) -> None:
-    """Raise GeometryError if too few points are left."""
-    if used.sum() < max(FEWEST, unknowns + 2):
+    Raises
+    ------
+    GeometryError
+        If too few points are left.
+    """
+    needed = max(FEWEST, design.shape[1] + 2)
+    if used.sum() < needed:
         raise GeometryError(
             f"points: only {int(used.sum())} tie points agree on one water surface; at least "
-            f"{max(FEWEST, unknowns + 2)} are needed. Add points, or give their expected spread."
+            f"{needed} are needed. Add points, or give their expected spread."
         )
+    solution = np.linalg.lstsq(design[used], heights[used], rcond=None)[0]
+    residual = heights - design @ solution
+    variance = (residual[used] ** 2).sum() / (used.sum() - design.shape[1])
+    # The residuals are cut at `REJECT` sigma.
+    return solution, residual, float(np.sqrt(variance)) / CUT_SIGMA

@@ -12,11 +12,10 @@ from multimedia.bathymetry.corrected_points import (
     CorrectedPoints,
     WaterSurface,
     as_water_surface,
-    checked_index,
-    height_of,
+    checked_water_index,
 )
-from multimedia.media.interfaces import Interfaces
 from multimedia.media.ray_tracing import trace_rays
+from multimedia.media.surface_sequence import SurfaceSequence
 from photocore.arrays import BoolArray, FloatArray, IntArray, as_points
 from photocore.errors import InputError
 
@@ -100,7 +99,7 @@ def intersect_refracted_rays(
     start, heading = np.broadcast_arrays(start, heading)
     if start.ndim != 3:
         raise InputError(f"origins: expected shape (points, rays, 3), found {start.shape}.")
-    surface, n_water = as_water_surface(water_level), checked_index(index)
+    surface, n_water = as_water_surface(water_level), checked_water_index(index)
     with np.errstate(invalid="ignore", divide="ignore"):
         heading = heading / np.linalg.norm(heading, axis=-1, keepdims=True)
     given = np.isfinite(start + heading).all(-1)
@@ -109,8 +108,8 @@ def intersect_refracted_rays(
     start = np.where(given[..., None], start - offset, 0.0)
     heading = np.where(given[..., None], heading, [0.0, 0.0, -1.0])
     straight, *_ = _meet(start, heading, start, given)
-    dry = straight[:, 2] >= height_of(local, straight[:, :2])
-    water = Interfaces(surfaces=(local,), indices=(1.0, n_water))
+    dry = straight[:, 2] >= local.height_at(straight[:, :2])
+    water = SurfaceSequence(surfaces=(local,), indices=(1.0, n_water))
     path = trace_rays(start, heading, water)
     refracted = given & (path.status == 0)
     use = np.where(dry[:, None], given, refracted)
@@ -118,7 +117,7 @@ def intersect_refracted_rays(
     on = np.where(dry[:, None, None], heading, np.nan_to_num(path.directions[..., 1, :]))
     xyz, inverse, misfit, strong = _meet(at, on, start, use)
     status = np.where(dry, BathymetryStatus.DRY, BathymetryStatus.RAYS).astype(np.int64)
-    under = xyz[:, 2] < height_of(local, xyz[:, :2])
+    under = xyz[:, 2] < local.height_at(xyz[:, :2])
     # Refracted rays that meet above the water belong to no point under it.
     status[~strong | (~dry & ~under)] = BathymetryStatus.FAILED
     failed = status == BathymetryStatus.FAILED
@@ -201,13 +200,15 @@ def correct_lidar_beams(
     )
     shape = echo.shape
     start, echo = start.reshape(-1, 3), echo.reshape(-1, 3)
-    surface, n_water = as_water_surface(water_level), checked_index(index)
-    slowed = n_water if group_index is None else checked_index(group_index)
+    surface, n_water = as_water_surface(water_level), checked_water_index(index)
+    slowed = n_water if group_index is None else checked_water_index(group_index)
     finite = np.asarray(np.isfinite(start + echo).all(-1))
     offset = np.round(echo[finite].mean(0)) if finite.any() else np.zeros(3)
     start, echo, local = start - offset, echo - offset, surface.shifted(-offset)
-    below = height_of(local, echo[:, :2]) - echo[:, 2]
-    path = trace_rays(start, echo - start, Interfaces(surfaces=(local,), indices=(1.0, n_water)))
+    below = local.height_at(echo[:, :2]) - echo[:, 2]
+    path = trace_rays(
+        start, echo - start, SurfaceSequence(surfaces=(local,), indices=(1.0, n_water))
+    )
     surface_at, onward = path.vertices[:, 0], path.directions[:, 1]
     air = np.linalg.norm(surface_at - start, axis=-1)
     rest = np.linalg.norm(echo - start, axis=-1) - air
@@ -218,7 +219,7 @@ def correct_lidar_beams(
     wrong = ~finite | (~hit & (below > 0))
     status[wrong] = BathymetryStatus.FAILED
     xyz[wrong] = np.nan
-    depth = np.where(hit, height_of(local, xyz[:, :2]) - xyz[:, 2], 0.0)
+    depth = np.where(hit, local.height_at(xyz[:, :2]) - xyz[:, 2], 0.0)
     return CorrectedPoints(
         xyz=(xyz + offset).reshape(shape),
         depth=depth.reshape(shape[:-1]),

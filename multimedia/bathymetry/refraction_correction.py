@@ -7,6 +7,7 @@ follows rigorously, without them its depth is stretched by the refractive index.
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -18,14 +19,12 @@ from multimedia.bathymetry.corrected_points import (
     Precision,
     WaterSurface,
     as_water_surface,
-    checked_index,
-    height_of,
+    checked_water_index,
 )
-from multimedia.media.interfaces import Interfaces
+from multimedia.media.collinearity import Medium, shifts
 from multimedia.media.ray_tracing import aim_rays
+from multimedia.media.surface_sequence import SurfaceSequence
 from multimedia.media.surfaces import Plane
-from multimedia.refraction.layers import Layers
-from multimedia.refraction.shifting import radial_shift_derivatives
 from photocore.arrays import BoolArray, FloatArray, IntArray, as_points
 from photocore.errors import GeometryError, InputError
 
@@ -38,6 +37,8 @@ MOST_STEPS = 30
 LAST_STEP, LAST_STEP_KINKED = 3e-8, 1e-12
 #: Step of the differences for the index, and for the level as a share of the camera height.
 DIFFERENCE = 1e-5
+#: Least depth of a point under a plane, as a share of the camera's height: a few roundings.
+JUST_UNDER = 1e-13
 #: Two rays of a smaller angle do not fix a point. [rad]
 SMALLEST_ANGLE = 1e-4
 
@@ -106,30 +107,25 @@ def correct_bathymetry(
     xyz = as_points(points, "points", dimension=3)
     shape = xyz.shape[:-1]
     flat = xyz.reshape(-1, 3)
-    surface, n_water = as_water_surface(water_level), checked_index(index)
+    surface, n_water = as_water_surface(water_level), checked_water_index(index)
     centres = _checked_cameras(cameras, surface)
     seen = _checked_visibility(visible, shape, len(centres))
     precision = precision or Precision()
+    count = len(flat)
+    result = (
+        np.empty((count, 3)), np.empty(count), np.empty(count, np.int64), np.empty((count, 3, 3))
+    )  # fmt: skip
     block = max(BLOCK_RAYS // max(len(centres), 1), 1)
-    parts = [
-        _correct_block(
-            flat[first : first + block],
-            surface,
-            n_water,
-            centres,
-            None if seen is None else seen[first : first + block],
-            precision,
-        )
-        for first in range(0, max(len(flat), 1), block)
-    ]
-    covariance = None
-    if precision.is_given:
-        covariance = np.concatenate([part[3] for part in parts]).reshape(*shape, 3, 3)
+    for first in range(0, count, block):
+        part = slice(first, first + block)
+        corrected = _correct_block(flat[part], surface, n_water, centres, seen[part], precision)
+        for whole, piece in zip(result, corrected, strict=True):
+            whole[part] = piece
     return CorrectedPoints(
-        xyz=np.concatenate([part[0] for part in parts]).reshape(xyz.shape),
-        depth=np.concatenate([part[1] for part in parts]).reshape(shape),
-        status=np.concatenate([part[2] for part in parts]).reshape(shape),
-        covariance=covariance,
+        xyz=result[0].reshape(xyz.shape),
+        depth=result[1].reshape(shape),
+        status=result[2].reshape(shape),
+        covariance=result[3].reshape(*shape, 3, 3) if precision.is_given else None,
     )
 
 
@@ -138,11 +134,11 @@ def _correct_block(
     surface: WaterSurface,
     index: float,
     centres: FloatArray,
-    seen: BoolArray | None,
+    seen: BoolArray,
     precision: Precision,
 ) -> tuple[FloatArray, FloatArray, IntArray, FloatArray]:
     """Return position, depth, status and covariance of one block of points."""
-    level = height_of(surface, apparent[:, :2])
+    level = surface.height_at(apparent[:, :2])
     below = level - apparent[:, 2]
     status = np.where(below > 0, BathymetryStatus.NADIR, BathymetryStatus.DRY).astype(np.int64)
     status[np.isnan(below)] = BathymetryStatus.NO_SURFACE
@@ -156,21 +152,16 @@ def _correct_block(
         + (below[wet] * precision.index) ** 2
         + ((1 - index) * precision.level) ** 2
     )
-    if len(centres) and wet.size:
-        mask = np.ones((len(wet), len(centres)), bool) if seen is None else seen[wet]
-        enough = mask.sum(-1) >= 2
-        rows = wet[enough]
-        if rows.size:
-            task = _Task.near(apparent[rows], centres, mask[enough], surface, index)
-            found, ok, weak = _solve(task, xyz[rows])
-            xyz[rows[~weak]] = np.where(ok[~weak, None], found[~weak], np.nan)
-            status[rows[~weak]] = np.where(
-                ok[~weak], BathymetryStatus.RAYS, BathymetryStatus.FAILED
-            )
-            if precision.is_given:
-                good = np.flatnonzero(ok & ~weak)
-                covariance[rows[good]] = _propagate(task.take(good), found[good], precision)
-    depth = np.maximum(height_of(surface, xyz[:, :2]) - xyz[:, 2], 0.0)
+    rows = wet[seen[wet].sum(-1) >= 2]
+    if rows.size:
+        task = _Task.near(apparent[rows], centres, seen[rows], surface, index)
+        points, ok, weak = _solve(task, xyz[rows])
+        xyz[rows[~weak]] = np.where(ok[~weak, None], points[~weak], np.nan)
+        status[rows[~weak]] = np.where(ok[~weak], BathymetryStatus.RAYS, BathymetryStatus.FAILED)
+        if precision.is_given:
+            good = np.flatnonzero(ok & ~weak)
+            covariance[rows[good]] = _propagate(task.take(good), points[good], precision)
+    depth = np.maximum(surface.height_at(xyz[:, :2]) - xyz[:, 2], 0.0)
     covariance[status == BathymetryStatus.FAILED] = np.nan
     return xyz, depth, status, covariance
 
@@ -239,8 +230,8 @@ def _solve(task: _Task, start: FloatArray) -> tuple[FloatArray, BoolArray, BoolA
 
 def _kept_in_water(surface: WaterSurface, point: FloatArray, step: FloatArray) -> FloatArray:
     """Shorten steps that would more than halve or double a depth: rays that hardly differ."""
-    depth = height_of(surface, point[:, :2]) - point[:, 2]
-    change = height_of(surface, point[:, :2] + step[:, :2]) - point[:, 2] - step[:, 2] - depth
+    depth = surface.height_at(point[:, :2]) - point[:, 2]
+    change = surface.height_at(point[:, :2] + step[:, :2]) - point[:, 2] - step[:, 2] - depth
     with np.errstate(invalid="ignore", divide="ignore"):
         share = np.fmin(1.0, np.where(change < 0, 0.5, 1.0) * depth / np.abs(change))
     return step * share[:, None]
@@ -271,78 +262,49 @@ def _pointing(
     task: _Task, point: FloatArray, row: IntArray, camera: IntArray
 ) -> tuple[FloatArray, FloatArray]:
     """Return directions in air of the rays of pairs, (k, 3), and their derivatives (k, 3, 3)."""
-    if isinstance(task.surface, Plane):
-        return _pointing_at_plane(task, task.surface, point, row, camera)
-    water = Interfaces(surfaces=(task.surface,), indices=(1.0, task.n_water))
-    path = aim_rays(task.centres[camera], point[row], water, jacobian=True)
-    return path.directions[:, 0], np.asarray(path.jacobian)
-
-
-def _pointing_at_plane(
-    task: _Task, plane: Plane, point: FloatArray, row: IntArray, camera: IntArray
-) -> tuple[FloatArray, FloatArray]:
-    """Return the same for a flat surface of any tilt, by Maas's radial shift in its frame."""
-    up = plane.normal
-    height = plane.side(task.centres)[camera]
-    # A point that Newton lifts out of the water for a moment is treated as if on the surface.
-    depth = np.maximum(-plane.side(point), 0.0)[row]
-    offset = point[row] - task.centres[camera]
-    across = offset - (offset @ up)[:, None] * up
-    radius = np.sqrt((across * across).sum(-1))
-    shift = radial_shift_derivatives(
-        radius, z0=height, zp=depth, layers=Layers(indices=(1.0, task.n_water))
-    )
-    small = radius < 1e-9 * (height + depth)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        outward = np.where(small[:, None], 0.0, across / radius[:, None])
-        ratio = np.where(small, shift.d_radius, shift.radius_bar / radius)
-    # Straight ray in air: radius_bar outwards, height + depth down.
-    ray = ratio[:, None] * across - (height + depth)[:, None] * up
-    # Its derivative: sideways by the ratio, outwards by radius and depth, down by the depth.
-    derivative = (
-        ratio[:, None, None] * (np.eye(3) - np.outer(up, up))
-        + outward[:, :, None]
-        * ((shift.d_radius - ratio)[:, None] * outward - shift.d_heights[:, 1, None] * up)[
-            :, None, :
-        ]
-        + np.outer(up, up)
-    )
+    if not isinstance(task.surface, Plane):
+        water = SurfaceSequence(surfaces=(task.surface,), indices=(1.0, task.n_water))
+        path = aim_rays(task.centres[camera], point[row], water, jacobian=True)
+        return path.directions[:, 0], np.asarray(path.jacobian)
+    up = task.surface.normal
+    height = task.surface.side(task.centres)[camera]
+    vectors = point[row] - task.centres[camera]
+    # A point that Newton lifts out of the water for a moment is treated as if just under it.
+    above = vectors @ up + height * (1 + JUST_UNDER)
+    vectors -= np.maximum(above, 0.0)[:, None] * up
+    medium = Medium(normal=up, height=height, thicknesses=(), indices=(1.0, task.n_water))
+    shift = shifts(vectors, medium, media=False)
+    ray = vectors + shift.g[:, None] * up
     length = np.sqrt((ray * ray).sum(-1))[:, None]
     heading = ray / length
+    derivative = np.eye(3) + up[:, None] * shift.gradient(vectors, medium)[:, None, :]
     # Only what is at right angles to the ray turns it.
     derivative -= heading[:, :, None] * (heading[:, None, :] @ derivative)
     return heading, derivative / length[:, :, None]
 
 
-def _propagate(task: _Task, found: FloatArray, precision: Precision) -> FloatArray:
+def _propagate(task: _Task, points: FloatArray, precision: Precision) -> FloatArray:
     """Return the covariance of true positions from index, level and apparent points."""
-    point = found - task.origin
+    point = points - task.origin
     _, normal, change = _balance(task, point)
     by_point = np.linalg.solve(change, normal + _weight_change(task, point))
     covariance: FloatArray = precision.point**2 * by_point @ by_point.transpose(0, 2, 1)
     step = DIFFERENCE * float(np.abs(task.centres[:, 2] - task.apparent[:, 2].mean()).max())
     lift = np.array([0.0, 0.0, step])
-    variants = (
-        (
-            precision.index,
-            DIFFERENCE,
-            {"n_water": task.n_water + DIFFERENCE},
-            {"n_water": task.n_water - DIFFERENCE},
-        ),
-        (
-            precision.level,
-            step,
-            {"surface": task.surface.shifted(lift)},
-            {"surface": task.surface.shifted(-lift)},
-        ),
-    )
-    for sigma, width, more, less in variants:
-        if sigma == 0:
-            continue
-        ahead, _, _ = _balance(task._replace(**more), point)
-        behind, _, _ = _balance(task._replace(**less), point)
-        rate = np.linalg.solve(change, ((ahead - behind) / (2 * width))[..., None])
-        covariance += sigma**2 * rate @ rate.transpose(0, 2, 1)
+
+    def changed(sign: float) -> dict[str, _Task]:
+        return {
+            "index": task._replace(n_water=task.n_water + sign * DIFFERENCE),
+            "level": task._replace(surface=task.surface.shifted(sign * lift)),
+        }
+
+    more, less = changed(1.0), changed(-1.0)
+    for name, width in (("index", DIFFERENCE), ("level", step)):
+        sigma = getattr(precision, name)
+        if sigma > 0:
+            difference = _balance(more[name], point)[0] - _balance(less[name], point)[0]
+            rate = np.linalg.solve(change, (difference / (2 * width))[..., None])
+            covariance += sigma**2 * rate @ rate.transpose(0, 2, 1)
     return covariance
 
 
@@ -378,12 +340,10 @@ def _checked_cameras(cameras: ArrayLike | None, surface: WaterSurface) -> FloatA
     return centres
 
 
-def _checked_visibility(
-    visible: ArrayLike | None, shape: tuple[int, ...], count: int
-) -> BoolArray | None:
+def _checked_visibility(visible: ArrayLike | None, shape: tuple[int, ...], count: int) -> BoolArray:
     """Return which camera saw which point, shape (n, m)."""
     if visible is None:
-        return None
+        return np.broadcast_to(np.True_, (math.prod(shape), count))
     seen = np.asarray(visible, dtype=bool)
     if seen.shape != (*shape, count):
         raise InputError(

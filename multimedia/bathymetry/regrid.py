@@ -44,8 +44,8 @@ def pull_back(values: FloatArray, move: FloatArray) -> FloatArray:
     for _ in range(STEPS):
         shift = _bilinear(np.moveaxis(move, -1, 0), place)
         source = home - np.moveaxis(shift, 0, -1)
-        found = np.asarray(np.isfinite(source).all(axis=-1))
-        place = np.where(found[..., None], source, place)
+        inside = np.asarray(np.isfinite(source).all(axis=-1))
+        place = np.where(inside[..., None], source, place)
     pulled = _bilinear(values, place)
     return np.where(np.isfinite(pulled), pulled, np.where(known, values, np.nan))
 

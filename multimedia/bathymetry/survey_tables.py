@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -67,12 +68,9 @@ def read_camera_positions(path: Path | str) -> CameraPositions:
         )
     name = Column("id", ("camera", "image", "photo", "label", "name", "file"), kind="text")
     table = read_table(path, (name, *_XYZ))
-    errors = table.repeated("id")
-    centres = _complete(table, ("X", "Y", "Z"), errors)
     if not len(table):
         raise InputError(f"{path}: holds no camera.")
-    if errors:
-        raise WorkbookError(errors)
+    centres = _numbers(table, ("X", "Y", "Z"), table.repeated("id"))
     ids = tuple(text or str(k) for k, text in enumerate(table.texts("id"), start=1))
     return CameraPositions(ids=ids, centres=centres)
 
@@ -102,13 +100,9 @@ def read_rays(path: Path | str) -> RayTable:
         *(Column(f"D{axis}", required=True) for axis in "XYZ"),
     )
     table = read_table(path, columns)
-    errors: list[CellError] = []
-    origins = _complete(table, ("X0", "Y0", "Z0"), errors)
-    directions = _complete(table, ("DX", "DY", "DZ"), errors)
-    if errors:
-        raise WorkbookError(errors)
     if not len(table):
         raise InputError(f"{path}: holds no rays.")
+    rays = _numbers(table, ("X0", "Y0", "Z0", "DX", "DY", "DZ"))
     ids, point, counts = np.unique(table.texts("id"), return_inverse=True, return_counts=True)
     # Points in the order of their first ray, rays in the order of the file.
     first = np.full(len(ids), len(point))
@@ -118,12 +112,10 @@ def read_rays(path: Path | str) -> RayTable:
     order = np.argsort(point, kind="stable")
     slot = np.empty(len(point), dtype=np.int64)
     slot[order] = np.arange(len(point)) - np.repeat(np.cumsum(counts) - counts, counts)
-    shape = (len(ids), int(counts.max()), 3)
-    grid_origins, grid_directions = np.full(shape, np.nan), np.full(shape, np.nan)
-    grid_origins[rank[point], slot] = origins
-    grid_directions[rank[point], slot] = directions
+    grid = np.full((len(ids), int(counts.max()), 6), np.nan)
+    grid[rank[point], slot] = rays
     names = tuple(str(name) for name in ids[np.argsort(rank)])
-    return RayTable(ids=names, origins=grid_origins, directions=grid_directions)
+    return RayTable(ids=names, origins=grid[..., :3], directions=grid[..., 3:])
 
 
 def read_trajectory(path: Path | str) -> tuple[FloatArray, FloatArray]:
@@ -136,18 +128,25 @@ def read_trajectory(path: Path | str) -> tuple[FloatArray, FloatArray]:
     """
     columns = (Column("time", ("gps_time", "t"), required=True, unit="s"), *_XYZ)
     table = read_table(path, columns)
-    errors: list[CellError] = []
-    rows = _complete(table, ("time", "X", "Y", "Z"), errors)
-    if errors:
-        raise WorkbookError(errors)
+    rows = _numbers(table, ("time", "X", "Y", "Z"))
     if len(rows) < 2 or not (np.diff(rows[:, 0]) > 0).all():
         raise InputError(f"{path}: needs at least two rows whose times increase.")
     return rows[:, 0], rows[:, 1:]
 
 
-def _complete(table: Table, keys: tuple[str, ...], errors: list[CellError]) -> FloatArray:
-    """Return columns of numbers, (n, k); a blank or infinite cell becomes a complaint."""
+def _numbers(table: Table, keys: tuple[str, ...], errors: Sequence[CellError] = ()) -> FloatArray:
+    """Return columns of numbers, (n, k).
+
+    Raises
+    ------
+    WorkbookError
+        If a cell is blank or infinite, or there are errors already; all of them are named.
+    """
     values = np.column_stack([table.numbers(key) for key in keys])
-    for row, column in np.argwhere(~np.isfinite(values)):
-        errors.append(table.error(int(row), keys[column], "is blank; expected a number."))
+    blank = [
+        table.error(int(row), keys[column], "is blank; expected a number.")
+        for row, column in np.argwhere(~np.isfinite(values))
+    ]
+    if errors or blank:
+        raise WorkbookError([*errors, *blank])
     return values

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -110,14 +110,9 @@ def wave_effect(
     origins = np.broadcast_to(centres, (len(true), *centres.shape))
     errors = np.empty((phases, len(true), 3))
     for number in range(phases):
-        moved = WaveSurface(
-            level=wave.level,
-            amplitude=wave.amplitude,
-            wave_vector=wave.wave_vector,
-            phase=wave.phase + 2 * np.pi * number / phases,
-        )
+        moved = replace(wave, phase=wave.phase + 2 * np.pi * number / phases)
         real = Interfaces(surfaces=(moved,), indices=(1.0, index))
         rays = aim_rays(centres, true[:, None], real).directions[..., 0, :]
-        found = intersect_refracted_rays(origins, rays, water_level=water_level, index=index)
-        errors[number] = found.xyz - true
+        points_seen = intersect_refracted_rays(origins, rays, water_level=water_level, index=index)
+        errors[number] = points_seen.xyz - true
     return WaveEffect(errors=errors)

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
-from pathlib import Path
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -13,11 +12,10 @@ from multimedia.bathymetry.clouds import MARK, Chunk, Cloud, open_cloud
 from multimedia.bathymetry.corrected_points import (
     BathymetryStatus,
     CorrectedPoints,
-    Precision,
     WaterSurface,
-    checked_index,
-    height_of,
+    checked_water_index,
 )
+from multimedia.bathymetry.correction_job import MIXED_UNITS, Job, Outcome
 from multimedia.bathymetry.dem import Dem, Window
 from multimedia.bathymetry.refracted_rays import correct_lidar_beams, intersect_refracted_rays
 from multimedia.bathymetry.refraction_correction import correct_bathymetry
@@ -41,130 +39,6 @@ from photocore.tables import write_csv
 WINDOW = 1024
 #: Widest planimetric shift that is followed across a window's edge. [cells]
 WIDEST_MARGIN = 4096
-#: Deeper than any photo sees: most likely millimetres. [m]
-DEEPEST = 200.0
-#: Lengths that differ by more than this are most likely in different units.
-MIXED_UNITS = 1000.0
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Job:
-    """What `correct_file` is asked to do.
-
-    Attributes
-    ----------
-    source, target : Path
-    water_level : str
-        A height [m] or a file, see `read_water_surface`.
-    index : float
-    cameras, visibility, trajectory : Path or None
-        Camera positions; who saw what; sensor positions over time (lidar).
-    max_angle : float or None
-        A camera sees a point only within this angle from the vertical. [rad]
-    precision : Precision
-    group_index : float or None
-    beams : bool
-        The points are lidar echoes with columns X0, Y0, Z0 or a trajectory.
-    rays : bool
-        The source is a table of measured rays.
-    sigma_direction : float
-        Of measured rays. [rad]
-    nodata : float or None
-    allow_dry : bool
-        Accept data without a single point under water.
-    overwrite : bool
-    """
-
-    source: Path
-    target: Path
-    water_level: str
-    index: float
-    cameras: Path | None = None
-    visibility: Path | None = None
-    trajectory: Path | None = None
-    max_angle: float | None = None
-    precision: Precision = field(default_factory=Precision)
-    group_index: float | None = None
-    beams: bool = False
-    rays: bool = False
-    sigma_direction: float = 1e-4
-    nodata: float | None = None
-    allow_dry: bool = False
-    overwrite: bool = False
-
-
-@dataclass(slots=True)
-class Outcome:
-    """What was done, for the user.
-
-    Attributes
-    ----------
-    counts : dict of str to int
-        Points per treatment.
-    max_depth, mean_change : float
-        Largest true depth and mean change of Z under water. [m]
-    lowest, highest : float
-        Range of the given heights. [m]
-    remarks : list of str
-    """
-
-    counts: dict[str, int] = field(default_factory=dict)
-    max_depth: float = 0.0
-    mean_change: float = 0.0
-    lowest: float = np.inf
-    highest: float = -np.inf
-    remarks: list[str] = field(default_factory=list)
-    _sum: float = 0.0
-    _wet: int = 0
-
-    def add(self, given: FloatArray, result: CorrectedPoints) -> None:
-        """Count a piece."""
-        for status in BathymetryStatus:
-            count = int((result.status == status).sum())
-            if count:
-                self.counts[status.label] = self.counts.get(status.label, 0) + count
-        finite = given[..., 2][np.isfinite(given[..., 2])]
-        if finite.size:
-            self.lowest = min(self.lowest, float(finite.min()))
-            self.highest = max(self.highest, float(finite.max()))
-        wet = np.isin(result.status, (BathymetryStatus.NADIR, BathymetryStatus.RAYS))
-        if wet.any():
-            self._wet += int(wet.sum())
-            self._sum += float((result.xyz - given)[..., 2][wet].sum())
-            self.mean_change = self._sum / self._wet
-            self.max_depth = max(self.max_depth, float(result.depth[wet].max()))
-
-    def judge(self, surface: WaterSurface, *, allow_dry: bool) -> None:
-        """Raise GeometryError when nothing lies under water; note what looks like millimetres."""
-        if not self._wet and not allow_dry:
-            level = _typical_level(surface)
-            hint = ""
-            if 0 < self.lowest / 2 <= 1000 * level <= 2 * self.highest:
-                hint = " The heights look like millimetres, the water level like metres."
-            raise GeometryError(
-                f"no point lies under the water surface: heights {self.lowest:g} to "
-                f"{self.highest:g}, water level {level:g}.{hint} Check level and unit, or say "
-                "--allow-dry if that is right."
-            )
-        span = self.highest - self.lowest
-        if self.max_depth > DEEPEST and 0 < span < self.max_depth / MIXED_UNITS:
-            raise GeometryError(
-                f"the water level {_typical_level(surface):g} lies {self.max_depth:g} above "
-                f"heights that span only {span:g}: are they in different units (mm and m)?"
-            )
-        if self.max_depth > DEEPEST:
-            self.remarks.append(
-                f"The deepest point lies {self.max_depth:.0f} m under water, deeper than photos "
-                "see: are the heights in millimetres, or is the water level wrong?"
-            )
-        failed = self.counts.get(BathymetryStatus.FAILED.label, 0)
-        if failed:
-            self.remarks.append(f"{failed} points could not be corrected and are marked so.")
-        outside = self.counts.get(BathymetryStatus.NO_SURFACE.label, 0)
-        if outside:
-            self.remarks.append(
-                f"{outside} points lie outside the modelled water surface and were left as given."
-            )
 
 
 def correct_file(job: Job, *, progress: Progress = no_progress) -> Outcome:
@@ -176,7 +50,7 @@ def correct_file(job: Job, *, progress: Progress = no_progress) -> Outcome:
         If anything is wrong with the data; the target is then not written.
     """
     check_writable(job.target, overwrite=job.overwrite)
-    checked_index(job.index)
+    checked_water_index(job.index)
     if job.source.resolve() == job.target.resolve():
         raise InputError(f"{job.target}: is the input itself; name another file for --out.")
     if job.rays:
@@ -200,8 +74,8 @@ def _correct_cloud(job: Job, progress: Progress) -> Outcome:
             "the original, or remove the attribute."
         )
     surface = read_water_surface(job.water_level)
-    outcome = Outcome(remarks=list(cloud.remarks))
-    correct = _corrector(job, cloud, surface, outcome)
+    correct, remarks = _corrector(job, cloud, surface)
+    outcome = Outcome(remarks=[*cloud.remarks, *remarks])
     sigmas = ("sigma_X", "sigma_Y", "sigma_Z") if job.precision.is_given and not job.beams else ()
     spoken = job.source.suffix.lower() not in (".ply", ".las", ".laz")
     numbers = ("X0", "Y0", "Z0", "gps_time") if job.beams else ()
@@ -228,22 +102,21 @@ def _correct_cloud(job: Job, progress: Progress) -> Outcome:
 
 
 def _corrector(
-    job: Job, cloud: Cloud, surface: WaterSurface, outcome: Outcome
-) -> Callable[[Chunk], CorrectedPoints]:
-    """Return the function that corrects one piece of a cloud."""
+    job: Job, cloud: Cloud, surface: WaterSurface
+) -> tuple[Callable[[Chunk], CorrectedPoints], list[str]]:
+    """Return the function that corrects one piece of a cloud, and what the user should know."""
+    nadir = partial(
+        correct_bathymetry, water_level=surface, index=job.index, precision=job.precision
+    )
     if job.beams:
         sensor = _sensor_positions(job, cloud)
-        return lambda chunk: correct_lidar_beams(
-            sensor(chunk),
-            chunk.xyz,
-            water_level=surface,
-            index=job.index,
-            group_index=job.group_index,
+        beams = partial(
+            correct_lidar_beams, water_level=surface, index=job.index, group_index=job.group_index
         )
+        return lambda chunk: beams(sensor(chunk), chunk.xyz), []
     if job.cameras is None:
-        return lambda chunk: correct_bathymetry(
-            chunk.xyz, water_level=surface, index=job.index, precision=job.precision
-        )
+        return lambda chunk: nadir(chunk.xyz), []
+    remarks = []
     cameras = read_camera_positions(job.cameras)
     pairs = read_visibility(job.visibility) if job.visibility else None
     if pairs is not None:
@@ -251,23 +124,17 @@ def _corrector(
         if not cloud.has("id"):
             raise InputError(f"{job.source}: --visibility needs a column id in the point cloud.")
     elif not cloud.has("cameras") and job.max_angle is None:
-        outcome.remarks.append(
+        remarks.append(
             "Nothing says which camera saw which point; every camera is taken to see every point. "
             "--visibility, a column 'cameras' or --max-angle do better."
         )
 
     def correct(chunk: Chunk) -> CorrectedPoints:
         _check_camera_unit(chunk.xyz, cameras.centres, job)
-        return correct_bathymetry(
-            chunk.xyz,
-            water_level=surface,
-            index=job.index,
-            cameras=cameras.centres,
-            visible=_visible(chunk, cameras, pairs, job),
-            precision=job.precision,
-        )
+        visible = _visible(chunk, cameras, pairs, job)
+        return nadir(chunk.xyz, cameras=cameras.centres, visible=visible)
 
-    return correct
+    return correct, remarks
 
 
 def _visible(
@@ -470,7 +337,7 @@ def _correct_rays(job: Job) -> Outcome:
         raise InputError(f"{job.target}: intersected rays are written as .csv.")
     table = read_rays(job.source)
     surface = read_water_surface(job.water_level)
-    found = intersect_refracted_rays(
+    points = intersect_refracted_rays(
         table.origins,
         table.directions,
         water_level=surface,
@@ -478,17 +345,17 @@ def _correct_rays(job: Job) -> Outcome:
         sigma_direction=job.sigma_direction,
     )
     outcome = Outcome()
-    depth = np.maximum(height_of(surface, found.xyz[:, :2]) - found.xyz[:, 2], 0.0)
-    result = CorrectedPoints(xyz=found.xyz, depth=depth, status=found.status)
-    outcome.add(found.xyz, result)
+    depth = np.maximum(surface.height_at(points.xyz[:, :2]) - points.xyz[:, 2], 0.0)
+    result = CorrectedPoints(xyz=points.xyz, depth=depth, status=points.status)
+    outcome.add(points.xyz, result)
     outcome.judge(surface, allow_dry=job.allow_dry)
     columns: dict[str, Any] = {"id": list(table.ids)}
-    columns |= dict(zip("XYZ", found.xyz.T, strict=True))
-    columns |= dict(zip(("sigma_X", "sigma_Y", "sigma_Z"), found.sigma.T, strict=True))
+    columns |= dict(zip("XYZ", points.xyz.T, strict=True))
+    columns |= dict(zip(("sigma_X", "sigma_Y", "sigma_Z"), points.sigma.T, strict=True))
     columns |= {
-        "misfit": found.misfit,
-        "rays": found.rays,
-        MARK: [BathymetryStatus(int(code)).label for code in found.status],
+        "misfit": points.misfit,
+        "rays": points.rays,
+        MARK: [BathymetryStatus(int(code)).label for code in points.status],
         "water_depth": depth,
     }
     write_csv(job.target, columns, overwrite=job.overwrite)
@@ -498,10 +365,3 @@ def _correct_rays(job: Job) -> Outcome:
 def _varies(surface: WaterSurface) -> bool:
     """Return whether the water is anything but level."""
     return not (isinstance(surface, Plane) and abs(surface.normal[2]) == 1.0)
-
-
-def _typical_level(surface: WaterSurface) -> float:
-    """Return one height of the surface, for messages."""
-    if isinstance(surface, Plane):
-        return float(surface.point[2])
-    return (surface.lowest + surface.highest) / 2

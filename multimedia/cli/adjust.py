@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from photocore.cli import print_json, remark, text_table
+from photocore.cli import print_result, tell_written, text_table
+from photocore.options import FILE, NUMBER, Names, as_json, number, overwrite
 
 if TYPE_CHECKING:
     from multimedia.adjustment.unknowns import Adjustment
@@ -24,24 +25,17 @@ NAME:index3 for one media of several. Labels for --prior are those of the result
 """
 
 
-def _names(
-    ctx: click.Context, param: click.Parameter, value: str  # noqa: ARG001
-) -> tuple[str, ...]:  # fmt: skip
-    """Split a list at commas."""
-    return tuple(part.strip() for part in value.split(",") if part.strip())
-
-
-@click.command(short_help="Bundle adjustment: cameras, points, media.", epilog=EXAMPLE)
-@click.argument("project", type=click.Path(path_type=Path))
+@click.command(epilog=EXAMPLE)
+@click.argument("project", type=FILE)
 @click.option(
-    "--interior", default="", callback=_names, metavar="LIST",
+    "--interior", default="", type=Names(), metavar="LIST",
     help="Interior parameters to estimate, of c,xh,yh,k1,k2,k3,p1,p2,scale,shear.  [default: none]",
 )  # fmt: skip
 @click.option(
     "--shared-interior", is_flag=True, help="One set of interior parameters for all cameras."
 )
 @click.option(
-    "--media", default="", callback=_names, metavar="LIST",
+    "--media", default="", type=Names(), metavar="LIST",
     help="Unknowns of the media, e.g. index3,offset,tilt1,tilt2.  [default: none]",
 )  # fmt: skip
 @click.option(
@@ -64,31 +58,27 @@ def _names(
     "--prior", multiple=True, metavar="LABEL=SIGMA",
     help="Standard deviation of an unknown's start value [its unit]; repeat it.",
 )  # fmt: skip
-@click.option(
-    "--robust", type=float, metavar="K",
-    help="Huber weights beyond K standard deviations.  [default: plain least squares]",
-)  # fmt: skip
-@click.option("--wavelength", type=float, default=None, help="For the salinity: light [nm].")
-@click.option("--temperature", type=float, help="For the salinity: water temperature [deg C].")
-@click.option("--depth", type=float, default=0.0, show_default=True, help="Its depth [m].")
-@click.option("--out", type=click.Path(path_type=Path), help="Write the adjusted project (.toml).")
-@click.option("--report", type=click.Path(path_type=Path), help="Write a report (.html).")
-@click.option("--overwrite", is_flag=True, help="Replace existing files.")
-@click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
+@number(
+    "--robust", "K", "Huber weights beyond K standard deviations.  [default: plain least squares]"
+)
+@number("--wavelength", "NM", "For the salinity: light [nm].")
+@number("--temperature", "C", "For the salinity: water temperature [deg C].", type=NUMBER)
+@number("--depth", "M", "Its depth [m].", type=NUMBER, default=0.0)
+@click.option("--out", type=FILE, help="Write the adjusted project (.toml).")
+@click.option("--report", type=FILE, help="Write a report (.html).")
+@overwrite
+@as_json
 def command(
-    project: Path, interior: tuple[str, ...], shared_interior: bool, media: tuple[str, ...],
-    fix_camera: tuple[str, ...], control: str, plate: tuple[str, ...], scale_bar: tuple[str, ...],
-    prior: tuple[str, ...], robust: float | None, wavelength: float | None,
-    temperature: float | None, depth: float, out: Path | None, report: Path | None,
-    overwrite: bool, as_json: bool,
+    project: Path, fix_camera: tuple[str, ...], plate: tuple[str, ...], scale_bar: tuple[str, ...],
+    prior: tuple[str, ...], wavelength: float | None, temperature: float | None, depth: float,
+    out: Path | None, report: Path | None, overwrite: bool, as_json: bool, **choices: Any,
 ) -> None:  # fmt: skip
     """Adjust cameras, object points and the media of a project together."""
     from multimedia.adjustment import workflow as adjust
     from multimedia.adjustment.unknowns import Unknowns
 
     unknowns = Unknowns(
-        fixed_cameras=fix_camera, interior=interior, shared_interior=shared_interior, media=media,
-        control=control, plates=plate, robust=robust,
+        fixed_cameras=fix_camera, plates=plate, **choices,
         scale_bars=tuple(adjust.parse_scale_bar(text) for text in scale_bar),
         priors=dict(adjust.parse_prior(text) for text in prior),
     )  # fmt: skip
@@ -100,24 +90,16 @@ def command(
         salinity = adjust.salinity_of(
             result, wavelength_nm=wavelength, temperature_c=temperature, depth=depth
         )
-    for note in notes:
-        remark(note)
-    if as_json:
-        data = adjust.as_dict(result)
-        if salinity:
-            data["salinity_percent"] = {"value": salinity[0], "sigma": salinity[1]}
-        print_json(data)
-    else:
-        _print(result)
-        if salinity:
-            click.echo(f"Salinity {salinity[0]:.3f} % (sigma {salinity[1]:.3f} %)")
-    for path in (out, report):
-        if path is not None:
-            remark(f"Written: {path}")
+    data, lines = adjust.as_dict(result), _lines(result)
+    if salinity:
+        data["salinity_percent"] = {"value": salinity[0], "sigma": salinity[1]}
+        lines.append(f"Salinity {salinity[0]:.3f} % (sigma {salinity[1]:.3f} %)")
+    print_result(data, lines, as_json=as_json, remarks=notes)
+    tell_written(out, report)
 
 
-def _print(result: Adjustment) -> None:
-    """Print sigma0, the unknowns and the suspects."""
+def _lines(result: Adjustment) -> list[str]:
+    """Return sigma0, the unknowns and the suspects."""
     import numpy as np
 
     rows = []
@@ -127,15 +109,12 @@ def _print(result: Adjustment) -> None:
         if name.rsplit(":", 1)[-1] in ("omega", "phi", "kappa", "tilt1", "tilt2"):
             value, sigma, unit = float(np.degrees(value)), float(np.degrees(sigma)), "deg"
         rows.append((name, f"{value:.6f}", f"{sigma:.2g}", unit))
-    click.echo(text_table(("unknown", "value", "sigma", ""), rows))
-    click.echo(
-        f"\nsigma0 {result.sigma0 * 1000:.3f} um, redundancy {result.redundancy}, "
-        f"{result.iterations} iterations"
-    )
-    for camera, sigma0 in result.sigma0_of.items():
-        click.echo(f"  camera {camera}: sigma0 {sigma0 * 1000:.3f} um")
     suspects = result.suspects()
-    for sentence in suspects[:20]:
-        click.echo(f"Suspected: {sentence}")
-    if len(suspects) > 20:
-        click.echo(f"... and {len(suspects) - 20} more")
+    return [
+        text_table(("unknown", "value", "sigma", ""), rows),
+        f"\nsigma0 {result.sigma0 * 1000:.3f} um, redundancy {result.redundancy}, "
+        f"{result.iterations} iterations",
+        *(f"  camera {name}: sigma0 {s * 1000:.3f} um" for name, s in result.sigma0_of.items()),
+        *(f"Suspected: {sentence}" for sentence in suspects[:20]),
+        *([f"... and {len(suspects) - 20} more"] if len(suspects) > 20 else []),
+    ]

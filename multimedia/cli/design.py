@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from math import degrees, radians
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from photocore.cli import print_json, remark, text_table
-from photocore.options import Size
+from photocore.cli import print_result, tell_written, text_table
+from photocore.options import FILE, POSITIVE, Number, Numbers, Size, as_json, number, overwrite
 
 if TYPE_CHECKING:
     from multimedia.design.studies import Design
@@ -21,114 +23,91 @@ Examples:
 """
 
 
-def _numbers(ctx: click.Context, param: click.Parameter, value: str | None) -> tuple[float, ...]:
-    """Split a list of numbers at commas."""
-    try:
-        return tuple(float(part) for part in (value or "").split(",") if part.strip())
-    except ValueError:
-        raise click.BadParameter(f"{value!r} is not a list of numbers", ctx, param) from None
-
-
-@click.command(short_help="Accuracy studies before anyone gets wet.", epilog=EXAMPLE)
-@click.argument("project", required=False, type=click.Path(path_type=Path))
-@click.option("--cameras", type=int, default=4, show_default=True, help="Cameras on the cone.")
-@click.option("--distance", type=float, help="From the last face to each camera [m].")
+@click.command(epilog=EXAMPLE)
+@click.argument("project", required=False, type=FILE)
 @click.option(
-    "--half-angle", type=float, default=30.0, show_default=True,
+    "--cameras", "count", type=click.IntRange(min=1), default=4, show_default=True,
+    help="Cameras on the cone.",
+)  # fmt: skip
+@number("--distance", "M", "From the last face to each camera [m].")
+@click.option(
+    "--half-angle", type=Number(above=0, below=90, to=radians), default=30.0, show_default=True,
     help="Half opening of the cone of cameras, in air [deg].",
 )  # fmt: skip
-@click.option("--c", "principal_distance", type=float, help="Principal distance [mm].")
+@click.option("--c", "principal_distance", type=POSITIVE, help="Principal distance [mm].")
 @click.option(
-    "--indices", callback=_numbers, default="1,1.337", show_default=True,
+    "--indices", type=Numbers(above=0), default="1,1.337", show_default=True,
     help="Refractive indices from camera to object.",
 )  # fmt: skip
 @click.option(
-    "--thicknesses",
-    callback=_numbers,
-    default="",
+    "--thicknesses", type=Numbers(least=0), default="",
     help="Of media between [m].  [default: none]",
-)
-@click.option("--extent", type=Size(), help="Width x height of the object space [m].")
+)  # fmt: skip
+@click.option("--extent", type=Size(least=0), help="Width x height of the object space [m].")
 @click.option(
     "--depths", type=Size(), metavar="LEASTxLARGEST", help="Depths of the object space [m]."
 )
 @click.option(
-    "--sigma", "sigma_image", type=float, default=0.001, show_default=True,
+    "--sigma", "sigma_image", type=POSITIVE, default=0.001, show_default=True,
     help="Precision of an image coordinate [mm].",
 )  # fmt: skip
-@click.option("--seed", type=int, default=1, show_default=True, help="Of the simulated noise.")
-@click.option("--out", type=click.Path(path_type=Path), help="Write the tables (.xlsx).")
-@click.option("--plot", type=click.Path(path_type=Path), help="Draw them (.png, .svg, .pdf).")
-@click.option("--overwrite", is_flag=True, help="Replace existing files.")
-@click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
+@click.option(
+    "--seed", type=click.IntRange(min=0), default=1, show_default=True,
+    help="Of the simulated noise.",
+)  # fmt: skip
+@click.option("--out", type=FILE, help="Write the tables (.xlsx).")
+@click.option("--plot", type=FILE, help="Draw them (.png, .svg, .pdf).")
+@overwrite
+@as_json
 def command(
-    project: Path | None, cameras: int, distance: float | None, half_angle: float,
-    principal_distance: float | None, indices: tuple[float, ...], thicknesses: tuple[float, ...],
-    extent: tuple[float, float] | None, depths: tuple[float, float] | None, sigma_image: float,
-    seed: int, out: Path | None, plot: Path | None, overwrite: bool, as_json: bool,
+    project: Path | None, seed: int, out: Path | None, plot: Path | None, overwrite: bool,
+    as_json: bool, **ring: Any,
 ) -> None:  # fmt: skip
     """Predict precision, ray angles, sensitivities and calibration costs of a set-up.
 
     Of a PROJECT file with cameras, media and the object points to be measured; or of cameras on a
     cone above the water, described by options.
     """
-    from math import radians
-
     from multimedia.design import workflow as design
 
     if project is not None:
         result = design.design_project(project, seed=seed)
     else:
-        needed = {"--distance": distance, "--c": principal_distance, "--extent": extent,
-                  "--depths": depths}  # fmt: skip
-        missing = [name for name, value in needed.items() if value is None]
-        if distance is None or principal_distance is None or extent is None or depths is None:
+        needed = {"--distance": "distance", "--c": "principal_distance", "--extent": "extent",
+                  "--depths": "depths"}  # fmt: skip
+        missing = [option for option, name in needed.items() if ring[name] is None]
+        if missing:
             raise click.UsageError(f"give a PROJECT file, or {', '.join(missing)} as well.")
-        result = design.design_ring(
-            count=cameras, distance=distance, half_angle=radians(half_angle),
-            principal_distance=principal_distance, indices=indices, thicknesses=thicknesses,
-            extent=extent, depths=depths, sigma_image=sigma_image, seed=seed,
-        )  # fmt: skip
+        result = design.design_ring(seed=seed, **ring)
     design.write_design(result, out=out, plot=plot, overwrite=overwrite)
-    for note in result.remarks:
-        remark(note)
-    if as_json:
-        print_json(design.as_dict(result))
-    else:
-        _print(result)
-    for path in (out, plot):
-        if path is not None:
-            remark(f"Written: {path}")
+    print_result(design.as_dict(result), _lines(result), as_json=as_json, remarks=result.remarks)
+    tell_written(out, plot)
 
 
-def _print(result: Design) -> None:
-    """Print the tables."""
-    from math import degrees
-
+def _lines(result: Design) -> Iterator[str]:
+    """Yield the tables."""
     unit = result.unit
     rows = [
         (f"{d:.4g}", f"{x:.3g}", f"{y:.3g}", f"{z:.3g}", f"{a:.1f}", f"{b:.1f}")
         for d, x, y, z, a, b in result.by_depth.tolist()
     ]
-    click.echo(f"Expected precision [{unit}] and intersection angle [deg]")
-    click.echo(text_table(("depth", "sigma X", "sigma Y", "sigma Z", "angle", "in air"), rows))
-    click.echo(f"\nWhat unknown media do to coordinates, RMS [{unit}]")
-    click.echo(
-        text_table(
-            ("unknown", "wrong by", "dX", "dY", "dZ"),
-            [(n, s, *(f"{v:.3g}" for v in moved)) for n, s, moved in result.sensitivities],
-        )
+    yield f"Expected precision [{unit}] and intersection angle [deg]"
+    yield text_table(("depth", "sigma X", "sigma Y", "sigma Z", "angle", "in air"), rows)
+    yield f"\nWhat unknown media do to coordinates, RMS [{unit}]"
+    yield text_table(
+        ("unknown", "wrong by", "dX", "dY", "dZ"),
+        [(n, s, *(f"{v:.3g}" for v in moved)) for n, s, moved in result.sensitivities],
     )
     if result.placements:
-        click.echo("\nPlacement of the cameras")
+        yield "\nPlacement of the cameras"
         places = [
             (f"{degrees(p.half_angle):.0f}", *(f"{v:.3g}" for v in p.sigma),
              f"{degrees(p.angle):.1f}")
             for p in result.placements
         ]  # fmt: skip
-        click.echo(text_table(("half angle", "sigma X", "sigma Y", "sigma Z", "rays"), places))
+        yield text_table(("half angle", "sigma X", "sigma Y", "sigma Z", "rays"), places)
         best = min(result.placements, key=lambda p: sum(v * v for v in p.sigma))
-        click.echo(f"Best: half angle {degrees(best.half_angle):.0f} deg.")
+        yield f"Best: half angle {degrees(best.half_angle):.0f} deg."
     if result.costs is not None:
         costs = result.costs
         cases = (
@@ -136,24 +115,18 @@ def _print(result: Design) -> None:
             ("II  water, calibrated in air", costs.air_calibration_in_water, costs.sigma0[1]),
             ("III water, calibrated in water", costs.water, costs.sigma0[2]),
         )
-        click.echo(f"\nCheck points when calibrating in air or in water, RMS [{unit}] (simulated)")
-        click.echo(
-            text_table(
-                ("case", "X", "Y", "Z", "sigma0 um"),
-                [(n, *(f"{v:.3g}" for v in e), f"{s * 1000:.2f}") for n, e, s in cases],
-            )
+        yield f"\nCheck points when calibrating in air or in water, RMS [{unit}] (simulated)"
+        yield text_table(
+            ("case", "X", "Y", "Z", "sigma0 um"),
+            [(n, *(f"{v:.3g}" for v in e), f"{s * 1000:.2f}") for n, e, s in cases],
         )
     if result.models:
-        click.echo(
-            f"\nSimplified models in place of the rigorous one, error across the ray [{unit}]"
+        yield f"\nSimplified models in place of the rigorous one, error across the ray [{unit}]"
+        yield text_table(
+            ("model", "RMS", "largest"),
+            [(name, f"{rms:.3g}", f"{largest:.3g}") for name, rms, largest in result.models],
         )
-        click.echo(
-            text_table(
-                ("model", "RMS", "largest"),
-                [(name, f"{rms:.3g}", f"{largest:.3g}") for name, rms, largest in result.models],
-            )
-        )
-        click.echo(
+        yield (
             f"Colour seam, red (650 nm) to blue (450 nm): up to {result.seam * 1000:.1f} um in the "
             "image (camera square to the media)."
         )

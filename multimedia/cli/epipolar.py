@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from photocore.cli import print_json, remark, text_table
+from photocore.cli import print_result, tell_written, text_table
+from photocore.options import FILE, THOUSANDTHS, Numbers, as_json, number, overwrite
 
 if TYPE_CHECKING:
     from multimedia.orientation.epipolar_workflow import Curves
@@ -20,40 +22,22 @@ Examples:
 """
 
 
-class Numbers(click.ParamType):  # type: ignore[type-arg,unused-ignore]
-    """Two numbers with a comma."""
-
-    name = "A,B"
-
-    def convert(
-        self, value: object, param: click.Parameter | None, ctx: click.Context | None
-    ) -> tuple[float, float]:
-        """Return both."""
-        if isinstance(value, tuple):
-            return value
-        try:
-            one, two = (float(part) for part in str(value).replace(";", ",").split(","))
-        except ValueError:
-            self.fail(f"{value!r} is not two numbers with a comma, e.g. 640.5,371.2", param, ctx)
-        return one, two
-
-
-@click.command(short_help="Epipolar curves and the candidates along them.", epilog=EXAMPLE)
-@click.argument("project", type=click.Path(path_type=Path))
+@click.command(epilog=EXAMPLE)
+@click.argument("project", type=FILE)
 @click.option("--camera", required=True, help="Camera of the image points.")
 @click.option("--to", "other", required=True, help="Camera in whose image the curves run.")
 @click.option(
     "--point", "ids", multiple=True, metavar="ID",
     help="Image point of --camera; repeatable.  [default: all of them]",
 )  # fmt: skip
-@click.option("--at", type=Numbers(), help="Column, row of a point instead [px].")
+@click.option("--at", type=Numbers(2), metavar="A,B", help="Column, row of a point instead [px].")
 @click.option(
-    "--z-range", type=Numbers(),
+    "--z-range", type=Numbers(2), metavar="A,B",
     help="Depth range of the object, Z from and to [unit of the project].  [default: that of the "
     "object points and a quarter more]",
 )  # fmt: skip
 @click.option(
-    "--chord", type=click.FloatRange(min=0, min_open=True), default=0.5, show_default=True,
+    "--chord", "chord_error", type=THOUSANDTHS, default=0.5, show_default=True,
     metavar="UM", help="Largest distance between curve and polygon [um].",
 )  # fmt: skip
 @click.option(
@@ -61,32 +45,17 @@ class Numbers(click.ParamType):  # type: ignore[type-arg,unused-ignore]
     type=int,
     help="Fixed number of vertices instead of --chord.  [default: as needed]",
 )
-@click.option(
-    "--tolerance", type=click.FloatRange(min=0, min_open=True), default=10.0, show_default=True,
-    metavar="UM", help="Half width of the band in which candidates are looked for [um].",
+@number(
+    "--tolerance", "UM", "Half width of the band in which candidates are looked for [um].",
+    type=THOUSANDTHS, default=10.0,
 )  # fmt: skip
-@click.option("--out", type=click.Path(path_type=Path), help="Vertices as .csv or .xlsx.")
-@click.option(
-    "--picture", type=click.Path(path_type=Path), help="Picture of the curves: .png, .svg or .pdf."
-)
-@click.option("--photo", type=click.Path(path_type=Path), help="Image of --to, under the picture.")
-@click.option("--overwrite", is_flag=True, help="Replace existing files.")
-@click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
+@click.option("--out", type=FILE, help="Vertices as .csv or .xlsx.")
+@click.option("--picture", type=FILE, help="Picture of the curves: .png, .svg or .pdf.")
+@click.option("--photo", type=FILE, help="Image of --to, under the picture.")
+@overwrite
+@as_json
 def command(
-    project: Path,
-    camera: str,
-    other: str,
-    ids: tuple[str, ...],
-    at: tuple[float, float] | None,
-    z_range: tuple[float, float] | None,
-    chord: float,
-    vertices: int | None,
-    tolerance: float,
-    out: Path | None,
-    picture: Path | None,
-    photo: Path | None,
-    overwrite: bool,
-    as_json: bool,
+    project: Path, out: Path | None, picture: Path | None, as_json: bool, **options: Any
 ) -> None:
     """Draw where the ray of an image point of one camera runs in the image of another.
 
@@ -96,41 +65,31 @@ def command(
     """
     from multimedia.orientation.epipolar_workflow import epipolar_project
 
-    found = epipolar_project(
-        project, camera=camera, other=other, ids=ids, at=at, z_range=z_range,
-        chord_error=chord / 1000.0, vertices=vertices, tolerance=tolerance / 1000.0, out=out,
-        picture=picture, photo=photo, overwrite=overwrite,
+    found = epipolar_project(project, out=out, picture=picture, **options)
+    print_result(
+        {"z_range": found.z_range, "curves": found.curves, "candidates": found.candidates},
+        _lines(found), as_json=as_json, remarks=(f"Note: {line}" for line in found.remarks),
     )  # fmt: skip
-    for line in found.remarks:
-        remark(f"Note: {line}")
-    if as_json:
-        print_json(
-            {"z_range": found.z_range, "curves": found.curves, "candidates": found.candidates}
-        )
-    else:
-        _print(found)
-    for file in (out, picture):
-        if file is not None:
-            remark(f"Written: {file}")
+    tell_written(out, picture)
 
 
-def _print(found: Curves) -> None:
-    """Print the curves if they are few, and the candidates."""
+def _lines(found: Curves) -> Iterator[str]:
+    """Yield the curves if they are few, and the candidates."""
     if len(found.curves) <= 3:
         rows = [
             (c["id"], *(f"{v:.5f}" for v in xy), *(f"{v:.4f}" for v in xyz))
             for c in found.curves
             for xy, xyz in zip(c["image"], c["points"], strict=True)
         ]
-        click.echo(text_table(("point", "x mm", "y mm", "X", "Y", "Z"), rows))
+        yield text_table(("point", "x mm", "y mm", "X", "Y", "Z"), rows)
     else:
-        click.echo(f"{len(found.curves)} curves; --out writes their vertices.")
+        yield f"{len(found.curves)} curves; --out writes their vertices."
     rows = [
         (c["id"], c["target"], f"{c['distance'] * 1000:.2f}", *(f"{c[k]:.4f}" for k in "XYZ"))
         for c in found.candidates
     ]
-    click.echo(f"\n{len(rows)} candidates")
+    yield f"\n{len(rows)} candidates"
     if rows:
-        click.echo(text_table(("point", "candidate", "off um", "X", "Y", "Z"), rows[:40]))
+        yield text_table(("point", "candidate", "off um", "X", "Y", "Z"), rows[:40])
     if len(rows) > 40:
-        click.echo(f"... and {len(rows) - 40} more; --json lists them all.")
+        yield f"... and {len(rows) - 40} more; --json lists them all."

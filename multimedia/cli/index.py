@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import click
 
-from photocore.cli import print_json, remark
+from photocore.cli import print_result, remark
+from photocore.options import NOT_NEGATIVE, NUMBER, as_json, number
 
 EXAMPLE = """\b
 Examples:
@@ -15,51 +16,40 @@ Examples:
 """
 
 
-@click.command(short_help="Refractive index of water, and its inverse.", epilog=EXAMPLE)
-@click.option(
-    "--wavelength", type=float, default=550.0, show_default=True, metavar="NM",
-    help="Wavelength of the light [nm]; blue 460, green 550, red 620.",
+@click.command(epilog=EXAMPLE)
+@number(
+    "--wavelength", "NM", "Wavelength of the light [nm]; blue 460, green 550, red 620.",
+    default=550.0,
 )  # fmt: skip
-@click.option(
-    "--temperature", type=float, default=20.0, show_default=True, metavar="C",
-    help="Water temperature [°C].",
-)  # fmt: skip
-@click.option(
-    "--salinity", type=float, default=0.0, show_default=True, metavar="PERCENT",
-    help="Salinity [%]; sea water has 3.5.",
-)  # fmt: skip
-@click.option(
-    "--depth", type=float, default=0.0, show_default=True, metavar="M", help="Water depth [m]."
-)
+@number("--temperature", "C", "Water temperature [°C].", type=NUMBER, default=20.0)
+@number("--salinity", "PERCENT", "Salinity [%]; sea water has 3.5.", type=NUMBER, default=0.0)
+@number("--depth", "M", "Water depth [m].", type=NUMBER, default=0.0)
 @click.option(
     "--formula", type=click.Choice(["hoehle", "quan-fry", "parrish"]), default="hoehle",
     show_default=True, help="Published formula; hoehle is that of the multimedia papers.",
 )  # fmt: skip
-@click.option(
-    "--sigma-wavelength", type=float, default=0.0, show_default=True, metavar="NM",
-    help="Standard deviation of the wavelength [nm].",
+@number(
+    "--sigma-wavelength", "NM", "Standard deviation of the wavelength [nm].",
+    type=NOT_NEGATIVE, default=0.0,
 )  # fmt: skip
-@click.option(
-    "--sigma-temperature", type=float, default=0.0, show_default=True, metavar="C",
-    help="Standard deviation of the temperature [°C].",
+@number(
+    "--sigma-temperature", "C", "Standard deviation of the temperature [°C].",
+    type=NOT_NEGATIVE, default=0.0,
 )  # fmt: skip
-@click.option(
-    "--sigma-salinity", type=float, default=0.0, show_default=True, metavar="PERCENT",
-    help="Standard deviation of the salinity [%].",
+@number(
+    "--sigma-salinity", "PERCENT", "Standard deviation of the salinity [%].",
+    type=NOT_NEGATIVE, default=0.0,
 )  # fmt: skip
-@click.option(
-    "--from-index", type=float, metavar="N",
-    help="A measured refractive index: the inverse; needs --find.",
-)  # fmt: skip
-@click.option(
-    "--sigma-index", type=float, default=0.0, show_default=True, metavar="N",
-    help="Standard deviation of the measured index.",
+@number("--from-index", "N", "A measured refractive index: the inverse; needs --find.")
+@number(
+    "--sigma-index", "N", "Standard deviation of the measured index.",
+    type=NOT_NEGATIVE, default=0.0,
 )  # fmt: skip
 @click.option(
     "--find", type=click.Choice(["salinity", "temperature"]),
     help="What to find from --from-index; the others are given.",
 )  # fmt: skip
-@click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
+@as_json
 def command(
     wavelength: float, temperature: float, salinity: float, depth: float, formula: str,
     sigma_wavelength: float, sigma_temperature: float, sigma_salinity: float,
@@ -73,20 +63,14 @@ def command(
         raise click.UsageError("--from-index and --find belong together.")
     from multimedia.workbook.index_workflow import find_from_index, find_index
 
+    water = (wavelength, temperature, salinity, depth, formula)
+    sigmas = (sigma_wavelength, sigma_temperature, sigma_salinity)
     if find is None or from_index is None:
-        result = find_index(
-            wavelength, temperature, salinity, depth, formula,
-            sigmas=(sigma_wavelength, sigma_temperature, sigma_salinity),
-        )  # fmt: skip
+        result = find_index(*water, sigmas=sigmas)
     else:
-        result = find_from_index(
-            find, from_index, sigma_index, wavelength, temperature, salinity, depth, formula,
-            sigmas=(sigma_wavelength, sigma_temperature, sigma_salinity),
-        )  # fmt: skip
-    if as_json:
-        print_json(result.as_dict())
-    else:
-        click.echo(result.text)
+        result = find_from_index(find, from_index, sigma_index, *water, sigmas=sigmas)
+    print_result(result.as_dict(), [result.text], as_json=as_json)
+    if not as_json:
         remark(f"{result.label}, formula {result.formula.name}: {result.formula.citation}")
         if result.sigma:
             remark(f"standard deviation {result.sigma:.2g}{result.unit}")

@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import click
+
+from photocore.options import FILE, as_json, overwrite
 
 EXAMPLE = """\b
 Examples:
@@ -14,10 +17,10 @@ Examples:
 """
 
 
-@click.command(short_help="Object points from image points of two or more cameras.", epilog=EXAMPLE)
-@click.argument("project", type=click.Path(path_type=Path))
+@click.command(epilog=EXAMPLE)
+@click.argument("project", type=FILE)
 @click.option(
-    "--points", type=click.Path(path_type=Path),
+    "--points", type=FILE,
     help="Table of image points: camera, id, and col, row [px] or x, y [mm]; or one row per point "
     "with columns such as 'cam1 col', 'cam1 row'.  [default: the project's own]",
 )  # fmt: skip
@@ -27,17 +30,10 @@ Examples:
     help="Least squares of the image residuals; of the distances to the rays; or the mean of the "
     "midpoints of all pairs of rays, as OpenPTV does.",
 )  # fmt: skip
-@click.option("--out", type=click.Path(path_type=Path), help="Also write a .csv or .xlsx table.")
-@click.option("--overwrite", is_flag=True, help="Replace an existing file.")
-@click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
-def command(
-    project: Path,
-    points: Path | None,
-    method: str,
-    out: Path | None,
-    overwrite: bool,
-    as_json: bool,
-) -> None:
+@click.option("--out", type=FILE, help="Also write a .csv or .xlsx table.")
+@overwrite
+@as_json
+def command(project: Path, out: Path | None, as_json: bool, **options: Any) -> None:
     """Intersect the rays of every point that two or more cameras of PROJECT (.toml) saw.
 
     Gives X, Y, Z with standard deviations [unit of the project], the number of rays, the largest
@@ -47,6 +43,6 @@ def command(
     from multimedia.cli.tables import show
     from multimedia.orientation.workflow import intersect_project
 
-    table = intersect_project(project, points=points, out=out, method=method, overwrite=overwrite)
+    table = intersect_project(project, out=out, **options)
     places = dict.fromkeys(("X", "Y", "Z"), 4) | {"angle": 1, "sigma0": 2}
     show(table, as_json=as_json, out=out, digits=places)

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import click
 
-from photocore.cli import print_json, remark, text_table
+from photocore.cli import print_json, print_result, remark, text_table
+from photocore.options import FILE, as_json, number, overwrite
 
 EXAMPLE = """\b
 Examples:
@@ -16,38 +18,32 @@ Examples:
 """
 
 
-@click.command(short_help="Project file from an OpenPTV experiment folder.", epilog=EXAMPLE)
-@click.argument("source", metavar="DIR", type=click.Path(path_type=Path))
+@click.command(epilog=EXAMPLE)
+@click.argument("source", metavar="DIR", type=FILE)
 @click.option(
-    "--out", type=click.Path(path_type=Path),
+    "--out", type=FILE,
     help="Project file to write (.toml), tables beside it.  [default: name of the folder + .toml, "
     "here]",
 )  # fmt: skip
 @click.option("--swap-indices", is_flag=True, help="Exchange the indices of glass and water.")
 @click.option(
-    "--min-pixels", type=click.IntRange(min=1), default=15, show_default=True,
+    "--min-pixels", "least_pixels", type=click.IntRange(min=1), default=15, show_default=True,
     help="Smaller targets are no dots of the calibration body [px].",
 )  # fmt: skip
-@click.option(
-    "--radius", type=click.FloatRange(min=0, min_open=True), default=25.0, show_default=True,
-    help="Farthest a target may lie from where the stored orientation expects it [px].",
+@number(
+    "--radius", "PX",
+    "Farthest a target may lie from where the stored orientation expects it [px].", default=25.0,
 )  # fmt: skip
 @click.option(
-    "--export", type=click.Path(path_type=Path),
+    "--export", type=FILE,
     help="The other way: DIR is a project file; write it as an OpenPTV folder.",
 )  # fmt: skip
-@click.option("--overwrite", is_flag=True, help="Replace existing files.")
-@click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
+@overwrite
+@as_json
 def command(
-    source: Path,
-    out: Path | None,
-    swap_indices: bool,
-    min_pixels: int,
-    radius: float,
-    export: Path | None,
-    overwrite: bool,
-    as_json: bool,
-) -> None:
+    source: Path, out: Path | None, export: Path | None, overwrite: bool, as_json: bool,
+    **options: Any,
+) -> None:  # fmt: skip
     """Read an OpenPTV experiment folder DIR into a project file.
 
     Reads ptv.par, .ori, .addpar, _targets, the calibration body and the first rt_is frame; finds
@@ -63,38 +59,22 @@ def command(
             print_json({"folder": export, "cameras": list(written.camera_names)})
         return
     target = out if out is not None else Path(f"{source.resolve().name}.toml")
-    found = import_openptv(
-        source, out=target, overwrite=overwrite, swap_indices=swap_indices,
-        least_pixels=min_pixels, radius=radius,
-    )  # fmt: skip
-    for line in found.project.remarks:
-        remark(f"Note: {line}")
-    cameras = found.project.cameras
-    if as_json:
-        print_json(
-            {
-                "project": target,
-                "files": list(found.files),
-                "unit": found.project.unit,
-                "cameras": [
-                    {"name": camera.name, "control_points": count, "media": media}
-                    for camera, count, media in zip(
-                        cameras, found.matched, found.project.media_of, strict=True
-                    )
-                ],
-                "object_points": len(found.project.object_points.ids),
-                "particles": found.particles,
-                "remarks": list(found.project.remarks),
-            }
-        )
-        return
-    total = len(found.project.object_points.ids)
-    rows = [
-        (camera.name, media or "none", f"{count} of {total}")
-        for camera, count, media in zip(cameras, found.matched, found.project.media_of, strict=True)
-    ]
-    click.echo(text_table(("camera", "looks through", "control points"), rows))
+    found = import_openptv(source, out=target, overwrite=overwrite, **options)
+    project = found.project
+    total = len(project.object_points.ids)
+    cameras = list(zip(project.cameras, found.matched, project.media_of, strict=True))
+    data = {
+        "project": target, "files": list(found.files), "unit": project.unit,
+        "cameras": [
+            {"name": camera.name, "control_points": count, "media": media}
+            for camera, count, media in cameras
+        ],
+        "object_points": total, "particles": found.particles, "remarks": list(project.remarks),
+    }  # fmt: skip
+    rows = [(camera.name, media or "none", f"{n} of {total}") for camera, n, media in cameras]
+    lines = [text_table(("camera", "looks through", "control points"), rows)]
     if found.particles:
-        click.echo(f"{found.particles} particles of the stored frame")
-    for file in found.files:
-        click.echo(f"Written: {file}")
+        lines.append(f"{found.particles} particles of the stored frame")
+    lines += [f"Written: {file}" for file in found.files]
+    notes = (f"Note: {line}" for line in project.remarks)
+    print_result(data, lines, as_json=as_json, remarks=notes)

@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import click
+
+from photocore.options import FILE, as_json, overwrite
 
 EXAMPLE = """\b
 Examples:
@@ -13,18 +16,16 @@ Examples:
 """
 
 
-@click.command(short_help="Image coordinates of object points through the media.", epilog=EXAMPLE)
-@click.argument("project", type=click.Path(path_type=Path))
+@click.command(epilog=EXAMPLE)
+@click.argument("project", type=FILE)
 @click.option(
-    "--points", type=click.Path(path_type=Path),
+    "--points", type=FILE,
     help="Table of object points: id, X, Y, Z.  [default: the project's own]",
 )  # fmt: skip
-@click.option("--out", type=click.Path(path_type=Path), help="Also write a .csv or .xlsx table.")
-@click.option("--overwrite", is_flag=True, help="Replace an existing file.")
-@click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
-def command(
-    project: Path, points: Path | None, out: Path | None, overwrite: bool, as_json: bool
-) -> None:
+@click.option("--out", type=FILE, help="Also write a .csv or .xlsx table.")
+@overwrite
+@as_json
+def command(project: Path, out: Path | None, as_json: bool, **options: Any) -> None:
     """Project object points into every camera of PROJECT, a .toml file.
 
     Prints image coordinates x, y [mm], x to the right and y up from the centre of the sensor, and
@@ -34,5 +35,5 @@ def command(
     from multimedia.cli.tables import show
     from multimedia.orientation.workflow import project_project
 
-    table = project_project(project, points=points, out=out, overwrite=overwrite)
+    table = project_project(project, out=out, **options)
     show(table, as_json=as_json, out=out, digits={"x": 6, "y": 6, "col": 4, "row": 4})

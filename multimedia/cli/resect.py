@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import Any
 
 import click
 
-from photocore.cli import print_json, remark, text_table
-
-if TYPE_CHECKING:
-    from multimedia.orientation.workflow import Resected
+from photocore.cli import print_result, remark, text_table
+from photocore.options import FILE, Names, as_json, overwrite
 
 EXAMPLE = """\b
 Examples:
@@ -20,34 +19,25 @@ Examples:
 """
 
 
-@click.command(
-    short_help="Orientation and calibration of each camera from control points.", epilog=EXAMPLE
-)
-@click.argument("project", type=click.Path(path_type=Path))
+@click.command(epilog=EXAMPLE)
+@click.argument("project", type=FILE)
 @click.option(
-    "--estimate", default="", metavar="NAMES",
+    "--estimate", type=Names(), default="", metavar="NAMES",
     help="Interior parameters to determine beside the exterior orientation, with commas: c, xh, "
     "yh [mm], k1, k2, k3, p1, p2, scale, shear; or 'all'.  [default: none]",
 )  # fmt: skip
 @click.option("--camera", "cameras", multiple=True, help="Only this camera; repeatable.")
+@click.option("--out", type=FILE, help="Write the project with the new orientations.")
 @click.option(
-    "--out", type=click.Path(path_type=Path), help="Write the project with the new orientations."
-)
-@click.option(
-    "--residuals", type=click.Path(path_type=Path),
+    "--residuals", type=FILE,
     help="Write the residuals [mm] of all image points as .csv or .xlsx.",
 )  # fmt: skip
-@click.option("--overwrite", is_flag=True, help="Replace existing files.")
-@click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
+@overwrite
+@as_json
 def command(
-    project: Path,
-    estimate: str,
-    cameras: tuple[str, ...],
-    out: Path | None,
-    residuals: Path | None,
-    overwrite: bool,
-    as_json: bool,
-) -> None:
+    project: Path, estimate: tuple[str, ...], out: Path | None, residuals: Path | None,
+    as_json: bool, **options: Any,
+) -> None:  # fmt: skip
     """Orient, and with --estimate calibrate, each camera of PROJECT (.toml) on its own.
 
     Uses the image points whose ids are among the object points. The start values of the project
@@ -56,31 +46,24 @@ def command(
     """
     from multimedia.orientation.workflow import resect_project, resected_as_dict
 
-    names = tuple(name.strip() for name in estimate.split(",") if name.strip())
-    if names == ("all",):
-        names = ("c", "xh", "yh", "k1", "k2", "k3", "p1", "p2", "scale", "shear")
-    found = resect_project(
-        project, estimate=names, cameras=cameras, out=out, residuals=residuals, overwrite=overwrite
-    )
-    for line in found.remarks:
-        remark(f"Note: {line}")
-    if as_json:
-        print_json(resected_as_dict(found))
-    else:
-        _print(found)
+    if estimate == ("all",):
+        estimate = ("c", "xh", "yh", "k1", "k2", "k3", "p1", "p2", "scale", "shear")
+    resected = resect_project(project, estimate=estimate, out=out, residuals=residuals, **options)
+    data = resected_as_dict(resected)
+    notes = (f"Note: {line}" for line in resected.remarks)
+    print_result(data, _lines(data["cameras"]), as_json=as_json, remarks=notes)
     if out is not None:
         remark(f"Project written to {out}")
     if residuals is not None:
         remark(f"Residuals written to {residuals}")
 
 
-def _print(found: Resected) -> None:
-    """Print parameters with their standard deviations."""
-    from multimedia.orientation.workflow import resected_as_dict
-
-    for camera in resected_as_dict(found)["cameras"]:
-        sigma0 = f"{camera['sigma0_um']:.3f} um" if camera["redundancy"] else "unknown"
-        click.echo(
+def _lines(cameras: list[dict[str, Any]]) -> Iterator[str]:
+    """Yield parameters with their standard deviations."""
+    for camera in cameras:
+        known = bool(camera["redundancy"])
+        sigma0 = f"{camera['sigma0_um']:.3f} um" if known else "unknown"
+        yield (
             f"{camera['name']}: sigma0 {sigma0}, {camera['points']} points, "
             f"redundancy {camera['redundancy']}, {camera['iterations']} iterations"
         )
@@ -88,8 +71,8 @@ def _print(found: Resected) -> None:
             (
                 name,
                 f"{camera[name]:.8g}",
-                f"{camera['sigma'][name]:.2g}" if camera["redundancy"] else "unknown",
+                f"{camera['sigma'][name]:.2g}" if known else "unknown",
             )
             for name in camera["estimated"]
         ]
-        click.echo(text_table(("parameter", "value", "sigma"), rows))
+        yield text_table(("parameter", "value", "sigma"), rows)

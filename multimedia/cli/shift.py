@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import click
 
 from photocore.cli import print_json, remark
-from photocore.options import Numbers
+from photocore.options import FILE, NUMBER, Numbers, as_json, number, overwrite
 
 EXAMPLE = """\b
 Examples:
@@ -18,16 +19,16 @@ Examples:
 """
 
 
-@click.command(short_help="Radial shift of a table of points.", epilog=EXAMPLE)
-@click.argument("source", metavar="IN", type=click.Path(path_type=Path))
-@click.option("--out", type=click.Path(path_type=Path), help="Result, .xlsx or .csv.")
+@click.command(epilog=EXAMPLE)
+@click.argument("source", metavar="IN", type=FILE)
+@click.option("--out", type=FILE, help="Result, .xlsx or .csv.")
 @click.option(
     "--camera", type=Numbers(3), metavar="X,Y,Z",
     help="Camera, in the unit of the points; Z = 0 is the interface on the water side.",
 )  # fmt: skip
-@click.option(
-    "--z0", type=float, metavar="LENGTH",
-    help="Instead of --camera: its distance from the first interface, nadir at X = Y = 0.",
+@number(
+    "--z0", "LENGTH",
+    "Instead of --camera: its distance from the first interface, nadir at X = Y = 0.", type=NUMBER,
 )  # fmt: skip
 @click.option(
     "--indices", type=Numbers(), metavar="N,N,...",
@@ -50,12 +51,11 @@ Examples:
 @click.option(
     "--new", is_flag=True, help="Write a new workbook with live formulas, not the table's own."
 )
-@click.option("--overwrite", is_flag=True, help="Replace an existing file.")
-@click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
+@overwrite
+@as_json
 def command(
     source: Path, out: Path | None, camera: tuple[float, float, float] | None, z0: float | None,
-    indices: tuple[float, ...] | None, thicknesses: tuple[float, ...] | None, sheet: str | None,
-    decimal: str | None, flavour: str, new: bool, overwrite: bool, as_json: bool,
+    as_json: bool, **options: Any,
 ) -> None:  # fmt: skip
     """Shift points so that straight rays see them where they are seen through the media.
 
@@ -70,10 +70,7 @@ def command(
         raise click.UsageError("give --camera or --z0, not both.")
     from multimedia.workbook.workflow import shift_file
 
-    report = shift_file(
-        source, out, camera=camera, z0=z0, indices=indices, thicknesses=thicknesses,
-        decimal=decimal, sheet=sheet, flavour=flavour, new=new, overwrite=overwrite,
-    )  # fmt: skip
+    report = shift_file(source, out, camera=camera, z0=z0, **options)
     for text in report.remarks:
         remark(f"Note: {text}")
     if as_json:

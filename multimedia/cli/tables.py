@@ -6,9 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import click
-
-from photocore.cli import print_json, remark, text_table
+from photocore.cli import print_result, remark, text_table
 
 if TYPE_CHECKING:
     from multimedia.orientation.workflow import Table
@@ -26,19 +24,15 @@ def show(
     key: str = "points",
 ) -> None:
     """Print a table: as JSON, or as text with the given number of decimals."""
-    for line in table.remarks:
-        remark(f"Note: {line}")
-    if as_json:
-        print_json({key: table.records(), "summary": list(table.summary)})
-    else:
-        records = table.records()
-        shown = records if out is None else records[:_SHOWN]
-        rows = [[_text(row[name], digits.get(name)) for name in table.columns] for row in shown]
-        click.echo(text_table(tuple(table.columns), rows))
-        if len(shown) < len(records):
-            click.echo(f"... and {len(records) - len(shown)} more")
-        for line in table.summary:
-            click.echo(line)
+    records = table.records()
+    shown = records if out is None else records[:_SHOWN]
+    rows = [[_text(row[name], digits.get(name)) for name in table.columns] for row in shown]
+    lines = [text_table(tuple(table.columns), rows)]
+    if len(shown) < len(records):
+        lines.append(f"... and {len(records) - len(shown)} more")
+    data = {key: records, "summary": list(table.summary)}
+    notes = (f"Note: {line}" for line in table.remarks)
+    print_result(data, [*lines, *table.summary], as_json=as_json, remarks=notes)
     if out is not None:
         remark(f"Table written to {out}")
 

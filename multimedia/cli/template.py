@@ -7,6 +7,7 @@ from pathlib import Path
 import click
 
 from photocore.cli import remark
+from photocore.options import FILE, overwrite
 
 EXAMPLE = """\b
 Examples:
@@ -15,10 +16,8 @@ Examples:
 """
 
 
-@click.command(
-    short_help="Workbook with radial shift and refractive index as live formulas.", epilog=EXAMPLE
-)
-@click.argument("out", metavar="OUT.xlsx", type=click.Path(path_type=Path))
+@click.command(epilog=EXAMPLE)
+@click.argument("out", metavar="OUT.xlsx", type=FILE)
 @click.option(
     "--rows", type=int, default=50, show_default=True, help="Prepared rows of the table of points."
 )
@@ -26,7 +25,7 @@ Examples:
     "--newton", type=int, default=6, show_default=True,
     help="Newton steps: 6 reach 1e-9 up to 75 degrees in the thinnest medium, 10 up to 85.",
 )  # fmt: skip
-@click.option("--overwrite", is_flag=True, help="Replace an existing file.")
+@overwrite
 def command(out: Path, rows: int, newton: int, overwrite: bool) -> None:
     """Write a workbook that shifts points and gives the refractive index of water by itself.
 

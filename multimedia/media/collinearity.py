@@ -38,8 +38,9 @@ class Medium:
     ----------
     normal : ndarray, shape (3,)
         Unit normal towards the camera, in the camera frame.
-    height : float
-        Height of the projection centre above the last face.
+    height : float or ndarray, shape (n,)
+        Height of the projection centre above the last face; one per point where the points are
+        seen from several centres.
     thicknesses : tuple of float
         Of the layers between the first and the last medium.
     indices : tuple of float
@@ -47,12 +48,12 @@ class Medium:
     """
 
     normal: FloatArray
-    height: float
+    height: float | FloatArray
     thicknesses: tuple[float, ...]
     indices: tuple[float, ...]
 
     @property
-    def first_height(self) -> float:
+    def first_height(self) -> float | FloatArray:
         """Height of the projection centre above the first face (Maas' Z0)."""
         return self.height - sum(self.thicknesses)
 
@@ -81,6 +82,13 @@ class Shifts:
     by_height: FloatArray
     by_thicknesses: FloatArray
     by_indices: FloatArray
+
+    def gradient(self, vectors: FloatArray, medium: Medium) -> FloatArray:
+        """Return dg / da, shape (n, 3): u = a + g m, so du / da = I + m (dg / da)^T."""
+        twice = 2.0 * self.by_rho2
+        gradient = twice[:, None] * vectors
+        gradient += (self.by_w - twice * self.w)[:, None] * medium.normal
+        return gradient
 
 
 def image_vectors(vectors: FloatArray, medium: Medium) -> FloatArray:
@@ -208,9 +216,9 @@ def _inverse_ratio(
     if not below.all():
         depth = np.where(below, depth, np.nan)
     heights: list[FloatArray | float] = [medium.first_height, *medium.thicknesses, depth]
-    if not below.all():
-        q = np.full_like(w, np.nan)
-        inside: list[FloatArray | float] = [*heights[:-1], depth[below]]
-        q[below] = 1.0 / shift_ratio(np.sqrt(rho2[below]), inside, medium.indices)
-        return rho2, q, heights
-    return rho2, 1.0 / shift_ratio(np.sqrt(rho2), heights, medium.indices), heights
+    if below.all():
+        return rho2, 1.0 / shift_ratio(np.sqrt(rho2), heights, medium.indices), heights
+    q = np.full_like(w, np.nan)
+    inside = [h[below] if isinstance(h, np.ndarray) else h for h in heights]
+    q[below] = 1.0 / shift_ratio(np.sqrt(rho2[below]), inside, medium.indices)
+    return rho2, q, heights

@@ -4,12 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Self
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from multimedia.media.camera import Camera
-from multimedia.media.collinearity import Medium
+from multimedia.media.collinearity import (
+    Medium,
+    Shifts,
+    image_vectors,
+    rays_in_object_space,
+    shifts,
+)
+from multimedia.media.optical_media import OpticalMedia, Sight, SightDerivatives, by_pose
+from multimedia.media.surfaces import tangents_of, unit_vector
 from multimedia.refraction.layers import Layers
 from photocore.arrays import FloatArray, as_floats, read_only
 from photocore.errors import GeometryError, InputError
@@ -17,7 +26,7 @@ from photocore.rotation import rotation_from_vector
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class FlatInterface:
+class FlatInterface(OpticalMedia):
     """Parallel layers on a plane of any tilt.
 
     Attributes
@@ -49,12 +58,13 @@ class FlatInterface:
     moves_with_camera: bool = False
 
     def __post_init__(self) -> None:
-        normal = read_only(self.normal, "normal", shape=(3,))
-        length = float(np.linalg.norm(normal))
-        if length == 0:
-            raise GeometryError("normal: the vector (0, 0, 0) has no direction.")
-        object.__setattr__(self, "normal", read_only(normal / length, "normal"))
+        object.__setattr__(self, "normal", unit_vector(self.normal, "normal"))
         object.__setattr__(self, "point", read_only(self.point, "point", shape=(3,)))
+
+    @property
+    def indices(self) -> tuple[float, ...]:
+        """Refractive indices from the camera's medium to the object's."""
+        return self.layers.indices
 
     @property
     def parameter_names(self) -> tuple[str, ...]:
@@ -76,10 +86,7 @@ class FlatInterface:
     @property
     def tangents(self) -> FloatArray:
         """Two unit vectors in the faces, at right angles, shape (2, 3)."""
-        axis = np.eye(3)[np.argmin(np.abs(self.normal))]
-        first = np.cross(self.normal, axis)
-        first /= np.linalg.norm(first)
-        return np.stack([first, np.cross(self.normal, first)])
+        return tangents_of(self.normal)
 
     def value(self, name: str) -> float:
         """Return a parameter; offset and tilts count from where the interface is."""
@@ -89,7 +96,7 @@ class FlatInterface:
         source = self.layers.indices if kind == "index" else self.layers.thicknesses
         return float(source[number])
 
-    def stepped(self, names: Sequence[str], step: ArrayLike) -> FlatInterface:
+    def stepped(self, names: Sequence[str], step: ArrayLike) -> Self:
         """Return the interface after adding ``step`` to the named parameters.
 
         Raises
@@ -151,3 +158,83 @@ class FlatInterface:
             thicknesses=tuple(self.layers.thicknesses),
             indices=tuple(self.layers.indices),
         )
+
+    def apparent_vectors(self, camera: Camera, points: FloatArray) -> FloatArray:
+        """Return the vectors to the points, raised along the normal."""
+        return image_vectors((points - camera.centre) @ camera.rotation, self.medium(camera))
+
+    def seen_from_afar(self, points: FloatArray) -> FloatArray | None:
+        """Return where points seem to be along the normal; None if that moves with the camera."""
+        if self.moves_with_camera:
+            return None
+        thicknesses = self.layers.thicknesses
+        raised = ((self.point - points) @ self.normal) * (1.0 - self.indices[0] / self.indices[-1])
+        for thickness, index in zip(thicknesses, self.indices[1:-1], strict=True):
+            raised = raised + thickness * (1.0 - self.indices[0] / index)
+        return points + raised[:, None] * self.normal
+
+    def seen(self, camera: Camera, points: FloatArray) -> tuple[FloatArray, NDArray[np.object_]]:
+        """Return `apparent_vectors`, and which points lie before the last face."""
+        medium = self.medium(camera)
+        vectors = (points - camera.centre) @ camera.rotation
+        before = vectors @ medium.normal + medium.height > 0
+        reasons = np.where(before, "before the interface", "").astype(object)
+        return image_vectors(vectors, medium), reasons
+
+    def object_rays(self, camera: Camera, directions: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Refract directions of the camera frame into the last medium, in closed form."""
+        origins, rays = rays_in_object_space(directions, self.medium(camera))
+        return origins @ camera.rotation.T + camera.centre, rays @ camera.rotation.T
+
+    def sight(
+        self, camera: Camera, points: FloatArray, *, exterior: bool, names: Sequence[str] = ()
+    ) -> Sight:
+        """Return the vectors of `apparent_vectors` with analytic derivatives."""
+        medium = self.medium(camera)
+        vectors = (points - camera.centre) @ camera.rotation
+        shift = shifts(vectors, medium, media=bool(names))
+        seen = vectors + shift.g[:, None] * medium.normal
+
+        def derivatives(by_seen: FloatArray) -> SightDerivatives:
+            # u = a + g(rho^2, w) m: the change of g adds a product of two vectors to the identity.
+            along = (by_seen.reshape(-1, 3) @ medium.normal).reshape(-1, 2)  # d(image)/dg
+            by_vector = along[:, :, None] * shift.gradient(vectors, medium)[:, None, :]
+            by_vector += by_seen
+            # Before faces that stand still rho and depth do not change with the rotation: the
+            # whole seen vector turns; and the height changes with the centre.
+            turning = (by_vector, vectors) if self.moves_with_camera else (by_seen, seen)
+            by_point, by_exterior = by_pose(camera, by_vector, turning if exterior else None)
+            if exterior and not self.moves_with_camera:
+                by_height = along * shift.by_height[:, None]
+                by_exterior[..., :3] += by_height[:, :, None] * self.normal
+            by_media = np.empty((len(points), 2, len(names)))
+            for k, name in enumerate(names):
+                by_media[:, :, k] = self._by_parameter(name, camera, vectors, by_seen, along, shift)
+            return SightDerivatives(by_point, by_exterior, by_media)
+
+        return Sight(seen, derivatives)
+
+    def _by_parameter(
+        self,
+        name: str,
+        camera: Camera,
+        vectors: FloatArray,
+        by_seen: FloatArray,
+        along: FloatArray,
+        shift: Shifts,
+    ) -> FloatArray:
+        """Return the derivatives of the image by one of `parameter_names`, shape (n, 2)."""
+        if name == "offset":
+            return along * -shift.by_height[:, None]
+        if name.startswith("thickness"):
+            return along * shift.by_thicknesses[:, [int(name[9:]) - 1]]
+        if name.startswith("index"):
+            return along * shift.by_indices[:, [int(name[5:]) - 1]]
+        to_camera: FloatArray = np.eye(3) if self.moves_with_camera else camera.rotation
+        centre = -self.point if self.moves_with_camera else camera.centre - self.point
+        # d(normal), in the interface's own frame
+        turn = np.cross(self.tangents[int(name[-1]) - 1], self.normal)
+        turn_camera = turn @ to_camera
+        change = (shift.by_w - 2.0 * shift.w * shift.by_rho2) * (vectors @ turn_camera)
+        change += shift.by_height * float(centre @ turn)
+        return along * change[:, None] + (by_seen @ turn_camera) * shift.g[:, None]

@@ -5,11 +5,12 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from multimedia.media.surfaces import Surface
+from multimedia.media.surfaces import RefractingSurface
 from photocore.arrays import BoolArray, FloatArray, as_floats, as_points, read_only
 from photocore.errors import InputError
 
@@ -23,19 +24,34 @@ STEEPENING = 1.9
 SAMPLES_PER_FEATURE = 8
 
 
-class HeightField(Surface):
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class HeightField(RefractingSurface):
     """A surface Z = f(X, Y); normals point up. Subclasses say what f is.
 
-    Attributes of every subclass: ``lowest`` and ``highest`` bound f, ``steepest`` bounds its
-    slope, ``feature`` is the horizontal size of its finest detail.
+    Attributes
+    ----------
+    lowest, highest : float
+        Bounds of f.
+    steepest : float
+        Bound of its slope.
+    feature : float
+        Horizontal size of its finest detail.
     """
 
-    __slots__ = ()
+    lowest: float = field(init=False)
+    highest: float = field(init=False)
+    steepest: float = field(init=False)
+    feature: float = field(init=False)
 
-    lowest: float
-    highest: float
-    steepest: float
-    feature: float
+    def _keep(self, **values: Any) -> None:
+        """Set what follows from the given values, once."""
+        for name, value in values.items():
+            object.__setattr__(self, name, value)
+
+    @property
+    def middle(self) -> float:
+        """Half way between the lowest and the highest point."""
+        return (self.lowest + self.highest) / 2
 
     @abstractmethod
     def heights(self, xy: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -61,7 +77,7 @@ class HeightField(Surface):
         flat = points.reshape(-1, 3)
         height = self.heights(flat[:, :2])[0]
         # Over a hole of the raster only the range of heights is known; cameras are far above it.
-        height = np.where(np.isnan(height), (self.lowest + self.highest) / 2, height)
+        height = np.where(np.isnan(height), self.middle, height)
         return (flat[:, 2] - height).reshape(points.shape[:-1])
 
     def hop(self, origins: FloatArray, directions: FloatArray, beyond: FloatArray) -> FloatArray:
@@ -84,9 +100,9 @@ class HeightField(Surface):
                 origins[often], directions[often], enter[often], leave[often]
             )
             result[often] = self._root(origins[often], directions[often], first, last)
-        found = np.flatnonzero(np.isfinite(result))
-        landed = origins[found, :2] + result[found, None] * directions[found, :2]
-        result[found[~self.covers(landed)]] = np.nan
+        met = np.flatnonzero(np.isfinite(result))
+        landed = origins[met, :2] + result[met, None] * directions[met, :2]
+        result[met[~self.covers(landed)]] = np.nan
         return result
 
     def _gap(
@@ -186,26 +202,25 @@ class WaveSurface(HeightField):
     amplitude: FloatArray
     wave_vector: FloatArray
     phase: FloatArray
-    lowest: float = field(init=False)
-    highest: float = field(init=False)
-    steepest: float = field(init=False)
-    feature: float = field(init=False)
 
     def __post_init__(self) -> None:
-        set_ = object.__setattr__
-        set_(self, "amplitude", read_only(np.atleast_1d(self.amplitude), "amplitude"))
-        count = len(self.amplitude)
-        vector = np.atleast_2d(self.wave_vector)
-        set_(self, "wave_vector", read_only(vector, "wave_vector", shape=(count, 2)))
-        set_(self, "phase", read_only(np.atleast_1d(self.phase), "phase", shape=(count,)))
-        number = np.hypot(*self.wave_vector.T)
+        amplitude = read_only(np.atleast_1d(self.amplitude), "amplitude")
+        count = len(amplitude)
+        vector = read_only(np.atleast_2d(self.wave_vector), "wave_vector", shape=(count, 2))
+        phase = read_only(np.atleast_1d(self.phase), "phase", shape=(count,))
+        number = np.hypot(*vector.T)
         if not (number > 0).all():
             raise InputError("wave_vector: a wave needs a length; the vector must not be zero.")
-        reach = float(np.abs(self.amplitude).sum())
-        set_(self, "lowest", self.level - reach - 1e-12 * abs(self.level))
-        set_(self, "highest", self.level + reach + 1e-12 * abs(self.level))
-        set_(self, "steepest", float((np.abs(self.amplitude) * number).sum()))
-        set_(self, "feature", float(2 * np.pi / number.max()))
+        reach = float(np.abs(amplitude).sum()) + 1e-12 * abs(self.level)
+        self._keep(
+            amplitude=amplitude,
+            wave_vector=vector,
+            phase=phase,
+            lowest=self.level - reach,
+            highest=self.level + reach,
+            steepest=float((np.abs(amplitude) * number).sum()),
+            feature=float(2 * np.pi / number.max()),
+        )
 
     @classmethod
     def sinusoid(
@@ -269,15 +284,10 @@ class RasterSurface(HeightField):
 
     raster: FloatArray
     xy_from_cell: FloatArray
-    lowest: float = field(init=False)
-    highest: float = field(init=False)
-    steepest: float = field(init=False)
-    feature: float = field(init=False)
     _padded: FloatArray = field(init=False, repr=False)
     _cell_from_xy: FloatArray = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        set_ = object.__setattr__
         raster = np.array(as_floats(self.raster, "raster"))
         if raster.ndim != 2 or min(raster.shape) < 3:
             raise InputError(
@@ -287,22 +297,23 @@ class RasterSurface(HeightField):
         if not np.isfinite(raster).any():
             raise InputError("raster: the water surface holds no height at all, only no-data.")
         raster.setflags(write=False)
-        set_(self, "raster", raster)
         affine = read_only(self.xy_from_cell, "xy_from_cell", shape=(2, 3))
         if abs(np.linalg.det(affine[:, :2])) == 0:
             raise InputError("xy_from_cell: the cells have no area.")
-        set_(self, "xy_from_cell", affine)
-        set_(self, "_cell_from_xy", np.linalg.inv(affine[:, :2]))
-        set_(self, "_padded", _with_ghosts(raster))
         low, high = float(np.nanmin(raster)), float(np.nanmax(raster))
         margin = OVERSHOOT * (high - low) + 1e-9 * max(1.0, abs(low), abs(high))
-        set_(self, "lowest", low - margin)
-        set_(self, "highest", high + margin)
         sides = np.hypot(affine[0, :2], affine[1, :2])
         rises = [_steepest_difference(raster, axis) for axis in (1, 0)]
-        steepest = STEEPENING * float(np.hypot(rises[0] / sides[0], rises[1] / sides[1]))
-        set_(self, "steepest", steepest)
-        set_(self, "feature", float(sides.min()))
+        self._keep(
+            raster=raster,
+            xy_from_cell=affine,
+            _cell_from_xy=np.linalg.inv(affine[:, :2]),
+            _padded=_with_ghosts(raster),
+            lowest=low - margin,
+            highest=high + margin,
+            steepest=STEEPENING * float(np.hypot(rises[0] / sides[0], rises[1] / sides[1])),
+            feature=float(sides.min()),
+        )
 
     def _cells(self, xy: FloatArray) -> FloatArray:
         cells: FloatArray = (xy - self.xy_from_cell[:, 2]) @ self._cell_from_xy.T

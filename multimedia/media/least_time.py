@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from multimedia.media.interfaces import Interfaces
-from multimedia.media.surfaces import Plane
+from multimedia.media.surface_sequence import SurfaceSequence
+from multimedia.media.surfaces import Plane, tangents_of
 from photocore.arrays import BoolArray, FloatArray
 
 #: A thin gap beside the critical angle gains a factor of 1.5 per step: 60 steps for 1e10.
@@ -25,7 +25,7 @@ GRAZING = 1e-9
 
 
 def least_time_path(
-    starts: FloatArray, ends: FloatArray, interfaces: Interfaces
+    starts: FloatArray, ends: FloatArray, interfaces: SurfaceSequence
 ) -> tuple[FloatArray, FloatArray, BoolArray]:
     """Return crossings (n, k, 3), directions (n, k + 1, 3), and which paths obey Snell's law.
 
@@ -76,7 +76,7 @@ def _least_time(
 ) -> tuple[FloatArray, FloatArray, BoolArray]:
     """Do the same for planes that lie apart."""
     count, total = len(planes), len(starts)
-    bases = np.stack([_basis(plane.normal) for plane in planes])  # (k, 2, 3)
+    bases = np.stack([tangents_of(plane.normal) for plane in planes])  # (k, 2, 3)
     scale = np.linalg.norm(ends - starts, axis=-1) + 1e-300
     crossings = np.empty((total, count, 3))
     for number, plane in enumerate(planes):
@@ -91,17 +91,13 @@ def _least_time(
         move = np.einsum("nka,kai->nki", step, bases)
         slope = (gradient.reshape(step.shape) * step).sum((-1, -2))
         share = np.ones(len(rows))
-        waiting = np.arange(len(rows))
+        # Near the minimum rounding of the time hides the gain: a full step is right there.
+        waiting = np.abs(slope) >= 1e-12 * time
         for _ in range(MOST_HALVINGS):
-            tried = crossings[rows[waiting]] + share[waiting, None, None] * move[waiting]
-            later = _lengths(
-                _corners(starts[rows[waiting]], tried, ends[rows[waiting]]), scale[rows[waiting]]
-            )
-            enough = time[waiting] + 1e-4 * share[waiting] * slope[waiting]
-            # Near the minimum rounding of the time hides the gain: a full step is right there.
-            hidden = np.abs(slope[waiting]) < 1e-12 * time[waiting]
-            waiting = waiting[(later @ indices > enough) & ~hidden]
-            if not waiting.size:
+            tried = crossings[rows] + share[:, None, None] * move
+            later = _lengths(_corners(starts[rows], tried, ends[rows]), scale[rows]) @ indices
+            waiting &= later > time + 1e-4 * share * slope
+            if not waiting.any():
                 break
             share[waiting] *= 0.5
         crossings[rows] += share[:, None, None] * move
@@ -173,11 +169,3 @@ def _time(
             hessian[:, k + 1, :, k] = cross.transpose(0, 2, 1)
     flat = hessian.reshape(len(corners), 2 * count, 2 * count)
     return gradient.reshape(len(corners), -1), flat, length @ indices
-
-
-def _basis(normal: FloatArray) -> FloatArray:
-    """Return two unit vectors in a plane, shape (2, 3)."""
-    aside = np.eye(3)[np.argmin(np.abs(normal))]
-    first = np.cross(normal, aside)
-    first = first / np.linalg.norm(first)
-    return np.stack([first, np.cross(normal, first)])

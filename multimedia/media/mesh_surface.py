@@ -32,18 +32,13 @@ class MeshSurface(HeightField):
 
     vertices: FloatArray
     triangles: IntArray
-    lowest: float = field(init=False)
-    highest: float = field(init=False)
-    steepest: float = field(init=False)
-    feature: float = field(init=False)
     _facet: FloatArray = field(init=False, repr=False)
     _corner: FloatArray = field(init=False, repr=False)
     _to_corners: FloatArray = field(init=False, repr=False)
     _corner_slopes: FloatArray = field(init=False, repr=False)
-    _grid: _Grid = field(init=False, repr=False)
+    _grid: TriangleCells = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        set_ = object.__setattr__
         vertices = read_only(self.vertices, "vertices")
         if vertices.ndim != 2 or vertices.shape[1:] != (3,):
             raise InputError(f"vertices: expected shape (n, 3), found {vertices.shape}.")
@@ -63,31 +58,34 @@ class MeshSurface(HeightField):
                 "and Y; a water surface has no vertical faces. Remove them."
             )
         triangles.setflags(write=False)
-        set_(self, "vertices", vertices)
-        set_(self, "triangles", triangles)
         corners = vertices[triangles]
         # (b1, b2) = _to_corners @ (xy - corner 0); b0 = 1 - b1 - b2.
         sides = np.stack([corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]], axis=-1)
         to_corners = np.linalg.inv(sides[:, :2, :])
-        set_(self, "_to_corners", to_corners)
-        set_(self, "_corner", corners[:, 0])
-        set_(self, "_facet", np.einsum("mk,mki->mi", sides[:, 2, :], to_corners))
+        facet = np.einsum("mk,mki->mi", sides[:, 2, :], to_corners)
         # Vertex slope: mean of the facets around it, weighted by their area.
-        total = np.zeros((len(vertices), 2))
-        weight = np.zeros(len(vertices))
+        area = np.abs(area)
+        total, weight = np.zeros((len(vertices), 2)), np.zeros(len(vertices))
         for corner in range(3):
-            np.add.at(total, triangles[:, corner], self._facet * np.abs(area)[:, None])
-            np.add.at(weight, triangles[:, corner], np.abs(area))
-        set_(self, "_corner_slopes", total / np.where(weight > 0, weight, 1.0)[:, None])
-        used = vertices[triangles.reshape(-1), 2]
-        margin = 1e-9 * max(1.0, float(np.abs(used).max()))
-        set_(self, "lowest", float(used.min()) - margin)
-        set_(self, "highest", float(used.max()) + margin)
+            np.add.at(total, triangles[:, corner], facet * area[:, None])
+            np.add.at(weight, triangles[:, corner], area)
+        heights = corners[..., 2]
+        margin = 1e-9 * max(1.0, float(np.abs(heights).max()))
         # Slivers along the hull of a triangulation may stand on edge; they are no waves.
-        real = np.abs(area) > 1e-2 * np.median(np.abs(area))
-        set_(self, "steepest", float(np.hypot(*self._facet[real].T).max()))
-        set_(self, "feature", float(np.sqrt(np.median(np.abs(area)))))
-        set_(self, "_grid", _Grid.over(corners[..., :2]))
+        real = area > 1e-2 * np.median(area)
+        self._keep(
+            vertices=vertices,
+            triangles=triangles,
+            lowest=float(heights.min()) - margin,
+            highest=float(heights.max()) + margin,
+            steepest=float(np.hypot(*facet[real].T).max()),
+            feature=float(np.sqrt(np.median(area))),
+            _facet=facet,
+            _corner=corners[:, 0],
+            _to_corners=to_corners,
+            _corner_slopes=total / np.where(weight > 0, weight, 1.0)[:, None],
+            _grid=TriangleCells.over(corners[..., :2]),
+        )
 
     def _locate(self, xy: FloatArray) -> tuple[IntArray, FloatArray]:
         """Return the triangle below each position (-1: none) and its barycentric coordinates."""
@@ -114,11 +112,11 @@ class MeshSurface(HeightField):
     def heights(self, xy: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return the height of the facet and its gradient; the mean level outside the mesh."""
         triangle, _ = self._locate(xy)
-        found = triangle >= 0
-        gradient = np.where(found[:, None], self._facet[triangle], 0.0)
+        inside = triangle >= 0
+        gradient = np.where(inside[:, None], self._facet[triangle], 0.0)
         corner = self._corner[triangle]
         height = corner[:, 2] + (gradient * (xy - corner[:, :2])).sum(-1)
-        return np.where(found, height, (self.lowest + self.highest) / 2), gradient
+        return np.where(inside, height, self.middle), gradient
 
     def slopes(self, xy: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return the slope between the vertices' slopes, and its derivative."""
@@ -135,7 +133,7 @@ class MeshSurface(HeightField):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Grid:
+class TriangleCells:
     """Square cells, each with the triangles whose bounding box touches it."""
 
     low: FloatArray
@@ -145,7 +143,7 @@ class _Grid:
     members: IntArray
 
     @classmethod
-    def over(cls, corners: FloatArray) -> _Grid:
+    def over(cls, corners: FloatArray) -> TriangleCells:
         """Sort triangles, shape (m, 3, 2), into about as many cells as there are triangles."""
         low, high = corners.min((0, 1)), corners.max((0, 1))
         extent = high - low

@@ -9,20 +9,15 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from multimedia.media.camera import EXTERIOR, INTERIOR, Camera
-from multimedia.media.collinearity import Shifts, image_vectors, shifts
 from multimedia.media.flat_interface import FlatInterface
-from multimedia.media.interfaces import Interfaces
-from multimedia.media.ray_paths import RayStatus
-from multimedia.media.ray_tracing import aim_rays
-from multimedia.media.traced_projection import sight, sight_vectors
+from multimedia.media.optical_media import OpticalMedia, StraightRays
 from multimedia.refraction.layers import Layers
 from photocore.arrays import BoolArray, FloatArray, as_points
 from photocore.errors import InputError
 
-#: What lies between a camera and the object: parallel layers whose last face is the plane Z = 0,
-#: the same anywhere else, surfaces of any form (ray-traced), or nothing.
-Media = Layers | FlatInterface | Interfaces | None
-Placed = FlatInterface | Interfaces | None
+#: What may be given to look through: parallel layers whose last face is the plane Z = 0, the same
+#: anywhere else (`FlatInterface`), surfaces of any form (`Interfaces`, ray-traced), or nothing.
+Media = Layers | OpticalMedia | None
 #: Points worked on at a time; their scratch rows stay in the processor's cache.
 BLOCK = 8192
 #: Field of view (half, as a tangent) beyond which image coordinates are no millimetres.
@@ -52,9 +47,11 @@ class Projection:
     by_interface: FloatArray
 
 
-def as_interface(media: Media) -> Placed:
-    """Return bare layers as an interface whose last face is the plane Z = 0."""
-    return FlatInterface(layers=media) if isinstance(media, Layers) else media
+def as_media(given: Media) -> OpticalMedia:
+    """Return bare layers as an interface whose last face is the plane Z = 0, None as nothing."""
+    if given is None:
+        return StraightRays()
+    return FlatInterface(layers=given) if isinstance(given, Layers) else given
 
 
 def project(camera: Camera, points: ArrayLike, layers: Media = None) -> FloatArray:
@@ -105,23 +102,12 @@ def project(camera: Camera, points: ArrayLike, layers: Media = None) -> FloatArr
     [3.8532, 0.0]
     """
     xyz = as_points(points, "points", dimension=3)
-    interface = as_interface(layers)
+    media = as_media(layers)
     flat = xyz.reshape(-1, 3)
     image: FloatArray = np.empty((len(flat), 2))
-    if isinstance(interface, Interfaces):
-        _central(sight_vectors(camera, flat, interface), camera, out=image)
-        image = camera.distortion.measured(image, camera.principal_point)
-        return image.reshape(*xyz.shape[:-1], 2)
-    medium = None if interface is None else interface.medium(camera)
-    for start in range(0, len(flat), BLOCK):
+    for start in range(0, max(len(flat), 1), BLOCK):
         part = slice(start, start + BLOCK)
-        vectors = (flat[part] - camera.centre) @ camera.rotation
-        seen = vectors if medium is None else image_vectors(vectors, medium)
-        _central(seen, camera, out=image[part])
-        if camera.distortion.is_identity:
-            image[part] += camera.principal_point
-        else:
-            image[part] = camera.distortion.measured(image[part], camera.principal_point)
+        image[part] = _image_of(media.apparent_vectors(camera, flat[part]), camera)
     return image.reshape(*xyz.shape[:-1], 2)
 
 
@@ -140,17 +126,8 @@ def projection_status(camera: Camera, points: ArrayLike, layers: Media = None) -
         ``outside the lens model`` or ``outside the sensor`` (still projected).
     """
     xyz = as_points(points, "points", dimension=3).reshape(-1, 3)
-    interface = as_interface(layers)
-    vectors: FloatArray = (xyz - camera.centre) @ camera.rotation
-    image = project(camera, xyz, interface)
-    before: BoolArray = np.zeros(len(xyz), dtype=bool)
-    if isinstance(interface, Interfaces):
-        paths = aim_rays(camera.centre, xyz, interface.seen_from(camera.centre, camera.rotation))
-        vectors = paths.directions[:, 0] @ camera.rotation
-    elif interface is not None:
-        medium = interface.medium(camera)
-        before = vectors @ medium.normal + medium.height > 0
-        vectors = image_vectors(vectors, medium)
+    vectors, reasons = as_media(layers).seen(camera, xyz)
+    image = _image_of(vectors, camera)
     outside: BoolArray = np.zeros(len(xyz), dtype=bool)
     if camera.sensor is not None:
         offset = np.abs(camera.sensor.pixel_from_image(image) - camera.sensor.origin)
@@ -160,11 +137,8 @@ def projection_status(camera: Camera, points: ArrayLike, layers: Media = None) -
     status[outside] = "outside the sensor"
     status[np.isnan(image).any(axis=-1)] = "outside the lens model"
     status[vectors[:, 2] >= 0] = "behind the camera"
-    status[before] = "before the interface"
-    if isinstance(interface, Interfaces):
-        for code in RayStatus:
-            if code != RayStatus.OK:
-                status[paths.status == code] = code.label
+    hidden = reasons != ""
+    status[hidden] = reasons[hidden]
     status[~np.isfinite(xyz).all(axis=-1)] = "not a number"
     return status.tolist()
 
@@ -194,74 +168,22 @@ def project_with_jacobian(
     -------
     Projection
     """
-    interface = as_interface(layers)
-    if isinstance(interface, Interfaces):
-        return _traced(camera, points, interface, camera_names, interface_names)
-    vectors = (points - camera.centre) @ camera.rotation
-    if interface is None:
-        if interface_names:
-            raise InputError("interface parameters: there is no interface to differentiate by.")
-        seen, shift, medium = vectors, None, None
-    else:
-        medium = interface.medium(camera)
-        shift = shifts(vectors, medium, media=bool(interface_names))
-        seen = vectors + shift.g[:, None] * medium.normal
-    lens = _through_lens(camera, seen, camera_names)
-    by_seen = lens.by_seen
-    by_vector = by_seen
-    along = None
-    if shift is not None and medium is not None:
-        # u = a + g(rho^2, w) m: the change of g adds a product of two vectors to the identity.
-        along = (by_seen.reshape(-1, 3) @ medium.normal).reshape(-1, 2)  # d(image)/dg
-        twice = 2.0 * shift.by_rho2
-        gradient = twice[:, None] * vectors
-        gradient += (shift.by_w - twice * shift.w)[:, None] * medium.normal
-        by_vector = along[:, :, None] * gradient[:, None, :]
-        by_vector += by_seen
-    by_point = (by_vector.reshape(-1, 3) @ camera.rotation.T).reshape(-1, 2, 3)
+    exterior = any(name in EXTERIOR for name in camera_names)
+    sight = as_media(layers).sight(camera, points, exterior=exterior, names=interface_names)
+    lens = _through_lens(camera, sight.vectors, camera_names)
+    by_point, by_exterior, by_interface = sight.derivatives(lens.by_seen)
     by_camera = np.empty((len(points), 2, len(camera_names)))
-    exterior = _by_exterior(
-        camera_names, camera, interface, vectors, by_seen, by_vector, by_point, along, shift
-    )
     for k, name in enumerate(camera_names):
-        by_camera[:, :, k] = exterior[name] if name in exterior else lens.by_interior[name]
-    by_interface = np.empty((len(points), 2, len(interface_names)))
-    if interface is not None and shift is not None and along is not None:
-        columns = _by_interface(interface_names, camera, interface, vectors, by_seen, along, shift)
-        for k, column in enumerate(columns):
-            by_interface[:, :, k] = column
+        by_camera[:, :, k] = (
+            by_exterior[:, :, EXTERIOR.index(name)] if name in EXTERIOR else lens.by_interior[name]
+        )
     return Projection(
         image=lens.image, by_point=by_point, by_camera=by_camera, by_interface=by_interface
     )
 
 
-def _traced(
-    camera: Camera,
-    points: FloatArray,
-    interfaces: Interfaces,
-    camera_names: Sequence[str],
-    interface_names: Sequence[str],
-) -> Projection:
-    """Project through ray-traced surfaces."""
-    exterior = any(name in EXTERIOR for name in camera_names)
-    seen = sight(camera, points, interfaces, exterior=exterior, index_names=interface_names)
-    lens = _through_lens(camera, seen.vectors, camera_names)
-    by_camera = np.empty((len(points), 2, len(camera_names)))
-    for k, name in enumerate(camera_names):
-        if name in EXTERIOR:
-            by_camera[:, :, k] = (lens.by_seen @ seen.by_exterior[name][:, :, None])[:, :, 0]
-        else:
-            by_camera[:, :, k] = lens.by_interior[name]
-    return Projection(
-        image=lens.image,
-        by_point=lens.by_seen @ seen.by_point,
-        by_camera=by_camera,
-        by_interface=lens.by_seen @ seen.by_indices,
-    )
-
-
 @dataclass(frozen=True, slots=True, eq=False)
-class _Lens:
+class _LensImage:
     """Image points of camera-frame vectors, and their derivatives."""
 
     image: FloatArray
@@ -269,10 +191,9 @@ class _Lens:
     by_interior: dict[str, FloatArray]  # each (n, 2)
 
 
-def _through_lens(camera: Camera, seen: FloatArray, names: Sequence[str]) -> _Lens:
+def _through_lens(camera: Camera, seen: FloatArray, names: Sequence[str]) -> _LensImage:
     """Apply central projection and distortion to vectors in the first medium."""
-    ideal = np.empty((len(seen), 2))
-    _central(seen, camera, out=ideal)
+    ideal = _central(seen, camera)
     own = [name for name in names if name in INTERIOR and name != "c"]
     # d(ideal)/du = -(c / u_z) [1 0 x/c; 0 1 y/c]  with x = -c u_x / u_z.
     lever = -camera.principal_distance / seen[:, 2]
@@ -282,24 +203,35 @@ def _through_lens(camera: Camera, seen: FloatArray, names: Sequence[str]) -> _Le
     by_seen[:, 1, 2] = lever * (ideal[:, 1] / camera.principal_distance)
     by_c = ideal / camera.principal_distance
     if camera.distortion.is_identity and not own:
-        return _Lens(ideal + camera.principal_point, by_seen, {"c": by_c})
+        return _LensImage(ideal + camera.principal_point, by_seen, {"c": by_c})
     image, by_ideal, by_own = camera.distortion.measured_with_jacobian(
         ideal, camera.principal_point, own
     )
     by_interior = {name: by_own[:, :, k] for k, name in enumerate(own)}
     by_interior["c"] = (by_ideal @ by_c[..., None])[..., 0]
-    return _Lens(image, by_ideal @ by_seen, by_interior)
+    return _LensImage(image, by_ideal @ by_seen, by_interior)
 
 
-def _central(seen: FloatArray, camera: Camera, *, out: FloatArray) -> None:
-    """Write the central projection of camera-frame vectors; NaN behind the camera."""
+def _image_of(seen: FloatArray, camera: Camera) -> FloatArray:
+    """Return measured image coordinates of camera-frame vectors in the first medium, (n, 2)."""
+    ideal = _central(seen, camera)
+    if camera.distortion.is_identity:
+        ideal += camera.principal_point
+        return ideal
+    return camera.distortion.measured(ideal, camera.principal_point)
+
+
+def _central(seen: FloatArray, camera: Camera) -> FloatArray:
+    """Return the central projection of camera-frame vectors; NaN behind the camera."""
     depth = seen[:, 2]
     with np.errstate(divide="ignore", invalid="ignore"):
         factor = -camera.principal_distance / depth
     if not (depth < 0).all():
         factor = np.where(depth < 0, factor, np.nan)
-    np.multiply(seen[:, 0], factor, out=out[:, 0])
-    np.multiply(seen[:, 1], factor, out=out[:, 1])
+    image: FloatArray = np.empty((len(seen), 2))
+    np.multiply(seen[:, 0], factor, out=image[:, 0])
+    np.multiply(seen[:, 1], factor, out=image[:, 1])
+    return image
 
 
 def refuse_pixels(camera: Camera, image: FloatArray) -> None:
@@ -326,67 +258,3 @@ def refuse_pixels(camera: Camera, image: FloatArray) -> None:
             )
             + ". Are these pixels? Give millimetres, or columns headed col and row with the sensor."
         )
-
-
-def _by_exterior(
-    names: Sequence[str],
-    camera: Camera,
-    interface: FlatInterface | None,
-    vectors: FloatArray,
-    by_seen: FloatArray,
-    by_vector: FloatArray,
-    by_point: FloatArray,
-    along: FloatArray | None,
-    shift: Shifts | None,
-) -> dict[str, FloatArray]:
-    """Return the derivatives by centre and rotation vector that ``names`` asks for."""
-    if not any(name in EXTERIOR for name in names):
-        return {}
-    by_centre = -by_point
-    # Turning the camera by a small vector v of the world: R^T d changes by R^T (d x v).
-    turned, of = by_vector, vectors
-    stays = interface is not None and not interface.moves_with_camera
-    if stays and interface is not None and along is not None and shift is not None:
-        # The height changes with the centre; rho and depth do not change with the rotation, the
-        # whole seen vector turns.
-        by_height = along * shift.by_height[:, None]
-        by_centre = by_centre + by_height[:, :, None] * interface.normal
-        turned, of = by_seen, vectors + shift.g[:, None] * (interface.normal @ camera.rotation)
-    # row . (a x v) = (row x a) . v, in the camera frame; then v back to the world.
-    by_turn = np.cross(turned, of[:, None, :]) @ camera.rotation.T
-    columns = {name: by_centre[:, :, k] for k, name in enumerate(EXTERIOR[:3])}
-    return columns | {name: by_turn[:, :, k] for k, name in enumerate(EXTERIOR[3:])}
-
-
-def _by_interface(
-    names: Sequence[str],
-    camera: Camera,
-    interface: FlatInterface,
-    vectors: FloatArray,
-    by_seen: FloatArray,
-    along: FloatArray,
-    shift: Shifts,
-) -> list[FloatArray]:
-    """Return the derivatives by the interface parameters, each of shape (n, 2)."""
-    to_camera: FloatArray
-    if interface.moves_with_camera:
-        to_camera, centre = np.eye(3), -interface.point
-    else:
-        to_camera, centre = camera.rotation, camera.centre - interface.point
-    columns: list[FloatArray] = []
-    for name in names:
-        if name == "offset":
-            columns.append(along * -shift.by_height[:, None])
-        elif name in ("tilt1", "tilt2"):
-            axis = interface.tangents[int(name[-1]) - 1]
-            turn = np.cross(axis, interface.normal)  # d(normal), in the interface's own frame
-            turn_camera = turn @ to_camera
-            by_w = vectors @ turn_camera
-            change = (shift.by_w - 2.0 * shift.w * shift.by_rho2) * by_w
-            change += shift.by_height * float(centre @ turn)
-            columns.append(along * change[:, None] + (by_seen @ turn_camera) * shift.g[:, None])
-        elif name.startswith("thickness"):
-            columns.append(along * shift.by_thicknesses[:, [int(name[9:]) - 1]])
-        else:
-            columns.append(along * shift.by_indices[:, [int(name[5:]) - 1]])
-    return columns

@@ -9,15 +9,16 @@ This is the second road beside the radial shift: no formula is shared.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from functools import partial
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from multimedia.media.interfaces import Interfaces
 from multimedia.media.least_time import least_time_path
 from multimedia.media.ray_paths import RayPaths, RayStatus
+from multimedia.media.surface_sequence import SurfaceSequence
 from multimedia.media.surfaces import Plane
 from photocore.arrays import BoolArray, FloatArray, IntArray, as_points
 
@@ -49,11 +50,20 @@ class _March(NamedTuple):
     bends: FloatArray  # (n, 2, 3): derivative of the last direction
     status: IntArray  # (n,)
 
+    @property
+    def paths(self) -> RayPaths:
+        """Without derivatives."""
+        return RayPaths(vertices=self.vertices, directions=self.directions, status=self.status)
 
-_Found = tuple[_March, BoolArray]
+    def take(self, rows: IntArray) -> _March:
+        """Return some of the rays."""
+        return _March._make(field[rows] for field in self)
 
 
-def trace_rays(origins: ArrayLike, directions: ArrayLike, interfaces: Interfaces) -> RayPaths:
+_Reached = tuple[_March, BoolArray]
+
+
+def trace_rays(origins: ArrayLike, directions: ArrayLike, interfaces: SurfaceSequence) -> RayPaths:
     """Trace rays from the camera through every interface.
 
     Parameters
@@ -62,7 +72,7 @@ def trace_rays(origins: ArrayLike, directions: ArrayLike, interfaces: Interfaces
         Starts, usually the projection centre. [m, or any unit of the interfaces]
     directions : array_like, shape (..., 3)
         Directions in the first medium, of any length; broadcast against the origins.
-    interfaces : Interfaces
+    interfaces : SurfaceSequence
         Surfaces and indices, all in the frame of the origins (see `Interfaces.seen_from`).
 
     Returns
@@ -84,31 +94,21 @@ def trace_rays(origins: ArrayLike, directions: ArrayLike, interfaces: Interfaces
     --------
     A ray that meets water at 45 degrees goes on at asin(sin 45 / 1.3333) = 32.03 degrees:
 
+    >>> from multimedia import Interfaces
     >>> water = Interfaces.flat_water(0.0, index=4 / 3)
     >>> path = trace_rays([0.0, 0.0, 1.0], [1.0, 0.0, -1.0], water)
     >>> path.vertices.round(9).tolist(), np.degrees(np.arcsin(path.directions[1, 0])).round(2)
     ([[1.0, 0.0, 0.0]], np.float64(32.03))
     """
-    start, heading = np.broadcast_arrays(
-        as_points(origins, "origins", dimension=3), as_points(directions, "directions", dimension=3)
-    )
-    shape, count = start.shape[:-1], len(interfaces.surfaces)
-    start, heading = start.reshape(-1, 3), heading.reshape(-1, 3)
-    parts = []
-    for first in range(0, max(len(start), 1), BLOCK):
-        part = slice(first, first + BLOCK)
-        parts.append(_march(start[part], _unit(heading[part]), interfaces, derivatives=False))
-    return RayPaths(
-        vertices=np.concatenate([part.vertices for part in parts]).reshape(*shape, count, 3),
-        directions=np.concatenate([part.directions for part in parts]).reshape(
-            *shape, count + 1, 3
-        ),
-        status=np.concatenate([part.status for part in parts]).reshape(shape),
+    return _blockwise(
+        as_points(origins, "origins", dimension=3),
+        as_points(directions, "directions", dimension=3),
+        lambda start, heading: _march(start, _unit(heading), interfaces, derivatives=False).paths,
     )
 
 
 def aim_rays(
-    centres: ArrayLike, points: ArrayLike, interfaces: Interfaces, *, jacobian: bool = False
+    centres: ArrayLike, points: ArrayLike, interfaces: SurfaceSequence, *, jacobian: bool = False
 ) -> RayPaths:
     """Find the ray from each projection centre that reaches each object point.
 
@@ -118,7 +118,7 @@ def aim_rays(
         Projection centres; broadcast against the points. [m, or any unit of the interfaces]
     points : array_like, shape (..., 3)
         Object points behind the last interface.
-    interfaces : Interfaces
+    interfaces : SurfaceSequence
         Surfaces and indices, all in the frame of the points (see `Interfaces.seen_from`).
     jacobian : bool
         Also return how the direction at the camera changes with the point.
@@ -142,40 +142,53 @@ def aim_rays(
     --------
     A point 1.5 m deep, seen from 1 m above the water: the ray of `trace_rays` goes through it.
 
+    >>> from multimedia import Interfaces
     >>> water = Interfaces.flat_water(0.0, index=4 / 3)
     >>> point = [1 + 1.5 * np.tan(np.arcsin(np.sin(np.pi / 4) * 0.75)), 0, -1.5]
     >>> aim_rays([0, 0, 1], point, water).vertices.round(12).tolist()
     [[1.0, 0.0, 0.0]]
     """
-    centre, target = np.broadcast_arrays(
-        as_points(centres, "centres", dimension=3), as_points(points, "points", dimension=3)
+
+    def aim(centre: FloatArray, target: FloatArray) -> RayPaths:
+        paths = _aim_block(centre, target, interfaces)
+        if not jacobian:
+            return paths
+        derivative = _pointing_derivative(centre, target, paths.directions[:, 0], interfaces)
+        return replace(paths, jacobian=derivative)
+
+    return _blockwise(
+        as_points(centres, "centres", dimension=3), as_points(points, "points", dimension=3), aim
     )
-    shape, count = target.shape[:-1], len(interfaces.surfaces)
-    centre, target = centre.reshape(-1, 3), target.reshape(-1, 3)
-    vertices = np.full((len(target), count, 3), np.nan)
-    directions = np.full((len(target), count + 1, 3), np.nan)
-    status = np.zeros(len(target), dtype=np.int64)
-    derivative = np.full((len(target), 3, 3), np.nan) if jacobian else None
-    for first in range(0, len(target), BLOCK):
-        part = slice(first, first + BLOCK)
-        found = _aim_block(centre[part], target[part], interfaces)
-        vertices[part], directions[part], status[part] = found
-        if derivative is not None:
-            derivative[part] = _pointing_derivative(
-                centre[part], target[part], directions[part, 0], interfaces
-            )
+
+
+def _blockwise(
+    first: FloatArray, second: FloatArray, work: Callable[[FloatArray, FloatArray], RayPaths]
+) -> RayPaths:
+    """Return what ``work`` makes of two vectors per ray, block by block, in their common shape."""
+    first, second = np.broadcast_arrays(first, second)
+    shape = first.shape[:-1]
+    first, second = first.reshape(-1, 3), second.reshape(-1, 3)
+    parts = [
+        work(first[start : start + BLOCK], second[start : start + BLOCK])
+        for start in range(0, max(len(first), 1), BLOCK)
+    ]
+
+    def joined(arrays: list[Any]) -> Any:
+        return np.concatenate(arrays).reshape((*shape, *arrays[0].shape[1:]))
+
+    jacobians = [part.jacobian for part in parts]
     return RayPaths(
-        vertices=vertices.reshape(*shape, count, 3),
-        directions=directions.reshape(*shape, count + 1, 3),
-        status=status.reshape(shape),
-        jacobian=None if derivative is None else derivative.reshape(*shape, 3, 3),
+        vertices=joined([part.vertices for part in parts]),
+        directions=joined([part.directions for part in parts]),
+        status=joined([part.status for part in parts]),
+        jacobian=None if jacobians[0] is None else joined(jacobians),
     )
 
 
 def _march(
     origins: FloatArray,
     directions: FloatArray,
-    interfaces: Interfaces,
+    interfaces: SurfaceSequence,
     *,
     derivatives: bool = True,
     frame: FloatArray | None = None,
@@ -230,10 +243,8 @@ def _march(
     return _March(vertices, headings, step, bend, status)
 
 
-def _aim_block(
-    centre: FloatArray, target: FloatArray, interfaces: Interfaces
-) -> tuple[FloatArray, FloatArray, IntArray]:
-    """Return vertices, directions and status of the rays from centre to target."""
+def _aim_block(centre: FloatArray, target: FloatArray, interfaces: SurfaceSequence) -> RayPaths:
+    """Return the rays from centre to target."""
     count = len(interfaces.surfaces)
     vertices = np.full((len(target), count, 3), np.nan)
     directions = np.full((len(target), count + 1, 3), np.nan)
@@ -257,17 +268,18 @@ def _aim_block(
         status[rows] = np.where(lost == RayStatus.OK, RayStatus.NOT_CONVERGED, lost)
     if backwards:
         vertices, directions = vertices[:, ::-1], -directions[:, ::-1]
-    return vertices, directions, status
+    return RayPaths(vertices=vertices, directions=directions, status=status)
 
 
-def _attempts(path: Interfaces) -> Iterator[Callable[[FloatArray, FloatArray], _Found]]:
+def _attempts(path: SurfaceSequence) -> Iterator[Callable[[FloatArray, FloatArray], _Reached]]:
     """Yield ways to find a ray, the cheap one first; each is tried on what the others left."""
     yield partial(_by_stages, path=path, stages=1)
-    if all(isinstance(surface, Plane) for surface in path.surfaces):
+    flat = all(isinstance(surface, Plane) for surface in path.surfaces)
+    if flat:
         yield partial(_by_least_time, path=path)
     for stages in STAGES:
         yield partial(_by_stages, path=path, stages=stages)
-    if all(isinstance(surface, Plane) for surface in path.surfaces):
+    if flat:
         return
     # Waves leave a few points whose straight start lies across a crest.
     for ring in RINGS:
@@ -276,19 +288,21 @@ def _attempts(path: Interfaces) -> Iterator[Callable[[FloatArray, FloatArray], _
             yield partial(_from_ring, path=path, ring=ring, angle=angle)
 
 
-def _by_stages(start: FloatArray, end: FloatArray, *, path: Interfaces, stages: int) -> _Found:
+def _by_stages(
+    start: FloatArray, end: FloatArray, *, path: SurfaceSequence, stages: int
+) -> _Reached:
     """Start along the straight line and bring the refraction in by stages."""
     heading = _unit(end - start)
     for stage in range(1, stages):
         # Geometric mean of "no refraction" and the real indices.
         share = stage / stages
         indices = [path.indices[0] ** (1 - share) * index**share for index in path.indices]
-        heading = _newton(start, end, heading, path.with_indices(indices))[0]
+        heading = _newton(start, end, heading, path.between(indices))[0]
     _, march, _, reached = _newton(start, end, heading, path)
     return march, reached
 
 
-def _by_least_time(start: FloatArray, end: FloatArray, *, path: Interfaces) -> _Found:
+def _by_least_time(start: FloatArray, end: FloatArray, *, path: SurfaceSequence) -> _Reached:
     """Take the path of least time, for planes only."""
     vertices, directions, reached = least_time_path(start, end, path)
     # Shooting along that direction gains the last digits, where it can follow.
@@ -302,8 +316,8 @@ def _by_least_time(start: FloatArray, end: FloatArray, *, path: Interfaces) -> _
 
 
 def _from_ring(
-    start: FloatArray, end: FloatArray, *, path: Interfaces, ring: float, angle: float
-) -> _Found:
+    start: FloatArray, end: FloatArray, *, path: SurfaceSequence, ring: float, angle: float
+) -> _Reached:
     """Start beside the best direction that the straight start leads to."""
     best, _, size, _ = _newton(start, end, _unit(end - start), path)
     width = ring * size / np.linalg.norm(end - start, axis=-1)
@@ -313,7 +327,7 @@ def _from_ring(
 
 
 def _newton(
-    start: FloatArray, end: FloatArray, heading: FloatArray, path: Interfaces
+    start: FloatArray, end: FloatArray, heading: FloatArray, path: SurfaceSequence
 ) -> tuple[FloatArray, _March, FloatArray, BoolArray]:
     """Turn start directions until the traced rays pass through the end points."""
     scale = np.linalg.norm(end - start, axis=-1) + np.abs(end).max(-1) + np.abs(start).max(-1)
@@ -321,13 +335,13 @@ def _newton(
     heading = heading.copy()
     frame = _across(heading)
     march = _march(start, heading, path, frame=frame)
-    miss = _miss(end, march)
-    size = _size(miss)
+    miss, size = _miss(end, march)
     rows = np.flatnonzero(np.isfinite(size))
     for _ in range(MOST_STEPS):
         if not rows.size:
             break
-        turn = _turn(end[rows], _rows(march, rows), miss[rows])
+        across, change = _sensitivity(end[rows], march.take(rows))
+        turn = _solve_2x2(change, (across @ miss[rows, :, None])[..., 0])
         old = size[rows].copy()
         pending, share = rows, np.ones(len(rows))
         for _ in range(MOST_HALVINGS):
@@ -338,8 +352,7 @@ def _newton(
             )
             tried_frame = _across(tried)
             new = _march(start[pending], tried, path, frame=tried_frame)
-            new_miss = _miss(end[pending], new)
-            new_size = _size(new_miss)
+            new_miss, new_size = _miss(end[pending], new)
             with np.errstate(invalid="ignore"):
                 better = new_size < old[place]
             good = pending[better]
@@ -363,25 +376,12 @@ def _newton(
     return heading, march, size, reached
 
 
-def _miss(end: FloatArray, march: _March) -> FloatArray:
-    """Return the vector from the ray to the point, at right angles to the ray; NaN if lost."""
+def _miss(end: FloatArray, march: _March) -> tuple[FloatArray, FloatArray]:
+    """Return the vector from the ray to the point, at right angles, and its length; NaN if lost."""
     toward = end - march.vertices[:, -1]
     heading = march.directions[:, -1]
     miss: FloatArray = toward - (toward * heading).sum(-1)[:, None] * heading
-    return miss
-
-
-def _size(vectors: FloatArray) -> FloatArray:
-    """Return the lengths of vectors."""
-    length: FloatArray = np.sqrt((vectors * vectors).sum(-1))
-    return length
-
-
-def _turn(end: FloatArray, march: _March, miss: FloatArray) -> FloatArray:
-    """Return the Newton step of the two start parameters, shape (n, 2)."""
-    frame, change = _sensitivity(end, march)
-    right = (frame @ miss[:, :, None])[..., 0]
-    return _solve_2x2(change, right)
+    return miss, np.sqrt((miss * miss).sum(-1))
 
 
 def _sensitivity(end: FloatArray, march: _March) -> tuple[FloatArray, FloatArray]:
@@ -397,7 +397,7 @@ def _sensitivity(end: FloatArray, march: _March) -> tuple[FloatArray, FloatArray
 
 
 def _pointing_derivative(
-    centre: FloatArray, target: FloatArray, heading: FloatArray, interfaces: Interfaces
+    centre: FloatArray, target: FloatArray, heading: FloatArray, interfaces: SurfaceSequence
 ) -> FloatArray:
     """Return the derivative of the unit direction at the camera by the object point."""
     frame = _across(heading)
@@ -435,14 +435,3 @@ def _unit(vectors: FloatArray) -> FloatArray:
     """Return unit vectors; NaN for a vector without length."""
     with np.errstate(divide="ignore", invalid="ignore"):
         return vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)
-
-
-def _rows(march: _March, rows: IntArray) -> _March:
-    """Return some of the rays."""
-    return _March(
-        march.vertices[rows],
-        march.directions[rows],
-        march.steps[rows],
-        march.bends[rows],
-        march.status[rows],
-    )

@@ -18,8 +18,10 @@ from photocore.arrays import FloatArray, as_floats, positive, read_only
 from photocore.errors import GeometryError
 
 
-class Surface(ABC):
+class RefractingSurface(ABC):
     """What ray tracing asks of an interface. All arrays are float64, points on the last axis."""
+
+    __slots__ = ()
 
     @abstractmethod
     def side(self, points: FloatArray) -> FloatArray:
@@ -51,8 +53,30 @@ class Surface(ABC):
         """Return the surface moved by a vector."""
 
 
+class RigidSurface(RefractingSurface):
+    """A surface that can be fixed to a camera: it is known wherever it is moved and turned."""
+
+    __slots__ = ()
+
+    @abstractmethod
+    def moved(self, rotation: FloatArray, translation: FloatArray) -> Self:
+        """Return the surface of one frame as seen in another, x' = rotation x + translation."""
+
+    def shifted(self, vector: ArrayLike) -> Self:
+        """Return the surface moved by a vector."""
+        return self.moved(np.eye(3), as_floats(vector, "vector"))
+
+
+def tangents_of(normal: FloatArray) -> FloatArray:
+    """Return two unit vectors at right angles to a unit normal and to each other, shape (2, 3)."""
+    axis = np.eye(3)[np.argmin(np.abs(normal))]
+    first = np.cross(normal, axis)
+    first /= np.linalg.norm(first)
+    return np.stack([first, np.cross(normal, first)])
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Plane(Surface):
+class Plane(RigidSurface):
     """A plane of any tilt.
 
     Attributes
@@ -74,7 +98,7 @@ class Plane(Surface):
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "point", read_only(self.point, "point", shape=(3,)))
-        object.__setattr__(self, "normal", _unit(self.normal, "normal"))
+        object.__setattr__(self, "normal", unit_vector(self.normal, "normal"))
 
     @classmethod
     def level(cls, height: float) -> Plane:
@@ -88,6 +112,16 @@ class Plane(Surface):
             point=(0.0, 0.0, height),  # type: ignore[arg-type]
             normal=(-slope_x, -slope_y, 1.0),  # type: ignore[arg-type]
         )
+
+    @property
+    def middle(self) -> float:
+        """The height of its point."""
+        return float(self.point[2])
+
+    def height_at(self, xy: FloatArray) -> FloatArray:
+        """Return the height above each position, shape (...); no plane that stands on edge."""
+        offset: FloatArray = (xy - self.point[:2]) @ (self.normal[:2] / self.normal[2])
+        return self.point[2] - offset
 
     def side(self, points: FloatArray) -> FloatArray:
         """Return the signed distance to the plane."""
@@ -113,17 +147,51 @@ class Plane(Surface):
         """Return zero: the normal of a plane never turns."""
         return np.zeros_like(steps)
 
-    def shifted(self, vector: ArrayLike) -> Plane:
-        """Return the plane moved by a vector."""
-        return replace(self, point=self.point + as_floats(vector, "vector"))
-
     def moved(self, rotation: FloatArray, translation: FloatArray) -> Plane:
         """Return the plane given in one frame as seen in another, x' = rotation x + translation."""
         return Plane(point=rotation @ self.point + translation, normal=rotation @ self.normal)
 
 
+class _RoundSurface(RigidSurface):
+    """What spheres and cylinders share; normals point outwards. Subclasses say what is radial."""
+
+    __slots__ = ()
+
+    radius: float
+
+    @abstractmethod
+    def _radial(self, vectors: FloatArray) -> FloatArray:
+        """Return the part of vectors in which the surface is a circle."""
+
+    @abstractmethod
+    def _offset(self, points: FloatArray) -> FloatArray:
+        """Return the radial part of the vectors from the centre to points."""
+
+    def side(self, points: FloatArray) -> FloatArray:
+        """Return the distance outside the surface, negative inside."""
+        distance: FloatArray = np.linalg.norm(self._offset(points), axis=-1) - self.radius
+        return distance
+
+    def hop(self, origins: FloatArray, directions: FloatArray, beyond: FloatArray) -> FloatArray:
+        """Return the distance to the next meeting with the surface; NaN where there is none."""
+        return _hop_round(self._offset(origins), self._radial(directions), self.radius, beyond)
+
+    def normals(self, points: FloatArray) -> FloatArray:
+        """Return the outward radii."""
+        return self._offset(points) / self.radius
+
+    def turn(
+        self,
+        points: FloatArray,  # noqa: ARG002
+        normals: FloatArray,  # noqa: ARG002
+        steps: FloatArray,
+    ) -> FloatArray:
+        """Return the radial part of the steps, over the radius."""
+        return self._radial(steps) / self.radius
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Sphere(Surface):
+class Sphere(_RoundSurface):
     """A sphere, such as the inner or outer face of a dome port; normals point outwards.
 
     Attributes
@@ -141,31 +209,13 @@ class Sphere(Surface):
         object.__setattr__(self, "centre", read_only(self.centre, "centre", shape=(3,)))
         object.__setattr__(self, "radius", positive(self.radius, "radius"))
 
-    def side(self, points: FloatArray) -> FloatArray:
-        """Return the distance outside the sphere, negative inside."""
-        distance: FloatArray = np.linalg.norm(points - self.centre, axis=-1) - self.radius
-        return distance
+    def _radial(self, vectors: FloatArray) -> FloatArray:
+        """Return the vectors."""
+        return vectors
 
-    def hop(self, origins: FloatArray, directions: FloatArray, beyond: FloatArray) -> FloatArray:
-        """Return the distance to the next meeting with the sphere; NaN where there is none."""
-        return _hop_round(origins - self.centre, directions, self.radius, beyond)
-
-    def normals(self, points: FloatArray) -> FloatArray:
-        """Return the outward radii."""
-        return (points - self.centre) / self.radius
-
-    def turn(
-        self,
-        points: FloatArray,  # noqa: ARG002
-        normals: FloatArray,  # noqa: ARG002
-        steps: FloatArray,
-    ) -> FloatArray:
-        """Return the steps over the radius."""
-        return steps / self.radius
-
-    def shifted(self, vector: ArrayLike) -> Sphere:
-        """Return the sphere moved by a vector."""
-        return replace(self, centre=self.centre + as_floats(vector, "vector"))
+    def _offset(self, points: FloatArray) -> FloatArray:
+        """Return the vectors from the centre."""
+        return points - self.centre
 
     def moved(self, rotation: FloatArray, translation: FloatArray) -> Sphere:
         """Return the sphere given in one frame as seen in another."""
@@ -173,7 +223,7 @@ class Sphere(Surface):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Cylinder(Surface):
+class Cylinder(_RoundSurface):
     """An endless circular cylinder, such as one wall of a glass tube; normals point outwards.
 
     Attributes
@@ -192,40 +242,16 @@ class Cylinder(Surface):
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "point", read_only(self.point, "point", shape=(3,)))
-        object.__setattr__(self, "axis", _unit(self.axis, "axis"))
+        object.__setattr__(self, "axis", unit_vector(self.axis, "axis"))
         object.__setattr__(self, "radius", positive(self.radius, "radius"))
 
-    def _across(self, vectors: FloatArray) -> FloatArray:
+    def _radial(self, vectors: FloatArray) -> FloatArray:
         """Return the part of vectors at right angles to the axis."""
         return vectors - (vectors @ self.axis)[..., None] * self.axis
 
-    def side(self, points: FloatArray) -> FloatArray:
-        """Return the distance outside the cylinder, negative inside."""
-        across = self._across(points - self.point)
-        distance: FloatArray = np.linalg.norm(across, axis=-1) - self.radius
-        return distance
-
-    def hop(self, origins: FloatArray, directions: FloatArray, beyond: FloatArray) -> FloatArray:
-        """Return the distance to the next meeting with the wall; NaN where there is none."""
-        across, along = self._across(origins - self.point), self._across(directions)
-        return _hop_round(across, along, self.radius, beyond)
-
-    def normals(self, points: FloatArray) -> FloatArray:
-        """Return the outward radii, at right angles to the axis."""
-        return self._across(points - self.point) / self.radius
-
-    def turn(
-        self,
-        points: FloatArray,  # noqa: ARG002
-        normals: FloatArray,  # noqa: ARG002
-        steps: FloatArray,
-    ) -> FloatArray:
-        """Return the part of the steps across the axis, over the radius."""
-        return self._across(steps) / self.radius
-
-    def shifted(self, vector: ArrayLike) -> Cylinder:
-        """Return the cylinder moved by a vector."""
-        return replace(self, point=self.point + as_floats(vector, "vector"))
+    def _offset(self, points: FloatArray) -> FloatArray:
+        """Return the shortest vectors from the axis."""
+        return self._radial(points - self.point)
 
     def moved(self, rotation: FloatArray, translation: FloatArray) -> Cylinder:
         """Return the cylinder given in one frame as seen in another."""
@@ -257,7 +283,7 @@ def _hop_round(
     return np.where(np.isfinite(distance), distance, np.nan)
 
 
-def _unit(vector: ArrayLike, name: str) -> FloatArray:
+def unit_vector(vector: ArrayLike, name: str) -> FloatArray:
     """Return a read-only unit vector."""
     given = read_only(vector, name, shape=(3,))
     length = float(np.linalg.norm(given))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from multimedia.media.camera import Camera
-from multimedia.media.projection import Placed, project
+from multimedia.media.projection import Media, project
 from multimedia.orientation.resection import resect
 from photocore.arrays import FloatArray, IntArray
 from photocore.errors import ConvergenceError, GeometryError, InputError
@@ -20,7 +20,7 @@ def match_targets(
     camera: Camera,
     control: FloatArray,
     targets: FloatArray,
-    interface: Placed,
+    interface: Media,
     *,
     radius: float = FIRST_RADIUS,
 ) -> IntArray:
@@ -72,7 +72,7 @@ def _nearest(
     camera: Camera,
     control: FloatArray,
     targets: FloatArray,
-    interface: Placed,
+    interface: Media,
     radius: float,
 ) -> IntArray:
     """Return mutual nearest neighbours within a radius."""

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from multimedia.media.camera import Camera
-from multimedia.media.projection import Media, as_interface, project
+from multimedia.media.projection import Media, as_media, project
 from multimedia.orientation.object_rays import image_rays
 from photocore.arrays import FloatArray, IntArray, as_points
 from photocore.errors import InputError
@@ -128,7 +128,7 @@ def epipolar_curve(
         raise InputError(f"vertices: expected 2 to {_MOST}, found {vertices}.")
     if not chord_error > 0:
         raise InputError(f"chord_error: must be above zero [mm], found {chord_error}.")
-    second = as_interface(second)
+    second = as_media(second)
     flat = measured.reshape(-1, 2)
     origins, directions = image_rays(camera, flat, first)
     near, far = _ends(origins, directions, low, high)

@@ -11,10 +11,10 @@ from numpy.typing import ArrayLike
 from scipy.stats import chi2
 
 from multimedia.media.camera import Camera
+from multimedia.media.optical_media import OpticalMedia
 from multimedia.media.projection import (
     Media,
-    Placed,
-    as_interface,
+    as_media,
     project,
     project_with_jacobian,
     refuse_pixels,
@@ -202,7 +202,7 @@ def intersect_pairs(
 
 
 def _pair_block(
-    cameras: Sequence[Camera], image: FloatArray, placed: Sequence[Placed]
+    cameras: Sequence[Camera], image: FloatArray, placed: Sequence[OpticalMedia]
 ) -> tuple[FloatArray, FloatArray]:
     """Return mean midpoints and mean distances of all pairs of rays."""
     rays = [image_rays(c, p, m) for c, p, m in zip(cameras, image, placed, strict=True)]
@@ -237,7 +237,7 @@ def _block(
     cameras: Sequence[Camera],
     image: FloatArray,
     sigmas: FloatArray,
-    placed: Sequence[Placed],
+    placed: Sequence[OpticalMedia],
 ) -> Intersection:
     """Intersect one block of points."""
     m, n, _ = image.shape
@@ -285,7 +285,7 @@ def _step(
     image: FloatArray,
     sigmas: FloatArray,
     seen: BoolArray,
-    placed: Sequence[Placed],
+    placed: Sequence[OpticalMedia],
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return normal matrices (6, n), steps (n, 3), weighted derivatives (m, n, 2, 3)."""
     n = len(xyz)
@@ -310,7 +310,7 @@ def _assembled(
     cameras: Sequence[Camera],
     image: FloatArray,
     sigmas: FloatArray,
-    placed: Sequence[Placed],
+    placed: Sequence[OpticalMedia],
     *,
     xyz: FloatArray,
     normal: FloatArray,
@@ -369,7 +369,7 @@ def _largest_angle(directions: Sequence[FloatArray]) -> FloatArray:
 
 def _checked(
     cameras: Sequence[Camera], image_points: ArrayLike, layers: Media | Sequence[Media]
-) -> tuple[FloatArray, list[Placed]]:
+) -> tuple[FloatArray, list[OpticalMedia]]:
     """Return image points and what each camera looks through."""
     if len(cameras) < 2:
         raise InputError(f"cameras: an intersection needs two or more, found {len(cameras)}.")
@@ -384,7 +384,7 @@ def _checked(
         raise InputError(f"layers: expected one per camera ({len(cameras)}), found {len(media)}.")
     for camera, points in zip(cameras, image, strict=True):
         refuse_pixels(camera, points)
-    return image, [as_interface(item) for item in media]
+    return image, [as_media(item) for item in media]
 
 
 def _sigmas(

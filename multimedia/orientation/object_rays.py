@@ -8,10 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from multimedia.media.camera import Camera
-from multimedia.media.collinearity import rays_in_object_space
-from multimedia.media.interfaces import Interfaces
-from multimedia.media.projection import Media, as_interface
-from multimedia.media.traced_projection import object_rays as traced_rays
+from multimedia.media.projection import Media, as_media
 from photocore.arrays import FloatArray, as_points
 
 
@@ -55,18 +52,9 @@ def image_rays(
     directions: FloatArray = np.empty((len(ideal), 3))
     directions[:, :2] = ideal
     directions[:, 2] = -camera.principal_distance
-    interface = as_interface(layers)
     shape = (*measured.shape[:-1], 3)
-    if isinstance(interface, Interfaces):
-        origins, rays = traced_rays(camera, directions, interface)
-        return origins.reshape(shape), rays.reshape(shape)
-    if interface is None:
-        rays = directions @ camera.rotation.T
-        rays /= np.sqrt((rays * rays).sum(-1, keepdims=True))
-        return np.broadcast_to(camera.centre, shape).copy(), rays.reshape(shape)
-    origins, rays = rays_in_object_space(directions, interface.medium(camera))
-    world = origins @ camera.rotation.T + camera.centre
-    return world.reshape(shape), (rays @ camera.rotation.T).reshape(shape)
+    origins, rays = as_media(layers).object_rays(camera, directions)
+    return origins.reshape(shape), rays.reshape(shape)
 
 
 def nearest_points(origins: Sequence[FloatArray], directions: Sequence[FloatArray]) -> FloatArray:

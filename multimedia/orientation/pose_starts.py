@@ -7,11 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from multimedia.media.camera import Camera
-from multimedia.media.collinearity import image_vectors
-from multimedia.media.flat_interface import FlatInterface
-from multimedia.media.interfaces import Interfaces
-from multimedia.media.projection import Placed
-from multimedia.media.traced_projection import sight_vectors
+from multimedia.media.optical_media import OpticalMedia
 from photocore.arrays import FloatArray
 from photocore.errors import GeometryError
 
@@ -22,7 +18,7 @@ _ROUNDS = 4
 
 
 def pose_starts(
-    camera: Camera, control: FloatArray, image: FloatArray, interface: Placed
+    camera: Camera, control: FloatArray, image: FloatArray, media: OpticalMedia
 ) -> list[Camera]:
     """Return poses from which ``camera`` may have seen the control points.
 
@@ -34,7 +30,7 @@ def pose_starts(
         At least 3 points.
     image : ndarray, shape (n, 2)
         [mm]
-    interface : FlatInterface, Interfaces or None
+    media : OpticalMedia
         What the camera looks through.
 
     Returns
@@ -54,40 +50,32 @@ def pose_starts(
     if good.sum() < 3:
         return []
     control, ideal = control[good], ideal[good]
-    starts = []
-    if interface is None:
+    if len(set(media.indices)) == 1:
         return _straight(camera, control, ideal)
-    if isinstance(interface, Interfaces) or interface.moves_with_camera:
+    apparent = media.seen_from_afar(control)
+    if apparent is not None:
+        starts = _straight(camera, apparent, ideal)
+    else:
         # Seen through its port a camera has, to first order, a longer principal distance; the
         # pose this gives is refined by apparent points like any other.
-        if isinstance(interface, Interfaces):
-            indices = interface.indices
-            starts += _straight(camera, control, ideal)
-        else:
-            indices = interface.layers.indices
-        longer = replace(camera, principal_distance=camera.principal_distance * indices[-1])
-        for pose in _straight(longer, control, ideal):
-            starts.append(replace(pose, principal_distance=camera.principal_distance))
-    else:
-        starts = _straight(camera, _seen_along_normal(control, interface), ideal)
-    return [better for start in starts for better in _refined(start, control, ideal, interface)]
+        starts = _straight(camera, control, ideal)
+        distance = camera.principal_distance
+        longer = replace(camera, principal_distance=distance * media.indices[-1])
+        starts += [
+            replace(pose, principal_distance=distance) for pose in _straight(longer, control, ideal)
+        ]
+    return [better for start in starts for better in _refined(start, control, ideal, media)]
 
 
 def _refined(
-    start: Camera, control: FloatArray, ideal: FloatArray, interface: FlatInterface | Interfaces
+    start: Camera, control: FloatArray, ideal: FloatArray, media: OpticalMedia
 ) -> list[Camera]:
     """Return the start and what the apparent points make of it."""
     found = [start]
     pose = start
     for _ in range(_ROUNDS):
-        vectors = (control - pose.centre) @ pose.rotation
         try:
-            if isinstance(interface, Interfaces):
-                seen = sight_vectors(pose, control, interface)
-                # As far away as the point itself, in the direction in which it is seen.
-                seen = seen * np.linalg.norm(vectors, axis=1, keepdims=True)
-            else:
-                seen = image_vectors(vectors, interface.medium(pose))
+            seen = media.apparent_vectors(pose, control)
         except GeometryError:
             break
         apparent = pose.centre + seen @ pose.rotation.T
@@ -101,16 +89,6 @@ def _refined(
     if pose is not start:
         found.append(pose)
     return found
-
-
-def _seen_along_normal(control: FloatArray, interface: FlatInterface) -> FloatArray:
-    """Return where the points seem to be for a camera far away along the normal."""
-    indices, inner = interface.layers.indices, interface.layers.thicknesses
-    depth = (interface.point - control) @ interface.normal
-    raised = depth * (1.0 - indices[0] / indices[-1])
-    for thickness, index in zip(inner, indices[1:-1], strict=True):
-        raised = raised + thickness * (1.0 - indices[0] / index)
-    return control + raised[:, None] * interface.normal
 
 
 def _straight(camera: Camera, control: FloatArray, ideal: FloatArray) -> list[Camera]:

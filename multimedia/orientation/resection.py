@@ -10,10 +10,10 @@ from numpy.typing import ArrayLike
 
 from multimedia.media.camera import EXTERIOR, INTERIOR, Camera
 from multimedia.media.flat_interface import FlatInterface
+from multimedia.media.optical_media import OpticalMedia
 from multimedia.media.projection import (
     Media,
-    Placed,
-    as_interface,
+    as_media,
     project_with_jacobian,
     refuse_pixels,
 )
@@ -146,7 +146,7 @@ def resect(
         camera, object_points, image_points, sigma, len(names)
     )
     what = f"resection of camera {camera.name}" if camera.name else "resection"
-    problem = _Problem(control, image, weights, as_interface(layers), names, what)
+    problem = _Problem(control, image, weights, as_media(layers), names, what)
     start = _best_start(camera, replace(problem, names=EXTERIOR))
     result = fit(
         start, problem.equations, problem.advance, names=names, what=what, rounding=problem.floor
@@ -179,7 +179,7 @@ class _Problem:
     control: FloatArray
     image: FloatArray
     weights: FloatArray
-    interface: Placed
+    interface: OpticalMedia
     names: tuple[str, ...]
     what: str
 

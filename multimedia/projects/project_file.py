@@ -12,7 +12,7 @@ import numpy as np
 from multimedia.media.camera import Camera, Sensor
 from multimedia.media.flat_interface import FlatInterface
 from multimedia.media.interfaces import Interfaces
-from multimedia.media.surfaces import Cylinder, Plane, Sphere, Surface
+from multimedia.media.surfaces import Cylinder, Plane, RefractingSurface, Sphere
 from multimedia.projects.model import (
     SIGMA_IMAGE,
     SIGMA_PIXEL,
@@ -226,7 +226,7 @@ def _surfaces(value: Mapping[str, Any], where: str) -> Interfaces:
     listed = value["surfaces"]
     if not isinstance(listed, list) or not listed:
         raise InputError(f"{where}: surfaces must be a list of sections, camera side first.")
-    surfaces: list[Surface] = []
+    surfaces: list[RefractingSurface] = []
     moving: list[bool] = []
     for number, item in enumerate(listed, start=1):
         place = f"{where}, surface {number}"
@@ -269,7 +269,7 @@ def _media_data(media: FlatInterface | Interfaces) -> dict[str, Any]:
     return data
 
 
-def _surface_data(surface: Surface) -> dict[str, Any]:
+def _surface_data(surface: RefractingSurface) -> dict[str, Any]:
     kinds = {Plane: "plane", Sphere: "sphere", Cylinder: "cylinder"}
     kind = kinds.get(type(surface))
     if kind is None:

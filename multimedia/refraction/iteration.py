@@ -17,9 +17,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from multimedia.refraction.shift import axis_ratio
+from multimedia.refraction.shift import as_layers, axis_ratio
 from photocore.arrays import BoolArray, FloatArray, IntArray, as_floats, positive
-from photocore.errors import InputError
 
 
 class ShiftIteration(NamedTuple):
@@ -100,12 +99,7 @@ def iterated_radius(
     (11, 4)
     """
     goal = as_floats(radius, "radius")
-    layers = [as_floats(height, f"heights[{i}]") for i, height in enumerate(heights)]
-    if len(layers) != len(indices):
-        raise InputError(
-            f"heights and indices: expected one refractive index per layer, found "
-            f"{len(layers)} heights and {len(indices)} indices."
-        )
+    layers = as_layers(heights, indices)
     positive(tolerance, "tolerance")
     if over_compensation is None:
         factor = best_over_compensation(goal, layers, indices)
@@ -114,7 +108,7 @@ def iterated_radius(
     shape = np.broadcast_shapes(goal.shape, *(h.shape for h in layers))
     goal, factor = (np.broadcast_to(a, shape).ravel() for a in (goal, factor))
     layers = [np.broadcast_to(h, shape).ravel() for h in layers]
-    whole = np.asarray(sum(layers[1:], layers[0]))
+    whole = np.asarray(sum(layers))
 
     bar, count = goal.copy(), np.zeros(goal.shape, dtype=np.int64)
     correction = np.full(goal.shape, np.inf)
@@ -165,17 +159,17 @@ def best_over_compensation(
     >>> float(best_over_compensation(150.0, (100.0, 10.0, 500.0), (1.0, 1.5, 1.34)).round(3))
     1.337
     """
-    layers = [as_floats(height, "heights") for height in heights]
+    layers = as_layers(heights, indices)
     on_axis = axis_ratio(layers, indices)
-    whole = np.asarray(sum(layers[1:], layers[0]))
+    whole = np.asarray(sum(layers))
     with np.errstate(invalid="ignore", divide="ignore"):
         tangent = on_axis * as_floats(radius, "radius") / whole
         sine = tangent / np.sqrt(1 + tangent**2)
-        steps = [
+        steps = sum(
             height * indices[0] / index / (1 - (indices[0] / index * sine) ** 2) ** 1.5
             for height, index in zip(layers, indices, strict=True)
-        ]
-        factor = whole / (1 - sine**2) ** 1.5 / sum(steps[1:], steps[0])
+        )
+        factor = whole / (1 - sine**2) ** 1.5 / steps
     # Beyond total reflection the estimate fails, and so will the iteration; start it safely.
     factor = np.where(np.isfinite(factor), factor, on_axis)
     return np.where(np.isnan(as_floats(radius, "radius") * whole), np.nan, factor)

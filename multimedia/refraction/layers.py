@@ -12,11 +12,11 @@ from numpy.typing import ArrayLike
 from photocore.arrays import FloatArray, as_floats
 from photocore.errors import GeometryError, InputError
 
-#: Diamond; nothing in front of a camera bends light more.
-HIGHEST_INDEX = 2.42
+#: Diamond; nothing in front of a camera for visible light bends it more.
+DIAMOND = 2.42
 
-#: Germanium, for infrared, is the last at 4.0.
-IMPOSSIBLE_INDEX = 4.1
+#: Germanium, for infrared, is the last at 4.0: beyond this an index is a typing error.
+HIGHEST_INDEX = 4.1
 
 #: Anything above this is a liquid or a solid, not a gas (xenon at 10 bar: 1.007).
 THINNEST_LIQUID = 1.1
@@ -52,7 +52,7 @@ class Layers:
     thicknesses: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
-        indices = _numbers(self.indices, "indices")
+        indices = checked_indices(self.indices)
         thicknesses = _numbers(self.thicknesses, "thicknesses")
         object.__setattr__(self, "indices", indices)
         object.__setattr__(self, "thicknesses", thicknesses)
@@ -61,17 +61,6 @@ class Layers:
                 f"indices: expected at least two media, the camera's and the object's; found "
                 f"{len(indices)}."
             )
-        for place, index in enumerate(indices, start=1):
-            if not (np.isfinite(index) and index >= 1):
-                raise InputError(
-                    f"indices: medium {place} has refractive index {index:g}; it must be at least "
-                    "1 (air 1.0003, water 1.33 to 1.35, glass 1.45 to 1.9)."
-                )
-            if index > IMPOSSIBLE_INDEX:
-                raise InputError(
-                    f"indices: medium {place} has refractive index {index:g}; nothing transparent "
-                    "has. Is a decimal point missing (1.337, not 13.37)?"
-                )
         for place, thickness in enumerate(thicknesses, start=1):
             if not (np.isfinite(thickness) and thickness >= 0):
                 raise InputError(
@@ -152,22 +141,20 @@ class Layers:
     @property
     def remarks(self) -> tuple[str, ...]:
         """What looks like a slip though it is possible; empty when nothing does."""
-        found = []
+        doubts = []
         outer = max(self.indices[0], self.indices[-1])
         for place, index in enumerate(self.indices[1:-1], start=2):
             if THINNEST_LIQUID < index < outer:
-                found.append(
+                doubts.append(
                     f"medium {place} (n = {index:g}) bends light less than the liquid next to it "
                     f"(n = {outer:g}), which no glass does: are the two indices swapped?"
                 )
         for place, index in enumerate(self.indices, start=1):
-            if index > HIGHEST_INDEX:
-                found.append(
-                    f"medium {place} has index {index:g}, more than diamond's {HIGHEST_INDEX}."
-                )
+            if index > DIAMOND:
+                doubts.append(f"medium {place} has index {index:g}, more than diamond's {DIAMOND}.")
         if len(set(self.indices)) == 1:
-            found.append("all media have the same index: nothing is refracted.")
-        return tuple(found)
+            doubts.append("all media have the same index: nothing is refracted.")
+        return tuple(doubts)
 
     def remarks_about(self, *, z0: ArrayLike, zp: ArrayLike) -> tuple[str, ...]:
         """Return `remarks` and what looks like millimetres mixed with metres.
@@ -179,19 +166,57 @@ class Layers:
         """
         distance = float(np.nanmax(as_floats(z0, "z0"), initial=0.0))
         distance += float(np.nanmax(as_floats(zp, "zp"), initial=0.0))
-        found = list(self.remarks)
+        doubts = list(self.remarks)
         thick = max(self.thicknesses, default=0.0)
         if thick > 10 * distance > 0:
-            found.append(
+            doubts.append(
                 f"a layer is {thick:g} thick, but camera and point are only {distance:g} apart "
                 "beside it: are the thicknesses in mm and the rest in m?"
             )
         if 0 < thick < 2e-6 * distance:
-            found.append(
+            doubts.append(
                 f"the thickest layer is {thick:g}, a {distance / thick:.0e}th of the distance "
                 f"{distance:g}: are the thicknesses in m and the rest in mm?"
             )
-        return tuple(found)
+        return tuple(doubts)
+
+
+def checked_indices(value: Sequence[float]) -> tuple[float, ...]:
+    """Return the refractive indices of media in their order, as floats.
+
+    Raises
+    ------
+    InputError
+        If one is impossible; see `checked_index`.
+    """
+    return tuple(
+        checked_index(n, f"indices: medium {place} has refractive index {n:g}")
+        for place, n in enumerate(_numbers(value, "indices"), start=1)
+    )
+
+
+def checked_index(value: float, complaint: str) -> float:
+    """Return a refractive index that a transparent medium may have.
+
+    Parameters
+    ----------
+    value : float
+        The index.
+    complaint : str
+        What the message begins with.
+
+    Raises
+    ------
+    InputError
+        If it is below 1 (nothing is optically thinner than vacuum) or beyond every material.
+    """
+    if not 1.0 <= value <= HIGHEST_INDEX:
+        raise InputError(
+            f"{complaint}; possible are 1 (vacuum, air) to {HIGHEST_INDEX:g} (germanium). Water "
+            "has about 1.33 to 1.35 (`multimedia index` computes it), glass 1.45 to 1.9. Is a "
+            "decimal point missing (1.337, not 13.37)?"
+        )
+    return value
 
 
 def _numbers(value: Sequence[float], name: str) -> tuple[float, ...]:

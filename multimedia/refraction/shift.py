@@ -6,14 +6,7 @@ the angle :math:`\beta_i` to the normal in each (Maas 2015, Eqs. 1 to 3):
 .. math:: R = \sum_i h_i \tan\beta_i, \qquad \bar R = \Bigl(\sum_i h_i\Bigr) \tan\beta_1, \qquad
           n_1 \sin\beta_1 = n_2 \sin\beta_2 = \dots
 
-The unknown here is :math:`t = \tan\beta` in the layer of the *lowest* index, because there the
-angle is largest and R runs through all values as t does:
-
-.. math:: F(t) = \sum_i \frac{h_i t}{\sqrt{a_i + b_i t^2}} = R, \qquad
-          a_i = n_i^2 / n_{min}^2, \quad b_i = a_i - 1 .
-
-F increases and is concave, so Newton's method approaches the root from below whatever the set-up:
-it cannot diverge, overshoot into total reflection, or stop at a wrong value.
+`multimedia.refraction.tangent` finds the root of the first equation, exactly.
 
 All heights and radii share one unit, any.
 
@@ -153,7 +146,7 @@ def shift_ratio(
     radius, layers = _checked(radius, heights, indices)
     radius_bar, _, _ = solve(radius, layers, indices, tangent=False)
     limit = axis_ratio(layers, indices)
-    whole = sum(layers, np.zeros(()))
+    whole = np.asarray(sum(layers))
     # The ratio leaves its limit with (R / whole)², which is beyond the last digit here.
     # "Not far" rather than "near", so that an unknown radius or height (NaN) gets no limit.
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -162,11 +155,9 @@ def shift_ratio(
 
 def axis_ratio(heights: Sequence[ArrayLike], indices: Sequence[float]) -> FloatArray:
     r"""Limit of :math:`\bar R / R` for R to 0; 1 where all heights are zero."""
-    whole = sum((as_floats(h, "heights") for h in heights), np.zeros(()))
-    reduced = sum(
-        (as_floats(h, "heights") * (indices[0] / n) for h, n in zip(heights, indices, strict=True)),
-        np.zeros(()),
-    )
+    layers = as_layers(heights, indices)
+    whole = np.asarray(sum(layers))
+    reduced = np.asarray(sum(h * (indices[0] / n) for h, n in zip(layers, indices, strict=True)))
     with np.errstate(divide="ignore", invalid="ignore"):
         return np.where(reduced == 0, 1.0, whole / reduced)
 
@@ -218,16 +209,16 @@ def shift_derivatives(
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         d_radius, d_heights, d_indices = _derivatives(t, lowest, layers, indices)
     shape = radius_bar.shape
-    found = ShiftDerivatives(
+    derivatives = ShiftDerivatives(
         radius_bar,
         np.broadcast_to(d_radius, shape).copy(),
         np.stack([np.broadcast_to(d, shape) for d in d_heights], axis=-1),
         np.stack([np.broadcast_to(d, shape) for d in d_indices], axis=-1),
     )
     unknown = np.isnan(radius_bar)
-    for derivative in found[1:]:
+    for derivative in derivatives[1:]:
         derivative[unknown] = np.nan
-    return found
+    return derivatives
 
 
 def _derivatives(
@@ -246,12 +237,12 @@ def _derivatives(
     def sum_over_layers(terms: list[FloatArray]) -> FloatArray:
         """Return sum(h_i term_i); what an absent layer would do to the ray does not count."""
         parts = [np.where(h > 0, h * term, 0.0) for h, term in zip(heights, terms, strict=True)]
-        return np.asarray(sum(parts[1:], parts[0]))
+        return np.asarray(sum(parts))
 
     layers = range(len(indices))
     steepness = [secants[i] ** 3 / indices[i] for i in layers]
     slope = sum_over_layers(steepness)
-    whole = np.asarray(sum(heights[1:], heights[0]))
+    whole = np.asarray(sum(heights))
     d_radius = whole * steepness[0] / slope
 
     rise = tangents[0] * sum_over_layers([secants[i] / indices[i] * gap(i, 0) for i in layers])
@@ -268,17 +259,28 @@ def _derivatives(
     return d_radius, d_heights, d_indices
 
 
-def _checked(
-    radius: ArrayLike, heights: Sequence[ArrayLike], indices: Sequence[float]
-) -> tuple[FloatArray, list[FloatArray]]:
-    """Return radius and heights as arrays, refusing what no set-up can mean."""
-    radius = as_floats(radius, "radius")
+def as_layers(heights: Sequence[ArrayLike], indices: Sequence[float]) -> list[FloatArray]:
+    """Return the heights of layers as arrays.
+
+    Raises
+    ------
+    InputError
+        If there are none, or not as many indices.
+    """
     layers = [as_floats(height, f"heights[{i}]") for i, height in enumerate(heights)]
     if len(layers) != len(indices) or not layers:
         raise InputError(
             f"heights and indices: expected one refractive index per layer, found "
             f"{len(layers)} heights and {len(indices)} indices."
         )
+    return layers
+
+
+def _checked(
+    radius: ArrayLike, heights: Sequence[ArrayLike], indices: Sequence[float]
+) -> tuple[FloatArray, list[FloatArray]]:
+    """Return radius and heights as arrays, refusing what no set-up can mean."""
+    radius, layers = as_floats(radius, "radius"), as_layers(heights, indices)
     for name, array in [("radius", radius), *((f"heights[{i}]", h) for i, h in enumerate(layers))]:
         least = np.fmin.reduce(array, axis=None, initial=np.inf)
         if least < 0:

@@ -10,7 +10,7 @@ from scipy.interpolate import CubicSpline
 
 from multimedia.refraction.layers import Layers
 from multimedia.refraction.shift import shift_ratio, shifted_radius
-from photocore.arrays import FloatArray, as_floats, positive
+from photocore.arrays import FloatArray, as_floats, contiguous_rows, positive
 from photocore.errors import GeometryError, InputError
 
 #: Points looked up at a time; scratch stays in the cache.
@@ -166,18 +166,9 @@ class ShiftTable:
             r = np.where(unknown, np.nan, r)
         self._refuse_outside(r, "radius", 0.0, self.max_radius)
         self._refuse_outside(depth, "zp", *self.depths)
-        shape = np.broadcast_shapes(r.shape, depth.shape)
-        result = np.empty(shape)
-        operands = [np.broadcast_to(r, shape), np.broadcast_to(depth, shape), result]
-        flags = [["readonly"], ["readonly"], ["writeonly"]]
-        with np.nditer(
-            operands,
-            flags=["external_loop", "buffered", "zerosize_ok"],
-            op_flags=flags,  # type: ignore[arg-type]  # numpy wants literals
-            buffersize=BLOCK,
-        ) as blocks:
-            for r_block, depth_block, target in blocks:
-                target[...] = r_block * self._ratio(r_block, depth_block)
+        result = np.empty(np.broadcast_shapes(r.shape, depth.shape))
+        for r_row, depth_row, target in contiguous_rows((r, depth), (result,), size=BLOCK):
+            target[...] = r_row * self._ratio(r_row, depth_row)
         return result
 
     def _ratio(self, radius: FloatArray, depth: FloatArray) -> FloatArray:

@@ -1,17 +1,29 @@
-r"""Root of F(t) = R: the numerical core of the radial shift, in numpy.
+r"""Root of F(t) = R: the numerical core of the radial shift.
 
-See `multimedia.refraction.shift` for the equations. All works on rows of a few thousand elements
-with scratch that stays in the processor's cache.
+The unknown t is the tangent of the ray in the medium of the *lowest* index, because there the angle
+is largest and R runs through all values as t does. With :math:`k_i = n_{min} / n_i` and
+:math:`q_i = 1 - k_i^2`, Snell's law (Maas 2015, Eq. 3) turns Eqs. (1) and (2) into
+
+.. math:: F(t) = t \sum_i \frac{h_i k_i}{\sqrt{1 + q_i t^2}} = R, \qquad
+          F'(t) = \sum_i \frac{h_i k_i}{(1 + q_i t^2)^{3/2}}, \qquad
+          \bar R = \frac{k_1 t \sum h_i}{\sqrt{1 + q_1 t^2}} .
+
+F increases and is concave, so Newton's method approaches the root from below whatever the set-up:
+it cannot diverge, overshoot into total reflection, or stop at a wrong value.
+
+`layer_terms`, `first_tangent` and `apparent_radius` are these formulas, once for all that use them:
+the rows of numpy here, the loops that `multimedia.refraction.compiled` hands to the compiler, and
+the workbook's columns (`multimedia.refraction.unrolled`).
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
 
 import numpy as np
 
-from photocore import double_double as twofold
-from photocore.arrays import FloatArray
+from photocore import double_double as dd
+from photocore.arrays import BoolArray, FloatArray, contiguous_rows
 
 #: Elements worked on at a time: the dozen scratch rows stay in the processor's second-level cache.
 BLOCK = 4096
@@ -27,43 +39,79 @@ MAX_STEPS = 60
 #: finished with twice the digits. Only thin layers beyond the others' critical angle do that.
 BENIGN = 4.0
 
-_Height = float | FloatArray
+#: The cubic first guess may overshoot beyond this; R over its slope at the axis never does.
+NEAR_AXIS = 0.6
+
+Height = float | FloatArray
+#: Shifted radius, t, and the index of the layer t belongs to, of one row.
+Row = tuple[FloatArray, FloatArray, Height]
+RowSolver = Callable[[FloatArray, list[Height], Sequence[float]], Row]
+
+
+def layer_terms(square: FloatArray, reduced: Height, bend: float) -> tuple[FloatArray, FloatArray]:
+    """Return what a layer adds to F(t) / t and to F'(t), from t², h k and q."""
+    cosine2 = 1.0 / (1.0 + bend * square)
+    value = reduced * np.sqrt(cosine2)
+    return value, value * cosine2
+
+
+def first_tangent(x: FloatArray, bulge: Height) -> FloatArray:
+    """Return t from x = R / A, F(t) = A t - B t³ + ..., to third order: x + (B / A) x³."""
+    return x * (1.0 + x * x * bulge)
+
+
+def apparent_radius(t: FloatArray, whole: Height, k: float, q: float) -> FloatArray:
+    """Return R bar from t, the height of all layers, and k and q of the first: Maas Eq. (2)."""
+    return whole * (k * t / np.sqrt(1.0 + q * t * t))
+
+
+def ratios(index: float, lowest: float) -> tuple[float, float]:
+    """Return k = n_min / n and q = 1 - k², the latter without cancellation."""
+    return lowest / index, (index - lowest) * (index + lowest) / index**2
 
 
 def solve(
-    radius: FloatArray, heights: list[FloatArray], indices: Sequence[float], *, tangent: bool
+    radius: FloatArray,
+    heights: list[FloatArray],
+    indices: Sequence[float],
+    *,
+    tangent: bool,
+    row_solver: RowSolver | None = None,
+    block: int = BLOCK,
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return the shifted radius and, if asked for, t and the index of the layer t belongs to."""
+    """Return the shifted radius and, if asked for, t and the index of the layer t belongs to.
+
+    Parameters
+    ----------
+    radius : ndarray, shape (...)
+        R, not negative.
+    heights : list of ndarray
+        Height of each layer, of shapes that broadcast with radius.
+    indices : sequence of float
+        Refractive index of each layer.
+    tangent : bool
+        Whether t and its index are wanted.
+    row_solver : callable, optional
+        What solves a row of at most ``block`` elements, by default `solve_row`.
+    block : int
+        Elements of a row.
+    """
     fixed = [h.item() if h.size == 1 else None for h in heights]
     varying = [h for h, f in zip(heights, fixed, strict=True) if f is None]
     shape = np.broadcast_shapes(radius.shape, *(h.shape for h in heights))
     outputs = [np.empty(shape) for _ in range(3 if tangent else 1)]
-    operands = [np.broadcast_to(a, shape) for a in (radius, *varying)] + outputs
-    flags = [["readonly"]] * (1 + len(varying)) + [["writeonly"]] * len(outputs)
-    # nditer hands out contiguous rows of any broadcast without ever expanding it as a whole.
-    with (
-        np.errstate(all="ignore"),
-        np.nditer(
-            operands,
-            flags=["external_loop", "buffered", "zerosize_ok"],
-            op_flags=flags,  # type: ignore[arg-type]  # numpy wants literals
-            buffersize=BLOCK,
-        ) as rows,
-    ):
-        for row in rows:
-            moving = iter(row[1 : 1 + len(varying)])
+    count = 1 + len(varying)
+    with np.errstate(all="ignore"):
+        for row in contiguous_rows((radius, *varying), outputs, size=block):
+            moving = iter(row[1:count])
             layers = [next(moving) if f is None else f for f in fixed]
-            result = _solve_row(row[0], layers, indices)
-            for target, values in zip(row[1 + len(varying) :], result, strict=False):
+            solution = (row_solver or solve_row)(row[0], layers, indices)
+            for target, values in zip(row[count:], solution, strict=False):
                 target[...] = values
-    if not tangent:
-        return outputs[0], outputs[0], outputs[0]
-    return outputs[0], outputs[1], outputs[2]
+    return outputs[0], outputs[-2 if tangent else 0], outputs[-1]
 
 
-def _solve_row(
-    radius: FloatArray, heights: list[_Height], indices: Sequence[float]
-) -> tuple[FloatArray, FloatArray, float | FloatArray]:
+def solve_row(radius: FloatArray, heights: list[Height], indices: Sequence[float]) -> Row:
     """Return shifted radius, t and the lowest index for one row of elements."""
     # Only zero is absent: an unknown height (NaN) stays, and makes the result unknown.
     present = [
@@ -71,92 +119,60 @@ def _solve_row(
     ]
     lowest = min([indices[0], *(n for _, n in present)])
     straight = sum((h for h, n in present if n == lowest), 0.0)
-    bent = [(h, (n / lowest) ** 2, (n - lowest) * (n + lowest) / lowest**2)
-            for h, n in present if n > lowest]  # fmt: skip
-    first = (indices[0] / lowest) ** 2, (indices[0] - lowest) * (indices[0] + lowest) / lowest**2
+    bent = [(h * k, q) for h, n in present for k, q in (ratios(n, lowest),) if q > 0]
 
-    t = _tangent_of_lowest(radius, straight, bent)
-    _finish_ill_conditioned(t, radius, present, lowest)
+    t = _root(radius, straight, bent)
+    _finish_ill_conditioned(t, radius, present, straight, bent, lowest)
     whole = sum((h for h, _ in present), 0.0)
-    if first[1] == 0:
-        radius_bar = whole * t
-    else:
-        radius_bar = t * t
-        radius_bar *= first[1]
-        radius_bar += first[0]
-        np.sqrt(radius_bar, out=radius_bar)
-        np.divide(t, radius_bar, out=radius_bar)
-        radius_bar *= whole
-
-    belongs: float | FloatArray = lowest
+    # In the layer of t itself nothing can overflow: t may be anything there.
+    radius_bar = (
+        whole * t
+        if indices[0] == lowest
+        else apparent_radius(t, whole, *ratios(indices[0], lowest))
+    )
+    belongs: Height = lowest
     gone = np.flatnonzero(straight == 0) if isinstance(straight, np.ndarray) else ()
     if len(gone) and lowest < indices[0]:
         # Here the layer of the lowest index has no height: it is absent, the next one limits.
         part = [h[gone] if isinstance(h, np.ndarray) else h for h in heights]
         part = [0.0 if n == lowest else h for h, n in zip(part, indices, strict=True)]
         belongs = np.full(radius.shape, lowest)
-        radius_bar[gone], t[gone], belongs[gone] = _solve_row(radius[gone], part, indices)
+        radius_bar[gone], t[gone], belongs[gone] = solve_row(radius[gone], part, indices)
     return radius_bar, t, belongs
 
 
-def _tangent_of_lowest(
-    radius: FloatArray, straight: _Height, bent: list[tuple[_Height, float, float]]
-) -> FloatArray:
-    """Return the root t of ``straight t + sum(h t / sqrt(a + b t²)) = radius``; NaN where none is.
+def ray_sums(
+    t: FloatArray, straight: Height, bent: Iterable[tuple[Height, float]]
+) -> tuple[FloatArray, FloatArray]:
+    """Return F(t) / t and F'(t) from the height of straight layers and (h k, q) of bending ones."""
+    square = t * t
+    value = slope = np.asarray(straight)
+    for reduced, bend in bent:
+        by_value, by_slope = layer_terms(square, reduced, bend)
+        value = value + by_value
+        slope = slope + by_slope
+    return value, slope
 
-    Parameters
-    ----------
-    radius : ndarray, shape (n,)
-        R.
-    straight : float or ndarray, shape (n,)
-        Height of the layers of the lowest index.
-    bent : list of (height, a, b)
-        The other layers.
-    """
+
+def _root(radius: FloatArray, straight: Height, bent: list[tuple[Height, float]]) -> FloatArray:
+    """Return the root t of F(t) = radius; NaN where none is."""
     if not bent:
         return radius / straight
-    # F(t) = A t - B t³ + ..., so t = x + (B / A) x³ + ... with x = R / A.
-    linear = straight + sum(h * a**-0.5 for h, a, _ in bent)
-    inverse = 1.0 / linear
-    x = radius * inverse
-    steepest = _largest(x)
-    t = x * x
-    if steepest < 0.6:
-        t *= sum(h * (0.5 * b * a**-1.5) for h, a, b in bent)
-        t *= inverse
-        t += 1.0
-        t *= x
+    linear = straight + sum(reduced for reduced, _ in bent)
+    x = radius / linear
+    if _largest(x) < NEAR_AXIS:
+        t = first_tangent(x, 0.5 * sum(reduced * q for reduced, q in bent) / linear)
     else:
-        # F(t) <= straight t + sum(h / sqrt(b)): for oblique rays the better lower bound.
-        ceiling = sum(h * b**-0.5 for h, _, b in bent)
+        # F(t) <= straight t + sum(h k / sqrt(q)): for oblique rays the better lower bound.
+        ceiling = sum(reduced * q**-0.5 for reduced, q in bent)
         t = np.fmax(x, (radius - ceiling) / straight)
         if np.any(straight == 0):
             t = np.where(straight == 0, np.where(radius < ceiling, x, np.nan), t)
-
-    square, root, term = np.empty_like(t), np.empty_like(t), np.empty_like(t)
-    value, slope, flags = np.empty_like(t), np.empty_like(t), np.empty(t.shape, dtype=bool)
     for _ in range(MAX_STEPS):
-        np.multiply(t, t, out=square)
-        value[...] = straight
-        slope[...] = straight
-        for height, a, b in bent:
-            np.multiply(square, b, out=root)
-            root += a
-            np.sqrt(root, out=root)
-            np.divide(1.0, root, out=root)  # s = 1 / sqrt(a + b t²)
-            np.multiply(root, height, out=term)
-            value += term  # F / t gains h s
-            root *= root
-            root *= a
-            term *= root
-            slope += term  # F' gains h a s³
-        value *= t
-        np.subtract(radius, value, out=value)
-        value /= slope
-        t += value
-        np.abs(value, out=value)
-        np.multiply(t, LAST_STEP, out=term)
-        if not np.greater(value, term, out=flags).any():
+        value, slope = ray_sums(t, straight, bent)
+        step = (radius - value * t) / slope
+        t += step
+        if not (np.abs(step) > LAST_STEP * t).any():
             break
     return t
 
@@ -164,7 +180,9 @@ def _tangent_of_lowest(
 def _finish_ill_conditioned(
     t: FloatArray,
     radius: FloatArray,
-    present: list[tuple[_Height, float]],
+    present: list[tuple[Height, float]],
+    straight: Height,
+    bent: list[tuple[Height, float]],
     lowest: float,
 ) -> None:
     """Polish, in place, roots whose relative error is many times that of R.
@@ -174,21 +192,20 @@ def _finish_ill_conditioned(
     """
     if not _largest(t) ** 2 > BENIGN:
         return
-    slope = np.full(t.shape, 0.0)
-    for height, n in present:
-        slope += height * (n / lowest) ** 2 * _cosine_ratio(t, n, lowest) ** 3
+    slope = ray_sums(t, straight, bent)[1]
     where = np.flatnonzero((radius > BENIGN * t * slope) & (t < 1e100))
     if not len(where):
         return
-    part = [(h[where] if isinstance(h, np.ndarray) else h, n) for h, n in present]
+
+    def part(height: Height) -> Height:
+        return height[where] if isinstance(height, np.ndarray) else height
+
+    layers, bends = [(part(h), n) for h, n in present], [(part(h), q) for h, q in bent]
     root, goal, slope = t[where], radius[where], slope[where]
     for _ in range(8):
-        step = _residual(root, goal, part, lowest) / slope
+        step = _residual(root, goal, layers, lowest) / slope
         root = root + step
-        slope = sum(
-            (h * (n / lowest) ** 2 * _cosine_ratio(root, n, lowest) ** 3 for h, n in part),
-            np.zeros(()),
-        )
+        slope = ray_sums(root, part(straight), bends)[1]
         if not (np.abs(step) > 1e-12 * root).any():
             break
     t[where] = root
@@ -199,23 +216,70 @@ def _largest(values: FloatArray) -> float:
     return float(np.fmax.reduce(values, initial=0.0))
 
 
-def _cosine_ratio(t: FloatArray, n: float, lowest: float) -> FloatArray:
-    """Return 1 / sqrt(a + b t²) of one layer."""
-    a, b = (n / lowest) ** 2, (n - lowest) * (n + lowest) / lowest**2
-    return np.asarray(1 / np.sqrt(a + b * t * t))
-
-
 def _residual(
-    t: FloatArray, radius: FloatArray, present: list[tuple[_Height, float]], lowest: float
+    t: FloatArray, radius: FloatArray, present: list[tuple[Height, float]], lowest: float
 ) -> FloatArray:
     """Return R - F(t), formed with twice the digits."""
-    rest = twofold.exact(radius)
-    square = twofold.product(t, t)
+    rest = dd.exact(radius)
+    square = dd.product(t, t)
     for height, n in present:
-        excess = twofold.subtract(twofold.product(n, n), twofold.product(lowest, lowest))
-        below = twofold.square_root(
-            twofold.add(twofold.product(n, n), twofold.multiply(excess, square))
-        )
-        above = twofold.multiply(twofold.product(height, lowest), twofold.exact(t))
-        rest = twofold.subtract(rest, twofold.divide(above, below))
+        excess = dd.subtract(dd.product(n, n), dd.product(lowest, lowest))
+        below = dd.square_root(dd.add(dd.product(n, n), dd.multiply(excess, square)))
+        above = dd.multiply(dd.product(height, lowest), dd.exact(t))
+        rest = dd.subtract(rest, dd.divide(above, below))
     return rest.high
+
+
+def shift_blocks(
+    radius: FloatArray,
+    heights: FloatArray,
+    moving: BoolArray,
+    k: FloatArray,
+    q: FloatArray,
+    inner: int,
+    out: FloatArray,
+    unsure: BoolArray,
+) -> None:
+    """Shift every element in loops that a compiler vectorises; for machine code, not for Python."""
+    t, value, slope = np.empty(inner), np.empty(inner), np.empty(inner)
+    whole, straight, layer = np.empty(inner), np.empty(inner), np.empty((k.size, inner))
+    for j in range(k.size):
+        layer[j, :] = k[j] * heights[j, 0]
+    for low in range(0, radius.size, inner):
+        width = min(inner, radius.size - low)
+        goal = radius[low : low + width]
+        for i in range(width):
+            whole[i] = straight[i] = value[i] = slope[i] = 0.0
+        for j in range(k.size):
+            if moving[j]:
+                for i in range(width):
+                    layer[j, i] = k[j] * heights[j, low + i]
+            n, lowest, half = 1.0 / k[j], 1.0 if q[j] == 0 else 0.0, 0.5 * q[j]
+            for i in range(width):
+                whole[i] += n * layer[j, i]
+                straight[i] += lowest * layer[j, i]
+                slope[i] += layer[j, i]
+                value[i] += half * layer[j, i]
+        for i in range(width):
+            x = goal[i] / slope[i]
+            t[i] = first_tangent(x, value[i] / slope[i] if x < NEAR_AXIS else 0.0)
+        for _ in range(12):
+            for i in range(width):
+                value[i] = slope[i] = straight[i]
+            for j in range(k.size):
+                if q[j] > 0:
+                    for i in range(width):
+                        by_value, by_slope = layer_terms(t[i] * t[i], layer[j, i], q[j])
+                        value[i] += by_value
+                        slope[i] += by_slope
+            open_ = 0
+            for i in range(width):
+                step = (goal[i] - value[i] * t[i]) / slope[i]
+                t[i] += step
+                open_ += abs(step) > LAST_STEP * t[i]
+            if open_ == 0:
+                break
+        for i in range(width):
+            out[low + i] = apparent_radius(t[i], whole[i], k[0], q[0])
+            # steep (or not finite), or the layer that t belongs to is absent
+            unsure[low + i] = not (t[i] < 2.0 and straight[i] > 0)

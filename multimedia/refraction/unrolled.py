@@ -1,10 +1,8 @@
 r"""The radial shift in a fixed number of Newton steps: what the workbook's formulas compute.
 
-With :math:`k_i = n_{min} / n_i`, :math:`q_i = 1 - k_i^2` and u = tan(beta) in the thinnest medium
+With F(u) and F'(u) of `multimedia.refraction.tangent`, u = tan(beta) in the thinnest medium,
 
-.. math:: F(u) = u \sum_i \frac{h_i k_i}{\sqrt{1 + q_i u^2}}, \qquad
-          F'(u) = \sum_i \frac{h_i k_i}{(1 + q_i u^2)^{3/2}}, \qquad
-          u_0 = \frac{R}{\sum h_i k_i}, \quad u_{j+1} = u_j + \frac{R - F(u_j)}{F'(u_j)} .
+.. math:: u_0 = \frac{R}{\sum h_i k_i}, \quad u_{j+1} = u_j + \frac{R - F(u_j)}{F'(u_j)} .
 
 Only squares, roots and quotients: every spreadsheet program has them, and no macro is needed.
 """
@@ -17,6 +15,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from multimedia.refraction.shift import as_layers
+from multimedia.refraction.tangent import apparent_radius, ratios, ray_sums
 from photocore.arrays import FloatArray, as_floats
 
 #: Six steps reach 1e-9 of R bar up to 75 degrees in the thinnest medium.
@@ -62,27 +62,19 @@ def unrolled_shift(
 
     Examples
     --------
-    >>> found = unrolled_shift(300.0, [500.0, 10.0, 200.0], [1.0, 1.5, 1.337])
-    >>> [round(float(u), 6) for u in found.u[:4]]
+    >>> shift = unrolled_shift(300.0, [500.0, 10.0, 200.0], [1.0, 1.5, 1.337])
+    >>> [round(float(u), 6) for u in shift.u[:4]]
     [0.457139, 0.462022, 0.462023, 0.462023]
     """
     r = as_floats(radius, "radius")
-    layers = [as_floats(height, f"heights[{i}]") for i, height in enumerate(heights)]
-    k = [min(indices) / index for index in indices]
-    q = [1 - ratio**2 for ratio in k]
-
-    def terms(u: FloatArray, power: float) -> FloatArray:
-        parts = [
-            h * ratio / (1 + bend * u**2) ** power
-            for h, ratio, bend in zip(layers, k, q, strict=True)
-        ]
-        return np.asarray(sum(parts[1:], parts[0]))
-
+    layers = as_layers(heights, indices)
+    factors = [ratios(index, min(indices)) for index in indices]
+    bent = [(h * k, q) for h, (k, q) in zip(layers, factors, strict=True)]
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        u: list[FloatArray] = [np.asarray(r / terms(np.zeros(()), 0.5))]
+        u: list[FloatArray] = [np.asarray(r / ray_sums(np.zeros(()), 0.0, bent)[0])]
         for _ in range(steps):
-            u.append(np.asarray(u[-1] + (r - u[-1] * terms(u[-1], 0.5)) / terms(u[-1], 1.5)))
-        whole = np.asarray(sum(layers[1:], layers[0]))
-        bar = np.asarray(whole * k[0] * u[-1] / np.sqrt(1 + q[0] * u[-1] ** 2))
-        residual = np.asarray(u[-1] * terms(u[-1], 0.5) - r)
+            value, slope = ray_sums(u[-1], 0.0, bent)
+            u.append(np.asarray(u[-1] + (r - u[-1] * value) / slope))
+        bar = np.asarray(apparent_radius(u[-1], sum(layers), *factors[0]))
+        residual = np.asarray(u[-1] * ray_sums(u[-1], 0.0, bent)[0] - r)
     return UnrolledShift(u, bar, residual)

@@ -9,6 +9,7 @@ that index, derivatives and inverses come from the same coefficients.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -85,21 +86,21 @@ class WaterFormula:
         given = _checked(wavelength_nm, temperature_c, salinity_percent, depth)
         allowed = (self.wavelength_nm, self.temperature_c, self.salinity_percent, self.depth)
         names = ("wavelength", "temperature", "salinity", "depth")
-        found = []
+        outside = []
         for name, unit, values, (low, high) in zip(
             names, ("nm", "°C", "%", "m"), given, allowed, strict=True
         ):
             if name == "depth" and not any(term.depth for term in self.terms):
                 if (values > 10).any():
-                    found.append(
+                    outside.append(
                         f"{self.name} has no term for depth: the value is that of the surface, "
                         f"about {1.4e-6 * float(values.max()):.1g} too low."
                     )
             elif ((values < low) | (values > high)).any():
-                found.append(
+                outside.append(
                     f"{name} is outside the range of {self.name}, {low:g} to {high:g} {unit}."
                 )
-        return tuple(found)
+        return tuple(outside)
 
 
 #: Maas 2015, Eq. (4), with the signs that the web text lost (docs/errata.md), multiplied out:
@@ -260,7 +261,7 @@ def water_index_derivatives(
             if power:
                 powers[variable] = power - 1
                 terms.append(Term(coefficient * power, *powers))
-        parts.append(_sum_of_terms(tuple(terms), given))
+        parts.append(_sum_of_terms(terms, given))
     return WaterIndexDerivatives(_sum_of_terms(formula.terms, given), *parts)
 
 
@@ -418,16 +419,15 @@ def _powers_of(
     variable: int, formula: WaterFormula, given: tuple[FloatArray, ...]
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return the coefficients of the powers 0, 1, 2 of one variable, the others given."""
-    parts = []
-    for power in range(3):
-        terms = [t for t in formula.terms if t[1 + variable] == power]
-        reduced = [Term(t[0], *(0 if i == variable else p for i, p in enumerate(t[1:])))
-                   for t in terms]  # fmt: skip
-        parts.append(_sum_of_terms(tuple(reduced), given))
-    return parts[0], parts[1], parts[2]
+    name = Term._fields[1 + variable]
+    first, second, third = (
+        [term._replace(**{name: 0}) for term in formula.terms if term[1 + variable] == power]
+        for power in range(3)
+    )
+    return _sum_of_terms(first, given), _sum_of_terms(second, given), _sum_of_terms(third, given)
 
 
-def _sum_of_terms(terms: tuple[Term, ...], given: tuple[FloatArray, ...]) -> FloatArray:
+def _sum_of_terms(terms: Iterable[Term], given: tuple[FloatArray, ...]) -> FloatArray:
     """Return the sum of the terms in the shape all variables broadcast to."""
     total = np.zeros(np.broadcast_shapes(*(g.shape for g in given)))
     for coefficient, *powers in terms:
@@ -439,28 +439,30 @@ def _sum_of_terms(terms: tuple[Term, ...], given: tuple[FloatArray, ...]) -> Flo
     return np.asarray(total)
 
 
-def _checked(
-    wavelength_nm: ArrayLike,
-    temperature_c: ArrayLike,
-    salinity_percent: ArrayLike,
-    depth: ArrayLike,
-) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Return the four as arrays, refusing what cannot be meant in their units."""
-    nm = as_floats(wavelength_nm, "wavelength_nm")
-    celsius = as_floats(temperature_c, "temperature_c")
-    percent = as_floats(salinity_percent, "salinity_percent")
-    metres = as_floats(depth, "depth")
-    _within(nm, "wavelength_nm", 180, 1200, "is light in nm; 0.52 µm is 520 nm")
-    _within(celsius, "temperature_c", -5, 100, "is liquid water in °C; 295 K is 22 °C")
-    _within(percent, "salinity_percent", 0, 30, "is salt in per cent; sea water is 3.5, not 35")
-    _within(metres, "depth", 0, 11000, "is a depth in m, positive downwards")
-    return nm, celsius, percent, metres
+#: What can be meant: name, lowest, highest, meaning.
+_LIMITS = (
+    ("wavelength_nm", 180, 1200, "is light in nm; 0.52 µm is 520 nm"),
+    ("temperature_c", -5, 100, "is liquid water in °C; 295 K is 22 °C"),
+    ("salinity_percent", 0, 30, "is salt in per cent; sea water is 3.5, not 35"),
+    ("depth", 0, 11000, "is a depth in m, positive downwards"),
+)
 
 
-def _within(values: FloatArray, name: str, low: float, high: float, meaning: str) -> None:
-    """Raise InputError if a value is outside, saying what the argument means."""
-    wrong = (values < low) | (values > high)
-    if wrong.any():
-        raise InputError(
-            f"{name}: found {values[wrong].flat[0]:g}; only {low:g} to {high:g} {meaning}."
-        )
+def _checked(*given: ArrayLike) -> tuple[FloatArray, ...]:
+    """Return wavelength, temperature, salinity and depth as arrays.
+
+    Raises
+    ------
+    InputError
+        If a value cannot be meant in its unit; the message says what the argument means.
+    """
+    arrays = []
+    for value, (name, low, high, meaning) in zip(given, _LIMITS, strict=True):
+        values = as_floats(value, name)
+        wrong = (values < low) | (values > high)
+        if wrong.any():
+            raise InputError(
+                f"{name}: found {values[wrong].flat[0]:g}; only {low:g} to {high:g} {meaning}."
+            )
+        arrays.append(values)
+    return tuple(arrays)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from math import hypot
 from typing import Any
@@ -15,6 +16,7 @@ from multimedia.refraction.water import (
     water_index_sigma,
     water_refractive_index,
 )
+from photocore.arrays import FloatArray
 from photocore.errors import GeometryError
 
 
@@ -87,26 +89,14 @@ def find_index(
     InputError
         If a value cannot be meant in its unit.
     """
+    given = _conditions(wavelength_nm, temperature_c, salinity_percent, depth)
     chosen = WATER_FORMULAS[formula]
-    given = {
-        "wavelength_nm": wavelength_nm,
-        "temperature_c": temperature_c,
-        "salinity_percent": salinity_percent,
-        "depth": depth,
-    }
-    sigma = water_index_sigma(
-        **given,
-        sigma_wavelength_nm=sigmas[0],
-        sigma_temperature_c=sigmas[1],
-        sigma_salinity_percent=sigmas[2],
-        formula=chosen,
-    )
     return WaterAnswer(
         key="refractive_index",
         label="refractive index of water",
         unit="",
         value=float(water_refractive_index(**given, formula=chosen)),
-        sigma=float(sigma),
+        sigma=_sigma_of_index(given, sigmas, chosen),
         conditions=given,
         formula=chosen,
         remarks=chosen.remarks(**given),
@@ -143,46 +133,62 @@ def find_from_index(
     GeometryError
         If no temperature, or no possible salinity, gives the index.
     """
+    key, unit, solve, low, high = _UNKNOWNS[what]
+    everything = _conditions(wavelength_nm, temperature_c, salinity_percent, depth)
+    given = {name: value for name, value in everything.items() if name != key}
     chosen = WATER_FORMULAS[formula]
-    given = {"wavelength_nm": wavelength_nm, "depth": depth}
-    if what == "salinity":
-        key, label, unit = "salinity_percent", "salinity of the water", " %"
-        given["temperature_c"] = temperature_c
-        value = float(salinity_from_index(index, **given, formula=chosen))
-        others = (sigmas[0], sigmas[1], 0.0)
-        # Within the error of the index fresh water may come out slightly below zero.
-        if not -0.5 <= value <= 30:
-            raise GeometryError(
-                f"no salinity between 0 and 30 % gives water of {temperature_c:g} °C the index "
-                f"{index:g} (it would take {value:.2f} %): check index and wavelength."
-            )
-    else:
-        key, label, unit = "temperature_c", "temperature of the water", " °C"
-        given["salinity_percent"] = salinity_percent
-        value = float(temperature_from_index(index, **given, formula=chosen))
-        others = (sigmas[0], 0.0, sigmas[2])
-        if not -5 <= value <= 100:
-            raise GeometryError(
-                f"no temperature of liquid water with {salinity_percent:g} % salt gives the index "
-                f"{index:g}: check index, salinity and wavelength."
-            )
-    everything = {**given, key: max(value, 0.0) if what == "salinity" else value}
-    slopes = water_index_derivatives(**everything, formula=chosen)
-    slope = slopes.d_salinity if what == "salinity" else slopes.d_temperature
-    from_conditions = water_index_sigma(
-        **everything,
-        sigma_wavelength_nm=others[0],
-        sigma_temperature_c=others[1],
-        sigma_salinity_percent=others[2],
-        formula=chosen,
-    )
+    value = float(solve(index, **given, formula=chosen))
+    if not low <= value <= high:
+        raise GeometryError(
+            f"no salinity between 0 and 30 % gives water of {temperature_c:g} °C the index "
+            f"{index:g} (it would take {value:.2f} %): check index and wavelength."
+            if what == "salinity"
+            else f"no temperature of liquid water with {salinity_percent:g} % salt gives the index "
+            f"{index:g}: check index, salinity and wavelength."
+        )
+    everything[key] = max(value, 0.0) if what == "salinity" else value
+    slope = getattr(water_index_derivatives(**everything, formula=chosen), f"d_{what}")
     return WaterAnswer(
         key=key,
-        label=label,
+        label=f"{what} of the water",
         unit=unit,
         value=value,
-        sigma=hypot(sigma_index, float(from_conditions)) / abs(float(slope)),
+        sigma=hypot(sigma_index, _sigma_of_index(everything, sigmas, chosen, unknown=key))
+        / abs(float(slope)),
         conditions={"refractive_index": index, **given},
         formula=chosen,
         remarks=chosen.remarks(**everything),
     )
+
+
+#: Key, unit, inverse formula and possible values. Within the error of the index fresh water may
+#: come out slightly below zero.
+_UNKNOWNS: dict[str, tuple[str, str, Callable[..., FloatArray], float, float]] = {
+    "salinity": ("salinity_percent", " %", salinity_from_index, -0.5, 30.0),
+    "temperature": ("temperature_c", " °C", temperature_from_index, -5.0, 100.0),
+}
+
+
+def _conditions(
+    wavelength_nm: float, temperature_c: float, salinity_percent: float, depth: float
+) -> dict[str, float]:
+    """Return the arguments that every formula takes."""
+    return {
+        "wavelength_nm": wavelength_nm,
+        "temperature_c": temperature_c,
+        "salinity_percent": salinity_percent,
+        "depth": depth,
+    }
+
+
+def _sigma_of_index(
+    given: dict[str, float],
+    sigmas: tuple[float, float, float],
+    formula: WaterFormula,
+    *,
+    unknown: str = "",
+) -> float:
+    """Return the standard deviation of the index from those of what is known."""
+    names = ("wavelength_nm", "temperature_c", "salinity_percent")
+    known = {f"sigma_{n}": s for n, s in zip(names, sigmas, strict=True) if n != unknown}
+    return float(water_index_sigma(**given, **known, formula=formula))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import tempfile
+import io
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -14,9 +14,8 @@ from openpyxl.workbook.defined_name import DefinedName
 from openpyxl.worksheet.datavalidation import DataValidation
 from openpyxl.worksheet.worksheet import Worksheet
 
-from photocore.workbook.cellxml import CellInput
-from photocore.workbook.editor import WorkbookEditor, rewrite_package
-from photocore.workbook.newbook import new_workbook
+from photocore.workbook.cells import CellValue
+from photocore.workbook.newbook import finish_book, new_workbook
 
 INPUT = PatternFill("solid", start_color="FFF9DB", end_color="FFF9DB")
 HEAD = PatternFill("solid", start_color="DCE6F1", end_color="DCE6F1")
@@ -30,13 +29,12 @@ class LiveBook:
     """A workbook under construction, with the values its formulas will show."""
 
     book: Workbook = field(default_factory=Workbook)
-    results: list[tuple[str, int, int, CellInput]] = field(default_factory=list)
-    inputs: list[tuple[str, int, int, float]] = field(default_factory=list)
+    results: dict[str, dict[str, CellValue]] = field(default_factory=dict)
 
     def sheet(self, name: str, title: str, note: str, *, first: bool = False) -> Worksheet:
         """Add a sheet with its title and one line of help, ready to print."""
         sheet: Worksheet = self.book.active if first else self.book.create_sheet()
-        sheet.title = name
+        sheet.title, self.results[name] = name, {}
         sheet["A1"], sheet["A1"].font = title, TITLE
         sheet["A2"], sheet["A2"].font = note, NOTE
         sheet.sheet_view.showGridLines = False
@@ -47,21 +45,22 @@ class LiveBook:
         sheet.oddFooter.left.text, sheet.oddFooter.right.text = "&F · &A", "&P / &N"
         return sheet
 
-    def formula(self, sheet: Worksheet, row: int, column: int, text: str, value: CellInput) -> None:
+    def formula(self, sheet: Worksheet, row: int, column: int, text: str, value: CellValue) -> None:
         """Write a formula and the value it has."""
         cell = sheet.cell(row, column, f"={text}")
         cell.font = FORMULA
-        self.results.append((sheet.title, row, column, value))
+        if value is not None:
+            self.results[sheet.title][cell.coordinate] = value
 
-    def typed(self, sheet: Worksheet, row: int, column: int, value: CellInput) -> None:
+    def typed(self, sheet: Worksheet, row: int, column: int, value: CellValue) -> None:
         """Write a cell that the user fills in."""
         cell = sheet.cell(row, column)
         if value is not None and value == value:
             cell.value = value
             if isinstance(value, str):
                 cell.data_type = "s"  # a name like =A1 is a name, not a formula
-            elif float(f"{value:.16g}") != value:
-                self.inputs.append((sheet.title, row, column, float(value)))
+            elif isinstance(value, float):
+                self.results[sheet.title][cell.coordinate] = value
         cell.fill, cell.border = INPUT, EDGE
 
     def name(self, name: str, sheet: Worksheet, row: int, column: int) -> None:
@@ -70,19 +69,11 @@ class LiveBook:
         self.book.defined_names[name] = DefinedName(name, attr_text=place)
 
     def save(self, path: Path, *, overwrite: bool) -> None:
-        """Write the workbook, then put the values into its formula cells."""
-        with (
-            new_workbook(path, overwrite=overwrite) as temporary,
-            tempfile.TemporaryDirectory() as folder,
-        ):
-            plain = Path(folder) / "plain.xlsx"
-            self.book.save(plain)
-            editor = WorkbookEditor(plain)
-            for title, row, column, number in self.inputs:  # openpyxl writes 16 digits only
-                editor.set_value(title, row, column, number)
-            for title, row, column, value in self.results:
-                editor.set_result(title, row, column, value)
-            rewrite_package(plain, temporary, editor.changed_parts())
+        """Write the workbook, with the values put into its formula cells."""
+        with new_workbook(path, overwrite=overwrite) as temporary:
+            package = io.BytesIO()
+            self.book.save(package)
+            finish_book(package, temporary, results=self.results)
 
 
 def headings(sheet: Worksheet, row: int, words: Sequence[str]) -> None:

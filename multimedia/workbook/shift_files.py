@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -9,11 +10,14 @@ import numpy as np
 
 from multimedia.refraction.layers import Layers
 from multimedia.workbook.shift_points import ShiftPoints, ShiftResult, ShiftSetup
-from photocore.errors import CellError, InputError, WorkbookError
+from photocore.errors import InputError, WorkbookError
 from photocore.tables import Column, Table, open_tables, read_named_values, read_table, write_csv
 
 #: Most layers a workbook is searched for.
 MOST_LAYERS = 9
+
+#: Where a length that has no column of its own comes from.
+COORDINATE = {"R": "X", "ZP": "Z"}
 
 COLUMNS = (
     Column("id", ("Point", "Name", "No", "Nr", "Punkt", "Punktnummer", "Punto"), "text"),
@@ -109,35 +113,18 @@ def points_of(table: Table, nadir: tuple[float, float]) -> tuple[ShiftPoints, li
     WorkbookError
         Naming every point that is incomplete or on the wrong side of the water.
     """
-    x, y, z = (table.numbers(key) for key in ("X", "Y", "Z"))
-    radius, depth = table.numbers("R").copy(), table.numbers("ZP").copy()
-    from_xy, from_z = np.isnan(radius), np.isnan(depth)
+    x, y, z, r, zp = (table.numbers(key) for key in ("X", "Y", "Z", "R", "ZP"))
     off_nadir = np.hypot(x - nadir[0], y - nadir[1])
-    radius[from_xy] = off_nadir[from_xy]
-    depth[from_z] = -z[from_z]
-    every = np.stack([x, y, z, table.numbers("R"), table.numbers("ZP")])
-    rows: list[int] = np.flatnonzero(~np.isnan(every).all(axis=0)).tolist()
-    errors: list[CellError] = []
-    for row in rows:
-        errors += _contradictions(table, row, (radius[row], off_nadir[row]), (depth[row], -z[row]))
-        if np.isnan(radius[row]):
-            key = "R" if "R" in table.present else "X"
-            errors.append(table.error(row, key, "is blank; give X and Y, or R."))
-        elif radius[row] < 0:
-            errors.append(table.error(row, "R", f"found {radius[row]:g}; a radius is positive."))
-        if np.isnan(depth[row]):
-            key = "ZP" if "ZP" in table.present else "Z"
-            errors.append(table.error(row, key, "is blank; give Z, or ZP."))
-        elif depth[row] < 0:
-            key = "Z" if from_z[row] else "ZP"
-            errors.append(
-                table.error(
-                    row,
-                    key,
-                    f"the point is {-depth[row]:g} above the water side of the interface; dry "
-                    "points are not refracted: take it out (Z is negative, ZP positive in water).",
-                )
-            )
+    radius, depth = np.where(np.isnan(r), off_nadir, r), np.where(np.isnan(zp), -z, zp)
+    rows: list[int] = np.flatnonzero(~np.isnan([x, y, z, r, zp]).all(axis=0)).tolist()
+    errors = [
+        table.error(row, key if key in table.present else COORDINATE.get(key, key), problem)
+        for row in rows
+        for key, problem in (
+            *_problems("R", (r[row], off_nadir[row]), "X, Y and the camera", "X and Y, or R"),
+            *_problems("ZP", (zp[row], -z[row]), "Z", "Z, or ZP"),
+        )
+    ]
     if errors:
         raise WorkbookError(errors)
     if not rows:
@@ -152,21 +139,24 @@ def points_of(table: Table, nadir: tuple[float, float]) -> tuple[ShiftPoints, li
     return points, rows
 
 
-def _contradictions(
-    table: Table, row: int, radii: tuple[float, float], depths: tuple[float, float]
-) -> list[CellError]:
-    """Return a complaint where a point is given in both ways and they differ."""
-    found = []
-    for key, other, (given, follows) in (("R", "X, Y and the camera", radii), ("ZP", "Z", depths)):
-        if abs(given - follows) > 1e-6 * max(abs(given), abs(follows)):
-            found.append(
-                table.error(
-                    row,
-                    key,
-                    f"found {given:.9g}, but {follows:.9g} follows from {other}; clear one.",
-                )
-            )
-    return found
+def _problems(
+    key: str, values: tuple[float, float], source: str, ways: str
+) -> Iterator[tuple[str, str]]:
+    """Yield columns and what is wrong with a length that is given, or follows from coordinates."""
+    given, follows = values
+    value = follows if np.isnan(given) else given
+    if abs(given - follows) > 1e-6 * max(abs(given), abs(follows)):
+        yield key, f"found {given:.9g}, but {follows:.9g} follows from {source}; clear one."
+    if np.isnan(value):
+        yield key, f"is blank; give {ways}."
+    elif value < 0 and key == "R":
+        yield key, f"found {value:g}; a radius is positive."
+    elif value < 0:
+        yield (
+            COORDINATE[key] if np.isnan(given) else key,
+            f"the point is {-value:g} above the water side of the interface; dry points are not "
+            "refracted: take it out (Z is negative, ZP positive in water).",
+        )
 
 
 def write_shift_csv(
@@ -178,13 +168,5 @@ def write_shift_csv(
     overwrite: bool = False,
 ) -> None:
     """Write shifted points as text, numbers to the last bit."""
-    columns: dict[str, object] = {"id": list(points.ids)}
-    with_xy = not np.isnan(points.xy).all()
-    if with_xy:
-        columns |= {"X": points.xy[:, 0], "Y": points.xy[:, 1], "Z": 0.0 - points.depth}
-    columns |= {"R": points.radius, "ZP": points.depth, "Rbar": result.radius_bar}
-    columns["dR"] = result.radius_bar - points.radius
-    if with_xy:
-        columns |= {"Xbar": result.xy_bar[:, 0], "Ybar": result.xy_bar[:, 1]}
-    columns["flag"] = list(result.flags)
+    columns = {key: list(values) for key, values in result.columns(points).items()}
     write_csv(path, columns, flavour=flavour, overwrite=overwrite)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,6 +11,9 @@ from multimedia.refraction.layers import Layers
 from multimedia.refraction.shifting import radial_shift_ratio
 from photocore.arrays import FloatArray
 from photocore.errors import InputError
+
+#: Columns that points given by their radius do not have.
+IN_PLANE = ("X", "Y", "Z", "Xbar", "Ybar")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -96,3 +100,23 @@ class ShiftResult:
     radius_bar: FloatArray
     xy_bar: FloatArray
     flags: tuple[str, ...]
+
+    def columns(
+        self, points: ShiftPoints, *, every: bool = False
+    ) -> dict[str, Sequence[str] | FloatArray]:
+        """Return the columns of tables; X, Y, Z of points given by radius only if ``every``."""
+        columns: dict[str, Sequence[str] | FloatArray] = {
+            "id": points.ids,
+            "X": points.xy[:, 0],
+            "Y": points.xy[:, 1],
+            "Z": 0.0 - points.depth,
+            "R": points.radius,
+            "ZP": points.depth,
+            "Rbar": self.radius_bar,
+            "dR": self.radius_bar - points.radius,
+            "Xbar": self.xy_bar[:, 0],
+            "Ybar": self.xy_bar[:, 1],
+            "flag": self.flags,
+        }
+        bare = not every and bool(np.isnan(points.xy).all())
+        return {k: v for k, v in columns.items() if not (bare and k in IN_PLANE)}

@@ -9,10 +9,9 @@ import numpy as np
 
 from multimedia.workbook.shift_points import ShiftPoints, ShiftResult, ShiftSetup
 from multimedia.workbook.shift_workbook import table_values
-from photocore.arrays import FloatArray
 from photocore.errors import InputError
 from photocore.tables import Table, open_tables
-from photocore.workbook.cellxml import CellInput
+from photocore.workbook.cells import CellValue
 from photocore.workbook.editor import WorkbookEditor
 from photocore.workbook.grid import SheetFile, cell_name
 
@@ -120,24 +119,18 @@ def add_columns(
     editor = WorkbookEditor(Path(path))
     grid = editor.grid(table.sheet)
     head = _head_row(grid.rows, table)
-    found = {str(value).strip(): c for c, value in grid.rows[head].items() if value is not None}
+    headed = {str(value).strip(): c for c, value in grid.rows[head].items() if value is not None}
     last = max(max(cells, default=0) for cells in grid.rows.values())
-    with_xy = not np.isnan(points.xy).all()
-    columns: dict[str, FloatArray | Sequence[str]] = {
-        "Rbar": result.radius_bar,
-        "dR": result.radius_bar - points.radius,
-    }
-    if with_xy:
-        columns |= {"Xbar": result.xy_bar[:, 0], "Ybar": result.xy_bar[:, 1]}
-    columns["flag"] = result.flags
-    for key, values in columns.items():
-        column = found.get(key)
+    for key, values in result.columns(points).items():
+        if key not in ADDED:
+            continue
+        column = headed.get(key)
         if column is None:
             last += 1
             column = last
             editor.set_value(table.sheet, head, column, key)
         for position, row in enumerate(rows):
-            value: CellInput = values[position]
+            value: CellValue = values[position]
             if not isinstance(value, str):
                 value = None if np.isnan(values[position]) else float(values[position])
             editor.set_value(table.sheet, table.rows[row], column, value)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -23,10 +24,11 @@ from multimedia.workbook.live_book import (
     allow_between,
     headings,
 )
-from multimedia.workbook.shift_points import ShiftPoints, ShiftSetup
+from multimedia.workbook.shift_points import IN_PLANE, ShiftPoints, ShiftResult, ShiftSetup
+from photocore.arrays import BoolArray
 from photocore.errors import InputError
 from photocore.output import check_writable
-from photocore.workbook.cellxml import CellInput
+from photocore.workbook.cells import CellValue
 
 #: More rows make a workbook that is slow to open; text tables have no limit.
 MOST_ROWS = 20_000
@@ -124,18 +126,11 @@ def write_shift_workbook(
         # openpyxl cannot ask for automatic heights; LibreOffice and Excel wrap at about 115 signs.
         readme.row_dimensions[row].height = 15 * (1 + len(line) // 115)
     index = write_index_sheet(book)
-    setup_rows = _media(book, setup, index if points is None else None)
     if points is None:
-        media = ShiftSetup(
-            layers=type(setup.layers)(
-                indices=(*setup.layers.indices[:-1], index), thicknesses=setup.layers.thicknesses
-            ),
-            z0=setup.z0,
-            nadir=setup.nadir,
-        )
-    else:
-        media = setup
-    _points(book, media, points, first=setup_rows + 3, count=count, steps=steps)
+        indices = (*setup.layers.indices[:-1], index)
+        setup = replace(setup, layers=replace(setup.layers, indices=indices))
+    setup_rows = _media(book, setup, live=points is None)
+    _points(book, setup, points, first=setup_rows + 3, count=count, steps=steps)
     book.book.move_sheet("RefractiveIndex", 1)
     book.book.active = 1
     for sheet in book.book.worksheets:
@@ -143,8 +138,8 @@ def write_shift_workbook(
     book.save(path, overwrite=overwrite)
 
 
-def _media(book: LiveBook, setup: ShiftSetup, live_index: float | None) -> int:
-    """Write camera and media; return the last row used."""
+def _media(book: LiveBook, setup: ShiftSetup, *, live: bool) -> int:
+    """Write camera and media, the last index as a formula if ``live``; return the last row used."""
     sheet = book.sheet(
         "Multimedia",
         "Radial shift through plane-parallel media",
@@ -152,29 +147,24 @@ def _media(book: LiveBook, setup: ShiftSetup, live_index: float | None) -> int:
     )
     layers, count = setup.layers, len(setup.layers.indices)
     headings(sheet, 4, ("name", "value", "k", "q"))
-    row = 5
     for i, index in enumerate(layers.indices, start=1):
+        row = 4 + i
         sheet.cell(row, 1, f"n_{i}")
-        last = i == count
-        if last and live_index is not None:
-            book.formula(sheet, row, 2, "n_w", live_index)
+        if i == count and live:
+            book.formula(sheet, row, 2, "n_w", index)
             sheet.cell(row, 2).fill = INPUT
-            index = live_index
         else:
             book.typed(sheet, row, 2, index)
         allow_between(sheet, f"B{row}", (1, 3), "Refractive index, at least 1; the camera's first.")
-        book.name(f"n_{i}", sheet, row, 2)
-        place = "the camera" if i == 1 else "the object" if last else f"layer {i - 1}"
+        k = min(layers.indices) / index
+        book.formula(sheet, row, 3, f"MIN($B$5:$B${4 + count})/n_{i}", k)
+        book.formula(sheet, row, 4, f"1-k_{i}^2", 1 - k * k)
+        sheet.cell(row, 3).number_format = sheet.cell(row, 4).number_format = "0.000000"
+        for column, name in enumerate("nkq", start=2):
+            book.name(f"{name}_{i}", sheet, row, column)
+        place = "the camera" if i == 1 else "the object" if i == count else f"layer {i - 1}"
         sheet.cell(row, 5, f"refractive index of the medium of {place}").font = NOTE
-        row += 1
-    every = [*layers.indices[:-1], layers.indices[-1] if live_index is None else live_index]
-    for i, index in enumerate(every, start=1):
-        k = min(every) / index
-        book.formula(sheet, 4 + i, 3, f"MIN($B$5:$B${4 + count})/n_{i}", k)
-        book.formula(sheet, 4 + i, 4, f"1-k_{i}^2", 1 - k * k)
-        book.name(f"k_{i}", sheet, 4 + i, 3)
-        book.name(f"q_{i}", sheet, 4 + i, 4)
-        sheet.cell(4 + i, 3).number_format = sheet.cell(4 + i, 4).number_format = "0.000000"
+    row = 5 + count
     typed: list[tuple[str, float]] = [(f"t_{i}", t) for i, t in enumerate(layers.thicknesses, 1)]
     typed += [("z_0", setup.z0), ("X_0", setup.nadir[0]), ("Y_0", setup.nadir[1])]
     for name, value in typed:
@@ -299,36 +289,35 @@ def _columns(layers: int, steps: int) -> list[tuple[str, str, str]]:
 
 def table_values(
     setup: ShiftSetup, points: ShiftPoints | None, count: int, steps: int
-) -> dict[str, list[CellInput]]:
+) -> dict[str, list[CellValue]]:
     """Return what every column shows, blank rows included."""
     keys = [key for key, _, _ in _columns(len(setup.layers.indices), steps)]
-    values: dict[str, list[CellInput]] = {key: [None] * count for key in keys[:6]}
+    values: dict[str, list[CellValue]] = {key: [None] * count for key in keys[:6]}
     values |= {key: [""] * count for key in keys[6:]}
     if points is None:
         return values
     # Not layers.heights: the sheet computes with what it holds.
     heights: list[ArrayLike] = [setup.z0, *setup.layers.thicknesses, points.depth]
-    found = unrolled_shift(points.radius, heights, setup.layers.indices, steps=steps)
-    with_xy = np.asarray(np.isfinite(points.xy).all(axis=1)).tolist()
+    shift = unrolled_shift(points.radius, heights, setup.layers.indices, steps=steps)
     with np.errstate(divide="ignore", invalid="ignore"):
-        ratio = np.where(points.radius == 0, 1.0, found.radius_bar / points.radius)
+        ratio = np.where(points.radius == 0, 1.0, shift.radius_bar / points.radius)
     nadir = np.asarray(setup.nadir)
     xy_bar = nadir + (points.xy - nadir) * ratio[:, None]
-    for i, name in enumerate(points.ids):
-        values["id"][i] = name
-        if with_xy[i]:
-            values["X"][i], values["Y"][i] = (float(v) for v in points.xy[i])
-            values["Z"][i] = float(-points.depth[i])
-            values["Xbar"][i], values["Ybar"][i] = (float(v) for v in xy_bar[i])
-        else:
-            values["R"][i], values["ZP"][i] = float(points.radius[i]), float(points.depth[i])
-        values["R_u"][i], values["ZP_u"][i] = float(points.radius[i]), float(points.depth[i])
-        for step, u in enumerate(found.u):
-            values[f"u{step}"][i] = float(u[i])
-        bar, left = float(found.radius_bar[i]), float(found.residual[i])
-        values["Rbar"][i], values["resid"][i] = bar, left
-        values["dR"][i] = bar - float(points.radius[i])
-        values["flag"][i] = "OK" if abs(left) <= TOLERANCE * points.radius[i] else "CHECK"
+    solved = np.abs(shift.residual) <= TOLERANCE * points.radius
+    columns = ShiftResult(
+        radius_bar=shift.radius_bar,
+        xy_bar=xy_bar,
+        flags=tuple("OK" if good else "CHECK" for good in solved),
+    ).columns(points, every=True)
+    columns |= {f"u{step}": u for step, u in enumerate(shift.u)}
+    columns |= {"R_u": points.radius, "ZP_u": points.depth, "resid": shift.residual}
+    with_xy = np.asarray(np.isfinite(points.xy).all(axis=1))
+    for key, column in columns.items():
+        shown: BoolArray = np.ones(len(points.ids), dtype=bool)
+        if key in (*IN_PLANE, "R", "ZP"):
+            shown = with_xy if key in IN_PLANE else ~with_xy
+        for i in np.flatnonzero(shown).tolist():
+            values[key][i] = column[i] if key in ("id", "flag") else float(column[i])
     return values
 
 

@@ -34,22 +34,9 @@ class ShiftReport:
 
     def as_dict(self) -> dict[str, Any]:
         """Return everything as plain data for ``--json``."""
-        points = [
-            {
-                "id": name,
-                "X": self.points.xy[i, 0],
-                "Y": self.points.xy[i, 1],
-                "Z": 0.0 - self.points.depth[i],
-                "R": self.points.radius[i],
-                "ZP": self.points.depth[i],
-                "Rbar": self.result.radius_bar[i],
-                "dR": self.result.radius_bar[i] - self.points.radius[i],
-                "Xbar": self.result.xy_bar[i, 0],
-                "Ybar": self.result.xy_bar[i, 1],
-                "flag": self.result.flags[i],
-            }
-            for i, name in enumerate(self.points.ids)
-        ]
+        columns = self.result.columns(self.points, every=True)
+        rows = zip(*columns.values(), strict=True)
+        points = [dict(zip(columns, row, strict=True)) for row in rows]
         setup = {**self.setup.layers.as_dict(), "z0": self.setup.z0, "nadir": self.setup.nadir}
         return {"points": points, "setup": setup, "remarks": self.remarks}
 

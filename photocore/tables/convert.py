@@ -88,7 +88,7 @@ def numbers(
             f"{NOT_CALCULATED}{more}. Open the file in the spreadsheet "
             "program, save it there, and try again.",
         )
-    found = _typed_unit(texts, wanted, complain, has_bare=bool(np.isfinite(result).any()))
+    common_unit = _typed_unit(texts, wanted, complain, has_bare=bool(np.isfinite(result).any()))
     _read_texts(result, texts, decimal, elsewhere, complain)
     remarks = []
     typed = sum(bool(part.unit) for part in texts.values())
@@ -97,7 +97,7 @@ def numbers(
     if column.kind == "integer":
         for broken in np.flatnonzero(np.isfinite(result) & (result != np.floor(result))):
             complain(int(broken), f"found {result[broken]:.15g}, expected a whole number.")
-    return result, found or unit, remarks
+    return result, common_unit or unit, remarks
 
 
 def flags(values: Sequence[Value | None], complain: Complain) -> FloatArray:
@@ -121,6 +121,8 @@ def flags(values: Sequence[Value | None], complain: Complain) -> FloatArray:
 
 def texts(values: Sequence[Value | None], complain: Complain) -> list[str]:
     """Return a column's texts; whole numbers lose the decimal point, so that 1.0 is ``"1"``."""
+    if {*map(type, values)} == {str}:
+        return [*map(str.strip, values)]  # type: ignore[arg-type]
     result = []
     for index, value in enumerate(values):
         if isinstance(value, float):

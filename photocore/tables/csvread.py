@@ -6,7 +6,7 @@ import codecs
 import csv
 import io
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence, Set
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import islice
 from pathlib import Path
@@ -15,22 +15,17 @@ import numpy as np
 
 from photocore.arrays import FloatArray
 from photocore.errors import CellError, InputError
-from photocore.tables.convert import decimal_evidence
-from photocore.tables.fill import fill, refuse_doubles, take_unit_row
 from photocore.tables.headings import Match, describe, find_columns
-from photocore.tables.model import Column, Table
-from photocore.tables.numbers import Decimal
-from photocore.tables.rows import RowSorter, label
-from photocore.workbook.grid import Grid, SheetFile, Value, cell_name
+from photocore.tables.model import Column
+from photocore.tables.numbers import Decimal, is_clear, plain_numbers
+from photocore.workbook.grid import CellGrid, SheetFile, Value, cell_name
 
 _DELIMITERS = (";", "\t", ",", "|", " ")
 _GUARDED = re.compile(r"'+[=+\-@\t\r]")
-#: A text that may be a number with three decimals or one with thousands.
-_GROUPED = re.compile(r"[+-]?[1-9]\d{0,2}[.,]\d{3}")
 _SAMPLE = 200
 _SAMPLE_TEXT = 2**18
-_CHUNK = 50_000
-_STARTS = frozenset("0123456789-+.,")
+#: Few enough records to stay in the processor's cache.
+_CHUNK = 4000
 
 
 @dataclass(slots=True)
@@ -64,11 +59,6 @@ class CsvFile:
             lines.readline()
             # The line that names the delimiter keeps its number, as spreadsheets count it.
             yield []
-        if delimiter != " " and '"' not in text:
-            # Without quotation marks a record is a line, which is quicker to take apart.
-            plain = io.StringIO(text[lines.tell() :], newline=None)
-            yield from (line.rstrip("\n").split(delimiter) for line in plain)
-            return
         try:
             yield from csv.reader(lines, delimiter=delimiter, skipinitialspace=delimiter == " ")
         except csv.Error as error:
@@ -77,9 +67,9 @@ class CsvFile:
                 "that is opened but not closed."
             ) from None
 
-    def grid(self, delimiter: str, *, most: int | None = _SAMPLE) -> Grid:
+    def grid(self, delimiter: str, *, most: int | None = _SAMPLE) -> CellGrid:
         """Return the first records as a grid of texts."""
-        grid = Grid("")
+        grid = CellGrid("")
         records = self.records(delimiter, sample=most == _SAMPLE)
         for row, record in enumerate(islice(records, most), start=1):
             cells: dict[int, Value] = {
@@ -135,56 +125,22 @@ def open_csv(path: Path) -> CsvFile:
     return CsvFile(label=path.name, text=text, remarks=remarks, delimiter=delimiter)
 
 
-def read_csv_table(
-    file: CsvFile,
-    columns: Sequence[Column],
-    *,
-    decimal: Decimal | None,
-    column_map: Mapping[str, str] | None,
-    errors: list[CellError],
-) -> Table:
-    """Read a text table; see `photocore.tables.read_table`."""
-    grid, match, delimiter = _find(file, columns, column_map)
-    refuse_doubles(file.label, "", match)
-    take_unit_row(grid, match)
-    table = Table(
-        file=file.label,
-        sheet="",
-        values={},
-        present=frozenset(match.columns),
-        rows=[],
-        columns=dict(match.columns),
-        units=dict(match.units),
-        headings=dict(match.headings),
-        remarks=[*file.remarks, *match.remarks],
-    )
-    gathered = _Gathered(match, columns)
-    _gather(file, delimiter, grid, table, gathered, errors)
-    quick = gathered.quick(decimal)
-    slow = gathered.careful(quick, decimal)
-    fill(
-        table,
-        [c for c in columns if c.key not in quick],
-        slow,
-        decimal,
-        errors,
-        proven=gathered.proven(quick),
-    )
-    table.values |= quick
-    for column in columns:
-        if column.kind == "integer" and column.key in quick:
-            bad = np.flatnonzero(quick[column.key] % 1 > 0)
-            message = "expected a whole number."
-            errors += [table.error(int(index), column.key, message) for index in bad]
-    return table
-
-
-def _find(
+def find_in_text(
     file: CsvFile, columns: Sequence[Column], column_map: Mapping[str, str] | None
-) -> tuple[Grid, Match, str]:
-    """Return the delimiter with which the most headings are found, and where they are."""
-    best: tuple[tuple[float, ...], Grid, Match | None, str] | None = None
-    for rank, delimiter in enumerate(file.delimiter or _DELIMITERS):
+) -> tuple[CellGrid, Match, str]:
+    """Return the first records, where the headings are, and the delimiter that shows most of them.
+
+    Raises
+    ------
+    InputError
+        If a required column is missing.
+    """
+    best: tuple[tuple[float, ...], CellGrid, Match | None, str] | None = None
+    sample = file.text[:_SAMPLE_TEXT]
+    # Those that do not occur all show the same: one field.
+    absent = [mark for mark in _DELIMITERS if mark not in sample][1:]
+    likely = [mark for mark in _DELIMITERS if mark not in absent]
+    for rank, delimiter in enumerate(file.delimiter or likely):
         grid = file.grid(delimiter)
         match = find_columns(grid, columns, column_map=column_map)
         score = match.score[0] if match else 0
@@ -213,252 +169,134 @@ def _consistency(file: CsvFile, delimiter: str) -> float:
     return counts.count(commonest) / len(counts) if commonest > 1 else 0.0
 
 
-@dataclass(slots=True)
-class _Chunk:
-    """Fields of one column of numbers: read already, or still as texts.
+@dataclass(frozen=True, slots=True)
+class PlainRows:
+    """Rows that are data without exception, by columns.
 
-    ``marks`` holds what the numbers read prove: a decimal ``"point"`` or ``"comma"``, or only
-    ``"grouped point"`` / ``"grouped comma"`` where each may also separate thousands.
+    Parameters
+    ----------
+    rows : range
+        Their numbers.
+    numbers : dict
+        Key to the numbers (NaN where blank) of columns that have one clear meaning.
+    texts : dict
+        Key to the fields of all other columns.
+    proven : dict
+        Key to the decimal separators that columns of numbers prove.
     """
 
-    numbers: FloatArray | None = None
-    texts: list[str] = field(default_factory=list)
-    marks: frozenset[str] = frozenset()
-
-    def cells(self) -> list[Value | None]:
-        """Return the fields as texts again, for the careful road that names bad ones."""
-        if self.numbers is None:
-            return [text or None for text in self.texts]
-        grouped = self.marks in ({"grouped point"}, {"grouped comma"})
-        shown = [
-            None if np.isnan(x) else f"{x:.3f}" if grouped and x % 1 else repr(x).removesuffix(".0")
-            for x in self.numbers.tolist()
-        ]
-        if self.marks & {"comma", "grouped comma"}:
-            return [text and text.replace(".", ",") for text in shown]
-        return list(shown)
+    rows: range
+    numbers: dict[str, FloatArray]
+    texts: dict[str, list[str]]
+    proven: dict[str, set[Decimal]]
 
 
-@dataclass(slots=True)
-class _Gathered:
-    """The fields of the columns asked for, in chunks; plain numbers are read at once."""
-
-    match: Match
-    columns: Sequence[Column]
-    numbers: dict[str, list[_Chunk]] = field(default_factory=dict)
-    texts: dict[str, list[Value | None]] = field(default_factory=dict)
-
-    def add(self, records: list[list[str]], width: int) -> None:
-        """Take the columns out of padded records."""
-        turned = list(zip(*records, strict=True)) if records else [()] * width
-        kinds = {column.key: column.kind for column in self.columns}
-        for key, number in self.match.columns.items():
-            fields = list(turned[number - 1]) if number <= width else [""] * len(records)
-            if kinds[key] in ("number", "integer"):
-                self.numbers.setdefault(key, []).append(_read_chunk(fields))
-            else:
-                self.texts.setdefault(key, []).extend(map(_unguarded, fields))
-
-    def proven(self, keys: Iterable[str]) -> dict[str, set[Decimal]]:
-        """Return the decimal separators that columns prove."""
-        known: tuple[Decimal, ...] = ("point", "comma")
-        return {
-            key: {mark for mark in known for chunk in self.numbers[key] if mark in chunk.marks}
-            for key in keys
-        }
-
-    def quick(self, decimal: Decimal | None) -> dict[str, FloatArray]:
-        """Return the columns that hold nothing but numbers of one clear meaning."""
-        marks = {
-            key: frozenset[str]().union(*(chunk.marks for chunk in chunks))
-            for key, chunks in self.numbers.items()
-        }
-        found = {}
-        for key, chunks in self.numbers.items():
-            others = frozenset[str]().union(*(m for k, m in marks.items() if k != key))
-            clear = _clear(marks[key], others, decimal)
-            arrays = [chunk.numbers for chunk in chunks if chunk.numbers is not None]
-            if clear and len(arrays) == len(chunks):
-                found[key] = np.concatenate(arrays)
-        return found
-
-    def careful(
-        self, quick: Mapping[str, FloatArray], decimal: Decimal | None
-    ) -> dict[str, list[Value | None]]:
-        """Return the cells of all other columns."""
-        cells = {
-            key: self.cells(chunks, decimal)
-            for key, chunks in self.numbers.items()
-            if key not in quick
-        }
-        return self.texts | cells
-
-    def cells(self, chunks: Sequence[_Chunk], decimal: Decimal | None) -> list[Value | None]:
-        """Return the cells of a column: numbers where they are clear, texts elsewhere."""
-        marks: set[str] = set()
-        for chunk in chunks:
-            marks |= chunk.marks if chunk.numbers is not None else decimal_evidence(chunk.texts)
-        clear = bool(decimal or marks & {"point", "comma"}) and _clear(marks, set(), decimal)
-        found: list[Value | None] = []
-        for chunk in chunks:
-            if chunk.numbers is not None and (clear or not chunk.marks):
-                found += [None if np.isnan(x) else x for x in chunk.numbers.tolist()]
-            else:
-                found += chunk.cells()
-        return found
-
-
-def _clear(marks: Set[str], others: Set[str], decimal: Decimal | None) -> bool:
-    """Whether numbers with these marks have one meaning."""
-    if not marks:
-        return True
-    if decimal is not None:
-        return marks <= {decimal, f"grouped {decimal}"}
-    if "point" in marks:
-        return marks <= {"point", "grouped point"}
-    if "comma" in marks:
-        return marks <= {"comma", "grouped comma"}
-    return marks == {"grouped point"} and "comma" not in others
-
-
-def _read_chunk(texts: list[str]) -> _Chunk:
-    """Read plain numbers (NaN where blank); leave the texts alone if any is not plain."""
-    numbers = _floats(texts)
-    if numbers is not None:
-        return _Chunk(numbers, marks=_marks(texts, numbers, "point"))
-    if any("." in text for text in texts):
-        return _Chunk(texts=texts)
-    numbers = _floats([text.replace(",", ".") for text in texts])
-    if numbers is None:
-        return _Chunk(texts=texts)
-    return _Chunk(numbers, marks=_marks(texts, numbers, "comma"))
-
-
-def _marks(texts: list[str], numbers: FloatArray, decimal: Decimal) -> frozenset[str]:
-    """Return what plain numbers prove about the separator they were read with."""
-    # Only numbers of three decimals can be mistaken for thousands; look at their texts alone.
-    with np.errstate(over="ignore"):
-        thousandths = (np.rint(numbers * 1000) / 1000 == numbers) | ~np.isfinite(numbers)
-    marks = set() if thousandths.all() else {str(decimal)}
-    mark = "." if decimal == "point" else ","
-    for index in np.flatnonzero(thousandths):
-        if mark in texts[index]:
-            grouped = _GROUPED.fullmatch(texts[index].strip())
-            marks.add(f"grouped {decimal}" if grouped else decimal)
-            if decimal == "point" and "point" in marks:
-                break
-            if len(marks) == 2:
-                break
-    return frozenset(marks)
-
-
-def _floats(texts: list[str]) -> FloatArray | None:
-    """Return numbers with a decimal point (NaN where blank); None if any is not plain."""
-    blanks = 0
-    try:
-        array = np.fromiter(map(float, texts), dtype=np.float64, count=len(texts))
-    except ValueError:
-        filled = [text.strip() or "nan" for text in texts]
-        try:
-            array = np.fromiter(map(float, filled), dtype=np.float64, count=len(texts))
-        except ValueError:
-            return None
-        blanks = sum(not text.strip() for text in texts)
-    # Python also reads "nan", "inf" and "1_000", which no surveyor means as numbers.
-    if np.count_nonzero(~np.isfinite(array)) != blanks or any("_" in text for text in texts):
-        return None
-    return array
-
-
-def _unguarded(text: str) -> str | None:
-    """Take off the apostrophe that keeps spreadsheets from running a text as a formula."""
-    return (text[1:] if text[:1] == "'" and _GUARDED.match(text) else text) or None
-
-
-def _gather(
+def plain_rows(
     file: CsvFile,
     delimiter: str,
-    grid: Grid,
-    table: Table,
-    gathered: _Gathered,
-    errors: list[CellError],
-) -> None:
-    """Sort the records into data and the rest, and take their columns."""
-    match = gathered.match
-    headings = grid.rows.get(match.header, {})
-    sorter = RowSorter(match, gathered.columns, headings)
-    above = [row for row in grid.rows if row < match.first and len(grid.rows[row]) == 1]
-    if above and match.first - above[-1] <= 2:
-        sorter.block = label(grid.rows[above[-1]][next(iter(grid.rows[above[-1]]))])
-    width = max([*match.columns.values(), *headings], default=1)
-    plain = _PlainChunks(sorter, width, headings)
-    source = file.records(delimiter)
-    first = 1 + sum(1 for _ in islice(source, match.first - 1))
-    while chunk := list(islice(source, _CHUNK)):
-        if plain.holds(first, chunk):
-            rows: Sequence[int] = range(first, first + len(chunk))
-            records = chunk
-            table.blocks += [sorter.block] * len(chunk)
-            sorter.previous = rows[-1]
-        else:
-            rows, records = _sorted_out(file, first, chunk, width, sorter, table, errors)
-        table.rows += rows
-        gathered.add(records, width)
-        first += len(chunk)
-    if not gathered.numbers and not gathered.texts:
-        gathered.add([], width)
-    table.remarks += sorter.remarks()
-
-
-@dataclass(slots=True)
-class _PlainChunks:
-    """Tells at a glance whether many records are all data, as most are."""
-
-    sorter: RowSorter
-    width: int
-    headings: Mapping[int, Value]
-
-    def holds(self, first: int, chunk: list[list[str]]) -> bool:
-        """Whether all records are full and numbers stand in two columns (or the only one)."""
-        numeric = sorted(self.sorter.numeric)
-        if first != self.sorter.previous + 1 or not numeric:
-            return False
-        if {*map(len, chunk)} != {self.width}:
-            return False
-        for number in numeric[:2]:
-            starts = {record[number - 1][:1] for record in chunk}
-            heading = str(self.headings.get(number, "x"))
-            if not starts <= _STARTS or heading[:1] in _STARTS:
-                return False
-        return True
-
-
-def _sorted_out(
-    file: CsvFile,
-    first: int,
-    chunk: list[list[str]],
     width: int,
-    sorter: RowSorter,
-    table: Table,
-    errors: list[CellError],
-) -> tuple[list[int], list[list[str]]]:
-    """Return the rows and records of a chunk that are data, all of the same width."""
-    padding = [""] * width
-    rows, records = [], []
-    for row, record in enumerate(chunk, start=first):
-        cells: dict[int, Value] = {
-            column: text for column, text in enumerate(record, start=1) if text.strip()
-        }
-        if not cells or not sorter.is_data(row, cells):
-            continue
-        if sorter.headings and max(cells) > width:
+    match: Match,
+    columns: Sequence[Column],
+    decimal: Decimal | None,
+    *,
+    careful: frozenset[str] = frozenset(),
+) -> PlainRows | None:
+    """Read a table on the quick road, None if any of its rows asks for a closer look.
+
+    Every record must be full, hold a number and at least one thing more, and be no headings again.
+
+    Parameters
+    ----------
+    file, delimiter, match, columns, decimal
+        The table.
+    width : int
+        Number of fields of each record.
+    careful : frozenset
+        Columns of numbers known to need a closer look; their fields stay texts.
+    """
+    kinds = {column.key: column.kind for column in columns}
+    numeric = {key for key in match.columns if kinds[key] in ("number", "integer")}
+    quick = sorted(numeric - careful)
+    if all(plain_numbers([match.headings.get(key) or "x"]) for key in quick):
+        return None
+    others = sorted(match.columns.keys() - quick)
+    chunks: dict[str, list[FloatArray]] = {key: [] for key in quick}
+    proven: dict[str, set[str]] = {key: set() for key in quick}
+    texts: dict[str, list[str]] = {key: [] for key in others}
+    last = match.first - 1
+    for chunk in _full_chunks(file, delimiter, last, width):
+        if chunk is None:
+            return None
+        fields = {key: chunk[number - 1] for key, number in match.columns.items()}
+        for key in quick:
+            plain = plain_numbers(fields[key])
+            if plain is None or (kinds[key] == "integer" and np.any(plain[0] % 1 > 0)):
+                return plain_rows(
+                    file, delimiter, width, match, columns, decimal, careful=careful | {key}
+                )
+            chunks[key].append(plain[0])
+            proven[key] |= plain[1]
+        filled = np.sum([~np.isnan(chunks[key][-1]) for key in quick], axis=0)
+        for index in np.flatnonzero(filled < min(2, len(numeric))).tolist():
+            if not filled[index] or not any(fields[key][index].strip() for key in others):
+                return None
+        for key in others:
+            texts[key] += fields[key]
+        last += len(filled)
+    if last < match.first:
+        return None
+    for key in quick:
+        elsewhere = set[str]().union(*(proven[other] for other in quick if other != key))
+        if not is_clear(proven[key], elsewhere, decimal):
+            careful |= {key}
+    if not careful.isdisjoint(quick):
+        return plain_rows(file, delimiter, width, match, columns, decimal, careful=careful)
+    known: tuple[Decimal, ...] = ("point", "comma")
+    return PlainRows(
+        range(match.first, last + 1),
+        {key: np.concatenate(arrays) for key, arrays in chunks.items()},
+        texts,
+        {key: {mark for mark in known if mark in proven[key]} for key in quick},
+    )
+
+
+def _full_chunks(
+    file: CsvFile, delimiter: str, skipped: int, width: int
+) -> Iterator[list[Sequence[str]] | None]:
+    """Yield many records at a time, turned into columns; None where one is not full."""
+    if delimiter == " " or '"' in file.text:
+        records = islice(file.records(delimiter), skipped, None)
+        while chunk := list(islice(records, _CHUNK)):
+            if {*map(len, chunk)} != {width}:
+                yield None
+            yield list(zip(*chunk, strict=True))
+        return
+    # Without quotation marks a record is a line, and many lines are taken apart at once.
+    text = file.text.rstrip("\r\n").replace("\r\n", "\n").replace("\r", "\n")
+    start = 0
+    for _ in range(skipped):
+        start = text.find("\n", start) + 1 or len(text)
+    while start < len(text):
+        end = text.find("\n", start + 40 * _CHUNK)
+        part = text[start : end if end > 0 else None]
+        if {line.count(delimiter) for line in part.split("\n")} != {width - 1}:
+            yield None
+        fields = part.replace("\n", delimiter).split(delimiter)
+        yield [fields[number::width] for number in range(width)]
+        start += len(part) + 1
+
+
+def too_wide(file: CsvFile, grid: CellGrid, width: int, rows: Iterable[int]) -> Iterator[CellError]:
+    """Yield a complaint for each record that reaches beyond the headings."""
+    for row in rows:
+        if max(grid.rows[row]) > width:
             message = (
-                f"the record has {max(cells)} fields, the headings {width}. If numbers have a "
-                "decimal comma, separate the fields by semicolons."
+                f"the record has {max(grid.rows[row])} fields, the headings {width}. If numbers "
+                "have a decimal comma, separate the fields by semicolons."
             )
-            place = cell_name(row, width + 1)
-            errors.append(CellError(message, file=file.label, cell=place))
-        rows.append(row)
-        records.append((record + padding)[:width])
-        table.blocks.append(sorter.block)
-    return rows, records
+            yield CellError(message, file=file.label, cell=cell_name(row, width + 1))
+
+
+def unguarded(text: str | None) -> str | None:
+    """Take off the apostrophe that keeps spreadsheets from running a text as a formula."""
+    return text[1:] if text and text[0] == "'" and _GUARDED.match(text) else text

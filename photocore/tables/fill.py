@@ -11,7 +11,7 @@ from photocore.tables import convert
 from photocore.tables.headings import Match
 from photocore.tables.model import Column, Table
 from photocore.tables.numbers import Decimal, unit_symbol
-from photocore.workbook.grid import CellDate, Grid, Value, cell_name, column_letters
+from photocore.workbook.grid import CellDate, CellGrid, Value, cell_name, column_letters
 
 
 def fill(
@@ -52,7 +52,7 @@ def fill(
 
         if column.kind == "text":
             table.values[column.key] = convert.texts(values, complain)
-            dated = sum(isinstance(value, CellDate) for value in values)
+            dated = table.sheet and sum(isinstance(value, CellDate) for value in values)
             if dated:
                 table.remarks.append(
                     f"{column.key}: {dated} cells hold dates; type a name like 3-4 as '3-4."
@@ -101,7 +101,7 @@ def refuse_doubles(label: str, title: str, match: Match) -> None:
         )
 
 
-def take_unit_row(grid: Grid, match: Match) -> None:
+def take_unit_row(grid: CellGrid, match: Match) -> None:
     """Skip a row of units below the headings, and remember them."""
     cells = grid.rows.get(match.first, {})
     units = {key: cells[number] for key, number in match.columns.items() if number in cells}

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 
 from photocore.tables.model import Column
 from photocore.tables.numbers import unit_symbol
-from photocore.workbook.grid import Grid, Value, cell_name, column_letters, column_number
+from photocore.workbook.grid import CellGrid, Value, cell_name, column_letters, column_number
 
 _UNIT = re.compile(r"\s*[\[(]\s*([^\])]*)\s*[\])]\s*$")
 _LOOSE_UNIT = re.compile(r"[\s_,]+(mm|cm|m|px|pixel|deg|°|gon|rad)$", re.IGNORECASE)
@@ -72,12 +72,12 @@ def unit_of(text: str) -> str:
     >>> unit_of("s1 [mm]"), unit_of("theta"), unit_of("x far px")
     ('mm', '', 'px')
     """
-    found = _UNIT.search(text) or _LOOSE_UNIT.search(text)
-    return unit_symbol(found[1]) if found else ""
+    unit = _UNIT.search(text) or _LOOSE_UNIT.search(text)
+    return unit_symbol(unit[1]) if unit else ""
 
 
 def find_columns(
-    grid: Grid,
+    grid: CellGrid,
     columns: Sequence[Column],
     *,
     column_map: Mapping[str, str] | None = None,
@@ -88,7 +88,7 @@ def find_columns(
 
     Parameters
     ----------
-    grid : Grid
+    grid : CellGrid
         The sheet.
     columns : sequence of Column
         What is looked for.
@@ -117,7 +117,7 @@ def find_columns(
 
 
 def _apply_map(
-    grid: Grid,
+    grid: CellGrid,
     columns: Sequence[Column],
     column_map: Mapping[str, str] | None,
     candidates: Sequence[int],
@@ -151,7 +151,7 @@ def _apply_map(
 
 
 def _heading_texts(
-    grid: Grid, row: int, span: tuple[int, int] | None
+    grid: CellGrid, row: int, span: tuple[int, int] | None
 ) -> list[tuple[dict[int, list[str]], int]]:
     """Return the headings that a row, alone or with the next, gives each column."""
 
@@ -169,7 +169,7 @@ def _heading_texts(
         for column, value in grid.rows[row].items()
         if isinstance(value, str) and value.strip() and column in upper
     }
-    found = [(single, row)] if single else []
+    headings = [(single, row)] if single else []
     cells = grid.rows.get(row + 1, {})
     lower = {c: v for c, v in inside(cells).items() if isinstance(cells[c], str) and v.strip()}
     if lower and len(lower) >= 2:
@@ -183,8 +183,8 @@ def _heading_texts(
                 double[column] = [*numbered, f"{group} {own}".strip(), own]
             else:
                 double[column] = [upper[column]]
-        found.append((double, row + 1))
-    return found
+        headings.append((double, row + 1))
+    return headings
 
 
 def _numbered(text: str, digit: str) -> str:
@@ -194,7 +194,7 @@ def _numbered(text: str, digit: str) -> str:
 
 
 def _filled_right(
-    grid: Grid, row: int, upper: Mapping[int, str], lower: Mapping[int, str]
+    grid: CellGrid, row: int, upper: Mapping[int, str], lower: Mapping[int, str]
 ) -> dict[int, str]:
     """Return the upper headings, each reaching right over its merged or empty cells."""
     reach = {left: right for top, left, _, right in grid.merged if top == row}
@@ -267,7 +267,7 @@ def _assign(
     return match
 
 
-def _take_nameless(grid: Grid, match: Match, columns: Sequence[Column]) -> None:
+def _take_nameless(grid: CellGrid, match: Match, columns: Sequence[Column]) -> None:
     """Take the column left of the others for the point names when only its heading is missing."""
     name = next((column for column in columns if column.kind == "text"), None)
     if name is None or name.key != "id" or name.key in match.columns or not match.columns:
@@ -296,7 +296,7 @@ def _forms(variants: Sequence[str]) -> list[str]:
 
 
 def _without_heading(
-    grid: Grid, columns: Sequence[Column], fixed: dict[str, int], candidates: Sequence[int]
+    grid: CellGrid, columns: Sequence[Column], fixed: dict[str, int], candidates: Sequence[int]
 ) -> Match:
     """Return where the data begin in a table whose columns are known by letter."""
     from photocore.tables.numbers import take_apart
@@ -337,7 +337,7 @@ def _without_heading(
     return match
 
 
-def describe(grid: Grid, match: Match | None) -> str:
+def describe(grid: CellGrid, match: Match | None) -> str:
     """Return a few words on the headings found nearest, for a message."""
     row = match.header if match else next(iter(sorted(grid.rows)), 0)
     cells = grid.rows.get(row, {})

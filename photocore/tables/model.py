@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Literal
 
@@ -205,7 +205,7 @@ def parse_column_map(text: str, keys: Sequence[str] = ()) -> dict[str, str]:
     """
     entries = [entry.strip() for entry in re.split(r"[,;]", text)]
     named = any("=" in entry for entry in entries)
-    found: dict[str, str] = {}
+    places: dict[str, str] = {}
     for position, entry in enumerate(entries, start=1):
         if named:
             key, equals, place = (part.strip() for part in entry.partition("="))
@@ -218,12 +218,12 @@ def parse_column_map(text: str, keys: Sequence[str] = ()) -> dict[str, str]:
         else:
             key, place = entry, column_letters(position)
         key = _known(key, keys)
-        if key in found:
+        if key in places:
             raise InputError(f'--columns: "{key}" is named twice.')
-        found[key] = place
-    if not found:
+        places[key] = place
+    if not places:
         raise InputError("--columns: names no column; write for example id=A,s1=B,s2=C.")
-    return found
+    return places
 
 
 def _known(key: str, keys: Sequence[str]) -> str:
@@ -233,6 +233,3 @@ def _known(key: str, keys: Sequence[str]) -> str:
     if len(alike) == 1:
         return alike[0]
     raise InputError(f'--columns: there is no column "{key}"; known are {", ".join(keys)}.')
-
-
-ColumnMap = Mapping[str, str]

@@ -3,29 +3,22 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence, Set
 from dataclasses import dataclass
 from typing import Literal
+
+import numpy as np
+
+from photocore.arrays import FloatArray
 
 Decimal = Literal["point", "comma"]
 Evidence = Literal["point", "comma", "none", "grouped comma", "grouped point"]
 
 #: Units people type, as they are written in headings; spelling to stable symbol.
-UNITS = {
-    **{
-        "mm": "mm",
-        "cm": "cm",
-        "dm": "dm",
-        "m": "m",
-        "km": "km",
-        "µm": "um",
-        "μm": "um",
-        "um": "um",
-    },
-    **{"px": "px", "pixel": "px", "pixels": "px", "pix": "px", "°": "deg", "deg": "deg"},
-    **{"degree": "deg", "degrees": "deg", "grad": "deg", "gradi": "deg", "gon": "gon"},
-    **{"rad": "rad", "%": "%", "°c": "degC", "nm": "nm", "-": "-"},
-}
+_SPELLINGS = {"um": "µm μm um", "px": "px pixel pixels pix", "degC": "°c"}
+_SPELLINGS |= {"deg": "° deg degree degrees grad gradi"}
+_SPELLINGS |= {unit: unit for unit in ("mm", "cm", "dm", "m", "km", "gon", "rad", "%", "nm", "-")}
+UNITS = {word: unit for unit, words in _SPELLINGS.items() for word in words.split()}
 _METRES = {"um": 1e-6, "mm": 1e-3, "cm": 1e-2, "dm": 1e-1, "m": 1.0, "km": 1e3}
 _SPACES = dict.fromkeys(map(ord, "\u00a0\u2007\u2009\u202f\u2002\u2003"), " ")
 _MINUS = dict.fromkeys(map(ord, "\u2212\u2012\u2013\ufe63\uff0d"), "-")
@@ -176,3 +169,65 @@ def decimal_of(
     if elsewhere:
         return own if elsewhere == {own} else None
     return "point" if own == "point" else None
+
+
+#: A text that may be a number with three decimals or one with thousands.
+_THREE_DECIMALS = re.compile(r"[+-]?[1-9]\d{0,2}[.,]\d{3}")
+
+
+def plain_numbers(texts: Sequence[str]) -> tuple[FloatArray, set[str]] | None:
+    """Return numbers (NaN where blank) with what they prove; None if any is not plain.
+
+    The quick road for columns that hold nothing but digits and one decimal mark. What they prove
+    is a decimal ``"point"`` or ``"comma"``, or only ``"grouped point"`` / ``"grouped comma"`` where
+    each mark may also separate thousands.
+    """
+    numbers, decimal, mark = _floats(texts), "point", "."
+    if numbers is None:
+        if any("." in text for text in texts):
+            return None
+        numbers, decimal, mark = _floats([text.replace(",", ".") for text in texts]), "comma", ","
+    if numbers is None:
+        return None
+    # Only numbers of three decimals can be mistaken for thousands; look at their texts alone.
+    with np.errstate(over="ignore"):
+        thousandths = (np.rint(numbers * 1000) / 1000 == numbers) | ~np.isfinite(numbers)
+    proven = set() if thousandths.all() else {decimal}
+    for index in np.flatnonzero(thousandths).tolist():
+        if decimal in proven:
+            break
+        if mark in texts[index]:
+            grouped = _THREE_DECIMALS.fullmatch(texts[index].strip())
+            proven.add(f"grouped {decimal}" if grouped else decimal)
+    return numbers, proven
+
+
+def is_clear(proven: Set[str], others: Set[str], decimal: Decimal | None) -> bool:
+    """Whether plain numbers have one meaning, given what they and the other columns prove."""
+    if not proven:
+        return True
+    if decimal is None and "point" in proven:
+        decimal = "point"
+    elif decimal is None and "comma" in proven:
+        decimal = "comma"
+    if decimal is not None:
+        return proven <= {decimal, f"grouped {decimal}"}
+    return proven == {"grouped point"} and "comma" not in others
+
+
+def _floats(texts: Sequence[str]) -> FloatArray | None:
+    """Return numbers with a decimal point (NaN where blank); None if any is not plain."""
+    blanks = 0
+    try:
+        array = np.fromiter(map(float, texts), dtype=np.float64, count=len(texts))
+    except ValueError:
+        filled = [text.strip() or "nan" for text in texts]
+        blanks = sum(not text.strip() for text in texts)
+        try:
+            array = np.fromiter(map(float, filled), dtype=np.float64, count=len(texts))
+        except ValueError:
+            return None
+    # Python also reads "nan", "inf" and "1_000", which no surveyor means as numbers.
+    if np.count_nonzero(~np.isfinite(array)) != blanks or "_" in "".join(texts):
+        return None
+    return array

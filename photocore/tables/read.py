@@ -10,13 +10,20 @@ import numpy as np
 
 from photocore.errors import CellError, InputError, WorkbookError
 from photocore.tables import convert
-from photocore.tables.csvread import CsvFile, open_csv, read_csv_table
+from photocore.tables.csvread import (
+    CsvFile,
+    find_in_text,
+    open_csv,
+    plain_rows,
+    too_wide,
+    unguarded,
+)
 from photocore.tables.fill import fill, refuse_doubles, take_unit_row
 from photocore.tables.headings import Match, bare, describe, find_columns
 from photocore.tables.model import Column, NamedValues, Table
 from photocore.tables.numbers import Decimal, take_apart
-from photocore.tables.rows import data_rows
-from photocore.workbook.grid import Grid, SheetFile, TableArea, Value, cell_name
+from photocore.tables.rows import DataRows, block_above, data_rows
+from photocore.workbook.grid import CellGrid, SheetFile, TableArea, Value, cell_name
 from photocore.workbook.package import check_header
 
 Source = Path | str | SheetFile | CsvFile
@@ -109,32 +116,42 @@ def read_table(
     """
     if decimal not in (None, "point", "comma"):
         raise InputError(f'decimal: expected "point" or "comma", found {decimal!r}.')
-    found = errors if errors is not None else []
+    complaints = errors if errors is not None else []
     book = (
         source
         if isinstance(source, SheetFile | CsvFile)
         else open_tables(source, max_rows=max_rows)
     )
     if isinstance(book, CsvFile):
-        table = read_csv_table(book, columns, decimal=decimal, column_map=column_map, errors=found)
+        place = _Place(*find_in_text(book, columns, column_map))
     else:
         place = _find(book, columns, name=name, sheet=sheet, column_map=column_map)
-        table = _read_grid(
-            book, place, columns, decimal, visible_only, max_rows=max_rows, errors=found
-        )
-        table.remarks[:0] = book.remarks
-    if errors is None and found:
-        raise WorkbookError(found)
+    refuse_doubles(book.label, place.grid.title, place.match)
+    take_unit_row(place.grid, place.match)
+    if isinstance(book, CsvFile):
+        table = _read_text(book, place, columns, decimal, complaints)
+    else:
+        rows = data_rows(place.grid, place.match, columns, visible_only=visible_only)
+        if place.grid.truncated or len(rows.rows) > max_rows:
+            raise InputError(
+                f"{book.label} › {place.grid.title}: has more than {max_rows} rows. Save the sheet "
+                "as .csv and use that file; text tables have no limit."
+            )
+        table = _new_table(book, place, rows)
+        _refuse_merged(table, place.grid, complaints)
+        fill(table, columns, _cells(place, rows), decimal, complaints)
+    if errors is None and complaints:
+        raise WorkbookError(complaints)
     return table
 
 
 @dataclass(slots=True)
 class _Place:
-    """A table in a workbook: its sheet, its columns, and its named area if it has one."""
+    """A table in a file: its sheet, its columns, and what separates the fields of a text."""
 
-    grid: Grid
+    grid: CellGrid
     match: Match
-    area: TableArea | None = None
+    delimiter: str = ""
 
 
 def _find(
@@ -206,10 +223,10 @@ def _in_area(
     match = replace(match, header=header, first=header + 1, last=bottom - area.totals_rows)
     if not area.totals_rows:
         _reach_below(grid, match, bottom)
-    return _Place(grid, match, area)
+    return _Place(grid, match)
 
 
-def _reach_below(grid: Grid, match: Match, bottom: int) -> None:
+def _reach_below(grid: CellGrid, match: Match, bottom: int) -> None:
     """Take in rows typed directly below a named table that did not grow with them."""
     used = set(match.columns.values())
     row = bottom
@@ -266,47 +283,64 @@ def _nothing_found(
     )
 
 
-def _read_grid(
-    book: SheetFile,
+def _read_text(
+    file: CsvFile,
     place: _Place,
     columns: Sequence[Column],
     decimal: Decimal | None,
-    visible_only: bool,
-    *,
-    max_rows: int,
     errors: list[CellError],
 ) -> Table:
-    """Turn the cells of a table into arrays."""
-    grid, match = place.grid, place.match
-    refuse_doubles(book.label, grid.title, match)
-    take_unit_row(grid, match)
-    found = data_rows(grid, match, columns, visible_only=visible_only)
-    if grid.truncated or len(found.rows) > max_rows:
-        raise InputError(
-            f"{book.label} › {grid.title}: has more than {max_rows} rows. Save the sheet as .csv "
-            "and use that file; text tables have no limit."
-        )
-    table = Table(
-        file=book.label,
-        sheet=grid.title,
-        values={},
-        present=frozenset(match.columns),
-        rows=found.rows,
-        columns=dict(match.columns),
-        units=dict(match.units),
-        headings=dict(match.headings),
-        blocks=found.blocks,
-        remarks=[*match.remarks, *found.remarks],
-    )
-    _refuse_merged(table, grid, errors)
-    raw: dict[str, list[Value | None]] = {}
-    for key, number in match.columns.items():
-        raw[key] = [grid.rows[row].get(number) for row in found.rows]
-    fill(table, columns, raw, decimal, errors)
+    """Read a text table, on the quick road where all of its rows are plain."""
+    match, proven = place.match, {}
+    width = max([*match.columns.values(), *place.grid.rows.get(match.header, {})], default=1)
+    plain = plain_rows(file, place.delimiter, width, match, columns, decimal)
+    if plain is None:
+        place = replace(place, grid=file.grid(place.delimiter, most=None))
+        rows = data_rows(place.grid, match, columns, visible_only=False)
+        table = _new_table(file, place, rows)
+        cells = _cells(place, rows)
+        if match.header:
+            errors += too_wide(file, place.grid, width, rows.rows)
+    else:
+        count = len(plain.rows)
+        rows = DataRows([*plain.rows], [block_above(place.grid, match)] * count)
+        table = _new_table(file, place, rows)
+        cells, proven = {**plain.texts}, plain.proven
+        table.values |= plain.numbers
+    for column in columns:
+        if column.kind in ("text", "flag") and column.key in cells:
+            cells[column.key] = [unguarded(text) for text in cells[column.key]]  # type: ignore[arg-type]
+    rest = [column for column in columns if column.key not in table.values]
+    fill(table, rest, cells, decimal, errors, proven=proven)
     return table
 
 
-def _refuse_merged(table: Table, grid: Grid, errors: list[CellError]) -> None:
+def _new_table(book: SheetFile | CsvFile, place: _Place, rows: DataRows) -> Table:
+    """Return a table without values."""
+    return Table(
+        file=book.label,
+        sheet=place.grid.title,
+        values={},
+        present=frozenset(place.match.columns),
+        rows=rows.rows,
+        columns=dict(place.match.columns),
+        units=dict(place.match.units),
+        headings=dict(place.match.headings),
+        blocks=rows.blocks,
+        remarks=[*book.remarks, *place.match.remarks, *rows.remarks],
+    )
+
+
+def _cells(place: _Place, rows: DataRows) -> dict[str, Sequence[Value | None]]:
+    """Return the cells of each column."""
+    grid = place.grid.rows
+    return {
+        key: [grid[row].get(number) for row in rows.rows]
+        for key, number in place.match.columns.items()
+    }
+
+
+def _refuse_merged(table: Table, grid: CellGrid, errors: list[CellError]) -> None:
     """Complain about merged cells among the data: they hide values."""
     used = {number: key for key, number in table.columns.items()}
     index_of = {row: index for index, row in enumerate(table.rows)}
@@ -358,7 +392,7 @@ def read_named_values(
     book = source if isinstance(source, SheetFile | CsvFile) else open_tables(source)
     if isinstance(book, CsvFile):
         book = book.as_sheets()
-    found = errors if errors is not None else []
+    complaints = errors if errors is not None else []
     titles = sorted(book.titles, key=lambda title: bare(title) != bare(sheet or ""))
     result = NamedValues(file=book.label, values={}, places={})
     for name in names:
@@ -370,14 +404,14 @@ def read_named_values(
             value = book.grid(title).rows.get(row, {}).get(column)
 
         def complain(_: int, message: str, key: str = name.key) -> None:
-            found.append(result.error(key, message))
+            complaints.append(result.error(key, message))
 
         result.values[name.key] = _single(name, value, decimal, complain)
         if place and name.kind == "number" and isinstance(value, str) and result.has(name.key):
             result.text_cells.append(f"{place[0]}!{result.cell(name.key)}")
-    if errors is None and found:
-        raise WorkbookError(found)
-    faulty = {error.column for error in found}
+    if errors is None and complaints:
+        raise WorkbookError(complaints)
+    faulty = {error.column for error in complaints}
     missing = [n.key for n in names if n.required and not result.has(n.key) and n.key not in faulty]
     if missing:
         where = f"{book.label} › {sheet}" if sheet else book.label
@@ -408,15 +442,15 @@ def _by_label(book: SheetFile, titles: Sequence[str], name: Column) -> tuple[str
     labels = {bare(name.key), *map(bare, name.aliases)}
     for title in titles:
         grid = book.grid(title)
-        found = _labels(grid)
-        places = [found[label] for label in labels if label in found]
+        texts = _labels(grid)
+        places = [texts[label] for label in labels if label in texts]
         if places:
             row, column = min(places)
             return title, row, _right_of(grid.rows[row], column, _value_column(grid)[1], name)
     return None
 
 
-def _labels(grid: Grid) -> dict[str, tuple[int, int]]:
+def _labels(grid: CellGrid) -> dict[str, tuple[int, int]]:
     """Return the place of each text near the top of a sheet, the first one of its kind."""
     if grid.labels is None:
         headings = _value_column(grid)[0]
@@ -428,7 +462,7 @@ def _labels(grid: Grid) -> dict[str, tuple[int, int]]:
     return grid.labels
 
 
-def _value_column(grid: Grid) -> tuple[int, int]:
+def _value_column(grid: CellGrid) -> tuple[int, int]:
     """Return row and column of the heading "value", zeros where there is none."""
     for row in sorted(grid.rows)[:20]:
         for column, text in grid.rows[row].items():

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 from photocore.tables.headings import Match, bare
 from photocore.tables.model import Column
-from photocore.workbook.grid import Grid, Value
+from photocore.workbook.grid import CellGrid, Value
 
 
 @dataclass(slots=True)
@@ -96,13 +96,13 @@ def label(value: Value) -> str:
 
 
 def data_rows(
-    grid: Grid, match: Match, columns: Sequence[Column], *, visible_only: bool
+    grid: CellGrid, match: Match, columns: Sequence[Column], *, visible_only: bool
 ) -> DataRows:
     """Return the rows of a table that hold data.
 
     Parameters
     ----------
-    grid : Grid
+    grid : CellGrid
         The sheet.
     match : Match
         Where the table's columns and headings are.
@@ -111,17 +111,9 @@ def data_rows(
     visible_only : bool
         Leave hidden rows out.
     """
-    found = DataRows()
+    data = DataRows()
     sorter = RowSorter(match, columns, grid.rows.get(match.header, {}))
-    above = [row for row in grid.rows if row < min(match.header or match.first, match.first)]
-    if match.header and above:
-        cells = grid.rows[max(above)]
-        if len(cells) == 1 and not isinstance(next(iter(cells.values())), str):
-            sorter.block = label(next(iter(cells.values())))
-    elif above:
-        for row in sorted(above)[-2:]:
-            if len(grid.rows[row]) == 1:
-                sorter.block = label(next(iter(grid.rows[row].values())))
+    sorter.block = block_above(grid, match)
     hidden = 0
     for row in sorted(grid.rows):
         if not match.first <= row <= match.last or not sorter.is_data(row, grid.rows[row]):
@@ -130,10 +122,20 @@ def data_rows(
             hidden += 1
             if visible_only:
                 continue
-        found.rows.append(row)
-        found.blocks.append(sorter.block)
-    found.remarks += sorter.remarks()
+        data.rows.append(row)
+        data.blocks.append(sorter.block)
+    data.remarks += sorter.remarks()
     if hidden:
         what = "were left out" if visible_only else "are used too; --visible-only leaves them out"
-        found.remarks.append(f"{hidden} hidden or filtered rows {what}.")
-    return found
+        data.remarks.append(f"{hidden} hidden or filtered rows {what}.")
+    return data
+
+
+def block_above(grid: CellGrid, match: Match) -> str:
+    """Return the label of the first block, which stands alone above the headings or the data."""
+    top = min(match.header or match.first, match.first)
+    for row in sorted(row for row in grid.rows if row < top)[-1 if match.header else -2 :]:
+        value = next(iter(grid.rows[row].values()))
+        if len(grid.rows[row]) == 1 and not (match.header and isinstance(value, str)):
+            return label(value)
+    return ""

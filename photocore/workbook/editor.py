@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import shutil
 import zipfile
 from collections.abc import Iterable, Mapping, Sequence
@@ -15,13 +14,12 @@ from numpy.typing import ArrayLike
 from photocore.errors import InputError
 from photocore.output import atomic_path, check_writable, free_path
 from photocore.workbook import formulas
-from photocore.workbook.cellxml import CellInput
-from photocore.workbook.grid import Grid, SheetFile, TableArea, cell_name
-from photocore.workbook.newrows import NewColumn, NewRows, RowFormula
-from photocore.workbook.package import check_header, open_package, read_part
+from photocore.workbook.cells import CellValue, NewColumn, NewRows, RowFormula, escape
+from photocore.workbook.grid import CellGrid, SheetFile, TableArea, cell_name
+from photocore.workbook.package import check_header, open_package, read_part, rewrite_package
 from photocore.workbook.splice import SheetChanges, Spliced, splice_sheet
 from photocore.workbook.xlsx import (
-    Sheet,
+    SheetPart,
     Workbook,
     open_xlsx,
     read_directory,
@@ -80,17 +78,17 @@ class WorkbookEditor:
 
     def table(self, name: str) -> TableArea | None:
         """Return a named table, None where there is none; upper and lower case are alike."""
-        found = (t for t in self.tables if t.name.casefold() == name.casefold())
-        return next(found, None)
+        tables = (t for t in self.tables if t.name.casefold() == name.casefold())
+        return next(tables, None)
 
-    def grid(self, title: str) -> Grid:
+    def grid(self, title: str) -> CellGrid:
         """Return a sheet's cells as they stand in the file."""
         self._sheet(title)
         if self._file is None:
             self._file = open_xlsx(self.path, max_rows=2**20)
         return self._file.grid(title)
 
-    def set_value(self, title: str, row: int, column: int, value: CellInput) -> None:
+    def set_value(self, title: str, row: int, column: int, value: CellValue) -> None:
         """Type a value into a cell; its format stays. None clears the cell."""
         if isinstance(value, float) and not np.isfinite(value):
             raise InputError(
@@ -99,7 +97,7 @@ class WorkbookEditor:
             )
         self._changes(title).inputs.setdefault(row, {})[column] = value
 
-    def set_result(self, title: str, row: int, column: int, value: CellInput) -> None:
+    def set_result(self, title: str, row: int, column: int, value: CellValue) -> None:
         """Store the result of a cell's formula; a cell without formula is left alone.
 
         NaN is stored as the error value #N/A.
@@ -107,7 +105,7 @@ class WorkbookEditor:
         self._changes(title).cached.setdefault(row, {})[column] = value
 
     def set_results(
-        self, title: str, first_row: int, columns: Mapping[int, ArrayLike | Sequence[CellInput]]
+        self, title: str, first_row: int, columns: Mapping[int, ArrayLike | Sequence[CellValue]]
     ) -> None:
         """Store the results of whole columns of formulas.
 
@@ -129,8 +127,8 @@ class WorkbookEditor:
     def append_rows(
         self,
         table: str,
-        rows: Sequence[Mapping[str, CellInput]],
-        results: Sequence[Mapping[str, CellInput]] = (),
+        rows: Sequence[Mapping[str, CellValue]],
+        results: Sequence[Mapping[str, CellValue]] = (),
     ) -> list[int]:
         """Add rows to a named table; formulas and formats are those of its last row.
 
@@ -169,8 +167,8 @@ class WorkbookEditor:
     def append_columns(
         self,
         table: str,
-        inputs: Mapping[str, ArrayLike | Sequence[CellInput]],
-        results: Mapping[str, ArrayLike | Sequence[CellInput]] | None = None,
+        inputs: Mapping[str, ArrayLike | Sequence[CellValue]],
+        results: Mapping[str, ArrayLike | Sequence[CellValue]] | None = None,
         *,
         count: int | None = None,
     ) -> list[int]:
@@ -202,18 +200,18 @@ class WorkbookEditor:
         new_rows = list(range(bottom + 1, bottom + 1 + count))
         if not new_rows:
             return []
-        _, left, last, right = area.area
-        model = formulas.row_cells(self.path, self._sheet(area.sheet), last, left, right)
+        last = area.area[2]
+        with open_package(self.path) as package:
+            model = formulas.model_cells(self.path, package, self._sheet(area.sheet), last)
         self._refuse_occupied(area, new_rows)
         columns = []
         for name, column in headings.items():
             like = model.get(column, formulas.ModelCell())
-            formula = RowFormula(like.formula, last) if like.formula else None
+            formula = RowFormula(escape(like.formula), last).at if like.formula else None
             fits = name in (results if formula else inputs)
             values = [*given[name]] if fits else []
             values += [None] * (count - len(values))
             columns.append(NewColumn(column, values, like.style, formula))
-        columns.sort(key=lambda column: column.column)
         self._changes(area.sheet).added.append(NewRows(bottom + 1, count, columns))
         self.grown[area.name] = (area, new_rows[-1])
         return new_rows
@@ -231,9 +229,7 @@ class WorkbookEditor:
             )
         return self.grown.get(area.name, (area, area.area[2]))
 
-    def save(
-        self, target: Path | str | None = None, *, overwrite: bool = False, backup: bool = True
-    ) -> Path | None:
+    def save(self, target: Path | str | None = None, *, overwrite: bool = False) -> Path | None:
         """Write the changed workbook.
 
         Parameters
@@ -244,8 +240,6 @@ class WorkbookEditor:
             backup is ever replaced.
         overwrite : bool
             Whether to replace another existing file.
-        backup : bool
-            Whether to keep the old file.
 
         Returns
         -------
@@ -269,7 +263,7 @@ class WorkbookEditor:
         kept: Path | None = None
         with atomic_path(target, overwrite=overwrite or in_place) as temporary:
             rewrite_package(self.path, temporary, parts)
-            if in_place and backup:
+            if in_place:
                 kept = free_path(self.path.parent, f"{self.path.name}.bak")
                 shutil.copy2(self.path, kept)
         return kept
@@ -284,14 +278,14 @@ class WorkbookEditor:
             parts: dict[str, bytes] = {}
             stripped = False
             for sheet in self.book.sheets:
-                found = spliced.get(sheet.title)
-                if found is None and sheet.title in stale:
+                changed = spliced.get(sheet.title)
+                if changed is None and sheet.title in stale:
                     data = read_part(self.path, package, sheet.part)
-                    found = splice_sheet(self.path, sheet.part, data, SheetChanges())
-                if found is not None:
+                    changed = splice_sheet(self.path, sheet.part, data, SheetChanges())
+                if changed is not None:
                     strip = sheet.title in stale
-                    parts[sheet.part] = found.joined(strip=strip)
-                    stripped |= strip and bool(found.strips)
+                    parts[sheet.part] = changed.joined(strip=strip)
+                    stripped |= strip and bool(changed.strips)
             for area, bottom in self.grown.values():
                 references.grow(area, bottom, parts)
             if stripped:
@@ -321,7 +315,7 @@ class WorkbookEditor:
         self._sheet(title)
         return self.changes.setdefault(title, SheetChanges())
 
-    def _sheet(self, title: str) -> Sheet:
+    def _sheet(self, title: str) -> SheetPart:
         for sheet in self.book.sheets:
             if sheet.title == title:
                 return sheet
@@ -340,25 +334,6 @@ class WorkbookEditor:
                     )
 
 
-def _plain(values: ArrayLike | Sequence[CellInput]) -> Sequence[CellInput]:
+def _plain(values: ArrayLike | Sequence[CellValue]) -> Sequence[CellValue]:
     """Return values as Python objects."""
     return values.tolist() if isinstance(values, np.ndarray) else list(values)  # type: ignore[arg-type]
-
-
-def rewrite_package(source: Path, target: Path, parts: Mapping[str, bytes]) -> None:
-    """Copy a zip package with some parts replaced; order, dates and methods stay."""
-    with zipfile.ZipFile(source) as old, target.open("wb") as file:
-        with zipfile.ZipFile(file, "w") as new:
-            new.comment = old.comment
-            for info in old.infolist():
-                data = parts.get(info.filename)
-                copy = zipfile.ZipInfo(info.filename, info.date_time)
-                copy.compress_type = (
-                    info.compress_type
-                    if info.compress_type in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
-                    else zipfile.ZIP_DEFLATED
-                )
-                copy.external_attr, copy.create_system = info.external_attr, info.create_system
-                new.writestr(copy, read_part(source, old, info.filename) if data is None else data)
-        file.flush()
-        os.fsync(file.fileno())

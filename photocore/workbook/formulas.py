@@ -11,10 +11,9 @@ from pathlib import Path
 from xml.sax.saxutils import escape as escape_xml
 from xml.sax.saxutils import unescape as unescape_xml
 
-from photocore.errors import InputError
-from photocore.workbook.grid import TableArea, cell_name, split_area, split_cell
-from photocore.workbook.package import EnoughError, local, open_package, read_part, scan_part
-from photocore.workbook.xlsx import Sheet, Workbook
+from photocore.workbook.grid import TableArea, cell_name, split_area
+from photocore.workbook.package import local, read_part, understood, xml_elements
+from photocore.workbook.xlsx import SheetPart, Workbook, row_cells
 
 _RANGE = re.compile(
     r"(?P<sheet>(?:'(?:[^']|'')+'|[A-Za-z0-9_.À-ɏ]+)!)?"
@@ -35,65 +34,34 @@ class ModelCell:
     formula: str = ""
 
 
-def row_cells(path: Path, sheet: Sheet, row: int, left: int, right: int) -> dict[int, ModelCell]:
+def model_cells(
+    path: Path, package: zipfile.ZipFile, sheet: SheetPart, row: int
+) -> dict[int, ModelCell]:
     """Return the formats and formulas of a row's cells, shared formulas written out."""
     from openpyxl.formula.translate import Translator
 
-    found: dict[int, ModelCell] = {}
-    shared: dict[str, tuple[str, str]] = {}
-    attributes: dict[str, str] = {}
-    formula_attributes: dict[str, str] | None = None
-    text: list[str] = []
-    place = (0, 0)
-    inside = False
-
-    def start(name: str, given: dict[str, str]) -> None:
-        nonlocal attributes, formula_attributes, place, inside
-        kind = local(name)
-        if kind == "row":
-            place = (int(given.get("r", place[0] + 1)), 0)
-            if place[0] > row:
-                raise EnoughError
-        elif kind == "c":
-            attributes, formula_attributes = given, None
-            place = split_cell(given["r"]) if "r" in given else (place[0], place[1] + 1)
-            text.clear()
-        elif kind == "f":
-            formula_attributes, inside = given, True
-
-    def end(name: str) -> None:
-        nonlocal inside
-        kind = local(name)
-        if kind == "f":
-            inside = False
-        if kind != "c":
-            return
-        formula = "".join(text)
-        if formula_attributes and formula_attributes.get("t") == "shared":
-            group = formula_attributes.get("si", "")
-            if formula:
-                shared[group] = (formula, cell_name(*place))
-            elif group in shared:
-                master, origin = shared[group]
-                translated = Translator(f"={master}", origin=origin)
-                formula = translated.translate_formula(cell_name(*place))[1:]
-        if place[0] == row and left <= place[1] <= right:
-            found[place[1]] = ModelCell(attributes.get("s", ""), formula)
-
-    def collect(data: str) -> None:
-        if inside:
-            text.append(data)
-
-    with open_package(path) as package:
-        try:
-            scan_part(path, package, sheet.part, start=start, end=end, text=collect)
-        except ValueError as error:
-            if isinstance(error, InputError):
-                raise
-            raise InputError(
-                f"{path} › {sheet.title}: damaged near row {place[0]}, a cell cannot be understood."
-            ) from error
-    return found
+    models: dict[int, ModelCell] = {}
+    shared: dict[str, Translator] = {}
+    number = 0
+    with understood(
+        lambda: f"{path} › {sheet.title}: damaged near row {number}, a cell cannot be understood."
+    ):
+        for element in xml_elements(path, package, sheet.part, "row"):
+            number = int(element.get("r", number + 1))
+            if number > row:
+                break
+            for column, cell in row_cells(element):
+                own = next((child for child in cell if local(child.tag) == "f"), None)
+                formula = "" if own is None else own.text or ""
+                if own is not None and own.get("t") == "shared":
+                    place, group = cell_name(number, column), own.get("si", "")
+                    if formula:
+                        shared[group] = Translator(f"={formula}", origin=place)
+                    elif group in shared:
+                        formula = shared[group].translate_formula(place)[1:]
+                if number == row:
+                    models[column] = ModelCell(cell.get("s", ""), formula)
+    return models
 
 
 @dataclass(slots=True)
@@ -140,28 +108,11 @@ class References:
         words += [rf"(?:'|\b){title}:" for title in quoted]
         return re.compile("|".join(words), re.IGNORECASE)
 
-    def _formulas(self, sheet: Sheet) -> str:
+    def _formulas(self, sheet: SheetPart) -> str:
         """Return the formulas of a sheet as one text, those that differ only in cells once."""
-        pieces: list[str] = []
-        shapes: set[str] = set()
-        inside = False
-
-        def start(name: str, attributes: dict[str, str]) -> None:  # noqa: ARG001
-            nonlocal inside
-            inside = local(name) == "f"
-
-        def end(name: str) -> None:  # noqa: ARG001
-            nonlocal inside
-            if inside:
-                shapes.add(_ANY_CELL.sub("#", "".join(pieces)))
-                pieces.clear()
-            inside = False
-
-        def collect(data: str) -> None:
-            if inside:
-                pieces.append(data)
-
-        scan_part(self.path, self.package, sheet.part, start=start, end=end, text=collect)
+        # Rows are asked for too, since what is passed over is kept in memory.
+        elements = xml_elements(self.path, self.package, sheet.part, "f", "row")
+        shapes = {_ANY_CELL.sub("#", element.text or "") for element in elements}
         return "\n".join(sorted(shapes))
 
     def grow(self, area: TableArea, bottom: int, parts: dict[str, bytes]) -> None:
@@ -196,7 +147,7 @@ class References:
 
         def replace(match: re.Match[bytes]) -> bytes:
             text = unescape_xml(match[2].decode("utf-8"), {"&quot;": '"', "&apos;": "'"})
-            new = grown_reference(text, area, bottom, own_sheet=False)
+            new = grown_reference(text, area, bottom)
             return match[0] if new == text else match[1] + escape_xml(new).encode() + match[3]
 
         changed = pattern.sub(replace, data)
@@ -204,7 +155,7 @@ class References:
             parts[name] = changed
 
 
-def grown_reference(text: str, area: TableArea, bottom: int, *, own_sheet: bool) -> str:
+def grown_reference(text: str, area: TableArea, bottom: int) -> str:
     """Return a reference with each range that ends in the table's last row reaching further.
 
     Parameters
@@ -215,24 +166,24 @@ def grown_reference(text: str, area: TableArea, bottom: int, *, own_sheet: bool)
         The table.
     bottom : int
         Its new last row.
-    own_sheet : bool
-        Whether ranges without a sheet name lie on the table's sheet.
     """
-    top, left, last, right = area.area
 
     def grow(match: re.Match[str]) -> str:
         title = (match["sheet"] or "").removesuffix("!").strip("'").replace("''", "'")
-        if title != area.sheet and not (own_sheet and not title):
-            return match[0]
         plain = f"{match['c1']}{match['r1']}:{match['c2']}{match['r2']}"
-        first_row, first_column, last_row, last_column = split_area(plain)
-        inside = left <= first_column and last_column <= right and first_row >= top
-        if last_row != last or not inside:
+        if title != area.sheet or not _ends_with(area, plain):
             return match[0]
         dollar = "$" if match["r2"].startswith("$") else ""
         return f"{match[0][: -len(match['r2'])]}{dollar}{bottom}"
 
     return _RANGE.sub(grow, text)
+
+
+def _ends_with(area: TableArea, reference: str) -> bool:
+    """Whether a range lies inside a table and ends in its last row."""
+    top, left, bottom, right = split_area(reference)
+    inside = area.area[1] <= left and right <= area.area[3] and top >= area.area[0]
+    return inside and bottom == area.area[2]
 
 
 def _grown_table(data: bytes, area: TableArea, bottom: int) -> bytes:
@@ -247,23 +198,15 @@ def _grown_table(data: bytes, area: TableArea, bottom: int) -> bytes:
 
 def _grown_sheet(data: bytes, area: TableArea, bottom: int) -> bytes:
     """Return a sheet whose conditional formats and validations reach to a new last row."""
-    top, left, last, right = area.area
 
     def grown(reference: str) -> str:
-        pieces = []
-        for piece in reference.split():
-            if not _AREA.fullmatch(piece):
-                pieces.append(piece)
-                continue
-            first_row, first_column, last_row, last_column = split_area(piece)
-            inside = left <= first_column and last_column <= right
-            if inside and last_row == last and first_row >= top:
-                piece = f"{cell_name(first_row, first_column)}:{cell_name(bottom, last_column)}"
-            pieces.append(piece)
-        return " ".join(pieces)
+        if not _AREA.fullmatch(reference) or not _ends_with(area, reference):
+            return reference
+        top, left, _, right = split_area(reference)
+        return f"{cell_name(top, left)}:{cell_name(bottom, right)}"
 
     def attribute(match: re.Match[bytes]) -> bytes:
-        return match[1] + grown(match[2].decode()).encode() + match[3]
+        return match[1] + " ".join(map(grown, match[2].decode().split())).encode() + match[3]
 
     def element(match: re.Match[bytes]) -> bytes:
         return re.sub(rb"""(\ssqref\s*=\s*["'])([^"']*)(["'])""", attribute, match[0])
@@ -278,13 +221,13 @@ def recalculate_on_load(
 ) -> None:
     """Tell spreadsheet programs to calculate all formulas when they open the workbook."""
     data = parts.get(book.part) or read_part(path, package, book.part)
-    found = re.search(rb"<(?:\w+:)?calcPr(?:\s[^>]*)?>", data)
-    if found:
-        tag = re.sub(rb"""\sfullCalcOnLoad\s*=\s*("[^"]*"|'[^']*')""", b"", found[0])
+    element = re.search(rb"<(?:\w+:)?calcPr(?:\s[^>]*)?>", data)
+    if element:
+        tag = re.sub(rb"""\sfullCalcOnLoad\s*=\s*("[^"]*"|'[^']*')""", b"", element[0])
         head = re.match(rb"<(?:\w+:)?calcPr", tag)
         end = head.end() if head else 0
         tag = tag[:end] + b' fullCalcOnLoad="1"' + tag[end:]
-        parts[book.part] = data[: found.start()] + tag + data[found.end() :]
+        parts[book.part] = data[: element.start()] + tag + data[element.end() :]
         return
     # The schema fixes the order of the elements; calcPr comes before these.
     later = (

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from datetime import datetime, timedelta
+from functools import lru_cache
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,7 +48,7 @@ Value = float | str | bool | CellDate | CellFault | NotCalculated
 
 
 @dataclass(slots=True)
-class Grid:
+class CellGrid:
     """The cells of one sheet that hold something.
 
     Rows and columns are counted from 1, as spreadsheets do.
@@ -115,19 +116,20 @@ class SheetFile:
 
     label: str
     titles: list[str]
-    load: Callable[[str], Grid]
+    load: Callable[[str], CellGrid]
     tables: Sequence[TableArea] = ()
     names: dict[str, tuple[str, int, int]] = field(default_factory=dict)
     remarks: list[str] = field(default_factory=list)
-    _grids: dict[str, Grid] = field(default_factory=dict)
+    _grids: dict[str, CellGrid] = field(default_factory=dict)
 
-    def grid(self, title: str) -> Grid:
+    def grid(self, title: str) -> CellGrid:
         """Return the cells of one sheet."""
         if title not in self._grids:
             self._grids[title] = self.load(title)
         return self._grids[title]
 
 
+@lru_cache(maxsize=2**15)
 def column_letters(column: int) -> str:
     """Return the letters of a column counted from 1.
 
@@ -141,6 +143,7 @@ def column_letters(column: int) -> str:
     return letters
 
 
+@lru_cache(maxsize=2**15)
 def column_number(letters: str) -> int:
     """Return the number, counted from 1, of a column's letters.
 

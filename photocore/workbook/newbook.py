@@ -3,18 +3,133 @@
 Own sheets, charts and typed cells go with a file that is replaced. So every new workbook carries a
 seal, the digest of its parts, in the comment of its zip package, and only a workbook whose seal is
 whole may be replaced by a new one. Whatever program saves it again breaks the seal.
+
+openpyxl builds the sheets, tables, names and charts, but leaves formula cells without values, so
+that viewers show blanks, and needs a Python object per cell. `finish_book` copies the package it
+wrote once more: prototype rows are multiplied, and every formula cell gets its value.
 """
 
 from __future__ import annotations
 
 import hashlib
+import math
+import re
 import zipfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass, field
 from pathlib import Path
+from typing import BinaryIO
 
 from photocore.errors import InputError
 from photocore.output import atomic_path, check_writable, free_path
+from photocore.workbook.cells import CellValue, NewColumn, NewRows, escape
+from photocore.workbook.formulas import ModelCell, model_cells
+from photocore.workbook.grid import split_cell
+from photocore.workbook.package import read_part, rewrite_package
+from photocore.workbook.splice import SheetChanges, splice_sheet
+from photocore.workbook.xlsx import read_directory
+
+#: Date of every part, so that equal input makes equal files; ZIP knows nothing before 1980.
+PART_TIME = (1980, 1, 1, 0, 0, 0)
+_ILLEGAL = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\ufffe\uffff]")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class RowBlock:
+    """Rows that repeat a prototype row, formats and formulas included.
+
+    Attributes
+    ----------
+    row : int
+        Number of the prototype row, the first of the block.
+    columns : sequence of (sequence of CellValue)
+        Values of columns A, B, ... ; in a formula column these are the results.
+    formulas : mapping of int to callable
+        Column (0 = A) to a function of the row number that returns the formula, the prototype's own
+        in its row; where absent the prototype's formula is repeated as it stands.
+    """
+
+    row: int
+    columns: Sequence[Sequence[CellValue]]
+    formulas: Mapping[int, Callable[[int], str]] = field(default_factory=dict)
+
+    def changes(self, prototype: Mapping[int, ModelCell]) -> SheetChanges:
+        """Return what makes the rows of a sheet with this prototype row."""
+        changes = SheetChanges(restates=True)
+        count = max((len(column) for column in self.columns), default=0)
+        columns = []
+        for column, values in enumerate(self.columns, start=1):
+            like = prototype.get(column, ModelCell())
+            shown = [*map(_result if like.formula else _typed, values)]
+            shown += [_result(None) if like.formula else None] * (count - len(values))
+            changes_of_kind = changes.cached if like.formula else changes.inputs
+            changes_of_kind.setdefault(self.row, {})[column] = shown[0] if shown else None
+            formula = self._formula(column - 1, like.formula) if like.formula else None
+            columns.append(NewColumn(column, shown[1:], like.style, formula))
+        changes.added.append(NewRows(self.row + 1, count - 1, columns))
+        return changes
+
+    def _formula(self, index: int, text: str) -> Callable[[int], str]:
+        own, constant = self.formulas.get(index), escape(text)
+        return (lambda row: escape(own(row))) if own else (lambda _: constant)
+
+
+def finish_book(
+    source: BinaryIO,
+    target: Path,
+    *,
+    results: Mapping[str, Mapping[str, CellValue]],
+    blocks: Mapping[str, RowBlock] | None = None,
+) -> None:
+    """Copy a package written by openpyxl, multiplying rows and filling in results.
+
+    Parameters
+    ----------
+    source : file
+        The package.
+    target : path
+        Where the finished one goes; overwritten.
+    results : mapping
+        Sheet name to cell (``"C7"``) to the value of the formula there (None is an empty text, NaN
+        is #N/A), or to the number there in full precision.
+    blocks : mapping, optional
+        Sheet name to the rows that repeat its prototype row.
+    """
+    with zipfile.ZipFile(source) as package:
+        parts = {}
+        for sheet in read_directory(target, package).sheets:
+            changes, block = SheetChanges(restates=True), (blocks or {}).get(sheet.title)
+            if block is not None:
+                prototype = model_cells(target, package, sheet, block.row)
+                if not prototype:
+                    raise InputError(f"row {block.row}: no prototype row to repeat.")
+                changes = block.changes(prototype)
+            for cell, value in results.get(sheet.title, {}).items():
+                row, column = split_cell(cell)
+                if block is None or row != block.row:
+                    # openpyxl writes 16 digits; doubles need up to 17.
+                    changes.cached.setdefault(row, {})[column] = _result(value)
+            data = read_part(target, package, sheet.part)
+            parts[sheet.part] = splice_sheet(target, sheet.part, data, changes).joined(strip=False)
+        core = read_part(target, package, "docProps/core.xml")
+        moment = rb"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\dZ"
+        parts["docProps/core.xml"] = re.sub(moment, b"1980-01-01T00:00:00Z", core)
+    rewrite_package(source, target, parts, date=PART_TIME)
+
+
+def _typed(value: CellValue) -> CellValue:
+    """Return what is typed into a cell: nothing for NaN, no characters that XML cannot hold."""
+    if isinstance(value, str):
+        return _ILLEGAL.sub("", value) or None
+    return None if value is None or math.isnan(value) else value
+
+
+def _result(value: CellValue) -> CellValue:
+    """Return what a formula shows: an empty text for None, #N/A for what is not finite."""
+    if isinstance(value, float):
+        return value if math.isfinite(value) else math.nan
+    return "" if value is None else _ILLEGAL.sub("", value) if isinstance(value, str) else value
 
 
 @contextmanager

@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from datetime import datetime
 from pathlib import Path
+from xml.etree.ElementTree import Element
 
 from photocore.errors import InputError
-from photocore.workbook.grid import CellDate, CellFault, Grid, SheetFile, Value, split_cell
-from photocore.workbook.package import local, open_package, read_part, scan_part
+from photocore.workbook.grid import CellDate, CellFault, CellGrid, SheetFile, Value, split_cell
+from photocore.workbook.package import local, open_package, read_part, understood, xml_events
 
 #: Repeated cells with content beyond these are a decompression bomb, not a survey.
 _MOST_COLUMNS = 16384
 _MOST_CELLS = 20_000_000
+_BLANKS = {"tab": "\t", "line-break": "\n"}
 _FAULTS = re.compile(r"(#[A-Z0-9/]+[!?]?|Err:\d+)")
 
 
@@ -33,24 +36,13 @@ def open_ods(path: Path, *, max_rows: int) -> SheetFile:
             path, package, "META-INF/manifest.xml"
         ):
             raise InputError(f"{path}: is protected by a password; save it without one.")
-        reader = _OdsReader(max_rows)
-        try:
-            scan_part(
-                path,
-                package,
-                "content.xml",
-                start=reader.start,
-                end=reader.end,
-                text=reader.collect,
-            )
-        except (ValueError, IndexError) as error:
-            if isinstance(error, InputError):
-                raise (
-                    InputError(f"{path}: {error}")
-                    if not str(error).startswith(str(path))
-                    else error
-                ) from None
-            raise InputError(f"{path}: damaged, a cell cannot be understood.") from error
+        reader = _OdsReader(path, max_rows)
+        with understood(lambda: f"{path}: damaged, a cell cannot be understood."):
+            for event, element in xml_events(path, package, "content.xml", "start", "end"):
+                if event == "start":
+                    reader.start(local(element.tag), element)
+                else:
+                    reader.end(local(element.tag), element)
     if not reader.grids:
         raise InputError(f"{path}: the OpenDocument file has no sheet.")
     grids = {grid.title: grid for grid in reader.grids}
@@ -63,72 +55,35 @@ def open_ods(path: Path, *, max_rows: int) -> SheetFile:
 class _OdsReader:
     """Builds the grids from the elements of content.xml."""
 
+    path: Path
     max_rows: int
-    grids: list[Grid] = field(default_factory=list)
+    grids: list[CellGrid] = field(default_factory=list)
     names: dict[str, tuple[str, int, int]] = field(default_factory=dict)
     hidden_sheets: set[str] = field(default_factory=set)
     hidden_styles: set[str] = field(default_factory=set)
-    kinds: dict[str, str] = field(default_factory=dict)
-    style: str = ""
     row: int = 0
-    column: int = 0
     filled: int = 0
-    row_repeat: int = 1
-    repeat: int = 1
-    row_hidden: bool = False
-    cells: dict[int, Value] = field(default_factory=dict)
-    attributes: dict[str, str] = field(default_factory=dict)
-    text: list[str] = field(default_factory=list)
-    paragraphs: int = 0
-    in_cell: bool = False
-    in_paragraph: int = 0
-    in_note: int = 0
 
-    def start(self, name: str, attributes: dict[str, str]) -> None:
-        """Handle an opening tag."""
-        kind = self.kinds.get(name)
-        if kind is None:
-            kind = self.kinds[name] = local(name)
-        if kind in ("table-cell", "covered-table-cell"):
-            self.attributes = {local(key): value for key, value in attributes.items()}
-            self.repeat = int(self.attributes.get("number-columns-repeated", "1"))
-            self.in_cell, self.paragraphs = True, 0
-            self.text.clear()
-        elif kind == "table-row":
-            plain = {local(key): value for key, value in attributes.items()}
-            self.row_repeat = int(plain.get("number-rows-repeated", "1"))
-            self.row_hidden = plain.get("visibility", "visible") != "visible"
-            self.row += 1
-            self.column, self.cells = 0, {}
-        elif kind == "p" and self.in_cell and not self.in_note:
-            if self.paragraphs:
-                self.text.append("\n")
-            self.paragraphs += 1
-            self.in_paragraph += 1
-        elif kind == "annotation":
-            self.in_note += 1
-        elif kind == "s" and self.in_paragraph and not self.in_note:
-            count = next((int(v) for k, v in attributes.items() if local(k) == "c"), 1)
-            self.text.append(" " * min(count, 1000))
-        elif kind == "tab" and self.in_paragraph and not self.in_note:
-            self.text.append("\t")
-        elif kind == "line-break" and self.in_paragraph and not self.in_note:
-            self.text.append("\n")
-        else:
-            self.start_sheet(kind, {local(key): value for key, value in attributes.items()})
-
-    def start_sheet(self, kind: str, attributes: dict[str, str]) -> None:
-        """Handle what comes once per sheet or file."""
-        if kind == "table" and "name" in attributes:
-            self.grids.append(Grid(attributes["name"]))
+    def start(self, kind: str, element: Element) -> None:
+        """Begin a sheet."""
+        if kind == "table" and (title := _attributes(element).get("name")) is not None:
+            self.grids.append(CellGrid(title))
             self.row = 0
-            if attributes.get("style-name") in self.hidden_styles:
-                self.hidden_sheets.add(attributes["name"])
+            if _attributes(element).get("style-name") in self.hidden_styles:
+                self.hidden_sheets.add(title)
+
+    def end(self, kind: str, element: Element) -> None:
+        """Take what is complete: a row, a style, a name."""
+        if kind == "table-row":
+            if self.grids:
+                self.end_row(element)
+            element.clear()
         elif kind == "style":
-            self.style = attributes.get("name", "")
-        elif kind == "table-properties" and attributes.get("display") == "false":
-            self.hidden_styles.add(self.style)
+            inner = (_attributes(part) for part in element if local(part.tag) == "table-properties")
+            if any(attributes.get("display") == "false" for attributes in inner):
+                self.hidden_styles.add(_attributes(element).get("name", ""))
         elif kind == "named-range":
+            attributes = _attributes(element)
             reference = attributes.get("cell-range-address", "")
             match = re.fullmatch(r"\$?(?:'((?:[^']|'')+)'|([^'.]+))\.(\$?[A-Z]+\$?\d+)", reference)
             if match:
@@ -136,69 +91,88 @@ class _OdsReader:
                 key = attributes.get("name", "").casefold()
                 self.names[key] = (title, *split_cell(match[3]))
 
-    def end(self, name: str) -> None:
-        """Handle a closing tag."""
-        kind = self.kinds.get(name, "")
-        if kind in ("table-cell", "covered-table-cell"):
-            self.end_cell()
-        elif kind == "table-row" and self.grids:
-            self.end_row()
-        elif kind == "p" and self.in_paragraph and not self.in_note:
-            self.in_paragraph -= 1
-        elif kind == "annotation":
-            self.in_note -= 1
-
-    def end_cell(self) -> None:
-        """Store one cell, as often as it is repeated."""
-        self.in_cell = False
-        value = self.value()
-        first = self.column + 1
-        self.column += self.repeat
-        down = int(self.attributes.get("number-rows-spanned", "1"))
-        across = int(self.attributes.get("number-columns-spanned", "1"))
-        if (down > 1 or across > 1) and self.grids:
-            self.grids[-1].merged.append((self.row, first, self.row + down - 1, first + across - 1))
-        if value is None:
-            return
-        self.filled += self.repeat * self.row_repeat
-        if self.column > _MOST_COLUMNS or self.filled > _MOST_CELLS:
-            raise InputError("refused, it repeats cells beyond the size of any real sheet.")
-        for column in range(first, self.column + 1):
-            self.cells[column] = value
-
-    def end_row(self) -> None:
+    def end_row(self, element: Element) -> None:
         """Store one row, as often as it is repeated."""
-        grid = self.grids[-1]
-        first = self.row
-        self.row += self.row_repeat - 1
-        for row in range(first, self.row + 1) if self.cells else ():
+        grid, attributes = self.grids[-1], _attributes(element)
+        repeat = int(attributes.get("number-rows-repeated", "1"))
+        first = self.row + 1
+        self.row += repeat
+        cells = self.cells(element, first, repeat)
+        for row in range(first, self.row + 1) if cells else ():
             if len(grid.rows) >= self.max_rows:
                 grid.truncated = True
                 return
-            grid.rows[row] = dict(self.cells)
-            if self.row_hidden:
+            grid.rows[row] = dict(cells)
+            if attributes.get("visibility", "visible") != "visible":
                 grid.hidden.add(row)
 
-    def collect(self, data: str) -> None:
-        """Gather the text of a cell."""
-        if self.in_paragraph and not self.in_note:
-            self.text.append(data)
+    def cells(self, element: Element, row: int, row_repeat: int) -> dict[int, Value]:
+        """Return the cells of one row, each as often as it is repeated."""
+        cells: dict[int, Value] = {}
+        last = 0
+        for cell in element:
+            if local(cell.tag) not in ("table-cell", "covered-table-cell"):
+                continue
+            attributes = _attributes(cell)
+            repeat = int(attributes.get("number-columns-repeated", "1"))
+            first, last = last + 1, last + repeat
+            down = int(attributes.get("number-rows-spanned", "1"))
+            across = int(attributes.get("number-columns-spanned", "1"))
+            if down > 1 or across > 1:
+                self.grids[-1].merged.append((row, first, row + down - 1, first + across - 1))
+            value = _value(attributes, cell)
+            if value is None:
+                continue
+            self.filled += repeat * row_repeat
+            if last > _MOST_COLUMNS or self.filled > _MOST_CELLS:
+                raise InputError(
+                    f"{self.path}: refused, it repeats cells beyond the size of any real sheet."
+                )
+            cells.update(dict.fromkeys(range(first, last + 1), value))
+        return cells
 
-    def value(self) -> Value | None:
-        """Return the typed value of the cell just read, None when it is blank."""
-        attributes, text = self.attributes, "".join(self.text)
-        kind = attributes.get("value-type", "")
-        is_formula = "formula" in attributes
-        if is_formula and _FAULTS.fullmatch(text.strip()):
-            return CellFault(text.strip())
-        if kind in ("float", "percentage", "currency"):
-            return float(attributes["value"]) if "value" in attributes else None
-        if kind == "boolean":
-            return attributes.get("boolean-value") == "true"
-        if kind == "date":
-            moment = datetime.fromisoformat(attributes.get("date-value", "").removesuffix("Z"))
-            # The shown text tells the format: "01.05." or "1-May" was typed as a number.
-            return CellDate(moment.replace(tzinfo=None), "d.m.yyyy")
-        if kind == "time":
-            return CellDate(datetime(1899, 12, 30), "h:mm")
-        return attributes.get("string-value", text) or None
+
+def _attributes(element: Element) -> dict[str, str]:
+    return {local(key): value for key, value in element.items()}
+
+
+def _paragraphs(element: Element) -> Iterator[str]:
+    """Yield the paragraphs of a cell; its comment does not count."""
+    for child in element:
+        kind = local(child.tag)
+        if kind == "p":
+            yield _text(child)
+        elif kind != "annotation":
+            yield from _paragraphs(child)
+
+
+def _text(element: Element) -> str:
+    """Return the text of a paragraph."""
+    pieces = [element.text or ""]
+    for child in element:
+        kind = local(child.tag)
+        if kind == "s":
+            pieces.append(" " * min(int(_attributes(child).get("c", "1")), 1000))
+        elif kind != "annotation":
+            pieces.append(_BLANKS.get(kind) or _text(child))
+        pieces.append(child.tail or "")
+    return "".join(pieces)
+
+
+def _value(attributes: dict[str, str], cell: Element) -> Value | None:
+    """Return the typed value of a cell, None when it is blank."""
+    kind = attributes.get("value-type", "")
+    text = "\n".join(_paragraphs(cell))
+    if "formula" in attributes and _FAULTS.fullmatch(text.strip()):
+        return CellFault(text.strip())
+    if kind in ("float", "percentage", "currency"):
+        return float(attributes["value"]) if "value" in attributes else None
+    if kind == "boolean":
+        return attributes.get("boolean-value") == "true"
+    if kind == "date":
+        moment = datetime.fromisoformat(attributes.get("date-value", "").removesuffix("Z"))
+        # The shown text tells the format: "01.05." or "1-May" was typed as a number.
+        return CellDate(moment.replace(tzinfo=None), "d.m.yyyy")
+    if kind == "time":
+        return CellDate(datetime(1899, 12, 30), "h:mm")
+    return attributes.get("string-value", text) or None

@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import lzma
+import os
 import zipfile
 import zlib
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from functools import lru_cache
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO, Literal
+from xml.etree import ElementTree
+from xml.etree.ElementTree import Element
 from xml.parsers import expat
 
 from photocore.errors import InputError
@@ -20,7 +24,8 @@ LARGEST_TOTAL = 512 * 2**20
 MOST_MEMBERS = 10_000
 _RATIO_MATTERS_FROM = 2**20
 _OLE = b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1"
-_CHUNK = 2**18
+#: Small, since the elements of a chunk are made before the first is looked at.
+_CHUNK = 2**15
 #: What unpacking a damaged member may raise.
 _UNPACKING = (
     zipfile.BadZipFile,
@@ -31,10 +36,6 @@ _UNPACKING = (
     NotImplementedError,
     RuntimeError,  # zipfile's word for a missing password
 )
-
-
-class EnoughError(Exception):
-    """Raised by a handler to stop a scan early; never leaves this package."""
 
 
 @contextmanager
@@ -146,18 +147,32 @@ def read_part(path: Path, package: zipfile.ZipFile, name: str) -> bytes:
         raise _damaged(path, name) from error
 
 
-def scan_part(
-    path: Path,
-    package: zipfile.ZipFile,
-    name: str,
+def rewrite_package(
+    source: Path | BinaryIO,
+    target: Path,
+    parts: Mapping[str, bytes],
     *,
-    start: Callable[[str, dict[str, str]], None],
-    end: Callable[[str], None] | None = None,
-    text: Callable[[str], None] | None = None,
+    date: tuple[int, int, int, int, int, int] | None = None,
 ) -> None:
-    """Stream one XML part through handlers without ever holding it whole.
+    """Copy a zip package with some parts replaced; order, methods and (without one) dates stay."""
+    with zipfile.ZipFile(source) as old, target.open("wb") as file:
+        with zipfile.ZipFile(file, "w", compresslevel=4) as new:
+            new.comment = old.comment
+            for info in old.infolist():
+                data = parts.get(info.filename)
+                copy = zipfile.ZipInfo(info.filename, date or info.date_time)
+                stored = info.compress_type == zipfile.ZIP_STORED
+                copy.compress_type = zipfile.ZIP_STORED if stored else zipfile.ZIP_DEFLATED
+                copy.external_attr, copy.create_system = info.external_attr, info.create_system
+                new.writestr(copy, read_part(target, old, info.filename) if data is None else data)
+        file.flush()
+        os.fsync(file.fileno())
 
-    A handler stops the scan by raising `EnoughError`.
+
+def xml_events(
+    path: Path, package: zipfile.ZipFile, name: str, *events: Literal["start", "end"]
+) -> Iterator[tuple[str, Element]]:
+    """Yield the events ("start", "end") of one XML part without ever holding its text whole.
 
     Raises
     ------
@@ -165,17 +180,21 @@ def scan_part(
         If the part is missing, damaged, not XML, or declares a document type (the door of entity
         bombs; no spreadsheet program writes one).
     """
-    parser = new_parser(path, name, start=start, end=end, text=text)
+    parser: Any = ElementTree.XMLPullParser(events)
+    rooted: list[str] = []
+    guard = new_parser(path, name, start=lambda root, _: rooted.append(root))
     try:
         with package.open(name) as part:
             while chunk := part.read(_CHUNK):
-                parser.Parse(chunk, False)
-            parser.Parse(b"", True)
-    except EnoughError:
-        return
+                if not rooted:  # a document type can only stand before the root
+                    guard.Parse(chunk, False)
+                parser.feed(chunk)
+                yield from parser.read_events()
+            parser.close()
+            yield from parser.read_events()
     except KeyError:
         raise InputError(f"{path}: is not a workbook, the part {name} is missing.") from None
-    except expat.ExpatError as error:
+    except (expat.ExpatError, ElementTree.ParseError, LookupError) as error:
         raise InputError(
             f"{path}: damaged, the part {name} is not valid XML ({error}). Open it in the "
             "spreadsheet program and save it again."
@@ -184,13 +203,31 @@ def scan_part(
         raise _damaged(path, name) from error
 
 
+def xml_elements(path: Path, package: zipfile.ZipFile, name: str, *kinds: str) -> Iterator[Element]:
+    """Yield the elements of some kinds of one XML part, emptied when the next one is asked for."""
+    wanted: dict[str, bool] = {}
+    for _, element in xml_events(path, package, name, "end"):
+        try:
+            is_wanted = wanted[element.tag]
+        except KeyError:
+            is_wanted = wanted[element.tag] = local(element.tag) in kinds
+        if is_wanted:
+            yield element
+            element.clear()
+
+
+def xml_root(path: Path, package: zipfile.ZipFile, name: str) -> Element:
+    """Return the root of one small XML part."""
+    *_, (_, root) = xml_events(path, package, name, "end")
+    return root
+
+
 def new_parser(
     path: Path,
     name: str,
     *,
-    start: Callable[[str, dict[str, str]], None],
-    end: Callable[[str], None] | None = None,
-    text: Callable[[str], None] | None = None,
+    start: Callable[[str, dict[str, str]], object],
+    end: Callable[[str], object] | None = None,
 ) -> Any:
     """Return an expat parser that refuses document types."""
     parser = expat.ParserCreate()
@@ -204,16 +241,25 @@ def new_parser(
     parser.StartDoctypeDeclHandler = refuse
     parser.buffer_text = True
     parser.StartElementHandler = start
-    if end is not None:
-        parser.EndElementHandler = end
-    if text is not None:
-        parser.CharacterDataHandler = text
+    parser.EndElementHandler = end
     return parser
 
 
+@lru_cache(maxsize=4096)
 def local(name: str) -> str:
-    """Return an element's or attribute's name without its prefix."""
-    return name.rpartition(":")[2]
+    """Return an element's or attribute's name without its namespace or prefix."""
+    return name.rpartition("}")[2].rpartition(":")[2]
+
+
+@contextmanager
+def understood(complaint: Callable[[], str]) -> Iterator[None]:
+    """Turn what unforeseen content raises into one complaint."""
+    try:
+        yield
+    except InputError:
+        raise
+    except (KeyError, ValueError, IndexError, OverflowError, RecursionError) as error:
+        raise InputError(complaint()) from error
 
 
 def _damaged(path: Path, name: str) -> InputError:

@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 import re
-from bisect import bisect_left
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections import deque
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from xml.parsers import expat
+from xml.sax.saxutils import quoteattr
 from xml.sax.saxutils import unescape as unescape_xml
 
 from photocore.errors import InputError
-from photocore.workbook.cellxml import CellInput, escape_attribute, type_and_content
+from photocore.workbook.cells import CellValue, NewCell, NewRows, cell_xml, type_and_content
 from photocore.workbook.grid import cell_name, column_number, split_area
-from photocore.workbook.newrows import NewCell, NewRows, new_cell_xml
-from photocore.workbook.package import local, new_parser
+from photocore.workbook.package import local, new_parser, understood
 from photocore.workbook.xlsx import unescape
 
 _TAG = re.compile(rb"""<[^\s/>]+(?:\s+[^\s=]+\s*=\s*(?:"[^"]*"|'[^']*'))*\s*(/?)>""")
@@ -34,27 +34,30 @@ class SheetChanges:
         (any more) are left as they are.
     added : list of NewRows
         Rows to be added, with formulas, formats and results.
+    restates : bool
+        Whether a number may be given among the results for a cell that holds one, to replace it.
     """
 
-    inputs: dict[int, dict[int, CellInput]] = field(default_factory=dict)
-    cached: dict[int, dict[int, CellInput]] = field(default_factory=dict)
+    inputs: dict[int, dict[int, CellValue]] = field(default_factory=dict)
+    cached: dict[int, dict[int, CellValue]] = field(default_factory=dict)
     added: list[NewRows] = field(default_factory=list)
+    restates: bool = False
 
     def __bool__(self) -> bool:
         return bool(self.inputs or self.cached or self.added)
 
-    def added_rows(self) -> Iterator[int]:
-        """Yield the numbers of the rows to be added."""
-        for block in self.added:
-            yield from range(block.first, block.first + block.count)
+    def rows(self) -> list[int]:
+        """Return the numbers of the rows with cells to be typed or added, in order."""
+        added = (range(block.first, block.first + block.size) for block in self.added)
+        return sorted(set(self.inputs).union(*added))
 
-    def added_cells(self, row: int) -> dict[int, NewCell]:
-        """Return the cells to be added in one row."""
-        found: dict[int, NewCell] = {}
+    def cells(self, row: int) -> dict[int, NewCell]:
+        """Return the cells to be typed or added in one row, in order."""
+        typed = self.inputs.get(row, {}).items()
+        cells = {column: NewCell(None if value == "" else value) for column, value in typed}
         for block in self.added:
-            if block.first <= row < block.first + block.count:
-                found |= block.cells(row)
-        return found
+            cells |= block.cells(row)
+        return dict(sorted(cells.items()))
 
 
 @dataclass(slots=True)
@@ -145,10 +148,9 @@ class _Splicer:
         self.changes = changes
         self.result = Spliced(data)
         self.edits = self.result.edits
-        self.new_rows = sorted({*changes.inputs, *changes.added_rows()})
+        self.new_rows = deque(changes.rows())
         self.parser = new_parser(path, part, start=self.start, end=self.end)
         self.kinds: dict[str, str] = {}
-        self.letters: dict[str, int] = {}
         self.inside = False
         self.prefix = ""
         self.row = self.column = 0
@@ -156,27 +158,24 @@ class _Splicer:
         self.attributes: dict[str, str] = {}
         self.children: list[tuple[str, int, int]] = []
         self.child_start = self.depth = 0
-        self.new_columns: list[int] = []
-        self.inputs: Mapping[int, CellInput] = {}
-        self.cached: Mapping[int, CellInput] = {}
-        self.added: Mapping[int, NewCell] = {}
+        self.new: dict[int, NewCell] = {}
+        self.cached: Mapping[int, CellValue] = {}
         self.dimension: tuple[int, int, str] | None = None
 
     def run(self) -> Spliced:
         """Parse, and return the edits in the order of the file."""
-        try:
-            self.parser.Parse(self.data, True)
-        except expat.ExpatError as error:
-            raise InputError(
-                f"{self.path}: damaged, the part {self.part} is not valid XML ({error})."
-            ) from None
-        except ValueError as error:
-            if isinstance(error, InputError):
-                raise
-            raise InputError(
+        with understood(
+            lambda: (
                 f"{self.path}: damaged, the part {self.part} cannot be understood near row "
                 f"{self.row}."
-            ) from error
+            )
+        ):
+            try:
+                self.parser.Parse(self.data, True)
+            except expat.ExpatError as error:
+                raise InputError(
+                    f"{self.path}: damaged, the part {self.part} is not valid XML ({error})."
+                ) from None
         if self.dimension and self.edits:
             self.grow_dimension(*self.dimension)
         self.edits.sort(key=lambda edit: edit[:2])
@@ -229,17 +228,15 @@ class _Splicer:
         self.column = 0
         if self.new_rows and self.new_rows[0] < self.row:
             self.add_rows(self.row, (self.row_start, self.row_start, "", ""))
-        if self.new_rows and self.new_rows[0] == self.row:
-            self.new_rows.pop(0)
         self.prefix = name[: len(name) - 3]
-        self.inputs = self.changes.inputs.get(self.row, {})
-        self.added = self.changes.added_cells(self.row) if self.changes.added else {}
         self.cached = self.changes.cached.get(self.row, {})
-        self.new_columns = sorted({*self.inputs, *self.added}) if self.inputs or self.added else []
+        self.new = {}
+        if self.new_rows and self.new_rows[0] == self.row:
+            self.new = self.changes.cells(self.new_rows.popleft())
 
     def end_row(self, name: str) -> None:
         """Insert the new cells behind the last one of this row."""
-        if self.new_columns:
+        if self.new:
             self.add_cells(10**6, self.closing(name, self.row_start))
 
     def start_cell(self, attributes: dict[str, str]) -> None:
@@ -251,49 +248,41 @@ class _Splicer:
         if reference is None:
             self.column += 1
         else:
-            letters = reference.rstrip("0123456789")
-            column = self.letters.get(letters)
-            if column is None:
-                column = self.letters[letters] = column_number(letters)
-            self.column = column
-        if self.new_columns and self.new_columns[0] < self.column:
+            self.column = column_number(reference.rstrip("0123456789"))
+        if self.new and next(iter(self.new)) < self.column:
             self.add_cells(self.column, (self.cell_start, self.cell_start, "", ""))
 
     def end_cell(self, name: str) -> None:
-        """Change this cell if asked, and note a formula's result for stripping."""
-        column = self.column
-        if self.new_columns and self.new_columns[0] == column:
-            self.new_columns.pop(0)
-            self.replace(name, self.inputs.get(column), self.added.get(column))
-        elif column in self.cached:
-            self.put_result(name, self.cached[column])
+        """Change this cell, or note that its result may be stale."""
+        if self.column in self.new:
+            self.replace(name, self.new.pop(self.column))
+        elif self.column in self.cached:
+            self.put_result(name, self.cached[self.column])
         elif len(self.children) > 1 and self.child("f"):
             self.strip(name)
 
-    def replace(self, name: str, value: CellInput, new: NewCell | None) -> None:
+    def replace(self, name: str, new: NewCell) -> None:
         """Give this cell another typed value, or a formula if it is empty."""
-        name_of_cell = cell_name(self.row, self.column)
+        where = f"{self.path} › {cell_name(self.row, self.column)}"
         if self.child("f"):
-            raise InputError(
-                f"{self.path} › {name_of_cell}: holds a formula, which is not overwritten."
-            )
-        if new is not None and self.children:
-            raise InputError(
-                f"{self.path} › {name_of_cell}: is not empty; a new row cannot be put there."
-            )
-        if new is None and self.holds(value):
+            raise InputError(f"{where}: holds a formula, which is not overwritten.")
+        if not new.is_typed and self.children:
+            raise InputError(f"{where}: is not empty; a new row cannot be put there.")
+        if new.is_typed and self.holds(new.value):
             return
-        style = self.attributes.get("s", "") or (new.style if new else "")
-        cell = NewCell(new.value, new.formula, style) if new else NewCell(value, None, style)
-        xml = new_cell_xml(self.row, self.column, cell, self.prefix)
-        self.edits.append((self.cell_start, self.element_end(name, self.cell_start), xml.encode()))
+        new = new._replace(style=self.attributes.get("s", "") or new.style)
+        edit = self.xml(self.column, new).encode()
+        self.edits.append((self.cell_start, self.element_end(name, self.cell_start), edit))
         self.result.inputs_changed = True
 
-    def put_result(self, name: str, value: CellInput) -> None:
+    def put_result(self, name: str, value: CellValue) -> None:
         """Give this cell's formula another cached result."""
         formula = self.child("f")
         if formula is None:
-            return  # the user put a value in its place: it stays
+            # Otherwise the user put a value in its place: it stays.
+            if self.changes.restates and isinstance(value, float):
+                self.replace(name, NewCell(value))
+            return
         kind, content = type_and_content(value, self.prefix, formula=True)
         stored = self.child("v")
         if stored and self.attributes.get("t", "") == kind:
@@ -312,9 +301,7 @@ class _Splicer:
     def with_result(self, name: str, kind: str, content: str) -> tuple[int, int, bytes]:
         """Return the edit that gives a formula cell this result and keeps all else of it."""
         kept = [
-            f' {key}="{escape_attribute(value)}"'
-            for key, value in self.attributes.items()
-            if key != "t"
+            f" {key}={quoteattr(value)}" for key, value in self.attributes.items() if key != "t"
         ]
         kept += [f' t="{kind}"'] if kind else []
         before = b"".join(self.data[s:e] for k, s, e in self.children if k == "f")
@@ -323,13 +310,13 @@ class _Splicer:
         replacement = opening + before + content.encode() + after + f"</{name}>".encode()
         return self.cell_start, self.element_end(name, self.cell_start), replacement
 
-    def holds(self, value: CellInput) -> bool:
+    def holds(self, value: CellValue) -> bool:
         """Whether this cell holds the value already."""
         kind = self.attributes.get("t", "n")
-        found = self.child("v") or self.child("is")
-        if found is None:
+        content = self.child("v") or self.child("is")
+        if content is None:
             return value is None or value == ""
-        inner = self.data[self.tag_end(found[0]) : self.data.rfind(b"<", found[0], found[1])]
+        inner = self.data[self.tag_end(content[0]) : self.data.rfind(b"<", content[0], content[1])]
         text = unescape_xml(inner.decode("utf-8"), {"&quot;": '"', "&apos;": "'"})
         try:
             if kind == "n" and not isinstance(value, str | bool) and value is not None:
@@ -347,60 +334,34 @@ class _Splicer:
 
     def child(self, kind: str) -> tuple[int, int] | None:
         """Return where a direct child of this cell lies."""
-        for found, start, end in self.children:
-            if found == kind:
+        for own, start, end in self.children:
+            if own == kind:
                 return start, end
         return None
 
     def add_cells(self, before: int, place: tuple[int, int, str, str]) -> None:
         """Insert the new cells of this row whose columns lie before one."""
-        count = bisect_left(self.new_columns, before)
-        columns, self.new_columns = self.new_columns[:count], self.new_columns[count:]
-        self.insert(self.cells(self.row, columns, self.inputs, self.added), place)
+        columns = [column for column in self.new if column < before]
+        self.insert("".join([self.xml(c, self.new.pop(c)) for c in columns]), place)
+
+    def xml(self, column: int, cell: NewCell, row: int = 0) -> str:
+        """Return the XML of a cell of this row, or of another one."""
+        reference = cell_name(row or self.row, column)
+        return cell_xml(reference, cell.value, cell.formula, self.prefix, cell.style)
 
     def add_rows(self, before: int, place: tuple[int, int, str, str]) -> None:
         """Insert the new rows whose numbers lie before one."""
-        count = bisect_left(self.new_rows, before)
-        rows, self.new_rows = self.new_rows[:count], self.new_rows[count:]
         pieces: list[str] = []
-        position = 0
-        while position < len(rows):
-            block = self.block_of(rows[position])
-            if block is not None:
-                start = rows[position] - block.first
-                length = self.run_length(rows, position, block)
-                pieces += block.xml(self.prefix, start, start + length)
-                position += length
-                continue
-            row = rows[position]
-            inputs = self.changes.inputs.get(row, {})
-            added = self.changes.added_cells(row)
-            cells = self.cells(row, sorted({*inputs, *added}), inputs, added)
+        while self.new_rows and self.new_rows[0] < before:
+            row = self.new_rows.popleft()
+            if len(self.changes.added) == 1 and row not in self.changes.inputs:
+                cells = self.changes.added[0].xml(row, self.prefix)
+            else:
+                new = self.changes.cells(row).items()
+                cells = "".join([self.xml(column, cell, row) for column, cell in new])
             if cells:
                 pieces.append(f'<{self.prefix}row r="{row}">{cells}</{self.prefix}row>')
-            position += 1
         self.insert("".join(pieces), place)
-
-    def block_of(self, row: int) -> NewRows | None:
-        """Return the block that alone fills a row."""
-        if row in self.changes.inputs:
-            return None
-        blocks = [b for b in self.changes.added if b.first <= row < b.first + b.count]
-        return blocks[0] if len(blocks) == 1 else None
-
-    def run_length(self, rows: list[int], position: int, block: NewRows) -> int:
-        """Return how many of the rows from a position on follow each other in one block."""
-        if len(self.changes.added) > 1:
-            return 1
-        length = 1
-        while (
-            position + length < len(rows)
-            and rows[position + length] == rows[position] + length
-            and rows[position + length] < block.first + block.count
-            and rows[position + length] not in self.changes.inputs
-        ):
-            length += 1
-        return length
 
     def insert(self, xml: str, place: tuple[int, int, str, str]) -> None:
         """Insert XML at a place (start, end, text before, text behind)."""
@@ -408,24 +369,6 @@ class _Splicer:
             start, end, opening, closing = place
             self.edits.append((start, end, f"{opening}{xml}{closing}".encode()))
             self.result.inputs_changed = True
-
-    def cells(
-        self,
-        row: int,
-        columns: Iterable[int],
-        inputs: Mapping[int, CellInput],
-        added: Mapping[int, NewCell],
-    ) -> str:
-        """Return the XML of new cells; clearing a cell that is not there makes none."""
-        pieces = []
-        for column in columns:
-            new = added.get(column)
-            value = new.value if new else inputs.get(column)
-            if new is None and (value is None or value == ""):
-                continue
-            cell = new or NewCell(value)
-            pieces.append(new_cell_xml(row, column, cell, self.prefix))
-        return "".join(pieces)
 
     def closing(self, name: str, start: int) -> tuple[int, int, str, str]:
         """Return the place just inside the end of an element, which may be self-closed."""
@@ -460,7 +403,7 @@ class _Splicer:
         made = [(row, column) for row, cells in self.changes.inputs.items() for column in cells]
         for block in self.changes.added:
             numbers = [column.column for column in block.columns]
-            made += [(block.first, min(numbers)), (block.first + block.count - 1, max(numbers))]
+            made += [(block.first, min(numbers)), (block.first + block.size - 1, max(numbers))]
         if not made or not re.fullmatch(r"[A-Z]{1,3}\d+(:[A-Z]{1,3}\d+)?", reference):
             return
         top, left, bottom, right = split_area(reference)

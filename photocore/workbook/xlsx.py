@@ -5,14 +5,18 @@ from __future__ import annotations
 import posixpath
 import re
 import zipfile
+from collections.abc import Iterator
 from dataclasses import dataclass, field
+from datetime import datetime
+from functools import partial
 from pathlib import Path
+from xml.etree.ElementTree import Element
 
 from photocore.errors import InputError
 from photocore.workbook.grid import (
     CellDate,
     CellFault,
-    Grid,
+    CellGrid,
     NotCalculated,
     SheetFile,
     TableArea,
@@ -22,7 +26,13 @@ from photocore.workbook.grid import (
     split_area,
     split_cell,
 )
-from photocore.workbook.package import EnoughError, local, open_package, scan_part
+from photocore.workbook.package import (
+    local,
+    open_package,
+    understood,
+    xml_elements,
+    xml_root,
+)
 
 #: Number formats 14-22, 27-36, 45-47, 50-58 are dates and times in every language of Excel.
 _BUILT_IN_DATES = {
@@ -32,10 +42,11 @@ _BUILT_IN_DATES = {
 }
 _ESCAPED = re.compile(r"_x([0-9A-Fa-f]{4})_")
 _CONTENT_TYPES = "[Content_Types].xml"
+_YES = ("1", "true", "on")
 
 
 @dataclass(slots=True)
-class Sheet:
+class SheetPart:
     """One sheet of a workbook package: its name, its part, and the parts of its tables."""
 
     title: str
@@ -49,11 +60,10 @@ class Workbook:
     """The directory of a workbook package: what lies where, no cells yet."""
 
     part: str
-    sheets: list[Sheet]
+    sheets: list[SheetPart]
     names: dict[str, str]
     relations: dict[str, tuple[str, str]]
     since_1904: bool = False
-    strict: bool = False
 
 
 def open_xlsx(path: Path, *, max_rows: int) -> SheetFile:
@@ -64,7 +74,7 @@ def open_xlsx(path: Path, *, max_rows: int) -> SheetFile:
     path : Path
         An .xlsx or .xlsm file.
     max_rows : int
-        Rows with content after which reading a sheet stops (`Grid.truncated`).
+        Rows with content after which reading a sheet stops (`CellGrid.truncated`).
 
     Raises
     ------
@@ -79,7 +89,7 @@ def open_xlsx(path: Path, *, max_rows: int) -> SheetFile:
     parts = {sheet.title: sheet.part for sheet in book.sheets}
     reader = _SheetReader(path, strings, dates, since_1904=book.since_1904, max_rows=max_rows)
 
-    def load(title: str) -> Grid:
+    def load(title: str) -> CellGrid:
         with open_package(path) as package:
             return reader.read(package, title, parts[title])
 
@@ -121,46 +131,24 @@ def read_directory(path: Path, package: zipfile.ZipFile) -> Workbook:
         raise InputError(f"{path}: is a binary workbook (.xlsb); save it as .xlsx.")
     if part not in names:
         raise InputError(f"{path}: is a zip file but not a workbook.")
-    book = Workbook(part=part, sheets=[], names={}, relations=_relations(path, package, part))
-    pending: list[tuple[str, str, bool]] = []
-    defined = ""
-    text: list[str] = []
-    root = ""
-
-    def start(name: str, attributes: dict[str, str]) -> None:
-        nonlocal defined, root
-        root = root or name
-        kind = local(name)
-        if kind == "workbook":
-            book.strict = any("purl.oclc.org" in value for value in attributes.values())
-        elif kind == "workbookPr":
-            book.since_1904 = attributes.get("date1904", "0") in ("1", "true", "on")
-        elif kind == "sheet":
-            key = next((v for k, v in attributes.items() if local(k) == "id"), "")
-            hidden = attributes.get("state", "visible") != "visible"
-            pending.append((attributes.get("name", ""), key, hidden))
-        elif kind == "definedName" and "localSheetId" not in attributes:
-            defined = attributes.get("name", "")
-            text.clear()
-
-    def end(name: str) -> None:
-        nonlocal defined
-        if local(name) == "definedName" and defined:
-            book.names[defined] = "".join(text)
-            defined = ""
-
-    def collect(data: str) -> None:
-        if defined:
-            text.append(data)
-
-    scan_part(path, package, part, start=start, end=end, text=collect)
-    if local(root) != "workbook":
+    relations = _relations(path, package, part)
+    book = Workbook(part=part, sheets=[], names={}, relations=relations)
+    root = xml_root(path, package, part)
+    if local(root.tag) != "workbook":
         raise InputError(f"{path}: is not a workbook but another kind of document.")
-    for title, key, hidden in pending:
-        kind, target = book.relations.get(key, ("", ""))
-        if kind == "worksheet" and target in names:
-            sheet = Sheet(title, target, hidden, _relations(path, package, target))
-            book.sheets.append(sheet)
+    for element in root.iter():
+        kind = local(element.tag)
+        if kind == "workbookPr":
+            book.since_1904 = element.get("date1904", "0") in _YES
+        elif kind == "sheet":
+            key = next((v for k, v in element.items() if local(k) == "id"), "")
+            kind, target = relations.get(key, ("", ""))
+            if kind == "worksheet" and target in names:
+                hidden = element.get("state", "visible") != "visible"
+                parts = _relations(path, package, target)
+                book.sheets.append(SheetPart(element.get("name", ""), target, hidden, parts))
+        elif kind == "definedName" and "localSheetId" not in element.attrib:
+            book.names[element.get("name", "")] = element.text or ""
     if not book.sheets:
         raise InputError(f"{path}: the workbook has no sheet with cells.")
     return book
@@ -170,134 +158,86 @@ def _relations(path: Path, package: zipfile.ZipFile, part: str) -> dict[str, tup
     """Return id -> (kind, target part) of a part's relations; external targets are left out."""
     folder, name = posixpath.split(part)
     rels = posixpath.join(folder, "_rels", f"{name}.rels")
-    found: dict[str, tuple[str, str]] = {}
-    if rels not in package.namelist():
-        return found
-
-    def start(name: str, attributes: dict[str, str]) -> None:
-        if local(name) == "Relationship" and attributes.get("TargetMode") != "External":
-            target = attributes.get("Target", "")
-            whole = target[1:] if target.startswith("/") else posixpath.join(folder, target)
-            kind = attributes.get("Type", "").rpartition("/")[2]
-            found[attributes.get("Id", "")] = (kind, posixpath.normpath(whole))
-
-    scan_part(path, package, rels, start=start)
-    return found
+    relations: dict[str, tuple[str, str]] = {}
+    if rels in package.namelist():
+        for element in xml_root(path, package, rels).iter():
+            if local(element.tag) == "Relationship" and element.get("TargetMode") != "External":
+                # An absolute target replaces the folder.
+                whole = posixpath.join("/", folder, element.get("Target", ""))
+                kind = element.get("Type", "").rpartition("/")[2]
+                relations[element.get("Id", "")] = kind, posixpath.normpath(whole).lstrip("/")
+    return relations
 
 
-def read_tables(path: Path, package: zipfile.ZipFile, sheet: Sheet) -> list[TableArea]:
+def read_tables(path: Path, package: zipfile.ZipFile, sheet: SheetPart) -> list[TableArea]:
     """Return the named tables of a sheet."""
-    found: list[TableArea] = []
-    for kind, target in sheet.relations.values():
-        if kind == "table" and target in package.namelist():
-            try:
-                found.append(_table(path, package, sheet.title, target))
-            except (KeyError, ValueError) as error:
-                if isinstance(error, InputError):
-                    raise
-                raise InputError(
-                    f"{path}: damaged, the table part {target} has no range."
-                ) from None
-    return found
+    tables = []
+    for kind, part in sheet.relations.values():
+        if kind == "table" and part in package.namelist():
+            root = xml_root(path, package, part)
+            with understood(
+                partial("{}: damaged, the table part {} has no range.".format, path, part)
+            ):
+                tables.append(_table(sheet.title, part, root))
+    return tables
 
 
-def _table(path: Path, package: zipfile.ZipFile, title: str, part: str) -> TableArea:
-    root: dict[str, str] = {}
-    columns: list[str] = []
-
-    def start(name: str, attributes: dict[str, str]) -> None:
-        if local(name) == "table":
-            root.update(attributes)
-        elif local(name) == "tableColumn":
-            columns.append(unescape(attributes.get("name", "")))
-
-    scan_part(path, package, part, start=start)
+def _table(title: str, part: str, root: Element) -> TableArea:
+    columns = (column for column in root.iter() if local(column.tag) == "tableColumn")
     return TableArea(
-        name=root.get("displayName") or root.get("name", ""),
+        name=root.get("displayName", root.get("name", "")),
         sheet=title,
-        area=split_area(root["ref"]),
+        area=split_area(root.attrib["ref"]),
         header_rows=int(root.get("headerRowCount", "1")),
         totals_rows=int(root.get("totalsRowCount", "0")),
         part=part,
-        columns=tuple(columns),
+        columns=tuple(unescape(column.get("name", "")) for column in columns),
     )
+
+
+def _part_of_kind(package: zipfile.ZipFile, book: Workbook, kind: str) -> str:
+    """Return the one part of a workbook of a kind, empty where it has none."""
+    part = next((target for own, target in book.relations.values() if own == kind), "")
+    return part if part in package.namelist() else ""
 
 
 def read_shared_strings(path: Path, package: zipfile.ZipFile, book: Workbook) -> list[str]:
     """Return the texts that cells of type ``s`` point to."""
-    part = next((target for kind, target in book.relations.values() if kind == "sharedStrings"), "")
-    strings: list[str] = []
-    if part not in package.namelist():
-        return strings
-    pieces: list[str] = []
-    inside = phonetic = False
+    part = _part_of_kind(package, book, "sharedStrings")
+    items = xml_elements(path, package, part, "si") if part else ()
+    return [unescape(_rich_text(item)) for item in items]
 
-    def start(name: str, attributes: dict[str, str]) -> None:  # noqa: ARG001
-        nonlocal inside, phonetic
-        kind = local(name)
-        if kind == "si":
-            pieces.clear()
-        elif kind == "rPh":
-            phonetic = True
-        elif kind == "t":
-            inside = not phonetic
 
-    def end(name: str) -> None:
-        nonlocal inside, phonetic
-        kind = local(name)
-        if kind == "si":
-            strings.append(unescape("".join(pieces)))
-        elif kind == "rPh":
-            phonetic = False
-        elif kind == "t":
-            inside = False
-
-    def collect(data: str) -> None:
-        if inside:
-            pieces.append(data)
-
-    scan_part(path, package, part, start=start, end=end, text=collect)
-    return strings
+def _rich_text(item: Element) -> str:
+    """Return a text whose runs may have formats of their own; phonetic runs do not count."""
+    pieces = []
+    for run in item:
+        kind = local(run.tag)
+        if kind == "t":
+            pieces.append(run.text or "")
+        elif kind == "r":
+            pieces += [piece.text or "" for piece in run if local(piece.tag) == "t"]
+    return "".join(pieces)
 
 
 def _date_styles(path: Path, package: zipfile.ZipFile, book: Workbook) -> dict[str, str]:
     """Return the cell styles (as the ``s`` attribute writes them) that show dates."""
-    part = next((target for kind, target in book.relations.values() if kind == "styles"), "")
-    if part not in package.namelist():
+    part = _part_of_kind(package, book, "styles")
+    if not part:
         return {}
-    formats: dict[int, str] = dict(_BUILT_IN_DATES)
+    codes: dict[int, str] = dict(_BUILT_IN_DATES)
     cells: list[int] = []
-    inside = False
-
-    def start(name: str, attributes: dict[str, str]) -> None:
-        nonlocal inside
-        kind = local(name)
-        if kind == "numFmt":
-            code = attributes.get("formatCode", "")
-            number = int(attributes.get("numFmtId", "0"))
-            if is_date_format(code):
-                formats[number] = code
-            else:
-                formats.pop(number, None)
-        elif kind == "cellXfs":
-            inside = True
-        elif kind == "xf" and inside:
-            cells.append(int(attributes.get("numFmtId", "0")))
-
-    def end(name: str) -> None:
-        nonlocal inside
-        if local(name) == "cellXfs":
-            inside = False
-
-    try:
-        scan_part(path, package, part, start=start, end=end)
-    except ValueError as error:
-        if isinstance(error, InputError):
-            raise
-        raise InputError(
-            f"{path}: damaged, the styles have a number format without number."
-        ) from None
-    return {str(index): formats[number] for index, number in enumerate(cells) if number in formats}
+    with understood(lambda: f"{path}: damaged, the styles have a number format without number."):
+        for element in xml_root(path, package, part).iter():
+            kind = local(element.tag)
+            if kind == "numFmt":
+                codes[int(element.get("numFmtId", "0"))] = element.get("formatCode", "")
+            elif kind == "cellXfs":
+                cells += [
+                    int(own.get("numFmtId", "0")) for own in element if local(own.tag) == "xf"
+                ]
+    dates = {number: code for number, code in codes.items() if is_date_format(code)}
+    return {str(index): dates[number] for index, number in enumerate(cells) if number in dates}
 
 
 def is_date_format(code: str) -> bool:
@@ -325,13 +265,22 @@ def unescape(text: str) -> str:
 
 def _single_cells(book: Workbook) -> dict[str, tuple[str, int, int]]:
     """Return the defined names that stand for one cell."""
-    found = {}
+    places = {}
     for name, reference in book.names.items():
         match = re.fullmatch(r"(?:'((?:[^']|'')+)'|([^'!:]+))!(\$?[A-Z]{1,3}\$?\d+)", reference)
         if match:
             title = match[1].replace("''", "'") if match[1] else match[2]
-            found[name.casefold()] = (title, *split_cell(match[3]))
-    return found
+            places[name.casefold()] = (title, *split_cell(match[3]))
+    return places
+
+
+def row_cells(row: Element) -> Iterator[tuple[int, Element]]:
+    """Yield the cells of a row with their column numbers."""
+    column = 0
+    for cell in row.iter(row.tag.removesuffix("row") + "c"):
+        reference = cell.get("r")
+        column = column + 1 if reference is None else column_number(reference.rstrip("0123456789"))
+        yield column, cell
 
 
 @dataclass(slots=True)
@@ -344,116 +293,55 @@ class _SheetReader:
     since_1904: bool
     max_rows: int
 
-    def read(self, package: zipfile.ZipFile, title: str, part: str) -> Grid:
+    def read(self, package: zipfile.ZipFile, title: str, part: str) -> CellGrid:
         """Return the sheet's cells; empty but formatted cells are left out."""
-        grid = Grid(title)
-        columns: dict[str, int] = {}
-        kinds: dict[str, str] = {}
-        text: list[str] = []
-        row = column = 0
-        cells: dict[int, Value] = {}
-        attributes_of_cell: dict[str, str] = {}
-        formula: str | None = None
-        inside = depth = collecting = phonetic = False
-
-        def start(name: str, attributes: dict[str, str]) -> None:
-            nonlocal row, column, cells, attributes_of_cell, formula
-            nonlocal inside, depth, collecting, phonetic
-            kind = kinds.get(name)
-            if kind is None:
-                kind = kinds[name] = local(name)
-            if kind == "c":
-                attributes_of_cell = attributes
-                reference = attributes.get("r")
-                if reference is None:
-                    column += 1
-                else:
-                    letters = reference.rstrip("0123456789")
-                    found = columns.get(letters)
-                    if found is None:
-                        found = columns[letters] = column_number(letters)
-                    column = found
-                formula = None
-                text.clear()
-            elif kind == "v":
-                collecting = inside
-            elif kind == "f":
-                formula = ""
-                depth = True
-            elif kind == "t":
-                collecting = inside and not phonetic
-            elif kind == "rPh":
-                phonetic = True
-            elif kind == "row" and inside:
-                row = int(attributes.get("r", row + 1))
-                column = 0
-                cells = {}
-                if attributes.get("hidden", "0") in ("1", "true", "on"):
+        grid = CellGrid(title)
+        row = 0
+        with understood(
+            lambda: (
+                f"{self.path} › {title}: damaged near row {row}, a cell cannot be understood. "
+                "Open the file in the spreadsheet program and save it again."
+            )
+        ):
+            for element in xml_elements(self.path, package, part, "row", "mergeCell"):
+                if local(element.tag) == "mergeCell":
+                    grid.merged.append(split_area(element.attrib["ref"]))
+                    continue
+                row = int(element.get("r", row + 1))
+                if element.get("hidden", "0") in _YES:
                     grid.hidden.add(row)
-            elif kind == "sheetData":
-                inside = True
-            elif kind == "mergeCell":
-                grid.merged.append(split_area(attributes["ref"]))
-
-        def end(name: str) -> None:
-            nonlocal inside, depth, collecting, phonetic
-            kind = kinds[name]
-            if kind == "c":
-                if text or formula is not None:
-                    value = self.value("".join(text), attributes_of_cell, formula)
-                    if value is not None:
-                        cells[column] = value
-            elif kind in ("v", "t"):
-                collecting = False
-            elif kind == "f":
-                depth = False
-            elif kind == "rPh":
-                phonetic = False
-            elif kind == "row" and inside:
+                cells = self.cells(element)
+                if cells and len(grid.rows) >= self.max_rows:
+                    grid.truncated = True
+                    break
                 if cells:
-                    if len(grid.rows) >= self.max_rows:
-                        grid.truncated = True
-                        raise EnoughError
                     grid.rows[row] = cells
-            elif kind == "sheetData":
-                inside = False
-
-        def collect(data: str) -> None:
-            nonlocal formula
-            if collecting:
-                text.append(data)
-            elif depth and formula is not None:
-                formula += data
-
-        try:
-            scan_part(self.path, package, part, start=start, end=end, text=collect)
-        except (KeyError, ValueError, IndexError, OverflowError) as error:
-            if isinstance(error, InputError):
-                raise
-            raise InputError(
-                f"{self.path} › {title}: damaged near row {row}, a cell cannot be understood. Open "
-                "the file in the spreadsheet program and save it again."
-            ) from error
         return grid
 
-    def value(self, text: str, attributes: dict[str, str], formula: str | None) -> Value | None:
-        """Return the typed value of one cell, None when it is blank."""
-        kind = attributes.get("t", "n")
-        if kind == "s" and text:
-            return self.strings[int(text)] or None
-        if not text:
-            # Text formulas store an empty result as no text at all; other types mean "never run".
-            return None if formula is None or kind == "str" else NotCalculated(formula)
+    def cells(self, row: Element) -> dict[int, Value]:
+        """Return the typed values of a row by column number, without those that are blank."""
+        cells: dict[int, Value] = {}
+        v = row.tag.removesuffix("row") + "v"
+        for column, cell in row_cells(row):
+            text, kind = cell.findtext(v, ""), cell.get("t", "n")
+            value = self.value(text, kind, cell) if text else _without_text(kind, cell)
+            if value is not None:
+                cells[column] = value
+        return cells
+
+    def value(self, text: str, kind: str, cell: Element) -> Value | None:
+        """Return the typed value of a cell that holds a text."""
         if kind == "n":
-            number = float(text)
-            style = self.dates.get(attributes.get("s", ""))
-            return number if style is None else self.date(number, style)
+            style = self.dates.get(cell.get("s", ""))
+            return float(text) if style is None else self.date(float(text), style)
+        if kind == "s":
+            return self.strings[int(text)] or None
         if kind == "b":
             return text.strip() in ("1", "true")
         if kind == "e":
             return CellFault(text)
         if kind == "d":
-            return self.iso(text)
+            return _iso_date(text)
         return unescape(text)
 
     def date(self, number: float, style: str) -> Value:
@@ -463,11 +351,21 @@ class _SheetReader:
         except (OverflowError, ValueError):
             return number
 
-    def iso(self, text: str) -> Value:
-        """Return a date stored as ISO text (strict workbooks)."""
-        from datetime import datetime
 
-        try:
-            return CellDate(datetime.fromisoformat(text.strip().removesuffix("Z")), "d.m.yyyy")
-        except ValueError:
-            return text
+def _without_text(kind: str, cell: Element) -> Value | None:
+    """Return what a cell without stored value holds: a text of its own, or a new formula."""
+    for child in cell:
+        if local(child.tag) == "is":
+            return unescape(_rich_text(child)) or None
+        # Text formulas store an empty result as no text at all; other types mean "never run".
+        if local(child.tag) == "f" and kind != "str":
+            return NotCalculated(child.text or "")
+    return None
+
+
+def _iso_date(text: str) -> Value:
+    """Return a date stored as ISO text (strict workbooks)."""
+    try:
+        return CellDate(datetime.fromisoformat(text.strip().removesuffix("Z")), "d.m.yyyy")
+    except ValueError:
+        return text

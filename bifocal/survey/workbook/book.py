@@ -32,8 +32,9 @@ from bifocal.survey.workbook.sheets import (
     validate,
 )
 from bifocal.survey.workbook.words import README, SETUP, word
-from photocore.workbook.bookrows import CellValue, column_letters, finish_book
-from photocore.workbook.newbook import new_workbook
+from photocore.workbook.cells import CellValue
+from photocore.workbook.grid import column_letters
+from photocore.workbook.newbook import finish_book, new_workbook
 
 #: Row of the keys in `Points` and `Results`.
 HEAD = 4
@@ -201,7 +202,7 @@ def _points(
         short=rows > STRUCTURED_ROWS,
     )
     first, last = HEAD + 1, HEAD + rows
-    letters = {column.key: column_letters(i) for i, column in enumerate(columns)}
+    letters = {column.key: column_letters(i + 1) for i, column in enumerate(columns)}
     flag_colours(sheet, letters["flag"], first, last)
     validate(sheet, f"{letters['use']}{first}:{letters['use']}{last}", choices="1,0")
     measured = ("col1", "row2") if content.is_pair else ("x1", "s2")

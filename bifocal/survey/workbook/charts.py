@@ -12,7 +12,9 @@ from bifocal.survey.workbook.content import CHART_ROWS, SurveyContent
 from bifocal.survey.workbook.reference_sheets import CHECK_HEAD
 from bifocal.survey.workbook.sheets import LABEL_FONT, BookBuilder, protect, set_up_print
 from bifocal.survey.workbook.words import word
-from photocore.workbook.bookrows import CellValue, RowBlock, column_letters
+from photocore.workbook.cells import CellValue
+from photocore.workbook.grid import column_letters
+from photocore.workbook.newbook import RowBlock
 
 #: Row of the headings of the chart data; text would break a scatter chart, so blanks are #N/A.
 HEAD = 4
@@ -29,10 +31,10 @@ def charts(
     rows = min(content.point_rows, CHART_ROWS)
     sheet = builder.sheet("Charts", word("Charts", language))
     note = word("chart_data", language).format(n=rows)
-    builder.text(sheet, f"{column_letters(LEFT)}{HEAD - 2}", note, LABEL_FONT)
+    builder.text(sheet, f"{column_letters(LEFT + 1)}{HEAD - 2}", note, LABEL_FONT)
     columns: list[list[CellValue]] = [[] for _ in range(LEFT)]
     for i, key in enumerate(_KEYS):
-        letter = column_letters(LEFT + i)
+        letter = column_letters(LEFT + i + 1)
         builder.text(sheet, f"{letter}{HEAD}", key, LABEL_FONT)
         at = f"ROW()-{HEAD}"
         found = f"INDEX(tblPoints[{key}],{at})"

@@ -14,7 +14,7 @@ from bifocal.survey.relief_table import ReliefTable
 from bifocal.survey.setup import OFF_RADIAL_SIGMAS, ON_PLANE_SIGMAS, SurveySetup
 from bifocal.survey.tolerances import RULES, SCALES, ToleranceRule
 from photocore.arrays import FloatArray
-from photocore.workbook.bookrows import CellValue
+from photocore.workbook.cells import CellValue
 
 #: Rows of the tables of an empty template.
 POINT_ROWS, CHECK_ROWS, CONTROL_ROWS, SPARE_ROWS = 300, 25, 12, 10

@@ -29,7 +29,8 @@ from bifocal.survey.workbook.sheets import (
     validate,
 )
 from bifocal.survey.workbook.words import word
-from photocore.workbook.bookrows import CellValue, column_letters
+from photocore.workbook.cells import CellValue
+from photocore.workbook.grid import column_letters
 
 Cells = Mapping[str, list[CellValue]]
 #: Row of the keys of the two tables; statistics and parameters stand above.
@@ -107,7 +108,7 @@ def _verdict(builder: BookBuilder, content: SurveyContent, accuracy: float | Non
         },
     )
     first, last = CHECK_HEAD + 1, CHECK_HEAD + len(rows)
-    letter = column_letters(VERDICT_LEFT + 2)
+    letter = column_letters(VERDICT_LEFT + 3)
     for verb, fill, ink in ((holds, "E2F0D9", "1E5B12"), (fails, "F8CBCB", "8B0000")):
         rule_ = FormulaRule(
             formula=[f'${letter}{first}="{verb}"'],

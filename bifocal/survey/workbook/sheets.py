@@ -17,7 +17,8 @@ from openpyxl.worksheet.worksheet import Worksheet
 
 from bifocal.survey.workbook.columns import Column, row_formula
 from bifocal.survey.workbook.words import label, word
-from photocore.workbook.bookrows import CellValue, RowBlock
+from photocore.workbook.cells import CellValue
+from photocore.workbook.newbook import RowBlock
 
 INPUT_FILL = PatternFill("solid", start_color="FFF9DB", end_color="FFF9DB")
 HEAD_FILL = PatternFill("solid", start_color="DCE6F1", end_color="DCE6F1")
@@ -177,7 +178,10 @@ class BookBuilder:
         sheet.row_dimensions[head - 1].height = 38
         self._add_table(sheet, name, columns, at, rows)
         if repeat:
-            self.blocks[sheet.title] = _block(name, columns, head + 1, rows, cells, letters, short)
+            block = _block(name, columns, head + 1, rows, cells, letters, short)
+            self.blocks[sheet.title] = block
+            for i, formula in block.formulas.items():
+                sheet.cell(head + 1, left + i).value = f"={formula(head + 1)}"
 
     def _cell(self, cell: object, table: str, column: Column, value: CellValue) -> None:
         """Write one cell of a table."""

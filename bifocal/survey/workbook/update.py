@@ -12,9 +12,10 @@ from bifocal.survey.workbook.content import SurveyContent
 from bifocal.survey.workbook.defaults import TYPED_FORMULAS
 from bifocal.survey.workbook.reader import SurveyInput
 from bifocal.survey.workbook.sheets import BookBuilder
-from photocore.workbook.bookrows import CellValue, RowBlock
+from photocore.workbook.cells import CellValue
 from photocore.workbook.editor import WorkbookEditor
 from photocore.workbook.grid import TableArea, split_cell
+from photocore.workbook.newbook import RowBlock
 
 
 def can_update(source: Path, target: Path, survey: SurveyInput, content: SurveyContent) -> str:

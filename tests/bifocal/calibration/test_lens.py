@@ -14,9 +14,9 @@ from PIL import Image
 from bifocal import Lens
 from bifocal.calibration.board_calibration import (
     BoardView,
-    calibrate,
     detect_board,
     find_board_size,
+    lens_of_views,
 )
 from bifocal.calibration.plumb_line import calibrate_from_lines, find_straight_edges
 from bifocal.calibration.workflow import undistorted
@@ -178,7 +178,7 @@ def board_views(count=12, noise=0.1, lens=BROWN, seed=5):
 
 
 def test_a_known_lens_is_found_within_its_standard_deviations():
-    result = calibrate(board_views(), (1024, 768))
+    result = lens_of_views(board_views(), (1024, 768))
     sigma = result.standard_deviations
     matrix = result.lens.camera_matrix
     for value, truth, name in (
@@ -193,7 +193,7 @@ def test_a_known_lens_is_found_within_its_standard_deviations():
 
 def test_terms_that_are_not_there_are_not_taken_in():
     plain = Lens(camera_matrix=MATRIX, coefficients=[-0.1, 0, 0, 0], image_size=(1024, 768))
-    result = calibrate(board_views(lens=plain), (1024, 768))
+    result = lens_of_views(board_views(lens=plain), (1024, 768))
     assert set(result.standard_deviations) == {"fx", "fy", "cx", "cy", "k1"}
 
 
@@ -204,13 +204,13 @@ def test_a_photo_that_does_not_fit_is_left_out_and_named():
     views[3] = BoardView(
         name="blurred", board=bad.board, pixels=bad.pixels + rng.normal(0, 8, (54, 2))
     )
-    result = calibrate(views, (1024, 768))
+    result = lens_of_views(views, (1024, 768))
     assert result.dropped == ("blurred",)
 
 
 def test_few_photos_are_refused():
     with pytest.raises(InputError, match="at least 3"):
-        calibrate(board_views(2), (1024, 768))
+        lens_of_views(board_views(2), (1024, 768))
 
 
 def drawn_board(squares=(10, 7), pixel=60):

@@ -191,7 +191,7 @@ def test_a_level_section_shows_the_relief_where_it_is(wall: Path) -> None:
         (("--relief", "picture.tif"), "picture rather than relief"),
         (("--points", "far.png"), "far.png"),
         (("--plane", "--vignetting", "much"), "cos4"),
-        (("--plane", "--feather", "-1"), "feather"),
+        (("--plane", "--vignetting", "nan,0,0"), "cos4"),
     ],
 )
 def test_what_cannot_be_meant_is_asked_back(
@@ -214,6 +214,15 @@ def test_what_cannot_be_meant_is_asked_back(
     assert message in done.stderr
     assert "Traceback" not in done.output
     assert set(wall.iterdir()) == before
+
+
+@pytest.mark.parametrize("place", ["x=nan", "y=", "1,2", "0,0 inf,1"])
+def test_a_section_must_have_a_place(wall: Path, place: str) -> None:
+    words = ("--relief", "relief.tif", "--deliver", "d", "--scale", "1:50", "--section", place)
+    done = run(wall, *words)
+    assert done.exit_code == 1
+    assert "write x=1.5" in done.stderr
+    assert not (wall / "d").exists()
 
 
 def test_a_one_pixel_photo_is_refused(wall: Path) -> None:

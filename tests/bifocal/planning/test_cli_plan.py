@@ -9,7 +9,7 @@ import pytest
 from click.testing import CliRunner
 
 from bifocal.cli.main import main
-from photocore.workbook.lint import lint
+from tests.workbook_lint import lint
 
 CANON = ["--sensor", "22.7x15.1", "--pixels", "3072x2048"]
 LENSES = ["--focal", "35", "--focal", "28", "--focal", "19"]
@@ -53,7 +53,7 @@ def test_the_workbook_holds_the_stations_and_two_charts_of_precision(tmp_path):
         ([*LENSES, "--sensor", "22.7", "--pixels", "3072x2048"], 2, "WIDTHxHEIGHT"),
         ([*LENSES, *CANON], 1, "size of the wall"),
         ([*LENSES, *CANON, "--scale", "one"], 2, "not a scale"),
-        ([*LENSES, *CANON, "--gsd", "-2"], 1, "above zero"),
+        ([*LENSES, *CANON, "--gsd", "-2"], 2, "above zero"),
     ],
 )
 def test_mistakes_get_one_message_and_the_right_status(arguments, status, message):

@@ -9,10 +9,11 @@ import numpy as np
 import pytest
 
 from bifocal import Pair, Quality, dense_relief
+from bifocal.files.images import as_grey
 from bifocal.relief_maps import edges, flow, seed
 from bifocal.relief_maps import forward_projection as splat
 from bifocal.relief_maps import smoothing as smooth
-from bifocal.relief_maps.frame import as_grey, common_bounds, make_frame, working_grid
+from bifocal.relief_maps.frame import common_bounds, make_frame, working_grid
 from bifocal.relief_maps.orientation_sigma import setup_sigma
 from bifocal.relief_maps.relief_files import hatched
 from photocore.errors import GeometryError, InputError

@@ -23,8 +23,8 @@ from bifocal.survey.workbook.book import write_book
 from bifocal.survey.workbook.columns import GEOREFERENCE, IDEAL_POINTS, RESULTS, pair_points
 from bifocal.survey.workbook.content import SurveyContent
 from photocore.errors import InputError
-from photocore.workbook.lint import lint
 from tests.recalculate import recalculated
+from tests.workbook_lint import lint
 
 ROOT = Path(__file__).parents[3]
 SHEETS = ["Readme", "Setup", "Points", "Results", "Check", "Georeference", "Planning", "Charts",

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from multimedia import Layers
+from multimedia import Interfaces, Layers, correct_bathymetry
 from photocore.errors import GeometryError, InputError
 
 
@@ -22,6 +22,21 @@ def test_a_single_number_counts_as_a_list_of_one() -> None:
 def test_an_index_below_one_is_refused(index: float) -> None:
     with pytest.raises(InputError, match="medium 3 has refractive index"):
         Layers(indices=(1.0, 1.5, index), thicknesses=(0.01,))
+
+
+@pytest.mark.parametrize("index", [0.99, 1.0, 3.0, 4.0, 4.1, 4.2, 13.37, np.nan])
+def test_one_limit_holds_for_layers_surfaces_and_bathymetry(index: float) -> None:
+    possible = 1 <= index <= 4.1
+    for make in (
+        lambda: Layers(indices=(1.0, index)),
+        lambda: Interfaces.flat_water(0.0, index=index),
+        lambda: correct_bathymetry([0.0, 0.0, -1.0], water_level=0.0, index=index),
+    ):
+        if possible:
+            make()
+        else:
+            with pytest.raises(InputError, match=r"possible are 1 .* to 4\.1 .*decimal point"):
+                make()
 
 
 def test_a_negative_thickness_is_refused() -> None:

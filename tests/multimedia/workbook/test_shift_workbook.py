@@ -15,8 +15,8 @@ from multimedia.workbook.shift_points import ShiftPoints, ShiftSetup
 from multimedia.workbook.shift_workbook import write_shift_workbook
 from multimedia.workbook.workflow import write_template
 from photocore.errors import InputError
-from photocore.workbook.lint import lint
 from tests import office
+from tests.workbook_lint import lint
 
 ORDERS = {
     "air glass water": ShiftSetup(

@@ -329,12 +329,12 @@ def test_another_reader_sees_the_stored_results(rich, tmp_path):
 
 
 def test_blocks_and_typed_cells_meet_in_rows_that_exist_or_not():
-    from photocore.workbook.newrows import NewColumn, NewRows, RowFormula
+    from photocore.workbook.cells import NewColumn, NewRows, RowFormula
 
     before = '<w><sheetData><row r="3"><c r="A3" s="5"/><c r="C3"/></row></sheetData></w>'
     columns = [
         NewColumn(1, [1.0, 2.0, None], "7"),
-        NewColumn(2, [5.0, None, 6.0], "", RowFormula("A1*$A$1", 1)),
+        NewColumn(2, [5.0, None, 6.0], "", RowFormula("A1*$A$1", 1).at),
     ]
     changes = SheetChanges(added=[NewRows(2, 3, columns)], inputs={4: {4: "note"}})
     after = splice_sheet(None, "s", before.encode(), changes).joined(strip=False).decode()
@@ -359,7 +359,7 @@ def test_blocks_and_typed_cells_meet_in_rows_that_exist_or_not():
 def test_a_formula_copied_downwards_moves_its_relative_rows_only(formula, moved):
     from openpyxl.formula.translate import Translator
 
-    from photocore.workbook.newrows import RowFormula
+    from photocore.workbook.cells import RowFormula
 
     assert RowFormula(formula, 2).at(7) == moved
     if "_x" not in formula:

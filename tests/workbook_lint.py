@@ -14,8 +14,14 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from photocore.workbook.grid import TableArea, cell_name, split_area, split_cell
-from photocore.workbook.package import local, open_package, scan_part
-from photocore.workbook.xlsx import Sheet, Workbook, read_directory, read_tables
+from photocore.workbook.package import local, new_parser, open_package, read_part
+from photocore.workbook.xlsx import (
+    SheetPart,
+    Workbook,
+    read_directory,
+    read_shared_strings,
+    read_tables,
+)
 
 _LIKE_A_CELL = re.compile(r"[A-Za-z]{1,3}\d{1,7}|[rR]\d*[cC]\d*|[rR]\d*|[cC]\d*")
 _NAME = re.compile(r"[A-Za-z_\\À-ɏ][\w.\\]*")
@@ -60,7 +66,7 @@ def lint(path: Path | str) -> list[str]:
         book = read_directory(path, package)
         tables = {sheet.title: read_tables(path, package, sheet) for sheet in book.sheets}
         faults = [*_package_faults(path, package), *_name_faults(book, tables)]
-        shared = _strings(path, package, book)
+        shared = read_shared_strings(path, package, book)
         formats = _count(path, package, book, "styles", "cellXfs", "xf")
         for sheet in book.sheets:
             facts = _read(path, package, sheet, shared)
@@ -247,7 +253,7 @@ def _filters(path: Path, package: zipfile.ZipFile, table: TableArea) -> list[str
     return found
 
 
-def _read(path: Path, package: zipfile.ZipFile, sheet: Sheet, shared: list[str]) -> _SheetFacts:
+def _read(path: Path, package: zipfile.ZipFile, sheet: SheetPart, shared: list[str]) -> _SheetFacts:
     """Return the facts of one sheet."""
     facts = _SheetFacts()
     text: list[str] = []
@@ -301,10 +307,11 @@ def _read(path: Path, package: zipfile.ZipFile, sheet: Sheet, shared: list[str])
     return facts
 
 
-def _strings(path: Path, package: zipfile.ZipFile, book: Workbook) -> list[str]:
-    from photocore.workbook.xlsx import read_shared_strings
-
-    return read_shared_strings(path, package, book)
+def scan_part(path, package, name, *, start, end=None, text=None) -> None:
+    """Send one XML part through handlers."""
+    parser = new_parser(path, name, start=start, end=end)
+    parser.CharacterDataHandler = text
+    parser.Parse(read_part(path, package, name), True)
 
 
 def _count(

@@ -8,8 +8,8 @@ from openpyxl.workbook.defined_name import DefinedName
 from openpyxl.worksheet.datavalidation import DataValidation
 from openpyxl.worksheet.table import Table
 
-from photocore.workbook.lint import formula_faults, lint
 from tests.golden import make_rich_workbook
+from tests.workbook_lint import formula_faults, lint
 
 
 @pytest.fixture

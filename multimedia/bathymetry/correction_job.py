@@ -1,0 +1,142 @@
+"""What a refraction correction of files is asked for, and what it tells the user afterwards."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from multimedia.bathymetry.corrected_points import (
+    BathymetryStatus,
+    CorrectedPoints,
+    Precision,
+    WaterSurface,
+)
+from photocore.arrays import FloatArray
+from photocore.errors import GeometryError
+
+#: Deeper than any photo sees: most likely millimetres. [m]
+DEEPEST = 200.0
+#: Lengths that differ by more than this are most likely in different units.
+MIXED_UNITS = 1000.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Job:
+    """What `correct_file` is asked to do.
+
+    Attributes
+    ----------
+    source, target : Path
+    water_level : str
+        A height [m] or a file, see `read_water_surface`.
+    index : float
+    cameras, visibility, trajectory : Path or None
+        Camera positions; who saw what; sensor positions over time (lidar).
+    max_angle : float or None
+        A camera sees a point only within this angle from the vertical. [rad]
+    precision : Precision
+    group_index : float or None
+    beams : bool
+        The points are lidar echoes with columns X0, Y0, Z0 or a trajectory.
+    rays : bool
+        The source is a table of measured rays.
+    sigma_direction : float
+        Of measured rays. [rad]
+    nodata : float or None
+    allow_dry : bool
+        Accept data without a single point under water.
+    overwrite : bool
+    """
+
+    source: Path
+    target: Path
+    water_level: str
+    index: float
+    cameras: Path | None = None
+    visibility: Path | None = None
+    trajectory: Path | None = None
+    max_angle: float | None = None
+    precision: Precision = field(default_factory=Precision)
+    group_index: float | None = None
+    beams: bool = False
+    rays: bool = False
+    sigma_direction: float = 1e-4
+    nodata: float | None = None
+    allow_dry: bool = False
+    overwrite: bool = False
+
+
+@dataclass(slots=True)
+class Outcome:
+    """What was done, for the user.
+
+    Attributes
+    ----------
+    counts : dict of str to int
+        Points per treatment.
+    max_depth, mean_change : float
+        Largest true depth and mean change of Z under water. [m]
+    lowest, highest : float
+        Range of the given heights. [m]
+    remarks : list of str
+    """
+
+    counts: dict[str, int] = field(default_factory=dict)
+    max_depth: float = 0.0
+    mean_change: float = 0.0
+    lowest: float = np.inf
+    highest: float = -np.inf
+    remarks: list[str] = field(default_factory=list)
+    _sum: float = 0.0
+    _wet: int = 0
+
+    def add(self, given: FloatArray, result: CorrectedPoints) -> None:
+        """Count a piece."""
+        for status in BathymetryStatus:
+            count = int((result.status == status).sum())
+            if count:
+                self.counts[status.label] = self.counts.get(status.label, 0) + count
+        finite = given[..., 2][np.isfinite(given[..., 2])]
+        if finite.size:
+            self.lowest = min(self.lowest, float(finite.min()))
+            self.highest = max(self.highest, float(finite.max()))
+        wet = np.isin(result.status, (BathymetryStatus.NADIR, BathymetryStatus.RAYS))
+        if wet.any():
+            self._wet += int(wet.sum())
+            self._sum += float((result.xyz - given)[..., 2][wet].sum())
+            self.mean_change = self._sum / self._wet
+            self.max_depth = max(self.max_depth, float(result.depth[wet].max()))
+
+    def judge(self, surface: WaterSurface, *, allow_dry: bool) -> None:
+        """Raise GeometryError when nothing lies under water; note what looks like millimetres."""
+        if not self._wet and not allow_dry:
+            level = surface.middle
+            hint = ""
+            if 0 < self.lowest / 2 <= 1000 * level <= 2 * self.highest:
+                hint = " The heights look like millimetres, the water level like metres."
+            raise GeometryError(
+                f"no point lies under the water surface: heights {self.lowest:g} to "
+                f"{self.highest:g}, water level {level:g}.{hint} Check level and unit, or say "
+                "--allow-dry if that is right."
+            )
+        span = self.highest - self.lowest
+        if self.max_depth > DEEPEST and 0 < span < self.max_depth / MIXED_UNITS:
+            raise GeometryError(
+                f"the water level {surface.middle:g} lies {self.max_depth:g} above "
+                f"heights that span only {span:g}: are they in different units (mm and m)?"
+            )
+        if self.max_depth > DEEPEST:
+            self.remarks.append(
+                f"The deepest point lies {self.max_depth:.0f} m under water, deeper than photos "
+                "see: are the heights in millimetres, or is the water level wrong?"
+            )
+        failed = self.counts.get(BathymetryStatus.FAILED.label, 0)
+        if failed:
+            self.remarks.append(f"{failed} points could not be corrected and are marked so.")
+        outside = self.counts.get(BathymetryStatus.NO_SURFACE.label, 0)
+        if outside:
+            self.remarks.append(
+                f"{outside} points lie outside the modelled water surface and were left as given."
+            )

@@ -1,0 +1,170 @@
+"""What may lie between a camera and the object: one protocol for all that projects through it."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Sequence
+from typing import NamedTuple, Self
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from multimedia.media.camera import Camera
+from photocore.arrays import FloatArray
+from photocore.errors import InputError
+
+
+class SightDerivatives(NamedTuple):
+    """Derivatives of image coordinates; by exterior orientation in the order of `EXTERIOR`."""
+
+    by_point: FloatArray  # (n, 2, 3)
+    by_exterior: FloatArray  # (n, 2, 6), with respect to centre and small rotation vector
+    by_media: FloatArray  # (n, 2, m), with respect to the parameters asked for
+
+
+class Sight(NamedTuple):
+    """Directions in which points are seen, and what follows for their images."""
+
+    #: Vectors in the camera frame and the camera's medium, of any length, shape (n, 3).
+    vectors: FloatArray
+    #: From the derivatives of the image by those vectors, (n, 2, 3), to those by everything else.
+    derivatives: Callable[[FloatArray], SightDerivatives]
+
+
+class OpticalMedia(ABC):
+    """Media between one camera and the object, placed in the world or before the camera."""
+
+    __slots__ = ()
+
+    @property
+    @abstractmethod
+    def indices(self) -> tuple[float, ...]:
+        """Refractive indices from the camera's medium to the object's."""
+
+    @property
+    def parameter_names(self) -> tuple[str, ...]:
+        """Names of everything that an adjustment may estimate; none unless a subclass says so."""
+        return ()
+
+    def value(self, name: str) -> float:
+        """Return the value of a parameter."""
+        raise InputError(f"interface parameter {name}: these media have none to estimate.")
+
+    def stepped(self, names: Sequence[str], step: ArrayLike) -> Self:  # noqa: ARG002
+        """Return the media after adding ``step`` to the named parameters."""
+        if names:
+            raise InputError(f"interface parameter {names[0]}: these media have none to estimate.")
+        return self
+
+    @abstractmethod
+    def apparent_vectors(self, camera: Camera, points: FloatArray) -> FloatArray:
+        """Return where points seem to be: vectors in the camera frame, (n, 3); NaN if unseen."""
+
+    def seen_from_afar(self, points: FloatArray) -> FloatArray | None:  # noqa: ARG002
+        """Return where points seem to be to any camera far away, (n, 3); None where that varies."""
+        return None
+
+    @abstractmethod
+    def seen(self, camera: Camera, points: FloatArray) -> tuple[FloatArray, NDArray[np.object_]]:
+        """Return `apparent_vectors`, and for each point why it is not seen; empty if it is."""
+
+    @abstractmethod
+    def sight(
+        self, camera: Camera, points: FloatArray, *, exterior: bool, names: Sequence[str] = ()
+    ) -> Sight:
+        """Return the directions with derivatives.
+
+        Parameters
+        ----------
+        camera : Camera
+            From where.
+        points : ndarray, shape (n, 3)
+            To where, in the world.
+        exterior : bool
+            Whether the derivatives by the exterior orientation are wanted.
+        names : sequence of str
+            Parameters of the media by which to differentiate.
+        """
+
+    @abstractmethod
+    def object_rays(self, camera: Camera, directions: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Follow directions of the camera frame, (n, 3), into the object's medium.
+
+        Returns
+        -------
+        origins, directions : ndarray, shape (n, 3)
+            In the world; unit vectors, NaN where a ray does not get there.
+        """
+
+
+class StraightRays(OpticalMedia):
+    """Nothing between camera and object, or one medium for both."""
+
+    __slots__ = ()
+
+    @property
+    def indices(self) -> tuple[float, ...]:
+        """One medium."""
+        return (1.0,)
+
+    def apparent_vectors(self, camera: Camera, points: FloatArray) -> FloatArray:
+        """Return the vectors to the points themselves."""
+        vectors: FloatArray = (points - camera.centre) @ camera.rotation
+        return vectors
+
+    def seen(self, camera: Camera, points: FloatArray) -> tuple[FloatArray, NDArray[np.object_]]:
+        """Return the vectors; nothing is in the way."""
+        return self.apparent_vectors(camera, points), np.full(len(points), "", dtype=object)
+
+    def sight(
+        self, camera: Camera, points: FloatArray, *, exterior: bool, names: Sequence[str] = ()
+    ) -> Sight:
+        """Return the vectors with derivatives.
+
+        Raises
+        ------
+        InputError
+            If derivatives by parameters of media are asked for.
+        """
+        if names:
+            raise InputError("interface parameters: there is no interface to differentiate by.")
+        vectors = self.apparent_vectors(camera, points)
+
+        def derivatives(by_seen: FloatArray) -> SightDerivatives:
+            by_point, by_exterior = by_pose(
+                camera, by_seen, (by_seen, vectors) if exterior else None
+            )
+            return SightDerivatives(by_point, by_exterior, np.empty((len(points), 2, 0)))
+
+        return Sight(vectors, derivatives)
+
+    def object_rays(self, camera: Camera, directions: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return the projection centre and the directions."""
+        rays = directions @ camera.rotation.T
+        rays /= np.sqrt((rays * rays).sum(-1, keepdims=True))
+        return np.broadcast_to(camera.centre, rays.shape).copy(), rays
+
+
+def by_pose(
+    camera: Camera, by_vector: FloatArray, turning: tuple[FloatArray, FloatArray] | None
+) -> tuple[FloatArray, FloatArray]:
+    """Return the derivatives by the point in the world and by centre and rotation of the camera.
+
+    Parameters
+    ----------
+    camera : Camera
+        The camera.
+    by_vector : ndarray, shape (n, 2, 3)
+        Derivatives by the vector to the point in the camera frame.
+    turning : (ndarray, ndarray) or None
+        Derivatives by the vectors that turn with the camera, (n, 2, 3), and those vectors, (n, 3);
+        without them the exterior orientation is left out, shape (n, 2, 0).
+    """
+    by_point = (by_vector.reshape(-1, 3) @ camera.rotation.T).reshape(-1, 2, 3)
+    if turning is None:
+        return by_point, np.empty((len(by_point), 2, 0))
+    # Turning the camera by a small vector v of the world: R^T d changes by R^T (d x v), and
+    # row . (a x v) = (row x a) . v in the camera frame; then v back to the world.
+    turned, vectors = turning
+    by_turn = np.cross(turned, vectors[:, None, :]) @ camera.rotation.T
+    return by_point, np.concatenate([-by_point, by_turn], axis=-1)

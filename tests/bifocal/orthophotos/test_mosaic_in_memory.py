@@ -1,0 +1,81 @@
+"""Mosaics of orthophotos and relief maps in memory."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import bifocal
+from bifocal.model.grid import Grid
+from photocore.errors import InputError
+
+
+def ortho(bounds, *, factor: float = 1.0, hole: bool = False) -> bifocal.Orthophoto:
+    """One wall, brighter to the right, whatever part of it is asked for."""
+    grid = Grid.from_bounds(bounds, gsd=0.02)
+    x, y = np.meshgrid(grid.columns_x, grid.rows_y)
+    grey = factor * (100 + 20 * x + 10 * np.sin(9 * y))
+    source = np.ones(grid.shape, np.uint8)
+    if hole:
+        source[: grid.height // 2] = 0
+    image = np.where(source[:, :, None] > 0, np.stack([grey] * 3, axis=-1), 0)
+    return bifocal.Orthophoto(
+        image=np.rint(image).astype(np.uint8),
+        source=source,
+        hidden=source == 0,
+        plane_from_pixel=grid.plane_from_pixel,
+    )
+
+
+def test_parts_of_one_picture_become_the_picture_again() -> None:
+    left, right = ortho((0, 0, 2, 1)), ortho((1, 0, 3, 1))
+    whole = bifocal.mosaic([left, right], options=bifocal.MosaicOptions(gain=False))
+    expected = ortho((0, 0, 3, 1))
+    assert whole.grid.bounds == pytest.approx((0, 0, 3, 1))
+    assert np.abs(whole.image.astype(int) - expected.image).max() <= 1
+    assert set(np.unique(whole.source)) == {1, 2}
+    assert whole.source[0, 0] == 1
+    assert whole.source[0, -1] == 2
+
+
+def test_exposures_are_made_equal() -> None:
+    whole = bifocal.mosaic([ortho((0, 0, 2, 1)), ortho((1, 0, 3, 1), factor=0.8)])
+    ratio = whole.image[:, :, 0] / ortho((0, 0, 3, 1)).image[:, :, 0]
+    # One factor for both: the geometric mean of the two exposures; all values were rounded.
+    np.testing.assert_allclose(ratio, np.sqrt(0.8), atol=1.5 / 100)
+    assert whole.gains[1, 0] / whole.gains[0, 0] == pytest.approx(1 / 0.8, rel=0.01)
+
+
+def test_what_one_does_not_show_the_other_fills_and_the_rest_stays_empty() -> None:
+    holed, part = ortho((0, 0, 2, 1), hole=True), ortho((0, 0.5, 1, 1))
+    whole = bifocal.mosaic([holed, part], options=bifocal.MosaicOptions(gain=False, blend=False))
+    assert (whole.source[:25, :50] == 2).all()
+    assert (whole.source[:25, 50:] == 0).all()
+    assert (whole.image[:25, 50:] == 0).all()
+    assert (whole.source[25:] == 1).all()
+
+
+def test_relief_maps_are_joined_and_never_mixed() -> None:
+    maps = [
+        bifocal.ReliefMap.from_relief(np.full((10, 20), r), plane_from_pixel=grid.plane_from_pixel)
+        for r, grid in (
+            (0.1, Grid.from_bounds((0, 0, 2, 1), gsd=0.1)),
+            (0.3, Grid.from_bounds((1, 0, 3, 1), gsd=0.1)),
+        )
+    ]
+    whole = bifocal.mosaic(maps, options=bifocal.MosaicOptions(priority=True))
+    assert whole.image.shape == (10, 30)
+    np.testing.assert_array_equal(np.unique(whole.image), np.float32([0.1, 0.3]))
+    assert (whole.source[:, :20] == 1).all()
+
+
+def test_unlike_or_single_rasters_are_refused() -> None:
+    flat = bifocal.ReliefMap.from_relief(
+        np.zeros((10, 20)),
+        plane_from_pixel=Grid.from_bounds((0, 0, 2, 1), gsd=0.1).plane_from_pixel,
+    )
+    for rasters in ([], [flat], [flat, ortho((0, 0, 2, 1))]):
+        with pytest.raises(InputError, match="two rasters or more, all of one kind"):
+            bifocal.mosaic(rasters)
+    with pytest.raises(InputError, match="none of the rasters"):
+        bifocal.mosaic([flat, flat], bounds=(10, 10, 11, 11))

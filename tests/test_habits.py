@@ -1,0 +1,44 @@
+"""Version, changelog, citation and hooks say the same thing."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from pathlib import Path
+
+ROOT = Path(__file__).parents[1]
+VERSION = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]["version"]
+
+
+def test_changelog_and_citation_have_the_version_of_the_package() -> None:
+    sections = re.findall(
+        r"^## (\S+) \((\d{4}-\d\d-\d\d)\)$", (ROOT / "CHANGELOG.md").read_text("utf-8"), re.M
+    )
+    citation = (ROOT / "CITATION.cff").read_text("utf-8")
+    assert sections[0][0] == VERSION
+    assert sections == sorted(sections, reverse=True)
+    assert f"\nversion: {VERSION}\ndate-released: {sections[0][1]}\n" in citation
+
+
+def test_papers_in_the_citation_are_those_the_tests_check() -> None:
+    citation = (ROOT / "CITATION.cff").read_text("utf-8")
+    for path in (ROOT / "tests" / "papers").glob("test_*.py"):
+        name = path.stem.split("_")[1].capitalize()
+        assert f"family-names: {name}" in citation, path.name
+
+
+def test_commands_named_for_contributors_exist() -> None:
+    page = (ROOT / "CONTRIBUTING.md").read_text("utf-8")
+    for script in re.findall(r"\.ci/\w+", page):
+        assert (ROOT / script).exists(), script
+    for target in re.findall(r"\]\(([^)#]+)\)", page):
+        assert (ROOT / target).exists(), target
+    steps = re.search(r"only these steps: (.*)", (ROOT / ".ci" / "check").read_text("utf-8"))[1]
+    for step in steps.split(", "):
+        assert f"\n        {step})" in (ROOT / ".ci" / "check").read_text("utf-8")
+
+
+def test_hooks_fetch_nothing() -> None:
+    hooks = (ROOT / ".pre-commit-config.yaml").read_text("utf-8")
+    assert "http" not in hooks
+    assert re.findall(r"- repo: (\S+)", hooks) == ["local"]

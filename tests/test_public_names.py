@@ -1,0 +1,91 @@
+"""The Python API: what `import bifocal` and `import multimedia` offer, and how fast."""
+
+from __future__ import annotations
+
+import inspect
+import re
+import subprocess
+import sys
+from importlib.metadata import version
+
+import pytest
+
+import bifocal
+import multimedia
+
+PACKAGES = [bifocal, multimedia]
+NAMES = [
+    pytest.param(package, name, id=f"{package.__name__}.{name}")
+    for package in PACKAGES
+    for name in package.__all__
+]
+PROMISED = {
+    "bifocal": "relief relief_displacements plane_coordinates Pair dense_relief orthophoto align "
+    "match calibrate mosaic",
+    "multimedia": "Layers water_refractive_index radial_shift ShiftTable Camera project intersect "
+    "resect bundle_adjust epipolar_curve correct_bathymetry",
+}
+
+
+@pytest.mark.parametrize("package", PACKAGES, ids=lambda p: p.__name__)
+def test_what_is_promised_is_offered(package) -> None:
+    assert set(PROMISED[package.__name__].split()) <= set(package.__all__)
+    assert set(package.__all__) <= set(dir(package))
+
+
+@pytest.mark.parametrize(("package", "name"), NAMES)
+def test_every_name_stands_in_the_table_of_contents(package, name: str) -> None:
+    assert re.search(rf"\b{name}\b", package.__doc__)
+    assert getattr(package, name).__doc__
+
+
+@pytest.mark.parametrize(
+    "name", ["align", "match", "dense_relief", "orthophoto", "mosaic", "calibrate", "relief"]
+)
+def test_public_functions_are_documented_in_full(name: str) -> None:
+    function = getattr(bifocal, name)
+    assert inspect.isfunction(function), "a submodule must never hide a public function"
+    text = inspect.getdoc(function)
+    for part in ("Parameters", "Returns", "Raises", "Examples"):
+        assert f"{part}\n{'-' * len(part)}\n" in text
+    for parameter in inspect.signature(function).parameters:
+        assert re.search(rf"^(.*, )?{parameter}(,.*)? : ", text, re.M), parameter
+
+
+@pytest.mark.parametrize(
+    ("package", "name", "message"),
+    [
+        (bifocal, "reliefs", "bifocal has no 'reliefs'; did you mean 'relief'?"),
+        (bifocal, "Foo", "bifocal has no 'Foo'. Public names: help(bifocal)"),
+        (multimedia, "radialshift", "did you mean 'radial_shift'?"),
+    ],
+)
+def test_a_name_that_is_not_offered_is_answered_with_the_nearest(package, name, message) -> None:
+    with pytest.raises(AttributeError, match=re.escape(message)):
+        getattr(package, name)
+
+
+@pytest.mark.parametrize("package", PACKAGES, ids=lambda p: p.__name__)
+def test_the_version_is_that_of_the_distribution(package) -> None:
+    assert package.__version__ == version("bifocal")
+
+
+HEAVY = ("numpy", "scipy", "cv2", "skimage", "rasterio", "openpyxl", "click", "matplotlib", "numba")
+
+
+@pytest.mark.parametrize("name", ["bifocal", "multimedia"])
+def test_importing_a_package_imports_nothing_heavy(name: str) -> None:
+    code = f"import sys, {name}; print(*(m for m in {HEAVY!r} if m in sys.modules))"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.split() == []
+
+
+@pytest.mark.parametrize("name", ["bifocal", "multimedia"])
+def test_the_list_of_commands_imports_nothing_heavy(name: str) -> None:
+    code = (
+        f"import sys\nfrom {name}.cli.main import main\n"
+        "try:\n    main(['--help'])\nexcept SystemExit:\n    pass\n"
+        f"print(*(m for m in {HEAVY!r} if m in sys.modules and m != 'click'))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.splitlines()[-1].split() == []
