@@ -11,8 +11,10 @@ from .model.intersection import Intersection
 from .model.lens import Lens
 from .model.pair import Pair, Photo
 from .model.relief_map import Quality, ReliefMap
-from .orientation.alignment import Alignment, Control, Interior, SiteMeasures
+from .orientation.alignment import Alignment
+from .orientation.control_points import Control, SiteMeasures
 from .orientation.homologous_points import match
+from .orientation.interior_orientation import Interior
 from .orientation.matching import Matches, MatchSettings
 from .orientation.photo_alignment import align
 from .orthophotos.compose import orthophoto

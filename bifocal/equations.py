@@ -1,5 +1,8 @@
 r"""Midulla's equations (1) to (7), one function each, in the order of the paper.
 
+What runs is this or `bifocal.rays`, which writes the same equations for two nadir points and for
+arrays of any precision; tests hold the two, and the dense matching built on them, equal.
+
 All lengths on the image share one unit, all lengths on the object another; the equations hold for
 any. Relief r is positive towards the cameras, displacement e positive outwards. Camera 1 is the
 far one: d1 > d2.
@@ -55,6 +58,7 @@ def relief_displacement(s: ArrayLike, r: ArrayLike, *, d: float) -> FloatArray:
     >>> float(relief_displacement(4.0, 1.0, d=16.0))
     0.25
     """
+    # Eq. (1)
     return np.asarray(as_floats(s, "s") * as_floats(r, "r") / positive(d, "d", unit="m"))
 
 
@@ -93,7 +97,7 @@ def relief_from_displacement(s: ArrayLike, e: ArrayLike, *, d: float) -> FloatAr
     """
     s, e = as_floats(s, "s"), as_floats(e, "e")
     with np.errstate(divide="ignore", invalid="ignore"):
-        return np.where(s == 0, np.nan, positive(d, "d", unit="m") * e / s)
+        return np.where(s == 0, np.nan, positive(d, "d", unit="m") * e / s)  # Eq. (2)
 
 
 def relief(s1: ArrayLike, s2: ArrayLike, *, d1: float, d2: float) -> FloatArray:
@@ -141,7 +145,7 @@ def relief(s1: ArrayLike, s2: ArrayLike, *, d1: float, d2: float) -> FloatArray:
     d1, d2 = _distances(d1, d2)
     rate = s2 / d2 - s1 / d1
     with np.errstate(divide="ignore", invalid="ignore"):
-        return np.where(rate == 0, np.nan, (s2 - s1) / rate)
+        return np.where(rate == 0, np.nan, (s2 - s1) / rate)  # Eq. (6)
 
 
 def relief_displacements(
@@ -181,9 +185,8 @@ def relief_displacements(
     >>> round(float(e1), 6), round(float(e2), 6)
     (0.242424, 0.470588)
     """
-    s1, s2 = as_floats(s1, "s1"), as_floats(s2, "s2")
     r = relief(s1, s2, d1=d1, d2=d2)
-    return np.asarray(s1 * r / float(d1)), np.asarray(s2 * r / float(d2))
+    return relief_displacement(s1, r, d=d1), relief_displacement(s2, r, d=d2)  # Eq. (5)
 
 
 def plane_coordinates(
@@ -223,7 +226,7 @@ def plane_coordinates(
     """
     s_prime = as_floats(s, "s") - as_floats(e, "e")
     theta = as_floats(theta, "theta")
-    return np.asarray(s_prime * np.sin(theta)), np.asarray(s_prime * np.cos(theta))
+    return np.asarray(s_prime * np.sin(theta)), np.asarray(s_prime * np.cos(theta))  # Eq. (7)
 
 
 def _distances(d1: float, d2: float) -> tuple[float, float]:

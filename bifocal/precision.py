@@ -1,7 +1,7 @@
 r"""Precision in closed form: error propagation through Midulla's equations.
 
 Symbols as in `bifocal.equations`. ``sigma_1`` and ``sigma_2`` are the standard deviations of the
-radial distances s1 and s2, in the unit of s; ``B = d1 d2 / (d1 - d2)`` is the lever arm.
+radial distances s1 and s2, in the unit of s; ``B = d1 d2 / (d1 - d2)`` is the base factor.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from bifocal.equations import relief
+from bifocal.rays import reduction
 from photocore.arrays import FloatArray, as_floats, positive
 from photocore.errors import GeometryError
 
@@ -26,7 +27,7 @@ class Sigmas(NamedTuple):
     y: FloatArray
 
 
-def lever_arm(*, d1: float, d2: float) -> float:
+def base_factor(*, d1: float, d2: float) -> float:
     """Return B = d1 d2 / (d1 - d2): metres of relief per unit of relative radial shift.
 
     Raises
@@ -38,7 +39,7 @@ def lever_arm(*, d1: float, d2: float) -> float:
     --------
     The paper's pairs, 35/19 mm and 35/28 mm:
 
-    >>> round(lever_arm(d1=17.5, d2=9.5), 2), round(lever_arm(d1=17.5, d2=14), 2)
+    >>> round(base_factor(d1=17.5, d2=9.5), 2), round(base_factor(d1=17.5, d2=14), 2)
     (20.78, 70.0)
     """
     d1, d2 = positive(d1, "d1", unit="m"), positive(d2, "d2", unit="m")
@@ -82,12 +83,8 @@ def sigma_relief(
     >>> round(float(near) * 1000, 1)
     27.6
     """
-    s1, s2 = as_floats(s1, "s1"), as_floats(s2, "s2")
-    r = relief(s1, s2, d1=d1, d2=d2)
-    rate = s2 / d2 - s1 / d1
-    noise = np.hypot((1 - r / d1) * sigma_1, (1 - r / d2) * sigma_2)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        return np.where(rate == 0, np.nan, noise / np.abs(rate))
+    _, by_1, by_2 = _differentials(as_floats(s1, "s1"), as_floats(s2, "s2"), d1, d2)
+    return np.asarray(np.hypot(by_1 * sigma_1, by_2 * sigma_2))
 
 
 def sigmas(
@@ -127,15 +124,12 @@ def sigmas(
     """
     s1, s2 = as_floats(s1, "s1"), as_floats(s2, "s2")
     theta = as_floats(theta, "theta")
-    r = relief(s1, s2, d1=d1, d2=d2)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        rate = np.where(s2 / d2 - s1 / d1 == 0, np.nan, s2 / d2 - s1 / d1)
-        by_1, by_2 = -(1 - r / d1) / rate, (1 - r / d2) / rate
-        e1_by_1, e1_by_2 = (r + s1 * by_1) / d1, s1 * by_2 / d1
-        e2_by_1, e2_by_2 = s2 * by_1 / d2, (r + s2 * by_2) / d2
-        along = np.hypot((1 - e1_by_1) * sigma_1, e1_by_2 * sigma_2)
-        # Turning the direction by a pick's error across moves s' sideways in proportion.
-        across = (1 - r / d1) * (sigma_1 if sigma_across is None else sigma_across)
+    r, by_1, by_2 = _differentials(s1, s2, d1, d2)
+    e1_by_1, e1_by_2 = (r + s1 * by_1) / d1, s1 * by_2 / d1
+    e2_by_1, e2_by_2 = s2 * by_1 / d2, (r + s2 * by_2) / d2
+    along = np.hypot((1 - e1_by_1) * sigma_1, e1_by_2 * sigma_2)
+    # Turning the direction by a pick's error across moves s' sideways in proportion.
+    across = reduction(r, d1) * (sigma_1 if sigma_across is None else sigma_across)
     sine, cosine = np.sin(theta), np.cos(theta)
     return Sigmas(
         r=np.hypot(by_1 * sigma_1, by_2 * sigma_2),
@@ -181,9 +175,9 @@ def uncertainty_radius(
     """
     wanted = as_floats(sigma_r_max, "sigma_r_max")
     r = as_floats(r, "r")
-    lever_arm(d1=d1, d2=d2)
+    base_factor(d1=d1, d2=d2)  # refuses d1 <= d2
     # Equal parts of sigma_m in both images, as sigma_relief with s_i = s' d_i / (d_i - r).
-    spread = np.hypot(1 - r / d1, 1 - r / d2) / np.sqrt(2.0)
+    spread = np.hypot(reduction(r, d1), reduction(r, d2)) / np.sqrt(2.0)
     factor = (d1 - r) * (d2 - r) / (d1 - d2) * spread
     with np.errstate(divide="ignore", invalid="ignore"):
         return np.where(wanted > 0, sigma_m * factor / wanted, np.nan)
@@ -201,4 +195,13 @@ def false_relief_of_scale(mismatch: ArrayLike, *, d1: float, d2: float) -> Float
     >>> round(float(false_relief_of_scale(0.01, d1=17.5, d2=14)), 2)
     0.7
     """
-    return np.asarray(as_floats(mismatch, "mismatch") * lever_arm(d1=d1, d2=d2))
+    return np.asarray(as_floats(mismatch, "mismatch") * base_factor(d1=d1, d2=d2))
+
+
+def _differentials(
+    s1: FloatArray, s2: FloatArray, d1: float, d2: float
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return r of Eq. (6) and its derivatives by s1 and s2; NaN where it is undefined."""
+    r = relief(s1, s2, d1=d1, d2=d2)
+    rate = np.where(np.isnan(r), np.nan, s2 / d2 - s1 / d1)
+    return r, -reduction(r, d1) / rate, reduction(r, d2) / rate

@@ -3,14 +3,20 @@
 Everything here lives on the reference plane: an image point is the position q where its ray meets
 the plane. A camera is its nadir N (foot on the plane) and its distance d. A point (X, Y, r) is
 seen at ``q = N + (P - N) d / (d - r)`` with P = (X, Y), Midulla Eq. (1) written for the plane.
+These are the equations of `bifocal.equations` for two nadir points; on an ideal pair, where both
+are one, they are the same (tests/papers/test_midulla.py). `magnification`, `reduction`,
+`zoom_factor` and `relief_from_zoom` keep the precision of what they are given: images and relief
+maps are float32.
 """
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
+from bifocal.equations import relief_displacement
 from photocore.arrays import FloatArray
 
 
@@ -21,16 +27,28 @@ class Foot(NamedTuple):
     distance: float
 
 
+def magnification(relief: Any, distance: Any) -> NDArray[Any]:
+    """Return s / s' = d / (d - r): how much farther from the nadir relief is seen, Eq. (1).
+
+    NaN for points level with the camera or behind it (r >= d), which have no image.
+    """
+    depth = distance - relief
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.where(depth > 0, distance / depth, np.nan)
+
+
+def reduction(relief: Any, distance: Any) -> Any:
+    """Return s' / s = 1 - r / d, the inverse of `magnification`: s' = s - e with Eq. (1)."""
+    return 1 - relief / distance
+
+
 def plane_position(xyz: FloatArray, camera: Foot) -> FloatArray:
     """Return where the ray to each point meets the reference plane, shape (..., 2). [m]
 
     Points level with the camera or behind it (r >= d) have no image: NaN.
     """
-    distance = camera.distance
-    depth = distance - xyz[..., 2]
-    with np.errstate(divide="ignore", invalid="ignore"):
-        stretch = np.where(depth > 0, distance / depth, np.nan)
-    return camera.nadir + (xyz[..., :2] - camera.nadir) * stretch[..., None]
+    factor = magnification(xyz[..., 2], camera.distance)
+    return camera.nadir + (xyz[..., :2] - camera.nadir) * factor[..., None]  # Eq. (1)
 
 
 def zoom_centre(far: Foot, near: Foot) -> FloatArray:
@@ -44,16 +62,31 @@ def zoom_centre(far: Foot, near: Foot) -> FloatArray:
     return (d1 * near.nadir - d2 * far.nadir) / (d1 - d2)
 
 
-def zoom_factor(relief: FloatArray, *, d1: float, d2: float) -> FloatArray:
-    """Return k(r) = d2 (d1 - r) / (d1 (d2 - r)); NaN for points at or behind the near camera."""
+def zoom_factor(relief: Any, *, d1: float, d2: float) -> NDArray[Any]:
+    """Return k(r) = d2 (d1 - r) / (d1 (d2 - r)); NaN for points at or behind the near camera.
+
+    It is the ratio of both `magnification`: s2 / s1 on an ideal pair.
+    """
     with np.errstate(divide="ignore", invalid="ignore"):
         return np.where(relief < d2, d2 * (d1 - relief) / (d1 * (d2 - relief)), np.nan)
 
 
-def relief_from_zoom(factor: FloatArray, *, d1: float, d2: float) -> FloatArray:
-    """Return r = d1 d2 (k - 1) / (k d1 - d2), the inverse of `zoom_factor`."""
+def relief_from_zoom(factor: Any, *, d1: float, d2: float) -> NDArray[Any]:
+    """Return r = d1 d2 (k - 1) / (k d1 - d2), the inverse of `zoom_factor`.
+
+    It is Eq. (6) with k = s2 / s1: `bifocal.equations.relief` of s1 = 1 and s2 = k.
+    """
     with np.errstate(divide="ignore", invalid="ignore"):
-        return np.where(factor * d1 > d2, d1 * d2 * (factor - 1) / (factor * d1 - d2), np.nan)
+        relief = d1 * d2 * (factor - 1) / (factor * d1 - d2)  # Eq. (6)
+        return np.where(factor * d1 > d2, relief, np.nan)
+
+
+def relief_per_zoom(relief: Any, *, d1: float, d2: float) -> Any:
+    """Return dr/dk = d1 d2 (d1 - d2) / (k d1 - d2)², the derivative of `relief_from_zoom`. [m]
+
+    With k d1 - d2 = d2 (d1 - d2) / (d2 - r); at r = 0 it is the base factor B.
+    """
+    return (d2 - relief) ** 2 * (d1 / (d2 * (d1 - d2)))
 
 
 def adjust_onto_epipolar_line(
@@ -125,21 +158,20 @@ def relief_of_rays(q1: FloatArray, q2: FloatArray, far: Foot, near: Foot) -> Flo
     rate = (q2 - near.nadir) / near.distance - (q1 - far.nadir) / far.distance
     square = (rate * rate).sum(-1)
     with np.errstate(divide="ignore", invalid="ignore"):
-        return np.where(square > 0, (shift * rate).sum(-1) / square, np.nan)
+        return np.where(square > 0, (shift * rate).sum(-1) / square, np.nan)  # Eq. (6)
 
 
 def point_on_ray(q: FloatArray, relief: FloatArray, camera: Foot) -> FloatArray:
     """Return (X, Y, r) of the point at the given relief on the ray through q, shape (..., 3)."""
-    share = (relief / camera.distance)[..., None]
-    xy = q + (camera.nadir - q) * share
+    xy = q - relief_displacement(q - camera.nadir, relief[..., None], d=camera.distance)  # Eq. (1)
     return np.concatenate([xy, relief[..., None]], axis=-1)
 
 
 def design_rows(xyz: FloatArray, camera: Foot) -> FloatArray:
     """Return the derivatives of the plane position with respect to (X, Y, r), shape (n, 2, 3)."""
-    distance = camera.distance
-    stretch = distance / (distance - xyz[:, 2])
+    factor = magnification(xyz[:, 2], camera.distance)
     rows = np.zeros((len(xyz), 2, 3))
-    rows[:, 0, 0] = rows[:, 1, 1] = stretch
-    rows[:, :, 2] = (xyz[:, :2] - camera.nadir) * (stretch / (distance - xyz[:, 2]))[:, None]
+    rows[:, 0, 0] = rows[:, 1, 1] = factor
+    by_relief = factor / (camera.distance - xyz[:, 2])
+    rows[:, :, 2] = (xyz[:, :2] - camera.nadir) * by_relief[:, None]
     return rows

@@ -41,7 +41,7 @@ from .orientation.epipolar_curves import (
     epipolar_candidates,
     epipolar_curve,
 )
-from .orientation.intersection import Intersection, intersect, intersect_pairs, intersect_rays
+from .orientation.intersection import IntersectedPoints, intersect, intersect_pairs, intersect_rays
 from .orientation.object_rays import image_rays
 from .orientation.point_status import PointStatus
 from .orientation.resection import Resection, resect
@@ -94,8 +94,8 @@ __all__ = [
     "FlatInterface",
     "HOEHLE",
     "ImagePoints",
+    "IntersectedPoints",
     "Interfaces",
-    "Intersection",
     "Layers",
     "Material",
     "MeshSurface",

@@ -1,6 +1,7 @@
-"""Lens distortion after Brown: ideal <-> measured image coordinates, with derivatives.
+"""Lens distortion: Brown's formula in mm, and the division model in pixels, with derivatives.
 
-One formula, three conventions. With r2 = x^2 + y^2, q = k1 r2 + k2 r2^2 + k3 r2^3:
+Brown: ideal <-> measured image coordinates, one formula, three conventions. With
+r2 = x^2 + y^2, q = k1 r2 + k2 r2^2 + k3 r2^3:
 
     x' = x (1 + q) + p1 (r2 + 2 x^2) + 2 p2 x y
     y' = y (1 + q) + p2 (r2 + 2 y^2) + 2 p1 x y
@@ -17,6 +18,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -260,6 +262,53 @@ class Brown:
             lost = ~(np.abs(self._formula(points) - target).max(axis=-1) <= 1e-11 * size)
         points[lost] = np.nan
         return points
+
+
+class RadialDivision(NamedTuple):
+    """Distortion of one term, ideal = c + (seen - c) / (1 + k rho^2), for a lens that is unknown.
+
+    rho is the seen radius over the principal distance; c is the centre [px].
+
+    Examples
+    --------
+    >>> bent = RadialDivision(0.1, np.array([500.0, 400.0]), 1000.0)
+    >>> bent.distort(bent.undistort([900.0, 400.0])).round(9).tolist()
+    [900.0, 400.0]
+    """
+
+    k: float
+    centre: FloatArray
+    focal: float
+
+    def undistort(self, pixels: ArrayLike) -> FloatArray:
+        """Return where seen points would be without distortion, shape (..., 2). [px]"""
+        away, square = self._polar(pixels)
+        return self.centre + away / (1.0 + self.k * square)
+
+    def undistorted_by_k(self, pixels: ArrayLike) -> FloatArray:
+        """Return the derivative of `undistort` by k, shape (..., 2). [px]"""
+        away, square = self._polar(pixels)
+        return -away * square / (1.0 + self.k * square) ** 2
+
+    def distort(self, pixels: ArrayLike) -> FloatArray:
+        """Return where ideal points are seen, shape (..., 2); NaN where none is. [px]"""
+        away, square = self._polar(pixels)
+        # The root of k ideal seen^2 - seen + ideal = 0 that is 1 at k = 0.
+        with np.errstate(invalid="ignore"):
+            return self.centre + away * 2.0 / (1.0 + np.sqrt(1.0 - 4.0 * self.k * square))
+
+    def distorted_by_ideal(self, pixels: ArrayLike) -> FloatArray:
+        """Return the derivative of `distort` at ideal points, shape (..., 2, 2)."""
+        away, square = self._polar(pixels)
+        with np.errstate(invalid="ignore"):
+            root = np.sqrt(1.0 - 4.0 * self.k * square)[..., None]
+        outer = away[..., :, None] * away[..., None, :] / self.focal**2
+        return 2.0 / (1.0 + root) * (np.eye(2) + 4.0 * self.k * outer / (root * (1.0 + root)))
+
+    def _polar(self, pixels: ArrayLike) -> tuple[FloatArray, FloatArray]:
+        """Return the way from the centre and its squared length over the principal distance's."""
+        away = as_points(pixels, "pixels", dimension=2) - self.centre
+        return away, (away**2).sum(-1, keepdims=True) / self.focal**2
 
 
 def inverse_2x2(matrices: FloatArray) -> FloatArray:

@@ -14,6 +14,7 @@ from xml.etree import ElementTree
 import numpy as np
 
 from photocore.arrays import FloatArray
+from photocore.camera import camera_matrix
 from photocore.errors import InputError
 
 
@@ -56,11 +57,6 @@ def read_foreign_lens(path: Path | str) -> LensData:
     )
 
 
-def _matrix(fx: float, fy: float, cx: float, cy: float) -> FloatArray:
-    """Return the camera matrix."""
-    return np.array([[fx, 0.0, cx], [0.0, fy, cy], [0.0, 0.0, 1.0]])
-
-
 def _colmap(path: Path, text: str) -> LensData:
     """Read the one camera of a COLMAP ``cameras.txt``."""
     rows = [line.split() for line in text.splitlines() if line.strip() and line[0] != "#"]
@@ -88,7 +84,7 @@ def _colmap(path: Path, text: str) -> LensData:
         raise InputError(f"{path}: COLMAP camera {model} with {len(p)} parameters is not read.")
     _, (fx, fy, cx, cy), terms = forms[model]
     return LensData(
-        _matrix(p[fx], p[fy], p[cx] - 0.5, p[cy] - 0.5),
+        camera_matrix(p[fx], p[fy] / p[fx], p[cx] - 0.5, p[cy] - 0.5),
         np.array([0.0 if i is None else p[i] for i in terms]),
         "fisheye" if model == "OPENCV_FISHEYE" else "opencv",
         (int(width), int(height)),
@@ -120,9 +116,8 @@ def _metashape(path: Path, text: str) -> LensData:
     width, height, f = value("width"), value("height"), value("f")
     if not (width > 0 and height > 0 and f > 0):
         raise InputError(f"{path}: <width>, <height> and <f> must be above zero.")
-    matrix = _matrix(
-        f + value("b1"), f, width / 2 + value("cx") - 0.5, height / 2 + value("cy") - 0.5
-    )
+    centre = width / 2 + value("cx") - 0.5, height / 2 + value("cy") - 0.5
+    matrix = camera_matrix(f + value("b1"), f / (f + value("b1")), *centre)
     # Metashape's p1 goes with r² + 2x², OpenCV's with 2xy in x: they are exchanged.
     terms = [value("k1"), value("k2"), value("p2"), value("p1"), value("k3")]
     size = (int(width), int(height))

@@ -1,12 +1,335 @@
-"""Rasters that are whole: what GDAL does not say when the disk is full."""
+"""GeoTIFF read and written window by window, whole or not at all; the half-pixel shift lives here.
+
+GDAL counts from pixel corners, these packages from pixel centres. Nor does GDAL say when the disk
+is full: every raster is checked whole before it takes the old one's place.
+"""
 
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager
+from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import DTypeLike, NDArray
+
+from photocore.arrays import FloatArray
+from photocore.errors import InputError
+from photocore.output import atomic_path
+
+#: Side of a tile of the file; GDAL's and most viewers' sweet spot. [px]
+BLOCK = 512
+#: GDAL keeps no more than this of a raster in memory; its own default is 5 % of the machine. [MB]
+CACHE_MB = 96
+
+
+class Window(NamedTuple):
+    """Part of a raster; it may reach beyond the edges. [px]"""
+
+    column: int
+    row: int
+    width: int
+    height: int
+
+    def widened(self, margin: int) -> Window:
+        """Return the window with so many pixels more on every side."""
+        column, row, width, height = self
+        return Window(column - margin, row - margin, width + 2 * margin, height + 2 * margin)
+
+
+class RasterFile(ExitStack):
+    """An open raster; windows may reach beyond its edges. Closed by ``with`` or `close`.
+
+    Parameters
+    ----------
+    path : path
+        Any format GDAL reads.
+    nodata : float, optional
+        Value of empty pixels, besides the one the file declares.
+
+    Attributes
+    ----------
+    path : Path
+    width, height, bands : int
+    dtype : numpy dtype
+    names : tuple of str
+        Band descriptions; empty text where there is none.
+    tags : dict
+        Metadata.
+    masked : bool
+        Whether the file has a validity mask.
+    nodata : float or None
+        The value given, else the one declared.
+    crs : object or None
+        Coordinate reference system.
+    transform : Affine
+        From pixel corners, GDAL's convention.
+    has_position : bool
+        Whether the file says where it lies.
+    xy_from_pixel : ndarray, shape (2, 3)
+        Affine map from (column, row, 1), integers at pixel centres, to (X, Y).
+
+    Raises
+    ------
+    InputError
+        If it is missing or no raster.
+    """
+
+    def __init__(self, path: Path | str, *, nodata: float | None = None) -> None:
+        import rasterio
+        from rasterio.enums import MaskFlags
+        from rasterio.errors import NotGeoreferencedWarning, RasterioError
+
+        super().__init__()
+        self.path = Path(path)
+        if self.path.is_dir():
+            raise InputError(f"{self.path}: is a folder; name the raster file in it.")
+        if not self.path.is_file():
+            raise InputError(f"{self.path}: no such raster file.")
+        self.enter_context(rasterio.Env(GDAL_CACHEMAX=CACHE_MB))
+        try:
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore", NotGeoreferencedWarning)
+                file = self._file = self.enter_context(rasterio.open(self.path))
+        except RasterioError:
+            self.close()
+            raise InputError(f"{self.path}: is not a raster file GDAL can read.") from None
+        self.width, self.height, self.bands = int(file.width), int(file.height), int(file.count)
+        self.dtype = np.dtype(file.dtypes[0])
+        self.names = tuple(name or "" for name in file.descriptions)
+        self.tags: dict[str, str] = dict(file.tags())
+        self.masked = MaskFlags.per_dataset in file.mask_flag_enums[0]
+        self._empty = [float(value) for value in (nodata, file.nodata) if value is not None]
+        self.nodata = self._empty[0] if self._empty else None
+        self.crs, self.transform = file.crs, file.transform
+        self.has_position = not self.transform.is_identity
+        self.xy_from_pixel = centre_matrix(self.transform)
+
+    def read(
+        self,
+        column: int,
+        row: int,
+        width: int,
+        height: int,
+        *,
+        bands: Sequence[int] | None = None,
+        fill: float = 0.0,
+        mask: bool = False,
+    ) -> NDArray[Any]:
+        """Return a window, shape (height, width, bands); what lies outside is ``fill``.
+
+        Parameters
+        ----------
+        bands : sequence of int, optional
+            Numbers from 1; all by default.
+        mask : bool
+            Return the validity mask instead (255 valid, 0 not), shape (height, width).
+        """
+        window = Window(column, row, width, height)
+        if mask:
+            return self._padded(window, self._file.dataset_mask, np.zeros((), np.uint8))
+        numbers = list(bands or range(1, self.bands + 1))
+        outside = np.full((len(numbers), 1, 1), fill, self.dtype)
+        part = self._padded(window, partial(self._file.read, numbers), outside)
+        return part.transpose(1, 2, 0)
+
+    def read_floats(
+        self, column: int, row: int, width: int, height: int, *, dtype: Any = np.float32
+    ) -> NDArray[Any]:
+        """Return band 1 as floats, NaN where there is no data, shape (height, width)."""
+
+        def known(window: Any) -> NDArray[Any]:
+            block = self._file.read(1, window=window)
+            values = block.astype(dtype)
+            for empty in self._empty:
+                values[block == empty] = np.nan
+            if self.masked:
+                values[self._file.dataset_mask(window=window) == 0] = np.nan
+            return values
+
+        return self._padded(Window(column, row, width, height), known, np.full((), np.nan, dtype))
+
+    def _padded(
+        self, window: Window, fetch: Callable[..., NDArray[Any]], outside: NDArray[Any]
+    ) -> NDArray[Any]:
+        """Return fetch(window=...), shape (..., height, width); ``outside`` beyond the edges."""
+        from rasterio.windows import Window as RasterWindow
+
+        column, row, width, height = window
+        c0, c1 = max(column, 0), min(column + width, self.width)
+        r0, r1 = max(row, 0), min(row + height, self.height)
+        whole = np.broadcast_to(outside, (*outside.shape[:-2], height, width))
+        if c1 <= c0 or r1 <= r0:
+            return whole.copy()
+        try:
+            part = fetch(window=RasterWindow(c0, r0, c1 - c0, r1 - r0))
+        except OSError as error:
+            raise InputError(
+                f"{self.path}: cannot be read at column {c0}, row {r0}; the file is damaged "
+                f"({error})."
+            ) from error
+        if part.shape == whole.shape:
+            return part
+        padded = whole.copy()
+        padded[..., r0 - row : r1 - row, c0 - column : c1 - column] = part
+        return padded
+
+    def read_reduced(
+        self, width: int, height: int, *, bands: Sequence[int]
+    ) -> tuple[NDArray[Any], NDArray[np.bool_]]:
+        """Return the whole raster shrunk, shape (height, width, bands), and where it is valid."""
+        from rasterio.enums import Resampling
+
+        shape = (len(bands), height, width)
+        try:
+            image = self._file.read(list(bands), out_shape=shape, resampling=Resampling.average)
+            mask = self._file.dataset_mask(out_shape=(height, width))
+        except OSError as error:
+            raise InputError(f"{self.path}: cannot be read ({error}).") from error
+        return image.transpose(1, 2, 0), mask > 0
+
+
+class RasterWriter:
+    """A GeoTIFF being written window by window; made by `create_geotiff`."""
+
+    def __init__(self, file: Any) -> None:
+        self._file = file
+
+    @property
+    def pixels(self) -> int:
+        """How many pixels the whole raster has."""
+        return int(self._file.width * self._file.height)
+
+    def write(
+        self, array: NDArray[Any], *, column: int = 0, row: int = 0, mask: Any = None
+    ) -> None:
+        """Write a window of shape (h, w) or (h, w, bands), and its validity mask (h, w)."""
+        from rasterio.windows import Window as RasterWindow
+
+        block = array[:, :, None] if array.ndim == 2 else array
+        window = RasterWindow(column, row, block.shape[1], block.shape[0])
+        self._file.write(block.transpose(2, 0, 1), window=window)
+        if mask is not None:
+            self._file.write_mask(np.asarray(mask, dtype=bool), window=window)
+
+
+@contextmanager
+def create_geotiff(
+    path: Path | str,
+    *,
+    width: int,
+    height: int,
+    bands: int,
+    dtype: DTypeLike,
+    transform: Any = None,
+    crs: Any = None,
+    nodata: float | None = None,
+    names: Sequence[str] = (),
+    tags: Mapping[str, str] | None = None,
+    colour: bool = False,
+    overviews: bool = False,
+    overwrite: bool = False,
+) -> Iterator[RasterWriter]:
+    """Yield a writer of a tiled, losslessly compressed GeoTIFF; whole or not at all.
+
+    Parameters
+    ----------
+    transform : Affine, optional
+        From pixel corners, see `corner_transform`; None: the raster lies nowhere.
+    names : sequence of str
+        Band descriptions.
+    tags : mapping of str to str
+        Metadata; those named ``TIFFTAG_...`` become tags of the TIFF itself.
+    colour : bool
+        The first three bands are red, green, blue.
+    overviews : bool
+        Reduced copies inside the file for fast display.
+
+    Raises
+    ------
+    InputError
+        If the place is not writable, the file exists, or the disk is full.
+    """
+    import rasterio
+    from rasterio.errors import NotGeoreferencedWarning
+
+    kind = np.dtype(dtype)
+    options = {
+        "driver": "GTiff", "width": width, "height": height, "count": bands, "dtype": kind.name,
+        "crs": crs, "transform": transform, "nodata": nodata,
+        "tiled": True, "blockxsize": BLOCK, "blockysize": BLOCK,
+        "interleave": "pixel" if colour else "band", "bigtiff": "IF_SAFER",
+        # libdeflate's fastest level: twice the speed of level 4 for 4 % more bytes on photographs.
+        "compress": "deflate", "zlevel": 1, "predictor": 3 if kind.kind == "f" else 2,
+    } | ({"photometric": "RGB"} if colour else {})  # fmt: skip
+    # Masks lie inside the file, and nothing beside it.
+    gdal = rasterio.Env(
+        GDAL_CACHEMAX=CACHE_MB, GDAL_TIFF_INTERNAL_MASK=True, GDAL_PAM_ENABLED=False
+    )
+    with atomic_path(path, overwrite=overwrite) as temporary, gdal:
+        try:
+            with written_whole(temporary, width=width, height=height, bands=bands):
+                with warnings.catch_warnings():
+                    warnings.simplefilter("ignore", NotGeoreferencedWarning)
+                    file = rasterio.open(temporary, "w", **options)
+                with file:
+                    file.update_tags(**(tags or {}))
+                    for number, name in enumerate(names, start=1):
+                        file.set_band_description(number, name)
+                    yield RasterWriter(file)
+                if overviews:
+                    _add_overviews(
+                        temporary, max(width, height), categories=not colour and kind.kind == "u"
+                    )
+        finally:
+            for extra in (".ovr", ".msk", ".aux.xml"):
+                temporary.with_name(temporary.name + extra).unlink(missing_ok=True)
+
+
+def _add_overviews(path: Path, side: int, *, categories: bool) -> None:
+    """Add halved copies down to one tile."""
+    import rasterio
+    from rasterio.enums import Resampling
+
+    factors: list[int] = []
+    while side / 2 ** len(factors) > BLOCK:
+        factors.append(2 ** (len(factors) + 1))
+    if not factors:
+        return
+    method = Resampling.nearest if categories else Resampling.average
+    with (
+        rasterio.Env(COMPRESS_OVERVIEW="DEFLATE", PREDICTOR_OVERVIEW="2", ZLEVEL_OVERVIEW="1"),
+        rasterio.open(path, "r+") as file,
+    ):
+        file.build_overviews(factors, method)
+
+
+def centre_matrix(transform: Any) -> FloatArray:
+    """Return the map from (column, row, 1), integers at pixel centres, to (X, Y), shape (2, 3).
+
+    Examples
+    --------
+    >>> from rasterio import Affine
+    >>> print(centre_matrix(Affine(2, 0, 10, 0, -2, 50)))
+    [[ 2.  0. 11.]
+     [ 0. -2. 49.]]
+    """
+    return _moved(np.reshape(tuple(transform)[:6], (2, 3)), 0.5)
+
+
+def corner_transform(xy_from_pixel: FloatArray) -> Any:
+    """Return GDAL's transform of a map from pixel centres, the inverse of `centre_matrix`."""
+    from rasterio import Affine
+
+    return Affine(*_moved(xy_from_pixel[:2], -0.5).ravel().tolist())
+
+
+def _moved(matrix: FloatArray, step: float) -> FloatArray:
+    """Return a map, shape (2, 3), that counts from places so many pixels right and down."""
+    return matrix @ np.array([[1.0, 0.0, step], [0.0, 1.0, step], [0.0, 0.0, 1.0]])
 
 
 @contextmanager
@@ -58,10 +381,10 @@ def check_whole(path: Path, *, width: int, height: int, bands: int) -> None:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", NotGeoreferencedWarning)
             with rasterio.open(path) as file:
-                found = (file.width, file.height, file.count)
-                if found != (width, height, bands):
+                shape = (file.width, file.height, file.count)
+                if shape != (width, height, bands):
                     raise OSError(
-                        f"the file is incomplete: {found[0]} x {found[1]} px in {found[2]} bands "
+                        f"the file is incomplete: {shape[0]} x {shape[1]} px in {shape[2]} bands "
                         f"instead of {width} x {height} in {bands}"
                     )
                 _check_blocks(file, size)

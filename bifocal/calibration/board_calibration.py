@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -76,26 +76,16 @@ class Calibration:
     without_board: tuple[str, ...] = ()
 
 
-@dataclass(frozen=True, slots=True)
-class _Model:
-    """A set of distortion terms: OpenCV's flags and how many unknowns they leave."""
-
-    name: str
-    flags: int
-    terms: int
-    names: tuple[str, ...] = field(default=())
-
-
-def _models() -> dict[str, _Model]:
-    """Return the models in order of growing freedom."""
+def _distortion_terms() -> dict[str, tuple[int, tuple[str, ...]]]:
+    """Return models in order of growing freedom: OpenCV's flags and the terms they leave."""
     import cv2
 
     k2, k3, tangential = cv2.CALIB_FIX_K2, cv2.CALIB_FIX_K3, cv2.CALIB_ZERO_TANGENT_DIST
     return {
-        "k1": _Model("k1", k2 | k3 | tangential, 1, ("k1",)),
-        "k1k2": _Model("k1k2", k3 | tangential, 2, ("k1", "k2")),
-        "k1k2p": _Model("k1k2p", k3, 4, ("k1", "k2", "p1", "p2")),
-        "k1k2pk3": _Model("k1k2pk3", 0, 5, ("k1", "k2", "p1", "p2", "k3")),
+        "k1": (k2 | k3 | tangential, ("k1",)),
+        "k1k2": (k3 | tangential, ("k1", "k2")),
+        "k1k2p": (k3, ("k1", "k2", "p1", "p2")),
+        "k1k2pk3": (0, ("k1", "k2", "p1", "p2", "k3")),
     }
 
 
@@ -121,8 +111,8 @@ def detect_board(
         return _detect_charuco(image, name, size)
     if pattern == "chessboard":
         flags = cv2.CALIB_CB_ADAPTIVE_THRESH | cv2.CALIB_CB_NORMALIZE_IMAGE
-        found, corners = cv2.findChessboardCorners(_reduced(image)[0], size, flags=flags)
-        if not found:
+        seen, corners = cv2.findChessboardCorners(_reduced(image)[0], size, flags=flags)
+        if not seen:
             return None
         corners = corners.reshape(-1, 2) * _reduced(image)[1]
         corners = _refined(image, corners.astype(np.float32), size)
@@ -130,10 +120,10 @@ def detect_board(
     else:
         asymmetric = pattern == "asymmetric-circles"
         flags = cv2.CALIB_CB_ASYMMETRIC_GRID if asymmetric else cv2.CALIB_CB_SYMMETRIC_GRID
-        found, corners = cv2.findCirclesGrid(image, size, flags=flags)
-        if not found:
-            found, corners = cv2.findCirclesGrid(image, size, flags=flags | cv2.CALIB_CB_CLUSTERING)
-        if not found:
+        seen, corners = cv2.findCirclesGrid(image, size, flags=flags)
+        if not seen:
+            seen, corners = cv2.findCirclesGrid(image, size, flags=flags | cv2.CALIB_CB_CLUSTERING)
+        if not seen:
             return None
         board = np.mgrid[0:columns, 0:rows].T.reshape(-1, 2)
         if asymmetric:
@@ -244,7 +234,7 @@ def lens_of_views(
     GeometryError
         If the views do not determine the lens (all of one tilt).
     """
-    models = _models()
+    models = _distortion_terms()
     if model not in ("auto", "fisheye", *models):
         raise InputError(f"model: {model!r} is not one of auto, {', '.join(models)}, fisheye.")
     kept = list(views)
@@ -255,8 +245,8 @@ def lens_of_views(
                 f"{len(kept)} usable photo(s) of the board; take at least 3, better 10, with the "
                 "board tilted differently and in every corner of the photo."
             )
-        solution = _solve(kept, image_size, model, models)
-        rms = {view.name: float(v) for view, v in zip(kept, solution.per_view, strict=True)}
+        best = _solve(kept, image_size, model)
+        rms = {view.name: float(v) for view, v in zip(kept, best.per_view, strict=True)}
         worst = max(rms, key=lambda name: rms[name])
         if rms[worst] <= max(DROPPED * float(np.median(list(rms.values()))), 0.5):
             break
@@ -265,62 +255,57 @@ def lens_of_views(
     limit = max(SUSPICIOUS * float(np.median(list(rms.values()))), 0.5)
     suspicious = tuple(name for name, value in rms.items() if value > limit)
     coverage = _coverage(kept, image_size)
-    verdict = _verdict(solution, coverage, len(kept), image_size)
-    lens = Lens(
-        camera_matrix=solution.matrix,
-        coefficients=solution.coefficients,
-        model=solution.kind,
-        image_size=image_size,
-        sigma0=solution.rms,
-        source=f"board calibration, {len(kept)} photos, model {solution.name}",
+    verdict = _verdict(best, coverage, len(kept))
+    lens = replace(
+        best.lens,
+        source=f"board calibration, {len(kept)} photos, model {best.name}",
         extra={
-            "standard_deviations": solution.deviations,
+            "standard_deviations": best.deviations,
             "coverage": coverage.tolist(),
             "verdict": verdict,
         },
     )
     return Calibration(
-        lens=lens, standard_deviations=solution.deviations, photo_rms=rms, dropped=tuple(dropped),
-        suspicious=suspicious, coverage=coverage, tried=solution.tried, verdict=verdict,
+        lens=lens, standard_deviations=best.deviations, photo_rms=rms, dropped=tuple(dropped),
+        suspicious=suspicious, coverage=coverage, tried=best.tried, verdict=verdict,
     )  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class _Solution:
-    """One adjustment's outcome."""
+class _LensFit:
+    """One model adjusted to the views."""
 
     name: str
-    kind: str
-    rms: float
-    matrix: FloatArray
-    coefficients: FloatArray
+    lens: Lens
     deviations: dict[str, float]
     per_view: FloatArray
-    tried: tuple[tuple[str, float], ...]
+    tried: tuple[tuple[str, float], ...] = ()
+
+    @property
+    def rms(self) -> float:
+        """Of all residuals. [px]"""
+        return float(self.lens.sigma0 or 0.0)
 
 
-def _solve(
-    views: Sequence[BoardView], size: tuple[int, int], wanted: str, models: dict[str, _Model]
-) -> _Solution:
+def _solve(views: Sequence[BoardView], size: tuple[int, int], wanted: str) -> _LensFit:
     """Return the adjustment with the wanted model, or with the one that the data justify."""
     if wanted == "fisheye":
         return _solve_fisheye(views, size)
+    models = _distortion_terms()
     names = list(models) if wanted == "auto" else [wanted]
-    results = {name: _solve_brown(views, size, models[name]) for name in names}
-    chosen = names[0]
+    fits = {name: _solve_brown(views, size, name, *models[name]) for name in names}
+    best = fits[names[0]]
     observations = 2 * sum(len(view.pixels) for view in views)
     for name in names[1:]:
-        small, large = results[chosen], results[name]
-        freedom = observations - 6 * len(views) - 4 - models[name].terms
-        extra = models[name].terms - models[chosen].terms
+        terms, more = len(models[name][1]), len(models[name][1]) - len(models[best.name][1])
+        freedom = observations - 6 * len(views) - 4 - terms
         if freedom < 1:
             break
-        gain = (small.rms**2 - large.rms**2) / large.rms**2 * freedom / extra
-        if gain > f_distribution.ppf(1 - SIGNIFICANCE, extra, freedom):
-            chosen = name
-    tried = tuple((name, result.rms) for name, result in results.items())
-    best = results[chosen]
-    if wanted == "auto" and _field_of_view(best.matrix, size) > 100:
+        gain = (best.rms**2 / fits[name].rms ** 2 - 1.0) * freedom / more
+        if gain > f_distribution.ppf(1 - SIGNIFICANCE, more, freedom):
+            best = fits[name]
+    tried = tuple((name, each.rms) for name, each in fits.items())
+    if wanted == "auto" and _field_of_view(best.lens.camera_matrix, size) > 100:
         fisheye = _solve_fisheye(views, size)
         tried = (*tried, ("fisheye", fisheye.rms))
         if fisheye.rms < 0.8 * best.rms:
@@ -328,7 +313,9 @@ def _solve(
     return replace(best, tried=tried)
 
 
-def _solve_brown(views: Sequence[BoardView], size: tuple[int, int], model: _Model) -> _Solution:
+def _solve_brown(
+    views: Sequence[BoardView], size: tuple[int, int], name: str, flags: int, names: tuple[str, ...]
+) -> _LensFit:
     """Adjust OpenCV's model with the given terms."""
     import cv2
 
@@ -336,7 +323,7 @@ def _solve_brown(views: Sequence[BoardView], size: tuple[int, int], model: _Mode
         rms, matrix, terms, _, _, deviations, _, per_view = cv2.calibrateCameraExtended(
             [v.board.astype(np.float32) for v in views],
             [v.pixels.astype(np.float32) for v in views],
-            size, None, None, flags=model.flags,
+            size, None, None, flags=flags,
         )  # fmt: skip
     except cv2.error as error:
         raise GeometryError(f"the calibration failed: {error.err}") from error
@@ -346,14 +333,14 @@ def _solve_brown(views: Sequence[BoardView], size: tuple[int, int], model: _Mode
         )
     order = ("fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2", "k3")
     sigmas = dict(zip(order, np.ravel(deviations).tolist(), strict=False))
-    wanted = {n: v for n, v in sigmas.items() if n in model.names or n in order[:4]}
-    return _Solution(
-        name=model.name, kind="opencv", rms=float(rms), matrix=matrix,
-        coefficients=np.ravel(terms)[:5], deviations=wanted, per_view=np.ravel(per_view), tried=(),
-    )  # fmt: skip
+    wanted = {n: v for n, v in sigmas.items() if n in names or n in order[:4]}
+    lens = Lens(
+        camera_matrix=matrix, coefficients=np.ravel(terms)[:5], image_size=size, sigma0=float(rms)
+    )
+    return _LensFit(name=name, lens=lens, deviations=wanted, per_view=np.ravel(per_view))
 
 
-def _solve_fisheye(views: Sequence[BoardView], size: tuple[int, int]) -> _Solution:
+def _solve_fisheye(views: Sequence[BoardView], size: tuple[int, int]) -> _LensFit:
     """Adjust OpenCV's fisheye model (equidistant with four terms)."""
     import cv2
 
@@ -382,11 +369,12 @@ def _solve_fisheye(views: Sequence[BoardView], size: tuple[int, int]) -> _Soluti
     variance = sum(v**2 * len(view.pixels) for v, view in zip(per_view, views, strict=True))
     sigmas = np.sqrt(np.diag(np.linalg.inv(normal)) * variance / freedom)
     names = ("fx", "fy", "cx", "cy", "k1", "k2", "k3", "k4")
-    return _Solution(
-        name="fisheye", kind="fisheye", rms=float(rms), matrix=matrix,
-        coefficients=np.ravel(terms), deviations=dict(zip(names, sigmas.tolist(), strict=True)),
-        per_view=np.array(per_view), tried=(),
+    lens = Lens(
+        camera_matrix=matrix, coefficients=np.ravel(terms), model="fisheye", image_size=size,
+        sigma0=float(rms),
     )  # fmt: skip
+    deviations = dict(zip(names, sigmas.tolist(), strict=True))
+    return _LensFit(name="fisheye", lens=lens, deviations=deviations, per_view=np.array(per_view))
 
 
 def _field_of_view(matrix: FloatArray, size: tuple[int, int]) -> float:
@@ -404,7 +392,7 @@ def _coverage(views: Sequence[BoardView], size: tuple[int, int]) -> IntArray:
     return counts.astype(np.int64)
 
 
-def _verdict(solution: _Solution, coverage: IntArray, photos: int, size: tuple[int, int]) -> str:
+def _verdict(best: _LensFit, coverage: IntArray, photos: int) -> str:
     """Return the quality in words, with what would improve it."""
     advice = []
     share = float((coverage > 0).mean())
@@ -416,12 +404,12 @@ def _verdict(solution: _Solution, coverage: IntArray, photos: int, size: tuple[i
         )
     if photos < 8:
         advice.append(f"only {photos} photos: take ten or more")
-    sigma_f = solution.deviations.get("fx", 0.0) / solution.matrix[0, 0]
+    sigma_f = best.deviations.get("fx", 0.0) / best.lens.camera_matrix[0, 0]
     if sigma_f > 2e-3:
         advice.append(f"the principal distance is known to {sigma_f:.1%} only: tilt the board more")
     # A residual of a ten-thousandth of the width is what a rigid, flat board gives.
-    coarse = solution.rms > max(1.0, size[0] / 4000)
+    coarse = best.rms > max(1.0, best.lens.image_size[0] / 4000)
     if coarse:
-        advice.append(f"residuals of {solution.rms:.2f} px: is the board flat, are photos sharp?")
+        advice.append(f"residuals of {best.rms:.2f} px: is the board flat, are photos sharp?")
     word = "poor" if coarse or share < 0.35 else "usable" if advice else "good"
     return word + (": " + "; ".join(advice) if advice else "")

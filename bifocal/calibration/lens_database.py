@@ -16,6 +16,7 @@ import numpy as np
 from bifocal.files.images import ImageInfo, image_info
 from bifocal.model.lens import Lens
 from photocore.arrays import FloatArray
+from photocore.camera import camera_matrix
 from photocore.errors import InputError, MissingExtraError
 
 #: Nodes of the tabulated profile; with 65 a cubic spline follows the map to 0.001 px.
@@ -32,8 +33,8 @@ class DatabaseLens:
     ----------
     lens : Lens
         Model ``radial``, scale 1 on the axis.
-    camera, name : str
-        As the database calls them.
+    name : str
+        As the database calls it.
     axis_scale : float
         Scale that the database's own map has on the axis; it was taken out.
     corner_shift : float
@@ -41,10 +42,17 @@ class DatabaseLens:
     """
 
     lens: Lens
-    camera: str
     name: str
     axis_scale: float
     corner_shift: float
+
+    @property
+    def remark(self) -> str:
+        """What the database gave and what was taken out."""
+        return (
+            f"{self.name}: {self.corner_shift:.1f} px in the corner; the database's scale on the "
+            f"axis ({(self.axis_scale - 1) * 100:+.2f} %) was taken out"
+        )
 
 
 def lens_from_database(
@@ -95,8 +103,8 @@ def lens_from_database(
     # The crop factor refers to the diagonal of 36 x 24 mm.
     pixels *= 36.0 / np.hypot(36.0, 24.0)
     centre = (width - 1) / 2, (height - 1) / 2
-    found = Lens(
-        camera_matrix=np.array([[pixels, 0, centre[0]], [0, pixels, centre[1]], [0, 0, 1]]),
+    lens = Lens(
+        camera_matrix=camera_matrix(pixels, 1.0, *centre),
         coefficients=profile,
         model="radial",
         image_size=info.size,
@@ -104,10 +112,8 @@ def lens_from_database(
         extra={"axis_scale_removed": axis_scale},
     )
     corner = np.array([[0.0, 0.0]])
-    shift = float(np.linalg.norm(found.distort(corner) - corner))
-    return DatabaseLens(
-        lens=found, camera=body.model, name=glass.model, axis_scale=axis_scale, corner_shift=shift
-    )
+    shift = float(np.linalg.norm(lens.distort(corner) - corner))
+    return DatabaseLens(lens=lens, name=glass.model, axis_scale=axis_scale, corner_shift=shift)
 
 
 def _camera(database: Any, info: ImageInfo, wanted: str) -> Any:
@@ -115,13 +121,13 @@ def _camera(database: Any, info: ImageInfo, wanted: str) -> Any:
     maker, model = (info.make, wanted or info.model)
     if not model:
         raise InputError(f"{info.path}: EXIF names no camera; give --camera-name.")
-    found = database.find_cameras(maker or None, model, loose_search=True)
+    bodies = database.find_cameras(maker or None, model, loose_search=True)
     # The search is by likeness ("iPhone 12" finds an iPhone 5): only the same name is the camera.
     same = {model.lower(), f"{maker} {model}".lower()}
-    exact = [item for item in found if item.model.lower() in same]
-    if exact or (wanted and found):
-        return (exact or found)[0]
-    near = ", ".join(sorted({item.model for item in found[:8]})) or "nothing similar"
+    exact = [item for item in bodies if item.model.lower() in same]
+    if exact or (wanted and bodies):
+        return (exact or bodies)[0]
+    near = ", ".join(sorted({item.model for item in bodies[:8]})) or "nothing similar"
     raise InputError(
         f"{info.path}: the camera {maker} {model} is not in the lens database (it has: {near}). "
         "Name one with --camera-name, or calibrate the lens yourself with `bifocal calibrate`."
@@ -132,14 +138,14 @@ def _lens(database: Any, body: Any, info: ImageInfo, wanted: str, focal: float) 
     """Return the one lens that EXIF or the user names; list the choice when it is ambiguous."""
     name = wanted or info.lens
     if name:
-        found = database.find_lenses(body, None, name)
-        exact = [item for item in found if item.model.lower() == name.lower()]
-        found = exact or found
+        lenses = database.find_lenses(body, None, name)
+        exact = [item for item in lenses if item.model.lower() == name.lower()]
+        lenses = exact or lenses
     else:
-        found = database.find_lenses(body)
-        if len({item.model for item in found}) == 1:
-            found = found[:1]  # a compact camera or telephone: the lens is part of it
-    fitting = [item for item in found if item.min_focal - 0.5 <= focal <= item.max_focal + 0.5]
+        lenses = database.find_lenses(body)
+        if len({item.model for item in lenses}) == 1:
+            lenses = lenses[:1]  # a compact camera or telephone: the lens is part of it
+    fitting = [item for item in lenses if item.min_focal - 0.5 <= focal <= item.max_focal + 0.5]
     if not fitting:
         raise InputError(
             f"{info.path}: no lens {name or '(EXIF names none)'} for {body.model} at {focal:g} mm "

@@ -7,13 +7,14 @@ terms follow; principal distance and principal point must be assumed.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.optimize import least_squares
 
 from bifocal.model.lens import Lens
 from photocore.arrays import ByteArray, FloatArray, as_points
+from photocore.camera import camera_matrix
 from photocore.errors import GeometryError, InputError
 
 #: A line must be this share of the photo's width to tell anything of distortion.
@@ -78,7 +79,6 @@ def calibrate_from_lines(
     point is taken in the middle of the photo.
     """
     width, height = image_size
-    centre = np.array([(width - 1) / 2, (height - 1) / 2])
     usable = [as_points(line, "line", dimension=2) for line in lines]
     usable = [line for line in usable if len(line) >= 3]
     if len(usable) < 3:
@@ -86,14 +86,21 @@ def calibrate_from_lines(
             f"{len(usable)} usable line(s); at least 3 with 3 points each are needed, better 10 "
             "near the edges of the photo."
         )
-    half = np.hypot(width, height) / 2
-    unit = focal_px / half
+    # Unknowns in units of the half diagonal, so that the steps are of like size.
+    share = 2 * focal_px / np.hypot(width, height)
+    units = np.array([share**2, share**4])
 
-    def straightness(parameters: FloatArray) -> FloatArray:
-        """Return distances from the best lines, in undistorted pixels."""
-        return np.concatenate(
-            [_off_line(_undistorted(line, centre, parameters, half)) for line in usable]
+    def lens_of(terms: FloatArray) -> Lens:
+        """Return the lens with radial terms k1, k2."""
+        matrix = camera_matrix(focal_px, 1.0, (width - 1) / 2, (height - 1) / 2)
+        return Lens(
+            camera_matrix=matrix, coefficients=np.array([*terms, 0.0, 0.0]), image_size=image_size
         )
+
+    def straightness(scaled: FloatArray) -> FloatArray:
+        """Return distances from the best lines, in undistorted pixels."""
+        lens = lens_of(scaled * units)
+        return np.concatenate([_off_line(lens.undistort(line)) for line in usable])
 
     solution = least_squares(straightness, np.zeros(2), loss="soft_l1", f_scale=0.5)
     left = straightness(solution.x)
@@ -105,19 +112,16 @@ def calibrate_from_lines(
             "take lines near its edges."
         )
     sigmas = np.sqrt(np.diag(np.linalg.inv(normal)) * (left**2).sum() / freedom)
-    # From radii in half diagonals to radii in principal distances.
-    k1, k2 = solution.x * [unit**2, unit**4]
     before, after = (float(np.sqrt(np.mean(v**2))) for v in (straightness(np.zeros(2)), left))
-    lens = Lens(
-        camera_matrix=np.array([[focal_px, 0, centre[0]], [0, focal_px, centre[1]], [0, 0, 1]]),
-        coefficients=np.array([k1, k2, 0.0, 0.0]),
-        image_size=image_size,
+    lens = replace(
+        lens_of(solution.x * units),
         sigma0=after,
         source=f"plumb line, {len(usable)} lines; principal distance and point assumed",
     )
+    sigma_k1, sigma_k2 = (float(v) for v in sigmas * units)
     return PlumbLine(
-        lens=lens, sigma_k1=float(sigmas[0] * unit**2), sigma_k2=float(sigmas[1] * unit**4),
-        rms_before=before, rms_after=after, lines=len(usable),
+        lens=lens, sigma_k1=sigma_k1, sigma_k2=sigma_k2, rms_before=before, rms_after=after,
+        lines=len(usable),
     )  # fmt: skip
 
 
@@ -135,10 +139,10 @@ def find_straight_edges(image: ByteArray, *, most: int = 80) -> list[FloatArray]
     import cv2
 
     blurred = cv2.GaussianBlur(image, (0, 0), 1.0)
-    found = cv2.createLineSegmentDetector().detect(blurred)[0]
-    if found is None:
+    detected = cv2.createLineSegmentDetector().detect(blurred)[0]
+    if detected is None:
         return []
-    segments = np.asarray(found, dtype=np.float64).reshape(-1, 2, 2)
+    segments = np.asarray(detected, dtype=np.float64).reshape(-1, 2, 2)
     length = np.linalg.norm(segments[:, 1] - segments[:, 0], axis=1)
     least = LEAST_LENGTH * image.shape[1]
     segments = segments[length > least / 12]
@@ -148,18 +152,6 @@ def find_straight_edges(image: ByteArray, *, most: int = 80) -> list[FloatArray]
     strength = cv2.magnitude(gradient_x, gradient_y)
     lines = [_refined_line(chain, strength) for chain in chains[:most]]
     return [line for line in lines if len(line) >= 8]
-
-
-def _undistorted(
-    line: FloatArray, centre: FloatArray, parameters: FloatArray, half: float
-) -> FloatArray:
-    """Return the points without distortion; radii in half diagonals, forward model inverted."""
-    offset = (line - centre) / half
-    ideal = offset
-    for _ in range(12):
-        square = (ideal**2).sum(axis=1, keepdims=True)
-        ideal = offset / (1 + parameters[0] * square + parameters[1] * square**2)
-    return centre + ideal * half
 
 
 def _off_line(points: FloatArray) -> FloatArray:

@@ -67,20 +67,17 @@ def calibrate_from_edges(
     check_writable(out, overwrite=overwrite)
     size = _common_size(images)
     remarks: list[str] = []
+    focal_px = focal_px or image_info(images[0]).focal_pixels
     if focal_px is None:
-        focal_px = image_info(images[0]).focal_pixels
-        if focal_px is None:
-            focal_px = float(np.hypot(*size))
-            remarks.append(
-                f"no focal length in EXIF: a principal distance of {focal_px:.0f} px (the photo's "
-                "diagonal) is assumed; give --focal-px if you know it."
-            )
-    chains: list[FloatArray] = []
+        focal_px = float(np.hypot(*size))
+        remarks.append(
+            f"no focal length in EXIF: a principal distance of {focal_px:.0f} px (the photo's "
+            "diagonal) is assumed; give --focal-px if you know it."
+        )
     if lines is not None:
         chains = _picked_lines(lines)
     else:
-        for path in images:
-            chains += find_straight_edges(_grey(path))
+        chains = [line for path in images for line in find_straight_edges(_grey(path))]
     result = calibrate_from_lines(chains, size, focal_px=focal_px)
     if result.rms_after > 0.8 * result.rms_before:
         remarks.append(
@@ -96,9 +93,9 @@ def write_database_lens(
 ) -> tuple[Lens, tuple[str, ...]]:
     """Write the lens file of the lens database for a photo; see `lens_from_database`."""
     check_writable(out, overwrite=overwrite)
-    found = lens_from_database(image, **names)
-    found.lens.write(out, overwrite=overwrite)
-    return found.lens, (_database_remark(found.name, found.axis_scale, found.corner_shift),)
+    known = lens_from_database(image, **names)
+    known.lens.write(out, overwrite=overwrite)
+    return known.lens, (known.remark,)
 
 
 def undistort_images(
@@ -134,10 +131,9 @@ def undistort_images(
     for done, (path, target) in enumerate(zip(images, targets, strict=True)):
         progress(done, len(images), path.name)
         if one is None:
-            found = lens_from_database(path, **names)
-            current = found.lens
-            remark = _database_remark(found.name, found.axis_scale, found.corner_shift)
-            remarks.append(f"{path.name}: {remark}")
+            known = lens_from_database(path, **names)
+            current = known.lens
+            remarks.append(f"{path.name}: {known.remark}")
         else:
             current = one
         check_size(current, path)
@@ -180,14 +176,6 @@ def undistorted(image: ImageArray, lens: Lens) -> ImageArray:
             cv2.INTER_CUBIC, borderMode=cv2.BORDER_CONSTANT,
         )  # fmt: skip
     return result
-
-
-def _database_remark(name: str, axis_scale: float, corner: float) -> str:
-    """Say what the database gave and what was taken out."""
-    return (
-        f"{name}: {corner:.1f} px in the corner; the database's scale on the axis "
-        f"({(axis_scale - 1) * 100:+.2f} %) was taken out"
-    )
 
 
 def _grey(path: Path) -> ByteArray:

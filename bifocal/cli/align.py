@@ -105,11 +105,11 @@ def command(
 
 def _options(given: dict[str, Any]) -> Any:
     """Return the workflow's options from the command line's."""
-    from bifocal.orientation.align_workflow import AlignOptions, LensData
-    from bifocal.orientation.alignment import SiteMeasures
+    from bifocal.orientation.align_workflow import AlignOptions, KnownLens
+    from bifocal.orientation.control_points import SiteMeasures
 
     lenses = tuple(
-        LensData(
+        KnownLens(
             lens=given[f"lens{n}"] or given["lens"],
             focal=given[f"focal{n}"],
             pixel_size=given[f"pixel_size{n}"] or given["pixel_size"],

@@ -59,10 +59,10 @@ def command(
     Give the lenses and the camera, and one wish: the size of the wall, a scale, a pixel size on
     the wall, or a sigma of the relief.
     """
-    from bifocal.planning.camera_plan import Sensor
+    from bifocal.planning.camera_plan import CameraSensor
     from bifocal.planning.workflow import make_plan, plan_as_dict
 
-    camera = Sensor(width=sensor[0], height=sensor[1], columns=pixels[0], rows=pixels[1])
+    camera = CameraSensor(width=sensor[0], height=sensor[1], columns=pixels[0], rows=pixels[1])
     plan = make_plan(focal_lengths, camera, out=out, **wishes)
     print_result(plan_as_dict(plan), _lines(plan), as_json=as_json)
     if out is not None:

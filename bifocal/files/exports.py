@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
 
+from bifocal.files.dxf import add_text, new_drawing
 from bifocal.model.points import SurveyPoints
 from photocore.arrays import BoolArray, FloatArray
+from photocore.cloud import write_cloud
 from photocore.errors import InputError
 from photocore.output import atomic_path
 from photocore.tables import write_csv
@@ -64,18 +66,12 @@ def export_points(
         If the ending is unknown, no point has coordinates, or the file cannot be written.
     """
     path = Path(path)
-    writers: dict[str, Callable[[Path, SurveyPoints, FloatArray], None]] = {
-        ".dxf": _write_dxf,
-        ".ply": _write_ply,
-        ".las": _write_las,
-        ".laz": _write_las,
-        ".geojson": _write_geojson,
-        ".xlsx": _write_xlsx,
-        ".csv": lambda p, s, c: _write_csv(p, s, c, order=order, flavour=flavour),
-    }
-    writer = writers.get(path.suffix.lower())
-    if writer is None:
-        raise InputError(f"{path}: ending not known; use one of {' '.join(writers)}.")
+    ending = path.suffix.lower()
+    writers = {".dxf": _write_dxf, ".geojson": _write_geojson, ".xlsx": _write_xlsx}
+    if ending not in writers and ending not in (".ply", ".las", ".laz", ".csv"):
+        raise InputError(
+            f"{path}: ending not known; use one of .dxf .ply .las .laz .geojson .xlsx .csv."
+        )
     if world and points.world is None:
         raise InputError(
             "the survey has no world coordinates; fill the Georeference sheet and solve again, "
@@ -90,84 +86,43 @@ def export_points(
         missing = [name for name, wanted in zip(points.ids, keep, strict=True) if not wanted]
         shown = ", ".join(missing[:10]) + (" ..." if len(missing) > 10 else "")
         remarks.append(f"{len(missing)} point(s) without coordinates left out: {shown}")
-    output = new_workbook if path.suffix.lower() == ".xlsx" else atomic_path
-    with output(path, overwrite=overwrite) as temporary:
-        writer(temporary, points.take(keep), coordinates[keep])
+    points, coordinates = points.take(keep), coordinates[keep]
+    if ending == ".csv":
+        _write_csv(path, points, coordinates, order=order, flavour=flavour, overwrite=overwrite)
+    elif ending in writers:
+        output = new_workbook if ending == ".xlsx" else atomic_path
+        with output(path, overwrite=overwrite) as temporary:
+            writers[ending](temporary, points, coordinates)
+    else:
+        uncertain = np.array([flag in UNCERTAIN_FLAGS for flag in points.flags], dtype=np.uint8)
+        write_cloud(
+            path, coordinates,
+            {"sigma_r": points.sigma_r.astype(np.float32), "uncertain": uncertain},
+            descriptions={"sigma_r": "sigma of relief, m"}, overwrite=overwrite,
+        )  # fmt: skip
     return tuple(remarks)
 
 
 def _write_dxf(path: Path, points: SurveyPoints, coordinates: FloatArray) -> None:
-    """Write an R2010 drawing in metres: a POINT, its name and its relief for each point."""
-    import ezdxf
-    from ezdxf import units
-
-    drawing = ezdxf.new("R2010", setup=True)
-    drawing.units = units.M
-    drawing.header["$PDMODE"] = 3  # points drawn as crosses
-    for layer, colour in LAYERS.items():
-        drawing.layers.add(layer, color=colour)
+    """Write a drawing: a POINT, its name and its relief for each point."""
     extent = float(np.ptp(coordinates[:, :2], axis=0).max())
     height = max(0.01, round(extent / 150, 3))
-    drawing.header["$PDSIZE"] = height
-    model = drawing.modelspace()
-    for i, place in enumerate(coordinates.tolist()):
+    drawing, model = new_drawing(LAYERS, point_style=3, point_size=height)
+    for i, (x, y, z) in enumerate(coordinates.tolist()):
         uncertain = points.flags[i] in UNCERTAIN_FLAGS
         layer = "BIFOCAL_UNCERTAIN" if uncertain else "BIFOCAL_POINTS"
-        model.add_point(place, dxfattribs={"layer": layer})
-        x, y, z = place
-        labels = (
-            ("BIFOCAL_NAMES", points.ids[i], 0.4),
-            ("BIFOCAL_RELIEF", f"{points.xyz[i, 2]:+.3f}", -1.4),
-        )
-        for label_layer, text, lift in labels:
-            model.add_text(
-                text.replace("\n", " "),
-                height=height,
-                dxfattribs={"layer": label_layer, "insert": (x + height / 2, y + lift * height, z)},
-            )
+        model.add_point((x, y, z), dxfattribs={"layer": layer})
+        relief = f"{points.xyz[i, 2]:+.3f}"
+        left = x + height / 2
+        add_text(model, points.ids[i], (left, y + 0.4 * height, z), height, "BIFOCAL_NAMES")
+        add_text(model, relief, (left, y - 1.4 * height, z), height, "BIFOCAL_RELIEF")
     drawing.saveas(path)
 
 
-def _write_ply(path: Path, points: SurveyPoints, coordinates: FloatArray) -> None:
-    """Write a binary PLY with x y z, sigma_r and uncertain (0/1)."""
-    fields = [("x", "<f8"), ("y", "<f8"), ("z", "<f8"), ("sigma_r", "<f4"), ("uncertain", "u1")]
-    rows = np.zeros(len(points), dtype=fields)
-    for axis, name in enumerate("xyz"):
-        rows[name] = coordinates[:, axis]
-    rows["sigma_r"] = points.sigma_r
-    rows["uncertain"] = [flag in UNCERTAIN_FLAGS for flag in points.flags]
-    kinds = {"<f8": "double", "<f4": "float", "u1": "uchar"}
-    properties = "".join(f"property {kinds[kind]} {name}\n" for name, kind in fields)
-    header = (
-        "ply\nformat binary_little_endian 1.0\ncomment metres\n"
-        f"element vertex {len(rows)}\n{properties}end_header\n"
-    )
-    path.write_bytes(header.encode("ascii") + rows.tobytes())
-
-
-def _write_las(path: Path, points: SurveyPoints, coordinates: FloatArray) -> None:
-    """Write LAS 1.4 (or LAZ) with sigma_r as an extra dimension, to 0.1 mm."""
-    import laspy
-
-    header = laspy.LasHeader(point_format=6, version="1.4")
-    header.offsets = np.floor(coordinates.min(axis=0))
-    header.scales = np.full(3, 1e-4)
-    header.add_extra_dim(
-        laspy.ExtraBytesParams(name="sigma_r", type=np.float32, description="sigma of relief, m")
-    )
-    cloud = laspy.LasData(header)
-    cloud.x, cloud.y, cloud.z = coordinates.T
-    cloud["sigma_r"] = points.sigma_r.astype(np.float32)
-    # ASPRS classes: 1 unclassified, 7 low point (noise).
-    cloud.classification = np.array(
-        [7 if flag in UNCERTAIN_FLAGS else 1 for flag in points.flags], dtype=np.uint8
-    )
-    cloud.write(str(path))
-
-
 def _write_csv(
-    path: Path, points: SurveyPoints, coordinates: FloatArray, *, order: str, flavour: str
-) -> None:
+    path: Path, points: SurveyPoints, coordinates: FloatArray, *, order: str, flavour: str,
+    overwrite: bool,
+) -> None:  # fmt: skip
     """Write a surveyor's point list without a heading line, comma-named order."""
     if order not in ORDERS:
         raise InputError(f"order: {order!r} is not one of {', '.join(ORDERS)}.")
@@ -180,7 +135,7 @@ def _write_csv(
     }
     write_csv(
         path, columns, flavour=flavour, formats=dict.fromkeys("ENZ", ".4f"), headings=False,
-        overwrite=True,
+        overwrite=overwrite,
     )  # fmt: skip
 
 

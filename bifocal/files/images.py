@@ -16,9 +16,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from bifocal.model.image import as_photo
 from photocore.arrays import ByteArray
 from photocore.errors import InputError
 from photocore.output import atomic_path
+from photocore.raster import RasterFile
 
 ImageArray = NDArray[np.uint8] | NDArray[np.uint16]
 
@@ -170,23 +172,15 @@ def _read_by_strips(info: ImageInfo) -> ImageArray | None:
 
     OpenCV decodes into a buffer and copies it: 600 MB for 100 megapixels.
     """
-    import rasterio
-    from rasterio.errors import NotGeoreferencedWarning, RasterioError
-    from rasterio.windows import Window
-
     try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", NotGeoreferencedWarning)
-            with rasterio.Env(GDAL_CACHEMAX=64), rasterio.open(info.path) as file:
-                if file.count not in (3, 4) or file.dtypes[0] not in ("uint8", "uint16"):
-                    return None
-                image = np.empty((file.height, file.width, 3), file.dtypes[0])
-                for top in range(0, file.height, 256):
-                    height = min(256, file.height - top)
-                    window = Window(0, top, file.width, height)
-                    part = file.read([1, 2, 3], window=window)
-                    image[top : top + height] = part.transpose(1, 2, 0)
-    except RasterioError:
+        with RasterFile(info.path) as file:
+            if file.bands not in (3, 4) or file.dtype not in (np.uint8, np.uint16):
+                return None
+            image = np.empty((file.height, file.width, 3), file.dtype)
+            for top in range(0, file.height, 256):
+                height = min(256, file.height - top)
+                image[top : top + height] = file.read(0, top, file.width, height, bands=[1, 2, 3])
+    except InputError:
         return None  # OpenCV may still read it, or say what is wrong
     return image
 
@@ -220,24 +214,12 @@ def as_grey(image: NDArray[np.generic], name: str) -> ByteArray:
     """
     import cv2
 
-    array = np.asarray(image)
-    if array.ndim not in (2, 3) or (array.ndim == 3 and array.shape[2] not in (1, 3, 4)):
-        raise InputError(f"{name}: expected shape (height, width[, 3]), found {array.shape}.")
-    if min(array.shape[:2]) < 16:
-        raise InputError(
-            f"{name}: {array.shape[1]} x {array.shape[0]} px is too small to match; "
-            "at least 16 px a side are needed."
-        )
+    small = "is too small to match; at least 16 px a side are needed."
+    array = as_photo(image, name, smallest=16, fault=small)
     if array.dtype == np.uint16:
         array = (array >> 8).astype(np.uint8)
-    if array.dtype != np.uint8:
-        raise InputError(f"{name}: expected 8 or 16 bits per channel, found {array.dtype}.")
-    if array.ndim == 2:
-        return array
-    if array.shape[2] == 1:
-        return np.ascontiguousarray(array[..., 0])
     # The plain mean of the channels has less noise than the luminance, which is mostly green.
-    return np.asarray(cv2.transform(array[..., :3], np.full((1, 3), 1 / 3)), dtype=np.uint8)
+    return array if array.ndim == 2 else cv2.transform(array, np.full((1, 3), 1 / 3))
 
 
 def write_image(path: Path | str, image: ImageArray, *, overwrite: bool = False) -> None:

@@ -5,11 +5,19 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from photocore.arrays import FloatArray, positive
 from photocore.errors import InputError
+
+#: xmin, ymin, xmax, ymax: outer edges of pixels. [m]
+Bounds = tuple[float, float, float, float]
+#: Column, row, width, height; may reach beyond a raster's edges. [px]
+Window = tuple[int, int, int, int]
+PixelMap = NDArray[np.float32]
 
 #: Rows and columns of a relief map and an orthophoto that differ by less are the same. [px]
 SAME_PIXEL = 1e-3
@@ -49,7 +57,7 @@ class Grid:
             raise InputError(f"a grid of {self.width} x {self.height} px is empty.")
 
     @classmethod
-    def from_bounds(cls, bounds: tuple[float, float, float, float], *, gsd: float) -> Grid:
+    def from_bounds(cls, bounds: Bounds, *, gsd: float) -> Grid:
         """Return the grid that fills xmin, ymin, xmax, ymax (outer edges of its pixels). [m]
 
         The top-left corner is kept; the far edges grow to whole pixels.
@@ -111,7 +119,7 @@ class Grid:
         return np.array([[self.gsd, 0.0, self.x0], [0.0, -self.gsd, self.y0], [0.0, 0.0, 1.0]])
 
     @property
-    def bounds(self) -> tuple[float, float, float, float]:
+    def bounds(self) -> Bounds:
         """Outer edges xmin, ymin, xmax, ymax. [m]"""
         half = self.gsd / 2
         return (
@@ -159,22 +167,86 @@ class Grid:
                 width, height = min(side, self.width - column), min(side, self.height - row)
                 yield column, row, self.window(column, row, width, height)
 
-    def snapped(self) -> Grid:
-        """Return a grid of the same cover whose pixel edges are whole multiples of the GSD.
+    def whole_offset_in(self, other: Grid) -> tuple[int, int] | None:
+        """Return that offset if the pixels of both grids are the same ones; None if not."""
+        column, row = self.offset_in(other)
+        whole = round(column), round(row)
+        same_gsd = abs(self.gsd / other.gsd - 1) * max(self.shape) < SAME_PIXEL
+        near = max(abs(column - whole[0]), abs(row - whole[1])) < 10 * SAME_PIXEL
+        return whole if same_gsd and near else None
 
-        Orthophotos of one wall made with the same GSD then fit together without resampling.
+    def resampling(self, other: Grid, margin: int) -> tuple[Window, PixelMap, PixelMap]:
+        """Return the window of another grid that covers this one, and this one's places in it.
+
+        Parameters
+        ----------
+        other : Grid
+        margin : int
+            Pixels around the window that the interpolation needs.
+
+        Returns
+        -------
+        window : tuple of int
+            Column, row, width and height.
+        columns, rows : ndarray of float32, shape (height, width)
+            Of every pixel of this grid, counted in the window: what cv2.remap takes.
         """
-        xmin, ymin, xmax, ymax = self.bounds
-        left, top = (
-            math.floor(xmin / self.gsd + SAME_PIXEL),
-            math.ceil(ymax / self.gsd - SAME_PIXEL),
-        )
-        right = math.ceil(xmax / self.gsd - SAME_PIXEL)
-        bottom = math.floor(ymin / self.gsd + SAME_PIXEL)
-        return Grid(
-            x0=(left + 0.5) * self.gsd,
-            y0=(top - 0.5) * self.gsd,
-            gsd=self.gsd,
-            width=right - left,
-            height=top - bottom,
-        )
+        column, row = self.offset_in(other)
+        step = self.gsd / other.gsd
+        c0, r0 = math.floor(column) - margin, math.floor(row) - margin
+        c1 = math.ceil(column + (self.width - 1) * step) + margin + 1
+        r1 = math.ceil(row + (self.height - 1) * step) + margin + 1
+        x = (column - c0 + step * np.arange(self.width)).astype(np.float32)
+        y = (row - r0 + step * np.arange(self.height)).astype(np.float32)
+        return (c0, r0, c1 - c0, r1 - r0), *np.meshgrid(x, y)
+
+
+class Gridded:
+    """An image on the reference plane that knows where its pixels are.
+
+    Attributes
+    ----------
+    plane_from_pixel : ndarray, shape (3, 3)
+        Affine map from (column, row, 1) to (X, Y, 1): square pixels, rows downwards. [m]
+    """
+
+    __slots__ = ()
+    plane_from_pixel: FloatArray
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Height and width. [px]"""
+        raise NotImplementedError
+
+    @property
+    def grid(self) -> Grid:
+        """Where the pixels are."""
+        return Grid.from_affine(self.plane_from_pixel, self.shape)
+
+    @property
+    def gsd(self) -> float:
+        """Side of a pixel on the plane. [m]"""
+        return float(self.plane_from_pixel[0, 0])
+
+    @property
+    def bounds(self) -> Bounds:
+        """Outer edges (X min, Y min, X max, Y max). [m]"""
+        return self.grid.bounds
+
+
+def bounds_of(positions: FloatArray) -> Bounds:
+    """Return the box around plane positions, shape (..., 2). [m]"""
+    flat = positions.reshape(-1, 2)
+    (xmin, ymin), (xmax, ymax) = flat.min(axis=0).tolist(), flat.max(axis=0).tolist()
+    return xmin, ymin, xmax, ymax
+
+
+def cut(array: NDArray[Any], window: Window, fill: Any = 0) -> NDArray[Any]:
+    """Return the part of an array at (column, row, width, height); ``fill`` beyond its edges."""
+    column, row, width, height = window
+    out = np.full((height, width, *array.shape[2:]), fill, array.dtype)
+    c0, r0 = max(column, 0), max(row, 0)
+    c1, r1 = min(column + width, array.shape[1]), min(row + height, array.shape[0])
+    if c1 > c0 and r1 > r0:
+        out[r0 - row : r1 - row, c0 - column : c1 - column] = array[r0:r1, c0:c1]
+    return out

@@ -131,42 +131,50 @@ class Lens:
 
         points = as_points(pixels, "pixels", dimension=2)
         flat = np.ascontiguousarray(points.reshape(-1, 1, 2))
-        if not len(flat):
-            return points.copy()
         if self.model == "radial":
             return self._scaled(points, inverse=True)
+        if not len(flat):
+            return points.copy()
         criteria = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 100, 1e-12)
-        matrix = np.array(self.camera_matrix)
-        coefficients = np.array(self.coefficients)
-        if self.model == "fisheye":
-            ideal = cv2.fisheye.undistortPoints(
-                flat, matrix, coefficients, P=matrix, criteria=criteria
-            )
-        else:
-            ideal = cv2.undistortPoints(flat, matrix, coefficients, P=matrix, criteria=criteria)
+        matrix, terms = np.array(self.camera_matrix), np.array(self.coefficients)
+        undistort = cv2.fisheye.undistortPoints if self.model == "fisheye" else cv2.undistortPoints
+        ideal = undistort(flat, matrix, terms, P=matrix, criteria=criteria)
         return np.asarray(ideal, dtype=np.float64).reshape(points.shape)
 
     def distort(self, pixels: ArrayLike) -> FloatArray:
         """Return where ideal points are seen through this lens, shape (..., 2). [px]"""
-        import cv2
-
         points = as_points(pixels, "pixels", dimension=2)
-        flat = points.reshape(-1, 2)
-        if not len(flat):
-            return points.copy()
         if self.model == "radial":
             return self._scaled(points, inverse=False)
-        matrix = np.array(self.camera_matrix)
+        return self._projected(points)[0].reshape(points.shape)
+
+    def distorted_by_ideal(self, pixels: ArrayLike) -> FloatArray:
+        """Return the derivative of `distort` at ideal points, shape (..., 2, 2)."""
+        points = as_points(pixels, "pixels", dimension=2)
+        if self.model == "radial":
+            half = np.diag([0.5, 0.5])
+            ahead, behind = (self.distort(points[..., None, :] + s * half) for s in (1, -1))
+            return np.swapaxes(ahead - behind, -1, -2)
+        by_shift = self._projected(points)[1] / np.diag(self.camera_matrix)[:2]
+        return by_shift.reshape(*points.shape, 2)
+
+    def _projected(self, points: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return OpenCV's distorted points and their derivative by a shift at depth 1."""
+        import cv2
+
+        flat = points.reshape(-1, 2)
+        if not len(flat):
+            return flat.copy(), np.zeros((0, 2, 2))
+        matrix, coefficients = np.array(self.camera_matrix), np.array(self.coefficients)
         rays = np.column_stack([flat, np.ones(len(flat))]) @ np.linalg.inv(matrix).T
         zero = np.zeros(3)
-        coefficients = np.array(self.coefficients)
         if self.model == "fisheye":
-            seen = cv2.fisheye.distortPoints(
-                np.ascontiguousarray(rays[:, None, :2]), matrix, coefficients
-            )
+            seen, by = cv2.fisheye.projectPoints(rays[:, None], zero, zero, matrix, coefficients)
+            by_shift = by[:, 11:13]  # f, c (2 each), k (4), rotation (3), shift
         else:
-            seen, _ = cv2.projectPoints(rays[:, None, :], zero, zero, matrix, coefficients)
-        return np.asarray(seen, dtype=np.float64).reshape(points.shape)
+            seen, by = cv2.projectPoints(rays[:, None], zero, zero, matrix, coefficients)
+            by_shift = by[:, 3:5]  # rotation (3), shift
+        return np.asarray(seen, dtype=np.float64).reshape(-1, 2), by_shift.reshape(-1, 2, 2)
 
     @property
     def principal_point(self) -> FloatArray:

@@ -14,6 +14,7 @@ from bifocal import rays
 from bifocal.model.flags import SIGMA_PIXEL, FlagLimits
 from bifocal.model.intersection import Intersection, PlanePicks, intersect
 from bifocal.model.lens import Lens
+from bifocal.precision import base_factor
 from photocore.arrays import FloatArray, as_points, positive, read_only
 from photocore.errors import GeometryError, InputError
 from photocore.jsonfile import read_object, write_object
@@ -125,6 +126,23 @@ class Photo:
         """Return the derivative of the plane position by the pixel, shape (n, 2, 2). [m/px]"""
         points = pixels if self.lens is None else self.lens.undistort(pixels)
         return homography_jacobian(self.plane_from_pixel, points)
+
+    def gsd(self, size: tuple[int, int]) -> float:
+        """Return the side of a pixel in the middle of a photo of (width, height) px. [m]
+
+        Raises
+        ------
+        GeometryError
+            If its middle does not look at the reference plane.
+        """
+        middle = np.array([[(size[0] - 1) / 2, (size[1] - 1) / 2]])
+        area = abs(float(np.linalg.det(self.metres_per_pixel(middle)[0])))
+        if not (np.isfinite(area) and area > 0):
+            raise GeometryError(
+                "the middle of the photo does not look at the reference plane; check "
+                "plane_from_pixel."
+            )
+        return float(np.sqrt(area))
 
     def to_dict(self) -> dict[str, Any]:
         """Return the photo's part of the pair file."""
@@ -316,7 +334,24 @@ class Pair:
     @property
     def base_factor(self) -> float:
         """B = d1 d2 / (d1 - d2): metres of relief per unit of relative radial shift. [m]"""
-        return self.d1 * self.d2 / (self.d1 - self.d2)
+        return base_factor(d1=self.d1, d2=self.d2)
+
+    def photo(self, number: int) -> Photo:
+        """Return image 1 or 2."""
+        return self.image1 if number == 1 else self.image2
+
+    def photo_file(self, number: int) -> Path:
+        """Return the image file of photo 1 or 2.
+
+        Raises
+        ------
+        InputError
+            If the pair file names none.
+        """
+        file = self.photo(number).file
+        if not file:
+            raise InputError(f'the pair file names no photo for "image{number}": add its "file".')
+        return self.folder / file
 
     @property
     def as_given(self) -> tuple[Photo, Photo]:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import compress
 
 import numpy as np
 
@@ -55,15 +55,10 @@ class SurveyPoints:
     def take(self, keep: BoolArray) -> SurveyPoints:
         """Return the points where ``keep`` is true."""
         return SurveyPoints(
-            ids=_take(self.ids, keep),
+            ids=tuple(compress(self.ids, keep)),
             xyz=self.xyz[keep],
             world=None if self.world is None else self.world[keep],
             sigma_r=self.sigma_r[keep],
-            flags=_take(self.flags, keep),
-            notes=_take(self.notes, keep),
+            flags=tuple(compress(self.flags, keep)),
+            notes=tuple(compress(self.notes, keep)),
         )
-
-
-def _take(items: Sequence[str], keep: BoolArray) -> tuple[str, ...]:
-    """Return the items where ``keep`` is true."""
-    return tuple(item for item, wanted in zip(items, keep, strict=True) if wanted)

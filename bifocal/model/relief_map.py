@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import IntEnum
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from bifocal.model.grid import Grid
-from photocore.arrays import ByteArray, FloatArray, as_points, read_only
+from bifocal.model.grid import Grid, Gridded
+from photocore.arrays import BoolArray, ByteArray, FloatArray, as_points, read_only
 from photocore.errors import InputError
 
 Float32Array = NDArray[np.float32]
@@ -25,7 +26,7 @@ class Quality(IntEnum):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class ReliefMap:
+class ReliefMap(Gridded):
     """Relief of a wall as seen square on: pixel (column, row) is a point (X, Y) of the plane.
 
     Attributes
@@ -96,28 +97,9 @@ class ReliefMap:
         return self.r.shape[0], self.r.shape[1]
 
     @property
-    def grid(self) -> Grid:
-        """Where the pixels are."""
-        return Grid.from_affine(self.plane_from_pixel, self.r.shape)
-
-    @property
-    def gsd(self) -> float:
-        """Side of a pixel on the plane. [m]"""
-        return float(self.plane_from_pixel[0, 0])
-
-    @property
-    def bounds(self) -> tuple[float, float, float, float]:
-        """Outer edges (X min, Y min, X max, Y max). [m]"""
-        return self.grid.bounds
-
-    @property
     def known(self) -> NDArray[np.bool_]:
         """Pixels whose relief is known, shape (height, width)."""
         return np.isfinite(self.r)
-
-    def pixels_from_plane(self, positions: ArrayLike) -> FloatArray:
-        """Return (column, row) of plane positions (X, Y), shape (..., 2). [px]"""
-        return self.grid.pixel_of(as_points(positions, "positions", dimension=2))
 
     def plane_positions(self, rows: slice = slice(None)) -> FloatArray:
         """Return (X, Y) of the pixel centres of some rows, shape (n, width, 2). [m]"""
@@ -125,47 +107,30 @@ class ReliefMap:
         return np.stack(np.broadcast_arrays(x[None, :], y[:, None]), axis=-1)
 
     def sample(self, positions: ArrayLike) -> FloatArray:
-        """Return the relief at plane positions (X, Y), shape (...); see `sample_with_sigma`. [m]"""
-        return self._sample(self.r, as_points(positions, "positions", dimension=2))
-
-    def sample_with_sigma(self, positions: ArrayLike) -> tuple[FloatArray, FloatArray]:
-        """Return relief and sigma at plane positions (X, Y), each of shape (...). [m]
+        """Return the relief at plane positions (X, Y), shape (...). [m]
 
         Bilinear between four known pixels; beside unknown ones the nearest pixel; NaN outside the
         map and where the nearest pixel is unknown.
         """
-        points = as_points(positions, "positions", dimension=2)
-        return self._sample(self.r, points), self._sample(self.sigma, points)
+        bilinear, _ = self._interpolated(self.r, positions, order=1)
+        nearest, inside = self._interpolated(self.r, positions, order=0)
+        known = np.where(np.isfinite(bilinear), bilinear, nearest)
+        return np.where(inside, known, np.nan)
 
     def sample_quality(self, positions: ArrayLike) -> ByteArray:
         """Return the `Quality` of the nearest pixel; UNKNOWN outside the map."""
-        pixels = self.pixels_from_plane(positions)
-        index, inside = self._nearest(pixels)
-        found = self.quality[index[..., 1], index[..., 0]]
-        return np.where(inside, found, np.uint8(Quality.UNKNOWN)).astype(np.uint8)
+        nearest, inside = self._interpolated(self.quality, positions, order=0)
+        return np.where(inside, nearest, Quality.UNKNOWN).astype(np.uint8)
 
-    def _nearest(self, pixels: FloatArray) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
-        """Return the nearest pixel, clamped into the map, and whether it was inside."""
-        height, width = self.shape
-        limit = np.array([width, height])
+    def _interpolated(
+        self, band: NDArray[Any], positions: ArrayLike, *, order: int
+    ) -> tuple[FloatArray, BoolArray]:
+        """Return a band at positions, nearest (order 0) or bilinear, and which are inside."""
+        from scipy.ndimage import map_coordinates
+
+        pixels = self.grid.pixel_of(as_points(positions, "positions", dimension=2))
         with np.errstate(invalid="ignore"):
-            inside = np.asarray(((pixels >= -0.5) & (pixels < limit - 0.5)).all(-1))
-        rounded = np.floor(np.where(inside[..., None], pixels, 0.0) + 0.5).astype(np.int64)
-        return np.clip(rounded, 0, limit - 1), inside
-
-    def _sample(self, band: Float32Array, points: FloatArray) -> FloatArray:
-        """Bilinear interpolation of a band that falls back to the nearest pixel beside NaN."""
-        height, width = self.shape
-        pixels = self.pixels_from_plane(points)
-        index, inside = self._nearest(pixels)
-        nearest = band[index[..., 1], index[..., 0]].astype(np.float64)
-        safe = np.where(inside[..., None], pixels, 0.0)
-        low = np.clip(np.floor(safe), 0, [max(width - 2, 0), max(height - 2, 0)]).astype(np.int64)
-        share = np.clip(safe - low, 0.0, 1.0)
-        col, row = low[..., 0], low[..., 1]
-        right, under = np.minimum(col + 1, width - 1), np.minimum(row + 1, height - 1)
-        u, v = share[..., 0], share[..., 1]
-        upper = band[row, col] * (1 - u) + band[row, right] * u
-        lower = band[under, col] * (1 - u) + band[under, right] * u
-        value = upper * (1 - v) + lower * v
-        return np.where(inside, np.where(np.isfinite(value), value, nearest), np.nan)
+            inside = np.all((pixels >= -0.5) & (pixels < np.array(self.shape[::-1]) - 0.5), -1)
+        at = np.where(inside[..., None], pixels, 0.0).reshape(-1, 2).T[::-1]
+        values = map_coordinates(band, at, np.float64, order=order, mode="nearest")
+        return values.reshape(inside.shape), inside

@@ -9,12 +9,13 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from bifocal.model.grid import SAME_PIXEL, Grid
+from bifocal.model.grid import Bounds, Grid, cut
 from photocore.arrays import FloatArray
 from photocore.errors import InputError
 
 ReliefArray = NDArray[np.float32]
-Bounds = tuple[float, float, float, float]
+#: A box without end.
+EVERYWHERE: Bounds = (-math.inf, -math.inf, math.inf, math.inf)
 #: Returns relief for (column, row, width, height) of a map, NaN beyond its edges.
 Fetch = Callable[[int, int, int, int], ReliefArray]
 
@@ -83,27 +84,18 @@ class MapSurface:
         """Return the surface of an array in memory, shape (height, width). [m]"""
         if r.shape != grid.shape:
             raise InputError(f"relief: expected shape {grid.shape}, found {r.shape}.")
-
-        def fetch(column: int, row: int, width: int, height: int) -> ReliefArray:
-            out = np.full((height, width), np.nan, np.float32)
-            c0, r0 = max(column, 0), max(row, 0)
-            c1, r1 = min(column + width, grid.width), min(row + height, grid.height)
-            if c1 > c0 and r1 > r0:
-                out[r0 - row : r1 - row, c0 - column : c1 - column] = r[r0:r1, c0:c1]
-            return out
-
-        return cls(grid, fetch)
+        relief = r.astype(np.float32, copy=False)
+        return cls(grid, lambda *window: cut(relief, window, np.nan))
 
     def window(self, grid: Grid) -> ReliefArray:
         """Return relief at the pixel centres of a grid.
 
         Bilinear on slopes, nearest across steps and beside holes, so that edges stay sharp.
         """
-        column, row = grid.offset_in(self.grid)
-        same_gsd = abs(grid.gsd / self.grid.gsd - 1) * max(grid.shape) < SAME_PIXEL
-        if same_gsd and max(abs(column - round(column)), abs(row - round(row))) < 10 * SAME_PIXEL:
-            return self._fetch(round(column), round(row), grid.width, grid.height)
-        return self._resample(grid, column, row)
+        offset = grid.whole_offset_in(self.grid)
+        if offset is not None:
+            return self._fetch(*offset, grid.width, grid.height)
+        return self._resample(grid)
 
     def extremes(self, bounds: Bounds) -> tuple[float, float]:
         """Return the extremes of the blocks that touch the box."""
@@ -122,42 +114,29 @@ class MapSurface:
     def _scan(self) -> tuple[FloatArray, FloatArray]:
         """Return the extremes of every block."""
         rows, columns = (-(-length // _BLOCK) for length in self.grid.shape)
-        lowest = np.full((rows, columns), np.nan)
-        highest = np.full((rows, columns), np.nan)
-        strip = 4 * _BLOCK  # whole tiles of the file at a time
-        for top in range(0, self.grid.height, strip):
-            height = min(strip, self.grid.height - top)
-            values = self._fetch(0, top, self.grid.width, height)
-            for first in range(0, height, _BLOCK):
-                block = values[first : first + _BLOCK]
-                starts = np.arange(0, self.grid.width, _BLOCK)
-                index = (top + first) // _BLOCK
-                # fmin and fmax skip NaN without a warning where all is NaN.
-                lowest[index] = np.fmin.reduceat(np.fmin.reduce(block, axis=0), starts)
-                highest[index] = np.fmax.reduceat(np.fmax.reduce(block, axis=0), starts)
+        lowest, highest = np.full((2, rows, columns), np.nan)
+        for top in range(0, rows, 4):  # whole tiles of the file at a time
+            count = min(4, rows - top)
+            values = self._fetch(0, top * _BLOCK, columns * _BLOCK, count * _BLOCK)
+            blocks = values.reshape(count, _BLOCK, columns, _BLOCK)
+            # fmin and fmax skip NaN without a warning where all is NaN.
+            for result, extreme in ((lowest, np.fmin), (highest, np.fmax)):
+                result[top : top + count] = extreme.reduce(extreme.reduce(blocks, axis=1), axis=-1)
         if np.isinf(lowest).any() or np.isinf(highest).any():
             raise InputError("the relief map holds infinite values; mark unknown pixels as NaN.")
         return lowest, highest
 
-    def _resample(self, grid: Grid, column: float, row: float) -> ReliefArray:
+    def _resample(self, grid: Grid) -> ReliefArray:
         import cv2
 
-        step = grid.gsd / self.grid.gsd
-        c0, r0 = math.floor(column) - 1, math.floor(row) - 1
-        c1 = math.ceil(column + (grid.width - 1) * step) + 2
-        r1 = math.ceil(row + (grid.height - 1) * step) + 2
-        patch = np.ascontiguousarray(self._fetch(c0, r0, c1 - c0, r1 - r0))
-        x = (column - c0 + step * np.arange(grid.width)).astype(np.float32)
-        y = (row - r0 + step * np.arange(grid.height)).astype(np.float32)
-        map_x = np.broadcast_to(x, grid.shape).copy()
-        map_y = np.broadcast_to(y[:, None], grid.shape).copy()
-        near = cv2.remap(patch, map_x, map_y, cv2.INTER_NEAREST)
-        smooth = cv2.remap(patch, map_x, map_y, cv2.INTER_LINEAR)
+        window, columns, rows = grid.resampling(self.grid, 1)
+        patch = np.ascontiguousarray(self._fetch(*window))
+        near = cv2.remap(patch, columns, rows, cv2.INTER_NEAREST)
+        smooth = cv2.remap(patch, columns, rows, cv2.INTER_LINEAR)
         # Steps and holes of the map, as seen by the four neighbours of a position.
         known = np.where(np.isnan(patch), np.float32(1e6), patch)
         corner = np.ones((2, 2), np.uint8)
         spread = cv2.dilate(known, corner, anchor=(0, 0)) - cv2.erode(known, corner, anchor=(0, 0))
-        rough = (spread > _STEP * self.grid.gsd)[
-            np.ix_(np.floor(y).astype(int), np.floor(x).astype(int))
-        ]
+        steps = spread > _STEP * self.grid.gsd
+        rough = steps[np.ix_(rows[:, 0].astype(int), columns[0].astype(int))]
         return np.asarray(np.where(rough | np.isnan(smooth), near, smooth), np.float32)

@@ -12,13 +12,13 @@ import numpy as np
 
 from bifocal.files.images import ImageInfo, image_info, read_image, to_eight_bit
 from bifocal.model.lens import Lens
-from bifocal.orientation.absolute_orientation import PhotoInput, set_up, silent
-from bifocal.orientation.alignment import Alignment, Control, Interior, SiteMeasures
+from bifocal.orientation.absolute_orientation import orient_pair
+from bifocal.orientation.alignment import Alignment, make_alignment, with_files
 from bifocal.orientation.alignment_picture import write_alignment_picture
-from bifocal.orientation.control import read_control, read_lengths
-from bifocal.orientation.oriented_pair import make_alignment, with_files
-from bifocal.orientation.photo_lens import lens_of_photo
-from photocore.arrays import ByteArray, FloatArray
+from bifocal.orientation.control_points import Control, SiteMeasures, read_control, read_lengths
+from bifocal.orientation.interior_orientation import Interior, lens_of_photo
+from bifocal.orientation.orientation_stages import PhotoInput, silent
+from photocore.arrays import FloatArray
 from photocore.errors import InputError
 from photocore.output import check_writable
 
@@ -31,7 +31,7 @@ SIGMA_NOMINAL, SIGMA_EQUIVALENT = 0.02, 0.04
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class LensData:
+class KnownLens:
     """What is known of one photo's lens; None where the EXIF data are to be used.
 
     Attributes
@@ -56,7 +56,7 @@ class AlignOptions:
 
     Attributes
     ----------
-    lenses : pair of LensData
+    lenses : pair of KnownLens
     site : SiteMeasures
     auto : bool
     control, lengths : Path or None
@@ -69,7 +69,7 @@ class AlignOptions:
         Unit of the control coordinates; empty: as the headings say, else metres.
     """
 
-    lenses: tuple[LensData, LensData] = field(default_factory=lambda: (LensData(), LensData()))
+    lenses: tuple[KnownLens, KnownLens] = field(default_factory=lambda: (KnownLens(), KnownLens()))
     site: SiteMeasures = field(default_factory=SiteMeasures)
     auto: bool = False
     control: Path | None = None
@@ -106,24 +106,26 @@ def align_photos(
         if path is not None:
             check_writable(path, overwrite=overwrite)
     infos = image_info(far), image_info(near)
-    interiors = _interiors(infos, options.lenses)
-    control = _control(options, interiors[0].image_size)
-    photos = tuple(
-        PhotoInput(grey=_grey(info.path), interior=interior, name=info.path.name)
-        for info, interior in zip(infos, interiors, strict=True)
+    first, second = (
+        PhotoInput(
+            grey=to_eight_bit(read_image(info.path, grey=True)),
+            interior=_interior(info, known, number),
+            name=info.path.name,
+        )
+        for number, (info, known) in enumerate(zip(infos, options.lenses, strict=True), start=1)
     )
-    given = (photos[0], photos[1])
-    made = set_up(given, control=control, site=options.site, step=step)
-    paths, ordered = (far, near), given
-    if made.exchanged:
-        paths, ordered = (near, far), (given[1], given[0])
+    control = _control(options, (first.interior.image_size, second.interior.image_size))
+    oriented = orient_pair((first, second), control=control, site=options.site, step=step)
+    paths, ordered = (far, near), (first, second)
+    if oriented.exchanged:
+        paths, ordered = (near, far), (second, first)
     line = None
     if options.line is not None:
         line = (np.array(options.line[0], dtype=np.float64).reshape(2, 2), options.line[1])
-    alignment = make_alignment(made, ordered, way=way, direction=line)
+    alignment = make_alignment(oriented, ordered, way=way, direction=line)
     if picture is not None:
         step("drawing the picture")
-        images: list[ByteArray] = [photo.grey for photo in ordered if photo.grey is not None]
+        images = [photo.grey for photo in ordered if photo.grey is not None]
         write_alignment_picture(picture, alignment, (images[0], images[1]), overwrite=overwrite)
     names = (_relative(paths[0], out.parent), _relative(paths[1], out.parent))
     lenses = _write_lenses(alignment, out, overwrite=overwrite)
@@ -174,12 +176,8 @@ def _way(options: AlignOptions) -> tuple[str, AlignOptions]:
 def _check_metres(options: AlignOptions) -> None:
     """Refuse distances and lengths in millimetres."""
     site = options.site
-    given = {
-        "--distance1": site.distance1,
-        "--distance2": site.distance2,
-        "--delta-d": site.delta_d,
-        "--length": options.length[1] if options.length else None,
-    }
+    given = {"--distance1": site.distance1, "--distance2": site.distance2}
+    given |= {"--delta-d": site.delta_d, "--length": options.length and options.length[1]}
     for name, value in given.items():
         if value and value > FARTHEST:
             raise InputError(
@@ -188,18 +186,7 @@ def _check_metres(options: AlignOptions) -> None:
             )
 
 
-def _interiors(
-    infos: tuple[ImageInfo, ImageInfo], lenses: tuple[LensData, LensData]
-) -> tuple[Interior, Interior]:
-    """Return both interior orientations."""
-    first, second = (
-        _interior(info, data, number)
-        for number, (info, data) in enumerate(zip(infos, lenses, strict=True), start=1)
-    )
-    return first, second
-
-
-def _interior(info: ImageInfo, data: LensData, number: int) -> Interior:
+def _interior(info: ImageInfo, data: KnownLens, number: int) -> Interior:
     """Return the best that is known of a photo's interior orientation."""
     if data.lens is not None:
         lens = lens_of_photo(Lens.read(data.lens), info.size, orientation=info.orientation)
@@ -207,48 +194,37 @@ def _interior(info: ImageInfo, data: LensData, number: int) -> Interior:
     pitch = data.pixel_size
     if pitch is None and data.sensor_width is not None:
         pitch = data.sensor_width / max(info.size)
+    exif = pitch or info.focal_plane_pitch
     if data.focal is not None:
-        pitch = pitch or info.focal_plane_pitch or _pitch_from_exif(info)
+        pitch = exif
+        if pitch is None and info.focal_length and info.focal_pixels:
+            # True and equivalent focal length together tell the pixel size.
+            pitch = info.focal_length / info.focal_pixels
         if pitch is None:
             raise InputError(
                 f"--focal{number} {data.focal:g} mm says nothing without the size of the sensor, "
                 f"which the EXIF data of {info.path.name} do not tell. Give --sensor-width (36 for "
                 "full frame, about 23 for APS-C) or --pixel-size."
             )
-        return Interior.from_focal(
+        focal, sigma, source = (
             data.focal / pitch,
-            image_size=info.size,
-            sigma=SIGMA_NOMINAL,
-            source=f"--focal{number} {data.focal:g} mm",
-            pixel_size=pitch,
+            SIGMA_NOMINAL,
+            f"--focal{number} {data.focal:g} mm",
         )
-    if info.focal_length and (pitch or info.focal_plane_pitch):
-        pitch = pitch or info.focal_plane_pitch or 1.0
-        return Interior.from_focal(
-            info.focal_length / pitch,
-            image_size=info.size,
-            sigma=SIGMA_NOMINAL,
-            source=f"EXIF, {info.focal_length:g} mm",
-            pixel_size=pitch,
-        )
-    if info.focal_pixels:
-        return Interior.from_focal(
-            info.focal_pixels,
-            image_size=info.size,
-            sigma=SIGMA_EQUIVALENT,
-            source=f"EXIF, {info.focal_length_35:g} mm equivalent",
-        )
-    return Interior.unknown(info.size)
+    elif info.focal_length and exif:
+        pitch, sigma, source = exif, SIGMA_NOMINAL, f"EXIF, {info.focal_length:g} mm"
+        focal = info.focal_length / pitch
+    elif info.focal_pixels:
+        focal, sigma, pitch = info.focal_pixels, SIGMA_EQUIVALENT, None
+        source = f"EXIF, {info.focal_length_35:g} mm equivalent"
+    else:
+        return Interior.unknown(info.size)
+    return Interior.from_focal(
+        focal, image_size=info.size, sigma=sigma, source=source, pixel_size=pitch
+    )
 
 
-def _pitch_from_exif(info: ImageInfo) -> float | None:
-    """Return the pixel size that true and equivalent focal length together tell. [mm]"""
-    if info.focal_length and info.focal_pixels:
-        return info.focal_length / info.focal_pixels
-    return None
-
-
-def _control(options: AlignOptions, size: tuple[int, int]) -> Control:
+def _control(options: AlignOptions, sizes: tuple[tuple[int, int], tuple[int, int]]) -> Control:
     """Return the control points and lengths the options name."""
     control = Control()
     if options.control is not None:
@@ -264,8 +240,9 @@ def _control(options: AlignOptions, size: tuple[int, int]) -> Control:
         control = read_lengths(options.lengths, control)
     if options.length is not None:
         control = _with_length(control, options.length, options.site.sigma_control)
-    for pixels, number in ((control.pixels1, 1), (control.pixels2, 2)):
-        _check_inside(control, pixels, size if number == 1 else None)
+    picks = (control.pixels1, control.pixels2)
+    for pixels, size, photo in zip(picks, sizes, ("far", "near"), strict=True):
+        _check_inside(control, pixels, size, photo)
     return control
 
 
@@ -275,35 +252,28 @@ def _with_length(
     """Return control with two more points on the wall and the length between them."""
     count = len(control.ids)
     ends = np.array(length[0], dtype=np.float64).reshape(2, 2)
-    nothing = np.full((2, 2), np.nan)
-    xyz = np.array([[np.nan, np.nan, 0.0]] * 2)
+    sigmas = np.full((2, 3), max(sigma, SIGMA_ON_WALL))
     return Control(
         ids=(*control.ids, "length, one end", "length, other end"),
-        xyz=np.concatenate([control.xyz, xyz]),
-        sigma=np.concatenate([control.sigma, np.full((2, 3), max(sigma, SIGMA_ON_WALL))]),
+        xyz=np.concatenate([control.xyz, [[np.nan, np.nan, 0.0]] * 2]),
+        sigma=np.concatenate([control.sigma, sigmas]),
         pixels1=np.concatenate([control.pixels1, ends]),
-        pixels2=np.concatenate([control.pixels2, nothing]),
+        pixels2=np.concatenate([control.pixels2, np.full((2, 2), np.nan)]),
         lengths=(*control.lengths, (count, count + 1, length[1])),
     )
 
 
-def _check_inside(control: Control, pixels: FloatArray, size: tuple[int, int] | None) -> None:
-    """Refuse picks far outside the photo: they belong to another photo or another size."""
-    if size is None:
-        return
+def _check_inside(control: Control, pixels: FloatArray, size: tuple[int, int], photo: str) -> None:
+    """Refuse picks outside the photo: they belong to another photo or another size."""
     width, height = size
     outside = (pixels < -0.5).any(axis=1) | (pixels > [width, height]).any(axis=1)
     if outside.any():
         name = control.ids[int(np.flatnonzero(outside)[0])]
         raise InputError(
-            f'control point "{name}" and {int(outside.sum()) - 1} more lie outside the far photo '
-            f"({width} x {height} px). Were the picks made on a photo of another size, or are far "
-            "and near exchanged?"
+            f'control point "{name}" and {int(outside.sum()) - 1} more lie outside the '
+            f"{photo} photo ({width} x {height} px). Were the picks made on a photo of another "
+            "size, or are far and near exchanged?"
         )
-
-
-def _grey(path: Path) -> ByteArray:
-    return np.asarray(to_eight_bit(read_image(path, grey=True)), dtype=np.uint8)
 
 
 def _relative(path: Path, folder: Path) -> str:
@@ -319,12 +289,9 @@ def _write_lenses(
 ) -> tuple[str | None, str | None]:
     """Write the lens files the pair needs beside it and return their names."""
     stem = out.name.removesuffix(".json").removesuffix(".pair")
-    names: list[str | None] = []
-    for number, photo in enumerate((alignment.pair.image1, alignment.pair.image2), start=1):
-        if photo.lens is None:
-            names.append(None)
-            continue
-        name = f"{stem}.lens{number}.json"
-        photo.lens.write(out.parent / name, overwrite=overwrite)
-        names.append(name)
+    names: list[str | None] = [None, None]
+    for index, photo in enumerate((alignment.pair.image1, alignment.pair.image2)):
+        if photo.lens is not None:
+            names[index] = f"{stem}.lens{index + 1}.json"
+            photo.lens.write(out.parent / f"{stem}.lens{index + 1}.json", overwrite=overwrite)
     return names[0], names[1]

@@ -1,199 +1,34 @@
-"""What goes into setting up a pair, and what comes out: all plain, checked data."""
+"""From an oriented pair to a pair file: axes, photos, lens files, standard deviations, words."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, replace
 from typing import Any
 
+import cv2
 import numpy as np
 
 from bifocal.model.lens import Lens
-from bifocal.model.pair import Pair
-from photocore.arrays import BoolArray, FloatArray
-from photocore.errors import InputError
+from bifocal.model.pair import Pair, Photo, apply_homography
+from bifocal.orientation.interior_orientation import Interior
+from bifocal.orientation.orientation_report import orientation_in_words
+from bifocal.orientation.orientation_stages import OrientedPair, PhotoInput
+from bifocal.orientation.pair_adjustment import AdjustedPair
+from bifocal.orientation.pair_observations import NAMES, at
+from bifocal.orientation.reference_plane import rivals
+from bifocal.orientation.tie_points import robust_sigma
+from photocore.arrays import BoolArray, ByteArray, FloatArray
+from photocore.camera import Pinhole, camera_matrix, plane_from_pixel
+from photocore.distortion import RadialDivision
 
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Interior:
-    """What is known of a photo's interior orientation before it is set up.
-
-    Attributes
-    ----------
-    focal : float
-        Principal distance in columns. [px]
-    sigma_focal : float
-        Its relative standard deviation: 0.0005 for a calibration, 0.5 for "a normal lens".
-    centre : ndarray, shape (2,)
-        Principal point (column, row). [px]
-    sigma_centre : float
-        Standard deviation of either coordinate. [px]
-    aspect, sigma_aspect : float
-        fy / fx and its standard deviation.
-    image_size : tuple of int
-        Width and height. [px]
-    source : str
-        Where it comes from, for the report.
-    lens : Lens or None
-        Distortion of the photo's pixels.
-    sigma_radial : float
-        Standard deviation of an unknown radial distortion k (relative shift at one principal
-        distance off the axis); zero keeps k = 0.
-    pixel_size : float or None
-        [mm]
-    is_calibrated : bool
-        Whether it comes from a lens file.
-    """
-
-    focal: float
-    sigma_focal: float
-    centre: FloatArray
-    sigma_centre: float
-    image_size: tuple[int, int]
-    source: str
-    aspect: float = 1.0
-    sigma_aspect: float = 0.001
-    lens: Lens | None = None
-    sigma_radial: float = 0.0
-    pixel_size: float | None = None
-    is_calibrated: bool = False
-
-    @classmethod
-    def from_lens(cls, lens: Lens, *, source: str) -> Interior:
-        """Return the interior orientation of a calibrated lens (already of the photo's format)."""
-        matrix = lens.camera_matrix
-        distorted = bool(np.any(lens.coefficients)) or lens.model == "fisheye"
-        return cls(
-            focal=float(matrix[0, 0]),
-            sigma_focal=0.0005,
-            centre=np.array(matrix[:2, 2]),
-            sigma_centre=0.0004 * float(matrix[0, 0]),
-            image_size=lens.image_size,
-            source=source,
-            aspect=float(matrix[1, 1] / matrix[0, 0]),
-            sigma_aspect=0.0001,
-            lens=lens if distorted else None,
-            is_calibrated=True,
-        )
-
-    @classmethod
-    def from_focal(
-        cls,
-        focal: float,
-        *,
-        image_size: tuple[int, int],
-        sigma: float,
-        source: str,
-        pixel_size: float | None = None,
-    ) -> Interior:
-        """Return what a focal length alone tells: the principal point near the photo's middle.
-
-        Parameters
-        ----------
-        focal : float
-            [px]
-        image_size : tuple of int
-            [px]
-        sigma : float
-            Relative standard deviation of the focal length.
-        source : str
-        pixel_size : float, optional
-            [mm]
-        """
-        width, height = image_size
-        return cls(
-            focal=focal,
-            sigma_focal=sigma,
-            centre=np.array([(width - 1) / 2, (height - 1) / 2]),
-            # Principal points of ordinary lenses scatter by half a per cent of the diagonal.
-            sigma_centre=0.006 * float(np.hypot(width, height)),
-            image_size=image_size,
-            source=source,
-            pixel_size=pixel_size,
-        )
-
-    @classmethod
-    def unknown(cls, image_size: tuple[int, int]) -> Interior:
-        """Return a normal lens: 1.2 times the longer side, within a factor of 1.65."""
-        return cls.from_focal(
-            1.2 * max(image_size),
-            image_size=image_size,
-            sigma=0.5,
-            source="unknown, a normal lens assumed",
-        )
-
-    @property
-    def is_assumed(self) -> bool:
-        """Whether nothing but experience stands behind the principal distance."""
-        return self.sigma_focal > 0.15
-
-    def ideal(self, pixels: FloatArray) -> FloatArray:
-        """Return pixels freed of the lens's distortion. [px]"""
-        return pixels.copy() if self.lens is None else np.asarray(self.lens.undistort(pixels))
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Control:
-    """Control points: what was measured on site, and where it is seen.
-
-    Attributes
-    ----------
-    ids : tuple of str
-    xyz : ndarray, shape (n, 3)
-        X, Y, r in the plane frame; NaN where not measured. [m]
-    sigma : ndarray, shape (n, 3)
-        Standard deviations of xyz. [m]
-    pixels1, pixels2 : ndarray, shape (n, 2)
-        Picks in the far and the near photo; NaN where not picked. [px]
-    lengths : tuple of (int, int, float)
-        Taped distances between two of the points: indices and metres.
-    """
-
-    ids: tuple[str, ...] = ()
-    xyz: FloatArray = field(default_factory=lambda: np.zeros((0, 3)))
-    sigma: FloatArray = field(default_factory=lambda: np.zeros((0, 3)))
-    pixels1: FloatArray = field(default_factory=lambda: np.zeros((0, 2)))
-    pixels2: FloatArray = field(default_factory=lambda: np.zeros((0, 2)))
-    lengths: tuple[tuple[int, int, float], ...] = ()
-
-    def __post_init__(self) -> None:
-        count = len(self.ids)
-        shapes = [self.xyz.shape, self.sigma.shape, self.pixels1.shape, self.pixels2.shape]
-        if shapes != [(count, 3), (count, 3), (count, 2), (count, 2)]:
-            raise InputError(f"control: {count} ids but arrays of shape {shapes}.")
-
-    def exchanged(self) -> Control:
-        """Return the same points with far and near photo exchanged."""
-        return Control(
-            ids=self.ids,
-            xyz=self.xyz,
-            sigma=self.sigma,
-            pixels1=self.pixels2,
-            pixels2=self.pixels1,
-            lengths=self.lengths,
-        )
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class SiteMeasures:
-    """Distances measured on site, None where not measured [m], and a spot of the wall.
-
-    ``wall`` is a pixel (column, row) of the far photo that shows the wall. [px]
-    """
-
-    distance1: float | None = None
-    distance2: float | None = None
-    delta_d: float | None = None
-    sigma: float = 0.02
-    parallel: bool = False
-    sigma_control: float = 0.003
-    sigma_pick: float = 0.5
-    wall: tuple[float, float] | None = None
+#: Façade lines farther than this from the photo's own upright are not asked. [deg]
+WIDEST = 20.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Alignment:
-    """A pair set up, with what stands behind it.
+    """A pair oriented, with what stands behind it.
 
     Attributes
     ----------
@@ -203,6 +38,8 @@ class Alignment:
     deviations : mapping of str to float
         Standard deviations: ``distance1`` ... [m], ``focal1`` ... [px], ``scale`` (relative).
     control_ids : tuple of str
+    control_positions : ndarray, shape (n, 2)
+        Where the far photo shows them on the plane. [m]
     control_residuals : ndarray, shape (n, 4)
         Observed minus computed column 1, row 1, column 2, row 2; NaN where not picked. [px]
     control_used : ndarray of bool, shape (n,)
@@ -210,8 +47,6 @@ class Alignment:
         Each point's misfit over its standard deviation.
     tie1, tie2 : ndarray, shape (m, 2)
         Homologous points found automatically, raw pixels. [px]
-    tie_relief : ndarray, shape (m,)
-        Their relief. [m]
     wall : ndarray of bool, shape (m,)
         Which of them lie on the wall.
     setup : mapping
@@ -226,13 +61,253 @@ class Alignment:
     way: str
     deviations: Mapping[str, float]
     control_ids: tuple[str, ...]
+    control_positions: FloatArray
     control_residuals: FloatArray
     control_used: BoolArray
     control_test: FloatArray
     tie1: FloatArray
     tie2: FloatArray
-    tie_relief: FloatArray
     wall: BoolArray
     setup: Mapping[str, Any]
     words: tuple[str, ...]
     remarks: tuple[str, ...] = ()
+
+
+def make_alignment(
+    oriented: OrientedPair,
+    photos: tuple[PhotoInput, PhotoInput],
+    *,
+    way: str,
+    direction: tuple[FloatArray, bool] | None = None,
+) -> Alignment:
+    """Return the pair of adjusted cameras with its diagnostics; photo files are not yet named.
+
+    Parameters
+    ----------
+    oriented : OrientedPair
+    photos : pair of PhotoInput
+        Far one first, as in ``oriented``.
+    way : str
+        ``control``, ``site`` or ``auto``.
+    direction : (pixels (2, 2), is_vertical), optional
+        Two points of photo 1 on a level or upright line of the wall, where the frame is free.
+    """
+    observations, adjusted = oriented.observations, oriented.adjusted
+    cameras = adjusted.cameras
+    if observations.free_datum:
+        cameras, note = _in_facade_axes(cameras, photos[0], direction)
+        oriented = replace(oriented, assumed=(*oriented.assumed, note))
+    far, near = (
+        _photo(camera, interior, _lens_of(interior, k))
+        for camera, interior, k in zip(
+            cameras, observations.interiors, adjusted.radial, strict=True
+        )
+    )
+    deviations = standard_deviations(adjusted)
+    others = rivals(oriented.faces)
+    if others and not oriented.wall_named:
+        deviations["relief_offset"] = max(abs(face.offset) for face in others)
+    used = observations.tie_used
+    sigma_tie = robust_sigma(adjusted.tie_misfit[used]) if used.any() else observations.sigma_pick
+    words = orientation_in_words(cameras, deviations, sigma_px=max(sigma_tie, 0.05))
+    first, second = observations.interiors
+    homography = plane_from_pixel(cameras[0])
+    return Alignment(
+        pair=Pair(image1=far, image2=near),
+        way=way,
+        deviations=deviations,
+        control_ids=observations.control.ids,
+        control_positions=apply_homography(homography, observations.control.pixels1),
+        control_residuals=adjusted.control_residuals,
+        control_used=observations.pick_used,
+        control_test=adjusted.control_test,
+        tie1=first.raw(observations.tie1[used]),
+        tie2=second.raw(observations.tie2[used]),
+        wall=observations.wall[used],
+        setup=_diagnostics(oriented, cameras, deviations, way, words, sigma_tie),
+        words=words,
+        remarks=oriented.remarks,
+    )
+
+
+def _in_facade_axes(
+    cameras: tuple[Pinhole, Pinhole], photo: PhotoInput, direction: tuple[FloatArray, bool] | None
+) -> tuple[tuple[Pinhole, Pinhole], str]:
+    """Return cameras in axes along the façade, origin in the far nadir, and what they rest on."""
+    far = cameras[0]
+    if direction is not None:
+        pixels, vertical = direction
+        ends = apply_homography(plane_from_pixel(far), photo.interior.ideal(pixels))
+        along = ends[1] - ends[0]
+        angle = float(np.arctan2(along[1], along[0])) - (np.pi / 2 if vertical else 0.0)
+        turn = (angle + np.pi / 2) % np.pi - np.pi / 2
+        note = f"{'Y' if vertical else 'X'} axis along the line given"
+    else:
+        turn, share = (
+            (0.0, 0.0) if photo.grey is None else _facade_turn(photo.grey, far, photo.interior)
+        )
+        note = "axes along the façade's straight lines"
+        if share < 0.25:
+            turn, note = 0.0, "Y axis as upright as the far photo"
+    cosine, sine = np.cos(turn), np.sin(turn)
+    axes = np.array([[cosine, sine, 0.0], [-sine, cosine, 0.0], [0.0, 0.0, 1.0]])
+    origin = far.centre * [1.0, 1.0, 0.0]
+    return (far.moved(axes, origin), cameras[1].moved(axes, origin)), note
+
+
+def _facade_turn(image: ByteArray, camera: Pinhole, interior: Interior) -> tuple[float, float]:
+    """Return the turn that makes the façade's lines upright and level, and their agreement.
+
+    Parameters
+    ----------
+    image : ndarray, shape (h, w)
+    camera : Pinhole
+    interior : Interior
+
+    Returns
+    -------
+    turn : float
+        Counter-clockwise turn to apply to the plane frame's axes. [rad]
+    share : float
+        Share of line length within 1° of it or of its perpendicular; below 0.25 trust nothing.
+    """
+    reduction = max(1.0, float(np.sqrt(image.size / 1.5e6)))
+    size = (round(image.shape[1] / reduction), round(image.shape[0] / reduction))
+    small = cv2.resize(image, size, interpolation=cv2.INTER_AREA)
+    lines = cv2.createLineSegmentDetector().detect(small)[0]
+    if lines is None:
+        return 0.0, 0.0
+    ends: FloatArray = (np.asarray(lines, dtype=np.float64).reshape(-1, 2) + 0.5) * reduction - 0.5
+    ends = apply_homography(plane_from_pixel(camera), interior.ideal(ends)).reshape(-1, 2, 2)
+    reach = 6 * camera.centre[2]
+    ends = ends[(np.linalg.norm(ends - camera.centre[:2], axis=2) < reach).all(axis=1)]
+    along = ends[:, 1] - ends[:, 0]
+    length = np.hypot(along[:, 0], along[:, 1])
+    degrees = (np.rad2deg(np.arctan2(along[:, 1], along[:, 0])) + 45.0) % 90.0 - 45.0
+    near = (np.abs(degrees) < WIDEST) & (length > 0.01 * camera.centre[2])
+    degrees, weight = degrees[near], length[near] ** 1.5
+    if len(degrees) < 20:
+        return 0.0, 0.0
+    trial = np.arange(-WIDEST, WIDEST, 0.05)
+    votes = np.exp(-0.5 * ((trial[:, None] - degrees) / 0.4) ** 2) @ weight
+    best = trial[votes.argmax()]
+    for _ in range(3):
+        close = np.abs(degrees - best) < 1.0
+        best = float(np.average(degrees[close], weights=weight[close]))
+    return float(np.deg2rad(best)), float(weight[close].sum() / weight.sum())
+
+
+def _lens_of(interior: Interior, k: float) -> Lens | None:
+    """Return the lens the pair's pixels need: the file's, or the estimated radial one."""
+    if interior.lens is not None or k == 0:
+        return interior.lens
+    # r_u = r_d / (1 + k r_d²) turned round: r_d / r_u as an even polynomial of r_u.
+    reach = np.hypot(*interior.image_size) / 2 / interior.focal
+    seen = np.linspace(0, reach, 200)[1:]
+    along = np.column_stack([seen, np.zeros_like(seen)])
+    ideal = RadialDivision(k, np.zeros(2), 1.0).undistort(along)[:, 0]
+    powers = np.stack([ideal**2, ideal**4, ideal**6], axis=1)
+    terms = np.linalg.lstsq(powers * ideal[:, None], seen - ideal, rcond=None)[0]
+    return Lens(
+        camera_matrix=camera_matrix(interior.focal, 1.0, *interior.centre),
+        coefficients=np.array([terms[0], terms[1], 0.0, 0.0, terms[2]]),
+        image_size=interior.image_size,
+        source="estimated from the pair's common points",
+    )
+
+
+def _photo(camera: Pinhole, interior: Interior, lens: Lens | None) -> Photo:
+    pitch = interior.pixel_size
+    return Photo(
+        plane_from_pixel=plane_from_pixel(camera),
+        nadir=camera.centre[:2],
+        distance=float(camera.centre[2]),
+        lens=lens,
+        principal_distance=None if pitch is None else float(camera.matrix[0, 0]) * pitch,
+        pixel_size=pitch,
+    )
+
+
+def standard_deviations(adjusted: AdjustedPair) -> dict[str, float]:
+    """Return standard deviations of what a surveyor asks for."""
+    out: dict[str, float] = {}
+    # Of the relative scale of the photos on the wall, ln f2 - ln d2 - ln f1 + ln d1, and of
+    # 1/d2 - 1/d1, which relief is divided by.
+    by_scale, by_relief = np.zeros(len(NAMES)), np.zeros(len(NAMES))
+    for number, (camera, sign) in enumerate(
+        zip(adjusted.cameras, (-1.0, 1.0), strict=True), start=1
+    ):
+        distance = float(camera.centre[2])
+        nadir = np.hypot(adjusted.sigma("X", number), adjusted.sigma("Y", number))
+        tilt = np.hypot(adjusted.sigma("turn X", number), adjusted.sigma("turn Y", number))
+        out[f"distance{number}"] = adjusted.sigma("Z", number)
+        out[f"nadir{number}"] = float(nadir / np.sqrt(2))
+        out[f"focal{number}"] = adjusted.sigma("focal length", number) * camera.matrix[0, 0]
+        out[f"tilt{number}_deg"] = float(np.rad2deg(tilt / np.sqrt(2)))
+        by_scale[at("focal length", number)] = sign
+        by_scale[at("Z", number)] = -sign / distance
+        by_relief[at("Z", number)] = -sign / distance**2
+    d1, d2 = (float(camera.centre[2]) for camera in adjusted.cameras)
+    scale, relief = (
+        float(np.sqrt(np.abs(row @ adjusted.covariance @ row))) for row in (by_scale, by_relief)
+    )
+    return out | {"scale": scale, "relief_scale": relief / abs(1 / d2 - 1 / d1)}
+
+
+def _diagnostics(
+    oriented: OrientedPair,
+    cameras: tuple[Pinhole, Pinhole],
+    deviations: Mapping[str, float],
+    way: str,
+    words: tuple[str, ...],
+    sigma_tie: float,
+) -> dict[str, Any]:
+    """Return the free diagnostics of the pair file."""
+    observations, adjusted = oriented.observations, oriented.adjusted
+    control = observations.control
+    out: dict[str, Any] = {
+        "way": way,
+        "standard_deviations": dict(deviations),
+        "sigma0": adjusted.sigma0,
+        "focal_px": [float(camera.matrix[0, 0]) for camera in cameras],
+        "principal_point_px": [camera.matrix[:2, 2] for camera in cameras],
+        "interior": [interior.source for interior in observations.interiors],
+        "common_points": {
+            "count": int(observations.tie_used.sum()),
+            "on_wall": int((observations.wall & observations.tie_used).sum()),
+            "sigma_px": sigma_tie,
+        },
+        "planes": [
+            {"offset": face.offset, "share": face.share, "pixel": list(face.pixel)}
+            for face in oriented.faces
+        ],
+        "assumed": oriented.assumed,
+        "words": list(words),
+    }
+    if control.ids:
+        out["control"] = [
+            {
+                "id": name,
+                "residual_px": adjusted.control_residuals[index],
+                "test": adjusted.control_test[index],
+                "used": bool(observations.pick_used[index]),
+            }
+            for index, name in enumerate(control.ids)
+        ]
+    return out
+
+
+def with_files(
+    alignment: Alignment, names: tuple[str, str], lenses: tuple[str | None, str | None]
+) -> Alignment:
+    """Return the alignment with photo and lens files named, relative to the pair file."""
+    photos = [
+        replace(photo, file=name, extra={**photo.extra, **({"lens": lens} if lens else {})})
+        for photo, name, lens in zip(
+            (alignment.pair.image1, alignment.pair.image2), names, lenses, strict=True
+        )
+    ]
+    pair = replace(
+        alignment.pair, image1=photos[0], image2=photos[1], extra={"setup": alignment.setup}
+    )
+    return replace(alignment, pair=pair)

@@ -24,7 +24,6 @@ class Features:
     pixels : ndarray, shape (n, 2)
     size : ndarray, shape (n,)
         Diameter. [px]
-    strength : ndarray, shape (n,)
     descriptors : ndarray, shape (n, 128), float32
     reduction : float
         Full pixels per pixel searched.
@@ -32,7 +31,6 @@ class Features:
 
     pixels: FloatArray
     size: FloatArray
-    strength: FloatArray
     descriptors: NDArray[np.float32]
     reduction: float
 
@@ -74,21 +72,13 @@ def find_features(
     detector: Any = cv2.SIFT.create(nfeatures=limit, contrastThreshold=0.02)
     keypoints, descriptors = detector.detectAndCompute(small, None)
     if not keypoints:
-        empty = np.zeros(0)
-        return Features(
-            pixels=np.zeros((0, 2)),
-            size=empty,
-            strength=empty,
-            descriptors=np.zeros((0, 128), np.float32),
-            reduction=reduction,
-        )
-    points = np.array([k.pt for k in keypoints], dtype=np.float64)
+        descriptors = np.zeros((0, 128))
+    points = np.array([k.pt for k in keypoints], dtype=np.float64).reshape(-1, 2)
     # Square root of L1-normalised SIFT: Euclidean distance then is Hellinger's.
     descriptors = descriptors / np.maximum(descriptors.sum(axis=1, keepdims=True), 1e-9)
     return Features(
         pixels=(points + 0.5) * factor - 0.5,
         size=np.array([k.size for k in keypoints]) * factor.mean(),
-        strength=np.array([k.response for k in keypoints]),
         descriptors=np.sqrt(descriptors).astype(np.float32),
         reduction=reduction,
     )
@@ -234,18 +224,18 @@ def sharpness(image: ByteArray) -> float:
         part = part[(part.shape[0] - band) // 2 :][:band]
     grey = part.astype(np.float32)
 
-    def gradient(image: NDArray[np.float32]) -> NDArray[np.float32]:
-        dx = np.abs(image[1:-1, 2:] - image[1:-1, :-2])
-        dy = np.abs(image[2:, 1:-1] - image[:-2, 1:-1])
-        return np.maximum(dx, dy)
-
-    fine = gradient(cv2.GaussianBlur(grey, (0, 0), 0.7))
-    coarse = gradient(cv2.GaussianBlur(grey, (0, 0), 2.8))
+    fine, coarse = (_steepness(cv2.GaussianBlur(grey, (0, 0), blur)) for blur in (0.7, 2.8))
     edges = coarse > np.percentile(coarse[::4, ::4], 98)
     if not edges.any() or coarse[edges].mean() < 1e-3:
         return 0.0
     # An ideal edge is steeper by the ratio of the blurs, 4; noise is far below on these edges.
     return float((np.median(fine[edges]) / np.median(coarse[edges]) - 1.0) / 1.5)
+
+
+def _steepness(image: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Return the larger of both grey-value differences across each inner pixel."""
+    across = np.abs(image[1:-1, 2:] - image[1:-1, :-2])
+    return np.maximum(across, np.abs(image[2:, 1:-1] - image[:-2, 1:-1]))
 
 
 def drop_repeated(pixels1: FloatArray, pixels2: FloatArray, *, apart: float = 1.0) -> BoolArray:

@@ -106,8 +106,5 @@ def match_summary(pair: Pair, matches: Matches) -> dict[str, Any]:
 
 def _photo(pair: Pair, number: int) -> ByteArray:
     """Return one photo of the pair, grey."""
-    photo = pair.image1 if number == 1 else pair.image2
-    if not photo.file:
-        raise InputError(f'the pair file names no photo for image{number}; add "file" to it.')
-    image = read_image(pair.folder / photo.file, grey=True)
+    image = read_image(pair.photo_file(number), grey=True)
     return np.asarray(to_eight_bit(image), dtype=np.uint8)

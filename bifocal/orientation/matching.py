@@ -7,15 +7,16 @@ one unknown, the position along that line, under the zoom k(r) that the relief i
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from itertools import pairwise
+from dataclasses import dataclass, fields, replace
+from itertools import chain, pairwise
+from typing import Any
 
 import numpy as np
 
 from bifocal.model.pair import Pair, Photo, apply_homography
 from bifocal.orientation.features import Features, drop_repeated, find_features, match_along_lines
 from bifocal.orientation.patches import PatchResult, refine, same_scale
-from bifocal.orientation.targets import Targets, find_targets
+from bifocal.orientation.targets import SurveyTargets, find_targets
 from bifocal.orientation.tie_points import robust_sigma
 from bifocal.rays import relief_of_rays, zoom_factor
 from photocore.arrays import BoolArray, ByteArray, FloatArray, IntArray
@@ -103,13 +104,13 @@ def match_pair(
         parts.append(_target_matches(pair, images, reliefs))
     if settings.features:
         parts.append(_feature_matches(pair, images, reliefs, settings))
-    found = _joined(parts)
-    if not len(found.ids) or (settings.features and len(found.ids) < 20):
+    matches = _joined(parts)
+    if not len(matches.ids) or (settings.features and len(matches.ids) < 20):
         raise GeometryError(
-            f"only {len(found.ids)} points match: photos and pair file do not belong together, "
+            f"only {len(matches.ids)} points match: photos and pair file do not belong together, "
             "or a photo is blurred. Make the pair file again with `bifocal align`."
         )
-    return found
+    return matches
 
 
 def _feature_matches(
@@ -126,10 +127,10 @@ def _feature_matches(
     pixels1, pixels2 = first.pixels[rows1], second.pixels[rows2]
     keep = drop_repeated(pixels1, pixels2)
     pixels1, pixels2 = pixels1[keep], pixels2[keep]
-    found, misfit = refine_along_lines(pair, images, pixels1, pixels2)
-    relief = relief_at(pair, pixels1, found.pixels2)
-    sigma = np.hypot(OPTIMISM * found.sigma, 0.02)
-    good = _accepted(pair, found, misfit, sigma, relief, reliefs, pixels1)
+    patches, misfit = refine_along_lines(pair, images, pixels1, pixels2)
+    relief = relief_at(pair, pixels1, patches.pixels2)
+    sigma = np.hypot(OPTIMISM * patches.sigma, 0.02)
+    good = _accepted(pair, patches, misfit, sigma, relief, reliefs, pixels1)
     chosen = np.flatnonzero(good)
     chosen = chosen[spread_evenly(pixels1[chosen], sigma[chosen], images[0].shape, settings.count)]
     order = np.lexsort((pixels1[chosen, 0], pixels1[chosen, 1] // 100))
@@ -137,13 +138,13 @@ def _feature_matches(
     # With the misfit across the line put back, `solve` can tell honest points from blunders.
     along = directions_at(pair, pixels1, np.nan_to_num(relief))
     across = np.stack([-along[:, 1], along[:, 0]], axis=1)
-    pixels2 = found.pixels2 + across * misfit[:, None]
+    pixels2 = patches.pixels2 + across * misfit[:, None]
     return Matches(
         pixels1=pixels1[chosen],
         pixels2=pixels2[chosen],
         sigma=sigma[chosen],
         misfit=misfit[chosen],
-        agreement=found.zncc[chosen],
+        agreement=patches.zncc[chosen],
         ids=tuple(f"M{number:04d}" for number in range(1, len(chosen) + 1)),
         kinds=("feature",) * len(chosen),
     )
@@ -151,15 +152,13 @@ def _feature_matches(
 
 def _joined(parts: list[Matches]) -> Matches:
     """Return several sets of matches as one."""
-    return Matches(
-        pixels1=np.concatenate([part.pixels1 for part in parts]),
-        pixels2=np.concatenate([part.pixels2 for part in parts]),
-        sigma=np.concatenate([part.sigma for part in parts]),
-        misfit=np.concatenate([part.misfit for part in parts]),
-        agreement=np.concatenate([part.agreement for part in parts]),
-        ids=tuple(name for part in parts for name in part.ids),
-        kinds=tuple(kind for part in parts for kind in part.kinds),
-    )
+    joined: dict[str, Any] = {}
+    for column in fields(Matches):
+        values = [getattr(part, column.name) for part in parts]
+        joined[column.name] = (
+            tuple(chain(*values)) if column.name in ("ids", "kinds") else np.concatenate(values)
+        )
+    return Matches(**joined)
 
 
 def _target_matches(
@@ -199,7 +198,7 @@ def _target_matches(
 
 
 def pair_targets(
-    pair: Pair, first: Targets, second: Targets, reliefs: tuple[float, float]
+    pair: Pair, first: SurveyTargets, second: SurveyTargets, reliefs: tuple[float, float]
 ) -> tuple[IntArray, IntArray]:
     """Return indices of the same targets in both photos.
 
@@ -213,7 +212,6 @@ def pair_targets(
     x2 = np.tile(second.pixels, (count1, 1))
     relief = relief_at(pair, x1, x2)
     fits = np.isfinite(relief) & (relief > reliefs[0]) & (relief < reliefs[1])
-    fits[~fits] = False
     usable = np.clip(np.nan_to_num(relief), *reliefs)
     off = np.linalg.norm(seen_at(pair, x1, usable) - x2, axis=1)
     zoom = np.sqrt(np.abs(np.linalg.det(local_zoom(pair, x1, usable))))
@@ -250,17 +248,9 @@ def _tiled_features(image: ByteArray, budget: float, limit: int) -> Features:
         row = part.pixels[:, 1] + start
         inside = (row >= top - 0.5) & (row < bottom - 0.5)
         pixels = np.column_stack([part.pixels[:, 0], row])
-        parts.append(
-            (pixels[inside], part.size[inside], part.strength[inside], part.descriptors[inside])
-        )
-    joined = [np.concatenate(items) for items in zip(*parts, strict=True)]
-    return Features(
-        pixels=joined[0],
-        size=joined[1],
-        strength=joined[2],
-        descriptors=joined[3],
-        reduction=reduction,
-    )
+        parts.append((pixels[inside], part.size[inside], part.descriptors[inside]))
+    pixels, size, descriptors = (np.concatenate(items) for items in zip(*parts, strict=True))
+    return Features(pixels=pixels, size=size, descriptors=descriptors, reduction=reduction)
 
 
 def seen_at(pair: Pair, pixels1: FloatArray, relief: FloatArray | float) -> FloatArray:
@@ -285,7 +275,7 @@ def relief_at(pair: Pair, pixels1: FloatArray, pixels2: FloatArray) -> FloatArra
 
 
 def _ideal(photo: Photo, pixels: FloatArray) -> FloatArray:
-    return pixels if photo.lens is None else np.asarray(photo.lens.undistort(pixels))
+    return pixels if photo.lens is None else photo.lens.undistort(pixels)
 
 
 def _guided(
@@ -293,13 +283,7 @@ def _guided(
 ) -> tuple[IntArray, IntArray]:
     """Return features paired along their radial lines."""
     ends = [_ideal(pair.image2, seen_at(pair, first.pixels, relief)) for relief in reliefs]
-    ideal = Features(
-        pixels=_ideal(pair.image2, second.pixels),
-        size=second.size,
-        strength=second.strength,
-        descriptors=second.descriptors,
-        reduction=second.reduction,
-    )
+    ideal = replace(second, pixels=_ideal(pair.image2, second.pixels))
     across = 1.5 + second.reduction
     expected = (ends[0], ends[1])
     to_pixels = np.linalg.inv(pair.image2.plane_from_pixel)
@@ -308,12 +292,18 @@ def _guided(
     return rows1.astype(np.int64), rows2.astype(np.int64)
 
 
-def directions_at(pair: Pair, pixels1: FloatArray, relief: FloatArray) -> FloatArray:
-    """Return unit vectors in photo 2 along which a point moves as its relief grows, (n, 2)."""
+def pixels_per_relief(pair: Pair, pixels1: FloatArray, relief: FloatArray) -> FloatArray:
+    """Return how a point moves in photo 2 as its relief grows, shape (n, 2). [px/m]"""
     step = 1e-3 * pair.image2.distance
     shift = seen_at(pair, pixels1, relief + step) - seen_at(pair, pixels1, relief - step)
+    return shift / (2 * step)
+
+
+def directions_at(pair: Pair, pixels1: FloatArray, relief: FloatArray) -> FloatArray:
+    """Return unit vectors in photo 2 along which a point moves as its relief grows, (n, 2)."""
+    rate = pixels_per_relief(pair, pixels1, relief)
     with np.errstate(divide="ignore", invalid="ignore"):
-        return shift / np.linalg.norm(shift, axis=1, keepdims=True)
+        return rate / np.linalg.norm(rate, axis=1, keepdims=True)
 
 
 def local_zoom(pair: Pair, pixels1: FloatArray, relief: FloatArray) -> FloatArray:
@@ -328,14 +318,10 @@ def local_zoom(pair: Pair, pixels1: FloatArray, relief: FloatArray) -> FloatArra
 
 def _raw_metres(photo: Photo, pixels: FloatArray) -> FloatArray:
     """Return the derivative of the plane position by the raw pixel, lens included. [m/px]"""
+    metres = photo.metres_per_pixel(pixels)
     if photo.lens is None:
-        return np.array(photo.metres_per_pixel(pixels))
-    half = np.array([0.5, 0.0])
-    parts = [
-        photo.plane_from_pixels(pixels + offset) - photo.plane_from_pixels(pixels - offset)
-        for offset in (half, half[::-1])
-    ]
-    return np.stack(parts, axis=-1)
+        return np.array(metres)
+    return metres @ np.linalg.inv(photo.lens.distorted_by_ideal(_ideal(photo, pixels)))
 
 
 def refine_along_lines(
@@ -372,17 +358,19 @@ def refine_along_lines(
     along = np.where(np.isfinite(along), along, [1.0, 0.0])
     smooth1, smooth2 = same_scale(*images, local)
     basis = along[:, :, None]
-    found = refine(smooth1, smooth2, pixels1, start, local, basis, reach=reach)
+    patches = refine(smooth1, smooth2, pixels1, start, local, basis, reach=reach)
     across = np.stack([-along[:, 1], along[:, 0]], axis=1)
     both = np.stack([along, across], axis=2)
-    free = refine(smooth1, smooth2, pixels1, found.pixels2, local, both, iterations=4, reach=reach)
-    misfit = ((free.pixels2 - found.pixels2) * across).sum(axis=1)
-    return found, np.where(free.converged, misfit, np.nan)
+    free = refine(
+        smooth1, smooth2, pixels1, patches.pixels2, local, both, iterations=4, reach=reach
+    )
+    misfit = ((free.pixels2 - patches.pixels2) * across).sum(axis=1)
+    return patches, np.where(free.converged, misfit, np.nan)
 
 
 def _accepted(
     pair: Pair,
-    found: PatchResult,
+    patches: PatchResult,
     misfit: FloatArray,
     sigma: FloatArray,
     relief: FloatArray,
@@ -390,24 +378,17 @@ def _accepted(
     pixels1: FloatArray,
 ) -> BoolArray:
     """Return which matches to believe."""
-    good = found.converged & (found.zncc > LEAST_AGREEMENT) & (sigma < 0.5)
+    good = patches.converged & (patches.zncc > LEAST_AGREEMENT) & (sigma < 0.5)
     good &= np.isfinite(misfit) & (relief > reliefs[0]) & (relief < reliefs[1])
     if not good.any():
         return np.asarray(good)
     # Honest misfits across the line show what the pair's geometry and the patches are good for.
     usual = max(robust_sigma(misfit[good]), 0.05)
     good &= np.abs(misfit) < np.maximum(3.5 * usual, 0.3)
-    rate = _pixels_per_metre(pair, pixels1, relief)
+    rate = np.linalg.norm(pixels_per_relief(pair, pixels1, relief), axis=1)
     with np.errstate(divide="ignore", invalid="ignore"):
         good &= sigma / rate < 0.05 * pair.image2.distance
     return np.asarray(good)
-
-
-def _pixels_per_metre(pair: Pair, pixels1: FloatArray, relief: FloatArray) -> FloatArray:
-    """Return how fast a point moves in photo 2 as its relief grows. [px/m]"""
-    step = 1e-3 * pair.image2.distance
-    shift = seen_at(pair, pixels1, relief + step) - seen_at(pair, pixels1, relief - step)
-    return np.linalg.norm(shift, axis=1) / (2 * step)
 
 
 def spread_evenly(

@@ -1,17 +1,18 @@
-"""A set-up in sentences a surveyor acts on: what is off, what it would do, what was done."""
+"""A pair's orientation in sentences a surveyor acts on: what is off, its effect, what was done."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from bifocal import rays
-from bifocal.orientation.pinhole import Pinhole, tilt
+from bifocal.precision import base_factor
+from photocore.camera import Pinhole
 
 
-def set_up_words(
+def orientation_in_words(
     cameras: tuple[Pinhole, Pinhole], deviations: dict[str, float], *, sigma_px: float
 ) -> tuple[str, ...]:
-    """Return the set-up in sentences.
+    """Return the orientation in sentences.
 
     Parameters
     ----------
@@ -25,15 +26,15 @@ def set_up_words(
     """
     far, near = cameras
     d1, d2 = float(far.centre[2]), float(near.centre[2])
-    lever = d1 * d2 / (d1 - d2)
+    base = base_factor(d1=d1, d2=d2)
     words = [
         f"Far camera {d1:.3f} m ± {_mm(deviations['distance1'])}, near camera {d2:.3f} m ± "
         f"{_mm(deviations['distance2'])} from the wall; {d1 - d2:.3f} m apart in depth.",
         _offset(far, near),
         *(_turn(name, camera) for name, camera in (("Far", far), ("Near", near))),
         _roll(far, near),
-        _scale(far, near, lever, deviations.get("scale", 0.0)),
-        _zone(far, near, lever, sigma_px, deviations.get("relief_scale", 0.0)),
+        _scale(far, near, base, deviations.get("scale", 0.0)),
+        _zone(far, near, base, sigma_px, deviations.get("relief_scale", 0.0)),
         _plane(deviations.get("relief_offset", 0.0)),
     ]
     return tuple(word for word in words if word)
@@ -66,7 +67,7 @@ def _offset(far: Pinhole, near: Pinhole) -> str:
 
 def _turn(name: str, camera: Pinhole) -> str:
     """Say how a camera is turned away from the wall's normal."""
-    right, up = np.rad2deg(np.arctan(tilt(camera)))
+    right, up = np.rad2deg(np.arctan(camera.tilt))
     total = float(np.rad2deg(np.arccos(np.clip(-camera.rotation[2, 2], -1, 1))))
     if total < 0.05:
         return f"{name} camera square to the wall."
@@ -92,7 +93,7 @@ def _roll(far: Pinhole, near: Pinhole) -> str:
     return f"The near photo is turned {abs(turn):.1f}° {side} against the far one (corrected)."
 
 
-def _scale(far: Pinhole, near: Pinhole, lever: float, sigma: float) -> str:
+def _scale(far: Pinhole, near: Pinhole, base: float, sigma: float) -> str:
     """Say how far the photos are from one scale, where that is more than its own uncertainty."""
     ratio = (near.matrix[0, 0] / near.centre[2]) / (far.matrix[0, 0] / far.centre[2])
     off = ratio - 1.0
@@ -100,7 +101,7 @@ def _scale(far: Pinhole, near: Pinhole, lever: float, sigma: float) -> str:
         return ""
     if abs(off) < 0.05:
         return (
-            f"The scales differ by {100 * off:+.2f} % (would read as {1000 * abs(off) * lever:.0f} "
+            f"The scales differ by {100 * off:+.2f} % (would read as {1000 * abs(off) * base:.0f} "
             "mm of relief; corrected)."
         )
     bigger = "larger" if ratio > 1 else "smaller"
@@ -111,11 +112,11 @@ def _scale(far: Pinhole, near: Pinhole, lever: float, sigma: float) -> str:
     )
 
 
-def _zone(far: Pinhole, near: Pinhole, lever: float, sigma_px: float, relief_scale: float) -> str:
+def _zone(far: Pinhole, near: Pinhole, base: float, sigma_px: float, relief_scale: float) -> str:
     """Say what precision to expect where."""
     pixel = max(far.centre[2] / far.matrix[0, 0], near.centre[2] / near.matrix[0, 0])
     sigma_m = sigma_px * pixel
-    radius = sigma_m * lever / 0.01
+    radius = sigma_m * base / 0.01
     at = 0.25 * far.centre[2]
     # All relief is too large or too small by one factor: what the distances leave open.
     share = (
@@ -125,7 +126,7 @@ def _zone(far: Pinhole, near: Pinhole, lever: float, sigma_px: float, relief_sca
         else ""
     )
     return (
-        f"With {sigma_px:.2g} px per point, relief is good to {1000 * sigma_m * lever / at:.1f} mm "
+        f"With {sigma_px:.2g} px per point, relief is good to {1000 * sigma_m * base / at:.1f} mm "
         f"at {at:.1f} m from the centre of zoom{share}; within {100 * radius:.0f} cm of it worse "
         "than 1 cm (area of uncertainty)."
     )

@@ -1,31 +1,28 @@
-"""The stages of a set-up: control first, then ties, lens, wall, refinement, gross errors.
+"""The stages of a pair's orientation: control, ties, lens, wall, refinement, gross errors.
 
-Each stage takes the problem and its solution and returns both, better.
+Each stage takes the pair as oriented so far and returns it better, with what is to be told of it.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
-from bifocal.orientation import validation as refusals
-from bifocal.orientation.alignment import Interior, SiteMeasures
-from bifocal.orientation.bundle import Problem, Solution, adjust, evaluate, onto_plane, radial_shift
-from bifocal.orientation.dominant_plane import even_points
-from bifocal.orientation.pinhole import Pinhole, plane_transfer, tilt, triangulate
+from bifocal.orientation import validation
+from bifocal.orientation.area_points import even_points
+from bifocal.orientation.control_points import SiteMeasures
+from bifocal.orientation.interior_orientation import Interior
+from bifocal.orientation.pair_adjustment import AdjustedPair, adjust, evaluated
+from bifocal.orientation.pair_observations import PairObservations, PairUnknowns
 from bifocal.orientation.reference_plane import Face, choose_wall, rivals_in_words
-from bifocal.orientation.tie_points import (
-    ROUGHNESS,
-    classify,
-    raw_pixels,
-    refine_ties,
-    robust_sigma,
-    settle,
-)
+from bifocal.orientation.tie_points import ROUGHNESS, classify, refine_ties, robust_sigma
 from photocore.arrays import ByteArray, FloatArray
+from photocore.camera import Pinhole, plane_transfer, triangulate
 from photocore.errors import GeometryError
+from photocore.rotation import rotation_from_vector
 
 #: "Image plane parallel to the wall" when nothing contradicts it. [rad]
 SIGMA_PARALLEL = np.deg2rad(0.3)
@@ -45,7 +42,7 @@ def silent(what: str) -> None:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class PhotoInput:
-    """One photo to be set up.
+    """One photo to be oriented.
 
     Attributes
     ----------
@@ -61,214 +58,250 @@ class PhotoInput:
     name: str
 
 
-@dataclass(slots=True)
-class Notes:
-    """What is to be told, gathered on the way."""
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class OrientedPair:
+    """Cameras of both photos, far one first, with everything that led to them.
 
-    remarks: list[str] = field(default_factory=list)
-    assumed: list[str] = field(default_factory=list)
-    faces: list[Face] = field(default_factory=list)
+    Attributes
+    ----------
+    observations, adjusted : PairObservations, AdjustedPair
+    exchanged : bool
+        Whether the photos were given the other way round.
+    assumed : tuple of str
+        What nothing but an assumption determines.
+    remarks : tuple of str
+    faces : tuple of Face
+        Where no control points define the plane: the wall, and the planes parallel to it.
+    wall_named : bool
+        Whether the user said which of them is the wall.
+    """
+
+    observations: PairObservations
+    adjusted: AdjustedPair
+    exchanged: bool = False
+    assumed: tuple[str, ...] = ()
+    remarks: tuple[str, ...] = ()
+    faces: tuple[Face, ...] = ()
+    wall_named: bool = False
+
+    @property
+    def gross(self) -> tuple[str, ...]:
+        """Control points left out."""
+        ids, used = self.observations.control.ids, self.observations.pick_used
+        return tuple(name for name, good in zip(ids, used, strict=True) if not good)
+
+    def readjusted(self, start: PairUnknowns | None = None, **changes: Any) -> OrientedPair:
+        """Return the pair adjusted with changed observations, from here or another start."""
+        observations = replace(self.observations, **changes)
+        adjusted = adjust(observations, start or self.adjusted)
+        return replace(self, observations=observations, adjusted=adjusted)
+
+    def told(self, *remarks: str) -> OrientedPair:
+        """Return the pair with remarks added."""
+        return replace(self, remarks=(*self.remarks, *remarks))
+
+    def settled(self, shares: tuple[float, ...] = ROUGHNESS) -> OrientedPair:
+        """Return the pair after the wall and the gross ties are settled."""
+        pair = self
+        for share in shares:
+            sigma = max(robust_sigma(pair.adjusted.tie_misfit[pair.observations.tie_used]), 0.03)
+            ties = classify(pair.observations, pair.adjusted, share=share, sigma=sigma)
+            pair = replace(pair, observations=ties).readjusted()
+        return pair
 
 
-def adjusted(
-    problem: Problem,
+def oriented_in_stages(
+    observations: PairObservations,
     cameras: tuple[Pinhole, Pinhole],
     photos: tuple[PhotoInput, PhotoInput],
     site: SiteMeasures,
     step: Step,
     *,
     with_control: bool,
-    notes: Notes,
-) -> tuple[Problem, Solution]:
-    """Return the adjustment after ties, wall, lens assumptions and refinement are settled."""
+) -> OrientedPair:
+    """Return the pair after ties, wall, lens assumptions and refinement are settled."""
     images = photos[0].grey, photos[1].grey
+    remarks: tuple[str, ...] = ()
     if with_control:
-        problem, cameras = _control_first(problem, cameras, notes)
-    solution = adjust(problem, cameras)
+        observations, cameras, remarks = _control_first(observations, cameras)
+    pair = OrientedPair(
+        observations=observations,
+        adjusted=adjust(observations, PairUnknowns(cameras=cameras)),
+        remarks=remarks,
+        wall_named=site.wall is not None,
+    )
     if with_control:
-        problem, solution = _one_zoom(problem, solution)
-    if len(problem.tie1) and images[0] is not None and images[1] is not None:
-        problem, solution = settle(problem, solution)
-        problem, solution = _unbent(problem, solution, notes)
+        pair = _one_zoom(pair)
+    if len(observations.tie1) and images[0] is not None and images[1] is not None:
         pictures = images[0], images[1]
-        problem, solution = _with_even_points(problem, solution, pictures, site, notes)
+        pair = _with_even_points(_unbent(pair.settled()), pictures, site)
         step("refining the common points")
         for _ in range(2):  # the second pass searches around better places
-            moved, good = refine_ties(problem, solution, (images[0], images[1]))
-            problem = replace(
-                problem,
-                tie2=np.where(good[:, None], moved, problem.tie2),
-                tie_used=problem.tie_used & good,
-                wall=problem.wall & good,
-            )
-            if problem.tie_used.sum() < 20:
+            moved, good = refine_ties(pair.observations, pair.adjusted, pictures)
+            ties = pair.observations
+            used = ties.tie_used & good
+            if used.sum() < 20:
                 raise GeometryError(
                     f"{photos[0].name} and {photos[1].name} match only roughly: one is blurred, or "
                     "they show different states of the wall. Take sharper photos."
                 )
-            solution = adjust(
-                problem, solution.cameras, radial=solution.radial, plane=solution.plane
-            )
-            problem, solution = settle(problem, solution, shares=ROUGHNESS[1:])
-    if problem.gauge and problem.sigma_tilt is None:
-        problem, solution = _parallel_if_so(problem, solution, notes)
-    return problem, solution
+            tie2 = np.where(good[:, None], moved, ties.tie2)
+            pair = pair.readjusted(tie2=tie2, tie_used=used, wall=ties.wall & good)
+            pair = pair.settled(ROUGHNESS[1:])
+    if pair.observations.free_datum and pair.observations.sigma_tilt is None:
+        pair = _parallel_if_so(pair)
+    return pair
 
 
 def _control_first(
-    problem: Problem, cameras: tuple[Pinhole, Pinhole], notes: Notes
-) -> tuple[Problem, tuple[Pinhole, Pinhole]]:
-    """Return the problem with the ties that fit the control's cameras, and those cameras."""
-    none = np.zeros(len(problem.tie1), dtype=bool)
-    alone = adjust(replace(problem, tie_used=none, wall=none), cameras)
-    if not len(problem.tie1):
-        return problem, alone.cameras
+    observations: PairObservations, cameras: tuple[Pinhole, Pinhole]
+) -> tuple[PairObservations, tuple[Pinhole, Pinhole], tuple[str, ...]]:
+    """Return the observations with the ties that fit the control's cameras, those, remarks."""
+    none = np.zeros(len(observations.tie1), dtype=bool)
+    start = PairUnknowns(cameras=cameras)
+    alone = adjust(replace(observations, tie_used=none, wall=none), start)
+    if not len(observations.tie1):
+        return observations, alone.cameras, ()
     # Control leaves the epipolar lines uncertain by some pixels: the majority shows by how much.
-    sigma = max(robust_sigma(alone.tie_misfit), problem.sigma_tie)
-    joined = classify(problem, alone, share=PLANE_SHARE, sigma=sigma)
+    sigma = max(robust_sigma(alone.tie_misfit), observations.sigma_tie)
+    joined = classify(observations, alone, share=PLANE_SHARE, sigma=sigma)
     if joined.wall.sum() < 20:
-        notes.remarks.append(
+        remark = (
             "Hardly any detail lies on the control points' plane; relief counts from the control "
             "points alone."
         )
-        return replace(joined, wall=none), alone.cameras
-    flat = problem.control.sigma[np.abs(np.nan_to_num(problem.control.xyz[:, 2])) < 0.05, 2]
+        return replace(joined, wall=none), alone.cameras, (remark,)
+    control = observations.control
+    flat = control.sigma[np.abs(np.nan_to_num(control.xyz[:, 2])) < 0.05, 2]
     tight = max(float(np.median(flat)) if len(flat) else 0.003, 0.001)
     slope = 2 * tight / float(alone.cameras[0].centre[2])
-    return replace(joined, sigma_plane=tight, sigma_slope=slope), alone.cameras
+    return replace(joined, sigma_plane=tight, sigma_slope=slope), alone.cameras, ()
 
 
-def _one_zoom(problem: Problem, solution: Solution) -> tuple[Problem, Solution]:
-    """Return the adjustment with one principal distance if both photos' are the same.
+def _one_zoom(pair: OrientedPair) -> OrientedPair:
+    """Return the pair with one principal distance if both photos' are the same.
 
     Two lenses of a bifocal pair differ by a third and more; if the focal lengths agree to within
     their precision and 3 %, the lens was not changed.
     """
-    interiors = problem.interiors
-    if min(i.sigma_focal for i in interiors) < 0.02 or problem.sigma_body is None:
-        return problem, solution
-    difference = float(np.log(solution.cameras[0].matrix[0, 0] / solution.cameras[1].matrix[0, 0]))
-    sigma = float(np.sqrt(solution.covariance[0, 0] + solution.covariance[11, 11]))
+    interiors, adjusted = pair.observations.interiors, pair.adjusted
+    if min(i.sigma_focal for i in interiors) < 0.02 or pair.observations.sigma_body is None:
+        return pair
+    difference = float(np.log(adjusted.cameras[0].matrix[0, 0] / adjusted.cameras[1].matrix[0, 0]))
+    sigma = float(np.hypot(adjusted.sigma("focal length", 1), adjusted.sigma("focal length", 2)))
     if abs(difference) > min(3 * sigma, 0.03) or sigma > 0.05:
-        return problem, solution
-    problem = replace(problem, sigma_zoom=5e-4)
-    return problem, adjust(problem, solution.cameras, plane=solution.plane)
+        return pair
+    return pair.readjusted(sigma_zoom=5e-4)
 
 
-def _unbent(problem: Problem, solution: Solution, notes: Notes) -> tuple[Problem, Solution]:
-    """Return the adjustment with estimated lens distortion where the photos clearly show some."""
-    if any(i.is_calibrated for i in problem.interiors):
-        return problem, solution
-    before = robust_sigma(solution.tie_misfit)
-    trial = replace(
-        problem,
-        interiors=tuple(replace(i, sigma_radial=0.1) for i in problem.interiors),  # type: ignore[arg-type]
-        tie_used=np.abs(solution.tie_misfit) < 8 * before,
+def _unbent(pair: OrientedPair) -> OrientedPair:
+    """Return the pair with estimated lens distortion where the photos clearly show some."""
+    interiors, misfit = pair.observations.interiors, pair.adjusted.tie_misfit
+    if any(i.is_calibrated for i in interiors):
+        return pair
+    before = robust_sigma(misfit)
+    bent = pair.readjusted(
+        interiors=tuple(replace(i, sigma_radial=0.1) for i in interiors),
+        tie_used=np.abs(misfit) < 8 * before,
     )
-    bent = adjust(trial, solution.cameras, plane=solution.plane)
-    wide = max(problem.interiors[0].image_size) / 2
+    wide = max(interiors[0].image_size) / 2
+    radial = bent.adjusted.radial
     corner = max(
-        abs(k) * (wide / i.focal) ** 2 * wide
-        for k, i in zip(bent.radial, problem.interiors, strict=True)
+        abs(k) * (wide / i.focal) ** 2 * wide for k, i in zip(radial, interiors, strict=True)
     )
-    if robust_sigma(bent.tie_misfit) > 0.85 * before or corner < 3.0:
-        return problem, solution
-    for k, interior in zip(bent.radial, problem.interiors, strict=True):
-        refusals.check_distortion(k, interior)
-    trial, bent = settle(trial, bent)
-    notes.remarks.append(
+    if robust_sigma(bent.adjusted.tie_misfit) > 0.85 * before or corner < 3.0:
+        return pair
+    for k, interior in zip(radial, interiors, strict=True):
+        validation.check_distortion(k, interior)
+    bent = bent.settled()
+    return bent.told(
         f"The photos show lens distortion of about {corner:.0f} px at the edge; it was estimated "
         "from the common points (k = "
-        + ", ".join(f"{k:.4f}" for k in bent.radial)
+        + ", ".join(f"{k:.4f}" for k in bent.adjusted.radial)
         + "). A calibrated lens (`bifocal calibrate`, --lens) is more reliable."
     )
-    return trial, bent
 
 
 def _with_even_points(
-    problem: Problem,
-    solution: Solution,
-    images: tuple[ByteArray, ByteArray],
-    site: SiteMeasures,
-    notes: Notes,
-) -> tuple[Problem, Solution]:
-    """Return the adjustment with points from the whole area, on the face that is the wall.
+    pair: OrientedPair, images: tuple[ByteArray, ByteArray], site: SiteMeasures
+) -> OrientedPair:
+    """Return the pair with points from the whole area, on the face that is the wall.
 
     Where control points define the plane, the frame stays theirs.
     """
-    count = len(problem.tie1)
-    raw1, raw2 = even_points(problem, solution, images)
+    old, adjusted = pair.observations, pair.adjusted
+    count = len(old.tie1)
+    raw1, raw2 = even_points(old, adjusted, images)
     extra = len(raw1)
-    problem = replace(
-        problem,
-        tie1=np.concatenate([problem.tie1, problem.interiors[0].ideal(raw1)]),
-        tie2=np.concatenate([problem.tie2, problem.interiors[1].ideal(raw2)]),
-        tie_used=np.concatenate([problem.tie_used, np.ones(extra, dtype=bool)]),
-        wall=np.concatenate([problem.wall, np.zeros(extra, dtype=bool)]),
-        sigma_wall=np.concatenate([problem.sigma_wall, np.ones(extra)]),
+    ties = replace(
+        old,
+        tie1=np.concatenate([old.tie1, old.interiors[0].ideal(raw1)]),
+        tie2=np.concatenate([old.tie2, old.interiors[1].ideal(raw2)]),
+        tie_used=np.concatenate([old.tie_used, np.ones(extra, dtype=bool)]),
+        wall=np.concatenate([old.wall, np.zeros(extra, dtype=bool)]),
+        sigma_wall=np.concatenate([old.sigma_wall, np.ones(extra)]),
     )
     # What the flow suggests is no observation until the patches agree.
-    moved, good = refine_ties(problem, solution, images)
+    moved, good = refine_ties(ties, adjusted, images)
     even = np.arange(len(good)) >= count
-    problem = replace(
-        problem,
-        tie2=np.where((good & even)[:, None], moved, problem.tie2),
-        tie_used=problem.tie_used & (good | ~even),
+    ties = replace(
+        ties,
+        tie2=np.where((good & even)[:, None], moved, ties.tie2),
+        tie_used=ties.tie_used & (good | ~even),
     )
-    straight = [
-        radial_shift(x, i, k)
-        for x, i, k in zip(
-            (problem.tie1, problem.tie2), problem.interiors, solution.radial, strict=True
-        )
-    ]
-    if not problem.gauge:
-        sigma = max(robust_sigma(solution.tie_misfit[:count][problem.tie_used[:count]]), 0.03)
-        started = evaluate(problem, solution)
-        held = problem.wall.any()
-        problem = classify(problem, started, share=ROUGHNESS[1], sigma=sigma)
-        if not held:
-            problem = replace(problem, wall=np.zeros_like(problem.wall))
-        return problem, adjust(
-            problem, solution.cameras, radial=solution.radial, plane=solution.plane
-        )
-    xyz = triangulate(*solution.cameras, *straight)
-    d1 = float(solution.cameras[0].centre[2])
-    fair = problem.tie_used & even & (np.abs(xyz[:, 2]) < 0.1 * d1)
+    if not ties.free_datum:
+        sigma = max(robust_sigma(adjusted.tie_misfit[old.tie_used]), 0.03)
+        held = ties.wall.any()
+        ties = classify(ties, evaluated(ties, adjusted), share=ROUGHNESS[1], sigma=sigma)
+        return replace(pair, observations=ties).readjusted(wall=ties.wall & held)
+    xyz = triangulate(*adjusted.cameras, *ties.straight_ties(adjusted.radial))
+    d1 = float(adjusted.cameras[0].centre[2])
+    fair = ties.tie_used & even & (np.abs(xyz[:, 2]) < 0.1 * d1)
     if fair.sum() < 200:
-        return problem, adjust(problem, solution.cameras, radial=solution.radial)
-    seen = raw_pixels(problem.interiors[0], problem.tie1[fair])
-    plane, notes.faces = choose_wall(xyz[fair], seen, solution.cameras, problem.interiors, site)
-    notes.remarks += [text for text in [rivals_in_words(notes.faces, site)] if text]
-    start = evaluate(problem, replace(solution, cameras=onto_plane(solution.cameras, plane)))
-    sigma = max(robust_sigma(start.tie_misfit[problem.tie_used]), 0.03)
-    problem = classify(problem, start, share=ROUGHNESS[1], sigma=sigma)
-    solution = adjust(problem, start.cameras, radial=solution.radial)
-    return settle(problem, solution, shares=ROUGHNESS[1:])
+        return replace(pair, observations=ties).readjusted()
+    seen = ties.interiors[0].raw(ties.tie1[fair])
+    plane, faces = choose_wall(xyz[fair], seen, adjusted.cameras, ties.interiors, site)
+    pair = replace(pair, faces=tuple(faces))
+    pair = pair.told(*(text for text in [rivals_in_words(faces, site)] if text))
+    start = evaluated(ties, replace(adjusted, cameras=_onto_plane(adjusted.cameras, plane)))
+    sigma = max(robust_sigma(start.tie_misfit[ties.tie_used]), 0.03)
+    ties = classify(ties, start, share=ROUGHNESS[1], sigma=sigma)
+    return replace(pair, observations=ties).readjusted(start).settled(ROUGHNESS[1:])
 
 
-def _parallel_if_so(problem: Problem, solution: Solution, notes: Notes) -> tuple[Problem, Solution]:
-    """Return the adjustment with image planes taken as parallel, if nothing contradicts it.
+def _onto_plane(cameras: tuple[Pinhole, Pinhole], plane: FloatArray) -> tuple[Pinhole, Pinhole]:
+    """Return cameras in the frame of the plane z = a + b X + c Y, X and Y all but kept."""
+    normal = np.array([-plane[1], -plane[2], 1.0])
+    normal /= np.linalg.norm(normal)
+    # The rotation that takes the normal to the new Z axis, about their common perpendicular.
+    turn = rotation_from_vector([normal[1], -normal[0], 0.0])
+    origin = np.array([0.0, 0.0, plane[0]])
+    return cameras[0].moved(turn, origin), cameras[1].moved(turn, origin)
+
+
+def _parallel_if_so(pair: OrientedPair) -> OrientedPair:
+    """Return the pair with image planes taken as parallel, if nothing contradicts it.
 
     Photos alone give the tilt to the wall to 0.1° to 0.5°; a camera that was set up square to the
     wall with care stands better than that.
     """
-    for number, camera in enumerate(solution.cameras):
-        size = float(np.linalg.norm(tilt(camera)))
-        at = 11 * number + 4
-        sigma = float(np.sqrt(solution.covariance[at, at] + solution.covariance[at + 1, at + 1]))
-        if size > 3 * np.hypot(sigma, SIGMA_PARALLEL) or size > np.deg2rad(1.5):
-            return problem, solution
-    sigma = _care(solution.cameras)
-    problem = replace(problem, sigma_tilt=sigma)
+    for number, camera in enumerate(pair.adjusted.cameras, start=1):
+        size = float(np.linalg.norm(camera.tilt))
+        turns = [pair.adjusted.sigma(name, number) for name in ("turn X", "turn Y")]
+        limit = 3 * float(np.linalg.norm([*turns, SIGMA_PARALLEL]))
+        if size > min(limit, np.deg2rad(1.5)):
+            return pair
+    sigma = _care(pair.adjusted.cameras)
+    changes: dict[str, Any] = {"sigma_tilt": sigma}
     if sigma < SIGMA_PARALLEL / 2:
         # Better than any wall is flat: the reference plane is then parallel to the image planes
         # and touches the wall, which may slope against it.
-        problem = replace(problem, sigma_plane=1e-4, sigma_slope=UNEVEN)
-    notes.assumed.append(
+        changes |= {"sigma_plane": 1e-4, "sigma_slope": UNEVEN}
+    note = (
         f"image planes parallel to the wall within {np.rad2deg(sigma):.2g}° (as they are to each "
         "other)"
     )
-    return problem, adjust(problem, solution.cameras, radial=solution.radial, plane=solution.plane)
+    return replace(pair, assumed=(*pair.assumed, note)).readjusted(**changes)
 
 
 def _care(cameras: tuple[Pinhole, Pinhole]) -> float:
@@ -281,7 +314,10 @@ def _care(cameras: tuple[Pinhole, Pinhole]) -> float:
     """
     far, near = cameras
     matrix = plane_transfer(far, near, np.zeros(3))
-    centred = np.linalg.inv(_at_centre(near)) @ matrix @ _at_centre(far)
+    corner = [np.eye(3), np.eye(3)]  # pixels from the principal point to those from the corner
+    for shift, camera in zip(corner, cameras, strict=True):
+        shift[:2, 2] = camera.matrix[:2, 2]
+    centred = np.linalg.inv(corner[1]) @ matrix @ corner[0]
     centred /= centred[2, 2]
     focal = 1.0 / np.hypot(1.0 / far.matrix[0, 0], 1.0 / near.matrix[0, 0])
     keystone = float(np.abs(centred[2, :2]).max() * focal)
@@ -291,41 +327,24 @@ def _care(cameras: tuple[Pinhole, Pinhole]) -> float:
     return float(np.clip(1.5 * turn, np.deg2rad(0.02), SIGMA_PARALLEL))
 
 
-def _at_centre(camera: Pinhole) -> FloatArray:
-    """Return the shift of pixels from the principal point to the photo's corner."""
-    shift = np.eye(3)
-    shift[:2, 2] = camera.matrix[:2, 2]
-    return shift
-
-
-def without_gross(
-    problem: Problem, solution: Solution
-) -> tuple[Problem, Solution, tuple[str, ...]]:
-    """Return the adjustment without gross control points, taking out the worst one by one."""
-    count = len(problem.control.ids)
-    dropped: list[int] = list(np.flatnonzero(~problem.pick_used))
+def without_gross(pair: OrientedPair) -> OrientedPair:
+    """Return the pair without gross control points, taking out the worst one by one."""
+    count = len(pair.observations.control.ids)
+    dropped: list[int] = list(np.flatnonzero(~pair.observations.pick_used))
     for _ in range(max(count // 3, 1) if count > 4 else 0):
-        test = np.where(problem.pick_used, solution.control_test, 0.0)
-        usual = max(
-            1.0, float(np.median(test[problem.pick_used])) if problem.pick_used.any() else 1
-        )
+        used = pair.observations.pick_used.copy()
+        test = np.where(used, pair.adjusted.control_test, 0.0)
+        usual = max(1.0, float(np.median(test[used])) if used.any() else 1)
         worst = int(test.argmax())
-        if test[worst] < GROSS_LIMIT * usual or problem.pick_used.sum() <= 4:
+        if test[worst] < GROSS_LIMIT * usual or used.sum() <= 4:
             break
-        used = problem.pick_used.copy()
         used[worst] = False
         dropped.append(worst)
-        problem = replace(problem, pick_used=used)
-        solution = adjust(problem, solution.cameras, radial=solution.radial, plane=solution.plane)
+        pair = pair.readjusted(pick_used=used)
     # A point thrown out by the first, rough fit may be good after all.
-    back = [i for i in dropped if solution.control_test[i] < GROSS_LIMIT]
+    back = [i for i in dropped if pair.adjusted.control_test[i] < GROSS_LIMIT]
     if back:
-        used = problem.pick_used.copy()
+        used = pair.observations.pick_used.copy()
         used[back] = True
-        problem = replace(problem, pick_used=used)
-        solution = adjust(problem, solution.cameras, radial=solution.radial, plane=solution.plane)
-    gross = tuple(problem.control.ids[i] for i in np.flatnonzero(~problem.pick_used))
-    return problem, solution, gross
-
-
-__all__ = ["SIGMA_PARALLEL", "Notes", "PhotoInput", "Step", "adjusted", "silent", "without_gross"]
+        pair = pair.readjusted(pick_used=used)
+    return pair

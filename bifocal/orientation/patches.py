@@ -101,18 +101,10 @@ def refine(
     if not len(pixels1):
         none = np.zeros(0)
         return PatchResult(np.zeros((0, 2)), none, none, np.zeros(0, dtype=bool))
-    out = [
-        _refine_part(
-            image1,
-            image2,
-            pixels1[part],
-            pixels2[part],
-            local[part],
-            directions[part],
-            (half, iterations, reach),
-        )
-        for part in (slice(start, start + 4000) for start in range(0, max(len(pixels1), 1), 4000))
-    ]
+    out = []
+    for start in range(0, len(pixels1), 4000):
+        points = [each[start : start + 4000] for each in (pixels1, pixels2, local, directions)]
+        out.append(_refine_part(image1, image2, *points, settings=(half, iterations, reach)))
     return PatchResult(*(np.concatenate(parts) for parts in zip(*out, strict=True)))
 
 
@@ -123,6 +115,7 @@ def _refine_part(
     pixels2: FloatArray,
     local: FloatArray,
     directions: FloatArray,
+    *,
     settings: tuple[int, int, float],
 ) -> PatchResult:
     """Refine at most 4000 matches (the coordinate maps stay small)."""
@@ -164,18 +157,17 @@ def _refine_part(
             break
         values = _sample(image2, position[index, None] + offsets[index])
         second[index] = values
-        found = np.einsum("npm,nm->np", solver[index], values)
-        found = np.nan_to_num(found)
-        solution[index] = found
+        solution[index] = terms = np.nan_to_num(np.einsum("npm,nm->np", solver[index], values))
         with np.errstate(divide="ignore", invalid="ignore"):
-            shift = found[:, 2:] / found[:, 1:2]
+            shift = terms[:, 2:] / terms[:, 1:2]
         shift = np.clip(np.nan_to_num(shift, nan=9.0), -1.0, 1.0)
         position[index] -= np.einsum("nij,nj->ni", directions[index], shift)
         size = np.abs(shift).max(axis=1)
         converged[index[size < 0.02]] = True
         lost = np.linalg.norm(position[index] - pixels2[index], axis=1) > reach
-        active[index[(size < 0.003) | lost | (found[:, 1] <= 0)]] = False
-        converged[index[lost | (found[:, 1] <= 0)]] = False
+        lost |= terms[:, 1] <= 0
+        active[index[(size < 0.003) | lost]] = False
+        converged[index[lost]] = False
     return PatchResult(
         position,
         _sigma(template, second, design, solution, normal, weight),

@@ -8,9 +8,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from bifocal.files.images import as_grey
-from bifocal.orientation.absolute_orientation import PhotoInput, set_up
-from bifocal.orientation.alignment import Alignment, Control, Interior, SiteMeasures
-from bifocal.orientation.oriented_pair import make_alignment
+from bifocal.orientation.absolute_orientation import orient_pair
+from bifocal.orientation.alignment import Alignment, make_alignment
+from bifocal.orientation.control_points import Control, SiteMeasures
+from bifocal.orientation.interior_orientation import Interior
+from bifocal.orientation.orientation_stages import PhotoInput
 from photocore.arrays import as_points
 from photocore.errors import InputError
 
@@ -87,7 +89,7 @@ def align(
         raise InputError(f"line: expected level or upright and two pixels, got {line[0]!r}.")
     site = site or SiteMeasures()
     photos = (_photo(image1, interiors[0], "image1"), _photo(image2, interiors[1], "image2"))
-    oriented = set_up(photos, control=control or Control(), site=site)
+    oriented = orient_pair(photos, control=control or Control(), site=site)
     direction = line and (as_points(line[1], "line", dimension=2), line[0] == "upright")
     way = "control" if control is not None else "site" if site.parallel else "auto"
     ordered = (photos[1], photos[0]) if oriented.exchanged else photos

@@ -6,16 +6,21 @@ one shifts every relief by the same offset, and nothing in the photos says so.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from bifocal.orientation.alignment import Interior, SiteMeasures
-from bifocal.orientation.dominant_plane import BAND, largest_plane, refitted
-from bifocal.orientation.pinhole import Pinhole
-from photocore.arrays import FloatArray
+from bifocal.orientation.control_points import SiteMeasures
+from bifocal.orientation.interior_orientation import Interior
+from photocore.arrays import FloatArray, IntArray
+from photocore.camera import Pinhole
 from photocore.errors import GeometryError
 
+#: Half the thickness of a face, as a share of the far distance.
+BAND = 0.0012
+#: The present plane is a face of the same wall: others slope less than this against it. [m/m]
+STEEPEST = 0.02
 #: A face with this share of the chosen one's points may as well be the wall.
 RIVAL = 0.5
 #: With this share of the largest face's points, a face at one scale is preferred to it.
@@ -57,11 +62,11 @@ def faces(heights: FloatArray, pixels: FloatArray, *, band: float) -> list[Face]
     band : float
         Half the thickness of a face. [m]
     """
-    found: list[Face] = []
+    planes: list[Face] = []
     count, order = len(heights), np.argsort(heights)
     heights, pixels = heights[order], pixels[order]
     free = np.ones(count, dtype=bool)
-    while len(found) < 6 and free.any():
+    while len(planes) < 6 and free.any():
         filled = np.concatenate([[0], np.cumsum(free)])
         low = np.searchsorted(heights, heights - band)
         high = np.searchsorted(heights, heights + band, side="right")
@@ -71,15 +76,15 @@ def faces(heights: FloatArray, pixels: FloatArray, *, band: float) -> list[Face]
         offset = float(np.median(heights[members]))
         if members.sum() < 0.05 * count:
             break
-        if all(abs(offset - other.offset) > APART * band for other in found):
-            found.append(
+        if all(abs(offset - other.offset) > APART * band for other in planes):
+            planes.append(
                 Face(offset, float(members.sum() / count), _midst(pixels, np.flatnonzero(members)))
             )
         free &= np.abs(heights - at) > band
-    return found
+    return planes
 
 
-def _midst(pixels: FloatArray, members: np.ndarray) -> tuple[float, float]:
+def _midst(pixels: FloatArray, members: IntArray) -> tuple[float, float]:
     """Return the member with the most other members, and the fewest strangers, around it."""
     radius = 0.03 * float(np.linalg.norm(np.ptp(pixels, axis=0)))
     some = members[:: max(1, len(members) // 400)]
@@ -123,22 +128,61 @@ def choose_wall(
     if site.wall is not None:
         offset = _height_at(heights, pixels, site.wall, interiors[0])
     elif is_one_scale(interiors, site):
-        found = faces(heights, pixels, band=band)
-        fair = [f for f in found if f.share >= COMPARABLE * found[0].share]
+        planes = faces(heights, pixels, band=band)
+        fair = [f for f in planes if f.share >= COMPARABLE * planes[0].share]
         if fair:
             offset = min(fair, key=lambda f: abs(scale_difference(cameras, plane, f.offset))).offset
     if offset:
         plane = refitted(xyz, plane + np.array([offset, 0.0, 0.0]), band=band)
         heights = _heights(xyz, plane)
-    found = faces(heights, pixels, band=band)
-    return plane, sorted(found, key=lambda face: (abs(face.offset) > band, -face.share))
+    planes = faces(heights, pixels, band=band)
+    return plane, sorted(planes, key=lambda face: (abs(face.offset) > band, -face.share))
+
+
+def largest_plane(xyz: FloatArray, *, band: float, seed: int = 7) -> FloatArray:
+    """Return the plane z = a + b X + c Y, nearly parallel to Z = 0, that holds most points.
+
+    Parameters
+    ----------
+    xyz : ndarray, shape (n, 3)
+    band : float
+        Points this near count fully less their distance (a narrow face beats a vague heap).
+    seed : int
+        Of the random triples.
+    """
+    generator = np.random.default_rng(seed)
+    sample = xyz[generator.choice(len(xyz), min(len(xyz), 6000), replace=False)]
+    triples = generator.integers(0, len(sample), (3000, 3))
+    corners = sample[triples]
+    ones = np.ones((*corners.shape[:2], 1))
+    design = np.concatenate([ones, corners[..., :2]], axis=2)
+    area = np.linalg.det(design)
+    extent = np.ptp(sample[:, :2], axis=0).prod()
+    wide = np.abs(area) > 0.02 * extent
+    planes = np.linalg.solve(design[wide], corners[wide][..., 2:])[..., 0]
+    planes = planes[np.abs(planes[:, 1:]).max(axis=1) < STEEPEST]
+    planes = np.concatenate([np.zeros((1, 3)), planes])
+    lifted = np.column_stack([np.ones(len(sample)), sample[:, :2]])
+    scores = [
+        np.maximum(1 - np.abs(sample[:, 2] - lifted @ plane) / band, 0).sum() for plane in planes
+    ]
+    return refitted(sample, planes[int(np.argmax(scores))], band=band)
+
+
+def refitted(xyz: FloatArray, plane: FloatArray, *, band: float) -> FloatArray:
+    """Return the plane fitted to the points within a band of an approximate one."""
+    lifted = np.column_stack([np.ones(len(xyz)), xyz[:, :2]])
+    for _ in range(3):
+        near = np.abs(xyz[:, 2] - lifted @ plane) < band
+        if near.sum() < 3:
+            break
+        plane = np.linalg.lstsq(lifted[near], xyz[near, 2], rcond=None)[0]
+    return np.asarray(plane)
 
 
 def is_one_scale(interiors: tuple[Interior, Interior], site: SiteMeasures) -> bool:
     """Return whether focal lengths and distances say that both photos were meant for one scale."""
-    d1, d2, delta = site.distance1, site.distance2, site.delta_d
-    d1 = d1 or (d2 + delta if d2 and delta else None)
-    d2 = d2 or (d1 - delta if d1 and delta else None)
+    d1, d2 = site.distances
     if not (site.parallel and d1 and d2) or any(interior.is_assumed for interior in interiors):
         return False
     ratio = interiors[1].focal / d2 * d1 / interiors[0].focal
@@ -151,14 +195,14 @@ def scale_difference(cameras: tuple[Pinhole, Pinhole], plane: FloatArray, offset
     return float(np.log(near / far))
 
 
-def rivals(found: list[Face]) -> list[Face]:
+def rivals(planes: Sequence[Face]) -> list[Face]:
     """Return the faces that may as well be the wall."""
-    return [face for face in found[1:] if face.share >= RIVAL * found[0].share]
+    return [face for face in planes[1:] if face.share >= RIVAL * planes[0].share]
 
 
-def rivals_in_words(found: list[Face], site: SiteMeasures) -> str:
+def rivals_in_words(planes: Sequence[Face], site: SiteMeasures) -> str:
     """Return the warning that other planes compete with the wall; empty if none does."""
-    others = rivals(found)
+    others = rivals(planes)
     if not others or site.wall is not None:
         return ""
     named = "; ".join(
@@ -167,10 +211,11 @@ def rivals_in_words(found: list[Face], site: SiteMeasures) -> str:
         for face in others
     )
     return (
-        f"CHECK THE WALL: only {100 * found[0].share:.0f} % of the details spread over both photos "
-        "lie on the plane taken for the wall (green in the picture), and other planes compete with "
-        f"it, at roughly: {named}. If the wall is one of these, every relief is off by that much: "
-        "name a spot of the wall in the far photo with --wall COL,ROW, or give control points."
+        f"CHECK THE WALL: only {100 * planes[0].share:.0f} % of the details spread over both "
+        "photos lie on the plane taken for the wall (green in the picture), and other planes "
+        f"compete with it, at roughly: {named}. If the wall is one of these, every relief is off "
+        "by that much: name a spot of the wall in the far photo with --wall COL,ROW, or give "
+        "control points."
     )
 
 
@@ -191,6 +236,3 @@ def _height_at(
             "from the centre of zoom (the photo's middle)."
         )
     return float(np.median(heights[near]))
-
-
-__all__ = ["Face", "choose_wall", "faces", "rivals", "rivals_in_words"]

@@ -11,10 +11,11 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from bifocal.orientation.alignment import Interior
+from bifocal.model.pair import apply_homography
 from bifocal.orientation.features import Features, drop_repeated, match_features
-from bifocal.orientation.pinhole import Pinhole, camera_matrix, fundamental, triangulate
+from bifocal.orientation.interior_orientation import Interior
 from photocore.arrays import BoolArray, FloatArray
+from photocore.camera import Pinhole, fundamental, homogeneous, triangulate
 from photocore.errors import GeometryError
 
 #: Fewer common points than this and any two photos may seem to match by chance.
@@ -42,6 +43,12 @@ class Ties:
     homography: FloatArray
     on_plane: BoolArray
     tolerance: float
+
+    @property
+    def parallax(self) -> FloatArray:
+        """How far the points leave the plane in photo 2, shape (m,). [px]"""
+        on_plane = apply_homography(self.homography, self.pixels1)
+        return np.linalg.norm(self.pixels2 - on_plane, axis=1)
 
 
 def find_ties(
@@ -75,7 +82,7 @@ def find_ties(
             "same wall."
         )
     x1, x2 = x1[agree], x2[agree]
-    homography, on_plane = _plane(x1, x2, tolerance)
+    homography, on_plane = _dominant_plane(x1, x2, 1.5 * tolerance, 8000)
     if on_plane.sum() < max(FEWEST_ON_PLANE * count, 20):
         raise GeometryError(
             f"no plane: only {int(on_plane.sum())} of {count} common points lie on one plane. The "
@@ -92,39 +99,23 @@ def _one_geometry(x1: FloatArray, x2: FloatArray, tolerance: float) -> BoolArray
     if len(x1) < 8:
         return np.zeros(len(x1), dtype=bool)
     cv2.setRNGSeed(7)
-    _, flat = cv2.findHomography(
-        x1, x2, cv2.USAC_MAGSAC, tolerance, maxIters=4000, confidence=0.9999
-    )
+    _, on_plane = _dominant_plane(x1, x2, tolerance, 4000)
     matrix, mask = cv2.findFundamentalMat(x1, x2, cv2.USAC_MAGSAC, tolerance, 0.9999, 4000)
-    on_plane = np.zeros(len(x1), bool) if flat is None else flat.ravel().astype(bool)
     agree = np.zeros(len(x1), bool) if matrix is None else mask.ravel().astype(bool)
     # A flat scene leaves F free: there the homography is the better witness.
     return agree if agree.sum() > 1.1 * on_plane.sum() else agree | on_plane
 
 
-def _plane(x1: FloatArray, x2: FloatArray, tolerance: float) -> tuple[FloatArray, BoolArray]:
-    """Return the dominant homography and its points, refitted."""
+def _dominant_plane(
+    x1: FloatArray, x2: FloatArray, tolerance: float, iterations: int
+) -> tuple[FloatArray, BoolArray]:
+    """Return the dominant homography and its points."""
     matrix, mask = cv2.findHomography(
-        x1, x2, cv2.USAC_MAGSAC, 1.5 * tolerance, maxIters=8000, confidence=0.9999
+        x1, x2, cv2.USAC_MAGSAC, tolerance, maxIters=iterations, confidence=0.9999
     )
     if matrix is None:
         return np.eye(3), np.zeros(len(x1), dtype=bool)
-    on_plane = mask.ravel().astype(bool)
-    return np.asarray(matrix, dtype=np.float64), on_plane
-
-
-def transferred(homography: FloatArray, pixels: FloatArray) -> FloatArray:
-    """Return pixels 1 carried to photo 2 over the plane."""
-    mapped = np.column_stack([pixels, np.ones(len(pixels))]) @ homography.T
-    with np.errstate(divide="ignore", invalid="ignore"):
-        return mapped[:, :2] / mapped[:, 2:]
-
-
-def parallax(ties: Ties) -> tuple[float, float]:
-    """Return the 90th and 98th percentile of how far common points leave the plane. [px]"""
-    misfit = np.linalg.norm(ties.pixels2 - transferred(ties.homography, ties.pixels1), axis=1)
-    low, high = np.percentile(misfit, [90, 98])
-    return float(low), float(high)
+    return np.asarray(matrix, dtype=np.float64), mask.ravel().astype(bool)
 
 
 def plane_scale(ties: Ties, image_size: tuple[int, int]) -> float:
@@ -132,7 +123,7 @@ def plane_scale(ties: Ties, image_size: tuple[int, int]) -> float:
     middle = np.median(ties.pixels1[ties.on_plane], axis=0)
     step = 0.01 * max(image_size)
     corners = middle + step * np.array([[1, 0], [-1, 0], [0, 1], [0, -1]])
-    moved = transferred(ties.homography, corners)
+    moved = apply_homography(ties.homography, corners)
     area = abs(np.linalg.det(np.stack([moved[0] - moved[1], moved[2] - moved[3]])))
     return float(np.sqrt(area) / (2 * step))
 
@@ -145,27 +136,22 @@ def first_cameras(ties: Ties, interiors: tuple[Interior, Interior]) -> tuple[Pin
     The homography between calibrated photos is ``R + t nᵀ / d``: up to four decompositions. The one
     in which the common points lie in front of both cameras and on their epipolar lines is it.
     """
-    matrices = [
-        camera_matrix(interior.focal, interior.aspect, *interior.centre) for interior in interiors
-    ]
+    matrices = [interior.matrix for interior in interiors]
     _, turns, shifts, normals = cv2.decomposeHomographyMat(
         np.linalg.inv(matrices[1]) @ ties.homography @ matrices[0], np.eye(3)
     )
-    best: tuple[float, tuple[Pinhole, Pinhole] | None] = (np.inf, None)
-    for turn, shift, normal in zip(turns, shifts, normals, strict=True):
-        for sign in (1.0, -1.0):
-            cameras = _in_plane_frame(matrices, turn, sign * shift.ravel(), sign * normal.ravel())
-            if cameras is None:
-                continue
-            cost = _cost(ties, cameras)
-            if cost < best[0]:
-                best = (cost, cameras)
-    if best[1] is None:
+    cameras = [
+        _in_plane_frame(matrices, turn, sign * shift.ravel(), sign * normal.ravel())
+        for turn, shift, normal in zip(turns, shifts, normals, strict=True)
+        for sign in (1.0, -1.0)
+    ]
+    possible = [pair for pair in cameras if pair is not None]
+    if not possible:
         raise GeometryError(
             "the two photos give no camera in front of the wall. Check the focal lengths "
             "(--focal1, --focal2) and that both photos show the same wall."
         )
-    return best[1]
+    return min(possible, key=lambda pair: _cost(ties, pair))
 
 
 def _in_plane_frame(
@@ -193,10 +179,10 @@ def _in_plane_frame(
 
 def _cost(ties: Ties, cameras: tuple[Pinhole, Pinhole]) -> float:
     """Return a robust cost: epipolar misfit, and points behind a camera."""
-    x1 = np.column_stack([ties.pixels1, np.ones(len(ties.pixels1))])
-    x2 = np.column_stack([ties.pixels2, np.ones(len(ties.pixels2))])
-    line = x1 @ fundamental(*cameras).T
-    misfit = np.abs((x2 * line).sum(1)) / np.maximum(np.hypot(line[:, 0], line[:, 1]), 1e-300)
+    line = homogeneous(ties.pixels1) @ fundamental(*cameras).T
+    misfit = np.abs((homogeneous(ties.pixels2) * line).sum(1)) / np.maximum(
+        np.hypot(line[:, 0], line[:, 1]), 1e-300
+    )
     xyz = triangulate(*cameras, ties.pixels1, ties.pixels2)
     lowest = min(camera.centre[2] for camera in cameras)
     behind = ~(xyz[:, 2] < lowest) & ~ties.on_plane
@@ -209,9 +195,7 @@ def rotation_only(ties: Ties, interiors: tuple[Interior, Interior]) -> bool:
 
     The homography between calibrated photos taken from one place is a rotation, whatever they show.
     """
-    matrices = [
-        camera_matrix(interior.focal, interior.aspect, *interior.centre) for interior in interiors
-    ]
+    matrices = [interior.matrix for interior in interiors]
     joined = np.linalg.inv(matrices[1]) @ ties.homography @ matrices[0]
     values = np.linalg.svd(joined, compute_uv=False)
     slack = 0.02 + 2 * float(np.hypot(interiors[0].sigma_focal, interiors[1].sigma_focal))

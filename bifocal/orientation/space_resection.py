@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import cv2
 import numpy as np
 
-from bifocal.orientation.alignment import Interior
-from bifocal.orientation.pinhole import Pinhole, camera_matrix, project
+from bifocal.orientation.interior_orientation import Interior
 from photocore.arrays import BoolArray, FloatArray
+from photocore.camera import Pinhole, camera_matrix, project
 from photocore.errors import GeometryError
 
 #: Picks that miss by more than this share of the image width are gross, whatever the lens.
@@ -52,21 +50,19 @@ def resect(
     width = max(interior.image_size)
     spread = min(3.0 * interior.sigma_focal, 1.3)
     count = 1 + 2 * int(np.ceil(spread / 0.08)) if spread > 0.02 else 1
-    best: tuple[float, Any, Any] = (np.inf, None, None)
-    for factor in np.exp(np.linspace(-spread, spread, count)) if count > 1 else [1.0]:
+    factors = np.exp(np.linspace(-spread, spread, count)) if count > 1 else [1.0]
+    best, camera, agree = np.inf, None, np.zeros(len(xyz), dtype=bool)
+    for factor in factors:
         matrix = camera_matrix(interior.focal * factor, interior.aspect, *interior.centre)
-        for camera in _candidates(xyz, pixels, matrix, generator):
-            misfit = np.linalg.norm(pixels - project(camera, xyz), axis=1)
-            misfit = np.nan_to_num(misfit, nan=1e6)
+        for candidate in _candidates(xyz, pixels, matrix, generator):
+            misfit = np.linalg.norm(pixels - project(candidate, xyz), axis=1)
+            share = np.nan_to_num(misfit, nan=1e6) / (GROSS_SHARE * width)
             # Robust cost that still prefers the more precise of two solutions, and at equal fit the
             # lens that is nearer to what is known.
-            cost = np.minimum(misfit / (GROSS_SHARE * width), 1.0) ** 2
-            prior = (np.log(factor) / interior.sigma_focal) ** 2
-            total = float(cost.sum()) + 1e-6 * prior
-            if total < best[0]:
-                best = (total, camera, misfit)
-    _, camera, misfit = best
-    agree = misfit < GROSS_SHARE * width if misfit is not None else np.zeros(len(xyz), bool)
+            cost = float((np.minimum(share, 1.0) ** 2).sum())
+            cost += 1e-6 * (np.log(factor) / interior.sigma_focal) ** 2
+            if cost < best:
+                best, camera, agree = cost, candidate, share < 1.0
     if camera is None or agree.sum() < 4:
         raise GeometryError(
             "no camera fits four of the control points. Check that their pixels belong to the "
@@ -79,7 +75,7 @@ def _candidates(
     xyz: FloatArray, pixels: FloatArray, matrix: FloatArray, generator: np.random.Generator
 ) -> list[Pinhole]:
     """Return cameras from all points and from small random subsets."""
-    found = _solve(xyz, pixels, matrix)
+    cameras = _solve(xyz, pixels, matrix)
     if len(xyz) >= 6:
         subsets = [generator.choice(len(xyz), 5, replace=False) for _ in range(12)]
     elif len(xyz) == 5:
@@ -87,8 +83,8 @@ def _candidates(
     else:
         subsets = []
     for subset in subsets:
-        found += _solve(xyz[subset], pixels[subset], matrix)
-    return found
+        cameras += _solve(xyz[subset], pixels[subset], matrix)
+    return cameras
 
 
 def _solve(xyz: FloatArray, pixels: FloatArray, matrix: FloatArray) -> list[Pinhole]:

@@ -20,7 +20,7 @@ FAMILIES = ("DICT_4X4_250", "DICT_5X5_250", "DICT_6X6_250", "DICT_APRILTAG_36h11
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Targets:
+class SurveyTargets:
     """Targets found in one photo.
 
     Attributes
@@ -44,7 +44,7 @@ class Targets:
     codes: tuple[str, ...]
 
 
-def find_targets(image: ByteArray) -> Targets:
+def find_targets(image: ByteArray) -> SurveyTargets:
     """Return every target of a grey photo.
 
     Parameters
@@ -61,7 +61,7 @@ def find_targets(image: ByteArray) -> Targets:
     codes, names, sizes = _codes(image)
     pixels = np.concatenate([part[0] for part in parts] + [codes])
     counts = [len(part[0]) for part in parts]
-    return Targets(
+    return SurveyTargets(
         pixels=pixels,
         size=np.concatenate([part[1] for part in parts] + [sizes]),
         dark=np.repeat([True, False, True, True], [*counts, len(codes)]),
@@ -77,7 +77,7 @@ def find_targets(image: ByteArray) -> Targets:
 def _discs(image: ByteArray, *, dark: bool) -> tuple[FloatArray, FloatArray]:
     """Return centres and diameters of discs."""
     grey = image if dark else cv2.bitwise_not(image).astype(np.uint8)
-    found: list[tuple[float, float, float]] = []
+    discs: list[tuple[float, float, float]] = []
     for box in (41, 161):
         mean = cv2.blur(grey, (box, box))
         mask = (grey.astype(np.int16) < mean.astype(np.int16) - 15).astype(np.uint8)
@@ -85,10 +85,10 @@ def _discs(image: ByteArray, *, dark: bool) -> tuple[FloatArray, FloatArray]:
         for left, top, width, height, area in stats[_round_ones(stats, image.shape, box)]:
             disc = _measure(grey, (int(left), int(top), int(width), int(height)), float(area))
             if disc is not None:
-                found.append(disc)
-    if not found:
+                discs.append(disc)
+    if not discs:
         return np.zeros((0, 2)), np.zeros(0)
-    array = np.array(found)
+    array = np.array(discs)
     _, first = np.unique(np.round(array[:, :2] / 2), axis=0, return_index=True)
     return array[first, :2], array[first, 2]
 

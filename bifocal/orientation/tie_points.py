@@ -6,11 +6,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from bifocal.orientation.alignment import Interior
-from bifocal.orientation.bundle import Problem, Solution, adjust, radial_shift
+from bifocal.orientation.interior_orientation import Interior
+from bifocal.orientation.pair_adjustment import AdjustedPair
+from bifocal.orientation.pair_observations import PairObservations
 from bifocal.orientation.patches import refine, same_scale
-from bifocal.orientation.pinhole import Pinhole, fundamental, projection_rows, triangulate
 from photocore.arrays import BoolArray, ByteArray, FloatArray
+from photocore.camera import Pinhole, project_with_jacobian, triangulate
 
 #: Ties of a wall that count as independent of each other.
 INDEPENDENT = 50
@@ -30,62 +31,45 @@ def relief_rate(cameras: tuple[Pinhole, Pinhole], xyz: FloatArray) -> FloatArray
     ray = xyz - cameras[0].centre
     with np.errstate(divide="ignore", invalid="ignore"):
         ray = ray / ray[:, 2:]
-    return np.einsum("nij,nj->ni", projection_rows(cameras[1], xyz), ray)
+    return np.einsum("nij,nj->ni", project_with_jacobian(cameras[1], xyz).by_point, ray)
 
 
 def local_maps(
     cameras: tuple[Pinhole, Pinhole],
     interiors: tuple[Interior, Interior],
     xyz: FloatArray,
-    raw: tuple[FloatArray, FloatArray],
+    ideal: tuple[FloatArray, FloatArray],
 ) -> FloatArray:
     """Return the derivative of photo 2 by photo 1 for surfaces parallel to the wall, (n, 2, 2)."""
     first, second = (
-        _undistorted(interior, pixels, projection_rows(camera, xyz)[:, :, :2])
-        for camera, interior, pixels in zip(cameras, interiors, raw, strict=True)
+        interior.raw_by_ideal(pixels) @ project_with_jacobian(camera, xyz).by_point[:, :, :2]
+        for camera, interior, pixels in zip(cameras, interiors, ideal, strict=True)
     )
     bad = ~(np.abs(np.linalg.det(np.nan_to_num(first))) > 0)
     first[bad], second[bad] = np.eye(2), np.eye(2)
     return second @ np.linalg.inv(first)
 
 
-def _undistorted(interior: Interior, raw: FloatArray, rows: FloatArray) -> FloatArray:
-    """Return the derivative of raw pixels, given that of ideal pixels."""
-    if interior.lens is None:
-        return rows
-    half = np.array([0.5, 0.0])
-    right = interior.ideal(raw + half) - interior.ideal(raw - half)
-    down = interior.ideal(raw + half[::-1]) - interior.ideal(raw - half[::-1])
-    return np.linalg.inv(np.stack([right, down], axis=-1)) @ rows
-
-
-def raw_pixels(interior: Interior, ideal: FloatArray) -> FloatArray:
-    """Return where ideal pixels are seen in the photo as it is."""
-    return ideal.copy() if interior.lens is None else np.asarray(interior.lens.distort(ideal))
-
-
 def refine_ties(
-    problem: Problem, solution: Solution, images: tuple[ByteArray, ByteArray]
+    observations: PairObservations, adjusted: AdjustedPair, images: tuple[ByteArray, ByteArray]
 ) -> tuple[FloatArray, BoolArray]:
     """Return the ties' positions in photo 2 to a tenth of a pixel, and which could be refined."""
-    interiors = problem.interiors
-    straight = [
-        radial_shift(x, i, k) if k else x
-        for x, i, k in zip((problem.tie1, problem.tie2), interiors, solution.radial, strict=True)
-    ]
-    xyz = triangulate(*solution.cameras, *straight)
-    raw1, raw2 = raw_pixels(interiors[0], problem.tie1), raw_pixels(interiors[1], problem.tie2)
-    local = local_maps(solution.cameras, interiors, xyz, (raw1, raw2))
-    usable = problem.tie_used & np.isfinite(local).all(axis=(1, 2))
+    interiors, ties = observations.interiors, (observations.tie1, observations.tie2)
+    xyz = triangulate(*adjusted.cameras, *observations.straight_ties(adjusted.radial))
+    raw1, raw2 = interiors[0].raw(ties[0]), interiors[1].raw(ties[1])
+    local = local_maps(adjusted.cameras, interiors, xyz, ties)
+    usable = observations.tie_used & np.isfinite(local).all(axis=(1, 2))
     smooth1, smooth2 = same_scale(*images, local[usable])
     both = np.broadcast_to(np.eye(2), (len(raw1), 2, 2))
-    found = refine(smooth1, smooth2, raw1, raw2, local, both, reach=4.0)
-    good = found.converged & (found.zncc > 0.85) & (found.sigma < 0.3)
-    return interiors[1].ideal(found.pixels2), good
+    patches = refine(smooth1, smooth2, raw1, raw2, local, both, reach=4.0)
+    good = patches.converged & (patches.zncc > 0.85) & (patches.sigma < 0.3)
+    return interiors[1].ideal(patches.pixels2), good
 
 
-def classify(problem: Problem, solution: Solution, *, share: float, sigma: float) -> Problem:
-    """Return the problem with gross ties left out and the wall's ties found anew.
+def classify(
+    observations: PairObservations, adjusted: AdjustedPair, *, share: float, sigma: float
+) -> PairObservations:
+    """Return the observations with gross ties left out and the wall's ties found anew.
 
     Parameters
     ----------
@@ -94,45 +78,18 @@ def classify(problem: Problem, solution: Solution, *, share: float, sigma: float
     sigma : float
         Precision of a tie's coordinate. [px]
     """
-    cameras = solution.cameras
-    used = np.abs(solution.tie_misfit) < 3.5 * sigma
-    xyz = triangulate(*cameras, problem.tie1, problem.tie2)
+    cameras = adjusted.cameras
+    used = np.abs(adjusted.tie_misfit) < 3.5 * sigma
+    xyz = triangulate(*cameras, observations.tie1, observations.tie2)
     lowest = min(camera.centre[2] for camera in cameras)
     used &= np.isfinite(xyz).all(axis=1) & (xyz[:, 2] < 0.95 * lowest)
     on_plane = np.column_stack([xyz[:, :2], np.zeros(len(xyz))])
     rate = np.linalg.norm(np.nan_to_num(relief_rate(cameras, on_plane)), axis=1)
     sigma_wall = np.hypot(1.5 * sigma, rate * share * cameras[0].centre[2] / 2)
-    wall = used & (np.abs(solution.wall_misfit) < 2.0 * sigma_wall)
+    wall = used & (np.abs(adjusted.wall_misfit) < 2.0 * sigma_wall)
     # Unevenness is common to whole stretches of wall: a thousand ties know its plane no better
     # than some fifty independent ones.
     sigma_wall = sigma_wall * np.sqrt(max(wall.sum() / INDEPENDENT, 1.0))
     return replace(
-        problem, tie_used=used, wall=wall, sigma_wall=sigma_wall, sigma_tie=max(sigma, 0.03)
+        observations, tie_used=used, wall=wall, sigma_wall=sigma_wall, sigma_tie=max(sigma, 0.03)
     )
-
-
-def settle(
-    problem: Problem, solution: Solution, *, shares: tuple[float, ...] = ROUGHNESS
-) -> tuple[Problem, Solution]:
-    """Return the problem and its solution after the wall and the gross ties are settled."""
-    for share in shares:
-        sigma = max(robust_sigma(solution.tie_misfit[problem.tie_used]), 0.03)
-        problem = classify(problem, solution, share=share, sigma=sigma)
-        solution = adjust(problem, solution.cameras, radial=solution.radial, plane=solution.plane)
-    return problem, solution
-
-
-def epipole_angle(cameras: tuple[Pinhole, Pinhole], xyz: FloatArray) -> FloatArray:
-    """Return the angle at which the two rays to each point meet. [rad]"""
-    first, second = (camera.centre - xyz for camera in cameras)
-    cosine = (first * second).sum(1) / (
-        np.linalg.norm(first, axis=1) * np.linalg.norm(second, axis=1)
-    )
-    return np.arccos(np.clip(cosine, -1, 1))
-
-
-def epipolar_lines(cameras: tuple[Pinhole, Pinhole], pixels1: FloatArray) -> FloatArray:
-    """Return the lines in photo 2 of ideal pixels 1, (a, b) of unit length, shape (n, 3)."""
-    line = np.column_stack([pixels1, np.ones(len(pixels1))]) @ fundamental(*cameras).T
-    with np.errstate(divide="ignore", invalid="ignore"):
-        return line / np.hypot(line[:, 0], line[:, 1])[:, None]

@@ -5,12 +5,14 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-from bifocal.orientation.alignment import Interior, SiteMeasures
-from bifocal.orientation.bundle import Solution
+from bifocal.model.pair import apply_homography
+from bifocal.orientation.control_points import SiteMeasures
 from bifocal.orientation.features import sharpness
-from bifocal.orientation.pinhole import Pinhole
-from bifocal.orientation.relative_orientation import Ties, rotation_only, transferred
+from bifocal.orientation.interior_orientation import Interior
+from bifocal.orientation.pair_adjustment import AdjustedPair
+from bifocal.orientation.relative_orientation import Ties, rotation_only
 from photocore.arrays import ByteArray
+from photocore.camera import Pinhole
 from photocore.errors import GeometryError, InputError
 
 #: Below this a photo is blurred (sharp photos: 0.3 to 0.6; blurred by 3 px: below 0.17).
@@ -53,11 +55,7 @@ def check_different(name1: str, name2: str, images: tuple[ByteArray, ByteArray])
 
 
 def check_parallax(
-    ties: Ties,
-    interiors: tuple[Interior, Interior],
-    names: tuple[str, str],
-    *,
-    flat_is_fine: bool,
+    ties: Ties, interiors: tuple[Interior, Interior], names: tuple[str, str], *, flat_is_fine: bool
 ) -> None:
     """Refuse photos in which nothing moves against the wall.
 
@@ -67,11 +65,10 @@ def check_parallax(
         Both distances were measured and the camera was square to the wall: a flat wall then is
         no obstacle.
     """
-    misfit = np.linalg.norm(ties.pixels2 - transferred(ties.homography, ties.pixels1), axis=1)
-    moving = float((misfit > 2.5 * ties.tolerance).mean())
+    moving = float((ties.parallax > 2.5 * ties.tolerance).mean())
     height, width = interiors[0].image_size[1], interiors[0].image_size[0]
     corners = np.array([[0, 0], [width, 0], [width, height], [0, height]], dtype=np.float64)
-    moved = transferred(ties.homography, corners) - corners
+    moved = apply_homography(ties.homography, corners) - corners
     if moving < 0.03 and np.abs(moved).max() < 2 * ties.tolerance:
         raise SamePhotoError(
             f"{names[0]} and {names[1]} show the same view: one photo twice, or two shots from the "
@@ -97,15 +94,15 @@ def check_parallax(
 def check_units(cameras: tuple[Pinhole, Pinhole], site: SiteMeasures) -> None:
     """Refuse control points that are not in metres."""
     d1, d2 = (float(camera.centre[2]) for camera in cameras)
-    for name, found, measured in (("1", d1, site.distance1), ("2", d2, site.distance2)):
+    for name, distance, measured in (("1", d1, site.distance1), ("2", d2, site.distance2)):
         if measured is None:
             continue
         for factor, unit in ((1000.0, "mm"), (100.0, "cm")):
-            if 0.8 < found / measured / factor < 1.25:
+            if 0.8 < distance / measured / factor < 1.25:
                 raise InputError(
-                    f"the control points are in {unit}: they put camera {name} {found:,.0f} away, "
-                    f"--distance{name} says {measured:g} m. Write them in metres, or the unit into "
-                    f"the headings (X [{unit}])."
+                    f"the control points are in {unit}: they put camera {name} {distance:,.0f} "
+                    f"away, --distance{name} says {measured:g} m. Write them in metres, or the "
+                    f"unit into the headings (X [{unit}])."
                 )
     if max(d1, d2) > FARTHEST:
         raise InputError(
@@ -130,9 +127,9 @@ def check_distortion(k: float, interior: Interior) -> None:
         )
 
 
-def check_movement(solution: Solution) -> None:
+def check_movement(adjusted: AdjustedPair) -> None:
     """Refuse a pair whose cameras stand (almost) at one distance."""
-    first, second = solution.cameras
+    first, second = adjusted.cameras
     d1, d2 = float(first.centre[2]), float(second.centre[2])
     moved = float(np.linalg.norm(first.centre - second.centre))
     if moved < LEAST_CHANGE * d1:
@@ -148,12 +145,11 @@ def check_movement(solution: Solution) -> None:
         )
 
 
-def check_determined(solution: Solution) -> None:
+def check_determined(adjusted: AdjustedPair) -> None:
     """Refuse a set-up whose distances came out hardly better than guessed."""
-    covariance = solution.covariance
-    for number, camera in enumerate(solution.cameras, start=1):
+    for number, camera in enumerate(adjusted.cameras, start=1):
         distance = float(camera.centre[2])
-        sigma = float(np.sqrt(covariance[11 * number - 2, 11 * number - 2]))
+        sigma = adjusted.sigma("Z", number)
         if sigma < 0.25 * distance:
             continue
         missing = (

@@ -9,13 +9,14 @@ from typing import NamedTuple, cast
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from bifocal.model.grid import Grid
+from bifocal.model.grid import Bounds, Grid
+from bifocal.model.image import ImageArray
 from bifocal.model.pair import Pair
 from bifocal.model.relief_map import ReliefMap
 from bifocal.model.surface import FlatSurface, MapSurface, ReliefArray, Surface
-from bifocal.orthophotos.ortho_image import ImageArray, OrthoOptions, Orthophoto, Source
+from bifocal.orthophotos.ortho_image import OrthoOptions, Orthophoto, Source
 from bifocal.orthophotos.pull_push import fill_holes
-from bifocal.orthophotos.rectify import View, footprint, native_gsd
+from bifocal.orthophotos.rectify import SourcePhoto, footprint
 from bifocal.orthophotos.visibility import hidden_from
 from photocore.arrays import BoolArray, ByteArray
 from photocore.errors import InputError
@@ -54,7 +55,7 @@ def orthophoto(
     relief: ReliefMap | Surface | ArrayLike | None = None,
     *,
     gsd: float | None = None,
-    bounds: tuple[float, float, float, float] | None = None,
+    bounds: Bounds | None = None,
     source: int = 1,
     options: OrthoOptions | None = None,
 ) -> Orthophoto:
@@ -112,9 +113,8 @@ def orthophoto(
     """
     options = options or OrthoOptions()
     surface = as_surface(relief)
-    photos = {1: pair.image1, 2: pair.image2}
     if isinstance(image, np.ndarray):
-        if source not in photos:
+        if source not in (1, 2):
             raise InputError(f"source: must be 1 or 2, got {source}.")
         images = {source: image}
     else:
@@ -125,7 +125,7 @@ def orthophoto(
     height, width = images[first].shape[:2]
     grid = choose_grid(pair, first, (width, height), surface, gsd=gsd, bounds=bounds)
     views = [
-        View.prepare(photos[number], pixels, number=number, gsd=grid.gsd)
+        SourcePhoto.prepare(pair.photo(number), pixels, number=number, gsd=grid.gsd)
         for number, pixels in images.items()
     ]
     out = np.zeros((*grid.shape, *views[0].image.shape[2:]), views[0].image.dtype)
@@ -172,22 +172,22 @@ def choose_grid(
     surface: Surface,
     *,
     gsd: float | None,
-    bounds: tuple[float, float, float, float] | None,
+    bounds: Bounds | None,
 ) -> Grid:
     """Return the grid asked for, by default the relief map's own, else that of the photo."""
-    photo = pair.image1 if number == 1 else pair.image2
+    photo = pair.photo(number)
     own = surface.grid if isinstance(surface, MapSurface) else None
     if own is not None and bounds is None and (gsd is None or gsd == own.gsd):
         return own
     if gsd is None:
-        gsd = own.gsd if own is not None else native_gsd(photo, size)
+        gsd = own.gsd if own is not None else photo.gsd(size)
     if bounds is None:
         bounds = own.bounds if own is not None else footprint(photo, size)
     return Grid.from_bounds(bounds, gsd=gsd)
 
 
 def render(
-    views: Sequence[View], surface: Surface, grid: Grid, options: OrthoOptions
+    views: Sequence[SourcePhoto], surface: Surface, grid: Grid, options: OrthoOptions
 ) -> Iterator[tuple[int, int, Tile]]:
     """Yield (column, row, tile) of an orthophoto, each in memory that does not grow with it."""
     for column, row, window in grid.tiles(TILE):
@@ -195,7 +195,7 @@ def render(
 
 
 def render_window(
-    views: Sequence[View], surface: Surface, window: Grid, options: OrthoOptions
+    views: Sequence[SourcePhoto], surface: Surface, window: Grid, options: OrthoOptions
 ) -> Tile:
     """Return one window of an orthophoto."""
     margin = _FILL_REACH if options.fill else 0
@@ -226,7 +226,7 @@ def render_window(
 
 
 def _look(
-    view: View, surface: Surface, grid: Grid, relief: ReliefArray, options: OrthoOptions
+    view: SourcePhoto, surface: Surface, grid: Grid, relief: ReliefArray, options: OrthoOptions
 ) -> _Look:
     column, row = view.pixel_map(grid, relief)
     inside = view.inside(column, row)
@@ -235,12 +235,12 @@ def _look(
         return _Look(np.zeros(shape, view.image.dtype), inside, np.zeros(grid.shape, bool))
     hidden = np.zeros(grid.shape, bool)
     if options.mask_hidden:
-        hidden = hidden_from(surface, grid, view.foot, relief) & inside
+        hidden = hidden_from(surface, grid, view.photo.foot, relief) & inside
     return _Look(view.sample(column, row, options.interpolation), inside, hidden)
 
 
 def _choose(
-    views: Sequence[View], looks: Sequence[_Look], grid: Grid, options: OrthoOptions
+    views: Sequence[SourcePhoto], looks: Sequence[_Look], grid: Grid, options: OrthoOptions
 ) -> tuple[ImageArray, ByteArray]:
     """Return colours and sources of a window: the better view, feathered where both see it."""
     usable = [look.inside & ~look.hidden for look in looks]
@@ -261,7 +261,7 @@ def _choose(
 
 
 def _share_of_first(
-    views: Sequence[View], usable: Sequence[BoolArray], grid: Grid, feather: float
+    views: Sequence[SourcePhoto], usable: Sequence[BoolArray], grid: Grid, feather: float
 ) -> NDArray[np.float32]:
     """Return the weight of the first view, 0..1."""
     import cv2
@@ -284,12 +284,9 @@ def _share_of_first(
 
 def _masked(image: ImageArray, keep: BoolArray) -> ImageArray:
     """Return the image with 0 where it is not to be kept."""
-    if keep.all():
-        return image
     import cv2
 
-    out: ImageArray = cv2.copyTo(image, keep.astype(np.uint8))
-    return out
+    return image if keep.all() else cv2.copyTo(image, keep.astype(np.uint8))
 
 
 def _fill(

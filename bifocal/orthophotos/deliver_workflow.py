@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import unicodedata
-from collections.abc import Iterator, Sequence
-from contextlib import ExitStack, contextmanager, suppress
+from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from datetime import date
 from pathlib import Path
@@ -21,10 +21,9 @@ from bifocal.model.points import SurveyPoints
 from bifocal.model.relief_map import Quality
 from bifocal.model.surface import FlatSurface, MapSurface, Surface
 from bifocal.orthophotos.compose import TILE
-from bifocal.orthophotos.drawing import Drawing, Legend, Sheet, round_step
+from bifocal.orthophotos.drawing import Drawing, Legend, PrintSheet, round_step
 from bifocal.orthophotos.drawing_files import write_drawing, write_section_dxf, write_section_svg
 from bifocal.orthophotos.ortho_workflow import (
-    OrthoResult,
     OrthoTask,
     make_ortho,
     open_surface,
@@ -33,6 +32,7 @@ from bifocal.orthophotos.ortho_workflow import (
 from bifocal.orthophotos.pdf_sheet import write_sheet
 from bifocal.orthophotos.sections import contours, section
 from bifocal.orthophotos.shading import shaded, tints
+from bifocal.orthophotos.tiles import RasterResult
 from photocore.arrays import positive
 from photocore.cli import Progress, no_progress
 from photocore.errors import InputError
@@ -80,7 +80,7 @@ class DeliverTask:
 class Delivery:
     """What was made: the orthophoto's result, the files and the sheet of paper."""
 
-    ortho: OrthoResult
+    ortho: RasterResult
     files: tuple[str, ...]
     sheet: str
 
@@ -107,17 +107,17 @@ def deliver(
     pair = Pair.read(pair_path)
     title = wish.title or str(pair.extra.get("name") or pair_path.name.split(".")[0])
     name = file_name(title)
-    remarks: list[str] = []
-    points = _points(wish.marked or task.points, remarks)
-    control = _points(wish.control, remarks)
-    with open_surface(task, pair, []) as surface:
+    points, remarks = _points(wish.marked or task.points)
+    control, notes_on_control = _points(wish.control)
+    remarks += notes_on_control
+    with open_surface(task, pair) as (surface, reader, _):
         # Everything that can be refused is, before the work.
         grid = planned_grid(pair, surface, task)
         notes = _notes(pair, grid, wish, task)
         drawing = Drawing(
             title=title, grid=grid, scale=scale, points=points, control=control, notes=notes
         )
-        sheet = Sheet.fitting(drawing, wish.paper)
+        sheet = PrintSheet.fitting(drawing, wish.paper)
         cuts = tuple(section(surface, grid, cut, step=gsd) for cut in wish.sections)
         drawing = replace(drawing, sections=cuts)
         with atomic_folder(folder, overwrite=overwrite) as place:
@@ -126,14 +126,12 @@ def deliver(
             )
             _pictures(place, name, drawing, sheet)
             if not isinstance(surface, FlatSurface):
-                with _measured(task, surface) as measured:
-                    share = _relief(
-                        place, f"{name}_relief", (surface, measured), drawing, sheet, wish
-                    )
+                surfaces = (surface, _measured(reader) or surface)
+                share = _relief(place, f"{name}_relief", surfaces, drawing, sheet, wish)
                 if share:
-                    remarks.append(
+                    remarks += (
                         f"relief sheet: {share:.1%} of it was not measured but interpolated or "
-                        "hidden; hatched in grey and without contour lines."
+                        "hidden; hatched in grey and without contour lines.",
                     )
             for number, cut in enumerate(cuts, start=1):
                 for writer, ending in ((write_section_dxf, "dxf"), (write_section_svg, "svg")):
@@ -157,7 +155,7 @@ def file_name(title: str) -> str:
     return "_".join(words) or "ortho"
 
 
-def _pictures(place: Path, name: str, drawing: Drawing, sheet: Sheet) -> None:
+def _pictures(place: Path, name: str, drawing: Drawing, sheet: PrintSheet) -> None:
     """Write PNG, drawing and print sheet of the raster of that name."""
     dpi = dpi_at_scale(drawing.grid.gsd, drawing.scale)
     with RasterReader(place / f"{name}.tif") as reader:
@@ -167,7 +165,7 @@ def _pictures(place: Path, name: str, drawing: Drawing, sheet: Sheet) -> None:
 
 
 def _relief(
-    place: Path, name: str, surfaces: tuple[Surface, Surface], drawing: Drawing, sheet: Sheet,
+    place: Path, name: str, surfaces: tuple[Surface, Surface], drawing: Drawing, sheet: PrintSheet,
     wish: DeliverTask,
 ) -> float:  # fmt: skip
     """Write the relief as numbers, and shaded with contour lines as picture, drawing and sheet.
@@ -211,34 +209,29 @@ def _relief(
     return share
 
 
-@contextmanager
-def _measured(task: OrthoTask, surface: Surface) -> Iterator[Surface]:
-    """Yield the measured part of a relief map; the surface itself where no map tells."""
-    with ExitStack() as stack:
-        found = surface
-        if task.relief is not None:
-            reader = stack.enter_context(RasterReader(task.relief))
-            if reader.bands >= 3 and reader.names[2].startswith("quality"):
-
-                def fetch(column: int, row: int, width: int, height: int) -> NDArray[np.float32]:
-                    r = reader.read_floats(column, row, width, height)
-                    quality = reader.read(column, row, width, height, bands=[3])[:, :, 0]
-                    return np.where(quality == Quality.MEASURED, r, np.float32(np.nan))
-
-                # A map of which nothing was measured is drawn as it is, hatched by no one.
-                with suppress(InputError):
-                    found = MapSurface(reader.grid, fetch)
-        yield found
-
-
-def _points(path: Path | None, remarks: list[str]) -> SurveyPoints | None:
-    if path is None:
+def _measured(reader: RasterReader | None) -> Surface | None:
+    """Return the measured part of a relief map; None where no map tells, or nothing was."""
+    if reader is None or reader.bands < 3 or not reader.names[2].startswith("quality"):
         return None
-    points, notes = read_survey_points(path)
-    remarks.extend(notes)
+
+    def fetch(*window: int) -> NDArray[np.float32]:
+        quality = reader.read(*window, bands=[3])[:, :, 0]
+        return np.where(quality == Quality.MEASURED, reader.read_floats(*window), np.float32("nan"))
+
+    # A map of which nothing was measured is drawn as it is, hatched by no one.
+    with suppress(InputError):
+        return MapSurface(reader.grid, fetch)
+    return None
+
+
+def _points(path: Path | None) -> tuple[SurveyPoints | None, tuple[str, ...]]:
+    """Return the points of a table, and remarks."""
+    if path is None:
+        return None, ()
+    points, remarks = read_survey_points(path)
     if not np.isfinite(points.xyz[:, :2]).all(axis=1).any():
         raise InputError(f"{path}: no point has X and Y in the plane frame.")
-    return points
+    return points, tuple(remarks)
 
 
 def _notes(pair: Pair, grid: Grid, wish: DeliverTask, task: OrthoTask) -> tuple[str, ...]:

@@ -136,7 +136,7 @@ class Drawing:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Sheet:
+class PrintSheet:
     """A sheet of paper for a drawing.
 
     Attributes
@@ -152,7 +152,7 @@ class Sheet:
     height: float
 
     @classmethod
-    def fitting(cls, drawing: Drawing, paper: str | None = None) -> Sheet:
+    def fitting(cls, drawing: Drawing, paper: str | None = None) -> PrintSheet:
         """Return the smallest sheet that holds a drawing.
 
         Raises

@@ -8,6 +8,7 @@ from xml.sax.saxutils import escape
 
 import numpy as np
 
+from bifocal.files.dxf import add_text, new_drawing
 from bifocal.model.points import SurveyPoints
 from bifocal.orthophotos.drawing import Drawing, Section, round_step
 from photocore.output import atomic_path
@@ -50,15 +51,12 @@ def write_drawing(path: Path, drawing: Drawing, image_name: str | None, *, overw
             dxfattribs={"layer": "BIFOCAL_IMAGE"},
         )
     paper = drawing.scale / 1000.0  # metres on the wall per millimetre on paper
+    style, arm = {"layer": "BIFOCAL_GRID"}, 2 * paper
     for x, y in drawing.crosses().tolist():
-        for a, b in (
-            ((x - 2 * paper, y), (x + 2 * paper, y)),
-            ((x, y - 2 * paper), (x, y + 2 * paper)),
-        ):
-            model.add_line(a, b, dxfattribs={"layer": "BIFOCAL_GRID"})
-        _text(
-            model, f"{x:g} / {y:g}", (x + 0.5 * paper, y + 0.5 * paper), 1.6 * paper, "BIFOCAL_GRID"
-        )
+        model.add_line((x - arm, y), (x + arm, y), dxfattribs=style)
+        model.add_line((x, y - arm), (x, y + arm), dxfattribs=style)
+        beside = (x + 0.5 * paper, y + 0.5 * paper)
+        add_text(model, f"{x:g} / {y:g}", beside, 1.6 * paper, "BIFOCAL_GRID")
     _scale_bar(model, drawing, paper)
     _points(model, drawing.points, "BIFOCAL_POINTS", 2.0 * paper)
     _points(model, drawing.control, "BIFOCAL_CONTROL", 2.0 * paper)
@@ -68,11 +66,11 @@ def write_drawing(path: Path, drawing: Drawing, image_name: str | None, *, overw
         )
         if len(line) > 60:
             place = tuple(line[len(line) // 2].tolist())
-            _text(model, f"{level:+.2f}", place, 1.4 * paper, "BIFOCAL_CONTOUR_TEXT")
+            add_text(model, f"{level:+.2f}", place, 1.4 * paper, "BIFOCAL_CONTOUR_TEXT")
     for cut in drawing.sections:
         model.add_lwpolyline(cut.path.tolist(), dxfattribs={"layer": "BIFOCAL_SECTION_LINES"})
         place = tuple(cut.path[0].tolist())
-        _text(model, cut.name, place, 2.5 * paper, "BIFOCAL_SECTION_LINES")
+        add_text(model, cut.name, place, 2.5 * paper, "BIFOCAL_SECTION_LINES")
     document.set_modelspace_vport(
         height=1.15 * (ymax - ymin), center=((xmin + xmax) / 2, (ymin + ymax) / 2)
     )
@@ -88,7 +86,7 @@ def write_section_dxf(path: Path, cut: Section, *, scale: float, overwrite: bool
     start, end = float(cut.place.min()), float(cut.place.max())
     ends = ((0.0, start), (0.0, end)) if cut.axis == "x" else ((start, 0.0), (end, 0.0))
     model.add_line(*ends, dxfattribs={"layer": "BIFOCAL_GRID"})
-    _text(model, f"section {cut.name}", ends[0], 3 * scale / 1000, "BIFOCAL_SECTIONS")
+    add_text(model, f"section {cut.name}", ends[0], 3 * scale / 1000, "BIFOCAL_SECTIONS")
     with atomic_path(path, overwrite=overwrite) as temporary:
         document.saveas(temporary)
 
@@ -111,9 +109,8 @@ def write_section_svg(path: Path, cut: Section, *, scale: float, overwrite: bool
         f'<polyline points="{" ".join(place(x, y) for x, y in piece.tolist())}"/>'
         for piece in pieces
     )
-    along = 1 if cut.axis == "x" else 0
-    ends = [np.array([0.0, 0.0]), np.array([0.0, 0.0])]
-    ends[0][along], ends[1][along] = every[:, along].min(), every[:, along].max()
+    along = np.array([0.0, 1.0] if cut.axis == "x" else [1.0, 0.0])  # the reference line
+    ends = (function(every @ along) * along for function in (np.min, np.max))
     zero = " ".join(place(*end.tolist()) for end in ends)
     y = height - 6
     tenth = bar * factor / 5
@@ -140,22 +137,8 @@ def write_section_svg(path: Path, cut: Section, *, scale: float, overwrite: bool
 
 
 def _new(scale: float) -> tuple[Any, Any]:
-    import ezdxf
-    from ezdxf import units
-
-    document = ezdxf.new("R2010", setup=True)
-    document.units = units.M
-    document.header["$PDMODE"] = 34  # points drawn as a cross in a circle
-    document.header["$PDSIZE"] = 3 * scale / 1000  # 3 mm on paper
-    for layer, colour in LAYERS.items():
-        document.layers.add(layer, color=colour)
-    return document, document.modelspace()
-
-
-def _text(model: Any, text: str, place: tuple[float, ...], height: float, layer: str) -> None:
-    model.add_text(
-        text.replace("\n", " "), height=height, dxfattribs={"layer": layer, "insert": place}
-    )
+    """Return a drawing whose points are crosses in circles of 3 mm on paper."""
+    return new_drawing(LAYERS, point_style=34, point_size=3 * scale / 1000)
 
 
 def _points(model: Any, points: SurveyPoints | None, layer: str, height: float) -> None:
@@ -164,18 +147,20 @@ def _points(model: Any, points: SurveyPoints | None, layer: str, height: float) 
     for name, place in zip(points.ids, points.xyz.tolist(), strict=True):
         if not np.isfinite(place[:2]).all():
             continue
-        if not np.isfinite(place[2]):  # relief left blank: on the wall
-            place[2] = 0.0
-        model.add_point(place, dxfattribs={"layer": layer})
+        relief = place[2] if np.isfinite(place[2]) else 0.0  # left blank: on the wall
+        model.add_point((*place[:2], relief), dxfattribs={"layer": layer})
         label = (place[0] + height / 2, place[1] + height / 2)
-        _text(model, name, label, height, "BIFOCAL_NAMES" if layer == "BIFOCAL_POINTS" else layer)
+        add_text(
+            model, name, label, height, "BIFOCAL_NAMES" if layer == "BIFOCAL_POINTS" else layer
+        )
 
 
 def _scale_bar(model: Any, drawing: Drawing, paper: float) -> None:
     xmin, ymin, _, _ = drawing.grid.bounds
     length = drawing.bar_length()
     y, high = ymin - 10 * paper, 2 * paper
-    style = {"layer": "BIFOCAL_SCALEBAR"}
+    layer = "BIFOCAL_SCALEBAR"
+    style = {"layer": layer}
     for part in range(5):
         a, b = xmin + length * part / 5, xmin + length * (part + 1) / 5
         corners = [(a, y), (b, y), (b, y + high), (a, y + high)]
@@ -183,8 +168,8 @@ def _scale_bar(model: Any, drawing: Drawing, paper: float) -> None:
             model.add_solid([corners[0], corners[1], corners[3], corners[2]], dxfattribs=style)
         model.add_lwpolyline(corners, close=True, dxfattribs=style)
     for share, text in ((0.0, "0"), (0.2, f"{length / 5:g}"), (1.0, f"{length:g} m")):
-        _text(model, text, (xmin + length * share, y + 1.5 * high), 2.4 * paper, "BIFOCAL_SCALEBAR")
-    _text(
-        model, f"{drawing.title}, 1:{drawing.scale:g}", (xmin, y - 4 * paper), 2.4 * paper,
-        "BIFOCAL_SCALEBAR",
-    )  # fmt: skip
+        add_text(
+            model, text, (xmin + length * share, y + 1.5 * high), 2.4 * paper, "BIFOCAL_SCALEBAR"
+        )
+    title = f"{drawing.title}, 1:{drawing.scale:g}"
+    add_text(model, title, (xmin, y - 4 * paper), 2.4 * paper, "BIFOCAL_SCALEBAR")

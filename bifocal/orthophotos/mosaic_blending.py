@@ -5,12 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import combinations
 from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from bifocal.model.grid import SAME_PIXEL, Grid
+from bifocal.model.grid import SAME_PIXEL, Bounds, Grid, bounds_of
 from bifocal.orthophotos.pull_push import fill_holes
 from photocore.arrays import BoolArray, FloatArray, IntArray
 from photocore.errors import InputError
@@ -45,7 +46,7 @@ class Layer(Protocol):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Plan:
+class SeamPlan:
     """Who fills which part of a mosaic, worked out on a coarse grid.
 
     Attributes
@@ -72,15 +73,13 @@ def common_grid(
     layers: Sequence[Layer],
     *,
     gsd: float | None = None,
-    bounds: tuple[float, float, float, float] | None = None,
+    bounds: Bounds | None = None,
 ) -> Grid:
     """Return a grid that covers all layers; on the lattice of the first of the finest if it can."""
     finest = min(layers, key=lambda layer: layer.grid.gsd).grid
     gsd = gsd or finest.gsd
     if bounds is None:
-        boxes = np.array([layer.grid.bounds for layer in layers])
-        low, high = boxes.min(axis=0), boxes.max(axis=0)
-        bounds = (float(low[0]), float(low[1]), float(high[2]), float(high[3]))
+        bounds = bounds_of(np.array([layer.grid.bounds for layer in layers]))
     if abs(gsd / finest.gsd - 1) > 1e-9:
         return Grid.from_bounds(bounds, gsd=gsd)
     left, _, _, top = finest.bounds
@@ -101,7 +100,7 @@ def plan_mosaic(
     gain: bool = True,
     relief: NDArray[np.float32] | None = None,
     coarse: Grid | None = None,
-) -> Plan:
+) -> SeamPlan:
     """Work out seams and gains.
 
     Parameters
@@ -122,23 +121,17 @@ def plan_mosaic(
     edges of the relief and from holes, which lie right behind such edges.
     """
     coarse = coarse or coarse_grid(grid)
-    images, valid = [], []
-    for layer in layers:
-        image, seen = _onto(layer, coarse)
-        images.append(image)
-        valid.append(seen)
+    images, valid = zip(*(_onto(layer, coarse) for layer in layers), strict=True)
     depth = np.stack([_depth(seen) for seen in valid])
     gains, differences = _gains(images, valid, wanted=gain)
     if priority:
-        rank = np.stack(
-            [np.where(seen, np.float32(len(layers) - i), 0) for i, seen in enumerate(valid)]
-        ).astype(np.float32)
-        labels = np.where(rank.max(axis=0) > 0, rank.argmax(axis=0), -1)
-        rank = np.stack([np.full(coarse.shape, len(layers) - i) for i in range(len(layers))])
-        return Plan(coarse, labels, rank.astype(np.float32), gains, differences)
+        labels = np.where(np.any(valid, axis=0), np.argmax(valid, axis=0), -1)
+        order = np.arange(len(layers), 0, -1, dtype=np.float32)
+        rank = np.broadcast_to(order[:, None, None], (len(layers), *coarse.shape))
+        return SeamPlan(coarse, labels, rank, gains, differences)
     even = [image * factor for image, factor in zip(images, gains, strict=True)]
     labels = _seams(even, valid, depth, relief, coarse.gsd)
-    return Plan(coarse, labels, depth, gains, differences)
+    return SeamPlan(coarse, labels, depth, gains, differences)
 
 
 def coarse_grid(grid: Grid) -> Grid:
@@ -148,7 +141,7 @@ def coarse_grid(grid: Grid) -> Grid:
 
 
 def mosaic_window(
-    layers: Sequence[Layer], plan: Plan, window: Grid, *, blend: bool
+    layers: Sequence[Layer], plan: SeamPlan, window: Grid, *, blend: bool
 ) -> tuple[NDArray[Any], IntArray]:
     """Return a window of the mosaic, shape (h, w, bands), and the layer of each pixel, -1 none."""
     halo = HALO if blend else 0
@@ -184,25 +177,18 @@ def window_of(layer: Layer, grid: Grid) -> tuple[NDArray[Any], BoolArray]:
     """Return a layer on a window's pixels; resampled (cubic) only if its own lie elsewhere."""
     import cv2
 
-    column, row = grid.offset_in(layer.grid)
-    step = grid.gsd / layer.grid.gsd
-    same = abs(step - 1) * max(grid.shape) < SAME_PIXEL
-    if same and max(abs(column - round(column)), abs(row - round(row))) < 10 * SAME_PIXEL:
-        return layer.read(round(column), round(row), grid.width, grid.height)
-    c0, r0 = math.floor(column) - 3, math.floor(row) - 3
-    c1 = math.ceil(column + (grid.width - 1) * step) + 4
-    r1 = math.ceil(row + (grid.height - 1) * step) + 4
-    image, seen = layer.read(c0, r0, c1 - c0, r1 - r0)
-    x = (column - c0 + step * np.arange(grid.width)).astype(np.float32)
-    y = (row - r0 + step * np.arange(grid.height)).astype(np.float32)
-    maps = (np.broadcast_to(x, grid.shape).copy(), np.broadcast_to(y[:, None], grid.shape).copy())
+    offset = grid.whole_offset_in(layer.grid)
+    if offset is not None:
+        return layer.read(*offset, grid.width, grid.height)
+    window, columns, rows = grid.resampling(layer.grid, 3)
+    image, seen = layer.read(*window)
     values = image.dtype.kind == "f"
     if not values and not seen.all():
         image, _ = fill_holes(image, seen, ~seen)  # no black from the holes into the rim
     flag = cv2.INTER_NEAREST if values else cv2.INTER_CUBIC
-    found = cv2.remap(image, *maps, flag, borderMode=cv2.BORDER_REPLICATE)
-    inside = cv2.remap(seen.astype(np.uint8), *maps, cv2.INTER_NEAREST)
-    return found.reshape(*grid.shape, -1), inside > 0
+    moved = cv2.remap(image, columns, rows, flag, borderMode=cv2.BORDER_REPLICATE)
+    inside = cv2.remap(seen.astype(np.uint8), columns, rows, cv2.INTER_NEAREST)
+    return moved.reshape(*grid.shape, -1), inside > 0
 
 
 def _onto(layer: Layer, coarse: Grid) -> tuple[NDArray[np.float32], BoolArray]:
@@ -214,21 +200,14 @@ def _onto(layer: Layer, coarse: Grid) -> tuple[NDArray[np.float32], BoolArray]:
     height = max(1, round(own.height * own.gsd / coarse.gsd))
     image, seen = layer.reduced(width, height)
     scale = 1.0 if image.dtype.kind == "f" else 1.0 / np.iinfo(image.dtype).max
-    xmin, _, _, ymax = own.bounds
-    column, row = (
-        ((a - xmin) / (own.width * own.gsd) * width - 0.5).astype(np.float32)
-        if k == 0
-        else ((ymax - a) / (own.height * own.gsd) * height - 0.5).astype(np.float32)
-        for k, a in enumerate((coarse.columns_x, coarse.rows_y))
-    )
-    maps = (
-        np.broadcast_to(column, coarse.shape).copy(),
-        np.broadcast_to(row[:, None], coarse.shape).copy(),
-    )
+    xmin, ymin, xmax, ymax = own.bounds
+    column = (coarse.columns_x - xmin) / (xmax - xmin) * width - 0.5
+    row = (ymax - coarse.rows_y) / (ymax - ymin) * height - 0.5
+    columns, rows = np.meshgrid(column.astype(np.float32), row.astype(np.float32))
     colours = np.nan_to_num(image.astype(np.float32)) * np.float32(scale)
-    found = cv2.remap(colours, *maps, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
-    inside = cv2.remap(seen.astype(np.uint8), *maps, cv2.INTER_NEAREST, borderValue=0) > 0
-    return found.reshape(*coarse.shape, -1), inside
+    moved = cv2.remap(colours, columns, rows, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+    inside = cv2.remap(seen.astype(np.uint8), columns, rows, cv2.INTER_NEAREST)
+    return moved.reshape(*coarse.shape, -1), inside > 0
 
 
 def _depth(seen: BoolArray) -> NDArray[np.float32]:
@@ -251,23 +230,20 @@ def _gains(
     normal = np.eye(count) * 1e-3
     right = np.zeros((count, bands))
     differences = {}
-    for i in range(count):
-        for j in range(i + 1, count):
-            both = valid[i] & valid[j]
-            if np.count_nonzero(both) < _LEAST_OVERLAP:
-                continue
-            a, b = images[i][both], images[j][both]
-            differences[i, j] = float(np.median(a[:, 0] - b[:, 0]))
-            usable = ((a > 0.02) & (a < 0.98) & (b > 0.02) & (b < 0.98)).all(axis=1)
-            if not wanted or np.count_nonzero(usable) < _LEAST_OVERLAP:
-                continue
-            ratio = np.median(np.log(a[usable]) - np.log(b[usable]), axis=0)
-            weight = math.sqrt(np.count_nonzero(usable))
-            normal[[i, j], [i, j]] += weight
-            normal[i, j] -= weight
-            normal[j, i] -= weight
-            right[i] -= weight * ratio
-            right[j] += weight * ratio
+    for i, j in combinations(range(count), 2):
+        both = valid[i] & valid[j]
+        if np.count_nonzero(both) < _LEAST_OVERLAP:
+            continue
+        a, b = images[i][both], images[j][both]
+        differences[i, j] = float(np.median(a[:, 0] - b[:, 0]))
+        usable = ((a > 0.02) & (a < 0.98) & (b > 0.02) & (b < 0.98)).all(axis=1)
+        if not wanted or np.count_nonzero(usable) < _LEAST_OVERLAP:
+            continue
+        ratio = np.median(np.log(a[usable]) - np.log(b[usable]), axis=0)
+        weight = math.sqrt(np.count_nonzero(usable))
+        normal[np.ix_([i, j], [i, j])] += weight * np.array([[1, -1], [-1, 1]])
+        right[i] -= weight * ratio
+        right[j] += weight * ratio
     if not wanted:
         return np.ones((count, bands)), differences
     return np.exp(np.linalg.solve(normal, right)), differences
@@ -291,11 +267,9 @@ def _seams(
     sure = (second <= 0) | (depth.max(axis=0) > 3 * second + 4)
     markers = np.where(sure & (depth.max(axis=0) > 0), best + 1, 0).astype(np.int32)
     cost = np.zeros(best.shape, np.float32)
-    for i in range(len(images)):
-        for j in range(i + 1, len(images)):
-            both = valid[i] & valid[j]
-            apart = np.abs(images[i] - images[j]).mean(axis=2)
-            cost = np.maximum(cost, np.where(both, apart, 0))
+    for i, j in combinations(range(len(images)), 2):
+        apart = np.abs(images[i] - images[j]).mean(axis=2)
+        cost = np.maximum(cost, np.where(valid[i] & valid[j], apart, 0))
     spread = float(np.percentile(cost[any_valid], 90)) if any_valid.any() else 0.0
     cost = cv2.GaussianBlur(cost / max(spread, 1e-3), (0, 0), 1.5)
     for seen in valid:
@@ -316,22 +290,15 @@ def _seams(
 
 def _overlap(a: Grid, b: Grid) -> bool:
     first, second = a.bounds, b.bounds
-    return not (
-        first[2] <= second[0]
-        or first[0] >= second[2]
-        or first[3] <= second[1]
-        or first[1] >= second[3]
-    )
+    return all(first[k] < second[k + 2] and second[k] < first[k + 2] for k in (0, 1))
 
 
-def _owners(plan: Plan, grid: Grid, seen: dict[int, BoolArray]) -> IntArray:
+def _owners(plan: SeamPlan, grid: Grid, seen: dict[int, BoolArray]) -> IntArray:
     """Return the layer of every pixel: the planned one, or the next that sees it."""
     coarse = plan.coarse
-    column = np.clip(
-        np.rint((grid.columns_x - coarse.x0) / coarse.gsd).astype(int), 0, coarse.width - 1
-    )
-    row = np.clip(np.rint((coarse.y0 - grid.rows_y) / coarse.gsd).astype(int), 0, coarse.height - 1)
-    at = np.ix_(row, column)
+    column = np.rint((grid.columns_x - coarse.x0) / coarse.gsd).astype(int)
+    row = np.rint((coarse.y0 - grid.rows_y) / coarse.gsd).astype(int)
+    at = np.ix_(row.clip(0, coarse.height - 1), column.clip(0, coarse.width - 1))
     owner = plan.labels[at].copy()
     good = np.zeros(grid.shape, bool)
     for k, valid in seen.items():

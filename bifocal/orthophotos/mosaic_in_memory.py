@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bifocal.model.grid import Grid
+from bifocal.model.grid import Bounds, Gridded, cut
+from bifocal.model.image import ImageArray
 from bifocal.model.relief_map import ReliefMap
-from bifocal.model.surface import Bounds
 from bifocal.orthophotos.compose import as_surface
 from bifocal.orthophotos.mosaic_blending import (
     coarse_grid,
@@ -19,7 +19,7 @@ from bifocal.orthophotos.mosaic_blending import (
     mosaic_window,
     plan_mosaic,
 )
-from bifocal.orthophotos.ortho_image import ImageArray, Orthophoto
+from bifocal.orthophotos.ortho_image import Orthophoto
 from photocore.arrays import BoolArray, ByteArray, FloatArray
 from photocore.errors import InputError
 
@@ -44,7 +44,7 @@ class MosaicOptions:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Mosaic:
+class Mosaic(Gridded):
     """One raster made of several.
 
     Attributes
@@ -65,9 +65,9 @@ class Mosaic:
     plane_from_pixel: FloatArray
 
     @property
-    def grid(self) -> Grid:
-        """Where the pixels are."""
-        return Grid.from_affine(self.plane_from_pixel, self.source.shape)
+    def shape(self) -> tuple[int, int]:
+        """Height and width. [px]"""
+        return self.source.shape[0], self.source.shape[1]
 
 
 class _ArrayLayer:
@@ -85,14 +85,8 @@ class _ArrayLayer:
         self, column: int, row: int, width: int, height: int
     ) -> tuple[NDArray[Any], BoolArray]:
         """Return a window and its validity; empty beyond the edges."""
-        rows, columns = np.arange(row, row + height), np.arange(column, column + width)
-        total = self.grid
-        inside = ((rows >= 0) & (rows < total.height))[:, None] & (
-            (columns >= 0) & (columns < total.width)
-        )
-        place = np.ix_(rows.clip(0, total.height - 1), columns.clip(0, total.width - 1))
-        seen = self.seen[place] & inside
-        return np.where(inside[:, :, None], self.image[place], 0), seen
+        window = (column, row, width, height)
+        return cut(self.image, window), cut(self.seen, window)
 
     def reduced(self, width: int, height: int) -> tuple[NDArray[Any], BoolArray]:
         """Return the whole raster shrunk: the mean of what is seen."""
@@ -143,6 +137,7 @@ def mosaic(
     --------
     Two halves of a grey wall, the second one darker, become one:
 
+    >>> from bifocal.model.grid import Grid
     >>> def half(x, grey):
     ...     grid = Grid.from_bounds((x, 0.0, x + 2.0, 1.0), gsd=0.02)
     ...     image = np.full((*grid.shape, 3), grey, np.uint8)
@@ -160,16 +155,16 @@ def mosaic(
     grid = common_grid(layers, gsd=gsd, bounds=bounds)
     coarse = coarse_grid(grid)
     edges = None if relief is None else as_surface(relief).window(coarse)
-    plan = plan_mosaic(
+    seams = plan_mosaic(
         layers, grid, priority=options.priority, gain=options.gain and not values, relief=edges,
         coarse=coarse,
     )  # fmt: skip
-    image, owner = mosaic_window(layers, plan, grid, blend=options.blend)
+    image, owner = mosaic_window(layers, seams, grid, blend=options.blend)
     if (owner < 0).all():
         raise InputError("none of the rasters shows anything within the bounds.")
     return Mosaic(
         image=image[:, :, 0] if image.shape[2] == 1 else image,
         source=(owner + 1).astype(np.uint8),
-        gains=plan.gains,
+        gains=seams.gains,
         plane_from_pixel=grid.plane_from_pixel,
     )

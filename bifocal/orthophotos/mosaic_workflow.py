@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -12,57 +11,26 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bifocal.files.geotiff import RasterReader, check_relief, create_raster
-from bifocal.model.grid import Grid
+from bifocal.model.grid import Bounds, Grid
 from bifocal.model.surface import MapSurface
+from bifocal.orthophotos.compose import TILE
 from bifocal.orthophotos.mosaic_blending import (
-    Plan,
+    SeamPlan,
     coarse_grid,
     common_grid,
     mosaic_window,
     plan_mosaic,
 )
-from photocore.arrays import BoolArray
+from bifocal.orthophotos.tiles import RasterResult, write_tiles
+from photocore.arrays import BoolArray, IntArray
 from photocore.cli import Progress, no_progress
 from photocore.errors import InputError
 from photocore.output import check_writable
 
-#: Side of the windows the mosaic is made in. [px]
-_TILE = 1024
 #: A relief map that differs from its neighbour by more is pointed out. [m]
 _RELIEF_STEP = 0.005
 #: Numbers of inputs must fit the 8-bit source band.
 _MOST_INPUTS = 255
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class MosaicResult:
-    """What was made.
-
-    Attributes
-    ----------
-    path : Path
-    grid : Grid
-    shares : dict of str to float
-        Part of the mosaic that each input fills, and ``none``.
-    remarks : tuple of str
-    """
-
-    path: Path
-    grid: Grid
-    shares: dict[str, float]
-    remarks: tuple[str, ...]
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return the result for ``--json``."""
-        return {
-            "file": str(self.path),
-            "gsd": self.grid.gsd,
-            "width": self.grid.width,
-            "height": self.grid.height,
-            "bounds": list(self.grid.bounds),
-            "shares": self.shares,
-            "remarks": list(self.remarks),
-        }
 
 
 class _FileLayer:
@@ -70,9 +38,7 @@ class _FileLayer:
 
     def __init__(self, reader: RasterReader) -> None:
         self.reader = reader
-        names = reader.names
-        kept = [i for i in range(1, reader.bands + 1) if names[i - 1] != "source"]
-        self.kept = kept
+        self.kept = [i for i, name in enumerate(reader.names, start=1) if name != "source"]
         self.grid: Grid = reader.grid
 
     @property
@@ -103,7 +69,7 @@ def make_mosaic(
     out: Path,
     *,
     gsd: float | None = None,
-    bounds: tuple[float, float, float, float] | None = None,
+    bounds: Bounds | None = None,
     relief: Sequence[Path] = (),
     priority: bool = False,
     gain: bool = True,
@@ -111,7 +77,7 @@ def make_mosaic(
     overviews: bool = True,
     overwrite: bool = False,
     progress: Progress = no_progress,
-) -> MosaicResult:
+) -> RasterResult:
     """Join orthophotos, or relief maps, of one wall.
 
     Parameters
@@ -144,19 +110,21 @@ def make_mosaic(
         grid = common_grid(layers, gsd=gsd, bounds=bounds)
         coarse = coarse_grid(grid)
         edges = _relief_of(relief, coarse, stack) if relief else None
-        plan = plan_mosaic(
+        seams = plan_mosaic(
             layers, grid, priority=priority, gain=gain and not values, relief=edges, coarse=coarse
         )
-        remarks = _remarks(layers, plan, grid, values=values)
         first = layers[0].reader
         names = [first.names[i - 1] for i in layers[0].kept]
-        bands = len(names) + 1
-        counts = np.zeros(len(layers) + 1, np.int64)
-        total = grid.width * grid.height
+
+        def tiles() -> Iterator[tuple[int, int, NDArray[Any], IntArray]]:
+            for column, row, window in grid.tiles(TILE):
+                image, owner = mosaic_window(layers, seams, window, blend=blend)
+                yield column, row, image, owner + 1
+
         with create_raster(
             out,
             grid,
-            bands=bands,
+            bands=len(names) + 1,
             dtype=first.dtype,
             overwrite=overwrite,
             names=[*names, "source"],
@@ -165,47 +133,43 @@ def make_mosaic(
             tags={f"BIFOCAL_INPUT_{i}": path.name for i, path in enumerate(inputs, start=1)},
             overviews=overviews,
         ) as writer:
-            done = 0
-            for column, row, window in grid.tiles(_TILE):
-                image, owner = mosaic_window(layers, plan, window, blend=blend)
-                source = (owner + 1).astype(first.dtype)
-                block = np.concatenate([image, source[:, :, None]], axis=2)
-                mask = None if values else owner >= 0
-                writer.write(block, column=column, row=row, mask=mask)
-                counts += np.bincount((owner + 1).ravel(), minlength=len(counts))
-                done += owner.size
-                progress(done, total, "mosaic")
-            if counts[0] == total:
+            counts = write_tiles(
+                writer, tiles(), sources=len(layers) + 1, masked=not values, progress=progress,
+                what="mosaic",
+            )  # fmt: skip
+            if not counts[1:].any():
                 raise InputError("none of the rasters shows anything within the bounds.")
-    shares = {"none": counts[0] / total}
-    shares |= {f"{i} {path.name}": counts[i] / total for i, path in enumerate(inputs, start=1)}
-    return MosaicResult(path=out, grid=grid, shares=shares, remarks=tuple(remarks))
+        remarks = _remarks(layers, seams, grid, values=values)
+    names = ["none", *(f"{i} {path.name}" for i, path in enumerate(inputs, start=1))]
+    shares = dict(zip(names, (counts / counts.sum()).tolist(), strict=True))
+    return RasterResult(path=out, grid=grid, shares=shares, remarks=tuple(remarks))
 
 
 def _check_alike(layers: Sequence[_FileLayer]) -> None:
-    first = layers[0]
+    first, count = layers[0].reader, len(layers[0].kept)
     for layer in layers[1:]:
-        same = layer.reader.dtype == first.reader.dtype and len(layer.kept) == len(first.kept)
-        if not same:
+        if layer.reader.dtype != first.dtype or len(layer.kept) != count:
             raise InputError(
                 f"{layer.reader.path} ({len(layer.kept)} bands of {layer.reader.dtype}) and "
-                f"{first.reader.path} ({len(first.kept)} of {first.reader.dtype}) cannot be "
-                "joined: give only orthophotos of the same kind, or only relief maps."
+                f"{first.path} ({count} of {first.dtype}) cannot be joined: give only orthophotos "
+                "of the same kind, or only relief maps."
             )
 
 
 def _relief_of(paths: Sequence[Path], coarse: Grid, stack: ExitStack) -> NDArray[np.float32]:
     """Return the first known relief of several maps on the coarse grid."""
-    found = np.full(coarse.shape, np.nan, np.float32)
+    relief = np.full(coarse.shape, np.nan, np.float32)
     for path in paths:
         reader = stack.enter_context(RasterReader(path))
         check_relief(reader)
         part = MapSurface(reader.grid, reader.read_floats).window(coarse)
-        found = np.where(np.isnan(found), part, found)
-    return found
+        relief = np.where(np.isnan(relief), part, relief)
+    return relief
 
 
-def _remarks(layers: Sequence[_FileLayer], plan: Plan, grid: Grid, *, values: bool) -> list[str]:
+def _remarks(
+    layers: Sequence[_FileLayer], seams: SeamPlan, grid: Grid, *, values: bool
+) -> list[str]:
     """Return what the user should know of how the inputs fit."""
     remarks = []
     names = [layer.reader.path.name for layer in layers]
@@ -219,15 +183,15 @@ def _remarks(layers: Sequence[_FileLayer], plan: Plan, grid: Grid, *, values: bo
         remarks.append(
             f"resampled, their pixels lie between those of the mosaic: {', '.join(moved)}"
         )
-    if not plan.differences:
+    if not seams.differences:
         remarks.append("the rasters do not overlap: exposure and fit could not be compared.")
-    for (i, j), difference in plan.differences.items():
+    for (i, j), difference in seams.differences.items():
         if values and abs(difference) > _RELIEF_STEP:
             remarks.append(
                 f"{names[i]} lies {difference * 1000:+.0f} mm before {names[j]} on their overlap."
             )
     if not values:
-        for name, gains in zip(names, plan.gains, strict=True):
+        for name, gains in zip(names, seams.gains, strict=True):
             if np.abs(gains - 1).max() > 0.02:
                 remarks.append(f"{name}: colours times {', '.join(f'{g:.2f}' for g in gains)}")
     return remarks

@@ -5,18 +5,15 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from enum import IntEnum
-from typing import Any, Literal
+from typing import Literal, get_args
 
-from numpy.typing import NDArray
-
-from bifocal.model.grid import Grid
+from bifocal.model.grid import Gridded
+from bifocal.model.image import ImageArray
 from photocore.arrays import BoolArray, ByteArray, FloatArray
 from photocore.errors import InputError
 
-#: 8 or 16 bits, shape (h, w) or (h, w, 3).
-ImageArray = NDArray[Any]
 Interpolation = Literal["nearest", "linear", "cubic", "lanczos"]
-INTERPOLATIONS = ("nearest", "linear", "cubic", "lanczos")
+INTERPOLATIONS: tuple[str, ...] = get_args(Interpolation)
 
 
 class Source(IntEnum):
@@ -60,7 +57,7 @@ class OrthoOptions:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Orthophoto:
+class Orthophoto(Gridded):
     """An orthophoto in memory.
 
     Attributes
@@ -81,19 +78,9 @@ class Orthophoto:
     plane_from_pixel: FloatArray
 
     @property
-    def grid(self) -> Grid:
-        """Where the pixels are."""
-        return Grid.from_affine(self.plane_from_pixel, self.source.shape)
-
-    @property
-    def gsd(self) -> float:
-        """Side of a pixel on the plane. [m]"""
-        return float(self.plane_from_pixel[0, 0])
-
-    @property
-    def bounds(self) -> tuple[float, float, float, float]:
-        """Outer edges (X min, Y min, X max, Y max). [m]"""
-        return self.grid.bounds
+    def shape(self) -> tuple[int, int]:
+        """Height and width. [px]"""
+        return self.source.shape[0], self.source.shape[1]
 
     @property
     def valid(self) -> BoolArray:

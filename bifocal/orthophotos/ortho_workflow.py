@@ -2,25 +2,24 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from bifocal.files.geotiff import RasterReader, check_relief, create_raster, dpi_at_scale
 from bifocal.files.images import ImageArray, image_info, read_image
 from bifocal.files.point_tables import read_survey_points
-from bifocal.model.grid import Grid
-from bifocal.model.pair import Pair, Photo
-from bifocal.model.surface import Bounds, FlatSurface, MapSurface, Surface
+from bifocal.model.grid import Bounds, Grid
+from bifocal.model.pair import Pair
+from bifocal.model.surface import EVERYWHERE, FlatSurface, MapSurface, Surface
 from bifocal.orthophotos.compose import NOTHING_IN_COMMON, choose_grid, render
 from bifocal.orthophotos.ortho_image import OrthoOptions, Source
-from bifocal.orthophotos.radiometry import correct_view, match_exposure
-from bifocal.orthophotos.rectify import View, native_gsd
+from bifocal.orthophotos.radiometry import corrected_photo, match_exposure
+from bifocal.orthophotos.rectify import SourcePhoto
+from bifocal.orthophotos.tiles import RasterResult, write_tiles
 from bifocal.orthophotos.triangles import TriangleSurface
 from photocore.arrays import ByteArray
 from photocore.cli import Progress, no_progress
@@ -62,7 +61,7 @@ class OrthoTask:
     match : bool
         Match the exposure of image 2 to image 1 where both are used.
     vignetting : str
-        Empty, ``auto`` or three coefficients.
+        Empty, ``cos4`` or three coefficients ``k1,k2,k3``.
     chromatic : bool
         Measure and undo the lateral colour shift of each photo.
     any_size : bool
@@ -87,37 +86,6 @@ class OrthoTask:
     overviews: bool | None = None
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class OrthoResult:
-    """What was made.
-
-    Attributes
-    ----------
-    path : Path
-    grid : Grid
-    shares : dict of str to float
-        Part of the pixels by source, and hidden ones.
-    remarks : tuple of str
-    """
-
-    path: Path
-    grid: Grid
-    shares: dict[str, float]
-    remarks: tuple[str, ...]
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return the result for ``--json``."""
-        return {
-            "file": str(self.path),
-            "gsd": self.grid.gsd,
-            "width": self.grid.width,
-            "height": self.grid.height,
-            "bounds": list(self.grid.bounds),
-            "shares": self.shares,
-            "remarks": list(self.remarks),
-        }
-
-
 def make_ortho(
     pair_path: Path,
     out: Path,
@@ -126,7 +94,7 @@ def make_ortho(
     overwrite: bool = False,
     world_file: bool = False,
     progress: Progress = no_progress,
-) -> OrthoResult:
+) -> RasterResult:
     """Render the orthophoto of a pair into a GeoTIFF; colours, source band, validity mask.
 
     Raises
@@ -138,85 +106,58 @@ def make_ortho(
     if out.suffix.lower() not in {".tif", ".tiff"}:
         raise InputError(f"{out}: an orthophoto is written as GeoTIFF; name it .tif.")
     pair = Pair.read(pair_path)
-    remarks = list(pair.remarks)
-    with open_surface(task, pair, remarks) as surface:
+    with open_surface(task, pair) as (surface, _, remarks):
         numbers = {"1": (1,), "2": (2,), "both": (1, 2)}[task.image]
-        images = {number: read_photo(pair, number) for number in numbers}
-        first_image = images[numbers[0]]
-        size = (first_image.shape[1], first_image.shape[0])
-        grid = _grid(pair, numbers[0], size, surface, task)
-        del first_image
-        views = _views(pair, images, surface, grid, task, remarks)
-        counts = np.zeros(len(Source), np.int64)
+        images = {number: read_image(pair.photo_file(number)) for number in numbers}
+        height, width = images[numbers[0]].shape[:2]
+        grid = _grid(pair, numbers[0], (width, height), surface, task)
+        photos, notes = _sources(pair, images, surface, grid, task)
         hidden = 0
-        first = views[0].image
-        bands = 1 if first.ndim == 2 else 3
-        overviews = task.overviews
-        if overviews is None:
-            overviews = grid.width * grid.height > OVERVIEWS_FROM
+
+        def tiles() -> Iterator[tuple[int, int, ImageArray, ByteArray]]:
+            nonlocal hidden
+            for column, row, tile in render(photos, surface, grid, task.options):
+                hidden += int(np.count_nonzero(tile.hidden))
+                yield column, row, tile.image, tile.source
+
+        bands = ("grey",) if photos[0].image.ndim == 2 else ("red", "green", "blue")
+        total = grid.width * grid.height
         with create_raster(
             out,
             grid,
-            bands=bands + 1,
-            dtype=first.dtype,
+            bands=len(bands) + 1,
+            dtype=photos[0].image.dtype,
             overwrite=overwrite,
-            names=(*(("red", "green", "blue") if bands == 3 else ("grey",)), "source"),
-            colour=bands == 3,
+            names=(*bands, "source"),
+            colour=len(bands) == 3,
             dpi=dpi_at_scale(grid.gsd, task.scale) if task.scale else None,
             crs_name=str(pair.extra.get("name") or "Facade plane"),
             tags=_tags(pair, task),
-            overviews=overviews,
+            overviews=total > OVERVIEWS_FROM if task.overviews is None else task.overviews,
             world_file=world_file,
         ) as writer:
-            total = grid.width * grid.height
-            done = 0
-            for column, row, tile in render(views, surface, grid, task.options):
-                writer.write(
-                    with_band(tile.image, tile.source),
-                    column=column,
-                    row=row,
-                    mask=tile.source > 0,
-                )
-                counts += np.bincount(tile.source.ravel(), minlength=len(Source))
-                hidden += int(np.count_nonzero(tile.hidden))
-                done += tile.source.size
-                progress(done, total, "orthophoto")
+            counts = write_tiles(
+                writer, tiles(), sources=len(Source), masked=True, progress=progress,
+                what="orthophoto",
+            )  # fmt: skip
             if counts[0] == total and not hidden:
                 raise InputError(NOTHING_IN_COMMON)
     shares = {source.name.lower(): float(counts[source]) / total for source in Source}
     shares["hidden"] = hidden / total
-    return OrthoResult(path=out, grid=grid, shares=shares, remarks=tuple(remarks))
-
-
-def with_band(image: ImageArray, band: ByteArray) -> ImageArray:
-    """Return colours and one more band, shape (h, w, bands); stored band after band."""
-    layers = image.reshape(*image.shape[:2], -1)
-    stacked = np.empty((layers.shape[2] + 1, *band.shape), image.dtype)
-    for number in range(layers.shape[2]):
-        stacked[number] = layers[:, :, number]
-    stacked[-1] = band
-    return stacked.transpose(1, 2, 0)
-
-
-def read_photo(pair: Pair, number: int) -> ImageArray:
-    """Return the pixels of a photo of the pair, upright.
-
-    Raises
-    ------
-    InputError
-        If the pair file does not name it.
-    """
-    photo = pair.image1 if number == 1 else pair.image2
-    if not photo.file:
-        raise InputError(f'the pair file names no "file" for image{number}; add it.')
-    return read_image(pair.folder / photo.file)
+    return RasterResult(
+        path=out, grid=grid, shares=shares, remarks=(*pair.remarks, *remarks, *notes)
+    )
 
 
 @contextmanager
-def open_surface(task: OrthoTask, pair: Pair, remarks: list[str]) -> Iterator[Surface]:
-    """Yield the relief asked for, checked against the cameras' distances."""
+def open_surface(
+    task: OrthoTask, pair: Pair
+) -> Iterator[tuple[Surface, RasterReader | None, tuple[str, ...]]]:
+    """Yield the relief asked for, checked against the cameras' distances, its map, and remarks."""
     with ExitStack() as stack:
-        surface: Surface
+        surface: Surface = FlatSurface(task.plane)
+        reader: RasterReader | None = None
+        remarks: tuple[str, ...] = ()
         if task.relief is not None and task.points is not None:
             raise InputError("give either a relief map or points, not both.")
         if task.relief is not None:
@@ -227,13 +168,8 @@ def open_surface(task: OrthoTask, pair: Pair, remarks: list[str]) -> Iterator[Su
             except InputError as error:
                 raise InputError(f"{task.relief}: {error}") from None
         elif task.points is not None:
-            surface = _triangles(task, remarks)
-        else:
-            surface = FlatSurface(task.plane)
-        box = (-math.inf, -math.inf, math.inf, math.inf)
-        if isinstance(surface, MapSurface | TriangleSurface):
-            box = surface.grid.bounds if isinstance(surface, MapSurface) else surface.bounds
-        low, high = surface.extremes(box)
+            surface, remarks = _triangles(task.points, task.breaklines)
+        low, high = surface.extremes(EVERYWHERE)
         nearest = min(pair.image1.distance, pair.image2.distance)
         if high >= nearest or low < -20 * pair.image1.distance:
             raise InputError(
@@ -241,14 +177,15 @@ def open_surface(task: OrthoTask, pair: Pair, remarks: list[str]) -> Iterator[Su
                 f"but the near camera stands {nearest:g} m from the plane. It must be in metres, "
                 "positive towards the cameras, and belong to this pair."
             )
-        yield surface
+        yield surface, reader, remarks
 
 
-def _triangles(task: OrthoTask, remarks: list[str]) -> TriangleSurface:
-    """Return the surface through the useful points of a table."""
-    assert task.points is not None
-    points, notes = read_survey_points(task.points)
-    remarks.extend(notes)
+def _triangles(
+    path: Path, breaklines: Sequence[Sequence[str]]
+) -> tuple[TriangleSurface, tuple[str, ...]]:
+    """Return the surface through the useful points of a table, and remarks."""
+    points, notes = read_survey_points(path)
+    remarks = list(notes)
     known = np.isfinite(points.xyz).all(axis=1)
     keep = known & np.array([flag not in _USELESS for flag in points.flags], dtype=bool)
     if not keep.all():
@@ -256,30 +193,26 @@ def _triangles(task: OrthoTask, remarks: list[str]) -> TriangleSurface:
     used = points.take(keep)
     index = {name: i for i, name in enumerate(used.ids)}
     lines = []
-    for line in task.breaklines:
+    for line in breaklines:
         missing = [name for name in line if name not in index]
         if missing:
             raise InputError(
-                f"breakline {','.join(line)}: {task.points} has no usable point "
-                f"{', '.join(missing)}."
+                f"breakline {','.join(line)}: {path} has no usable point {', '.join(missing)}."
             )
         lines.append([index[name] for name in line])
     remarks.append(
         "Relief between the points is interpolated; outside of them the orthophoto is empty."
     )
     try:
-        return TriangleSurface(used.xyz, lines)
+        return TriangleSurface(used.xyz, lines), tuple(remarks)
     except InputError as error:
-        raise InputError(f"{task.points}: {error}") from None
+        raise InputError(f"{path}: {error}") from None
 
 
 def planned_grid(pair: Pair, surface: Surface, task: OrthoTask) -> Grid:
     """Return the grid the task will have, without decoding a photo; asks back like `make_ortho`."""
     number = 2 if task.image == "2" else 1
-    photo = pair.image1 if number == 1 else pair.image2
-    if not photo.file:
-        raise InputError(f'the pair file names no "file" for image{number}; add it.')
-    return _grid(pair, number, image_info(pair.folder / photo.file).size, surface, task)
+    return _grid(pair, number, image_info(pair.photo_file(number)).size, surface, task)
 
 
 def _grid(pair: Pair, first: int, size: tuple[int, int], surface: Surface, task: OrthoTask) -> Grid:
@@ -288,8 +221,7 @@ def _grid(pair: Pair, first: int, size: tuple[int, int], surface: Surface, task:
     if bounds is None and isinstance(surface, TriangleSurface):
         bounds = surface.bounds
     grid = choose_grid(pair, first, size, surface, gsd=task.gsd, bounds=bounds)
-    photo: Photo = pair.image1 if first == 1 else pair.image2
-    own = native_gsd(photo, size)
+    own = pair.photo(first).gsd(size)
     ratio = grid.gsd / own
     pixels = grid.width * grid.height
     strange = not FINEST <= ratio <= COARSEST or pixels > MOST_PIXELS
@@ -304,31 +236,31 @@ def _grid(pair: Pair, first: int, size: tuple[int, int], surface: Surface, task:
     return grid
 
 
-def _views(
-    pair: Pair, images: dict[int, ImageArray], surface: Surface, grid: Grid, task: OrthoTask,
-    remarks: list[str],
-) -> list[View]:  # fmt: skip
-    """Return the photos ready to be rendered, corrected as asked for and not otherwise."""
-    views = []
+def _sources(
+    pair: Pair, images: dict[int, ImageArray], surface: Surface, grid: Grid, task: OrthoTask
+) -> tuple[list[SourcePhoto], list[str]]:
+    """Return the photos ready to be rendered, corrected as asked for, and what was done."""
+    photos, remarks = [], []
     for number in sorted(images):
-        photo = pair.image1 if number == 1 else pair.image2
+        photo = pair.photo(number)
         pixels = images.pop(number)  # the reduced or corrected copy is enough from here on
-        image, chromatic, notes = correct_view(
+        image, chromatic, notes = corrected_photo(
             pixels, photo, vignetting=task.vignetting, chromatic=task.chromatic
         )
-        remarks.extend(f"image {number}: {note}" for note in notes)
-        views.append(View.prepare(photo, image, number=number, gsd=grid.gsd, chromatic=chromatic))
-    if len(views) == 2:
-        if views[0].image.dtype != views[1].image.dtype or (
-            views[0].image.ndim != views[1].image.ndim
-        ):
+        remarks += [f"image {number}: {note}" for note in notes]
+        photos.append(
+            SourcePhoto.prepare(photo, image, number=number, gsd=grid.gsd, chromatic=chromatic)
+        )
+    if len(photos) == 2:
+        first, second = (photo.image for photo in photos)
+        if first.dtype != second.dtype or first.ndim != second.ndim:
             raise InputError(
                 "the two photos differ in bits or colour; save both alike, or use --image 1."
             )
         if task.match:
-            views[1], note = match_exposure(views[0], views[1], surface, grid)
+            photos[1], note = match_exposure(photos[0], photos[1], surface, grid)
             remarks.append(note)
-    return views
+    return photos, remarks
 
 
 def _tags(pair: Pair, task: OrthoTask) -> dict[str, str]:

@@ -14,7 +14,7 @@ import numpy as np
 
 from bifocal.files.geotiff import RasterReader
 from bifocal.files.strips import colour_strips, predicted
-from bifocal.orthophotos.drawing import BAND, STRIP, Drawing, Sheet, multiples
+from bifocal.orthophotos.drawing import BAND, STRIP, Drawing, PrintSheet, multiples
 from photocore.output import atomic_path
 
 #: PDF's own unit in millimetres: 72 to the inch.
@@ -24,7 +24,7 @@ _WIDTH = 0.556
 
 
 def write_sheet(
-    path: Path, drawing: Drawing, sheet: Sheet, reader: RasterReader, *, overwrite: bool
+    path: Path, drawing: Drawing, sheet: PrintSheet, reader: RasterReader, *, overwrite: bool
 ) -> None:
     """Write a drawing on a sheet; empty pixels are white."""
     with atomic_path(path, overwrite=overwrite) as temporary, temporary.open("wb") as file:
@@ -83,7 +83,7 @@ class _Pdf:
         self.file.write(f"{number} 0 obj\n".encode("ascii"))
         return number
 
-    def finish(self, commands: str, picture: int, sheet: Sheet) -> None:
+    def finish(self, commands: str, picture: int, sheet: PrintSheet) -> None:
         """Write page, catalogue and table of objects."""
         content = self.begin_stream("")
         self.add(commands.encode("cp1252", errors="replace"))
@@ -116,7 +116,7 @@ class _Pdf:
 class _Page:
     """The drawing commands of a sheet, in millimetres."""
 
-    def __init__(self, drawing: Drawing, sheet: Sheet) -> None:
+    def __init__(self, drawing: Drawing, sheet: PrintSheet) -> None:
         self.drawing, self.sheet = drawing, sheet
         self.parts = [f"{_UNITS_PER_MM:.8f} 0 0 {_UNITS_PER_MM:.8f} 0 0 cm"]
         self.origin = sheet.origin(drawing)
@@ -127,14 +127,11 @@ class _Page:
         x, y = self.origin
         wide, high = self.drawing.paper_size
         self.parts.append(f"q {wide:.6f} 0 0 {high:.6f} {x:.6f} {y:.6f} cm /Im Do Q")
-        self._frame()
-        self._grid()
-        self._contours()
-        self._points()
-        self._title()
-        self._scale_bar()
-        self._level()
-        self._legend()
+        for draw in (
+            self._frame, self._grid, self._contours, self._points, self._title, self._scale_bar,
+            self._level, self._legend,
+        ):  # fmt: skip
+            draw()
         return "\n".join(self.parts) + "\n"
 
     def _place(self, x: float, y: float) -> tuple[float, float]:
@@ -147,6 +144,10 @@ class _Page:
         steps = " ".join(f"{point} l" for point in rest)
         self.parts.append(f"{width} w {start} m {steps} S")
 
+    def _cross(self, x: float, y: float, size: float, *, width: float = 0.18) -> None:
+        self._line([(x - size, y), (x + size, y)], width=width)
+        self._line([(x, y - size), (x, y + size)], width=width)
+
     def _box(self, x: float, y: float, wide: float, high: float, *, fill: bool = False) -> None:
         self.parts.append(f"0.18 w {x:.4f} {y:.4f} {wide:.4f} {high:.4f} re {'B' if fill else 'S'}")
 
@@ -157,10 +158,8 @@ class _Page:
         clean = text.replace("\\", "\\\\").replace("(", "\\(").replace(")", "\\)")
         # Helvetica's digits are 0.556 of the size wide; close enough to centre short labels.
         shift = 0.278 * size * len(text) if middle else 0.0
-        if turned:
-            matrix = f"0 1 -1 0 {x:.4f} {y - shift:.4f}"
-        else:
-            matrix = f"1 0 0 1 {x - shift:.4f} {y:.4f}"
+        upright = f"1 0 0 1 {x - shift:.4f} {y:.4f}"
+        matrix = f"0 1 -1 0 {x:.4f} {y - shift:.4f}" if turned else upright
         self.parts.append(f"BT /F{2 if bold else 1} {size} Tf {matrix} Tm ({clean}) Tj ET")
 
     def _frame(self) -> None:
@@ -177,31 +176,20 @@ class _Page:
         step = self.drawing.grid_step()
         for shade, width in (("1 G", 0.5), ("0 G", 0.13)):  # white halo: legible on any colour
             self.parts.append(shade)
-            for px, py in (self._place(*place) for place in self.drawing.crosses().tolist()):
-                self._line([(px - 2, py), (px + 2, py)], width=width)
-                self._line([(px, py - 2), (px, py + 2)], width=width)
+            for place in self.drawing.crosses().tolist():
+                self._cross(*self._place(*place), 2, width=width)
         digits = 0 if step >= 1 else (1 if step >= 0.1 else 2)
         for x in multiples(xmin, xmax, step).tolist():
-            px, bottom = self._place(x, ymin)
-            top = self._place(x, ymax)[1]
-            for y, out in ((bottom, -1.0), (top, 1.0)):
-                self._line([(px, y), (px, y + 1.5 * out)])
-                self._text(
-                    px, y + (2.2 if out > 0 else -4.2), f"{x:.{digits}f}", size=2.2, middle=True
-                )
+            for y, tick, beside in ((ymin, -1.5, -4.2), (ymax, 1.5, 2.2)):
+                px, py = self._place(x, y)
+                self._line([(px, py), (px, py + tick)])
+                self._text(px, py + beside, f"{x:.{digits}f}", size=2.2, middle=True)
         for y in multiples(ymin, ymax, step).tolist():
-            left, py = self._place(xmin, y)
-            right = self._place(xmax, y)[0]
-            for x, out in ((left, -1.0), (right, 1.0)):
-                self._line([(x, py), (x + 1.5 * out, py)])
-                self._text(
-                    x + (-2.2 if out < 0 else 4.0),
-                    py,
-                    f"{y:.{digits}f}",
-                    size=2.2,
-                    middle=True,
-                    turned=True,
-                )
+            for x, tick, beside in ((xmin, -1.5, -2.2), (xmax, 1.5, 4.0)):
+                px, py = self._place(x, y)
+                self._line([(px, py), (px + tick, py)])
+                text = f"{y:.{digits}f}"
+                self._text(px + beside, py, text, size=2.2, middle=True, turned=True)
 
     def _contours(self) -> None:
         self.parts.append("0.75 0.1 0.1 RG")
@@ -236,9 +224,8 @@ class _Page:
         part = wide / len(legend.colours)
         for number, colour in enumerate(legend.colours):
             tint = " ".join(f"{value / 255:.3f}" for value in colour)
-            self.parts.append(
-                f"{tint} rg {x + number * part:.4f} {y} {part + 0.02:.4f} {high} re f"
-            )
+            box = f"{x + number * part:.4f} {y} {part + 0.02:.4f} {high}"
+            self.parts.append(f"{tint} rg {box} re f")
         self.parts.append("0 g")
         self._box(x, y, wide, high)
         low, top = legend.limits
@@ -266,8 +253,7 @@ class _Page:
                 if points is self.drawing.control:
                     self._line([*corners, corners[0]], width=0.25)
                 else:
-                    self._line([(px - size, py), (px + size, py)])
-                    self._line([(px, py - size), (px, py + size)])
+                    self._cross(px, py, size)
                 beside, wide = px + size + 0.4, _WIDTH * 2.0 * len(name)
                 if px <= edge < beside + wide:  # the edge of the picture would cut it
                     beside = px - size - 0.4 - wide
@@ -285,12 +271,8 @@ class _Page:
 
         title = self.drawing.title
         self._text(block + 3, bottom + STRIP - 8, title, size=fitting(title, 5.0), bold=True)
-        self._text(
-            block + 3,
-            bottom + STRIP - 14,
-            f"{self.drawing.subtitle} 1:{self.drawing.scale:g}",
-            size=3.5,
-        )
+        kind = f"{self.drawing.subtitle} 1:{self.drawing.scale:g}"
+        self._text(block + 3, bottom + STRIP - 14, kind, size=3.5)
         self._text(right - 30, bottom + 2.5, self.sheet.name, size=2.2)
         for number, note in enumerate(self.drawing.notes[:5]):
             self._text(block + 3, bottom + STRIP - 19 - 3.2 * number, note, size=fitting(note, 2.2))
@@ -305,10 +287,8 @@ class _Page:
             self._box(x + part * wide / 5, y, wide / 5, 1.8, fill=True)
         self.parts.append("0 g")
         for part in (0, 1, 5):
-            unit = " m" if part == 5 else ""
-            self._text(
-                x + part * wide / 5, y + 3, f"{length * part / 5:g}{unit}", size=2.4, middle=True
-            )
+            text = f"{length * part / 5:g}{' m' if part == 5 else ''}"
+            self._text(x + part * wide / 5, y + 3, text, size=2.4, middle=True)
         self._text(x, y - 4.2, f"1:{self.drawing.scale:g}  (print at 100 %)", size=2.2)
 
     def _level(self) -> None:

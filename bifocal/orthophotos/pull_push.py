@@ -51,8 +51,7 @@ def fill_holes(
         missing = weight <= 0
         filled = _plain(colour, weight)
         filled[missing] = coarse[missing]
-    found = np.isfinite(filled.reshape(*known.shape, -1)).all(axis=-1)
-    done: BoolArray = holes & found
+    done: BoolArray = holes & np.isfinite(filled.reshape(*known.shape, -1)).all(axis=-1)
     out = image.copy()
     if image.dtype.kind == "f":
         out[done] = filled[done]

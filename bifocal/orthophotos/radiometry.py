@@ -14,10 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bifocal.model.grid import Grid
+from bifocal.model.image import ImageArray, as_photo
 from bifocal.model.pair import Photo
 from bifocal.model.surface import Surface
-from bifocal.orthophotos.ortho_image import ImageArray
-from bifocal.orthophotos.rectify import ChromaticShift, View, check_image, native_gsd
+from bifocal.orthophotos.rectify import ChromaticShift, SourcePhoto
 from bifocal.orthophotos.visibility import hidden_from
 from photocore.arrays import BoolArray, FloatArray
 from photocore.errors import InputError
@@ -30,7 +30,7 @@ _LEAST_COMMON = 500
 _ROWS = 256
 
 
-def correct_view(
+def corrected_photo(
     image: ImageArray, photo: Photo, *, vignetting: str = "", chromatic: bool = False
 ) -> tuple[ImageArray, ChromaticShift | None, tuple[str, ...]]:
     """Return a photo freed of vignetting, its colour shift, and what was done.
@@ -47,7 +47,7 @@ def correct_view(
         Measure the radial shift of red and blue against green.
     """
     notes = []
-    image = check_image(image)
+    image = as_photo(image)
     if vignetting:
         image = devignetted(image, photo, vignetting)
         notes.append(f"vignetting corrected ({vignetting}).")
@@ -76,7 +76,7 @@ def devignetted(image: ImageArray, photo: Photo, model: str) -> ImageArray:
     height, width = image.shape[:2]
     _, radius = _middle((width, height))
     if model == "cos4":
-        focal = photo.distance / native_gsd(photo, (width, height))
+        focal = photo.distance / photo.gsd((width, height))
         if photo.lens is not None:
             focal = float(photo.lens.camera_matrix[0, 0])
         # cos^4 of the angle off the axis = (1 + tan^2)^-2.
@@ -113,13 +113,10 @@ def chromatic_shift(image: ImageArray) -> ChromaticShift:
     y, x = np.mgrid[0:height, 0:width].astype(np.float32)
     x, y = x - np.float32(centre[0]), y - np.float32(centre[1])
     green = _edges(image[:, :, 1])
-    dx, dy = (
-        cv2.Sobel(green, cv2.CV_32F, 1, 0, scale=1 / 8),
-        cv2.Sobel(green, cv2.CV_32F, 0, 1, scale=1 / 8),
-    )
+    dx, dy = (cv2.Sobel(green, cv2.CV_32F, *axis, scale=1 / 8) for axis in ((1, 0), (0, 1)))
     radial = dx * x + dy * y  # rho dG/drho
     square = (x * x + y * y) / np.float32(radius**2)
-    found = []
+    stretches = []
     for band in (0, 2):
         a = np.zeros(2)
         for _ in range(2):
@@ -138,11 +135,13 @@ def chromatic_shift(image: ImageArray) -> ChromaticShift:
             if np.linalg.cond(normal) > 1e12:
                 break
             a -= np.linalg.solve(normal, g @ difference[keep])
-        found.append((float(a[0]), float(a[1])))
-    return ChromaticShift(red=found[0], blue=found[1], centre=centre, radius=radius)
+        stretches.append((float(a[0]), float(a[1])))
+    return ChromaticShift(red=stretches[0], blue=stretches[1], centre=centre, radius=radius)
 
 
-def match_exposure(first: View, second: View, surface: Surface, grid: Grid) -> tuple[View, str]:
+def match_exposure(
+    first: SourcePhoto, second: SourcePhoto, surface: Surface, grid: Grid
+) -> tuple[SourcePhoto, str]:
     """Return the second photo in the colours of the first, and what was done.
 
     Notes
@@ -158,7 +157,7 @@ def match_exposure(first: View, second: View, surface: Surface, grid: Grid) -> t
     limit = float(np.iinfo(first.image.dtype).max)
     for view in (first, second):
         column, row = view.pixel_map(coarse, relief)
-        usable &= view.inside(column, row) & ~hidden_from(surface, coarse, view.foot, relief)
+        usable &= view.inside(column, row) & ~hidden_from(surface, coarse, view.photo.foot, relief)
         colours = view.sample(column, row, "linear").astype(np.float64) / limit
         samples.append(colours.reshape(*coarse.shape, -1))
         positions.append((column, row))
@@ -173,11 +172,10 @@ def match_exposure(first: View, second: View, surface: Surface, grid: Grid) -> t
         _fit(np.log(samples[0][usable, band]), np.log(samples[1][usable, band]), square)
         for band in range(bands)
     ]
-    image = _recoloured(second.image, fits, limit, second.factor)
+    image = _recoloured(second.image, fits, limit)
     gains = ", ".join(f"{math.exp(fit[0]):.2f}" for fit in fits)
-    return replace(
-        second, image=image
-    ), f"image 2 matched to the colours of image 1 (gain {gains})."
+    note = f"image 2 matched to the colours of image 1 (gain {gains})."
+    return replace(second, image=image), note
 
 
 def _fit(log1: FloatArray, log2: FloatArray, square: FloatArray) -> FloatArray:
@@ -196,45 +194,48 @@ def _fit(log1: FloatArray, log2: FloatArray, square: FloatArray) -> FloatArray:
     return solution
 
 
-def _recoloured(image: ImageArray, fits: list[FloatArray], limit: float, factor: int) -> ImageArray:
-    """Return the image with every band's fit applied, some rows at a time."""
-    del factor  # rho is relative: a reduced photo has the same middle and corner
-    out = image.copy()
-    layers = out.reshape(*out.shape[:2], -1)
-    height, width = out.shape[:2]
+def _recoloured(image: ImageArray, fits: list[FloatArray], limit: float) -> ImageArray:
+    """Return the image with every band's fit applied."""
     levels = np.arange(int(limit) + 1) / limit
-    centre, radius = _middle((width, height))
-    x = ((np.arange(width) - centre[0]) ** 2).astype(np.float32)
-    for band, (a, g, b, c) in enumerate(fits):
-        table = (limit * np.exp(a) * levels**g).astype(np.float32)
-        for top in range(0, height, _ROWS):
-            rows = np.arange(top, min(top + _ROWS, height))
-            y = ((rows - centre[1]) ** 2).astype(np.float32)
-            square = (x[None, :] + y[:, None]) / np.float32(radius**2)
-            part = layers[rows[0] : rows[-1] + 1, :, band]
-            value = table[part] * np.exp(square * (np.float32(b) + np.float32(c) * square))
-            layers[rows[0] : rows[-1] + 1, :, band] = np.rint(value.clip(0, limit)).astype(
-                out.dtype
-            )
-    return out
+    tables = [(limit * np.exp(a) * levels**g).astype(np.float32) for a, g, _, _ in fits]
+
+    def recolour(part: ImageArray, square: NDArray[np.float32]) -> NDArray[np.float32]:
+        layers = part.reshape(*square.shape, -1)
+        bands = [
+            table[layers[:, :, band]] * np.exp(square * (np.float32(b) + np.float32(c) * square))
+            for band, (table, (_, _, b, c)) in enumerate(zip(tables, fits, strict=True))
+        ]
+        return np.stack(bands, axis=-1).reshape(part.shape)
+
+    return _by_rows(image, recolour)
 
 
 def _scaled(
     image: ImageArray, gain: Callable[[NDArray[np.float32]], NDArray[np.float32]]
 ) -> ImageArray:
-    """Return the image times a gain that depends on (rho / R)^2, some rows at a time."""
-    out = image.copy()
+    """Return the image times a gain that depends on (rho / R)^2."""
+    bands = (1,) * (image.ndim - 2)
+    return _by_rows(image, lambda part, square: part * gain(square).reshape(*square.shape, *bands))
+
+
+def _by_rows(
+    image: ImageArray, change: Callable[[ImageArray, NDArray[np.float32]], NDArray[np.float32]]
+) -> ImageArray:
+    """Return the image as changed by a function of its pixels and (rho / R)^2, in small parts.
+
+    A photo reduced in size has the same middle and corner, so the same (rho / R)^2.
+    """
+    out = np.empty_like(image)
     height, width = image.shape[:2]
     centre, radius = _middle((width, height))
     limit = np.iinfo(image.dtype).max
     x = ((np.arange(width) - centre[0]) ** 2).astype(np.float32)
+    y = ((np.arange(height) - centre[1]) ** 2).astype(np.float32)
     for top in range(0, height, _ROWS):
-        rows = np.arange(top, min(top + _ROWS, height))
-        y = ((rows - centre[1]) ** 2).astype(np.float32)
-        factor = gain((x[None, :] + y[:, None]) / np.float32(radius**2))
-        part = image[rows[0] : rows[-1] + 1]
-        value = part * factor.reshape(factor.shape + (1,) * (image.ndim - 2))
-        out[rows[0] : rows[-1] + 1] = np.rint(value.clip(0, limit)).astype(image.dtype)
+        rows = slice(top, top + _ROWS)
+        square = (x[None, :] + y[rows, None]) / np.float32(radius**2)
+        value = change(image[rows], square)
+        out[rows] = np.rint(value.clip(0, limit)).astype(image.dtype)
     return out
 
 
@@ -246,8 +247,7 @@ def _edges(band: NDArray[np.integer]) -> NDArray[np.float32]:
     fine = cv2.GaussianBlur(value, (0, 0), 1.0) - cv2.GaussianBlur(value, (0, 0), 6.0)
     energy = cv2.GaussianBlur(fine * fine, (0, 0), 6.0)
     floor = float(np.iinfo(band.dtype).max) * 0.01
-    contrast: NDArray[np.float32] = fine / (np.sqrt(energy) + np.float32(floor))
-    return contrast
+    return fine / (np.sqrt(energy) + np.float32(floor))
 
 
 def _middle(size: tuple[int, int]) -> tuple[tuple[float, float], float]:

@@ -4,19 +4,19 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
-from bifocal.model.grid import Grid
+from bifocal.model.grid import Bounds, Grid, PixelMap, bounds_of
+from bifocal.model.image import ImageArray, as_photo
 from bifocal.model.pair import Photo, apply_homography
 from bifocal.model.surface import ReliefArray
-from bifocal.orthophotos.ortho_image import ImageArray, Interpolation
-from bifocal.rays import Foot
+from bifocal.orthophotos.ortho_image import Interpolation
+from bifocal.rays import magnification
 from photocore.arrays import BoolArray, FloatArray
 from photocore.errors import GeometryError, InputError
-
-MapArray = NDArray[np.float32]
 
 #: Distortion is tabulated every so many ideal pixels and interpolated linearly in between; for a
 #: 19 mm zoom (44 px in the corner) that is true to 0.001 px.
@@ -46,7 +46,7 @@ class ChromaticShift:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class View:
+class SourcePhoto:
     """A photo made ready for orthophotos of a certain pixel size.
 
     Attributes
@@ -81,54 +81,44 @@ class View:
         number: int,
         gsd: float | None = None,
         chromatic: ChromaticShift | None = None,
-    ) -> View:
-        """Return a view; a photo much finer than ``gsd`` is reduced first, against aliasing.
+    ) -> SourcePhoto:
+        """Return it; a photo much finer than ``gsd`` is reduced first, against aliasing.
 
         Raises
         ------
         InputError
             If the image is not a photo of 8 or 16 bits per channel.
         """
-        image = check_image(image)
+        image = as_photo(image)
         size = (image.shape[1], image.shape[0])
         factor = 1
         if gsd is not None:
-            factor = max(1, math.floor(gsd / native_gsd(photo, size) + 0.25))
+            factor = max(1, math.floor(gsd / photo.gsd(size) + 0.25))
         factor = min(factor, max(1, min(size) // 2))
         if factor > 1:
             image = _reduced(image, factor)
         lens = LensTable.of_photo(photo, size) if photo.lens is not None else None
         return cls(
-            photo=photo,
-            image=image,
-            factor=factor,
-            size=size,
-            number=number,
-            lens=lens,
+            photo=photo, image=image, factor=factor, size=size, number=number, lens=lens,
             chromatic=chromatic,
-        )
+        )  # fmt: skip
 
-    @property
-    def foot(self) -> Foot:
-        """Nadir and distance of the camera."""
-        return self.photo.foot
-
-    def pixel_map(self, grid: Grid, relief: ReliefArray) -> tuple[MapArray, MapArray]:
+    def pixel_map(self, grid: Grid, relief: ReliefArray) -> tuple[PixelMap, PixelMap]:
         """Return column and row of the photo for every pixel of a window; NaN where none."""
         column, row = _project(self.photo, self.size, grid, relief)
         if self.lens is not None:
             column, row = self.lens.distort(column, row)
         return column.astype(np.float32), row.astype(np.float32)
 
-    def inside(self, column: MapArray, row: MapArray) -> BoolArray:
+    def inside(self, column: PixelMap, row: PixelMap) -> BoolArray:
         """Return which positions lie within the photo; NaN does not."""
         width, height = self.size
-        found: BoolArray = (column >= -0.5) & (column <= width - 0.5)
-        found &= row >= -0.5
-        found &= row <= height - 0.5
-        return found
+        inside: BoolArray = (column >= -0.5) & (column <= width - 0.5)
+        inside &= row >= -0.5
+        inside &= row <= height - 0.5
+        return inside
 
-    def sample(self, column: MapArray, row: MapArray, interpolation: Interpolation) -> ImageArray:
+    def sample(self, column: PixelMap, row: PixelMap, interpolation: Interpolation) -> ImageArray:
         """Return the photo's colours at positions, shape (h, w, 3) or (h, w)."""
         if self.chromatic is None or self.image.ndim == 2:
             return self._remap(self.image, column, row, interpolation)
@@ -144,7 +134,7 @@ class View:
         return np.stack(bands, axis=-1)
 
     def _remap(
-        self, image: ImageArray, column: MapArray, row: MapArray, interpolation: Interpolation
+        self, image: ImageArray, column: PixelMap, row: PixelMap, interpolation: Interpolation
     ) -> ImageArray:
         import cv2
 
@@ -162,48 +152,10 @@ class View:
             )
         if max(image.shape[:2]) > _REMAP_LIMIT:
             image, column, row = _part(image, column, row)
-        found: ImageArray = cv2.remap(image, column, row, flag, borderMode=cv2.BORDER_REPLICATE)
-        return found
+        return cv2.remap(image, column, row, flag, borderMode=cv2.BORDER_REPLICATE)
 
 
-def check_image(image: ImageArray) -> ImageArray:
-    """Return an array that is a photo: 8 or 16 bits, grey or RGB; alpha is dropped.
-
-    Raises
-    ------
-    InputError
-        Otherwise.
-    """
-    image = np.asarray(image)
-    if image.dtype not in (np.uint8, np.uint16):
-        raise InputError(
-            f"image: expected 8 or 16 bits per channel (uint8, uint16), found {image.dtype}."
-        )
-    if image.ndim == 3 and image.shape[2] == 4:
-        image = image[:, :, :3]
-    if image.ndim == 3 and image.shape[2] == 1:
-        image = image[:, :, 0]
-    if not (image.ndim == 2 or (image.ndim == 3 and image.shape[2] == 3)):
-        raise InputError(f"image: expected shape (h, w) or (h, w, 3), found {image.shape}.")
-    if min(image.shape[:2]) < 2:
-        raise InputError(
-            f"image: {image.shape[1]} x {image.shape[0]} px is not a photo; check the file."
-        )
-    return np.ascontiguousarray(image)
-
-
-def native_gsd(photo: Photo, size: tuple[int, int]) -> float:
-    """Return the side of a pixel in the middle of a photo, on the reference plane. [m]"""
-    middle = np.array([[(size[0] - 1) / 2, (size[1] - 1) / 2]])
-    area = abs(float(np.linalg.det(photo.metres_per_pixel(middle)[0])))
-    if not (math.isfinite(area) and area > 0):
-        raise GeometryError(
-            "the middle of the photo does not look at the reference plane; check plane_from_pixel."
-        )
-    return math.sqrt(area)
-
-
-def footprint(photo: Photo, size: tuple[int, int]) -> tuple[float, float, float, float]:
+def footprint(photo: Photo, size: tuple[int, int]) -> Bounds:
     """Return the box on the reference plane that a photo covers: xmin, ymin, xmax, ymax. [m]
 
     Raises
@@ -211,13 +163,7 @@ def footprint(photo: Photo, size: tuple[int, int]) -> tuple[float, float, float,
     GeometryError
         If the photo looks past the horizon of the plane.
     """
-    width, height = size
-    columns = np.linspace(-0.5, width - 0.5, 33)
-    rows = np.linspace(-0.5, height - 0.5, 33)
-    rim = np.concatenate(
-        [np.stack(np.broadcast_arrays(columns, row), -1) for row in rows[[0, -1]]]
-        + [np.stack(np.broadcast_arrays(column, rows), -1) for column in columns[[0, -1]]]
-    )
+    rim = _rim(size, outwards=0.5, points=33)
     ideal = rim if photo.lens is None else photo.lens.undistort(rim)
     # The denominator of the homography changes sign where the photo meets the horizon.
     depth = ideal @ photo.plane_from_pixel[2, :2] + photo.plane_from_pixel[2, 2]
@@ -227,8 +173,14 @@ def footprint(photo: Photo, size: tuple[int, int]) -> tuple[float, float, float,
             "the photo looks past the horizon of the reference plane, so it covers no finite "
             "part of it. Say which part is wanted: --bounds XMIN,YMIN,XMAX,YMAX."
         )
-    low, high = plane.min(0), plane.max(0)
-    return float(low[0]), float(low[1]), float(high[0]), float(high[1])
+    return bounds_of(plane)
+
+
+def _rim(size: tuple[int, int], *, outwards: float, points: int) -> FloatArray:
+    """Return pixels along the four edges of a photo, so far outside the outermost centres."""
+    low, high = -outwards, np.array(size) - 1.0 + outwards
+    corners = np.array([[low, low], [high[0], low], high, [low, high[1]], [low, low]])
+    return np.concatenate([np.linspace(a, b, points) for a, b in pairwise(corners)])
 
 
 def _project(
@@ -244,9 +196,7 @@ def _project(
     matrix = np.linalg.inv(photo.plane_from_pixel)
     nx, ny = photo.nadir
     x, y = grid.columns_x - nx, grid.rows_y - ny
-    with np.errstate(divide="ignore", invalid="ignore"):
-        k = photo.distance / (photo.distance - relief.astype(np.float64))
-    k[k < 0] = np.nan  # relief behind the camera
+    k = magnification(relief.astype(np.float64), photo.distance)  # Eq. (1)
     constant = matrix @ np.array([nx, ny, 1.0])
     reach = max(np.abs(x).max(), np.abs(y).max())
     tilt = np.abs(matrix[2, :2]).max() * reach * max(1.0, float(np.fmax.reduce(k, axis=None)))
@@ -277,20 +227,17 @@ def _reduced(image: ImageArray, factor: int) -> ImageArray:
     height, width = image.shape[:2]
     high, wide = -(-height // factor) * factor, -(-width // factor) * factor
     padded = cv2.copyMakeBorder(image, 0, high - height, 0, wide - width, cv2.BORDER_REPLICATE)
-    small: ImageArray = cv2.resize(
-        padded, (wide // factor, high // factor), interpolation=cv2.INTER_AREA
-    )
-    return small
+    return cv2.resize(padded, (wide // factor, high // factor), interpolation=cv2.INTER_AREA)
 
 
 def _part(
-    image: ImageArray, column: MapArray, row: MapArray
-) -> tuple[ImageArray, MapArray, MapArray]:
+    image: ImageArray, column: PixelMap, row: PixelMap
+) -> tuple[ImageArray, PixelMap, PixelMap]:
     """Cut out of a very large photo what a window needs."""
     height, width = image.shape[:2]
     margin = 8
 
-    def limits(positions: MapArray, length: int) -> tuple[int, int]:
+    def limits(positions: PixelMap, length: int) -> tuple[int, int]:
         low, high = (f.reduce(positions, axis=None) for f in (np.fmin, np.fmax))
         if np.isnan(low):
             return 0, 1
@@ -316,11 +263,7 @@ class LensTable:
     def of_photo(cls, photo: Photo, size: tuple[int, int]) -> LensTable:
         """Tabulate over the ideal pixels that the photo shows."""
         assert photo.lens is not None
-        width, height = size
-        columns, rows = np.linspace(-1, width, 65), np.linspace(-1, height, 65)
-        rim = [np.stack(np.broadcast_arrays(columns, row), -1) for row in (-1.0, float(height))]
-        rim += [np.stack(np.broadcast_arrays(column, rows), -1) for column in (-1.0, float(width))]
-        ideal = photo.lens.undistort(np.concatenate(rim))
+        ideal = photo.lens.undistort(_rim(size, outwards=1.0, points=65))
         low = np.floor(np.nanmin(ideal, axis=0)) - _LENS_STEP
         high = np.ceil(np.nanmax(ideal, axis=0)) + _LENS_STEP
         if not (np.isfinite(low).all() and (high - low).max() < 20 * max(size)):
@@ -340,12 +283,6 @@ class LensTable:
 
         u = ((column - self.left) * (1 / _LENS_STEP)).astype(np.float32)
         v = ((row - self.top) * (1 / _LENS_STEP)).astype(np.float32)
-        shift = cv2.remap(
-            self.shift,
-            u,
-            v,
-            cv2.INTER_LINEAR,
-            borderMode=cv2.BORDER_CONSTANT,
-            borderValue=(math.nan, math.nan),
-        )
+        outside = (math.nan, math.nan)
+        shift = cv2.remap(self.shift, u, v, cv2.INTER_LINEAR, borderValue=outside)
         return column + shift[:, :, 0], row + shift[:, :, 1]

@@ -99,15 +99,15 @@ def section(surface: Surface, grid: Grid, name: str, *, step: float) -> Section:
 
 def sample(surface: Surface, points: FloatArray, *, gsd: float) -> FloatArray:
     """Return relief at points of a path, shape (n,); nearest pixel of the given size. [m]"""
-    found = np.full(len(points), np.nan)
+    relief = np.full(len(points), np.nan)
     for first in range(0, len(points), _TOGETHER):
         part = points[first : first + _TOGETHER]
         low, high = part.min(axis=0), part.max(axis=0)
         width, height = (math.ceil((high[k] - low[k]) / gsd) + 1 for k in (0, 1))
         window = Grid(x0=float(low[0]), y0=float(high[1]), gsd=gsd, width=width, height=height)
         column, row = np.rint(window.pixel_of(part)).astype(np.int64).T
-        found[first : first + _TOGETHER] = surface.window(window)[row, column]
-    return found
+        relief[first : first + _TOGETHER] = surface.window(window)[row, column]
+    return relief
 
 
 def _path(name: str, grid: Grid) -> tuple[str, FloatArray]:

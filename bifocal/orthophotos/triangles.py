@@ -9,8 +9,8 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from bifocal.model.grid import Grid
-from bifocal.model.surface import Bounds, ReliefArray
+from bifocal.model.grid import Bounds, Grid, bounds_of
+from bifocal.model.surface import ReliefArray
 from photocore.arrays import FloatArray, IntArray, as_points
 from photocore.errors import InputError
 
@@ -89,16 +89,15 @@ class TriangleSurface:
         fixed = np.rint(corners * 2**_BITS).astype(np.int32)
         for index, triangle in zip(touched.tolist(), fixed, strict=True):
             cv2.fillConvexPoly(owner, triangle, float(index), lineType=cv2.LINE_8, shift=_BITS)
-        found = owner >= 0
-        plane = self._planes[np.where(found, owner, 0)]
+        index = np.maximum(owner, 0)
+        plane = self._planes[index]
         x, y = grid.columns_x[None, :], grid.rows_y[:, None]
         relief = plane[..., 0] * x + plane[..., 1] * y + plane[..., 2]
         # Pixels on an edge may belong to the triangle beside; steep ones must not shoot out of it.
-        index = np.where(found, owner, 0)
         low, high = self._low[index, 2], self._high[index, 2]
         slack = 0.02 * (high - low)
         relief = np.clip(relief, low - slack, high + slack)
-        return np.where(found, relief, np.nan).astype(np.float32)
+        return np.where(owner >= 0, relief, np.nan).astype(np.float32)
 
     def extremes(self, bounds: Bounds) -> tuple[float, float]:
         """Return the extremes over the triangles that touch a box."""
@@ -110,8 +109,7 @@ class TriangleSurface:
     @property
     def bounds(self) -> Bounds:
         """Box around the points: xmin, ymin, xmax, ymax. [m]"""
-        (x0, y0), (x1, y1) = self.points[:, :2].min(0), self.points[:, :2].max(0)
-        return float(x0), float(y0), float(x1), float(y1)
+        return bounds_of(self.points[:, :2])
 
     def _touching(self, bounds: Bounds) -> IntArray:
         xmin, ymin, xmax, ymax = bounds
@@ -159,14 +157,6 @@ def _halved(
 
 def _planes(corners: FloatArray) -> FloatArray:
     """Return a, b, c of r = a X + b Y + c for triangles, shape (n, 3)."""
-    u, v = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
-    det = u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]
-    with np.errstate(divide="ignore", invalid="ignore"):
-        a = (u[:, 2] * v[:, 1] - v[:, 2] * u[:, 1]) / det
-        b = (u[:, 0] * v[:, 2] - v[:, 0] * u[:, 2]) / det
-    # A sliver on the rim has no area: the mean of its corners is as good as any.
-    flat = ~np.isfinite(a) | ~np.isfinite(b)
-    a[flat] = b[flat] = 0.0
-    c = corners[:, 0, 2] - a * corners[:, 0, 0] - b * corners[:, 0, 1]
-    c[flat] = corners[flat][:, :, 2].mean(axis=1)
-    return np.stack([a, b, c], axis=-1)
+    design = corners * [1.0, 1.0, 0.0] + [0.0, 0.0, 1.0]
+    # A sliver on the rim has no area: the pseudo-inverse fits its corners as well as it can.
+    return (np.linalg.pinv(design) @ corners[:, :, 2:])[:, :, 0]

@@ -8,9 +8,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from bifocal.model.grid import Grid
-from bifocal.model.surface import Bounds, ReliefArray, Surface
-from bifocal.rays import Foot
+from bifocal.model.grid import Bounds, Grid
+from bifocal.model.surface import EVERYWHERE, ReliefArray, Surface
+from bifocal.rays import Foot, magnification
 from photocore.arrays import BoolArray
 
 #: A pixel of the buffer is a candidate when another on its ray lies this much farther in. [px]
@@ -73,8 +73,8 @@ def hidden_from(surface: Surface, grid: Grid, camera: Foot, relief: ReliefArray)
     else:
         relief_wide = relief
     # The same cells for every window, so that windows fit together.
-    _, high = surface.extremes((-math.inf, -math.inf, math.inf, math.inf))
-    largest = camera.distance / (camera.distance - high) if high < camera.distance else math.nan
+    _, high = surface.extremes(EVERYWHERE)
+    largest = float(magnification(high, camera.distance))
     return _hidden(relief_wide, wide, camera, (column, row), grid.shape, largest)
 
 
@@ -122,7 +122,7 @@ def _towards(bounds: Bounds, camera: Foot, share: float) -> Bounds:
     )
 
 
-class _Tile(NamedTuple):
+class _Surroundings(NamedTuple):
     """A window with its surroundings, in pixels, seen from the nadir."""
 
     relief: ReliefArray  # [px]
@@ -146,7 +146,7 @@ def _hidden(
     gsd = grid.gsd
     x = ((grid.columns_x - camera.nadir[0]) / gsd).astype(np.float32)
     y = ((grid.rows_y - camera.nadir[1]) / gsd).astype(np.float32)
-    tile = _Tile(
+    around = _Surroundings(
         relief=relief * np.float32(1 / gsd),
         x=x,
         y=y,
@@ -154,10 +154,10 @@ def _hidden(
         distance=np.float32(camera.distance / gsd),
         core=np.s_[row : row + shape[0], column : column + shape[1]],
     )
-    buffer = _Buffer.of_tile(tile, largest)
+    buffer = _Buffer.of_surroundings(around, largest)
     if buffer is None:
         return np.zeros(shape, bool)
-    return _sharpen(tile, buffer)
+    return _sharpen(around, buffer)
 
 
 class _Buffer(NamedTuple):
@@ -168,19 +168,17 @@ class _Buffer(NamedTuple):
     columns: int
 
     @classmethod
-    def of_tile(cls, tile: _Tile, largest: float) -> _Buffer | None:
+    def of_surroundings(cls, around: _Surroundings, largest: float) -> _Buffer | None:
         """Return the filled buffer; None if nothing of the core is known."""
-        core = tile.core
-        depth = tile.distance - tile.relief
-        with np.errstate(divide="ignore", invalid="ignore"):
-            stretch = np.where(depth > 0, tile.distance / depth, np.float32(np.nan))
+        core = around.core
+        stretch = magnification(around.relief, around.distance)  # Eq. (1)
         if math.isnan(largest):
             largest = float(np.fmax.reduce(stretch, axis=None))
         if np.isnan(np.fmax.reduce(stretch[core], axis=None)):
             return None
         # Just wider than the widest gap between neighbours on a flat part: no cell stays empty.
         stretch *= np.float32(1 / (1.02 * largest))
-        u, v = tile.x * stretch, tile.y[:, None] * stretch
+        u, v = around.x * stretch, around.y[:, None] * stretch
         # Only cells that hold a pixel of the core matter; the rest goes to a cell of its own.
         u0, u1 = (float(f.reduce(u[core], axis=None)) for f in (np.fmin, np.fmax))
         v0, v1 = (float(f.reduce(v[core], axis=None)) for f in (np.fmin, np.fmax))
@@ -189,9 +187,9 @@ class _Buffer(NamedTuple):
         columns, rows = (int(math.floor(b) - math.floor(a)) + 1 for a, b in ((u0, u1), (v0, v1)))
         nearest = np.full(rows * columns + 1, np.inf, np.float32)
         cells = _cells(u, v, rows, columns)
-        np.minimum.at(nearest, cells.ravel(), tile.rho.ravel())
+        np.minimum.at(nearest, cells.ravel(), around.rho.ravel())
         for first, second in ((np.s_[:, :-1], np.s_[:, 1:]), (np.s_[:-1], np.s_[1:])):
-            ends = [(a[first], a[second]) for a in (u, v, tile.rho)]
+            ends = [(a[first], a[second]) for a in (u, v, around.rho)]
             _join(nearest, ends, rows, columns)
         nearest[-1] = np.inf
         return cls(nearest, cells[core], columns)
@@ -223,7 +221,7 @@ def _join(
     np.minimum.at(nearest, _cells(points[0], points[1], rows, columns), points[2])
 
 
-def _sharpen(tile: _Tile, buffer: _Buffer) -> BoolArray:
+def _sharpen(around: _Surroundings, buffer: _Buffer) -> BoolArray:
     """Return the hidden pixels, those at the rims of shadows decided along their own rays.
 
     The cells are a pixel wide, so the rim of a shadow is known to a pixel only, and shadows of
@@ -232,36 +230,36 @@ def _sharpen(tile: _Tile, buffer: _Buffer) -> BoolArray:
     """
     import cv2
 
-    core, rho = tile.core, tile.rho[tile.core]
+    core, rho = around.core, around.rho[around.core]
     ahead = rho - buffer.nearest[buffer.cells]
-    found = ahead > np.float32(_MARGIN)
-    flags, square = found.astype(np.uint8), np.ones((3, 3), np.uint8)
+    hidden = ahead > np.float32(_MARGIN)
+    flags, square = hidden.astype(np.uint8), np.ones((3, 3), np.uint8)
     sure = (cv2.erode(flags, square) > 0) & (ahead > np.float32(_SURE))
     unsure = (cv2.dilate(flags, square) > 0) & ~sure
-    known = np.where(np.isnan(tile.relief), np.float32(-1e9), tile.relief)
-    rise = cv2.dilate(known, square)[core] - tile.relief[core]
-    unsure |= rise * rho > np.float32(_LEAST_SHADOW) * (tile.distance - tile.relief[core])
+    known = np.where(np.isnan(around.relief), np.float32(-1e9), around.relief)
+    rise = cv2.dilate(known, square)[core] - around.relief[core]
+    unsure |= rise * rho > np.float32(_LEAST_SHADOW) * (around.distance - around.relief[core])
     row, column = np.nonzero(unsure & ~sure)
     if not len(row):
-        return found
+        return hidden
     cell = buffer.cells[row, column].astype(np.int64)
     occluder = buffer.nearest[cell]
     for shift in [i * buffer.columns + j for i in (-1, 0, 1) for j in (-1, 0, 1)]:
         # At a rim the occluder may lie just beside the pixel's own cell.
         occluder = np.fmin(occluder, buffer.nearest[np.clip(cell + shift, 0, cell.max())])
-    occluder = np.where(found[row, column], buffer.nearest[cell], occluder)
-    sure[row, column] = _above_ray(tile, row + core[0].start, column + core[1].start, occluder)
+    occluder = np.where(hidden[row, column], buffer.nearest[cell], occluder)
+    sure[row, column] = _above_ray(around, row + core[0].start, column + core[1].start, occluder)
     return sure
 
 
 def _above_ray(
-    tile: _Tile, row: NDArray[np.int64], column: NDArray[np.int64], occluder: ReliefArray
+    around: _Surroundings, row: NDArray[np.int64], column: NDArray[np.int64], occluder: ReliefArray
 ) -> BoolArray:
     """Return which pixels' rays to the camera run into relief beside them or at the occluder."""
-    rows, columns = tile.relief.shape
-    r, rho = tile.relief[row, column], tile.rho[row, column]
-    slope = (tile.distance - r) / rho
-    to_x, to_y = -tile.x[column] / rho, tile.y[row] / rho
+    rows, columns = around.relief.shape
+    r, rho = around.relief[row, column], around.rho[row, column]
+    slope = (around.distance - r) / rho
+    to_x, to_y = -around.x[column] / rho, around.y[row] / rho
     hidden = np.zeros(len(row), bool)
     to_occluder = np.where(np.isfinite(occluder), rho - occluder, np.float32(0))
 
@@ -269,7 +267,7 @@ def _above_ray(
         i = np.rint(row[of] + to_y[of] * t).astype(np.int32)
         j = np.rint(column[of] + to_x[of] * t).astype(np.int32)
         inside = (i >= 0) & (i < rows) & (j >= 0) & (j < columns)
-        return tile.relief[i.clip(0, rows - 1), j.clip(0, columns - 1)], inside
+        return around.relief[i.clip(0, rows - 1), j.clip(0, columns - 1)], inside
 
     near = [np.full(len(row), t, np.float32) for t in _BESIDE]
     left = np.arange(len(row))

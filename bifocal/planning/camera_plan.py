@@ -6,13 +6,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bifocal.precision import sigmas
+from bifocal.precision import sigma_relief
 from photocore.arrays import FloatArray, positive
 from photocore.errors import InputError
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Sensor:
+class CameraSensor:
     """A camera's sensor.
 
     Attributes
@@ -101,7 +101,7 @@ class Plan:
 
     Attributes
     ----------
-    sensor : Sensor
+    sensor : CameraSensor
     stations : tuple of Station
         Feasible ones first, then by expected precision of the relief.
     sigma_px : float
@@ -110,7 +110,7 @@ class Plan:
         Bound of the area of uncertainty. [m]
     """
 
-    sensor: Sensor
+    sensor: CameraSensor
     stations: tuple[Station, ...]
     sigma_px: float
     sigma_r_max: float
@@ -138,7 +138,7 @@ class Plan:
         y = np.linspace(half_h, -half_h, rows)
         radius = np.hypot(*np.meshgrid(x, y))
         sigma = self.sigma_px * station.gsd
-        grid = sigmas(
-            radius, radius, 0.0, d1=station.d1, d2=station.d2, sigma_1=sigma, sigma_2=sigma
-        ).r
+        grid = sigma_relief(
+            radius, radius, d1=station.d1, d2=station.d2, sigma_1=sigma, sigma_2=sigma
+        )
         return x, y, np.where(radius < 1e-9, np.nan, grid)

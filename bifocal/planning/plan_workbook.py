@@ -82,9 +82,8 @@ def _stations_sheet(sheet: Any, plan: Plan) -> None:
             cell = sheet.cell(row, column, value)
             cell.number_format = _COLUMNS[column - 1][2]
             cell.alignment = Alignment(wrap_text=True, vertical="top")
-        if row == 5 and station.feasible:
-            for column in range(1, len(_COLUMNS) + 1):
-                sheet.cell(row, column).fill = PatternFill("solid", fgColor="E2F0D9")
+            if row == 5 and station.feasible:
+                cell.fill = PatternFill("solid", fgColor="E2F0D9")
     last = 4 + len(plan.stations)
     table = Table(
         displayName="tblPlan", ref=f"A4:{sheet.cell(4, len(_COLUMNS)).column_letter}{last}"
@@ -101,9 +100,7 @@ def _stations_sheet(sheet: Any, plan: Plan) -> None:
     chart.x_axis.delete = chart.y_axis.delete = False
     chart.width, chart.height = 22, 10
     sheet.add_chart(chart, f"A{last + 3}")
-    sheet.page_setup.orientation = "landscape"
-    sheet.page_setup.fitToHeight = 0
-    sheet.sheet_properties.pageSetUpPr.fitToPage = True
+    _fit_to_width(sheet)
 
 
 def _grid_sheet(sheet: Any, plan: Plan) -> None:
@@ -130,6 +127,11 @@ def _grid_sheet(sheet: Any, plan: Plan) -> None:
     ends = {"start_type": "min", "start_color": "63BE7B", "end_type": "max", "end_color": "F8696B"}
     middle = {"mid_type": "percentile", "mid_value": 60, "mid_color": "FFEB84"}
     sheet.conditional_formatting.add(area, ColorScaleRule(**ends, **middle))
+    _fit_to_width(sheet)
+
+
+def _fit_to_width(sheet: Any) -> None:
+    """Print a sheet across the page, as many pages high as it takes."""
     sheet.page_setup.orientation = "landscape"
     sheet.page_setup.fitToHeight = 0
     sheet.sheet_properties.pageSetUpPr.fitToPage = True

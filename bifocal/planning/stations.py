@@ -7,8 +7,8 @@ from dataclasses import replace
 from itertools import combinations
 from math import ceil, hypot, sqrt
 
-from bifocal.planning.camera_plan import Plan, Sensor, Station
-from bifocal.precision import lever_arm, uncertainty_radius
+from bifocal.planning.camera_plan import CameraSensor, Plan, Station
+from bifocal.precision import base_factor, sigma_relief, uncertainty_radius
 from photocore.arrays import positive
 from photocore.errors import InputError
 
@@ -22,7 +22,7 @@ NEAREST = 0.2
 
 def plan_stations(
     focal_lengths: Sequence[float],
-    sensor: Sensor,
+    sensor: CameraSensor,
     *,
     object_size: tuple[float, float] | None = None,
     scale_number: float | None = None,
@@ -38,7 +38,7 @@ def plan_stations(
     ----------
     focal_lengths : sequence of float
         Two or more different principal distances. [mm]
-    sensor : Sensor
+    sensor : CameraSensor
     object_size : tuple of float, optional
         Width and height of the wall. Alone it sets the scale so that one photo covers it. [m]
     scale_number : float, optional
@@ -73,7 +73,7 @@ def plan_stations(
     --------
     The paper's camera at 1:500: 17.5 m and 9.5 m for 35 and 19 mm.
 
-    >>> canon = Sensor(width=22.7, height=15.1, columns=3072, rows=2048)
+    >>> canon = CameraSensor(width=22.7, height=15.1, columns=3072, rows=2048)
     >>> best = plan_stations([35, 28, 19], canon, scale_number=500, sigma_px=1.0).best
     >>> best.c1, best.c2, round(best.d1, 2), round(best.d2, 2), round(best.sigma_r_rms * 1000, 1)
     (35.0, 19.0, 17.5, 9.5, 27.6)
@@ -126,7 +126,7 @@ def plan_stations(
 
 
 def _station(
-    c1: float, c2: float, scale_number: float, sensor: Sensor,
+    c1: float, c2: float, scale_number: float, sensor: CameraSensor,
     object_size: tuple[float, float] | None, sigma_px: float, free_space: float | None,
 ) -> Station:  # fmt: skip
     """Return the stations of one pair of lenses, the uncertainty still open."""
@@ -136,7 +136,8 @@ def _station(
     half_diagonal = hypot(*footprint) / 2
     # Mean square radius of a rectangle about its centre is diagonal² / 12.
     rms = hypot(*footprint) / sqrt(12)
-    noise = sqrt(2) * sigma_px * gsd * lever_arm(d1=d1, d2=d2)
+    sigma = sigma_px * gsd
+    in_both = {"d1": d1, "d2": d2, "sigma_1": sigma, "sigma_2": sigma}
     feasible = free_space is None or d1 <= free_space
     note = ""
     if not feasible:
@@ -149,8 +150,9 @@ def _station(
     return Station(
         c1=c1, c2=c2, d1=d1, d2=d2, delta_d=d1 - d2, scale_number=scale_number, gsd=gsd,
         footprint=footprint, photos=_photos(object_size, footprint),
-        sigma_r_rms=noise / rms, sigma_r_corner=noise / half_diagonal,
-        sigma_ortho=sqrt(2) * sigma_px * gsd * d2 / (d1 - d2),
+        sigma_r_rms=float(sigma_relief(rms, rms, **in_both)),
+        sigma_r_corner=float(sigma_relief(half_diagonal, half_diagonal, **in_both)),
+        sigma_ortho=sqrt(2) * sigma * base_factor(d1=d1, d2=d2) / d1,  # e1 = s1 r / d1, Eq. (1)
         uncertain_radius=0.0, uncertain_share=0.0, feasible=feasible, note=note,
     )  # fmt: skip
 

@@ -7,7 +7,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from bifocal.planning.camera_plan import Plan, Sensor
+from bifocal.planning.camera_plan import CameraSensor, Plan
 from bifocal.planning.plan_workbook import write_plan
 from bifocal.planning.stations import plan_stations
 from photocore.errors import InputError
@@ -16,7 +16,7 @@ from photocore.output import check_writable
 
 def make_plan(
     focal_lengths: Sequence[float],
-    sensor: Sensor,
+    sensor: CameraSensor,
     *,
     out: Path | None = None,
     overwrite: bool = False,

@@ -2,35 +2,32 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bifocal.files.images import as_grey
-from bifocal.model.grid import Grid
+from bifocal.model.grid import Bounds, Grid, bounds_of
 from bifocal.model.pair import Pair
 from bifocal.model.relief_map import Quality, ReliefMap
-from bifocal.relief_maps import edges, flow, seed
-from bifocal.relief_maps import forward_projection as splat
-from bifocal.relief_maps import smoothing as smooth
+from bifocal.rays import plane_position
+from bifocal.relief_maps import edges, flow, forward_projection, seed, smoothing
 from bifocal.relief_maps.exposure import match_exposure
+from bifocal.relief_maps.forward_projection import MapBands
 from bifocal.relief_maps.frame import (
     LONGEST_SIDE,
     Frame,
     common_bounds,
     make_frame,
-    native_gsd,
     working_grid,
     zoomed_box,
 )
-from bifocal.relief_maps.orientation_sigma import setup_sigma
+from bifocal.relief_maps.orientation_sigma import orientation_sigma
 from bifocal.relief_maps.registration import Registration, check_registration
 from photocore.arrays import BoolArray, ByteArray
 from photocore.cli import Progress, no_progress
 from photocore.errors import InputError
-
-Bounds = tuple[float, float, float, float]
 
 #: Coarsening of the working frame, and the most pixels it may have.
 QUALITIES = {"fast": (2.0, 3.2e6), "standard": (1.0, 9e6), "best": (1.0, 30e6)}
@@ -69,26 +66,18 @@ class DenseRelief(ReliefMap):
 
     def summary(self) -> dict[str, object]:
         """Return the figures of `bifocal relief --json`."""
-        known = self.known
-        shares = {q.name.lower(): float((self.quality == q).mean()) for q in Quality}
-        values = self.r[known]
+        figures = {"min": 0, "p1": 1, "median": 50, "p99": 99, "max": 100}
+        values = np.percentile(self.r[self.known], list(figures.values())).tolist()
+        sigma = self.sigma[self.quality == Quality.MEASURED]
         return {
             "size": [self.shape[1], self.shape[0]],
             "gsd": self.gsd,
             "working_gsd": self.working_gsd,
             "bounds": list(self.bounds),
-            "shares": shares,
-            "relief": dict(
-                zip(
-                    ("min", "p1", "median", "p99", "max"),
-                    np.percentile(values, [0, 1, 50, 99, 100]).tolist(),
-                    strict=True,
-                )
-            ),
-            "sigma_median": float(np.median(self.sigma[self.quality == Quality.MEASURED]))
-            if (self.quality == Quality.MEASURED).any()
-            else None,
-            "registration": self.registration.to_dict(),
+            "shares": {q.name.lower(): float((self.quality == q).mean()) for q in Quality},
+            "relief": dict(zip(figures, values, strict=True)),
+            "sigma_median": float(np.median(sigma)) if sigma.size else None,
+            "registration": asdict(self.registration) | {"remarks": self.registration.remarks},
         }
 
 
@@ -168,20 +157,22 @@ def dense_relief(
     frame = match_exposure(frame, coarse)
     progress(0.2, 1.0, "Matching")
     small = quality != "fast" and work.width * work.height < SMALL
-    found = flow.measure(frame, coarse, stride=flow.FINE_STRIDE if small else flow.STRIDE)
-    registration = check_registration(frame, found)
+    matched = flow.measure(frame, coarse, stride=flow.FINE_STRIDE if small else flow.STRIDE)
+    registration = check_registration(frame, matched)
     progress(0.7, 1.0, "Edges")
-    source, usable = _surfaces(frame, found, relief_range)
+    source, usable = _surfaces(frame, matched, relief_range)
     progress(0.85, 1.0, "Relief map")
-    layer = splat.to_plane(frame, source, usable, target)
-    layer = _complete(frame, layer, target)
+    bands = forward_projection.to_plane(frame, source, usable, target)
+    bands = _complete(frame, bands, target)
     progress(1.0, 1.0)
-    layer = _resampled(layer, target, wanted)
-    known = np.isfinite(layer.r)
+    bands = _resampled(bands, target, wanted)
+    known = np.isfinite(bands.r)
     return DenseRelief(
-        r=layer.r,
-        sigma=np.where(known, np.hypot(layer.sigma, setup_sigma(pair, layer.r)), np.float32("nan")),
-        quality=np.where(known, layer.quality, np.uint8(Quality.UNKNOWN)),
+        r=bands.r,
+        sigma=np.where(
+            known, np.hypot(bands.sigma, orientation_sigma(pair, bands.r)), np.float32("nan")
+        ),
+        quality=np.where(known, bands.quality, np.uint8(Quality.UNKNOWN)),
         plane_from_pixel=wanted.plane_from_pixel,
         registration=registration,
         working_gsd=work.gsd,
@@ -197,7 +188,7 @@ def _grids(
     relief_range: tuple[float, float] | None,
 ) -> tuple[Grid, Grid, Grid]:
     """Return the grid of the map, the same at working resolution at the finest, and the work's."""
-    native = native_gsd(pair.image1, images[0].shape)
+    native = pair.image1.gsd((images[0].shape[1], images[0].shape[0]))
     common = common_bounds(pair, (images[0].shape, images[1].shape))
     step = native if gsd is None else float(gsd)
     box = common if bounds is None else bounds
@@ -216,17 +207,10 @@ def _grids(
             f"are matched at half the GSD, so it may be {COARSEST_GSD:g} m at most and must leave "
             f"{FEWEST_PIXELS} px a side."
         )
-    low, high = relief_range or (
-        seed.DEEPEST * pair.image2.distance,
-        seed.HIGHEST * pair.image2.distance,
-    )
+    low, high = relief_range or seed.usual_range(pair.image2.distance)
     reach = _seen_box(pair, box, low, high) if bounds is not None else box
-    reach = (
-        max(reach[0], common[0]),
-        max(reach[1], common[1]),
-        min(reach[2], common[2]),
-        min(reach[3], common[3]),
-    )
+    lower, upper = np.maximum(reach[:2], common[:2]), np.minimum(reach[2:], common[2:])
+    reach = (*lower.tolist(), *upper.tolist())
     if reach[2] - reach[0] < 16 * native or reach[3] - reach[1] < 16 * native:
         raise InputError(
             f"bounds: {box} m lie outside what both photos see, "
@@ -265,56 +249,51 @@ def _check_range(relief_range: tuple[float, float], d2: float) -> None:
 def _seen_box(pair: Pair, box: Bounds, low: float, high: float) -> Bounds:
     """Return where photo 1 sees, on the plane, what stands within a box between two reliefs."""
     foot = pair.image1.foot
-    corners = np.array([[box[0], box[1]], [box[2], box[3]]])
-    places = [
-        foot.nadir + (corners - foot.nadir) * foot.distance / (foot.distance - r)
-        for r in (low, 0.0, min(high, 0.6 * foot.distance))
-    ]
-    stacked = np.concatenate(places)
-    (a, b), (c, d) = stacked.min(0), stacked.max(0)
-    return float(a), float(b), float(c), float(d)
+    corners = (box[:2], box[2:])
+    reliefs = (low, 0.0, min(high, 0.6 * foot.distance))
+    xyz = np.array([[x, y, r] for r in reliefs for x, y in corners])
+    return bounds_of(plane_position(xyz, foot))
 
 
 def _surfaces(
-    frame: Frame, found: flow.Measurement, relief_range: tuple[float, float] | None
-) -> tuple[splat.Layer, BoolArray]:
+    frame: Frame, matched: flow.Measurement, relief_range: tuple[float, float] | None
+) -> tuple[MapBands, BoolArray]:
     """Return relief, sigma and quality of the pixels of photo 1, and which of them to use."""
     d2 = frame.distances[1]
-    lever = frame.pair.base_factor
-    low, high = relief_range or (seed.DEEPEST * d2, seed.HIGHEST * d2)
+    base_factor = frame.pair.base_factor
+    low, high = relief_range or seed.usual_range(d2)
     margin = 0.1 * (high - low)
-    relief = np.clip(np.nan_to_num(found.r), low - margin, high + margin).astype(np.float32)
-    typical = float(np.median(found.sigma_px[::8, ::8]))
-    relief = edges.sharpen(frame, relief, lever, typical)
-    quiet = np.minimum(found.sigma_px, np.float32(NOISE_CLIP))
-    relief = smooth.shrink_noise(relief, flow.sigma_of_relief(frame, relief, quiet))
-    sigma = flow.sigma_of_relief(frame, relief, found.sigma_px)
-    valid = (np.abs(found.across) < ACROSS_LIMIT) & (found.loop < LOOP_LIMIT)
+    relief = np.clip(np.nan_to_num(matched.r), low - margin, high + margin).astype(np.float32)
+    relief = edges.sharpen(frame, relief, float(np.median(matched.sigma_px[::8, ::8])))
+    quiet = np.minimum(matched.sigma_px, np.float32(NOISE_CLIP))
+    relief = smoothing.shrink_noise(relief, flow.sigma_of_relief(frame, relief, quiet))
+    sigma = flow.sigma_of_relief(frame, relief, matched.sigma_px)
+    valid = (np.abs(matched.across) < ACROSS_LIMIT) & (matched.loop < LOOP_LIMIT)
     valid &= sigma < SIGMA_SHARE * d2
     quality = np.where(valid, Quality.MEASURED, Quality.INTERPOLATED).astype(np.uint8)
     x, y = frame.from_centre()
     reach = np.maximum(np.sqrt(x * x + y * y), 1)
-    covered = splat.hidden_in_second(
-        frame, relief, (1.5 * lever / reach + 0.002 * d2).astype(np.float32)
+    covered = forward_projection.hidden_in_second(
+        frame, relief, (1.5 * base_factor / reach + 0.002 * d2).astype(np.float32)
     )
     covered &= ~valid
-    layer = splat.Layer(relief, sigma, quality)
-    filled = splat.fill_outwards(layer, covered, frame.grid, frame.pair.image1.nadir)
+    bands = MapBands(relief, sigma, quality)
+    filled = forward_projection.fill_outwards(bands, covered, frame.grid, frame.pair.image1.nadir)
     inside = flow.is_inside(frame, relief)
-    usable = inside & ~(splat.ramps(frame, relief) & ~filled & ~valid)
-    layer.quality[covered] = Quality.HIDDEN
-    return layer, usable
+    usable = inside & ~(forward_projection.ramps(frame, relief) & ~filled & ~valid)
+    bands.quality[covered] = Quality.HIDDEN
+    return bands, usable
 
 
-def _complete(frame: Frame, layer: splat.Layer, grid: Grid) -> splat.Layer:
+def _complete(frame: Frame, bands: MapBands, grid: Grid) -> MapBands:
     """Return the map with strips hidden from photo 1 filled from the surface behind."""
     # Holes outside what both photos see stay unknown.
-    holes = ~np.isfinite(layer.r) & _cover(frame, grid)
-    splat.fill_outwards(layer, holes, grid, frame.pair.image1.nadir)
-    splat.fill_small(layer, holes)
-    layer = layer._replace(r=smooth.tidy_steps(layer.r))
-    splat.forget_outside(layer)
-    return layer
+    holes = ~np.isfinite(bands.r) & _cover(frame, grid)
+    forward_projection.fill_outwards(bands, holes, grid, frame.pair.image1.nadir)
+    forward_projection.fill_small(bands, holes)
+    bands = bands._replace(r=smoothing.tidy_steps(bands.r))
+    forward_projection.forget_outside(bands)
+    return bands
 
 
 def _cover(frame: Frame, grid: Grid) -> BoolArray:
@@ -330,30 +309,23 @@ def _cover(frame: Frame, grid: Grid) -> BoolArray:
     )
 
 
-def _resampled(layer: splat.Layer, grid: Grid, wanted: Grid) -> splat.Layer:
+def _resampled(bands: MapBands, grid: Grid, wanted: Grid) -> MapBands:
     """Return the map on the grid asked for, interpolated if that is finer."""
     import cv2
 
     if wanted.gsd >= 0.999 * grid.gsd:
-        return layer
+        return bands
     column, row = wanted.offset_in(grid)
     ratio = wanted.gsd / grid.gsd
     matrix = np.array([[ratio, 0, column], [0, ratio, row]])
 
     def warp(band: np.ndarray, how: int) -> np.ndarray:
-        return np.asarray(
-            cv2.warpAffine(
-                band,
-                matrix,
-                (wanted.width, wanted.height),
-                flags=how | cv2.WARP_INVERSE_MAP,
-                borderMode=cv2.BORDER_REPLICATE,
-            )
-        )
+        size, flags = (wanted.width, wanted.height), how | cv2.WARP_INVERSE_MAP
+        return cv2.warpAffine(band, matrix, size, flags=flags, borderMode=cv2.BORDER_REPLICATE)
 
-    nearest, smoothed = warp(layer.r, cv2.INTER_NEAREST), warp(layer.r, cv2.INTER_LINEAR)
-    return splat.Layer(
+    nearest, smoothed = warp(bands.r, cv2.INTER_NEAREST), warp(bands.r, cv2.INTER_LINEAR)
+    return MapBands(
         np.where(np.isfinite(smoothed), smoothed, nearest),
-        warp(layer.sigma, cv2.INTER_NEAREST),
-        warp(layer.quality, cv2.INTER_NEAREST),
+        warp(bands.sigma, cv2.INTER_NEAREST),
+        warp(bands.quality, cv2.INTER_NEAREST),
     )

@@ -24,9 +24,7 @@ WINDOW, SOFTNESS = 4, 100.0
 FAVOUR = 0.05
 
 
-def sharpen(
-    frame: Frame, relief: Float32Array, lever: float, sigma_px: float = 0.0
-) -> Float32Array:
+def sharpen(frame: Frame, relief: Float32Array, sigma_px: float = 0.0) -> Float32Array:
     """Return the relief of photo 1 with ramps at steps replaced by one of the two surfaces.
 
     Parameters
@@ -34,8 +32,6 @@ def sharpen(
     frame : Frame
     relief : ndarray of float32, shape (height, width)
         Measured relief. [m]
-    lever : float
-        B = d1 d2 / (d1 - d2). [m]
     sigma_px : float
         Precision of matching, typical of the frame. [px]
     """
@@ -45,7 +41,7 @@ def sharpen(
     disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * REACH + 1, 2 * REACH + 1))
     upper, lower = cv2.dilate(median, disc), cv2.erode(median, disc)
     x, y = frame.from_centre()
-    parallax = (upper - lower) * np.sqrt(x * x + y * y) / np.float32(lever)
+    parallax = (upper - lower) * np.sqrt(x * x + y * y) / np.float32(frame.pair.base_factor)
     band = parallax > max(LEAST_STEP, NOISE_STEPS * sigma_px)
     result = relief.copy()
     far, near = _features(frame.image1), _features(frame.image2)

@@ -8,7 +8,8 @@ import cv2
 import numpy as np
 
 from bifocal.relief_maps.frame import Float32Array, Frame, zoom_map
-from photocore.arrays import ByteArray, FloatArray
+from bifocal.relief_maps.registration import least_absolute
+from photocore.arrays import FloatArray
 
 #: Grey values outside are clipped or dark noise and do not take part.
 DARKEST, BRIGHTEST = 12.0, 243.0
@@ -34,7 +35,6 @@ def match_exposure(frame: Frame, coarse: Float32Array) -> Frame:
     texture is made or lost.
     """
     height, width = frame.grid.shape
-    x, y = _unit(width, height)
     step_x, step_y = max(1, width // SAMPLES), max(1, height // SAMPLES)
     part = (slice(step_y // 2, None, step_y), slice(step_x // 2, None, step_x))
     relief = cv2.resize(coarse, (width, height), interpolation=cv2.INTER_LINEAR)
@@ -51,41 +51,20 @@ def match_exposure(frame: Frame, coarse: Float32Array) -> Frame:
         return frame
     # Vignetting belongs to photo 2's own pixels, so the terms are taken at its positions.
     u, v = columns[use] / width * 2 - 1, rows[use] / height * 2 - 1
-    solution = _robust(_terms(u, v, np.log(second[use])), np.log(first[use]))
-    table = np.log(np.maximum(np.arange(256), 0.5))
-    change = np.abs(np.exp(_terms(u, v, np.log(second[use])) @ solution) - second[use])
+    terms = _terms(u, v, np.log(second[use]))
+    solution = least_absolute(terms, np.log(first[use]), rounds=12, floor=0.01)
+    change = np.abs(np.exp(terms @ solution) - second[use])
     if np.median(change) < WORTHWHILE:
         return frame
-    smooth = np.exp(
-        solution[0] + solution[1] * x + solution[2] * y + solution[3] * (x * x + y * y)
-    ).astype(np.float32)
-    curve = np.exp(solution[4] * table).astype(np.float32)
-    exposed = np.clip(np.rint(curve[frame.image2] * smooth), 0, 255)
-    return replace(frame, image2=_bytes(exposed))
-
-
-def _bytes(values: np.ndarray) -> ByteArray:
-    """Return values as 8-bit."""
-    return values.astype(np.uint8)
-
-
-def _unit(width: int, height: int) -> tuple[FloatArray, FloatArray]:
-    """Return coordinates from -1 to 1, shapes (1, width) and (height, 1)."""
+    level, across, down, vignetting, gamma = solution
     x = np.arange(width)[None, :] / width * 2 - 1
     y = np.arange(height)[:, None] / height * 2 - 1
-    return x, y
+    smooth = np.exp(level + across * x + down * y + vignetting * (x * x + y * y))
+    curve = np.exp(gamma * np.log(np.maximum(np.arange(256), 0.5))).astype(np.float32)
+    exposed = np.clip(np.rint(curve[frame.image2] * smooth.astype(np.float32)), 0, 255)
+    return replace(frame, image2=exposed.astype(np.uint8))
 
 
 def _terms(u: np.ndarray, v: np.ndarray, log_grey: np.ndarray) -> FloatArray:
     """Return the design matrix."""
     return np.column_stack([np.ones_like(u), u, v, u * u + v * v, log_grey])
-
-
-def _robust(design: FloatArray, wanted: FloatArray) -> FloatArray:
-    """Return the solution of least absolute deviations by reweighting."""
-    weight: np.ndarray = np.ones(len(wanted))
-    solution = np.zeros(design.shape[1])
-    for _ in range(12):
-        solution = np.linalg.lstsq(design * weight[:, None], wanted * weight, rcond=None)[0]
-        weight = 1 / np.sqrt(np.maximum(np.abs(wanted - design @ solution), 0.01))
-    return np.asarray(solution)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from bifocal import rays
-from bifocal.relief_maps.frame import Float32Array, Frame, zoom_map
+from bifocal.relief_maps.frame import Float32Array, Frame, offsets, zoom_map
 from photocore.arrays import BoolArray, ByteArray
 
 #: Weight of smoothness; 30 is as good before noise is taken out, 20 keeps more detail for it.
@@ -82,8 +82,7 @@ def measure(frame: Frame, coarse: Float32Array, *, stride: int = STRIDE) -> Meas
     height, width = frame.grid.shape
     seed_relief = cv2.resize(coarse, (width, height), interpolation=cv2.INTER_LINEAR)
     columns, rows = zoom_map(frame, seed_relief)
-    x = np.arange(width, dtype=np.float32)[None, :]
-    y = np.arange(height, dtype=np.float32)[:, None]
+    x, y = offsets((height, width))
     flow = seeded_flow(
         frame.image1, frame.image2, np.dstack([columns - x, rows - y]), finest=0, stride=stride
     )
@@ -110,14 +109,13 @@ def split(frame: Frame, flow: Float32Array) -> tuple[Float32Array, Float32Array]
 def sigma_of_relief(frame: Frame, relief: Float32Array, sigma_px: Float32Array) -> Float32Array:
     """Return the standard deviation of r from a matching precision in pixels. [m]
 
-    ``sigma_r = sigma_m B / s'`` at r = 0 with B = d1 d2 / (d1 - d2); the full derivative of
-    `bifocal.rays.relief_from_zoom` by the position in photo 2 is used.
+    ``sigma_r = sigma_m B / s'`` at r = 0 with B = d1 d2 / (d1 - d2): `precision.sigma_relief`
+    with all error in image 2.
     """
     x, y = frame.from_centre()
     reach = np.maximum(np.sqrt(x * x + y * y), np.float32(0.5))
     d1, d2 = frame.distances
-    # dr/dk = d1 d2 (d1 - d2) / (k d1 - d2)², and k d1 - d2 = d2 (d1 - d2) / (d2 - r).
-    rate = (d2 - relief) ** 2 * np.float32(d1 / (d2 * (d1 - d2)))
+    rate = rays.relief_per_zoom(relief, d1=d1, d2=d2)
     return np.asarray(np.abs(rate) * sigma_px / reach, dtype=np.float32)
 
 
@@ -125,9 +123,7 @@ def _loop(frame: Frame, flow: Float32Array) -> Float32Array:
     """Return how far a pixel lands from itself after the flow there and back. [px]"""
     import cv2
 
-    height, width = frame.grid.shape
-    x = np.arange(width, dtype=np.float32)[None, :]
-    y = np.arange(height, dtype=np.float32)[:, None]
+    x, y = offsets(frame.grid.shape)
     there = (flow[..., 0] + x, flow[..., 1] + y)
     seed = _turned_round(flow)
     back = seeded_flow(frame.image2, frame.image1, seed, finest=1)
@@ -148,8 +144,7 @@ def _turned_round(flow: Float32Array) -> Float32Array:
     size = (max(8, width // 8), max(8, height // 8))
     small = cv2.medianBlur(cv2.resize(flow, size, interpolation=cv2.INTER_AREA), 5)
     scale = np.array([size[0] / width, size[1] / height], dtype=np.float32)
-    x = np.arange(size[0], dtype=np.float32)[None, :]
-    y = np.arange(size[1], dtype=np.float32)[:, None]
+    x, y = offsets(small.shape[:2])
     back = -small
     for _ in range(6):
         columns, rows = x + back[..., 0] * scale[0], y + back[..., 1] * scale[1]
@@ -162,7 +157,5 @@ def is_inside(frame: Frame, relief: Float32Array) -> BoolArray:
     import cv2
 
     columns, rows = zoom_map(frame, relief)
-    content = cv2.remap(
-        frame.seen2.astype(np.uint8), columns, rows, cv2.INTER_NEAREST, borderValue=0
-    )
+    content = cv2.remap(frame.seen2.astype(np.uint8), columns, rows, cv2.INTER_NEAREST)
     return np.asarray(frame.seen1 & (content > 0))

@@ -8,9 +8,9 @@ import numpy as np
 
 from bifocal.model.grid import Grid
 from bifocal.model.relief_map import Quality
-from bifocal.rays import Foot
-from bifocal.relief_maps.frame import Float32Array, Frame, zoom_map
-from photocore.arrays import BoolArray, ByteArray, FloatArray
+from bifocal.rays import Foot, magnification, reduction
+from bifocal.relief_maps.frame import Float32Array, Frame, offsets, values_at, zoom_map
+from photocore.arrays import BoolArray, ByteArray, FloatArray, IntArray
 
 #: A relief agrees with the pixel it came from to this. [m], relative to d1
 AGREEMENT = 4e-4
@@ -24,7 +24,7 @@ FRINGE_HIDDEN, FRINGE_INTERPOLATED = 24.0, 100.0
 DEEPEST_HOLE = 30.0
 
 
-class Layer(NamedTuple):
+class MapBands(NamedTuple):
     """Bands of a relief map in the making."""
 
     r: Float32Array
@@ -41,21 +41,21 @@ def ramps(frame: Frame, relief: Float32Array) -> BoolArray:
     import cv2
 
     foot = frame.pair.image1.foot
-    x, y = _from_nadir(frame.grid, foot)
+    x, y = offsets(frame.grid.shape, frame.grid.pixel_of(foot.nadir))
     across = cv2.Sobel(relief, cv2.CV_32F, 1, 0, ksize=3, scale=0.125)
     down = cv2.Sobel(relief, cv2.CV_32F, 0, 1, ksize=3, scale=0.125)
-    distance = np.float32(foot.distance)
-    stretch = 1 - (relief + across * x + down * y) / distance
+    # d s'/d s of s' = s (1 - r / d), Eq. (1).
+    stretch = reduction(relief + across * x + down * y, np.float32(foot.distance))
     return np.asarray(stretch > STRETCH)
 
 
-def to_plane(frame: Frame, source: Layer, usable: BoolArray, grid: Grid) -> Layer:
+def to_plane(frame: Frame, source: MapBands, usable: BoolArray, grid: Grid) -> MapBands:
     """Return the relief map on a grid of the plane.
 
     Parameters
     ----------
     frame : Frame
-    source : Layer
+    source : MapBands
         Bands in the frame of photo 1.
     usable : ndarray of bool
         Pixels that may be used.
@@ -71,11 +71,8 @@ def to_plane(frame: Frame, source: Layer, usable: BoolArray, grid: Grid) -> Laye
     around = np.ones((5, 5), dtype=np.uint8)
     upper = cv2.dilate(np.where(known, first, np.float32(-1e3)), around)
     lower = cv2.erode(np.where(known, first, np.float32(1e3)), around)
-    result = Layer(
-        np.full(grid.shape, np.nan, dtype=np.float32),
-        np.full(grid.shape, np.nan, dtype=np.float32),
-        np.zeros(grid.shape, dtype=np.uint8),
-    )
+    unknown = np.full(grid.shape, np.float32(np.nan))
+    result = MapBands(unknown, unknown.copy(), np.zeros(grid.shape, dtype=np.uint8))
     for start in (upper, first, lower):
         start = np.where(np.abs(start) < 999, start, np.float32(np.nan))
         _gather(frame, source, relief, grid, foot, start, result)
@@ -84,36 +81,42 @@ def to_plane(frame: Frame, source: Layer, usable: BoolArray, grid: Grid) -> Laye
 
 def _scatter(frame: Frame, relief: Float32Array, grid: Grid, foot: Foot) -> Float32Array:
     """Drop every pixel of photo 1 where it stands on the plane; the highest wins."""
-    x, y = _from_nadir(frame.grid, foot)
-    share = 1 - relief / np.float32(foot.distance)
+    x, y = offsets(frame.grid.shape, frame.grid.pixel_of(foot.nadir))
+    share = reduction(relief, np.float32(foot.distance))  # Eq. (1): s' = s - e = s (1 - r / d)
     ratio = frame.grid.gsd / grid.gsd
     nadir = grid.pixel_of(foot.nadir)
     with np.errstate(invalid="ignore"):
         column = x * share * np.float32(ratio) + np.float32(nadir[0] + 0.5)
         row = y * share * np.float32(ratio) + np.float32(nadir[1] + 0.5)
         inside = (column >= 0) & (column < grid.width) & (row >= 0) & (row < grid.height)
-    height = relief[inside]
     index = row[inside].astype(np.int32) * np.int64(grid.width) + column[inside].astype(np.int32)
-    result = np.full(grid.shape, np.nan, dtype=np.float32)
-    if height.size:
-        low, high = float(height.min()), float(height.max())
+    return _highest(relief[inside], index, np.full(grid.shape, np.nan, dtype=np.float32))
+
+
+def _highest(relief: Float32Array, index: IntArray, result: Float32Array) -> Float32Array:
+    """Return an image with values put at flat indices, the highest where several fall."""
+    if relief.size:
+        low, high = float(relief.min()), float(relief.max())
         # A radix sort of 16-bit levels: later writes win, so the highest comes last.
-        level = ((height - low) * (65535 / max(high - low, 1e-9))).astype(np.uint16)
+        level = ((relief - low) * (65535 / max(high - low, 1e-9))).astype(np.uint16)
         order = np.argsort(level, kind="stable")
-        result.ravel()[index[order]] = height[order]
+        result.ravel()[index[order]] = relief[order]
     return result
 
 
 def _gather(
     frame: Frame,
-    source: Layer,
+    source: MapBands,
     relief: Float32Array,
     grid: Grid,
     foot: Foot,
     start: Float32Array,
-    result: Layer,
+    result: MapBands,
 ) -> None:
-    """Look up, where nothing is known yet, the surface that a first value leads to (in place)."""
+    """Look up, where nothing is known yet, the surface that a first value leads to (in place).
+
+    Eq. (1), s = s' d / (d - r), with the r it is meant to find: a fixed point.
+    """
     import cv2
 
     todo = np.isfinite(start) & ~np.isfinite(result.r)
@@ -124,50 +127,30 @@ def _gather(
     away = ((places - foot.nadir) / [frame.grid.gsd, -frame.grid.gsd]).astype(np.float32)
     nadir = frame.grid.pixel_of(foot.nadir).astype(np.float32)
     value = start[row, column]
-    for _ in range(2):
-        q = nadir + away * (foot.distance / (foot.distance - value))[:, None]
-        value = _at(relief, q, cv2.INTER_NEAREST)
-    q = nadir + away * (foot.distance / (foot.distance - value))[:, None]
-    final = _at(relief, q, cv2.INTER_NEAREST)
+    steps = []
+    for _ in range(3):
+        q = nadir + away * magnification(value, foot.distance)[:, None]
+        value = values_at(relief, q, cv2.INTER_NEAREST)
+        steps.append(value)
+    value, final = steps[1:]
     tolerance = AGREEMENT * foot.distance
     with np.errstate(invalid="ignore"):
         good = np.abs(final - value) < tolerance
-        smooth = _at(relief, q, cv2.INTER_LINEAR)
+        smooth = values_at(relief, q, cv2.INTER_LINEAR)
         final = np.where(np.abs(smooth - final) < tolerance, smooth, final)
     row, column, q, final = row[good], column[good], q[good], final[good]
     result.r[row, column] = final
-    result.sigma[row, column] = _at(source.sigma, q, cv2.INTER_NEAREST)
-    result.quality[row, column] = _at(source.quality, q, cv2.INTER_NEAREST)
+    result.sigma[row, column] = values_at(source.sigma, q, cv2.INTER_NEAREST)
+    result.quality[row, column] = values_at(source.quality, q, cv2.INTER_NEAREST)
 
 
-def _at(band: np.ndarray, q: Float32Array, how: int) -> np.ndarray:
-    """Return a band at (column, row) positions, NaN or 0 outside."""
-    import cv2
-
-    outside = np.nan if band.dtype == np.float32 else 0
-    parts = np.array_split(q, len(q) // 30000 + 1)
-    found = [
-        cv2.remap(
-            band,
-            np.ascontiguousarray(part[None, :, 0]),
-            np.ascontiguousarray(part[None, :, 1]),
-            how,
-            borderMode=cv2.BORDER_CONSTANT,
-            borderValue=outside,
-        )[0]
-        for part in parts
-        if len(part)
-    ]
-    return np.concatenate(found) if found else np.zeros(0, dtype=band.dtype)
-
-
-def fill_outwards(layer: Layer, holes: BoolArray, grid: Grid, nadir: FloatArray) -> BoolArray:
+def fill_outwards(bands: MapBands, holes: BoolArray, grid: Grid, nadir: FloatArray) -> BoolArray:
     """Fill holes from the next known pixel farther out (in place); return which were filled.
 
     Behind a step lies the lower surface, and it goes on outwards: the nearest pixel would smear
     the step itself over what it hides.
     """
-    height, width = layer.r.shape
+    height, width = bands.r.shape
     row, column = np.nonzero(holes)
     if not len(row):
         return np.zeros_like(holes)
@@ -182,14 +165,20 @@ def fill_outwards(layer: Layer, holes: BoolArray, grid: Grid, nadir: FloatArray)
     for _ in range(LEAPS):  # each round doubles the leap of those that are still in a hole
         hop = number[target]
         target = np.where(hop >= 0, target[np.maximum(hop, 0)], target)
-    good = np.isfinite(layer.r.ravel()[target]) & (number[target] < 0)
-    at, source = (row * width + column)[good], target[good]
-    layer.r.ravel()[at] = layer.r.ravel()[source]
-    layer.sigma.ravel()[at] = 3 * layer.sigma.ravel()[source]
-    layer.quality.ravel()[at] = Quality.HIDDEN
-    filled = np.zeros(height * width, dtype=bool)
-    filled[at] = True
-    return filled.reshape(height, width)
+    good = np.isfinite(bands.r.ravel()[target]) & (number[target] < 0)
+    filled = np.zeros_like(holes)
+    filled[row[good], column[good]] = True
+    _fill(bands, filled, target[good], 3, Quality.HIDDEN)
+    return filled
+
+
+def _fill(
+    bands: MapBands, holes: BoolArray, source: IntArray, factor: float, quality: Quality
+) -> None:
+    """Fill holes, in order of rows, from flat indices; their sigma grows (in place)."""
+    bands.r[holes] = bands.r.ravel()[source]
+    bands.sigma[holes] = factor * bands.sigma.ravel()[source]
+    bands.quality[holes] = quality
 
 
 def hidden_in_second(frame: Frame, relief: Float32Array, step: Float32Array) -> BoolArray:
@@ -203,43 +192,29 @@ def hidden_in_second(frame: Frame, relief: Float32Array, step: Float32Array) -> 
     step : ndarray of float32, broadcastable
         How much higher the covering surface must be. [m]
     """
+    import cv2
+
     columns, rows = zoom_map(frame, relief)
     height, width = relief.shape
     with np.errstate(invalid="ignore"):
         column, row = np.rint(columns).astype(np.int32), np.rint(rows).astype(np.int32)
         inside = (column >= 0) & (column < width) & (row >= 0) & (row < height)
-    index = np.where(inside, row.astype(np.int64) * width + column, 0)
-    level = ((relief - relief.min()) * (65535 / max(float(np.ptp(relief)), 1e-9))).astype(np.uint16)
-    order = np.argsort(level.ravel(), kind="stable")
-    order = order[inside.ravel()[order]]
-    top = np.full(height * width, np.float32(-1e3))
-    top[index.ravel()[order]] = relief.ravel()[order]
-    covering = _close(top.reshape(height, width))
-    return np.asarray(inside & (covering.ravel()[index] > relief + step))
+    # What falls outside goes to a cell of its own behind the last one.
+    index = np.where(inside, row.astype(np.int64) * width + column, height * width).ravel()
+    top = _highest(relief.ravel(), index, np.full(relief.size + 1, np.float32(-1e3)))
+    cracked = top[:-1].reshape(height, width)
+    covering = cv2.morphologyEx(cracked, cv2.MORPH_CLOSE, np.ones((3, 3), np.uint8))
+    above = covering.ravel().take(index, mode="clip").reshape(height, width)
+    return np.asarray(inside & (above > relief + step))
 
 
-def _from_nadir(grid: Grid, foot: Foot) -> tuple[Float32Array, Float32Array]:
-    """Return offsets of a grid's pixels from a nadir, shapes (1, width) and (height, 1). [px]"""
-    nadir = grid.pixel_of(foot.nadir)
-    x = np.arange(grid.width, dtype=np.float32)[None, :] - np.float32(nadir[0])
-    y = np.arange(grid.height, dtype=np.float32)[:, None] - np.float32(nadir[1])
-    return x, y
-
-
-def _close(top: Float32Array) -> Float32Array:
-    """Close the cracks of a forward-mapped surface."""
-    import cv2
-
-    return np.asarray(cv2.morphologyEx(top, cv2.MORPH_CLOSE, np.ones((3, 3), dtype=np.uint8)))
-
-
-def fill_small(layer: Layer, holes: BoolArray) -> None:
+def fill_small(bands: MapBands, holes: BoolArray) -> None:
     """Fill what is left of holes from the nearest known pixel, a few pixels deep (in place)."""
     import cv2
 
     if not holes.any():
         return
-    unknown = ~np.isfinite(layer.r)
+    unknown = ~np.isfinite(bands.r)
     distance, label = cv2.distanceTransformWithLabels(
         unknown.astype(np.uint8), cv2.DIST_L2, 5, labelType=cv2.DIST_LABEL_PIXEL
     )
@@ -249,20 +224,17 @@ def fill_small(layer: Layer, holes: BoolArray) -> None:
         return
     source_of_label = np.zeros(int(label.max()) + 1, dtype=np.int64)
     source_of_label[label.ravel()[known]] = known
-    source = source_of_label[label[fill]]
-    layer.r[fill] = layer.r.ravel()[source]
-    layer.sigma[fill] = 5 * layer.sigma.ravel()[source]
-    layer.quality[fill] = Quality.INTERPOLATED
+    _fill(bands, fill, source_of_label[label[fill]], 5, Quality.INTERPOLATED)
 
 
-def forget_outside(layer: Layer) -> None:
+def forget_outside(bands: MapBands) -> None:
     """Make unknown what measured relief does not surround, but for a fringe (in place).
 
     Beyond the outermost thing both photos saw, a filled relief has nothing to lean on.
     """
     import cv2
 
-    measured = (layer.quality == Quality.MEASURED) & np.isfinite(layer.r)
+    measured = (bands.quality == Quality.MEASURED) & np.isfinite(bands.r)
     grains = np.ones((3, 3), np.uint8)
     solid = cv2.morphologyEx(measured.astype(np.uint8), cv2.MORPH_OPEN, grains)
     distance = cv2.distanceTransform(1 - solid, cv2.DIST_L2, 3)
@@ -272,8 +244,7 @@ def forget_outside(layer: Layer) -> None:
     for side in (label[0], label[-1], label[:, 0], label[:, -1]):
         outer[side] = True
     outer[0] = False  # near measured relief
-    far = (layer.quality == Quality.HIDDEN) | (distance > FRINGE_INTERPOLATED)
+    far = (bands.quality == Quality.HIDDEN) | (distance > FRINGE_INTERPOLATED)
     lost = outer[label] & far
-    layer.r[lost] = np.nan
-    layer.sigma[lost] = np.nan
-    layer.quality[lost] = Quality.UNKNOWN
+    bands.r[lost] = bands.sigma[lost] = np.nan
+    bands.quality[lost] = Quality.UNKNOWN

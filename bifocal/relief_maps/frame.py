@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import permutations
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bifocal import rays
-from bifocal.model.grid import Grid
+from bifocal.model.grid import Bounds, Grid, bounds_of, cut
 from bifocal.model.pair import Pair, Photo
 from photocore.arrays import BoolArray, ByteArray, FloatArray
 from photocore.errors import GeometryError, InputError
@@ -57,22 +60,19 @@ class Frame:
 
     def from_centre(self) -> tuple[Float32Array, Float32Array]:
         """Return offsets from the zoom centre, shapes (1, width) and (height, 1). [px]"""
-        x = np.arange(self.grid.width, dtype=np.float32)[None, :] - np.float32(self.centre[0])
-        y = np.arange(self.grid.height, dtype=np.float32)[:, None] - np.float32(self.centre[1])
-        return x, y
+        return offsets(self.grid.shape, self.centre)
 
 
-def native_gsd(photo: Photo, shape: tuple[int, ...]) -> float:
-    """Return the side of a photo's pixel on the plane in the middle of the photo. [m]"""
-    height, width = shape[:2]
-    middle = np.array([[(width - 1) / 2, (height - 1) / 2]])
-    jacobian = photo.metres_per_pixel(middle)[0]
-    return float(np.sqrt(abs(np.linalg.det(jacobian))))
+def offsets(
+    shape: tuple[int, int], centre: Sequence[float] | FloatArray = (0.0, 0.0)
+) -> tuple[Float32Array, Float32Array]:
+    """Return offsets of pixels from a point (column, row), shapes (1, w) and (h, 1). [px]"""
+    x = np.arange(shape[1], dtype=np.float32)[None, :] - np.float32(centre[0])
+    y = np.arange(shape[0], dtype=np.float32)[:, None] - np.float32(centre[1])
+    return x, y
 
 
-def common_bounds(
-    pair: Pair, shapes: tuple[tuple[int, ...], tuple[int, ...]]
-) -> tuple[float, float, float, float]:
+def common_bounds(pair: Pair, shapes: tuple[tuple[int, ...], tuple[int, ...]]) -> Bounds:
     """Return the box on the plane that both photos see (X min, Y min, X max, Y max). [m]
 
     Raises
@@ -81,10 +81,8 @@ def common_bounds(
         If the photos have no common area on the plane.
     """
     places = []
-    for one, other, shape, across in (
-        (pair.image1, pair.image2, shapes[0], shapes[1]),
-        (pair.image2, pair.image1, shapes[1], shapes[0]),
-    ):
+    photos = zip((pair.image1, pair.image2), shapes, strict=True)
+    for (one, shape), (other, across) in permutations(photos):
         footprint = _footprint(one, shape)
         places.append(footprint[_shows(other, across, footprint)])
     both = np.concatenate(places)
@@ -93,22 +91,18 @@ def common_bounds(
             "the two photos have no common area on the reference plane: check that they show the "
             "same wall and that the pair file belongs to them."
         )
-    (x_min, y_min), (x_max, y_max) = both.min(0).tolist(), both.max(0).tolist()
-    return x_min, y_min, x_max, y_max
+    return bounds_of(both)
 
 
-def zoomed_box(
-    pair: Pair, shape2: tuple[int, ...], box: tuple[float, float, float, float], relief: float
-) -> tuple[float, float, float, float]:
+def zoomed_box(pair: Pair, shape2: tuple[int, ...], box: Bounds, relief: float) -> Bounds:
     """Return a box grown to where photo 2 shows what stands out by a relief, as far as it does."""
-    d1, d2 = pair.image1.distance, pair.image2.distance
-    factor = d2 * (d1 - relief) / (d1 * (d2 - relief))
-    corners = np.array([[box[0], box[1]], [box[2], box[3]]])
+    factor = rays.zoom_factor(relief, d1=pair.image1.distance, d2=pair.image2.distance)
+    corners = np.reshape(box, (2, 2))
     grown = pair.zoom_centre + (corners - pair.zoom_centre) * factor
     footprint = _footprint(pair.image2, shape2)
     low = np.minimum(corners[0], np.maximum(grown[0], footprint.min(0)))
     high = np.maximum(corners[1], np.minimum(grown[1], footprint.max(0)))
-    return float(low[0]), float(low[1]), float(high[0]), float(high[1])
+    return bounds_of(np.stack([low, high]))
 
 
 def _shows(photo: Photo, shape: tuple[int, ...], places: FloatArray) -> BoolArray:
@@ -128,26 +122,22 @@ def _footprint(photo: Photo, shape: tuple[int, ...]) -> FloatArray:
     height, width = shape[:2]
     sides = []
     for across, down in ((33, 33), (1025, 2), (2, 1025)):
-        columns, rows = (
-            np.linspace(-0.5, width - 0.5, across),
-            np.linspace(-0.5, height - 0.5, down),
-        )
+        columns = np.linspace(-0.5, width - 0.5, across)
+        rows = np.linspace(-0.5, height - 0.5, down)
         sides.append(np.stack(np.meshgrid(columns, rows), axis=-1).reshape(-1, 2))
     pixels = np.concatenate(sides)
     places = photo.plane_from_pixels(pixels)
     determinant = np.linalg.det(photo.metres_per_pixel(pixels))
     middle = np.array([[(width - 1) / 2, (height - 1) / 2]])
     sign = np.sign(np.linalg.det(photo.metres_per_pixel(middle)))
-    limit = (COARSEST_SHARE * native_gsd(photo, shape)) ** 2
+    limit = (COARSEST_SHARE * photo.gsd((width, height))) ** 2
     with np.errstate(invalid="ignore"):
         good = np.isfinite(places).all(-1) & (determinant * sign > 0)
         good &= np.abs(determinant) < limit
     return places[good & _in_front(photo, shape, places)]
 
 
-def working_grid(
-    pair: Pair, shape1: tuple[int, ...], box: tuple[float, float, float, float], gsd: float
-) -> Grid:
+def working_grid(pair: Pair, shape1: tuple[int, ...], box: Bounds, gsd: float) -> Grid:
     """Return the grid over a box; on the lattice of photo 1 if that is square to the wall."""
     grid = Grid.from_bounds(box, gsd=gsd)
     photo = pair.image1
@@ -189,8 +179,9 @@ def _on_grid(photo: Photo, image: ByteArray, grid: Grid) -> tuple[ByteArray, Boo
     height, width = image.shape
     shift = _whole_shift(matrix, grid) if photo.lens is None else None
     if shift is not None:
-        return _cut(image, shift, grid)
-    ratio = grid.gsd / native_gsd(photo, image.shape)
+        window = (*shift, grid.width, grid.height)
+        return cut(image, window), cut(np.ones(image.shape, bool), window)
+    ratio = grid.gsd / photo.gsd((width, height))
     scale = 1.0
     if ratio > 1.5:  # averaging first, so that the coarser grid does not alias
         scale = 1 / ratio
@@ -236,28 +227,33 @@ def _whole_shift(matrix: FloatArray, grid: Grid) -> tuple[int, int] | None:
     return (int(offset[0]), int(offset[1])) if np.abs(off).max() < SAME_LATTICE * 10 else None
 
 
-def _cut(image: ByteArray, corner: tuple[int, int], grid: Grid) -> tuple[ByteArray, BoolArray]:
-    """Return the part of a photo that starts at a pixel; outside it there is nothing."""
-    result = np.zeros(grid.shape, dtype=np.uint8)
-    seen = np.zeros(grid.shape, dtype=bool)
-    column, row = corner
-    left, top = max(0, -column), max(0, -row)
-    right = min(grid.width, image.shape[1] - column)
-    bottom = min(grid.height, image.shape[0] - row)
-    if right > left and bottom > top:
-        result[top:bottom, left:right] = image[
-            top + row : bottom + row, left + column : right + column
-        ]
-        seen[top:bottom, left:right] = True
-    return result, seen
-
-
 def zoom_map(frame: Frame, relief: Float32Array) -> tuple[Float32Array, Float32Array]:
-    """Return where photo 2 shows the pixels of photo 1 at given relief (columns, rows). [px]"""
+    """Return where photo 2 shows the pixels of photo 1 at given relief (columns, rows). [px]
+
+    Eq. (6) read the other way round, about the zoom centre: q2 - e = k(r) (q1 - e).
+    """
     d1, d2 = frame.distances
     factor = rays.zoom_factor(relief, d1=d1, d2=d2).astype(np.float32)
     x, y = frame.from_centre()
-    return (
-        factor * x + np.float32(frame.centre[0]),
-        factor * y + np.float32(frame.centre[1]),
-    )
+    column, row = (np.float32(value) for value in frame.centre)
+    return factor * x + column, factor * y + row
+
+
+def values_at(band: NDArray[Any], places: NDArray[np.floating], how: int) -> NDArray[Any]:
+    """Return a band or picture at (column, row), shape (n, 2); NaN or 0 outside it.
+
+    Parameters
+    ----------
+    how : int
+        OpenCV's interpolation, ``cv2.INTER_NEAREST`` or another.
+    """
+    import cv2
+
+    outside = np.nan if band.dtype.kind == "f" else 0
+    values = [np.zeros((0, *band.shape[2:]), band.dtype)]
+    # cv2.remap counts the places of one call in 16 bits.
+    for part in np.array_split(places.astype(np.float32), len(places) // 30000 + 1):
+        if len(part):
+            columns, rows = (np.ascontiguousarray(part[None, :, axis]) for axis in (0, 1))
+            values.append(cv2.remap(band, columns, rows, how, borderValue=outside)[0])
+    return np.concatenate(values)

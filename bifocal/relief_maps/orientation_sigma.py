@@ -1,4 +1,4 @@
-"""What the set-up's own uncertainty does to relief, where the pair file states it."""
+"""What the orientation's own uncertainty does to relief, where the pair file states it."""
 
 from __future__ import annotations
 
@@ -7,10 +7,11 @@ from collections.abc import Mapping
 import numpy as np
 
 from bifocal.model.pair import Pair
+from bifocal.precision import false_relief_of_scale
 from bifocal.relief_maps.frame import Float32Array
 
 
-def setup_sigma(pair: Pair, relief: Float32Array) -> Float32Array:
+def orientation_sigma(pair: Pair, relief: Float32Array) -> Float32Array:
     """Return the standard deviation of relief that comes from scale and distances. [m]
 
     Notes
@@ -24,13 +25,14 @@ def setup_sigma(pair: Pair, relief: Float32Array) -> Float32Array:
     d1, d2 = pair.image1.distance, pair.image2.distance
     rate1, rate2 = d2 / (d1 * (d1 - d2)), d1 / (d2 * (d1 - d2))
     per_metre = np.hypot(rate1 * sigma1, rate2 * sigma2)
-    return np.hypot(np.float32(pair.base_factor * scale), relief * np.float32(per_metre))
+    by_scale = false_relief_of_scale(scale, d1=d1, d2=d2)
+    return np.hypot(np.float32(by_scale), relief * np.float32(per_metre))
 
 
 def _stated(pair: Pair, name: str) -> float:
     """Return a standard deviation of the pair file, 0 where there is none."""
-    setup = pair.extra.get("setup")
-    stated = setup.get("standard_deviations") if isinstance(setup, Mapping) else None
+    orientation = pair.extra.get("setup")
+    stated = orientation.get("standard_deviations") if isinstance(orientation, Mapping) else None
     value = stated.get(name) if isinstance(stated, Mapping) else None
     usable = isinstance(value, int | float) and np.isfinite(value) and value > 0
     return float(value) if usable and value is not None else 0.0

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 
 import numpy as np
 
+from bifocal.precision import false_relief_of_scale
 from bifocal.relief_maps.flow import Measurement
 from bifocal.relief_maps.frame import Frame
+from photocore.arrays import FloatArray
 from photocore.errors import GeometryError
 
 #: Pixels that come back to themselves within this are taken for matched. [px]
@@ -40,7 +42,6 @@ class Registration:
         Relief of the most frequent surface. [m]
     false_relief_per_scale : float
         Constant false relief per 0.1 % of error in the relative scale of the photos. [m]
-    remarks : tuple of str
     """
 
     matched: float
@@ -50,14 +51,37 @@ class Registration:
     systematic: float
     wall: float
     false_relief_per_scale: float
-    remarks: tuple[str, ...]
 
-    def to_dict(self) -> dict[str, object]:
-        """Return plain values."""
-        return asdict(self)
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """What the user should be told."""
+        told = []
+        per_scale = self.false_relief_per_scale
+        if self.systematic > REMARK_PX:
+            told.append(
+                f"the photos do not fit exactly: matched points miss the radial lines by "
+                f"{self.across_median:.2f} px (median), as from a shift of {self.shift[0]:+.2f}, "
+                f"{self.shift[1]:+.2f} px and a rotation of {np.degrees(self.rotation):+.4f} deg "
+                "of photo 2. Relief is off likewise; improve the pair file with more control "
+                "points (`bifocal align`)."
+            )
+        if self.matched < 0.5:
+            told.append(f"only {self.matched:.0%} of the pixels could be matched there and back.")
+        if 0.3 * per_scale < abs(self.wall) < 15 * per_scale:
+            told.append(
+                f"the largest flat surface lies at r = {1000 * self.wall:+.0f} mm. If it is your "
+                "reference plane, the scale of the photos differs by "
+                f"{100 * self.wall / per_scale * 1e-3:+.3f} %."
+            )
+        told.append(
+            f"an error of 0.1 % in the relative scale of the photos shifts all relief by "
+            f"{1000 * per_scale:.0f} mm and shows in no residual: what guarantees it are the "
+            "control points or distances the pair file was made from. Check one known relief."
+        )
+        return tuple(told)
 
 
-def check_registration(frame: Frame, found: Measurement) -> Registration:
+def check_registration(frame: Frame, measured: Measurement) -> Registration:
     """Return how well the photos fit each other.
 
     Raises
@@ -67,10 +91,9 @@ def check_registration(frame: Frame, found: Measurement) -> Registration:
     """
     step = max(1, int(np.sqrt(frame.grid.width * frame.grid.height / 4e4)))
     part = (slice(step // 2, None, step), slice(step // 2, None, step))
-    x, y = (np.asarray(axis) for axis in frame.from_centre())
-    grid_x, grid_y = np.broadcast_arrays(x, y)
+    grid_x, grid_y = np.broadcast_arrays(*frame.from_centre())
     px, py = grid_x[part].astype(np.float64), grid_y[part].astype(np.float64)
-    across, loop, relief = found.across[part], found.loop[part], found.r[part]
+    across, loop, relief = measured.across[part], measured.loop[part], measured.r[part]
     common = (frame.seen1 & frame.seen2)[part]
     matched = common & (loop < MATCHED)
     share = float(matched.sum() / max(common.sum(), 1))
@@ -85,9 +108,6 @@ def check_registration(frame: Frame, found: Measurement) -> Registration:
     shift, rotation, systematic, median = _systematic(
         px[use], py[use], across[use].astype(np.float64)
     )
-    wall = _mode(relief[use])
-    per_scale = 1e-3 * frame.pair.base_factor
-    remarks = _remarks(median, systematic, shift, rotation, wall, per_scale, share)
     if median > REFUSE_PX:
         raise GeometryError(
             f"the photos are not registered: matched points miss the radial lines by {median:.1f} "
@@ -95,15 +115,15 @@ def check_registration(frame: Frame, found: Measurement) -> Registration:
             f"{shift[0]:+.1f}, {shift[1]:+.1f} px and a rotation of {np.degrees(rotation):+.3f} "
             "deg. Make the pair file with `bifocal align --control` or `--auto`."
         )
+    d1, d2 = frame.distances
     return Registration(
         matched=share,
         across_median=median,
         shift=shift,
         rotation=rotation,
         systematic=systematic,
-        wall=wall,
-        false_relief_per_scale=per_scale,
-        remarks=remarks,
+        wall=_mode(relief[use]),
+        false_relief_per_scale=float(false_relief_of_scale(1e-3, d1=d1, d2=d2)),
     )
 
 
@@ -118,12 +138,7 @@ def _systematic(
         return (0.0, 0.0), 0.0, 0.0, 0.0
     radius = np.hypot(x, y)
     design = np.column_stack([-y / radius, x / radius, radius])
-    weight: np.ndarray = np.ones(len(x))
-    solution = np.zeros(3)
-    for _ in range(8):  # iteratively reweighted: least absolute deviations
-        scaled = design * weight[:, None]
-        solution = np.linalg.lstsq(scaled, across * weight, rcond=None)[0]
-        weight = 1 / np.sqrt(np.maximum(np.abs(across - design @ solution), 0.02))
+    solution = least_absolute(design, across, rounds=8, floor=0.02)
     explained = design @ solution
     return (
         (float(solution[0]), float(solution[1])),
@@ -131,6 +146,21 @@ def _systematic(
         float(np.sqrt(np.mean(explained**2))),
         float(np.median(np.abs(across))),
     )
+
+
+def least_absolute(
+    design: FloatArray, wanted: FloatArray, *, rounds: int, floor: float
+) -> FloatArray:
+    """Return the solution of least absolute deviations, by reweighted least squares.
+
+    Residuals below ``floor`` count as it: they would be weighted without bound.
+    """
+    weight: FloatArray = np.ones(len(wanted))
+    solution: FloatArray = np.zeros(design.shape[1])
+    for _ in range(rounds):
+        solution = np.linalg.lstsq(design * weight[:, None], wanted * weight, rcond=None)[0]
+        weight = 1 / np.sqrt(np.maximum(np.abs(wanted - design @ solution), floor))
+    return solution
 
 
 def _mode(relief: np.ndarray) -> float:
@@ -142,36 +172,3 @@ def _mode(relief: np.ndarray) -> float:
     peak = int(count.argmax())
     near = relief[np.abs(relief - (edge[peak] + 0.0025)) < 0.01]
     return float(np.median(near)) if len(near) else float(edge[peak])
-
-
-def _remarks(
-    median: float,
-    systematic: float,
-    shift: tuple[float, float],
-    rotation: float,
-    wall: float,
-    per_scale: float,
-    share: float,
-) -> tuple[str, ...]:
-    """Return what the user should be told."""
-    told = []
-    if systematic > REMARK_PX:
-        told.append(
-            f"the photos do not fit exactly: matched points miss the radial lines by "
-            f"{median:.2f} px (median), as from a shift of {shift[0]:+.2f}, {shift[1]:+.2f} px and "
-            f"a rotation of {np.degrees(rotation):+.4f} deg of photo 2. Relief is off likewise; "
-            "improve the pair file with more control points (`bifocal align`)."
-        )
-    if share < 0.5:
-        told.append(f"only {share:.0%} of the pixels could be matched there and back.")
-    if abs(wall) > 0.3 * per_scale and abs(wall) < 15 * per_scale:
-        told.append(
-            f"the largest flat surface lies at r = {1000 * wall:+.0f} mm. If it is your reference "
-            f"plane, the scale of the photos differs by {100 * wall / per_scale * 1e-3:+.3f} %."
-        )
-    told.append(
-        f"an error of 0.1 % in the relative scale of the photos shifts all relief by "
-        f"{1000 * per_scale:.0f} mm and shows in no residual: what guarantees it are the control "
-        "points or distances the pair file was made from. Check one known relief."
-    )
-    return tuple(told)

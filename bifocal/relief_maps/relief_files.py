@@ -1,95 +1,19 @@
-"""Relief maps in and out: three-band GeoTIFF, coloured point cloud, shaded preview."""
+"""A picture of a relief map: colours with hill shade."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bifocal.model.relief_map import Quality, ReliefMap
-from photocore.arrays import ByteArray, FloatArray
+from photocore.arrays import FloatArray
 from photocore.errors import InputError
 from photocore.output import atomic_path
 
 #: Longer side of a preview. [px]
 PREVIEW_SIDE = 2000
-_ROWS = 512
-
-
-class Cloud(NamedTuple):
-    """Points of a relief map, ready to be written.
-
-    Attributes
-    ----------
-    xyz : ndarray, shape (n, 3)
-        X, Y, relief. [m]
-    colours : ndarray of uint8, shape (n, 3)
-    sigma : ndarray, shape (n,)
-        Of the relief. [m]
-    quality : ndarray of uint8, shape (n,)
-    """
-
-    xyz: FloatArray
-    colours: ByteArray
-    sigma: FloatArray
-    quality: ByteArray
-
-
-def write_cloud(path: Path | str, cloud: Cloud, *, overwrite: bool = False) -> None:
-    """Write a coloured point cloud as .ply, .las or .laz.
-
-    Raises
-    ------
-    InputError
-        If the ending is another.
-    """
-    path = Path(path)
-    writers = {".ply": _write_ply, ".las": _write_las, ".laz": _write_las}
-    writer = writers.get(path.suffix.lower())
-    if writer is None:
-        raise InputError(f"{path}: point clouds are written as .ply, .las or .laz.")
-    with atomic_path(path, overwrite=overwrite) as temporary:
-        writer(temporary, cloud)
-
-
-def _write_ply(path: Path, cloud: Cloud) -> None:
-    """Write a binary PLY."""
-    fields = [("x", "<f8"), ("y", "<f8"), ("z", "<f8"), ("red", "u1"), ("green", "u1"),
-              ("blue", "u1"), ("sigma", "<f4"), ("quality", "u1")]  # fmt: skip
-    rows = np.zeros(len(cloud.xyz), dtype=fields)
-    for axis, name in enumerate(("x", "y", "z")):
-        rows[name] = cloud.xyz[:, axis]
-    for axis, name in enumerate(("red", "green", "blue")):
-        rows[name] = cloud.colours[:, axis]
-    rows["sigma"], rows["quality"] = cloud.sigma, cloud.quality
-    kinds = {"<f8": "double", "<f4": "float", "u1": "uchar"}
-    properties = "".join(f"property {kinds[kind]} {name}\n" for name, kind in fields)
-    header = (
-        "ply\nformat binary_little_endian 1.0\ncomment metres, plane frame\n"
-        f"element vertex {len(rows)}\n{properties}end_header\n"
-    )
-    path.write_bytes(header.encode("ascii") + rows.tobytes())
-
-
-def _write_las(path: Path, cloud: Cloud) -> None:
-    """Write LAS 1.4 (or LAZ) with colour, sigma as extra dimension and quality as user data."""
-    import laspy
-
-    header = laspy.LasHeader(point_format=7, version="1.4")
-    header.offsets = np.floor(cloud.xyz.min(axis=0))
-    header.scales = np.full(3, 1e-4)
-    header.add_extra_dim(
-        laspy.ExtraBytesParams(name="sigma", type=np.float32, description="sigma of relief, m")
-    )
-    points = laspy.LasData(header)
-    points.x, points.y, points.z = cloud.xyz.T
-    for axis, name in enumerate(("red", "green", "blue")):
-        points[name] = cloud.colours[:, axis].astype(np.uint16) * 257
-    points["sigma"] = cloud.sigma.astype(np.float32)
-    points.user_data = cloud.quality
-    points.write(str(path))
 
 
 def write_preview(path: Path | str, relief: ReliefMap, *, overwrite: bool = False) -> None:

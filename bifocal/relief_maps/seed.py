@@ -9,7 +9,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from bifocal.relief_maps.frame import Float32Array, Frame
+from bifocal import rays
+from bifocal.relief_maps.frame import Float32Array, Frame, offsets
 from photocore.arrays import BoolArray, ByteArray
 
 #: Width or height at which the sweep works; more brings little, costs squarely. [px]
@@ -67,6 +68,11 @@ def coarse_relief(
     return np.asarray(cv2.medianBlur(coarse, 5)), factor
 
 
+def usual_range(d2: float) -> tuple[float, float]:
+    """Return the least and the greatest relief tried where none are given. [m]"""
+    return DEEPEST * d2, HIGHEST * d2
+
+
 def hypotheses(
     frame: Frame,
     size: tuple[int, int],
@@ -75,13 +81,12 @@ def hypotheses(
 ) -> np.ndarray:
     """Return relief values that are uniform in parallax, from low to high, shape (n,). [m]"""
     d1, d2 = frame.distances
-    low, high = relief_range or (DEEPEST * d2, HIGHEST * d2)
-    zoom = [d2 * (d1 - r) / (d1 * (d2 - r)) for r in (low, high)]
+    low, high = relief_range or usual_range(d2)
+    zoom = rays.zoom_factor(np.array([low, high]), d1=d1, d2=d2)
     corners = np.array([[0, 0], [size[0], 0], [0, size[1]], size]) - centre
     reach = float(np.hypot(*corners.T).max())
     count = int(np.clip((zoom[1] - zoom[0]) * reach * STEPS_PER_PIXEL, 8, MOST_STEPS))
-    factor = np.linspace(zoom[0], zoom[1], count)
-    return np.asarray(d1 * d2 * (factor - 1) / (factor * d1 - d2))
+    return rays.relief_from_zoom(np.linspace(zoom[0], zoom[1], count), d1=d1, d2=d2)
 
 
 def _cost_volume(
@@ -97,15 +102,12 @@ def _cost_volume(
 
     d1, d2 = frame.distances
     height, width = far.shape
-    x = np.arange(width, dtype=np.float32)[None, :] - np.float32(centre[0])
-    y = np.arange(height, dtype=np.float32)[:, None] - np.float32(centre[1])
-    x, y = np.broadcast_arrays(x, y)
+    x, y = np.broadcast_arrays(*offsets((height, width), centre))
     cost = np.empty((height, width, len(relief)), dtype=np.float32)
     windows = (5, 11)
     moments = {n: _moments(far, n) for n in windows}
     content = inside.astype(np.float32)
-    for i, r in enumerate(relief):
-        zoom = np.float32(d2 * (d1 - r) / (d1 * (d2 - r)))
+    for i, zoom in enumerate(rays.zoom_factor(relief, d1=d1, d2=d2).astype(np.float32)):
         maps = (zoom * x + np.float32(centre[0]), zoom * y + np.float32(centre[1]))
         moved = cv2.remap(near, *maps, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
         there = cv2.remap(content, *maps, cv2.INTER_LINEAR, borderValue=0.0)

@@ -7,14 +7,18 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from bifocal.files.geotiff import write_relief
 from bifocal.files.images import ImageArray, read_image, to_eight_bit
 from bifocal.model.pair import Pair
 from bifocal.model.relief_map import ReliefMap
-from bifocal.relief_maps import DenseRelief, dense_relief
-from bifocal.relief_maps.relief_files import Cloud, write_cloud, write_preview
+from bifocal.relief_maps import dense_relief
+from bifocal.relief_maps.frame import values_at
+from bifocal.relief_maps.relief_files import write_preview
+from photocore.arrays import FloatArray
 from photocore.cli import Progress, no_progress
+from photocore.cloud import write_cloud
 from photocore.errors import GeometryError, InputError
 from photocore.output import check_writable
 
@@ -71,10 +75,7 @@ def relief_of_pair(
     """
     _check_outputs(job)
     pair = Pair.read(pair_file)
-    image1, image2 = (
-        _photo(pair, file, key)
-        for file, key in ((pair.image1.file, "image1"), (pair.image2.file, "image2"))
-    )
+    image1, image2 = (read_image(pair.photo_file(number)) for number in (1, 2))
     result = dense_relief(
         pair, image1, image2, gsd=job.gsd, bounds=job.bounds, quality=job.quality,
         relief_range=job.relief_range, progress=progress,
@@ -94,73 +95,59 @@ def relief_of_pair(
         write_preview(job.preview, result, overwrite=job.overwrite)
         written.append(job.preview)
     if job.cloud is not None:
-        write_cloud(job.cloud, coloured_cloud(result, pair, image1), overwrite=job.overwrite)
+        xyz, attributes = coloured_cloud(result, pair, image1)
+        write_cloud(
+            job.cloud, xyz, attributes, comment="metres, plane frame",
+            descriptions={"sigma": "sigma of relief, m"}, overwrite=job.overwrite,
+        )  # fmt: skip
         written.append(job.cloud)
     summary = result.summary() | {"written": [str(path) for path in written]}
-    return summary, (*pair.remarks, *_remarks(result))
+    return summary, (*pair.remarks, *result.registration.remarks)
 
 
-def coloured_cloud(relief: ReliefMap, pair: Pair, image1: ImageArray) -> Cloud:
-    """Return the known points of a relief map with the colours of photo 1."""
+def coloured_cloud(
+    relief: ReliefMap, pair: Pair, image1: ImageArray
+) -> tuple[FloatArray, dict[str, NDArray[Any]]]:
+    """Return the known points of a relief map with the colours of photo 1.
+
+    Returns
+    -------
+    xyz : ndarray, shape (n, 3)
+        X, Y, relief. [m]
+    attributes : dict of str to ndarray, shape (n,)
+        ``red``, ``green``, ``blue`` (8 bits), ``sigma`` of the relief [m], ``quality``.
+    """
     import cv2
 
     picture = to_eight_bit(image1)
     if picture.ndim == 2:
         picture = np.repeat(picture[..., None], 3, axis=2)
-    parts = []
+    positions, colours = [], []
     for row in range(0, relief.shape[0], _ROWS):
         rows = slice(row, row + _ROWS)
         known = relief.known[rows]
-        xyz = np.concatenate(
-            [relief.plane_positions(rows)[known], relief.r[rows][known][:, None]], axis=1
-        )
-        if not len(xyz):
+        if not known.any():
             continue
-        pixels = pair.image1.project(xyz).astype(np.float32)
-        colours = np.concatenate(
-            [
-                cv2.remap(
-                    picture,
-                    np.ascontiguousarray(some[None, :, 0]),
-                    np.ascontiguousarray(some[None, :, 1]),
-                    cv2.INTER_LINEAR,
-                )[0]
-                for some in np.array_split(pixels, len(pixels) // 30000 + 1)
-            ]
-        )
-        parts.append(
-            Cloud(
-                xyz,
-                colours,
-                relief.sigma[rows][known].astype(np.float64),
-                relief.quality[rows][known],
-            )
-        )
-    return Cloud(*(np.concatenate(bands) for bands in zip(*parts, strict=True)))
+        xyz = np.column_stack([relief.plane_positions(rows)[known], relief.r[rows][known]])
+        positions.append(xyz)
+        colours.append(values_at(picture, pair.image1.project(xyz), cv2.INTER_LINEAR))
+    known = relief.known
+    attributes = dict(zip(("red", "green", "blue"), np.concatenate(colours).T, strict=True))
+    attributes |= {
+        "sigma": relief.sigma[known].astype(np.float32),
+        "quality": relief.quality[known],
+    }
+    return np.concatenate(positions), attributes
 
 
 def _check_outputs(job: ReliefJob) -> None:
     """Refuse, before any work, outputs that could not be written."""
-    check_writable(job.out, overwrite=job.overwrite)
-    if job.out.suffix.lower() not in {".tif", ".tiff"}:
-        raise InputError(f"{job.out}: the relief map is written as .tif.")
-    if job.preview is not None:
-        check_writable(job.preview, overwrite=job.overwrite)
-        if job.preview.suffix.lower() != ".png":
-            raise InputError(f"{job.preview}: the preview is written as .png.")
-    if job.cloud is not None:
-        check_writable(job.cloud, overwrite=job.overwrite)
-        if job.cloud.suffix.lower() not in {".ply", ".las", ".laz"}:
-            raise InputError(f"{job.cloud}: point clouds are written as .ply, .las or .laz.")
-
-
-def _photo(pair: Pair, file: str, key: str) -> ImageArray:
-    """Read a photo named in a pair file."""
-    if not file:
-        raise InputError(f'the pair file names no photo for "{key}": add its "file".')
-    return read_image(pair.folder / file)
-
-
-def _remarks(result: DenseRelief) -> tuple[str, ...]:
-    """Return what the registration tells the user."""
-    return result.registration.remarks
+    for path, endings, rule in (
+        (job.out, {".tif", ".tiff"}, "the relief map is written as .tif."),
+        (job.preview, {".png"}, "the preview is written as .png."),
+        (job.cloud, {".ply", ".las", ".laz"}, "point clouds are written as .ply, .las or .laz."),
+    ):
+        if path is not None:
+            check_writable(path, overwrite=job.overwrite)
+            if path.suffix.lower() not in endings:
+                raise InputError(f"{path}: {rule}")

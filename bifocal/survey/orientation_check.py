@@ -13,9 +13,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from bifocal.model.pair import Pair, apply_homography
+from photocore import adjustment
 from photocore.arrays import BoolArray, FloatArray, as_points
 from photocore.errors import GeometryError, InputError
 
+#: The differences that are looked for, tilts only with `MINIMUM_FOR_TILT` points.
+NAMES = ("scale", "rotation", "shift X", "shift Y", "tilt X", "tilt Y")
 #: Beyond this many sigma a plane point is taken for one that is not on the plane.
 OUTLIER_LIMIT = 4.0
 #: Tilt needs this many points: 6 unknowns, 2 observations a point, and some redundancy.
@@ -134,7 +137,7 @@ def check_orientation(
 
     Notes
     -----
-    Gauss-Newton on ``q1 = G q2`` with G = scale, rotation, shift and, from five points on, the two
+    Least squares on ``q1 = G q2`` with G = scale, rotation, shift and, from five points on, the two
     projective terms of a tilt; weighted by the picks' precision in both photos. Points beyond
     four sigma (robustly scaled) are left out one by one, worst first. Shift and tilt are counted
     at the near nadir. Scale: false relief ``eps B`` everywhere; shift t: ``t B / s'`` at a fifth
@@ -162,7 +165,7 @@ def check_orientation(
         if worst is None or used.sum() <= 4 or scaled[worst] <= limit:
             break
         used[worst] = False
-    matrix = _matrix(values)
+    matrix = _mapped(values, q2)[0]
     shift = np.array([[1, 0, origin[0]], [0, 1, origin[1]], [0, 0, 1]])
     plane = shift @ matrix @ np.linalg.inv(shift)
     redundancy = 2 * int(used.sum()) - len(values)
@@ -191,18 +194,28 @@ def _root_weights(pair: Pair, first: FloatArray, second: FloatArray, sigma: floa
     return inverse_root
 
 
-def _matrix(values: FloatArray) -> FloatArray:
-    """Return the homography of (scale, rotation, shift X, shift Y[, tilt X, tilt Y])."""
-    scale, turn, tx, ty = values[:4]
-    px, py = values[4:] if len(values) == 6 else (0.0, 0.0)
-    stretch = 1.0 + scale
-    return np.array(
-        [
-            [stretch * np.cos(turn), stretch * np.sin(turn), tx],
-            [-stretch * np.sin(turn), stretch * np.cos(turn), ty],
-            [px, py, 1.0],
-        ]
-    )
+def _mapped(values: FloatArray, q2: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return the homography of (scale, rotation, shift X, shift Y[, tilt X, tilt Y]) at work.
+
+    Returns
+    -------
+    matrix : ndarray, shape (3, 3)
+    mapped : ndarray, shape (n, 2)
+    jacobian : ndarray, shape (n, 2, 4 or 6)
+    """
+    stretch, sine, cosine = 1.0 + values[0], np.sin(values[1]), np.cos(values[1])
+    turn = np.array([[cosine, sine], [-sine, cosine]])
+    matrix = np.eye(3)
+    matrix[:2, :2], matrix[:2, 2] = stretch * turn, values[2:4]
+    matrix[2, :2] = values[4:] if len(values) == 6 else 0.0
+    mapped = apply_homography(matrix, q2)
+    by_turn = stretch * np.array([[-sine, cosine], [-cosine, -sine]])
+    shift = np.broadcast_to(np.eye(2), (len(q2), 2, 2))
+    columns = [(q2 @ turn.T)[..., None], (q2 @ by_turn.T)[..., None], shift]
+    if len(values) == 6:
+        columns.append(-mapped[:, :, None] * q2[:, None, :])
+    scale = q2 @ matrix[2, :2] + 1.0
+    return matrix, mapped, np.concatenate(columns, axis=2) / scale[:, None, None]
 
 
 def _fit(
@@ -212,38 +225,25 @@ def _fit(
 
     Residual sizes are root mean squares over the two coordinates, so that 1 is usual.
     """
-    unknowns = 6 if used.sum() >= MINIMUM_FOR_TILT else 4
-    values = np.zeros(unknowns)
-    # Unit-sized unknowns: rotation and scale act on the radius, tilt on its square.
-    radius = max(float(np.abs(q2[used]).max()), 1e-12)
-    units = np.array([1 / radius, 1 / radius, 1, 1, 1 / radius**2, 1 / radius**2])[:unknowns]
-    for _ in range(20):
-        left = q1 - apply_homography(_matrix(values), q2)
-        rows = np.stack([_slope(values, q2, k, units[k]) for k in range(unknowns)], axis=-1)
-        design = (weight[used] @ rows[used]).reshape(-1, unknowns)
-        seen = (weight[used] @ left[used][:, :, None]).reshape(-1)
-        if np.linalg.matrix_rank(design, tol=1e-8 * np.linalg.norm(design, 2)) < unknowns:
-            raise GeometryError(
-                "set-up check: the plane points lie on one spot or one line; "
-                "mark points spread over the photo."
-            )
-        step = np.linalg.lstsq(design, seen, rcond=None)[0] * units
-        values = values + step
-        if np.abs(step / units).max() < 1e-14 * radius:
-            break
-    left = q1 - apply_homography(_matrix(values), q2)
+    names = NAMES if used.sum() >= MINIMUM_FOR_TILT else NAMES[:4]
+
+    def equations(values: FloatArray) -> tuple[FloatArray, FloatArray]:
+        _, mapped, jacobian = _mapped(values, q2[used])
+        seen = weight[used] @ (mapped - q1[used])[:, :, None]
+        return seen.ravel(), (weight[used] @ jacobian).reshape(-1, len(names))
+
+    try:
+        fit = adjustment.fit(
+            np.zeros(len(names)), equations, np.add, names=names, what="set-up check", rounding=1e-9
+        )
+    except GeometryError:
+        raise GeometryError(
+            "set-up check: the plane points lie on one spot or one line; "
+            "mark points spread over the photo."
+        ) from None
+    left = q1 - _mapped(fit.state, q2)[1]
     scaled = np.linalg.norm((weight @ left[:, :, None])[:, :, 0], axis=1)
-    covariance = np.linalg.inv(design.T @ design) * np.outer(units, units)
-    return values, covariance, scaled, left
-
-
-def _slope(values: FloatArray, q2: FloatArray, index: int, unit: float) -> FloatArray:
-    """Return the derivative of the mapped positions by one parameter, times its unit."""
-    step = 1e-6 * unit
-    ahead, behind = values.copy(), values.copy()
-    ahead[index] += step
-    behind[index] -= step
-    return (apply_homography(_matrix(ahead), q2) - apply_homography(_matrix(behind), q2)) / 2e-6
+    return fit.state, fit.cofactor, scaled, left
 
 
 def _worst(scaled: FloatArray, used: BoolArray) -> tuple[int | None, float]:
@@ -264,14 +264,9 @@ def _parameters(
     inner = radius / 5
     # The correction maps image 2 onto image 1: image 2 itself deviates by the opposite.
     values = np.concatenate([[values[0] / (1 + values[0])], values[1:]])
-    table = [
-        ("scale", 100.0, "%", base),
-        ("rotation", float(np.degrees(1.0)), "deg", 0.0),
-        ("shift X", 1000.0, "mm", base / inner),
-        ("shift Y", 1000.0, "mm", base / inner),
-        ("tilt X", float(np.degrees(distance)), "deg", -base * radius),
-        ("tilt Y", float(np.degrees(distance)), "deg", -base * radius),
-    ]
+    degrees = float(np.degrees(1.0))
+    table = [(100.0, "%", base), (degrees, "deg", 0.0)]
+    table += [(1000.0, "mm", base / inner)] * 2 + [(degrees * distance, "deg", -base * radius)] * 2
     return tuple(
         OrientationParameter(
             name=name,
@@ -280,5 +275,7 @@ def _parameters(
             unit=unit,
             false_relief=float(-value * effect),
         )
-        for (name, factor, unit, effect), value, sigma in zip(table, values, sigmas, strict=False)
+        for name, (factor, unit, effect), value, sigma in zip(
+            NAMES, table, values, sigmas, strict=False
+        )
     )

@@ -3,26 +3,28 @@
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
-from multimedia.adjustment.bundle_dense import LARGEST, solve_dense
-from multimedia.adjustment.bundle_problem import (
-    Observations,
-    Problem,
-    State,
-    place_columns,
-    with_common_values,
+from multimedia.adjustment.bundle_columns import place_columns, with_common_values
+from multimedia.adjustment.bundle_equations import (
+    Bundle,
+    BundleState,
+    ImageObservations,
+    Pose,
+    turn_arm,
 )
-from multimedia.adjustment.bundle_sparse import redundancy_numbers, solve_sparse
-from multimedia.adjustment.bundle_starts import start_points, start_poses
 from multimedia.adjustment.unknowns import Adjustment, Unknowns
 from multimedia.media.camera import EXTERIOR, Camera
 from multimedia.media.flat_interface import FlatInterface
+from multimedia.orientation.intersection import intersect
 from multimedia.projects.model import ObjectPoints, Project
+from photocore.adjustment import Fit, huber_weights
 from photocore.arrays import BoolArray, FloatArray, IntArray
 from photocore.errors import GeometryError, InputError
+from photocore.similarity import fit_similarity
 
 #: Robust weights settle in a few rounds; more change nothing that matters.
 ROBUST_ROUNDS = 8
@@ -62,37 +64,25 @@ def bundle_adjust(project: Project, unknowns: Unknowns | None = None) -> Adjustm
     the cameras (large ones).
     """
     unknowns = unknowns or Unknowns()
-    problem, remarks = prepare(project, unknowns)
-    weights = np.ones_like(problem.observations.image)
-    solution = _solve(problem, weights)
-    if unknowns.robust is not None:
-        for _ in range(ROBUST_ROUNDS):
-            # Residuals in units of the robust spread: the median of |N| is 0.6745.
-            spread = max(float(np.median(np.abs(solution.miss))) / 0.6745, 1e-300)
-            size = np.maximum(np.abs(solution.miss) / spread, 1e-300)
-            new = np.minimum(1.0, unknowns.robust / size)
-            if np.abs(new - weights).max() < 1e-3:
-                break
-            weights = new
-            solution = _solve(replace(problem, start=solution.state), weights)
-    return _result(problem, solution, weights, remarks)
+    bundle, remarks = prepare(project, unknowns)
+    if not bundle.columns.labels and not bundle.free.any():
+        raise InputError("adjust: nothing to estimate; free a camera or add new points.")
+    seen = bundle.observations
+    weights = np.ones_like(seen.image)
+    result = bundle.fit(bundle.start)
+    for _ in range(ROBUST_ROUNDS if unknowns.robust is not None else 0):
+        assert unknowns.robust is not None
+        plain = result.residuals[: weights.size].reshape(-1, 2) / np.sqrt(weights)
+        new = huber_weights(plain, unknowns.robust)
+        if np.abs(new - weights).max() < 1e-3:
+            break
+        weights = new
+        weighted = replace(seen, sigma=seen.sigma / np.sqrt(weights))
+        result = replace(bundle, observations=weighted).fit(result.state)
+    return _adjustment(bundle, result, weights, remarks)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class _Solution:
-    """What either way of solving gives, for unit weight."""
-
-    state: State
-    miss: FloatArray
-    cofactor: FloatArray
-    point_cofactor: FloatArray
-    redundancy_numbers: FloatArray
-    square_sum: float
-    redundancy: int
-    iterations: int
-
-
-def prepare(project: Project, unknowns: Unknowns) -> tuple[Problem, tuple[str, ...]]:
+def prepare(project: Project, unknowns: Unknowns) -> tuple[Bundle, tuple[str, ...]]:
     """Return the equations of a project, and remarks about what was left out."""
     project = with_common_values(project, unknowns.media)
     ids, rows, remarks = _used_points(project, unknowns)
@@ -101,11 +91,10 @@ def prepare(project: Project, unknowns: Unknowns) -> tuple[Problem, tuple[str, .
     points = np.full((len(ids), 3), np.nan)
     sigma = np.zeros((len(ids), 3))
     plate_of = np.full(len(ids), -1, dtype=np.int64)
-    given = np.array([place[name] for name in control.ids if name in place], dtype=np.int64)
-    keep = np.array([k for k, name in enumerate(control.ids) if name in place], dtype=np.int64)
-    points[given] = control.xyz[keep]
+    keep = [k for k, name in enumerate(control.ids) if name in place]
+    given = [place[control.ids[k]] for k in keep]
     assert control.sigma is not None
-    sigma[given] = control.sigma[keep]
+    points[given], sigma[given] = control.xyz[keep], control.sigma[keep]
     for plate, name in enumerate(unknowns.plates):
         on = [place[i] for i, g in zip(control.ids, control.groups, strict=True) if g == name]
         if len(on) < 3:
@@ -113,26 +102,23 @@ def prepare(project: Project, unknowns: Unknowns) -> tuple[Problem, tuple[str, .
         plate_of[on] = plate
     local = np.where(plate_of[:, None] >= 0, points, 0.0)
     movable = _movable(unknowns, points, sigma, plate_of)
-    observations = _observations(project, rows, place)
     columns = place_columns(project, unknowns, ids, movable)
-    poses = start_poses(project, unknowns.plates, ids, plate_of, local)
+    poses = _start_poses(project, unknowns.plates, ids, plate_of, local)
     for plate, (rotation, shift) in enumerate(poses):
-        on_plate = plate_of == plate
-        points[on_plate] = local[on_plate] @ rotation.T + shift
-    points = start_points(project, ids, points)
-    weighted = movable & np.isfinite(sigma) & (sigma > 0) & (plate_of < 0)[:, None]
-    if unknowns.control == "free":
-        weighted[:] = False
-    start = State(
+        points[plate_of == plate] = local[plate_of == plate] @ rotation.T + shift
+    points = _start_points(project, ids, points)
+    weighted = movable & np.isfinite(sigma) & (sigma > 0) & (unknowns.control != "free")
+    start = BundleState(
         cameras=project.cameras, media=dict(project.media), points=points, poses=poses,
         drift=np.zeros(len(columns.labels)),
     )  # fmt: skip
-    problem = Problem(
-        project=project, unknowns=unknowns, ids=ids, start=start, observations=observations,
-        columns=columns, plate_of=plate_of, local=local, free=movable & (columns.points < 0),
-        known=points, known_sigma=np.where(weighted, sigma, np.nan),
+    bundle = Bundle(
+        project=project, unknowns=unknowns, ids=ids, start=start,
+        observations=_observations(project, rows, place), columns=columns, plate_of=plate_of,
+        local=local, free=movable & (columns.points < 0), known=points,
+        known_sigma=np.where(weighted, sigma, np.nan),
     )  # fmt: skip
-    return problem, remarks
+    return replace(bundle, datum=bundle.datum_rows()), remarks
 
 
 def _used_points(
@@ -172,27 +158,23 @@ def _movable(
 ) -> BoolArray:
     """Return which coordinates are unknowns of their own."""
     new: BoolArray = np.isnan(points)
-    if unknowns.control == "free":
-        movable: BoolArray = np.ones_like(new)
-    elif unknowns.control == "weighted":
-        if np.isnan(sigma[~new[:, 0]]).any():
-            raise InputError(
-                "control = weighted: every control point needs a sigma (0 for an error-free one)."
-            )
-        movable = new | (sigma > 0)
-    else:
-        movable = new | (np.nan_to_num(sigma) > 0)
-    return movable & (plate_of < 0)[:, None]
+    if unknowns.control == "weighted" and np.isnan(sigma[~new[:, 0]]).any():
+        raise InputError(
+            "control = weighted: every control point needs a sigma (0 for an error-free one)."
+        )
+    free = unknowns.control == "free"
+    return (new | (np.nan_to_num(sigma) > 0) | free) & (plate_of < 0)[:, None]
 
 
-def _observations(project: Project, rows: list[int], place: dict[str, int]) -> Observations:
+def _observations(project: Project, rows: list[int], place: dict[str, int]) -> ImageObservations:
     """Return the image points of the used rows."""
     images = project.image_points
     line = {name: k for k, name in enumerate(project.camera_names)}
     camera = np.array([line[images.cameras[row]] for row in rows])
     assert images.sigma is not None
     sigma = images.sigma[rows]
-    return Observations(
+    return ImageObservations(
+        source=np.array(rows),
         rows=tuple(np.flatnonzero(camera == k) for k in range(len(project.cameras))),
         point=np.array([place[images.ids[row]] for row in rows]),
         image=images.image[rows],
@@ -200,144 +182,142 @@ def _observations(project: Project, rows: list[int], place: dict[str, int]) -> O
     )
 
 
-def _solve(problem: Problem, weights: FloatArray) -> _Solution:
-    """Adjust with the given weights, the dense or the sparse way."""
-    seen = problem.observations
-    problem = replace(problem, observations=replace(seen, sigma=seen.sigma / np.sqrt(weights)))
-    unknowns = problem.dense_count + int(problem.free.sum())
-    if unknowns == 0:
-        raise InputError("adjust: nothing to estimate; free a camera or add new points.")
-    observed = 2 * len(seen.point)
-    if unknowns > LARGEST:
-        sparse = solve_sparse(problem, what="adjustment")
-        extra = len(sparse.linear.extra_miss)
-        return _Solution(
-            state=sparse.state, miss=sparse.linear.miss / np.sqrt(weights),
-            cofactor=sparse.cofactor, point_cofactor=sparse.point_cofactor,
-            redundancy_numbers=redundancy_numbers(problem, sparse), square_sum=sparse.cost,
-            redundancy=observed + extra - unknowns, iterations=sparse.iterations,
-        )  # fmt: skip
-    found, datum = solve_dense(problem, what="adjustment")
-    dense = problem.dense_count
-    points = np.zeros((len(problem.ids), 3, 3))
-    frees = np.argwhere(problem.free)
-    for a, (j, axis) in enumerate(frees.tolist()):
-        for b in range(max(0, a - 2), min(len(frees), a + 3)):
-            if frees[b, 0] == j:
-                points[j, axis, frees[b, 1]] = found.cofactor[dense + a, dense + b]
-    numbers = found.redundancy_numbers[:observed].reshape(-1, 2)
-    residuals = found.residuals[: len(found.residuals) - len(datum)]
-    return _Solution(
-        state=found.state, miss=residuals[:observed].reshape(-1, 2) / np.sqrt(weights),
-        cofactor=found.cofactor[:dense, :dense], point_cofactor=points,
-        redundancy_numbers=numbers, square_sum=float(residuals @ residuals),
-        redundancy=found.redundancy, iterations=found.iterations,
-    )  # fmt: skip
+def _start_points(project: Project, ids: Sequence[str], points: FloatArray) -> FloatArray:
+    """Return the points with unknown ones intersected from the cameras' start orientations.
+
+    Raises
+    ------
+    GeometryError
+        If the rays of a point do not meet beyond the interface from these starts.
+    """
+    wanted = np.flatnonzero(np.isnan(points).any(axis=1))
+    filled = points.copy()
+    filled[wanted] = _intersected(project, ids, wanted)
+    lost = [ids[j] for j in wanted.tolist() if np.isnan(filled[j]).any()]
+    if lost:
+        raise GeometryError(
+            f"adjust: from the start orientations the rays of {', '.join(lost[:8])} do not meet "
+            "in the object's medium. Improve the orientations (`multimedia resect`), or check "
+            "that these image points belong together."
+        )
+    return filled
 
 
-def _result(
-    problem: Problem, solution: _Solution, weights: FloatArray, remarks: tuple[str, ...]
+def _start_poses(
+    project: Project, plates: Sequence[str], ids: Sequence[str], plate_of: IntArray,
+    local: FloatArray,
+) -> tuple[Pose, ...]:  # fmt: skip
+    """Return the pose of each plate that fits its intersected points best.
+
+    Raises
+    ------
+    GeometryError
+        If fewer than three points of a plate can be intersected, or these lie on a line.
+    """
+    poses = []
+    for plate, label in enumerate(plates):
+        on = np.flatnonzero(plate_of == plate)
+        xyz = _intersected(project, ids, on)
+        good = np.isfinite(xyz).all(axis=1)
+        if good.sum() < 3:
+            raise GeometryError(
+                f"adjust: plate {label}: only {int(good.sum())} of its points are seen by two "
+                "cameras; at least 3 are needed for a start."
+            )
+        start = fit_similarity(local[on][good], xyz[good])
+        poses.append((start.rotation, start.target_centre - start.rotation @ start.source_centre))
+    return tuple(poses)
+
+
+def _intersected(project: Project, ids: Sequence[str], which: IntArray) -> FloatArray:
+    """Return points intersected from the start orientations; NaN where that fails."""
+    if not which.size:
+        return np.empty((0, 3))
+    image, _ = project.image_points.grid(project.camera_names, [ids[j] for j in which.tolist()])
+    return intersect(project.cameras, image, project.interfaces).xyz
+
+
+def _adjustment(
+    bundle: Bundle, result: Fit[BundleState], weights: FloatArray, remarks: tuple[str, ...]
 ) -> Adjustment:
     """Return everything in the project's own terms."""
-    project, seen = problem.project, problem.observations
-    factor = np.nan
-    if solution.redundancy > 0:
-        factor = float(np.sqrt(solution.square_sum / solution.redundancy))
+    project, seen, state = bundle.project, bundle.observations, result.state
     unit = float(np.sqrt(np.mean(seen.sigma**2)))
+    own = slice(0, weights.size)
+    misses = result.residuals[own].reshape(-1, 2)
+    shares = result.redundancy_numbers[own].reshape(-1, 2)
     # The image rows, back in the order of the project's own table.
-    rows = _rows_of(problem)
-    count = len(project.image_points.ids)
+    rows, count = seen.source, len(project.image_points.ids)
     residuals, normed, numbers, weight = (np.full((count, 2), np.nan) for _ in range(4))
-    residuals[rows] = -solution.miss * seen.sigma
-    with np.errstate(divide="ignore", invalid="ignore"):
-        own = factor * np.sqrt(np.maximum(solution.redundancy_numbers, 0.0) / weights)
-        normed[rows] = np.where(solution.redundancy_numbers > 1e-9, -solution.miss / own, np.nan)
-    numbers[rows], weight[rows] = solution.redundancy_numbers, weights
-    points, covariance = _points(problem, solution, factor)
-    adjusted = replace(
-        project, cameras=solution.state.cameras, media=solution.state.media, object_points=points
-    )
-    values, change = _values(problem, solution.state)
+    residuals[rows] = -misses * seen.sigma / np.sqrt(weights)
+    normed[rows] = -result.standardised[own].reshape(-1, 2)
+    numbers[rows], weight[rows] = shares, weights
+    points, covariance = _points(bundle, result)
+    values, change = _values(bundle, state)
+    sigma0_of = {}
+    for name, mine in zip(project.camera_names, seen.rows, strict=True):
+        share = float(shares[mine].sum())
+        square = float((misses[mine] ** 2).sum())
+        sigma0_of[name] = unit * float(np.sqrt(square / share)) if share > 1e-9 else float("nan")
     return Adjustment(
-        project=adjusted, names=problem.columns.labels, values=values,
-        covariance=change @ solution.cofactor @ change.T * factor**2,
+        project=replace(project, cameras=state.cameras, media=state.media, object_points=points),
+        names=bundle.columns.labels, values=values,
+        covariance=change @ result.cofactor @ change.T * result.sigma0**2,
         point_covariance=covariance, residuals=residuals, standardised=normed,
-        redundancy_numbers=numbers, weights=weight, sigma0=factor * unit,
-        redundancy=solution.redundancy, iterations=solution.iterations,
-        sigma0_of=_sigma0_of(problem, solution, weights, unit), remarks=remarks,
+        redundancy_numbers=numbers, weights=weight, sigma0=result.sigma0 * unit,
+        redundancy=result.redundancy, iterations=result.iterations, sigma0_of=sigma0_of,
+        remarks=remarks,
     )  # fmt: skip
 
 
-def _rows_of(problem: Problem) -> IntArray:
-    """Return the row of the project's image points that each observation came from."""
-    images = problem.project.image_points
-    cameras = problem.project.camera_names
-    camera = np.empty(len(problem.observations.point), dtype=np.int64)
-    for k, own in enumerate(problem.observations.rows):
-        camera[own] = k
-    row_of = {pair: row for row, pair in enumerate(zip(images.cameras, images.ids, strict=True))}
-    return np.array(
-        [
-            row_of[cameras[k], problem.ids[j]]
-            for k, j in zip(camera, problem.observations.point, strict=True)
-        ],
-        dtype=np.int64,
-    )
-
-
-def _points(
-    problem: Problem, solution: _Solution, factor: float
-) -> tuple[ObjectPoints, FloatArray]:
+def _points(bundle: Bundle, result: Fit[BundleState]) -> tuple[ObjectPoints, FloatArray]:
     """Return the adjusted object points and their covariances."""
-    place = problem.columns
-    covariance = solution.point_cofactor * factor**2
+    place, cofactor, state = bundle.columns, result.cofactor, result.state
+    covariance = result.block_cofactor.copy()
     for j in np.flatnonzero((place.points >= 0).any(axis=1)):
         axes = np.flatnonzero(place.points[j] >= 0)
-        block = solution.cofactor[np.ix_(place.points[j][axes], place.points[j][axes])]
-        covariance[j][np.ix_(axes, axes)] = block * factor**2
-    for plate, first in enumerate(place.plates):
-        pose = solution.cofactor[first : first + 6, first : first + 6] * factor**2
-        shift = solution.state.poses[plate][1]
-        for j in np.flatnonzero(problem.plate_of == plate):
-            x, y, z = solution.state.points[j] - shift
-            lever = np.array([[0.0, z, -y], [-z, 0.0, x], [y, -x, 0.0]])
-            rows = np.concatenate([np.eye(3), lever], axis=1)
+        columns = place.points[j][axes]
+        covariance[j][np.ix_(axes, axes)] = cofactor[np.ix_(columns, columns)]
+    for plate, at in enumerate(place.plates):
+        pose = cofactor[np.ix_(list(at.values()), list(at.values()))]
+        for j in np.flatnonzero(bundle.plate_of == plate):
+            arm = turn_arm(state.points[j] - state.poses[plate][1])
+            rows = np.concatenate([np.eye(3), arm], axis=1)
             covariance[j] = rows @ pose @ rows.T
-    control = problem.project.object_points
+    control = bundle.project.object_points
     group = dict(zip(control.ids, control.groups, strict=True))
-    ids = (*problem.ids, *(name for name in control.ids if name not in set(problem.ids)))
-    rest = np.array([control.ids.index(name) for name in ids[len(problem.ids) :]], dtype=np.int64)
-    xyz = np.concatenate([solution.state.points, control.xyz[rest]])
-    unseen = np.full((len(rest), 3, 3), np.nan)
-    full = np.concatenate([covariance, unseen])
+    unseen = [row for row, name in enumerate(control.ids) if name not in set(bundle.ids)]
+    ids = (*bundle.ids, *(control.ids[row] for row in unseen))
+    full = np.concatenate([covariance * result.sigma0**2, np.full((len(unseen), 3, 3), np.nan)])
     return ObjectPoints(
-        ids=ids, xyz=xyz, sigma=np.sqrt(np.diagonal(full, axis1=1, axis2=2)),
+        ids=ids, xyz=np.concatenate([state.points, control.xyz[unseen]]),
+        sigma=np.sqrt(np.diagonal(full, axis1=1, axis2=2)),
         groups=tuple(group.get(name, "new") for name in ids),
     ), full  # fmt: skip
 
 
-def _values(problem: Problem, state: State) -> tuple[FloatArray, FloatArray]:
-    """Return the adjusted dense unknowns, and the change from rotation vectors to angles."""
-    place, inner = problem.columns, problem.unknowns.interior
-    values, change = state.drift.copy(), np.eye(problem.dense_count)
-    for k, camera in enumerate(state.cameras):
-        first, second = place.exterior[k], place.interior[k]
-        if first is not None:
-            values[first : first + 6] = [camera.value(name) for name in EXTERIOR]
-            change[first + 3 : first + 6, first + 3 : first + 6] = _rates(camera)
-        if second is not None:
-            values[second : second + len(inner)] = [camera.value(name) for name in inner]
-    for who, name, column in place.media:
+def _values(bundle: Bundle, state: BundleState) -> tuple[FloatArray, FloatArray]:
+    """Return the adjusted unknowns, and the change from rotation vectors to angles."""
+    place = bundle.columns
+    values, change = state.drift.copy(), np.eye(len(place.labels))
+    plates = [
+        Camera(centre=shift, rotation=rotation, principal_distance=1.0)
+        for rotation, shift in state.poses
+    ]
+    for at, camera in zip((*place.cameras, *place.plates), (*state.cameras, *plates), strict=True):
+        for name, column in at.items():
+            values[column] = camera.value(name)
+        turns = [at[name] for name in EXTERIOR[3:] if name in at]
+        if turns:
+            change[np.ix_(turns, turns)] = _rates(camera)
+    for who, at in place.media.items():
         interface = state.media[who]
-        if name.startswith(("index", "thickness")) and isinstance(interface, FlatInterface):
-            values[column] = interface.value(name)
-    for plate, first in enumerate(place.plates):
-        rotation, shift = state.poses[plate]
-        stand_in = Camera(centre=shift, rotation=rotation, principal_distance=1.0)
-        values[first : first + 6] = [*shift, *stand_in.angles]
-        change[first + 3 : first + 6, first + 3 : first + 6] = _rates(stand_in)
-    for j, axis in np.argwhere(place.points >= 0).tolist():
-        values[place.points[j, axis]] = state.points[j, axis]
+        assert isinstance(interface, FlatInterface)
+        for name, column in at.items():
+            if name.startswith(("index", "thickness")):
+                values[column] = interface.value(name)
+    kept = place.points >= 0
+    values[place.points[kept]] = state.points[kept]
     return values, change
 
 
@@ -347,16 +327,3 @@ def _rates(camera: Camera) -> FloatArray:
         return camera.angle_rates()
     except GeometryError:
         return np.full((3, 3), np.nan)
-
-
-def _sigma0_of(
-    problem: Problem, solution: _Solution, weights: FloatArray, unit: float
-) -> dict[str, float]:
-    """Return sigma0 of each camera: square sum over the sum of redundancy numbers. [mm]"""
-    sigma0 = {}
-    for k, name in enumerate(problem.project.camera_names):
-        rows = problem.observations.rows[k]
-        share = float(solution.redundancy_numbers[rows].sum())
-        square = float((solution.miss[rows] ** 2 * weights[rows]).sum())
-        sigma0[name] = unit * float(np.sqrt(square / share)) if share > 1e-9 else float("nan")
-    return sigma0

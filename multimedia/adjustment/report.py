@@ -72,11 +72,7 @@ def _summary(result: Adjustment) -> str:
 def _unknowns(result: Adjustment) -> str:
     """Return the table of adjusted values with their standard deviations."""
     rows = []
-    for k, name in enumerate(result.names):
-        sigma = float(np.sqrt(result.covariance[k, k]))
-        value, unit = float(result.values[k]), ""
-        if name.rsplit(":", 1)[-1] in ("omega", "phi", "kappa", "tilt1", "tilt2"):
-            value, sigma, unit = np.degrees(value), np.degrees(sigma), "deg"
+    for name, value, sigma, unit in result.rows():
         digits = max(0, min(12, 2 - int(np.floor(np.log10(sigma))) if sigma > 0 else 6))
         rows.append(
             f"<tr><td>{escape(name)}<td>{value:.{digits}f}<td>{sigma:.{digits}f}<td>{unit}</tr>"
@@ -128,11 +124,11 @@ def _residuals(result: Adjustment) -> str:
 
 def _suspects(result: Adjustment) -> str:
     """Return the list of suspects, or a word that there are none."""
-    found = result.suspects()
-    if not found:
+    suspects = result.suspects()
+    if not suspects:
         return "<p>None beyond 3.5 standard deviations.</p>"
-    items = "".join(f"<li>{escape(sentence)}</li>" for sentence in found[:50])
-    more = f"<p>... and {len(found) - 50} more.</p>" if len(found) > 50 else ""
+    items = "".join(f"<li>{escape(sentence)}</li>" for sentence in suspects[:50])
+    more = f"<p>... and {len(suspects) - 50} more.</p>" if len(suspects) > 50 else ""
     return f"<ol>{items}</ol>{more}"
 
 

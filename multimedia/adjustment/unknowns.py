@@ -7,9 +7,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from multimedia.media.camera import INTERIOR
+from multimedia.media.camera import EXTERIOR, INTERIOR
 from multimedia.projects.model import Project
-from photocore.adjustment import correlations
+from photocore.adjustment import OUTLIER_LIMIT, correlations, standardised
 from photocore.arrays import FloatArray, positive
 from photocore.errors import InputError
 
@@ -155,6 +155,15 @@ class Adjustment:
         row = self.names.index(name)
         return float(np.sqrt(self.covariance[row, row]))
 
+    def rows(self) -> list[tuple[str, float, float, str]]:
+        """Return name, value, sigma and unit of every unknown; angles in degrees."""
+        table = []
+        for k, name in enumerate(self.names):
+            turns = name.rsplit(":", 1)[-1] in (*EXTERIOR[3:], "tilt1", "tilt2")
+            factor, unit = (float(np.degrees(1.0)), "deg") if turns else (1.0, "")
+            table.append((name, float(self.values[k]) * factor, self.sigma(name) * factor, unit))
+        return table
+
     @property
     def correlations(self) -> FloatArray:
         """Correlation matrix of the unknowns, shape (u, u)."""
@@ -166,11 +175,9 @@ class Adjustment:
 
         Baarda's internal reliability: 4.13 sigma / sqrt(redundancy number).
         """
-        with np.errstate(divide="ignore", invalid="ignore"):
-            ratio = np.where(self.redundancy_numbers > 1e-9, self.redundancy_numbers, np.nan)
-            return 4.13 * self.sigma0 / np.sqrt(ratio)
+        return standardised(4.13 * self.sigma0, self.redundancy_numbers)
 
-    def suspects(self, limit: float = 3.5) -> list[str]:
+    def suspects(self, limit: float = OUTLIER_LIMIT) -> list[str]:
         """Return a sentence for each image point that looks like a gross error, worst first."""
         worst = np.abs(np.nan_to_num(self.standardised)).max(axis=1, initial=0.0)
         points = self.project.image_points

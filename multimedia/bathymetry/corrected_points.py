@@ -30,16 +30,13 @@ class BathymetryStatus(IntEnum):
     @property
     def label(self) -> str:
         """The treatment in words."""
-        return _LABELS[self]
+        is_outside = self is BathymetryStatus.NO_SURFACE
+        return "outside the water surface" if is_outside else self.name.lower()
 
 
-_LABELS = {
-    BathymetryStatus.DRY: "dry",
-    BathymetryStatus.NADIR: "nadir",
-    BathymetryStatus.RAYS: "rays",
-    BathymetryStatus.NO_SURFACE: "outside the water surface",
-    BathymetryStatus.FAILED: "failed",
-}
+def status_labels(status: IntArray) -> list[str]:
+    """Return how points were treated, in words."""
+    return [BathymetryStatus(code).label for code in status.tolist()]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -7,14 +7,15 @@ from typing import Any
 
 import numpy as np
 
-from multimedia.bathymetry.cloud_ply import read_ply_mesh
 from multimedia.bathymetry.corrected_points import WaterSurface
-from multimedia.bathymetry.dem import Dem, Window
+from multimedia.bathymetry.dem import Dem
 from multimedia.media.height_field import RasterSurface
 from multimedia.media.mesh_surface import MeshSurface
 from multimedia.media.surfaces import Plane
+from photocore.cloud.ply import read_ply_mesh
 from photocore.errors import InputError
 from photocore.jsonfile import read_object
+from photocore.raster import Window
 
 FORMAT = "multimedia-waterlevel/1"
 #: A water surface of more cells is coarser than it looks: averaging it down loses nothing.
@@ -70,8 +71,8 @@ def read_water_surface(given: str, *, crs: Any = None) -> WaterSurface:
                 f"{path}: {raster.width} x {raster.height} cells; average the water surface down "
                 f"to at most {MOST_CELLS / 1e6:g} million (waves are metres long, not millimetres)."
             )
-        heights = raster.read(Window(0, 0, raster.width, raster.height))
-        return RasterSurface(raster=heights, xy_from_cell=raster.xy_from_cell)
+        heights = raster.heights(Window(0, 0, raster.width, raster.height))
+        return RasterSurface(raster=heights, xy_from_cell=raster.xy_from_pixel)
 
 
 def _read_fitted(path: Path) -> Plane:

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import numpy as np
 
-from multimedia.bathymetry.clouds import open_cloud
 from multimedia.bathymetry.mean_water_level import WaterLevel, mean_water_level
 from multimedia.bathymetry.water_surfaces import FORMAT
+from photocore.cloud import open_cloud
 from photocore.errors import InputError
 from photocore.jsonfile import write_object
 from photocore.output import check_writable
@@ -62,7 +62,7 @@ def fit_water_level(
         if target.suffix.lower() != ".json":
             raise InputError(f"{target}: a water level is written as .json.")
     cloud = open_cloud(source)
-    points = np.concatenate([chunk.xyz for chunk in cloud.chunks()])
+    points = np.concatenate([piece.xyz for piece in cloud.pieces()])
     fitted = FittedLevel(
         water=mean_water_level(points, tilted=tilted, spread=spread), remarks=list(cloud.remarks)
     )

@@ -4,19 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from functools import partial
-from typing import Any
 
 import numpy as np
 
-from multimedia.bathymetry.clouds import MARK, Chunk, Cloud, open_cloud
 from multimedia.bathymetry.corrected_points import (
-    BathymetryStatus,
     CorrectedPoints,
     WaterSurface,
     checked_water_index,
+    status_labels,
 )
 from multimedia.bathymetry.correction_job import MIXED_UNITS, Job, Outcome
-from multimedia.bathymetry.dem import Dem, Window
+from multimedia.bathymetry.dem import Dem
 from multimedia.bathymetry.refracted_rays import correct_lidar_beams, intersect_refracted_rays
 from multimedia.bathymetry.refraction_correction import correct_bathymetry
 from multimedia.bathymetry.regrid import pull_back
@@ -31,10 +29,21 @@ from multimedia.bathymetry.water_surfaces import read_water_surface
 from multimedia.media.surfaces import Plane
 from photocore.arrays import BoolArray, FloatArray
 from photocore.cli import Progress, no_progress
+from photocore.cloud import open_cloud
+from photocore.cloud.model import Cloud, CloudPiece
 from photocore.errors import GeometryError, InputError
-from photocore.output import atomic_path, check_writable
+from photocore.output import check_writable
+from photocore.raster import Window
 from photocore.tables import write_csv
 
+#: Attribute that marks a cloud this package has corrected.
+MARK = "refraction"
+#: What a corrected cloud gains: numpy type and description.
+_GAINED = {
+    MARK: ("u1", "0 dry 1 nadir 2 rays 3 4 none"),
+    "water_depth": ("f4", "true depth under water"),
+    **dict.fromkeys(("sigma_X", "sigma_Y", "sigma_Z"), ("f4", "standard deviation")),
+}
 #: Side of the windows in which a DEM is corrected: 8 MB of heights. [cells]
 WINDOW = 1024
 #: Widest planimetric shift that is followed across a window's edge. [cells]
@@ -76,26 +85,22 @@ def _correct_cloud(job: Job, progress: Progress) -> Outcome:
     surface = read_water_surface(job.water_level)
     correct, remarks = _corrector(job, cloud, surface)
     outcome = Outcome(remarks=[*cloud.remarks, *remarks])
-    sigmas = ("sigma_X", "sigma_Y", "sigma_Z") if job.precision.is_given and not job.beams else ()
+    is_precise = job.precision.is_given and not job.beams
+    gained = {
+        name: kind for name, kind in _GAINED.items() if is_precise or not name.startswith("sigma")
+    }
     spoken = job.source.suffix.lower() not in (".ply", ".las", ".laz")
     numbers = ("X0", "Y0", "Z0", "gps_time") if job.beams else ()
     texts = ("id", "cameras") if job.cameras else ()
     done = 0
-    with (
-        atomic_path(job.target, overwrite=job.overwrite) as temporary,
-        cloud.writer(temporary, (MARK, "water_depth", *sigmas)) as writer,
-    ):
-        for chunk in cloud.chunks(numbers=numbers, texts=texts):
-            result = correct(chunk)
-            outcome.add(chunk.xyz, result)
-            status: Any = result.status
-            if spoken:
-                status = [BathymetryStatus(int(code)).label for code in result.status]
-            extra = {MARK: status, "water_depth": result.depth}
-            if sigmas and result.sigma is not None:
-                extra |= dict(zip(sigmas, result.sigma.T, strict=True))
-            writer.write(chunk, result.xyz, extra)
-            done += len(chunk.xyz)
+    with cloud.copy(job.target, gained, overwrite=job.overwrite) as write:
+        for piece in cloud.pieces(numbers=numbers, texts=texts):
+            result = correct(piece)
+            outcome.add(piece.xyz, result)
+            status = status_labels(result.status) if spoken else result.status
+            sigma = () if result.sigma is None else result.sigma.T
+            write(piece, result.xyz, dict(zip(gained, (status, result.depth, *sigma), strict=True)))
+            done += len(piece.xyz)
             progress(done, done + 1, f"{done} points")
         outcome.judge(surface, allow_dry=job.allow_dry)
     return outcome
@@ -103,7 +108,7 @@ def _correct_cloud(job: Job, progress: Progress) -> Outcome:
 
 def _corrector(
     job: Job, cloud: Cloud, surface: WaterSurface
-) -> tuple[Callable[[Chunk], CorrectedPoints], list[str]]:
+) -> tuple[Callable[[CloudPiece], CorrectedPoints], list[str]]:
     """Return the function that corrects one piece of a cloud, and what the user should know."""
     nadir = partial(
         correct_bathymetry, water_level=surface, index=job.index, precision=job.precision
@@ -113,9 +118,9 @@ def _corrector(
         beams = partial(
             correct_lidar_beams, water_level=surface, index=job.index, group_index=job.group_index
         )
-        return lambda chunk: beams(sensor(chunk), chunk.xyz), []
+        return lambda piece: beams(sensor(piece), piece.xyz), []
     if job.cameras is None:
-        return lambda chunk: nadir(chunk.xyz), []
+        return lambda piece: nadir(piece.xyz), []
     remarks = []
     cameras = read_camera_positions(job.cameras)
     pairs = read_visibility(job.visibility) if job.visibility else None
@@ -129,26 +134,26 @@ def _corrector(
             "--visibility, a column 'cameras' or --max-angle do better."
         )
 
-    def correct(chunk: Chunk) -> CorrectedPoints:
-        _check_camera_unit(chunk.xyz, cameras.centres, job)
-        visible = _visible(chunk, cameras, pairs, job)
-        return nadir(chunk.xyz, cameras=cameras.centres, visible=visible)
+    def correct(piece: CloudPiece) -> CorrectedPoints:
+        _check_camera_unit(piece.xyz, cameras.centres, job)
+        visible = _visible(piece, cameras, pairs, job)
+        return nadir(piece.xyz, cameras=cameras.centres, visible=visible)
 
     return correct, remarks
 
 
 def _visible(
-    chunk: Chunk, cameras: CameraPositions, pairs: Mapping[str, set[str]] | None, job: Job
+    piece: CloudPiece, cameras: CameraPositions, pairs: Mapping[str, set[str]] | None, job: Job
 ) -> BoolArray:
     """Return which camera saw which point: by table, by column, by angle, or all."""
-    seen = np.ones((len(chunk.xyz), len(cameras.ids)), dtype=bool)
+    seen = np.ones((len(piece.xyz), len(cameras.ids)), dtype=bool)
     if pairs is not None:
-        sets = [pairs.get(name, set()) for name in chunk.texts["id"]]
+        sets = [pairs.get(name, set()) for name in piece.texts["id"]]
         seen = np.array([[camera in names for camera in cameras.ids] for names in sets])
-    elif "cameras" in chunk.texts:
+    elif "cameras" in piece.texts:
         place = {name: k for k, name in enumerate(cameras.ids)}
         seen[:] = False
-        for number, text in enumerate(chunk.texts["cameras"]):
+        for number, text in enumerate(piece.texts["cameras"]):
             names = text.replace(";", " ").replace(",", " ").replace("|", " ").split()
             unknown = [name for name in names if name not in place]
             if unknown:
@@ -158,7 +163,7 @@ def _visible(
                 )
             seen[number, [place[name] for name in names]] = True
     if job.max_angle is not None:
-        seen &= _within_angle(chunk.xyz, cameras.centres, job.max_angle)
+        seen &= _within_angle(piece.xyz, cameras.centres, job.max_angle)
     return seen
 
 
@@ -192,7 +197,7 @@ def _check_pairs(pairs: Mapping[str, set[str]], cameras: CameraPositions, job: J
         )
 
 
-def _sensor_positions(job: Job, cloud: Cloud) -> Callable[[Chunk], FloatArray]:
+def _sensor_positions(job: Job, cloud: Cloud) -> Callable[[CloudPiece], FloatArray]:
     """Return the function that finds where the sensor was for the points of a piece."""
     if job.trajectory is None:
         if not all(cloud.has(name) for name in ("X0", "Y0", "Z0")):
@@ -200,13 +205,13 @@ def _sensor_positions(job: Job, cloud: Cloud) -> Callable[[Chunk], FloatArray]:
                 f"{job.source}: lidar beams need the sensor position of each point: columns X0, Y0 "
                 "and Z0, or --trajectory with times."
             )
-        return lambda chunk: np.column_stack([chunk.numbers[n] for n in ("X0", "Y0", "Z0")])
+        return lambda piece: np.column_stack([piece.numbers[n] for n in ("X0", "Y0", "Z0")])
     if not cloud.has("gps_time"):
         raise InputError(f"{job.source}: --trajectory needs a time (gps_time) for each point.")
     times, positions = read_trajectory(job.trajectory)
 
-    def at_time(chunk: Chunk) -> FloatArray:
-        when = chunk.numbers["gps_time"]
+    def at_time(piece: CloudPiece) -> FloatArray:
+        when = piece.numbers["gps_time"]
         if when.min() < times[0] or when.max() > times[-1]:
             raise InputError(
                 f"{job.trajectory}: covers times {times[0]:g} to {times[-1]:g}, the points need "
@@ -251,10 +256,7 @@ def _correct_dem(job: Job, progress: Progress) -> Outcome:
         tags = {"REFRACTION_INDEX": f"{job.index:g}", "REFRACTION_WATER_LEVEL": job.water_level}
         bands = ("height", "sigma") if job.precision.is_given else ("height",)
         windows = list(dem.windows(WINDOW))
-        with (
-            atomic_path(job.target, overwrite=job.overwrite) as temporary,
-            dem.writer(temporary, bands=bands, tags=tags) as write,
-        ):
+        with dem.copy(job.target, bands=bands, tags=tags, overwrite=job.overwrite) as write:
             margin = 0  # widened when a window needs more, and kept for the next
             for number, window in enumerate(windows, start=1):
                 bands_of, margin = _correct_window(
@@ -278,13 +280,8 @@ def _correct_window(
 ) -> tuple[FloatArray, int]:
     """Return the bands of one window, shape (bands, height, width), and the margin it took."""
     while True:
-        wide = Window(
-            window.column - margin,
-            window.row - margin,
-            window.width + 2 * margin,
-            window.height + 2 * margin,
-        )
-        given = np.concatenate([dem.positions(wide), dem.read(wide)[..., None]], axis=-1)
+        wide = window.widened(margin)
+        given = np.concatenate([dem.positions(wide), dem.heights(wide)[..., None]], axis=-1)
         known = np.isfinite(given[..., 2])
         points = given[known]
         visible = None
@@ -299,7 +296,7 @@ def _correct_window(
             precision=job.precision,
         )
         move = np.full((*known.shape, 2), np.nan)
-        move[known] = (result.xyz - points)[:, :2] @ np.linalg.inv(dem.xy_from_cell[:, :2]).T
+        move[known] = (result.xyz - points)[:, :2] @ np.linalg.inv(dem.xy_from_pixel[:, :2]).T
         reach = int(np.ceil(np.nanmax(np.abs(move), initial=0.0)))
         needed = reach + 2 if reach else 0
         if needed <= margin or centres is None:
@@ -346,16 +343,15 @@ def _correct_rays(job: Job) -> Outcome:
     )
     outcome = Outcome()
     depth = np.maximum(surface.height_at(points.xyz[:, :2]) - points.xyz[:, 2], 0.0)
-    result = CorrectedPoints(xyz=points.xyz, depth=depth, status=points.status)
-    outcome.add(points.xyz, result)
+    outcome.add(points.xyz, CorrectedPoints(xyz=points.xyz, depth=depth, status=points.status))
     outcome.judge(surface, allow_dry=job.allow_dry)
-    columns: dict[str, Any] = {"id": list(table.ids)}
-    columns |= dict(zip("XYZ", points.xyz.T, strict=True))
-    columns |= dict(zip(("sigma_X", "sigma_Y", "sigma_Z"), points.sigma.T, strict=True))
-    columns |= {
+    columns = {
+        "id": list(table.ids),
+        **dict(zip("XYZ", points.xyz.T, strict=True)),
+        **dict(zip(("sigma_X", "sigma_Y", "sigma_Z"), points.sigma.T, strict=True)),
         "misfit": points.misfit,
         "rays": points.rays,
-        MARK: [BathymetryStatus(int(code)).label for code in points.status],
+        MARK: status_labels(points.status),
         "water_depth": depth,
     }
     write_csv(job.target, columns, overwrite=job.overwrite)

@@ -100,15 +100,7 @@ def command(
 
 def _lines(result: Adjustment) -> list[str]:
     """Return sigma0, the unknowns and the suspects."""
-    import numpy as np
-
-    rows = []
-    for k, name in enumerate(result.names):
-        value, sigma = float(result.values[k]), result.sigma(name)
-        unit = ""
-        if name.rsplit(":", 1)[-1] in ("omega", "phi", "kappa", "tilt1", "tilt2"):
-            value, sigma, unit = float(np.degrees(value)), float(np.degrees(sigma)), "deg"
-        rows.append((name, f"{value:.6f}", f"{sigma:.2g}", unit))
+    rows = [(name, f"{value:.6f}", f"{s:.2g}", unit) for name, value, s, unit in result.rows()]
     suspects = result.suspects()
     return [
         text_table(("unknown", "value", "sigma", ""), rows),

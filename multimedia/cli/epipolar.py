@@ -12,7 +12,7 @@ from photocore.cli import print_result, tell_written, text_table
 from photocore.options import FILE, THOUSANDTHS, Numbers, as_json, number, overwrite
 
 if TYPE_CHECKING:
-    from multimedia.orientation.epipolar_workflow import Curves
+    from multimedia.orientation.epipolar_workflow import EpipolarResult
 
 EXAMPLE = """\b
 Examples:
@@ -65,28 +65,28 @@ def command(
     """
     from multimedia.orientation.epipolar_workflow import epipolar_project
 
-    found = epipolar_project(project, out=out, picture=picture, **options)
+    result = epipolar_project(project, out=out, picture=picture, **options)
     print_result(
-        {"z_range": found.z_range, "curves": found.curves, "candidates": found.candidates},
-        _lines(found), as_json=as_json, remarks=(f"Note: {line}" for line in found.remarks),
+        {"z_range": result.z_range, "curves": result.curves, "candidates": result.candidates},
+        _lines(result), as_json=as_json, remarks=(f"Note: {line}" for line in result.remarks),
     )  # fmt: skip
     tell_written(out, picture)
 
 
-def _lines(found: Curves) -> Iterator[str]:
+def _lines(result: EpipolarResult) -> Iterator[str]:
     """Yield the curves if they are few, and the candidates."""
-    if len(found.curves) <= 3:
+    if len(result.curves) <= 3:
         rows = [
             (c["id"], *(f"{v:.5f}" for v in xy), *(f"{v:.4f}" for v in xyz))
-            for c in found.curves
+            for c in result.curves
             for xy, xyz in zip(c["image"], c["points"], strict=True)
         ]
         yield text_table(("point", "x mm", "y mm", "X", "Y", "Z"), rows)
     else:
-        yield f"{len(found.curves)} curves; --out writes their vertices."
+        yield f"{len(result.curves)} curves; --out writes their vertices."
     rows = [
         (c["id"], c["target"], f"{c['distance'] * 1000:.2f}", *(f"{c[k]:.4f}" for k in "XYZ"))
-        for c in found.candidates
+        for c in result.candidates
     ]
     yield f"\n{len(rows)} candidates"
     if rows:

@@ -59,22 +59,22 @@ def command(
             print_json({"folder": export, "cameras": list(written.camera_names)})
         return
     target = out if out is not None else Path(f"{source.resolve().name}.toml")
-    found = import_openptv(source, out=target, overwrite=overwrite, **options)
-    project = found.project
+    imported = import_openptv(source, out=target, overwrite=overwrite, **options)
+    project = imported.project
     total = len(project.object_points.ids)
-    cameras = list(zip(project.cameras, found.matched, project.media_of, strict=True))
+    cameras = list(zip(project.cameras, imported.matched, project.media_of, strict=True))
     data = {
-        "project": target, "files": list(found.files), "unit": project.unit,
+        "project": target, "files": list(imported.files), "unit": project.unit,
         "cameras": [
             {"name": camera.name, "control_points": count, "media": media}
             for camera, count, media in cameras
         ],
-        "object_points": total, "particles": found.particles, "remarks": list(project.remarks),
+        "object_points": total, "particles": imported.particles, "remarks": list(project.remarks),
     }  # fmt: skip
     rows = [(camera.name, media or "none", f"{n} of {total}") for camera, n, media in cameras]
     lines = [text_table(("camera", "looks through", "control points"), rows)]
-    if found.particles:
-        lines.append(f"{found.particles} particles of the stored frame")
-    lines += [f"Written: {file}" for file in found.files]
+    if imported.particles:
+        lines.append(f"{imported.particles} particles of the stored frame")
+    lines += [f"Written: {file}" for file in imported.files]
     notes = (f"Note: {line}" for line in project.remarks)
     print_result(data, lines, as_json=as_json, remarks=notes)

@@ -9,14 +9,14 @@ from typing import TYPE_CHECKING
 from photocore.cli import print_result, remark, text_table
 
 if TYPE_CHECKING:
-    from multimedia.orientation.workflow import Table
+    from multimedia.orientation.workflow import PointTable
 
 #: Rows printed when the table also goes into a file.
 _SHOWN = 10
 
 
 def show(
-    table: Table,
+    table: PointTable,
     *,
     as_json: bool,
     out: Path | None,

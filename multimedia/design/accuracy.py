@@ -16,7 +16,7 @@ from multimedia.media.camera import EXTERIOR, Camera
 from multimedia.media.flat_interface import FlatInterface
 from multimedia.media.projection import project, project_with_jacobian
 from multimedia.orientation.intersection import intersect
-from multimedia.orientation.object_rays import image_rays
+from multimedia.orientation.object_rays import image_rays, largest_angle
 from multimedia.orientation.resection import resect
 from multimedia.refraction.layers import Layers
 from photocore.arrays import BoolArray, FloatArray, as_points, positive
@@ -88,9 +88,10 @@ def study_setup(
         seen_by += seen
         if seen.any():
             own = interface.parameter_names if interface is not None else ()
-            found = project_with_jacobian(camera, points[seen], interface, interface_names=own)
-            normal[seen] += found.by_point.transpose(0, 2, 1) @ found.by_point
-            right = found.by_point.transpose(0, 2, 1) @ found.by_interface
+            slopes = project_with_jacobian(camera, points[seen], interface, interface_names=own)
+            by_point = slopes.by_point.transpose(0, 2, 1)
+            normal[seen] += by_point @ slopes.by_point
+            right = by_point @ slopes.by_interface
             for k, parameter in enumerate(own):
                 key = f"{name}:{parameter}"
                 moment = moments.setdefault(key, np.zeros((len(points), 3)))
@@ -117,8 +118,8 @@ def study_setup(
         moved = np.einsum("nij,nj->ni", inverse, moment)
         sensitivity[key] = np.sqrt(np.nanmean(moved**2, axis=0)) * step
     return Study(
-        points=points, sigma=sigma, angle=_largest_angle(rays),
-        angle_in_air=_largest_angle(straight), seen_by=seen_by, sensitivity=sensitivity,
+        points=points, sigma=sigma, angle=largest_angle(rays),
+        angle_in_air=largest_angle(straight), seen_by=seen_by, sensitivity=sensitivity,
     )  # fmt: skip
 
 
@@ -129,17 +130,6 @@ def _on_sensor(camera: Camera, image: FloatArray) -> BoolArray:
     pixels = camera.sensor.pixel_from_image(np.nan_to_num(image, nan=1e12))
     size = np.array([camera.sensor.width, camera.sensor.height])
     return np.asarray(((pixels >= -0.5) & (pixels <= size - 0.5)).all(axis=1))
-
-
-def _largest_angle(rays: Sequence[FloatArray]) -> FloatArray:
-    """Return the largest angle between any two unit vectors of each point; NaN below two."""
-    largest = np.full(len(rays[0]), np.nan)
-    for i, first in enumerate(rays):
-        for second in rays[i + 1 :]:
-            # Angle from the cross product too: the cosine alone is blind near zero.
-            sine = np.linalg.norm(np.cross(first, second), axis=1)
-            largest = np.fmax(largest, np.arctan2(sine, (first * second).sum(axis=1)))
-    return largest
 
 
 def object_grid(
@@ -201,20 +191,16 @@ def ring_of_cameras(
              np.cos(half_angle)]
         )  # fmt: skip
         centre = top + distance * offset
-        # Aim where the target appears: two rounds of shifting the aim by the image of the target.
+        # Aim where the target appears: rounds of shifting the aim by the image of the target.
         aim = target.astype(np.float64)
-        camera = Camera.looking_at(
-            centre, aim, principal_distance=principal_distance, name=f"cam{k + 1}"
-        )
-        for _ in range(6):
-            seen = project(camera, target, interface)
-            if not np.isfinite(seen).all():
-                raise GeometryError(f"design: camera {k + 1} cannot see the target.")
-            direction = camera.rotation @ np.array([*seen, -principal_distance])
-            aim = centre + direction
+        for _ in range(7):
             camera = Camera.looking_at(
                 centre, aim, principal_distance=principal_distance, name=f"cam{k + 1}"
             )
+            seen = project(camera, target, interface)
+            if not np.isfinite(seen).all():
+                raise GeometryError(f"design: camera {k + 1} cannot see the target.")
+            aim = centre + camera.rotation @ np.array([*seen, -principal_distance])
         cameras.append(camera)
     return tuple(cameras)
 
@@ -239,7 +225,7 @@ def compare_placements(
         If no opening works.
     """
     target = points.mean(axis=0)
-    found = []
+    placements = []
     for half_angle in half_angles:
         try:
             cameras = ring_of_cameras(
@@ -251,17 +237,13 @@ def compare_placements(
             continue
         if (study.seen_by < count).any():
             continue
-        x, y, z = study.rms_sigma.tolist()
-        found.append(
-            Placement(
-                half_angle=float(half_angle), sigma=(x, y, z), angle=float(np.mean(study.angle))
-            )
-        )
-    if not found:
+        sigma, angle = tuple(study.rms_sigma.tolist()), float(np.mean(study.angle))
+        placements.append(Placement(half_angle=float(half_angle), sigma=sigma, angle=angle))
+    if not placements:
         raise GeometryError(
             "design: under no angle do all cameras see all points; increase the distance."
         )
-    return tuple(found)
+    return tuple(placements)
 
 
 def calibration_costs(
@@ -317,7 +299,7 @@ def calibration_costs(
     def evaluate(
         true_media: FlatInterface, assumed: FlatInterface, start: Sequence[Camera], noise: float,
         estimate: Sequence[str],
-    ) -> tuple[list[Camera], FloatArray, float]:  # fmt: skip
+    ) -> tuple[list[Camera], tuple[float, ...], float]:  # fmt: skip
         oriented, images, sigma0 = [], [], []
         for camera, first in zip(cameras, start, strict=True):
             image = project(camera, points, true_media)
@@ -328,9 +310,9 @@ def calibration_costs(
             )
             oriented.append(result.camera)
             sigma0.append(result.sigma0)
-        found = intersect(oriented, np.stack(images)[:, ~control], assumed).xyz
-        error = np.sqrt(np.nanmean((found - points[~control]) ** 2, axis=0))
-        return oriented, error, float(np.sqrt(np.mean(np.square(sigma0))))
+        xyz = intersect(oriented, np.stack(images)[:, ~control], assumed).xyz
+        error = np.sqrt(np.nanmean((xyz - points[~control]) ** 2, axis=0))
+        return oriented, tuple(error.tolist()), float(np.sqrt(np.mean(np.square(sigma0))))
 
     try:
         calibrated, first, sigma1 = evaluate(dry, dry, cameras, sigma_image, interior)
@@ -344,11 +326,6 @@ def calibration_costs(
             "that fill the object space."
         ) from error
 
-    def triple(values: FloatArray) -> tuple[float, float, float]:
-        x, y, z = values.tolist()
-        return x, y, z
-
     return CalibrationCosts(
-        air=triple(first), air_calibration_in_water=triple(second), water=triple(third),
-        sigma0=(sigma1, sigma2, sigma3),
-    )  # fmt: skip
+        air=first, air_calibration_in_water=second, water=third, sigma0=(sigma1, sigma2, sigma3)
+    )

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from multimedia.projects.point_tables import fill_sheet
 from photocore.output import atomic_path
 from photocore.workbook.newbook import new_workbook
 
@@ -18,13 +19,12 @@ def write_design_workbook(path: Path | str, design: Design, *, overwrite: bool =
     """Write precision per depth, sensitivities, placements and calibration costs as .xlsx."""
     from openpyxl import Workbook
     from openpyxl.chart import LineChart, Reference
-    from openpyxl.styles import Font
 
     book = Workbook()
     sheet = book.active
     sheet.title = "Precision"
-    _table(sheet, ("depth", "sigma X", "sigma Y", "sigma Z", "angle deg", "in air deg"),
-           design.by_depth.tolist())  # fmt: skip
+    headings = ("depth", "sigma X", "sigma Y", "sigma Z", "angle deg", "in air deg")
+    fill_sheet(sheet, headings, design.by_depth.tolist())
     chart = LineChart()
     chart.title = f"Expected sigma over depth [{design.unit}]"
     last = 1 + len(design.by_depth)
@@ -34,11 +34,11 @@ def write_design_workbook(path: Path | str, design: Design, *, overwrite: bool =
     chart.set_categories(Reference(sheet, min_col=1, min_row=2, max_row=last))
     chart.x_axis.delete = chart.y_axis.delete = False
     sheet.add_chart(chart, "H2")
-    _table(
+    fill_sheet(
         book.create_sheet("Sensitivity"), ("unknown", "step", "dX", "dY", "dZ"),
         [(name, step, *moved) for name, step, moved in design.sensitivities],
     )  # fmt: skip
-    _table(
+    fill_sheet(
         book.create_sheet("Placement"),
         ("half angle deg", "sigma X", "sigma Y", "sigma Z", "ray angle deg"),
         [
@@ -48,7 +48,7 @@ def write_design_workbook(path: Path | str, design: Design, *, overwrite: bool =
     )  # fmt: skip
     if design.costs is not None:
         costs = design.costs
-        _table(
+        fill_sheet(
             book.create_sheet("Calibration"), ("case", "mu X", "mu Y", "mu Z", "sigma0 mm"),
             [
                 ("I air, calibrated in air", *costs.air, costs.sigma0[0]),
@@ -56,15 +56,13 @@ def write_design_workbook(path: Path | str, design: Design, *, overwrite: bool =
                 ("III water, calibrated in water", *costs.water, costs.sigma0[2]),
             ],
         )  # fmt: skip
-    _table(
+    fill_sheet(
         book.create_sheet("Models"), ("model", "RMS", "largest"),
         [*design.models, ("colour seam in the image, mm", design.seam, design.seam)],
     )  # fmt: skip
     for item in book.worksheets:
         for cell in item[1]:
-            cell.font = Font(bold=True)
             item.column_dimensions[cell.column_letter].width = 18
-        item.freeze_panes = "A2"
     with new_workbook(path, overwrite=overwrite) as temporary:
         book.save(temporary)
 
@@ -97,15 +95,3 @@ def write_design_plot(path: Path | str, design: Design, *, overwrite: bool = Fal
             axes.legend()
     with atomic_path(path, overwrite=overwrite) as temporary, mpl.rc_context():
         figure.savefig(temporary, dpi=130)
-
-
-def _table(sheet: Any, headings: tuple[str, ...], rows: Any) -> None:
-    """Write a heading and rows of texts and numbers."""
-    sheet.append(headings)
-    for row in rows:
-        sheet.append(
-            [
-                item if isinstance(item, str) else float(item) if np.isfinite(item) else None
-                for item in row
-            ]
-        )

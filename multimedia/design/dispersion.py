@@ -313,7 +313,7 @@ def correct_dispersion(
         for top in range(0, rows, STRIP):
             row, column = np.mgrid[top : min(top + STRIP, rows), 0:columns]
             offsets = np.stack([column - middle[0], row - middle[1]], axis=-1) * size
-            found = colour_positions(
+            fetched = colour_positions(
                 offsets,
                 z0=z0,
                 zp=zp,
@@ -321,7 +321,7 @@ def correct_dispersion(
                 principal_distance=principal_distance,
                 reference=0,
             )
-            places = found[..., 1] / size + np.asarray(middle)
+            places = fetched[..., 1] / size + np.asarray(middle)
             values = map_coordinates(
                 spline, places[..., ::-1].transpose(2, 0, 1), mode="nearest", prefilter=False
             )

@@ -60,9 +60,9 @@ class CalibrationCosts:
         Of I, II and III. [mm]
     """
 
-    air: tuple[float, float, float]
-    air_calibration_in_water: tuple[float, float, float]
-    water: tuple[float, float, float]
+    air: tuple[float, ...]
+    air_calibration_in_water: tuple[float, ...]
+    water: tuple[float, ...]
     sigma0: tuple[float, float, float]
 
 
@@ -71,7 +71,7 @@ class Placement:
     """One way to place the cameras and what it gives: half angle [rad], RMS sigmas, ray angle."""
 
     half_angle: float
-    sigma: tuple[float, float, float]
+    sigma: tuple[float, ...]
     angle: float
 
 

@@ -12,7 +12,6 @@ from photocore.arrays import FloatArray, as_floats, as_points, positive, read_on
 from photocore.distortion import NAMES as DISTORTION
 from photocore.distortion import Brown
 from photocore.errors import GeometryError, InputError
-from photocore.interior import image_from_pixel, pixel_from_image
 from photocore.rotation import (
     angles_from_rotation,
     rotation_from_vector,
@@ -31,6 +30,8 @@ LARGEST_ANGLE = 6.2832
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Sensor:
     """Size of the sensor and its pixels: what pixels and image coordinates need of each other.
+
+    Pixels count rows down, image coordinates y up: this is the only place y is flipped.
 
     Attributes
     ----------
@@ -72,11 +73,13 @@ class Sensor:
 
     def image_from_pixel(self, pixels: ArrayLike) -> FloatArray:
         """Return image coordinates of (column, row), shape (..., 2). [mm]"""
-        return image_from_pixel(pixels, origin=self.origin, pitch=self.pitch)
+        offset = as_points(pixels, "pixels", dimension=2) - self.origin
+        return offset * (self.pitch * (1.0, -1.0))
 
     def pixel_from_image(self, image: ArrayLike) -> FloatArray:
         """Return (column, row) of image coordinates, shape (..., 2). [px]"""
-        return pixel_from_image(image, origin=self.origin, pitch=self.pitch)
+        scaled = as_points(image, "image", dimension=2) / (self.pitch * (1.0, -1.0))
+        return scaled + self.origin
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

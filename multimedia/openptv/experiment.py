@@ -8,11 +8,11 @@ from pathlib import Path
 
 import numpy as np
 
-from multimedia.media.camera import Camera
+from multimedia.media.camera import Camera, Sensor
 from multimedia.media.flat_interface import FlatInterface
 from multimedia.openptv.openptv_files import (
     ControlParameters,
-    Targets,
+    DetectedTargets,
     addpar_text,
     glass_interface,
     ori_text,
@@ -44,22 +44,22 @@ class Experiment:
     ----------
     project : Project
         Cameras, media and calibration body; no image points yet.
-    targets : tuple of Targets or None
+    targets : tuple of DetectedTargets or None
         Detections of each camera's calibration image.
     particles, particle_targets : ndarray
         Stored positions, shape (n, 3), and target numbers per camera, of the first ``rt_is``
         frame found; empty without one.
-    frame_targets : tuple of Targets or None
+    frame_targets : tuple of DetectedTargets or None
         Detections of that frame.
     manual : tuple of (list of str, ndarray)
         Points clicked by hand in each calibration image: ids and pixels; may be empty.
     """
 
     project: Project
-    targets: tuple[Targets | None, ...]
+    targets: tuple[DetectedTargets | None, ...]
     particles: FloatArray
     particle_targets: IntArray
-    frame_targets: tuple[Targets | None, ...]
+    frame_targets: tuple[DetectedTargets | None, ...]
     manual: tuple[tuple[list[str], FloatArray], ...] = ()
 
 
@@ -87,16 +87,23 @@ def read_experiment(folder: Path | str, *, swap_indices: bool = False) -> Experi
     remarks: list[str] = []
     if control_path.parent.name not in _PARAMETERS and control_path.parent != folder:
         remarks.append(f"{folder}: has no ptv.par of its own; read {control_path}.")
-    indices = _checked_indices(control, control_path.name, swap_indices, remarks)
-    cameras, media, media_of = _cameras(control, roots, indices, remarks)
-    body, source = _body(roots, remarks)
+    indices, odd = _checked_indices(control, control_path.name, swap_indices)
+    cameras, media, media_of, odd_cameras = _cameras(control, roots, indices)
+    body, source = _body(roots)
+    remarks += [*odd, *odd_cameras]
+    if not source:
+        remarks.append("no calibration body (cal_ori.par names it) was found: no object points.")
     targets = tuple(
         _targets(roots, [f"{name}_targets"], control.field) for name in control.calibration_images
     )
-    for camera, found in zip(cameras, targets, strict=True):
-        if found is None:
-            remarks.append(f"{camera.name}: no _targets file of its calibration image was found.")
-    particles, numbers, frame = _particles(roots, control, remarks)
+    remarks += [
+        f"{camera.name}: no _targets file of its calibration image was found."
+        for camera, detected in zip(cameras, targets, strict=True)
+        if detected is None
+    ]
+    particles, numbers, frame, odd_frame = _particles(roots, control)
+    manual, odd_manual = _manual(roots, len(cameras))
+    remarks += [*odd_frame, *odd_manual]
     project = Project(
         cameras=tuple(cameras),
         media=media,
@@ -114,7 +121,7 @@ def read_experiment(folder: Path | str, *, swap_indices: bool = False) -> Experi
         particles=particles,
         particle_targets=numbers,
         frame_targets=frame,
-        manual=_manual(roots, len(cameras), remarks),
+        manual=manual,
     )
 
 
@@ -127,14 +134,13 @@ def write_experiment(folder: Path | str, project: Project, *, overwrite: bool = 
         If OpenPTV cannot hold the project: other than three or more parallel media fixed in the
         world and common to all cameras, no sensor, or distortion it does not know.
     """
-    cameras = project.cameras
     first = project.interface_of(0)
     if not isinstance(first, FlatInterface) or len(first.layers.indices) != 3:
         raise InputError("OpenPTV needs three media (air, glass, water) before every camera.")
-    layers = first.layers
-    lines = [str(len(cameras))]
+    layers, sensor = first.layers, _sensor(project.cameras[0])
+    lines = [str(len(project.cameras))]
     files: dict[str, str] = {}
-    for number, camera in enumerate(cameras):
+    for number, camera in enumerate(project.cameras):
         interface = project.interface_of(number)
         if (
             not isinstance(interface, FlatInterface)
@@ -145,33 +151,14 @@ def write_experiment(folder: Path | str, project: Project, *, overwrite: bool = 
                 f"camera {camera.name}: OpenPTV knows only media that are fixed in the world and "
                 "the same for all cameras."
             )
-        if camera.sensor is None:
-            raise InputError(f"camera {camera.name}: OpenPTV needs its sensor.")
-        # The glass vector runs from the origin to the foot on the water side.
-        reach = float(interface.point @ interface.normal)
-        if reach <= 0:
-            raise InputError(
-                f"camera {camera.name}: the water side of the glass must lie between origin and "
-                "camera for OpenPTV; move the origin of the object frame into the water."
-            )
-        # OpenPTV's origin of the image is the corner-to-corner centre of the sensor.
-        centre = np.array([camera.sensor.width, camera.sensor.height]) / 2
-        shift = camera.sensor.image_from_pixel(centre)
-        if np.abs(shift).max() > 1e-9:
-            camera = _moved_origin(camera, shift)
         base = f"cal/{camera.name}.tif"
-        files[f"{base}.ori"] = ori_text(camera, interface.normal * reach)
-        files[f"{base}.addpar"] = addpar_text(camera)
+        files |= _camera_files(camera, interface, base)
         lines += [f"img/{camera.name}.", base]
         rows = project.image_points.of_camera(camera.name)
         if rows:
-            files[f"{base}_targets"] = _targets_text(project, number, rows)
-    sensor = cameras[0].sensor
-    if sensor is None:
-        raise InputError(f"camera {cameras[0].name}: OpenPTV needs its sensor.")
+            files[f"{base}_targets"] = _targets_text(project, camera, rows)
     lines += ["1", "0", "1", str(sensor.width), str(sensor.height)]
-    lines += [f"{v:.15g}" for v in (*sensor.pitch,)] + ["0"]
-    lines += [f"{v:.15g}" for v in (*layers.indices, *layers.thicknesses)]
+    lines += [f"{v:.15g}" for v in (*sensor.pitch, 0, *layers.indices, *layers.thicknesses)]
     files["parameters/ptv.par"] = "\n".join(lines) + "\n"
     if project.object_points.ids:
         files["cal/calblock.txt"] = "".join(
@@ -184,6 +171,30 @@ def write_experiment(folder: Path | str, project: Project, *, overwrite: bool = 
             (temporary / name).write_text(text, encoding="utf-8", newline="\n")
 
 
+def _sensor(camera: Camera) -> Sensor:
+    if camera.sensor is None:
+        raise InputError(f"camera {camera.name}: OpenPTV needs its sensor.")
+    return camera.sensor
+
+
+def _camera_files(camera: Camera, interface: FlatInterface, base: str) -> dict[str, str]:
+    """Return the .ori and .addpar file of one camera."""
+    sensor = _sensor(camera)
+    # The glass vector runs from the origin to the foot on the water side.
+    reach = float(interface.point @ interface.normal)
+    if reach <= 0:
+        raise InputError(
+            f"camera {camera.name}: the water side of the glass must lie between origin and "
+            "camera for OpenPTV; move the origin of the object frame into the water."
+        )
+    # OpenPTV's origin of the image is the corner-to-corner centre of the sensor.
+    shift = sensor.image_from_pixel(np.array([sensor.width, sensor.height]) / 2)
+    if np.abs(shift).max() > 1e-9:
+        camera = _moved_origin(camera, shift)
+    glass = ori_text(camera, interface.normal * reach)
+    return {f"{base}.ori": glass, f"{base}.addpar": addpar_text(camera)}
+
+
 def _moved_origin(camera: Camera, shift: FloatArray) -> Camera:
     """Return the camera with the image origin moved to ``shift``; distortion about it must not."""
     if camera.distortion.convention is Convention.OPENPTV and not camera.distortion.is_identity:
@@ -193,12 +204,9 @@ def _moved_origin(camera: Camera, shift: FloatArray) -> Camera:
     return replace(camera, principal_point=camera.principal_point - shift)
 
 
-def _targets_text(project: Project, camera: int, rows: Sequence[int]) -> str:
+def _targets_text(project: Project, camera: Camera, rows: Sequence[int]) -> str:
     """Return a _targets file; the last number is the row of the point in the calibration body."""
-    sensor = project.cameras[camera].sensor
-    if sensor is None:
-        return ""
-    pixels = sensor.pixel_from_image(project.image_points.image[list(rows)])
+    pixels = _sensor(camera).pixel_from_image(project.image_points.image[list(rows)])
     place = project.object_points.rows([project.image_points.ids[row] for row in rows])
     lines = [f"{len(rows)}\n"]
     for k, ((x, y), number) in enumerate(zip(pixels, place, strict=True)):
@@ -216,8 +224,8 @@ def _control_path(folder: Path) -> Path:
     if len(others) == 1:
         return others[0]
     if others:
-        found = ", ".join(str(path.parent) for path in others[:SHOWN])
-        raise InputError(f"{folder}: holds several experiments; name one of {found}.")
+        shown = ", ".join(str(path.parent) for path in others[:SHOWN])
+        raise InputError(f"{folder}: holds several experiments; name one of {shown}.")
     if any(folder.glob("parameters*.y*ml")):
         raise InputError(
             f"{folder}: has its parameters as YAML only. Save them once as a parameters folder "
@@ -241,9 +249,10 @@ def _find(roots: Sequence[Path], name: str) -> Path | None:
 
 
 def _checked_indices(
-    control: ControlParameters, file: str, swap: bool, remarks: list[str]
-) -> tuple[float, ...]:
-    """Return the indices, and say what is odd about them."""
+    control: ControlParameters, file: str, swap: bool
+) -> tuple[tuple[float, ...], list[str]]:
+    """Return the indices, and what is odd about them."""
+    remarks = []
     air, glass, water = control.indices
     if swap:
         remarks.append(f"{file}: indices of glass and water exchanged, as asked.")
@@ -260,16 +269,14 @@ def _checked_indices(
         remarks.append(
             f"{file}: glass of {control.thickness:g} mm; OpenPTV's lengths are in mm, is this in m?"
         )
-    return air, glass, water
+    return (air, glass, water), remarks
 
 
 def _cameras(
-    control: ControlParameters,
-    roots: Sequence[Path],
-    indices: tuple[float, ...],
-    remarks: list[str],
-) -> tuple[list[Camera], dict[str, FlatInterface], tuple[str, ...]]:
-    """Return cameras, the different glass walls, and the wall of each camera."""
+    control: ControlParameters, roots: Sequence[Path], indices: tuple[float, ...]
+) -> tuple[list[Camera], dict[str, FlatInterface], tuple[str, ...], list[str]]:
+    """Return cameras, the different glass walls, the wall of each camera, and remarks."""
+    remarks: list[str] = []
     cameras: list[Camera] = []
     media: dict[str, FlatInterface] = {}
     media_of: list[str] = []
@@ -303,15 +310,15 @@ def _cameras(
                 f"{path.name}: the camera stands {height:g} mm above the water side of the glass: "
                 "inside or behind it. Turn the glass vector or check the units."
             )
-    return cameras, media, tuple(media_of)
+    return cameras, media, tuple(media_of), remarks
 
 
 def _same(one: FlatInterface, other: FlatInterface) -> bool:
     return bool(np.allclose(one.point, other.point) and np.allclose(one.normal, other.normal))
 
 
-def _body(roots: Sequence[Path], remarks: list[str]) -> tuple[ObjectPoints, str]:
-    """Return the calibration body named by cal_ori.par, or found by its usual name."""
+def _body(roots: Sequence[Path]) -> tuple[ObjectPoints, str]:
+    """Return the calibration body that cal_ori.par names or of a usual name, and its file."""
     names = list(_BODIES)
     listed = _find(roots, "cal_ori.par")
     if listed is not None:
@@ -331,47 +338,41 @@ def _body(roots: Sequence[Path], remarks: list[str]) -> tuple[ObjectPoints, str]
                 continue
             if len(ids) >= _FEWEST:
                 return ObjectPoints(ids=tuple(ids), xyz=xyz), path.name
-    remarks.append("no calibration body (cal_ori.par names it) was found: no object points.")
     return ObjectPoints(), ""
 
 
 def _manual(
-    roots: Sequence[Path], cameras: int, remarks: list[str]
-) -> tuple[tuple[list[str], FloatArray], ...]:
-    """Return the points clicked by hand in each calibration image, if they were kept."""
+    roots: Sequence[Path], cameras: int
+) -> tuple[tuple[tuple[list[str], FloatArray], ...], tuple[str, ...]]:
+    """Return the points clicked by hand in each calibration image, if kept; and remarks."""
     points, pixels = _find(roots, "man_ori.par"), _find(roots, "man_ori.dat")
     if points is None or pixels is None:
-        return ()
+        return (), ()
     try:
         ids, places = read_manual(points, pixels)
     except InputError as error:
         # Only a help for poor start values: an experiment is complete without it.
-        remarks.append(f"left out: {error}")
-        return ()
+        return (), (f"left out: {error}",)
     each = len(ids) // cameras
-    return tuple(
-        (ids[k * each : (k + 1) * each], places[k * each : (k + 1) * each]) for k in range(cameras)
-    )
+    parts = [slice(k * each, (k + 1) * each) for k in range(cameras)]
+    return tuple((ids[part], places[part]) for part in parts), ()
 
 
-def _targets(roots: Sequence[Path], names: Sequence[str], field: int) -> Targets | None:
-    for name in names:
-        path = _find(roots, name)
-        if path is not None:
-            return read_targets(path, field=field)
-    return None
+def _targets(roots: Sequence[Path], names: Sequence[str], field: int) -> DetectedTargets | None:
+    path = next((path for name in names if (path := _find(roots, name)) is not None), None)
+    return None if path is None else read_targets(path, field=field)
 
 
 def _particles(
-    roots: Sequence[Path], control: ControlParameters, remarks: list[str]
-) -> tuple[FloatArray, IntArray, tuple[Targets | None, ...]]:
-    """Return the first stored frame: positions, target numbers and the targets."""
+    roots: Sequence[Path], control: ControlParameters
+) -> tuple[FloatArray, IntArray, tuple[DetectedTargets | None, ...], tuple[str, ...]]:
+    """Return the first stored frame: positions, target numbers, the targets; and remarks."""
     nothing = np.empty((0, 3)), np.empty((0, len(control.images)), dtype=np.int64), ()
-    found = [path for root in roots for path in sorted((root / "res").glob("rt_is.*"))]
-    found += [path for root in roots for path in sorted(root.glob("rt_is.*"))]
-    if not found:
-        return nothing
-    path = found[0]
+    stored = [path for root in roots for path in sorted((root / "res").glob("rt_is.*"))]
+    stored += [path for root in roots for path in sorted(root.glob("rt_is.*"))]
+    if not stored:
+        return *nothing, ()
+    path = stored[0]
     frame = path.suffix.lstrip(".")
     positions, numbers = read_correspondences(path)
     if numbers.shape[1] < len(control.images):
@@ -384,9 +385,8 @@ def _particles(
         for image in control.images
     )
     if any(targets is None for targets in frames):
-        remarks.append(f"{path.name}: its _targets files were not all found; frame left out.")
-        return nothing
-    return positions, numbers, frames
+        return *nothing, (f"{path.name}: its _targets files were not all found; frame left out.",)
+    return positions, numbers, frames, ()
 
 
 def particle_points(experiment: Experiment) -> tuple[ObjectPoints, ImagePoints]:
@@ -398,8 +398,7 @@ def particle_points(experiment: Experiment) -> tuple[ObjectPoints, ImagePoints]:
         If a particle refers to a target that does not exist.
     """
     ids = tuple(f"p{k}" for k in range(1, len(experiment.particles) + 1))
-    cameras: list[str] = []
-    names: list[str] = []
+    seen_by: list[tuple[str, str]] = []
     pixels: list[FloatArray] = []
     for k, targets in enumerate(experiment.frame_targets):
         camera = experiment.project.cameras[k]
@@ -412,10 +411,10 @@ def particle_points(experiment: Experiment) -> tuple[ObjectPoints, ImagePoints]:
                 f"file holds {len(targets.pixels)}. Positions and targets are of other frames."
             )
         seen = np.flatnonzero(number >= 0)
-        cameras += [camera.name] * len(seen)
-        names += [ids[row] for row in seen]
+        seen_by += [(camera.name, ids[row]) for row in seen]
         pixels.append(camera.sensor.image_from_pixel(targets.pixels[number[seen]]))
     if not pixels:
         return ObjectPoints(), ImagePoints()
-    images = ImagePoints(cameras=tuple(cameras), ids=tuple(names), image=np.concatenate(pixels))
+    cameras, names = zip(*seen_by, strict=True) if seen_by else ((), ())
+    images = ImagePoints(cameras=cameras, ids=names, image=np.concatenate(pixels))
     return ObjectPoints(ids=ids, xyz=experiment.particles), images

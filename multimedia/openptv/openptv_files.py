@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -46,7 +47,7 @@ class ControlParameters:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Targets:
+class DetectedTargets:
     """Detected targets of one image: pixels (column, row), pixel counts, correspondence numbers."""
 
     pixels: FloatArray
@@ -112,7 +113,8 @@ def read_camera(path: Path, *, sensor: Sensor, name: str) -> tuple[Camera, Float
     values = _numbers(path, 3 + 3 + 9 + 2 + 1, "X0 Y0 Z0, angles, matrix, xh yh, c")
     remarks: list[str] = []
     matrix = values[6:15].reshape(3, 3)
-    rotation = _rotation(path, values[3:6], matrix, remarks)
+    rotation, said = _rotation(path, values[3:6], matrix)
+    remarks += said
     glass = values[18:21] if len(values) >= 21 else np.zeros(3)
     if not np.any(glass):
         remarks.append(f"{path.name}: no glass vector; the camera looks through no interface.")
@@ -149,7 +151,7 @@ def glass_interface(
     return FlatInterface(layers=layers, point=glass, normal=glass)
 
 
-def read_targets(path: Path, *, field: int = 0) -> Targets:
+def read_targets(path: Path, *, field: int = 0) -> DetectedTargets:
     """Read a _targets file: number, column, row, pixels, width, height, grey sum, correspondence.
 
     Raises
@@ -157,23 +159,19 @@ def read_targets(path: Path, *, field: int = 0) -> Targets:
     InputError
         If the count in the first line does not fit the lines that follow.
     """
-    text = _text(path).split(None, 1)
-    count = int(_float(path, text[0] if text else "", "number of targets"))
-    rest = text[1].split() if len(text) > 1 else []
+    first, *rest = _text(path).split() or [""]
+    count = int(_floats(path, [first], "number of targets")[0])
     if len(rest) != 8 * count:
         raise InputError(
             f"{path}: its first line announces {count} targets of 8 numbers, {len(rest)} numbers "
             "follow. The file is cut off, or is no target file."
         )
-    try:
-        table = np.array(rest, dtype=np.float64).reshape(count, 8)
-    except ValueError as error:
-        raise InputError(f"{path}: {error}; expected numbers only.") from None
+    table = _floats(path, rest, "targets").reshape(count, 8)
     pixels = table[:, 1:3].copy()
     if field in (1, 2):
         # Half frames: the file counts every other line.
         pixels[:, 1] = 2 * pixels[:, 1] + (field == 1)
-    return Targets(
+    return DetectedTargets(
         pixels=pixels, counts=table[:, 3].astype(np.int64), numbers=table[:, 7].astype(np.int64)
     )
 
@@ -196,7 +194,7 @@ def read_body(path: Path) -> tuple[list[str], FloatArray]:
                 f"{path}, line {number}: found {len(fields)} values, expected number X Y Z."
             )
         ids.append(fields[0])
-        points.append([_float(path, field, f"line {number}") for field in fields[1:]])
+        points.append(_floats(path, fields[1:], f"line {number}"))
     if not ids:
         raise InputError(f"{path}: no points; expected lines of number X Y Z.")
     return ids, np.array(points)
@@ -218,7 +216,7 @@ def read_manual(points: Path, pixels: Path) -> tuple[list[str], FloatArray]:
         If the two files do not belong together.
     """
     ids = _text(points).split()
-    values = np.array([_float(pixels, w, "man_ori") for w in _text(pixels).split()])
+    values = _floats(pixels, _text(pixels).split(), "man_ori")
     if values.size != 2 * len(ids):
         raise InputError(
             f"{pixels}: holds {values.size} numbers for the {len(ids)} points of {points.name}; "
@@ -237,18 +235,16 @@ def read_correspondences(path: Path) -> tuple[FloatArray, IntArray]:
     InputError
         If the count in the first line does not fit the lines that follow.
     """
-    lines = [line.split() for line in _text(path).splitlines() if line.strip()]
-    count = int(_float(path, lines[0][0] if lines else "", "number of particles"))
-    rows = lines[1:]
+    first, *rows = [line.split() for line in _text(path).splitlines() if line.strip()] or [[""]]
+    count = int(_floats(path, first[:1], "number of particles")[0])
     widths = {len(row) for row in rows}
     if len(rows) != count or len(widths) > 1 or (widths and min(widths) < 6):
         raise InputError(
             f"{path}: its first line announces {count} particles, {len(rows)} lines follow "
             "(expected number X Y Z and one target number per camera)."
         )
-    table = np.array(
-        [[_float(path, value, f"line {k}") for value in row] for k, row in enumerate(rows, 2)]
-    ).reshape(count, -1)
+    table = np.array([_floats(path, row, f"line {k}") for k, row in enumerate(rows, 2)])
+    table = table.reshape(count, -1)
     return table[:, 1:4].copy(), table[:, 4:].astype(np.int64).reshape(count, -1)
 
 
@@ -287,16 +283,16 @@ def addpar_text(camera: Camera) -> str:
     return " ".join(f"{v:.16g}" for v in terms) + "\n"
 
 
-def _rotation(path: Path, angles: FloatArray, matrix: FloatArray, remarks: list[str]) -> FloatArray:
-    """Return the rotation from angles and printed matrix, which must agree."""
+def _rotation(
+    path: Path, angles: FloatArray, matrix: FloatArray
+) -> tuple[FloatArray, tuple[str, ...]]:
+    """Return the rotation from angles and printed matrix, which must agree, and remarks."""
     by_angles = world_from_camera(*(float(a) for a in angles))
     if not np.any(matrix) or np.abs(by_angles - matrix).max() < MATRIX_ROUNDING:
-        return by_angles
+        return by_angles, ()
     if np.abs(world_from_camera(*np.radians(angles)) - matrix).max() < MATRIX_ROUNDING:
-        remarks.append(
-            f"{path.name}: the angles are in degrees, though OpenPTV wants radians; its matrix "
-            "tells, and is used."
-        )
+        odd = "the angles are in degrees, though OpenPTV wants radians; its matrix tells, and "
+        odd += "is used."
     elif np.abs(matrix @ matrix.T - np.eye(3)).max() > 1e-3:
         raise InputError(f"{path}: the 3 x 3 matrix is not a rotation; a number is wrong.")
     elif np.linalg.det(matrix) < 0:
@@ -304,8 +300,8 @@ def _rotation(path: Path, angles: FloatArray, matrix: FloatArray, remarks: list[
             f"{path}: the 3 x 3 matrix mirrors the world: a coordinate system is left-handed."
         )
     else:
-        remarks.append(f"{path.name}: angles and matrix disagree; the matrix is used.")
-    return nearest_rotation(matrix)
+        odd = "angles and matrix disagree; the matrix is used."
+    return nearest_rotation(matrix), (f"{path.name}: {odd}",)
 
 
 def _text(path: Path) -> str:
@@ -319,24 +315,35 @@ def _text(path: Path) -> str:
         raise InputError(f"{path}: cannot be read ({error.strerror}).") from None
 
 
-def _float(path: Path, text: str, what: str) -> float:
+def _floats(path: Path, words: Sequence[str], what: str) -> FloatArray:
+    """Return words as numbers; refuse the first that is none; {} in ``what`` is its place."""
     try:
-        return float(text)
+        return np.array(words, dtype=np.float64)
     except ValueError:
-        raise InputError(f"{path}, {what}: expected a number, found {text!r:.40}.") from None
+        place, bad = next((k, w) for k, w in enumerate(words, 1) if not _is_number(w))
+        where = what.format(place)
+        raise InputError(f"{path}, {where}: expected a number, found {bad!r:.40}.") from None
+
+
+def _is_number(word: str) -> bool:
+    try:
+        float(word)
+    except ValueError:
+        return False
+    return True
 
 
 def _number(path: Path, lines: list[str], index: int, what: str) -> float:
     if index >= len(lines):
         raise InputError(f"{path}: ends before line {index + 1} ({what}).")
-    return _float(path, (lines[index].split() or [""])[0], f"line {index + 1} ({what})")
+    words = lines[index].split()[:1] or [""]
+    return float(_floats(path, words, f"line {index + 1} ({what})")[0])
 
 
 def _numbers(path: Path, least: int, what: str) -> FloatArray:
-    words = _text(path).split()
-    values = [_float(path, word, f"value {k}") for k, word in enumerate(words, 1)]
+    values = _floats(path, _text(path).split(), "value {}")
     if len(values) < least:
         raise InputError(f"{path}: {len(values)} numbers, expected at least {least}: {what}.")
     if not np.isfinite(values).all():
         raise InputError(f"{path}: holds a value that is not a finite number.")
-    return np.array(values)
+    return values

@@ -47,25 +47,25 @@ def match_targets(
     if camera.sensor is None:
         raise InputError(f"camera {camera.name}: matching targets needs its sensor.")
     state = camera
-    found = _nearest(state, control, targets, interface, radius)
+    partner = _nearest(state, control, targets, interface, radius)
     for _ in range(_ROUNDS):
-        seen = found >= 0
+        seen = partner >= 0
         if seen.sum() < 4:
-            return found
+            return partner
         image = np.full((len(control), 2), np.nan)
-        image[seen] = camera.sensor.image_from_pixel(targets[found[seen]])
+        image[seen] = camera.sensor.image_from_pixel(targets[partner[seen]])
         try:
             result = resect(state, control, image, interface)
         except (GeometryError, ConvergenceError, InputError):
-            return found
+            return partner
         miss = np.linalg.norm(result.residuals[seen] / camera.sensor.pitch, axis=1)
         state = result.camera
         limit = min(radius, max(LEAST_RADIUS, WIDEST_MISFIT * float(np.median(miss))))
         again = _nearest(state, control, targets, interface, limit)
-        if np.array_equal(again, found):
-            return found
-        found = again
-    return found
+        if np.array_equal(again, partner):
+            return partner
+        partner = again
+    return partner
 
 
 def _nearest(
@@ -78,14 +78,14 @@ def _nearest(
     """Return mutual nearest neighbours within a radius."""
     from scipy.spatial import cKDTree
 
-    found = np.full(len(control), -1, dtype=np.int64)
+    partner = np.full(len(control), -1, dtype=np.int64)
     image = project(camera, control, interface)
     seen = np.flatnonzero(np.isfinite(image).all(axis=1))
     if camera.sensor is None or not len(seen) or not len(targets):
-        return found
+        return partner
     expected = camera.sensor.pixel_from_image(image[seen])
     distance, nearest = cKDTree(targets).query(expected)
     _, back = cKDTree(expected).query(targets)
     mutual = (back[nearest] == np.arange(len(seen))) & (distance < radius)
-    found[seen[mutual]] = nearest[mutual]
-    return found
+    partner[seen[mutual]] = nearest[mutual]
+    return partner

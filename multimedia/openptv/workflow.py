@@ -15,12 +15,12 @@ from multimedia.openptv.experiment import (
     read_experiment,
     write_experiment,
 )
-from multimedia.openptv.openptv_files import Targets
+from multimedia.openptv.openptv_files import DetectedTargets
 from multimedia.openptv.target_matching import FIRST_RADIUS, match_targets
 from multimedia.orientation.resection import resect
 from multimedia.projects.model import ImagePoints, Project
 from multimedia.projects.project_file import read_project, write_project
-from photocore.arrays import FloatArray
+from photocore.arrays import FloatArray, IntArray
 from photocore.errors import PhotogrammetryError
 from photocore.output import check_writable
 
@@ -80,45 +80,42 @@ def import_openptv(
         check_writable(out, overwrite=overwrite)
     # The stored orientation belongs to the indices as stored, whatever is thought of them.
     experiment = read_experiment(folder)
-    project = (
-        read_experiment(folder, swap_indices=True).project if swap_indices else (experiment.project)
-    )
-    remarks = list(project.remarks)
-    found: list[tuple[list[str], list[str], FloatArray]] = []
-    matched: list[int] = []
-    for k, camera in enumerate(project.cameras):
-        ids, image = _control(experiment, k, least_pixels, radius, remarks)
-        matched.append(len(ids))
-        found.append(([camera.name] * len(ids), ids, image))
+    project = experiment.project
+    if swap_indices:
+        project = read_experiment(folder, swap_indices=True).project
+    control = [_control(experiment, k, least_pixels, radius) for k in range(len(project.cameras))]
+    matched = tuple(len(ids) for ids, _, _ in control)
     _, particles = particle_points(experiment)
     images = ImagePoints(
-        cameras=tuple(c for part in found for c in part[0]) + particles.cameras,
-        ids=tuple(p for part in found for p in part[1]) + particles.ids,
-        image=np.concatenate([*(part[2] for part in found), particles.image]),
+        cameras=(*np.repeat(project.camera_names, matched).tolist(), *particles.cameras),
+        ids=(*(name for ids, _, _ in control for name in ids), *particles.ids),
+        image=np.concatenate([*(image for _, image, _ in control), particles.image]),
         groups=("control",) * sum(matched) + ("particles",) * len(particles.ids),
     )
-    project = replace(project, image_points=images, remarks=tuple(remarks))
+    remarks = (*project.remarks, *(text for _, _, said in control for text in said))
+    project = replace(project, image_points=images, remarks=remarks)
     files = () if out is None else tuple(write_project(out, project, overwrite=overwrite))
     return Import(
-        project=project, matched=tuple(matched), particles=len(experiment.particles), files=files
+        project=project, matched=matched, particles=len(experiment.particles), files=files
     )
 
 
 def export_openptv(project: Path, folder: Path, *, overwrite: bool = False) -> Project:
     """Write a project as an OpenPTV experiment folder."""
-    found = read_project(project)
-    write_experiment(folder, found, overwrite=overwrite)
-    return found
+    content = read_project(project)
+    write_experiment(folder, content, overwrite=overwrite)
+    return content
 
 
 def _control(
-    experiment: Experiment, k: int, least_pixels: int, radius: float, remarks: list[str]
-) -> tuple[list[str], FloatArray]:
-    """Return the control points found in one calibration image, and where."""
+    experiment: Experiment, k: int, least_pixels: int, radius: float
+) -> tuple[list[str], FloatArray, list[str]]:
+    """Return the control points found in one calibration image, where, and remarks."""
     project, targets = experiment.project, experiment.targets[k]
     camera, body = project.cameras[k], project.object_points
     if targets is None or not body.ids or camera.sensor is None:
-        return [], np.empty((0, 2))
+        return [], np.empty((0, 2)), []
+    remarks = []
     best = _matched(project, camera, k, targets, least_pixels, radius)
     others = [(camera, 1, f"targets below {least_pixels} px were needed too.")]
     if (best >= 0).sum() < 0.5 * len(body.ids):
@@ -143,7 +140,7 @@ def _control(
         missing = [body.ids[row] for row in np.flatnonzero(best < 0)]
         remarks.append(f"{camera.name}: no target for control points {_listed(missing)}.")
     image = camera.sensor.image_from_pixel(targets.pixels[best[seen]])
-    return [body.ids[row] for row in seen], image
+    return [body.ids[row] for row in seen], image, remarks
 
 
 def _from_clicks(experiment: Experiment, k: int) -> Camera | None:
@@ -156,31 +153,26 @@ def _from_clicks(experiment: Experiment, k: int) -> Camera | None:
     place = np.array(body.rows(ids), dtype=np.int64)
     known = place >= 0
     try:
-        found = resect(
-            camera, body.xyz[place[known]], camera.sensor.image_from_pixel(pixels[known]),
-            project.interface_of(k),
-        )  # fmt: skip
+        image = camera.sensor.image_from_pixel(pixels[known])
+        return resect(camera, body.xyz[place[known]], image, project.interface_of(k)).camera
     except PhotogrammetryError:
         # Clicks of another image, or too few: the stored orientation remains.
         return None
-    return found.camera
 
 
 def _matched(
-    project: Project, camera: Camera, k: int, targets: Targets, least_pixels: int, radius: float
-) -> np.ndarray[tuple[int, ...], np.dtype[np.int64]]:
+    project: Project,
+    camera: Camera,
+    k: int,
+    targets: DetectedTargets,
+    least_pixels: int,
+    radius: float,
+) -> IntArray:  # fmt: skip
     """Return the target of each control point in the file's numbering, -1 for none."""
     large = np.flatnonzero(targets.counts >= least_pixels)
-    found = match_targets(
-        camera,
-        project.object_points.xyz,
-        targets.pixels[large],
-        project.interface_of(k),
-        radius=radius,
-    )
-    if not len(large):
-        return found
-    return np.where(found >= 0, large[found], -1)
+    control, medium = project.object_points.xyz, project.interface_of(k)
+    partner = match_targets(camera, control, targets.pixels[large], medium, radius=radius)
+    return np.where(partner >= 0, large[partner], -1) if len(large) else partner
 
 
 def _listed(names: Sequence[str], most: int = 10) -> str:

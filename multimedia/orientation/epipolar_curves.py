@@ -177,8 +177,8 @@ def epipolar_candidates(
     --------
     >>> line = EpipolarCurves(image=np.array([[0.0, 0.0], [10.0, 0.0]]),
     ...                       points=np.array([[0.0, 0, -1], [0, 0, -2]]), counts=np.array(2))
-    >>> found = epipolar_candidates(line, [(5.0, 0.02), (5.0, 1.0)], tolerance=0.05)
-    >>> found.targets.tolist(), found.points.tolist()
+    >>> near = epipolar_candidates(line, [(5.0, 0.02), (5.0, 1.0)], tolerance=0.05)
+    >>> near.targets.tolist(), near.points.tolist()
     ([0], [[0.0, 0.0, -1.5]])
     """
     if not tolerance > 0:
@@ -187,15 +187,15 @@ def epipolar_candidates(
     polygons = curves.image.reshape(-1, *curves.image.shape[-2:])
     points = curves.points.reshape(-1, *curves.points.shape[-2:])
     size = max(1, _CHUNK // max(1, len(seen) * (polygons.shape[1] - 1)))
-    found = [
+    parts = [
         _near(polygons[k : k + size], points[k : k + size], seen, tolerance, k)
         for k in range(0, len(polygons), size)
     ]
     return Candidates(
-        curves=np.concatenate([f.curves for f in found]),
-        targets=np.concatenate([f.targets for f in found]),
-        distance=np.concatenate([f.distance for f in found]),
-        points=np.concatenate([f.points for f in found]),
+        curves=np.concatenate([part.curves for part in parts]),
+        targets=np.concatenate([part.targets for part in parts]),
+        distance=np.concatenate([part.distance for part in parts]),
+        points=np.concatenate([part.points for part in parts]),
     )
 
 

@@ -13,7 +13,7 @@ from multimedia.media.camera import Camera
 from multimedia.orientation.epipolar_curves import epipolar_candidates, epipolar_curve
 from multimedia.orientation.epipolar_picture import draw_epipolar
 from multimedia.orientation.intersection import intersect_pairs
-from multimedia.projects.model import SHOWN, ImagePoints, Project
+from multimedia.projects.model import SHOWN, Project
 from multimedia.projects.point_tables import write_columns
 from multimedia.projects.project_file import read_project
 from photocore.arrays import FloatArray
@@ -25,7 +25,7 @@ _MARGIN = 0.25
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Curves:
+class EpipolarResult:
     """Curves and candidates as plain data.
 
     Attributes
@@ -61,7 +61,7 @@ def epipolar_project(
     picture: Path | None = None,
     photo: Path | None = None,
     overwrite: bool = False,
-) -> Curves:
+) -> EpipolarResult:
     """Return the epipolar curves of points of ``camera`` in the image of ``other``.
 
     Parameters
@@ -87,22 +87,22 @@ def epipolar_project(
         if file is not None:
             check_writable(file, overwrite=overwrite)
     project = read_project(path)
-    one, two = _index(project, camera), _index(project, other)
+    one, two = project.camera_index(camera), project.camera_index(other)
     if one == two:
         raise InputError("--camera and --to name the same camera; an epipolar curve needs two.")
     first, second = project.cameras[one], project.cameras[two]
+    media = (project.interface_of(one), project.interface_of(two))
     names, image = _points(project, first, ids, at)
     depths, remarks = _depths(project, z_range)
-    found = epipolar_curve(
-        first, image, second, (project.interface_of(one), project.interface_of(two)),
-        z_range=depths, chord_error=chord_error, vertices=vertices,
+    polygons = epipolar_curve(
+        first, image, second, media, z_range=depths, chord_error=chord_error, vertices=vertices,
     )  # fmt: skip
     rows = project.image_points.of_camera(other)
     targets = project.image_points.image[rows]
-    near = epipolar_candidates(found, targets, tolerance=tolerance)
+    near = epipolar_candidates(polygons, targets, tolerance=tolerance)
     curves = []
     for name, vertex, point, count in zip(
-        names, found.image, found.points, found.counts, strict=True
+        names, polygons.image, polygons.points, polygons.counts, strict=True
     ):
         curves.append(
             {"id": name, "image": vertex[:count], "points": point[:count]}
@@ -115,17 +115,13 @@ def epipolar_project(
             "on the object's side of the interface?"
         )
     image_pairs = np.stack([image[near.curves], targets[near.targets]])
-    exact = intersect_pairs(
-        (first, second), image_pairs, (project.interface_of(one), project.interface_of(two))
-    )[0]
+    exact = intersect_pairs((first, second), image_pairs, media)[0]
     candidates = [
         {
             "id": names[curve],
             "target": project.image_points.ids[rows[target]],
             "distance": distance,
-            "X": point[0],
-            "Y": point[1],
-            "Z": point[2],
+            **dict(zip("XYZ", point, strict=True)),
         }
         for curve, target, distance, point in zip(
             near.curves, near.targets, near.distance, exact, strict=True
@@ -134,32 +130,17 @@ def epipolar_project(
     if out is not None:
         write_columns(out, _columns(curves, project.unit), overwrite=overwrite)
     if picture is not None:
-        _draw(
-            picture, second, curves, targets[near.targets], photo, f"{camera} in {other}", overwrite
-        )
-    return Curves(
+        if second.sensor is None:
+            raise InputError(f"--picture: camera {other} has no sensor, so no pixels to draw in.")
+        draw_epipolar(
+            picture, [c["pixels"] for c in curves], [c["id"] for c in curves],
+            second.sensor.pixel_from_image(targets[near.targets]),
+            size=(second.sensor.width, second.sensor.height), photo=photo,
+            title=f"Epipolar curves of {camera} in {other}", overwrite=overwrite,
+        )  # fmt: skip
+    return EpipolarResult(
         curves=curves, candidates=candidates, z_range=depths,
         remarks=(*project.remarks, *remarks),
-    )  # fmt: skip
-
-
-def _draw(
-    picture: Path,
-    camera: Camera,
-    curves: Sequence[dict[str, Any]],
-    targets: FloatArray,
-    photo: Path | None,
-    title: str,
-    overwrite: bool,
-) -> None:
-    """Draw the curves over the photo."""
-    if camera.sensor is None:
-        raise InputError(f"--picture: camera {camera.name} has no sensor, so no pixels to draw in.")
-    draw_epipolar(
-        picture, [c["pixels"] for c in curves], [c["id"] for c in curves],
-        camera.sensor.pixel_from_image(targets),
-        size=(camera.sensor.width, camera.sensor.height), photo=photo,
-        title=f"Epipolar curves of {title}", overwrite=overwrite,
     )  # fmt: skip
 
 
@@ -170,12 +151,11 @@ def _columns(curves: Sequence[dict[str, Any]], unit: str) -> dict[str, Any]:
     columns: dict[str, Any] = {
         "id": [c["id"] for c in curves for _ in c["image"]],
         "vertex": [k for c in curves for k in range(1, len(c["image"]) + 1)],
-        "x [mm]": image[:, 0],
-        "y [mm]": image[:, 1],
     }
+    columns |= dict(zip(("x [mm]", "y [mm]"), image.T, strict=True))
     if all("pixels" in c for c in curves):
         pixels = np.concatenate([c["pixels"] for c in curves])
-        columns |= {"col [px]": pixels[:, 0], "row [px]": pixels[:, 1]}
+        columns |= dict(zip(("col [px]", "row [px]"), pixels.T, strict=True))
     return columns | {f"{axis} [{unit}]": points[:, k] for k, axis in enumerate("XYZ")}
 
 
@@ -183,14 +163,6 @@ def _pixels(camera: Camera, image: FloatArray) -> dict[str, FloatArray]:
     if camera.sensor is None:
         return {}
     return {"pixels": camera.sensor.pixel_from_image(image)}
-
-
-def _index(project: Project, name: str) -> int:
-    if name not in project.camera_names:
-        raise InputError(
-            f"no camera is called {name!r}; the project has {', '.join(project.camera_names)}."
-        )
-    return project.camera_names.index(name)
 
 
 def _points(
@@ -201,7 +173,7 @@ def _points(
         if camera.sensor is None:
             raise InputError(f"--at: camera {camera.name} has no sensor, so no pixels.")
         return [f"{at[0]:g},{at[1]:g}"], camera.sensor.image_from_pixel([at])
-    images: ImagePoints = project.image_points
+    images = project.image_points
     rows = {images.ids[row]: row for row in images.of_camera(camera.name)}
     missing = [name for name in ids if name not in rows]
     if missing:

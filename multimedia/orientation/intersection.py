@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import combinations
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -19,9 +20,16 @@ from multimedia.media.projection import (
     project_with_jacobian,
     refuse_pixels,
 )
-from multimedia.orientation.object_rays import image_rays, inverse_3x3, nearest_points, times
+from multimedia.orientation.object_rays import (
+    image_rays,
+    inverse_3x3,
+    largest_angle,
+    nearest_points,
+    times,
+)
 from multimedia.orientation.point_status import PointStatus
 from multimedia.projects.model import SIGMA_IMAGE, SIGMA_PIXEL
+from photocore.adjustment import standardised
 from photocore.arrays import BoolArray, FloatArray, IntArray, as_points
 from photocore.errors import InputError
 
@@ -38,7 +46,7 @@ _SMALL = 1e-12
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Intersection:
+class IntersectedPoints:
     """Intersected points with their precision.
 
     Attributes
@@ -90,7 +98,7 @@ def intersect(
     layers: Media | Sequence[Media] = None,
     *,
     sigma: ArrayLike | None = None,
-) -> Intersection:
+) -> IntersectedPoints:
     """Intersect the rays of every point by least squares of the image residuals.
 
     Parameters
@@ -107,7 +115,7 @@ def intersect(
 
     Returns
     -------
-    Intersection
+    IntersectedPoints
         Points no two rays lead to are NaN, with a status.
 
     Raises
@@ -133,20 +141,21 @@ def intersect(
     """
     image, placed = _checked(cameras, image_points, layers)
     sigmas = _sigmas(cameras, sigma, image.shape)
-    parts = []
-    for start in range(0, max(image.shape[1], 1), BLOCK):
-        part = slice(start, start + BLOCK)
-        parts.append(_block(cameras, image[:, part], sigmas[:, part], placed))
-    return Intersection(
-        xyz=np.concatenate([p.xyz for p in parts]),
-        covariance=np.concatenate([p.covariance for p in parts]),
-        residuals=np.concatenate([p.residuals for p in parts], axis=1),
-        standardised=np.concatenate([p.standardised for p in parts], axis=1),
-        sigma0=np.concatenate([p.sigma0 for p in parts]),
-        rays=np.concatenate([p.rays for p in parts]),
-        angle=np.concatenate([p.angle for p in parts]),
-        status=np.concatenate([p.status for p in parts]),
-    )
+    parts = [_block(cameras, image[:, p], sigmas[:, p], placed) for p in _parts(image)]
+
+    def whole(name: str, axis: int = 0) -> Any:
+        return np.concatenate([getattr(part, name) for part in parts], axis=axis)
+
+    return IntersectedPoints(
+        xyz=whole("xyz"), covariance=whole("covariance"), residuals=whole("residuals", 1),
+        standardised=whole("standardised", 1), sigma0=whole("sigma0"), rays=whole("rays"),
+        angle=whole("angle"), status=whole("status"),
+    )  # fmt: skip
+
+
+def _parts(image: FloatArray) -> list[slice]:
+    """Return the blocks in which points are worked on; one empty block for no points."""
+    return [slice(k, k + BLOCK) for k in range(0, max(image.shape[1], 1), BLOCK)]
 
 
 def intersect_rays(
@@ -168,8 +177,7 @@ def intersect_rays(
     """
     image, placed = _checked(cameras, image_points, layers)
     xyz = np.empty((image.shape[1], 3))
-    for start in range(0, image.shape[1], BLOCK):
-        part = slice(start, start + BLOCK)
+    for part in _parts(image):
         rays = [image_rays(c, p[part], m) for c, p, m in zip(cameras, image, placed, strict=True)]
         xyz[part] = nearest_points([o for o, _ in rays], [d for _, d in rays])
     return xyz
@@ -195,8 +203,7 @@ def intersect_pairs(
     """
     image, placed = _checked(cameras, image_points, layers)
     xyz, apart = np.empty((image.shape[1], 3)), np.empty(image.shape[1])
-    for start in range(0, image.shape[1], BLOCK):
-        part = slice(start, start + BLOCK)
+    for part in _parts(image):
         xyz[part], apart[part] = _pair_block(cameras, image[:, part], placed)
     return xyz, apart
 
@@ -238,19 +245,19 @@ def _block(
     image: FloatArray,
     sigmas: FloatArray,
     placed: Sequence[OpticalMedia],
-) -> Intersection:
+) -> IntersectedPoints:
     """Intersect one block of points."""
     m, n, _ = image.shape
     seen: BoolArray = np.asarray(np.isfinite(image).all(axis=-1))
     rays = [image_rays(c, p, i) for c, p, i in zip(cameras, image, placed, strict=True)]
     xyz = nearest_points([o for o, _ in rays], [d for _, d in rays])
-    angle = _largest_angle([d for _, d in rays])
+    angle = largest_angle([d for _, d in rays])
     status = np.where(np.isfinite(xyz).all(axis=1), PointStatus.NOT_CONVERGED, PointStatus.WEAK)
     count = seen.sum(axis=0)
     normal: FloatArray = np.full((6, n), np.nan)
     active = np.flatnonzero(status == PointStatus.NOT_CONVERGED)
     reach = np.abs(xyz - cameras[0].centre).max(axis=1)
-    lever: FloatArray = np.full((m, n, 2, 3), np.nan)
+    slopes: FloatArray = np.full((m, n, 2, 3), np.nan)
     before: FloatArray = np.full(n, np.nan)
     for _ in range(_MOST_STEPS):
         if not active.size:
@@ -262,7 +269,7 @@ def _block(
         )
         lost: BoolArray = np.asarray(np.isnan(step[:, 0]))
         moved = np.where(lost[:, None], xyz[some], xyz[some] + step)
-        normal[:, some], lever[:, some], xyz[some] = new, by_point, moved
+        normal[:, some], slopes[:, some], xyz[some] = new, by_point, moved
         size = np.sqrt(np.einsum("ni,ni->n", step, step))
         with np.errstate(invalid="ignore", divide="ignore"):
             # Each step is shorter than the last by the same factor: the next one need not be made
@@ -274,7 +281,7 @@ def _block(
         status[active[lost]] = PointStatus.BEHIND
         active = active[~done & ~lost]
     return _assembled(
-        cameras, image, sigmas, placed, xyz=xyz, normal=normal, lever=lever, angle=angle,
+        cameras, image, sigmas, placed, xyz=xyz, normal=normal, slopes=slopes, angle=angle,
         rays=count, status=status,
     )  # fmt: skip
 
@@ -289,21 +296,21 @@ def _step(
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return normal matrices (6, n), steps (n, 3), weighted derivatives (m, n, 2, 3)."""
     n = len(xyz)
-    lever: FloatArray = np.full((len(cameras), n, 2, 3), np.nan)
+    slopes: FloatArray = np.full((len(cameras), n, 2, 3), np.nan)
     normal, right = np.zeros((6, n)), np.zeros((3, n))
     for k, camera in enumerate(cameras):
         use: slice | BoolArray = slice(None) if seen[k].all() else seen[k]
-        found = project_with_jacobian(camera, xyz[use], placed[k])
+        seen_at = project_with_jacobian(camera, xyz[use], placed[k])
         weight = 1.0 / sigmas[k][use]
-        miss = (image[k][use] - found.image) * weight
-        weighted = found.by_point * weight[:, :, None]
-        lever[k, use] = weighted
+        miss = (image[k][use] - seen_at.image) * weight
+        weighted = seen_at.by_point * weight[:, :, None]
+        slopes[k, use] = weighted
         for axis in range(2):
             a, b, c = weighted[:, axis].T
             v = miss[:, axis]
             normal[:, use] += np.stack([a * a, a * b, a * c, b * b, b * c, c * c])
             right[:, use] += np.stack([a * v, b * v, c * v])
-    return normal, times(inverse_3x3(normal), right).T, lever
+    return normal, times(inverse_3x3(normal), right).T, slopes
 
 
 def _assembled(
@@ -314,14 +321,13 @@ def _assembled(
     *,
     xyz: FloatArray,
     normal: FloatArray,
-    lever: FloatArray,
+    slopes: FloatArray,
     angle: FloatArray,
     rays: IntArray,
     status: IntArray,
-) -> Intersection:
+) -> IntersectedPoints:
     """Return precision, residuals and tests of the points found."""
-    xyz[status == PointStatus.WEAK] = np.nan
-    xyz[(status == PointStatus.BEHIND) | (status == PointStatus.NOT_CONVERGED)] = np.nan
+    xyz[status != PointStatus.OK] = np.nan
     status[rays == 1] = PointStatus.ONE_RAY
     status[rays == 0] = PointStatus.NO_RAY
     inverse = inverse_3x3(normal)
@@ -337,34 +343,22 @@ def _assembled(
     with np.errstate(divide="ignore", invalid="ignore"):
         sigma0 = np.where(redundancy > 0, np.sqrt(square / redundancy), np.nan)
         sigma0[np.isnan(xyz[:, 0])] = np.nan
-        # Cofactor of a weighted residual: 1 - a N^-1 a^T.
-        spread = 1.0 - np.einsum("mnki,mnki->mnk", lever @ covariance, lever)
-        standardised = weighted / np.sqrt(np.where(spread > 1e-9, spread, np.nan))
+    # Cofactor of a weighted residual: 1 - a N^-1 a^T.
+    spread = 1.0 - np.einsum("mnki,mnki->mnk", slopes @ covariance, slopes)
     good = status == PointStatus.OK
     status[good & (angle < WEAK_ANGLE)] = PointStatus.WEAK
     limits = chi2.ppf(1.0 - RISK, np.maximum(2 * np.arange(len(cameras) + 1) - 3, 1))
     status[good & (square > limits[rays])] = PointStatus.GROSS_ERROR
-    return Intersection(
+    return IntersectedPoints(
         xyz=xyz,
         covariance=covariance,
         residuals=residuals,
-        standardised=standardised,
+        standardised=standardised(weighted, spread),
         sigma0=sigma0,
         rays=rays.astype(np.int64),
         angle=angle,
         status=status.astype(np.int64),
     )
-
-
-def _largest_angle(directions: Sequence[FloatArray]) -> FloatArray:
-    """Return the largest angle between two rays of each point; NaN with fewer than two."""
-    widest = np.full(len(directions[0]), np.nan)
-    for one, two in combinations(directions, 2):
-        # The chord keeps small angles exact where the cosine would lose them.
-        gap = one - two
-        chord = np.sqrt(np.einsum("ni,ni->n", gap, gap))
-        widest = np.fmax(widest, chord)
-    return 2.0 * np.arcsin(np.minimum(0.5 * widest, 1.0))
 
 
 def _checked(
@@ -392,13 +386,11 @@ def _sigmas(
 ) -> FloatArray:
     """Return standard deviations of all image coordinates. [mm]"""
     if sigma is None:
-        given = np.array(
-            [
-                SIGMA_IMAGE if c.sensor is None else SIGMA_PIXEL * float(c.sensor.pitch.mean())
-                for c in cameras
-            ]
-        )
-        return np.broadcast_to(given[:, None, None], shape)
+        given = [
+            SIGMA_IMAGE if c.sensor is None else SIGMA_PIXEL * float(c.sensor.pitch.mean())
+            for c in cameras
+        ]
+        return np.broadcast_to(np.array(given)[:, None, None], shape)
     try:
         values = np.broadcast_to(np.asarray(sigma, dtype=np.float64), shape)
     except ValueError:

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import combinations
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from multimedia.media.camera import Camera
 from multimedia.media.projection import Media, as_media
-from photocore.arrays import FloatArray, as_points
+from photocore.arrays import BoolArray, FloatArray, as_points
 
 
 def image_rays(
@@ -70,26 +71,14 @@ def nearest_points(origins: Sequence[FloatArray], directions: Sequence[FloatArra
     normal, right = np.zeros((6, n)), np.zeros((3, n))
     for origin, direction in zip(origins, directions, strict=True):
         seen = np.isfinite(direction[:, 0])
-        o, d = (origin, direction) if seen.all() else (origin[seen], direction[seen])
+        use: slice | BoolArray = slice(None) if seen.all() else seen
+        o, d = origin[use], direction[use]
         x, y, z = d.T
         part = np.stack([1 - x * x, -x * y, -x * z, 1 - y * y, -y * z, 1 - z * z])
         along = np.einsum("ni,ni->n", o, d)
-        foot = (o - along[:, None] * d).T
-        if seen.all():
-            normal += part
-            right += foot
-        else:
-            normal[:, seen] += part
-            right[:, seen] += foot
-    return solve_3x3(normal, right).T
-
-
-def solve_3x3(normal: FloatArray, right: FloatArray) -> FloatArray:
-    """Solve symmetric 3 x 3 systems, shape (3, n); NaN where singular.
-
-    ``normal`` holds the rows xx, xy, xz, yy, yz, zz.
-    """
-    return times(inverse_3x3(normal), right)
+        normal[:, use] += part
+        right[:, use] += (o - along[:, None] * d).T
+    return times(inverse_3x3(normal), right).T
 
 
 def inverse_3x3(normal: FloatArray) -> FloatArray:
@@ -111,3 +100,14 @@ def times(inverse: FloatArray, right: FloatArray) -> FloatArray:
     xx, xy, xz, yy, yz, zz = inverse
     a, b, c = right
     return np.stack([xx * a + xy * b + xz * c, xy * a + yy * b + yz * c, xz * a + yz * b + zz * c])
+
+
+def largest_angle(directions: Sequence[FloatArray]) -> FloatArray:
+    """Return the largest angle between two rays of each point; NaN with fewer than two."""
+    widest = np.full(len(directions[0]), np.nan)
+    for one, two in combinations(directions, 2):
+        # The chord keeps small angles exact where the cosine would lose them.
+        gap = one - two
+        chord = np.sqrt(np.einsum("ni,ni->n", gap, gap))
+        widest = np.fmax(widest, chord)
+    return 2.0 * np.arcsin(np.minimum(0.5 * widest, 1.0))

@@ -71,7 +71,6 @@ def _refined(
     start: Camera, control: FloatArray, ideal: FloatArray, media: OpticalMedia
 ) -> list[Camera]:
     """Return the start and what the apparent points make of it."""
-    found = [start]
     pose = start
     for _ in range(_ROUNDS):
         try:
@@ -86,9 +85,7 @@ def _refined(
             break
         # Of the mirror poses of a flat target keep the branch this start belongs to.
         pose = min(poses, key=lambda other: -float(np.trace(other.rotation.T @ pose.rotation)))
-    if pose is not start:
-        found.append(pose)
-    return found
+    return [start] if pose is start else [start, pose]
 
 
 def _straight(camera: Camera, control: FloatArray, ideal: FloatArray) -> list[Camera]:
@@ -107,7 +104,7 @@ def _straight(camera: Camera, control: FloatArray, ideal: FloatArray) -> list[Ca
         flags.append(cv2.SOLVEPNP_P3P)
     if len(points) >= 6:
         flags.append(cv2.SOLVEPNP_EPNP)
-    found = []
+    poses = []
     for flag in flags:
         try:
             _, turns, shifts_, _ = cv2.solvePnPGeneric(points, rays, np.eye(3), None, flags=flag)
@@ -118,5 +115,5 @@ def _straight(camera: Camera, control: FloatArray, ideal: FloatArray) -> list[Ca
             rotation, _ = cv2.Rodrigues(turn)
             position = -(rotation.T @ shift).ravel() * scale + centre
             if np.isfinite(position).all() and np.isfinite(rotation).all():
-                found.append(replace(camera, centre=position, rotation=rotation.T @ _FLIP))
-    return found
+                poses.append(replace(camera, centre=position, rotation=rotation.T @ _FLIP))
+    return poses

@@ -18,12 +18,10 @@ from multimedia.media.projection import (
     refuse_pixels,
 )
 from multimedia.orientation.pose_starts import pose_starts
-from photocore.adjustment import correlations, fit, minimise
+from photocore.adjustment import OUTLIER_LIMIT, correlations, fit, minimise
 from photocore.arrays import BoolArray, FloatArray, as_points
 from photocore.errors import ConvergenceError, GeometryError, InputError
 
-#: A residual beyond this many of its own standard deviations is a gross error (1 honest in 2000).
-OUTLIER_LIMIT = 3.5
 #: A pose whose residuals are below this share of the image coordinates is the right one, unless the
 #: control is flatter than the other share and has a mirror pose. False minima leave a tenth.
 FITS, DEEP = 0.003, 0.05
@@ -146,20 +144,16 @@ def resect(
         camera, object_points, image_points, sigma, len(names)
     )
     what = f"resection of camera {camera.name}" if camera.name else "resection"
-    problem = _Problem(control, image, weights, as_media(layers), names, what)
+    problem = _ControlImages(control, image, weights, as_media(layers), names, what)
     start = _best_start(camera, replace(problem, names=EXTERIOR))
     result = fit(
         start, problem.equations, problem.advance, names=names, what=what, rounding=problem.floor
     )
     _refuse_mirrored(result.state, result.sigma0, problem)
-    with np.errstate(invalid="ignore", divide="ignore"):
-        spread = result.sigma0 * np.sqrt(np.maximum(result.redundancy_numbers, 0.0))
-        controlled = result.redundancy_numbers > 1e-9
-        standardised = np.where(controlled, -result.residuals / spread, np.nan)
     shape = (len(used), 2)
     residuals, normed = np.full(shape, np.nan), np.full(shape, np.nan)
     residuals[used] = -result.residuals.reshape(-1, 2) * weights
-    normed[used] = standardised.reshape(-1, 2)
+    normed[used] = -result.standardised.reshape(-1, 2)
     return Resection(
         camera=result.state,
         names=names,
@@ -173,7 +167,7 @@ def resect(
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Problem:
+class _ControlImages:
     """Control points, their images, and the parameters wanted."""
 
     control: FloatArray
@@ -186,15 +180,15 @@ class _Problem:
     def equations(self, camera: Camera) -> tuple[FloatArray, FloatArray] | None:
         """Return computed minus measured and its derivatives; None if a point is not seen."""
         try:
-            found = project_with_jacobian(
+            seen = project_with_jacobian(
                 camera, self.control, self.interface, camera_names=self.names
             )
         except GeometryError:
             return None
-        if not np.isfinite(found.image).all():
+        if not np.isfinite(seen.image).all():
             return None
-        miss = (found.image - self.image) / self.weights
-        jacobian = found.by_camera / self.weights[:, :, None]
+        miss = (seen.image - self.image) / self.weights
+        jacobian = seen.by_camera / self.weights[:, :, None]
         return miss.ravel(), jacobian.reshape(-1, len(self.names))
 
     def is_beyond_doubt(self, cost: float) -> bool:
@@ -217,25 +211,24 @@ class _Problem:
 
     def cost(self, camera: Camera) -> float:
         """Return the weighted square sum, infinite where a point is not seen."""
-        found = self.equations(camera)
-        return np.inf if found is None else float(found[0] @ found[0])
+        equations = self.equations(camera)
+        return np.inf if equations is None else float(equations[0] @ equations[0])
 
 
-def _best_start(camera: Camera, problem: _Problem) -> Camera:
+def _best_start(camera: Camera, problem: _ControlImages) -> Camera:
     """Return the pose of the smallest square sum that any start leads to."""
-    found: list[tuple[float, Camera]] = []
+    poses: list[tuple[float, Camera]] = []
     count = 1
-    for start in _starts(camera, problem):
-        count += 1
+    for count, start in enumerate(_starts(camera, problem), start=2):  # noqa: B007
         if not np.isfinite(problem.cost(start)):
             continue
         pose = minimise(
             start, problem.equations, problem.advance, most=60, settle=1e-4, rounding=problem.floor
         )
-        found.append((float(pose.residuals @ pose.residuals), pose.state))
-        if problem.is_beyond_doubt(found[-1][0]):
+        poses.append((float(pose.residuals @ pose.residuals), pose.state))
+        if problem.is_beyond_doubt(poses[-1][0]):
             break
-    if not found:
+    if not poses:
         raise ConvergenceError(
             f"{problem.what}: no position was found from which the camera sees all control points "
             "through the interface. Check that image and object points belong together, the units "
@@ -244,10 +237,10 @@ def _best_start(camera: Camera, problem: _Problem) -> Camera:
             iterations=count,
             residual=float("nan"),
         )
-    return min(found, key=lambda pair: pair[0])[1]
+    return min(poses, key=lambda pair: pair[0])[1]
 
 
-def _starts(camera: Camera, problem: _Problem) -> Iterator[Camera]:
+def _starts(camera: Camera, problem: _ControlImages) -> Iterator[Camera]:
     """Yield the pose given, then those found without it, which cost some time to find."""
     yield camera
     yield from pose_starts(camera, problem.control, problem.image, problem.interface)
@@ -304,7 +297,7 @@ def _checked_points(
     return control, image, weights, used
 
 
-def _refuse_mirrored(camera: Camera, sigma0: float, problem: _Problem) -> None:
+def _refuse_mirrored(camera: Camera, sigma0: float, problem: _ControlImages) -> None:
     """Refuse a bad fit that becomes a good one when the control is mirrored."""
     size = float(np.sqrt(np.mean(problem.image**2)))
     if not sigma0 > 0.005 * size:

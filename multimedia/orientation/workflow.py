@@ -13,7 +13,7 @@ from multimedia.media.camera import EXTERIOR, INTERIOR
 from multimedia.media.projection import project as project_points
 from multimedia.media.projection import projection_status
 from multimedia.orientation.intersection import (
-    Intersection,
+    IntersectedPoints,
     intersect,
     intersect_pairs,
     intersect_rays,
@@ -23,17 +23,13 @@ from multimedia.orientation.resection import Resection, resect
 from multimedia.projects.model import SHOWN, ImagePoints, ObjectPoints, Project
 from multimedia.projects.point_tables import read_image_points, read_object_points, write_columns
 from multimedia.projects.project_file import read_project, write_project
-from photocore.arrays import FloatArray
+from photocore.arrays import FloatArray, IntArray
 from photocore.errors import InputError
 from photocore.output import check_writable
 
-#: How points may be intersected.
-METHODS = ("rigorous", "rays", "pairs")
-_ANGLES = ("omega", "phi", "kappa")
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Table:
+class PointTable:
     """Columns to print or write, with what to say about them."""
 
     columns: dict[str, Any]
@@ -50,37 +46,32 @@ class Table:
 
 def project_project(
     path: Path, *, points: Path | None, out: Path | None, overwrite: bool = False
-) -> Table:
+) -> PointTable:
     """Project the object points of a project, or of another table, into all its cameras."""
     if out is not None:
         check_writable(out, overwrite=overwrite)
     project = read_project(path)
     objects, remarks = _objects(project, points)
-    names: list[str] = []
-    parts: list[FloatArray] = []
-    pixels: list[FloatArray] = []
-    status: list[str] = []
-    for camera, media in zip(project.cameras, project.interfaces, strict=True):
-        image = project_points(camera, objects.xyz, media)
-        parts.append(image)
-        names += [camera.name] * len(objects.ids)
-        status += projection_status(camera, objects.xyz, media)
-        if camera.sensor is not None:
-            pixels.append(camera.sensor.pixel_from_image(image))
-    image = np.concatenate(parts)
+    views = list(zip(project.cameras, project.interfaces, strict=True))
+    images = [project_points(camera, objects.xyz, media) for camera, media in views]
+    pixels = [
+        camera.sensor.pixel_from_image(image)
+        for camera, image in zip(project.cameras, images, strict=True)
+        if camera.sensor is not None
+    ]
     columns: dict[str, Any] = {
-        "camera": names,
-        "id": list(objects.ids) * len(project.cameras),
-        "x": image[:, 0],
-        "y": image[:, 1],
+        "camera": np.repeat(project.camera_names, len(objects.ids)).tolist(),
+        "id": list(objects.ids) * len(views),
     }
-    if len(pixels) == len(parts):
-        both = np.concatenate(pixels)
-        columns |= {"col": both[:, 0], "row": both[:, 1]}
-    columns["status"] = status
+    columns |= dict(zip("xy", np.concatenate(images).T, strict=True))
+    if len(pixels) == len(views):
+        columns |= dict(zip(("col", "row"), np.concatenate(pixels).T, strict=True))
+    columns["status"] = [
+        text for camera, media in views for text in projection_status(camera, objects.xyz, media)
+    ]
     units = {"x": "mm", "y": "mm", "col": "px", "row": "px"}
     _write(out, columns, units, overwrite)
-    return Table(columns=columns, remarks=(*project.remarks, *remarks))
+    return PointTable(columns=columns, remarks=(*project.remarks, *remarks))
 
 
 def intersect_project(
@@ -90,7 +81,7 @@ def intersect_project(
     out: Path | None,
     method: str = "rigorous",
     overwrite: bool = False,
-) -> Table:
+) -> PointTable:
     """Intersect the image points of a project, or of another table."""
     if out is not None:
         check_writable(out, overwrite=overwrite)
@@ -101,24 +92,22 @@ def intersect_project(
     sigma = np.where(np.isnan(sigma), project.sigma_image, sigma)
     u = project.unit
     if method == "rigorous":
-        found = intersect(project.cameras, image, project.interfaces, sigma=sigma)
-        columns, units, summary = _intersection_columns(project, found, u)
-        xyz = found.xyz
+        solved = intersect(project.cameras, image, project.interfaces, sigma=sigma)
+        columns, units, summary = _intersection_columns(project, solved, u)
+        xyz = solved.xyz
     else:
+        extra: dict[str, Any] = {}
         if method == "rays":
             xyz = intersect_rays(project.cameras, image, project.interfaces)
-            extra: dict[str, Any] = {}
         else:
-            xyz, distance = intersect_pairs(project.cameras, image, project.interfaces)
-            extra = {"ray_distance": distance}
+            xyz, extra["ray_distance"] = intersect_pairs(project.cameras, image, project.interfaces)
         rays = np.isfinite(image).all(axis=-1).sum(axis=0)
         lost = [PointStatus.NO_RAY, PointStatus.ONE_RAY]
         status = [
             PointStatus.OK.label if good else (lost[n] if n < 2 else PointStatus.WEAK).label
             for good, n in zip(np.isfinite(xyz[:, 0]), rays.tolist(), strict=True)
         ]
-        columns = {"X": xyz[:, 0], "Y": xyz[:, 1], "Z": xyz[:, 2], **extra}
-        columns |= {"rays": rays, "status": status}
+        columns = dict(zip("XYZ", xyz.T, strict=True)) | extra | {"rays": rays, "status": status}
         units = dict.fromkeys(("X", "Y", "Z", "ray_distance"), u)
         summary = [
             f"{int(np.isfinite(xyz[:, 0]).sum())} points from {len(images.ids)} image points"
@@ -127,41 +116,39 @@ def intersect_project(
     summary += _check(project, list(ids), xyz)
     remarks = [*remarks, *_suspicious(project, columns["status"])]
     _write(out, columns, units, overwrite)
-    return Table(columns=columns, remarks=(*project.remarks, *remarks), summary=tuple(summary))
+    return PointTable(columns=columns, remarks=(*project.remarks, *remarks), summary=tuple(summary))
 
 
 def _intersection_columns(
-    project: Project, found: Intersection, unit: str
+    project: Project, solved: IntersectedPoints, unit: str
 ) -> tuple[dict[str, Any], dict[str, str], list[str]]:
     """Return the columns of a rigorous intersection, their units, and a summary."""
-    sigma = found.sigma
-    worst = found.worst_camera
-    doubtful = found.status == PointStatus.GROSS_ERROR
+    doubtful = solved.status == PointStatus.GROSS_ERROR
     columns: dict[str, Any] = {
-        **{axis: found.xyz[:, k] for k, axis in enumerate("XYZ")},
-        **{f"sigma_{axis}": sigma[:, k] for k, axis in enumerate("XYZ")},
-        "rays": found.rays,
-        "angle": np.degrees(found.angle),
-        "sigma0": found.sigma0,
+        **dict(zip("XYZ", solved.xyz.T, strict=True)),
+        **dict(zip(("sigma_X", "sigma_Y", "sigma_Z"), solved.sigma.T, strict=True)),
+        "rays": solved.rays,
+        "angle": np.degrees(solved.angle),
+        "sigma0": solved.sigma0,
         "suspect": [
             project.cameras[camera].name if bad and camera >= 0 else ""
-            for camera, bad in zip(worst.tolist(), doubtful.tolist(), strict=True)
+            for camera, bad in zip(solved.worst_camera.tolist(), doubtful.tolist(), strict=True)
         ],
-        "status": [PointStatus(code).label for code in found.status.tolist()],
+        "status": [PointStatus(code).label for code in solved.status.tolist()],
     }
     units = dict.fromkeys(("X", "Y", "Z", "sigma_X", "sigma_Y", "sigma_Z"), unit) | {"angle": "deg"}
-    good = np.isfinite(found.xyz[:, 0])
+    good = np.isfinite(solved.xyz[:, 0])
     summary = [f"{int(good.sum())} points"]
-    controlled = np.isfinite(found.sigma0)
+    controlled = np.isfinite(solved.sigma0)
     if controlled.any():
-        weights = np.maximum(2 * found.rays[controlled] - 3, 1)
-        overall = np.sqrt((found.sigma0[controlled] ** 2 * weights).sum() / weights.sum())
+        weights = np.maximum(2 * solved.rays[controlled] - 3, 1)
+        overall = np.sqrt((solved.sigma0[controlled] ** 2 * weights).sum() / weights.sum())
         summary[0] += (
             f", sigma0 {overall:.3g} (1 expected with image coordinates of "
             f"{project.sigma_image * 1000:g} um)"
         )
     for code in PointStatus:
-        count = int((found.status == code).sum())
+        count = int((solved.status == code).sum())
         if count and code != PointStatus.OK:
             summary.append(f"{count} points: {code.label}")
     return columns, units, summary
@@ -193,9 +180,9 @@ def resect_project(
     project = read_project(path)
     unknown = [name for name in cameras if name not in project.camera_names]
     if unknown:
+        have = ", ".join(project.camera_names)
         raise InputError(
-            f"--camera: no camera is called {', '.join(unknown)}; the project has "
-            f"{', '.join(project.camera_names)}."
+            f"--camera: no camera is called {', '.join(unknown)}; the project has {have}."
         )
     objects = project.object_points
     if not objects.ids:
@@ -203,46 +190,48 @@ def resect_project(
     remarks = list(project.remarks)
     results: dict[str, Resection] = {}
     used: dict[str, tuple[str, ...]] = {}
-    adjusted = list(project.cameras)
-    for k, camera in enumerate(project.cameras):
-        if cameras and camera.name not in cameras:
-            continue
-        rows = project.image_points.of_camera(camera.name)
-        ids = [project.image_points.ids[row] for row in rows]
-        place = objects.rows(ids)
-        known = [(row, at) for row, at in zip(rows, place, strict=True) if at >= 0]
-        strange = [name for name, at in zip(ids, place, strict=True) if at < 0]
-        if strange:
-            more = " ..." if len(strange) > SHOWN else ""
-            remarks.append(
-                f"{camera.name}: {len(strange)} image points have no object point of their name "
-                f"and were left out: {', '.join(strange[:SHOWN])}{more}"
-            )
-        image = project.image_points.image[[row for row, _ in known]]
-        sigma = _image_sigma(project, [row for row, _ in known])
-        control = objects.xyz[[at for _, at in known]]
-        result = resect(
-            camera, control, image, project.interface_of(k), estimate=estimate, sigma=sigma
-        )
-        results[camera.name] = result
-        if result.redundancy == 0:
-            remarks.append(
-                f"{camera.name}: {len(known)} points just determine {len(result.names)} "
-                "parameters; nothing checks them, and no precision can be given."
-            )
-        used[camera.name] = tuple(objects.ids[at] for _, at in known)
-        adjusted[k] = result.camera
-        suspects = [
-            name for name, bad in zip(used[camera.name], result.suspects, strict=True) if bad
-        ]
-        if suspects:
-            remarks.append(f"{camera.name}: gross errors? points {', '.join(suspects[:SHOWN])}")
+    for k, name in enumerate(project.camera_names):
+        if not cameras or name in cameras:
+            results[name], used[name], odd = _resected(project, k, estimate)
+            remarks += [f"{name}: {text}" for text in odd]
+    adjusted = [results[c.name].camera if c.name in results else c for c in project.cameras]
     project = replace(project, cameras=tuple(adjusted))
     if residuals is not None:
         _write(residuals, residual_columns(results, used), {"vx": "mm", "vy": "mm"}, overwrite)
     if out is not None:
         write_project(out, project, overwrite=overwrite)
     return Resected(project=project, results=results, used=used, remarks=tuple(remarks))
+
+
+def _resected(
+    project: Project, k: int, estimate: Sequence[str]
+) -> tuple[Resection, tuple[str, ...], list[str]]:
+    """Return the resection of one camera, the points it used, and remarks."""
+    images, objects, remarks = project.image_points, project.object_points, []
+    rows = np.array(images.of_camera(project.camera_names[k]), dtype=np.int64)
+    place = np.array(objects.rows([images.ids[row] for row in rows]), dtype=np.int64)
+    strange = [images.ids[row] for row in rows[place < 0]]
+    if strange:
+        more = " ..." if len(strange) > SHOWN else ""
+        remarks.append(
+            f"{len(strange)} image points have no object point of their name and were left out: "
+            f"{', '.join(strange[:SHOWN])}{more}"
+        )
+    rows, place = rows[place >= 0], place[place >= 0]
+    result = resect(
+        project.cameras[k], objects.xyz[place], images.image[rows], project.interface_of(k),
+        estimate=estimate, sigma=_image_sigma(project, rows),
+    )  # fmt: skip
+    if result.redundancy == 0:
+        remarks.append(
+            f"{len(rows)} points just determine {len(result.names)} parameters; nothing checks "
+            "them, and no precision can be given."
+        )
+    names = tuple(objects.ids[at] for at in place)
+    suspects = [name for name, bad in zip(names, result.suspects, strict=True) if bad]
+    if suspects:
+        remarks.append(f"gross errors? points {', '.join(suspects[:SHOWN])}")
+    return result, names, remarks
 
 
 def residual_columns(
@@ -257,17 +246,14 @@ def residual_columns(
     return {
         "camera": [name for name in names for _ in used[name]],
         "id": [point for name in names for point in used[name]],
-        "vx": v[:, 0],
-        "vy": v[:, 1],
-        "wx": w[:, 0],
-        "wy": w[:, 1],
+        **dict(zip(("vx", "vy", "wx", "wy"), np.hstack([v, w]).T, strict=True)),
     }
 
 
-def resected_as_dict(found: Resected) -> dict[str, Any]:
+def resected_as_dict(resected: Resected) -> dict[str, Any]:
     """Return resections as plain data for ``--json``; angles in degrees."""
     cameras = []
-    for name, result in found.results.items():
+    for name, result in resected.results.items():
         values = {p: _shown(p, result.camera.value(p)) for p in EXTERIOR + INTERIOR}
         sigmas = {p: _shown(p, s) for p, s in result.sigmas.items()}
         cameras.append(
@@ -275,7 +261,7 @@ def resected_as_dict(found: Resected) -> dict[str, Any]:
                 "name": name,
                 "sigma0": result.sigma0,
                 "sigma0_um": result.sigma0 * 1000.0,
-                "points": len(found.used[name]),
+                "points": len(resected.used[name]),
                 "redundancy": result.redundancy,
                 "iterations": result.iterations,
                 "estimated": list(result.names),
@@ -283,23 +269,21 @@ def resected_as_dict(found: Resected) -> dict[str, Any]:
                 "sigma": sigmas,
                 "correlations": result.correlations,
                 "suspects": [
-                    p for p, bad in zip(found.used[name], result.suspects, strict=True) if bad
+                    p for p, bad in zip(resected.used[name], result.suspects, strict=True) if bad
                 ],
             }
         )
-    return {"unit": found.project.unit, "cameras": cameras, "remarks": list(found.remarks)}
+    return {"unit": resected.project.unit, "cameras": cameras, "remarks": list(resected.remarks)}
 
 
 def _shown(name: str, value: float) -> float:
-    return float(np.degrees(value)) if name in _ANGLES else value
+    return float(np.degrees(value)) if name in EXTERIOR[3:] else value
 
 
-def _image_sigma(project: Project, rows: Sequence[int]) -> FloatArray | None:
+def _image_sigma(project: Project, rows: IntArray) -> FloatArray | None:
     """Return standard deviations of image points, None if all are alike."""
-    sigma = project.image_points.sigma
-    if sigma is None or not rows:
-        return None
-    given = sigma[list(rows)]
+    assert project.image_points.sigma is not None
+    given = project.image_points.sigma[rows]
     if np.isnan(given).all():
         return None
     return np.where(np.isnan(given), project.sigma_image, given)

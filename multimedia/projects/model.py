@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -189,9 +189,19 @@ class Project:
         """What each camera looks through."""
         return tuple(self.interface_of(k) for k in range(len(self.cameras)))
 
-    def with_cameras(self, cameras: Sequence[Camera]) -> Project:
-        """Return the project with other orientations of the same cameras."""
-        return replace(self, cameras=tuple(cameras))
+    def camera_index(self, name: str) -> int:
+        """Return the number of the camera called ``name``.
+
+        Raises
+        ------
+        InputError
+            If there is none.
+        """
+        if name not in self.camera_names:
+            raise InputError(
+                f"no camera is called {name!r}; the project has {', '.join(self.camera_names)}."
+            )
+        return self.camera_names.index(name)
 
 
 def refuse_repeated(names: Sequence[str], what: str) -> None:

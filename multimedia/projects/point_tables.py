@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -118,13 +119,12 @@ def read_image_points(path: Path, cameras: Sequence[Camera]) -> tuple[ImagePoint
         return wide
     by_name = {camera.name: camera for camera in cameras}
     names = table.texts("camera")
-    errors: list[CellError] = []
-    for row, name in enumerate(names):
-        if name not in by_name:
-            errors.append(
-                table.error(row, "camera", f"no camera is called {name!r}; known: "
-                            f"{', '.join(list(by_name)[:SHOWN])}.")
-            )  # fmt: skip
+    known = ", ".join(list(by_name)[:SHOWN])
+    errors = [
+        table.error(row, "camera", f"no camera is called {name!r}; known: {known}.")
+        for row, name in enumerate(names)
+        if name not in by_name
+    ]
     if not ({"x", "y"} <= table.present or {"col", "row"} <= table.present):
         raise InputError(f"{path}: neither columns x and y [mm] nor col and row [px] were found.")
     in_mm = {"x", "y"} <= table.present
@@ -154,11 +154,9 @@ def read_image_points(path: Path, cameras: Sequence[Camera]) -> tuple[ImagePoint
 def object_columns(points: ObjectPoints, unit: str) -> dict[str, FloatArray | tuple[str, ...]]:
     """Return the columns of a table of object points."""
     columns: dict[str, FloatArray | tuple[str, ...]] = {"id": points.ids}
-    for k, axis in enumerate("XYZ"):
-        columns[f"{axis} [{unit}]"] = points.xyz[:, k]
+    columns |= {f"{axis} [{unit}]": points.xyz[:, k] for k, axis in enumerate("XYZ")}
     if points.sigma is not None and np.isfinite(points.sigma).any():
-        for k, axis in enumerate("XYZ"):
-            columns[f"sigma_{axis} [{unit}]"] = points.sigma[:, k]
+        columns |= {f"sigma_{axis} [{unit}]": points.sigma[:, k] for k, axis in enumerate("XYZ")}
     if any(points.groups):
         columns["group"] = points.groups
     return columns
@@ -196,20 +194,25 @@ def write_columns(
     if path.suffix.lower() != ".xlsx":
         raise InputError(f"{path}: tables are written as .csv or .xlsx; give one of these endings.")
     from openpyxl import Workbook
-    from openpyxl.styles import Font
 
     from photocore.workbook.newbook import new_workbook
 
     book = Workbook()
-    sheet = book.active
-    sheet.append(list(columns))
-    for cell in sheet[1]:
-        cell.font = Font(bold=True)
-    for row in zip(*columns.values(), strict=True):
-        sheet.append([_cell(value) for value in row])
-    sheet.freeze_panes = "A2"
+    fill_sheet(book.active, list(columns), zip(*columns.values(), strict=True))
     with new_workbook(path, overwrite=overwrite) as temporary:
         book.save(temporary)
+
+
+def fill_sheet(sheet: Any, headings: Sequence[str], rows: Iterable[Sequence[object]]) -> None:
+    """Write a table into an empty sheet: bold headings that stay in sight, then the rows."""
+    from openpyxl.styles import Font
+
+    sheet.append(list(headings))
+    for cell in sheet[1]:
+        cell.font = Font(bold=True)
+    for row in rows:
+        sheet.append([_cell(value) for value in row])
+    sheet.freeze_panes = "A2"
 
 
 def _cell(value: object) -> object:
@@ -238,10 +241,8 @@ def _ids(table: Table) -> tuple[str, ...]:
 
 def _factor(table: Table, key: str, unit: str) -> float:
     """Return what converts a column to ``unit``; 1 where the heading says no length."""
-    found = table.units.get(key, "")
-    if found not in METRES or unit not in METRES:
-        return 1.0
-    return METRES[found] / METRES[unit]
+    given = table.units.get(key, "")
+    return METRES[given] / METRES[unit] if given in METRES and unit in METRES else 1.0
 
 
 def _gathered(table: Table, keys: Sequence[str], unit: str, errors: list[CellError]) -> FloatArray:
@@ -254,10 +255,8 @@ def _gathered(table: Table, keys: Sequence[str], unit: str, errors: list[CellErr
 
 def _sigmas(table: Table) -> FloatArray:
     """Return sigma_x, sigma_y in their own unit; one column serves both."""
-    x, y = table.numbers("sigma_x"), table.numbers("sigma_y")
-    if "sigma_y" not in table.present:
-        y = x
-    return np.column_stack([x, y])
+    second = "sigma_y" if "sigma_y" in table.present else "sigma_x"
+    return np.column_stack([table.numbers("sigma_x"), table.numbers(second)])
 
 
 def _to_mm(camera: Camera, pixels: FloatArray, sigma: FloatArray) -> tuple[FloatArray, FloatArray]:

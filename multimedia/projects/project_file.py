@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from multimedia.media.camera import Camera, Sensor
+from multimedia.media.camera import EXTERIOR, Camera, Sensor
 from multimedia.media.flat_interface import FlatInterface
 from multimedia.media.interfaces import Interfaces
 from multimedia.media.surfaces import Cylinder, Plane, RefractingSurface, Sphere
@@ -36,11 +36,11 @@ from photocore.errors import GeometryError, InputError
 from photocore.output import atomic_path, check_writable
 
 FORMAT = "multimedia-project/1"
-#: Keys of each kind of ray-traced surface.
-_KINDS: Mapping[str, tuple[str, ...]] = {
-    "plane": ("point", "normal"),
-    "sphere": ("centre", "radius"),
-    "cylinder": ("point", "axis", "radius"),
+#: Each kind of ray-traced surface and its keys.
+_KINDS: Mapping[str, tuple[Callable[..., RefractingSurface], tuple[str, ...]]] = {
+    "plane": (Plane, ("point", "normal")),
+    "sphere": (Sphere, ("centre", "radius")),
+    "cylinder": (Cylinder, ("point", "axis", "radius")),
 }
 _HEAD = """\
 # Project of the `multimedia` commands; object lengths in `unit`, image lengths in mm, angles in
@@ -151,9 +151,9 @@ def _toml(path: Path) -> dict[str, Any]:
 
 
 def _project(data: dict[str, Any], folder: Path) -> Project:
-    found = data.pop("format", None)
-    if found != FORMAT:
-        raise InputError(f'format must be "{FORMAT}", found {found!r}.')
+    form = data.pop("format", None)
+    if form != FORMAT:
+        raise InputError(f'format must be "{FORMAT}", found {form!r}.')
     unit = str(data.pop("unit", "m"))
     if unit not in METRES:
         raise InputError(f"unit: {unit!r} is no unit of length; choose {', '.join(METRES)}.")
@@ -176,12 +176,12 @@ def _project(data: dict[str, Any], folder: Path) -> Project:
     objects, images = ObjectPoints(), ImagePoints()
     if "object_points" in data:
         table = folder / str(data.pop("object_points"))
-        objects, said = read_object_points(table, unit=unit)
-        remarks += [f"{table.name}: {text}" for text in said]
+        objects, odd = read_object_points(table, unit=unit)
+        remarks += [f"{table.name}: {text}" for text in odd]
     if "image_points" in data:
         table = folder / str(data.pop("image_points"))
-        images, said = read_image_points(table, cameras)
-        remarks += [f"{table.name}: {text}" for text in said]
+        images, odd = read_image_points(table, cameras)
+        remarks += [f"{table.name}: {text}" for text in odd]
     return Project(
         cameras=cameras,
         media=media,
@@ -233,14 +233,10 @@ def _surfaces(value: Mapping[str, Any], where: str) -> Interfaces:
         kind = str(item.get("kind", "")) if isinstance(item, Mapping) else ""
         if kind not in _KINDS:
             raise InputError(f"{place}: kind must be one of {', '.join(_KINDS)}, found {kind!r}.")
-        _only(item, place, ("kind", "moves_with_camera", *_KINDS[kind]))
-        vectors = {key: _vector(item, key, place, None) for key in _KINDS[kind] if key != "radius"}
-        if kind == "plane":
-            surfaces.append(Plane(**vectors))
-        elif kind == "sphere":
-            surfaces.append(Sphere(**vectors, radius=_number(item, "radius", place)))
-        else:
-            surfaces.append(Cylinder(**vectors, radius=_number(item, "radius", place)))
+        form, keys = _KINDS[kind]
+        _only(item, place, ("kind", "moves_with_camera", *keys))
+        read = {key: _number if key == "radius" else _vector for key in keys}
+        surfaces.append(form(**{key: read[key](item, key, place) for key in keys}))
         moving.append(_flag(item, "moves_with_camera", place))
     indices = value.get("indices")
     if not isinstance(indices, list):
@@ -270,17 +266,13 @@ def _media_data(media: FlatInterface | Interfaces) -> dict[str, Any]:
 
 
 def _surface_data(surface: RefractingSurface) -> dict[str, Any]:
-    kinds = {Plane: "plane", Sphere: "sphere", Cylinder: "cylinder"}
-    kind = kinds.get(type(surface))
-    if kind is None:
-        raise InputError(
-            f"a {type(surface).__name__} cannot be written into a project file; it holds "
-            f"{', '.join(_KINDS)}."
-        )
-    values = {key: getattr(surface, key) for key in _KINDS[kind]}
-    return {"kind": kind} | {
-        k: float(v) if k == "radius" else v.tolist() for k, v in values.items()
-    }
+    for kind, (form, keys) in _KINDS.items():
+        if type(surface) is form:
+            return {"kind": kind} | {k: np.asarray(getattr(surface, k)).tolist() for k in keys}
+    raise InputError(
+        f"a {type(surface).__name__} cannot be written into a project file; it holds "
+        f"{', '.join(_KINDS)}."
+    )
 
 
 _CAMERA_KEYS = ("name", "media", "centre", "omega", "phi", "kappa", "c", "principal_point",
@@ -292,7 +284,7 @@ def _camera(value: Any, number: int) -> tuple[Camera, str]:
     _only(value, where, _CAMERA_KEYS)
     name = str(value.get("name", f"cam{number}"))
     where = f"camera {name}"
-    angles = np.array([_number(value, key, where) for key in ("omega", "phi", "kappa")])
+    angles = np.array([_number(value, key, where) for key in EXTERIOR[3:]])
     if (np.abs(angles) > 720.0).any():
         raise InputError(f"{where}: omega, phi, kappa are in degrees; found {angles.tolist()}.")
     c = _number(value, "c", where)
@@ -305,7 +297,7 @@ def _camera(value: Any, number: int) -> tuple[Camera, str]:
     # Whole turns do not matter, and from_angles takes none.
     turns = np.radians(np.remainder(angles + 180.0, 360.0) - 180.0)
     camera = Camera.from_angles(
-        _vector(value, "centre", where, None),
+        _vector(value, "centre", where),
         *(float(a) for a in turns),
         principal_distance=c,
         principal_point=_vector(value, "principal_point", where, (0.0, 0.0)),
@@ -317,12 +309,9 @@ def _camera(value: Any, number: int) -> tuple[Camera, str]:
 
 
 def _camera_data(camera: Camera, media: str) -> dict[str, Any]:
-    data: dict[str, Any] = {"name": camera.name}
-    if media:
-        data["media"] = media
+    data: dict[str, Any] = {"name": camera.name} | ({"media": media} if media else {})
     data["centre"] = camera.centre.tolist()
-    degrees = np.degrees(camera.angles)
-    data |= {key: float(a) for key, a in zip(("omega", "phi", "kappa"), degrees, strict=True)}
+    data |= dict(zip(EXTERIOR[3:], np.degrees(camera.angles).tolist(), strict=True))
     data["c"] = camera.principal_distance
     data["principal_point"] = camera.principal_point.tolist()
     if not camera.distortion.is_identity:
@@ -344,12 +333,12 @@ def _sensor(value: Any, where: str) -> Sensor:
     pitch = value.get("pitch")
     if isinstance(pitch, int | float):
         value = {**value, "pitch": [pitch, pitch]}
-    found = _vector(value, "pitch", where, None)
-    if (found > 0.2).any():
-        raise InputError(f"{where}: a pitch of {found.tolist()} mm? Typical are 0.002 to 0.03 mm.")
-    origin = _vector(value, "origin", where, None) if "origin" in value else None
-    size = [int(_number(value, key, where)) for key in ("width", "height")]
-    return Sensor(width=size[0], height=size[1], pitch=found, origin=origin)  # type: ignore[arg-type]
+    size = _vector(value, "pitch", where)
+    if (size > 0.2).any():
+        raise InputError(f"{where}: a pitch of {size.tolist()} mm? Typical are 0.002 to 0.03 mm.")
+    origin = _vector(value, "origin", where) if "origin" in value else None
+    width, height = (int(_number(value, key, where)) for key in ("width", "height"))
+    return Sensor(width=width, height=height, pitch=size, origin=origin)  # type: ignore[arg-type]
 
 
 def _distortion(value: Any, where: str, c: float) -> Brown:
@@ -383,35 +372,37 @@ def _only(value: Any, where: str, keys: tuple[str, ...]) -> None:
             raise InputError(f"{where}: unknown key {key!r}.{hint} Known: {', '.join(keys)}.")
 
 
-def _number(value: Mapping[str, Any], key: str, where: str) -> float:
+def _given(value: Mapping[str, Any], key: str, where: str) -> Any:
     if key not in value:
         raise InputError(f"{where}: the key {key!r} is missing.")
-    found = value[key]
-    if not is_finite_number(found):
-        raise InputError(f"{where}: {key} must be a number, found {found!r:.40}.")
-    return float(found)
+    return value[key]
+
+
+def _number(value: Mapping[str, Any], key: str, where: str) -> float:
+    number = _given(value, key, where)
+    if not is_finite_number(number):
+        raise InputError(f"{where}: {key} must be a number, found {number!r:.40}.")
+    return float(number)
 
 
 def _vector(
-    value: Mapping[str, Any], key: str, where: str, default: tuple[float, ...] | None
+    value: Mapping[str, Any], key: str, where: str, default: tuple[float, ...] | None = None
 ) -> Any:
-    if key not in value:
-        if default is None:
-            raise InputError(f"{where}: the key {key!r} is missing.")
-        return np.array(default)
     size = 2 if key in ("principal_point", "pitch", "origin") else 3
-    found = value[key]
+    if key not in value and default is not None:
+        return np.array(default)
+    numbers = _given(value, key, where)
     if (
-        not isinstance(found, list)
-        or len(found) != size
-        or not all(is_finite_number(v) for v in found)
+        not isinstance(numbers, list)
+        or len(numbers) != size
+        or not all(is_finite_number(v) for v in numbers)
     ):
-        raise InputError(f"{where}: {key} must be {size} numbers, found {found!r:.60}.")
-    return np.array(found, dtype=np.float64)
+        raise InputError(f"{where}: {key} must be {size} numbers, found {numbers!r:.60}.")
+    return np.array(numbers, dtype=np.float64)
 
 
 def _flag(value: Mapping[str, Any], key: str, where: str) -> bool:
-    found = value.get(key, False)
-    if not isinstance(found, bool):
-        raise InputError(f"{where}: {key} must be true or false, found {found!r:.40}.")
-    return found
+    flag = value.get(key, False)
+    if not isinstance(flag, bool):
+        raise InputError(f"{where}: {key} must be true or false, found {flag!r:.40}.")
+    return flag

@@ -9,8 +9,8 @@ import pytest
 from scipy.spatial import cKDTree
 
 from bifocal import Pair
-from bifocal.orientation.align_workflow import AlignOptions, LensData, align_photos
-from bifocal.orientation.alignment import SiteMeasures
+from bifocal.orientation.align_workflow import AlignOptions, KnownLens, align_photos
+from bifocal.orientation.control_points import SiteMeasures
 from bifocal.orientation.match_workflow import match_photos
 from bifocal.orientation.matching import MatchSettings
 
@@ -89,7 +89,7 @@ def test_the_photos_alone_and_one_distance_set_up_the_church(data_dir, tmp_path,
     out = tmp_path / "wall.pair.json"
     options = AlignOptions(
         auto=True,
-        lenses=(LensData(lens=lens), LensData(lens=lens)),
+        lenses=(KnownLens(lens=lens), KnownLens(lens=lens)),
         site=SiteMeasures(distance1=geometry["far"]["height_over_plane_m"]),
     )
     made = align_photos(folder / "far.jpg", folder / "near.jpg", out, options)
@@ -103,7 +103,7 @@ def test_the_photos_alone_and_one_distance_set_up_the_church(data_dir, tmp_path,
 
 def test_an_exactly_bifocal_pair_is_recognised(data_dir, tmp_path) -> None:
     folder = data_dir / "semireal_church"
-    lenses = tuple(LensData(focal=focal, sensor_width=22.7) for focal in (36, 18))
+    lenses = tuple(KnownLens(focal=focal, sensor_width=22.7) for focal in (36, 18))
     out = tmp_path / "wall.pair.json"
     options = AlignOptions(auto=True, lenses=lenses, site=SiteMeasures(distance1=18.0))
     pair = align_photos(folder / "d18.png", folder / "d9.png", out, options).pair

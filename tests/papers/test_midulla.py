@@ -10,14 +10,15 @@ from hypothesis import strategies as st
 
 from bifocal import (
     plane_coordinates,
+    rays,
     relief,
     relief_displacement,
     relief_displacements,
     relief_from_displacement,
 )
 from bifocal.precision import (
+    base_factor,
     false_relief_of_scale,
-    lever_arm,
     sigma_relief,
     sigmas,
     uncertainty_radius,
@@ -128,7 +129,7 @@ def test_one_pixel_picks_at_the_rms_radius_give_the_known_sigma(pair, expected):
     assert found == pytest.approx(expected, rel=0.01)
 
 
-def test_sigma_at_the_plane_is_the_lever_arm_over_the_radius():
+def test_sigma_at_the_plane_is_the_base_factor_over_the_radius():
     found = sigma_relief(2.0, 2.0, d1=17.5, d2=9.5, sigma_1=0.0, sigma_2=0.003)
     assert found == pytest.approx(0.003 * 17.5 * 9.5 / 8 / 2.0, rel=1e-14)
 
@@ -159,7 +160,7 @@ def test_sigma_r_of_both_forms_agrees():
 
 
 def test_strongly_different_lenses_are_preferable():
-    assert lever_arm(d1=17.5, d2=9.5) < lever_arm(d1=17.5, d2=14.0) / 3
+    assert base_factor(d1=17.5, d2=9.5) < base_factor(d1=17.5, d2=14.0) / 3
 
 
 @pytest.mark.parametrize(("d2", "expected"), [(9.5, 0.21), (14.0, 0.70)])
@@ -188,4 +189,69 @@ def test_the_area_of_uncertainty_of_the_papers_camera_matches_the_field():
 
 def test_precision_refuses_a_near_camera_farther_than_the_far_one():
     with pytest.raises(GeometryError, match="greater"):
-        lever_arm(d1=9.5, d2=17.5)
+        base_factor(d1=9.5, d2=17.5)
+
+
+#: An ideal pair, a point off the nadir, its relief: what every form of the equations must agree on.
+IDEAL = given(
+    d2=st.floats(0.5, 50), gap=st.floats(0.2, 50), share=st.floats(-2, 0.9),
+    radius=st.floats(0.05, 100), theta=st.floats(-3.1, 3.1),
+)  # fmt: skip
+
+
+@IDEAL
+def test_both_rays_of_an_ideal_pair_give_equation_6(d2, gap, share, radius, theta):
+    d1, r = d2 + gap, share * d2
+    s1, s2 = seen(d1, d1, d2, d2, radius, r)
+    direction, nadir = np.array([np.sin(theta), np.cos(theta)]), np.array([0.3, -0.7])
+    far, near = rays.Foot(nadir, d1), rays.Foot(nadir, d2)
+    q1, q2 = nadir + s1 * direction, nadir + s2 * direction
+    point = np.array([*(nadir + radius * direction), r])
+    np.testing.assert_allclose(rays.plane_position(point, far), q1, rtol=1e-12, atol=1e-12)
+    np.testing.assert_allclose(rays.plane_position(point, near), q2, rtol=1e-12, atol=1e-12)
+    wanted = relief(s1, s2, d1=d1, d2=d2)
+    # |q2 - q1| is what r is read from: it is known to its rounding, the base factor magnifies it.
+    slack = 64 * EPS * (1 + s2) * d1 * d2 / (d1 - d2) / radius * (1 + abs(r))
+    assert rays.relief_of_rays(q1, q2, far, near) == pytest.approx(wanted, abs=slack)
+    assert rays.relief_from_zoom(s2 / s1, d1=d1, d2=d2) == pytest.approx(wanted, abs=slack)
+    assert rays.relief_from_zoom(rays.zoom_factor(r, d1=d1, d2=d2), d1=d1, d2=d2) == pytest.approx(
+        r, abs=slack
+    )
+    np.testing.assert_allclose(rays.point_on_ray(q1, np.array(r), far), point, rtol=0, atol=1e-11)
+
+
+@IDEAL
+def test_magnification_is_equation_1(d2, gap, share, radius, theta):  # noqa: ARG001
+    r = share * d2
+    s = radius * float(rays.magnification(r, d2))
+    # s' = s - e with Eq. (1), and back.
+    assert s - relief_displacement(s, r, d=d2) == pytest.approx(radius, rel=1e-13)
+    assert s * rays.reduction(r, d2) == pytest.approx(radius, rel=1e-13)
+
+
+def test_magnification_is_nan_level_with_the_camera_and_behind_it():
+    assert np.isnan(rays.magnification(np.array([9.5, 10.0]), 9.5)).all()
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+def test_forms_for_images_keep_their_precision(dtype):
+    r = np.array([0.5], dtype)
+    assert rays.magnification(r, 9.5).dtype == dtype
+    assert rays.zoom_factor(r, d1=17.5, d2=9.5).dtype == dtype
+    assert rays.relief_from_zoom(r + 1, d1=17.5, d2=9.5).dtype == dtype
+    assert rays.relief_per_zoom(r, d1=17.5, d2=9.5).dtype == dtype
+
+
+@IDEAL
+def test_the_sigma_of_dense_relief_is_that_of_image_2_alone(d2, gap, share, radius, theta):  # noqa: ARG001
+    d1, r = d2 + gap, share * d2
+    s1, s2 = seen(d1, d1, d2, d2, radius, r)
+    sigma = sigma_relief(s1, s2, d1=d1, d2=d2, sigma_1=0.0, sigma_2=0.001)
+    # k = s2 / s1: an error of s2 is one of k, s1 times smaller.
+    assert rays.relief_per_zoom(r, d1=d1, d2=d2) * 0.001 / s1 == pytest.approx(sigma, rel=1e-9)
+
+
+def test_relief_per_zoom_is_the_base_factor_on_the_plane():
+    assert rays.relief_per_zoom(0.0, d1=17.5, d2=9.5) == pytest.approx(
+        base_factor(d1=17.5, d2=9.5), rel=4 * EPS
+    )

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from photocore.distortion import NAMES, Brown, Convention
+from photocore.distortion import NAMES, Brown, Convention, RadialDivision
 from photocore.errors import InputError
 from tests.rounding import EPS
 
@@ -89,3 +89,24 @@ def test_a_lens_that_folds_the_image_over_gives_nan_not_a_wrong_point():
 def test_scale_far_from_one_is_refused():
     with pytest.raises(InputError, match="scale 100"):
         Brown(scale=100.0)
+
+
+@pytest.mark.parametrize("k", [0.15, 0.0, -0.15])
+def test_the_division_model_by_hand_and_back(k: float) -> None:
+    lens = RadialDivision(k, np.array([500.0, 300.0]), 1000.0)
+    # Seen 400 px off the centre, rho = 0.4: 400 / (1 + 0.16 k).
+    assert lens.undistort([900.0, 300.0]) == pytest.approx([500 + 400 / (1 + 0.16 * k), 300.0])
+    pixels = np.random.default_rng(0).uniform(0, 900, (40, 2))
+    np.testing.assert_allclose(lens.distort(lens.undistort(pixels)), pixels, atol=1e-9)
+
+
+def test_derivatives_of_the_division_model() -> None:
+    centre = np.array([500.0, 300.0])
+    lens = RadialDivision(0.1, centre, 1000.0)
+    pixels = np.random.default_rng(1).uniform(0, 900, (20, 2))
+    for axis, step in enumerate(1e-3 * np.eye(2)):
+        slope = (lens.distort(pixels + step) - lens.distort(pixels - step)) / 2e-3
+        np.testing.assert_allclose(lens.distorted_by_ideal(pixels)[..., axis], slope, atol=1e-8)
+    more, less = (RadialDivision(0.1 + d, centre, 1000.0).undistort(pixels) for d in (1e-6, -1e-6))
+    slope = (more - less) / 2e-6
+    np.testing.assert_allclose(lens.undistorted_by_k(pixels), slope, atol=1e-6)

@@ -9,7 +9,15 @@ import pytest
 import rasterio
 from rasterio.errors import RasterioIOError
 
-from photocore.raster import check_whole, written_whole
+from photocore.errors import InputError
+from photocore.raster import (
+    RasterFile,
+    Window,
+    check_whole,
+    corner_transform,
+    create_geotiff,
+    written_whole,
+)
 
 WIDTH, HEIGHT = 700, 300
 pytestmark = pytest.mark.filterwarnings("ignore::rasterio.errors.NotGeoreferencedWarning")
@@ -72,3 +80,51 @@ def test_what_gdal_says_and_what_it_does_not_say_are_told_alike(tmp_path: Path) 
         written_whole(path, width=WIDTH, height=HEIGHT, bands=2),
     ):
         path.write_bytes(write(path).read_bytes()[:1000])
+
+
+def test_a_raster_comes_back_with_place_names_and_tags(tmp_path: Path) -> None:
+    # The centre of the first pixel is (11, 49): its corner, of which GDAL speaks, is (10, 50).
+    matrix = np.array([[2.0, 0.0, 11.0], [0.0, -2.0, 49.0]])
+    values = np.arange(600 * 530 * 2, dtype=np.float32).reshape(530, 600, 2)
+    with create_geotiff(
+        tmp_path / "a.tif", width=600, height=530, bands=2, dtype="float32", nodata=3.0,
+        transform=corner_transform(matrix), crs="EPSG:32632", names=["h", "s"], tags={"A": "b"},
+    ) as writer:  # fmt: skip
+        writer.write(values[:, :512], column=0)
+        writer.write(values[:, 512:], column=512)
+    with rasterio.open(tmp_path / "a.tif") as file:
+        assert tuple(file.transform)[:6] == (2, 0, 10, 0, -2, 50)
+    with RasterFile(tmp_path / "a.tif", nodata=4.0) as file:
+        assert (file.width, file.height, file.bands, file.dtype) == (600, 530, 2, np.float32)
+        assert (file.names, file.tags["A"], file.nodata) == (("h", "s"), "b", 4.0)
+        assert file.has_position
+        np.testing.assert_array_equal(file.xy_from_pixel, matrix)
+        np.testing.assert_array_equal(file.read(510, 7, 5, 3), values[7:10, 510:515])
+        # Band 1 holds even numbers: 4 is unknown as the reader says, 2 and 6 are not.
+        near = file.read_floats(-1, 0, 6, 1, dtype=np.float64)
+        np.testing.assert_array_equal(near, [[np.nan, 0, 2, np.nan, 6, 8]])
+        assert near.dtype == np.float64
+
+
+def test_a_raster_that_lies_nowhere_says_so(tmp_path: Path) -> None:
+    with create_geotiff(tmp_path / "a.tif", width=3, height=2, bands=1, dtype="uint8") as writer:
+        writer.write(np.ones((2, 3), np.uint8))
+    with RasterFile(tmp_path / "a.tif") as file:
+        assert not file.has_position
+        assert (file.crs, file.nodata, file.masked) == (None, None, False)
+    with pytest.raises(InputError, match="is a folder"):
+        RasterFile(tmp_path)
+
+
+def test_a_damaged_raster_is_refused_where_it_cannot_be_read(tmp_path: Path) -> None:
+    data = write(tmp_path / "a.tif", **TILED).read_bytes()
+    (tmp_path / "cut.tif").write_bytes(data[: len(data) // 2])
+    with (
+        RasterFile(tmp_path / "cut.tif") as file,
+        pytest.raises(InputError, match=r"cut\.tif: cannot be read at column 0, row 0; the"),
+    ):
+        file.read(-5, -5, WIDTH, HEIGHT + 5)
+
+
+def test_a_window_is_widened_on_every_side() -> None:
+    assert Window(10, 20, 30, 40).widened(2) == (8, 18, 34, 44)

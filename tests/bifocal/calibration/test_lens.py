@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import cv2
 import numpy as np
@@ -46,6 +47,21 @@ def test_distortion_is_browns_and_its_inverse_exact():
     seen = BROWN.distort(GRID)
     np.testing.assert_allclose(seen, brown_by_hand(GRID, BROWN), atol=1e-9)
     np.testing.assert_allclose(BROWN.undistort(seen), GRID, atol=1e-8)
+
+
+@pytest.mark.parametrize(
+    ("model", "coefficients"),
+    [
+        ("opencv", [-0.2, 0.06, 1e-3, -5e-4, 0.01]),
+        ("fisheye", [-0.01, 0.002, 1e-3, 0.0]),
+        ("radial", [v for r in range(0, 761, 95) for v in (r, 1 - 8e-8 * r**2)]),
+    ],
+)
+def test_distortion_changes_as_its_derivative_says(model, coefficients):
+    lens = replace(BROWN, model=model, coefficients=coefficients)
+    for axis, step in enumerate(1e-3 * np.eye(2)):
+        slope = (lens.distort(GRID + step) - lens.distort(GRID - step)) / 2e-3
+        np.testing.assert_allclose(lens.distorted_by_ideal(GRID)[..., axis], slope, atol=2e-7)
 
 
 def test_a_radial_profile_goes_both_ways():

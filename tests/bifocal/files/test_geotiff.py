@@ -94,6 +94,20 @@ def test_float_rasters_keep_nan_and_declared_nodata(tmp_path: Path) -> None:
         np.testing.assert_array_equal(reader.read_floats(0, 0, 2, 1), [[0.5, np.nan]])
 
 
+def test_whole_numbers_are_unknown_where_marked_masked_or_beyond_the_edges(tmp_path: Path) -> None:
+    profile = {"driver": "GTiff", "width": 3, "height": 1, "count": 1, "dtype": "int16",
+               "transform": rasterio.Affine(1, 0, 0, 0, -1, 1)}  # fmt: skip
+    with rasterio.open(tmp_path / "n.tif", "w", nodata=-9999, **profile) as file:
+        file.write(np.array([[[4, -9999, 6]]], np.int16))
+    with rasterio.open(tmp_path / "m.tif", "w", **profile) as file:
+        file.write(np.array([[[4, 5, 6]]], np.int16))
+        file.write_mask(np.array([[True, False, True]]))
+    for name in ("n.tif", "m.tif"):
+        with RasterReader(tmp_path / name) as reader:
+            window = reader.read_floats(-1, 0, 4, 2)
+        np.testing.assert_array_equal(window, [[np.nan, 4, np.nan, 6], [np.nan] * 4])
+
+
 def test_overviews_are_inside_the_file(tmp_path: Path) -> None:
     grid = Grid.from_bounds((0, 0, 7.0, 5.0), gsd=0.005)
     with create_raster(

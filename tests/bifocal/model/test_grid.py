@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from bifocal.model.grid import Grid
+from bifocal.model.grid import Grid, cut
 from photocore.errors import InputError
 
 
@@ -32,18 +32,32 @@ def test_tiles_cover_every_pixel_once_and_know_where_they_are() -> None:
     assert (seen == 1).all()
 
 
-def test_snapped_grids_of_one_gsd_fit_without_resampling() -> None:
-    first = Grid.from_bounds((0.0123, 0.0456, 1.0, 1.0), gsd=0.005).snapped()
-    second = Grid.from_bounds((0.5011, -0.3, 2.0, 0.7777), gsd=0.005).snapped()
-    column, row = second.offset_in(first)
-    assert (column, row) == pytest.approx((round(column), round(row)), abs=1e-9)
-    assert first.bounds[0] <= 0.0123
-    assert first.bounds[3] >= 1.0
+def test_an_array_is_cut_with_filling_beyond_its_edges() -> None:
+    array = np.arange(12).reshape(3, 4)
+    np.testing.assert_array_equal(
+        cut(array, (2, 1, 3, 3), -1), [[6, 7, -1], [10, 11, -1], [-1] * 3]
+    )
+    assert (cut(array, (9, 9, 2, 1)) == np.zeros((1, 2))).all()
 
 
-def test_an_already_snapped_grid_does_not_grow() -> None:
-    grid = Grid.from_bounds((-0.35, -0.1, 0.7, 0.95), gsd=0.005)
-    assert grid.snapped().shape == grid.shape
+def test_pixels_of_the_same_lattice_have_a_whole_offset() -> None:
+    grid = Grid(x0=0.0, y0=0.0, gsd=0.1, width=25, height=13)
+    assert grid.window(-3, 4, 5, 6).whole_offset_in(grid) == (-3, 4)
+    assert Grid(x0=0.05, y0=0.0, gsd=0.1, width=5, height=5).whole_offset_in(grid) is None
+    assert Grid(x0=0.0, y0=0.0, gsd=0.11, width=5, height=5).whole_offset_in(grid) is None
+
+
+def test_resampling_finds_every_pixel_in_its_window() -> None:
+    other, grid = (
+        Grid(x0=x, y0=1.0, gsd=g, width=9, height=7) for x, g in ((0.0, 0.1), (0.3, 0.04))
+    )
+    (column, row, width, height), columns, rows = grid.resampling(other, 2)
+    # Pixel (5, 3) of the grid lies at X = 0.5, Y = 0.88: column 5, row 1.2 of the other.
+    assert columns[3, 5] + column == pytest.approx(5.0, abs=1e-6)
+    assert rows[3, 5] + row == pytest.approx(1.2, abs=1e-6)
+    assert columns.min() >= 2
+    assert columns.max() <= width - 3
+    assert rows.max() <= height - 3
 
 
 @pytest.mark.parametrize("bounds", [(0, 0, 0, 1), (1, 0, 0, 1), (0, 0, float("nan"), 1)])

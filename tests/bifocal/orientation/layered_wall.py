@@ -11,7 +11,8 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from bifocal.orientation.pinhole import Pinhole, camera_matrix, rotation_matrix
+from photocore.camera import Pinhole, camera_matrix
+from photocore.rotation import rotation_from_vector
 
 SIZE = (960, 640)
 #: Boards: x, y of the lower left corner, width, height, relief. [m]
@@ -46,7 +47,7 @@ def camera(
     focal = focal or distance / pixel
     matrix = camera_matrix(focal, 1.0, (SIZE[0] - 1) / 2 + shift[0], (SIZE[1] - 1) / 2 + shift[1])
     square_on = np.diag([1.0, -1.0, -1.0])
-    rotation = rotation_matrix(np.deg2rad(turn_deg)) @ square_on
+    rotation = rotation_from_vector(np.deg2rad(turn_deg)) @ square_on
     return Pinhole(matrix, rotation, np.array([*offset, distance]))
 
 

@@ -4,9 +4,11 @@ import cv2
 import numpy as np
 import pytest
 
-from bifocal.orientation.absolute_orientation import PhotoInput, set_up
-from bifocal.orientation.alignment import Control, Interior, SiteMeasures
-from bifocal.orientation.pinhole import project, triangulate
+from bifocal.orientation.absolute_orientation import orient_pair
+from bifocal.orientation.control_points import Control, SiteMeasures
+from bifocal.orientation.interior_orientation import Interior
+from bifocal.orientation.orientation_stages import PhotoInput
+from photocore.camera import project, triangulate
 from photocore.errors import GeometryError
 from tests.bifocal.orientation.layered_wall import BOARDS, SIZE, camera, photograph, relief_at, take
 
@@ -40,22 +42,22 @@ def relief_error(made) -> np.ndarray:
     rng = np.random.default_rng(0)
     xyz = np.column_stack([rng.uniform(-5, 5, (400, 2)) * [1, 0.7], np.zeros(400)])
     xyz[:, 2] = relief_at(xyz)
-    found = triangulate(*made.solution.cameras, project(FAR, xyz), project(NEAR, xyz))
+    found = triangulate(*made.adjusted.cameras, project(FAR, xyz), project(NEAR, xyz))
     return found[:, 2] - xyz[:, 2]
 
 
 def test_the_photos_alone_with_one_distance_give_the_relief(views) -> None:
-    made = set_up(inputs(views), control=Control(), site=SiteMeasures(distance1=16.0))
+    made = orient_pair(inputs(views), control=Control(), site=SiteMeasures(distance1=16.0))
     error = relief_error(made)
     # 0.5 % of the focal ratio is 2 % of relief; boards stand out by 0.3 m.
     assert np.median(np.abs(error)) < 0.008
-    assert made.solution.cameras[1].centre[2] == pytest.approx(9.0, rel=0.01)
+    assert made.adjusted.cameras[1].centre[2] == pytest.approx(9.0, rel=0.01)
 
 
 @pytest.mark.acceptance
 def test_both_distances_square_to_the_wall_give_the_relief(views) -> None:
     site = SiteMeasures(distance1=16.0, distance2=9.0, parallel=True)
-    made = set_up(inputs(views, sigma=0.02), control=Control(), site=site)
+    made = orient_pair(inputs(views, sigma=0.02), control=Control(), site=site)
     assert np.median(np.abs(relief_error(made))) < 0.003
     assert any("parallel" in text for text in made.assumed)
 
@@ -73,10 +75,10 @@ def test_four_wall_points_and_one_relief_point_repair_the_set_up(views) -> None:
         pixels1=project(FAR, xyz) + rng.normal(0, 0.1, (5, 2)),
         pixels2=project(NEAR, xyz) + rng.normal(0, 0.1, (5, 2)),
     )
-    made = set_up(inputs(views, sigma=0.02), control=points, site=SiteMeasures(sigma_pick=0.1))
+    made = orient_pair(inputs(views, sigma=0.02), control=points, site=SiteMeasures(sigma_pick=0.1))
     error = relief_error(made)
     assert np.median(np.abs(error)) < 0.004
-    for found, true in zip(made.solution.cameras, (FAR, NEAR), strict=True):
+    for found, true in zip(made.adjusted.cameras, (FAR, NEAR), strict=True):
         assert found.centre[2] == pytest.approx(true.centre[2], rel=0.02)
 
 
@@ -85,7 +87,7 @@ def test_a_dark_photo_is_matched_all_the_same(views) -> None:
     dark = (views.near * 0.2 + 5).astype(np.uint8)
     first, second = inputs(views)
     second = PhotoInput(grey=dark, interior=second.interior, name="near.jpg")
-    made = set_up((first, second), control=Control(), site=SiteMeasures(distance1=16.0))
+    made = orient_pair((first, second), control=Control(), site=SiteMeasures(distance1=16.0))
     assert np.median(np.abs(relief_error(made))) < 0.012
 
 
@@ -95,17 +97,17 @@ def test_exchanged_photos_are_noticed_when_the_lens_stayed_the_same() -> None:
     far, near = camera(16.0, focal=1400.0), camera(10.0, focal=1400.0, offset=(0.3, 0.0))
     shot = take(far, near, seed=3)
     first, second = inputs(shot)
-    made = set_up((second, first), control=Control(), site=SiteMeasures(distance1=16.0))
+    made = orient_pair((second, first), control=Control(), site=SiteMeasures(distance1=16.0))
     assert made.exchanged
     assert "was" not in made.remarks[0] or made.remarks[0]
-    assert made.solution.cameras[0].centre[2] == pytest.approx(16.0, abs=0.05)
+    assert made.adjusted.cameras[0].centre[2] == pytest.approx(16.0, abs=0.05)
 
 
 def test_one_photo_twice_is_refused(views) -> None:
     first, second = inputs(views)
     twin = PhotoInput(grey=first.grey, interior=second.interior, name="near.jpg")
     with pytest.raises(GeometryError, match="are the same photo"):
-        set_up((first, twin), control=Control(), site=SiteMeasures(distance1=16.0))
+        orient_pair((first, twin), control=Control(), site=SiteMeasures(distance1=16.0))
 
 
 @pytest.mark.acceptance
@@ -114,7 +116,7 @@ def test_two_shots_from_one_place_are_refused(views) -> None:
     first, second = inputs(views)
     twin = PhotoInput(grey=again[:, :-40][:, 40:], interior=second.interior, name="again.jpg")
     with pytest.raises(GeometryError, match=r"same|no parallax|one place"):
-        set_up((first, twin), control=Control(), site=SiteMeasures(distance1=16.0))
+        orient_pair((first, twin), control=Control(), site=SiteMeasures(distance1=16.0))
 
 
 def test_zoom_without_walking_is_called_the_classic_mistake(views) -> None:
@@ -128,17 +130,17 @@ def test_zoom_without_walking_is_called_the_classic_mistake(views) -> None:
         name="zoom.jpg",
     )
     with pytest.raises(GeometryError, match="classic mistake"):
-        set_up((first, second), control=Control(), site=SiteMeasures(distance1=16.0))
+        orient_pair((first, second), control=Control(), site=SiteMeasures(distance1=16.0))
 
 
 @pytest.mark.acceptance
 def test_a_wall_without_relief_is_refused_by_auto_and_taken_with_both_distances() -> None:
     flat = take(FAR, NEAR, seed=5, boards=())
     with pytest.raises(GeometryError, match="no parallax: nothing in the photos stands out"):
-        set_up(inputs(flat), control=Control(), site=SiteMeasures(distance1=16.0))
+        orient_pair(inputs(flat), control=Control(), site=SiteMeasures(distance1=16.0))
     site = SiteMeasures(distance1=16.0, distance2=9.0, parallel=True)
-    made = set_up(inputs(flat), control=Control(), site=site)
-    assert made.solution.cameras[1].centre[2] == pytest.approx(9.0, abs=0.02)
+    made = orient_pair(inputs(flat), control=Control(), site=site)
+    assert made.adjusted.cameras[1].centre[2] == pytest.approx(9.0, abs=0.02)
 
 
 def test_two_different_walls_are_refused(views) -> None:
@@ -147,7 +149,7 @@ def test_two_different_walls_are_refused(views) -> None:
         grey=photograph(NEAR, seed=9), interior=second.interior, name="elsewhere.jpg"
     )
     with pytest.raises(GeometryError, match="too little in common"):
-        set_up((first, other), control=Control(), site=SiteMeasures(distance1=16.0))
+        orient_pair((first, other), control=Control(), site=SiteMeasures(distance1=16.0))
 
 
 def test_a_blurred_photo_is_named(views) -> None:
@@ -155,12 +157,12 @@ def test_a_blurred_photo_is_named(views) -> None:
     soft = cv2.GaussianBlur(views.near, (0, 0), 5.0)
     blurred = PhotoInput(grey=soft, interior=second.interior, name="near.jpg")
     with pytest.raises(GeometryError, match=r"near\.jpg: the photo is blurred"):
-        set_up((first, blurred), control=Control(), site=SiteMeasures(distance1=16.0))
+        orient_pair((first, blurred), control=Control(), site=SiteMeasures(distance1=16.0))
 
 
 def test_without_any_distance_there_is_no_scale(views) -> None:
     with pytest.raises(GeometryError, match="nothing gives the scale"):
-        set_up(inputs(views), control=Control(), site=SiteMeasures())
+        orient_pair(inputs(views), control=Control(), site=SiteMeasures())
 
 
 @pytest.mark.acceptance
@@ -175,8 +177,8 @@ def test_a_length_on_the_wall_gives_the_scale(views) -> None:
         pixels2=np.full((2, 2), np.nan),
         lengths=((0, 1, float(np.linalg.norm(ends[0] - ends[1]))),),
     )
-    made = set_up(inputs(views), control=points, site=SiteMeasures())
-    assert made.solution.cameras[0].centre[2] == pytest.approx(16.0, rel=0.01)
+    made = orient_pair(inputs(views), control=points, site=SiteMeasures())
+    assert made.adjusted.cameras[0].centre[2] == pytest.approx(16.0, rel=0.01)
 
 
 @pytest.mark.acceptance
@@ -191,7 +193,7 @@ def test_equal_distances_are_refused(views) -> None:
         name="beside.jpg",
     )
     with pytest.raises(GeometryError, match="hardly any change of distance"):
-        set_up((first, second), control=Control(), site=SiteMeasures(distance1=16.0))
+        orient_pair((first, second), control=Control(), site=SiteMeasures(distance1=16.0))
 
 
 def test_boards_do_not_overlap() -> None:

@@ -10,9 +10,9 @@ from click.testing import CliRunner
 
 from bifocal import Pair
 from bifocal.cli.main import main
-from bifocal.orientation.alignment import Interior
-from bifocal.orientation.pinhole import project
+from bifocal.orientation.interior_orientation import Interior
 from bifocal.orientation.validation import check_distortion
+from photocore.camera import project
 from photocore.errors import GeometryError
 from tests.bifocal.orientation.layered_wall import camera, relief_at, take
 
@@ -169,6 +169,17 @@ def test_wrong_options_are_explained(folder, options, message) -> None:
     assert result.exit_code == 1
     assert message in result.stderr
     assert "Traceback" not in result.stderr
+
+
+@pytest.mark.parametrize(("column", "photo"), [(4, "far"), (6, "near")])
+def test_a_pick_outside_its_photo_is_refused(folder, column, photo) -> None:
+    lines = (folder / "control.csv").read_text(encoding="utf-8").splitlines()
+    fields = lines[2].split(",")
+    fields[column] = "1200.5"
+    (folder / "out.csv").write_text("\n".join([*lines[:2], ",".join(fields), *lines[3:]]))
+    result = align(folder, "--control", "out.csv", *lens(), out="outside.pair.json")
+    assert result.exit_code == 1
+    assert f'"b" and 0 more lie outside the {photo} photo (960 x 640 px)' in result.stderr
 
 
 def test_a_pair_file_ends_in_json(folder) -> None:

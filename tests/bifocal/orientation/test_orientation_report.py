@@ -3,7 +3,10 @@
 import numpy as np
 import pytest
 
-from bifocal.orientation.orientation_report import set_up_words
+from bifocal.orientation.alignment import standard_deviations
+from bifocal.orientation.orientation_report import orientation_in_words
+from bifocal.orientation.pair_adjustment import AdjustedPair
+from bifocal.orientation.pair_observations import at
 from tests.bifocal.orientation.layered_wall import camera
 
 SURE = {"distance1": 0.01, "distance2": 0.01, "scale": 1e-5, "relief_scale": 0.0}
@@ -11,7 +14,7 @@ SURE = {"distance1": 0.01, "distance2": 0.01, "scale": 1e-5, "relief_scale": 0.0
 
 def words(far=None, near=None, **deviations: float) -> str:
     cameras = (far or camera(16.0), near or camera(8.0))
-    return "\n".join(set_up_words(cameras, {**SURE, **deviations}, sigma_px=0.1))
+    return "\n".join(orientation_in_words(cameras, {**SURE, **deviations}, sigma_px=0.1))
 
 
 @pytest.mark.parametrize("turn", [(0.04, 0.04, 0.0), (0.1, 0.0, 0.0), (0.0, -0.3, 0.0)])
@@ -34,13 +37,16 @@ def test_uncertain_distances_are_part_of_the_precision_of_relief() -> None:
 
 
 def test_relief_scale_is_the_spread_of_relief_under_the_distances_own() -> None:
-    from bifocal.orientation.oriented_pair import _deviations
-
     covariance = np.zeros((25, 25))
-    covariance[9, 9], covariance[20, 20] = 0.3**2, 0.05**2
-    covariance[9, 20] = covariance[20, 9] = 0.2 * 0.3 * 0.05
-    found = _deviations(covariance, (camera(16.0), camera(8.0)))["relief_scale"]
+    rows = [at("Z", 1), at("Z", 2)]
+    covariance[np.ix_(rows, rows)] = [[0.3**2, 0.2 * 0.3 * 0.05], [0.2 * 0.3 * 0.05, 0.05**2]]
+    none = np.zeros(0)
+    adjusted = AdjustedPair(
+        cameras=(camera(16.0), camera(8.0)), covariance=covariance, sigma0=1.0,
+        control_residuals=none, control_test=none, tie_misfit=none, wall_misfit=none,
+    )  # fmt: skip
+    found = standard_deviations(adjusted)["relief_scale"]
     rng = np.random.default_rng(0)
-    drawn = rng.multivariate_normal([16, 8], covariance[np.ix_([9, 20], [9, 20])], 200_000)
+    drawn = rng.multivariate_normal([16, 8], covariance[np.ix_(rows, rows)], 200_000)
     spread = np.std(1 / (1 / drawn[:, 1] - 1 / drawn[:, 0])) / 16.0
     assert found == pytest.approx(spread, rel=0.02)

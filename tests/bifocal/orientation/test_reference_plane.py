@@ -3,10 +3,11 @@
 import numpy as np
 import pytest
 
-from bifocal.orientation.alignment import Interior, SiteMeasures
-from bifocal.orientation.orientation_report import set_up_words
-from bifocal.orientation.pinhole import project
+from bifocal.orientation.control_points import SiteMeasures
+from bifocal.orientation.interior_orientation import Interior
+from bifocal.orientation.orientation_report import orientation_in_words
 from bifocal.orientation.reference_plane import choose_wall, faces, rivals_in_words
+from photocore.camera import project
 from photocore.errors import GeometryError
 from tests.bifocal.orientation.layered_wall import SIZE, camera
 
@@ -80,6 +81,6 @@ def test_one_rough_wall_is_one_face_and_no_warning() -> None:
 
 def test_the_zero_of_relief_is_stated_no_better_than_the_planes_agree() -> None:
     sure = {"distance1": 0.01, "distance2": 0.01}
-    assert not any("zero" in word for word in set_up_words(CAMERAS, sure, sigma_px=0.1))
-    text = set_up_words(CAMERAS, {**sure, "relief_offset": 0.113}, sigma_px=0.1)[-1]
+    assert not any("zero" in word for word in orientation_in_words(CAMERAS, sure, sigma_px=0.1))
+    text = orientation_in_words(CAMERAS, {**sure, "relief_offset": 0.113}, sigma_px=0.1)[-1]
     assert "its zero is certain only to 113 mm" in text

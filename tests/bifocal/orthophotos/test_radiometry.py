@@ -11,11 +11,11 @@ from bifocal.model.grid import Grid
 from bifocal.model.surface import FlatSurface
 from bifocal.orthophotos.radiometry import (
     chromatic_shift,
-    correct_view,
+    corrected_photo,
     devignetted,
     match_exposure,
 )
-from bifocal.orthophotos.rectify import View
+from bifocal.orthophotos.rectify import SourcePhoto
 from photocore.errors import InputError
 
 SIZE = (480, 360)
@@ -31,7 +31,7 @@ def wall() -> np.ndarray:
 
 
 def test_nothing_is_corrected_unless_asked_for() -> None:
-    image, shift, notes = correct_view(wall(), PHOTO)
+    image, shift, notes = corrected_photo(wall(), PHOTO)
     np.testing.assert_array_equal(image, wall())
     assert shift is None
     assert notes == ()
@@ -76,7 +76,7 @@ def test_the_second_photo_takes_the_colours_of_the_first() -> None:
     dark = np.rint(255 * 0.7 * (bright / 255.0) ** 1.2).astype(np.uint8)
     grid = Grid.from_bounds((-2.4, -1.8, 2.4, 1.8), gsd=0.01)
     first, second = (
-        View.prepare(PHOTO, image, number=number, gsd=0.01)
+        SourcePhoto.prepare(PHOTO, image, number=number, gsd=0.01)
         for number, image in ((1, bright), (2, dark))
     )
     matched, note = match_exposure(first, second, FlatSurface(), grid)

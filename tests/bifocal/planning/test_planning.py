@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from bifocal.planning.camera_plan import Sensor
+from bifocal.planning.camera_plan import CameraSensor
 from bifocal.planning.stations import plan_stations
 from photocore.errors import InputError
 
-CANON = Sensor(width=22.7, height=15.1, columns=3072, rows=2048)
+CANON = CameraSensor(width=22.7, height=15.1, columns=3072, rows=2048)
 
 
 def test_the_papers_stations_follow_from_its_lenses_and_scale():
@@ -84,4 +84,4 @@ def test_wishes_that_cannot_be_met_are_named(call, message):
 
 def test_a_sensor_with_swapped_sides_is_noticed():
     with pytest.raises(InputError, match="not square"):
-        Sensor(width=22.7, height=15.1, columns=2048, rows=3072)
+        CameraSensor(width=22.7, height=15.1, columns=2048, rows=3072)

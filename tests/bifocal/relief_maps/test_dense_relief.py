@@ -10,11 +10,9 @@ import pytest
 
 from bifocal import Pair, Quality, dense_relief
 from bifocal.files.images import as_grey
-from bifocal.relief_maps import edges, flow, seed
-from bifocal.relief_maps import forward_projection as splat
-from bifocal.relief_maps import smoothing as smooth
+from bifocal.relief_maps import edges, flow, forward_projection, seed, smoothing
 from bifocal.relief_maps.frame import common_bounds, make_frame, working_grid
-from bifocal.relief_maps.orientation_sigma import setup_sigma
+from bifocal.relief_maps.orientation_sigma import orientation_sigma
 from bifocal.relief_maps.relief_files import hatched
 from photocore.errors import GeometryError, InputError
 from tests.scenes import RICH, Rendering, Scene, SetupErrors, bifocal_cameras, facade, render
@@ -221,7 +219,7 @@ def test_the_coarse_sweep_finds_relief_to_a_few_centimetres():
     assert np.median(error) < 0.06
 
 
-def test_sigma_is_the_lever_times_the_matching_precision_over_the_radius():
+def test_sigma_is_the_base_factor_times_the_matching_precision_over_the_radius():
     frame = small_frame()
     flat = np.zeros(frame.grid.shape, dtype=np.float32)
     sigma = flow.sigma_of_relief(frame, flat, flat + np.float32(0.1))
@@ -233,12 +231,12 @@ def test_sigma_is_the_lever_times_the_matching_precision_over_the_radius():
 def test_the_precision_of_the_set_up_is_added_where_it_is_stated():
     setup = {"standard_deviations": {"scale": 1e-4, "distance1": 0.01, "distance2": 0.02}}
     pair = replace(shot().pair, extra={"setup": setup})
-    sigma = setup_sigma(pair, np.array([0.0, 1.0], dtype=np.float32))
+    sigma = orientation_sigma(pair, np.array([0.0, 1.0], dtype=np.float32))
     # By hand: B 1e-4 = 2.078 mm; per metre of relief 9.5 / (17.5 * 8) * 10 mm = 0.679 mm and
     # 17.5 / (9.5 * 8) * 20 mm = 4.605 mm.
     wanted = [2.078e-3, np.sqrt(2.078**2 + 0.679**2 + 4.605**2) * 1e-3]
     np.testing.assert_allclose(sigma, wanted, rtol=1e-3)
-    assert setup_sigma(shot().pair, np.ones(2, np.float32)).tolist() == [0.0, 0.0]
+    assert orientation_sigma(shot().pair, np.ones(2, np.float32)).tolist() == [0.0, 0.0]
 
 
 def test_flow_of_a_known_zoom_gives_its_relief_and_nothing_across():
@@ -256,7 +254,7 @@ def test_smoothing_quiets_a_flat_wall_and_keeps_a_step():
     wall = np.zeros((80, 80), dtype=np.float32)
     wall[:, 40:] = 0.5
     noisy = wall + rng.normal(0, 0.01, wall.shape).astype(np.float32)
-    quiet = smooth.shrink_noise(noisy, np.full_like(wall, 0.01))
+    quiet = smoothing.shrink_noise(noisy, np.full_like(wall, 0.01))
     assert np.std((quiet - wall)[:, 15:25]) < 0.003
     assert np.abs(quiet - wall)[10:-10, 38:42].max() < 0.06
 
@@ -278,7 +276,7 @@ def test_a_ramp_over_a_step_is_made_sharp():
     slab = (x > 0.8) & (x < 2.2) & (-y > 0.6) & (-y < 1.6)
     relief = np.where(slab, 0.3, 0.0).astype(np.float32)
     blurred = cv2.GaussianBlur(relief, (0, 0), 2.0)
-    sharp = edges.sharpen(frame, blurred, frame.pair.base_factor)
+    sharp = edges.sharpen(frame, blurred)
     assert np.abs(sharp - relief).mean() < 0.75 * np.abs(blurred - relief).mean()
 
 
@@ -289,8 +287,8 @@ def test_hidden_strips_take_the_surface_behind():
     holes = np.zeros(grid.shape, dtype=bool)
     holes[:, 560:575] = True
     r[holes] = np.nan
-    layer = splat.Layer(r, np.zeros_like(r), np.ones(grid.shape, dtype=np.uint8))
-    filled = splat.fill_outwards(layer, holes, grid, np.zeros(2))
+    layer = forward_projection.MapBands(r, np.zeros_like(r), np.ones(grid.shape, dtype=np.uint8))
+    filled = forward_projection.fill_outwards(layer, holes, grid, np.zeros(2))
     middle = slice(200, 312)
     assert filled[middle, 560:575].all()
     np.testing.assert_array_equal(layer.r[middle, 560:575], 0.0)
@@ -301,8 +299,10 @@ def test_relief_beyond_the_outermost_measured_is_forgotten_and_holes_are_kept():
     quality = np.full((200, 200), 3, np.uint8)
     quality[60:, :] = 1
     quality[100:140, 80:120] = 2  # a window pane, surrounded
-    layer = splat.Layer(np.ones((200, 200), np.float32), np.ones((200, 200), np.float32), quality)
-    splat.forget_outside(layer)
+    layer = forward_projection.MapBands(
+        np.ones((200, 200), np.float32), np.ones((200, 200), np.float32), quality
+    )
+    forward_projection.forget_outside(layer)
     assert np.isnan(layer.r[:30]).all()
     assert (layer.quality[:30] == 0).all()
     assert np.isnan(layer.sigma[:30]).all()

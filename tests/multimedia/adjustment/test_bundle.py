@@ -11,8 +11,6 @@ from scipy.spatial.transform import Rotation
 
 from multimedia import Camera, Layers
 from multimedia.adjustment.bundle import bundle_adjust, prepare
-from multimedia.adjustment.bundle_dense import solve_dense
-from multimedia.adjustment.bundle_sparse import redundancy_numbers, solve_sparse
 from multimedia.adjustment.unknowns import ScaleBar, Unknowns
 from multimedia.media.flat_interface import FlatInterface
 from multimedia.media.projection import project
@@ -302,17 +300,17 @@ def test_elimination_and_orthogonal_solution_agree():
             ),
         ),
     )
-    problem, _ = prepare(given, unknowns)
-    dense, _ = solve_dense(problem, what="test")
-    sparse = solve_sparse(problem, what="test")
+    bundle, _ = prepare(given, unknowns)
+    dense = bundle.fit(bundle.start)
+    sparse = bundle.fit(bundle.start, largest=0)
     np.testing.assert_allclose(sparse.state.points, dense.state.points, atol=1e-6)
-    count = problem.dense_count
-    np.testing.assert_allclose(np.diag(sparse.cofactor), np.diag(dense.cofactor)[:count], rtol=1e-5)
-    numbers = dense.redundancy_numbers[: 2 * len(keep)].reshape(-1, 2)
-    np.testing.assert_allclose(redundancy_numbers(problem, sparse), numbers, atol=1e-6)
-    frees = np.argwhere(problem.free)
-    spread = sparse.point_cofactor[frees[:, 0], frees[:, 1], frees[:, 1]]
-    np.testing.assert_allclose(spread, np.diag(dense.cofactor)[count:], rtol=1e-5)
+    np.testing.assert_allclose(np.diag(sparse.cofactor), np.diag(dense.cofactor), rtol=1e-5)
+    np.testing.assert_allclose(sparse.redundancy_numbers, dense.redundancy_numbers, atol=1e-6)
+    free = np.argwhere(bundle.free)
+    spread, expected = (
+        fit.block_cofactor[free[:, 0], free[:, 1], free[:, 1]] for fit in (sparse, dense)
+    )
+    np.testing.assert_allclose(spread, expected, rtol=1e-5)
 
 
 def test_a_free_network_neither_shifts_nor_turns_its_points():
@@ -326,6 +324,23 @@ def test_a_free_network_neither_shifts_nor_turns_its_points():
     turn = arm[:, 0] * moved[:, 1] - arm[:, 1] * moved[:, 0]
     assert abs(turn.mean()) < 1e-5
     assert np.isfinite(result.point_covariance).all()
+
+
+def test_a_large_free_network_neither_shifts_nor_turns_its_cameras():
+    points = some_points(150)
+    given = with_true_cameras(a_project(points=points, noise=0.0005))
+    # The scale is all but free too, since only the thickness of the glass holds it: bars do.
+    bars = tuple(
+        ScaleBar(first=a, second=b, length=float(np.linalg.norm(points[int(a)] - points[int(b)])),
+                 sigma=0.001)
+        for a, b in (("0", "1"), ("2", "3"), ("4", "5"))
+    )  # fmt: skip
+    result = bundle_adjust(given, Unknowns(control="free", scale_bars=bars))
+    before = np.array([camera.centre for camera in given.cameras])
+    moved = np.array([camera.centre for camera in result.project.cameras]) - before
+    # The glass lies in the plane Z = 0: only shifts along it are not felt.
+    np.testing.assert_allclose(moved[:, :2].mean(axis=0), 0, atol=1e-7)
+    assert np.abs(result.project.object_points.xyz - points).max() < 1.0
 
 
 def test_a_plate_of_known_shape_finds_its_pose():

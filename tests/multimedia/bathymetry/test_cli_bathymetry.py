@@ -192,13 +192,13 @@ def test_a_las_cloud_keeps_every_attribute(tmp_path: Path, suffix: str) -> None:
 
 @pytest.mark.parametrize("form", ["ascii", "binary_little_endian", "binary_big_endian"])
 def test_a_ply_cloud_keeps_properties_faces_and_byte_order(tmp_path: Path, form: str) -> None:
-    from multimedia.bathymetry.cloud_ply import PlyCloud, read_ply_mesh
+    from photocore.cloud.ply import PlyCloud, read_ply_mesh
 
     xyz = positions()
     write_ply(tmp_path / "in.ply", xyz, form)
     assert bathymetry(tmp_path / "in.ply", tmp_path / "out.ply")[0] == 0
     cloud = PlyCloud(tmp_path / "out.ply")
-    chunk = next(cloud.chunks(numbers=["q", "water_depth"]))
+    chunk = next(cloud.pieces(numbers=["q", "water_depth"]))
     np.testing.assert_allclose(chunk.xyz, nadir(xyz), atol=1e-12)
     np.testing.assert_array_equal(chunk.numbers["q"], np.arange(len(xyz)) % 251)
     content = (tmp_path / "out.ply").read_bytes()
@@ -494,7 +494,7 @@ def test_bad_dems_are_refused_in_plain_words(tmp_path: Path) -> None:
     assert "25 cells hold 0" in refused(tmp_path, tmp_path / "zero.tif")
     (tmp_path / "text.tif").write_text("no raster", encoding="utf-8")
     assert "not a raster file" in refused(tmp_path, tmp_path / "text.tif")
-    assert "no such file" in refused(tmp_path, tmp_path / "absent.tif")
+    assert "no such raster file" in refused(tmp_path, tmp_path / "absent.tif")
     write_dem(tmp_path / "nowhere.tif", heights, transform=None, crs=None)
     message = refused(tmp_path, tmp_path / "nowhere.tif", "--cameras", tmp_path / "cameras.csv")
     assert "no geotransform" in message
@@ -550,7 +550,7 @@ def test_units_levels_and_sides_that_cannot_be_are_refused(tmp_path: Path) -> No
         (50.0, "no point lies under the water surface"),
         (102_500, "different units"),
         ("low.txt", "neither a height"),
-        ("low.tif", "no such file"),
+        ("low.tif", "no such raster file"),
     ):
         code, _, err = run(*call, "--water-level", level)
         assert code == 1

@@ -192,10 +192,11 @@ def test_what_openptv_cannot_hold_is_refused_by_name(tank_project, tmp_path):
     views = tank_project.cameras
     scaled = replace(views[0], distortion=Brown(scale=1.01))
     with pytest.raises(InputError, match=r"camera cam1.*scale"):
-        write_experiment(tmp_path / "a", tank_project.with_cameras((scaled, *views[1:])))
+        write_experiment(tmp_path / "a", replace(tank_project, cameras=(scaled, *views[1:])))
     with pytest.raises(InputError, match=r"cam1.*sensor"):
         write_experiment(
-            tmp_path / "b", tank_project.with_cameras((replace(views[0], sensor=None), *views[1:]))
+            tmp_path / "b",
+            replace(tank_project, cameras=(replace(views[0], sensor=None), *views[1:])),
         )
     assert not (tmp_path / "a").exists() or not list((tmp_path / "a").iterdir())
 

@@ -153,7 +153,7 @@ def test_existing_files_are_kept_unless_told(tmp_path):
 
 def test_a_camera_without_sensor_writes_millimetres(tmp_path):
     want = full_project()
-    bare = want.with_cameras([replace(camera, sensor=None) for camera in want.cameras])
+    bare = replace(want, cameras=tuple(replace(camera, sensor=None) for camera in want.cameras))
     write_project(tmp_path / "tank.toml", bare)
     assert "x [mm]" in (tmp_path / "tank_image_points.csv").read_text()
     got = read_project(tmp_path / "tank.toml")

@@ -2,22 +2,24 @@
 
 import numpy as np
 import pytest
+from scipy.linalg import rq
 
 from bifocal import Pair, Photo
-from bifocal.orientation.pinhole import (
+from photocore.camera import (
+    PARAMETERS,
     Pinhole,
     camera_matrix,
     fundamental,
-    pinhole_from_plane,
+    fundamental_with_jacobian,
     pixel_from_plane,
     plane_from_pixel,
     plane_transfer,
+    plane_transfer_with_jacobian,
     project,
-    projection_rows,
-    rotation_matrix,
-    tilt,
+    project_with_jacobian,
     triangulate,
 )
+from photocore.rotation import rotation_from_vector
 from tests.rounding import EPS
 
 SQUARE_ON = np.diag([1.0, -1.0, -1.0])
@@ -25,7 +27,7 @@ SQUARE_ON = np.diag([1.0, -1.0, -1.0])
 
 def make(seed: int, distance: float) -> Pinhole:
     rng = np.random.default_rng(seed)
-    turn = rotation_matrix(rng.uniform(-0.5, 0.5, 3))
+    turn = rotation_from_vector(rng.uniform(-0.5, 0.5, 3))
     return Pinhole(
         camera_matrix(2500.0 + 100 * seed, 1.001, 1510.0, 1000.0),
         turn @ SQUARE_ON,
@@ -39,6 +41,19 @@ def photo_of(camera: Pinhole) -> Photo:
         nadir=camera.centre[:2],
         distance=camera.centre[2],
     )
+
+
+def pinhole_from_plane(matrix, nadir, distance) -> Pinhole:
+    """Return the camera that a homography, a nadir and a distance are, by an RQ decomposition."""
+    centre = np.array([nadir[0], nadir[1], distance])
+    columns = np.eye(3)
+    columns[:, 2] = -centre
+    upper, rotation = rq(np.linalg.inv(matrix) @ np.linalg.inv(columns))
+    signs = np.sign(np.diag(upper))
+    upper, rotation = upper * signs, signs[:, None] * rotation
+    if np.linalg.det(rotation) < 0:  # the homography's sign is free, the camera's is not
+        rotation = -rotation
+    return Pinhole(upper / upper[2, 2], rotation, centre)
 
 
 @pytest.mark.parametrize("seed", range(5))
@@ -65,7 +80,7 @@ def test_square_on_camera_by_hand() -> None:
     np.testing.assert_allclose(project(camera, np.array([[1.0, 0.5, 0.0]])), [[300.0, -20.0]])
     # 2 m of relief at 10 m: 10 / 8 times as far from the nadir.
     np.testing.assert_allclose(project(camera, np.array([[1.0, 0.0, 2.0]])), [[350.0, 80.0]])
-    np.testing.assert_allclose(tilt(camera), [0.0, 0.0])
+    np.testing.assert_allclose(camera.tilt, [0.0, 0.0])
     np.testing.assert_allclose(
         pixel_from_plane(camera) @ [1.0, 0.5, 1.0] / -10.0, [-300.0, 20.0, -1.0]
     )
@@ -77,7 +92,7 @@ def test_a_camera_turned_to_the_right_has_positive_tilt() -> None:
     turn = np.array([[np.cos(a), 0, np.sin(a)], [0, 1, 0], [-np.sin(a), 0, np.cos(a)]])
     camera = Pinhole(np.eye(3), SQUARE_ON @ turn, np.array([0.0, 0.0, 1.0]))
     np.testing.assert_allclose(camera.rotation[2], [np.sin(a), 0, -np.cos(a)], atol=4 * EPS)
-    np.testing.assert_allclose(tilt(camera), [np.tan(a), 0.0], atol=4 * EPS)
+    np.testing.assert_allclose(camera.tilt, [np.tan(a), 0.0], atol=4 * EPS)
 
 
 def test_projection_rows_are_the_derivative() -> None:
@@ -87,7 +102,9 @@ def test_projection_rows_are_the_derivative() -> None:
         step = np.zeros(3)
         step[axis] = 1e-6
         slope = (project(camera, xyz + step) - project(camera, xyz - step)) / 2e-6
-        np.testing.assert_allclose(projection_rows(camera, xyz)[:, :, axis], slope, rtol=1e-6)
+        np.testing.assert_allclose(
+            project_with_jacobian(camera, xyz).by_point[:, :, axis], slope, rtol=1e-6
+        )
 
 
 def test_rays_meet_where_the_point_is_and_obey_the_fundamental_matrix() -> None:
@@ -111,7 +128,7 @@ def test_a_plane_is_carried_from_photo_to_photo_also_when_it_slopes() -> None:
 
 
 def test_rotation_of_nothing_is_exactly_nothing() -> None:
-    assert (rotation_matrix(np.zeros(3)) == np.eye(3)).all()
+    assert (rotation_from_vector(np.zeros(3)) == np.eye(3)).all()
 
 
 def test_pair_of_two_pinholes_intersects_their_points() -> None:
@@ -120,3 +137,37 @@ def test_pair_of_two_pinholes_intersects_their_points() -> None:
     xyz = np.random.default_rng(6).uniform(-1, 1, (30, 3))
     found = pair.intersect(project(far, xyz), project(near, xyz))
     np.testing.assert_allclose(found.xyz, xyz, atol=1e-8)
+
+
+@pytest.mark.parametrize("index", range(len(PARAMETERS)), ids=PARAMETERS)
+def test_every_parameter_moves_pixels_lines_and_planes_as_its_derivative_says(index: int) -> None:
+    far, near = make(3, 14.0), make(2, 8.0)
+    plane = np.array([0.1, 0.02, -0.03])
+    xyz = np.array([[0.3, -0.4, 0.5], [-1.0, 0.2, -0.3]])
+    step = np.zeros(len(PARAMETERS))
+    step[index] = h = 1e-3 if PARAMETERS[index] in ("column", "row", "X", "Y", "Z") else 1e-6
+    ahead, behind = far.stepped(step), far.stepped(-step)
+    for value, by in (
+        (lambda cam: project(cam, xyz), project_with_jacobian(far, xyz).by_camera[..., index]),
+        (lambda cam: fundamental(cam, near), fundamental_with_jacobian(far, near)[1][index]),
+        (lambda cam: fundamental(near, cam), fundamental_with_jacobian(near, far)[1][10 + index]),
+        (
+            lambda cam: plane_transfer(cam, near, plane),
+            plane_transfer_with_jacobian(far, near, plane)[1][index],
+        ),
+        (
+            lambda cam: plane_transfer(near, cam, plane),
+            plane_transfer_with_jacobian(near, far, plane)[1][10 + index],
+        ),
+    ):
+        slope = (value(ahead) - value(behind)) / (2 * h)
+        np.testing.assert_allclose(by, slope, atol=1e-6 * np.abs(slope).max())
+
+
+@pytest.mark.parametrize("index", range(3))
+def test_a_moved_plane_moves_its_transfer(index: int) -> None:
+    far, near = make(1, 14.0), make(2, 8.0)
+    plane, step = np.array([0.1, 0.02, -0.03]), 1e-6 * np.eye(3)[index]
+    slope = plane_transfer(far, near, plane + step) - plane_transfer(far, near, plane - step)
+    by = plane_transfer_with_jacobian(far, near, plane)[1][20 + index]
+    np.testing.assert_allclose(by, slope / 2e-6, atol=2e-7 * np.abs(by).max())

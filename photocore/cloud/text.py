@@ -1,20 +1,24 @@
-"""Point clouds as text: any delimiter, decimal comma, columns by heading; other cells untouched."""
+"""Point clouds as text: any delimiter, decimal comma, columns by heading; other cells untouched.
+
+Unlike `photocore.tables`, which reads whole tables, a cloud of any size passes in pieces.
+"""
 
 from __future__ import annotations
 
 import csv
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from itertools import islice
 from pathlib import Path
-from typing import TextIO
+from typing import Any, TextIO
 
 import numpy as np
 
-from multimedia.bathymetry.clouds import CHUNK, Chunk, Cloud, CloudWriter
 from photocore.arrays import FloatArray
+from photocore.cloud.model import PIECE, Cloud, CloudPiece, NewAttributes, PieceWriter
 from photocore.errors import CellError, InputError, WorkbookError
+from photocore.tables.headings import bare
 
 #: Headings of each coordinate and of the columns other commands ask for.
 HEADINGS: dict[str, tuple[str, ...]] = {
@@ -32,31 +36,31 @@ HEADINGS: dict[str, tuple[str, ...]] = {
 DECIMALS = 9
 
 
-class CsvCloud(Cloud):
+class TextCloud(Cloud):
     """A text file with a heading per column, or three or more bare columns X Y Z ..."""
 
     def __init__(self, path: Path) -> None:
-        self.path = path
-        self.remarks: list[str] = []
+        super().__init__(path)
         self._encoding = _encoding_of(path)
         with self._open() as file:
-            first = next((line for line in file if line.strip()), "")
-            second = next((line for line in file if line.strip()), "")
+            lines = (line for line in file if line.strip())
+            first, second = next(lines, ""), next(lines, "")
         if not first:
             raise InputError(f"{path}: the file is empty.")
         self._delimiter = next((mark for mark in ";\t,|" if mark in first), " ")
         self._comma = self._delimiter != "," and bool(
             re.search(r"\d,\d", second or first) and not re.search(r"\d\.\d", second)
         )
-        names = self._split(first)
-        self._headed = not all(_number(name, self._comma) is not None for name in names)
+        names = [name.strip() for name in next(self._split([first]))]
+        self._headed = any(self._number(name) is None for name in names)
         self._names = (
-            names if self._headed else ["X", "Y", "Z", *map(str, range(4, len(names) + 1))]
+            names if self._headed else ["X", "Y", "Z", *map(str, range(4, 1 + len(names)))]
         )
+        places = {bare(name): place for place, name in reversed(list(enumerate(self._names)))}
         self._columns = {
-            key: place
+            key: next(places[form] for form in forms if form in places)
             for key, forms in HEADINGS.items()
-            if (place := self._find(key, forms)) is not None
+            if not places.keys().isdisjoint(forms)
         }
         missing = [key for key in "XYZ" if key not in self._columns]
         if missing or len(names) < 3:
@@ -71,14 +75,10 @@ class CsvCloud(Cloud):
     def _open(self) -> TextIO:
         return self.path.open(encoding=self._encoding, newline="")
 
-    def _split(self, line: str) -> list[str]:
+    def _split(self, lines: Iterator[str] | Sequence[str]) -> Iterator[list[str]]:
         if self._delimiter == " ":
-            return line.split()
-        return [cell.strip() for cell in next(csv.reader([line], delimiter=self._delimiter))]
-
-    def _find(self, key: str, forms: tuple[str, ...]) -> int | None:
-        bare = [re.sub(r"[\[(].*?[\])]|[\s_.#/-]", "", name).lower() for name in self._names]
-        return next((bare.index(form) for form in (key.lower(), *forms) if form in bare), None)
+            return (line.split() for line in lines)
+        return csv.reader(lines, delimiter=self._delimiter)
 
     def _refuse_millimetres(self) -> None:
         for key in "XYZ":
@@ -94,38 +94,36 @@ class CsvCloud(Cloud):
         """Return whether a column exists."""
         return name in self._columns or name in self._names
 
-    def chunks(self, *, numbers: Sequence[str] = (), texts: Sequence[str] = ()) -> Iterator[Chunk]:
+    def pieces(
+        self, *, numbers: Sequence[str] = (), texts: Sequence[str] = ()
+    ) -> Iterator[CloudPiece]:
         """Yield pieces of the file."""
+        wanted = [*"XYZ", *(key for key in numbers if key in self._columns)]
         with self._open() as file:
             rows = self._rows(file)
             if self._headed:
                 next(rows)
-            while piece := list(islice(rows, CHUNK)):
-                keys = [*"XYZ", *(key for key in numbers if key in self._columns)]
+            while piece := list(islice(rows, PIECE)):
                 errors: list[CellError] = []
-                values = {key: self._floats(piece, key, errors) for key in keys}
+                values = {key: self._floats(piece, self._columns[key], errors) for key in wanted}
                 if errors:
                     raise WorkbookError(errors)
-                yield Chunk(
+                yield CloudPiece(
                     xyz=np.column_stack([values.pop(key) for key in "XYZ"]),
                     raw=[cells for _, cells in piece],
                     numbers=values,
                     texts={
-                        k: [cells[self._columns[k]] for _, cells in piece]
-                        for k in texts
-                        if k in self._columns
+                        key: [cells[self._columns[key]] for _, cells in piece]
+                        for key in texts
+                        if key in self._columns
                     },
                 )
 
     def _rows(self, file: TextIO) -> Iterator[tuple[int, list[str]]]:
         """Yield number and cells of each row that holds something."""
-        if self._delimiter == " ":
-            lines: Iterator[list[str]] = (line.split() for line in file)
-        else:
-            lines = csv.reader(file, delimiter=self._delimiter)
         width = len(self._names)
         try:
-            for number, cells in enumerate(lines, start=1):
+            for number, cells in enumerate(self._split(file), start=1):
                 if any(cell.strip() for cell in cells):
                     # Short rows are blank at the end; rows longer than the heading keep their tail.
                     yield number, cells + [""] * (width - len(cells))
@@ -133,69 +131,65 @@ class CsvCloud(Cloud):
             raise InputError(f"{self.path}: cannot be read as a text table ({error}).") from None
 
     def _floats(
-        self, piece: list[tuple[int, list[str]]], key: str, errors: list[CellError]
+        self, piece: list[tuple[int, list[str]]], place: int, errors: list[CellError]
     ) -> FloatArray:
         """Return a column; cells that are no numbers are complained of and become NaN."""
-        place = self._columns[key]
-        values = [_number(cells[place], self._comma) for _, cells in piece]
+        texts = [cells[place] for _, cells in piece]
+        with suppress(ValueError):  # all filled, as most are
+            plain = [text.replace(",", ".") for text in texts] if self._comma else texts
+            return np.array(list(map(float, plain)))
+        values = list(map(self._number, texts))
+        decimal = " with a decimal comma" if self._comma else ""
         errors += [
             CellError(
-                f"found {cells[place]!r}, expected a number"
-                f"{' with a decimal comma' if self._comma else ''}. Mend the cell.",
+                f"found {text!r}, expected a number{decimal}. Mend the cell.",
                 file=str(self.path),
                 cell=f"row {number}",
                 column=self._names[place],
             )
-            for (number, cells), value in zip(piece, values, strict=True)
+            for (number, _), text, value in zip(piece, texts, values, strict=True)
             if value is None
         ]
-        return np.array([np.nan if value is None else value for value in values])
+        return np.array(values, dtype=np.float64)  # None becomes NaN
+
+    def _number(self, text: str) -> float | None:
+        """Return a number, NaN for a blank cell, None for anything else."""
+        try:
+            return float(text.replace(",", ".") if self._comma else text)
+        except ValueError:
+            return None if text.strip() else np.nan
 
     @contextmanager
-    def writer(self, path: Path, extra: Sequence[str]) -> Iterator[CloudWriter]:
-        """Yield a writer of the same dialect."""
+    def _written(self, path: Path, extra: NewAttributes) -> Iterator[PieceWriter]:
+        """Yield a writer of the same dialect; a cell whose number did not change keeps its text."""
         encoding = "utf-8-sig" if self._encoding == "utf-8-sig" else "utf-8"
+        places = [self._columns[key] for key in "XYZ"]
         with path.open("w", encoding=encoding, newline="") as file:
             writer = csv.writer(file, delimiter=self._delimiter, lineterminator="\n")
             if self._headed:
                 writer.writerow([*self._names, *extra])
-            yield _CsvWriter(writer, [self._columns[key] for key in "XYZ"], self._comma)
 
+            def write(piece: CloudPiece, xyz: FloatArray, values: Mapping[str, Any]) -> None:
+                rows = [list(cells) for cells in piece.raw]
+                for axis, place in enumerate(places):
+                    moved = np.flatnonzero(xyz[:, axis] != piece.xyz[:, axis])
+                    for number, text in zip(moved, self._texts(xyz[moved, axis]), strict=True):
+                        rows[number][place] = text
+                for column in values.values():
+                    for row, text in zip(rows, self._texts(column), strict=True):
+                        row.append(text)
+                writer.writerows(rows)
 
-class _CsvWriter:
-    def __init__(self, writer: object, places: list[int], comma: bool) -> None:
-        self._writer, self._places, self._comma = writer, places, comma
+            yield write
 
-    def write(self, chunk: Chunk, xyz: FloatArray, extra: Mapping[str, FloatArray]) -> None:
-        """Write rows; a cell whose number did not change keeps its text."""
-        columns = [list(values) for values in extra.values()]
-        changed = xyz != chunk.xyz
-        for number, cells in enumerate(chunk.raw):
-            out = list(cells)
-            for axis, place in enumerate(self._places):
-                if changed[number, axis]:
-                    out[place] = self._text(xyz[number, axis])
-            out += [self._text(column[number]) for column in columns]
-            self._writer.writerow(out)  # type: ignore[attr-defined]
-
-    def _text(self, value: float | str) -> str:
-        if isinstance(value, str):
-            return value
-        if not np.isfinite(value):
-            return ""
-        text = repr(round(float(value), DECIMALS))
-        return text.replace(".", ",") if self._comma else text
-
-
-def _number(text: str, comma: bool) -> float | None:
-    """Return a number, NaN for a blank cell, None for anything else."""
-    text = text.strip()
-    if not text:
-        return float("nan")
-    try:
-        return float(text.replace(",", ".") if comma else text)
-    except ValueError:
-        return None
+    def _texts(self, values: FloatArray | list[str]) -> list[str]:
+        """Return the cells of a column; unknown numbers are blank."""
+        if isinstance(values, list):
+            return values
+        texts = [
+            repr(round(value, DECIMALS)) if value == value else "" for value in values.tolist()
+        ]
+        return [text.replace(".", ",") for text in texts] if self._comma else texts
 
 
 def _encoding_of(path: Path) -> str:

@@ -1,13 +1,13 @@
-"""Control points and taped lengths from a table."""
+"""Control points and distances measured on site, and their tables."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
 
-from bifocal.orientation.alignment import Control
-from photocore.arrays import FloatArray
+from photocore.arrays import BoolArray, FloatArray
 from photocore.errors import CellError, InputError, WorkbookError
 from photocore.tables import Column, Table, read_table
 
@@ -32,6 +32,71 @@ LENGTHS = (
     Column("length", ("distance", "lunghezza", "distanza", "laenge", "länge", "strecke"),
            required=True, unit="m"),
 )  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Control:
+    """Control points: what was measured on site, and where it is seen.
+
+    Attributes
+    ----------
+    ids : tuple of str
+    xyz : ndarray, shape (n, 3)
+        X, Y, r in the plane frame; NaN where not measured. [m]
+    sigma : ndarray, shape (n, 3)
+        Standard deviations of xyz. [m]
+    pixels1, pixels2 : ndarray, shape (n, 2)
+        Picks in the far and the near photo; NaN where not picked. [px]
+    lengths : tuple of (int, int, float)
+        Taped distances between two of the points: indices and metres.
+    """
+
+    ids: tuple[str, ...] = ()
+    xyz: FloatArray = field(default_factory=lambda: np.zeros((0, 3)))
+    sigma: FloatArray = field(default_factory=lambda: np.zeros((0, 3)))
+    pixels1: FloatArray = field(default_factory=lambda: np.zeros((0, 2)))
+    pixels2: FloatArray = field(default_factory=lambda: np.zeros((0, 2)))
+    lengths: tuple[tuple[int, int, float], ...] = ()
+
+    def __post_init__(self) -> None:
+        count = len(self.ids)
+        shapes = [self.xyz.shape, self.sigma.shape, self.pixels1.shape, self.pixels2.shape]
+        if shapes != [(count, 3), (count, 3), (count, 2), (count, 2)]:
+            raise InputError(f"control: {count} ids but arrays of shape {shapes}.")
+
+    def exchanged(self) -> Control:
+        """Return the same points with far and near photo exchanged."""
+        return replace(self, pixels1=self.pixels2, pixels2=self.pixels1)
+
+    @property
+    def positioned(self) -> BoolArray:
+        """Which points have X and Y, shape (n,)."""
+        return np.asarray(np.isfinite(self.xyz[:, :2]).all(axis=1))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SiteMeasures:
+    """Distances measured on site, None where not measured [m], and a spot of the wall.
+
+    ``wall`` is a pixel (column, row) of the far photo that shows the wall. [px]
+    """
+
+    distance1: float | None = None
+    distance2: float | None = None
+    delta_d: float | None = None
+    sigma: float = 0.02
+    parallel: bool = False
+    sigma_control: float = 0.003
+    sigma_pick: float = 0.5
+    wall: tuple[float, float] | None = None
+
+    @property
+    def distances(self) -> tuple[float | None, float | None]:
+        """Both distances, one of them by the difference where only that was measured. [m]"""
+        d1, d2, delta = self.distance1, self.distance2, self.delta_d
+        if delta:
+            d1, d2 = d1 or (d2 + delta if d2 else None), d2 or (d1 - delta if d1 else None)
+        return d1, d2
 
 
 def read_control(path: Path | str, *, sigma: float, sigma_plane: float, unit: str = "") -> Control:
@@ -94,7 +159,7 @@ def read_lengths(path: Path | str, control: Control) -> Control:
     table = read_table(path, LENGTHS)
     index = {name: number for number, name in enumerate(control.ids)}
     lengths = _metres(table, "length", "")
-    found: list[tuple[int, int, float]] = []
+    taped: list[tuple[int, int, float]] = []
     errors: list[CellError] = []
     for row, ends in enumerate(zip(table.texts("from"), table.texts("to"), strict=True)):
         for key, name in zip(("from", "to"), ends, strict=True):
@@ -104,17 +169,10 @@ def read_lengths(path: Path | str, control: Control) -> Control:
         if not lengths[row] > 0:
             errors.append(table.error(row, "length", "expected a length above zero, in metres."))
         elif ends[0] in index and ends[1] in index:
-            found.append((index[ends[0]], index[ends[1]], float(lengths[row])))
+            taped.append((index[ends[0]], index[ends[1]], float(lengths[row])))
     if errors:
         raise WorkbookError(errors)
-    return Control(
-        ids=control.ids,
-        xyz=control.xyz,
-        sigma=control.sigma,
-        pixels1=control.pixels1,
-        pixels2=control.pixels2,
-        lengths=(*control.lengths, *found),
-    )
+    return replace(control, lengths=(*control.lengths, *taped))
 
 
 def _metres(table: Table, key: str, unit: str) -> FloatArray:

@@ -1,0 +1,39 @@
+"""What every DXF drawing of this package shares: metres, named layers, points, texts."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+
+def new_drawing(
+    layers: Mapping[str, int], *, point_style: int, point_size: float
+) -> tuple[Any, Any]:
+    """Return an empty R2010 drawing in metres and its model space.
+
+    Parameters
+    ----------
+    layers : mapping of str to int
+        Layers and their colours (AutoCAD colour index).
+    point_style : int
+        ``$PDMODE``: 3 a cross, 34 a cross in a circle.
+    point_size : float
+        Of drawn points. [m]
+    """
+    import ezdxf
+    from ezdxf import units
+
+    drawing = ezdxf.new("R2010", setup=True)
+    drawing.units = units.M
+    drawing.header["$PDMODE"] = point_style
+    drawing.header["$PDSIZE"] = point_size
+    for layer, colour in layers.items():
+        drawing.layers.add(layer, color=colour)
+    return drawing, drawing.modelspace()
+
+
+def add_text(model: Any, text: str, place: tuple[float, ...], height: float, layer: str) -> None:
+    """Write a text of one line; ``place`` is its lower left corner. [m]"""
+    model.add_text(
+        text.replace("\n", " "), height=height, dxfattribs={"layer": layer, "insert": place}
+    )

@@ -1,0 +1,450 @@
+"""Least-squares adjustment of the two cameras of a pair from everything that is known of them.
+
+Control points, tie points, wall points, taped distances and what is known of the lenses all enter
+one adjustment with their standard deviations; what an observation does not reach is held by the
+prior, and the covariance says so.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from bifocal.orientation.pair_observations import (
+    CAMERA,
+    NAMES,
+    WALL,
+    PairObservations,
+    PairUnknowns,
+    at,
+)
+from photocore import adjustment
+from photocore.arrays import BoolArray, FloatArray
+from photocore.camera import (
+    PARAMETERS,
+    Pinhole,
+    fundamental_with_jacobian,
+    homogeneous,
+    plane_transfer_with_jacobian,
+    project,
+    project_with_jacobian,
+    ray_on_plane,
+    triangulate,
+)
+from photocore.errors import GeometryError
+
+#: A coordinate that was not measured, as a standard deviation. [m]
+UNKNOWN = 1e6
+#: Rounding error of pixels and metres, as a share of their standard deviations.
+ROUNDING = 1e-9
+#: Relative standard deviation with which one camera body has one aspect.
+SIGMA_ASPECT = 2e-4
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class AdjustedPair(PairUnknowns):
+    """Adjusted cameras.
+
+    Attributes
+    ----------
+    covariance : ndarray, shape (25, 25)
+        Of all `NAMES`; zero where held.
+    sigma0 : float
+        Standard deviation of unit weight.
+    control_residuals : ndarray, shape (n, 4)
+        [px]
+    control_test : ndarray, shape (n,)
+        Misfit of a point over its standard deviation, allowing for its leverage.
+    tie_misfit : ndarray, shape (m,)
+        Epipolar distance of all ties. [px]
+    wall_misfit : ndarray, shape (m,)
+        Distance of all ties from where the wall plane puts them, along the line. [px]
+    """
+
+    covariance: FloatArray
+    sigma0: float
+    control_residuals: FloatArray
+    control_test: FloatArray
+    tie_misfit: FloatArray
+    wall_misfit: FloatArray
+
+    def sigma(self, name: str, camera: int) -> float:
+        """Return the standard deviation of a parameter of camera 1 or 2."""
+        index = at(name, camera)
+        return float(np.sqrt(self.covariance[index, index]))
+
+
+def adjust(observations: PairObservations, start: PairUnknowns) -> AdjustedPair:
+    """Return the adjusted cameras.
+
+    Parameters
+    ----------
+    observations : PairObservations
+    start : PairUnknowns
+        Approximate cameras, distortion and wall plane.
+
+    Raises
+    ------
+    GeometryError
+        If the observations leave a parameter undetermined.
+    """
+    free = observations.estimated
+
+    def equations(state: PairUnknowns) -> tuple[FloatArray, FloatArray]:
+        residuals, jacobian = pair_equations(observations, state)
+        return residuals, jacobian[:, free]
+
+    def advance(state: PairUnknowns, step: FloatArray) -> PairUnknowns:
+        whole = np.zeros(len(NAMES))
+        whole[free] = step
+        return state.stepped(whole)
+
+    names = [name for name, estimated in zip(NAMES, free, strict=True) if estimated]
+    start = PairUnknowns(cameras=start.cameras, radial=start.radial, plane=start.plane)
+    try:
+        fit = adjustment.fit(
+            start, equations, advance, names=names, what="the pair", rounding=ROUNDING
+        )
+    except GeometryError:
+        raise GeometryError(
+            "the observations do not determine the cameras. Measure more control points, spread "
+            "over the photo and off the wall plane, or give the distances."
+        ) from None
+    redundancy = max(fit.redundancy, 1)
+    sigma0 = float(np.sqrt((fit.residuals @ fit.residuals) / redundancy))
+    covariance = np.zeros((len(NAMES), len(NAMES)))
+    covariance[np.ix_(free, free)] = fit.cofactor
+    state = fit.state
+    return AdjustedPair(
+        cameras=state.cameras,
+        radial=state.radial,
+        plane=state.plane,
+        covariance=covariance * max(sigma0, 1.0) ** 2,
+        sigma0=sigma0,
+        control_residuals=_control_residuals(observations, state),
+        control_test=_control_test(observations, state, covariance),
+        tie_misfit=tie_misfit(observations, state),
+        wall_misfit=wall_misfit(observations, state),
+    )
+
+
+def tie_misfit(observations: PairObservations, state: PairUnknowns) -> FloatArray:
+    """Return the signed distance of all ties from their epipolar lines, shape (m,). [px]"""
+    return _epipolar(observations, state, np.ones(len(observations.tie1), dtype=bool))[0]
+
+
+def wall_misfit(observations: PairObservations, state: PairUnknowns) -> FloatArray:
+    """Return how far all ties lie from the wall plane's transfer, shape (m,). [px]"""
+    return _transfer(observations, state, np.ones(len(observations.tie1), dtype=bool))[0]
+
+
+def evaluated(observations: PairObservations, adjusted: AdjustedPair) -> AdjustedPair:
+    """Return an adjusted pair with the misfits of other observations' ties, not adjusted."""
+    return replace(
+        adjusted,
+        tie_misfit=tie_misfit(observations, adjusted),
+        wall_misfit=wall_misfit(observations, adjusted),
+    )
+
+
+def pair_equations(
+    observations: PairObservations, state: PairUnknowns
+) -> tuple[FloatArray, FloatArray]:
+    """Return everything observed against computed in standard deviations, and derivatives."""
+    used, wall = observations.tie_used, observations.tie_used & observations.wall
+    parts = [_priors(observations, state)]
+    if used.any():
+        values, by = _epipolar(observations, state, used)
+        parts.append((values / observations.sigma_tie, by / observations.sigma_tie))
+    if wall.any():
+        values, by = _transfer(observations, state, wall)
+        sigma = observations.sigma_wall[wall]
+        parts.append((values / sigma, by / sigma[:, None]))
+    if observations.control.ids:
+        control = _control(observations, state)
+        parts.append((control.misfit.ravel(), control.by_unknowns.reshape(-1, len(NAMES))))
+        parts.append(_lengths(observations, state, control))
+    residuals = np.concatenate([values for values, _ in parts])
+    jacobian = np.concatenate([by for _, by in parts])
+    lost = ~np.isfinite(residuals)
+    residuals[lost], jacobian[lost] = 1e3, 0.0
+    return residuals, jacobian
+
+
+def _priors(observations: PairObservations, state: PairUnknowns) -> tuple[FloatArray, FloatArray]:
+    """Return the lens's, the tape's and the plane's observations: all but the tilts are linear."""
+    values = state.values()
+    linear: list[tuple[dict[int, float], float, float]] = []
+    tilts, by_tilts = [], []
+    for number, (interior, camera) in enumerate(
+        zip(observations.interiors, state.cameras, strict=True), start=1
+    ):
+        known = [
+            ("focal length", np.log(interior.focal), interior.sigma_focal),
+            ("aspect", np.log(interior.aspect), interior.sigma_aspect),
+            ("column", interior.centre[0], interior.sigma_centre),
+            ("row", interior.centre[1], interior.sigma_centre),
+            ("radial", 0.0, interior.sigma_radial),
+        ]
+        linear += [({at(name, number): 1.0}, value, sigma) for name, value, sigma in known]
+        if observations.sigma_tilt is not None:
+            axis, turn = camera.rotation[2], at("turn X", number)
+            by_turn = np.cross(axis, np.eye(3))
+            by = np.zeros((2, len(NAMES)))
+            by[:, turn : turn + 3] = (
+                -(by_turn[:, :2].T + np.outer(camera.tilt, by_turn[:, 2])) / axis[2]
+            )
+            tilts.append(camera.tilt / observations.sigma_tilt)
+            by_tilts.append(by / observations.sigma_tilt)
+    body = observations.sigma_body
+    same = [("focal length", observations.sigma_zoom), ("column", body), ("row", body)]
+    same += [("aspect", None if body is None else SIGMA_ASPECT)]
+    linear += [
+        ({at(name, 1): 1.0, at(name, 2): -1.0}, 0.0, sigma)
+        for name, sigma in same
+        if sigma is not None
+    ]
+    distances = {
+        "distance1": {at("Z", 1): 1.0},
+        "distance2": {at("Z", 2): 1.0},
+        "delta_d": {at("Z", 1): 1.0, at("Z", 2): -1.0},
+    }
+    linear += [(distances[name], *known) for name, known in observations.measured.items()]
+    if observations.estimated[-1]:
+        sigmas = (observations.sigma_plane, observations.sigma_slope, observations.sigma_slope)
+        linear += [({NAMES.index(name): 1.0}, 0.0, s) for name, s in zip(WALL, sigmas, strict=True)]
+    linear = [row for row in linear if row[2] > 0]
+    jacobian = np.zeros((len(linear), len(NAMES)))
+    for row, (terms, _, sigma) in enumerate(linear):
+        jacobian[row, list(terms)] = np.array(list(terms.values())) / sigma
+    wanted = np.array([value / sigma for _, value, sigma in linear])
+    return (
+        np.concatenate([jacobian @ values - wanted, *tilts]),
+        np.concatenate([jacobian, *by_tilts]),
+    )
+
+
+def _straight(
+    observations: PairObservations, state: PairUnknowns, which: BoolArray
+) -> tuple[tuple[FloatArray, FloatArray], tuple[FloatArray, FloatArray]]:
+    """Return ties freed of the radial distortion, homogeneous, and their derivatives by k."""
+    models = [i.radial(k) for i, k in zip(observations.interiors, state.radial, strict=True)]
+    ties = (observations.tie1[which], observations.tie2[which])
+    straight = [homogeneous(m.undistort(x)) for m, x in zip(models, ties, strict=True)]
+    by_k = [m.undistorted_by_k(x) for m, x in zip(models, ties, strict=True)]
+    return (straight[0], straight[1]), (by_k[0], by_k[1])
+
+
+def _epipolar(
+    observations: PairObservations, state: PairUnknowns, which: BoolArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return the signed (Sampson) distance of ties from their epipolar lines, by `NAMES`. [px]
+
+    Notes
+    -----
+    ``e = x2ᵀ F x1 / |(F x1, Fᵀ x2)|``, of the lines' first two components.
+    """
+    (x1, x2), (x1_by_k, x2_by_k) = _straight(observations, state, which)
+    matrix, by_cameras = fundamental_with_jacobian(*state.cameras)
+    line2, line1 = (x1 @ matrix.T)[:, :2], (x2 @ matrix)[:, :2]
+    length = np.sqrt(np.maximum((line2**2).sum(1) + (line1**2).sum(1), 1e-300))[:, None]
+    misfit = ((x2 @ matrix) * x1).sum(1) / length[:, 0]
+    # e = s / n, so de = (ds - e dn) / n, with dn = (line . d line) / n.
+    share2, share1 = misfit[:, None] * line2 / length, misfit[:, None] * line1 / length
+    left, right = x2.copy(), x1.copy()
+    left[:, :2] -= share2
+    by_matrix = left[:, :, None] * right[:, None, :]
+    by_matrix[:, :, :2] -= x2[:, :, None] * share1[:, None, :]
+    by_matrix /= length[:, :, None]
+    by = np.zeros((len(x1), len(NAMES)))
+    by[:, _CAMERAS] = by_matrix.reshape(-1, 9) @ by_cameras.reshape(-1, 9).T
+    by_x1, by_x2 = line1 - share2 @ matrix[:2, :2], line2 - share1 @ matrix[:2, :2].T
+    by[:, at("radial", 1)] = (by_x1 * x1_by_k).sum(1) / length[:, 0]
+    by[:, at("radial", 2)] = (by_x2 * x2_by_k).sum(1) / length[:, 0]
+    return misfit, by
+
+
+def _transfer(
+    observations: PairObservations, state: PairUnknowns, which: BoolArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return how far ties lie from the wall plane's transfer along the line, by `NAMES`. [px]"""
+    (x1, x2), (x1_by_k, x2_by_k) = _straight(observations, state, which)
+    matrix, by_cameras = fundamental_with_jacobian(*state.cameras)
+    transfer, by_transfer = plane_transfer_with_jacobian(*state.cameras, state.plane)
+    line = (x1 @ matrix.T)[:, :2]
+    carried = x1 @ transfer.T
+    with np.errstate(divide="ignore", invalid="ignore"):
+        mapped = carried[:, :2] / carried[:, 2:]
+        length = np.hypot(line[:, 0], line[:, 1])[:, None]
+        along = np.column_stack([-line[:, 1], line[:, 0]]) / length
+        shift = x2[:, :2] - mapped
+        misfit = (shift * along).sum(1)
+        by_line = np.column_stack([shift[:, 1], -shift[:, 0]]) - misfit[:, None] * line / length
+        by_line /= length
+        by_carried = -np.column_stack([along, -(along * mapped).sum(1)]) / carried[:, 2:]
+    by = np.zeros((len(x1), len(NAMES)))
+    by_matrix = (by_line[:, :, None] * x1[:, None, :]).reshape(-1, 6)
+    by[:, _CAMERAS] = by_matrix @ by_cameras[:, :2].reshape(-1, 6).T
+    by_matrix = (by_carried[:, :, None] * x1[:, None, :]).reshape(-1, 9)
+    by[:, _CAMERAS_AND_WALL] += by_matrix @ by_transfer.reshape(-1, 9).T
+    by_x1 = (by_line @ matrix[:2] + by_carried @ transfer)[:, :2]
+    by[:, at("radial", 1)] = (by_x1 * x1_by_k).sum(1)
+    by[:, at("radial", 2)] = (along * x2_by_k).sum(1)
+    return misfit, by
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _AdjustedControl:
+    """Control points of one state.
+
+    Attributes
+    ----------
+    misfit : ndarray, shape (n, 4)
+        What picks and coordinates contradict each other, in four independent directions; zero in
+        those of picks that are missing or not used. [standard deviations]
+    by_unknowns : ndarray, shape (n, 4, 25)
+    xyz : ndarray, shape (n, 3)
+        Adjusted points. [m]
+    xyz_by_unknowns : ndarray, shape (n, 3, 25)
+    """
+
+    misfit: FloatArray
+    by_unknowns: FloatArray
+    xyz: FloatArray
+    xyz_by_unknowns: FloatArray
+
+
+def _control(
+    observations: PairObservations, state: PairUnknowns, used: BoolArray | None = None
+) -> _AdjustedControl:
+    """Return adjusted points, what their picks leave of misfit, and derivatives.
+
+    Four picks and three measured coordinates meet in the point's three unknowns, which are
+    eliminated: so a metre known to 3 mm pulls less than a pick known to half a pixel.
+
+    Notes
+    -----
+    An orthogonal turn of the seven equations leaves four without the point. The point minimises
+    the square sum of its part, so that its derivative by the cameras is that at the point held.
+    """
+    control, sigma_pick = observations.control, observations.sigma_pick
+    used = observations.pick_used if used is None else used
+    models = [i.radial(k) for i, k in zip(observations.interiors, state.radial, strict=True)]
+    raw = (control.pixels1, control.pixels2)
+    picks = np.concatenate([m.undistort(x) for m, x in zip(models, raw, strict=True)], axis=1)
+    known, sigma = _known_points(observations, state.cameras, picks)
+    xyz = known
+    seen = np.isfinite(picks) & used[:, None]
+    held = np.eye(3) / sigma[:, :, None]
+    for _ in range(3):
+        views = [project_with_jacobian(camera, xyz) for camera in state.cameras]
+        rows = np.concatenate([view.by_point for view in views], axis=1) / sigma_pick
+        misfit = (picks - np.concatenate([view.pixels for view in views], axis=1)) / sigma_pick
+        rows = np.where(seen[:, :, None], np.nan_to_num(rows), 0.0)
+        misfit = np.where(seen, np.nan_to_num(misfit, nan=1e4), 0.0)
+        base, triangle = np.linalg.qr(np.concatenate([rows, held], axis=1), mode="complete")
+        turn, triangle = base.transpose(0, 2, 1), triangle[:, :3]
+        split = turn @ np.concatenate([misfit, (known - xyz) / sigma], axis=1)[..., None]
+        xyz = xyz + np.linalg.solve(triangle, split[:, :3])[..., 0]
+    by = np.zeros((len(xyz), 4, len(NAMES)))
+    for number, (view, model, x) in enumerate(zip(views, models, raw, strict=True)):
+        half, first = slice(2 * number, 2 * number + 2), number * len(CAMERA)
+        by[:, half, first : first + len(PARAMETERS)] = -view.by_camera
+        by[:, half, first + len(PARAMETERS)] = model.undistorted_by_k(x)
+    split_by = turn[:, :, :4] @ np.where(seen[:, :, None], np.nan_to_num(by / sigma_pick), 0.0)
+    return _AdjustedControl(
+        misfit=split[:, 3:, 0],
+        by_unknowns=split_by[:, 3:],
+        xyz=xyz,
+        xyz_by_unknowns=np.linalg.solve(triangle, split_by[:, :3]),
+    )
+
+
+def _known_points(
+    observations: PairObservations, cameras: tuple[Pinhole, Pinhole], picks: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return control points, what was not measured filled in roughly, and their sigmas."""
+    control = observations.control
+    both = triangulate(*cameras, picks[:, :2], picks[:, 2:])
+    first, second = (
+        ray_on_plane(c, p) for c, p in zip(cameras, (picks[:, :2], picks[:, 2:]), strict=True)
+    )
+    single = np.where(np.isfinite(first), first, second)
+    guess = np.where(np.isfinite(both), both, single)
+    flat = control.sigma[:, 2:] < UNKNOWN  # relief known: the plane fixes X and Y better
+    guess = np.where(flat & np.isfinite(single) & (control.xyz[:, 2:] == 0), single, guess)
+    known = np.where(np.isfinite(control.xyz), control.xyz, np.nan_to_num(guess))
+    return known, np.where(np.isfinite(control.xyz), control.sigma, UNKNOWN)
+
+
+def _control_residuals(observations: PairObservations, state: PairUnknowns) -> FloatArray:
+    """Return picks minus the projection of the control points as given, shape (n, 4). [px]"""
+    control = observations.control
+    if not control.ids:
+        return np.zeros((0, 4))
+    xyz = np.where(np.isfinite(control.xyz), control.xyz, _control(observations, state).xyz)
+    parts = [
+        interior.radial(k).undistort(pixels) - project(camera, xyz)
+        for interior, k, pixels, camera in zip(
+            observations.interiors, state.radial, (control.pixels1, control.pixels2),
+            state.cameras, strict=True,
+        )
+    ]  # fmt: skip
+    return np.concatenate(parts, axis=1)
+
+
+def _lengths(
+    observations: PairObservations, state: PairUnknowns, control: _AdjustedControl
+) -> tuple[FloatArray, FloatArray]:
+    """Return the taped distances' residuals; the picks' own noise is part of their weight."""
+    used, far = observations.pick_used, state.cameras[0]
+    lengths = [(a, b, c) for a, b, c in observations.control.lengths if used[a] and used[b]]
+    if not lengths:
+        return np.zeros(0), np.zeros((0, len(NAMES)))
+    first, second, taped = (np.array(column) for column in zip(*lengths, strict=True))
+    between = control.xyz[first] - control.xyz[second]
+    between_by = control.xyz_by_unknowns[first] - control.xyz_by_unknowns[second]
+    length = np.linalg.norm(between, axis=1)
+    pick = 1.41 * far.centre[2] / far.matrix[0, 0] * observations.sigma_pick
+    sigma = float(np.hypot(observations.control.sigma.min(initial=0.003), pick))
+    misfit = (length - taped) / sigma
+    by = np.einsum("ni,nik->nk", between / length[:, None], between_by) / sigma
+    # A pixel on the wall is distance over principal distance; so is the picks' share of sigma.
+    by[:, at("Z", 1)] -= misfit * (pick / sigma) ** 2 / far.centre[2]
+    by[:, at("focal length", 1)] += misfit * (pick / sigma) ** 2
+    return misfit, by
+
+
+def _control_test(
+    observations: PairObservations, state: PairUnknowns, cofactor: FloatArray
+) -> FloatArray:
+    """Return each control point's misfit in standard deviations, as if it had been left out.
+
+    With residual block w, its Jacobian A and the cofactor Q of the parameters,
+    ``T² = wᵀ (I - A Q Aᵀ)⁻¹ w`` per coordinate; unused points are tested against the others.
+    """
+    control, out = observations.control, np.zeros(len(observations.control.ids))
+    if not control.ids:
+        return out
+    adjusted = _control(observations, state)
+    others = _control(observations, state, np.ones(len(control.ids), dtype=bool)).misfit
+    missing = np.isnan(np.concatenate([control.pixels1, control.pixels2], axis=1)).sum(axis=1)
+    for index in np.flatnonzero(missing < 4):
+        if not observations.pick_used[index]:
+            out[index] = np.linalg.norm(others[index]) / np.sqrt(4 - missing[index])
+            continue
+        block = adjusted.by_unknowns[index]
+        # A point that alone determines something has no redundancy: its test says nothing.
+        values, vectors = np.linalg.eigh(np.eye(4) - block @ cofactor @ block.T)
+        parts = (vectors.T @ adjusted.misfit[index]) ** 2
+        usable = values > 0.02
+        count = int(usable.sum() - missing[index])
+        if count > 0:
+            out[index] = np.sqrt((parts[usable] / values[usable]).sum() / count)
+    return out
+
+
+#: Where the cameras' `PARAMETERS` stand in `NAMES`, without and with the wall's.
+_CAMERAS = [at(name, number) for number in (1, 2) for name in PARAMETERS]
+_CAMERAS_AND_WALL = [*_CAMERAS, *(NAMES.index(name) for name in WALL)]

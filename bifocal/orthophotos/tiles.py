@@ -1,0 +1,87 @@
+"""Rasters of a wall written tile by tile: colours or values, and a band of sources."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bifocal.model.grid import Grid
+from photocore.arrays import IntArray
+from photocore.cli import Progress
+from photocore.raster import RasterWriter
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RasterResult:
+    """An orthophoto, a mosaic or a relief map that was made.
+
+    Attributes
+    ----------
+    path : Path
+    grid : Grid
+    shares : dict of str to float
+        Part of the pixels by source, ``none`` for empty ones; of an orthophoto also ``hidden``.
+    remarks : tuple of str
+    """
+
+    path: Path
+    grid: Grid
+    shares: dict[str, float]
+    remarks: tuple[str, ...]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the result for ``--json``."""
+        return {
+            "file": str(self.path),
+            "gsd": self.grid.gsd,
+            "width": self.grid.width,
+            "height": self.grid.height,
+            "bounds": list(self.grid.bounds),
+            "shares": self.shares,
+            "remarks": list(self.remarks),
+        }
+
+
+def write_tiles(
+    writer: RasterWriter,
+    tiles: Iterator[tuple[int, int, NDArray[Any], NDArray[np.integer]]],
+    *,
+    sources: int,
+    masked: bool,
+    progress: Progress,
+    what: str,
+) -> IntArray:
+    """Write all tiles and return how many pixels come from each source, shape (sources,).
+
+    Parameters
+    ----------
+    tiles : iterator of (column, row, image, source)
+        Image of shape (h, w) or (h, w, bands); source (h, w), 0 for empty pixels. The source
+        becomes one more band.
+    sources : int
+        Number of sources, the empty one included.
+    masked : bool
+        Write a validity mask; relief maps say by NaN where they are empty.
+    """
+    counts = np.zeros(sources, np.int64)
+    for column, row, image, source in tiles:
+        mask = source > 0 if masked else None
+        writer.write(with_band(image, source), column=column, row=row, mask=mask)
+        counts += np.bincount(source.ravel(), minlength=sources)
+        progress(int(counts.sum()), writer.pixels, what)
+    return counts
+
+
+def with_band(image: NDArray[Any], band: NDArray[np.integer]) -> NDArray[Any]:
+    """Return an image and one more band, shape (h, w, bands); stored band after band."""
+    layers = image.reshape(*image.shape[:2], -1)
+    stacked = np.empty((layers.shape[2] + 1, *band.shape), image.dtype)
+    for number in range(layers.shape[2]):
+        stacked[number] = layers[:, :, number]
+    stacked[-1] = band
+    return stacked.transpose(1, 2, 0)

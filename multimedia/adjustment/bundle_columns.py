@@ -1,0 +1,150 @@
+"""Which unknown of a bundle adjustment is which column, by name."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from multimedia.adjustment.unknowns import Unknowns
+from multimedia.media.camera import EXTERIOR
+from multimedia.media.flat_interface import FlatInterface
+from multimedia.projects.model import Project
+from photocore.arrays import BoolArray, IntArray
+from photocore.errors import InputError
+
+#: Media parameters that are properties of a material: one value for all media unless named.
+_MATERIAL = ("index", "thickness")
+#: Columns by the name of the parameter.
+Places = Mapping[str, int]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class BundleColumns:
+    """Place of every unknown that is not eliminated.
+
+    Attributes
+    ----------
+    labels : tuple of str
+        One per column.
+    cameras : tuple of mapping of str to int
+        Columns of each camera's exterior and interior parameters; cameras may share some.
+    media : mapping of str to mapping of str to int
+        Columns of the parameters of each media.
+    plates : tuple of mapping of str to int
+        Columns of each plate's pose.
+    points : ndarray of int, shape (p, 3)
+        Column of a coordinate that is not eliminated (ends of scale bars), else -1.
+    """
+
+    labels: tuple[str, ...]
+    cameras: tuple[Places, ...]
+    media: Mapping[str, Places]
+    plates: tuple[Places, ...]
+    points: IntArray
+
+
+def place_columns(
+    project: Project, unknowns: Unknowns, ids: Sequence[str], movable: BoolArray
+) -> BundleColumns:
+    """Return the place of every unknown; refuse names that the project does not have.
+
+    Raises
+    ------
+    InputError
+        Naming an unknown camera, media, media parameter, prior or scale-bar end.
+    """
+    labels: dict[str, int] = {}
+
+    def places(group: str, names: Sequence[str]) -> dict[str, int]:
+        return {name: labels.setdefault(f"{group}:{name}", len(labels)) for name in names}
+
+    strange = set(unknowns.fixed_cameras) - set(project.camera_names)
+    if strange:
+        raise InputError(f"fixed_cameras: there is no camera {', '.join(sorted(strange))}.")
+    exterior = [
+        places(name, () if name in unknowns.fixed_cameras else EXTERIOR)
+        for name in project.camera_names
+    ]
+    interior = [
+        places(_interior_group(name, unknowns.shared_interior), unknowns.interior)
+        for name in project.camera_names
+    ]
+    media = _media_columns(project, unknowns.media, labels)
+    plates = tuple(places(f"plate {plate}", EXTERIOR) for plate in unknowns.plates)
+    points = np.full((len(ids), 3), -1, dtype=np.int64)
+    row_of = {name: row for row, name in enumerate(ids)}
+    for bar in unknowns.scale_bars:
+        for end in (bar.first, bar.second):
+            if end not in row_of:
+                raise InputError(f"scale bar {bar.first}-{bar.second}: no point is called {end}.")
+            moving = movable[row_of[end]]
+            axes = [axis for axis, moves in zip("XYZ", moving, strict=True) if moves]
+            points[row_of[end], moving] = list(places(f"point {end}", axes).values())
+    missing = [label for label in unknowns.priors if label not in labels]
+    if missing:
+        shown = ", ".join(list(labels)[:40])
+        raise InputError(f"priors: {', '.join(missing)} is not estimated; unknowns are {shown}.")
+    return BundleColumns(
+        labels=tuple(labels), cameras=tuple(a | b for a, b in zip(exterior, interior, strict=True)),
+        media=media, plates=plates, points=points,
+    )  # fmt: skip
+
+
+def _interior_group(camera: str, shared: bool | Mapping[str, str]) -> str:
+    """Return the name of a camera's set of interior parameters."""
+    if isinstance(shared, bool):
+        return "interior" if shared else camera
+    return shared.get(camera, camera)
+
+
+def _media_columns(
+    project: Project, wanted: Sequence[str], labels: dict[str, int]
+) -> dict[str, Places]:
+    """Append the media unknowns to labels and return the columns of each media."""
+    used = [name for name in dict.fromkeys(project.media_of) if name]
+    if wanted and not used:
+        raise InputError("media: no camera looks through anything; there is nothing to estimate.")
+    columns: dict[str, dict[str, int]] = {}
+    for item in wanted:
+        who, _, parameter = item.rpartition(":")
+        for owner in [who] if who else used:
+            if owner not in project.media:
+                raise InputError(f"media: there are no media {owner!r}, only {', '.join(used)}.")
+            interface = project.media[owner]
+            if not isinstance(interface, FlatInterface):
+                raise InputError(
+                    f"media: {owner} is ray-traced; only plane-parallel media can be estimated."
+                )
+            allowed = interface.parameter_names
+            if parameter not in allowed:
+                raise InputError(
+                    f"media: {owner} has no {parameter!r}; its parameters are {', '.join(allowed)}."
+                )
+            own = columns.setdefault(owner, {})
+            if parameter in own:
+                raise InputError(f"media: {', '.join(wanted)} names the same unknown twice.")
+            common = not who and parameter.startswith(_MATERIAL)
+            label = parameter if common else f"{owner}:{parameter}"
+            own[parameter] = labels.setdefault(label, len(labels))
+    return dict(columns)
+
+
+def with_common_values(project: Project, wanted: Sequence[str]) -> Project:
+    """Return the project with one start value for parameters that are common to all media."""
+    media = dict(project.media)
+    for item in (name for name in wanted if name.startswith(_MATERIAL) and ":" not in name):
+        flat = {
+            name: interface
+            for name, interface in media.items()
+            if name in project.media_of
+            and isinstance(interface, FlatInterface)
+            and item in interface.parameter_names
+        }
+        values = [interface.value(item) for interface in flat.values()]
+        if len(set(values)) > 1:
+            mean = float(np.mean(values))
+            for name, interface in flat.items():
+                media[name] = interface.stepped([item], [mean - interface.value(item)])
+    return replace(project, media=media)

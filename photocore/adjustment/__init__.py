@@ -1,0 +1,20 @@
+"""The one adjustment: Levenberg-Marquardt with its precision; dense, or with points eliminated."""
+
+from photocore.adjustment.blocks import BlockEquations
+from photocore.adjustment.dense import DenseEquations, undetermined
+from photocore.adjustment.iteration import LARGEST, Fit, correlations, fit, minimise
+from photocore.adjustment.outliers import OUTLIER_LIMIT, huber_weights, standardised
+
+__all__ = [
+    "LARGEST",
+    "OUTLIER_LIMIT",
+    "BlockEquations",
+    "DenseEquations",
+    "Fit",
+    "correlations",
+    "fit",
+    "huber_weights",
+    "minimise",
+    "standardised",
+    "undetermined",
+]

@@ -1,0 +1,229 @@
+"""A pinhole camera: projection with derivatives, and the homography that replaces it on a plane.
+
+The object frame has Z = 0 on the reference plane and Z up towards the cameras, so a camera at
+C = (N, d) with camera matrix K and rotation R (``x_camera = R (P - C)``, z forwards) sees the plane
+through ``pixel ~ K R [e1 e2 -C] (X, Y, 1)``. Conversely that homography together with N and d gives
+K and R back: eight numbers and three are the eleven of a pinhole camera.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple, Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from photocore.arrays import FloatArray
+from photocore.rotation import rotation_from_vector
+
+#: What a camera is differentiated by: logarithms of fx and fy / fx, principal point [px], a small
+#: turn about the object frame's axes [rad], projection centre [m].
+PARAMETERS = (
+    "focal length", "aspect", "column", "row", "turn X", "turn Y", "turn Z", "X", "Y", "Z"
+)  # fmt: skip
+#: The matrices of e_k x v, for the three axes e_k: shape (3, 3, 3).
+CROSS = np.array(
+    [[[0, 0, 0], [0, 0, -1], [0, 1, 0]], [[0, 0, 1], [0, 0, 0], [-1, 0, 0]],
+     [[0, -1, 0], [1, 0, 0], [0, 0, 0]]], dtype=np.float64,
+)  # fmt: skip
+
+
+class LensModel(Protocol):
+    """What bends the rays of a photo: ideal pixels to seen ones and back."""
+
+    def distort(self, pixels: ArrayLike) -> FloatArray:
+        """Return where ideal points are seen, shape (..., 2). [px]"""
+
+    def undistort(self, pixels: ArrayLike) -> FloatArray:
+        """Return where seen points would be without distortion, shape (..., 2). [px]"""
+
+    def distorted_by_ideal(self, pixels: ArrayLike) -> FloatArray:
+        """Return the derivative of `distort` at ideal points, shape (..., 2, 2)."""
+
+
+class Pinhole(NamedTuple):
+    """Camera matrix (3, 3) [px], rotation camera from object frame (3, 3), centre (3,) [m]."""
+
+    matrix: FloatArray
+    rotation: FloatArray
+    centre: FloatArray
+
+    @property
+    def tilt(self) -> FloatArray:
+        """The optical axis' X and Y components per unit towards the plane, shape (2,).
+
+        (0, 0) for an image plane parallel to it; (tan a, 0) for a camera looking a to the right.
+        """
+        axis = self.rotation[2]
+        return axis[:2] / -axis[2]
+
+    def moved(self, rotation: FloatArray, origin: FloatArray) -> Pinhole:
+        """Return the camera in a frame whose axes are the rows of ``rotation``, with new origin."""
+        return self._replace(
+            rotation=self.rotation @ rotation.T, centre=rotation @ (self.centre - origin)
+        )
+
+    def stepped(self, step: FloatArray) -> Pinhole:
+        """Return the camera after adding to its `PARAMETERS`, the turn as a rotation vector."""
+        focal = self.matrix[0, 0] * np.exp(step[0])
+        aspect = self.matrix[1, 1] / self.matrix[0, 0] * np.exp(step[1])
+        return Pinhole(
+            camera_matrix(focal, aspect, *(self.matrix[:2, 2] + step[2:4])),
+            self.rotation @ rotation_from_vector(step[4:7]),
+            self.centre + step[7:10],
+        )
+
+
+class ProjectedPoints(NamedTuple):
+    """Pixels (n, 2) and their derivatives by the point (n, 2, 3) and by `PARAMETERS` (n, 2, 10)."""
+
+    pixels: FloatArray
+    by_point: FloatArray
+    by_camera: FloatArray
+
+
+def camera_matrix(focal: float, aspect: float, column: float, row: float) -> FloatArray:
+    """Return K with fx = focal, fy = focal * aspect and no skew. [px]"""
+    return np.array([[focal, 0.0, column], [0.0, focal * aspect, row], [0.0, 0.0, 1.0]])
+
+
+def pixel_from_plane(camera: Pinhole, plane: FloatArray | None = None) -> FloatArray:
+    """Return the homography from (X, Y, 1) on a plane to pixels, shape (3, 3).
+
+    ``plane`` is (a, b, c) of z = a + b X + c Y; without it the reference plane.
+    """
+    lift = np.diag([1.0, 1.0, 0.0])
+    if plane is not None:
+        lift[2] = plane[1], plane[2], plane[0]
+    lift[:, 2] -= camera.centre
+    return camera.matrix @ camera.rotation @ lift
+
+
+def plane_from_pixel(camera: Pinhole) -> FloatArray:
+    """Return the homography from pixels to the reference plane, largest element 1 in size."""
+    matrix = np.linalg.inv(pixel_from_plane(camera))
+    return matrix / matrix[2, 2] if abs(matrix[2, 2]) > 1e-12 else matrix
+
+
+def project(camera: Pinhole, xyz: FloatArray) -> FloatArray:
+    """Return pixels of points (..., 3), shape (..., 2); NaN for points behind the camera."""
+    seen = (xyz - camera.centre) @ (camera.matrix @ camera.rotation).T
+    depth = seen[..., 2:]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.where(depth > 0, seen[..., :2] / depth, np.nan)
+
+
+def project_with_jacobian(camera: Pinhole, xyz: FloatArray) -> ProjectedPoints:
+    """Return pixels of points (n, 3) with their derivatives; all NaN behind the camera."""
+    mapped = camera.matrix @ camera.rotation
+    away = xyz - camera.centre
+    pixels = project(camera, xyz)
+    depth = (away @ mapped[2])[:, None, None]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        by_point = (mapped[:2] - pixels[:, :, None] * mapped[2]) / depth
+    by_camera = np.zeros((len(xyz), 2, len(PARAMETERS)))
+    offset = pixels - camera.matrix[:2, 2]
+    by_camera[:, :, 0] = offset
+    by_camera[:, 1, 1] = offset[:, 1]
+    by_camera[:, :, 2:4] = np.eye(2)
+    # Turned by a small v the camera sees R (P - C + v x (P - C)): row . (v x a) = (a x row) . v.
+    by_camera[:, :, 4:7] = np.cross(away[:, None], by_point)
+    by_camera[:, :, 7:] = -by_point
+    return ProjectedPoints(pixels, by_point, by_camera)
+
+
+def ray_on_plane(camera: Pinhole, pixels: FloatArray) -> FloatArray:
+    """Return where rays meet the reference plane, as points of relief zero, shape (n, 3)."""
+    ray = homogeneous(pixels) @ np.linalg.inv(camera.matrix).T @ camera.rotation
+    with np.errstate(divide="ignore", invalid="ignore"):
+        reach = np.where(ray[:, 2] < 0, -camera.centre[2] / ray[:, 2], np.nan)
+    points = camera.centre + reach[:, None] * ray
+    points[:, 2] = np.where(np.isfinite(points[:, 0]), 0.0, np.nan)
+    return points
+
+
+def homogeneous(pixels: FloatArray) -> FloatArray:
+    """Return (column, row, 1), shape (n, 3)."""
+    return np.column_stack([pixels, np.ones(len(pixels))])
+
+
+def fundamental(first: Pinhole, second: Pinhole) -> FloatArray:
+    """Return F with x2ᵀ F x1 = 0 for homogeneous pixels of one point, shape (3, 3)."""
+    return fundamental_with_jacobian(first, second)[0]
+
+
+def fundamental_with_jacobian(first: Pinhole, second: Pinhole) -> tuple[FloatArray, FloatArray]:
+    """Return F and its derivatives by both cameras' `PARAMETERS`, shape (20, 3, 3).
+
+    Notes
+    -----
+    With M = K R the rays of pixels x1, x2 are M1⁻¹ x1 and M2⁻¹ x2; they and the base b = C1 - C2
+    lie in one plane: ``F = M2⁻ᵀ [b]x M1⁻¹``.
+    """
+    base = np.einsum("k,kij->ij", first.centre - second.centre, CROSS)
+    rays, by_rays = [], []
+    for camera in (first, second):
+        inverse = np.linalg.inv(camera.matrix @ camera.rotation)
+        rays.append(inverse)
+        by_rays.append(-inverse @ _mapped_by_camera(camera) @ inverse)
+    left, right = rays[1].T, rays[0]
+    by_centre = left @ CROSS @ right
+    by_turned = np.swapaxes(by_rays[1], 1, 2) @ base @ right
+    parts = [left @ base @ by_rays[0], by_centre, by_turned, -by_centre]
+    return left @ base @ right, np.concatenate(parts)
+
+
+def plane_transfer(first: Pinhole, second: Pinhole, plane: FloatArray) -> FloatArray:
+    """Return the homography from pixels 1 to pixels 2 over the plane z = a + b X + c Y."""
+    return pixel_from_plane(second, plane) @ np.linalg.inv(pixel_from_plane(first, plane))
+
+
+def plane_transfer_with_jacobian(
+    first: Pinhole, second: Pinhole, plane: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return `plane_transfer` and its derivatives by both cameras and the plane, (23, 3, 3)."""
+    views = [pixel_from_plane(camera, plane) for camera in (first, second)]
+    back = np.linalg.inv(views[0])
+    transfer = views[1] @ back
+    by_camera, by_plane = [], []
+    for camera, view in zip((first, second), views, strict=True):
+        mapped = camera.matrix @ camera.rotation
+        inner = _mapped_by_camera(camera) @ np.linalg.inv(mapped) @ view
+        by_centre, by_height = np.zeros((3, 3, 3)), np.zeros((3, 3, 3))
+        for axis, column in enumerate((2, 0, 1)):
+            by_centre[axis, :, 2] = -mapped[:, axis]
+            by_height[axis, :, column] = mapped[:, 2]
+        by_camera.append(np.concatenate([inner, by_centre]))
+        by_plane.append(by_height)
+    parts = [-transfer @ by_camera[0], by_camera[1], by_plane[1] - transfer @ by_plane[0]]
+    return transfer, np.concatenate(parts) @ back
+
+
+def _mapped_by_camera(camera: Pinhole) -> FloatArray:
+    """Return the derivatives of K R by the first seven of `PARAMETERS`, shape (7, 3, 3)."""
+    by_matrix = np.zeros((4, 3, 3))
+    by_matrix[0, 0, 0] = camera.matrix[0, 0]
+    by_matrix[:2, 1, 1] = camera.matrix[1, 1]
+    by_matrix[2, 0, 2] = by_matrix[3, 1, 2] = 1.0
+    turned = camera.matrix @ camera.rotation @ CROSS
+    return np.concatenate([by_matrix @ camera.rotation, turned])
+
+
+def triangulate(
+    first: Pinhole, second: Pinhole, pixels1: FloatArray, pixels2: FloatArray
+) -> FloatArray:
+    """Return where two rays meet, shape (n, 3): linear, each equation in units of a pixel."""
+    design, value = [], []
+    for camera, pixels in ((first, pixels1), (second, pixels2)):
+        mapped = camera.matrix @ camera.rotation
+        rows = pixels[:, :, None] * mapped[2] - mapped[:2]
+        design.append(rows)
+        value.append(rows @ camera.centre)
+    rows, side = np.concatenate(design, axis=1), np.concatenate(value, axis=1)
+    normal = np.swapaxes(rows, 1, 2) @ rows
+    known = np.isfinite(normal).all(axis=(1, 2))
+    known[known] = np.linalg.det(normal[known]) > 0
+    xyz = np.full((len(rows), 3), np.nan)
+    right = np.einsum("nij,ni->nj", rows[known], side[known])
+    xyz[known] = np.linalg.solve(normal[known], right[..., None])[..., 0]
+    return xyz
