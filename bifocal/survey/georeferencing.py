@@ -1,4 +1,4 @@
-"""World coordinates from control points: roto-translation with scale, one bad point wall out."""
+"""World coordinates from control points: roto-translation with scale, one bad point found out."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ ALPHA = 0.01
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TransformationModel:
-    """A kind of transformation: how many parameters, how many points it needs, how it is wall."""
+    """A kind of transformation: how many parameters, how many points it needs, how it is found."""
 
     name: str
     parameters: int
