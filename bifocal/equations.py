@@ -114,13 +114,14 @@ def relief(s1: ArrayLike, s2: ArrayLike, *, d1: float, d2: float) -> FloatArray:
     Returns
     -------
     r : ndarray, shape (...)
-        Relief, positive towards the cameras. NaN where undefined: at the nadir point, and where
-        the two rays are parallel (s1 / d1 = s2 / d2). [unit of d1, d2]
+        Relief, positive towards the cameras. NaN where undefined: at the nadir point, for a
+        negative distance, and where the two rays do not meet before the near camera
+        (s1 / d1 >= s2 / d2). [unit of d1, d2]
 
     Raises
     ------
     GeometryError
-        If d1 equals d2: the two displacements are then always equal.
+        If d1 is not above d2: camera 1 is the far one.
     InputError
         If d1 or d2 is not a positive number.
 
@@ -145,7 +146,8 @@ def relief(s1: ArrayLike, s2: ArrayLike, *, d1: float, d2: float) -> FloatArray:
     d1, d2 = _distances(d1, d2)
     rate = s2 / d2 - s1 / d1
     with np.errstate(divide="ignore", invalid="ignore"):
-        return np.where(rate == 0, np.nan, (s2 - s1) / rate)  # Eq. (6)
+        # r - d2 = -s1 (d1 - d2) / (d1 rate): only a positive rate meets before camera 2.
+        return np.where((s1 > 0) & (rate > 0), (s2 - s1) / rate, np.nan)  # Eq. (6)
 
 
 def relief_displacements(
@@ -230,10 +232,15 @@ def plane_coordinates(
 
 
 def _distances(d1: float, d2: float) -> tuple[float, float]:
-    """Return both distances as floats, refusing equal ones."""
+    """Return both distances as floats, the far camera's first."""
     d1, d2 = positive(d1, "d1", unit="m"), positive(d2, "d2", unit="m")
     if d1 == d2:
         raise GeometryError(
             f"d1 and d2 are both {d1:g} m: the two photos must be taken from different distances."
+        )
+    if d1 < d2:
+        raise GeometryError(
+            f"d1 = {d1:g} m is shorter than d2 = {d2:g} m, but camera 1 is the far one: exchange "
+            "the photos together with their distances."
         )
     return d1, d2

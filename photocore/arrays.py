@@ -17,6 +17,9 @@ IntArray = NDArray[np.int64]
 BoolArray = NDArray[np.bool_]
 ByteArray = NDArray[np.uint8]
 
+#: Nothing measured is larger, and squares of squares of it still are numbers.
+LARGEST = 1e15
+
 
 def as_floats(value: ArrayLike, name: str) -> FloatArray:
     """Return value as a float64 array.
@@ -79,19 +82,38 @@ def read_only(value: ArrayLike, name: str, *, shape: tuple[int, ...] | None = No
 
 
 def positive(value: float, name: str, *, unit: str = "") -> float:
-    """Return value as a float, refusing anything that is not a finite number above zero.
+    """Return value as a float, refusing anything that is not above zero, or beyond `LARGEST`.
 
     Raises
     ------
     InputError
         Otherwise.
     """
+    return _within(value, name, unit, np.nextafter(0.0, 1.0), "above zero")
+
+
+def not_negative(value: float, name: str, *, unit: str = "") -> float:
+    """Return value as a float, refusing anything that is not zero or more, or beyond `LARGEST`.
+
+    Raises
+    ------
+    InputError
+        Otherwise.
+    """
+    return _within(value, name, unit, 0.0, "zero or more")
+
+
+def _within(value: float, name: str, unit: str, least: float, words: str) -> float:
+    """Return one number from ``least`` to `LARGEST`."""
     array = as_floats(value, name)
     if array.size != 1:
         raise InputError(f"{name}: expected one number, found shape {array.shape}.")
     number = float(array.item())
-    if not (np.isfinite(number) and number > 0):
-        raise InputError(f"{name}: must be above zero{unit and f' [{unit}]'}, got {value}.")
+    if not least <= number <= LARGEST:
+        raise InputError(
+            f"{name}: must be {words}{unit and f' [{unit}]'} and no more than {LARGEST:g}, "
+            f"got {value}."
+        )
     return number
 
 

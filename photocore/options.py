@@ -12,9 +12,9 @@ from typing import Any, TypeVar
 
 import click
 
+from photocore.arrays import LARGEST
+
 Command = TypeVar("Command", bound=Callable[..., Any])
-#: Nothing measured is larger, and squares of squares of it still are numbers.
-LARGEST = 1e15
 FILE = click.Path(path_type=Path)
 
 overwrite = click.option("--overwrite", is_flag=True, help="Replace existing files.")

@@ -15,13 +15,15 @@ from bifocal.model.flags import SIGMA_PIXEL, FlagLimits
 from bifocal.model.intersection import Intersection, PlanePicks, intersect
 from bifocal.model.lens import Lens
 from bifocal.precision import base_factor
-from photocore.arrays import FloatArray, as_points, positive, read_only
+from photocore.arrays import FloatArray, as_points, not_negative, positive, read_only
 from photocore.errors import GeometryError, InputError
 from photocore.jsonfile import read_object, write_object
 
 FORMAT = "bifocal-pair/1"
 
 
+#: No wall is photographed from further away, nor has coordinates beyond. [m]
+FARTHEST, OUTERMOST = 1e5, 1e8
 #: Numbers of a photo that the pair file may hold, with their units.
 _OPTIONAL = {"sigma_pixel": "px", "principal_distance": "mm", "pixel_size": "mm"}
 
@@ -73,6 +75,12 @@ class Photo:
         set_(self, "plane_from_pixel", matrix)
         set_(self, "nadir", read_only(self.nadir, "nadir", shape=(2,)))
         set_(self, "distance", positive(self.distance, "distance", unit="m"))
+        for name, most in (("nadir", OUTERMOST), ("distance", FARTHEST)):
+            if np.max(np.abs(getattr(self, name))) > most:
+                raise InputError(
+                    f"{name}: {getattr(self, name)} m is beyond reason (more than {most:g} m); "
+                    "check the number and its unit, metres."
+                )
         for name, unit in _OPTIONAL.items():
             value = getattr(self, name)
             set_(self, name, None if value is None else positive(value, name, unit=unit))
@@ -111,7 +119,8 @@ class Photo:
 
     def precision(self, sigma_px: float | None = None) -> float:
         """Return the measuring precision: as given, else the photo's own, else 0.5. [px]"""
-        return positive(sigma_px or self.sigma_pixel or SIGMA_PIXEL, "sigma_px", unit="px")
+        given = self.sigma_pixel if sigma_px is None else sigma_px
+        return positive(SIGMA_PIXEL if given is None else given, "sigma_px", unit="px")
 
     def picks(self, pixels: FloatArray, sigma_px: float | None = None) -> PlanePicks:
         """Return picks carried to the plane, of the given precision or else the photo's own."""
@@ -398,7 +407,7 @@ class Pair:
         Raises
         ------
         InputError
-            If the two arrays differ in shape.
+            If the two arrays differ in shape, or a precision is impossible.
 
         Notes
         -----
@@ -413,11 +422,15 @@ class Pair:
             raise InputError(
                 f"pixels1 {first.shape} and pixels2 {second.shape} must both have shape (n, 2)."
             )
+        if sigma_r_max is not None:
+            positive(sigma_r_max, "sigma_r_max", unit="m")
+        common = {"d1": sigma_d1, "d2": sigma_d2, "scale": sigma_scale, "nadir": sigma_nadir}
+        d1, d2, scale, nadir = (not_negative(v, f"sigma_{k}") for k, v in common.items())
         return intersect(
             self.image1.picks(first, sigma_px),
             self.image2.picks(second, sigma_px),
             limits=FlagLimits(sigma_r_max=sigma_r_max),
-            sigma_orientation=(sigma_d1, sigma_d2, sigma_scale, sigma_nadir),
+            sigma_orientation=(d1, d2, scale, nadir),
         )
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -76,9 +77,8 @@ def solve_points(
         radii = _measured_radii(first, second, points, sigma_px)
     s1, s2, d1, d2 = radii.s1, radii.s2, first.distance, second.distance
     den = s2 / d2 - s1 / d1
-    # den > 0 is the same as r < d2: r - d2 = -s1 (d1 - d2) / (d1 den).
-    meet = (s1 > 0) & (den * (d1 - d2) > 0)
-    r = np.where(meet, relief(s1, s2, d1=d1, d2=d2), np.nan)  # Eq. (6)
+    (d_far, far), (d_near, near) = _far_first((d1, s1), (d2, s2))
+    r = relief(far, near, d1=d_far, d2=d_near)  # Eq. (6)
     e1, e2 = (  # Eqs. (1) and (3)
         relief_displacement(own, r, d=d) for own, d in ((radii.own1, d1), (radii.own2, d2))
     )
@@ -156,6 +156,9 @@ def _measured_radii(
     bearing = np.where(s1 == 0, 0.0, np.degrees(np.arctan2(x1, y1)))
     theta = np.where(incomplete, np.nan, np.where(cartesian, bearing, points.polar[:, 2]))
     sigma = first.precision(sigma)
+    (d_far, far, sigma_far), (d_near, near, sigma_near) = _far_first(
+        (first.distance, s1, sigma), (second.distance, s2, k12 * sigma)
+    )
     with np.errstate(divide="ignore", invalid="ignore"):
         across = (x1 * y2 - y1 * x2) * k12 / s1
         q = np.where(s1 > 0, across, np.where(cartesian & ~incomplete, 0.0, np.nan))
@@ -172,9 +175,7 @@ def _measured_radii(
         q=q,
         standardised=standardised,
         at_nadir=s1 == 0,
-        sigma_r=sigma_relief(
-            s1, s2, d1=first.distance, d2=second.distance, sigma_1=sigma, sigma_2=k12 * sigma
-        ),
+        sigma_r=sigma_relief(far, near, d1=d_far, d2=d_near, sigma_1=sigma_far, sigma_2=sigma_near),
     )
 
 
@@ -229,6 +230,11 @@ def _adjusted_radii(
         sigma_r=solved.sigma_px * k_r,
         carried=carried | {"k_q": k_q, "k_r": k_r, "misfit_px": solved.misfit},
     )
+
+
+def _far_first(*photos: tuple[Any, ...]) -> list[tuple[Any, ...]]:
+    """Return what is known of both photos, each with its distance first, the far one's first."""
+    return sorted(photos, key=lambda photo: -photo[0])
 
 
 def _length(vectors: FloatArray) -> FloatArray:

@@ -101,9 +101,27 @@ def test_unit_of_the_image_does_not_matter():
     assert relief(s1 * 1000, s2 * 1000, d1=17.5, d2=9.5) == pytest.approx(0.7, abs=1e-13)
 
 
-def test_equal_distances_are_refused():
+@pytest.mark.parametrize(
+    ("s1", "s2"),
+    [
+        (10.0, 5.0),  # meet behind both cameras
+        (17.5, 9.4),
+        (17.5, 9.5),  # parallel
+        (1.0, -1.0),  # no distance is negative
+        (-4.0, -5.0),
+        (0.0, 5.0),  # in the near camera itself
+    ],
+)
+def test_relief_is_nan_where_no_rays_meet_before_the_near_camera(s1, s2):
+    assert np.isnan(relief(s1, s2, d1=17.5, d2=9.5))
+    assert np.isnan(relief_displacements(s1, s2, d1=17.5, d2=9.5)).all()
+
+
+def test_equal_and_exchanged_distances_are_refused():
     with pytest.raises(GeometryError, match="different distances"):
         relief(4.0, 5.0, d1=10.0, d2=10.0)
+    with pytest.raises(GeometryError, match="camera 1 is the far one"):
+        relief(4.0, 4.2, d1=9.5, d2=17.5)
 
 
 @pytest.mark.parametrize("bad", [0.0, -1.0, np.nan, np.inf])

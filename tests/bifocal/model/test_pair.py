@@ -181,6 +181,39 @@ def test_unequal_numbers_of_picks_are_refused():
         ideal().intersect(np.zeros((2, 2)), np.zeros((3, 2)))
 
 
+@pytest.mark.parametrize(
+    ("precision", "words"),
+    [
+        ({"sigma_px": 0.0}, "above zero"),
+        ({"sigma_px": -1.0}, "above zero"),
+        ({"sigma_d1": -5.0}, "zero or more"),
+        ({"sigma_d2": np.nan}, "zero or more"),
+        ({"sigma_scale": np.inf}, "zero or more"),
+        ({"sigma_nadir": 1e300}, "zero or more"),
+        ({"sigma_r_max": 0.0}, "above zero"),
+    ],
+)
+def test_a_precision_that_cannot_be_is_refused_by_name(precision, words):
+    with pytest.raises(InputError, match=f"^{next(iter(precision))}: must be {words}"):
+        ideal().intersect([[100, 100]], [[110, 110]], **precision)
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "words"),
+    [
+        ("distance", 1e300, "distance: must be above zero"),
+        ("distance", 1e30, "distance: must be above zero"),
+        ("distance", 1.2e5, "distance: 120000.0 m is beyond reason"),
+        ("nadir", [1e300, 0.0], "nadir: .* beyond reason"),
+        ("sigma_pixel", 1e300, "sigma_pixel: must be above zero"),
+    ],
+)
+def test_numbers_beyond_reason_are_refused(key, value, words):
+    given = {"plane_from_pixel": METRES, "nadir": [0, 0], "distance": 17.5} | {key: value}
+    with pytest.raises(InputError, match=words):
+        Photo(**given)
+
+
 def test_lens_distortion_is_taken_off_and_put_back(tmp_path):
     lens = Lens(
         camera_matrix=[[3000, 0, 1536], [0, 3000, 1024], [0, 0, 1]],
