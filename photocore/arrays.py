@@ -30,7 +30,10 @@ def as_floats(value: ArrayLike, name: str) -> FloatArray:
         If it holds anything that is not a number; the message names the argument.
     """
     try:
-        return np.asarray(value, dtype=np.float64)
+        array = np.asarray(value)
+        if array.dtype.kind in "US":  # numpy would take the text "17.5"; no file of ours means it
+            raise TypeError
+        return np.asarray(array, dtype=np.float64)
     except OverflowError as error:
         largest = sys.float_info.max
         raise InputError(f"{name}: holds a whole number above {largest:.2g}.") from error

@@ -24,7 +24,7 @@ class LensData(NamedTuple):
     camera_matrix: FloatArray
     coefficients: FloatArray
     model: str
-    image_size: tuple[int, int]
+    image_size: tuple[float, float]
     source: str
 
 
@@ -48,6 +48,10 @@ def read_foreign_lens(path: Path | str) -> LensData:
         text = path.read_text(encoding="utf-8")
     except UnicodeDecodeError:
         raise InputError(f"{path}: is not a text file, expected a lens calibration.") from None
+    if "<!DOCTYPE" in text:
+        raise InputError(
+            f"{path}: declares a document type (DOCTYPE), which calibrations never do; remove it."
+        )
     if ending == ".xml":
         return _opencv(path) if "opencv_storage" in text[:500] else _metashape(path, text)
     if ending == ".txt":
@@ -83,11 +87,13 @@ def _colmap(path: Path, text: str) -> LensData:
     if model not in forms or len(p) != forms[model][0]:
         raise InputError(f"{path}: COLMAP camera {model} with {len(p)} parameters is not read.")
     _, (fx, fy, cx, cy), terms = forms[model]
+    if not (p[fx] > 0 and p[fy] > 0):
+        raise InputError(f"{path}: the focal lengths must be above zero [px].")
     return LensData(
         camera_matrix(p[fx], p[fy] / p[fx], p[cx] - 0.5, p[cy] - 0.5),
         np.array([0.0 if i is None else p[i] for i in terms]),
         "fisheye" if model == "OPENCV_FISHEYE" else "opencv",
-        (int(width), int(height)),
+        (width, height),
         f"COLMAP {model}, {path.name}",
     )
 
@@ -114,14 +120,14 @@ def _metashape(path: Path, text: str) -> LensData:
             "calibrate again in Metashape with these switched off."
         )
     width, height, f = value("width"), value("height"), value("f")
-    if not (width > 0 and height > 0 and f > 0):
-        raise InputError(f"{path}: <width>, <height> and <f> must be above zero.")
+    if not (width > 0 and height > 0 and f > 0 and f + value("b1") > 0):
+        raise InputError(f"{path}: <width>, <height>, <f> and f + b1 must be above zero.")
     centre = width / 2 + value("cx") - 0.5, height / 2 + value("cy") - 0.5
     matrix = camera_matrix(f + value("b1"), f / (f + value("b1")), *centre)
     # Metashape's p1 goes with r² + 2x², OpenCV's with 2xy in x: they are exchanged.
     terms = [value("k1"), value("k2"), value("p2"), value("p1"), value("k3")]
-    size = (int(width), int(height))
-    return LensData(matrix, np.array(terms), "opencv", size, f"Metashape, {path.name}")
+    source = f"Metashape, {path.name}"
+    return LensData(matrix, np.array(terms), "opencv", (width, height), source)
 
 
 def _opencv(path: Path) -> LensData:
@@ -150,5 +156,5 @@ def _opencv(path: Path) -> LensData:
         raise InputError(f"{path}: lacks camera_matrix (3x3) or distortion_coefficients.")
     if width is None or height is None:
         raise InputError(f"{path}: lacks image_width and image_height; add both.")
-    size = (int(width), int(height))
+    size = (float(width), float(height))
     return LensData(matrix, np.ravel(terms), "opencv", size, f"OpenCV, {path.name}")

@@ -10,12 +10,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from photocore.arrays import FloatArray, as_points, read_only
+from photocore.arrays import FloatArray, as_floats, as_points, not_negative, read_only
 from photocore.errors import InputError
 from photocore.jsonfile import read_object, write_object
 from photocore.lensformats import read_foreign_lens
 
 FORMAT = "bifocal-lens/1"
+#: No photo is larger. [px]
+LARGEST_SIDE = 1e6
 #: Numbers of coefficients each model may have; empty: any even number from 8 on.
 MODELS: Mapping[str, tuple[int, ...]] = {
     "opencv": (0, 4, 5, 8, 12, 14),
@@ -59,8 +61,10 @@ class Lens:
     def __post_init__(self) -> None:
         set_ = object.__setattr__
         set_(self, "camera_matrix", read_only(self.camera_matrix, "camera_matrix", shape=(3, 3)))
-        set_(self, "coefficients", read_only(np.ravel(self.coefficients), "coefficients"))
-        if self.model not in MODELS:
+        _check_matrix(self.camera_matrix)
+        terms = np.ravel(as_floats(self.coefficients, "coefficients"))
+        set_(self, "coefficients", read_only(terms, "coefficients"))
+        if not isinstance(self.model, str) or self.model not in MODELS:
             raise InputError(f"lens model: {self.model!r} is not one of {', '.join(MODELS)}.")
         count = len(self.coefficients)
         if self.model == "radial":
@@ -69,10 +73,18 @@ class Lens:
             raise InputError(
                 f"lens model {self.model!r} takes {MODELS[self.model]} coefficients, found {count}."
             )
-        size = tuple(int(v) for v in self.image_size)
-        if len(size) != 2 or min(size) < 1:
-            raise InputError(f"image_size: expected width and height [px], found {size}.")
-        set_(self, "image_size", size)
+        size = as_floats(self.image_size, "image_size")
+        if (
+            size.shape != (2,)
+            or not ((size >= 1) & (size <= LARGEST_SIDE) & (size == np.rint(size))).all()
+        ):
+            raise InputError(
+                "image_size: expected width and height in whole pixels, found "
+                f"{size.tolist()!r:.60}."
+            )
+        set_(self, "image_size", (int(size[0]), int(size[1])))
+        if self.sigma0 is not None:
+            set_(self, "sigma0", not_negative(self.sigma0, "sigma0", unit="px"))
 
     @classmethod
     def read(cls, path: Path | str) -> Lens:
@@ -85,7 +97,10 @@ class Lens:
         """
         if Path(path).suffix.lower() in {".txt", ".xml", ".yml", ".yaml"}:
             foreign = read_foreign_lens(path)
-            return cls(**foreign._asdict())
+            try:
+                return cls(**foreign._asdict())
+            except InputError as error:
+                raise InputError(f"{path}: {error}") from None
         data = read_object(path, what="lens file")
         if str(data.get("format", "")).startswith("bifocal-pair"):
             raise InputError(f"{path}: is a pair file, not a lens file; name the lens.json.")
@@ -93,14 +108,14 @@ class Lens:
             known = {
                 "camera_matrix": data.pop("camera_matrix"),
                 "coefficients": data.pop("coefficients"),
-                "image_size": tuple(data.pop("image_size")),
+                "image_size": data.pop("image_size"),
             }
             data.pop("format", None)
             return cls(
                 **known,
                 model=data.pop("model", "opencv"),
                 sigma0=data.pop("sigma0", None),
-                source=data.pop("source", ""),
+                source=str(data.pop("source", "")),
                 extra=data,
             )
         except KeyError as error:
@@ -201,6 +216,15 @@ class Lens:
         with np.errstate(divide="ignore", invalid="ignore"):
             ratio = np.where(radius > 0, guess / radius, 1.0 / profile(0.0))
         return self.principal_point + offset * ratio[..., None]
+
+
+def _check_matrix(matrix: FloatArray) -> None:
+    """Refuse what is no camera matrix: without focal lengths, or not ending in 0 0 1."""
+    if not (np.diag(matrix) > 0).all() or tuple(matrix[2]) != (0.0, 0.0, 1.0):
+        raise InputError(
+            "camera_matrix: expected [[fx, 0, cx], [0, fy, cy], [0, 0, 1]] with focal lengths "
+            f"fx and fy above zero [px], found {matrix.tolist()}."
+        )
 
 
 def _check_profile(coefficients: FloatArray) -> None:

@@ -158,6 +158,63 @@ def test_a_broken_lens_file_is_named(tmp_path, content, message):
     assert "bad.json" in str(caught.value)
 
 
+GOOD = {"camera_matrix": MATRIX.tolist(), "coefficients": [0, 0, 0, 0], "image_size": [1024, 768]}
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "message"),
+    [
+        ("image_size", "ab", "image_size: expected numbers"),
+        ("image_size", ["a", "b"], "image_size: expected numbers"),
+        ("image_size", ["3000", "2000"], "image_size: expected numbers"),
+        ("image_size", [384.7, 256], "whole pixels"),
+        ("image_size", [np.inf, 256], "whole pixels"),
+        ("image_size", [1e30, 256], "whole pixels"),
+        ("image_size", [10**400, 256], "image_size: holds a whole number above"),
+        ("image_size", 5, "whole pixels"),
+        ("image_size", {"a": 1}, "image_size: expected numbers"),
+        ("image_size", None, "whole pixels"),
+        ("coefficients", [[1], [2, 3]], "coefficients: expected numbers"),
+        ("camera_matrix", [[0, 0, 5], [0, 0, 5], [0, 0, 1]], "fx and fy above zero"),
+        ("camera_matrix", [[900, 0, 5], [0, 900, 5], [0, 0, 0]], "fx and fy above zero"),
+        ("camera_matrix", [[-900, 0, 5], [0, 900, 5], [0, 0, 1]], "fx and fy above zero"),
+        ("model", {}, "is not one of"),
+        ("sigma0", "x", "sigma0: expected numbers"),
+        ("sigma0", np.nan, "sigma0: must be zero or more"),
+    ],
+)
+def test_text_lists_and_huge_numbers_in_a_lens_file_are_named(tmp_path, key, value, message):
+    path = tmp_path / "lens.json"
+    path.write_text(json.dumps(GOOD | {key: value}))
+    with pytest.raises(InputError, match=message) as caught:
+        Lens.read(path)
+    assert str(caught.value).startswith(f"{path}: ")
+
+
+METASHAPE = "<calibration><projection>frame</projection><width>9</width><height>9</height>{}"
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "message"),
+    [
+        ("cameras.txt", "1 SIMPLE_PINHOLE 3000 2000 0 1500 1000", "focal lengths"),
+        ("cameras.txt", "1 PINHOLE 3000 2000 900 0 1500 1000", "focal lengths"),
+        ("cameras.txt", "1 PINHOLE nan 2000 900 900 1500 1000", "image_size"),
+        ("cameras.txt", "1 PINHOLE 384.7 2000 900 900 1500 1000", "whole pixels"),
+        ("cameras.txt", "1 PINHOLE 3000 2000 900 900 nan 1000", "camera_matrix"),
+        ("m.xml", METASHAPE.format("<f>9</f><b1>-9</b1></calibration>"), "above zero"),
+        ("m.xml", METASHAPE.format("<f>9</f><cx>nan</cx></calibration>"), "camera_matrix"),
+        ("m.xml", '<!DOCTYPE a [<!ENTITY b "3">]>' + METASHAPE.format("<f>&b;"), "DOCTYPE"),
+    ],
+)
+def test_impossible_calibrations_of_other_programs_are_named(tmp_path, name, content, message):
+    path = tmp_path / name
+    path.write_text(content)
+    with pytest.raises(InputError, match=message) as caught:
+        Lens.read(path)
+    assert str(caught.value).startswith(f"{path}: ")
+
+
 # Boards
 
 
