@@ -14,7 +14,7 @@ from multimedia.bathymetry.corrected_points import (
     status_labels,
 )
 from multimedia.bathymetry.correction_job import MIXED_UNITS, Job, Outcome
-from multimedia.bathymetry.dem import Dem
+from multimedia.bathymetry.dem import SENTINELS, Dem
 from multimedia.bathymetry.refracted_rays import correct_lidar_beams, intersect_refracted_rays
 from multimedia.bathymetry.refraction_correction import correct_bathymetry
 from multimedia.bathymetry.regrid import pull_back
@@ -44,6 +44,8 @@ _GAINED = {
     "water_depth": ("f4", "true depth under water"),
     **dict.fromkeys(("sigma_X", "sigma_Y", "sigma_Z"), ("f4", "standard deviation")),
 }
+#: Refractive index of any water, pure or brine, for any light that passes it.
+WATER = (1.3, 1.4)
 #: Side of the windows in which a DEM is corrected: 8 MB of heights. [cells]
 WINDOW = 1024
 #: Widest planimetric shift that is followed across a window's edge. [cells]
@@ -60,6 +62,12 @@ def correct_file(job: Job, *, progress: Progress = no_progress) -> Outcome:
     """
     check_writable(job.target, overwrite=job.overwrite)
     checked_water_index(job.index)
+    lowest, highest = WATER
+    if not lowest <= job.index <= highest:
+        raise InputError(
+            f"--index: {job.index:g} is no water's; relative to the air water has {lowest:g} to "
+            f"{highest:g} (`multimedia index` computes it)."
+        )
     if job.source.resolve() == job.target.resolve():
         raise InputError(f"{job.target}: is the input itself; name another file for --out.")
     if job.rays:
@@ -72,6 +80,8 @@ def correct_file(job: Job, *, progress: Progress = no_progress) -> Outcome:
 def _correct_cloud(job: Job, progress: Progress) -> Outcome:
     """Correct a point cloud piece by piece."""
     cloud = open_cloud(job.source)
+    if job.nodata is not None:
+        raise InputError(f"{job.source}: --nodata is for the cells of a DEM, this is a cloud.")
     if job.target.suffix.lower() != job.source.suffix.lower():
         raise InputError(
             f"{job.target}: a {job.source.suffix} cloud is written as {job.source.suffix}, with "
@@ -95,6 +105,12 @@ def _correct_cloud(job: Job, progress: Progress) -> Outcome:
     done = 0
     with cloud.copy(job.target, gained, overwrite=job.overwrite) as write:
         for piece in cloud.pieces(numbers=numbers, texts=texts):
+            unknown = piece.xyz[np.isin(piece.xyz[:, 2], SENTINELS), 2]
+            if unknown.size:
+                raise InputError(
+                    f"{job.source}: {unknown.size} points have the height {unknown[0]:g}, which "
+                    "programs write where they know none; leave these points out."
+                )
             result = correct(piece)
             outcome.add(piece.xyz, result)
             status = status_labels(result.status) if spoken else result.status

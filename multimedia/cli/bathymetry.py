@@ -104,6 +104,8 @@ def command(
     for name in ("visibility", "max_angle"):
         if wishes[name] and not cameras:
             raise click.UsageError(f"--{name.replace('_', '-')} needs --cameras.")
+    if wishes["group_index"] and not beams:
+        raise click.UsageError("--group-index needs --beams or --trajectory.")
     if wishes["rays"] and (beams or cameras):
         raise click.UsageError("--rays holds its cameras already; leave the other options out.")
     if beams and cameras:

@@ -636,3 +636,32 @@ def test_a_full_disk_leaves_the_old_model_as_it_was(
     assert "Traceback" not in done.stderr
     assert target.read_bytes() == old
     assert sorted(path.name for path in tmp_path.iterdir()) == ["bed.tif", "dem.tif"]
+
+
+@pytest.mark.parametrize("index", ["1.0", "1.29", "1.41", "1.5"])
+def test_an_index_that_is_no_waters_is_refused(tmp_path: Path, index: str) -> None:
+    source = tmp_path / "c.csv"
+    write_cloud_csv(source, positions(20))
+    target = tmp_path / "o.csv"
+    status, _, said = run(
+        "bathymetry", source, "--water-level", LEVEL, "--index", index, "--out", target
+    )
+    assert status == 1
+    assert f"--index: {float(index):g} is no water's" in said
+    assert not target.exists()
+
+
+def test_heights_of_points_that_mean_unknown_are_refused(tmp_path: Path) -> None:
+    source, xyz = tmp_path / "c.csv", positions(20)
+    xyz[7, 2] = -9999.0
+    write_cloud_csv(source, xyz)
+    assert "1 points have the height -9999" in refused(tmp_path, source)
+    assert "--nodata is for the cells of a DEM" in refused(tmp_path, source, "--nodata", -9999)
+
+
+def test_a_group_index_is_for_lidar(tmp_path: Path) -> None:
+    source = tmp_path / "c.csv"
+    write_cloud_csv(source, positions(20))
+    status, _, said = bathymetry(source, tmp_path / "o.csv", "--group-index", 1.36)
+    assert status == 2
+    assert "--group-index needs --beams" in said
