@@ -108,7 +108,7 @@ def find_columns(
     best: Match | None = None
     for row in candidates:
         for texts, header in _heading_texts(grid, row, span):
-            match = _assign(wanted, texts, fixed, header)
+            match = _assign(wanted, texts, fixed, header, column_map or {})
             match.score = (*match.score[:2], int(header == row))
             _take_nameless(grid, match, wanted)
             if match.score[0] > len(fixed) and (best is None or match.score > best.score):
@@ -214,8 +214,9 @@ def _assign(
     texts: Mapping[int, list[str]],
     fixed: Mapping[str, int],
     header: int,
+    mapped: Mapping[str, str],
 ) -> Match:
-    """Give each column asked for one of the headings, by key, then by alias in order."""
+    """Give each column asked for a heading: as the user says, by key, then by alias in order."""
     match = Match(columns=dict(fixed), first=header + 1, header=header)
     taken: dict[int, str] = {number: key for key, number in fixed.items()}
     exact = 0
@@ -229,6 +230,13 @@ def _assign(
         if unit:
             match.units[column.key] = unit
 
+    said = [column for column in columns if column.key in mapped and column.key not in fixed]
+    for column in said:
+        place = column.aliases[0]
+        fits = [n for n in sorted(texts) if n not in taken and bare(place) in forms[n]]
+        if fits:
+            take(column, min(fits, key=lambda n: place not in map(str.strip, texts[n])))
+    columns = [column for column in columns if column not in said]
     for column in columns:
         for number in sorted(texts):
             mine = (t.strip() == column.key for t in texts[number])
@@ -253,7 +261,7 @@ def _assign(
                 and not aliases[column.key].isdisjoint(forms[number])
             ):
                 take(column, number)
-    for column in columns:
+    for column in (*said, *columns):
         number = match.columns.get(column.key, 0)
         if number in texts and column.key not in fixed:
             same = [

@@ -126,6 +126,13 @@ def read_table(
         place = _Place(*find_in_text(book, columns, column_map))
     else:
         place = _find(book, columns, name=name, sheet=sheet, column_map=column_map)
+    asked = column_map or {}
+    for key in (column.key for column in columns if column.key in asked):
+        if key not in place.match.columns:
+            raise InputError(
+                f'{book.label}: --columns names "{asked[key]}" for {key}, but there is no such '
+                f"heading; the headings are {describe(place.grid, place.match)}."
+            )
     refuse_doubles(book.label, place.grid.title, place.match)
     take_unit_row(place.grid, place.match)
     if isinstance(book, CsvFile):

@@ -237,3 +237,16 @@ def test_a_bad_field_far_down_a_large_table_is_named(tmp_path):
     path.write_text("\n".join(lines))
     with pytest.raises(WorkbookError, match=r"big.csv › B60002 \(s1\): found \"x\""):
         read_table(path, COLUMNS)
+
+
+@pytest.mark.parametrize("columns", [{"s1": "nope"}, {"id": "A", "s1": "nope"}])
+def test_a_heading_the_user_names_must_exist(file, columns):
+    with pytest.raises(
+        InputError, match=r'names "nope" for s1, but there is no such heading; .*"s1"'
+    ):
+        read_table(file("id;s1;s2\nP1;1.5;2.5\n"), COLUMNS, column_map=columns)
+
+
+def test_what_the_user_says_of_columns_goes_before_their_own_headings(file):
+    table = read_table(file("id;s1;s2\nP1;1.5;2.5\n"), COLUMNS, column_map={"s1": "s2", "s2": "s1"})
+    assert (table.numbers("s1").item(), table.numbers("s2").item()) == (2.5, 1.5)
