@@ -91,11 +91,7 @@ def _lines(plan: Plan) -> Iterator[str]:
         if station.note:
             yield f"{station.c1:g}/{station.c2:g} mm: {station.note}"
     best = plan.best
-    yield (
-        f"\nBest: {best.c1:g} mm from {best.d1:.2f} m and {best.c2:g} mm from {best.d2:.2f} m."
-        if best.feasible
-        else "\nNo pair of lenses fits into the free space."
-    )
+    yield f"\nBest: {best.c1:g} mm from {best.d1:.2f} m and {best.c2:g} mm from {best.d2:.2f} m."
     x, y, sigma = plan.sigma_grid(best, columns=7, rows=5)
     yield f"\nsigma of r [mm] over its photo, picks of {plan.sigma_px:g} px:"
     grid = [

@@ -117,7 +117,7 @@ class Plan:
 
     @property
     def best(self) -> Station:
-        """The feasible station of best precision; the least bad one if none is feasible."""
+        """The feasible station of best precision; of equal precision, that of the largest photo."""
         return self.stations[0]
 
     def sigma_grid(

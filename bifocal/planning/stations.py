@@ -10,7 +10,7 @@ from math import ceil, hypot, sqrt
 from bifocal.planning.camera_plan import CameraSensor, Plan, Station
 from bifocal.precision import base_factor, sigma_relief, uncertainty_radius
 from photocore.arrays import positive
-from photocore.errors import InputError
+from photocore.errors import GeometryError, InputError
 
 #: Share of the photo that neighbouring photos of a large façade have in common.
 OVERLAP = 0.2
@@ -63,6 +63,8 @@ def plan_stations(
     ------
     InputError
         If fewer than two different lenses, no wish or more than one wish for the scale is given.
+    GeometryError
+        If no pair of lenses fits into the free space; the message says what each would reach.
 
     Notes
     -----
@@ -119,7 +121,11 @@ def plan_stations(
             f"the near camera would stand {nearest * 100:.1f} cm from the wall: the wished scale "
             "or pixel is too fine. Check its unit: GSD and sigma are given in mm, a scale as 1:N."
         )
-    drafts.sort(key=lambda s: (not s.feasible, s.sigma_r_rms, s.d1))
+    if not any(station.feasible for station in drafts):
+        notes = "; ".join(f"{s.c1:g}/{s.c2:g} mm {s.note}" for s in drafts)
+        raise GeometryError(f"no pair of lenses fits into the free space: {notes}.")
+    # A wanted sigma makes all alike in it, but for rounding: the larger photo is then the better.
+    drafts.sort(key=lambda s: (not s.feasible, float(f"{s.sigma_r_rms:.9g}"), -s.gsd, s.d1))
     limit = sigma_r_max or 3 * drafts[0].sigma_r_rms
     stations = tuple(_with_uncertainty(s, sigma_px, limit) for s in drafts)
     return Plan(sensor=sensor, stations=stations, sigma_px=sigma_px, sigma_r_max=limit)

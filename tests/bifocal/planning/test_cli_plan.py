@@ -54,6 +54,7 @@ def test_the_workbook_holds_the_stations_and_two_charts_of_precision(tmp_path):
         ([*LENSES, *CANON], 1, "size of the wall"),
         ([*LENSES, *CANON, "--scale", "one"], 2, "not a scale"),
         ([*LENSES, *CANON, "--gsd", "-2"], 2, "above zero"),
+        ([*LENSES, *CANON, "--scale", "500", "--free-space", "5"], 1, "no pair of lenses fits"),
     ],
 )
 def test_mistakes_get_one_message_and_the_right_status(arguments, status, message):

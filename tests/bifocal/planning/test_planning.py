@@ -7,7 +7,7 @@ import pytest
 
 from bifocal.planning.camera_plan import CameraSensor
 from bifocal.planning.stations import plan_stations
-from photocore.errors import InputError
+from photocore.errors import GeometryError, InputError
 
 CANON = CameraSensor(width=22.7, height=15.1, columns=3072, rows=2048)
 
@@ -54,6 +54,18 @@ def test_the_area_of_uncertainty_is_where_sigma_reaches_the_bound():
     best = plan.best
     noise = np.sqrt(2) * 0.5 * best.gsd * 17.5 * 9.5 / 8
     assert best.uncertain_radius == pytest.approx(noise / 0.05)
+
+
+def test_of_pairs_made_equally_precise_the_one_that_covers_more_is_best():
+    plan = plan_stations([35, 28, 19], CANON, sigma_r=0.005, object_size=(12, 8))
+    assert [s.sigma_r_rms for s in plan.stations] == pytest.approx([0.005] * 3)
+    widths = [station.footprint[0] for station in plan.stations]
+    assert widths == sorted(widths, reverse=True)
+
+
+def test_no_plan_is_made_where_nothing_fits():
+    with pytest.raises(GeometryError, match=r"35/19 mm needs 17.50 m, only 5.00 m are free"):
+        plan_stations([35, 19], CANON, scale_number=500, free_space=5.0)
 
 
 def test_too_little_room_is_said_with_what_would_fit():
