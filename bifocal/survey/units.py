@@ -8,9 +8,13 @@ import numpy as np
 
 from bifocal.model.pair import Pair
 from bifocal.survey.observations import PointObservations
+from bifocal.survey.relief_table import ReliefTable
 from bifocal.survey.setup import SurveySetup
 from photocore.arrays import FloatArray
-from photocore.errors import InputError
+from photocore.errors import GeometryError, InputError
+
+#: Misfits across the radius beyond this many sigma, at most points, are no slips of the hand.
+CONTRADICTION = 100.0
 
 #: No lens sees further to the side than this many principal distances (72 degrees off axis).
 WIDEST = 3.0
@@ -155,3 +159,23 @@ def refuse_millimetres(pair: Pair, points: PointObservations, where: str) -> Non
             f"{where}: no pixel coordinate exceeds {np.nanmax(np.abs(pixels)):.4g} px: they look "
             "like millimetres. Give raw pixels, or head the columns x1 [mm] ... y2 [mm]."
         )
+
+
+def refuse_contradiction(points: PointObservations, table: ReliefTable, where: str) -> None:
+    """Refuse picks of which most contradict that both photos show the same points.
+
+    Raises
+    ------
+    GeometryError
+        With the likely reason.
+    """
+    miss = np.abs(table.standardised[points.use & ~np.isnan(table.standardised)])
+    far = int((miss > CONTRADICTION).sum())
+    if len(miss) < 3 or 2 * far <= len(miss):
+        return
+    raise GeometryError(
+        f"{where}: at {far} of {len(miss)} points the two picks miss each other across the radius "
+        f"by more than {CONTRADICTION:g} sigma, so the columns of the photos do not belong "
+        "together: columns of equal heading (say with --columns which is which), coordinates not "
+        "counted from the nadir points, photos turned against each other, or names mixed up."
+    )

@@ -27,6 +27,7 @@ from bifocal.survey.remarks import (
 from bifocal.survey.setup import SCALE_TOLERANCE, SurveySetup
 from bifocal.survey.tolerances import RULES, ToleranceRule, as_rule
 from bifocal.survey.units import (
+    refuse_contradiction,
     refuse_far_stations,
     refuse_millimetres,
     refuse_pixels,
@@ -207,6 +208,7 @@ def solve(
     else:
         solved = _solve_pair(general, survey, sigma_px, adjust=adjust_setup)
     table = solved.table
+    refuse_contradiction(solved.points, table, survey.where)
     check = check_points(table, survey.known, judged)
     world, world_remarks = _placed(survey, table, model or survey.model)
     remarks = (
