@@ -75,7 +75,14 @@ def common_grid(
     gsd: float | None = None,
     bounds: Bounds | None = None,
 ) -> Grid:
-    """Return a grid that covers all layers; on the lattice of the first of the finest if it can."""
+    """Return a grid that covers all layers; on the lattice of the first of the finest if it can.
+
+    Raises
+    ------
+    InputError
+        If the layers lie too far apart to show one wall, or the box is empty.
+    """
+    _refuse_unrelated([layer.grid.bounds for layer in layers])
     finest = min(layers, key=lambda layer: layer.grid.gsd).grid
     gsd = gsd or finest.gsd
     if bounds is None:
@@ -90,6 +97,25 @@ def common_grid(
     if c1 <= c0 or r1 <= r0:
         raise InputError("bounds: the box is empty.")
     return finest.window(c0, r0, c1 - c0, r1 - r0)
+
+
+def _refuse_unrelated(boxes: Sequence[Bounds]) -> None:
+    """Refuse rasters with more room to all others than the larger of two is wide or high."""
+    box = np.array(boxes)
+    low, high = box[:, :2], box[:, 2:]
+    gap = np.maximum(low[:, None] - high[None], low[None] - high[:, None]).max(axis=2)
+    side = (high - low).max(axis=1)
+    joined, reached = gap <= np.maximum(side[:, None], side[None]), np.arange(len(box)) == 0
+    for _ in boxes:
+        reached = joined[reached].any(axis=0)
+    if not reached.all():
+        alone = int(np.argmin(reached))
+        raise InputError(
+            f"rasters 1 and {alone + 1} have nothing in common: they cover X, Y "
+            f"{low[0].round(3).tolist()} to {high[0].round(3).tolist()} and "
+            f"{low[alone].round(3).tolist()} to {high[alone].round(3).tolist()} m. A mosaic needs "
+            "rasters of one wall in one frame."
+        )
 
 
 def plan_mosaic(

@@ -154,6 +154,11 @@ def _check_alike(layers: Sequence[_FileLayer]) -> None:
                 f"{first.path} ({count} of {first.dtype}) cannot be joined: give only orthophotos "
                 "of the same kind, or only relief maps."
             )
+        if layer.reader.crs != first.crs:
+            raise InputError(
+                f"{layer.reader.path} and {first.path} are in different coordinate systems; bring "
+                "them into one before."
+            )
 
 
 def _relief_of(paths: Sequence[Path], coarse: Grid, stack: ExitStack) -> NDArray[np.float32]:

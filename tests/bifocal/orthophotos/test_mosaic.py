@@ -137,3 +137,25 @@ def test_what_cannot_be_joined_is_refused(tmp_path: Path) -> None:
         assert done.exit_code == 1, done.output
         assert message in done.stderr
         assert not (tmp_path / "m.tif").exists()
+
+
+def test_rasters_that_have_nothing_in_common_are_refused(tmp_path: Path) -> None:
+    write(tmp_path / "a.tif", (0, 0, 0.5, 0.5))
+    write(tmp_path / "near.tif", (0.7, 0, 1.2, 0.5))  # a pillar stood between
+    write(tmp_path / "far.tif", (1.1, 0.4, 1.6, 0.9))
+    write(tmp_path / "other.tif", (5000, 900, 5000.5, 900.5))
+    done = run(tmp_path, "a.tif", "far.tif", "other.tif", "--out", "m.tif")
+    assert done.exit_code == 1, done.output
+    assert "rasters 1 and 2 have nothing in common: they cover X, Y [0.0, 0.0] to" in done.stderr
+    assert not (tmp_path / "m.tif").exists()
+    assert run(tmp_path, "a.tif", "far.tif", "near.tif", "--out", "m.tif").exit_code == 0
+
+
+def test_rasters_of_different_coordinate_systems_are_refused(tmp_path: Path) -> None:
+    for name in ("a.tif", "b.tif"):
+        write(tmp_path / name, (0, 0, 0.5, 0.5))
+    with rasterio.open(tmp_path / "b.tif", "r+") as file:
+        file.crs = rasterio.CRS.from_epsg(32632)
+    done = run(tmp_path, "a.tif", "b.tif", "--out", "m.tif")
+    assert done.exit_code == 1
+    assert "different coordinate systems" in done.stderr
