@@ -205,7 +205,7 @@ def _fit(
     Raises
     ------
     GeometryError
-        If too few points are left.
+        If too few points are left, or those of a tilted surface lie on one line.
     """
     needed = max(FEWEST, design.shape[1] + 2)
     if used.sum() < needed:
@@ -213,7 +213,12 @@ def _fit(
             f"points: only {int(used.sum())} tie points agree on one water surface; at least "
             f"{needed} are needed. Add points, or give their expected spread."
         )
-    solution = np.linalg.lstsq(design[used], heights[used], rcond=None)[0]
+    solution, _, rank, _ = np.linalg.lstsq(design[used], heights[used], rcond=1e-12)
+    if rank < design.shape[1]:
+        raise GeometryError(
+            "points: the tie points on the water surface lie on one line, about which it may tilt "
+            "at will. Add points beside the line, or fit a level surface (without --tilted)."
+        )
     residual = heights - design @ solution
     variance = (residual[used] ** 2).sum() / (used.sum() - design.shape[1])
     # The residuals are cut at `REJECT` sigma.

@@ -84,3 +84,12 @@ def test_a_perfectly_flat_surface_has_no_spread() -> None:
 def test_too_few_points_on_the_surface_are_refused(points, kind, message) -> None:
     with pytest.raises(kind, match=message):
         mm.mean_water_level(points, spread=0.001 if len(points) > 5 else None)
+
+
+@pytest.mark.parametrize("direction", [(1.0, 0.0), (0.3, 0.7)])
+def test_points_on_one_line_do_not_show_a_tilt(direction) -> None:
+    along = np.arange(20.0)
+    points = np.column_stack([np.outer(along, direction), 1.8 + 0.001 * np.sin(along)])
+    with pytest.raises(GeometryError, match="lie on one line"):
+        mm.mean_water_level(points, tilted=True)
+    assert mm.mean_water_level(points).level == pytest.approx(1.8, abs=0.001)
