@@ -25,16 +25,34 @@ class LasCloud(Cloud):
 
     def __init__(self, path: Path) -> None:
         super().__init__(path)
+        self._check_counts()
         with self._reading() as reader:
             self._header = reader.header
             self._evlrs = reader.evlrs
+            records = [record.user_id for record in (*self._header.vlrs, *(self._evlrs or ()))]
         if self._header.point_count == 0:
             raise InputError(f"{path}: holds no points.")
-        records = [record.user_id for record in (*self._header.vlrs, *(self._evlrs or ()))]
         if "LASF_Projection" not in records:
             self.remarks.append(
                 f"{path.name} has no coordinate reference system; its coordinates are taken as "
                 "metres, like those of the cameras."
+            )
+
+    def _check_counts(self) -> None:
+        """Refuse a header that promises more records than the file has room for.
+
+        laspy would read them one by one, up to four thousand million times nothing.
+        """
+        with self.path.open("rb") as file:
+            head = file.read(247)
+        size = self.path.stat().st_size
+        records = struct.unpack_from("<I", head, 100)[0] if len(head) >= 104 else 0
+        if len(head) == 247 and head[25] >= 4:
+            records += struct.unpack_from("<I", head, 243)[0]
+        if 54 * records > size:  # the shortest has 54 bytes
+            raise InputError(
+                f"{self.path}: cannot be read as LAS; it is damaged or cut off (its header "
+                f"promises {records} records)."
             )
 
     @contextmanager

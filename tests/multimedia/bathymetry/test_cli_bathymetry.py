@@ -665,3 +665,20 @@ def test_a_group_index_is_for_lidar(tmp_path: Path) -> None:
     status, _, said = bathymetry(source, tmp_path / "o.csv", "--group-index", 1.36)
     assert status == 2
     assert "--group-index needs --beams" in said
+
+
+def test_a_las_header_of_junk_is_refused_at_once(tmp_path: Path) -> None:
+    path = tmp_path / "junk.laz"
+    for seed in range(8):
+        junk = bytearray(np.random.default_rng(seed).bytes(3000))
+        junk[:4] = b"LASF"
+        junk[100:104] = (2**32 - 1 - seed).to_bytes(4, "little")
+        path.write_bytes(junk)
+        assert "cannot be read as LAS" in refused(tmp_path, path)
+    write_las(path, positions(20))
+    whole = bytearray(path.read_bytes())
+    whole[100:104] = (1).to_bytes(4, "little")
+    start = int.from_bytes(whole[94:96], "little")
+    whole[start : start + 54] = b"\xac" * 54
+    path.write_bytes(whole)
+    assert "cannot be read as LAS" in refused(tmp_path, path)
