@@ -10,6 +10,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from multimedia.design.studies import CalibrationCosts, Placement, Study
 from multimedia.media.camera import EXTERIOR, Camera
@@ -162,7 +163,7 @@ def ring_of_cameras(
     half_angle: float,
     *,
     interface: FlatInterface,
-    target: FloatArray,
+    target: ArrayLike,
     principal_distance: float,
 ) -> tuple[Camera, ...]:
     """Return cameras evenly on a cone about the vertical through the target, all looking at it.
@@ -177,12 +178,13 @@ def ring_of_cameras(
         Of the cone, in air; 0 puts them all on the axis. [rad]
     interface : FlatInterface
         What they look through; a camera that would stand inside it raises `GeometryError`.
-    target : ndarray, shape (3,)
+    target : array_like, shape (3,)
         Point in the object's medium that they aim at as it appears.
     principal_distance : float
         [mm]
     """
     cameras = []
+    target = as_points(target, "target", dimension=3)
     top = np.array([target[0], target[1], 0.0])
     for k in range(count):
         azimuth = 2 * np.pi * k / count
@@ -192,7 +194,7 @@ def ring_of_cameras(
         )  # fmt: skip
         centre = top + distance * offset
         # Aim where the target appears: rounds of shifting the aim by the image of the target.
-        aim = target.astype(np.float64)
+        aim = target.copy()
         for _ in range(7):
             camera = Camera.looking_at(
                 centre, aim, principal_distance=principal_distance, name=f"cam{k + 1}"

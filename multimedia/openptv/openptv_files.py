@@ -11,9 +11,10 @@ import numpy as np
 from multimedia.media.camera import Camera, Sensor
 from multimedia.media.flat_interface import FlatInterface
 from multimedia.refraction.layers import Layers
-from photocore.arrays import FloatArray, IntArray
+from photocore.arrays import LARGEST, FloatArray, IntArray
 from photocore.distortion import Brown, Convention
 from photocore.errors import GeometryError, InputError
+from photocore.output import check_regular
 from photocore.rotation import nearest_rotation, world_from_camera
 
 #: A printed matrix has 7 decimals; angles and matrix of one camera differ by a few of the last.
@@ -160,13 +161,15 @@ def read_targets(path: Path, *, field: int = 0) -> DetectedTargets:
         If the count in the first line does not fit the lines that follow.
     """
     first, *rest = _text(path).split() or [""]
-    count = int(_floats(path, [first], "number of targets")[0])
+    count = _number(path, [first], 0, "number of targets")
     if len(rest) != 8 * count:
         raise InputError(
-            f"{path}: its first line announces {count} targets of 8 numbers, {len(rest)} numbers "
+            f"{path}: its first line announces {count:g} targets of 8 numbers, {len(rest)} numbers "
             "follow. The file is cut off, or is no target file."
         )
-    table = _floats(path, rest, "targets").reshape(count, 8)
+    table = _floats(path, rest, "targets").reshape(-1, 8)
+    if not (np.abs(table) <= LARGEST).all():
+        raise InputError(f"{path}: holds a value that is not a finite number.")
     pixels = table[:, 1:3].copy()
     if field in (1, 2):
         # Half frames: the file counts every other line.
@@ -305,6 +308,7 @@ def _rotation(
 
 
 def _text(path: Path) -> str:
+    check_regular(path)
     try:
         return path.read_text(encoding="utf-8", errors="strict")
     except FileNotFoundError:
@@ -337,7 +341,10 @@ def _number(path: Path, lines: list[str], index: int, what: str) -> float:
     if index >= len(lines):
         raise InputError(f"{path}: ends before line {index + 1} ({what}).")
     words = lines[index].split()[:1] or [""]
-    return float(_floats(path, words, f"line {index + 1} ({what})")[0])
+    number = float(_floats(path, words, f"line {index + 1} ({what})")[0])
+    if not abs(number) <= LARGEST:
+        raise InputError(f"{path}, line {index + 1} ({what}): {words[0]:.40} is no finite number.")
+    return number
 
 
 def _numbers(path: Path, least: int, what: str) -> FloatArray:

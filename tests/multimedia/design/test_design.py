@@ -134,3 +134,15 @@ def test_missing_options_and_wrong_indices_are_named():
     result = CliRunner().invoke(main, wrong)
     assert result.exit_code == 1
     assert "index" in result.stderr.lower()
+
+
+def test_a_ring_takes_its_target_as_any_three_numbers() -> None:
+    interface = FlatInterface(layers=Layers(indices=(1.0, 1.33)))
+    rings = [
+        ring_of_cameras(3, 0.6, 0.4, interface=interface, target=target, principal_distance=25.0)
+        for target in ((0, 0, -0.1), [0.0, 0.0, -0.1], np.array([0.0, 0.0, -0.1]))
+    ]
+    for ring in rings[1:]:
+        np.testing.assert_array_equal([c.centre for c in ring], [c.centre for c in rings[0]])
+    with pytest.raises(InputError, match="target"):
+        ring_of_cameras(3, 0.6, 0.4, interface=interface, target=(0, 0), principal_distance=25.0)

@@ -336,3 +336,14 @@ def test_the_commands_give_openptvs_particle_positions(cavity, tmp_path):
     assert np.median(miss) < 0.0006
     # Rigorously, the rays of this experiment do not meet, and the command says so.
     assert "--method pairs" in run(main, words).stderr
+
+
+@pytest.mark.parametrize("count", ["9" * 5000, "inf", "nan", "1e300"])
+def test_an_impossible_number_of_targets_is_named(tmp_path: Path, count: str) -> None:
+    path = tmp_path / "cam1.tif_targets"
+    path.write_text(f"{count}\n" + "1 2 3 4 5 6 7 8\n")
+    with pytest.raises(InputError, match=r"line 1 \(number of targets\): .* is no finite number"):
+        read_targets(path)
+    path.write_text("1\n1 2 3 1e300 5 6 7 8\n")
+    with pytest.raises(InputError, match="not a finite number"):
+        read_targets(path)
