@@ -7,6 +7,7 @@ import sys
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from importlib import import_module
+from io import TextIOWrapper
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -129,6 +130,8 @@ class LazyGroup(click.Group):
         """
         with suppress(ValueError):  # not in the main thread: somebody else handles signals there
             signal.signal(signal.SIGTERM, _stop)
+        if isinstance(sys.stdout, TextIOWrapper):  # a name the terminal lacks letters for
+            sys.stdout.reconfigure(errors="backslashreplace")
         try:
             return super().invoke(ctx)
         except (click.ClickException, click.exceptions.Exit, click.Abort):

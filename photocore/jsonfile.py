@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from photocore.errors import InputError
-from photocore.output import atomic_path
+from photocore.output import atomic_path, check_regular
 
 
 def read_object(path: Path | str, *, what: str) -> dict[str, Any]:
@@ -29,6 +29,7 @@ def read_object(path: Path | str, *, what: str) -> dict[str, Any]:
         If the file is missing, is not text, not JSON, or not an object.
     """
     path = Path(path)
+    check_regular(path)
     try:
         text = path.read_text(encoding="utf-8-sig")
     except FileNotFoundError:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import shutil
+import stat
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -34,6 +35,22 @@ def check_writable(path: Path | str, *, overwrite: bool) -> Path:
         raise InputError(f"{path}: the folder {folder} is read-only; choose another place.")
     check_not_open(path)
     return path
+
+
+def check_regular(path: Path) -> None:
+    """Refuse an input that is a pipe or a device: reading it may wait for ever.
+
+    Raises
+    ------
+    InputError
+        Unless it is a file, a folder or missing, which the reader says better.
+    """
+    try:
+        mode = path.stat().st_mode
+    except (OSError, ValueError):
+        return
+    if not (stat.S_ISREG(mode) or stat.S_ISDIR(mode)):
+        raise InputError(f"{path}: is a pipe or a device; save what it gives as a file first.")
 
 
 def check_not_open(path: Path) -> None:

@@ -33,7 +33,7 @@ from multimedia.refraction.layers import Layers
 from photocore.arrays import is_finite_number
 from photocore.distortion import NAMES, Brown, Convention
 from photocore.errors import GeometryError, InputError
-from photocore.output import atomic_path, check_writable
+from photocore.output import atomic_path, check_regular, check_writable
 
 FORMAT = "multimedia-project/1"
 #: Each kind of ray-traced surface and its keys.
@@ -128,6 +128,7 @@ def project_data(project: Project) -> dict[str, Any]:
 
 
 def _toml(path: Path) -> dict[str, Any]:
+    check_regular(path)
     try:
         return tomllib.loads(path.read_text(encoding="utf-8-sig"))
     except FileNotFoundError:

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from photocore.errors import CellError, InputError, WorkbookError
+from photocore.output import check_regular
 from photocore.tables import convert
 from photocore.tables.csvread import (
     CsvFile,
@@ -50,6 +51,7 @@ def open_tables(path: Path | str, *, max_rows: int = 100_000) -> SheetFile | Csv
         If the file is missing, empty, damaged, protected, unsafe or of another kind.
     """
     path = Path(path)
+    check_regular(path)
     ending = path.suffix.lower()
     if ending in (".csv", ".tsv", ".txt"):
         return open_csv(path)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
 from types import SimpleNamespace
@@ -170,3 +171,39 @@ def test_a_test_fails_that_ends_in_the_handler(pytester: pytest.Pytester, reques
     )
     result = pytester.runpytest_subprocess("-p", "no:randomly", "-n", "0")
     result.assert_outcomes(passed=3, errors=2)
+
+
+def test_a_name_that_the_terminal_cannot_show_is_shown_in_code(tmp_path) -> None:
+    picks = tmp_path / "p.csv"
+    picks.write_text("id,x1,y1,x2,y2\n\u6771,3,2,3.2,2.13\n", encoding="utf-8")
+    done = subprocess.run(
+        [sys.executable, "-m", "bifocal", "solve", str(picks), "--d1", "17.5", "--d2", "9.5"],
+        capture_output=True, check=False, env={**os.environ, "PYTHONIOENCODING": "latin-1"},
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    assert rb"\u6771" in done.stdout
+
+
+PIPES = [
+    "bifocal solve p.csv --d1 17.5 --d2 9.5",
+    "bifocal solve p.xlsx",
+    "bifocal solve p.ods",
+    "bifocal relief p.pair.json --out r.tif",
+    "multimedia project p.toml --out o.csv",
+    "multimedia shift p.csv --json",
+    "multimedia bathymetry p.las --water-level 1 --index 1.34 --out o.las",
+]
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no pipes with names here")
+@pytest.mark.parametrize("line", PIPES)
+def test_a_pipe_that_nobody_writes_to_does_not_hang(tmp_path, line: str) -> None:
+    program, command, name, *options = line.split()
+    os.mkfifo(tmp_path / name)
+    done = subprocess.run(
+        [sys.executable, "-m", program, command, name, *options],
+        capture_output=True, text=True, check=False, cwd=tmp_path, timeout=60,
+    )  # fmt: skip
+    assert done.returncode == 1
+    assert done.stderr.count("\n") == 1
+    assert name in done.stderr
