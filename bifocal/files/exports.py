@@ -15,7 +15,7 @@ from photocore.cloud import write_cloud
 from photocore.errors import InputError
 from photocore.output import atomic_path
 from photocore.tables import write_csv
-from photocore.workbook.newbook import new_workbook
+from photocore.workbook.newbook import new_workbook, without_control
 
 #: Point lists as surveyors name them: P point, N north, E east, Z height, D description.
 ORDERS = ("PNEZD", "PENZD")
@@ -175,7 +175,7 @@ def _write_xlsx(path: Path, points: SurveyPoints, coordinates: FloatArray) -> No
         numbers = [*points.xyz[i], *world[i], points.sigma_r[i]]
         texts = []
         for text in (name, points.flags[i], points.notes[i]):
-            cell = WriteOnlyCell(sheet, text)
+            cell = WriteOnlyCell(sheet, without_control(text))
             cell.data_type = "s"  # a name that starts with "=" stays a name
             texts.append(cell)
         cells = [float(value) if np.isfinite(value) else None for value in numbers]

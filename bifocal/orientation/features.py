@@ -210,6 +210,10 @@ def _best_on_segment(
     )
 
 
+#: Smaller photos hold no detail to speak of. [px]
+SMALLEST_SIDE = 16
+
+
 def sharpness(image: ByteArray) -> float:
     """Return how much fine detail a photo has against coarse detail, 0 (blurred) to about 1.
 
@@ -217,6 +221,8 @@ def sharpness(image: ByteArray) -> float:
     photo keeps its steepness at every scale, a blurred one has none left at the finest.
     """
     height, width = image.shape
+    if min(height, width) < SMALLEST_SIDE:
+        return 0.0
     part = image[height // 8 : -height // 8 or None, width // 8 : -width // 8 or None]
     if part.size > 4e6:
         step = int(np.ceil(np.sqrt(part.size / 4e6)))

@@ -121,7 +121,7 @@ def finish_book(
 def _typed(value: CellValue) -> CellValue:
     """Return what is typed into a cell: nothing for NaN, no characters that XML cannot hold."""
     if isinstance(value, str):
-        return _ILLEGAL.sub("", value) or None
+        return without_control(value) or None
     return None if value is None or math.isnan(value) else value
 
 
@@ -129,7 +129,12 @@ def _result(value: CellValue) -> CellValue:
     """Return what a formula shows: an empty text for None, #N/A for what is not finite."""
     if isinstance(value, float):
         return value if math.isfinite(value) else math.nan
-    return "" if value is None else _ILLEGAL.sub("", value) if isinstance(value, str) else value
+    return "" if value is None else without_control(value) if isinstance(value, str) else value
+
+
+def without_control(text: str) -> str:
+    """Return a text without the characters that XML cannot hold."""
+    return _ILLEGAL.sub("", text)
 
 
 @contextmanager

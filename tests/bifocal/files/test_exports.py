@@ -130,3 +130,12 @@ def test_a_survey_is_never_exported_onto_itself(tmp_path):
     assert done.exit_code == 1
     assert "the survey itself" in done.stderr
     assert table.read_text().startswith("Point")
+
+
+def test_names_with_control_characters_fit_into_a_workbook(tmp_path):
+    nan = np.full(1, np.nan)
+    points = SurveyPoints(
+        ids=("A\x01b",), xyz=np.ones((1, 3)), world=None, sigma_r=nan, flags=("OK",), notes=("",)
+    )
+    export_points(tmp_path / "o.xlsx", points)
+    assert openpyxl.load_workbook(tmp_path / "o.xlsx")["Results"]["A2"].value == "Ab"

@@ -263,3 +263,14 @@ def test_a_spot_on_a_board_makes_the_board_the_wall(folder) -> None:
     planes = Pair.read(folder / "board.pair.json").extra["setup"]["planes"]
     assert planes[0]["offset"] == pytest.approx(0.0, abs=0.01)
     assert min(abs(plane["offset"] + 0.35) for plane in planes) < 0.03
+
+
+def test_photos_of_a_pixel_are_refused_in_words(tmp_path):
+    for name in ("a.png", "b.png"):
+        cv2.imwrite(str(tmp_path / name), np.zeros((1, 1, 3), np.uint8))
+    out = tmp_path / "w.pair.json"
+    words = [str(tmp_path / "a.png"), str(tmp_path / "b.png"), "--auto", "--out", str(out)]
+    done = CliRunner().invoke(main, ["align", *words])
+    assert done.exit_code == 1
+    assert done.stderr.startswith("Error: ")
+    assert not out.exists()

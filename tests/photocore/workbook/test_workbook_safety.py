@@ -347,3 +347,11 @@ def test_a_cell_in_the_last_corner_of_the_sheet_costs_nothing(tmp_path):
     begin = time.process_time()
     read_table(path, COLUMNS)
     assert time.process_time() - begin < 1
+
+
+def test_small_parts_may_shrink_as_much_as_they_like(tmp_path):
+    path = tmp_path / "styled.xlsx"
+    spaces = b"<worksheet>" + b" " * 10_000_000 + b"</worksheet>"
+    path.write_bytes(rebuilt(parts={SHEET: spaces}))
+    with package.open_package(path) as opened:
+        assert max(i.file_size / i.compress_size for i in opened.infolist()) > 500
