@@ -115,7 +115,7 @@ def _within(value: float, name: str, unit: str, least: float, words: str) -> flo
     if not least <= number <= LARGEST:
         raise InputError(
             f"{name}: must be {words}{unit and f' [{unit}]'} and no more than {LARGEST:g}, "
-            f"got {value}."
+            f"got {value!s:.40}."
         )
     return number
 

@@ -206,6 +206,12 @@ def _check_space(path: Path, grid: Grid, bytes_per_pixel: int) -> None:
     free = shutil.disk_usage(path.parent).free
     if needed > free:
         raise InputError(
-            f"{path}: {grid.width} x {grid.height} px need more than {needed / 1e9:.1f} GB and "
-            f"{free / 1e9:.1f} GB are free. Choose another disk, a coarser --gsd or --bounds."
+            f"{path}: {grid.width} x {grid.height} px need more than {_size(needed)} and "
+            f"{_size(free)} are free. Choose another disk, a coarser --gsd or --bounds."
         )
+
+
+def _size(count: float) -> str:
+    """Return a number of bytes in words."""
+    power = min(int(np.log10(max(count, 1))) // 3, 3)
+    return f"{count / 1000**power:.4g} {('bytes', 'kB', 'MB', 'GB')[power]}"

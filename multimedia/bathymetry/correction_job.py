@@ -111,6 +111,11 @@ class Outcome:
 
     def judge(self, surface: WaterSurface, *, allow_dry: bool) -> None:
         """Raise GeometryError when nothing lies under water; note what looks like millimetres."""
+        if not np.isfinite(self.lowest):
+            raise GeometryError(
+                "no point has a position: heights are blank, or the rays of each point are "
+                "parallel, point upwards or have no direction."
+            )
         if not self._wet and not allow_dry:
             level = surface.middle
             hint = ""

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import shutil
 import subprocess
 import sys
 import textwrap
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -179,3 +181,13 @@ def test_an_existing_file_is_only_replaced_on_request(tmp_path: Path) -> None:
     write_colour(tmp_path / "o.tif")
     with pytest.raises(InputError, match="--overwrite"):
         write_colour(tmp_path / "o.tif")
+
+
+def test_a_small_disk_is_told_in_units_that_say_something(tmp_path, monkeypatch):
+    monkeypatch.setattr(shutil, "disk_usage", lambda _: SimpleNamespace(free=8192))
+    grid = Grid.from_bounds((0, 0, 2, 1), gsd=0.005)
+    with (
+        pytest.raises(InputError, match=r"need more than 24 kB and 8\.192 kB are free"),
+        create_raster(tmp_path / "o.tif", grid, bands=3, dtype=np.uint8),
+    ):
+        pass

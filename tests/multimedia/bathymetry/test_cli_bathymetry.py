@@ -682,3 +682,11 @@ def test_a_las_header_of_junk_is_refused_at_once(tmp_path: Path) -> None:
     whole[start : start + 54] = b"\xac" * 54
     path.write_bytes(whole)
     assert "cannot be read as LAS" in refused(tmp_path, path)
+
+
+@pytest.mark.parametrize("direction", ["0,0,0", "0,0,1", "0,0,-1"])
+def test_rays_that_meet_nowhere_are_told_so(tmp_path: Path, direction: str) -> None:
+    source = tmp_path / "rays.csv"
+    rows = [f"A,{x},0,105,{direction}" for x in (0, 1)]
+    source.write_text("\n".join(["id,X0,Y0,Z0,DX,DY,DZ", *rows]) + "\n")
+    assert "no point has a position" in refused(tmp_path, source, "--rays")
