@@ -9,16 +9,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from photocore.errors import InputError
+from photocore.errors import LARGEST, InputError
 
 #: Always float64 at run time; numpy's own stubs type many float64 results as floating[Any].
 FloatArray = NDArray[np.floating[Any]]
 IntArray = NDArray[np.int64]
 BoolArray = NDArray[np.bool_]
 ByteArray = NDArray[np.uint8]
-
-#: Nothing measured is larger, and squares of squares of it still are numbers.
-LARGEST = 1e15
 
 
 def as_floats(value: ArrayLike, name: str) -> FloatArray:

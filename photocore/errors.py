@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+#: Nothing measured is larger, and squares of squares of it still are numbers.
+LARGEST = 1e15
+
 
 class PhotogrammetryError(Exception):
     """Root of everything raised on purpose; the command line prints it without a traceback."""

@@ -12,7 +12,7 @@ from typing import Any, TypeVar
 
 import click
 
-from photocore.arrays import LARGEST
+from photocore.errors import LARGEST
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 FILE = click.Path(path_type=Path)

@@ -32,6 +32,8 @@ def adjust_project(
     result : Adjustment
     remarks : tuple of str
     """
+    if out is not None and report is not None and out.resolve() == report.resolve():
+        raise InputError(f"{out}: is named for the project and for the report; name two files.")
     for path in (out, report):
         if path is not None:
             check_writable(path, overwrite=overwrite)

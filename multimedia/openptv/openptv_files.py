@@ -11,9 +11,9 @@ import numpy as np
 from multimedia.media.camera import Camera, Sensor
 from multimedia.media.flat_interface import FlatInterface
 from multimedia.refraction.layers import Layers
-from photocore.arrays import LARGEST, FloatArray, IntArray
+from photocore.arrays import FloatArray, IntArray
 from photocore.distortion import Brown, Convention
-from photocore.errors import GeometryError, InputError
+from photocore.errors import LARGEST, GeometryError, InputError
 from photocore.output import check_regular
 from photocore.rotation import nearest_rotation, world_from_camera
 
