@@ -10,6 +10,7 @@ import pytest
 
 from bifocal import Pair, Quality, dense_relief
 from bifocal.files.images import as_grey
+from bifocal.model.grid import Grid
 from bifocal.relief_maps import edges, flow, forward_projection, seed, smoothing
 from bifocal.relief_maps.frame import common_bounds, make_frame, working_grid
 from bifocal.relief_maps.orientation_sigma import orientation_sigma
@@ -208,6 +209,35 @@ def small_frame():
 
 def test_an_ideal_photo_is_not_resampled():
     np.testing.assert_array_equal(small_frame().image1, as_grey(shot().image1, "image1"))
+
+
+def test_a_photo_brought_to_a_coarser_grid_stays_where_it_was():
+    # Grey rises by 0.2137 a column and 0.1083 a row: averaging keeps it, half a pixel off shows.
+    columns, rows = np.meshgrid(np.arange(768.0), np.arange(512.0))
+    ramp = np.rint(20 + 0.2137 * columns + 0.1083 * rows).astype(np.uint8)
+    pair = shot().pair
+    grid = Grid.from_bounds((-4.0, -2.5, 4.0, 2.5), gsd=4.1 * pair.image1.gsd((768, 512)))
+    frame = make_frame(pair, ramp, ramp, grid)
+    places = np.stack(np.meshgrid(grid.columns_x, grid.rows_y), axis=-1)
+    pixels = pair.image1.pixels_from_plane(places)
+    off = frame.image1 - (20 + pixels @ [0.2137, 0.1083])
+    inside = frame.seen1 & (np.abs(pixels - [383.5, 255.5]) < [370, 240]).all(axis=-1)
+    assert inside.mean() > 0.3
+    assert abs(off[inside].mean()) < 0.05
+
+
+def test_relief_that_falls_away_outwards_is_a_ramp_and_that_which_rises_is_none():
+    # By hand: r = -k x falls away to the right; there a pixel's width of the photo is spread over
+    # 1 + 2 k x / d1 pixels of the plane, beyond the limit of 1.3 where x > 0.15 d1 / k.
+    frame = small_frame()
+    x, y = frame.from_centre()
+    limit = forward_projection.STRETCH - 1
+    for axis in (x + 0 * y, y + 0 * x):
+        falling = forward_projection.ramps(frame, (-0.01 * axis).astype(np.float32))
+        wanted = axis > limit / 2 * 17.5 / 0.01
+        clear = np.abs(axis - limit / 2 * 17.5 / 0.01) > 2
+        clear[0] = clear[-1] = clear[:, 0] = clear[:, -1] = False
+        np.testing.assert_array_equal(falling[clear], wanted[clear])
 
 
 def test_the_coarse_sweep_finds_relief_to_a_few_centimetres():
