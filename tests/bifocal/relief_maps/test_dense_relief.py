@@ -8,7 +8,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from bifocal import Pair, Quality, dense_relief
+from bifocal import Pair, Photo, Quality, dense_relief
 from bifocal.files.images import as_grey
 from bifocal.model.grid import Grid
 from bifocal.relief_maps import edges, flow, forward_projection, seed, smoothing
@@ -212,18 +212,18 @@ def test_an_ideal_photo_is_not_resampled():
 
 
 def test_a_photo_brought_to_a_coarser_grid_stays_where_it_was():
-    # Grey rises by 0.2137 a column and 0.1083 a row: averaging keeps it, half a pixel off shows.
-    columns, rows = np.meshgrid(np.arange(768.0), np.arange(512.0))
-    ramp = np.rint(20 + 0.2137 * columns + 0.1083 * rows).astype(np.uint8)
-    pair = shot().pair
-    grid = Grid.from_bounds((-4.0, -2.5, 4.0, 2.5), gsd=4.1 * pair.image1.gsd((768, 512)))
-    frame = make_frame(pair, ramp, ramp, grid)
+    # Grey rises by 0.5 a column and 0.6 a row, which averaging keeps: half a pixel of the coarser
+    # grid too far is 2 grey levels and more, rounding at most one half.
+    columns, rows = np.meshgrid(np.arange(256.0), np.arange(160.0))
+    ramp = np.rint(20 + 0.5 * columns + 0.6 * rows).astype(np.uint8)
+    metres = [[0.02, 0, -0.02 * 127.5], [0, -0.02, 0.02 * 79.5], [0, 0, 1]]
+    far, near = (Photo(plane_from_pixel=metres, nadir=(0, 0), distance=d) for d in (17.5, 9.5))
+    grid = Grid.from_bounds((-2.0, -1.2, 2.0, 1.2), gsd=0.083)
+    frame = make_frame(Pair(image1=far, image2=near), ramp, ramp, grid)
     places = np.stack(np.meshgrid(grid.columns_x, grid.rows_y), axis=-1)
-    pixels = pair.image1.pixels_from_plane(places)
-    off = frame.image1 - (20 + pixels @ [0.2137, 0.1083])
-    inside = frame.seen1 & (np.abs(pixels - [383.5, 255.5]) < [370, 240]).all(axis=-1)
-    assert inside.mean() > 0.3
-    assert abs(off[inside].mean()) < 0.05
+    wanted = 20 + (places * [50, -50] + [127.5, 79.5]) @ [0.5, 0.6]
+    assert frame.seen1.all()
+    assert abs((frame.image1 - wanted).mean()) < 0.6
 
 
 def test_relief_that_falls_away_outwards_is_a_ramp_and_that_which_rises_is_none():
