@@ -165,7 +165,7 @@ _GROUPS: tuple[tuple[str, str, tuple[tuple[str, str], ...]], ...] = (
     (
         "bifocal/relief_maps/seed.py",
         "tests/bifocal/relief_maps/test_dense_relief.py",
-        (("centre = (frame.centre + 0.5) / factor - 0.5", "centre = frame.centre / factor"),),
+        (("np.array([low, high]), d1=d1, d2=d2", "np.array([low, high]), d1=d2, d2=d1"),),
     ),
     (
         "bifocal/relief_maps/frame.py",
@@ -210,7 +210,7 @@ _GROUPS: tuple[tuple[str, str, tuple[tuple[str, str], ...]], ...] = (
     ),
     (
         "bifocal/orthophotos/sections.py",
-        "tests/bifocal/orthophotos/test_cli_ortho.py",
+        "tests/bifocal/orthophotos/test_sections.py",
         (("np.linspace(0.0, 1.0, count)", "np.linspace(0.0, 1.0, count + 1)[:-1]"),),
     ),
     (
