@@ -1,6 +1,6 @@
 """Planted faults: single lines made wrong, each of which the default tests must notice.
 
-    .venv/bin/python -m tests.planted_faults             every fault, by the tests nearest to it
+    .venv/bin/python -m tests.planted_faults             every fault by its nearest tests, 15 min
     .venv/bin/python -m tests.planted_faults --whole     survivors by the whole default suite too
     .venv/bin/python -m tests.planted_faults 3 17        some of them
 
