@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+import cv2
 import numpy as np
 from scipy.optimize import least_squares
 
@@ -136,8 +137,6 @@ def find_straight_edges(image: ByteArray, *, most: int = 80) -> list[FloatArray]
     lines : list of ndarray, shape (n, 2)
         Longest first. [px]
     """
-    import cv2
-
     blurred = cv2.GaussianBlur(image, (0, 0), 1.0)
     detected = cv2.createLineSegmentDetector().detect(blurred)[0]
     if detected is None:

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+import cv2
 import numpy as np
 
 from bifocal.calibration.board_calibration import Calibration
@@ -162,8 +163,6 @@ def check_size(lens: Lens, path: Path) -> None:
 
 def undistorted(image: ImageArray, lens: Lens) -> ImageArray:
     """Return the photo without distortion: same size, same camera matrix, cubic, in strips."""
-    import cv2
-
     height, width = image.shape[:2]
     result = np.empty_like(image)
     # Strips keep the coordinate maps small, and below remap's limit of 32767 rows.

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -136,8 +137,6 @@ def read_image(path: Path | str, *, grey: bool = False) -> ImageArray:
     InputError
         As `image_info`, and if the pixels cannot be decoded or are cut off.
     """
-    import cv2
-
     info = image_info(path)
     if info.size[0] * info.size[1] > _BY_STRIPS and not grey:
         large = _read_by_strips(info)
@@ -212,8 +211,6 @@ def as_grey(image: NDArray[np.generic], name: str) -> ByteArray:
     InputError
         If it is not an image of 8 or 16 bits, or smaller than 16 pixels a side.
     """
-    import cv2
-
     small = "is too small to match; at least 16 px a side are needed."
     array = as_photo(image, name, smallest=16, fault=small)
     if array.dtype == np.uint16:
@@ -224,8 +221,6 @@ def as_grey(image: NDArray[np.generic], name: str) -> ByteArray:
 
 def write_image(path: Path | str, image: ImageArray, *, overwrite: bool = False) -> None:
     """Write RGB, RGBA or grey pixels as the ending says (.png, .jpg, .tif), whole or not at all."""
-    import cv2
-
     path = Path(path)
     ending = path.suffix.lower()
     if ending not in {".png", ".jpg", ".jpeg", ".tif", ".tiff"}:

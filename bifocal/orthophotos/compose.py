@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple, cast
 
+import cv2
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -264,8 +265,6 @@ def _share_of_first(
     views: Sequence[SourcePhoto], usable: Sequence[BoolArray], grid: Grid, feather: float
 ) -> NDArray[np.float32]:
     """Return the weight of the first view, 0..1."""
-    import cv2
-
     first, second = usable
     middle = np.array([[grid.x0 + grid.gsd * grid.width / 2, grid.y0 - grid.gsd * grid.height / 2]])
     sizes = []
@@ -284,8 +283,6 @@ def _share_of_first(
 
 def _masked(image: ImageArray, keep: BoolArray) -> ImageArray:
     """Return the image with 0 where it is not to be kept."""
-    import cv2
-
     return image if keep.all() else cv2.copyTo(image, keep.astype(np.uint8))
 
 
@@ -293,8 +290,6 @@ def _fill(
     image: ImageArray, source: ByteArray, area: BoolArray, relief: ReliefArray
 ) -> tuple[ImageArray, ByteArray]:
     """Close holes within an area, with the colours of the surface behind, not of what hides it."""
-    import cv2
-
     holes = (source == Source.NONE) & area
     if not holes.any():
         return image, source

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from itertools import combinations
 from typing import Any, Protocol
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -175,8 +176,6 @@ def mosaic_window(
 
 def window_of(layer: Layer, grid: Grid) -> tuple[NDArray[Any], BoolArray]:
     """Return a layer on a window's pixels; resampled (cubic) only if its own lie elsewhere."""
-    import cv2
-
     offset = grid.whole_offset_in(layer.grid)
     if offset is not None:
         return layer.read(*offset, grid.width, grid.height)
@@ -193,8 +192,6 @@ def window_of(layer: Layer, grid: Grid) -> tuple[NDArray[Any], BoolArray]:
 
 def _onto(layer: Layer, coarse: Grid) -> tuple[NDArray[np.float32], BoolArray]:
     """Return a layer on the coarse grid, colours 0..1 (values stay as they are)."""
-    import cv2
-
     own = layer.grid
     width = max(1, round(own.width * own.gsd / coarse.gsd))
     height = max(1, round(own.height * own.gsd / coarse.gsd))
@@ -212,8 +209,6 @@ def _onto(layer: Layer, coarse: Grid) -> tuple[NDArray[np.float32], BoolArray]:
 
 def _depth(seen: BoolArray) -> NDArray[np.float32]:
     """Return how far a place is from the rim of a layer, holes within it not counted. [px]"""
-    import cv2
-
     # A rim of zeros: the edge of the raster is an edge of the layer as well.
     padded = np.pad(seen.astype(np.uint8), 1)
     closed = cv2.morphologyEx(padded, cv2.MORPH_CLOSE, np.ones((31, 31), np.uint8))
@@ -257,7 +252,6 @@ def _seams(
     gsd: float,
 ) -> IntArray:
     """Return the layer of every place, with seams where they are seen least."""
-    import cv2
     from skimage.segmentation import watershed
 
     any_valid = np.logical_or.reduce(list(valid))
@@ -318,8 +312,6 @@ def _blended(
     images: dict[int, NDArray[np.float32]], valid: dict[int, BoolArray], owner: IntArray
 ) -> NDArray[np.float32]:
     """Return the images mixed band by band (Burt and Adelson 1983)."""
-    import cv2
-
     total: list[NDArray[np.float32]] = []
     weights: list[NDArray[np.float32]] = []
     # Beyond its rim a layer goes on as the plain mosaic: layers that agree blend into themselves.

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -90,7 +91,6 @@ class _ArrayLayer:
 
     def reduced(self, width: int, height: int) -> tuple[NDArray[Any], BoolArray]:
         """Return the whole raster shrunk: the mean of what is seen."""
-        import cv2
 
         def shrunk(values: NDArray[Any]) -> FloatArray:
             return cv2.resize(values, (width, height), interpolation=cv2.INTER_AREA)

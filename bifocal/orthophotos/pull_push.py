@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -31,8 +32,6 @@ def fill_holes(
     Pull: known colours are averaged over 2 x 2 pixels again and again until averages reach into
     the holes. Push: each level takes its unknown pixels from the next coarser one.
     """
-    import cv2
-
     weight = known.astype(np.float32)
     colour: NDArray[Any] = image.astype(np.float32)
     colour[~known] = 0

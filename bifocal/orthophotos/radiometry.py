@@ -10,6 +10,7 @@ import math
 from collections.abc import Callable
 from dataclasses import replace
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -106,8 +107,6 @@ def chromatic_shift(image: ImageArray) -> ChromaticShift:
     If red is stretched by ``1 + a(rho)`` it differs from green by ``-a rho dG/drho`` wherever both
     show the same edges; a0 and a1 follow by least squares over all edges, in two rounds.
     """
-    import cv2
-
     height, width = image.shape[:2]
     centre, radius = _middle((width, height))
     y, x = np.mgrid[0:height, 0:width].astype(np.float32)
@@ -241,8 +240,6 @@ def _by_rows(
 
 def _edges(band: NDArray[np.integer]) -> NDArray[np.float32]:
     """Return local contrast, comparable between bands of different brightness."""
-    import cv2
-
     value = band.astype(np.float32)
     fine = cv2.GaussianBlur(value, (0, 0), 1.0) - cv2.GaussianBlur(value, (0, 0), 6.0)
     energy = cv2.GaussianBlur(fine * fine, (0, 0), 6.0)

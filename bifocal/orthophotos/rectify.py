@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass
 from itertools import pairwise
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -136,8 +137,6 @@ class SourcePhoto:
     def _remap(
         self, image: ImageArray, column: PixelMap, row: PixelMap, interpolation: Interpolation
     ) -> ImageArray:
-        import cv2
-
         flag = {
             "nearest": cv2.INTER_NEAREST,
             "linear": cv2.INTER_LINEAR,
@@ -222,8 +221,6 @@ def _project(
 
 def _reduced(image: ImageArray, factor: int) -> ImageArray:
     """Return an image averaged over squares of ``factor`` pixels; incomplete squares at the end."""
-    import cv2
-
     height, width = image.shape[:2]
     high, wide = -(-height // factor) * factor, -(-width // factor) * factor
     padded = cv2.copyMakeBorder(image, 0, high - height, 0, wide - width, cv2.BORDER_REPLICATE)
@@ -279,8 +276,6 @@ class LensTable:
 
     def distort(self, column: FloatArray, row: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return raw positions of ideal ones; NaN where the photo cannot show them."""
-        import cv2
-
         u = ((column - self.left) * (1 / _LENS_STEP)).astype(np.float32)
         v = ((row - self.top) * (1 / _LENS_STEP)).astype(np.float32)
         outside = (math.nan, math.nan)

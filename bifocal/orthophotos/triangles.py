@@ -6,6 +6,7 @@ import math
 from collections.abc import Sequence
 from itertools import pairwise
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -76,8 +77,6 @@ class TriangleSurface:
 
     def window(self, grid: Grid) -> ReliefArray:
         """Return relief at the pixel centres of a grid; NaN outside the triangles."""
-        import cv2
-
         owner = np.full(grid.shape, -1, np.int32)
         # Pixel centres just on the rim still count: the rasteriser fills boundaries.
         touched = self._touching(grid.bounds)

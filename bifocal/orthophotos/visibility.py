@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -228,8 +229,6 @@ def _sharpen(around: _Surroundings, buffer: _Buffer) -> BoolArray:
     a pixel are missed. Where that matters the ray from the pixel to the camera is followed at the
     place of the occluder and right beside the pixel: it is hidden if relief rises above the ray.
     """
-    import cv2
-
     core, rho = around.core, around.rho[around.core]
     ahead = rho - buffer.nearest[buffer.cells]
     hidden = ahead > np.float32(_MARGIN)

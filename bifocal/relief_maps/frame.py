@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from itertools import permutations
 from typing import Any
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -172,8 +173,6 @@ def make_frame(
 
 def _on_grid(photo: Photo, image: ByteArray, grid: Grid) -> tuple[ByteArray, BoolArray]:
     """Return a photo on the grid and where it has content."""
-    import cv2
-
     matrix = np.linalg.inv(photo.plane_from_pixel) @ grid.plane_from_pixel
     matrix = matrix / matrix[2, 2]
     height, width = image.shape
@@ -247,8 +246,6 @@ def values_at(band: NDArray[Any], places: NDArray[np.floating], how: int) -> NDA
     how : int
         OpenCV's interpolation, ``cv2.INTER_NEAREST`` or another.
     """
-    import cv2
-
     outside = np.nan if band.dtype.kind == "f" else 0
     values = [np.zeros((0, *band.shape[2:]), band.dtype)]
     # cv2.remap counts the places of one call in 16 bits.
