@@ -12,11 +12,11 @@ import numpy as np
 from bifocal.orientation import validation
 from bifocal.orientation.control_points import Control, SiteMeasures
 from bifocal.orientation.features import find_features
-from bifocal.orientation.interior_orientation import Interior
+from bifocal.orientation.interior_orientation import Cameras, Interiors
 from bifocal.orientation.orientation_stages import (
     SIGMA_PARALLEL,
     OrientedPair,
-    PhotoInput,
+    Photos,
     Step,
     oriented_in_stages,
     silent,
@@ -28,7 +28,7 @@ from bifocal.orientation.relative_orientation import Ties, find_ties, first_came
 from bifocal.orientation.space_resection import resect
 from bifocal.orientation.tie_points import robust_sigma
 from photocore.arrays import BoolArray
-from photocore.camera import Pinhole, ray_on_plane
+from photocore.camera import ray_on_plane
 from photocore.errors import GeometryError
 from photocore.similarity import Similarity, fit_plane
 
@@ -37,7 +37,7 @@ from photocore.similarity import Similarity, fit_plane
 class _Given:
     """What `orient_pair` is given."""
 
-    photos: tuple[PhotoInput, PhotoInput]
+    photos: Photos
     control: Control
     site: SiteMeasures
     step: Step
@@ -48,17 +48,13 @@ class _Given:
         return self.photos[0].name, self.photos[1].name
 
     @property
-    def interiors(self) -> tuple[Interior, Interior]:
+    def interiors(self) -> Interiors:
         """Interior orientations of the photos."""
         return self.photos[0].interior, self.photos[1].interior
 
 
 def orient_pair(
-    photos: tuple[PhotoInput, PhotoInput],
-    *,
-    control: Control,
-    site: SiteMeasures,
-    step: Step = silent,
+    photos: Photos, *, control: Control, site: SiteMeasures, step: Step = silent
 ) -> OrientedPair:
     """Return the cameras of a pair.
 
@@ -108,9 +104,7 @@ def orient_pair(
     return replace(pair, remarks=told, assumed=assumed)
 
 
-def _contradiction(
-    cameras: tuple[Pinhole, Pinhole], interiors: tuple[Interior, Interior], ties: Ties
-) -> float:
+def _contradiction(cameras: Cameras, interiors: Interiors, ties: Ties) -> float:
     """Return how far the common points are from the cameras' epipolar lines. [px]"""
     observations = PairObservations(interiors=interiors, tie1=ties.pixels1, tie2=ties.pixels2)
     return robust_sigma(tie_misfit(observations, PairUnknowns(cameras=cameras)))
@@ -191,9 +185,7 @@ def _ties(given: _Given, *, needed: bool) -> tuple[Ties | None, tuple[str, ...]]
         return None, (remark,)
 
 
-def _start(
-    given: _Given, ties: Ties | None, enough: bool
-) -> tuple[tuple[Pinhole, Pinhole], BoolArray, tuple[Interior, Interior]]:
+def _start(given: _Given, ties: Ties | None, enough: bool) -> tuple[Cameras, BoolArray, Interiors]:
     """Return approximate cameras, the control points that agree, and the interiors used."""
     control, interiors = given.control, given.interiors
     agree = np.ones(len(control.ids), dtype=bool)
@@ -215,9 +207,7 @@ def _start(
     return _scaled(first_cameras(ties, interiors), given, interiors), agree, interiors
 
 
-def _plausible_focals(
-    interiors: tuple[Interior, Interior], ties: Ties, site: SiteMeasures
-) -> tuple[Interior, Interior]:
+def _plausible_focals(interiors: Interiors, ties: Ties, site: SiteMeasures) -> Interiors:
     """Return interiors whose unknown focal length follows from the distances and the scale."""
     first, second = interiors
     if not (first.is_assumed or second.is_assumed):
@@ -235,9 +225,7 @@ def _plausible_focals(
     return replace(first, focal=second.focal / ratio), second
 
 
-def _scaled(
-    cameras: tuple[Pinhole, Pinhole], given: _Given, interiors: tuple[Interior, Interior]
-) -> tuple[Pinhole, Pinhole]:
+def _scaled(cameras: Cameras, given: _Given, interiors: Interiors) -> Cameras:
     """Return cameras of far distance 1 brought to metres and, where known, to X and Y."""
     control, site = given.control, given.site
     near, scale = cameras[1].centre[2], 0.0
@@ -275,7 +263,7 @@ def _scaled(
 
 
 def _observations(
-    given: _Given, interiors: tuple[Interior, Interior], ties: Ties | None, agree: BoolArray
+    given: _Given, interiors: Interiors, ties: Ties | None, agree: BoolArray
 ) -> PairObservations:
     """Return everything observed, ideal pixels throughout."""
     control, site = given.control, given.site
@@ -308,7 +296,7 @@ def _observations(
     )
 
 
-def _same_body(interiors: tuple[Interior, Interior]) -> float | None:
+def _same_body(interiors: Interiors) -> float | None:
     """Return how closely the principal points agree, if both may be of one camera body. [px]"""
     first, second = interiors
     # With one photo upright and one lying the axes differ.

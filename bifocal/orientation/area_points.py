@@ -10,6 +10,7 @@ import cv2
 import numpy as np
 
 from bifocal import rays
+from bifocal.orientation.interior_orientation import Images
 from bifocal.orientation.pair_adjustment import AdjustedPair
 from bifocal.orientation.pair_observations import PairObservations
 from photocore.arrays import BoolArray, ByteArray, FloatArray
@@ -22,7 +23,7 @@ POINTS = 3000
 
 
 def even_points(
-    observations: PairObservations, adjusted: AdjustedPair, images: tuple[ByteArray, ByteArray]
+    observations: PairObservations, adjusted: AdjustedPair, images: Images
 ) -> tuple[FloatArray, FloatArray]:
     """Return points spread evenly over the wall's area, where either photo sees them.
 

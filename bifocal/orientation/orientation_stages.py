@@ -14,13 +14,13 @@ import numpy as np
 from bifocal.orientation import validation
 from bifocal.orientation.area_points import even_points
 from bifocal.orientation.control_points import SiteMeasures
-from bifocal.orientation.interior_orientation import Interior
+from bifocal.orientation.interior_orientation import Cameras, Images, Interior
 from bifocal.orientation.pair_adjustment import AdjustedPair, adjust, evaluated
 from bifocal.orientation.pair_observations import PairObservations, PairUnknowns
 from bifocal.orientation.reference_plane import Face, choose_wall, rivals_in_words
 from bifocal.orientation.tie_points import ROUGHNESS, classify, refine_ties, robust_sigma
 from photocore.arrays import ByteArray, FloatArray
-from photocore.camera import Pinhole, plane_transfer, triangulate
+from photocore.camera import plane_transfer, triangulate
 from photocore.errors import GeometryError
 from photocore.rotation import rotation_from_vector
 
@@ -56,6 +56,9 @@ class PhotoInput:
     grey: ByteArray | None
     interior: Interior
     name: str
+
+
+Photos = tuple[PhotoInput, PhotoInput]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -112,8 +115,8 @@ class OrientedPair:
 
 def oriented_in_stages(
     observations: PairObservations,
-    cameras: tuple[Pinhole, Pinhole],
-    photos: tuple[PhotoInput, PhotoInput],
+    cameras: Cameras,
+    photos: Photos,
     site: SiteMeasures,
     step: Step,
     *,
@@ -154,8 +157,8 @@ def oriented_in_stages(
 
 
 def _control_first(
-    observations: PairObservations, cameras: tuple[Pinhole, Pinhole]
-) -> tuple[PairObservations, tuple[Pinhole, Pinhole], tuple[str, ...]]:
+    observations: PairObservations, cameras: Cameras
+) -> tuple[PairObservations, Cameras, tuple[str, ...]]:
     """Return the observations with the ties that fit the control's cameras, those, remarks."""
     none = np.zeros(len(observations.tie1), dtype=bool)
     start = PairUnknowns(cameras=cameras)
@@ -222,9 +225,7 @@ def _unbent(pair: OrientedPair) -> OrientedPair:
     )
 
 
-def _with_even_points(
-    pair: OrientedPair, images: tuple[ByteArray, ByteArray], site: SiteMeasures
-) -> OrientedPair:
+def _with_even_points(pair: OrientedPair, images: Images, site: SiteMeasures) -> OrientedPair:
     """Return the pair with points from the whole area, on the face that is the wall.
 
     Where control points define the plane, the frame stays theirs.
@@ -269,7 +270,7 @@ def _with_even_points(
     return replace(pair, observations=ties).readjusted(start).settled(ROUGHNESS[1:])
 
 
-def _onto_plane(cameras: tuple[Pinhole, Pinhole], plane: FloatArray) -> tuple[Pinhole, Pinhole]:
+def _onto_plane(cameras: Cameras, plane: FloatArray) -> Cameras:
     """Return cameras in the frame of the plane z = a + b X + c Y, X and Y all but kept."""
     normal = np.array([-plane[1], -plane[2], 1.0])
     normal /= np.linalg.norm(normal)
@@ -304,7 +305,7 @@ def _parallel_if_so(pair: OrientedPair) -> OrientedPair:
     return replace(pair, assumed=(*pair.assumed, note)).readjusted(**changes)
 
 
-def _care(cameras: tuple[Pinhole, Pinhole]) -> float:
+def _care(cameras: Cameras) -> float:
     """Return how carefully the cameras seem to have been set up, from photo against photo. [rad]
 
     Over the wall, photo 2 is a turned and keystoned photo 1. Set up independently to an accuracy
