@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from photocore.cli import print_result, remark
-from photocore.options import FILE, Numbers, as_json, number, overwrite
+from photocore.options import FILE, Numbers, as_json, choice, number, overwrite
 
 if TYPE_CHECKING:
     from bifocal.orientation.alignment import Alignment
@@ -66,10 +66,7 @@ points.csv, one line per control point; r blank = on the wall; pixels in both ph
     "--vertical", type=Numbers(4), metavar="COL,ROW,COL,ROW",
     help="Two points of the far photo on an upright line of the wall [px].",
 )  # fmt: skip
-@click.option(
-    "--unit", type=click.Choice(["m", "cm", "mm"]),
-    help="Unit of the control coordinates.  [default: the headings', else m]",
-)  # fmt: skip
+@choice("--unit", "m|cm|mm", "Unit of the control coordinates.  [default: the headings', else m]")
 @number("--sigma-pick", "PX", "Precision of a pick [px].", default=0.5)
 @number("--sigma-control", "M", "Precision of a control coordinate [m].", default=0.003)
 @number("--sigma-distance", "M", "Precision of the measured distances [m].", default=0.02)

@@ -16,7 +16,7 @@ from bifocal.model.intersection import Intersection, PlanePicks, intersect
 from bifocal.model.lens import Lens
 from bifocal.precision import base_factor
 from photocore.arrays import FloatArray, as_points, positive, read_only
-from photocore.errors import GeometryError, InputError
+from photocore.errors import GeometryError, InputError, located
 from photocore.jsonfile import read_object, write_object
 
 FORMAT = "bifocal-pair/1"
@@ -282,12 +282,8 @@ class Pair:
             If a homography is singular or both distances are equal.
         """
         data = read_object(path, what="pair file")
-        try:
+        with located(path):
             return cls.from_dict(data, folder=Path(path).parent)
-        except GeometryError as error:
-            raise GeometryError(f"{path}: {error}") from None
-        except InputError as error:
-            raise InputError(f"{path}: {error}") from None
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any], *, folder: Path = Path()) -> Pair:
@@ -456,7 +452,7 @@ def _photo_from_dict(data: Any, key: str, folder: Path) -> Photo:
     lens = data.get("lens")
     if lens is not None and not isinstance(lens, str):
         raise InputError(f'"{key}.lens" must name a lens file, found {lens!r}.')
-    try:
+    with located(f'"{key}"'):
         return Photo(
             file=file,
             lens=Lens.read(folder / lens) if lens else None,
@@ -466,7 +462,3 @@ def _photo_from_dict(data: Any, key: str, folder: Path) -> Photo:
             **{name: data.pop(name, None) for name in _OPTIONAL},
             extra=data,
         )
-    except GeometryError as error:
-        raise GeometryError(f'"{key}": {error}') from None
-    except InputError as error:
-        raise InputError(f'"{key}": {error}') from None

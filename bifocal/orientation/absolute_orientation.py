@@ -29,7 +29,7 @@ from bifocal.orientation.space_resection import resect
 from bifocal.orientation.tie_points import robust_sigma
 from photocore.arrays import BoolArray
 from photocore.camera import ray_on_plane
-from photocore.errors import GeometryError
+from photocore.errors import GeometryError, located
 from photocore.similarity import Similarity, fit_plane
 
 
@@ -194,10 +194,8 @@ def _start(given: _Given, ties: Ties | None, enough: bool) -> tuple[Cameras, Boo
         for pixels, photo in zip((control.pixels1, control.pixels2), given.photos, strict=True):
             seen = control.positioned & np.isfinite(pixels).all(axis=1)
             xyz = np.nan_to_num(control.xyz[seen])
-            try:
+            with located(photo.name):
                 camera, fits = resect(xyz, photo.interior.ideal(pixels[seen]), photo.interior)
-            except GeometryError as error:
-                raise GeometryError(f"{photo.name}: {error}") from None
             cameras.append(camera)
             agree[np.flatnonzero(seen)[~fits]] = False
         return (cameras[0], cameras[1]), agree, interiors

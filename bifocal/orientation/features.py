@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from photocore.arrays import BoolArray, ByteArray, FloatArray
+from photocore.arrays import BoolArray, ByteArray, Float32Array, FloatArray
 
 #: SIFT doubles its input: 2.5 MP needs 0.6 GB, and patches are refined on the full photo anyway.
 FEATURE_PIXELS = 2.5e6
@@ -31,7 +31,7 @@ class Features:
 
     pixels: FloatArray
     size: FloatArray
-    descriptors: NDArray[np.float32]
+    descriptors: Float32Array
     reduction: float
 
 
@@ -177,13 +177,13 @@ def _angle(away: FloatArray) -> FloatArray:
 
 
 def _best_on_segment(
-    descriptors: NDArray[np.float32],
+    descriptors: Float32Array,
     second: Features,
     candidates: NDArray[np.intp],
     ends: tuple[FloatArray, FloatArray],
     across: float,
     ratio: float,
-) -> tuple[NDArray[np.intp], NDArray[np.float32]]:
+) -> tuple[NDArray[np.intp], Float32Array]:
     """Return each feature's distinct nearest candidate near its segment (-1: none)."""
     x2 = second.pixels[candidates]
     along = ends[1] - ends[0]
@@ -232,7 +232,7 @@ def sharpness(image: ByteArray) -> float:
     return float((np.median(fine[edges]) / np.median(coarse[edges]) - 1.0) / 1.5)
 
 
-def _steepness(image: NDArray[np.float32]) -> NDArray[np.float32]:
+def _steepness(image: Float32Array) -> Float32Array:
     """Return the larger of both grey-value differences across each inner pixel."""
     across = np.abs(image[1:-1, 2:] - image[1:-1, :-2])
     return np.maximum(across, np.abs(image[2:, 1:-1] - image[:-2, 1:-1]))

@@ -6,9 +6,8 @@ from typing import NamedTuple
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
-from photocore.arrays import BoolArray, ByteArray, FloatArray
+from photocore.arrays import BoolArray, ByteArray, Float32Array, FloatArray
 
 #: Half the window, in samples: 15 x 15 samples of the coarser photo.
 HALF = 7
@@ -36,7 +35,7 @@ class PatchResult(NamedTuple):
 
 def same_scale(
     image1: ByteArray, image2: ByteArray, local: FloatArray
-) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+) -> tuple[Float32Array, Float32Array]:
     """Return both photos as floats, the finer one smoothed to the coarser one's sharpness.
 
     Parameters
@@ -63,8 +62,8 @@ def same_scale(
 
 
 def refine(
-    image1: NDArray[np.float32],
-    image2: NDArray[np.float32],
+    image1: Float32Array,
+    image2: Float32Array,
     pixels1: FloatArray,
     pixels2: FloatArray,
     local: FloatArray,
@@ -109,8 +108,8 @@ def refine(
 
 
 def _refine_part(
-    image1: NDArray[np.float32],
-    image2: NDArray[np.float32],
+    image1: Float32Array,
+    image2: Float32Array,
     pixels1: FloatArray,
     pixels2: FloatArray,
     local: FloatArray,
@@ -176,7 +175,7 @@ def _refine_part(
     )
 
 
-def _sample(image: NDArray[np.float32], where: FloatArray) -> FloatArray:
+def _sample(image: Float32Array, where: FloatArray) -> FloatArray:
     """Return the image at pixel positions (..., 2), cubic; NaN outside."""
     shape = where.shape[:-1]
     flat = where.reshape(shape[0], -1, 2).astype(np.float32)

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from bifocal.model.grid import SAME_PIXEL, Bounds, Grid, bounds_of
 from bifocal.orthophotos.pull_push import fill_holes
-from photocore.arrays import BoolArray, FloatArray, IntArray
+from photocore.arrays import BoolArray, Float32Array, FloatArray, IntArray
 from photocore.errors import InputError
 
 #: Side of the raster on which seams and exposure are worked out. [px]
@@ -65,7 +65,7 @@ class SeamPlan:
 
     coarse: Grid
     labels: IntArray
-    rank: NDArray[np.float32]
+    rank: Float32Array
     gains: FloatArray
     differences: dict[tuple[int, int], float]
 
@@ -99,7 +99,7 @@ def plan_mosaic(
     *,
     priority: bool = False,
     gain: bool = True,
-    relief: NDArray[np.float32] | None = None,
+    relief: Float32Array | None = None,
     coarse: Grid | None = None,
 ) -> SeamPlan:
     """Work out seams and gains.
@@ -190,7 +190,7 @@ def window_of(layer: Layer, grid: Grid) -> tuple[NDArray[Any], BoolArray]:
     return moved.reshape(*grid.shape, -1), inside > 0
 
 
-def _onto(layer: Layer, coarse: Grid) -> tuple[NDArray[np.float32], BoolArray]:
+def _onto(layer: Layer, coarse: Grid) -> tuple[Float32Array, BoolArray]:
     """Return a layer on the coarse grid, colours 0..1 (values stay as they are)."""
     own = layer.grid
     width = max(1, round(own.width * own.gsd / coarse.gsd))
@@ -207,7 +207,7 @@ def _onto(layer: Layer, coarse: Grid) -> tuple[NDArray[np.float32], BoolArray]:
     return moved.reshape(*coarse.shape, -1), inside > 0
 
 
-def _depth(seen: BoolArray) -> NDArray[np.float32]:
+def _depth(seen: BoolArray) -> Float32Array:
     """Return how far a place is from the rim of a layer, holes within it not counted. [px]"""
     # A rim of zeros: the edge of the raster is an edge of the layer as well.
     padded = np.pad(seen.astype(np.uint8), 1)
@@ -218,7 +218,7 @@ def _depth(seen: BoolArray) -> NDArray[np.float32]:
 
 
 def _gains(
-    images: Sequence[NDArray[np.float32]], valid: Sequence[BoolArray], *, wanted: bool
+    images: Sequence[Float32Array], valid: Sequence[BoolArray], *, wanted: bool
 ) -> tuple[FloatArray, dict[tuple[int, int], float]]:
     """Return the factors that make common parts equal, by least squares over all overlaps."""
     count, bands = len(images), images[0].shape[2]
@@ -245,10 +245,10 @@ def _gains(
 
 
 def _seams(
-    images: Sequence[NDArray[np.float32]],
+    images: Sequence[Float32Array],
     valid: Sequence[BoolArray],
-    depth: NDArray[np.float32],
-    relief: NDArray[np.float32] | None,
+    depth: Float32Array,
+    relief: Float32Array | None,
     gsd: float,
 ) -> IntArray:
     """Return the layer of every place, with seams where they are seen least."""
@@ -309,11 +309,11 @@ def _owners(plan: SeamPlan, grid: Grid, seen: dict[int, BoolArray]) -> IntArray:
 
 
 def _blended(
-    images: dict[int, NDArray[np.float32]], valid: dict[int, BoolArray], owner: IntArray
-) -> NDArray[np.float32]:
+    images: dict[int, Float32Array], valid: dict[int, BoolArray], owner: IntArray
+) -> Float32Array:
     """Return the images mixed band by band (Burt and Adelson 1983)."""
-    total: list[NDArray[np.float32]] = []
-    weights: list[NDArray[np.float32]] = []
+    total: list[Float32Array] = []
+    weights: list[Float32Array] = []
     # Beyond its rim a layer goes on as the plain mosaic: layers that agree blend into themselves.
     plain = np.zeros_like(next(iter(images.values())))
     for k, raw in images.items():

@@ -22,7 +22,7 @@ from bifocal.orthophotos.mosaic_blending import (
     plan_mosaic,
 )
 from bifocal.orthophotos.tiles import RasterResult, write_tiles
-from photocore.arrays import BoolArray, IntArray
+from photocore.arrays import BoolArray, Float32Array, IntArray
 from photocore.cli import Progress, no_progress
 from photocore.errors import InputError
 from photocore.output import check_writable
@@ -156,7 +156,7 @@ def _check_alike(layers: Sequence[_FileLayer]) -> None:
             )
 
 
-def _relief_of(paths: Sequence[Path], coarse: Grid, stack: ExitStack) -> NDArray[np.float32]:
+def _relief_of(paths: Sequence[Path], coarse: Grid, stack: ExitStack) -> Float32Array:
     """Return the first known relief of several maps on the coarse grid."""
     relief = np.full(coarse.shape, np.nan, np.float32)
     for path in paths:

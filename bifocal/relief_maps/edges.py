@@ -9,7 +9,8 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-from bifocal.relief_maps.frame import Float32Array, Frame, zoom_map
+from bifocal.relief_maps.frame import Frame, zoom_map
+from photocore.arrays import Float32Array
 
 #: Half width of a ramp. [px]
 REACH = 9

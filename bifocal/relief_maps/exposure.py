@@ -7,9 +7,9 @@ from dataclasses import replace
 import cv2
 import numpy as np
 
-from bifocal.relief_maps.frame import Float32Array, Frame, zoom_map
+from bifocal.relief_maps.frame import Frame, zoom_map
 from bifocal.relief_maps.registration import least_absolute
-from photocore.arrays import FloatArray
+from photocore.arrays import Float32Array, FloatArray
 
 #: Grey values outside are clipped or dark noise and do not take part.
 DARKEST, BRIGHTEST = 12.0, 243.0

@@ -8,8 +8,8 @@ import cv2
 import numpy as np
 
 from bifocal import rays
-from bifocal.relief_maps.frame import Float32Array, Frame, offsets, zoom_map
-from photocore.arrays import BoolArray, ByteArray
+from bifocal.relief_maps.frame import Frame, offsets, zoom_map
+from photocore.arrays import BoolArray, ByteArray, Float32Array
 
 #: Weight of smoothness; 30 is as good before noise is taken out, 20 keeps more detail for it.
 ALPHA = 20.0

@@ -10,8 +10,8 @@ import numpy as np
 from bifocal.model.grid import Grid
 from bifocal.model.relief_map import Quality
 from bifocal.rays import Foot, magnification, reduction
-from bifocal.relief_maps.frame import Float32Array, Frame, offsets, values_at, zoom_map
-from photocore.arrays import BoolArray, ByteArray, FloatArray, IntArray
+from bifocal.relief_maps.frame import Frame, offsets, values_at, zoom_map
+from photocore.arrays import BoolArray, ByteArray, Float32Array, FloatArray, IntArray
 
 #: A relief agrees with the pixel it came from to this. [m], relative to d1
 AGREEMENT = 4e-4

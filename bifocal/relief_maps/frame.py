@@ -14,10 +14,8 @@ from numpy.typing import NDArray
 from bifocal import rays
 from bifocal.model.grid import Bounds, Grid, bounds_of, cut
 from bifocal.model.pair import Pair, Photo
-from photocore.arrays import BoolArray, ByteArray, FloatArray
+from photocore.arrays import BoolArray, ByteArray, Float32Array, FloatArray
 from photocore.errors import GeometryError, InputError
-
-Float32Array = NDArray[np.float32]
 
 #: A plane grid that fits the pixels of a photo this well is not resampled. [px]
 SAME_LATTICE = 2e-3

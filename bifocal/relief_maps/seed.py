@@ -11,8 +11,8 @@ import cv2
 import numpy as np
 
 from bifocal import rays
-from bifocal.relief_maps.frame import Float32Array, Frame, offsets
-from photocore.arrays import BoolArray, ByteArray
+from bifocal.relief_maps.frame import Frame, offsets
+from photocore.arrays import BoolArray, ByteArray, Float32Array
 
 #: Width or height at which the sweep works; more brings little, costs squarely. [px]
 COARSE_SIDE = 420

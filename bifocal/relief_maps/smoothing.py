@@ -5,7 +5,7 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-from bifocal.relief_maps.frame import Float32Array
+from photocore.arrays import Float32Array
 
 #: Half windows, small to large. [px]
 WINDOWS = (8, 16)

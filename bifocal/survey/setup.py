@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -12,7 +13,7 @@ from bifocal.model.pair import Pair
 from bifocal.precision import false_relief_of_scale
 from bifocal.survey.observations import PointObservations
 from photocore.arrays import FloatArray, positive
-from photocore.errors import GeometryError, InputError
+from photocore.errors import GeometryError, InputError, located
 
 #: Scales of the two photos may differ by this share; what remains is taken out by `k_12`.
 SCALE_TOLERANCE = 0.02
@@ -101,12 +102,8 @@ class SurveySetup:
         InputError, GeometryError
             If a value is missing, or values contradict each other, naming the file.
         """
-        try:
+        with located(self.where) if self.where else nullcontext():
             return self._pair()
-        except GeometryError as error:
-            raise GeometryError(self._said(str(error))) from None
-        except InputError as error:
-            raise InputError(self._said(str(error))) from None
 
     def _pair(self) -> Pair:
         missing = [name for name, value in (("d_1", self.d1), ("d_2", self.d2)) if value is None]
