@@ -22,6 +22,8 @@ from photocore.errors import GeometryError, InputError
 LEAST_LENGTH = 0.15
 #: Edge points more than this far off their line are not of it. [px]
 EDGE_LIMIT = 1.5
+#: As many of the longest edges are taken.
+MOST_LINES = 80
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -126,7 +128,7 @@ def calibrate_from_lines(
     )  # fmt: skip
 
 
-def find_straight_edges(image: ByteArray, *, most: int = 80) -> list[FloatArray]:
+def find_straight_edges(image: ByteArray) -> list[FloatArray]:
     """Return points along long, nearly straight edges of a grey photo.
 
     Segments found by OpenCV's detector are joined where they continue each other, and their points
@@ -149,7 +151,7 @@ def find_straight_edges(image: ByteArray, *, most: int = 80) -> list[FloatArray]
     gradient_x = cv2.Sobel(blurred, cv2.CV_32F, 1, 0, ksize=3)
     gradient_y = cv2.Sobel(blurred, cv2.CV_32F, 0, 1, ksize=3)
     strength = cv2.magnitude(gradient_x, gradient_y)
-    lines = [_refined_line(chain, strength) for chain in chains[:most]]
+    lines = [_refined_line(chain, strength) for chain in chains[:MOST_LINES]]
     return [line for line in lines if len(line) >= 8]
 
 

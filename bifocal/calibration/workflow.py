@@ -13,9 +13,9 @@ from bifocal.calibration.board_calibration import Calibration
 from bifocal.calibration.board_photos import calibrate
 from bifocal.calibration.lens_database import lens_from_database
 from bifocal.calibration.plumb_line import PlumbLine, calibrate_from_lines, find_straight_edges
-from bifocal.files.images import ImageArray, image_info, read_image, to_eight_bit, write_image
+from bifocal.files.images import ImageArray, image_info, read_grey, read_image, write_image
 from bifocal.model.lens import Lens
-from photocore.arrays import ByteArray, FloatArray
+from photocore.arrays import FloatArray
 from photocore.cli import Progress, no_progress
 from photocore.errors import InputError
 from photocore.output import check_writable
@@ -33,7 +33,9 @@ def calibrate_from_boards(
     """Calibrate from board photos and write the lens file; ``board`` as for `calibrate`."""
     check_writable(out, overwrite=overwrite)
     _common_size(images)
-    result = calibrate(map(_grey, images), names=_unique_names(images), progress=progress, **board)
+    result = calibrate(
+        map(read_grey, images), names=_unique_names(images), progress=progress, **board
+    )
     result.lens.write(out, overwrite=overwrite)
     return result
 
@@ -78,7 +80,7 @@ def calibrate_from_edges(
     if lines is not None:
         chains = _picked_lines(lines)
     else:
-        chains = [line for path in images for line in find_straight_edges(_grey(path))]
+        chains = [line for path in images for line in find_straight_edges(read_grey(path))]
     result = calibrate_from_lines(chains, size, focal_px=focal_px)
     if result.rms_after > 0.8 * result.rms_before:
         remarks.append(
@@ -175,11 +177,6 @@ def undistorted(image: ImageArray, lens: Lens) -> ImageArray:
             cv2.INTER_CUBIC, borderMode=cv2.BORDER_CONSTANT,
         )  # fmt: skip
     return result
-
-
-def _grey(path: Path) -> ByteArray:
-    """Return a photo in grey, 8 bit."""
-    return to_eight_bit(read_image(path, grey=True))
 
 
 def _common_size(images: Sequence[Path]) -> tuple[int, int]:

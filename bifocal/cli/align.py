@@ -107,29 +107,20 @@ def _options(given: dict[str, Any]) -> Any:
 
     lenses = tuple(
         KnownLens(
-            lens=given[f"lens{n}"] or given["lens"],
-            focal=given[f"focal{n}"],
-            pixel_size=given[f"pixel_size{n}"] or given["pixel_size"],
-            sensor_width=given[f"sensor_width{n}"] or given["sensor_width"],
+            **{
+                name: given[f"{name}{number}"] or given.get(name)
+                for name in ("lens", "focal", "pixel_size", "sensor_width")
+            }
         )
-        for n in (1, 2)
+        for number in (1, 2)
     )
+    site = ("distance1", "distance2", "delta_d", "sigma_control", "sigma_pick", "wall")
     line = given["horizontal"] or given["vertical"]
     length = given["length"]
     return AlignOptions(
         lenses=(lenses[0], lenses[1]),
-        site=SiteMeasures(
-            distance1=given["distance1"],
-            distance2=given["distance2"],
-            delta_d=given["delta_d"],
-            sigma=given["sigma_distance"],
-            sigma_control=given["sigma_control"],
-            sigma_pick=given["sigma_pick"],
-            wall=given["wall"],
-        ),
-        auto=given["auto"],
-        control=given["control"],
-        lengths=given["lengths"],
+        site=SiteMeasures(sigma=given["sigma_distance"], **{name: given[name] for name in site}),
+        **{name: given[name] for name in ("auto", "control", "lengths")},
         length=(length[:4], length[4]) if length else None,
         line=(line, given["horizontal"] is None) if line else None,
         unit=given["unit"] or "",

@@ -7,7 +7,7 @@ The sample lies in the folder ``sample`` beside this module. It was rendered by 
 from __future__ import annotations
 
 import csv
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -49,7 +49,6 @@ class DemoResult:
         Median error of the relief map [m] and share of it beyond 3 cm, where both photos see.
     map_known : float
         Share of the wall with a measured relief.
-    remarks : tuple of str
     """
 
     folder: Path
@@ -62,7 +61,6 @@ class DemoResult:
     map_median: float
     map_share: float
     map_known: float
-    remarks: tuple[str, ...] = field(default=())
 
     @property
     def rmse(self) -> float:
@@ -101,7 +99,7 @@ def run_demo(
     job = ReliefJob(
         out=folder / "relief.tif", preview=folder / "relief.png", bounds=BOUNDS, overwrite=True
     )
-    _, remarks = relief_of_pair(folder / "facade.pair.json", job)
+    relief_of_pair(folder / "facade.pair.json", job)
     progress(0.85, 1.0, "making the orthophoto")
     make_ortho(
         folder / "facade.pair.json", folder / "ortho.tif",
@@ -112,7 +110,7 @@ def run_demo(
     median, share, known = _against_truth(read_relief(folder / "relief.tif"))
     return DemoResult(
         folder=folder, files=_FILES, ids=ids, true=true, found=relief, sigma=sigma, flags=flags,
-        map_median=median, map_share=share, map_known=known, remarks=remarks,
+        map_median=median, map_share=share, map_known=known,
     )  # fmt: skip
 
 

@@ -184,6 +184,11 @@ def _read_by_strips(info: ImageInfo) -> ImageArray | None:
     return image
 
 
+def read_grey(path: Path | str) -> ByteArray:
+    """Return a photo in grey, 8 bit; see `read_image`."""
+    return to_eight_bit(read_image(path, grey=True))
+
+
 def turn_upright(image: Any, orientation: int) -> ImageArray:
     """Return stored pixels as EXIF orientation 1 to 8 wants them seen."""
     if orientation >= 5:
@@ -281,12 +286,10 @@ def _named_exif(tag: Any) -> dict[int, Any]:
     """Return a TIFF's EXIF values under their numbers."""
     if tag is None or not isinstance(tag.value, dict):
         return {}
-    numbers = {
-        "FocalLength": 37386, "FNumber": 33437, "FocalLengthIn35mmFilm": 41989,
-        "LensModel": 42036, "SubjectDistance": 37382, "FocalPlaneXResolution": 41486,
-        "FocalPlaneResolutionUnit": 41488,
-    }  # fmt: skip
-    return {numbers[key]: value for key, value in tag.value.items() if key in numbers}
+    from PIL.ExifTags import Base
+
+    numbers = Base.__members__
+    return {int(numbers[key]): value for key, value in tag.value.items() if key in numbers}
 
 
 def _info_from_exif(path: Path, size: tuple[int, int], bits: int, exif: Any) -> ImageInfo:

@@ -15,7 +15,7 @@ from bifocal.model.flags import SIGMA_PIXEL, FlagLimits
 from bifocal.model.intersection import Intersection, PlanePicks, intersect
 from bifocal.model.lens import Lens
 from bifocal.precision import base_factor
-from photocore.arrays import FloatArray, as_points, positive, read_only
+from photocore.arrays import BoolArray, FloatArray, as_points, positive, read_only
 from photocore.errors import GeometryError, InputError, located
 from photocore.jsonfile import read_object, write_object
 
@@ -126,6 +126,22 @@ class Photo:
         """Return the derivative of the plane position by the pixel, shape (n, 2, 2). [m/px]"""
         points = pixels if self.lens is None else self.lens.undistort(pixels)
         return homography_jacobian(self.plane_from_pixel, points)
+
+    def sees_ahead(self, positions: FloatArray, shape: tuple[int, ...]) -> BoolArray:
+        """Tell which plane positions lie on the photo's side of its horizon.
+
+        Parameters
+        ----------
+        positions : ndarray, shape (..., 2)
+            [m]
+        shape : (height, width, ...)
+            Of the photo. [px]
+        """
+        inverse = np.linalg.inv(self.plane_from_pixel)
+        scale = positions @ inverse[2, :2] + inverse[2, 2]
+        # q = H p / w and p = H^-1 q * w: both scales have the same sign where the photo looks.
+        reference = self.plane_from_pixel[2] @ [shape[1] / 2, shape[0] / 2, 1.0]
+        return np.asarray(scale * reference > 0)
 
     def gsd(self, size: tuple[int, int]) -> float:
         """Return the side of a pixel in the middle of a photo of (width, height) px. [m]

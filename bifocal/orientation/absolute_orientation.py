@@ -17,9 +17,7 @@ from bifocal.orientation.orientation_stages import (
     SIGMA_PARALLEL,
     OrientedPair,
     Photos,
-    Step,
     oriented_in_stages,
-    silent,
     without_gross,
 )
 from bifocal.orientation.pair_adjustment import tie_misfit
@@ -40,7 +38,6 @@ class _Given:
     photos: Photos
     control: Control
     site: SiteMeasures
-    step: Step
 
     @property
     def names(self) -> tuple[str, str]:
@@ -53,9 +50,7 @@ class _Given:
         return self.photos[0].interior, self.photos[1].interior
 
 
-def orient_pair(
-    photos: Photos, *, control: Control, site: SiteMeasures, step: Step = silent
-) -> OrientedPair:
+def orient_pair(photos: Photos, *, control: Control, site: SiteMeasures) -> OrientedPair:
     """Return the cameras of a pair.
 
     Parameters
@@ -66,23 +61,19 @@ def orient_pair(
         Points measured on site; may be empty.
     site : SiteMeasures
         Distances measured on site.
-    step : callable
-        Told what is being done.
 
     Raises
     ------
     GeometryError
         If the photos and measurements do not make a pair; the message says why and what to do.
     """
-    given = _Given(photos=photos, control=control, site=site, step=step)
+    given = _Given(photos=photos, control=control, site=site)
     known = control.positioned
     enough = all(
         (known & np.isfinite(pixels).all(axis=1)).sum() >= 4
         for pixels in (control.pixels1, control.pixels2)
     )
-    step("looking for common points")
     ties, remarks = _ties(given, needed=not enough)
-    step("setting up the cameras")
     cameras, agree, interiors = _start(given, ties, enough)
     if enough and ties is not None:
         misfit = _contradiction(cameras, interiors, ties)
@@ -95,7 +86,7 @@ def orient_pair(
     elif ties is not None:
         validation.check_parallax(ties, interiors, given.names, flat_is_fine=site.parallel)
     observations = _observations(given, interiors, ties, agree)
-    pair = oriented_in_stages(observations, cameras, photos, site, step, with_control=enough)
+    pair = oriented_in_stages(observations, cameras, photos, site, with_control=enough)
     pair = without_gross(pair)
     validation.check_determined(pair.adjusted)
     validation.check_movement(pair.adjusted)
@@ -137,9 +128,7 @@ def _picks_exchanged(given: _Given, ties: Ties, misfit: float) -> bool:
 
 def _with_picks_exchanged(given: _Given) -> OrientedPair:
     """Return the pair with the picks of the two photos exchanged, saying so."""
-    pair = orient_pair(
-        given.photos, control=given.control.exchanged(), site=given.site, step=given.step
-    )
+    pair = orient_pair(given.photos, control=given.control.exchanged(), site=given.site)
     note = (
         f"col1, row1 of the control points are pixels of {given.names[1]}, col2, row2 of "
         f"{given.names[0]}; the picks were exchanged."
@@ -157,9 +146,7 @@ def _with_photos_exchanged(given: _Given) -> OrientedPair:
         )
     if site.distance1 and site.distance2 and site.distance1 < site.distance2:
         site = replace(site, distance1=site.distance2, distance2=site.distance1)
-    pair = orient_pair(
-        given.photos[::-1], control=given.control.exchanged(), site=site, step=given.step
-    )
+    pair = orient_pair(given.photos[::-1], control=given.control.exchanged(), site=site)
     note = (
         f"{near} is the near photo; the two were exchanged. Image 1 of the pair file is {far}, and "
         "--distance1 means its distance."

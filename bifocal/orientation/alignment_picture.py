@@ -99,10 +99,7 @@ def _grid(alignment: Alignment, images: Images) -> tuple[FloatArray, float]:
 def _pixels_ahead(photo: Photo, image: ByteArray, grid: FloatArray) -> FloatArray:
     """Return the pixels of plane positions; NaN behind the camera, which would be mirrored."""
     pixels = photo.pixels_from_plane(grid)
-    ahead = np.linalg.inv(photo.plane_from_pixel)[2]
-    middle = photo.plane_from_pixels(np.array([image.shape[1] / 2.0, image.shape[0] / 2.0]))
-    sign = np.sign(middle @ ahead[:2] + ahead[2])
-    pixels[(grid @ ahead[:2] + ahead[2]) * sign <= 0] = np.nan
+    pixels[~photo.sees_ahead(grid, image.shape)] = np.nan
     return pixels
 
 

@@ -13,6 +13,8 @@ from photocore.arrays import BoolArray, ByteArray, Float32Array, FloatArray
 
 #: SIFT doubles its input: 2.5 MP needs 0.6 GB, and patches are refined on the full photo anyway.
 FEATURE_PIXELS = 2.5e6
+#: The nearest descriptor is at most this share as far as the second: anywhere, on the line.
+DISTINCT, DISTINCT_ON_LINE = 0.85, 0.9
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -84,9 +86,7 @@ def find_features(
     )
 
 
-def match_features(
-    first: Features, second: Features, *, ratio: float = 0.85
-) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+def match_features(first: Features, second: Features) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     """Return indices of mutual nearest neighbours that stand out from the second nearest."""
     if len(first.pixels) < 2 or len(second.pixels) < 2:
         return np.zeros(0, np.intp), np.zeros(0, np.intp)
@@ -109,7 +109,7 @@ def match_features(
         runner = part.max(axis=1)
         nearest[start : start + 2000] = best
         # |a - b|² = 2 - 2 a·b for unit vectors.
-        distinct[start : start + 2000] = (2 - 2 * value) < ratio**2 * (2 - 2 * runner)
+        distinct[start : start + 2000] = (2 - 2 * value) < DISTINCT**2 * (2 - 2 * runner)
     rows = np.arange(count)
     good = distinct & (back[nearest] == rows)
     return rows[good], nearest[good]
@@ -122,7 +122,6 @@ def match_along_lines(
     expected: tuple[FloatArray, FloatArray],
     *,
     across: float,
-    ratio: float = 0.9,
 ) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     """Return the nearest neighbours among those that lie near each feature's epipolar segment.
 
@@ -135,8 +134,6 @@ def match_along_lines(
         The segments' ends in photo 2. [px]
     across : float
         Largest distance from the line. [px]
-    ratio : float
-        Required distinctness among the candidates on the segment.
 
     Returns
     -------
@@ -161,7 +158,7 @@ def match_along_lines(
         if len(candidates):
             ends = expected[0][rows], expected[1][rows]
             best, value = _best_on_segment(
-                first.descriptors[rows], second, candidates, ends, across, ratio
+                first.descriptors[rows], second, candidates, ends, across
             )
             nearest[rows], similarity[rows] = best, value
     # One partner each: the most similar keeps it.
@@ -182,7 +179,6 @@ def _best_on_segment(
     candidates: NDArray[np.intp],
     ends: tuple[FloatArray, FloatArray],
     across: float,
-    ratio: float,
 ) -> tuple[NDArray[np.intp], Float32Array]:
     """Return each feature's distinct nearest candidate near its segment (-1: none)."""
     x2 = second.pixels[candidates]
@@ -203,7 +199,7 @@ def _best_on_segment(
     close &= np.abs(x2[None, :, 1] - x2[best, None, 1]) < across
     part[close] = -1.0
     runner = part.max(axis=1)
-    good = (value > 0.6) & ((2 - 2 * value) < ratio**2 * (2 - 2 * runner))
+    good = (value > 0.6) & ((2 - 2 * value) < DISTINCT_ON_LINE**2 * (2 - 2 * runner))
     return (
         np.where(good, candidates[best], -1).astype(np.intp),
         np.where(good, value, -1.0).astype(np.float32),
@@ -238,9 +234,9 @@ def _steepness(image: Float32Array) -> Float32Array:
     return np.maximum(across, np.abs(image[2:, 1:-1] - image[:-2, 1:-1]))
 
 
-def drop_repeated(pixels1: FloatArray, pixels2: FloatArray, *, apart: float = 1.0) -> BoolArray:
+def drop_repeated(pixels1: FloatArray, pixels2: FloatArray) -> BoolArray:
     """Return which matches to keep when several sit at one place (one per orientation)."""
-    keys = np.round(np.concatenate([pixels1, pixels2], axis=1) / apart).astype(np.int64)
+    keys = np.round(np.concatenate([pixels1, pixels2], axis=1)).astype(np.int64)
     _, first = np.unique(keys, axis=0, return_index=True)
     keep = np.zeros(len(pixels1), dtype=bool)
     keep[first] = True

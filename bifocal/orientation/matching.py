@@ -319,7 +319,7 @@ def _raw_metres(photo: Photo, pixels: FloatArray) -> FloatArray:
 
 
 def refine_along_lines(
-    pair: Pair, images: Images, pixels1: FloatArray, pixels2: FloatArray, *, reach: float = 4.0
+    pair: Pair, images: Images, pixels1: FloatArray, pixels2: FloatArray
 ) -> tuple[PatchResult, FloatArray]:
     """Return matches refined along their radial lines, and how far off the line they fit best.
 
@@ -329,8 +329,6 @@ def refine_along_lines(
     images : two ndarrays, uint8
     pixels1, pixels2 : ndarray, shape (n, 2)
         Approximate matches.
-    reach : float
-        Farther from the start than this a match is lost. [px]
 
     Returns
     -------
@@ -347,12 +345,10 @@ def refine_along_lines(
     along = np.where(np.isfinite(along), along, [1.0, 0.0])
     smooth1, smooth2 = same_scale(*images, local)
     basis = along[:, :, None]
-    patches = refine(smooth1, smooth2, pixels1, start, local, basis, reach=reach)
+    patches = refine(smooth1, smooth2, pixels1, start, local, basis)
     across = np.stack([-along[:, 1], along[:, 0]], axis=1)
     both = np.stack([along, across], axis=2)
-    free = refine(
-        smooth1, smooth2, pixels1, patches.pixels2, local, both, iterations=4, reach=reach
-    )
+    free = refine(smooth1, smooth2, pixels1, patches.pixels2, local, both, iterations=4)
     misfit = ((free.pixels2 - patches.pixels2) * across).sum(axis=1)
     return patches, np.where(free.converged, misfit, np.nan)
 

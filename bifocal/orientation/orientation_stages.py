@@ -5,7 +5,6 @@ Each stage takes the pair as oriented so far and returns it better, with what is
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -32,12 +31,6 @@ UNEVEN = 0.004
 GROSS_LIMIT = 4.0
 #: Ties within about this share of d1 of the control points' plane are taken for the wall at first.
 PLANE_SHARE = 0.003
-
-Step = Callable[[str], None]
-
-
-def silent(what: str) -> None:
-    """Tell nobody what is being done."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -118,7 +111,6 @@ def oriented_in_stages(
     cameras: Cameras,
     photos: Photos,
     site: SiteMeasures,
-    step: Step,
     *,
     with_control: bool,
 ) -> OrientedPair:
@@ -138,7 +130,6 @@ def oriented_in_stages(
     if len(observations.tie1) and images[0] is not None and images[1] is not None:
         pictures = images[0], images[1]
         pair = _with_even_points(_unbent(pair.settled()), pictures, site)
-        step("refining the common points")
         for _ in range(2):  # the second pass searches around better places
             moved, good = refine_ties(pair.observations, pair.adjusted, pictures)
             ties = pair.observations

@@ -11,6 +11,8 @@ from photocore.arrays import BoolArray, ByteArray, Float32Array, FloatArray
 
 #: Half the window, in samples: 15 x 15 samples of the coarser photo.
 HALF = 7
+#: Farther from the start than this a match is lost. [px]
+REACH = 4.0
 
 
 class PatchResult(NamedTuple):
@@ -69,9 +71,7 @@ def refine(
     local: FloatArray,
     directions: FloatArray,
     *,
-    half: int = HALF,
     iterations: int = 8,
-    reach: float = 3.0,
 ) -> PatchResult:
     """Move each match in photo 2 along given directions until the patches agree.
 
@@ -85,12 +85,8 @@ def refine(
         Derivative of photo 2 by photo 1 (the zoom k(r) under which the patch is seen).
     directions : ndarray, shape (n, 2, k)
         One (radial matching) or two unit vectors in photo 2.
-    half : int
-        Half the window in samples.
     iterations : int
         At most so many Gauss-Newton steps.
-    reach : float
-        Farther from the start than this a match is lost. [px]
 
     Notes
     -----
@@ -103,7 +99,7 @@ def refine(
     out = []
     for start in range(0, len(pixels1), 4000):
         points = [each[start : start + 4000] for each in (pixels1, pixels2, local, directions)]
-        out.append(_refine_part(image1, image2, *points, settings=(half, iterations, reach)))
+        out.append(_refine_part(image1, image2, *points, iterations=iterations))
     return PatchResult(*(np.concatenate(parts) for parts in zip(*out, strict=True)))
 
 
@@ -114,16 +110,14 @@ def _refine_part(
     pixels2: FloatArray,
     local: FloatArray,
     directions: FloatArray,
-    *,
-    settings: tuple[int, int, float],
+    iterations: int,
 ) -> PatchResult:
     """Refine at most 4000 matches (the coordinate maps stay small)."""
-    half, iterations, reach = settings
     known: BoolArray = np.isfinite(local.sum(axis=(1, 2)) + pixels2.sum(axis=1))
     local = np.where(known[:, None, None], local, np.eye(2))
     scale = np.sqrt(np.abs(np.linalg.det(local)))
     step = np.maximum(1.0, 1.0 / np.clip(scale, 0.1, 10.0))
-    axis = np.arange(-half - 1, half + 2, dtype=np.float64)
+    axis = np.arange(-HALF - 1, HALF + 2, dtype=np.float64)
     wide = np.stack(np.meshgrid(axis, axis), axis=-1)
     # Sampled one ring wider, for the gradient.
     first = _sample(image1, pixels1[:, None, None] + wide[None] * step[:, None, None, None])
@@ -136,7 +130,7 @@ def _refine_part(
     gradient /= step[:, None, None]
     inverse = np.linalg.inv(local)
     columns = gradient @ (inverse @ directions)
-    weight = np.exp(-(grid**2).sum(1) / (2 * (0.75 * half) ** 2))
+    weight = np.exp(-(grid**2).sum(1) / (2 * (0.75 * HALF) ** 2))
     weight /= weight.sum()
     design = np.concatenate([np.ones((count, len(grid), 1)), template[:, :, None], columns], axis=2)
     normal = np.einsum("nij,i,nik->njk", design, weight, design)
@@ -163,7 +157,7 @@ def _refine_part(
         position[index] -= np.einsum("nij,nj->ni", directions[index], shift)
         size = np.abs(shift).max(axis=1)
         converged[index[size < 0.02]] = True
-        lost = np.linalg.norm(position[index] - pixels2[index], axis=1) > reach
+        lost = np.linalg.norm(position[index] - pixels2[index], axis=1) > REACH
         lost |= terms[:, 1] <= 0
         active[index[(size < 0.003) | lost]] = False
         converged[index[lost]] = False

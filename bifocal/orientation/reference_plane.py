@@ -134,7 +134,7 @@ def choose_wall(
     return plane, sorted(planes, key=lambda face: (abs(face.offset) > band, -face.share))
 
 
-def largest_plane(xyz: FloatArray, *, band: float, seed: int = 7) -> FloatArray:
+def largest_plane(xyz: FloatArray, *, band: float) -> FloatArray:
     """Return the plane z = a + b X + c Y, nearly parallel to Z = 0, that holds most points.
 
     Parameters
@@ -142,10 +142,8 @@ def largest_plane(xyz: FloatArray, *, band: float, seed: int = 7) -> FloatArray:
     xyz : ndarray, shape (n, 3)
     band : float
         Points this near count fully less their distance (a narrow face beats a vague heap).
-    seed : int
-        Of the random triples.
     """
-    generator = np.random.default_rng(seed)
+    generator = np.random.default_rng(7)
     sample = xyz[generator.choice(len(xyz), min(len(xyz), 6000), replace=False)]
     triples = generator.integers(0, len(sample), (3000, 3))
     corners = sample[triples]

@@ -58,7 +58,7 @@ def refine_ties(
     usable = observations.tie_used & np.isfinite(local).all(axis=(1, 2))
     smooth1, smooth2 = same_scale(*images, local[usable])
     both = np.broadcast_to(np.eye(2), (len(raw1), 2, 2))
-    patches = refine(smooth1, smooth2, raw1, raw2, local, both, reach=4.0)
+    patches = refine(smooth1, smooth2, raw1, raw2, local, both)
     good = patches.converged & (patches.zncc > 0.85) & (patches.sigma < 0.3)
     return interiors[1].ideal(patches.pixels2), good
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 from typing import Any, Protocol
@@ -99,8 +99,7 @@ def plan_mosaic(
     *,
     priority: bool = False,
     gain: bool = True,
-    relief: Float32Array | None = None,
-    coarse: Grid | None = None,
+    relief: Callable[[Grid], Float32Array] | None = None,
 ) -> SeamPlan:
     """Work out seams and gains.
 
@@ -110,10 +109,8 @@ def plan_mosaic(
         Earlier layers cover later ones; otherwise seams are sought.
     gain : bool
         Make the colours equal.
-    relief : ndarray, shape of coarse, optional
-        Relief of the wall: seams keep away from its edges. [m]
-    coarse : Grid, optional
-        As `coarse_grid` returns it.
+    relief : callable, optional
+        Gives the relief of the wall on a grid: seams keep away from its edges. [m]
 
     Notes
     -----
@@ -121,7 +118,8 @@ def plan_mosaic(
     Soille, "Morphological image compositing", 2006) that runs where the layers agree, away from
     edges of the relief and from holes, which lie right behind such edges.
     """
-    coarse = coarse or coarse_grid(grid)
+    factor = max(1.0, max(grid.shape) / COARSE)
+    coarse = Grid.from_bounds(grid.bounds, gsd=grid.gsd * factor)
     images, valid = zip(*(_onto(layer, coarse) for layer in layers), strict=True)
     depth = np.stack([_depth(seen) for seen in valid])
     gains, differences = _gains(images, valid, wanted=gain)
@@ -131,14 +129,9 @@ def plan_mosaic(
         rank = np.broadcast_to(order[:, None, None], (len(layers), *coarse.shape))
         return SeamPlan(coarse, labels, rank, gains, differences)
     even = [image * factor for image, factor in zip(images, gains, strict=True)]
-    labels = _seams(even, valid, depth, relief, coarse.gsd)
+    edges = None if relief is None else relief(coarse)
+    labels = _seams(even, valid, depth, edges, coarse.gsd)
     return SeamPlan(coarse, labels, depth, gains, differences)
-
-
-def coarse_grid(grid: Grid) -> Grid:
-    """Return the grid on which a mosaic is planned."""
-    factor = max(1.0, max(grid.shape) / COARSE)
-    return Grid.from_bounds(grid.bounds, gsd=grid.gsd * factor)
 
 
 def mosaic_window(

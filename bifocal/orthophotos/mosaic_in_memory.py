@@ -14,12 +14,7 @@ from bifocal.model.grid import Bounds, Gridded, cut
 from bifocal.model.image import ImageArray
 from bifocal.model.relief_map import ReliefMap
 from bifocal.orthophotos.compose import as_surface
-from bifocal.orthophotos.mosaic_blending import (
-    coarse_grid,
-    common_grid,
-    mosaic_window,
-    plan_mosaic,
-)
+from bifocal.orthophotos.mosaic_blending import common_grid, mosaic_window, plan_mosaic
 from bifocal.orthophotos.ortho_image import Orthophoto
 from photocore.arrays import BoolArray, ByteArray, FloatArray
 from photocore.errors import InputError
@@ -153,11 +148,9 @@ def mosaic(
         raise InputError("a mosaic needs two rasters or more, all of one kind.")
     values = layers[0].image.dtype.kind == "f"
     grid = common_grid(layers, gsd=gsd, bounds=bounds)
-    coarse = coarse_grid(grid)
-    edges = None if relief is None else as_surface(relief).window(coarse)
     seams = plan_mosaic(
-        layers, grid, priority=options.priority, gain=options.gain and not values, relief=edges,
-        coarse=coarse,
+        layers, grid, priority=options.priority, gain=options.gain and not values,
+        relief=None if relief is None else as_surface(relief).window,
     )  # fmt: skip
     image, owner = mosaic_window(layers, seams, grid, blend=options.blend)
     if (owner < 0).all():

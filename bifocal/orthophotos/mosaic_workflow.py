@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -14,13 +15,7 @@ from bifocal.files.geotiff import RasterReader, check_relief, create_raster
 from bifocal.model.grid import Bounds, Grid
 from bifocal.model.surface import MapSurface
 from bifocal.orthophotos.compose import TILE
-from bifocal.orthophotos.mosaic_blending import (
-    SeamPlan,
-    coarse_grid,
-    common_grid,
-    mosaic_window,
-    plan_mosaic,
-)
+from bifocal.orthophotos.mosaic_blending import SeamPlan, common_grid, mosaic_window, plan_mosaic
 from bifocal.orthophotos.tiles import RasterResult, write_tiles
 from photocore.arrays import BoolArray, Float32Array, IntArray
 from photocore.cli import Progress, no_progress
@@ -108,11 +103,8 @@ def make_mosaic(
         _check_alike(layers)
         values = layers[0].is_relief
         grid = common_grid(layers, gsd=gsd, bounds=bounds)
-        coarse = coarse_grid(grid)
-        edges = _relief_of(relief, coarse, stack) if relief else None
-        seams = plan_mosaic(
-            layers, grid, priority=priority, gain=gain and not values, relief=edges, coarse=coarse
-        )
+        edges = partial(_relief_of, relief, stack) if relief else None
+        seams = plan_mosaic(layers, grid, priority=priority, gain=gain and not values, relief=edges)
         first = layers[0].reader
         names = [first.names[i - 1] for i in layers[0].kept]
 
@@ -156,7 +148,7 @@ def _check_alike(layers: Sequence[_FileLayer]) -> None:
             )
 
 
-def _relief_of(paths: Sequence[Path], coarse: Grid, stack: ExitStack) -> Float32Array:
+def _relief_of(paths: Sequence[Path], stack: ExitStack, coarse: Grid) -> Float32Array:
     """Return the first known relief of several maps on the coarse grid."""
     relief = np.full(coarse.shape, np.nan, np.float32)
     for path in paths:

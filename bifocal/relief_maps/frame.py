@@ -110,7 +110,7 @@ def _shows(photo: Photo, shape: tuple[int, ...], places: FloatArray) -> BoolArra
     height, width = shape[:2]
     with np.errstate(invalid="ignore"):
         inside = ((pixels > -1) & (pixels < [width, height])).all(-1)
-    return np.asarray(inside & _in_front(photo, shape, places))
+    return np.asarray(inside & photo.sees_ahead(places, shape))
 
 
 def _footprint(photo: Photo, shape: tuple[int, ...]) -> FloatArray:
@@ -133,7 +133,7 @@ def _footprint(photo: Photo, shape: tuple[int, ...]) -> FloatArray:
     with np.errstate(invalid="ignore"):
         good = np.isfinite(places).all(-1) & (determinant * sign > 0)
         good &= np.abs(determinant) < limit
-    return places[good & _in_front(photo, shape, places)]
+    return places[good & photo.sees_ahead(places, shape)]
 
 
 def working_grid(pair: Pair, shape1: tuple[int, ...], box: Bounds, gsd: float) -> Grid:
@@ -195,7 +195,7 @@ def _on_grid(photo: Photo, image: ByteArray, grid: Grid) -> tuple[ByteArray, Boo
         rows = slice(top, top + part.height)
         with np.errstate(invalid="ignore"):
             seen[rows] = ((pixels >= 0) & (pixels <= [width - 1, height - 1])).all(-1)
-        seen[rows] &= _in_front(photo, (height, width), places)
+        seen[rows] &= photo.sees_ahead(places, (height, width))
         maps = ((pixels + 0.5) * factors - 0.5).astype(np.float32)
         maps[~np.isfinite(maps)] = -1e4
         result[rows] = cv2.remap(
@@ -203,15 +203,6 @@ def _on_grid(photo: Photo, image: ByteArray, grid: Grid) -> tuple[ByteArray, Boo
         )
     result[~seen] = 0
     return result, seen
-
-
-def _in_front(photo: Photo, shape: tuple[int, ...], places: FloatArray) -> BoolArray:
-    """Return which plane points lie on the photo's side of its horizon."""
-    inverse = np.linalg.inv(photo.plane_from_pixel)
-    scale = places @ inverse[2, :2] + inverse[2, 2]
-    # q = H p / w and p = H^-1 q * w: both scales have the same sign where the photo looks.
-    reference = photo.plane_from_pixel[2] @ [shape[1] / 2, shape[0] / 2, 1.0]
-    return np.asarray(scale * reference > 0)
 
 
 def _whole_shift(matrix: FloatArray, grid: Grid) -> tuple[int, int] | None:

@@ -12,7 +12,7 @@ from bifocal.survey.check_points import check_points
 from bifocal.survey.georeferencing import georeference
 from bifocal.survey.point_survey import solve_points
 from bifocal.survey.reference import KnownPoints
-from bifocal.survey.template_workflow import MOST_ROWS, log_row, relative_name
+from bifocal.survey.template_workflow import MOST_ROWS, log_row
 from bifocal.survey.tolerances import RULES, sentence
 from bifocal.survey.workbook.book import write_book
 from bifocal.survey.workbook.content import SurveyContent
@@ -20,6 +20,7 @@ from bifocal.survey.workbook.update import can_update, update_book
 from bifocal.survey.workflow import SolvedSurvey
 from photocore.errors import InputError
 from photocore.jsonfile import to_text
+from photocore.output import relative_name
 from photocore.tables import write_csv
 from photocore.workbook.newbook import is_untouched, other_name
 
