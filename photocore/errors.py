@@ -104,9 +104,10 @@ class ConvergenceError(PhotogrammetryError, RuntimeError):
 @contextmanager
 def located(where: object) -> Iterator[None]:
     """Say where: put a file's name or a key before the message of whatever is refused within."""
+    place = f"{where}: " if where else ""
     try:
         yield
     except GeometryError as error:
-        raise GeometryError(f"{where}: {error}") from None
+        raise GeometryError(f"{place}{error}") from None
     except InputError as error:
-        raise InputError(f"{where}: {error}") from None
+        raise InputError(f"{place}{error}") from None

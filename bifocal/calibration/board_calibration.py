@@ -137,12 +137,8 @@ def find_board_size(images: Sequence[ByteArray]) -> tuple[int, int]:
     InputError
         If no two photos agree.
     """
-    flags = (
-        cv2.CALIB_CB_LARGER
-        | cv2.CALIB_CB_EXHAUSTIVE
-        | cv2.CALIB_CB_ACCURACY
-        | cv2.CALIB_CB_NORMALIZE_IMAGE
-    )
+    flags = cv2.CALIB_CB_LARGER | cv2.CALIB_CB_EXHAUSTIVE
+    flags |= cv2.CALIB_CB_ACCURACY | cv2.CALIB_CB_NORMALIZE_IMAGE
     votes: Counter[tuple[int, int]] = Counter()
     for image in images:
         found, _, meta = cv2.findChessboardCornersSBWithMeta(_reduced(image)[0], (3, 3), flags)

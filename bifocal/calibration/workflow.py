@@ -173,9 +173,8 @@ def undistorted(image: ImageArray, lens: Lens) -> ImageArray:
         columns, rows = np.meshgrid(np.arange(width), np.arange(top, bottom))
         seen = lens.distort(np.stack([columns, rows], axis=-1)).astype(np.float32)
         result[top:bottom] = cv2.remap(
-            image, np.ascontiguousarray(seen[..., 0]), np.ascontiguousarray(seen[..., 1]),
-            cv2.INTER_CUBIC, borderMode=cv2.BORDER_CONSTANT,
-        )  # fmt: skip
+            image, seen, None, cv2.INTER_CUBIC, borderMode=cv2.BORDER_CONSTANT
+        )
     return result
 
 

@@ -85,10 +85,8 @@ def resampled(image: ByteArray, pixels: FloatArray) -> ByteArray:
     if reduction > 1:
         image = cv2.blur(image, (reduction, reduction)).astype(np.uint8)
     maps = np.nan_to_num(pixels, nan=-10.0).astype(np.float32)
-    return np.asarray(
-        cv2.remap(image, maps[..., 0], maps[..., 1], cv2.INTER_LINEAR, borderValue=0),
-        dtype=np.uint8,
-    )
+    moved = cv2.remap(image, maps, None, cv2.INTER_LINEAR, borderValue=0)
+    return np.asarray(moved, dtype=np.uint8)
 
 
 def _flow(first: ByteArray, second: ByteArray) -> FloatArray:

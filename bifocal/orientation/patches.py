@@ -110,6 +110,7 @@ def _refine_part(
     pixels2: FloatArray,
     local: FloatArray,
     directions: FloatArray,
+    *,
     iterations: int,
 ) -> PatchResult:
     """Refine at most 4000 matches (the coordinate maps stay small)."""
@@ -173,14 +174,7 @@ def _sample(image: Float32Array, where: FloatArray) -> FloatArray:
     """Return the image at pixel positions (..., 2), cubic; NaN outside."""
     shape = where.shape[:-1]
     flat = where.reshape(shape[0], -1, 2).astype(np.float32)
-    values = cv2.remap(
-        image,
-        np.ascontiguousarray(flat[..., 0]),
-        np.ascontiguousarray(flat[..., 1]),
-        cv2.INTER_CUBIC,
-        borderMode=cv2.BORDER_CONSTANT,
-        borderValue=float("nan"),
-    )
+    values = cv2.remap(image, flat, None, cv2.INTER_CUBIC, borderValue=float("nan"))
     return np.asarray(values, dtype=np.float64).reshape(shape)
 
 

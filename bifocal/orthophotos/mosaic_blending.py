@@ -30,6 +30,10 @@ _EDGE_SLOPE = 0.5
 _LEAST_OVERLAP = 50
 
 
+#: A layer's values, shape (h, w, bands), and which of them are valid, shape (h, w).
+Seen = tuple[NDArray[Any], BoolArray]
+
+
 class Layer(Protocol):
     """One raster of a mosaic."""
 
@@ -37,12 +41,10 @@ class Layer(Protocol):
     def grid(self) -> Grid:
         """Where its pixels are."""
 
-    def read(
-        self, column: int, row: int, width: int, height: int
-    ) -> tuple[NDArray[Any], BoolArray]:
+    def read(self, column: int, row: int, width: int, height: int) -> Seen:
         """Return a window, shape (h, w, bands), and its validity; empty beyond the edges."""
 
-    def reduced(self, width: int, height: int) -> tuple[NDArray[Any], BoolArray]:
+    def reduced(self, width: int, height: int) -> Seen:
         """Return the whole raster shrunk to a size."""
 
 
@@ -167,7 +169,7 @@ def mosaic_window(
     return np.clip(np.rint(mixed[core]), 0, limit).astype(dtype), owner[core]
 
 
-def window_of(layer: Layer, grid: Grid) -> tuple[NDArray[Any], BoolArray]:
+def window_of(layer: Layer, grid: Grid) -> Seen:
     """Return a layer on a window's pixels; resampled (cubic) only if its own lie elsewhere."""
     offset = grid.whole_offset_in(layer.grid)
     if offset is not None:

@@ -14,9 +14,9 @@ from bifocal.model.grid import Bounds, Gridded, cut
 from bifocal.model.image import ImageArray
 from bifocal.model.relief_map import ReliefMap
 from bifocal.orthophotos.compose import as_surface
-from bifocal.orthophotos.mosaic_blending import common_grid, mosaic_window, plan_mosaic
+from bifocal.orthophotos.mosaic_blending import Seen, common_grid, mosaic_window, plan_mosaic
 from bifocal.orthophotos.ortho_image import Orthophoto
-from photocore.arrays import BoolArray, ByteArray, FloatArray
+from photocore.arrays import ByteArray, FloatArray
 from photocore.errors import InputError
 
 
@@ -77,14 +77,12 @@ class _ArrayLayer:
             values, self.seen = raster.image, raster.valid
         self.image: NDArray[Any] = np.atleast_3d(values)
 
-    def read(
-        self, column: int, row: int, width: int, height: int
-    ) -> tuple[NDArray[Any], BoolArray]:
+    def read(self, column: int, row: int, width: int, height: int) -> Seen:
         """Return a window and its validity; empty beyond the edges."""
         window = (column, row, width, height)
         return cut(self.image, window), cut(self.seen, window)
 
-    def reduced(self, width: int, height: int) -> tuple[NDArray[Any], BoolArray]:
+    def reduced(self, width: int, height: int) -> Seen:
         """Return the whole raster shrunk: the mean of what is seen."""
 
         def shrunk(values: NDArray[Any]) -> FloatArray:

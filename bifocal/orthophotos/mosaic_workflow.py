@@ -15,9 +15,15 @@ from bifocal.files.geotiff import RasterReader, check_relief, create_raster
 from bifocal.model.grid import Bounds, Grid
 from bifocal.model.surface import MapSurface
 from bifocal.orthophotos.compose import TILE
-from bifocal.orthophotos.mosaic_blending import SeamPlan, common_grid, mosaic_window, plan_mosaic
+from bifocal.orthophotos.mosaic_blending import (
+    SeamPlan,
+    Seen,
+    common_grid,
+    mosaic_window,
+    plan_mosaic,
+)
 from bifocal.orthophotos.tiles import RasterResult, write_tiles
-from photocore.arrays import BoolArray, Float32Array, IntArray
+from photocore.arrays import Float32Array, IntArray
 from photocore.cli import Progress, no_progress
 from photocore.errors import InputError
 from photocore.output import check_writable
@@ -41,9 +47,7 @@ class _FileLayer:
         """Whether it holds values rather than colours."""
         return self.reader.dtype.kind == "f"
 
-    def read(
-        self, column: int, row: int, width: int, height: int
-    ) -> tuple[NDArray[Any], BoolArray]:
+    def read(self, column: int, row: int, width: int, height: int) -> Seen:
         """Return a window and its validity."""
         size = (column, row, width, height)
         if self.is_relief:
@@ -53,7 +57,7 @@ class _FileLayer:
         valid = self.reader.read(*size, mask=True) > 0
         return self.reader.read(*size, bands=self.kept), valid
 
-    def reduced(self, width: int, height: int) -> tuple[NDArray[Any], BoolArray]:
+    def reduced(self, width: int, height: int) -> Seen:
         """Return the whole raster shrunk."""
         image, valid = self.reader.read_reduced(width, height, bands=self.kept)
         return image, valid & np.isfinite(image[:, :, 0])

@@ -199,7 +199,7 @@ def _on_grid(photo: Photo, image: ByteArray, grid: Grid) -> tuple[ByteArray, Boo
         maps = ((pixels + 0.5) * factors - 0.5).astype(np.float32)
         maps[~np.isfinite(maps)] = -1e4
         result[rows] = cv2.remap(
-            image, maps[..., 0], maps[..., 1], cv2.INTER_CUBIC, borderMode=cv2.BORDER_REPLICATE
+            image, maps, None, cv2.INTER_CUBIC, borderMode=cv2.BORDER_REPLICATE
         )
     result[~seen] = 0
     return result, seen
@@ -240,6 +240,5 @@ def values_at(band: NDArray[Any], places: NDArray[np.floating], how: int) -> NDA
     # cv2.remap counts the places of one call in 16 bits.
     for part in np.array_split(places.astype(np.float32), len(places) // 30000 + 1):
         if len(part):
-            columns, rows = (np.ascontiguousarray(part[None, :, axis]) for axis in (0, 1))
-            values.append(cv2.remap(band, columns, rows, how, borderValue=outside)[0])
+            values.append(cv2.remap(band, part[None], None, how, borderValue=outside)[0])
     return np.concatenate(values)

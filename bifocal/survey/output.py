@@ -191,7 +191,10 @@ def _records(solution: SolvedSurvey) -> list[str]:
     columns = [table[key].tolist() for key in _NUMBERS]
     world = [solution.world[:, i].tolist() for i in range(3)] if solution.georeference else []
     keys = [*_NUMBERS, *("ENH" if world else "")]
-    numbers = [[_number(value) for value in values] for values in (*columns, *world)]
+    numbers = [
+        [repr(value) if math.isfinite(value) else "null" for value in values]
+        for values in (*columns, *world)
+    ]
     names = [json.dumps(name, ensure_ascii=False) for name in table.ids]
     use = ["true" if value else "false" for value in solution.points.use]
     template = (
@@ -199,10 +202,6 @@ def _records(solution: SolvedSurvey) -> list[str]:
         + ', "flag": "{}", "use": {}}}'
     )  # fmt: skip
     return [template.format(*row) for row in zip(names, *numbers, table.flags, use, strict=True)]
-
-
-def _number(value: float) -> str:
-    return repr(value) if math.isfinite(value) else "null"
 
 
 def _head(solution: SolvedSurvey) -> dict[str, Any]:

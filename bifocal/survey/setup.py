@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -102,7 +101,7 @@ class SurveySetup:
         InputError, GeometryError
             If a value is missing, or values contradict each other, naming the file.
         """
-        with located(self.where) if self.where else nullcontext():
+        with located(self.where):
             return self._pair()
 
     def _pair(self) -> Pair:
@@ -132,9 +131,6 @@ class SurveySetup:
             if (value := getattr(self, name)) is not None:
                 positive(value, name)
         return Pair.ideal(d1=self.d1, d2=self.d2, c1=self.c1, c2=self.c2, sigma=self.precision)
-
-    def _said(self, text: str) -> str:
-        return f"{self.where}: {text}" if self.where else text
 
     def in_millimetres(self, points: PointObservations) -> PointObservations:
         """Return the points as image coordinates of `pair`, without raw pixels."""
@@ -170,13 +166,11 @@ class SurveySetup:
             return ""
         share = (1000.0 * self.d2 / self.c2) / (1000.0 * self.d1 / self.c1) - 1.0
         if abs(share) > tolerance:
+            place = f"{self.where}: " if self.where else ""
             raise GeometryError(
-                self._said(
-                    f"c_1/d_1 = {self.c1 / self.d1:.4g} and c_2/d_2 = {self.c2 / self.d2:.4g} "
-                    f"differ by {abs(share):.1%}: a bifocal pair has the same scale in both "
-                    "photos. Check c_1, c_2, d_1 and d_2 "
-                    f"(tolerance {tolerance:.1%}, --scale-tolerance)."
-                )
+                f"{place}c_1/d_1 = {self.c1 / self.d1:.4g} and c_2/d_2 = {self.c2 / self.d2:.4g} "
+                f"differ by {abs(share):.1%}: a bifocal pair has the same scale in both photos. "
+                f"Check c_1, c_2, d_1 and d_2 (tolerance {tolerance:.1%}, --scale-tolerance)."
             )
         if abs(share) < 1e-4:
             return ""
