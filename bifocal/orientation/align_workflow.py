@@ -202,11 +202,8 @@ def _interior(info: ImageInfo, data: KnownLens, number: int) -> Interior:
                 f"which the EXIF data of {info.path.name} do not tell. Give --sensor-width (36 for "
                 "full frame, about 23 for APS-C) or --pixel-size."
             )
-        focal, sigma, source = (
-            data.focal / pitch,
-            SIGMA_NOMINAL,
-            f"--focal{number} {data.focal:g} mm",
-        )
+        focal, sigma = data.focal / pitch, SIGMA_NOMINAL
+        source = f"--focal{number} {data.focal:g} mm"
     elif info.focal_length and exif:
         pitch, sigma, source = exif, SIGMA_NOMINAL, f"EXIF, {info.focal_length:g} mm"
         focal = info.focal_length / pitch

@@ -65,11 +65,8 @@ def find_features(
     """
     image = stretch(image)
     reduction = max(1.0, float(np.sqrt(image.size / budget)))
-    if reduction > 1.0:
-        size = (round(image.shape[1] / reduction), round(image.shape[0] / reduction))
-        small = cv2.resize(image, size, interpolation=cv2.INTER_AREA)
-    else:
-        small = image
+    size = (round(image.shape[1] / reduction), round(image.shape[0] / reduction))
+    small = cv2.resize(image, size, interpolation=cv2.INTER_AREA)
     factor = np.array([image.shape[1] / small.shape[1], image.shape[0] / small.shape[0]])
     detector: Any = cv2.SIFT.create(nfeatures=limit, contrastThreshold=0.02)
     keypoints, descriptors = detector.detectAndCompute(small, None)
