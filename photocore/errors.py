@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 
 
 class PhotogrammetryError(Exception):
@@ -98,3 +99,15 @@ class ConvergenceError(PhotogrammetryError, RuntimeError):
     def __init__(self, message: str, *, iterations: int, residual: float) -> None:
         self.iterations, self.residual = iterations, residual
         super().__init__(f"{message} ({iterations} iterations, residual {residual:.3g})")
+
+
+@contextmanager
+def located(where: object) -> Iterator[None]:
+    """Say where: put a file's name or a key before the message of whatever is refused within."""
+    place = f"{where}: " if where else ""
+    try:
+        yield
+    except GeometryError as error:
+        raise GeometryError(f"{place}{error}") from None
+    except InputError as error:
+        raise InputError(f"{place}{error}") from None

@@ -110,6 +110,17 @@ def number(
     )
 
 
+def choice(name: str, words: str, text: str, **more: Any) -> Callable[[Command], Command]:
+    """Return an option that takes one of ``"these|words"``, its help, a default that is shown."""
+    kind = click.Choice(words.split("|"), case_sensitive=more.pop("case_sensitive", True))
+    return click.option(name, type=kind, help=text, show_default="default" in more, **more)
+
+
+def switch(name: str, text: str) -> Callable[[Command], Command]:
+    """Return an option that holds unless its ``--no-`` form is given."""
+    return click.option(f"--{name}/--no-{name}", default=True, show_default=True, help=text)
+
+
 class Numbers(Number):
     """So many numbers with commas or semicolons between them; decimal points.
 
@@ -201,3 +212,8 @@ class Names(click.ParamType):  # type: ignore[type-arg,unused-ignore]
         if isinstance(value, tuple):
             return value
         return tuple(part.strip() for part in value.split(",") if part.strip())
+
+
+def bounds(text: str) -> Callable[[Command], Command]:
+    """Return the option for a part of the plane: its four limits in metres."""
+    return number("--bounds", "XMIN,YMIN,XMAX,YMAX", text, type=Numbers(4))

@@ -138,3 +138,12 @@ def _give_usual_mode(path: Path) -> None:
     mask = os.umask(0)
     os.umask(mask)
     path.chmod(0o666 & ~mask)
+
+
+def relative_name(path: Path | str, folder: Path) -> str:
+    """Return a path as seen from a folder, with slashes; absolute across Windows drives."""
+    whole = Path(path).resolve()
+    try:
+        return Path(os.path.relpath(whole, folder.resolve())).as_posix()
+    except ValueError:
+        return whole.as_posix()
