@@ -14,7 +14,7 @@ from multimedia.media.flat_interface import FlatInterface
 from multimedia.projects.project_file import read_project, write_project
 from multimedia.refraction.water import salinity_from_index, water_index_derivatives
 from photocore.errors import InputError
-from photocore.output import check_writable
+from photocore.output import check_all_writable
 
 
 def adjust_project(
@@ -32,9 +32,7 @@ def adjust_project(
     result : Adjustment
     remarks : tuple of str
     """
-    for path in (out, report):
-        if path is not None:
-            check_writable(path, overwrite=overwrite)
+    check_all_writable(out, report, overwrite=overwrite)
     project = read_project(source)
     result = bundle_adjust(project, unknowns)
     if out is not None:

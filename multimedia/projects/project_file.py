@@ -33,7 +33,7 @@ from multimedia.refraction.layers import Layers
 from photocore.arrays import is_finite_number
 from photocore.distortion import NAMES, Brown, Convention
 from photocore.errors import GeometryError, InputError
-from photocore.output import atomic_path, check_writable
+from photocore.output import atomic_path, check_all_writable
 
 FORMAT = "multimedia-project/1"
 #: Each kind of ray-traced surface and its keys.
@@ -101,8 +101,7 @@ def write_project(path: Path | str, project: Project, *, overwrite: bool = False
         tables[table] = dict(image_columns(project.image_points, project.cameras))
     # Tables (arrays of them too) must follow the plain keys.
     order = sorted(data, key=lambda key: isinstance(data[key], dict | list))
-    for file in (path, *tables):
-        check_writable(file, overwrite=overwrite)
+    check_all_writable(path, *tables, overwrite=overwrite)
     for table, columns in tables.items():
         write_columns(table, columns, overwrite=overwrite)
     with atomic_path(path, overwrite=overwrite) as temporary:
