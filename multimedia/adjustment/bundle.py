@@ -18,7 +18,6 @@ from multimedia.adjustment.bundle_equations import (
 )
 from multimedia.adjustment.unknowns import Adjustment, Unknowns
 from multimedia.media.camera import EXTERIOR, Camera
-from multimedia.media.flat_interface import FlatInterface
 from multimedia.orientation.intersection import intersect
 from multimedia.projects.model import ObjectPoints, Project
 from photocore.adjustment import Fit, huber_weights
@@ -312,7 +311,6 @@ def _values(bundle: Bundle, state: BundleState) -> tuple[FloatArray, FloatArray]
             change[np.ix_(turns, turns)] = _rates(camera)
     for who, at in place.media.items():
         interface = state.media[who]
-        assert isinstance(interface, FlatInterface)
         for name, column in at.items():
             if name.startswith(("index", "thickness")):
                 values[column] = interface.value(name)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -212,9 +213,7 @@ def refuse_repeated(names: Sequence[str], what: str) -> None:
     InputError
         Naming them.
     """
-    if len(set(names)) == len(names):
-        return
-    seen: set[str] = set()
-    twice = [name for name in names if name in seen or seen.add(name)]  # type: ignore[func-returns-value]
-    shown = ", ".join(dict.fromkeys(twice[:SHOWN]))
-    raise InputError(f"{what}: {shown} occurs more than once; give each its own name.")
+    twice = [name for name, count in Counter(names).items() if count > 1]
+    if twice:
+        shown = ", ".join(twice[:SHOWN])
+        raise InputError(f"{what}: {shown} occurs more than once; give each its own name.")
