@@ -92,7 +92,6 @@ def prepare(project: Project, unknowns: Unknowns) -> tuple[Bundle, tuple[str, ..
     plate_of = np.full(len(ids), -1, dtype=np.int64)
     keep = [k for k, name in enumerate(control.ids) if name in place]
     given = [place[control.ids[k]] for k in keep]
-    assert control.sigma is not None
     points[given], sigma[given] = control.xyz[keep], control.sigma[keep]
     for plate, name in enumerate(unknowns.plates):
         on = [place[i] for i, g in zip(control.ids, control.groups, strict=True) if g == name]
@@ -170,7 +169,6 @@ def _observations(project: Project, rows: list[int], place: dict[str, int]) -> I
     images = project.image_points
     line = {name: k for k, name in enumerate(project.camera_names)}
     camera = np.array([line[images.cameras[row]] for row in rows])
-    assert images.sigma is not None
     sigma = images.sigma[rows]
     return ImageObservations(
         source=np.array(rows),

@@ -278,7 +278,6 @@ def _shown(name: str, value: float) -> float:
 
 def _image_sigma(project: Project, rows: IntArray) -> FloatArray | None:
     """Return standard deviations of image points, None if all are alike."""
-    assert project.image_points.sigma is not None
     given = project.image_points.sigma[rows]
     if np.isnan(given).all():
         return None

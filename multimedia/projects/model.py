@@ -39,7 +39,7 @@ class ObjectPoints:
 
     ids: tuple[str, ...] = ()
     xyz: FloatArray = field(default_factory=lambda: np.empty((0, 3)))
-    sigma: FloatArray | None = None
+    sigma: FloatArray = None  # type: ignore[assignment]
     groups: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
@@ -78,7 +78,7 @@ class ImagePoints:
     cameras: tuple[str, ...] = ()
     ids: tuple[str, ...] = ()
     image: FloatArray = field(default_factory=lambda: np.empty((0, 2)))
-    sigma: FloatArray | None = None
+    sigma: FloatArray = None  # type: ignore[assignment]
     groups: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
@@ -113,7 +113,7 @@ class ImagePoints:
             for row, (c, p) in enumerate(zip(self.cameras, self.ids, strict=True))
             if c in line and p in column
         ]
-        if rows and self.sigma is not None:
+        if rows:
             row, at, point = np.array(rows).T
             image[at, point] = self.image[row]
             sigma[at, point] = self.sigma[row]

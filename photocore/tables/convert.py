@@ -102,9 +102,6 @@ def flags(values: Sequence[Value | None], complain: Complain) -> FloatArray:
     for index, value in enumerate(values):
         if value is None or (isinstance(value, str) and not value.strip()):
             continue
-        if isinstance(value, bool):
-            result[index] = float(value)
-            continue
         word = f"{value:.15g}" if isinstance(value, float) else str(value).strip().casefold()
         if word in _YES | _NO:
             result[index] = float(word in _YES)
