@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 from photocore.errors import InputError
@@ -22,13 +24,25 @@ def read_text(path: Path, what: str, *, form: str = "") -> str:
     InputError
         If the file is missing, a folder, cannot be read, or is not text.
     """
+    with readable(path, what, missing=what):
+        try:
+            return path.read_text(encoding="utf-8-sig")
+        except UnicodeDecodeError:
+            raise InputError(f"{path}: is not a text file, expected a {what}{form}.") from None
+
+
+@contextmanager
+def readable(path: Path, what: str, *, missing: str = "file") -> Iterator[None]:
+    """Say what is wrong with a file that cannot be read within: missing, a folder, locked."""
     if path.is_dir():
         raise InputError(f"{path}: is a folder, expected a {what}.")
     try:
-        return path.read_text(encoding="utf-8-sig")
+        yield
     except FileNotFoundError:
-        raise InputError(f"{path}: no such {what}.") from None
-    except UnicodeDecodeError:
-        raise InputError(f"{path}: is not a text file, expected a {what}{form}.") from None
+        raise InputError(f"{path}: no such {missing}.") from None
+    except PermissionError:
+        raise InputError(
+            f"{path}: may not be read; close it in other programs or check its permissions."
+        ) from None
     except OSError as error:
         raise InputError(f"{path}: cannot be read ({error.strerror}).") from error

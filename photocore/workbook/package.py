@@ -16,6 +16,7 @@ from xml.etree.ElementTree import Element
 from xml.parsers import expat
 
 from photocore.errors import InputError
+from photocore.textfile import readable
 
 #: The largest honest compression ratio seen in 1539 real workbooks was 121.
 LARGEST_RATIO = 250
@@ -69,19 +70,8 @@ def check_header(path: Path) -> None:
     InputError
         Always, unless the file begins like a zip package.
     """
-    try:
-        with path.open("rb") as file:
-            start = file.read(8)
-    except FileNotFoundError:
-        raise InputError(f"{path}: no such file.") from None
-    except IsADirectoryError:
-        raise InputError(f"{path}: is a folder, expected a table file.") from None
-    except PermissionError:
-        if path.is_dir():
-            raise InputError(f"{path}: is a folder, expected a table file.") from None
-        raise InputError(
-            f"{path}: may not be read; close it in other programs or check its permissions."
-        ) from None
+    with readable(path, "table file"), path.open("rb") as file:
+        start = file.read(8)
     if not start:
         raise InputError(f"{path}: the file is empty (0 bytes).")
     if start == _OLE:
