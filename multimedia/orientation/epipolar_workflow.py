@@ -98,14 +98,12 @@ def epipolar_project(
     rows = project.image_points.of_camera(other)
     targets = project.image_points.image[rows]
     near = epipolar_candidates(polygons, targets, tolerance=tolerance)
-    curves = []
-    for name, vertex, point, count in zip(
-        names, polygons.image, polygons.points, polygons.counts, strict=True
-    ):
-        curves.append(
-            {"id": name, "image": vertex[:count], "points": point[:count]}
-            | _pixels(second, vertex[:count])
-        )
+    parts = zip(names, polygons.image, polygons.points, polygons.counts, strict=True)
+    curves = [
+        {"id": name, "image": vertex[:count], "points": point[:count]}
+        | _pixels(second, vertex[:count])
+        for name, vertex, point, count in parts
+    ]
     lost = [c["id"] for c in curves if not np.isfinite(c["image"]).all()]
     if lost:
         remarks.append(
