@@ -18,6 +18,8 @@ The pair
     align, Alignment          a pair from two photos and what was measured on site
     Control, Interior, SiteMeasures   what `align` is told
 Points
+    solve, SolvedSurvey       relief, coordinates, precision, check of measured points
+    georeference, Georeference   wall coordinates to world coordinates by control points
     match, Matches            homologous points found automatically, with their precision
     MatchSettings             what `match` looks for
 The whole wall

@@ -21,6 +21,9 @@ from .orthophotos.compose import orthophoto
 from .orthophotos.mosaic_in_memory import Mosaic, MosaicOptions, mosaic
 from .orthophotos.ortho_image import OrthoOptions, Orthophoto
 from .relief_maps.dense_matching import DenseRelief, dense_relief
+from .survey.georeferencing import georeference
+from .survey.reference import Georeference
+from .survey.workflow import SolvedSurvey, solve
 
 __version__: str
 
@@ -29,6 +32,7 @@ __all__ = [
     "Calibration",
     "Control",
     "DenseRelief",
+    "Georeference",
     "Interior",
     "Intersection",
     "Lens",
@@ -43,9 +47,11 @@ __all__ = [
     "Quality",
     "ReliefMap",
     "SiteMeasures",
+    "SolvedSurvey",
     "align",
     "calibrate",
     "dense_relief",
+    "georeference",
     "match",
     "mosaic",
     "orthophoto",
@@ -54,4 +60,5 @@ __all__ = [
     "relief_displacement",
     "relief_displacements",
     "relief_from_displacement",
+    "solve",
 ]

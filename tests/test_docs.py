@@ -111,3 +111,11 @@ def test_python_examples_run(page, tmp_path, monkeypatch):
             names |= example.globs
         else:
             exec(compile(code, str(page), "exec"), names)
+
+
+def test_the_page_on_the_architecture_names_only_what_exists() -> None:
+    text = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8")
+    paths = re.findall(r"`((?:bifocal|multimedia|photocore|tests|docs|benchmarks)/[\w./]+)`", text)
+    assert len(paths) > 20
+    missing = [path for path in paths if "NAME" not in path and not (ROOT / path).exists()]
+    assert not missing

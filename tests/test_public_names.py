@@ -21,7 +21,7 @@ NAMES = [
 ]
 PROMISED = {
     "bifocal": "relief relief_displacements plane_coordinates Pair dense_relief orthophoto align "
-    "match calibrate mosaic",
+    "match calibrate mosaic solve georeference",
     "multimedia": "Layers water_refractive_index radial_shift ShiftTable Camera project intersect "
     "resect bundle_adjust epipolar_curve correct_bathymetry",
 }
@@ -40,7 +40,18 @@ def test_every_name_stands_in_the_table_of_contents(package, name: str) -> None:
 
 
 @pytest.mark.parametrize(
-    "name", ["align", "match", "dense_relief", "orthophoto", "mosaic", "calibrate", "relief"]
+    "name",
+    [
+        "align",
+        "match",
+        "dense_relief",
+        "orthophoto",
+        "mosaic",
+        "calibrate",
+        "relief",
+        "solve",
+        "georeference",
+    ],
 )
 def test_public_functions_are_documented_in_full(name: str) -> None:
     function = getattr(bifocal, name)

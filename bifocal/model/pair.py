@@ -293,9 +293,9 @@ class Pair:
     def from_dict(cls, data: Mapping[str, Any], *, folder: Path = Path()) -> Pair:
         """Return the pair described by a pair file's content."""
         data = dict(data)
-        found = data.pop("format", None)
-        if found != FORMAT:
-            raise InputError(f'"format" must be "{FORMAT}", found {found!r}.')
+        stated = data.pop("format", None)
+        if stated != FORMAT:
+            raise InputError(f'"format" must be "{FORMAT}", found {stated!r}.')
         if data.get("layers"):
             raise InputError(
                 '"layers": pairs seen through other media are not supported by this version.'

@@ -34,7 +34,7 @@ def check_points(
     accuracy = max((axis.rmse for axis in axes.values() if axis.n), default=float("nan"))
     return CheckResult(
         ids=known.ids,
-        found=solved,
+        solved=solved,
         errors=errors,
         axes=axes,
         verdicts=judge(accuracy, rules) if np.isfinite(accuracy) else (),

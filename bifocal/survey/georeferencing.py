@@ -93,13 +93,13 @@ def georeference(
         points = KnownPoints.from_columns(points, "XYZ")
     if isinstance(control, Mapping):
         control = KnownPoints.from_columns(control, "ENH")
-    found = control.coordinates_in(points)
+    wall = control.coordinates_in(points)
     flat = bool(np.isnan(control.xyz[:, 2]).all())
     simplest = ("2D",) if flat else ("levelled", "3D")
     names = simplest if model == "auto" else (model,)
     usable = {
         name: control.used
-        & ~np.isnan(found).any(axis=1)
+        & ~np.isnan(wall).any(axis=1)
         & ~np.isnan(control.xyz[:, : MODELS[name].axes]).any(axis=1)
         for name in names
     }
@@ -113,13 +113,13 @@ def georeference(
         )
     fuller = len(names) > 1 and usable["3D"].sum() >= MODELS["3D"].needed
     try:
-        best = _robust(first, found, control, usable[first.name])
+        best = _robust(first, wall, control, usable[first.name])
     except GeometryError:
         if not fuller:
             raise
-        best = _robust(MODELS["3D"], found, control, usable["3D"])
+        best = _robust(MODELS["3D"], wall, control, usable["3D"])
     else:
-        best = _fuller_if_better(best, found, control, usable["3D"]) if fuller else best
+        best = _fuller_if_better(best, wall, control, usable["3D"]) if fuller else best
     chosen, transformation, used, squares, redundancy = best
     flat_world = chosen.axes == 2
     origin = round_origin(
@@ -130,13 +130,12 @@ def georeference(
     offset = near[used].mean(axis=0)
     if flat_world:
         offset[2] = transformation.target_centre[2]
-    turned = (found - transformation.source_centre) @ transformation.rotation.T
     return Georeference(
         ids=control.ids,
         world_from_wall=transformation,
         model=chosen.name,
-        residuals=near - (offset + transformation.scale * turned),
-        found=found,
+        residuals=residuals(transformation, wall, near, offset),
+        solved=wall,
         used=used,
         bad=tuple(
             name
@@ -153,27 +152,33 @@ def georeference(
 _Fit = tuple[TransformationModel, Similarity, BoolArray, float, int]
 
 
-def _fit(model: TransformationModel, found: FloatArray, world: FloatArray, used: BoolArray) -> _Fit:
+def _fit(model: TransformationModel, wall: FloatArray, world: FloatArray, used: BoolArray) -> _Fit:
     """Return the fit to the chosen points with its sum of squares and redundancy."""
     target = world.copy()
     if model.axes == 2:
         target[:, 2] = 0.0
-    transformation = model.fit(found[used], target[used])
+    transformation = model.fit(wall[used], target[used])
     # About a round origin, so that the sum of squares is not one of rounding errors.
     origin = round_origin(target[used])
     offset = (target[used] - origin).mean(axis=0)
-    turned = (found[used] - transformation.source_centre) @ transformation.rotation.T
-    residuals = (target[used] - origin) - (offset + transformation.scale * turned)
-    residuals = residuals[:, : model.axes]
+    left = residuals(transformation, wall[used], target[used] - origin, offset)[:, : model.axes]
     redundancy = model.axes * int(used.sum()) - model.parameters
-    return model, transformation, used, float((residuals**2).sum()), redundancy
+    return model, transformation, used, float((left**2).sum()), redundancy
+
+
+def residuals(
+    transformation: Similarity, wall: FloatArray, near: FloatArray, offset: FloatArray
+) -> FloatArray:
+    """Return known minus computed coordinates near an origin from which the centre lies offset."""
+    turned = (wall - transformation.source_centre) @ transformation.rotation.T
+    return np.asarray(near - (offset + transformation.scale * turned))
 
 
 def _robust(
-    model: TransformationModel, found: FloatArray, control: KnownPoints, used: BoolArray
+    model: TransformationModel, wall: FloatArray, control: KnownPoints, used: BoolArray
 ) -> _Fit:
     """Return the fit without the points that contradict the others."""
-    best = _fit(model, found, control.xyz, used)
+    best = _fit(model, wall, control.xyz, used)
     size = float(np.abs(control.xyz[used]).max())
     while True:
         *_, squares, redundancy = best
@@ -186,7 +191,7 @@ def _robust(
             without = best[2].copy()
             without[row] = False
             try:
-                trials.append(_fit(model, found, control.xyz, without))
+                trials.append(_fit(model, wall, control.xyz, without))
             except GeometryError:
                 continue
         if not trials:
@@ -200,11 +205,11 @@ def _robust(
 
 
 def _fuller_if_better(
-    simple: _Fit, found: FloatArray, control: KnownPoints, used: BoolArray
+    simple: _Fit, wall: FloatArray, control: KnownPoints, used: BoolArray
 ) -> _Fit:
     """Return the 3D fit if it explains significantly more than the levelled one."""
     try:
-        full = _robust(MODELS["3D"], found, control, used)
+        full = _robust(MODELS["3D"], wall, control, used)
     except GeometryError:
         return simple
     if simple[2].sum() < full[2].sum():

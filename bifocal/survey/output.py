@@ -285,11 +285,11 @@ def point_rows(solution: SolvedSurvey, most: int) -> list[tuple[str, ...]]:
 def summary(solution: SolvedSurvey) -> list[str]:
     """Return check points, verdict and georeference in words."""
     lines = []
-    for axis, found in solution.check.axes.items():
-        if found.n:
+    for axis, errors in solution.check.axes.items():
+        if errors.n:
             lines.append(
-                f"Check {axis}: {found.n} {_points(found.n)}, RMSE {found.rmse:.4f} m, "
-                f"mean {found.mean:+.4f} m, largest {found.max_abs:.4f} m"
+                f"Check {axis}: {errors.n} {_points(errors.n)}, RMSE {errors.rmse:.4f} m, "
+                f"mean {errors.mean:+.4f} m, largest {errors.max_abs:.4f} m"
             )
     lines += [f"Drawing scale, {line}" for line in verdict_lines(solution)]
     geo = solution.georeference

@@ -109,7 +109,7 @@ class CheckResult:
     ----------
     ids : tuple of str, length n
         Names in the order of the `Check` sheet.
-    found : ndarray, shape (n, 3)
+    solved : ndarray, shape (n, 3)
         Solved X, Y, Z; NaN where the point was not measured. [m]
     errors : ndarray, shape (n, 3)
         Found minus known; NaN where either is missing or the point is not used. [m]
@@ -122,7 +122,7 @@ class CheckResult:
     """
 
     ids: tuple[str, ...]
-    found: FloatArray
+    solved: FloatArray
     errors: FloatArray
     axes: Mapping[str, AxisErrors]
     verdicts: tuple[Verdict, ...]
@@ -156,7 +156,7 @@ class Georeference:
         ``"2D"``, ``"levelled"`` or ``"3D"``.
     residuals : ndarray, shape (n, 3)
         Known minus computed E, N, H, also of points left out; NaN where unknown. [m]
-    found : ndarray, shape (n, 3)
+    solved : ndarray, shape (n, 3)
         Solved X, Y, Z of the control points. [m]
     used : ndarray of bool, shape (n,)
         Points the transformation rests on.
@@ -175,7 +175,7 @@ class Georeference:
     world_from_wall: Similarity
     model: str
     residuals: FloatArray
-    found: FloatArray
+    solved: FloatArray
     used: BoolArray
     bad: tuple[str, ...]
     sigma0: float

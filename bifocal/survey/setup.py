@@ -141,6 +141,8 @@ class SurveySetup:
 
     def in_millimetres(self, points: PointObservations) -> PointObservations:
         """Return the points as image coordinates of `pair`, without raw pixels."""
+        if self.unit == "mm" and not points.has_pixels.any():
+            return points
         typed = (points.xy1, points.xy2)
         if self.unit == "px" and self.pitch is not None:
             flip = np.array([self.pitch, -self.pitch])

@@ -37,9 +37,9 @@ def charts(
         letter = column_letters(LEFT + 1 + i)
         sheet.text(f"{letter}{HEAD}", key, LABEL_FONT)
         at = f"ROW()-{HEAD}"
-        found = f"INDEX(tblPoints[{key}],{at})"
+        value = f"INDEX(tblPoints[{key}],{at})"
         sheet.formula(
-            f"{letter}{HEAD + 1}", f"IF(ISNUMBER({found}),{found},NA())", None, form="0.000"
+            f"{letter}{HEAD + 1}", f"IF(ISNUMBER({value}),{value},NA())", None, form="0.000"
         )
         sheet.worksheet[f"{letter}{HEAD + 1}"].font = Font(name="Calibri", color="A6A6A6", size=8)
         listed: list[CellValue] = [

@@ -9,6 +9,7 @@ import numpy as np
 
 from bifocal.model.flags import FlagLimits
 from bifocal.model.pair import Pair, Photo
+from bifocal.survey.georeferencing import residuals
 from bifocal.survey.observations import PointObservations
 from bifocal.survey.reference import CheckResult, Georeference, KnownPoints
 from bifocal.survey.relief_table import ReliefTable
@@ -210,7 +211,7 @@ def check_cells(content: SurveyContent) -> dict[str, list[CellValue]]:
     for i, axis in enumerate("XYZ"):
         cells[f"{axis}_ref"] = inputs(known.xyz[:, i])
         if check is not None:
-            cells[axis] = inputs(check.found[:, i])
+            cells[axis] = inputs(check.solved[:, i])
             cells[f"d{axis}"] = inputs(check.errors[:, i])
     return cells
 
@@ -227,16 +228,16 @@ def control_cells(content: SurveyContent) -> dict[str, list[CellValue]]:
         return cells
     cells["found_bad"] = [0 if name in geo.bad else None for name in geo.ids]
     used, fit = geo.used, geo.world_from_wall
-    centred = geo.found - fit.source_centre
+    centred = geo.solved - fit.source_centre
     near = control.xyz - geo.origin
-    residuals = near - (geo.offset + fit.scale * (centred @ fit.rotation.T))
+    left = residuals(fit, geo.solved, near, geo.offset)
     if geo.model == "2D":
         near[:, 2] = 0.0
     for i, (axis, world) in enumerate(zip("XYZ", "ENH", strict=True)):
-        cells[axis] = inputs(geo.found[:, i])
+        cells[axis] = inputs(geo.solved[:, i])
         cells[f"c{axis}"] = inputs(np.where(used, centred[:, i], 0.0))
         cells[f"c{world}"] = inputs(np.where(used, near[:, i], 0.0))
-        cells[f"v{world}"] = inputs(residuals[:, i])
+        cells[f"v{world}"] = inputs(left[:, i])
     cells["w"] = [int(value) for value in used]
     return cells
 

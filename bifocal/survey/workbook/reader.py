@@ -241,7 +241,7 @@ def _read_points(book: SheetFile | CsvFile, options: ReadOptions, errors: list[C
     followed = {*_XY, *_POLAR} if general else set()
     for shared in ((), _PIXELS, _XY):
         last = shared == _XY
-        found: list[CellError] = []
+        complaints: list[CellError] = []
         try:
             table = read_table(
                 book,
@@ -251,7 +251,7 @@ def _read_points(book: SheetFile | CsvFile, options: ReadOptions, errors: list[C
                 decimal=options.decimal,
                 column_map=options.columns or None,
                 visible_only=options.visible_only,
-                errors=found,
+                errors=complaints,
             )
         except InputError:
             if last:
@@ -260,7 +260,7 @@ def _read_points(book: SheetFile | CsvFile, options: ReadOptions, errors: list[C
         given = table.present & {*_XY, *_PIXELS, "s1", "s2"}
         if last or (given and (not shared or table.present.issuperset(shared))):
             break
-    errors += found
+    errors += complaints
     for key in followed:
         table.values[key] = np.full(len(table), np.nan)
     return table

@@ -245,7 +245,7 @@ def _sums(sheet: SheetBuilder, content: SurveyContent) -> None:
         world = content.control.xyz[geo.used] - geo.origin
         if geo.model == "2D":
             world[:, 2] = 0.0
-        centred = np.hstack([geo.found[geo.used] - geo.world_from_wall.source_centre, world]).T
+        centred = np.hstack([geo.solved[geo.used] - geo.world_from_wall.source_centre, world]).T
     column = dict(zip("XYZENH", centred, strict=True))
     products = {
         "a2": "XE+YN", "b2": "XN-YE", "sq2": "XX+YY", "aL": "XE-ZN", "bL": "XN+ZE",

@@ -113,8 +113,8 @@ def _named_cells(editor: WorkbookEditor, built: BookBuilder, content: SurveyCont
 
 def _place(editor: WorkbookEditor, name: str) -> tuple[str, int, int] | None:
     """Return sheet, row and column of a named cell."""
-    found = next((v for k, v in editor.book.names.items() if k.casefold() == name.casefold()), "")
-    sheet, _, cell = found.rpartition("!")
+    place = next((v for k, v in editor.book.names.items() if k.casefold() == name.casefold()), "")
+    sheet, _, cell = place.rpartition("!")
     sheet = sheet.strip("'").replace("''", "'")
     if sheet not in editor.titles or ":" in cell or not cell:
         return None
@@ -186,8 +186,8 @@ def _fixed_table(editor: WorkbookEditor, built: BookBuilder, name: str, key: str
     first = area.area[0] + 1
     stand = [grid.get(first + i, {}).get(headings[key]) for i in range(len(given))]
     same = (
-        isinstance(found, float) and math.isclose(found, float(value or 0), rel_tol=1e-12)
-        for found, value in zip(stand, given, strict=True)
+        isinstance(there, float) and math.isclose(there, float(value or 0), rel_tol=1e-12)
+        for there, value in zip(stand, given, strict=True)
     )
     if all(same):
         _table(editor, built, name, range(len(given)))
