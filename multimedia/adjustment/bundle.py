@@ -242,7 +242,7 @@ def _adjustment(
     unit = float(np.sqrt(np.mean(seen.sigma**2)))
     own = slice(0, weights.size)
     misses = result.residuals[own].reshape(-1, 2)
-    shares = result.redundancy_numbers[own].reshape(-1, 2)
+    shares = result.linear.redundancy_numbers[own].reshape(-1, 2)
     # The image rows, back in the order of the project's own table.
     rows, count = seen.source, len(project.image_points.ids)
     residuals, normed, numbers, weight = (np.full((count, 2), np.nan) for _ in range(4))
@@ -259,7 +259,7 @@ def _adjustment(
     return Adjustment(
         project=replace(project, cameras=state.cameras, media=state.media, object_points=points),
         names=bundle.columns.labels, values=values,
-        covariance=change @ result.cofactor @ change.T * result.sigma0**2,
+        covariance=change @ result.linear.cofactor @ change.T * result.sigma0**2,
         point_covariance=covariance, residuals=residuals, standardised=normed,
         redundancy_numbers=numbers, weights=weight, sigma0=result.sigma0 * unit,
         redundancy=result.redundancy, iterations=result.iterations, sigma0_of=sigma0_of,
@@ -269,8 +269,8 @@ def _adjustment(
 
 def _points(bundle: Bundle, result: Fit[BundleState]) -> tuple[ObjectPoints, FloatArray]:
     """Return the adjusted object points and their covariances."""
-    place, cofactor, state = bundle.columns, result.cofactor, result.state
-    covariance = result.block_cofactor.copy()
+    place, cofactor, state = bundle.columns, result.linear.cofactor, result.state
+    covariance = result.linear.block_cofactor.copy()
     for j in np.flatnonzero((place.points >= 0).any(axis=1)):
         axes = np.flatnonzero(place.points[j] >= 0)
         columns = place.points[j][axes]

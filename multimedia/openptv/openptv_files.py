@@ -65,9 +65,7 @@ def read_control(path: Path) -> ControlParameters:
     InputError
         If a line is missing or not what it should be; the message names the line.
     """
-    lines = [line.strip() for line in read_text(path, _KIND).splitlines()]
-    while lines and not lines[-1]:
-        lines.pop()
+    lines = [line.strip() for line in read_text(path, _KIND).rstrip().splitlines()]
     count = int(_number(path, lines, 0, "number of cameras"))
     if not 1 <= count <= 64:
         raise InputError(f"{path}, line 1: {count} cameras; expected 1 to 64.")

@@ -417,15 +417,14 @@ def temperature_from_index(
 
 def _powers_of(
     variable: int, formula: WaterFormula, given: tuple[FloatArray, ...]
-) -> list[FloatArray]:
+) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return the coefficients of the powers 0, 1, 2 of one variable, the others given."""
     name = Term._fields[1 + variable]
-    return [
-        _sum_of_terms(
-            [t._replace(**{name: 0}) for t in formula.terms if t[1 + variable] == p], given
-        )
-        for p in range(3)
-    ]
+    first, second, third = (
+        [term._replace(**{name: 0}) for term in formula.terms if term[1 + variable] == power]
+        for power in range(3)
+    )
+    return _sum_of_terms(first, given), _sum_of_terms(second, given), _sum_of_terms(third, given)
 
 
 def _sum_of_terms(terms: Iterable[Term], given: tuple[FloatArray, ...]) -> FloatArray:

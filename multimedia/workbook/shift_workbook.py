@@ -206,8 +206,7 @@ def _points(
                 book.formula(sheet, row, number, text, value)
             else:
                 book.typed(sheet, row, number, value)
-            cell = sheet.cell(row, number)
-            cell.number_format = _number_format(key)
+            sheet.cell(row, number).number_format = _number_format(key)
     sheet.row_dimensions[first - 1].height = 42
     last = get_column_letter(len(columns))
     table = Table(displayName="tblMM", name="tblMM", ref=f"A{first}:{last}{first + count}")

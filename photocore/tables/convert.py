@@ -86,14 +86,12 @@ def numbers(
         complain(unfinished[0], _not_calculated(more))
     common_unit = _typed_unit(texts, wanted, complain, has_bare=bool(np.isfinite(result).any()))
     _read_texts(result, texts, decimal, elsewhere, complain)
-    remarks = []
     typed = sum(bool(part.unit) for part in texts.values())
-    if typed:
-        remarks.append(f"{column.key}: the unit typed into {typed} cells was taken off.")
+    taken_off = f"{column.key}: the unit typed into {typed} cells was taken off."
     if column.kind == "integer":
         for broken in np.flatnonzero(np.isfinite(result) & (result != np.floor(result))):
             complain(int(broken), f"found {result[broken]:.15g}, expected a whole number.")
-    return result, common_unit or unit, remarks
+    return result, common_unit or unit, [taken_off] if typed else []
 
 
 def flags(values: Sequence[Value | None], complain: Complain) -> FloatArray:
