@@ -28,13 +28,8 @@ class CellError(InputError):
     def __init__(
         self, message: str, *, file: str = "", sheet: str = "", cell: str = "", column: str = ""
     ) -> None:
-        self.message, self.file, self.sheet, self.cell, self.column = (
-            message,
-            file,
-            sheet,
-            cell,
-            column,
-        )
+        self.message, self.column = message, column
+        self.file, self.sheet, self.cell = file, sheet, cell
         place = f"{sheet}!{cell}" if sheet and cell else sheet or cell
         where = f"{file} › {place}" if file and place else file or place
         if column:

@@ -36,6 +36,13 @@ def check_writable(path: Path | str, *, overwrite: bool) -> Path:
     return path
 
 
+def check_all_writable(*paths: Path | None, overwrite: bool) -> None:
+    """Refuse each path that is given as `check_writable` does; None stands for no file."""
+    for path in paths:
+        if path is not None:
+            check_writable(path, overwrite=overwrite)
+
+
 def check_not_open(path: Path) -> None:
     """Refuse a file that a spreadsheet program has open.
 

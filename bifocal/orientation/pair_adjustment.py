@@ -115,7 +115,7 @@ def adjust(observations: PairObservations, start: PairUnknowns) -> AdjustedPair:
     redundancy = max(fit.redundancy, 1)
     sigma0 = float(np.sqrt((fit.residuals @ fit.residuals) / redundancy))
     covariance = np.zeros((len(NAMES), len(NAMES)))
-    covariance[np.ix_(free, free)] = fit.cofactor
+    covariance[np.ix_(free, free)] = fit.linear.cofactor
     state = fit.state
     return AdjustedPair(
         cameras=state.cameras,

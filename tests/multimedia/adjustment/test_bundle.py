@@ -304,11 +304,15 @@ def test_elimination_and_orthogonal_solution_agree():
     dense = bundle.fit(bundle.start)
     sparse = bundle.fit(bundle.start, largest=0)
     np.testing.assert_allclose(sparse.state.points, dense.state.points, atol=1e-6)
-    np.testing.assert_allclose(np.diag(sparse.cofactor), np.diag(dense.cofactor), rtol=1e-5)
-    np.testing.assert_allclose(sparse.redundancy_numbers, dense.redundancy_numbers, atol=1e-6)
+    np.testing.assert_allclose(
+        np.diag(sparse.linear.cofactor), np.diag(dense.linear.cofactor), rtol=1e-5
+    )
+    np.testing.assert_allclose(
+        sparse.linear.redundancy_numbers, dense.linear.redundancy_numbers, atol=1e-6
+    )
     free = np.argwhere(bundle.free)
     spread, expected = (
-        fit.block_cofactor[free[:, 0], free[:, 1], free[:, 1]] for fit in (sparse, dense)
+        fit.linear.block_cofactor[free[:, 0], free[:, 1], free[:, 1]] for fit in (sparse, dense)
     )
     np.testing.assert_allclose(spread, expected, rtol=1e-5)
 
