@@ -13,6 +13,7 @@ from photocore.errors import LARGEST, InputError
 
 #: Always float64 at run time; numpy's own stubs type many float64 results as floating[Any].
 FloatArray = NDArray[np.floating[Any]]
+Float32Array = NDArray[np.float32]
 IntArray = NDArray[np.int64]
 BoolArray = NDArray[np.bool_]
 ByteArray = NDArray[np.uint8]

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 
 #: Nothing measured is larger, and squares of squares of it still are numbers.
 LARGEST = 1e15
@@ -30,13 +31,8 @@ class CellError(InputError):
     def __init__(
         self, message: str, *, file: str = "", sheet: str = "", cell: str = "", column: str = ""
     ) -> None:
-        self.message, self.file, self.sheet, self.cell, self.column = (
-            message,
-            file,
-            sheet,
-            cell,
-            column,
-        )
+        self.message, self.column = message, column
+        self.file, self.sheet, self.cell = file, sheet, cell
         place = f"{sheet}!{cell}" if sheet and cell else sheet or cell
         where = f"{file} › {place}" if file and place else file or place
         if column:
@@ -101,3 +97,15 @@ class ConvergenceError(PhotogrammetryError, RuntimeError):
     def __init__(self, message: str, *, iterations: int, residual: float) -> None:
         self.iterations, self.residual = iterations, residual
         super().__init__(f"{message} ({iterations} iterations, residual {residual:.3g})")
+
+
+@contextmanager
+def located(where: object) -> Iterator[None]:
+    """Say where: put a file's name or a key before the message of whatever is refused within."""
+    place = f"{where}: " if where else ""
+    try:
+        yield
+    except GeometryError as error:
+        raise GeometryError(f"{place}{error}") from None
+    except InputError as error:
+        raise InputError(f"{place}{error}") from None

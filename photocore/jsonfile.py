@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 
 from photocore.errors import InputError
-from photocore.output import atomic_path, check_regular
+from photocore.output import atomic_path
+from photocore.textfile import read_text
 
 
 def read_object(path: Path | str, *, what: str) -> dict[str, Any]:
@@ -29,17 +30,7 @@ def read_object(path: Path | str, *, what: str) -> dict[str, Any]:
         If the file is missing, is not text, not JSON, or not an object.
     """
     path = Path(path)
-    check_regular(path)
-    try:
-        text = path.read_text(encoding="utf-8-sig")
-    except FileNotFoundError:
-        raise InputError(f"{path}: no such {what}.") from None
-    except IsADirectoryError:
-        raise InputError(f"{path}: is a folder, expected a {what}.") from None
-    except UnicodeDecodeError:
-        raise InputError(f"{path}: is not a text file, expected a {what} (JSON).") from None
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read ({error.strerror}).") from error
+    text = read_text(path, what, form=" (JSON)")
     try:
         value = json.loads(text)
     except json.JSONDecodeError as error:
@@ -70,12 +61,10 @@ def plain(value: Any) -> Any:
     """Return value with numpy types made plain and non-finite numbers made None."""
     if isinstance(value, dict):
         return {str(key): plain(item) for key, item in value.items()}
-    if isinstance(value, np.ndarray):
+    if isinstance(value, np.ndarray | np.generic):
         return plain(value.tolist())
     if isinstance(value, list | tuple):
         return [plain(item) for item in value]
-    if isinstance(value, np.generic):
-        return plain(value.item())
     if isinstance(value, float) and not math.isfinite(value):
         return None
     if isinstance(value, Path):

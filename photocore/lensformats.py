@@ -16,6 +16,7 @@ import numpy as np
 from photocore.arrays import FloatArray
 from photocore.camera import camera_matrix
 from photocore.errors import InputError
+from photocore.textfile import read_text
 
 
 class LensData(NamedTuple):
@@ -44,10 +45,7 @@ def read_foreign_lens(path: Path | str) -> LensData:
     ending = path.suffix.lower()
     if ending in {".yml", ".yaml"}:
         return _opencv(path)
-    try:
-        text = path.read_text(encoding="utf-8")
-    except UnicodeDecodeError:
-        raise InputError(f"{path}: is not a text file, expected a lens calibration.") from None
+    text = read_text(path, "lens calibration")
     if "<!DOCTYPE" in text:
         raise InputError(
             f"{path}: declares a document type (DOCTYPE), which calibrations never do; remove it."

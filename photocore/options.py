@@ -40,6 +40,7 @@ class Number(click.ParamType):  # type: ignore[type-arg,unused-ignore]
 
     name = "number"
     described = "a number; the unit is in the help."
+    is_single = True
 
     def __init__(
         self,
@@ -67,15 +68,12 @@ class Number(click.ParamType):  # type: ignore[type-arg,unused-ignore]
         fault = next(filter(None, map(self.fault, numbers)), None)
         if fault:
             self.fail(f"{fault}, got {value}.", param, ctx)
-        return self.result(tuple(self.to(number) for number in numbers))
+        converted = tuple(self.to(number) for number in numbers)
+        return converted[0] if self.is_single else converted
 
     def parse(self, text: str) -> list[float]:
         """Return the numbers a text holds; ValueError where it is something else."""
         return [float(text.replace(",", "."))]
-
-    def result(self, numbers: tuple[float, ...]) -> Any:
-        """Return what the option gives."""
-        return numbers[0]
 
     def fault(self, number: float) -> str | None:
         """Return what is wrong with a number."""
@@ -110,6 +108,22 @@ def number(
     )
 
 
+def choice(name: str, words: str, text: str, **more: Any) -> Callable[[Command], Command]:
+    """Return an option that takes one of ``"these|words"``, its help, a default that is shown."""
+    kind = click.Choice(words.split("|"), case_sensitive=more.pop("case_sensitive", True))
+    return click.option(name, type=kind, help=text, show_default="default" in more, **more)
+
+
+def switch(name: str, text: str) -> Callable[[Command], Command]:
+    """Return an option that holds unless its ``--no-`` form is given."""
+    return click.option(f"--{name}/--no-{name}", default=True, show_default=True, help=text)
+
+
+def sigma(name: str, unit: str, text: str) -> Callable[[Command], Command]:
+    """Return the option of a standard deviation, 0 where it is not given."""
+    return number(name, unit, text, type=NOT_NEGATIVE, default=0.0)
+
+
 class Numbers(Number):
     """So many numbers with commas or semicolons between them; decimal points.
 
@@ -122,6 +136,7 @@ class Numbers(Number):
     """
 
     name = "numbers"
+    is_single = False
 
     def __init__(self, count: int | None = None, **limits: Any) -> None:
         super().__init__(**limits)
@@ -137,26 +152,19 @@ class Numbers(Number):
             raise ValueError(text)
         return numbers
 
-    def result(self, numbers: tuple[float, ...]) -> tuple[float, ...]:
-        """Return all of them."""
-        return numbers
-
 
 class Size(Number):
     """Two numbers as WIDTHxHEIGHT; decimal commas are understood."""
 
     name = "WxH"
     described = "WIDTHxHEIGHT, e.g. 22.7x15.1"
+    is_single = False
 
     def parse(self, text: str) -> list[float]:
         """Return width and height."""
         parts = text.lower().replace("*", "x").replace("×", "x").replace(",", ".").split("x")
         width, height = (float(part) for part in parts)
         return [width, height]
-
-    def result(self, numbers: tuple[float, ...]) -> tuple[float, ...]:
-        """Return both."""
-        return numbers
 
 
 class Scale(Number):
@@ -201,3 +209,8 @@ class Names(click.ParamType):  # type: ignore[type-arg,unused-ignore]
         if isinstance(value, tuple):
             return value
         return tuple(part.strip() for part in value.split(",") if part.strip())
+
+
+def bounds(text: str) -> Callable[[Command], Command]:
+    """Return the option for a part of the plane: its four limits in metres."""
+    return number("--bounds", "XMIN,YMIN,XMAX,YMAX", text, type=Numbers(4))

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import shutil
-import stat
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -37,20 +36,11 @@ def check_writable(path: Path | str, *, overwrite: bool) -> Path:
     return path
 
 
-def check_regular(path: Path) -> None:
-    """Refuse an input that is a pipe or a device: reading it may wait for ever.
-
-    Raises
-    ------
-    InputError
-        Unless it is a file, a folder or missing, which the reader says better.
-    """
-    try:
-        mode = path.stat().st_mode
-    except (OSError, ValueError):
-        return
-    if not (stat.S_ISREG(mode) or stat.S_ISDIR(mode)):
-        raise InputError(f"{path}: is a pipe or a device; save what it gives as a file first.")
+def check_all_writable(*paths: Path | None, overwrite: bool) -> None:
+    """Refuse each path that is given as `check_writable` does; None stands for no file."""
+    for path in paths:
+        if path is not None:
+            check_writable(path, overwrite=overwrite)
 
 
 def check_not_open(path: Path) -> None:
@@ -155,3 +145,12 @@ def _give_usual_mode(path: Path) -> None:
     mask = os.umask(0)
     os.umask(mask)
     path.chmod(0o666 & ~mask)
+
+
+def relative_name(path: Path | str, folder: Path) -> str:
+    """Return a path as seen from a folder, with slashes; absolute across Windows drives."""
+    whole = Path(path).resolve()
+    try:
+        return Path(os.path.relpath(whole, folder.resolve())).as_posix()
+    except ValueError:
+        return whole.as_posix()

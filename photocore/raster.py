@@ -81,7 +81,7 @@ class RasterFile(ExitStack):
     def __init__(self, path: Path | str, *, nodata: float | None = None) -> None:
         import rasterio
         from rasterio.enums import MaskFlags
-        from rasterio.errors import NotGeoreferencedWarning, RasterioError
+        from rasterio.errors import RasterioError
 
         super().__init__()
         self.path = Path(path)
@@ -91,9 +91,7 @@ class RasterFile(ExitStack):
             raise InputError(f"{self.path}: no such raster file.")
         self.enter_context(rasterio.Env(GDAL_CACHEMAX=CACHE_MB))
         try:
-            with warnings.catch_warnings():
-                warnings.simplefilter("ignore", NotGeoreferencedWarning)
-                file = self._file = self.enter_context(rasterio.open(self.path))
+            file = self._file = self.enter_context(_opened(self.path))
         except RasterioError:
             self.close()
             raise InputError(f"{self.path}: is not a raster file GDAL can read.") from None
@@ -192,6 +190,16 @@ class RasterFile(ExitStack):
         return image.transpose(1, 2, 0), mask > 0
 
 
+def _opened(path: Path, mode: str = "r", **options: Any) -> Any:
+    """Return an open raster, without the warning that it has no position."""
+    import rasterio
+    from rasterio.errors import NotGeoreferencedWarning
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", NotGeoreferencedWarning)
+        return rasterio.open(path, mode, **options)
+
+
 class RasterWriter:
     """A GeoTIFF being written window by window; made by `create_geotiff`."""
 
@@ -254,7 +262,6 @@ def create_geotiff(
         If the place is not writable, the file exists, or the disk is full.
     """
     import rasterio
-    from rasterio.errors import NotGeoreferencedWarning
 
     kind = np.dtype(dtype)
     options = {
@@ -272,10 +279,7 @@ def create_geotiff(
     with atomic_path(path, overwrite=overwrite) as temporary, gdal:
         try:
             with written_whole(temporary, width=width, height=height, bands=bands):
-                with warnings.catch_warnings():
-                    warnings.simplefilter("ignore", NotGeoreferencedWarning)
-                    file = rasterio.open(temporary, "w", **options)
-                with file:
+                with _opened(temporary, "w", **options) as file:
                     file.update_tags(**(tags or {}))
                     for number, name in enumerate(names, start=1):
                         file.set_band_description(number, name)
@@ -373,25 +377,22 @@ def check_whole(path: Path, *, width: int, height: int, bands: int) -> None:
     width, height, bands : int
         What it must hold. [px, px, -]
     """
-    import rasterio
-    from rasterio.errors import NotGeoreferencedWarning, RasterioError
+    from rasterio.errors import RasterioError
 
     size = path.stat().st_size
     try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", NotGeoreferencedWarning)
-            with rasterio.open(path) as file:
-                shape = (file.width, file.height, file.count)
-                if shape != (width, height, bands):
-                    raise OSError(
-                        f"the file is incomplete: {shape[0]} x {shape[1]} px in {shape[2]} bands "
-                        f"instead of {width} x {height} in {bands}"
-                    )
+        with _opened(path) as file:
+            shape = (file.width, file.height, file.count)
+            if shape != (width, height, bands):
+                raise OSError(
+                    f"the file is incomplete: {shape[0]} x {shape[1]} px in {shape[2]} bands "
+                    f"instead of {width} x {height} in {bands}"
+                )
+            _check_blocks(file, size)
+            levels = len(file.overviews(1))
+        for level in range(levels):
+            with _opened(path, overview_level=level) as file:
                 _check_blocks(file, size)
-                levels = len(file.overviews(1))
-            for level in range(levels):
-                with rasterio.open(path, overview_level=level) as file:
-                    _check_blocks(file, size)
     except RasterioError as error:
         raise OSError("the file is incomplete; is the disk full?") from error
 

@@ -33,11 +33,8 @@ class Similarity:
     target_centre: FloatArray
 
     def __post_init__(self) -> None:
-        for name, shape in (
-            ("rotation", (3, 3)),
-            ("source_centre", (3,)),
-            ("target_centre", (3,)),
-        ):
+        shapes = {"rotation": (3, 3), "source_centre": (3,), "target_centre": (3,)}
+        for name, shape in shapes.items():
             object.__setattr__(self, name, read_only(getattr(self, name), name, shape=shape))
 
     def __call__(self, points: ArrayLike) -> FloatArray:

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
+import cv2
 import numpy as np
 from scipy.stats import f as f_distribution
 
@@ -78,8 +79,6 @@ class Calibration:
 
 def _distortion_terms() -> dict[str, tuple[int, tuple[str, ...]]]:
     """Return models in order of growing freedom: OpenCV's flags and the terms they leave."""
-    import cv2
-
     k2, k3, tangential = cv2.CALIB_FIX_K2, cv2.CALIB_FIX_K3, cv2.CALIB_ZERO_TANGENT_DIST
     return {
         "k1": (k2 | k3 | tangential, ("k1",)),
@@ -104,8 +103,6 @@ def detect_board(
     size : tuple of int
         Inner corners (chessboard), circles, or squares (ChArUco) across and up.
     """
-    import cv2
-
     columns, rows = size
     if pattern == "charuco":
         return _detect_charuco(image, name, size)
@@ -140,14 +137,8 @@ def find_board_size(images: Sequence[ByteArray]) -> tuple[int, int]:
     InputError
         If no two photos agree.
     """
-    import cv2
-
-    flags = (
-        cv2.CALIB_CB_LARGER
-        | cv2.CALIB_CB_EXHAUSTIVE
-        | cv2.CALIB_CB_ACCURACY
-        | cv2.CALIB_CB_NORMALIZE_IMAGE
-    )
+    flags = cv2.CALIB_CB_LARGER | cv2.CALIB_CB_EXHAUSTIVE
+    flags |= cv2.CALIB_CB_ACCURACY | cv2.CALIB_CB_NORMALIZE_IMAGE
     votes: Counter[tuple[int, int]] = Counter()
     for image in images:
         found, _, meta = cv2.findChessboardCornersSBWithMeta(_reduced(image)[0], (3, 3), flags)
@@ -164,8 +155,6 @@ def find_board_size(images: Sequence[ByteArray]) -> tuple[int, int]:
 
 def _reduced(image: ByteArray) -> tuple[ByteArray, float]:
     """Return a copy of at most 2000 px for the search, and the factor back."""
-    import cv2
-
     factor = max(1.0, max(image.shape[:2]) / 2000)
     if factor == 1.0:
         return image, 1.0
@@ -175,8 +164,6 @@ def _reduced(image: ByteArray) -> tuple[ByteArray, float]:
 
 def _refined(image: ByteArray, corners: Any, size: tuple[int, int]) -> FloatArray:
     """Return corners refined in a window that reaches half-way to the usual neighbour."""
-    import cv2
-
     grid = corners.reshape(size[1], size[0], 2)
     gaps = [np.median(np.linalg.norm(np.diff(grid, axis=axis), axis=2)) for axis in (0, 1)]
     window = int(np.clip(min(gaps) / 2 - 1, 2, CORNER_WINDOW))
@@ -189,8 +176,6 @@ def _refined(image: ByteArray, corners: Any, size: tuple[int, int]) -> FloatArra
 
 def _detect_charuco(image: ByteArray, name: str, size: tuple[int, int]) -> BoardView | None:
     """Return the ChArUco corners seen, over the common dictionaries; at least six."""
-    import cv2
-
     best: BoardView | None = None
     for dictionary in (
         cv2.aruco.DICT_4X4_250, cv2.aruco.DICT_5X5_250, cv2.aruco.DICT_6X6_250,
@@ -317,8 +302,6 @@ def _solve_brown(
     views: Sequence[BoardView], size: tuple[int, int], name: str, flags: int, names: tuple[str, ...]
 ) -> _LensFit:
     """Adjust OpenCV's model with the given terms."""
-    import cv2
-
     try:
         rms, matrix, terms, _, _, deviations, _, per_view = cv2.calibrateCameraExtended(
             [v.board.astype(np.float32) for v in views],
@@ -342,8 +325,6 @@ def _solve_brown(
 
 def _solve_fisheye(views: Sequence[BoardView], size: tuple[int, int]) -> _LensFit:
     """Adjust OpenCV's fisheye model (equidistant with four terms)."""
-    import cv2
-
     # OpenCV 5 moved these two flags out of the fisheye namespace.
     place: Any = cv2 if hasattr(cv2, "CALIB_RECOMPUTE_EXTRINSIC") else cv2.fisheye
     flags = place.CALIB_RECOMPUTE_EXTRINSIC | place.CALIB_FIX_SKEW

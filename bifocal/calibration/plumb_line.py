@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+import cv2
 import numpy as np
 from scipy.optimize import least_squares
 
@@ -21,6 +22,8 @@ from photocore.errors import GeometryError, InputError
 LEAST_LENGTH = 0.15
 #: Edge points more than this far off their line are not of it. [px]
 EDGE_LIMIT = 1.5
+#: As many of the longest edges are taken.
+MOST_LINES = 80
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -125,7 +128,7 @@ def calibrate_from_lines(
     )  # fmt: skip
 
 
-def find_straight_edges(image: ByteArray, *, most: int = 80) -> list[FloatArray]:
+def find_straight_edges(image: ByteArray) -> list[FloatArray]:
     """Return points along long, nearly straight edges of a grey photo.
 
     Segments found by OpenCV's detector are joined where they continue each other, and their points
@@ -136,8 +139,6 @@ def find_straight_edges(image: ByteArray, *, most: int = 80) -> list[FloatArray]
     lines : list of ndarray, shape (n, 2)
         Longest first. [px]
     """
-    import cv2
-
     blurred = cv2.GaussianBlur(image, (0, 0), 1.0)
     detected = cv2.createLineSegmentDetector().detect(blurred)[0]
     if detected is None:
@@ -150,7 +151,7 @@ def find_straight_edges(image: ByteArray, *, most: int = 80) -> list[FloatArray]
     gradient_x = cv2.Sobel(blurred, cv2.CV_32F, 1, 0, ksize=3)
     gradient_y = cv2.Sobel(blurred, cv2.CV_32F, 0, 1, ksize=3)
     strength = cv2.magnitude(gradient_x, gradient_y)
-    lines = [_refined_line(chain, strength) for chain in chains[:most]]
+    lines = [_refined_line(chain, strength) for chain in chains[:MOST_LINES]]
     return [line for line in lines if len(line) >= 8]
 
 

@@ -6,15 +6,16 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+import cv2
 import numpy as np
 
 from bifocal.calibration.board_calibration import Calibration
 from bifocal.calibration.board_photos import calibrate
 from bifocal.calibration.lens_database import lens_from_database
 from bifocal.calibration.plumb_line import PlumbLine, calibrate_from_lines, find_straight_edges
-from bifocal.files.images import ImageArray, image_info, read_image, to_eight_bit, write_image
+from bifocal.files.images import ImageArray, image_info, read_grey, read_image, write_image
 from bifocal.model.lens import Lens
-from photocore.arrays import ByteArray, FloatArray
+from photocore.arrays import FloatArray
 from photocore.cli import Progress, no_progress
 from photocore.errors import InputError
 from photocore.output import check_writable
@@ -32,7 +33,9 @@ def calibrate_from_boards(
     """Calibrate from board photos and write the lens file; ``board`` as for `calibrate`."""
     check_writable(out, overwrite=overwrite)
     _common_size(images)
-    result = calibrate(map(_grey, images), names=_unique_names(images), progress=progress, **board)
+    result = calibrate(
+        map(read_grey, images), names=_unique_names(images), progress=progress, **board
+    )
     result.lens.write(out, overwrite=overwrite)
     return result
 
@@ -77,7 +80,7 @@ def calibrate_from_edges(
     if lines is not None:
         chains = _picked_lines(lines)
     else:
-        chains = [line for path in images for line in find_straight_edges(_grey(path))]
+        chains = [line for path in images for line in find_straight_edges(read_grey(path))]
     result = calibrate_from_lines(chains, size, focal_px=focal_px)
     if result.rms_after > 0.8 * result.rms_before:
         remarks.append(
@@ -162,8 +165,6 @@ def check_size(lens: Lens, path: Path) -> None:
 
 def undistorted(image: ImageArray, lens: Lens) -> ImageArray:
     """Return the photo without distortion: same size, same camera matrix, cubic, in strips."""
-    import cv2
-
     height, width = image.shape[:2]
     result = np.empty_like(image)
     # Strips keep the coordinate maps small, and below remap's limit of 32767 rows.
@@ -172,15 +173,9 @@ def undistorted(image: ImageArray, lens: Lens) -> ImageArray:
         columns, rows = np.meshgrid(np.arange(width), np.arange(top, bottom))
         seen = lens.distort(np.stack([columns, rows], axis=-1)).astype(np.float32)
         result[top:bottom] = cv2.remap(
-            image, np.ascontiguousarray(seen[..., 0]), np.ascontiguousarray(seen[..., 1]),
-            cv2.INTER_CUBIC, borderMode=cv2.BORDER_CONSTANT,
-        )  # fmt: skip
+            image, seen, None, cv2.INTER_CUBIC, borderMode=cv2.BORDER_CONSTANT
+        )
     return result
-
-
-def _grey(path: Path) -> ByteArray:
-    """Return a photo in grey, 8 bit."""
-    return to_eight_bit(read_image(path, grey=True))
 
 
 def _common_size(images: Sequence[Path]) -> tuple[int, int]:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from photocore.cli import print_result, remark
-from photocore.options import FILE, Numbers, as_json, number, overwrite
+from photocore.options import FILE, Numbers, as_json, choice, number, overwrite
 
 if TYPE_CHECKING:
     from bifocal.orientation.alignment import Alignment
@@ -66,10 +66,7 @@ points.csv, one line per control point; r blank = on the wall; pixels in both ph
     "--vertical", type=Numbers(4), metavar="COL,ROW,COL,ROW",
     help="Two points of the far photo on an upright line of the wall [px].",
 )  # fmt: skip
-@click.option(
-    "--unit", type=click.Choice(["m", "cm", "mm"]),
-    help="Unit of the control coordinates.  [default: the headings', else m]",
-)  # fmt: skip
+@choice("--unit", "m|cm|mm", "Unit of the control coordinates.  [default: the headings', else m]")
 @number("--sigma-pick", "PX", "Precision of a pick [px].", default=0.5)
 @number("--sigma-control", "M", "Precision of a control coordinate [m].", default=0.003)
 @number("--sigma-distance", "M", "Precision of the measured distances [m].", default=0.02)
@@ -110,29 +107,20 @@ def _options(given: dict[str, Any]) -> Any:
 
     lenses = tuple(
         KnownLens(
-            lens=given[f"lens{n}"] or given["lens"],
-            focal=given[f"focal{n}"],
-            pixel_size=given[f"pixel_size{n}"] or given["pixel_size"],
-            sensor_width=given[f"sensor_width{n}"] or given["sensor_width"],
+            **{
+                name: given[f"{name}{number}"] or given.get(name)
+                for name in ("lens", "focal", "pixel_size", "sensor_width")
+            }
         )
-        for n in (1, 2)
+        for number in (1, 2)
     )
+    site = ("distance1", "distance2", "delta_d", "sigma_control", "sigma_pick", "wall")
     line = given["horizontal"] or given["vertical"]
     length = given["length"]
     return AlignOptions(
         lenses=(lenses[0], lenses[1]),
-        site=SiteMeasures(
-            distance1=given["distance1"],
-            distance2=given["distance2"],
-            delta_d=given["delta_d"],
-            sigma=given["sigma_distance"],
-            sigma_control=given["sigma_control"],
-            sigma_pick=given["sigma_pick"],
-            wall=given["wall"],
-        ),
-        auto=given["auto"],
-        control=given["control"],
-        lengths=given["lengths"],
+        site=SiteMeasures(sigma=given["sigma_distance"], **{name: given[name] for name in site}),
+        **{name: given[name] for name in ("auto", "control", "lengths")},
         length=(length[:4], length[4]) if length else None,
         line=(line, given["horizontal"] is None) if line else None,
         unit=given["unit"] or "",

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 from photocore.cli import print_result, progress_bar, remark, text_table
-from photocore.options import FILE, Size, as_json, number, overwrite
+from photocore.options import FILE, Size, as_json, choice, number, overwrite
 
 if TYPE_CHECKING:
     from bifocal.calibration.board_calibration import Calibration
@@ -28,20 +28,18 @@ One lens file holds for one lens at one focus and one zoom mark.
 @click.command(epilog=EXAMPLE)
 @click.argument("images", nargs=-1, required=True, metavar="IMAGE...", type=FILE)
 @click.option("--out", type=FILE, required=True, help="The lens file.")
-@click.option(
-    "--pattern", default="chessboard", show_default=True,
-    type=click.Choice(["chessboard", "circles", "asymmetric-circles", "charuco"]),
-    help="What is on the board.",
+@choice(
+    "--pattern", "chessboard|circles|asymmetric-circles|charuco", "What is on the board.",
+    default="chessboard",
 )  # fmt: skip
 @click.option(
     "--board", type=Size(least=1, whole=True),
     help="Inner corners of a chessboard, circles of a grid, squares of a ChArUco board, across x "
     "up.  [default: chessboard recognised by itself]",
 )  # fmt: skip
-@click.option(
-    "--model", default="auto", show_default=True,
-    type=click.Choice(["auto", "k1", "k1k2", "k1k2p", "k1k2pk3", "fisheye"]),
-    help="Distortion terms; auto takes in what an F test at 1 % asks for.",
+@choice(
+    "--model", "auto|k1|k1k2|k1k2p|k1k2pk3|fisheye",
+    "Distortion terms; auto takes in what an F test at 1 % asks for.", default="auto",
 )  # fmt: skip
 @click.option(
     "--straight-edges", is_flag=True,

@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from photocore.cli import remark
-from photocore.options import FILE, overwrite
+from photocore.options import FILE, choice, overwrite
 
 EXAMPLE = """\b
 Examples:
@@ -24,13 +24,13 @@ Examples:
     help="File to write; its ending chooses the format: .dxf .ply .las .laz .csv .geojson .xlsx",
 )  # fmt: skip
 @click.option("--world", is_flag=True, help="E, N, H instead of the wall's X, Y, relief [m].")
-@click.option(
-    "--order", type=click.Choice(["PNEZD", "PENZD"]), default="PNEZD", show_default=True,
-    help="Columns of a .csv: Point, North, East, height Z, Description.",
+@choice(
+    "--order", "PNEZD|PENZD", "Columns of a .csv: Point, North, East, height Z, Description.",
+    default="PNEZD",
 )  # fmt: skip
-@click.option(
-    "--csv-flavour", type=click.Choice(["plain", "excel-it", "excel-de"]), default="plain",
-    show_default=True, help="Separator, decimal sign and encoding of a .csv.",
+@choice(
+    "--csv-flavour", "plain|excel-it|excel-de", "Separator, decimal sign and encoding of a .csv.",
+    default="plain",
 )  # fmt: skip
 @overwrite
 def command(

@@ -9,7 +9,7 @@ from typing import Any
 import click
 
 from photocore.cli import print_result, remark
-from photocore.options import FILE, NUMBER, as_json, number, overwrite
+from photocore.options import FILE, NUMBER, as_json, choice, number, overwrite
 
 EXAMPLE = """\b
 Examples:
@@ -31,10 +31,7 @@ Then:
     "--count", type=click.IntRange(1, 100_000), default=4000, show_default=True,
     help="About so many feature points, spread evenly.",
 )  # fmt: skip
-@click.option(
-    "--what", type=click.Choice(["all", "features", "targets"]), default="all", show_default=True,
-    help="Natural detail, survey targets, or both.",
-)  # fmt: skip
+@choice("--what", "all|features|targets", "Natural detail, survey targets, or both.", default="all")
 @number(
     "--relief-min", "M", "Lowest relief looked for [m].  [default: -0.5 x near distance]",
     type=NUMBER,
@@ -43,10 +40,7 @@ Then:
     "--relief-max", "M", "Highest relief looked for [m].  [default: 0.4 x near distance]",
     type=NUMBER,
 )  # fmt: skip
-@click.option(
-    "--lang", type=click.Choice(["en", "it", "de"]), default="en", show_default=True,
-    help="Language of the workbook.",
-)  # fmt: skip
+@choice("--lang", "en|it|de", "Language of the workbook.", default="en")
 @overwrite
 @as_json
 def command(

@@ -8,7 +8,7 @@ from typing import Any
 import click
 
 from photocore.cli import print_result, progress_bar
-from photocore.options import FILE, Length, Numbers, as_json, overwrite
+from photocore.options import FILE, Length, as_json, bounds, overwrite, switch
 
 EXAMPLE = """\b
 Examples:
@@ -26,24 +26,15 @@ The last band of the result says which input every pixel comes from: 1, 2, ... i
 @click.option(
     "--gsd", type=Length(above=0), help="Pixel [m] or 5mm.  [default: that of the finest]"
 )
-@click.option(
-    "--bounds", type=Numbers(4), metavar="XMIN,YMIN,XMAX,YMAX",
-    help="Part of the wall [m].  [default: all of it]",
-)  # fmt: skip
+@bounds("Part of the wall [m].  [default: all of it]")
 @click.option(
     "--relief", multiple=True, type=FILE,
     help="Relief map: seams keep away from its edges; repeat it.",
 )  # fmt: skip
 @click.option("--priority", is_flag=True, help="Earlier files cover later ones; no seam is sought.")
-@click.option("--gain/--no-gain", default=True, show_default=True, help="Make the exposure equal.")
-@click.option(
-    "--blend/--no-blend", default=True, show_default=True,
-    help="Blend over the seams; relief maps are never mixed.",
-)  # fmt: skip
-@click.option(
-    "--overviews/--no-overviews", default=True, show_default=True,
-    help="Reduced copies in the file, for fast display.",
-)  # fmt: skip
+@switch("gain", "Make the exposure equal.")
+@switch("blend", "Blend over the seams; relief maps are never mixed.")
+@switch("overviews", "Reduced copies in the file, for fast display.")
 @overwrite
 @as_json
 def command(rasters: tuple[Path, ...], out: Path, as_json: bool, **options: Any) -> None:

@@ -8,7 +8,18 @@ from typing import Any
 import click
 
 from photocore.cli import print_result, progress_bar, remark
-from photocore.options import FILE, NOT_NEGATIVE, Length, Numbers, Scale, as_json, number, overwrite
+from photocore.options import (
+    FILE,
+    NOT_NEGATIVE,
+    Length,
+    Scale,
+    as_json,
+    bounds,
+    choice,
+    number,
+    overwrite,
+    switch,
+)
 
 EXAMPLE = """\b
 Examples:
@@ -34,32 +45,24 @@ Examples:
     "--plane", is_flag=False, flag_value="0", type=Length(), metavar="[M]",
     help="No relief: the reference plane, or one so many metres before it.",
 )  # fmt: skip
-@click.option(
-    "--image", type=click.Choice(["1", "2", "both"]), default="1", show_default=True,
-    help="Photo that gives the colours: 1 far, 2 near, both: 1 where it sees the wall, else 2.",
+@choice(
+    "--image", "1|2|both",
+    "Photo that gives the colours: 1 far, 2 near, both: 1 where it sees the wall, else 2.",
+    default="1",
 )  # fmt: skip
 @click.option(
     "--gsd", type=Length(above=0),
     help="Pixel of the orthophoto [m], or with its unit: 5mm.  [default: that of the relief map "
     "or the photo]",
 )  # fmt: skip
-@click.option(
-    "--bounds", type=Numbers(4), metavar="XMIN,YMIN,XMAX,YMAX",
-    help="Part of the wall [m].  [default: all that is known]",
+@bounds("Part of the wall [m].  [default: all that is known]")
+@choice(
+    "--interpolation", "cubic|linear|nearest|lanczos", "Between the pixels of the photo.",
+    default="cubic",
 )  # fmt: skip
-@click.option(
-    "--interpolation", type=click.Choice(["cubic", "linear", "nearest", "lanczos"]),
-    default="cubic", show_default=True, help="Between the pixels of the photo.",
-)  # fmt: skip
-@click.option(
-    "--mask/--no-mask", default=True, show_default=True,
-    help="Leave empty what relief hides from the camera, or show what hides it.",
-)  # fmt: skip
+@switch("mask", "Leave empty what relief hides from the camera, or show what hides it.")
 @click.option("--fill", is_flag=True, help="Close holes with the colours around them.")
-@click.option(
-    "--match/--no-match", default=True, show_default=True,
-    help="With --image both: bring photo 2 to the colours of photo 1.",
-)  # fmt: skip
+@switch("match", "With --image both: bring photo 2 to the colours of photo 1.")
 @click.option(
     "--vignetting", default="", metavar="cos4|K1,K2,K3",
     help="Undo the fall-off of light to the corners.  [default: off]",
@@ -80,9 +83,9 @@ Examples:
     default=254.0,
 )  # fmt: skip
 @click.option("--title", default="", help="Title of the drawing.  [default: the pair's name]")
-@click.option(
-    "--paper", type=click.Choice(["A4", "A3", "A2", "A1", "A0"], case_sensitive=False),
-    help="Sheet of paper.  [default: the smallest that fits]",
+@choice(
+    "--paper", "A4|A3|A2|A1|A0", "Sheet of paper.  [default: the smallest that fits]",
+    case_sensitive=False,
 )  # fmt: skip
 @click.option("--mark", type=FILE, help="Table of points to draw.  [default: --points]")
 @click.option("--control", type=FILE, help="Table of control points to draw.")

@@ -9,7 +9,7 @@ from typing import Any
 import click
 
 from photocore.cli import print_result, progress_bar
-from photocore.options import FILE, Numbers, as_json, number, overwrite
+from photocore.options import FILE, Numbers, as_json, bounds, choice, number, overwrite
 
 EXAMPLE = """\b
 Examples:
@@ -30,18 +30,15 @@ photos, 2 interpolated, 3 hidden from a camera, 0 unknown).
     "Side of a pixel of the map on the plane [m], 0.2 at most; a coarse one is also matched "
     "more coarsely.  [default: that of the far photo]",
 )  # fmt: skip
-@click.option(
-    "--bounds", type=Numbers(4), metavar="XMIN,YMIN,XMAX,YMAX",
-    help="Part of the plane [m].  [default: all that both photos see]",
+@bounds("Part of the plane [m].  [default: all that both photos see]")
+@choice(
+    "--quality", "fast|standard|best",
+    "fast: half the resolution; best: full resolution also above 9 megapixels.",
+    default="standard",
 )  # fmt: skip
-@click.option(
-    "--quality", type=click.Choice(["fast", "standard", "best"]), default="standard",
-    show_default=True,
-    help="fast: half the resolution; best: full resolution also above 9 megapixels.",
-)  # fmt: skip
-@click.option(
-    "--relief-range", type=Numbers(2), metavar="LOW,HIGH",
-    help="Least and greatest relief to expect [m].  [default: -36 % and +22 % of d2]",
+@number(
+    "--relief-range", "LOW,HIGH",
+    "Least and greatest relief to expect [m].  [default: -36 % and +22 % of d2]", type=Numbers(2),
 )  # fmt: skip
 @click.option("--preview", type=FILE, help="Also a shaded picture (.png).")
 @click.option("--cloud", type=FILE, help="Also a coloured point cloud (.ply, .las, .laz).")

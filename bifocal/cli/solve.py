@@ -8,7 +8,7 @@ from typing import Any
 import click
 
 from photocore.cli import remark, text_table
-from photocore.options import FILE, as_json, number, overwrite
+from photocore.options import FILE, as_json, choice, number, overwrite
 
 EXAMPLE = """\b
 Examples:
@@ -38,20 +38,14 @@ SHOWN = 40
     "headings.  [default: found by heading]",
 )  # fmt: skip
 @click.option("--sheet", metavar="NAME", help="Sheet of the points.  [default: found]")
-@click.option(
-    "--decimal", type=click.Choice(["point", "comma"]),
-    help="Decimal separator of numbers typed as text.  [default: found]",
-)  # fmt: skip
+@choice("--decimal", "point|comma", "Decimal separator of numbers typed as text.  [default: found]")
 @click.option("--visible-only", is_flag=True, help="Leave out hidden and filtered rows.")
 @number("--d1", "M", "Distance of camera 1 [m].  [default: Setup]")
 @number("--d2", "M", "Distance of camera 2 [m].  [default: Setup]")
 @number("--c1", "MM", "Principal distance of image 1 [mm].  [default: Setup]")
 @number("--c2", "MM", "Principal distance of image 2 [mm].  [default: Setup]")
 @number("--pitch", "MM", "Size of a pixel [mm].  [default: Setup]")
-@click.option(
-    "--unit", type=click.Choice(["mm", "px"]),
-    help="Unit of x1 y1 x2 y2.  [default: as headings or Setup say, else mm]",
-)  # fmt: skip
+@choice("--unit", "mm|px", "Unit of x1 y1 x2 y2.  [default: as headings or Setup say, else mm]")
 @number("--sigma-s", "MM", "Precision of an image coordinate [mm].  [default: Setup, else 0.5 px]")
 @number(
     "--sigma-px", "PX",

@@ -7,14 +7,15 @@ The sample lies in the folder ``sample`` beside this module. It was rendered by 
 from __future__ import annotations
 
 import csv
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from bifocal.demo import SAMPLE
-from bifocal.files.geotiff import RasterReader, read_relief
-from bifocal.files.images import read_image, write_image
+from bifocal.files.geotiff import RasterReader, dpi_at_scale, read_relief
+from bifocal.files.images import read_image
+from bifocal.files.strips import write_png
 from bifocal.model.relief_map import ReliefMap
 from bifocal.orthophotos.ortho_workflow import OrthoTask, make_ortho
 from bifocal.relief_maps.workflow import ReliefJob, relief_of_pair
@@ -29,6 +30,8 @@ from photocore.output import atomic_path
 PICK_SIGMA = 0.2
 #: The part of the wall that both photos show whole, up to the top of the cornice. [m]
 BOUNDS = (-5.3, -3.45, 5.3, 3.42)
+#: Scale 1:N at which the picture of the orthophoto prints.
+SHEET_SCALE = 50.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -49,7 +52,6 @@ class DemoResult:
         Median error of the relief map [m] and share of it beyond 3 cm, where both photos see.
     map_known : float
         Share of the wall with a measured relief.
-    remarks : tuple of str
     """
 
     folder: Path
@@ -62,7 +64,6 @@ class DemoResult:
     map_median: float
     map_share: float
     map_known: float
-    remarks: tuple[str, ...] = field(default=())
 
     @property
     def rmse(self) -> float:
@@ -81,12 +82,11 @@ def run_demo(
     InputError
         If the folder cannot be made, or holds results already and ``overwrite`` is false.
     """
-    names = [name for name, _ in _FILES]
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise InputError(f"{folder}: cannot be made ({error.strerror}).") from error
-    taken = [name for name in names if (folder / name).exists()]
+    taken = [name for name, _ in _FILES if (folder / name).exists()]
     if taken and not overwrite:
         raise InputError(
             f"{folder}: holds {', '.join(taken[:3])} ... already; add --overwrite, or name another "
@@ -101,18 +101,20 @@ def run_demo(
     job = ReliefJob(
         out=folder / "relief.tif", preview=folder / "relief.png", bounds=BOUNDS, overwrite=True
     )
-    _, remarks = relief_of_pair(folder / "facade.pair.json", job)
+    relief_of_pair(folder / "facade.pair.json", job)
     progress(0.85, 1.0, "making the orthophoto")
     make_ortho(
         folder / "facade.pair.json", folder / "ortho.tif",
         OrthoTask(relief=folder / "relief.tif", bounds=BOUNDS), overwrite=True,
     )  # fmt: skip
-    _write_preview(folder / "ortho.png", folder / "ortho.tif")
+    with RasterReader(folder / "ortho.tif") as file:
+        dpi = dpi_at_scale(file.grid.gsd, SHEET_SCALE)
+        write_png(folder / "ortho.png", file, dpi=dpi, overwrite=True)
     progress(1.0, 1.0, "done")
     median, share, known = _against_truth(read_relief(folder / "relief.tif"))
     return DemoResult(
         folder=folder, files=_FILES, ids=ids, true=true, found=relief, sigma=sigma, flags=flags,
-        map_median=median, map_share=share, map_known=known, remarks=remarks,
+        map_median=median, map_share=share, map_known=known,
     )  # fmt: skip
 
 
@@ -159,12 +161,3 @@ def _against_truth(relief: ReliefMap) -> tuple[float, float, float]:
     error = np.abs(measured - truth.r)[known]
     share = float(known.sum() / both.sum())
     return float(np.median(error)), float((error > 0.03).mean()), share
-
-
-def _write_preview(path: Path, raster: Path) -> None:
-    """Write the colours of an orthophoto as PNG, hidden pixels transparent."""
-    with RasterReader(raster) as file:
-        width, height = file.grid.width, file.grid.height
-        colours = file.read(0, 0, width, height, bands=[1, 2, 3])
-        mask = file.read(0, 0, width, height, mask=True)
-    write_image(path, np.dstack([colours, mask]), overwrite=True)

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -136,8 +137,6 @@ def read_image(path: Path | str, *, grey: bool = False) -> ImageArray:
     InputError
         As `image_info`, and if the pixels cannot be decoded or are cut off.
     """
-    import cv2
-
     info = image_info(path)
     if info.size[0] * info.size[1] > _BY_STRIPS and not grey:
         large = _read_by_strips(info)
@@ -185,6 +184,11 @@ def _read_by_strips(info: ImageInfo) -> ImageArray | None:
     return image
 
 
+def read_grey(path: Path | str) -> ByteArray:
+    """Return a photo in grey, 8 bit; see `read_image`."""
+    return to_eight_bit(read_image(path, grey=True))
+
+
 def turn_upright(image: Any, orientation: int) -> ImageArray:
     """Return stored pixels as EXIF orientation 1 to 8 wants them seen."""
     if orientation >= 5:
@@ -212,8 +216,6 @@ def as_grey(image: NDArray[np.generic], name: str) -> ByteArray:
     InputError
         If it is not an image of 8 or 16 bits, or smaller than 16 pixels a side.
     """
-    import cv2
-
     small = "is too small to match; at least 16 px a side are needed."
     array = as_photo(image, name, smallest=16, fault=small)
     if array.dtype == np.uint16:
@@ -224,8 +226,6 @@ def as_grey(image: NDArray[np.generic], name: str) -> ByteArray:
 
 def write_image(path: Path | str, image: ImageArray, *, overwrite: bool = False) -> None:
     """Write RGB, RGBA or grey pixels as the ending says (.png, .jpg, .tif), whole or not at all."""
-    import cv2
-
     path = Path(path)
     ending = path.suffix.lower()
     if ending not in {".png", ".jpg", ".jpeg", ".tif", ".tiff"}:
@@ -286,12 +286,10 @@ def _named_exif(tag: Any) -> dict[int, Any]:
     """Return a TIFF's EXIF values under their numbers."""
     if tag is None or not isinstance(tag.value, dict):
         return {}
-    numbers = {
-        "FocalLength": 37386, "FNumber": 33437, "FocalLengthIn35mmFilm": 41989,
-        "LensModel": 42036, "SubjectDistance": 37382, "FocalPlaneXResolution": 41486,
-        "FocalPlaneResolutionUnit": 41488,
-    }  # fmt: skip
-    return {numbers[key]: value for key, value in tag.value.items() if key in numbers}
+    from PIL.ExifTags import Base
+
+    numbers = Base.__members__
+    return {int(numbers[key]): value for key, value in tag.value.items() if key in numbers}
 
 
 def _info_from_exif(path: Path, size: tuple[int, int], bits: int, exif: Any) -> ImageInfo:

@@ -10,14 +10,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from photocore.arrays import FloatArray, positive
+from photocore.arrays import Float32Array, FloatArray, positive
 from photocore.errors import InputError
 
 #: xmin, ymin, xmax, ymax: outer edges of pixels. [m]
 Bounds = tuple[float, float, float, float]
 #: Column, row, width, height; may reach beyond a raster's edges. [px]
 Window = tuple[int, int, int, int]
-PixelMap = NDArray[np.float32]
 
 #: Rows and columns of a relief map and an orthophoto that differ by less are the same. [px]
 SAME_PIXEL = 1e-3
@@ -175,7 +174,7 @@ class Grid:
         near = max(abs(column - whole[0]), abs(row - whole[1])) < 10 * SAME_PIXEL
         return whole if same_gsd and near else None
 
-    def resampling(self, other: Grid, margin: int) -> tuple[Window, PixelMap, PixelMap]:
+    def resampling(self, other: Grid, margin: int) -> tuple[Window, Float32Array, Float32Array]:
         """Return the window of another grid that covers this one, and this one's places in it.
 
         Parameters

@@ -150,32 +150,15 @@ def _square(jacobian: FloatArray) -> FloatArray:
 
 def _inverse2(matrix: FloatArray) -> FloatArray:
     """Return the inverses of 2x2 matrices; NaN where singular."""
-    a, b, c, d = matrix[:, 0, 0], matrix[:, 0, 1], matrix[:, 1, 0], matrix[:, 1, 1]
+    (a, b), (c, d) = matrix.transpose(1, 2, 0)
     with np.errstate(divide="ignore", invalid="ignore"):
-        factor = 1.0 / (a * d - b * c)
-    inverse = np.empty_like(matrix)
-    inverse[:, 0, 0], inverse[:, 0, 1] = d * factor, -b * factor
-    inverse[:, 1, 0], inverse[:, 1, 1] = -c * factor, a * factor
-    return inverse
+        return (np.array([[d, -b], [-c, a]]) / (a * d - b * c)).transpose(2, 0, 1)
 
 
 def _inverse3(matrix: FloatArray) -> FloatArray:
     """Return the inverses of symmetric 3x3 matrices by cofactors; NaN where singular."""
-    m = matrix
-    cofactor = np.empty_like(m)
-    cofactor[:, 0, 0] = m[:, 1, 1] * m[:, 2, 2] - m[:, 1, 2] ** 2
-    cofactor[:, 0, 1] = m[:, 0, 2] * m[:, 1, 2] - m[:, 0, 1] * m[:, 2, 2]
-    cofactor[:, 0, 2] = m[:, 0, 1] * m[:, 1, 2] - m[:, 0, 2] * m[:, 1, 1]
-    cofactor[:, 1, 1] = m[:, 0, 0] * m[:, 2, 2] - m[:, 0, 2] ** 2
-    cofactor[:, 1, 2] = m[:, 0, 1] * m[:, 0, 2] - m[:, 0, 0] * m[:, 1, 2]
-    cofactor[:, 2, 2] = m[:, 0, 0] * m[:, 1, 1] - m[:, 0, 1] ** 2
-    cofactor[:, 1, 0], cofactor[:, 2, 0] = cofactor[:, 0, 1], cofactor[:, 0, 2]
-    cofactor[:, 2, 1] = cofactor[:, 1, 2]
-    determinant = (
-        m[:, 0, 0] * cofactor[:, 0, 0]
-        + m[:, 0, 1] * cofactor[:, 0, 1]
-        + m[:, 0, 2] * cofactor[:, 0, 2]
-    )
+    cofactor = np.cross(matrix[:, [1, 2, 0]], matrix[:, [2, 0, 1]])
+    determinant = (matrix[:, 0] * cofactor[:, 0]).sum(axis=1)
     with np.errstate(divide="ignore", invalid="ignore"):
         return np.where(determinant > 0, 1.0 / determinant, np.nan)[:, None, None] * cofactor
 

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from photocore.arrays import FloatArray, as_floats, as_points, not_negative, read_only
-from photocore.errors import InputError
+from photocore.errors import InputError, located
 from photocore.jsonfile import read_object, write_object
 from photocore.lensformats import read_foreign_lens
 
@@ -104,24 +104,14 @@ class Lens:
         data = read_object(path, what="lens file")
         if str(data.get("format", "")).startswith("bifocal-pair"):
             raise InputError(f"{path}: is a pair file, not a lens file; name the lens.json.")
-        try:
-            known = {
-                "camera_matrix": data.pop("camera_matrix"),
-                "coefficients": data.pop("coefficients"),
-                "image_size": data.pop("image_size"),
-            }
-            data.pop("format", None)
-            return cls(
-                **known,
-                model=data.pop("model", "opencv"),
-                sigma0=data.pop("sigma0", None),
-                source=str(data.pop("source", "")),
-                extra=data,
-            )
-        except KeyError as error:
-            raise InputError(f"{path}: the key {error} is missing.") from None
-        except InputError as error:
-            raise InputError(f"{path}: {error}") from None
+        data.pop("format", None)
+        known = ("camera_matrix", "coefficients", "image_size", "model", "sigma0", "source")
+        stated = {name: data.pop(name) for name in known if name in data}
+        with located(path):
+            for name in known[:3]:
+                if name not in stated:
+                    raise InputError(f"the key {name!r} is missing.")
+            return cls(**stated, extra=data)
 
     def to_dict(self) -> dict[str, Any]:
         """Return what `read` understands."""

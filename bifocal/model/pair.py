@@ -15,8 +15,15 @@ from bifocal.model.flags import SIGMA_PIXEL, FlagLimits
 from bifocal.model.intersection import Intersection, PlanePicks, intersect
 from bifocal.model.lens import Lens
 from bifocal.precision import base_factor
-from photocore.arrays import FloatArray, as_points, not_negative, positive, read_only
-from photocore.errors import GeometryError, InputError
+from photocore.arrays import (
+    BoolArray,
+    FloatArray,
+    as_points,
+    not_negative,
+    positive,
+    read_only,
+)
+from photocore.errors import GeometryError, InputError, located
 from photocore.jsonfile import read_object, write_object
 
 FORMAT = "bifocal-pair/1"
@@ -135,6 +142,22 @@ class Photo:
         """Return the derivative of the plane position by the pixel, shape (n, 2, 2). [m/px]"""
         points = pixels if self.lens is None else self.lens.undistort(pixels)
         return homography_jacobian(self.plane_from_pixel, points)
+
+    def sees_ahead(self, positions: FloatArray, shape: tuple[int, ...]) -> BoolArray:
+        """Tell which plane positions lie on the photo's side of its horizon.
+
+        Parameters
+        ----------
+        positions : ndarray, shape (..., 2)
+            [m]
+        shape : (height, width, ...)
+            Of the photo. [px]
+        """
+        inverse = np.linalg.inv(self.plane_from_pixel)
+        scale = positions @ inverse[2, :2] + inverse[2, 2]
+        # q = H p / w and p = H^-1 q * w: both scales have the same sign where the photo looks.
+        reference = self.plane_from_pixel[2] @ [shape[1] / 2, shape[0] / 2, 1.0]
+        return np.asarray(scale * reference > 0)
 
     def gsd(self, size: tuple[int, int]) -> float:
         """Return the side of a pixel in the middle of a photo of (width, height) px. [m]
@@ -291,12 +314,8 @@ class Pair:
             If a homography is singular or both distances are equal.
         """
         data = read_object(path, what="pair file")
-        try:
+        with located(path):
             return cls.from_dict(data, folder=Path(path).parent)
-        except GeometryError as error:
-            raise GeometryError(f"{path}: {error}") from None
-        except InputError as error:
-            raise InputError(f"{path}: {error}") from None
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any], *, folder: Path = Path()) -> Pair:
@@ -469,7 +488,7 @@ def _photo_from_dict(data: Any, key: str, folder: Path) -> Photo:
     lens = data.get("lens")
     if lens is not None and not isinstance(lens, str):
         raise InputError(f'"{key}.lens" must name a lens file, found {lens!r}.')
-    try:
+    with located(f'"{key}"'):
         return Photo(
             file=file,
             lens=Lens.read(folder / lens) if lens else None,
@@ -479,7 +498,3 @@ def _photo_from_dict(data: Any, key: str, folder: Path) -> Photo:
             **{name: data.pop(name, None) for name in _OPTIONAL},
             extra=data,
         )
-    except GeometryError as error:
-        raise GeometryError(f'"{key}": {error}') from None
-    except InputError as error:
-        raise InputError(f'"{key}": {error}') from None

@@ -10,10 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from bifocal.model.grid import Grid, Gridded
-from photocore.arrays import BoolArray, ByteArray, FloatArray, as_points, read_only
+from photocore.arrays import BoolArray, ByteArray, Float32Array, FloatArray, as_points, read_only
 from photocore.errors import InputError
-
-Float32Array = NDArray[np.float32]
 
 
 class Quality(IntEnum):

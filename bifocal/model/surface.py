@@ -10,14 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bifocal.model.grid import Bounds, Grid, cut
-from photocore.arrays import FloatArray
+from photocore.arrays import Float32Array, FloatArray
 from photocore.errors import InputError
 
-ReliefArray = NDArray[np.float32]
 #: A box without end.
 EVERYWHERE: Bounds = (-math.inf, -math.inf, math.inf, math.inf)
 #: Returns relief for (column, row, width, height) of a map, NaN beyond its edges.
-Fetch = Callable[[int, int, int, int], ReliefArray]
+Fetch = Callable[[int, int, int, int], Float32Array]
 
 #: Side of the blocks whose extremes a map remembers; smaller blocks give tighter tile margins. [px]
 _BLOCK = 128
@@ -29,7 +28,7 @@ _STEP = 3.0
 class Surface(Protocol):
     """Relief over the reference plane."""
 
-    def window(self, grid: Grid) -> ReliefArray:
+    def window(self, grid: Grid) -> Float32Array:
         """Return relief at the pixel centres of a grid; NaN where unknown. [m]"""
 
     def extremes(self, bounds: Bounds) -> tuple[float, float]:
@@ -50,7 +49,7 @@ class FlatSurface:
             raise InputError(f"relief: must be a finite number [m], got {r}.")
         self.r = float(r)
 
-    def window(self, grid: Grid) -> ReliefArray:
+    def window(self, grid: Grid) -> Float32Array:
         """Return the constant."""
         return np.full(grid.shape, self.r, np.float32)
 
@@ -87,7 +86,7 @@ class MapSurface:
         relief = r.astype(np.float32, copy=False)
         return cls(grid, lambda *window: cut(relief, window, np.nan))
 
-    def window(self, grid: Grid) -> ReliefArray:
+    def window(self, grid: Grid) -> Float32Array:
         """Return relief at the pixel centres of a grid.
 
         Bilinear on slopes, nearest across steps and beside holes, so that edges stay sharp.
@@ -126,7 +125,7 @@ class MapSurface:
             raise InputError("the relief map holds infinite values; mark unknown pixels as NaN.")
         return lowest, highest
 
-    def _resample(self, grid: Grid) -> ReliefArray:
+    def _resample(self, grid: Grid) -> Float32Array:
         import cv2
 
         window, columns, rows = grid.resampling(self.grid, 1)

@@ -12,14 +12,12 @@ import numpy as np
 from bifocal.orientation import validation
 from bifocal.orientation.control_points import Control, SiteMeasures
 from bifocal.orientation.features import find_features
-from bifocal.orientation.interior_orientation import Interior
+from bifocal.orientation.interior_orientation import Cameras, Interiors
 from bifocal.orientation.orientation_stages import (
     SIGMA_PARALLEL,
     OrientedPair,
-    PhotoInput,
-    Step,
+    Photos,
     oriented_in_stages,
-    silent,
     without_gross,
 )
 from bifocal.orientation.pair_adjustment import tie_misfit
@@ -28,8 +26,8 @@ from bifocal.orientation.relative_orientation import Ties, find_ties, first_came
 from bifocal.orientation.space_resection import resect
 from bifocal.orientation.tie_points import robust_sigma
 from photocore.arrays import BoolArray
-from photocore.camera import Pinhole, ray_on_plane
-from photocore.errors import GeometryError
+from photocore.camera import ray_on_plane
+from photocore.errors import GeometryError, located
 from photocore.similarity import Similarity, fit_plane
 
 
@@ -37,10 +35,9 @@ from photocore.similarity import Similarity, fit_plane
 class _Given:
     """What `orient_pair` is given."""
 
-    photos: tuple[PhotoInput, PhotoInput]
+    photos: Photos
     control: Control
     site: SiteMeasures
-    step: Step
 
     @property
     def names(self) -> tuple[str, str]:
@@ -48,18 +45,12 @@ class _Given:
         return self.photos[0].name, self.photos[1].name
 
     @property
-    def interiors(self) -> tuple[Interior, Interior]:
+    def interiors(self) -> Interiors:
         """Interior orientations of the photos."""
         return self.photos[0].interior, self.photos[1].interior
 
 
-def orient_pair(
-    photos: tuple[PhotoInput, PhotoInput],
-    *,
-    control: Control,
-    site: SiteMeasures,
-    step: Step = silent,
-) -> OrientedPair:
+def orient_pair(photos: Photos, *, control: Control, site: SiteMeasures) -> OrientedPair:
     """Return the cameras of a pair.
 
     Parameters
@@ -70,23 +61,19 @@ def orient_pair(
         Points measured on site; may be empty.
     site : SiteMeasures
         Distances measured on site.
-    step : callable
-        Told what is being done.
 
     Raises
     ------
     GeometryError
         If the photos and measurements do not make a pair; the message says why and what to do.
     """
-    given = _Given(photos=photos, control=control, site=site, step=step)
+    given = _Given(photos=photos, control=control, site=site)
     known = control.positioned
     enough = all(
         (known & np.isfinite(pixels).all(axis=1)).sum() >= 4
         for pixels in (control.pixels1, control.pixels2)
     )
-    step("looking for common points")
     ties, remarks = _ties(given, needed=not enough)
-    step("setting up the cameras")
     cameras, agree, interiors = _start(given, ties, enough)
     if enough and ties is not None:
         misfit = _contradiction(cameras, interiors, ties)
@@ -99,7 +86,7 @@ def orient_pair(
     elif ties is not None:
         validation.check_parallax(ties, interiors, given.names, flat_is_fine=site.parallel)
     observations = _observations(given, interiors, ties, agree)
-    pair = oriented_in_stages(observations, cameras, photos, site, step, with_control=enough)
+    pair = oriented_in_stages(observations, cameras, photos, site, with_control=enough)
     pair = without_gross(pair)
     validation.check_determined(pair.adjusted)
     validation.check_movement(pair.adjusted)
@@ -108,9 +95,7 @@ def orient_pair(
     return replace(pair, remarks=told, assumed=assumed)
 
 
-def _contradiction(
-    cameras: tuple[Pinhole, Pinhole], interiors: tuple[Interior, Interior], ties: Ties
-) -> float:
+def _contradiction(cameras: Cameras, interiors: Interiors, ties: Ties) -> float:
     """Return how far the common points are from the cameras' epipolar lines. [px]"""
     observations = PairObservations(interiors=interiors, tie1=ties.pixels1, tie2=ties.pixels2)
     return robust_sigma(tie_misfit(observations, PairUnknowns(cameras=cameras)))
@@ -143,9 +128,7 @@ def _picks_exchanged(given: _Given, ties: Ties, misfit: float) -> bool:
 
 def _with_picks_exchanged(given: _Given) -> OrientedPair:
     """Return the pair with the picks of the two photos exchanged, saying so."""
-    pair = orient_pair(
-        given.photos, control=given.control.exchanged(), site=given.site, step=given.step
-    )
+    pair = orient_pair(given.photos, control=given.control.exchanged(), site=given.site)
     note = (
         f"col1, row1 of the control points are pixels of {given.names[1]}, col2, row2 of "
         f"{given.names[0]}; the picks were exchanged."
@@ -163,9 +146,7 @@ def _with_photos_exchanged(given: _Given) -> OrientedPair:
         )
     if site.distance1 and site.distance2 and site.distance1 < site.distance2:
         site = replace(site, distance1=site.distance2, distance2=site.distance1)
-    pair = orient_pair(
-        given.photos[::-1], control=given.control.exchanged(), site=site, step=given.step
-    )
+    pair = orient_pair(given.photos[::-1], control=given.control.exchanged(), site=site)
     note = (
         f"{near} is the near photo; the two were exchanged. Image 1 of the pair file is {far}, and "
         "--distance1 means its distance."
@@ -191,9 +172,7 @@ def _ties(given: _Given, *, needed: bool) -> tuple[Ties | None, tuple[str, ...]]
         return None, (remark,)
 
 
-def _start(
-    given: _Given, ties: Ties | None, enough: bool
-) -> tuple[tuple[Pinhole, Pinhole], BoolArray, tuple[Interior, Interior]]:
+def _start(given: _Given, ties: Ties | None, enough: bool) -> tuple[Cameras, BoolArray, Interiors]:
     """Return approximate cameras, the control points that agree, and the interiors used."""
     control, interiors = given.control, given.interiors
     agree = np.ones(len(control.ids), dtype=bool)
@@ -202,10 +181,8 @@ def _start(
         for pixels, photo in zip((control.pixels1, control.pixels2), given.photos, strict=True):
             seen = control.positioned & np.isfinite(pixels).all(axis=1)
             xyz = np.nan_to_num(control.xyz[seen])
-            try:
+            with located(photo.name):
                 camera, fits = resect(xyz, photo.interior.ideal(pixels[seen]), photo.interior)
-            except GeometryError as error:
-                raise GeometryError(f"{photo.name}: {error}") from None
             cameras.append(camera)
             agree[np.flatnonzero(seen)[~fits]] = False
         return (cameras[0], cameras[1]), agree, interiors
@@ -215,9 +192,7 @@ def _start(
     return _scaled(first_cameras(ties, interiors), given, interiors), agree, interiors
 
 
-def _plausible_focals(
-    interiors: tuple[Interior, Interior], ties: Ties, site: SiteMeasures
-) -> tuple[Interior, Interior]:
+def _plausible_focals(interiors: Interiors, ties: Ties, site: SiteMeasures) -> Interiors:
     """Return interiors whose unknown focal length follows from the distances and the scale."""
     first, second = interiors
     if not (first.is_assumed or second.is_assumed):
@@ -235,9 +210,7 @@ def _plausible_focals(
     return replace(first, focal=second.focal / ratio), second
 
 
-def _scaled(
-    cameras: tuple[Pinhole, Pinhole], given: _Given, interiors: tuple[Interior, Interior]
-) -> tuple[Pinhole, Pinhole]:
+def _scaled(cameras: Cameras, given: _Given, interiors: Interiors) -> Cameras:
     """Return cameras of far distance 1 brought to metres and, where known, to X and Y."""
     control, site = given.control, given.site
     near, scale = cameras[1].centre[2], 0.0
@@ -275,7 +248,7 @@ def _scaled(
 
 
 def _observations(
-    given: _Given, interiors: tuple[Interior, Interior], ties: Ties | None, agree: BoolArray
+    given: _Given, interiors: Interiors, ties: Ties | None, agree: BoolArray
 ) -> PairObservations:
     """Return everything observed, ideal pixels throughout."""
     control, site = given.control, given.site
@@ -308,7 +281,7 @@ def _observations(
     )
 
 
-def _same_body(interiors: tuple[Interior, Interior]) -> float | None:
+def _same_body(interiors: Interiors) -> float | None:
     """Return how closely the principal points agree, if both may be of one camera body. [px]"""
     first, second = interiors
     # With one photo upright and one lying the axes differ.

@@ -2,25 +2,23 @@
 
 from __future__ import annotations
 
-import os
-from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from bifocal.files.images import ImageInfo, image_info, read_image, to_eight_bit
+from bifocal.files.images import ImageInfo, image_info, read_grey
 from bifocal.model.lens import Lens
 from bifocal.orientation.absolute_orientation import orient_pair
 from bifocal.orientation.alignment import Alignment, make_alignment, with_files
 from bifocal.orientation.alignment_picture import write_alignment_picture
 from bifocal.orientation.control_points import Control, SiteMeasures, read_control, read_lengths
 from bifocal.orientation.interior_orientation import Interior, lens_of_photo
-from bifocal.orientation.orientation_stages import PhotoInput, silent
+from bifocal.orientation.orientation_stages import PhotoInput
 from photocore.arrays import FloatArray
 from photocore.errors import InputError
-from photocore.output import check_writable
+from photocore.output import check_writable, relative_name
 
 #: A wall point given without r lies on the plane to this. [m]
 SIGMA_ON_WALL = 0.005
@@ -87,7 +85,6 @@ def align_photos(
     *,
     picture: Path | None = None,
     overwrite: bool = False,
-    step: Callable[[str], None] = silent,
 ) -> Alignment:
     """Set a pair up, write the pair file (and lens files it needs, and the picture), return it.
 
@@ -108,14 +105,14 @@ def align_photos(
     infos = image_info(far), image_info(near)
     first, second = (
         PhotoInput(
-            grey=to_eight_bit(read_image(info.path, grey=True)),
+            grey=read_grey(info.path),
             interior=_interior(info, known, number),
             name=info.path.name,
         )
         for number, (info, known) in enumerate(zip(infos, options.lenses, strict=True), start=1)
     )
     control = _control(options, (first.interior.image_size, second.interior.image_size))
-    oriented = orient_pair((first, second), control=control, site=options.site, step=step)
+    oriented = orient_pair((first, second), control=control, site=options.site)
     paths, ordered = (far, near), (first, second)
     if oriented.exchanged:
         paths, ordered = (near, far), (second, first)
@@ -124,10 +121,9 @@ def align_photos(
         line = (np.array(options.line[0], dtype=np.float64).reshape(2, 2), options.line[1])
     alignment = make_alignment(oriented, ordered, way=way, direction=line)
     if picture is not None:
-        step("drawing the picture")
         images = [photo.grey for photo in ordered if photo.grey is not None]
         write_alignment_picture(picture, alignment, (images[0], images[1]), overwrite=overwrite)
-    names = (_relative(paths[0], out.parent), _relative(paths[1], out.parent))
+    names = (relative_name(paths[0], out.parent), relative_name(paths[1], out.parent))
     lenses = _write_lenses(alignment, out, overwrite=overwrite)
     alignment = with_files(alignment, names, lenses)
     alignment.pair.write(out, overwrite=overwrite)
@@ -206,11 +202,8 @@ def _interior(info: ImageInfo, data: KnownLens, number: int) -> Interior:
                 f"which the EXIF data of {info.path.name} do not tell. Give --sensor-width (36 for "
                 "full frame, about 23 for APS-C) or --pixel-size."
             )
-        focal, sigma, source = (
-            data.focal / pitch,
-            SIGMA_NOMINAL,
-            f"--focal{number} {data.focal:g} mm",
-        )
+        focal, sigma = data.focal / pitch, SIGMA_NOMINAL
+        source = f"--focal{number} {data.focal:g} mm"
     elif info.focal_length and exif:
         pitch, sigma, source = exif, SIGMA_NOMINAL, f"EXIF, {info.focal_length:g} mm"
         focal = info.focal_length / pitch
@@ -274,14 +267,6 @@ def _check_inside(control: Control, pixels: FloatArray, size: tuple[int, int], p
             f"{photo} photo ({width} x {height} px). Were the picks made on a photo of another "
             "size, or are far and near exchanged?"
         )
-
-
-def _relative(path: Path, folder: Path) -> str:
-    """Return a path relative to a folder, with slashes; absolute across Windows drives."""
-    try:
-        return Path(os.path.relpath(path.resolve(), folder.resolve())).as_posix()
-    except ValueError:
-        return path.resolve().as_posix()
 
 
 def _write_lenses(

@@ -11,9 +11,9 @@ import numpy as np
 
 from bifocal.model.lens import Lens
 from bifocal.model.pair import Pair, Photo, apply_homography
-from bifocal.orientation.interior_orientation import Interior
+from bifocal.orientation.interior_orientation import Cameras, Interior
 from bifocal.orientation.orientation_report import orientation_in_words
-from bifocal.orientation.orientation_stages import OrientedPair, PhotoInput
+from bifocal.orientation.orientation_stages import OrientedPair, PhotoInput, Photos
 from bifocal.orientation.pair_adjustment import AdjustedPair
 from bifocal.orientation.pair_observations import NAMES, at
 from bifocal.orientation.reference_plane import rivals
@@ -75,7 +75,7 @@ class Alignment:
 
 def make_alignment(
     oriented: OrientedPair,
-    photos: tuple[PhotoInput, PhotoInput],
+    photos: Photos,
     *,
     way: str,
     direction: tuple[FloatArray, bool] | None = None,
@@ -131,8 +131,8 @@ def make_alignment(
 
 
 def _in_facade_axes(
-    cameras: tuple[Pinhole, Pinhole], photo: PhotoInput, direction: tuple[FloatArray, bool] | None
-) -> tuple[tuple[Pinhole, Pinhole], str]:
+    cameras: Cameras, photo: PhotoInput, direction: tuple[FloatArray, bool] | None
+) -> tuple[Cameras, str]:
     """Return cameras in axes along the façade, origin in the far nadir, and what they rest on."""
     far = cameras[0]
     if direction is not None:
@@ -256,7 +256,7 @@ def standard_deviations(adjusted: AdjustedPair) -> dict[str, float]:
 
 def _diagnostics(
     oriented: OrientedPair,
-    cameras: tuple[Pinhole, Pinhole],
+    cameras: Cameras,
     deviations: Mapping[str, float],
     way: str,
     words: tuple[str, ...],

@@ -13,6 +13,7 @@ from bifocal.files.images import write_image
 from bifocal.model.pair import Photo
 from bifocal.orientation.alignment import Alignment
 from bifocal.orientation.area_points import resampled
+from bifocal.orientation.interior_orientation import Images
 from photocore.arrays import ByteArray, FloatArray
 
 #: Longer side of the picture. [px]
@@ -49,11 +50,7 @@ def _whole(at: FloatArray) -> tuple[int, int]:
 
 
 def write_alignment_picture(
-    path: Path | str,
-    alignment: Alignment,
-    images: tuple[ByteArray, ByteArray],
-    *,
-    overwrite: bool = False,
+    path: Path | str, alignment: Alignment, images: Images, *, overwrite: bool = False
 ) -> None:
     """Write the overlay: far photo red, near photo cyan, so what lies on the wall looks grey.
 
@@ -81,7 +78,7 @@ def write_alignment_picture(
     write_image(path, picture, overwrite=overwrite)
 
 
-def _grid(alignment: Alignment, images: tuple[ByteArray, ByteArray]) -> tuple[FloatArray, float]:
+def _grid(alignment: Alignment, images: Images) -> tuple[FloatArray, float]:
     """Return the plane positions of the picture's pixels (h, w, 2), and their size. [m]"""
     far = alignment.pair.image1
     parts = [far.plane_from_pixels(alignment.tie1[alignment.wall]), alignment.control_positions]
@@ -102,10 +99,7 @@ def _grid(alignment: Alignment, images: tuple[ByteArray, ByteArray]) -> tuple[Fl
 def _pixels_ahead(photo: Photo, image: ByteArray, grid: FloatArray) -> FloatArray:
     """Return the pixels of plane positions; NaN behind the camera, which would be mirrored."""
     pixels = photo.pixels_from_plane(grid)
-    ahead = np.linalg.inv(photo.plane_from_pixel)[2]
-    middle = photo.plane_from_pixels(np.array([image.shape[1] / 2.0, image.shape[0] / 2.0]))
-    sign = np.sign(middle @ ahead[:2] + ahead[2])
-    pixels[(grid @ ahead[:2] + ahead[2]) * sign <= 0] = np.nan
+    pixels[~photo.sees_ahead(grid, image.shape)] = np.nan
     return pixels
 
 

@@ -10,6 +10,7 @@ import cv2
 import numpy as np
 
 from bifocal import rays
+from bifocal.orientation.interior_orientation import Images
 from bifocal.orientation.pair_adjustment import AdjustedPair
 from bifocal.orientation.pair_observations import PairObservations
 from photocore.arrays import BoolArray, ByteArray, FloatArray
@@ -22,7 +23,7 @@ POINTS = 3000
 
 
 def even_points(
-    observations: PairObservations, adjusted: AdjustedPair, images: tuple[ByteArray, ByteArray]
+    observations: PairObservations, adjusted: AdjustedPair, images: Images
 ) -> tuple[FloatArray, FloatArray]:
     """Return points spread evenly over the wall's area, where either photo sees them.
 
@@ -84,10 +85,8 @@ def resampled(image: ByteArray, pixels: FloatArray) -> ByteArray:
     if reduction > 1:
         image = cv2.blur(image, (reduction, reduction)).astype(np.uint8)
     maps = np.nan_to_num(pixels, nan=-10.0).astype(np.float32)
-    return np.asarray(
-        cv2.remap(image, maps[..., 0], maps[..., 1], cv2.INTER_LINEAR, borderValue=0),
-        dtype=np.uint8,
-    )
+    moved = cv2.remap(image, maps, None, cv2.INTER_LINEAR, borderValue=0)
+    return np.asarray(moved, dtype=np.uint8)
 
 
 def _flow(first: ByteArray, second: ByteArray) -> FloatArray:

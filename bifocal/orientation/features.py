@@ -9,10 +9,12 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from photocore.arrays import BoolArray, ByteArray, FloatArray
+from photocore.arrays import BoolArray, ByteArray, Float32Array, FloatArray
 
 #: SIFT doubles its input: 2.5 MP needs 0.6 GB, and patches are refined on the full photo anyway.
 FEATURE_PIXELS = 2.5e6
+#: The nearest descriptor is at most this share as far as the second: anywhere, on the line.
+DISTINCT, DISTINCT_ON_LINE = 0.85, 0.9
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -31,7 +33,7 @@ class Features:
 
     pixels: FloatArray
     size: FloatArray
-    descriptors: NDArray[np.float32]
+    descriptors: Float32Array
     reduction: float
 
 
@@ -63,11 +65,8 @@ def find_features(
     """
     image = stretch(image)
     reduction = max(1.0, float(np.sqrt(image.size / budget)))
-    if reduction > 1.0:
-        size = (round(image.shape[1] / reduction), round(image.shape[0] / reduction))
-        small = cv2.resize(image, size, interpolation=cv2.INTER_AREA)
-    else:
-        small = image
+    size = (round(image.shape[1] / reduction), round(image.shape[0] / reduction))
+    small = cv2.resize(image, size, interpolation=cv2.INTER_AREA)
     factor = np.array([image.shape[1] / small.shape[1], image.shape[0] / small.shape[0]])
     detector: Any = cv2.SIFT.create(nfeatures=limit, contrastThreshold=0.02)
     keypoints, descriptors = detector.detectAndCompute(small, None)
@@ -84,9 +83,7 @@ def find_features(
     )
 
 
-def match_features(
-    first: Features, second: Features, *, ratio: float = 0.85
-) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+def match_features(first: Features, second: Features) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     """Return indices of mutual nearest neighbours that stand out from the second nearest."""
     if len(first.pixels) < 2 or len(second.pixels) < 2:
         return np.zeros(0, np.intp), np.zeros(0, np.intp)
@@ -109,7 +106,7 @@ def match_features(
         runner = part.max(axis=1)
         nearest[start : start + 2000] = best
         # |a - b|² = 2 - 2 a·b for unit vectors.
-        distinct[start : start + 2000] = (2 - 2 * value) < ratio**2 * (2 - 2 * runner)
+        distinct[start : start + 2000] = (2 - 2 * value) < DISTINCT**2 * (2 - 2 * runner)
     rows = np.arange(count)
     good = distinct & (back[nearest] == rows)
     return rows[good], nearest[good]
@@ -122,7 +119,6 @@ def match_along_lines(
     expected: tuple[FloatArray, FloatArray],
     *,
     across: float,
-    ratio: float = 0.9,
 ) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     """Return the nearest neighbours among those that lie near each feature's epipolar segment.
 
@@ -135,8 +131,6 @@ def match_along_lines(
         The segments' ends in photo 2. [px]
     across : float
         Largest distance from the line. [px]
-    ratio : float
-        Required distinctness among the candidates on the segment.
 
     Returns
     -------
@@ -161,7 +155,7 @@ def match_along_lines(
         if len(candidates):
             ends = expected[0][rows], expected[1][rows]
             best, value = _best_on_segment(
-                first.descriptors[rows], second, candidates, ends, across, ratio
+                first.descriptors[rows], second, candidates, ends, across
             )
             nearest[rows], similarity[rows] = best, value
     # One partner each: the most similar keeps it.
@@ -177,13 +171,12 @@ def _angle(away: FloatArray) -> FloatArray:
 
 
 def _best_on_segment(
-    descriptors: NDArray[np.float32],
+    descriptors: Float32Array,
     second: Features,
     candidates: NDArray[np.intp],
     ends: tuple[FloatArray, FloatArray],
     across: float,
-    ratio: float,
-) -> tuple[NDArray[np.intp], NDArray[np.float32]]:
+) -> tuple[NDArray[np.intp], Float32Array]:
     """Return each feature's distinct nearest candidate near its segment (-1: none)."""
     x2 = second.pixels[candidates]
     along = ends[1] - ends[0]
@@ -203,7 +196,7 @@ def _best_on_segment(
     close &= np.abs(x2[None, :, 1] - x2[best, None, 1]) < across
     part[close] = -1.0
     runner = part.max(axis=1)
-    good = (value > 0.6) & ((2 - 2 * value) < ratio**2 * (2 - 2 * runner))
+    good = (value > 0.6) & ((2 - 2 * value) < DISTINCT_ON_LINE**2 * (2 - 2 * runner))
     return (
         np.where(good, candidates[best], -1).astype(np.intp),
         np.where(good, value, -1.0).astype(np.float32),
@@ -238,15 +231,15 @@ def sharpness(image: ByteArray) -> float:
     return float((np.median(fine[edges]) / np.median(coarse[edges]) - 1.0) / 1.5)
 
 
-def _steepness(image: NDArray[np.float32]) -> NDArray[np.float32]:
+def _steepness(image: Float32Array) -> Float32Array:
     """Return the larger of both grey-value differences across each inner pixel."""
     across = np.abs(image[1:-1, 2:] - image[1:-1, :-2])
     return np.maximum(across, np.abs(image[2:, 1:-1] - image[:-2, 1:-1]))
 
 
-def drop_repeated(pixels1: FloatArray, pixels2: FloatArray, *, apart: float = 1.0) -> BoolArray:
+def drop_repeated(pixels1: FloatArray, pixels2: FloatArray) -> BoolArray:
     """Return which matches to keep when several sit at one place (one per orientation)."""
-    keys = np.round(np.concatenate([pixels1, pixels2], axis=1) / apart).astype(np.int64)
+    keys = np.round(np.concatenate([pixels1, pixels2], axis=1)).astype(np.int64)
     _, first = np.unique(keys, axis=0, return_index=True)
     keep = np.zeros(len(pixels1), dtype=bool)
     keep[first] = True

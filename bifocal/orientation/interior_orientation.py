@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from bifocal.model.lens import Lens
-from photocore.arrays import FloatArray
-from photocore.camera import camera_matrix
+from photocore.arrays import ByteArray, FloatArray
+from photocore.camera import Pinhole, camera_matrix
 from photocore.distortion import RadialDivision
 from photocore.errors import InputError
 
@@ -154,6 +154,12 @@ class Interior:
     def radial(self, k: float) -> RadialDivision:
         """Return the model of an unknown radial distortion k, on top of the lens's."""
         return RadialDivision(k, self.centre, self.focal)
+
+
+#: What belongs to both photos of a pair, the far one first.
+Interiors = tuple[Interior, Interior]
+Cameras = tuple[Pinhole, Pinhole]
+Images = tuple[ByteArray, ByteArray]
 
 
 def lens_of_photo(lens: Lens, size: tuple[int, int], *, orientation: int = 1) -> Lens:

@@ -7,12 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from bifocal.files.images import read_image, to_eight_bit
+from bifocal.files.images import read_grey
 from bifocal.model.pair import Pair
 from bifocal.orientation.matching import Matches, MatchSettings, match_pair
 from bifocal.survey.observations import PointObservations
 from bifocal.survey.template_workflow import write_survey
-from photocore.arrays import ByteArray
 from photocore.errors import InputError
 from photocore.output import check_writable
 from photocore.tables import write_csv
@@ -37,7 +36,7 @@ def match_photos(
         raise InputError(f"{out}: points are written as .xlsx (survey workbook) or .csv.")
     check_writable(out, overwrite=overwrite)
     pair = Pair.read(pair_path)
-    images = (_photo(pair, 1), _photo(pair, 2))
+    images = (read_grey(pair.photo_file(1)), read_grey(pair.photo_file(2)))
     matches = match_pair(pair, images, settings)
     if out.suffix.lower() == ".csv":
         write_csv(out, csv_columns(matches), formats=_FORMATS, overwrite=overwrite)
@@ -102,9 +101,3 @@ def match_summary(pair: Pair, matches: Matches) -> dict[str, Any]:
         "relief_range": np.nanpercentile(solved.xyz[:, 2], [1, 99]),
         "sigma_r_median": float(np.nanmedian(solved.sigma[:, 2])),
     }
-
-
-def _photo(pair: Pair, number: int) -> ByteArray:
-    """Return one photo of the pair, grey."""
-    image = read_image(pair.photo_file(number), grey=True)
-    return np.asarray(to_eight_bit(image), dtype=np.uint8)

@@ -15,6 +15,7 @@ import numpy as np
 
 from bifocal.model.pair import Pair, Photo, apply_homography
 from bifocal.orientation.features import Features, drop_repeated, find_features, match_along_lines
+from bifocal.orientation.interior_orientation import Images
 from bifocal.orientation.patches import PatchResult, refine, same_scale
 from bifocal.orientation.targets import SurveyTargets, find_targets
 from bifocal.orientation.tie_points import robust_sigma
@@ -79,9 +80,7 @@ class MatchSettings:
     budget: float = 6e6
 
 
-def match_pair(
-    pair: Pair, images: tuple[ByteArray, ByteArray], settings: MatchSettings | None = None
-) -> Matches:
+def match_pair(pair: Pair, images: Images, settings: MatchSettings | None = None) -> Matches:
     """Return homologous points spread over the façade.
 
     Parameters
@@ -114,10 +113,7 @@ def match_pair(
 
 
 def _feature_matches(
-    pair: Pair,
-    images: tuple[ByteArray, ByteArray],
-    reliefs: tuple[float, float],
-    settings: MatchSettings,
+    pair: Pair, images: Images, reliefs: tuple[float, float], settings: MatchSettings
 ) -> Matches:
     """Return matched features, spread evenly."""
     limit = int(np.clip(6 * settings.count, 6000, 24000))
@@ -161,9 +157,7 @@ def _joined(parts: list[Matches]) -> Matches:
     return Matches(**joined)
 
 
-def _target_matches(
-    pair: Pair, images: tuple[ByteArray, ByteArray], reliefs: tuple[float, float]
-) -> Matches:
+def _target_matches(pair: Pair, images: Images, reliefs: tuple[float, float]) -> Matches:
     """Return survey targets seen in both photos; coded ones keep their code as name."""
     first, second = find_targets(images[0]), find_targets(images[1])
     rows1, rows2 = pair_targets(pair, first, second, reliefs)
@@ -325,12 +319,7 @@ def _raw_metres(photo: Photo, pixels: FloatArray) -> FloatArray:
 
 
 def refine_along_lines(
-    pair: Pair,
-    images: tuple[ByteArray, ByteArray],
-    pixels1: FloatArray,
-    pixels2: FloatArray,
-    *,
-    reach: float = 4.0,
+    pair: Pair, images: Images, pixels1: FloatArray, pixels2: FloatArray
 ) -> tuple[PatchResult, FloatArray]:
     """Return matches refined along their radial lines, and how far off the line they fit best.
 
@@ -340,8 +329,6 @@ def refine_along_lines(
     images : two ndarrays, uint8
     pixels1, pixels2 : ndarray, shape (n, 2)
         Approximate matches.
-    reach : float
-        Farther from the start than this a match is lost. [px]
 
     Returns
     -------
@@ -358,12 +345,10 @@ def refine_along_lines(
     along = np.where(np.isfinite(along), along, [1.0, 0.0])
     smooth1, smooth2 = same_scale(*images, local)
     basis = along[:, :, None]
-    patches = refine(smooth1, smooth2, pixels1, start, local, basis, reach=reach)
+    patches = refine(smooth1, smooth2, pixels1, start, local, basis)
     across = np.stack([-along[:, 1], along[:, 0]], axis=1)
     both = np.stack([along, across], axis=2)
-    free = refine(
-        smooth1, smooth2, pixels1, patches.pixels2, local, both, iterations=4, reach=reach
-    )
+    free = refine(smooth1, smooth2, pixels1, patches.pixels2, local, both, iterations=4)
     misfit = ((free.pixels2 - patches.pixels2) * across).sum(axis=1)
     return patches, np.where(free.converged, misfit, np.nan)
 

@@ -5,12 +5,13 @@ from __future__ import annotations
 import numpy as np
 
 from bifocal import rays
+from bifocal.orientation.interior_orientation import Cameras
 from bifocal.precision import base_factor
 from photocore.camera import Pinhole
 
 
 def orientation_in_words(
-    cameras: tuple[Pinhole, Pinhole], deviations: dict[str, float], *, sigma_px: float
+    cameras: Cameras, deviations: dict[str, float], *, sigma_px: float
 ) -> tuple[str, ...]:
     """Return the orientation in sentences.
 

@@ -5,7 +5,6 @@ Each stage takes the pair as oriented so far and returns it better, with what is
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -14,13 +13,13 @@ import numpy as np
 from bifocal.orientation import validation
 from bifocal.orientation.area_points import even_points
 from bifocal.orientation.control_points import SiteMeasures
-from bifocal.orientation.interior_orientation import Interior
+from bifocal.orientation.interior_orientation import Cameras, Images, Interior
 from bifocal.orientation.pair_adjustment import AdjustedPair, adjust, evaluated
 from bifocal.orientation.pair_observations import PairObservations, PairUnknowns
 from bifocal.orientation.reference_plane import Face, choose_wall, rivals_in_words
 from bifocal.orientation.tie_points import ROUGHNESS, classify, refine_ties, robust_sigma
 from photocore.arrays import ByteArray, FloatArray
-from photocore.camera import Pinhole, plane_transfer, triangulate
+from photocore.camera import plane_transfer, triangulate
 from photocore.errors import GeometryError
 from photocore.rotation import rotation_from_vector
 
@@ -32,12 +31,6 @@ UNEVEN = 0.004
 GROSS_LIMIT = 4.0
 #: Ties within about this share of d1 of the control points' plane are taken for the wall at first.
 PLANE_SHARE = 0.003
-
-Step = Callable[[str], None]
-
-
-def silent(what: str) -> None:
-    """Tell nobody what is being done."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -56,6 +49,9 @@ class PhotoInput:
     grey: ByteArray | None
     interior: Interior
     name: str
+
+
+Photos = tuple[PhotoInput, PhotoInput]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -112,10 +108,9 @@ class OrientedPair:
 
 def oriented_in_stages(
     observations: PairObservations,
-    cameras: tuple[Pinhole, Pinhole],
-    photos: tuple[PhotoInput, PhotoInput],
+    cameras: Cameras,
+    photos: Photos,
     site: SiteMeasures,
-    step: Step,
     *,
     with_control: bool,
 ) -> OrientedPair:
@@ -135,7 +130,6 @@ def oriented_in_stages(
     if len(observations.tie1) and images[0] is not None and images[1] is not None:
         pictures = images[0], images[1]
         pair = _with_even_points(_unbent(pair.settled()), pictures, site)
-        step("refining the common points")
         for _ in range(2):  # the second pass searches around better places
             moved, good = refine_ties(pair.observations, pair.adjusted, pictures)
             ties = pair.observations
@@ -154,8 +148,8 @@ def oriented_in_stages(
 
 
 def _control_first(
-    observations: PairObservations, cameras: tuple[Pinhole, Pinhole]
-) -> tuple[PairObservations, tuple[Pinhole, Pinhole], tuple[str, ...]]:
+    observations: PairObservations, cameras: Cameras
+) -> tuple[PairObservations, Cameras, tuple[str, ...]]:
     """Return the observations with the ties that fit the control's cameras, those, remarks."""
     none = np.zeros(len(observations.tie1), dtype=bool)
     start = PairUnknowns(cameras=cameras)
@@ -222,9 +216,7 @@ def _unbent(pair: OrientedPair) -> OrientedPair:
     )
 
 
-def _with_even_points(
-    pair: OrientedPair, images: tuple[ByteArray, ByteArray], site: SiteMeasures
-) -> OrientedPair:
+def _with_even_points(pair: OrientedPair, images: Images, site: SiteMeasures) -> OrientedPair:
     """Return the pair with points from the whole area, on the face that is the wall.
 
     Where control points define the plane, the frame stays theirs.
@@ -269,7 +261,7 @@ def _with_even_points(
     return replace(pair, observations=ties).readjusted(start).settled(ROUGHNESS[1:])
 
 
-def _onto_plane(cameras: tuple[Pinhole, Pinhole], plane: FloatArray) -> tuple[Pinhole, Pinhole]:
+def _onto_plane(cameras: Cameras, plane: FloatArray) -> Cameras:
     """Return cameras in the frame of the plane z = a + b X + c Y, X and Y all but kept."""
     normal = np.array([-plane[1], -plane[2], 1.0])
     normal /= np.linalg.norm(normal)
@@ -304,7 +296,7 @@ def _parallel_if_so(pair: OrientedPair) -> OrientedPair:
     return replace(pair, assumed=(*pair.assumed, note)).readjusted(**changes)
 
 
-def _care(cameras: tuple[Pinhole, Pinhole]) -> float:
+def _care(cameras: Cameras) -> float:
     """Return how carefully the cameras seem to have been set up, from photo against photo. [rad]
 
     Over the wall, photo 2 is a turned and keystoned photo 1. Set up independently to an accuracy

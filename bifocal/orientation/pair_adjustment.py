@@ -11,10 +11,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from bifocal.orientation.interior_orientation import Cameras
 from bifocal.orientation.pair_observations import (
     CAMERA,
     NAMES,
     WALL,
+    Equations,
     PairObservations,
     PairUnknowns,
     at,
@@ -23,7 +25,6 @@ from photocore import adjustment
 from photocore.arrays import BoolArray, FloatArray
 from photocore.camera import (
     PARAMETERS,
-    Pinhole,
     fundamental_with_jacobian,
     homogeneous,
     plane_transfer_with_jacobian,
@@ -91,7 +92,7 @@ def adjust(observations: PairObservations, start: PairUnknowns) -> AdjustedPair:
     """
     free = observations.estimated
 
-    def equations(state: PairUnknowns) -> tuple[FloatArray, FloatArray]:
+    def equations(state: PairUnknowns) -> Equations:
         residuals, jacobian = pair_equations(observations, state)
         return residuals, jacobian[:, free]
 
@@ -114,7 +115,7 @@ def adjust(observations: PairObservations, start: PairUnknowns) -> AdjustedPair:
     redundancy = max(fit.redundancy, 1)
     sigma0 = float(np.sqrt((fit.residuals @ fit.residuals) / redundancy))
     covariance = np.zeros((len(NAMES), len(NAMES)))
-    covariance[np.ix_(free, free)] = fit.cofactor
+    covariance[np.ix_(free, free)] = fit.linear.cofactor
     state = fit.state
     return AdjustedPair(
         cameras=state.cameras,
@@ -148,9 +149,7 @@ def evaluated(observations: PairObservations, adjusted: AdjustedPair) -> Adjuste
     )
 
 
-def pair_equations(
-    observations: PairObservations, state: PairUnknowns
-) -> tuple[FloatArray, FloatArray]:
+def pair_equations(observations: PairObservations, state: PairUnknowns) -> Equations:
     """Return everything observed against computed in standard deviations, and derivatives."""
     used, wall = observations.tie_used, observations.tie_used & observations.wall
     parts = [_priors(observations, state)]
@@ -172,7 +171,7 @@ def pair_equations(
     return residuals, jacobian
 
 
-def _priors(observations: PairObservations, state: PairUnknowns) -> tuple[FloatArray, FloatArray]:
+def _priors(observations: PairObservations, state: PairUnknowns) -> Equations:
     """Return the lens's, the tape's and the plane's observations: all but the tilts are linear."""
     values = state.values()
     linear: list[tuple[dict[int, float], float, float]] = []
@@ -236,9 +235,7 @@ def _straight(
     return (straight[0], straight[1]), (by_k[0], by_k[1])
 
 
-def _epipolar(
-    observations: PairObservations, state: PairUnknowns, which: BoolArray
-) -> tuple[FloatArray, FloatArray]:
+def _epipolar(observations: PairObservations, state: PairUnknowns, which: BoolArray) -> Equations:
     """Return the signed (Sampson) distance of ties from their epipolar lines, by `NAMES`. [px]
 
     Notes
@@ -265,9 +262,7 @@ def _epipolar(
     return misfit, by
 
 
-def _transfer(
-    observations: PairObservations, state: PairUnknowns, which: BoolArray
-) -> tuple[FloatArray, FloatArray]:
+def _transfer(observations: PairObservations, state: PairUnknowns, which: BoolArray) -> Equations:
     """Return how far ties lie from the wall plane's transfer along the line, by `NAMES`. [px]"""
     (x1, x2), (x1_by_k, x2_by_k) = _straight(observations, state, which)
     matrix, by_cameras = fundamental_with_jacobian(*state.cameras)
@@ -362,7 +357,7 @@ def _control(
 
 
 def _known_points(
-    observations: PairObservations, cameras: tuple[Pinhole, Pinhole], picks: FloatArray
+    observations: PairObservations, cameras: Cameras, picks: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """Return control points, what was not measured filled in roughly, and their sigmas."""
     control = observations.control
@@ -396,7 +391,7 @@ def _control_residuals(observations: PairObservations, state: PairUnknowns) -> F
 
 def _lengths(
     observations: PairObservations, state: PairUnknowns, control: _AdjustedControl
-) -> tuple[FloatArray, FloatArray]:
+) -> Equations:
     """Return the taped distances' residuals; the picks' own noise is part of their weight."""
     used, far = observations.pick_used, state.cameras[0]
     lengths = [(a, b, c) for a, b, c in observations.control.lengths if used[a] and used[b]]

@@ -7,15 +7,17 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from bifocal.orientation.control_points import Control
-from bifocal.orientation.interior_orientation import Interior
+from bifocal.orientation.interior_orientation import Cameras, Interiors
 from photocore.arrays import BoolArray, FloatArray
-from photocore.camera import PARAMETERS, Pinhole
+from photocore.camera import PARAMETERS
 
 #: Parameters of one camera of the pair, and of the ties' wall.
 CAMERA = (*PARAMETERS, "radial")
 WALL = ("wall height", "wall slope X", "wall slope Y")
 #: All parameters, in the order of the covariance.
 NAMES = (*(f"{name} {number}" for number in (1, 2) for name in CAMERA), *WALL)
+#: Standardised misfits, shape (m,), and their rates by the unknowns, shape (m, len(NAMES)).
+Equations = tuple[FloatArray, FloatArray]
 
 
 def at(name: str, camera: int) -> int:
@@ -64,7 +66,7 @@ class PairObservations:
         Whether origin and turn of the plane frame are free and must be held.
     """
 
-    interiors: tuple[Interior, Interior]
+    interiors: Interiors
     control: Control = field(default_factory=Control)
     pick_used: BoolArray = field(default_factory=lambda: np.zeros(0, dtype=bool))
     sigma_pick: float = 0.5
@@ -115,7 +117,7 @@ class PairUnknowns:
         The ties' wall, z = a + b X + c Y. [m, -, -]
     """
 
-    cameras: tuple[Pinhole, Pinhole]
+    cameras: Cameras
     radial: tuple[float, float] = (0.0, 0.0)
     plane: FloatArray = field(default_factory=lambda: np.zeros(3))
 

@@ -6,12 +6,13 @@ from typing import NamedTuple
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
-from photocore.arrays import BoolArray, ByteArray, FloatArray
+from photocore.arrays import BoolArray, ByteArray, Float32Array, FloatArray
 
 #: Half the window, in samples: 15 x 15 samples of the coarser photo.
 HALF = 7
+#: Farther from the start than this a match is lost. [px]
+REACH = 4.0
 
 
 class PatchResult(NamedTuple):
@@ -36,7 +37,7 @@ class PatchResult(NamedTuple):
 
 def same_scale(
     image1: ByteArray, image2: ByteArray, local: FloatArray
-) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+) -> tuple[Float32Array, Float32Array]:
     """Return both photos as floats, the finer one smoothed to the coarser one's sharpness.
 
     Parameters
@@ -63,16 +64,14 @@ def same_scale(
 
 
 def refine(
-    image1: NDArray[np.float32],
-    image2: NDArray[np.float32],
+    image1: Float32Array,
+    image2: Float32Array,
     pixels1: FloatArray,
     pixels2: FloatArray,
     local: FloatArray,
     directions: FloatArray,
     *,
-    half: int = HALF,
     iterations: int = 8,
-    reach: float = 3.0,
 ) -> PatchResult:
     """Move each match in photo 2 along given directions until the patches agree.
 
@@ -86,12 +85,8 @@ def refine(
         Derivative of photo 2 by photo 1 (the zoom k(r) under which the patch is seen).
     directions : ndarray, shape (n, 2, k)
         One (radial matching) or two unit vectors in photo 2.
-    half : int
-        Half the window in samples.
     iterations : int
         At most so many Gauss-Newton steps.
-    reach : float
-        Farther from the start than this a match is lost. [px]
 
     Notes
     -----
@@ -104,27 +99,26 @@ def refine(
     out = []
     for start in range(0, len(pixels1), 4000):
         points = [each[start : start + 4000] for each in (pixels1, pixels2, local, directions)]
-        out.append(_refine_part(image1, image2, *points, settings=(half, iterations, reach)))
+        out.append(_refine_part(image1, image2, *points, iterations=iterations))
     return PatchResult(*(np.concatenate(parts) for parts in zip(*out, strict=True)))
 
 
 def _refine_part(
-    image1: NDArray[np.float32],
-    image2: NDArray[np.float32],
+    image1: Float32Array,
+    image2: Float32Array,
     pixels1: FloatArray,
     pixels2: FloatArray,
     local: FloatArray,
     directions: FloatArray,
     *,
-    settings: tuple[int, int, float],
+    iterations: int,
 ) -> PatchResult:
     """Refine at most 4000 matches (the coordinate maps stay small)."""
-    half, iterations, reach = settings
     known: BoolArray = np.isfinite(local.sum(axis=(1, 2)) + pixels2.sum(axis=1))
     local = np.where(known[:, None, None], local, np.eye(2))
     scale = np.sqrt(np.abs(np.linalg.det(local)))
     step = np.maximum(1.0, 1.0 / np.clip(scale, 0.1, 10.0))
-    axis = np.arange(-half - 1, half + 2, dtype=np.float64)
+    axis = np.arange(-HALF - 1, HALF + 2, dtype=np.float64)
     wide = np.stack(np.meshgrid(axis, axis), axis=-1)
     # Sampled one ring wider, for the gradient.
     first = _sample(image1, pixels1[:, None, None] + wide[None] * step[:, None, None, None])
@@ -137,7 +131,7 @@ def _refine_part(
     gradient /= step[:, None, None]
     inverse = np.linalg.inv(local)
     columns = gradient @ (inverse @ directions)
-    weight = np.exp(-(grid**2).sum(1) / (2 * (0.75 * half) ** 2))
+    weight = np.exp(-(grid**2).sum(1) / (2 * (0.75 * HALF) ** 2))
     weight /= weight.sum()
     design = np.concatenate([np.ones((count, len(grid), 1)), template[:, :, None], columns], axis=2)
     normal = np.einsum("nij,i,nik->njk", design, weight, design)
@@ -164,7 +158,7 @@ def _refine_part(
         position[index] -= np.einsum("nij,nj->ni", directions[index], shift)
         size = np.abs(shift).max(axis=1)
         converged[index[size < 0.02]] = True
-        lost = np.linalg.norm(position[index] - pixels2[index], axis=1) > reach
+        lost = np.linalg.norm(position[index] - pixels2[index], axis=1) > REACH
         lost |= terms[:, 1] <= 0
         active[index[(size < 0.003) | lost]] = False
         converged[index[lost]] = False
@@ -176,18 +170,11 @@ def _refine_part(
     )
 
 
-def _sample(image: NDArray[np.float32], where: FloatArray) -> FloatArray:
+def _sample(image: Float32Array, where: FloatArray) -> FloatArray:
     """Return the image at pixel positions (..., 2), cubic; NaN outside."""
     shape = where.shape[:-1]
     flat = where.reshape(shape[0], -1, 2).astype(np.float32)
-    values = cv2.remap(
-        image,
-        np.ascontiguousarray(flat[..., 0]),
-        np.ascontiguousarray(flat[..., 1]),
-        cv2.INTER_CUBIC,
-        borderMode=cv2.BORDER_CONSTANT,
-        borderValue=float("nan"),
-    )
+    values = cv2.remap(image, flat, None, cv2.INTER_CUBIC, borderValue=float("nan"))
     return np.asarray(values, dtype=np.float64).reshape(shape)
 
 

@@ -12,9 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from bifocal.orientation.control_points import SiteMeasures
-from bifocal.orientation.interior_orientation import Interior
+from bifocal.orientation.interior_orientation import Cameras, Interior, Interiors
 from photocore.arrays import FloatArray, IntArray
-from photocore.camera import Pinhole
 from photocore.errors import GeometryError
 
 #: Half the thickness of a face, as a share of the far distance.
@@ -96,11 +95,7 @@ def _midst(pixels: FloatArray, members: IntArray) -> tuple[float, float]:
 
 
 def choose_wall(
-    xyz: FloatArray,
-    pixels: FloatArray,
-    cameras: tuple[Pinhole, Pinhole],
-    interiors: tuple[Interior, Interior],
-    site: SiteMeasures,
+    xyz: FloatArray, pixels: FloatArray, cameras: Cameras, interiors: Interiors, site: SiteMeasures
 ) -> tuple[FloatArray, list[Face]]:
     """Return the wall's plane z = a + b X + c Y and all faces parallel to it, the wall first.
 
@@ -139,7 +134,7 @@ def choose_wall(
     return plane, sorted(planes, key=lambda face: (abs(face.offset) > band, -face.share))
 
 
-def largest_plane(xyz: FloatArray, *, band: float, seed: int = 7) -> FloatArray:
+def largest_plane(xyz: FloatArray, *, band: float) -> FloatArray:
     """Return the plane z = a + b X + c Y, nearly parallel to Z = 0, that holds most points.
 
     Parameters
@@ -147,10 +142,8 @@ def largest_plane(xyz: FloatArray, *, band: float, seed: int = 7) -> FloatArray:
     xyz : ndarray, shape (n, 3)
     band : float
         Points this near count fully less their distance (a narrow face beats a vague heap).
-    seed : int
-        Of the random triples.
     """
-    generator = np.random.default_rng(seed)
+    generator = np.random.default_rng(7)
     sample = xyz[generator.choice(len(xyz), min(len(xyz), 6000), replace=False)]
     triples = generator.integers(0, len(sample), (3000, 3))
     corners = sample[triples]
@@ -180,7 +173,7 @@ def refitted(xyz: FloatArray, plane: FloatArray, *, band: float) -> FloatArray:
     return np.asarray(plane)
 
 
-def is_one_scale(interiors: tuple[Interior, Interior], site: SiteMeasures) -> bool:
+def is_one_scale(interiors: Interiors, site: SiteMeasures) -> bool:
     """Return whether focal lengths and distances say that both photos were meant for one scale."""
     d1, d2 = site.distances
     if not (site.parallel and d1 and d2) or any(interior.is_assumed for interior in interiors):
@@ -189,7 +182,7 @@ def is_one_scale(interiors: tuple[Interior, Interior], site: SiteMeasures) -> bo
     return abs(float(np.log(ratio))) < ONE_SCALE
 
 
-def scale_difference(cameras: tuple[Pinhole, Pinhole], plane: FloatArray, offset: float) -> float:
+def scale_difference(cameras: Cameras, plane: FloatArray, offset: float) -> float:
     """Return how far the near photo's scale is from the far one's on a plane moved by an offset."""
     far, near = (camera.matrix[0, 0] / (camera.centre[2] - plane[0] - offset) for camera in cameras)
     return float(np.log(near / far))

@@ -13,7 +13,7 @@ import numpy as np
 
 from bifocal.model.pair import apply_homography
 from bifocal.orientation.features import Features, drop_repeated, match_features
-from bifocal.orientation.interior_orientation import Interior
+from bifocal.orientation.interior_orientation import Cameras, Interiors
 from photocore.arrays import BoolArray, FloatArray
 from photocore.camera import Pinhole, fundamental, homogeneous, triangulate
 from photocore.errors import GeometryError
@@ -52,10 +52,7 @@ class Ties:
 
 
 def find_ties(
-    first: Features,
-    second: Features,
-    interiors: tuple[Interior, Interior],
-    names: tuple[str, str],
+    first: Features, second: Features, interiors: Interiors, names: tuple[str, str]
 ) -> Ties:
     """Match features and keep those that obey one epipolar geometry.
 
@@ -128,7 +125,7 @@ def plane_scale(ties: Ties, image_size: tuple[int, int]) -> float:
     return float(np.sqrt(area) / (2 * step))
 
 
-def first_cameras(ties: Ties, interiors: tuple[Interior, Interior]) -> tuple[Pinhole, Pinhole]:
+def first_cameras(ties: Ties, interiors: Interiors) -> Cameras:
     """Return approximate cameras in the frame of the dominant plane, far distance 1.
 
     Notes
@@ -156,7 +153,7 @@ def first_cameras(ties: Ties, interiors: tuple[Interior, Interior]) -> tuple[Pin
 
 def _in_plane_frame(
     matrices: list[FloatArray], turn: FloatArray, shift: FloatArray, normal: FloatArray
-) -> tuple[Pinhole, Pinhole] | None:
+) -> Cameras | None:
     """Return both cameras in a frame on the plane, Y as upright as photo 1 is."""
     if normal[2] <= 0.05:  # the plane must be in front of camera 1
         return None
@@ -177,7 +174,7 @@ def _in_plane_frame(
     )
 
 
-def _cost(ties: Ties, cameras: tuple[Pinhole, Pinhole]) -> float:
+def _cost(ties: Ties, cameras: Cameras) -> float:
     """Return a robust cost: epipolar misfit, and points behind a camera."""
     line = homogeneous(ties.pixels1) @ fundamental(*cameras).T
     misfit = np.abs((homogeneous(ties.pixels2) * line).sum(1)) / np.maximum(
@@ -190,7 +187,7 @@ def _cost(ties: Ties, cameras: tuple[Pinhole, Pinhole]) -> float:
     return float(np.minimum(np.nan_to_num(misfit, nan=wide), wide).sum() + wide * behind.sum())
 
 
-def rotation_only(ties: Ties, interiors: tuple[Interior, Interior]) -> bool:
+def rotation_only(ties: Ties, interiors: Interiors) -> bool:
     """Return whether the photos differ only by turning and zooming the camera (no movement).
 
     The homography between calibrated photos taken from one place is a rotation, whatever they show.

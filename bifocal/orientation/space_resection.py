@@ -14,9 +14,7 @@ from photocore.errors import GeometryError
 GROSS_SHARE = 0.006
 
 
-def resect(
-    xyz: FloatArray, pixels: FloatArray, interior: Interior, *, seed: int = 7
-) -> tuple[Pinhole, BoolArray]:
+def resect(xyz: FloatArray, pixels: FloatArray, interior: Interior) -> tuple[Pinhole, BoolArray]:
     """Return an approximate camera and which points agree with it.
 
     Parameters
@@ -27,8 +25,6 @@ def resect(
         Their ideal pixels.
     interior : Interior
         What is known of the lens. An unknown principal distance is searched over a wide range.
-    seed : int
-        Of the random subsets.
 
     Returns
     -------
@@ -46,7 +42,7 @@ def resect(
             "and nine are advised."
         )
     _refuse_line(xyz)
-    generator = np.random.default_rng(seed)
+    generator = np.random.default_rng(7)
     width = max(interior.image_size)
     spread = min(3.0 * interior.sigma_focal, 1.3)
     count = 1 + 2 * int(np.ceil(spread / 0.08)) if spread > 0.02 else 1

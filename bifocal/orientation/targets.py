@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from photocore.arrays import BoolArray, ByteArray, FloatArray
+from photocore.arrays import BoolArray, ByteArray, Float32Array, FloatArray
 
 #: Diameters of discs looked for. [px]
 SMALLEST, LARGEST = 5.0, 120.0
@@ -162,7 +162,7 @@ def _chequers(image: ByteArray) -> tuple[FloatArray, FloatArray]:
 
 
 def _crossing(
-    image: ByteArray, smooth: NDArray[np.float32], column: int, row: int
+    image: ByteArray, smooth: Float32Array, column: int, row: int
 ) -> tuple[float, float, float] | None:
     """Return the crossing near a pixel and the size used, None if it is no chequer."""
     reach = 6

@@ -6,12 +6,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from bifocal.orientation.interior_orientation import Interior
+from bifocal.orientation.interior_orientation import Cameras, Images, Interiors
 from bifocal.orientation.pair_adjustment import AdjustedPair
 from bifocal.orientation.pair_observations import PairObservations
 from bifocal.orientation.patches import refine, same_scale
-from photocore.arrays import BoolArray, ByteArray, FloatArray
-from photocore.camera import Pinhole, project_with_jacobian, triangulate
+from photocore.arrays import BoolArray, FloatArray
+from photocore.camera import project_with_jacobian, triangulate
 
 #: Ties of a wall that count as independent of each other.
 INDEPENDENT = 50
@@ -26,7 +26,7 @@ def robust_sigma(values: FloatArray) -> float:
     return float(1.4826 * np.median(finite)) if len(finite) else np.inf
 
 
-def relief_rate(cameras: tuple[Pinhole, Pinhole], xyz: FloatArray) -> FloatArray:
+def relief_rate(cameras: Cameras, xyz: FloatArray) -> FloatArray:
     """Return how far a point moves in photo 2 per metre of relief along its ray 1, (n, 2) [px/m]"""
     ray = xyz - cameras[0].centre
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -35,10 +35,7 @@ def relief_rate(cameras: tuple[Pinhole, Pinhole], xyz: FloatArray) -> FloatArray
 
 
 def local_maps(
-    cameras: tuple[Pinhole, Pinhole],
-    interiors: tuple[Interior, Interior],
-    xyz: FloatArray,
-    ideal: tuple[FloatArray, FloatArray],
+    cameras: Cameras, interiors: Interiors, xyz: FloatArray, ideal: tuple[FloatArray, FloatArray]
 ) -> FloatArray:
     """Return the derivative of photo 2 by photo 1 for surfaces parallel to the wall, (n, 2, 2)."""
     first, second = (
@@ -51,7 +48,7 @@ def local_maps(
 
 
 def refine_ties(
-    observations: PairObservations, adjusted: AdjustedPair, images: tuple[ByteArray, ByteArray]
+    observations: PairObservations, adjusted: AdjustedPair, images: Images
 ) -> tuple[FloatArray, BoolArray]:
     """Return the ties' positions in photo 2 to a tenth of a pixel, and which could be refined."""
     interiors, ties = observations.interiors, (observations.tie1, observations.tie2)
@@ -61,7 +58,7 @@ def refine_ties(
     usable = observations.tie_used & np.isfinite(local).all(axis=(1, 2))
     smooth1, smooth2 = same_scale(*images, local[usable])
     both = np.broadcast_to(np.eye(2), (len(raw1), 2, 2))
-    patches = refine(smooth1, smooth2, raw1, raw2, local, both, reach=4.0)
+    patches = refine(smooth1, smooth2, raw1, raw2, local, both)
     good = patches.converged & (patches.zncc > 0.85) & (patches.sigma < 0.3)
     return interiors[1].ideal(patches.pixels2), good
 

@@ -8,11 +8,10 @@ import numpy as np
 from bifocal.model.pair import apply_homography
 from bifocal.orientation.control_points import SiteMeasures
 from bifocal.orientation.features import sharpness
-from bifocal.orientation.interior_orientation import Interior
+from bifocal.orientation.interior_orientation import Cameras, Images, Interior, Interiors
 from bifocal.orientation.pair_adjustment import AdjustedPair
 from bifocal.orientation.relative_orientation import Ties, rotation_only
 from photocore.arrays import ByteArray
-from photocore.camera import Pinhole
 from photocore.errors import GeometryError, InputError
 
 #: Below this a photo is blurred (sharp photos: 0.3 to 0.6; blurred by 3 px: below 0.17).
@@ -39,7 +38,7 @@ def check_sharp(name: str, image: ByteArray) -> None:
         )
 
 
-def check_different(name1: str, name2: str, images: tuple[ByteArray, ByteArray]) -> None:
+def check_different(name1: str, name2: str, images: Images) -> None:
     """Refuse one photo given twice, also saved again or in another size."""
     small = [
         cv2.resize(image, (96, 64), interpolation=cv2.INTER_AREA).astype(np.float64)
@@ -55,7 +54,7 @@ def check_different(name1: str, name2: str, images: tuple[ByteArray, ByteArray])
 
 
 def check_parallax(
-    ties: Ties, interiors: tuple[Interior, Interior], names: tuple[str, str], *, flat_is_fine: bool
+    ties: Ties, interiors: Interiors, names: tuple[str, str], *, flat_is_fine: bool
 ) -> None:
     """Refuse photos in which nothing moves against the wall.
 
@@ -91,7 +90,7 @@ def check_parallax(
         )
 
 
-def check_units(cameras: tuple[Pinhole, Pinhole], site: SiteMeasures) -> None:
+def check_units(cameras: Cameras, site: SiteMeasures) -> None:
     """Refuse control points that are not in metres."""
     d1, d2 = (float(camera.centre[2]) for camera in cameras)
     for name, distance, measured in (("1", d1, site.distance1), ("2", d2, site.distance2)):

@@ -6,19 +6,20 @@ import math
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple, cast
 
+import cv2
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from bifocal.model.grid import Bounds, Grid
 from bifocal.model.image import ImageArray
 from bifocal.model.pair import Pair
 from bifocal.model.relief_map import ReliefMap
-from bifocal.model.surface import FlatSurface, MapSurface, ReliefArray, Surface
+from bifocal.model.surface import FlatSurface, MapSurface, Surface
 from bifocal.orthophotos.ortho_image import OrthoOptions, Orthophoto, Source
 from bifocal.orthophotos.pull_push import fill_holes
 from bifocal.orthophotos.rectify import SourcePhoto, footprint
 from bifocal.orthophotos.visibility import hidden_from
-from photocore.arrays import BoolArray, ByteArray
+from photocore.arrays import BoolArray, ByteArray, Float32Array
 from photocore.errors import InputError
 
 #: Side of the windows an orthophoto is made in; larger ones repeat less of their surroundings,
@@ -226,7 +227,7 @@ def render_window(
 
 
 def _look(
-    view: SourcePhoto, surface: Surface, grid: Grid, relief: ReliefArray, options: OrthoOptions
+    view: SourcePhoto, surface: Surface, grid: Grid, relief: Float32Array, options: OrthoOptions
 ) -> _Look:
     column, row = view.pixel_map(grid, relief)
     inside = view.inside(column, row)
@@ -262,10 +263,8 @@ def _choose(
 
 def _share_of_first(
     views: Sequence[SourcePhoto], usable: Sequence[BoolArray], grid: Grid, feather: float
-) -> NDArray[np.float32]:
+) -> Float32Array:
     """Return the weight of the first view, 0..1."""
-    import cv2
-
     first, second = usable
     middle = np.array([[grid.x0 + grid.gsd * grid.width / 2, grid.y0 - grid.gsd * grid.height / 2]])
     sizes = []
@@ -284,17 +283,13 @@ def _share_of_first(
 
 def _masked(image: ImageArray, keep: BoolArray) -> ImageArray:
     """Return the image with 0 where it is not to be kept."""
-    import cv2
-
     return image if keep.all() else cv2.copyTo(image, keep.astype(np.uint8))
 
 
 def _fill(
-    image: ImageArray, source: ByteArray, area: BoolArray, relief: ReliefArray
+    image: ImageArray, source: ByteArray, area: BoolArray, relief: Float32Array
 ) -> tuple[ImageArray, ByteArray]:
     """Close holes within an area, with the colours of the surface behind, not of what hides it."""
-    import cv2
-
     holes = (source == Source.NONE) & area
     if not holes.any():
         return image, source

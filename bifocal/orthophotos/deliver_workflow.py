@@ -10,7 +10,6 @@ from datetime import date
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bifocal.files.geotiff import RasterReader, create_raster, dpi_at_scale, gsd_at_scale
 from bifocal.files.point_tables import read_survey_points
@@ -33,7 +32,7 @@ from bifocal.orthophotos.pdf_sheet import write_sheet
 from bifocal.orthophotos.sections import contours, section
 from bifocal.orthophotos.shading import shaded, tints
 from bifocal.orthophotos.tiles import RasterResult
-from photocore.arrays import positive
+from photocore.arrays import Float32Array, positive
 from photocore.cli import Progress, no_progress
 from photocore.errors import InputError
 from photocore.output import atomic_folder
@@ -214,7 +213,7 @@ def _measured(reader: RasterReader | None) -> Surface | None:
     if reader is None or reader.bands < 3 or not reader.names[2].startswith("quality"):
         return None
 
-    def fetch(*window: int) -> NDArray[np.float32]:
+    def fetch(*window: int) -> Float32Array:
         quality = reader.read(*window, bands=[3])[:, :, 0]
         return np.where(quality == Quality.MEASURED, reader.read_floats(*window), np.float32("nan"))
 

@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 from typing import Any, Protocol
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from bifocal.model.grid import SAME_PIXEL, Bounds, Grid, bounds_of
 from bifocal.orthophotos.pull_push import fill_holes
-from photocore.arrays import BoolArray, FloatArray, IntArray
+from photocore.arrays import BoolArray, Float32Array, FloatArray, IntArray
 from photocore.errors import InputError
 
 #: Side of the raster on which seams and exposure are worked out. [px]
@@ -29,6 +30,10 @@ _EDGE_SLOPE = 0.5
 _LEAST_OVERLAP = 50
 
 
+#: A layer's values, shape (h, w, bands), and which of them are valid, shape (h, w).
+Seen = tuple[NDArray[Any], BoolArray]
+
+
 class Layer(Protocol):
     """One raster of a mosaic."""
 
@@ -36,12 +41,10 @@ class Layer(Protocol):
     def grid(self) -> Grid:
         """Where its pixels are."""
 
-    def read(
-        self, column: int, row: int, width: int, height: int
-    ) -> tuple[NDArray[Any], BoolArray]:
+    def read(self, column: int, row: int, width: int, height: int) -> Seen:
         """Return a window, shape (h, w, bands), and its validity; empty beyond the edges."""
 
-    def reduced(self, width: int, height: int) -> tuple[NDArray[Any], BoolArray]:
+    def reduced(self, width: int, height: int) -> Seen:
         """Return the whole raster shrunk to a size."""
 
 
@@ -64,7 +67,7 @@ class SeamPlan:
 
     coarse: Grid
     labels: IntArray
-    rank: NDArray[np.float32]
+    rank: Float32Array
     gains: FloatArray
     differences: dict[tuple[int, int], float]
 
@@ -124,8 +127,7 @@ def plan_mosaic(
     *,
     priority: bool = False,
     gain: bool = True,
-    relief: NDArray[np.float32] | None = None,
-    coarse: Grid | None = None,
+    relief: Callable[[Grid], Float32Array] | None = None,
 ) -> SeamPlan:
     """Work out seams and gains.
 
@@ -135,10 +137,8 @@ def plan_mosaic(
         Earlier layers cover later ones; otherwise seams are sought.
     gain : bool
         Make the colours equal.
-    relief : ndarray, shape of coarse, optional
-        Relief of the wall: seams keep away from its edges. [m]
-    coarse : Grid, optional
-        As `coarse_grid` returns it.
+    relief : callable, optional
+        Gives the relief of the wall on a grid: seams keep away from its edges. [m]
 
     Notes
     -----
@@ -146,7 +146,8 @@ def plan_mosaic(
     Soille, "Morphological image compositing", 2006) that runs where the layers agree, away from
     edges of the relief and from holes, which lie right behind such edges.
     """
-    coarse = coarse or coarse_grid(grid)
+    factor = max(1.0, max(grid.shape) / COARSE)
+    coarse = Grid.from_bounds(grid.bounds, gsd=grid.gsd * factor)
     images, valid = zip(*(_onto(layer, coarse) for layer in layers), strict=True)
     depth = np.stack([_depth(seen) for seen in valid])
     gains, differences = _gains(images, valid, wanted=gain)
@@ -156,14 +157,9 @@ def plan_mosaic(
         rank = np.broadcast_to(order[:, None, None], (len(layers), *coarse.shape))
         return SeamPlan(coarse, labels, rank, gains, differences)
     even = [image * factor for image, factor in zip(images, gains, strict=True)]
-    labels = _seams(even, valid, depth, relief, coarse.gsd)
+    edges = None if relief is None else relief(coarse)
+    labels = _seams(even, valid, depth, edges, coarse.gsd)
     return SeamPlan(coarse, labels, depth, gains, differences)
-
-
-def coarse_grid(grid: Grid) -> Grid:
-    """Return the grid on which a mosaic is planned."""
-    factor = max(1.0, max(grid.shape) / COARSE)
-    return Grid.from_bounds(grid.bounds, gsd=grid.gsd * factor)
 
 
 def mosaic_window(
@@ -199,10 +195,8 @@ def mosaic_window(
     return np.clip(np.rint(mixed[core]), 0, limit).astype(dtype), owner[core]
 
 
-def window_of(layer: Layer, grid: Grid) -> tuple[NDArray[Any], BoolArray]:
+def window_of(layer: Layer, grid: Grid) -> Seen:
     """Return a layer on a window's pixels; resampled (cubic) only if its own lie elsewhere."""
-    import cv2
-
     offset = grid.whole_offset_in(layer.grid)
     if offset is not None:
         return layer.read(*offset, grid.width, grid.height)
@@ -217,10 +211,8 @@ def window_of(layer: Layer, grid: Grid) -> tuple[NDArray[Any], BoolArray]:
     return moved.reshape(*grid.shape, -1), inside > 0
 
 
-def _onto(layer: Layer, coarse: Grid) -> tuple[NDArray[np.float32], BoolArray]:
+def _onto(layer: Layer, coarse: Grid) -> tuple[Float32Array, BoolArray]:
     """Return a layer on the coarse grid, colours 0..1 (values stay as they are)."""
-    import cv2
-
     own = layer.grid
     width = max(1, round(own.width * own.gsd / coarse.gsd))
     height = max(1, round(own.height * own.gsd / coarse.gsd))
@@ -236,10 +228,8 @@ def _onto(layer: Layer, coarse: Grid) -> tuple[NDArray[np.float32], BoolArray]:
     return moved.reshape(*coarse.shape, -1), inside > 0
 
 
-def _depth(seen: BoolArray) -> NDArray[np.float32]:
+def _depth(seen: BoolArray) -> Float32Array:
     """Return how far a place is from the rim of a layer, holes within it not counted. [px]"""
-    import cv2
-
     # A rim of zeros: the edge of the raster is an edge of the layer as well.
     padded = np.pad(seen.astype(np.uint8), 1)
     closed = cv2.morphologyEx(padded, cv2.MORPH_CLOSE, np.ones((31, 31), np.uint8))
@@ -249,7 +239,7 @@ def _depth(seen: BoolArray) -> NDArray[np.float32]:
 
 
 def _gains(
-    images: Sequence[NDArray[np.float32]], valid: Sequence[BoolArray], *, wanted: bool
+    images: Sequence[Float32Array], valid: Sequence[BoolArray], *, wanted: bool
 ) -> tuple[FloatArray, dict[tuple[int, int], float]]:
     """Return the factors that make common parts equal, by least squares over all overlaps."""
     count, bands = len(images), images[0].shape[2]
@@ -276,14 +266,13 @@ def _gains(
 
 
 def _seams(
-    images: Sequence[NDArray[np.float32]],
+    images: Sequence[Float32Array],
     valid: Sequence[BoolArray],
-    depth: NDArray[np.float32],
-    relief: NDArray[np.float32] | None,
+    depth: Float32Array,
+    relief: Float32Array | None,
     gsd: float,
 ) -> IntArray:
     """Return the layer of every place, with seams where they are seen least."""
-    import cv2
     from skimage.segmentation import watershed
 
     any_valid = np.logical_or.reduce(list(valid))
@@ -341,13 +330,11 @@ def _owners(plan: SeamPlan, grid: Grid, seen: dict[int, BoolArray]) -> IntArray:
 
 
 def _blended(
-    images: dict[int, NDArray[np.float32]], valid: dict[int, BoolArray], owner: IntArray
-) -> NDArray[np.float32]:
+    images: dict[int, Float32Array], valid: dict[int, BoolArray], owner: IntArray
+) -> Float32Array:
     """Return the images mixed band by band (Burt and Adelson 1983)."""
-    import cv2
-
-    total: list[NDArray[np.float32]] = []
-    weights: list[NDArray[np.float32]] = []
+    total: list[Float32Array] = []
+    weights: list[Float32Array] = []
     # Beyond its rim a layer goes on as the plain mosaic: layers that agree blend into themselves.
     plain = np.zeros_like(next(iter(images.values())))
     for k, raw in images.items():

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -13,14 +14,9 @@ from bifocal.model.grid import Bounds, Gridded, cut
 from bifocal.model.image import ImageArray
 from bifocal.model.relief_map import ReliefMap
 from bifocal.orthophotos.compose import as_surface
-from bifocal.orthophotos.mosaic_blending import (
-    coarse_grid,
-    common_grid,
-    mosaic_window,
-    plan_mosaic,
-)
+from bifocal.orthophotos.mosaic_blending import Seen, common_grid, mosaic_window, plan_mosaic
 from bifocal.orthophotos.ortho_image import Orthophoto
-from photocore.arrays import BoolArray, ByteArray, FloatArray
+from photocore.arrays import ByteArray, FloatArray
 from photocore.errors import InputError
 
 
@@ -81,16 +77,13 @@ class _ArrayLayer:
             values, self.seen = raster.image, raster.valid
         self.image: NDArray[Any] = np.atleast_3d(values)
 
-    def read(
-        self, column: int, row: int, width: int, height: int
-    ) -> tuple[NDArray[Any], BoolArray]:
+    def read(self, column: int, row: int, width: int, height: int) -> Seen:
         """Return a window and its validity; empty beyond the edges."""
         window = (column, row, width, height)
         return cut(self.image, window), cut(self.seen, window)
 
-    def reduced(self, width: int, height: int) -> tuple[NDArray[Any], BoolArray]:
+    def reduced(self, width: int, height: int) -> Seen:
         """Return the whole raster shrunk: the mean of what is seen."""
-        import cv2
 
         def shrunk(values: NDArray[Any]) -> FloatArray:
             return cv2.resize(values, (width, height), interpolation=cv2.INTER_AREA)
@@ -153,11 +146,9 @@ def mosaic(
         raise InputError("a mosaic needs two rasters or more, all of one kind.")
     values = layers[0].image.dtype.kind == "f"
     grid = common_grid(layers, gsd=gsd, bounds=bounds)
-    coarse = coarse_grid(grid)
-    edges = None if relief is None else as_surface(relief).window(coarse)
     seams = plan_mosaic(
-        layers, grid, priority=options.priority, gain=options.gain and not values, relief=edges,
-        coarse=coarse,
+        layers, grid, priority=options.priority, gain=options.gain and not values,
+        relief=None if relief is None else as_surface(relief).window,
     )  # fmt: skip
     image, owner = mosaic_window(layers, seams, grid, blend=options.blend)
     if (owner < 0).all():

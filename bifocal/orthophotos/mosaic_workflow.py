@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -16,13 +17,13 @@ from bifocal.model.surface import MapSurface
 from bifocal.orthophotos.compose import TILE
 from bifocal.orthophotos.mosaic_blending import (
     SeamPlan,
-    coarse_grid,
+    Seen,
     common_grid,
     mosaic_window,
     plan_mosaic,
 )
 from bifocal.orthophotos.tiles import RasterResult, write_tiles
-from photocore.arrays import BoolArray, IntArray
+from photocore.arrays import Float32Array, IntArray
 from photocore.cli import Progress, no_progress
 from photocore.errors import InputError
 from photocore.output import check_writable
@@ -46,9 +47,7 @@ class _FileLayer:
         """Whether it holds values rather than colours."""
         return self.reader.dtype.kind == "f"
 
-    def read(
-        self, column: int, row: int, width: int, height: int
-    ) -> tuple[NDArray[Any], BoolArray]:
+    def read(self, column: int, row: int, width: int, height: int) -> Seen:
         """Return a window and its validity."""
         size = (column, row, width, height)
         if self.is_relief:
@@ -58,7 +57,7 @@ class _FileLayer:
         valid = self.reader.read(*size, mask=True) > 0
         return self.reader.read(*size, bands=self.kept), valid
 
-    def reduced(self, width: int, height: int) -> tuple[NDArray[Any], BoolArray]:
+    def reduced(self, width: int, height: int) -> Seen:
         """Return the whole raster shrunk."""
         image, valid = self.reader.read_reduced(width, height, bands=self.kept)
         return image, valid & np.isfinite(image[:, :, 0])
@@ -108,11 +107,8 @@ def make_mosaic(
         _check_alike(layers)
         values = layers[0].is_relief
         grid = common_grid(layers, gsd=gsd, bounds=bounds)
-        coarse = coarse_grid(grid)
-        edges = _relief_of(relief, coarse, stack) if relief else None
-        seams = plan_mosaic(
-            layers, grid, priority=priority, gain=gain and not values, relief=edges, coarse=coarse
-        )
+        edges = partial(_relief_of, relief, stack) if relief else None
+        seams = plan_mosaic(layers, grid, priority=priority, gain=gain and not values, relief=edges)
         first = layers[0].reader
         names = [first.names[i - 1] for i in layers[0].kept]
 
@@ -161,7 +157,7 @@ def _check_alike(layers: Sequence[_FileLayer]) -> None:
             )
 
 
-def _relief_of(paths: Sequence[Path], coarse: Grid, stack: ExitStack) -> NDArray[np.float32]:
+def _relief_of(paths: Sequence[Path], stack: ExitStack, coarse: Grid) -> Float32Array:
     """Return the first known relief of several maps on the coarse grid."""
     relief = np.full(coarse.shape, np.nan, np.float32)
     for path in paths:

@@ -23,7 +23,7 @@ from bifocal.orthophotos.tiles import RasterResult, write_tiles
 from bifocal.orthophotos.triangles import TriangleSurface
 from photocore.arrays import ByteArray
 from photocore.cli import Progress, no_progress
-from photocore.errors import InputError
+from photocore.errors import InputError, located
 from photocore.output import check_writable
 
 #: A pixel this many times finer or coarser than the photo's own is asked back about.
@@ -163,10 +163,8 @@ def open_surface(
         if task.relief is not None:
             reader = stack.enter_context(RasterReader(task.relief))
             check_relief(reader)
-            try:
+            with located(task.relief):
                 surface = MapSurface(reader.grid, reader.read_floats)
-            except InputError as error:
-                raise InputError(f"{task.relief}: {error}") from None
         elif task.points is not None:
             surface, remarks = _triangles(task.points, task.breaklines)
         low, high = surface.extremes(EVERYWHERE)
@@ -203,10 +201,8 @@ def _triangles(
     remarks.append(
         "Relief between the points is interpolated; outside of them the orthophoto is empty."
     )
-    try:
+    with located(path):
         return TriangleSurface(used.xyz, lines), tuple(remarks)
-    except InputError as error:
-        raise InputError(f"{path}: {error}") from None
 
 
 def planned_grid(pair: Pair, surface: Surface, task: OrthoTask) -> Grid:

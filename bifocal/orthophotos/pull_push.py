@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from typing import Any
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from photocore.arrays import BoolArray
+from photocore.arrays import BoolArray, Float32Array
 
 #: Halvings of the picture; holes up to 2^8 px wide are closed.
 _LEVELS = 8
@@ -31,8 +32,6 @@ def fill_holes(
     Pull: known colours are averaged over 2 x 2 pixels again and again until averages reach into
     the holes. Push: each level takes its unknown pixels from the next coarser one.
     """
-    import cv2
-
     weight = known.astype(np.float32)
     colour: NDArray[Any] = image.astype(np.float32)
     colour[~known] = 0
@@ -61,7 +60,7 @@ def fill_holes(
     return out, done
 
 
-def _plain(colour: NDArray[np.float32], weight: NDArray[np.float32]) -> NDArray[np.float32]:
+def _plain(colour: Float32Array, weight: Float32Array) -> Float32Array:
     """Return the colours themselves; NaN where nothing is known."""
     divisor = np.where(weight > 0, weight, np.float32(np.nan)).astype(np.float32)
     divisor = divisor.reshape(weight.shape + (1,) * (colour.ndim - 2))

@@ -10,6 +10,7 @@ import math
 from collections.abc import Callable
 from dataclasses import replace
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -19,7 +20,7 @@ from bifocal.model.pair import Photo
 from bifocal.model.surface import Surface
 from bifocal.orthophotos.rectify import ChromaticShift, SourcePhoto
 from bifocal.orthophotos.visibility import hidden_from
-from photocore.arrays import BoolArray, FloatArray
+from photocore.arrays import BoolArray, Float32Array, FloatArray
 from photocore.errors import InputError
 
 #: Side of the grid on which two photos are compared. [px]
@@ -91,7 +92,7 @@ def devignetted(image: ImageArray, photo: Photo, model: str) -> ImageArray:
             f"vignetting: {model!r} is neither cos4 nor three numbers k1,k2,k3."
         ) from None
 
-    def gain(square: NDArray[np.float32]) -> NDArray[np.float32]:
+    def gain(square: Float32Array) -> Float32Array:
         falloff = 1 + square * (k1 + square * (k2 + square * k3))
         return np.asarray(1 / np.maximum(falloff, 0.05), dtype=np.float32)
 
@@ -106,8 +107,6 @@ def chromatic_shift(image: ImageArray) -> ChromaticShift:
     If red is stretched by ``1 + a(rho)`` it differs from green by ``-a rho dG/drho`` wherever both
     show the same edges; a0 and a1 follow by least squares over all edges, in two rounds.
     """
-    import cv2
-
     height, width = image.shape[:2]
     centre, radius = _middle((width, height))
     y, x = np.mgrid[0:height, 0:width].astype(np.float32)
@@ -199,7 +198,7 @@ def _recoloured(image: ImageArray, fits: list[FloatArray], limit: float) -> Imag
     levels = np.arange(int(limit) + 1) / limit
     tables = [(limit * np.exp(a) * levels**g).astype(np.float32) for a, g, _, _ in fits]
 
-    def recolour(part: ImageArray, square: NDArray[np.float32]) -> NDArray[np.float32]:
+    def recolour(part: ImageArray, square: Float32Array) -> Float32Array:
         layers = part.reshape(*square.shape, -1)
         bands = [
             table[layers[:, :, band]] * np.exp(square * (np.float32(b) + np.float32(c) * square))
@@ -210,16 +209,14 @@ def _recoloured(image: ImageArray, fits: list[FloatArray], limit: float) -> Imag
     return _by_rows(image, recolour)
 
 
-def _scaled(
-    image: ImageArray, gain: Callable[[NDArray[np.float32]], NDArray[np.float32]]
-) -> ImageArray:
+def _scaled(image: ImageArray, gain: Callable[[Float32Array], Float32Array]) -> ImageArray:
     """Return the image times a gain that depends on (rho / R)^2."""
     bands = (1,) * (image.ndim - 2)
     return _by_rows(image, lambda part, square: part * gain(square).reshape(*square.shape, *bands))
 
 
 def _by_rows(
-    image: ImageArray, change: Callable[[ImageArray, NDArray[np.float32]], NDArray[np.float32]]
+    image: ImageArray, change: Callable[[ImageArray, Float32Array], Float32Array]
 ) -> ImageArray:
     """Return the image as changed by a function of its pixels and (rho / R)^2, in small parts.
 
@@ -239,10 +236,8 @@ def _by_rows(
     return out
 
 
-def _edges(band: NDArray[np.integer]) -> NDArray[np.float32]:
+def _edges(band: NDArray[np.integer]) -> Float32Array:
     """Return local contrast, comparable between bands of different brightness."""
-    import cv2
-
     value = band.astype(np.float32)
     fine = cv2.GaussianBlur(value, (0, 0), 1.0) - cv2.GaussianBlur(value, (0, 0), 6.0)
     energy = cv2.GaussianBlur(fine * fine, (0, 0), 6.0)

@@ -6,16 +6,15 @@ import math
 from dataclasses import dataclass
 from itertools import pairwise
 
+import cv2
 import numpy as np
-from numpy.typing import NDArray
 
-from bifocal.model.grid import Bounds, Grid, PixelMap, bounds_of
+from bifocal.model.grid import Bounds, Grid, bounds_of
 from bifocal.model.image import ImageArray, as_photo
 from bifocal.model.pair import Photo, apply_homography
-from bifocal.model.surface import ReliefArray
 from bifocal.orthophotos.ortho_image import Interpolation
 from bifocal.rays import magnification
-from photocore.arrays import BoolArray, FloatArray
+from photocore.arrays import BoolArray, Float32Array, FloatArray
 from photocore.errors import GeometryError, InputError
 
 #: Distortion is tabulated every so many ideal pixels and interpolated linearly in between; for a
@@ -103,14 +102,14 @@ class SourcePhoto:
             chromatic=chromatic,
         )  # fmt: skip
 
-    def pixel_map(self, grid: Grid, relief: ReliefArray) -> tuple[PixelMap, PixelMap]:
+    def pixel_map(self, grid: Grid, relief: Float32Array) -> tuple[Float32Array, Float32Array]:
         """Return column and row of the photo for every pixel of a window; NaN where none."""
         column, row = _project(self.photo, self.size, grid, relief)
         if self.lens is not None:
             column, row = self.lens.distort(column, row)
         return column.astype(np.float32), row.astype(np.float32)
 
-    def inside(self, column: PixelMap, row: PixelMap) -> BoolArray:
+    def inside(self, column: Float32Array, row: Float32Array) -> BoolArray:
         """Return which positions lie within the photo; NaN does not."""
         width, height = self.size
         inside: BoolArray = (column >= -0.5) & (column <= width - 0.5)
@@ -118,7 +117,9 @@ class SourcePhoto:
         inside &= row <= height - 0.5
         return inside
 
-    def sample(self, column: PixelMap, row: PixelMap, interpolation: Interpolation) -> ImageArray:
+    def sample(
+        self, column: Float32Array, row: Float32Array, interpolation: Interpolation
+    ) -> ImageArray:
         """Return the photo's colours at positions, shape (h, w, 3) or (h, w)."""
         if self.chromatic is None or self.image.ndim == 2:
             return self._remap(self.image, column, row, interpolation)
@@ -134,10 +135,12 @@ class SourcePhoto:
         return np.stack(bands, axis=-1)
 
     def _remap(
-        self, image: ImageArray, column: PixelMap, row: PixelMap, interpolation: Interpolation
+        self,
+        image: ImageArray,
+        column: Float32Array,
+        row: Float32Array,
+        interpolation: Interpolation,
     ) -> ImageArray:
-        import cv2
-
         flag = {
             "nearest": cv2.INTER_NEAREST,
             "linear": cv2.INTER_LINEAR,
@@ -184,7 +187,7 @@ def _rim(size: tuple[int, int], *, outwards: float, points: int) -> FloatArray:
 
 
 def _project(
-    photo: Photo, size: tuple[int, int], grid: Grid, relief: ReliefArray
+    photo: Photo, size: tuple[int, int], grid: Grid, relief: Float32Array
 ) -> tuple[FloatArray, FloatArray]:
     """Return the ideal (column, row) of every pixel of a window, in double precision.
 
@@ -222,8 +225,6 @@ def _project(
 
 def _reduced(image: ImageArray, factor: int) -> ImageArray:
     """Return an image averaged over squares of ``factor`` pixels; incomplete squares at the end."""
-    import cv2
-
     height, width = image.shape[:2]
     high, wide = -(-height // factor) * factor, -(-width // factor) * factor
     padded = cv2.copyMakeBorder(image, 0, high - height, 0, wide - width, cv2.BORDER_REPLICATE)
@@ -231,13 +232,13 @@ def _reduced(image: ImageArray, factor: int) -> ImageArray:
 
 
 def _part(
-    image: ImageArray, column: PixelMap, row: PixelMap
-) -> tuple[ImageArray, PixelMap, PixelMap]:
+    image: ImageArray, column: Float32Array, row: Float32Array
+) -> tuple[ImageArray, Float32Array, Float32Array]:
     """Cut out of a very large photo what a window needs."""
     height, width = image.shape[:2]
     margin = 8
 
-    def limits(positions: PixelMap, length: int) -> tuple[int, int]:
+    def limits(positions: Float32Array, length: int) -> tuple[int, int]:
         low, high = (f.reduce(positions, axis=None) for f in (np.fmin, np.fmax))
         if np.isnan(low):
             return 0, 1
@@ -255,7 +256,7 @@ def _part(
 class LensTable:
     """Where ideal pixels are seen through the lens, tabulated."""
 
-    shift: NDArray[np.float32]
+    shift: Float32Array
     left: float
     top: float
 
@@ -279,8 +280,6 @@ class LensTable:
 
     def distort(self, column: FloatArray, row: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return raw positions of ideal ones; NaN where the photo cannot show them."""
-        import cv2
-
         u = ((column - self.left) * (1 / _LENS_STEP)).astype(np.float32)
         v = ((row - self.top) * (1 / _LENS_STEP)).astype(np.float32)
         outside = (math.nan, math.nan)

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from bifocal.model.grid import Grid
 from bifocal.model.surface import Surface
-from photocore.arrays import ByteArray
+from photocore.arrays import ByteArray, Float32Array
 
 #: Tints from far to near: dark blue, green-grey, sand, nearly white.
 _TINTS = np.array(
@@ -17,7 +17,7 @@ _TINTS = np.array(
 _LIGHT = np.array([-0.5, 0.5, 0.7071])
 
 
-def tints(relief: NDArray[np.floating], limits: tuple[float, float]) -> NDArray[np.float32]:
+def tints(relief: NDArray[np.floating], limits: tuple[float, float]) -> Float32Array:
     """Return the unlit colours of a relief, shape (..., 3), 0 to 255; NaN counts as 0 m."""
     span = max(limits[1] - limits[0], 1e-6)
     share = np.clip((np.nan_to_num(relief) - limits[0]) / span, 0, 1) * (len(_TINTS) - 1)

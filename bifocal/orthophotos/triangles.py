@@ -6,12 +6,12 @@ import math
 from collections.abc import Sequence
 from itertools import pairwise
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from bifocal.model.grid import Bounds, Grid, bounds_of
-from bifocal.model.surface import ReliefArray
-from photocore.arrays import FloatArray, IntArray, as_points
+from photocore.arrays import Float32Array, FloatArray, IntArray, as_points
 from photocore.errors import InputError
 
 #: Times a breakline is halved where the triangles still cross it; 2^10 pieces are finer than any
@@ -74,10 +74,8 @@ class TriangleSurface:
         self._low, self._high = corners.min(axis=1), corners.max(axis=1)
         self._planes = _planes(corners)
 
-    def window(self, grid: Grid) -> ReliefArray:
+    def window(self, grid: Grid) -> Float32Array:
         """Return relief at the pixel centres of a grid; NaN outside the triangles."""
-        import cv2
-
         owner = np.full(grid.shape, -1, np.int32)
         # Pixel centres just on the rim still count: the rasteriser fills boundaries.
         touched = self._touching(grid.bounds)

@@ -5,13 +5,14 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from bifocal.model.grid import Bounds, Grid
-from bifocal.model.surface import EVERYWHERE, ReliefArray, Surface
+from bifocal.model.surface import EVERYWHERE, Surface
 from bifocal.rays import Foot, magnification
-from photocore.arrays import BoolArray
+from photocore.arrays import BoolArray, Float32Array
 
 #: A pixel of the buffer is a candidate when another on its ray lies this much farther in. [px]
 _MARGIN = 1.0
@@ -33,7 +34,7 @@ _LARGEST, _SMALLEST = 2_000_000, 200
 _MOST_STEPS = 400
 
 
-def hidden_from(surface: Surface, grid: Grid, camera: Foot, relief: ReliefArray) -> BoolArray:
+def hidden_from(surface: Surface, grid: Grid, camera: Foot, relief: Float32Array) -> BoolArray:
     """Return which pixels of a window a camera cannot see because relief is in the way.
 
     Parameters
@@ -125,16 +126,16 @@ def _towards(bounds: Bounds, camera: Foot, share: float) -> Bounds:
 class _Surroundings(NamedTuple):
     """A window with its surroundings, in pixels, seen from the nadir."""
 
-    relief: ReliefArray  # [px]
-    x: ReliefArray  # of every column, from the nadir [px]
-    y: ReliefArray  # of every row, upwards [px]
-    rho: ReliefArray  # distance from the nadir [px]
+    relief: Float32Array  # [px]
+    x: Float32Array  # of every column, from the nadir [px]
+    y: Float32Array  # of every row, upwards [px]
+    rho: Float32Array  # distance from the nadir [px]
     distance: np.float32  # of the camera [px]
     core: tuple[slice, slice]  # the window itself
 
 
 def _hidden(
-    relief: ReliefArray,
+    relief: Float32Array,
     grid: Grid,
     camera: Foot,
     start: tuple[int, int],
@@ -163,7 +164,7 @@ def _hidden(
 class _Buffer(NamedTuple):
     """The z-buffer: the smallest rho in each cell of q, and the cell of each pixel of the core."""
 
-    nearest: ReliefArray
+    nearest: Float32Array
     cells: NDArray[np.int32]
     columns: int
 
@@ -195,7 +196,7 @@ class _Buffer(NamedTuple):
         return cls(nearest, cells[core], columns)
 
 
-def _cells(u: ReliefArray, v: ReliefArray, rows: int, columns: int) -> NDArray[np.int32]:
+def _cells(u: Float32Array, v: Float32Array, rows: int, columns: int) -> NDArray[np.int32]:
     """Return the cell of positions; the one after the last for what lies outside or is NaN."""
     inside = (u >= 0) & (v >= 0) & (u < columns) & (v < rows)
     with np.errstate(invalid="ignore"):
@@ -205,7 +206,7 @@ def _cells(u: ReliefArray, v: ReliefArray, rows: int, columns: int) -> NDArray[n
 
 
 def _join(
-    nearest: ReliefArray, ends: list[tuple[ReliefArray, ReliefArray]], rows: int, columns: int
+    nearest: Float32Array, ends: list[tuple[Float32Array, Float32Array]], rows: int, columns: int
 ) -> None:
     """Insert points of the faces between neighbours that lie more than a cell apart."""
     (u, u_next), (v, v_next), _ = ends
@@ -228,8 +229,6 @@ def _sharpen(around: _Surroundings, buffer: _Buffer) -> BoolArray:
     a pixel are missed. Where that matters the ray from the pixel to the camera is followed at the
     place of the occluder and right beside the pixel: it is hidden if relief rises above the ray.
     """
-    import cv2
-
     core, rho = around.core, around.rho[around.core]
     ahead = rho - buffer.nearest[buffer.cells]
     hidden = ahead > np.float32(_MARGIN)
@@ -253,7 +252,7 @@ def _sharpen(around: _Surroundings, buffer: _Buffer) -> BoolArray:
 
 
 def _above_ray(
-    around: _Surroundings, row: NDArray[np.int64], column: NDArray[np.int64], occluder: ReliefArray
+    around: _Surroundings, row: NDArray[np.int64], column: NDArray[np.int64], occluder: Float32Array
 ) -> BoolArray:
     """Return which pixels' rays to the camera run into relief beside them or at the occluder."""
     rows, columns = around.relief.shape
@@ -263,7 +262,7 @@ def _above_ray(
     hidden = np.zeros(len(row), bool)
     to_occluder = np.where(np.isfinite(occluder), rho - occluder, np.float32(0))
 
-    def height(of: NDArray[np.int64], t: ReliefArray) -> tuple[ReliefArray, BoolArray]:
+    def height(of: NDArray[np.int64], t: Float32Array) -> tuple[Float32Array, BoolArray]:
         i = np.rint(row[of] + to_y[of] * t).astype(np.int32)
         j = np.rint(column[of] + to_x[of] * t).astype(np.int32)
         inside = (i >= 0) & (i < rows) & (j >= 0) & (j < columns)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import asdict, dataclass
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -298,8 +299,6 @@ def _complete(frame: Frame, bands: MapBands, grid: Grid) -> MapBands:
 
 def _cover(frame: Frame, grid: Grid) -> BoolArray:
     """Return which pixels of the map both photos cover (taken at r = 0)."""
-    import cv2
-
     both = (frame.seen1 & frame.seen2).astype(np.uint8)
     column, row = frame.grid.offset_in(grid)
     scale = frame.grid.gsd / grid.gsd
@@ -311,8 +310,6 @@ def _cover(frame: Frame, grid: Grid) -> BoolArray:
 
 def _resampled(bands: MapBands, grid: Grid, wanted: Grid) -> MapBands:
     """Return the map on the grid asked for, interpolated if that is finer."""
-    import cv2
-
     if wanted.gsd >= 0.999 * grid.gsd:
         return bands
     column, row = wanted.offset_in(grid)

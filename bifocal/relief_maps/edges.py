@@ -6,9 +6,11 @@ question is only which pixel is whose: the photos answer it, smoothed along the 
 
 from __future__ import annotations
 
+import cv2
 import numpy as np
 
-from bifocal.relief_maps.frame import Float32Array, Frame, zoom_map
+from bifocal.relief_maps.frame import Frame, zoom_map
+from photocore.arrays import Float32Array
 
 #: Half width of a ramp. [px]
 REACH = 9
@@ -35,8 +37,6 @@ def sharpen(frame: Frame, relief: Float32Array, sigma_px: float = 0.0) -> Float3
     sigma_px : float
         Precision of matching, typical of the frame. [px]
     """
-    import cv2
-
     median = cv2.medianBlur(relief, 5)
     disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * REACH + 1, 2 * REACH + 1))
     upper, lower = cv2.dilate(median, disc), cv2.erode(median, disc)
@@ -58,8 +58,6 @@ def sharpen(frame: Frame, relief: Float32Array, sigma_px: float = 0.0) -> Float3
 
 def _features(image: np.ndarray) -> Float32Array:
     """Return grey value and both derivatives, shape (height, width, 3)."""
-    import cv2
-
     grey = image.astype(np.float32)
     across = cv2.Sobel(image, cv2.CV_32F, 1, 0, ksize=3, scale=0.25)
     down = cv2.Sobel(image, cv2.CV_32F, 0, 1, ksize=3, scale=0.25)
@@ -70,8 +68,6 @@ def _mismatch(
     frame: Frame, far: Float32Array, near: Float32Array, relief: Float32Array
 ) -> Float32Array:
     """Return how badly photo 2 fits photo 1 at given relief. [grey levels]"""
-    import cv2
-
     columns, rows = zoom_map(frame, relief)
     moved = cv2.remap(near, columns, rows, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
     off = cv2.absdiff(moved, far)
@@ -96,7 +92,5 @@ class _Guide:
 
     @staticmethod
     def _blur(values: np.ndarray) -> Float32Array:
-        import cv2
-
         side = 2 * WINDOW + 1
         return np.asarray(cv2.blur(values, (side, side)))

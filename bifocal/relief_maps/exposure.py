@@ -7,9 +7,9 @@ from dataclasses import replace
 import cv2
 import numpy as np
 
-from bifocal.relief_maps.frame import Float32Array, Frame, zoom_map
+from bifocal.relief_maps.frame import Frame, zoom_map
 from bifocal.relief_maps.registration import least_absolute
-from photocore.arrays import FloatArray
+from photocore.arrays import Float32Array
 
 #: Grey values outside are clipped or dark noise and do not take part.
 DARKEST, BRIGHTEST = 12.0, 243.0
@@ -51,7 +51,7 @@ def match_exposure(frame: Frame, coarse: Float32Array) -> Frame:
         return frame
     # Vignetting belongs to photo 2's own pixels, so the terms are taken at its positions.
     u, v = columns[use] / width * 2 - 1, rows[use] / height * 2 - 1
-    terms = _terms(u, v, np.log(second[use]))
+    terms = np.column_stack([np.ones_like(u), u, v, u * u + v * v, np.log(second[use])])
     solution = least_absolute(terms, np.log(first[use]), rounds=12, floor=0.01)
     change = np.abs(np.exp(terms @ solution) - second[use])
     if np.median(change) < WORTHWHILE:
@@ -63,8 +63,3 @@ def match_exposure(frame: Frame, coarse: Float32Array) -> Frame:
     curve = np.exp(gamma * np.log(np.maximum(np.arange(256), 0.5))).astype(np.float32)
     exposed = np.clip(np.rint(curve[frame.image2] * smooth.astype(np.float32)), 0, 255)
     return replace(frame, image2=exposed.astype(np.uint8))
-
-
-def _terms(u: np.ndarray, v: np.ndarray, log_grey: np.ndarray) -> FloatArray:
-    """Return the design matrix."""
-    return np.column_stack([np.ones_like(u), u, v, u * u + v * v, log_grey])

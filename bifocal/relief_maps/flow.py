@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import cv2
 import numpy as np
 
 from bifocal import rays
-from bifocal.relief_maps.frame import Float32Array, Frame, offsets, zoom_map
-from photocore.arrays import BoolArray, ByteArray
+from bifocal.relief_maps.frame import Frame, offsets, zoom_map
+from photocore.arrays import BoolArray, ByteArray, Float32Array
 
 #: Weight of smoothness; 30 is as good before noise is taken out, 20 keeps more detail for it.
 ALPHA = 20.0
@@ -64,8 +65,6 @@ def seeded_flow(
     Dense inverse search with variational refinement (Kroeger et al. 2016), OpenCV's "medium".
     Windowed matchers, log-polar and ortho-space sweeps were three to six times less precise.
     """
-    import cv2
-
     flow = cv2.DISOpticalFlow.create(cv2.DISOPTICAL_FLOW_PRESET_MEDIUM)
     flow.setFinestScale(finest)
     flow.setVariationalRefinementAlpha(ALPHA)
@@ -77,8 +76,6 @@ def seeded_flow(
 
 def measure(frame: Frame, coarse: Float32Array, *, stride: int = STRIDE) -> Measurement:
     """Match both photos and return the relief of the pixels of photo 1."""
-    import cv2
-
     height, width = frame.grid.shape
     seed_relief = cv2.resize(coarse, (width, height), interpolation=cv2.INTER_LINEAR)
     columns, rows = zoom_map(frame, seed_relief)
@@ -121,8 +118,6 @@ def sigma_of_relief(frame: Frame, relief: Float32Array, sigma_px: Float32Array) 
 
 def _loop(frame: Frame, flow: Float32Array) -> Float32Array:
     """Return how far a pixel lands from itself after the flow there and back. [px]"""
-    import cv2
-
     x, y = offsets(frame.grid.shape)
     there = (flow[..., 0] + x, flow[..., 1] + y)
     seed = _turned_round(flow)
@@ -138,8 +133,6 @@ def _turned_round(flow: Float32Array) -> Float32Array:
     Each coarse pixel of photo 2 takes the flow of the pixels that land there; the fixed point of
     ``back(q) = -flow(q + back(q))`` is reached in a few steps where the flow is smooth.
     """
-    import cv2
-
     height, width = flow.shape[:2]
     size = (max(8, width // 8), max(8, height // 8))
     small = cv2.medianBlur(cv2.resize(flow, size, interpolation=cv2.INTER_AREA), 5)
@@ -154,8 +147,6 @@ def _turned_round(flow: Float32Array) -> Float32Array:
 
 def is_inside(frame: Frame, relief: Float32Array) -> BoolArray:
     """Return which pixels of photo 1 fall on photo 2's content at their relief."""
-    import cv2
-
     columns, rows = zoom_map(frame, relief)
     content = cv2.remap(frame.seen2.astype(np.uint8), columns, rows, cv2.INTER_NEAREST)
     return np.asarray(frame.seen1 & (content > 0))

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+import cv2
 import numpy as np
 
 from bifocal.model.grid import Grid
 from bifocal.model.relief_map import Quality
 from bifocal.rays import Foot, magnification, reduction
-from bifocal.relief_maps.frame import Float32Array, Frame, offsets, values_at, zoom_map
-from photocore.arrays import BoolArray, ByteArray, FloatArray, IntArray
+from bifocal.relief_maps.frame import Frame, offsets, values_at, zoom_map
+from photocore.arrays import BoolArray, ByteArray, Float32Array, FloatArray, IntArray
 
 #: A relief agrees with the pixel it came from to this. [m], relative to d1
 AGREEMENT = 4e-4
@@ -38,8 +39,6 @@ def ramps(frame: Frame, relief: Float32Array) -> BoolArray:
     With s1 the radius about the nadir of photo 1, ``ds'/ds1 = 1 - r/d1 - (s1/d1) dr/ds1`` is how
     much wall one pixel covers; on a true surface it is near one.
     """
-    import cv2
-
     foot = frame.pair.image1.foot
     x, y = offsets(frame.grid.shape, frame.grid.pixel_of(foot.nadir))
     across = cv2.Sobel(relief, cv2.CV_32F, 1, 0, ksize=3, scale=0.125)
@@ -62,8 +61,6 @@ def to_plane(frame: Frame, source: MapBands, usable: BoolArray, grid: Grid) -> M
     grid : Grid
         Of the relief map.
     """
-    import cv2
-
     foot = frame.pair.image1.foot
     relief = np.where(usable, source.r, np.float32(np.nan))
     first = _scatter(frame, relief, grid, foot)
@@ -117,8 +114,6 @@ def _gather(
 
     Eq. (1), s = s' d / (d - r), with the r it is meant to find: a fixed point.
     """
-    import cv2
-
     todo = np.isfinite(start) & ~np.isfinite(result.r)
     row, column = np.nonzero(todo)
     if not len(row):
@@ -192,8 +187,6 @@ def hidden_in_second(frame: Frame, relief: Float32Array, step: Float32Array) -> 
     step : ndarray of float32, broadcastable
         How much higher the covering surface must be. [m]
     """
-    import cv2
-
     columns, rows = zoom_map(frame, relief)
     height, width = relief.shape
     with np.errstate(invalid="ignore"):
@@ -210,8 +203,6 @@ def hidden_in_second(frame: Frame, relief: Float32Array, step: Float32Array) -> 
 
 def fill_small(bands: MapBands, holes: BoolArray) -> None:
     """Fill what is left of holes from the nearest known pixel, a few pixels deep (in place)."""
-    import cv2
-
     if not holes.any():
         return
     unknown = ~np.isfinite(bands.r)
@@ -232,8 +223,6 @@ def forget_outside(bands: MapBands) -> None:
 
     Beyond the outermost thing both photos saw, a filled relief has nothing to lean on.
     """
-    import cv2
-
     measured = (bands.quality == Quality.MEASURED) & np.isfinite(bands.r)
     grains = np.ones((3, 3), np.uint8)
     solid = cv2.morphologyEx(measured.astype(np.uint8), cv2.MORPH_OPEN, grains)

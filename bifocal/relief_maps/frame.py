@@ -7,16 +7,15 @@ from dataclasses import dataclass
 from itertools import permutations
 from typing import Any
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from bifocal import rays
 from bifocal.model.grid import Bounds, Grid, bounds_of, cut
 from bifocal.model.pair import Pair, Photo
-from photocore.arrays import BoolArray, ByteArray, FloatArray
+from photocore.arrays import BoolArray, ByteArray, Float32Array, FloatArray
 from photocore.errors import GeometryError, InputError
-
-Float32Array = NDArray[np.float32]
 
 #: A plane grid that fits the pixels of a photo this well is not resampled. [px]
 SAME_LATTICE = 2e-3
@@ -111,7 +110,7 @@ def _shows(photo: Photo, shape: tuple[int, ...], places: FloatArray) -> BoolArra
     height, width = shape[:2]
     with np.errstate(invalid="ignore"):
         inside = ((pixels > -1) & (pixels < [width, height])).all(-1)
-    return np.asarray(inside & _in_front(photo, shape, places))
+    return np.asarray(inside & photo.sees_ahead(places, shape))
 
 
 def _footprint(photo: Photo, shape: tuple[int, ...]) -> FloatArray:
@@ -134,7 +133,7 @@ def _footprint(photo: Photo, shape: tuple[int, ...]) -> FloatArray:
     with np.errstate(invalid="ignore"):
         good = np.isfinite(places).all(-1) & (determinant * sign > 0)
         good &= np.abs(determinant) < limit
-    return places[good & _in_front(photo, shape, places)]
+    return places[good & photo.sees_ahead(places, shape)]
 
 
 def working_grid(pair: Pair, shape1: tuple[int, ...], box: Bounds, gsd: float) -> Grid:
@@ -172,8 +171,6 @@ def make_frame(
 
 def _on_grid(photo: Photo, image: ByteArray, grid: Grid) -> tuple[ByteArray, BoolArray]:
     """Return a photo on the grid and where it has content."""
-    import cv2
-
     matrix = np.linalg.inv(photo.plane_from_pixel) @ grid.plane_from_pixel
     matrix = matrix / matrix[2, 2]
     height, width = image.shape
@@ -198,23 +195,14 @@ def _on_grid(photo: Photo, image: ByteArray, grid: Grid) -> tuple[ByteArray, Boo
         rows = slice(top, top + part.height)
         with np.errstate(invalid="ignore"):
             seen[rows] = ((pixels >= 0) & (pixels <= [width - 1, height - 1])).all(-1)
-        seen[rows] &= _in_front(photo, (height, width), places)
+        seen[rows] &= photo.sees_ahead(places, (height, width))
         maps = ((pixels + 0.5) * factors - 0.5).astype(np.float32)
         maps[~np.isfinite(maps)] = -1e4
         result[rows] = cv2.remap(
-            image, maps[..., 0], maps[..., 1], cv2.INTER_CUBIC, borderMode=cv2.BORDER_REPLICATE
+            image, maps, None, cv2.INTER_CUBIC, borderMode=cv2.BORDER_REPLICATE
         )
     result[~seen] = 0
     return result, seen
-
-
-def _in_front(photo: Photo, shape: tuple[int, ...], places: FloatArray) -> BoolArray:
-    """Return which plane points lie on the photo's side of its horizon."""
-    inverse = np.linalg.inv(photo.plane_from_pixel)
-    scale = places @ inverse[2, :2] + inverse[2, 2]
-    # q = H p / w and p = H^-1 q * w: both scales have the same sign where the photo looks.
-    reference = photo.plane_from_pixel[2] @ [shape[1] / 2, shape[0] / 2, 1.0]
-    return np.asarray(scale * reference > 0)
 
 
 def _whole_shift(matrix: FloatArray, grid: Grid) -> tuple[int, int] | None:
@@ -247,13 +235,10 @@ def values_at(band: NDArray[Any], places: NDArray[np.floating], how: int) -> NDA
     how : int
         OpenCV's interpolation, ``cv2.INTER_NEAREST`` or another.
     """
-    import cv2
-
     outside = np.nan if band.dtype.kind == "f" else 0
     values = [np.zeros((0, *band.shape[2:]), band.dtype)]
     # cv2.remap counts the places of one call in 16 bits.
     for part in np.array_split(places.astype(np.float32), len(places) // 30000 + 1):
         if len(part):
-            columns, rows = (np.ascontiguousarray(part[None, :, axis]) for axis in (0, 1))
-            values.append(cv2.remap(band, columns, rows, how, borderValue=outside)[0])
+            values.append(cv2.remap(band, part[None], None, how, borderValue=outside)[0])
     return np.concatenate(values)

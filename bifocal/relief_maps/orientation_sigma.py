@@ -8,7 +8,7 @@ import numpy as np
 
 from bifocal.model.pair import Pair
 from bifocal.precision import false_relief_of_scale
-from bifocal.relief_maps.frame import Float32Array
+from photocore.arrays import Float32Array
 
 
 def orientation_sigma(pair: Pair, relief: Float32Array) -> Float32Array:

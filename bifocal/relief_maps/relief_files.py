@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bifocal.model.relief_map import Quality, ReliefMap
-from photocore.arrays import FloatArray
+from photocore.arrays import Float32Array, FloatArray
 from photocore.errors import InputError
 from photocore.output import atomic_path
 
@@ -65,7 +65,7 @@ def hatched(colours: NDArray[np.floating], where: NDArray[np.bool_]) -> FloatArr
     return result
 
 
-def shaded(colours: NDArray[np.floating], r: NDArray[np.float32], gsd: float) -> FloatArray:
+def shaded(colours: NDArray[np.floating], r: Float32Array, gsd: float) -> FloatArray:
     """Return colours darkened and lightened by light from the upper left, shape (h, w, 3)."""
     filled = np.where(np.isfinite(r), r, np.nanmedian(r)).astype(np.float64)
     down, across = np.gradient(filled, gsd)

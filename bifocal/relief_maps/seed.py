@@ -7,11 +7,12 @@ across.
 
 from __future__ import annotations
 
+import cv2
 import numpy as np
 
 from bifocal import rays
-from bifocal.relief_maps.frame import Float32Array, Frame, offsets
-from photocore.arrays import BoolArray, ByteArray
+from bifocal.relief_maps.frame import Frame, offsets
+from photocore.arrays import BoolArray, ByteArray, Float32Array
 
 #: Width or height at which the sweep works; more brings little, costs squarely. [px]
 COARSE_SIDE = 420
@@ -43,8 +44,6 @@ def coarse_relief(
     Hypotheses are uniform in parallax, r / (d2 - r) - r / (d1 - r), not in r. The matching cost is
     1 - ZNCC over two window sizes; semi-global matching (Hirschmueller 2008) on eight paths.
     """
-    import cv2
-
     factor = max(1, round(max(frame.grid.shape) / COARSE_SIDE))
     size = (frame.grid.width // factor, frame.grid.height // factor)
     if min(size) < 16:
@@ -98,8 +97,6 @@ def _cost_volume(
     centre: np.ndarray,
 ) -> Float32Array:
     """Return 1 - ZNCC of every pixel and hypothesis, 0..1, shape (height, width, n)."""
-    import cv2
-
     d1, d2 = frame.distances
     height, width = far.shape
     x, y = np.broadcast_arrays(*offsets((height, width), centre))
@@ -123,8 +120,6 @@ def _cost_volume(
 
 def _moments(image: Float32Array, n: int) -> tuple[Float32Array, Float32Array]:
     """Return local mean and variance in an n x n window."""
-    import cv2
-
     mean = cv2.blur(image, (n, n))
     return mean, np.maximum(cv2.blur(image * image, (n, n)) - mean * mean, 0)
 

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import cv2
 import numpy as np
 
-from bifocal.relief_maps.frame import Float32Array
+from photocore.arrays import Float32Array
 
 #: Half windows, small to large. [px]
 WINDOWS = (8, 16)
@@ -28,8 +29,6 @@ def shrink_noise(relief: Float32Array, sigma: Float32Array) -> Float32Array:
     deviation as its regularisation and the weights 1/sigma²: Wiener's shrinkage in each window.
     Smoothing acts on r, not on flow: near the nadir a small flow is a large relief.
     """
-    import cv2
-
     weight = 1 / np.maximum(sigma, np.float32(1e-6)) ** 2
     for half in WINDOWS:
         side = (2 * half + 1, 2 * half + 1)
@@ -51,8 +50,6 @@ def tidy_steps(relief: Float32Array) -> Float32Array:
     Single pixels on the wrong side of a step cast shadows of their own; the median took the share
     of wrong pixels from 2.05 to 1.91 % and made hidden pixels found right 76 instead of 67 %.
     """
-    import cv2
-
     unknown = ~np.isfinite(relief)
     filled = np.where(unknown, np.float32(0), relief)
     around = np.ones((5, 5), dtype=np.uint8)

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -117,8 +118,6 @@ def coloured_cloud(
     attributes : dict of str to ndarray, shape (n,)
         ``red``, ``green``, ``blue`` (8 bits), ``sigma`` of the relief [m], ``quality``.
     """
-    import cv2
-
     picture = to_eight_bit(image1)
     if picture.ndim == 2:
         picture = np.repeat(picture[..., None], 3, axis=2)

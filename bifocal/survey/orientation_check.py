@@ -243,7 +243,7 @@ def _fit(
         ) from None
     left = q1 - _mapped(fit.state, q2)[1]
     scaled = np.linalg.norm((weight @ left[:, :, None])[:, :, 0], axis=1)
-    return fit.state, fit.cofactor, scaled, left
+    return fit.state, fit.linear.cofactor, scaled, left
 
 
 def _worst(scaled: FloatArray, used: BoolArray) -> tuple[int | None, float]:

@@ -12,7 +12,7 @@ from bifocal.survey.check_points import check_points
 from bifocal.survey.georeferencing import georeference
 from bifocal.survey.point_survey import solve_points
 from bifocal.survey.reference import KnownPoints
-from bifocal.survey.template_workflow import MOST_ROWS, log_row, relative_name
+from bifocal.survey.template_workflow import MOST_ROWS, log_row
 from bifocal.survey.tolerances import RULES, sentence
 from bifocal.survey.workbook.book import write_book
 from bifocal.survey.workbook.content import SurveyContent
@@ -20,6 +20,7 @@ from bifocal.survey.workbook.update import can_update, update_book
 from bifocal.survey.workflow import SolvedSurvey
 from photocore.errors import InputError
 from photocore.jsonfile import to_text
+from photocore.output import relative_name
 from photocore.tables import write_csv
 from photocore.workbook.newbook import is_untouched, other_name
 
@@ -190,7 +191,10 @@ def _records(solution: SolvedSurvey) -> list[str]:
     columns = [table[key].tolist() for key in _NUMBERS]
     world = [solution.world[:, i].tolist() for i in range(3)] if solution.georeference else []
     keys = [*_NUMBERS, *("ENH" if world else "")]
-    numbers = [[_number(value) for value in values] for values in (*columns, *world)]
+    numbers = [
+        [repr(value) if math.isfinite(value) else "null" for value in values]
+        for values in (*columns, *world)
+    ]
     names = [json.dumps(name, ensure_ascii=False) for name in table.ids]
     use = ["true" if value else "false" for value in solution.points.use]
     template = (
@@ -198,10 +202,6 @@ def _records(solution: SolvedSurvey) -> list[str]:
         + ', "flag": "{}", "use": {}}}'
     )  # fmt: skip
     return [template.format(*row) for row in zip(names, *numbers, table.flags, use, strict=True)]
-
-
-def _number(value: float) -> str:
-    return repr(value) if math.isfinite(value) else "null"
 
 
 def _head(solution: SolvedSurvey) -> dict[str, Any]:

@@ -12,7 +12,7 @@ from bifocal.model.pair import Pair
 from bifocal.precision import false_relief_of_scale
 from bifocal.survey.observations import PointObservations
 from photocore.arrays import FloatArray, positive
-from photocore.errors import GeometryError, InputError
+from photocore.errors import GeometryError, InputError, located
 
 #: Scales of the two photos may differ by this share; what remains is taken out by `k_12`.
 SCALE_TOLERANCE = 0.02
@@ -101,12 +101,8 @@ class SurveySetup:
         InputError, GeometryError
             If a value is missing, or values contradict each other, naming the file.
         """
-        try:
+        with located(self.where):
             return self._pair()
-        except GeometryError as error:
-            raise GeometryError(self._said(str(error))) from None
-        except InputError as error:
-            raise InputError(self._said(str(error))) from None
 
     def _pair(self) -> Pair:
         missing = [name for name, value in (("d_1", self.d1), ("d_2", self.d2)) if value is None]
@@ -135,9 +131,6 @@ class SurveySetup:
             if (value := getattr(self, name)) is not None:
                 positive(value, name)
         return Pair.ideal(d1=self.d1, d2=self.d2, c1=self.c1, c2=self.c2, sigma=self.precision)
-
-    def _said(self, text: str) -> str:
-        return f"{self.where}: {text}" if self.where else text
 
     def in_millimetres(self, points: PointObservations) -> PointObservations:
         """Return the points as image coordinates of `pair`, without raw pixels."""
@@ -173,13 +166,11 @@ class SurveySetup:
             return ""
         share = (1000.0 * self.d2 / self.c2) / (1000.0 * self.d1 / self.c1) - 1.0
         if abs(share) > tolerance:
+            place = f"{self.where}: " if self.where else ""
             raise GeometryError(
-                self._said(
-                    f"c_1/d_1 = {self.c1 / self.d1:.4g} and c_2/d_2 = {self.c2 / self.d2:.4g} "
-                    f"differ by {abs(share):.1%}: a bifocal pair has the same scale in both "
-                    "photos. Check c_1, c_2, d_1 and d_2 "
-                    f"(tolerance {tolerance:.1%}, --scale-tolerance)."
-                )
+                f"{place}c_1/d_1 = {self.c1 / self.d1:.4g} and c_2/d_2 = {self.c2 / self.d2:.4g} "
+                f"differ by {abs(share):.1%}: a bifocal pair has the same scale in both photos. "
+                f"Check c_1, c_2, d_1 and d_2 (tolerance {tolerance:.1%}, --scale-tolerance)."
             )
         if abs(share) < 1e-4:
             return ""

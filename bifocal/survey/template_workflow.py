@@ -8,16 +8,14 @@ from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
-from bifocal.model.flags import FlagLimits
 from bifocal.model.pair import Pair
 from bifocal.survey.observations import PointObservations
 from bifocal.survey.point_survey import solve_points
-from bifocal.survey.setup import SurveySetup
 from bifocal.survey.workbook.book import write_book
 from bifocal.survey.workbook.content import POINT_ROWS, SurveyContent
 from bifocal.survey.workbook.words import LANGUAGES
 from photocore.errors import InputError
-from photocore.output import check_writable
+from photocore.output import check_writable, relative_name
 
 #: Beyond this many points a spreadsheet is no tool any more.
 MOST_ROWS = 100_000
@@ -57,8 +55,7 @@ def write_survey(
     path: Path | str,
     points: PointObservations,
     *,
-    setup: SurveySetup | None = None,
-    pair: Pair | None = None,
+    pair: Pair,
     pair_path: Path | str | None = None,
     sigma_px: float | None = None,
     language: str = "en",
@@ -72,11 +69,8 @@ def write_survey(
     path : path
         An ``.xlsx`` file.
     points : PointObservations
-        With ``pixels1`` and ``pixels2`` [px] for a pair; ``xy1, xy2`` or ``polar`` for a set-up.
-    setup : SurveySetup, optional
-        Of an ideal pair.
-    pair : Pair, optional
-        Any pair; give this or ``setup``.
+        With ``pixels1`` and ``pixels2``. [px]
+    pair : Pair
     pair_path : path, optional
         Where the pair file lies; named in the workbook.
     sigma_px : float, optional
@@ -91,34 +85,23 @@ def write_survey(
     Raises
     ------
     InputError
-        If neither or both of pair and set-up are given, or the file cannot be written.
+        If the file cannot be written.
 
     Notes
     -----
-    With a pair, the raw pixels ``col1 row1 col2 row2`` are the inputs; ``x1 y1 x2 y2`` are live
+    The raw pixels ``col1 row1 col2 row2`` are the inputs; ``x1 y1 x2 y2`` are live
     formulas: the homographies in `Setup` carry them to the plane, in millimetres of the image
     scale about the zoom centre. `bifocal solve` gives the same from the workbook as from the pair.
     """
-    if (setup is None) == (pair is None):
-        raise InputError("write_survey: give a pair or a set-up, one of them.")
     path = check_book_path(path)
     check_writable(path, overwrite=overwrite)
-    measured, limits = points, FlagLimits()
-    if setup is not None:
-        pair, measured, limits = setup.pair(), setup.in_millimetres(points), setup.limits
-    assert pair is not None
     content = SurveyContent(
         language=language,
-        setup=setup,
         pair=pair,
-        as_given=setup is not None,
-        limits=limits,
         pair_file=relative_name(pair_path, path.parent) if pair_path is not None else "",
         sigma_px=sigma_px,
         points=points,
-        table=solve_points(
-            pair, measured, sigma_px=sigma_px, limits=limits, as_given=setup is not None
-        ),
+        table=solve_points(pair, points, sigma_px=sigma_px),
         log=[log_row(what, pair_path)],
     )
     write_book(path, content, overwrite=overwrite)
@@ -136,14 +119,6 @@ def check_book_path(path: Path | str) -> Path:
     if path.suffix.lower() != ".xlsx":
         raise InputError(f"{path}: a new workbook must end in .xlsx.")
     return path
-
-
-def relative_name(path: Path | str, folder: Path) -> str:
-    """Return a file's name as seen from a folder."""
-    try:
-        return Path(os.path.relpath(Path(path).resolve(), folder.resolve())).as_posix()
-    except ValueError:  # another drive
-        return Path(path).as_posix()
 
 
 def log_row(what: str, file: Path | str | None) -> LogRow:

@@ -94,9 +94,7 @@ class Verdict:
     holds: bool
 
 
-def judge(
-    accuracy: float, rules: tuple[ToleranceRule, ...] = RULES, scales: tuple[int, ...] = SCALES
-) -> tuple[Verdict, ...]:
+def judge(accuracy: float, rules: tuple[ToleranceRule, ...] = RULES) -> tuple[Verdict, ...]:
     """Return the verdict on an accuracy [m] for every rule and scale.
 
     Examples
@@ -107,7 +105,7 @@ def judge(
     return tuple(
         Verdict(rule=rule, scale=scale, tolerance=limit, holds=accuracy <= limit)
         for rule in rules
-        for scale in scales
+        for scale in SCALES
         if (limit := rule.tolerance(scale)) is not None
     )
 

@@ -18,7 +18,6 @@ from multimedia.adjustment.bundle_equations import (
 )
 from multimedia.adjustment.unknowns import Adjustment, Unknowns
 from multimedia.media.camera import EXTERIOR, Camera
-from multimedia.media.flat_interface import FlatInterface
 from multimedia.orientation.intersection import intersect
 from multimedia.projects.model import ObjectPoints, Project
 from photocore.adjustment import Fit, huber_weights
@@ -93,7 +92,6 @@ def prepare(project: Project, unknowns: Unknowns) -> tuple[Bundle, tuple[str, ..
     plate_of = np.full(len(ids), -1, dtype=np.int64)
     keep = [k for k, name in enumerate(control.ids) if name in place]
     given = [place[control.ids[k]] for k in keep]
-    assert control.sigma is not None
     points[given], sigma[given] = control.xyz[keep], control.sigma[keep]
     for plate, name in enumerate(unknowns.plates):
         on = [place[i] for i, g in zip(control.ids, control.groups, strict=True) if g == name]
@@ -171,7 +169,6 @@ def _observations(project: Project, rows: list[int], place: dict[str, int]) -> I
     images = project.image_points
     line = {name: k for k, name in enumerate(project.camera_names)}
     camera = np.array([line[images.cameras[row]] for row in rows])
-    assert images.sigma is not None
     sigma = images.sigma[rows]
     return ImageObservations(
         source=np.array(rows),
@@ -245,7 +242,7 @@ def _adjustment(
     unit = float(np.sqrt(np.mean(seen.sigma**2)))
     own = slice(0, weights.size)
     misses = result.residuals[own].reshape(-1, 2)
-    shares = result.redundancy_numbers[own].reshape(-1, 2)
+    shares = result.linear.redundancy_numbers[own].reshape(-1, 2)
     # The image rows, back in the order of the project's own table.
     rows, count = seen.source, len(project.image_points.ids)
     residuals, normed, numbers, weight = (np.full((count, 2), np.nan) for _ in range(4))
@@ -262,7 +259,7 @@ def _adjustment(
     return Adjustment(
         project=replace(project, cameras=state.cameras, media=state.media, object_points=points),
         names=bundle.columns.labels, values=values,
-        covariance=change @ result.cofactor @ change.T * result.sigma0**2,
+        covariance=change @ result.linear.cofactor @ change.T * result.sigma0**2,
         point_covariance=covariance, residuals=residuals, standardised=normed,
         redundancy_numbers=numbers, weights=weight, sigma0=result.sigma0 * unit,
         redundancy=result.redundancy, iterations=result.iterations, sigma0_of=sigma0_of,
@@ -272,8 +269,8 @@ def _adjustment(
 
 def _points(bundle: Bundle, result: Fit[BundleState]) -> tuple[ObjectPoints, FloatArray]:
     """Return the adjusted object points and their covariances."""
-    place, cofactor, state = bundle.columns, result.cofactor, result.state
-    covariance = result.block_cofactor.copy()
+    place, cofactor, state = bundle.columns, result.linear.cofactor, result.state
+    covariance = result.linear.block_cofactor.copy()
     for j in np.flatnonzero((place.points >= 0).any(axis=1)):
         axes = np.flatnonzero(place.points[j] >= 0)
         columns = place.points[j][axes]
@@ -312,7 +309,6 @@ def _values(bundle: Bundle, state: BundleState) -> tuple[FloatArray, FloatArray]
             change[np.ix_(turns, turns)] = _rates(camera)
     for who, at in place.media.items():
         interface = state.media[who]
-        assert isinstance(interface, FlatInterface)
         for name, column in at.items():
             if name.startswith(("index", "thickness")):
                 values[column] = interface.value(name)

@@ -9,7 +9,6 @@ import numpy as np
 
 from multimedia.adjustment.unknowns import Unknowns
 from multimedia.media.camera import EXTERIOR
-from multimedia.media.flat_interface import FlatInterface
 from multimedia.projects.model import Project
 from photocore.arrays import BoolArray, IntArray
 from photocore.errors import InputError
@@ -112,12 +111,11 @@ def _media_columns(
         for owner in [who] if who else used:
             if owner not in project.media:
                 raise InputError(f"media: there are no media {owner!r}, only {', '.join(used)}.")
-            interface = project.media[owner]
-            if not isinstance(interface, FlatInterface):
+            allowed = project.media[owner].parameter_names
+            if not allowed:
                 raise InputError(
                     f"media: {owner} is ray-traced; only plane-parallel media can be estimated."
                 )
-            allowed = interface.parameter_names
             if parameter not in allowed:
                 raise InputError(
                     f"media: {owner} has no {parameter!r}; its parameters are {', '.join(allowed)}."
@@ -138,9 +136,7 @@ def with_common_values(project: Project, wanted: Sequence[str]) -> Project:
         flat = {
             name: interface
             for name, interface in media.items()
-            if name in project.media_of
-            and isinstance(interface, FlatInterface)
-            and item in interface.parameter_names
+            if name in project.media_of and item in interface.parameter_names
         }
         values = [interface.value(item) for interface in flat.values()]
         if len(set(values)) > 1:

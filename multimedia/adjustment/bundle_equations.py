@@ -249,9 +249,7 @@ class Bundle:
                 for camera, at in zip(state.cameras, place.cameras, strict=True)
             )
             for name, at in place.media.items():
-                interface = media[name]
-                assert isinstance(interface, FlatInterface)
-                media[name] = interface.stepped(list(at), own[list(at.values())])
+                media[name] = media[name].stepped(list(at), own[list(at.values())])
         except (InputError, GeometryError):
             return None
         points = state.points.copy()

@@ -10,11 +10,10 @@ import numpy as np
 from multimedia.adjustment.bundle import bundle_adjust
 from multimedia.adjustment.report import write_adjustment_report
 from multimedia.adjustment.unknowns import Adjustment, ScaleBar, Unknowns
-from multimedia.media.flat_interface import FlatInterface
 from multimedia.projects.project_file import read_project, write_project
 from multimedia.refraction.water import salinity_from_index, water_index_derivatives
 from photocore.errors import InputError
-from photocore.output import check_writable
+from photocore.output import check_all_writable
 
 
 def adjust_project(
@@ -34,9 +33,7 @@ def adjust_project(
     """
     if out is not None and report is not None and out.resolve() == report.resolve():
         raise InputError(f"{out}: is named for the project and for the report; name two files.")
-    for path in (out, report):
-        if path is not None:
-            check_writable(path, overwrite=overwrite)
+    check_all_writable(out, report, overwrite=overwrite)
     project = read_project(source)
     result = bundle_adjust(project, unknowns)
     if out is not None:
@@ -91,14 +88,9 @@ def salinity_of(
 
     None if the last medium's index was not estimated.
     """
-    used = [name for name in result.project.media_of if name]
-    if not used:
-        return None
-    interface = result.project.media[used[0]]
-    if not isinstance(interface, FlatInterface):
-        return None
-    last = len(interface.layers.indices)
-    names = [name for name in result.names if name.rpartition(":")[2] == f"index{last}"]
+    media = [interface for interface in result.project.interfaces if interface is not None]
+    last = media[0].parameter_names[-1:] if media else ()
+    names = [name for name in result.names if name.rpartition(":")[2] in last]
     if not names:
         return None
     salinity = float(

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from enum import IntEnum
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -13,25 +12,20 @@ from multimedia.media.surfaces import Plane
 from multimedia.refraction.layers import checked_index
 from photocore.arrays import FloatArray, IntArray, as_floats
 from photocore.errors import GeometryError, InputError
+from photocore.labelled import LabelledCode
 
 #: A water surface: flat or tilted, a raster, a mesh or waves.
 WaterSurface = Plane | HeightField
 
 
-class BathymetryStatus(IntEnum):
+class BathymetryStatus(LabelledCode):
     """How a point was treated; written to tables by its label."""
 
-    DRY = 0
-    NADIR = 1
-    RAYS = 2
-    NO_SURFACE = 3
-    FAILED = 4
-
-    @property
-    def label(self) -> str:
-        """The treatment in words."""
-        is_outside = self is BathymetryStatus.NO_SURFACE
-        return "outside the water surface" if is_outside else self.name.lower()
+    DRY = 0, "dry"
+    NADIR = 1, "nadir"
+    RAYS = 2, "rays"
+    NO_SURFACE = 3, "outside the water surface"
+    FAILED = 4, "failed"
 
 
 def status_labels(status: IntArray) -> list[str]:

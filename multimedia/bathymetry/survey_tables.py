@@ -103,19 +103,15 @@ def read_rays(path: Path | str) -> RayTable:
     if not len(table):
         raise InputError(f"{path}: holds no rays.")
     rays = _numbers(table, ("X0", "Y0", "Z0", "DX", "DY", "DZ"))
-    ids, point, counts = np.unique(table.texts("id"), return_inverse=True, return_counts=True)
-    # Points in the order of their first ray, rays in the order of the file.
-    first = np.full(len(ids), len(point))
-    np.minimum.at(first, point, np.arange(len(point)))
-    rank = np.empty(len(ids), dtype=np.int64)
-    rank[np.argsort(first)] = np.arange(len(ids))
+    number = {name: k for k, name in enumerate(dict.fromkeys(table.texts("id")))}
+    point = np.array([number[name] for name in table.texts("id")])
+    counts = np.bincount(point)
     order = np.argsort(point, kind="stable")
     slot = np.empty(len(point), dtype=np.int64)
     slot[order] = np.arange(len(point)) - np.repeat(np.cumsum(counts) - counts, counts)
-    grid = np.full((len(ids), int(counts.max()), 6), np.nan)
-    grid[rank[point], slot] = rays
-    names = tuple(str(name) for name in ids[np.argsort(rank)])
-    return RayTable(ids=names, origins=grid[..., :3], directions=grid[..., 3:])
+    grid = np.full((len(number), int(counts.max()), 6), np.nan)
+    grid[point, slot] = rays
+    return RayTable(ids=tuple(number), origins=grid[..., :3], directions=grid[..., 3:])
 
 
 def read_trajectory(path: Path | str) -> tuple[FloatArray, FloatArray]:

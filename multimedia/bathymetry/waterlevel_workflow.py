@@ -12,7 +12,7 @@ from multimedia.bathymetry.water_surfaces import FORMAT
 from photocore.cloud import open_cloud
 from photocore.errors import InputError
 from photocore.jsonfile import write_object
-from photocore.output import check_writable
+from photocore.output import check_all_writable
 
 #: A level whose standard deviation exceeds this is no level of a lab or a river: millimetres? [m]
 COARSEST = 1.0
@@ -57,10 +57,9 @@ def fit_water_level(
     InputError, GeometryError
         If the file cannot be read or shows no water surface.
     """
-    if target is not None:
-        check_writable(target, overwrite=overwrite)
-        if target.suffix.lower() != ".json":
-            raise InputError(f"{target}: a water level is written as .json.")
+    check_all_writable(target, overwrite=overwrite)
+    if target is not None and target.suffix.lower() != ".json":
+        raise InputError(f"{target}: a water level is written as .json.")
     cloud = open_cloud(source)
     points = np.concatenate([piece.xyz for piece in cloud.pieces()])
     fitted = FittedLevel(

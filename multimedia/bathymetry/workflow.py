@@ -251,7 +251,8 @@ def _correct_dem(job: Job, progress: Progress) -> Outcome:
         if "REFRACTION_INDEX" in dem.tags:
             raise InputError(f"{job.source}: has been corrected for refraction already.")
         surface = read_water_surface(job.water_level, crs=dem.crs)
-        if not dem.has_position and (job.cameras is not None or _varies(surface)):
+        is_level = isinstance(surface, Plane) and abs(surface.normal[2]) == 1.0
+        if not dem.has_position and (job.cameras is not None or not is_level):
             raise InputError(
                 f"{job.source}: has no position (no geotransform), so its cells cannot be related "
                 "to cameras or to a water surface; georeference it first."
@@ -372,8 +373,3 @@ def _correct_rays(job: Job) -> Outcome:
     }
     write_csv(job.target, columns, overwrite=job.overwrite)
     return outcome
-
-
-def _varies(surface: WaterSurface) -> bool:
-    """Return whether the water is anything but level."""
-    return not (isinstance(surface, Plane) and abs(surface.normal[2]) == 1.0)

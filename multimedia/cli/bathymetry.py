@@ -9,7 +9,7 @@ from typing import Any
 import click
 
 from photocore.cli import print_result, progress_bar
-from photocore.options import FILE, NOT_NEGATIVE, Number, as_json, number, overwrite
+from photocore.options import FILE, Number, as_json, number, overwrite, sigma
 
 EXAMPLE = """\b
 Examples:
@@ -55,17 +55,12 @@ Examples:
     "--max-angle", type=Number(above=0, most=89.9, to=radians), metavar="DEG",
     help="A camera sees only points within this angle from its vertical [deg]. [default: any]",
 )  # fmt: skip
-@number(
-    "--sigma-index", "N", "Standard deviation of the index [-].", type=NOT_NEGATIVE, default=0.0
-)
-@number(
-    "--sigma-level", "M", "Standard deviation of the water level [m].",
-    type=NOT_NEGATIVE, default=0.0,
-)  # fmt: skip
-@number(
+@sigma("--sigma-index", "N", "Standard deviation of the index [-].")
+@sigma("--sigma-level", "M", "Standard deviation of the water level [m].")
+@sigma(
     "--sigma-point", "M",
     "Standard deviation of the coordinates in IN [m]. Any sigma adds sigma columns or a "
-    "second band.", type=NOT_NEGATIVE, default=0.0,
+    "second band.",
 )  # fmt: skip
 @click.option("--beams", is_flag=True, help="IN holds lidar echoes with columns X0, Y0, Z0. [off]")
 @click.option(

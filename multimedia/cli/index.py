@@ -5,7 +5,7 @@ from __future__ import annotations
 import click
 
 from photocore.cli import print_result, remark
-from photocore.options import NOT_NEGATIVE, NUMBER, as_json, number
+from photocore.options import NUMBER, as_json, number, sigma
 
 EXAMPLE = """\b
 Examples:
@@ -14,6 +14,13 @@ Examples:
   multimedia index --temperature 20 --sigma-temperature 0.5 --salinity 3.5 --sigma-salinity 0.1
   multimedia index --from-index 1.3412 --sigma-index 0.00015 --find salinity --temperature 20
 """
+
+#: Arguments of the formulas that the options set.
+_KEYS = {
+    "wavelength": "wavelength_nm",
+    "temperature": "temperature_c",
+    "salinity": "salinity_percent",
+}
 
 
 @click.command(epilog=EXAMPLE)
@@ -28,32 +35,19 @@ Examples:
     "--formula", type=click.Choice(["hoehle", "quan-fry", "parrish"]), default="hoehle",
     show_default=True, help="Published formula; hoehle is that of the multimedia papers.",
 )  # fmt: skip
-@number(
-    "--sigma-wavelength", "NM", "Standard deviation of the wavelength [nm].",
-    type=NOT_NEGATIVE, default=0.0,
-)  # fmt: skip
-@number(
-    "--sigma-temperature", "C", "Standard deviation of the temperature [°C].",
-    type=NOT_NEGATIVE, default=0.0,
-)  # fmt: skip
-@number(
-    "--sigma-salinity", "PERCENT", "Standard deviation of the salinity [%].",
-    type=NOT_NEGATIVE, default=0.0,
-)  # fmt: skip
+@sigma("--sigma-wavelength", "NM", "Standard deviation of the wavelength [nm].")
+@sigma("--sigma-temperature", "C", "Standard deviation of the temperature [°C].")
+@sigma("--sigma-salinity", "PERCENT", "Standard deviation of the salinity [%].")
 @number("--from-index", "N", "A measured refractive index: the inverse; needs --find.")
-@number(
-    "--sigma-index", "N", "Standard deviation of the measured index.",
-    type=NOT_NEGATIVE, default=0.0,
-)  # fmt: skip
+@sigma("--sigma-index", "N", "Standard deviation of the measured index.")
 @click.option(
     "--find", type=click.Choice(["salinity", "temperature"]),
     help="What to find from --from-index; the others are given.",
 )  # fmt: skip
 @as_json
 def command(
-    wavelength: float, temperature: float, salinity: float, depth: float, formula: str,
-    sigma_wavelength: float, sigma_temperature: float, sigma_salinity: float,
-    from_index: float | None, sigma_index: float, find: str | None, as_json: bool,
+    depth: float, formula: str, from_index: float | None, sigma_index: float, find: str | None,
+    as_json: bool, **given: float,
 ) -> None:  # fmt: skip
     """Print the refractive index of water; or, the other way round, salinity or temperature.
 
@@ -63,12 +57,12 @@ def command(
         raise click.UsageError("--from-index and --find belong together.")
     from multimedia.workbook.index_workflow import find_from_index, find_index
 
-    water = (wavelength, temperature, salinity, depth, formula)
-    sigmas = (sigma_wavelength, sigma_temperature, sigma_salinity)
+    water = {key: given[name] for name, key in _KEYS.items()} | {"depth": depth}
+    sigmas = {f"sigma_{key}": given[f"sigma_{name}"] for name, key in _KEYS.items()}
     if find is None or from_index is None:
-        result = find_index(*water, sigmas=sigmas)
+        result = find_index(water, formula, sigmas=sigmas)
     else:
-        result = find_from_index(find, from_index, sigma_index, *water, sigmas=sigmas)
+        result = find_from_index(find, from_index, sigma_index, water, formula, sigmas=sigmas)
     print_result(result.as_dict(), [result.text], as_json=as_json)
     if not as_json:
         remark(f"{result.label}, formula {result.formula.name}: {result.formula.citation}")

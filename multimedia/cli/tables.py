@@ -15,14 +15,7 @@ if TYPE_CHECKING:
 _SHOWN = 10
 
 
-def show(
-    table: PointTable,
-    *,
-    as_json: bool,
-    out: Path | None,
-    digits: Mapping[str, int],
-    key: str = "points",
-) -> None:
+def show(table: PointTable, *, as_json: bool, out: Path | None, digits: Mapping[str, int]) -> None:
     """Print a table: as JSON, or as text with the given number of decimals."""
     records = table.records()
     shown = records if out is None else records[:_SHOWN]
@@ -30,7 +23,7 @@ def show(
     lines = [text_table(tuple(table.columns), rows)]
     if len(shown) < len(records):
         lines.append(f"... and {len(records) - len(shown)} more")
-    data = {key: records, "summary": list(table.summary)}
+    data = {"points": records, "summary": list(table.summary)}
     notes = (f"Note: {line}" for line in table.remarks)
     print_result(data, [*lines, *table.summary], as_json=as_json, remarks=notes)
     if out is not None:

@@ -102,8 +102,7 @@ def lavest(
     (26.8, [0.0, -0.002, -1.421])
     """
     factor = layers.indices[-1] / layers.indices[0]
-    constant = positive(principal_distance, "principal_distance", unit="mm") * factor
-    return _judged(radius, z0, zp, layers, principal_distance, constant, ())
+    return _judged(_seen(radius, z0, zp, layers, principal_distance), principal_distance * factor)
 
 
 def agrafiotis(
@@ -153,8 +152,7 @@ def agrafiotis(
     share = [mean / sum(means) for mean in means]
     indices = layers.indices
     factor = sum(s * n for s, n in zip(share, indices, strict=True)) / indices[0]
-    constant = positive(principal_distance, "principal_distance", unit="mm") * factor
-    return _judged(radius, z0, zp, layers, principal_distance, constant, ())
+    return _judged(_seen(radius, z0, zp, layers, principal_distance), principal_distance * factor)
 
 
 def telem(
@@ -207,52 +205,50 @@ def telem(
     """
     if not 0 <= terms <= 5:
         raise InputError(f"terms: 0 to 5 radial coefficients, found {terms}.")
-    constant = positive(principal_distance, "principal_distance", unit="mm")
-    true, tangent = _image_and_tangent(radius, z0, zp, layers, constant)
-    seen = tangent > 0
-    if np.count_nonzero(seen) <= terms:
+    seen = _seen(radius, z0, zp, layers, principal_distance)
+    aside = seen.tangent > 0
+    if np.count_nonzero(aside) <= terms:
         raise InputError(
-            f"radius: {np.count_nonzero(seen)} points off the axis cannot determine a camera "
+            f"radius: {np.count_nonzero(aside)} points off the axis cannot determine a camera "
             f"constant and {terms} coefficients."
         )
     # r' = c_w T (1 + k1 (c_w T)² + ...) is linear in c_w, c_w³ k1, ...; T scaled against rounding.
-    largest = float(tangent.max())
-    scaled = (tangent[seen] / largest).ravel()
+    largest = float(seen.tangent.max())
+    scaled = (seen.tangent[aside] / largest).ravel()
     design = np.stack([scaled ** (2 * i + 1) for i in range(terms + 1)], axis=-1)
-    solution = np.linalg.lstsq(design, true[seen].ravel(), rcond=None)[0]
+    solution = np.linalg.lstsq(design, seen.image[aside].ravel(), rcond=None)[0]
     absorbed = float(solution[0]) / largest
     distortion = tuple(
         float(value) / largest ** (2 * i + 1) / absorbed ** (2 * i + 1)
         for i, value in enumerate(solution[1:], start=1)
     )
-    return _judged(radius, z0, zp, layers, constant, absorbed, distortion)
+    return _judged(seen, absorbed, distortion)
 
 
-def _image_and_tangent(
-    radius: ArrayLike, z0: float, zp: ArrayLike, layers: Layers, constant: float
-) -> tuple[FloatArray, FloatArray]:
-    """Return the true radial image distance and R over the whole distance."""
-    r = as_floats(radius, "radius")
-    tangent = np.asarray(r / (z0 + layers.thickness + as_floats(zp, "zp")))
+class _Seen(NamedTuple):
+    """True radial image distances [mm], the whole distance, and R over that distance."""
+
+    image: FloatArray
+    whole: FloatArray
+    tangent: FloatArray
+
+
+def _seen(
+    radius: ArrayLike, z0: float, zp: ArrayLike, layers: Layers, principal_distance: float
+) -> _Seen:
+    """Return where the camera truly sees the points."""
+    constant = positive(principal_distance, "principal_distance", unit="mm")
+    r, whole = as_floats(radius, "radius"), z0 + layers.thickness + as_floats(zp, "zp")
+    tangent = np.asarray(r / whole)
     ratio = radial_shift_ratio(r, z0=z0, zp=zp, layers=layers)
-    return np.asarray(constant * tangent * ratio), tangent
+    return _Seen(np.asarray(constant * tangent * ratio), np.asarray(whole), tangent)
 
 
-def _judged(
-    radius: ArrayLike,
-    z0: float,
-    zp: ArrayLike,
-    layers: Layers,
-    constant: float,
-    absorbed: float,
-    distortion: tuple[float, ...],
-) -> Approximation:
+def _judged(seen: _Seen, absorbed: float, distortion: tuple[float, ...] = ()) -> Approximation:
     """Return a model with its errors."""
-    true, tangent = _image_and_tangent(radius, z0, zp, layers, constant)
-    plain = absorbed * tangent
+    plain = absorbed * seen.tangent
     predicted = plain * (1 + sum(k * plain ** (2 * i) for i, k in enumerate(distortion, start=1)))
-    error = np.asarray(predicted - true)
-    whole = z0 + layers.thickness + as_floats(zp, "zp")
+    error = np.asarray(predicted - seen.image)
     # An image error seen as a displacement of the point: the scale there is true image / R.
-    at_object = np.asarray(error * whole / absorbed)
+    at_object = np.asarray(error * seen.whole / absorbed)
     return Approximation(absorbed, distortion, error, at_object, float(np.sqrt(np.mean(error**2))))

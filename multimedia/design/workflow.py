@@ -27,7 +27,7 @@ from multimedia.projects.project_file import read_project
 from multimedia.refraction.layers import Layers
 from photocore.arrays import FloatArray
 from photocore.errors import GeometryError, InputError
-from photocore.output import check_writable
+from photocore.output import check_all_writable
 
 #: A millimetre in the units that projects use.
 MILLIMETRE = {"m": 1e-3, "cm": 0.1, "mm": 1.0}
@@ -173,9 +173,7 @@ def _by_depth(study: Study) -> FloatArray:
 
 def write_design(design: Design, *, out: Path | None, plot: Path | None, overwrite: bool) -> None:
     """Write the workbook and the picture where asked."""
-    for path in (out, plot):
-        if path is not None:
-            check_writable(path, overwrite=overwrite)
+    check_all_writable(out, plot, overwrite=overwrite)
     if out is not None:
         write_design_workbook(out, design, overwrite=overwrite)
     if plot is not None:

@@ -230,21 +230,17 @@ class Camera:
 
     def value(self, name: str) -> float:
         """Return the parameter of `EXTERIOR` or `INTERIOR` called ``name``."""
-        if name in EXTERIOR:
-            index = EXTERIOR.index(name)
-            return float(self.centre[index]) if index < 3 else self.angles[index - 3]
-        if name == "c":
-            return self.principal_distance
-        if name in ("xh", "yh"):
-            return float(self.principal_point["xy".index(name[0])])
-        return float(getattr(self.distortion, name))
+        if name in DISTORTION:
+            return float(getattr(self.distortion, name))
+        values = (*self.centre, *self.angles, self.principal_distance, *self.principal_point)
+        return float(values[(EXTERIOR + INTERIOR).index(name)])
 
     def stepped(self, names: Sequence[str], step: ArrayLike) -> Camera:
         """Return the camera after adding ``step`` to the named parameters.
 
         ``omega``, ``phi``, ``kappa`` here are the three components of a small rotation vector in
         the world frame if all three are named (the camera turns by it; no gimbal lock), so that a
-        solver may use `multimedia.solvers.jacobian`'s derivatives as they are. See
+        solver may use the derivatives of `project_with_jacobian` as they are. See
         `angle_rates` for the way back to angles.
 
         Raises

@@ -90,11 +90,8 @@ class FlatInterface(OpticalMedia):
 
     def value(self, name: str) -> float:
         """Return a parameter; offset and tilts count from where the interface is."""
-        if name in ("offset", "tilt1", "tilt2"):
-            return 0.0
-        kind, number = name[:-1], int(name[-1]) - 1
-        source = self.layers.indices if kind == "index" else self.layers.thicknesses
-        return float(source[number])
+        values = (0.0, 0.0, 0.0, *self.layers.thicknesses, *self.layers.indices)
+        return values[self.parameter_names.index(name)]
 
     def stepped(self, names: Sequence[str], step: ArrayLike) -> Self:
         """Return the interface after adding ``step`` to the named parameters.
@@ -110,24 +107,14 @@ class FlatInterface(OpticalMedia):
             raise InputError(
                 f"interface parameter {unknown[0]}: not one of {', '.join(self.parameter_names)}."
             )
-        tilt = np.array([change.get("tilt1", 0.0), change.get("tilt2", 0.0)]) @ self.tangents
-        layers = self.layers
-        if any(name[:5] in ("index", "thick") for name in change):
-            layers = replace(
-                layers,
-                indices=tuple(
-                    n + change.get(f"index{k}", 0.0) for k, n in enumerate(layers.indices, 1)
-                ),
-                thicknesses=tuple(
-                    t + change.get(f"thickness{k}", 0.0)
-                    for k, t in enumerate(layers.thicknesses, 1)
-                ),
-            )
+        moved = {name: self.value(name) + change.get(name, 0.0) for name in self.parameter_names}
+        offset, tilt1, tilt2, *materials = moved.values()
+        thin = len(self.layers.thicknesses)
         return replace(
             self,
-            layers=layers,
-            point=self.point + change.get("offset", 0.0) * self.normal,
-            normal=rotation_from_vector(tilt) @ self.normal,
+            layers=Layers(indices=tuple(materials[thin:]), thicknesses=tuple(materials[:thin])),
+            point=self.point + offset * self.normal,
+            normal=rotation_from_vector([tilt1, tilt2] @ self.tangents) @ self.normal,
         )
 
     def medium(self, camera: Camera) -> Medium:

@@ -142,12 +142,9 @@ class Interfaces(SurfaceSequence, OpticalMedia):
         """Return `apparent_vectors`, and the label of the ray's `RayStatus` where there is none."""
         fixed = self.seen_from(camera.centre, camera.rotation)
         paths = aim_rays(camera.centre, points, fixed)
-        reasons = np.full(len(points), "", dtype=object)
-        for code in RayStatus:
-            if code != RayStatus.OK:
-                reasons[paths.status == code] = code.label
+        labels = np.array(["", *(code.label for code in RayStatus if code)], dtype=object)
         distance = np.linalg.norm(points - camera.centre, axis=-1, keepdims=True)
-        return distance * (paths.directions[:, 0] @ camera.rotation), reasons
+        return distance * (paths.directions[:, 0] @ camera.rotation), labels[paths.status]
 
     def object_rays(self, camera: Camera, directions: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Trace directions of the camera frame into the last medium."""

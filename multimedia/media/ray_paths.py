@@ -3,33 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from enum import IntEnum
 
 from photocore.arrays import FloatArray, IntArray
+from photocore.labelled import LabelledCode
 
 
-class RayStatus(IntEnum):
+class RayStatus(LabelledCode):
     """Why a ray has no path; written to tables by its label."""
 
-    OK = 0
-    MISSED = 1
-    TOTAL_REFLECTION = 2
-    WRONG_SIDE = 3
-    NOT_CONVERGED = 4
-
-    @property
-    def label(self) -> str:
-        """The reason in words."""
-        return _LABELS[self]
-
-
-_LABELS = {
-    RayStatus.OK: "ok",
-    RayStatus.MISSED: "misses an interface",
-    RayStatus.TOTAL_REFLECTION: "total reflection",
-    RayStatus.WRONG_SIDE: "point and camera not on the sides the interfaces demand",
-    RayStatus.NOT_CONVERGED: "not converged",
-}
+    OK = 0, "ok"
+    MISSED = 1, "misses an interface"
+    TOTAL_REFLECTION = 2, "total reflection"
+    WRONG_SIDE = 3, "point and camera not on the sides the interfaces demand"
+    NOT_CONVERGED = 4, "not converged"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -138,12 +138,7 @@ class Plane(RigidSurface):
         """Return the one normal for every point."""
         return np.broadcast_to(self.normal, points.shape)
 
-    def turn(
-        self,
-        points: FloatArray,  # noqa: ARG002
-        normals: FloatArray,  # noqa: ARG002
-        steps: FloatArray,
-    ) -> FloatArray:
+    def turn(self, points: FloatArray, normals: FloatArray, steps: FloatArray) -> FloatArray:  # noqa: ARG002
         """Return zero: the normal of a plane never turns."""
         return np.zeros_like(steps)
 
@@ -180,12 +175,7 @@ class _RoundSurface(RigidSurface):
         """Return the outward radii."""
         return self._offset(points) / self.radius
 
-    def turn(
-        self,
-        points: FloatArray,  # noqa: ARG002
-        normals: FloatArray,  # noqa: ARG002
-        steps: FloatArray,
-    ) -> FloatArray:
+    def turn(self, points: FloatArray, normals: FloatArray, steps: FloatArray) -> FloatArray:  # noqa: ARG002
         """Return the radial part of the steps, over the radius."""
         return self._radial(steps) / self.radius
 

@@ -299,7 +299,8 @@ def _cameras(
             media_of.append("")
             continue
         wall = glass_interface(glass, indices, control.thickness)
-        same = [k for k, other in media.items() if _same(wall, other)]
+        place = [wall.point, wall.normal]
+        same = [k for k, other in media.items() if np.allclose(place, [other.point, other.normal])]
         if not same:
             same = [f"wall{len(media) + 1}"]
             media[same[0]] = wall
@@ -311,10 +312,6 @@ def _cameras(
                 "inside or behind it. Turn the glass vector or check the units."
             )
     return cameras, media, tuple(media_of), remarks
-
-
-def _same(one: FlatInterface, other: FlatInterface) -> bool:
-    return bool(np.allclose(one.point, other.point) and np.allclose(one.normal, other.normal))
 
 
 def _body(roots: Sequence[Path]) -> tuple[ObjectPoints, str]:

@@ -14,11 +14,12 @@ from multimedia.refraction.layers import Layers
 from photocore.arrays import FloatArray, IntArray
 from photocore.distortion import Brown, Convention
 from photocore.errors import LARGEST, GeometryError, InputError
-from photocore.output import check_regular
 from photocore.rotation import nearest_rotation, world_from_camera
+from photocore.textfile import read_text
 
 #: A printed matrix has 7 decimals; angles and matrix of one camera differ by a few of the last.
 MATRIX_ROUNDING = 1e-5
+_KIND = "file of OpenPTV"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -64,9 +65,7 @@ def read_control(path: Path) -> ControlParameters:
     InputError
         If a line is missing or not what it should be; the message names the line.
     """
-    lines = [line.strip() for line in _text(path).splitlines()]
-    while lines and not lines[-1]:
-        lines.pop()
+    lines = [line.strip() for line in read_text(path, _KIND).rstrip().splitlines()]
     count = int(_number(path, lines, 0, "number of cameras"))
     if not 1 <= count <= 64:
         raise InputError(f"{path}, line 1: {count} cameras; expected 1 to 64.")
@@ -160,7 +159,7 @@ def read_targets(path: Path, *, field: int = 0) -> DetectedTargets:
     InputError
         If the count in the first line does not fit the lines that follow.
     """
-    first, *rest = _text(path).split() or [""]
+    first, *rest = read_text(path, _KIND).split() or [""]
     count = _number(path, [first], 0, "number of targets")
     if len(rest) != 8 * count:
         raise InputError(
@@ -188,7 +187,7 @@ def read_body(path: Path) -> tuple[list[str], FloatArray]:
         If a line has other than four numbers; the message names it.
     """
     ids, points = [], []
-    for number, line in enumerate(_text(path).splitlines(), start=1):
+    for number, line in enumerate(read_text(path, _KIND).splitlines(), start=1):
         fields = line.replace(",", " ").split()
         if not fields or fields[0].startswith("#"):
             continue
@@ -218,8 +217,8 @@ def read_manual(points: Path, pixels: Path) -> tuple[list[str], FloatArray]:
     InputError
         If the two files do not belong together.
     """
-    ids = _text(points).split()
-    values = _floats(pixels, _text(pixels).split(), "man_ori")
+    ids = read_text(points, _KIND).split()
+    values = _floats(pixels, read_text(pixels, _KIND).split(), "man_ori")
     if values.size != 2 * len(ids):
         raise InputError(
             f"{pixels}: holds {values.size} numbers for the {len(ids)} points of {points.name}; "
@@ -238,7 +237,9 @@ def read_correspondences(path: Path) -> tuple[FloatArray, IntArray]:
     InputError
         If the count in the first line does not fit the lines that follow.
     """
-    first, *rows = [line.split() for line in _text(path).splitlines() if line.strip()] or [[""]]
+    first, *rows = [
+        line.split() for line in read_text(path, _KIND).splitlines() if line.strip()
+    ] or [[""]]
     count = int(_floats(path, first[:1], "number of particles")[0])
     widths = {len(row) for row in rows}
     if len(rows) != count or len(widths) > 1 or (widths and min(widths) < 6):
@@ -307,34 +308,16 @@ def _rotation(
     return nearest_rotation(matrix), (f"{path.name}: {odd}",)
 
 
-def _text(path: Path) -> str:
-    check_regular(path)
-    try:
-        return path.read_text(encoding="utf-8", errors="strict")
-    except FileNotFoundError:
-        raise InputError(f"{path}: no such file.") from None
-    except UnicodeDecodeError:
-        raise InputError(f"{path}: is not a text file.") from None
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read ({error.strerror}).") from None
-
-
 def _floats(path: Path, words: Sequence[str], what: str) -> FloatArray:
     """Return words as numbers; refuse the first that is none; {} in ``what`` is its place."""
-    try:
-        return np.array(words, dtype=np.float64)
-    except ValueError:
-        place, bad = next((k, w) for k, w in enumerate(words, 1) if not _is_number(w))
-        where = what.format(place)
-        raise InputError(f"{path}, {where}: expected a number, found {bad!r:.40}.") from None
-
-
-def _is_number(word: str) -> bool:
-    try:
-        float(word)
-    except ValueError:
-        return False
-    return True
+    values = np.empty(len(words))
+    for place, word in enumerate(words):
+        try:
+            values[place] = float(word)
+        except ValueError:
+            where = what.format(place + 1)
+            raise InputError(f"{path}, {where}: expected a number, found {word!r:.40}.") from None
+    return values
 
 
 def _number(path: Path, lines: list[str], index: int, what: str) -> float:
@@ -348,7 +331,7 @@ def _number(path: Path, lines: list[str], index: int, what: str) -> float:
 
 
 def _numbers(path: Path, least: int, what: str) -> FloatArray:
-    values = _floats(path, _text(path).split(), "value {}")
+    values = _floats(path, read_text(path, _KIND).split(), "value {}")
     if len(values) < least:
         raise InputError(f"{path}: {len(values)} numbers, expected at least {least}: {what}.")
     if not np.isfinite(values).all():

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -22,7 +21,7 @@ from multimedia.projects.model import ImagePoints, Project
 from multimedia.projects.project_file import read_project, write_project
 from photocore.arrays import FloatArray, IntArray
 from photocore.errors import PhotogrammetryError
-from photocore.output import check_writable
+from photocore.output import check_all_writable
 
 #: Fewer control points than this cannot be called matched.
 _FEWEST = 6
@@ -76,8 +75,7 @@ def import_openptv(
     radius : float
         Farthest a target may lie from where the stored orientation expects it. [px]
     """
-    if out is not None:
-        check_writable(out, overwrite=overwrite)
+    check_all_writable(out, overwrite=overwrite)
     # The stored orientation belongs to the indices as stored, whatever is thought of them.
     experiment = read_experiment(folder)
     project = experiment.project
@@ -138,7 +136,9 @@ def _control(
         )
     elif len(seen) < len(body.ids):
         missing = [body.ids[row] for row in np.flatnonzero(best < 0)]
-        remarks.append(f"{camera.name}: no target for control points {_listed(missing)}.")
+        more = f" and {len(missing) - 10} more" if len(missing) > 10 else ""
+        shown = ", ".join(missing[:10])
+        remarks.append(f"{camera.name}: no target for control points {shown}{more}.")
     image = camera.sensor.image_from_pixel(targets.pixels[best[seen]])
     return [body.ids[row] for row in seen], image, remarks
 
@@ -173,9 +173,3 @@ def _matched(
     control, medium = project.object_points.xyz, project.interface_of(k)
     partner = match_targets(camera, control, targets.pixels[large], medium, radius=radius)
     return np.where(partner >= 0, large[partner], -1) if len(large) else partner
-
-
-def _listed(names: Sequence[str], most: int = 10) -> str:
-    """Return names, the first few of many."""
-    more = f" and {len(names) - most} more" if len(names) > most else ""
-    return ", ".join(names[:most]) + more

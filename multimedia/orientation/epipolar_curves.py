@@ -191,12 +191,9 @@ def epipolar_candidates(
         _near(polygons[k : k + size], points[k : k + size], seen, tolerance, k)
         for k in range(0, len(polygons), size)
     ]
-    return Candidates(
-        curves=np.concatenate([part.curves for part in parts]),
-        targets=np.concatenate([part.targets for part in parts]),
-        distance=np.concatenate([part.distance for part in parts]),
-        points=np.concatenate([part.points for part in parts]),
-    )
+    names = ("curves", "targets", "distance", "points")
+    whole = {name: np.concatenate([getattr(part, name) for part in parts]) for name in names}
+    return Candidates(**whole)
 
 
 def _ends(

@@ -73,12 +73,8 @@ def draw_epipolar(
             label="candidates",
         )  # fmt: skip
         axes.legend(loc="upper right")
-    axes.set_xlim(-0.5, size[0] - 0.5)
-    axes.set_ylim(size[1] - 0.5, -0.5)
-    axes.set_aspect("equal")
-    axes.set_xlabel("column [px]")
-    axes.set_ylabel("row [px]")
-    axes.set_title(title)
+    axes.set(xlim=(-0.5, size[0] - 0.5), ylim=(size[1] - 0.5, -0.5), aspect="equal")
+    axes.set(xlabel="column [px]", ylabel="row [px]", title=title)
     with atomic_path(path, overwrite=overwrite) as temporary:
         figure.savefig(temporary, dpi=150)
 

@@ -18,7 +18,7 @@ from multimedia.projects.point_tables import write_columns
 from multimedia.projects.project_file import read_project
 from photocore.arrays import FloatArray
 from photocore.errors import InputError
-from photocore.output import check_writable
+from photocore.output import check_all_writable
 
 #: The depth range without --z-range: that of the object points, this share of it wider.
 _MARGIN = 0.25
@@ -83,9 +83,7 @@ def epipolar_project(
     out, picture : path, optional
         Table of vertices; picture of the curves over ``photo``.
     """
-    for file in (out, picture):
-        if file is not None:
-            check_writable(file, overwrite=overwrite)
+    check_all_writable(out, picture, overwrite=overwrite)
     project = read_project(path)
     one, two = project.camera_index(camera), project.camera_index(other)
     if one == two:
@@ -100,14 +98,12 @@ def epipolar_project(
     rows = project.image_points.of_camera(other)
     targets = project.image_points.image[rows]
     near = epipolar_candidates(polygons, targets, tolerance=tolerance)
-    curves = []
-    for name, vertex, point, count in zip(
-        names, polygons.image, polygons.points, polygons.counts, strict=True
-    ):
-        curves.append(
-            {"id": name, "image": vertex[:count], "points": point[:count]}
-            | _pixels(second, vertex[:count])
-        )
+    parts = zip(names, polygons.image, polygons.points, polygons.counts, strict=True)
+    curves = [
+        {"id": name, "image": vertex[:count], "points": point[:count]}
+        | _pixels(second, vertex[:count])
+        for name, vertex, point, count in parts
+    ]
     lost = [c["id"] for c in curves if not np.isfinite(c["image"]).all()]
     if lost:
         remarks.append(

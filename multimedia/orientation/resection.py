@@ -154,10 +154,11 @@ def resect(
     residuals, normed = np.full(shape, np.nan), np.full(shape, np.nan)
     residuals[used] = -result.residuals.reshape(-1, 2) * weights
     normed[used] = -result.standardised.reshape(-1, 2)
+    covariance = result.linear.cofactor * result.sigma0**2
     return Resection(
         camera=result.state,
         names=names,
-        covariance=_angle_covariance(result.state, names, result.cofactor * result.sigma0**2),
+        covariance=_angle_covariance(result.state, names, covariance),
         residuals=residuals,
         standardised=normed,
         sigma0=result.sigma0,

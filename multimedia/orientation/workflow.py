@@ -25,7 +25,7 @@ from multimedia.projects.point_tables import read_image_points, read_object_poin
 from multimedia.projects.project_file import read_project, write_project
 from photocore.arrays import FloatArray, IntArray
 from photocore.errors import InputError
-from photocore.output import check_writable
+from photocore.output import check_all_writable
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -48,8 +48,7 @@ def project_project(
     path: Path, *, points: Path | None, out: Path | None, overwrite: bool = False
 ) -> PointTable:
     """Project the object points of a project, or of another table, into all its cameras."""
-    if out is not None:
-        check_writable(out, overwrite=overwrite)
+    check_all_writable(out, overwrite=overwrite)
     project = read_project(path)
     objects, remarks = _objects(project, points)
     views = list(zip(project.cameras, project.interfaces, strict=True))
@@ -83,8 +82,7 @@ def intersect_project(
     overwrite: bool = False,
 ) -> PointTable:
     """Intersect the image points of a project, or of another table."""
-    if out is not None:
-        check_writable(out, overwrite=overwrite)
+    check_all_writable(out, overwrite=overwrite)
     project = read_project(path)
     images, remarks = _images(project, points)
     ids = images.names
@@ -174,9 +172,7 @@ def resect_project(
     overwrite: bool = False,
 ) -> Resected:
     """Orient the cameras of a project, each on its own, from its control points."""
-    for file in (out, residuals):
-        if file is not None:
-            check_writable(file, overwrite=overwrite)
+    check_all_writable(out, residuals, overwrite=overwrite)
     project = read_project(path)
     unknown = [name for name in cameras if name not in project.camera_names]
     if unknown:
@@ -282,7 +278,6 @@ def _shown(name: str, value: float) -> float:
 
 def _image_sigma(project: Project, rows: IntArray) -> FloatArray | None:
     """Return standard deviations of image points, None if all are alike."""
-    assert project.image_points.sigma is not None
     given = project.image_points.sigma[rows]
     if np.isnan(given).all():
         return None

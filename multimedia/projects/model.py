@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -38,7 +39,7 @@ class ObjectPoints:
 
     ids: tuple[str, ...] = ()
     xyz: FloatArray = field(default_factory=lambda: np.empty((0, 3)))
-    sigma: FloatArray | None = None
+    sigma: FloatArray = None  # type: ignore[assignment]
     groups: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
@@ -77,7 +78,7 @@ class ImagePoints:
     cameras: tuple[str, ...] = ()
     ids: tuple[str, ...] = ()
     image: FloatArray = field(default_factory=lambda: np.empty((0, 2)))
-    sigma: FloatArray | None = None
+    sigma: FloatArray = None  # type: ignore[assignment]
     groups: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
@@ -112,7 +113,7 @@ class ImagePoints:
             for row, (c, p) in enumerate(zip(self.cameras, self.ids, strict=True))
             if c in line and p in column
         ]
-        if rows and self.sigma is not None:
+        if rows:
             row, at, point = np.array(rows).T
             image[at, point] = self.image[row]
             sigma[at, point] = self.sigma[row]
@@ -212,9 +213,7 @@ def refuse_repeated(names: Sequence[str], what: str) -> None:
     InputError
         Naming them.
     """
-    if len(set(names)) == len(names):
-        return
-    seen: set[str] = set()
-    twice = [name for name in names if name in seen or seen.add(name)]  # type: ignore[func-returns-value]
-    shown = ", ".join(dict.fromkeys(twice[:SHOWN]))
-    raise InputError(f"{what}: {shown} occurs more than once; give each its own name.")
+    twice = [name for name, count in Counter(names).items() if count > 1]
+    if twice:
+        shown = ", ".join(twice[:SHOWN])
+        raise InputError(f"{what}: {shown} occurs more than once; give each its own name.")

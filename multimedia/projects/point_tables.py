@@ -155,7 +155,7 @@ def object_columns(points: ObjectPoints, unit: str) -> dict[str, FloatArray | tu
     """Return the columns of a table of object points."""
     columns: dict[str, FloatArray | tuple[str, ...]] = {"id": points.ids}
     columns |= {f"{axis} [{unit}]": points.xyz[:, k] for k, axis in enumerate("XYZ")}
-    if points.sigma is not None and np.isfinite(points.sigma).any():
+    if np.isfinite(points.sigma).any():
         columns |= {f"sigma_{axis} [{unit}]": points.sigma[:, k] for k, axis in enumerate("XYZ")}
     if any(points.groups):
         columns["group"] = points.groups
@@ -177,7 +177,7 @@ def image_columns(
         columns |= {"col [px]": pixels[:, 0], "row [px]": pixels[:, 1]}
     else:
         columns |= {"x [mm]": points.image[:, 0], "y [mm]": points.image[:, 1]}
-    if points.sigma is not None and np.isfinite(points.sigma).any():
+    if np.isfinite(points.sigma).any():
         columns |= {"sigma_x [mm]": points.sigma[:, 0], "sigma_y [mm]": points.sigma[:, 1]}
     if any(points.groups):
         columns["group"] = points.groups

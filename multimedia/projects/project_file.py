@@ -33,7 +33,8 @@ from multimedia.refraction.layers import Layers
 from photocore.arrays import is_finite_number
 from photocore.distortion import NAMES, Brown, Convention
 from photocore.errors import GeometryError, InputError
-from photocore.output import atomic_path, check_regular, check_writable
+from photocore.output import atomic_path, check_all_writable
+from photocore.textfile import read_text
 
 FORMAT = "multimedia-project/1"
 #: Each kind of ray-traced surface and its keys.
@@ -101,8 +102,7 @@ def write_project(path: Path | str, project: Project, *, overwrite: bool = False
         tables[table] = dict(image_columns(project.image_points, project.cameras))
     # Tables (arrays of them too) must follow the plain keys.
     order = sorted(data, key=lambda key: isinstance(data[key], dict | list))
-    for file in (path, *tables):
-        check_writable(file, overwrite=overwrite)
+    check_all_writable(path, *tables, overwrite=overwrite)
     for table, columns in tables.items():
         write_columns(table, columns, overwrite=overwrite)
     with atomic_path(path, overwrite=overwrite) as temporary:
@@ -128,18 +128,14 @@ def project_data(project: Project) -> dict[str, Any]:
 
 
 def _toml(path: Path) -> dict[str, Any]:
-    check_regular(path)
-    try:
-        return tomllib.loads(path.read_text(encoding="utf-8-sig"))
-    except FileNotFoundError:
-        raise InputError(f"{path}: no such project file.") from None
-    except IsADirectoryError:
+    if path.is_dir():
         raise InputError(
             f"{path}: is a folder. Give the project file in it; for an OpenPTV experiment make "
             "one with `multimedia openptv`."
-        ) from None
-    except UnicodeDecodeError:
-        raise InputError(f"{path}: is not a text file, expected a project file (TOML).") from None
+        )
+    text = read_text(path, "project file", form=" (TOML)")
+    try:
+        return tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         hint = "" if path.suffix.lower() == ".toml" else " A project is a .toml file."
         raise InputError(f"{path}: is not valid TOML: {error}.{hint}") from None
@@ -147,8 +143,6 @@ def _toml(path: Path) -> dict[str, Any]:
         raise InputError(f"{path}: holds a whole number of thousands of digits.") from None
     except RecursionError:
         raise InputError(f"{path}: nested too deeply for a project file.") from None
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read ({error.strerror}).") from None
 
 
 def _project(data: dict[str, Any], folder: Path) -> Project:

@@ -64,42 +64,33 @@ class WaterAnswer:
         }
 
 
-def find_index(
-    wavelength_nm: float,
-    temperature_c: float,
-    salinity_percent: float,
-    depth: float,
-    formula: str,
-    *,
-    sigmas: tuple[float, float, float],
-) -> WaterAnswer:
+def find_index(water: dict[str, float], formula: str, *, sigmas: dict[str, float]) -> WaterAnswer:
     """Return the refractive index of water.
 
     Parameters
     ----------
-    wavelength_nm, temperature_c, salinity_percent, depth : float
-        [nm, °C, %, m]
+    water : dict of str to float
+        wavelength_nm, temperature_c, salinity_percent, depth. [nm, °C, %, m]
     formula : str
         Name of one of `WATER_FORMULAS`.
-    sigmas : (float, float, float)
-        Standard deviations of the first three.
+    sigmas : dict of str to float
+        Standard deviations, named as in `water_index_sigma`.
 
     Raises
     ------
     InputError
         If a value cannot be meant in its unit.
     """
-    given = _conditions(wavelength_nm, temperature_c, salinity_percent, depth)
     chosen = WATER_FORMULAS[formula]
     return WaterAnswer(
         key="refractive_index",
         label="refractive index of water",
         unit="",
-        value=float(water_refractive_index(**given, formula=chosen)),
-        sigma=_sigma_of_index(given, sigmas, chosen),
-        conditions=given,
+        value=float(water_refractive_index(**water, formula=chosen)),
+        sigma=float(water_index_sigma(**water, **sigmas, formula=chosen)),
+        conditions=water,
         formula=chosen,
-        remarks=chosen.remarks(**given),
+        remarks=chosen.remarks(**water),
     )
 
 
@@ -107,23 +98,20 @@ def find_from_index(
     what: str,
     index: float,
     sigma_index: float,
-    wavelength_nm: float,
-    temperature_c: float,
-    salinity_percent: float,
-    depth: float,
+    water: dict[str, float],
     formula: str,
     *,
-    sigmas: tuple[float, float, float],
+    sigmas: dict[str, float],
 ) -> WaterAnswer:
     """Return the salinity or temperature of water of a known index.
 
     Parameters
     ----------
     what : {"salinity", "temperature"}
-        What is unknown; its own argument below is ignored.
+        What is unknown; its own value and standard deviation below are ignored.
     index, sigma_index : float
         Refractive index and its standard deviation.
-    wavelength_nm, temperature_c, salinity_percent, depth, formula, sigmas
+    water, formula, sigmas
         As in `find_index`.
 
     Raises
@@ -134,27 +122,27 @@ def find_from_index(
         If no temperature, or no possible salinity, gives the index.
     """
     key, unit, solve, low, high = _UNKNOWNS[what]
-    everything = _conditions(wavelength_nm, temperature_c, salinity_percent, depth)
-    given = {name: value for name, value in everything.items() if name != key}
+    given = {name: value for name, value in water.items() if name != key}
     chosen = WATER_FORMULAS[formula]
     value = float(solve(index, **given, formula=chosen))
     if not low <= value <= high:
         raise GeometryError(
-            f"no salinity between 0 and 30 % gives water of {temperature_c:g} °C the index "
-            f"{index:g} (it would take {value:.2f} %): check index and wavelength."
+            f"no salinity between 0 and 30 % gives water of {water['temperature_c']:g} °C the "
+            f"index {index:g} (it would take {value:.2f} %): check index and wavelength."
             if what == "salinity"
-            else f"no temperature of liquid water with {salinity_percent:g} % salt gives the index "
-            f"{index:g}: check index, salinity and wavelength."
+            else f"no temperature of liquid water with {water['salinity_percent']:g} % salt gives "
+            f"the index {index:g}: check index, salinity and wavelength."
         )
-    everything[key] = max(value, 0.0) if what == "salinity" else value
+    everything = water | {key: max(value, 0.0) if what == "salinity" else value}
+    known = {name: sigma for name, sigma in sigmas.items() if name != f"sigma_{key}"}
+    sigma_others = float(water_index_sigma(**everything, **known, formula=chosen))
     slope = getattr(water_index_derivatives(**everything, formula=chosen), f"d_{what}")
     return WaterAnswer(
         key=key,
         label=f"{what} of the water",
         unit=unit,
         value=value,
-        sigma=hypot(sigma_index, _sigma_of_index(everything, sigmas, chosen, unknown=key))
-        / abs(float(slope)),
+        sigma=hypot(sigma_index, sigma_others) / abs(float(slope)),
         conditions={"refractive_index": index, **given},
         formula=chosen,
         remarks=chosen.remarks(**everything),
@@ -167,28 +155,3 @@ _UNKNOWNS: dict[str, tuple[str, str, Callable[..., FloatArray], float, float]] =
     "salinity": ("salinity_percent", " %", salinity_from_index, -0.5, 30.0),
     "temperature": ("temperature_c", " °C", temperature_from_index, -5.0, 100.0),
 }
-
-
-def _conditions(
-    wavelength_nm: float, temperature_c: float, salinity_percent: float, depth: float
-) -> dict[str, float]:
-    """Return the arguments that every formula takes."""
-    return {
-        "wavelength_nm": wavelength_nm,
-        "temperature_c": temperature_c,
-        "salinity_percent": salinity_percent,
-        "depth": depth,
-    }
-
-
-def _sigma_of_index(
-    given: dict[str, float],
-    sigmas: tuple[float, float, float],
-    formula: WaterFormula,
-    *,
-    unknown: str = "",
-) -> float:
-    """Return the standard deviation of the index from those of what is known."""
-    names = ("wavelength_nm", "temperature_c", "salinity_percent")
-    known = {f"sigma_{n}": s for n, s in zip(names, sigmas, strict=True) if n != unknown}
-    return float(water_index_sigma(**given, **known, formula=formula))

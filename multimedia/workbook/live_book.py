@@ -89,7 +89,7 @@ def allow_between(sheet: Worksheet, cells: str, limits: tuple[float, float], pro
         type="decimal",
         operator="between",
         formula1=f"{limits[0]:g}",
-        formula2=f"{limits[1]:.0f}",
+        formula2=f"{limits[1]:.10g}",
         allow_blank=True,
         showErrorMessage=True,
         showInputMessage=True,

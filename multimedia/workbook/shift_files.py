@@ -1,4 +1,4 @@
-"""Tables of points for the radial shift: read tolerantly, written as text."""
+"""Tables of points for the radial shift, read tolerantly."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 
 from multimedia.refraction.layers import Layers
-from multimedia.workbook.shift_points import ShiftPoints, ShiftResult, ShiftSetup
+from multimedia.workbook.shift_points import ShiftPoints, ShiftSetup
 from photocore.errors import InputError, WorkbookError
-from photocore.tables import Column, Table, open_tables, read_named_values, read_table, write_csv
+from photocore.tables import Column, Table, open_tables, read_named_values, read_table
 
 #: Most layers a workbook is searched for.
 MOST_LAYERS = 9
@@ -157,16 +157,3 @@ def _problems(
             f"the point is {-value:g} above the water side of the interface; dry points are not "
             "refracted: take it out (Z is negative, ZP positive in water).",
         )
-
-
-def write_shift_csv(
-    path: Path | str,
-    points: ShiftPoints,
-    result: ShiftResult,
-    *,
-    flavour: str = "plain",
-    overwrite: bool = False,
-) -> None:
-    """Write shifted points as text, numbers to the last bit."""
-    columns = {key: list(values) for key, values in result.columns(points).items()}
-    write_csv(path, columns, flavour=flavour, overwrite=overwrite)

@@ -72,9 +72,7 @@ def update_template(
     area = editor.table("tblMM")
     if area is None:
         raise InputError(f"{path}: has no table tblMM.")
-    top, left, _, right = area.area
-    cells = editor.grid(area.sheet).rows.get(top, {})
-    columns = {str(cells[c]): c for c in range(left, right + 1) if c in cells}
+    columns = area.headings()
     steps = sum(key[0] == "u" and key[1:].isdigit() for key in columns) - 1
     values = table_values(setup, points, len(points.ids), max(steps, 1))
     for key, column in columns.items():

@@ -12,6 +12,7 @@ from openpyxl.styles import Alignment, Font, PatternFill
 from openpyxl.utils import get_column_letter
 from openpyxl.worksheet.table import Table, TableFormula, TableStyleInfo
 
+from multimedia.refraction.layers import HIGHEST_INDEX
 from multimedia.refraction.unrolled import STEPS, TOLERANCE, unrolled_shift
 from multimedia.workbook.index_sheet import write_index_sheet
 from multimedia.workbook.live_book import (
@@ -155,7 +156,8 @@ def _media(book: LiveBook, setup: ShiftSetup, *, live: bool) -> int:
             sheet.cell(row, 2).fill = INPUT
         else:
             book.typed(sheet, row, 2, index)
-        allow_between(sheet, f"B{row}", (1, 3), "Refractive index, at least 1; the camera's first.")
+        words = "Refractive index, at least 1; the camera's first."
+        allow_between(sheet, f"B{row}", (1, HIGHEST_INDEX), words)
         k = min(layers.indices) / index
         book.formula(sheet, row, 3, f"MIN($B$5:$B${4 + count})/n_{i}", k)
         book.formula(sheet, row, 4, f"1-k_{i}^2", 1 - k * k)
@@ -204,8 +206,7 @@ def _points(
                 book.formula(sheet, row, number, text, value)
             else:
                 book.typed(sheet, row, number, value)
-            cell = sheet.cell(row, number)
-            cell.number_format = _number_format(key)
+            sheet.cell(row, number).number_format = _number_format(key)
     sheet.row_dimensions[first - 1].height = 42
     last = get_column_letter(len(columns))
     table = Table(displayName="tblMM", name="tblMM", ref=f"A{first}:{last}{first + count}")

@@ -7,12 +7,13 @@ from pathlib import Path
 from typing import Any
 
 from multimedia.refraction.layers import Layers
-from multimedia.workbook.shift_files import points_of, read_shift_input, write_shift_csv
+from multimedia.workbook.shift_files import points_of, read_shift_input
 from multimedia.workbook.shift_points import ShiftPoints, ShiftResult, ShiftSetup
 from multimedia.workbook.shift_update import add_columns, is_template, update_template
 from multimedia.workbook.shift_workbook import write_shift_workbook
 from photocore.errors import InputError
-from photocore.output import check_writable
+from photocore.output import check_all_writable
+from photocore.tables import write_csv
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -89,10 +90,9 @@ def shift_file(
         If a cell, an option or a file is at fault.
     """
     out = None if out is None else Path(out)
-    if out is not None:
-        check_writable(out, overwrite=overwrite)
-        if out.suffix.lower() not in (".xlsx", ".xlsm", ".csv"):
-            raise InputError(f"{out}: results are written as .xlsx or .csv.")
+    check_all_writable(out, overwrite=overwrite)
+    if out is not None and out.suffix.lower() not in (".xlsx", ".xlsm", ".csv"):
+        raise InputError(f"{out}: results are written as .xlsx or .csv.")
     given = read_shift_input(path, decimal=decimal, sheet=sheet)
     setup = _setup(given.setup, camera, z0, indices, thicknesses)
     points, rows = points_of(given.table, setup.nadir)
@@ -100,7 +100,7 @@ def shift_file(
     table, kind = given.table, Path(path).suffix.lower()
     kept: Path | None = None
     if out is not None and out.suffix.lower() == ".csv":
-        write_shift_csv(out, points, result, flavour=flavour, overwrite=overwrite)
+        write_csv(out, result.columns(points), flavour=flavour, overwrite=overwrite)
     elif out is not None and (new or kind not in (".xlsx", ".xlsm")):
         write_shift_workbook(out, setup, points, rows=1, overwrite=overwrite)
     elif out is not None and given.setup is not None and is_template(path):

@@ -57,24 +57,6 @@ class Fit(Generic[State]):
         return self.linear.residuals
 
     @property
-    def cofactor(self) -> FloatArray:
-        """Inverse of the normal matrix, shape (u, u); times sigma0^2 the covariance.
-
-        Without the coordinates of points: see `block_cofactor`.
-        """
-        return self.linear.cofactor
-
-    @property
-    def block_cofactor(self) -> FloatArray:
-        """The same for the coordinates of each point, shape (p, 3, 3); 0 where not free."""
-        return self.linear.block_cofactor
-
-    @property
-    def redundancy_numbers(self) -> FloatArray:
-        """Share of an observation's error that shows in its own residual, 0 to 1, shape (n,)."""
-        return self.linear.redundancy_numbers
-
-    @property
     def redundancy(self) -> int:
         """Observations beyond the necessary ones."""
         return len(self.residuals) - self.linear.unknowns
@@ -89,7 +71,7 @@ class Fit(Generic[State]):
     @property
     def standardised(self) -> FloatArray:
         """Residuals over their own standard deviations; NaN where nothing controls them."""
-        return standardised(self.residuals, self.redundancy_numbers, self.sigma0)
+        return standardised(self.residuals, self.linear.redundancy_numbers, self.sigma0)
 
 
 def correlations(covariance: FloatArray) -> FloatArray:

@@ -83,21 +83,15 @@ def numbers(
             complain(index, _wrong_type(value, wanted))
     if unfinished:
         more = f" (and {len(unfinished) - 1} more in this column)" if len(unfinished) > 1 else ""
-        complain(
-            unfinished[0],
-            f"{NOT_CALCULATED}{more}. Open the file in the spreadsheet "
-            "program, save it there, and try again.",
-        )
+        complain(unfinished[0], _not_calculated(more))
     common_unit = _typed_unit(texts, wanted, complain, has_bare=bool(np.isfinite(result).any()))
     _read_texts(result, texts, decimal, elsewhere, complain)
-    remarks = []
     typed = sum(bool(part.unit) for part in texts.values())
-    if typed:
-        remarks.append(f"{column.key}: the unit typed into {typed} cells was taken off.")
+    taken_off = f"{column.key}: the unit typed into {typed} cells was taken off."
     if column.kind == "integer":
         for broken in np.flatnonzero(np.isfinite(result) & (result != np.floor(result))):
             complain(int(broken), f"found {result[broken]:.15g}, expected a whole number.")
-    return result, common_unit or unit, remarks
+    return result, common_unit or unit, [taken_off] if typed else []
 
 
 def flags(values: Sequence[Value | None], complain: Complain) -> FloatArray:
@@ -105,9 +99,6 @@ def flags(values: Sequence[Value | None], complain: Complain) -> FloatArray:
     result = np.full(len(values), np.nan)
     for index, value in enumerate(values):
         if value is None or (isinstance(value, str) and not value.strip()):
-            continue
-        if isinstance(value, bool):
-            result[index] = float(value)
             continue
         word = f"{value:.15g}" if isinstance(value, float) else str(value).strip().casefold()
         if word in _YES | _NO:
@@ -125,6 +116,7 @@ def texts(values: Sequence[Value | None], complain: Complain) -> list[str]:
         return [*map(str.strip, values)]  # type: ignore[arg-type]
     result = []
     for index, value in enumerate(values):
+        text = ""
         if isinstance(value, float):
             text = str(int(value)) if value.is_integer() and abs(value) < 1e15 else repr(value)
         elif isinstance(value, str):
@@ -135,9 +127,6 @@ def texts(values: Sequence[Value | None], complain: Complain) -> list[str]:
             text = value.shown
         elif isinstance(value, CellFault | NotCalculated):
             complain(index, _wrong_type(value, ""))
-            text = ""
-        else:
-            text = ""
         result.append(text)
     return result
 
@@ -200,11 +189,8 @@ def _typed_unit(
             continue
         shown = f"{part.digits} {part.unit}"
         value = part.value("comma" if "," in part.digits else "point")
-        better = converted(value, symbol, wanted) if value is not None and symbol else None
-        number = better if better is not None else value
-        advice = f"Write {number:.15g}; the" if number is not None and symbol == "" else "The"
-        if better is not None:
-            advice = f"Write {better:.15g}; the"
+        number = converted(value, symbol, wanted) if value is not None and symbol else value
+        advice = f"Write {number:.15g}; the" if number is not None else "The"
         complain(
             index,
             f'found "{_short(shown)}", expected a number{wanted and f" in {wanted}"}. '
@@ -232,15 +218,11 @@ def _mixed(part: NumberText, agreed: Decimal) -> str:
     value = part.value(other)
     if value is None:
         return f'found "{_short(part.digits)}", expected a number.'
+    better = f"{value:.15g}".replace(".", "," if agreed == "comma" else ".")
     return (
         f'found "{_short(part.digits)}", while numbers here are written with the decimal '
-        f"{agreed}. Write {_localised(value, agreed)}, or say --decimal {other} if all are."
+        f"{agreed}. Write {better}, or say --decimal {other} if all are."
     )
-
-
-def _localised(value: float, decimal: Decimal) -> str:
-    text = f"{value:.15g}"
-    return text.replace(".", ",") if decimal == "comma" else text
 
 
 def _not_a_number(text: str, unit: str) -> str:
@@ -250,15 +232,17 @@ def _not_a_number(text: str, unit: str) -> str:
     return f'found "{_short(text)}", {expected}. Type the number, or clear the cell.'
 
 
+def _not_calculated(more: str = "") -> str:
+    advice = "Open the file in the spreadsheet program, save it there, and try again."
+    return f"{NOT_CALCULATED}{more}. {advice}"
+
+
 def _wrong_type(value: Value, unit: str) -> str:
     expected = f"expected a number{unit and f' in {unit}'}"
     if isinstance(value, CellFault):
         return f"holds the error {value.text}. Mend its formula, or clear the cell."
     if isinstance(value, NotCalculated):
-        return (
-            f"{NOT_CALCULATED}. Open the file in the spreadsheet program, save it there, and try "
-            "again."
-        )
+        return _not_calculated()
     if isinstance(value, CellDate):
         number = " or ".join(_before_the_date(value))
         if not number:

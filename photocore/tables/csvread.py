@@ -18,6 +18,7 @@ from photocore.errors import CellError, InputError
 from photocore.tables.headings import Match, describe, find_columns
 from photocore.tables.model import Column
 from photocore.tables.numbers import Decimal, is_clear, plain_numbers
+from photocore.textfile import readable
 from photocore.workbook.grid import CellGrid, SheetFile, Value, cell_name
 
 _DELIMITERS = (";", "\t", ",", "|", " ")
@@ -94,14 +95,8 @@ def open_csv(path: Path) -> CsvFile:
     InputError
         If it is missing, empty or not text.
     """
-    try:
+    with readable(path, "table file"):
         content = path.read_bytes()
-    except FileNotFoundError:
-        raise InputError(f"{path}: no such file.") from None
-    except OSError as error:
-        if path.is_dir():
-            raise InputError(f"{path}: is a folder, expected a table file.") from None
-        raise InputError(f"{path}: cannot be read ({error.strerror}).") from None
     if not content.strip():
         raise InputError(f"{path}: the file is empty.")
     if content.startswith((b"PK\x03\x04", b"\xd0\xcf\x11\xe0")):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -94,10 +94,9 @@ def _fields(values: Any, decimal: str, form: str) -> Iterable[str]:
     """Return the fields of one column."""
     if isinstance(values, np.ndarray) and values.dtype.kind in "fiub":
         return _number_fields(values, decimal, form)
-    items: Sequence[Any] = values
     return [
         guarded(item) if isinstance(item, str) else _one_number(item, decimal, form)
-        for item in items
+        for item in values
     ]
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import unicodedata
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from photocore.tables.model import Column
@@ -219,8 +219,9 @@ def _assign(
     """Give each column asked for a heading: as the user says, by key, then by alias in order."""
     match = Match(columns=dict(fixed), first=header + 1, header=header)
     taken: dict[int, str] = {number: key for key, number in fixed.items()}
-    exact = 0
     forms = {number: _forms(variants) for number, variants in texts.items()}
+    keys = {column.key: bare(column.key) for column in columns}
+    aliases = {column.key: {bare(alias) for alias in column.aliases} for column in columns}
 
     def take(column: Column, number: int) -> None:
         match.columns[column.key], taken[number] = number, column.key
@@ -233,35 +234,25 @@ def _assign(
     said = [column for column in columns if column.key in mapped and column.key not in fixed]
     for column in said:
         place = column.aliases[0]
-        fits = [n for n in sorted(texts) if n not in taken and bare(place) in forms[n]]
-        if fits:
-            take(column, min(fits, key=lambda n: place not in map(str.strip, texts[n])))
-    columns = [column for column in columns if column not in said]
+        fitting = [n for n in sorted(texts) if n not in taken and bare(place) in forms[n]]
+        if fitting:
+            take(column, min(fitting, key=lambda n: place not in map(str.strip, texts[n])))
+    others = [column for column in columns if column not in said]
+    by_column = [(column, number) for column in others for number in sorted(texts)]
+    by_number = [(column, number) for number in sorted(texts) for column in others]
+    ways: tuple[tuple[list[tuple[Column, int]], Callable[[str, int], bool]], ...] = (
+        (by_column, lambda key, number: key in map(str.strip, texts[number])),
+        (by_column, lambda key, number: keys[key] in forms[number]),
+        (by_number, lambda key, number: not aliases[key].isdisjoint(forms[number])),
+    )
+    matched = [len(match.columns)]
+    for pairs, fits in ways:
+        for column, number in pairs:
+            is_free = column.key not in match.columns and number not in taken
+            if is_free and fits(column.key, number):
+                take(column, number)
+        matched.append(len(match.columns))
     for column in columns:
-        for number in sorted(texts):
-            mine = (t.strip() == column.key for t in texts[number])
-            if column.key not in match.columns and number not in taken and any(mine):
-                take(column, number)
-                exact += 1
-    keys = {column.key: bare(column.key) for column in columns}
-    for column in columns:
-        for number in sorted(texts):
-            if (
-                column.key not in match.columns
-                and number not in taken
-                and keys[column.key] in forms[number]
-            ):
-                take(column, number)
-    aliases = {column.key: {bare(alias) for alias in column.aliases} for column in columns}
-    for number in sorted(texts):
-        for column in columns:
-            if (
-                column.key not in match.columns
-                and number not in taken
-                and not aliases[column.key].isdisjoint(forms[number])
-            ):
-                take(column, number)
-    for column in (*said, *columns):
         number = match.columns.get(column.key, 0)
         if number in texts and column.key not in fixed:
             same = [
@@ -271,7 +262,7 @@ def _assign(
             ]
             if len(same) > 1:
                 match.doubles[column.key] = same
-    match.score = (len(match.columns), exact, 0)
+    match.score = (len(match.columns), matched[1] - matched[0], 0)
     return match
 
 

@@ -132,12 +132,7 @@ def converted(value: float, unit: str, wanted: str) -> float | None:
 
 def proven_by(texts: Iterable[NumberText]) -> set[Decimal]:
     """Return the decimal separators that texts prove."""
-    marks: set[Decimal] = set()
-    for text in texts:
-        evidence = text.evidence
-        if evidence in ("point", "comma"):
-            marks.add(evidence)
-    return marks
+    return {text.evidence for text in texts if text.evidence in ("point", "comma")}
 
 
 def decimal_of(
@@ -206,10 +201,7 @@ def is_clear(proven: Set[str], others: Set[str], decimal: Decimal | None) -> boo
     """Whether plain numbers have one meaning, given what they and the other columns prove."""
     if not proven:
         return True
-    if decimal is None and "point" in proven:
-        decimal = "point"
-    elif decimal is None and "comma" in proven:
-        decimal = "comma"
+    decimal = decimal or ("point" if "point" in proven else "comma" if "comma" in proven else None)
     if decimal is not None:
         return proven <= {decimal, f"grouped {decimal}"}
     return proven == {"grouped point"} and "comma" not in others

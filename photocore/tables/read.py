@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import chain
 from pathlib import Path
 
 import numpy as np
 
 from photocore.errors import CellError, InputError, WorkbookError
-from photocore.output import check_regular
 from photocore.tables import convert
 from photocore.tables.csvread import (
     CsvFile,
@@ -51,7 +51,6 @@ def open_tables(path: Path | str, *, max_rows: int = 100_000) -> SheetFile | Csv
         If the file is missing, empty, damaged, protected, unsafe or of another kind.
     """
     path = Path(path)
-    check_regular(path)
     ending = path.suffix.lower()
     if ending in (".csv", ".tsv", ".txt"):
         return open_csv(path)
@@ -181,18 +180,17 @@ def _find(
             )
     wanted = bare(name or "")
     near: _Place | None = None
-    for area in book.tables if wanted else ():
-        if area.sheet in titles and bare(area.name) in (wanted, f"tbl{wanted}"):
-            place = _in_area(book, area, columns, column_map)
-            if place and not place.match.missing(columns):
-                return place
-            near = near or place
-    for title in titles if wanted else ():
-        if bare(title) == wanted:
-            place = _in_sheet(book, title, columns, column_map)
-            if place and not place.match.missing(columns):
-                return place
-            near = near or place
+    areas = [
+        a for a in book.tables if a.sheet in titles and bare(a.name) in (wanted, f"tbl{wanted}")
+    ]
+    named = chain(
+        (_in_area(book, area, columns, column_map) for area in areas),
+        (_in_sheet(book, title, columns, column_map) for title in titles if bare(title) == wanted),
+    )
+    for place in named if wanted else ():
+        if place and not place.match.missing(columns):
+            return place
+        near = near or place
     places = [p for title in titles if (p := _in_sheet(book, title, columns, column_map))]
     whole = [place for place in places if not place.match.missing(columns)]
     if whole:
@@ -204,12 +202,8 @@ def _find(
                 "has the same headings."
             )
         return best
-    raise _nothing_found(
-        book,
-        titles,
-        columns,
-        near or max(places, key=lambda place: place.match.score, default=None),
-    )
+    near = near or max(places, key=lambda place: place.match.score, default=None)
+    raise _nothing_found(book, titles, columns, near)
 
 
 def _in_area(

@@ -46,8 +46,7 @@ def open_ods(path: Path, *, max_rows: int) -> SheetFile:
     if not reader.grids:
         raise InputError(f"{path}: the OpenDocument file has no sheet.")
     grids = {grid.title: grid for grid in reader.grids}
-    titles = [title for title in grids if title not in reader.hidden_sheets]
-    titles += [title for title in grids if title in reader.hidden_sheets]
+    titles = sorted(grids, key=reader.hidden_sheets.__contains__)
     return SheetFile(label=path.name, titles=titles, load=grids.__getitem__, names=reader.names)
 
 

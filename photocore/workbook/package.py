@@ -16,6 +16,7 @@ from xml.etree.ElementTree import Element
 from xml.parsers import expat
 
 from photocore.errors import InputError
+from photocore.textfile import readable
 
 #: Larger only in bombs, and in small parts of honest workbooks: rows of styled empty cells.
 LARGEST_RATIO = 250
@@ -69,19 +70,8 @@ def check_header(path: Path) -> None:
     InputError
         Always, unless the file begins like a zip package.
     """
-    try:
-        with path.open("rb") as file:
-            start = file.read(8)
-    except FileNotFoundError:
-        raise InputError(f"{path}: no such file.") from None
-    except IsADirectoryError:
-        raise InputError(f"{path}: is a folder, expected a table file.") from None
-    except PermissionError:
-        if path.is_dir():
-            raise InputError(f"{path}: is a folder, expected a table file.") from None
-        raise InputError(
-            f"{path}: may not be read; close it in other programs or check its permissions."
-        ) from None
+    with readable(path, "table file"), path.open("rb") as file:
+        start = file.read(8)
     if not start:
         raise InputError(f"{path}: the file is empty (0 bytes).")
     if start == _OLE:
@@ -139,12 +129,8 @@ def read_part(path: Path, package: zipfile.ZipFile, name: str) -> bytes:
     InputError
         If the part is missing or damaged.
     """
-    try:
+    with _unpacking(path, name):
         return package.read(name)
-    except KeyError:
-        raise InputError(f"{path}: is not a workbook, the part {name} is missing.") from None
-    except _UNPACKING as error:
-        raise _damaged(path, name) from error
 
 
 def rewrite_package(
@@ -184,7 +170,7 @@ def xml_events(
     rooted: list[str] = []
     guard = new_parser(path, name, start=lambda root, _: rooted.append(root))
     try:
-        with package.open(name) as part:
+        with _unpacking(path, name), package.open(name) as part:
             while chunk := part.read(_CHUNK):
                 if not rooted:  # a document type can only stand before the root
                     guard.Parse(chunk, False)
@@ -192,15 +178,11 @@ def xml_events(
                 yield from parser.read_events()
             parser.close()
             yield from parser.read_events()
-    except KeyError:
-        raise InputError(f"{path}: is not a workbook, the part {name} is missing.") from None
     except (expat.ExpatError, ElementTree.ParseError, LookupError) as error:
         raise InputError(
             f"{path}: damaged, the part {name} is not valid XML ({error}). Open it in the "
             "spreadsheet program and save it again."
         ) from None
-    except _UNPACKING as error:
-        raise _damaged(path, name) from error
 
 
 def xml_elements(path: Path, package: zipfile.ZipFile, name: str, *kinds: str) -> Iterator[Element]:
@@ -262,8 +244,15 @@ def understood(complaint: Callable[[], str]) -> Iterator[None]:
         raise InputError(complaint()) from error
 
 
-def _damaged(path: Path, name: str) -> InputError:
-    return InputError(
-        f"{path}: damaged, the part {name} cannot be unpacked. Open it in the spreadsheet "
-        "program and save it again."
-    )
+@contextmanager
+def _unpacking(path: Path, name: str) -> Iterator[None]:
+    """Turn what unpacking a missing or damaged part raises into an InputError."""
+    try:
+        yield
+    except KeyError:
+        raise InputError(f"{path}: is not a workbook, the part {name} is missing.") from None
+    except _UNPACKING as error:
+        raise InputError(
+            f"{path}: damaged, the part {name} cannot be unpacked. Open it in the spreadsheet "
+            "program and save it again."
+        ) from error

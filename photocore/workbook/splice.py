@@ -334,10 +334,8 @@ class _Splicer:
 
     def child(self, kind: str) -> tuple[int, int] | None:
         """Return where a direct child of this cell lies."""
-        for own, start, end in self.children:
-            if own == kind:
-                return start, end
-        return None
+        places = ((start, end) for own, start, end in self.children if own == kind)
+        return next(places, None)
 
     def add_cells(self, before: int, place: tuple[int, int, str, str]) -> None:
         """Insert the new cells of this row whose columns lie before one."""

@@ -93,11 +93,10 @@ def open_xlsx(path: Path, *, max_rows: int) -> SheetFile:
         with open_package(path) as package:
             return reader.read(package, title, parts[title])
 
-    visible = [sheet.title for sheet in book.sheets if not sheet.hidden]
-    hidden = [sheet.title for sheet in book.sheets if sheet.hidden]
+    visible_first = sorted(book.sheets, key=lambda sheet: sheet.hidden)
     return SheetFile(
         label=path.name,
-        titles=visible + hidden,
+        titles=[sheet.title for sheet in visible_first],
         load=load,
         tables=tables,
         names=_single_cells(book),

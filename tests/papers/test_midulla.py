@@ -171,6 +171,16 @@ def test_closed_forms_agree_with_monte_carlo(pair, r):
     np.testing.assert_allclose(np.array(drawn) / np.array(formal), 1.0, atol=0.05)
 
 
+def test_across_the_radius_a_point_moves_as_far_as_relief_leaves_of_its_distance():
+    # Towards +y only the pick across the radius moves x', by (1 - r / d1): 2 m before the wall,
+    # camera at 16 m, 7/8 of 4 um, 2 m behind it 9/8. Towards +x it is y'.
+    for r, wanted in ((2.0, 0.0035), (-2.0, 0.0045)):
+        s1, s2 = seen(16.0, 16.0, 8.0, 8.0, 3.0, r)
+        both = {"d1": 16.0, "d2": 8.0, "sigma_1": 0.02, "sigma_2": 0.02, "sigma_across": 0.004}
+        assert sigmas(s1, s2, 0.0, **both).x == pytest.approx(wanted, rel=1e-12)
+        assert sigmas(s1, s2, np.pi / 2, **both).y == pytest.approx(wanted, rel=1e-12)
+
+
 def test_sigma_r_of_both_forms_agrees():
     s1, s2 = seen(*PAIRS["35/19"], 2.0, 0.8)
     both = {"d1": 17.5, "d2": 9.5, "sigma_1": 0.004, "sigma_2": 0.007}

@@ -25,9 +25,9 @@ def test_a_straight_line_equals_the_textbook_formulas():
     # b = Sxy / Sxx with Sxx = 17.5; sigma_b^2 = sigma0^2 / Sxx
     b = ((X - 2.5) * (Y - Y.mean())).sum() / 17.5
     assert got.state == pytest.approx([Y.mean() - 2.5 * b, b], rel=1e-10)
-    assert got.cofactor[1, 1] == pytest.approx(1 / 17.5, rel=1e-12)
+    assert got.linear.cofactor[1, 1] == pytest.approx(1 / 17.5, rel=1e-12)
     assert got.redundancy == 4
-    assert got.redundancy_numbers.sum() == pytest.approx(4.0, rel=1e-12)
+    assert got.linear.redundancy_numbers.sum() == pytest.approx(4.0, rel=1e-12)
     v = got.state[0] + got.state[1] * X - Y
     assert got.sigma0 == pytest.approx(np.sqrt(v @ v / 4), rel=1e-12)
 

@@ -37,6 +37,7 @@ from bifocal.survey.workbook.sheets import (
     HEAD_FONT,
     LABEL_FONT,
     BookBuilder,
+    Cells,
     SheetBuilder,
 )
 from bifocal.survey.workbook.words import readme, term
@@ -44,7 +45,6 @@ from photocore.workbook.cells import CellValue
 from photocore.workbook.grid import column_letters
 from photocore.workbook.newbook import finish_book, new_workbook
 
-Cells = Mapping[str, Sequence[CellValue]]
 #: Row of the keys in `Points` and `Results`.
 HEAD = 4
 

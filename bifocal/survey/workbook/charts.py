@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 from openpyxl.chart import BarChart, Reference, ScatterChart, Series
 from openpyxl.chart.shapes import GraphicalProperties
 from openpyxl.styles import Font
 
 from bifocal.survey.workbook.content import CHART_ROWS, SurveyContent
 from bifocal.survey.workbook.reference_sheets import CHECK_HEAD
-from bifocal.survey.workbook.sheets import LABEL_FONT, BookBuilder
+from bifocal.survey.workbook.sheets import LABEL_FONT, BookBuilder, Cells
 from bifocal.survey.workbook.words import word
 from photocore.workbook.cells import CellValue
 from photocore.workbook.grid import column_letters
@@ -23,9 +21,7 @@ LEFT = 16
 _KEYS = ("X", "Y", "s_c", "sigma_r")
 
 
-def charts(
-    builder: BookBuilder, content: SurveyContent, cells: Mapping[str, list[CellValue]]
-) -> None:
+def charts(builder: BookBuilder, content: SurveyContent, cells: Cells) -> None:
     """Write the chart data and three charts."""
     language = builder.language
     rows = min(content.point_rows, CHART_ROWS)
@@ -82,7 +78,7 @@ def _scatter(title: str, x_title: str, y_title: str, x: Reference, y: Reference)
     return chart
 
 
-def _equal_scales(chart: ScatterChart, cells: Mapping[str, list[CellValue]]) -> None:
+def _equal_scales(chart: ScatterChart, cells: Cells) -> None:
     """Give X and Y the same scale, so that the wall keeps its shape."""
     extents = []
     for key in ("X", "Y"):
@@ -93,7 +89,7 @@ def _equal_scales(chart: ScatterChart, cells: Mapping[str, list[CellValue]]) -> 
         middle = (low + high) / 2
         step = _round_step(span / 8)
         axis.scaling.min = round((middle - span / 2) / step) * step
-        axis.scaling.max = axis.scaling.min + _steps(span, step) * step
+        axis.scaling.max = axis.scaling.min + (int(span / step) + 1) * step
         axis.majorUnit = step
     chart.height, chart.width = 12.5, 13.5
 
@@ -102,11 +98,6 @@ def _round_step(rough: float) -> float:
     """Return the least of 1, 2 or 5 times a power of ten that is not below rough."""
     steps = sorted(factor * 10.0**power for factor in (1, 2, 5) for power in range(-6, 7))
     return next((step for step in steps if step >= rough), steps[-1])
-
-
-def _steps(span: float, step: float) -> int:
-    """Return how many steps cover the span."""
-    return int(span / step) + 1
 
 
 def _errors(builder: BookBuilder, content: SurveyContent) -> None:

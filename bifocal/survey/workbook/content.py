@@ -16,7 +16,7 @@ from bifocal.survey.relief_table import ReliefTable
 from bifocal.survey.setup import SurveySetup
 from bifocal.survey.tolerances import RULES, ToleranceRule
 from bifocal.survey.workbook.setup_cells import MATRICES, NADIRS
-from photocore.arrays import FloatArray
+from photocore.arrays import BoolArray, FloatArray
 from photocore.workbook.cells import CellValue
 
 #: Rows of the tables of an empty template.
@@ -133,17 +133,18 @@ def inputs(values: FloatArray) -> list[CellValue]:
     return [None if value != value else value for value in values.tolist()]
 
 
+def _named(names: Sequence[str], used: BoolArray) -> dict[str, list[CellValue]]:
+    """Return the columns that every table of points begins with."""
+    return {"id": [name_cell(name) for name in names], "use": [int(value) for value in used]}
+
+
 def point_cells(content: SurveyContent) -> dict[str, list[CellValue]]:
     """Return every column of `Points` by key."""
     points, table = content.points, content.table
     if points is None:
         return {}
-    cells: dict[str, list[CellValue]] = {
-        "id": [name_cell(name) for name in points.ids],
-        "use": [int(value) for value in points.use],
-        "code": list(points.code),
-        "note": list(points.note),
-    }
+    cells = _named(points.ids, points.use)
+    cells |= {"code": list(points.code), "note": list(points.note)}
     groups = [
         (("x1", "y1"), points.xy1),
         (("x2", "y2"), points.xy2),
@@ -204,10 +205,7 @@ def result_cells(
 def check_cells(content: SurveyContent) -> dict[str, list[CellValue]]:
     """Return every column of `Check` by key."""
     known, check = content.known, content.check
-    cells: dict[str, list[CellValue]] = {
-        "id": [name_cell(name) for name in known.ids],
-        "use": [int(value) for value in known.used],
-    }
+    cells = _named(known.ids, known.used)
     for i, axis in enumerate("XYZ"):
         cells[f"{axis}_ref"] = inputs(known.xyz[:, i])
         if check is not None:
@@ -219,10 +217,7 @@ def check_cells(content: SurveyContent) -> dict[str, list[CellValue]]:
 def control_cells(content: SurveyContent) -> dict[str, list[CellValue]]:
     """Return every column of `Georeference` by key."""
     control, geo = content.control, content.georeference
-    cells: dict[str, list[CellValue]] = {
-        "id": [name_cell(name) for name in control.ids],
-        "use": [int(value) for value in control.used],
-    }
+    cells = _named(control.ids, control.used)
     cells |= {axis: inputs(control.xyz[:, i]) for i, axis in enumerate("ENH")}
     if geo is None:
         return cells

@@ -82,12 +82,12 @@ class SurveyInput:
 
     points: PointObservations
     setup: SurveySetup
-    unit: str
+    unit: str = ""
     known: KnownPoints
-    control: KnownPoints
-    model: str
-    language: str
-    is_ours: bool
+    control: KnownPoints = field(default_factory=KnownPoints)
+    model: str = "auto"
+    language: str = "en"
+    is_ours: bool = False
     table: Table
     known_rows: tuple[int, ...] = ()
     control_rows: tuple[int, ...] = ()
@@ -100,12 +100,7 @@ class SurveyInput:
         return cls(
             points=points,
             setup=SurveySetup(where="points"),
-            unit="",
             known=with_measured(KnownPoints(), points),
-            control=KnownPoints(),
-            model="auto",
-            language="en",
-            is_ours=False,
             table=table,
         )
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping, Sequence
 
 import numpy as np
 from openpyxl.styles import Alignment
@@ -30,13 +29,13 @@ from bifocal.survey.workbook.sheets import (
     HEAD_FONT,
     LABEL_FONT,
     BookBuilder,
+    Cells,
     SheetBuilder,
 )
 from bifocal.survey.workbook.words import word
 from photocore.workbook.cells import CellValue
 from photocore.workbook.grid import column_letters
 
-Cells = Mapping[str, Sequence[CellValue]]
 #: Row of the keys of the two tables; statistics and parameters stand above.
 CHECK_HEAD, CONTROL_HEAD = 12, 27
 _SENSOR = ("sensor_w", "sensor_h")

@@ -40,12 +40,16 @@ FLAG_COLOURS = {
 }
 
 
+#: The values of a table's columns, by key.
+Cells = Mapping[str, Sequence[CellValue]]
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class TableContent:
     """A table as built: its columns and their values by key."""
 
     columns: Sequence[SurveyColumn]
-    cells: Mapping[str, Sequence[CellValue]]
+    cells: Cells
 
 
 @dataclass(slots=True, eq=False)
@@ -131,7 +135,7 @@ class SheetBuilder:
         *,
         at: tuple[int, int],
         rows: int,
-        cells: Mapping[str, Sequence[CellValue]],
+        cells: Cells,
         repeat: bool = False,
         short: bool = False,
     ) -> None:
@@ -267,7 +271,7 @@ class SheetBuilder:
             guard.sort = guard.autoFilter = False
 
 
-def _at(cells: Mapping[str, Sequence[CellValue]], column: SurveyColumn, row: int) -> CellValue:
+def _at(cells: Cells, column: SurveyColumn, row: int) -> CellValue:
     values = cells.get(column.key, ())
     return values[row - 1] if row <= len(values) else column.spare
 
@@ -286,7 +290,7 @@ def _block(
     columns: Sequence[SurveyColumn],
     first: int,
     rows: int,
-    cells: Mapping[str, Sequence[CellValue]],
+    cells: Cells,
     letters: Mapping[str, str],
     short: bool,
 ) -> RowBlock:

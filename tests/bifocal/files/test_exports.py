@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import struct
 
 import ezdxf
 import laspy
@@ -71,6 +72,25 @@ def test_ply_is_binary_doubles(tmp_path):
     start = data.index(b"end_header\n") + len(b"end_header\n")
     assert np.frombuffer(data[start : start + 24], "<f8").tolist() == [1.0, 2.0, 0.5]
     assert b"element vertex 3" in data
+
+
+def test_ply_says_the_precision_of_each_point_in_metres(tmp_path):
+    export_points(tmp_path / "p.ply", POINTS)
+    heading, rows = (tmp_path / "p.ply").read_bytes().split(b"end_header\n")
+    names = [line.split()[1:] for line in heading.decode().splitlines() if "property" in line]
+    assert names == [["double", "x"], ["double", "y"], ["double", "z"], ["float", "sigma_r"],
+                     ["uchar", "uncertain"]]  # fmt: skip
+    points = list(struct.iter_unpack("<dddfB", rows))
+    assert [point[3] for point in points] == pytest.approx([0.01, 0.02, 0.9], rel=1e-6)
+    assert [point[4] for point in points] == [0, 0, 1]
+
+
+def test_dxf_of_the_world_still_writes_the_relief_beside_its_points(tmp_path):
+    export_points(tmp_path / "w.dxf", POINTS, world=True)
+    drawing = ezdxf.readfile(tmp_path / "w.dxf").modelspace()
+    np.testing.assert_allclose([e.dxf.location for e in drawing.query("POINT")], POINTS.world[:3])
+    layer = drawing.query('TEXT[layer=="BIFOCAL_RELIEF"]')
+    assert [e.dxf.text for e in layer] == ["+0.500", "-0.100", "+0.000"]
 
 
 def test_geojson_is_valid_json_with_the_relief(tmp_path):

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from bifocal import Lens, Pair, Photo, rays, relief
+from bifocal.model.flags import FlagLimits, point_flags
 from bifocal.survey.observations import PointObservations
 from bifocal.survey.point_survey import solve_points
 from bifocal.survey.remarks import point_remarks
@@ -54,6 +55,15 @@ def test_projected_points_are_intersected_where_they_were(pair):
     assert np.abs(found.residuals).max() < 1e-9
 
 
+def test_pixels_of_an_ideal_pair_are_counted_right_and_down_from_its_nadir_points():
+    pair = Pair.ideal(
+        d1=17.5, d2=9.5, c1=35, c2=19, pitch=0.0074, nadir1=(1536, 1024), nadir2=(1500, 1000)
+    )
+    # By hand: 0.0074 mm * 0.5 m/mm = 3.7 mm on the wall; 100 px right and 50 px up of the nadir.
+    for photo, pixel in ((pair.image1, (1636, 974)), (pair.image2, (1600, 950))):
+        np.testing.assert_allclose(photo.plane_from_pixels([pixel]), [[0.37, 0.185]], rtol=1e-12)
+
+
 def test_an_ideal_pair_equals_the_closed_form_to_1e_12():
     pair, xyz = ideal(), scene()
     xyz = xyz[np.hypot(*xyz[:, :2].T) > 0.5]
@@ -64,6 +74,25 @@ def test_an_ideal_pair_equals_the_closed_form_to_1e_12():
     np.testing.assert_allclose(
         pair.intersect(first, second).xyz[:, 2], expected, rtol=1e-12, atol=1e-12
     )
+
+
+def test_displacements_are_counted_from_the_nadir_of_their_own_photo():
+    pair, xyz = tilted(), scene()
+    found = pair.intersect(*pair.project(xyz))
+    for e, photo in ((found.e1, pair.image1), (found.e2, pair.image2)):
+        # Similar triangles: |P - N| on the wall is seen |P - N| d / (d - r) from the nadir.
+        radius, r = np.hypot(*(xyz[:, :2] - photo.nadir).T), xyz[:, 2]
+        np.testing.assert_allclose(e, radius * r / (photo.distance - r), atol=1e-9)
+
+
+def test_precision_makes_a_point_weak_above_half_the_limit_and_uncertain_above_it():
+    sigma = np.array([0.0199, 0.0201, 0.0399, 0.0401])
+    nothing = np.zeros(4, dtype=bool)
+    flags = point_flags(
+        at_nadir=nothing, standardised=np.zeros(4), incomplete=nothing, relief=np.ones(4),
+        sigma_r=sigma, near_distance=9.5, limits=FlagLimits(sigma_r_max=0.04),
+    )  # fmt: skip
+    assert flags == ("OK", "WEAK", "WEAK", "UNCERTAIN")
 
 
 def test_every_pair_is_a_zoom_about_e():

@@ -85,7 +85,7 @@ def test_what_cannot_be_meant_is_refused() -> None:
         bifocal.align(noise(), noise(), interiors=(None, small))
     with pytest.raises(InputError, match="level or upright"):
         bifocal.align(noise(), noise(), line=("along", line))
-    with pytest.raises(InputError, match=r"image1: expected shape \(height, width"):
+    with pytest.raises(InputError, match=r"image1: expected shape \(h, w"):
         bifocal.match(PAIR, np.zeros(7, np.uint8), noise())
 
 

@@ -134,6 +134,19 @@ def test_a_nadir_photo_over_a_flat_wall_comes_back_exactly(dtype: type) -> None:
     assert ortho.gsd == pytest.approx(0.00369)
 
 
+def test_a_photo_ends_half_a_pixel_beyond_its_outermost_pixels() -> None:
+    # A wall seen 1:1, the orthophoto 3 px wider on every side: the photo's own pixels, no more.
+    photo = np.full((30, 40), 200, np.uint8)
+    matrix = [[0.01, 0, -0.2], [0, -0.01, 0.15], [0, 0, 1]]
+    far, near = (Photo(plane_from_pixel=matrix, nadir=(0, 0), distance=d) for d in (17.5, 9.5))
+    ortho = bifocal.orthophoto(
+        Pair(image1=far, image2=near), photo, gsd=0.01, bounds=(-0.235, -0.175, 0.225, 0.185)
+    )
+    wanted = np.zeros((36, 46), bool)
+    wanted[3:33, 3:43] = True
+    np.testing.assert_array_equal(ortho.valid, wanted)
+
+
 def test_a_flat_wall_before_the_plane_is_the_photo_scaled_about_the_nadir() -> None:
     # r = 1 m at d = 11 m: a pixel at q shows P = q (1 - 1/11); 10/11 of the pixel size.
     ramp = np.tile(np.arange(220, dtype=np.uint8), (200, 1))

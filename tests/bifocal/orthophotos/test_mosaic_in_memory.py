@@ -38,6 +38,17 @@ def test_parts_of_one_picture_become_the_picture_again() -> None:
     assert whole.source[0, -1] == 2
 
 
+@pytest.mark.parametrize("upright", [False, True])
+def test_each_part_owns_what_lies_deep_within_it(upright: bool) -> None:
+    boxes = [(0, 0, 1, 2), (0, 1, 1, 3)] if upright else [(0, 0, 2, 1), (1, 0, 3, 1)]
+    whole = bifocal.mosaic([ortho(box) for box in boxes])
+    # Along the middle of the strip, 1 m to 2 m is common: a tenth off either rim is the other's.
+    along = whole.source[::-1, 25] if upright else whole.source[25]
+    place = 0.02 * (np.arange(150) + 0.5)
+    assert (along[place < 1.1] == 1).all()
+    assert (along[place > 1.9] == 2).all()
+
+
 def test_exposures_are_made_equal() -> None:
     whole = bifocal.mosaic([ortho((0, 0, 2, 1)), ortho((1, 0, 3, 1), factor=0.8)])
     ratio = whole.image[:, :, 0] / ortho((0, 0, 3, 1)).image[:, :, 0]

@@ -8,8 +8,9 @@ from functools import cache
 import numpy as np
 import pytest
 
-from bifocal import Pair, Quality, dense_relief
+from bifocal import Pair, Photo, Quality, dense_relief
 from bifocal.files.images import as_grey
+from bifocal.model.grid import Grid
 from bifocal.relief_maps import edges, flow, forward_projection, seed, smoothing
 from bifocal.relief_maps.frame import common_bounds, make_frame, working_grid
 from bifocal.relief_maps.orientation_sigma import orientation_sigma
@@ -208,6 +209,35 @@ def small_frame():
 
 def test_an_ideal_photo_is_not_resampled():
     np.testing.assert_array_equal(small_frame().image1, as_grey(shot().image1, "image1"))
+
+
+def test_a_photo_brought_to_a_coarser_grid_stays_where_it_was():
+    # Grey rises by 0.5 a column and 0.6 a row, which averaging keeps: half a pixel of the coarser
+    # grid too far is 2 grey levels and more, rounding at most one half.
+    columns, rows = np.meshgrid(np.arange(256.0), np.arange(160.0))
+    ramp = np.rint(20 + 0.5 * columns + 0.6 * rows).astype(np.uint8)
+    metres = [[0.02, 0, -0.02 * 127.5], [0, -0.02, 0.02 * 79.5], [0, 0, 1]]
+    far, near = (Photo(plane_from_pixel=metres, nadir=(0, 0), distance=d) for d in (17.5, 9.5))
+    grid = Grid.from_bounds((-2.0, -1.2, 2.0, 1.2), gsd=0.083)
+    frame = make_frame(Pair(image1=far, image2=near), ramp, ramp, grid)
+    places = np.stack(np.meshgrid(grid.columns_x, grid.rows_y), axis=-1)
+    wanted = 20 + (places * [50, -50] + [127.5, 79.5]) @ [0.5, 0.6]
+    assert frame.seen1.all()
+    assert abs((frame.image1 - wanted).mean()) < 0.6
+
+
+def test_relief_that_falls_away_outwards_is_a_ramp_and_that_which_rises_is_none():
+    # By hand: r = -k x falls away to the right; there a pixel's width of the photo is spread over
+    # 1 + 2 k x / d1 pixels of the plane, beyond the limit of 1.3 where x > 0.15 d1 / k.
+    frame = small_frame()
+    x, y = frame.from_centre()
+    limit = forward_projection.STRETCH - 1
+    for axis in (x + 0 * y, y + 0 * x):
+        falling = forward_projection.ramps(frame, (-0.01 * axis).astype(np.float32))
+        wanted = axis > limit / 2 * 17.5 / 0.01
+        clear = np.abs(axis - limit / 2 * 17.5 / 0.01) > 2
+        clear[0] = clear[-1] = clear[:, 0] = clear[:, -1] = False
+        np.testing.assert_array_equal(falling[clear], wanted[clear])
 
 
 def test_the_coarse_sweep_finds_relief_to_a_few_centimetres():

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import json
 import os
 import zipfile
@@ -145,6 +146,19 @@ def test_radial_distances_from_a_text_table(tmp_path):
     assert by_id(answer)["A"]["r"] == pytest.approx(1.0, abs=1e-8)
     assert by_id(answer)["A"]["X"] == pytest.approx(2.0, abs=1e-8)
     assert answer["check"]["max_abs"] == pytest.approx(0.01, abs=1e-8)
+
+
+def test_every_column_of_the_result_table_is_headed_by_its_unit(tmp_path):
+    out = tmp_path / "result.csv"
+    assert run("solve", fill(tmp_path / "s.xlsx"), "--out", out).exit_code == 0
+    heading, *lines = csv.reader(out.read_text("utf-8-sig").splitlines())
+    for name, unit in (("r", "m"), ("e1", "mm"), ("e2", "mm"), ("s_c", "mm"), ("q", "mm"),
+                       ("sigma_r", "m"), ("X", "m"), ("Y", "m"), ("Z", "m")):  # fmt: skip
+        assert f"{name} [{unit}]" in heading
+    # P1 stands 1 m before the wall: 1 m of relief, 35 * 2 / 16.5 / 17.5 mm of displacement.
+    first = dict(zip(heading, next(line for line in lines if line[0] == "P1"), strict=True))
+    assert float(first["r [m]"]) == pytest.approx(1.0, abs=1e-6)
+    assert float(first["e1 [mm]"]) == pytest.approx(35 * 2 / 16.5 / 17.5, abs=1e-4)
 
 
 def test_swapped_images_are_said_and_solved(tmp_path):

@@ -47,6 +47,19 @@ def test_sigma0_is_that_of_the_noise():
     assert found.residuals.mean(axis=0) == pytest.approx(0, abs=1e-9)
 
 
+def test_sigma0_of_points_without_height_counts_two_equations_each():
+    # Corners of a square moved in X in turn by +-5 mm: no shift, turn or scale takes that up.
+    # By hand: 8 equations, 4 unknowns, sigma0 = sqrt(4 * 5^2 / 4) = 5 mm.
+    square = np.array([[1.0, 1, 0.2], [-1, 1, 0.2], [-1, -1, 0.2], [1, -1, 0.2]])
+    world = UTM + square + [[0.005, 0, 0], [-0.005, 0, 0], [0.005, 0, 0], [-0.005, 0, 0]]
+    world[:, 2] = np.nan
+    found = georeference(
+        KnownPoints(ids=IDS[:4], xyz=square), KnownPoints(ids=IDS[:4], xyz=world), model="2D"
+    )
+    assert found.redundancy == 4
+    assert found.sigma0 == pytest.approx(0.005, rel=1e-6)
+
+
 @pytest.mark.parametrize("count", [4, 5, 12])
 def test_one_bad_point_is_found_and_left_out(count):
     world = levelled(0.005)

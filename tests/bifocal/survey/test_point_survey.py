@@ -186,6 +186,24 @@ def test_exact_picks_of_an_offset_tilted_pair_give_the_points_back():
     assert solve_points(pair, points).xyz == pytest.approx(xyz, abs=1e-8)
 
 
+def test_millimetres_of_a_general_pair_are_those_of_image_1():
+    # 1:500 and 1:450: seen in both photos at the scale of image 1, as in the workbook.
+    metres = np.diag([0.004, -0.004, 1.0])
+    far, near = (
+        Photo(plane_from_pixel=metres, nadir=[0, 0], distance=d, principal_distance=c)
+        for d, c in ((17.5, 35.0), (9.0, 20.0))
+    )
+    pair, xyz = Pair(image1=far, image2=near), np.array([[2.0, 0.0, 1.0]])
+    pixels1, pixels2 = pair.project(xyz)
+    table = solve_points(pair, PointObservations(ids=("A",), pixels1=pixels1, pixels2=pixels2))
+    assert table.image_scale == 500
+    assert table["s1_used"][0] == pytest.approx(35 * 2 / 16.5, rel=1e-9)
+    assert table["s2_used"][0] == pytest.approx(18 * 2 / 8, rel=1e-9)
+    assert table["e1"][0] == pytest.approx(35 * 2 / 16.5 / 17.5, rel=1e-9)
+    assert table["e2"][0] == pytest.approx(18 * 2 / 8 / 9, rel=1e-9)
+    assert table.xyz == pytest.approx(xyz, abs=1e-9)
+
+
 def test_equal_distances_are_refused():
     with pytest.raises(GeometryError, match="same distance"):
         SurveySetup(d1=9.5, d2=9.5).pair()

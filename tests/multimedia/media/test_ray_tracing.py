@@ -10,6 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial import Delaunay
+from scipy.spatial.transform import Rotation
 
 import multimedia as mm
 from photocore.errors import GeometryError, InputError
@@ -411,3 +412,20 @@ def test_least_time_finds_the_ray_that_shooting_loses() -> None:
         before = layers.indices[k] * np.cross(path.directions[:, k], surface.normal)
         after = layers.indices[k + 1] * np.cross(path.directions[:, k + 1], surface.normal)
         np.testing.assert_allclose(before, after, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    "surface",
+    [
+        mm.Plane(point=[1, 2, 3], normal=[0.2, 0.1, 1]),
+        mm.Sphere(centre=[1, 2, 3], radius=50.0),
+        mm.Cylinder(point=[1, 2, 3], axis=[0.3, 1, -0.2], radius=50.0),
+    ],
+    ids=["plane", "sphere", "cylinder"],
+)
+def test_a_surface_moved_with_its_points_stays_the_same_to_them(surface) -> None:
+    turn = Rotation.from_euler("xyz", [0.4, -0.7, 1.1]).as_matrix()
+    shift, points = np.array([20.0, -30.0, 5.0]), grid_points(4, 50, -80, 80)
+    moved, there = surface.moved(turn, shift), points @ turn.T + shift
+    np.testing.assert_allclose(moved.side(there), surface.side(points), atol=1e-12)
+    np.testing.assert_allclose(moved.normals(there), surface.normals(points) @ turn.T, atol=1e-13)

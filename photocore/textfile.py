@@ -1,0 +1,50 @@
+"""Text files in, with messages that say what was expected where."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from photocore.errors import InputError
+
+
+def read_text(path: Path, what: str, *, form: str = "") -> str:
+    """Return the text of a UTF-8 file, without a byte order mark.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    what, form : str
+        What it should be and how it is written, for the message: ``"pair file"``, ``" (JSON)"``.
+
+    Raises
+    ------
+    InputError
+        If the file is missing, a folder, cannot be read, or is not text.
+    """
+    with readable(path, what, missing=what):
+        try:
+            return path.read_text(encoding="utf-8-sig")
+        except UnicodeDecodeError:
+            raise InputError(f"{path}: is not a text file, expected a {what}{form}.") from None
+
+
+@contextmanager
+def readable(path: Path, what: str, *, missing: str = "file") -> Iterator[None]:
+    """Say what is wrong with a file that cannot be read: missing, a folder, a pipe, locked."""
+    if path.is_dir():
+        raise InputError(f"{path}: is a folder, expected a {what}.")
+    try:
+        if path.exists() and not path.is_file():  # reading it may wait for ever
+            raise InputError(f"{path}: is a pipe or a device; save what it gives as a file first.")
+        yield
+    except FileNotFoundError:
+        raise InputError(f"{path}: no such {missing}.") from None
+    except PermissionError:
+        raise InputError(
+            f"{path}: may not be read; close it in other programs or check its permissions."
+        ) from None
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read ({error.strerror}).") from error

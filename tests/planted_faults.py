@@ -1,0 +1,434 @@
+"""Planted faults: single lines made wrong, each of which the default tests must notice.
+
+    .venv/bin/python -m tests.planted_faults             every fault by its nearest tests, 15 min
+    .venv/bin/python -m tests.planted_faults --whole     survivors by the whole default suite too
+    .venv/bin/python -m tests.planted_faults 3 17        some of them
+
+Not collected by pytest; `tests/test_planted_faults.py` only holds that every fault still fits the
+code. A fault is planted in a copy of the tree, never in the tree itself.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+ROOT = Path(__file__).parents[1]
+
+
+@dataclass(frozen=True, slots=True)
+class Fault:
+    """A text that occurs once in a file, what takes its place, and the tests nearest to it."""
+
+    file: str
+    right: str
+    wrong: str
+    tests: str
+
+    def planted(self, text: str) -> str:
+        """Return the file's text with the fault in it."""
+        if text.count(self.right) != 1:
+            raise ValueError(f"{self.file}: {self.right!r} stands {text.count(self.right)} times")
+        return text.replace(self.right, self.wrong)
+
+
+# Each file, the tests nearest to it, and its lines as they are and as they must not be.
+_GROUPS: tuple[tuple[str, str, tuple[tuple[str, str], ...]], ...] = (
+    # The equations
+    (
+        "bifocal/equations.py",
+        "bifocal/equations.py tests/papers/test_midulla.py",
+        (
+            ("rate = s2 / d2 - s1 / d1", "rate = s2 / d1 - s1 / d2"),
+            ("relief_displacement(s2, r, d=d2)", "relief_displacement(s2, r, d=d1)"),
+            ('as_floats(s, "s") - as_floats(e, "e")', 'as_floats(s, "s") + as_floats(e, "e")'),
+        ),
+    ),
+    (
+        "bifocal/rays.py",
+        "tests/papers/test_midulla.py tests/bifocal/model/test_pair.py",
+        (
+            ("d1 * near.nadir - d2 * far.nadir", "d1 * far.nadir - d2 * near.nadir"),
+            ("return (d2 - relief) ** 2", "return (d1 - relief) ** 2"),
+            (
+                "by_relief = factor / (camera.distance - xyz[:, 2])",
+                "by_relief = factor / camera.distance",
+            ),
+        ),
+    ),
+    (
+        "bifocal/precision.py",
+        "bifocal/precision.py tests/papers/test_midulla.py tests/bifocal/planning/test_planning.py",
+        (
+            ("across = reduction(r, d1) *", "across = (1 + r / d1) *"),
+            ("(d1 - r) * (d2 - r) / (d1 - d2) * spread", "(d1 - r) * d2 / (d1 - d2) * spread"),
+        ),
+    ),
+    # The model
+    (
+        "bifocal/model/pair.py",
+        "tests/bifocal/model/test_pair.py",
+        (
+            ("[0, -scale, scale * row]", "[0, -scale, -scale * row]"),
+            ("matrix[None, :2, :2] - mapped", "matrix[None, :2, :2] + mapped"),
+        ),
+    ),
+    (
+        "bifocal/model/intersection.py",
+        "tests/bifocal/model/test_pair.py",
+        (
+            ("(relief / depth**2)", "(relief / depth)"),
+            (
+                "e2=_outward(a2 - xyz[:, :2], xyz[:, :2] - near.foot.nadir)",
+                "e2=_outward(a2 - xyz[:, :2], xyz[:, :2] - far.foot.nadir)",
+            ),
+        ),
+    ),
+    (
+        "bifocal/model/flags.py",
+        "tests/bifocal/model tests/bifocal/survey/test_point_survey.py",
+        (("sigma_r > limit / 2", "sigma_r > limit / 4"),),
+    ),
+    (
+        "bifocal/model/grid.py",
+        "tests/bifocal/model tests/bifocal/files/test_geotiff.py",
+        (
+            (
+                "self.y0 - (self.height - 1) * self.gsd - half",
+                "self.y0 - self.height * self.gsd - half",
+            ),
+        ),
+    ),
+    (
+        "bifocal/model/surface.py",
+        "tests/bifocal/model tests/bifocal/orthophotos/test_visibility.py",
+        (("max(r0, 0) : max(r1 + 1, 0)", "max(r0, 0) : max(r1, 0)"),),
+    ),
+    (
+        "bifocal/model/relief_map.py",
+        "tests/bifocal/model",
+        (("np.array(self.shape[::-1]) - 0.5", "np.array(self.shape[::-1]) + 0.5"),),
+    ),
+    # The survey
+    (
+        "bifocal/survey/point_survey.py",
+        "tests/bifocal/survey/test_point_survey.py tests/bifocal/survey/test_solve.py",
+        (
+            (
+                "scale_number = first.scale_number or 1000.0",
+                "scale_number = second.scale_number or 1000.0",
+            ),
+            ("np.sqrt(1.0 + (s2 / s1) ** 2)", "np.sqrt(1.0 + s2 / s1)"),
+        ),
+    ),
+    (
+        "bifocal/survey/georeferencing.py",
+        "tests/bifocal/survey/test_georeference.py",
+        (("redundancy = model.axes * int(", "redundancy = 3 * int("),),
+    ),
+    (
+        "bifocal/survey/check_points.py",
+        "tests/bifocal/survey/test_check_points.py",
+        (("solved - known.xyz, np.nan", "known.xyz - solved, np.nan"),),
+    ),
+    (
+        "bifocal/survey/orientation_check.py",
+        "tests/bifocal/survey/test_orientation_check.py",
+        (('(degrees * distance, "deg", -base', '(degrees, "deg", -base'),),
+    ),
+    (
+        "bifocal/survey/workbook/columns.py",
+        "tests/bifocal/survey/test_survey_workbook.py",
+        (
+            ("(k_12*(1-[@r]/d_2))^2", "(k_12*(1-[@r]/d_1))^2"),
+            ("(n{image}_{axis}-e_{axis})*1000", "n{image}_{axis}*1000"),
+        ),
+    ),
+    (
+        "bifocal/survey/output.py",
+        "tests/bifocal/survey/test_solve.py tests/bifocal/survey/test_cli_solve.py",
+        (
+            (
+                'dict.fromkeys(("e1", "e2", "s_c", "q"), length',
+                'dict.fromkeys(("e1", "e2", "s_c", "r"), length',
+            ),
+        ),
+    ),
+    # Relief maps
+    (
+        "bifocal/relief_maps/seed.py",
+        "tests/bifocal/relief_maps/test_dense_relief.py",
+        (("np.array([low, high]), d1=d1, d2=d2", "np.array([low, high]), d1=d2, d2=d1"),),
+    ),
+    (
+        "bifocal/relief_maps/frame.py",
+        "tests/bifocal/relief_maps/test_dense_relief.py",
+        (("(pixels + 0.5) * factors - 0.5", "pixels * factors"),),
+    ),
+    (
+        "bifocal/relief_maps/forward_projection.py",
+        "tests/bifocal/relief_maps/test_dense_relief.py",
+        (("relief + across * x + down * y", "relief - across * x + down * y"),),
+    ),
+    (
+        "bifocal/relief_maps/edges.py",
+        "tests/bifocal/relief_maps/test_dense_relief.py",
+        (("level = mean - slope * self.mean", "level = mean + slope * self.mean"),),
+    ),
+    (
+        "bifocal/relief_maps/smoothing.py",
+        "tests/bifocal/relief_maps/test_dense_relief.py",
+        (("np.maximum(spread - 1 / total, 0)", "np.maximum(spread + 1 / total, 0)"),),
+    ),
+    (
+        "bifocal/relief_maps/orientation_sigma.py",
+        "tests/bifocal/relief_maps/test_dense_relief.py",
+        (("rate1, rate2 = d2", "rate2, rate1 = d2"),),
+    ),
+    # Orthophotos
+    (
+        "bifocal/orthophotos/rectify.py",
+        "tests/bifocal/orthophotos/test_compose.py tests/bifocal/orthophotos/test_cli_ortho.py",
+        (("column <= width - 0.5", "column <= width + 0.5"),),
+    ),
+    (
+        "bifocal/orthophotos/visibility.py",
+        "tests/bifocal/orthophotos/test_visibility.py",
+        (("over = above - r[left] - ray * t", "over = above - r[left] + ray * t"),),
+    ),
+    (
+        "bifocal/orthophotos/compose.py",
+        "tests/bifocal/orthophotos/test_compose.py tests/bifocal/orthophotos/test_cli_ortho.py",
+        (("second + (first - second) * weight", "first + (second - first) * weight"),),
+    ),
+    (
+        "bifocal/orthophotos/sections.py",
+        "tests/bifocal/orthophotos/test_sections.py",
+        (("np.linspace(0.0, 1.0, count)", "np.linspace(0.0, 1.0, count + 1)[:-1]"),),
+    ),
+    (
+        "bifocal/orthophotos/mosaic_blending.py",
+        "tests/bifocal/orthophotos/test_mosaic_in_memory.py"
+        " tests/bifocal/orthophotos/test_mosaic.py",
+        (("(coarse.y0 - grid.rows_y) / coarse.gsd", "(grid.rows_y - coarse.y0) / coarse.gsd"),),
+    ),
+    # Writers
+    (
+        "bifocal/files/exports.py",
+        "tests/bifocal/files/test_exports.py",
+        (('relief = f"{points.xyz[i, 2]:+.3f}"', 'relief = f"{z:+.3f}"'),),
+    ),
+    (
+        "bifocal/files/geotiff.py",
+        "tests/bifocal/files/test_geotiff.py",
+        (("-grid.gsd, grid.x0, grid.y0)", "-grid.gsd, grid.bounds[0], grid.bounds[3])"),),
+    ),
+    (
+        "photocore/cloud/ply.py",
+        "tests/photocore/cloud tests/bifocal/files/test_exports.py",
+        (("rows[name] = values", 'rows[name] = values if name in "xyz" else 1000 * values'),),
+    ),
+    (
+        "photocore/cloud/las.py",
+        "tests/photocore/cloud tests/bifocal/files/test_exports.py",
+        (("values.astype(np.uint16) * 257", "values.astype(np.uint16) * 256"),),
+    ),
+    (
+        "photocore/raster.py",
+        "tests/photocore/test_raster.py",
+        (("_moved(xy_from_pixel[:2], -0.5)", "_moved(xy_from_pixel[:2], 0.0)"),),
+    ),
+    # The common ground
+    (
+        "photocore/camera.py",
+        "tests/photocore/test_camera.py",
+        (("np.cross(away[:, None], by_point)", "np.cross(by_point, away[:, None])"),),
+    ),
+    (
+        "photocore/rotation.py",
+        "tests/photocore/test_rotation.py",
+        (("[0.0, co, -so * cp], [0.0, so, co * cp]", "[0.0, co, so * cp], [0.0, so, co * cp]"),),
+    ),
+    (
+        "photocore/similarity.py",
+        "tests/photocore/test_similarity.py",
+        (("(length + (p[:, 1] * q[:, 2]).sum()) / total", "length / total"),),
+    ),
+    (
+        "photocore/adjustment/blocks.py",
+        "tests/photocore/test_adjustment.py tests/multimedia/adjustment/test_bundle.py",
+        (("2.0 * mixed[column]", "mixed[column]"),),
+    ),
+    (
+        "photocore/double_double.py",
+        "photocore/double_double.py tests/photocore/test_double_double.py",
+        (("(a.high * b.low + a.low * b.high)", "a.high * b.low"),),
+    ),
+    (
+        "photocore/tables/numbers.py",
+        "photocore/tables tests/photocore/tables/test_table_numbers.py"
+        " tests/photocore/tables/test_tables.py",
+        (
+            ("_METRES[unit] / _METRES[wanted]", "_METRES[wanted] / _METRES[unit]"),
+            ('digits.rfind(".") > digits.rfind(",")', 'digits.rfind(".") < digits.rfind(",")'),
+        ),
+    ),
+    (
+        "photocore/workbook/cells.py",
+        "photocore/workbook/cells.py tests/photocore/workbook/test_editor.py",
+        (("{piece}{row + offset}", "{piece}{row - offset}"),),
+    ),
+    # Through water
+    (
+        "multimedia/refraction/tangent.py",
+        "tests/multimedia/refraction/test_radial_shift.py",
+        (
+            (
+                "dd.add(dd.product(n, n), dd.multiply(excess",
+                "dd.subtract(dd.product(n, n), dd.multiply(excess",
+            ),
+        ),
+    ),
+    (
+        "multimedia/refraction/shift.py",
+        "tests/multimedia/refraction/test_radial_shift.py",
+        (("h * (indices[0] / n)", "h * (n / indices[0])"),),
+    ),
+    (
+        "multimedia/refraction/water.py",
+        "tests/multimedia/refraction/test_water.py",
+        (("Term(-0.00423, wavelength=-1", "Term(0.00423, wavelength=-1"),),
+    ),
+    (
+        "multimedia/refraction/layers.py",
+        "tests/multimedia/refraction/test_layers.py",
+        (("max(self.indices[0], self.indices[-1])", "min(self.indices[0], self.indices[-1])"),),
+    ),
+    (
+        "multimedia/media/projection.py",
+        "tests/multimedia/media/test_projection.py",
+        (("by_seen[:, 1, 2] = lever", "by_seen[:, 1, 2] = -lever"),),
+    ),
+    (
+        "multimedia/media/ray_tracing.py",
+        "tests/multimedia/media/test_ray_tracing.py",
+        (("(ratio * ratio * cos_a / cos_b)", "(ratio * cos_a / cos_b)"),),
+    ),
+    (
+        "multimedia/media/surfaces.py",
+        "tests/multimedia/media/test_ray_tracing.py",
+        (("axis=rotation @ self.axis", "axis=self.axis"),),
+    ),
+    (
+        "multimedia/orientation/intersection.py",
+        "tests/multimedia/orientation/test_intersection.py",
+        (("redundancy = 2 * rays - 3", "redundancy = 2 * rays - 2"),),
+    ),
+    (
+        "multimedia/orientation/resection.py",
+        "tests/multimedia/orientation/test_resection.py",
+        (
+            (
+                "= -result.residuals.reshape(-1, 2) * weights",
+                "= result.residuals.reshape(-1, 2) * weights",
+            ),
+        ),
+    ),
+    (
+        "multimedia/orientation/epipolar_curves.py",
+        "tests/multimedia/orientation/test_epipolar.py",
+        (
+            (
+                "points[curve, place] * (1.0 - part) + points[curve, place + 1] * part",
+                "points[curve, place] * part + points[curve, place + 1] * (1.0 - part)",
+            ),
+        ),
+    ),
+    (
+        "multimedia/bathymetry/refraction_correction.py",
+        "tests/multimedia/bathymetry/test_bathymetry.py",
+        (("((1 - index) * precision.level)", "(index * precision.level)"),),
+    ),
+    (
+        "multimedia/adjustment/bundle_equations.py",
+        "tests/multimedia/adjustment/test_bundle.py",
+        (("np.cross(arm[:, None, :], by_point[on])", "np.cross(by_point[on], arm[:, None, :])"),),
+    ),
+)
+
+FAULTS = tuple(
+    Fault(file, right, wrong, tests) for file, tests, lines in _GROUPS for right, wrong in lines
+)
+
+
+def copied_tree(folder: Path) -> Path:
+    """Copy every file that git knows into a folder; return it."""
+    names = subprocess.run(
+        ["git", "ls-files", "-z"], cwd=ROOT, capture_output=True, check=True, text=True
+    ).stdout.split("\0")
+    for name in filter(None, names):
+        if (ROOT / name).is_file():
+            (folder / name).parent.mkdir(parents=True, exist_ok=True)
+            shutil.copy2(ROOT / name, folder / name)
+    return folder
+
+
+def is_noticed(tree: Path, fault: Fault, tests: list[str]) -> bool:
+    """Tell whether tests fail with the fault planted in a copy of the tree."""
+    path = tree / fault.file
+    right = path.read_text(encoding="utf-8")
+    path.write_text(fault.planted(right), encoding="utf-8")
+    try:
+        ended = subprocess.run(
+            [sys.executable, "-m", "pytest", "-x", "-q", "--no-header", "-p", "no:cacheprovider",
+             *(["-n", "0"] if tests else []), *tests],
+            cwd=tree, capture_output=True, check=False,
+            env={**os.environ, "PYTHONPATH": str(tree), "PYTHONDONTWRITEBYTECODE": "1"},
+        )  # fmt: skip
+    finally:
+        path.write_text(right, encoding="utf-8")
+    if ended.returncode not in (0, 1):
+        raise RuntimeError(f"pytest ended with {ended.returncode}: {ended.stdout.decode()[-2000:]}")
+    return ended.returncode == 1
+
+
+def _say(line: str) -> None:
+    sys.stdout.write(f"{line}\n")
+    sys.stdout.flush()
+
+
+def main() -> int:
+    """Plant the faults one by one; say which are noticed."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("numbers", nargs="*", type=int, help="faults to plant, from 1; default all")
+    parser.add_argument("--whole", action="store_true", help="survivors by the whole suite too")
+    given = parser.parse_args()
+    numbers = given.numbers or range(1, len(FAULTS) + 1)
+    survivors = []
+    with tempfile.TemporaryDirectory() as folder:
+        tree = copied_tree(Path(folder))
+        for number in numbers:
+            fault, begin = FAULTS[number - 1], time.monotonic()
+            noticed = is_noticed(tree, fault, fault.tests.split())
+            if not noticed and given.whole:
+                noticed = is_noticed(tree, fault, [])
+            seconds = time.monotonic() - begin
+            word = "noticed " if noticed else "SURVIVES"
+            _say(
+                f"{number:3} {word} {seconds:4.0f} s  {fault.file}: {fault.right} -> {fault.wrong}"
+            )
+            if not noticed:
+                survivors.append(number)
+    _say(f"{len(numbers) - len(survivors)} of {len(numbers)} noticed; survivors: {survivors}")
+    return bool(survivors)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,21 @@
+"""The planted faults of `tests/planted_faults.py` still fit the code they are to be planted in."""
+
+from __future__ import annotations
+
+import ast
+
+import pytest
+
+from tests.planted_faults import FAULTS, ROOT
+
+
+def test_there_are_sixty_faults_and_none_is_named_twice():
+    assert len({(fault.file, fault.right, fault.wrong) for fault in FAULTS}) == len(FAULTS) >= 60
+
+
+@pytest.mark.parametrize("fault", FAULTS, ids=lambda fault: f"{fault.file}: {fault.right}")
+def test_a_fault_fits_the_code_once_and_leaves_valid_python(fault):
+    text = (ROOT / fault.file).read_text(encoding="utf-8")
+    assert ast.dump(ast.parse(fault.planted(text))) != ast.dump(ast.parse(text))
+    for test in fault.tests.split():
+        assert (ROOT / test).exists()
