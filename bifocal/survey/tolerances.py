@@ -99,7 +99,7 @@ def judge(accuracy: float, rules: tuple[ToleranceRule, ...] = RULES) -> tuple[Ve
 
     Examples
     --------
-    >>> [(v.scale, v.holds) for v in judge(0.008, RULES[:1], (20, 50))]
+    >>> [(v.scale, v.holds) for v in judge(0.008, RULES[:1]) if v.scale in (20, 50)]
     [(20, False), (50, True)]
     """
     return tuple(
