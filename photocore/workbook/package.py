@@ -19,11 +19,12 @@ from photocore.errors import InputError
 from photocore.textfile import readable
 
 #: Larger only in bombs, and in small parts of honest workbooks: rows of styled empty cells.
-LARGEST_RATIO = 250
+LARGEST_RATIO, LARGEST_RATIO_OF_SMALL = 250, 1000
+SMALL = 16 * 2**20
 LARGEST_PART = 256 * 2**20
 LARGEST_TOTAL = 512 * 2**20
 MOST_MEMBERS = 10_000
-_RATIO_MATTERS_FROM = 16 * 2**20
+_RATIO_MATTERS_FROM = 2**20
 _OLE = b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1"
 #: Small, since the elements of a chunk are made before the first is looked at.
 _CHUNK = 2**15
@@ -117,7 +118,8 @@ def check_members(path: Path, members: list[zipfile.ZipInfo]) -> None:
                 f"{path}: refused, it unpacks to more than {LARGEST_TOTAL // 2**20} MiB (or "
                 f"{LARGEST_PART // 2**20} MiB in one part). For that many rows use a .csv file."
             )
-        if member.file_size > _RATIO_MATTERS_FROM and ratio > LARGEST_RATIO:
+        largest = LARGEST_RATIO if member.file_size > SMALL else LARGEST_RATIO_OF_SMALL
+        if member.file_size > _RATIO_MATTERS_FROM and ratio > largest:
             raise InputError(f"{refuse}the part {name!r:.80} grows {ratio:.0f}-fold when unpacked.")
 
 
