@@ -6,8 +6,6 @@ radial distances s1 and s2, in the unit of s; ``B = d1 d2 / (d1 - d2)`` is the b
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -15,16 +13,6 @@ from bifocal.equations import relief
 from bifocal.rays import reduction
 from photocore.arrays import FloatArray, as_floats, positive
 from photocore.errors import GeometryError
-
-
-class Sigmas(NamedTuple):
-    """Standard deviations of everything one point yields, each of the shape of s1."""
-
-    r: FloatArray
-    e1: FloatArray
-    e2: FloatArray
-    x: FloatArray
-    y: FloatArray
 
 
 def base_factor(*, d1: float, d2: float) -> float:
@@ -83,61 +71,11 @@ def sigma_relief(
     >>> round(float(near) * 1000, 1)
     27.6
     """
-    _, by_1, by_2 = _differentials(as_floats(s1, "s1"), as_floats(s2, "s2"), d1, d2)
-    return np.asarray(np.hypot(by_1 * sigma_1, by_2 * sigma_2))
-
-
-def sigmas(
-    s1: ArrayLike,
-    s2: ArrayLike,
-    theta: ArrayLike,
-    *,
-    d1: float,
-    d2: float,
-    sigma_1: float,
-    sigma_2: float,
-    sigma_across: float | None = None,
-) -> Sigmas:
-    r"""Return the standard deviations of r, e1, e2 and of x', y' from image 1.
-
-    Parameters
-    ----------
-    s1, s2 : array_like, shape (...)
-        Radial distances. [mm]
-    theta : array_like, shape (...)
-        Direction, clockwise from +y. [rad]
-    d1, d2, sigma_1, sigma_2 : float
-        As `sigma_relief`.
-    sigma_across : float, optional
-        Standard deviation of pick 1 across the radius; default sigma_1. [unit of s]
-
-    Returns
-    -------
-    Sigmas
-        r in the unit of d; e1, e2, x, y in the unit of s.
-
-    Notes
-    -----
-    Total differentials of Eqs. (5) to (7) in (s1, s2) and in the direction. With
-    :math:`\partial r/\partial s_1 = -(1 - r/d_1)/q` and
-    :math:`\partial r/\partial s_2 = (1 - r/d_2)/q`.
-    """
     s1, s2 = as_floats(s1, "s1"), as_floats(s2, "s2")
-    theta = as_floats(theta, "theta")
-    r, by_1, by_2 = _differentials(s1, s2, d1, d2)
-    e1_by_1, e1_by_2 = (r + s1 * by_1) / d1, s1 * by_2 / d1
-    e2_by_1, e2_by_2 = s2 * by_1 / d2, (r + s2 * by_2) / d2
-    along = np.hypot((1 - e1_by_1) * sigma_1, e1_by_2 * sigma_2)
-    # Turning the direction by a pick's error across moves s' sideways in proportion.
-    across = reduction(r, d1) * (sigma_1 if sigma_across is None else sigma_across)
-    sine, cosine = np.sin(theta), np.cos(theta)
-    return Sigmas(
-        r=np.hypot(by_1 * sigma_1, by_2 * sigma_2),
-        e1=np.hypot(e1_by_1 * sigma_1, e1_by_2 * sigma_2),
-        e2=np.hypot(e2_by_1 * sigma_1, e2_by_2 * sigma_2),
-        x=np.hypot(along * sine, across * cosine),
-        y=np.hypot(along * cosine, across * sine),
-    )
+    r = relief(s1, s2, d1=d1, d2=d2)
+    rate = np.where(np.isnan(r), np.nan, s2 / d2 - s1 / d1)
+    by_1, by_2 = reduction(r, d1) / rate, reduction(r, d2) / rate
+    return np.asarray(np.hypot(by_1 * sigma_1, by_2 * sigma_2))
 
 
 def uncertainty_radius(
@@ -196,12 +134,3 @@ def false_relief_of_scale(mismatch: ArrayLike, *, d1: float, d2: float) -> Float
     0.7
     """
     return np.asarray(as_floats(mismatch, "mismatch") * base_factor(d1=d1, d2=d2))
-
-
-def _differentials(
-    s1: FloatArray, s2: FloatArray, d1: float, d2: float
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return r of Eq. (6) and its derivatives by s1 and s2; NaN where it is undefined."""
-    r = relief(s1, s2, d1=d1, d2=d2)
-    rate = np.where(np.isnan(r), np.nan, s2 / d2 - s1 / d1)
-    return r, -reduction(r, d1) / rate, reduction(r, d2) / rate

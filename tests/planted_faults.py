@@ -61,13 +61,14 @@ _GROUPS: tuple[tuple[str, str, tuple[tuple[str, str], ...]], ...] = (
                 "by_relief = factor / (camera.distance - xyz[:, 2])",
                 "by_relief = factor / camera.distance",
             ),
+            ("rows[:, 1, 1] = factor", "rows[:, 1, 1] = 1 / factor"),
         ),
     ),
     (
         "bifocal/precision.py",
         "bifocal/precision.py tests/papers/test_midulla.py tests/bifocal/planning/test_planning.py",
         (
-            ("across = reduction(r, d1) *", "across = (1 + r / d1) *"),
+            ("by_1, by_2 = reduction(r, d1)", "by_1, by_2 = (1 + r / d1)"),
             ("(d1 - r) * (d2 - r) / (d1 - d2) * spread", "(d1 - r) * d2 / (d1 - d2) * spread"),
         ),
     ),

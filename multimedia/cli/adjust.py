@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from photocore.cli import print_result, tell_written, text_table
-from photocore.options import FILE, NUMBER, Names, as_json, number, overwrite
+from photocore.options import FILE, NUMBER, Names, as_json, choice, number, overwrite
 
 if TYPE_CHECKING:
     from multimedia.adjustment.unknowns import Adjustment
@@ -41,10 +41,10 @@ NAME:index3 for one media of several. Labels for --prior are those of the result
 @click.option(
     "--fix-camera", multiple=True, metavar="NAME", help="Keep this camera's orientation; repeat it."
 )
-@click.option(
-    "--control", type=click.Choice(["fixed", "weighted", "free"]), default="fixed",
-    show_default=True,
-    help="Control points: error-free unless they have a sigma, all weighted, or a free network.",
+@choice(
+    "--control", "fixed|weighted|free",
+    "Control points: error-free unless they have a sigma, all weighted, or a free network.",
+    default="fixed",
 )  # fmt: skip
 @click.option(
     "--plate", multiple=True, metavar="GROUP",

@@ -5,7 +5,7 @@ from __future__ import annotations
 import click
 
 from photocore.cli import print_result, remark
-from photocore.options import NUMBER, as_json, number, sigma
+from photocore.options import NUMBER, as_json, choice, number, sigma
 
 EXAMPLE = """\b
 Examples:
@@ -31,19 +31,16 @@ _KEYS = {
 @number("--temperature", "C", "Water temperature [°C].", type=NUMBER, default=20.0)
 @number("--salinity", "PERCENT", "Salinity [%]; sea water has 3.5.", type=NUMBER, default=0.0)
 @number("--depth", "M", "Water depth [m].", type=NUMBER, default=0.0)
-@click.option(
-    "--formula", type=click.Choice(["hoehle", "quan-fry", "parrish"]), default="hoehle",
-    show_default=True, help="Published formula; hoehle is that of the multimedia papers.",
+@choice(
+    "--formula", "hoehle|quan-fry|parrish",
+    "Published formula; hoehle is that of the multimedia papers.", default="hoehle",
 )  # fmt: skip
 @sigma("--sigma-wavelength", "NM", "Standard deviation of the wavelength [nm].")
 @sigma("--sigma-temperature", "C", "Standard deviation of the temperature [°C].")
 @sigma("--sigma-salinity", "PERCENT", "Standard deviation of the salinity [%].")
 @number("--from-index", "N", "A measured refractive index: the inverse; needs --find.")
 @sigma("--sigma-index", "N", "Standard deviation of the measured index.")
-@click.option(
-    "--find", type=click.Choice(["salinity", "temperature"]),
-    help="What to find from --from-index; the others are given.",
-)  # fmt: skip
+@choice("--find", "salinity|temperature", "What to find from --from-index; the others are given.")
 @as_json
 def command(
     depth: float, formula: str, from_index: float | None, sigma_index: float, find: str | None,

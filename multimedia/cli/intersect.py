@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from photocore.options import FILE, as_json, overwrite
+from photocore.options import FILE, as_json, choice, overwrite
 
 EXAMPLE = """\b
 Examples:
@@ -24,11 +24,10 @@ Examples:
     help="Table of image points: camera, id, and col, row [px] or x, y [mm]; or one row per point "
     "with columns such as 'cam1 col', 'cam1 row'.  [default: the project's own]",
 )  # fmt: skip
-@click.option(
-    "--method", type=click.Choice(("rigorous", "rays", "pairs")), default="rigorous",
-    show_default=True,
-    help="Least squares of the image residuals; of the distances to the rays; or the mean of the "
-    "midpoints of all pairs of rays, as OpenPTV does.",
+@choice(
+    "--method", "rigorous|rays|pairs",
+    "Least squares of the image residuals; of the distances to the rays; or the mean of the "
+    "midpoints of all pairs of rays, as OpenPTV does.", default="rigorous",
 )  # fmt: skip
 @click.option("--out", type=FILE, help="Also write a .csv or .xlsx table.")
 @overwrite

@@ -8,7 +8,7 @@ from typing import Any
 import click
 
 from photocore.cli import print_json, remark
-from photocore.options import FILE, NUMBER, Numbers, as_json, number, overwrite
+from photocore.options import FILE, NUMBER, Numbers, as_json, choice, number, overwrite
 
 EXAMPLE = """\b
 Examples:
@@ -40,10 +40,9 @@ Examples:
     "[default: the workbook's; none for two media]",
 )  # fmt: skip
 @click.option("--sheet", help="The only sheet to look at.  [default: all]")
-@click.option(
-    "--decimal", type=click.Choice(["point", "comma"]),
-    help="Decimal separator of numbers typed as text.  [default: detected]",
-)  # fmt: skip
+@choice(
+    "--decimal", "point|comma", "Decimal separator of numbers typed as text.  [default: detected]"
+)
 @click.option(
     "--csv", "flavour", type=click.Choice(["plain", "excel-it", "excel-de"]), default="plain",
     show_default=True, help="How to write .csv: comma and point, or semicolon and comma.",

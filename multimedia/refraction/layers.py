@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from photocore.arrays import FloatArray, as_floats
-from photocore.errors import GeometryError, InputError
+from photocore.errors import GeometryError, InputError, located
 
 #: Diamond; nothing in front of a camera for visible light bends it more.
 DIAMOND = 2.42
@@ -94,10 +94,8 @@ class Layers:
             raise InputError(
                 f'{where}: expected {{"indices": [1.0, 1.5, 1.337], "thicknesses": [0.01]}}.'
             )
-        try:
+        with located(where):
             return cls(indices=value["indices"], thicknesses=value.get("thicknesses", ()))
-        except InputError as error:
-            raise InputError(f"{where}: {error}") from None
 
     def as_dict(self) -> dict[str, list[float]]:
         """Return the object that JSON files hold."""

@@ -10,7 +10,7 @@ import numpy as np
 
 from multimedia.refraction.layers import Layers
 from multimedia.workbook.shift_points import ShiftPoints, ShiftSetup
-from photocore.errors import InputError, WorkbookError
+from photocore.errors import InputError, WorkbookError, located
 from photocore.tables import Column, Table, open_tables, read_named_values, read_table
 
 #: Most layers a workbook is searched for.
@@ -90,7 +90,7 @@ def read_shift_input(
     indices = [n for i in range(1, MOST_LAYERS + 1) if not np.isnan(n := numbers[f"n_{i}"])]
     if len(indices) < 2 or np.isnan(numbers["z_0"]):
         return ShiftInput(table=table, setup=None)
-    try:
+    with located(f"{values.file} › Multimedia"):
         layers = Layers(
             indices=tuple(indices),
             thicknesses=tuple(numbers[f"t_{i}"] for i in range(1, len(indices) - 1)),
@@ -100,8 +100,6 @@ def read_shift_input(
             z0=numbers["z_0"],
             nadir=(float(np.nan_to_num(numbers["X_0"])), float(np.nan_to_num(numbers["Y_0"]))),
         )
-    except InputError as error:
-        raise InputError(f"{values.file} › Multimedia: {error}") from None
     return ShiftInput(table=table, setup=setup)
 
 

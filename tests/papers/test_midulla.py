@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import mpmath
 import numpy as np
 import pytest
@@ -16,11 +18,12 @@ from bifocal import (
     relief_displacements,
     relief_from_displacement,
 )
+from bifocal.model.flags import FlagLimits
+from bifocal.model.intersection import PlanePicks, intersect
 from bifocal.precision import (
     base_factor,
     false_relief_of_scale,
     sigma_relief,
-    sigmas,
     uncertainty_radius,
 )
 from photocore.errors import GeometryError, InputError
@@ -152,39 +155,61 @@ def test_sigma_at_the_plane_is_the_base_factor_over_the_radius():
     assert found == pytest.approx(0.003 * 17.5 * 9.5 / 8 / 2.0, rel=1e-14)
 
 
+def plane_picks(point, distance, sigma):
+    """Return the picks of one point by a camera over the origin of the plane, 1 px = 1 m."""
+    foot = rays.Foot(np.zeros(2), distance)
+    position = np.array([point[:2]]) * distance / (distance - point[2])
+    return PlanePicks(
+        positions=position, metres_per_pixel=np.eye(2)[None], sigma_px=sigma, foot=foot
+    )
+
+
 @pytest.mark.parametrize("pair", PAIRS)
 @pytest.mark.parametrize("r", [-0.6, 0.0, 1.0])
 def test_closed_forms_agree_with_monte_carlo(pair, r):
-    c1, d1, c2, d2 = PAIRS[pair]
+    _, d1, _, d2 = PAIRS[pair]
     rng = np.random.default_rng(20240601)
-    radius, theta, noise, draws = 3.1, 0.7, 0.0074, 100_000
-    s1, s2 = seen(c1, d1, c2, d2, radius, r)
-    # Picks are x, y with equal noise in both images; s and theta follow from them.
+    radius, theta, noise, draws = 3.1, 0.7, 0.0007, 100_000
     direction = np.array([np.sin(theta), np.cos(theta)])
-    pick1 = s1 * direction + rng.normal(0, noise, (draws, 2))
-    pick2 = s2 * direction + rng.normal(0, noise, (draws, 2))
-    n1, n2 = np.hypot(*pick1.T), np.hypot(*pick2.T)
-    e1, e2 = relief_displacements(n1, n2, d1=d1, d2=d2)
-    x, y = plane_coordinates(n1, e1, np.arctan2(pick1[:, 0], pick1[:, 1]))
-    drawn = [np.std(v) for v in (relief(n1, n2, d1=d1, d2=d2), e1, e2, x, y)]
-    formal = sigmas(s1, s2, theta, d1=d1, d2=d2, sigma_1=noise, sigma_2=noise)
-    np.testing.assert_allclose(np.array(drawn) / np.array(formal), 1.0, atol=0.05)
+    exact = [plane_picks([*radius * direction, r], d, noise) for d in (d1, d2)]
+    formal = intersect(*exact, limits=FlagLimits()).sigma[0]
+    # Picks are x, y with equal noise in both images; the point follows from them.
+    drawn = [
+        replace(
+            pick,
+            positions=pick.positions + rng.normal(0, noise, (draws, 2)),
+            metres_per_pixel=np.broadcast_to(np.eye(2), (draws, 2, 2)),
+        )
+        for pick in exact
+    ]
+    xyz = intersect(*drawn, limits=FlagLimits()).xyz
+    np.testing.assert_allclose(xyz.std(axis=0) / formal, 1.0, atol=0.05)
+    # Of the radial distances alone, as Eq. (6) has it.
+    s1, s2 = (np.hypot(*pick.positions.T) for pick in drawn)
+    scatter = relief(s1, s2, d1=d1, d2=d2).std()
+    s1, s2 = (np.hypot(*pick.positions[0]) for pick in exact)
+    both = {"d1": d1, "d2": d2, "sigma_1": noise, "sigma_2": noise}
+    assert sigma_relief(s1, s2, **both) == pytest.approx(scatter, rel=0.05)
 
 
 def test_across_the_radius_a_point_moves_as_far_as_relief_leaves_of_its_distance():
     # Towards +y only the pick across the radius moves x', by (1 - r / d1): 2 m before the wall,
-    # camera at 16 m, 7/8 of 4 um, 2 m behind it 9/8. Towards +x it is y'.
+    # camera at 16 m, 7/8 of 4 um, 2 m behind it 9/8. Towards +x it is y'. The other photo's picks
+    # are too rough to help.
     for r, wanted in ((2.0, 0.0035), (-2.0, 0.0045)):
-        s1, s2 = seen(16.0, 16.0, 8.0, 8.0, 3.0, r)
-        both = {"d1": 16.0, "d2": 8.0, "sigma_1": 0.02, "sigma_2": 0.02, "sigma_across": 0.004}
-        assert sigmas(s1, s2, 0.0, **both).x == pytest.approx(wanted, rel=1e-12)
-        assert sigmas(s1, s2, np.pi / 2, **both).y == pytest.approx(wanted, rel=1e-12)
+        for axis, point in enumerate(([0.0, 3.0, r], [3.0, 0.0, r])):
+            picks = plane_picks(point, 16.0, 0.004), plane_picks(point, 8.0, 40.0)
+            found = intersect(*picks, limits=FlagLimits()).sigma[0, axis]
+            assert found == pytest.approx(wanted, rel=1e-6)
 
 
-def test_sigma_r_of_both_forms_agrees():
-    s1, s2 = seen(*PAIRS["35/19"], 2.0, 0.8)
+@pytest.mark.parametrize("r", [-0.6, 0.0, 0.8])
+def test_sigma_r_of_both_forms_agrees(r):
+    picks = plane_picks([2.0, 0.0, r], 17.5, 0.004), plane_picks([2.0, 0.0, r], 9.5, 0.007)
+    s1, s2 = (pick.positions[0, 0] for pick in picks)
+    found = intersect(*picks, limits=FlagLimits()).sigma[0, 2]
     both = {"d1": 17.5, "d2": 9.5, "sigma_1": 0.004, "sigma_2": 0.007}
-    assert sigmas(s1, s2, 0.3, **both).r == pytest.approx(sigma_relief(s1, s2, **both), rel=1e-13)
+    assert sigma_relief(s1, s2, **both) == pytest.approx(found, rel=1e-9)
 
 
 def test_strongly_different_lenses_are_preferable():
