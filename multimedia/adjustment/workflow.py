@@ -91,7 +91,8 @@ def salinity_of(
     names = [name for name in result.names if name.rpartition(":")[2] in last]
     if not names:
         return None
-    water = {"wavelength_nm": wavelength_nm, "temperature_c": temperature_c, "depth": depth}
+    water: dict[str, Any] = {"wavelength_nm": wavelength_nm, "temperature_c": temperature_c}
+    water["depth"] = depth
     salinity = float(salinity_from_index(result.value(names[0]), **water))
     rates = water_index_derivatives(**water, salinity_percent=salinity)
     return salinity, result.sigma(names[0]) / abs(float(rates.d_salinity))
