@@ -80,12 +80,6 @@ class OrientedPair:
     faces: tuple[Face, ...] = ()
     wall_named: bool = False
 
-    @property
-    def gross(self) -> tuple[str, ...]:
-        """Control points left out."""
-        ids, used = self.observations.control.ids, self.observations.pick_used
-        return tuple(name for name, good in zip(ids, used, strict=True) if not good)
-
     def readjusted(self, start: PairUnknowns | None = None, **changes: Any) -> OrientedPair:
         """Return the pair adjusted with changed observations, from here or another start."""
         observations = replace(self.observations, **changes)

@@ -93,16 +93,10 @@ def salinity_of(
     names = [name for name in result.names if name.rpartition(":")[2] in last]
     if not names:
         return None
-    salinity = float(
-        salinity_from_index(
-            result.value(names[0]), wavelength_nm=wavelength_nm, temperature_c=temperature_c,
-            depth=depth,
-        )
-    )  # fmt: skip
-    rates = water_index_derivatives(
-        wavelength_nm=wavelength_nm, temperature_c=temperature_c, salinity_percent=salinity,
-        depth=depth,
-    )  # fmt: skip
+    water: dict[str, Any] = {"wavelength_nm": wavelength_nm, "temperature_c": temperature_c}
+    water["depth"] = depth
+    salinity = float(salinity_from_index(result.value(names[0]), **water))
+    rates = water_index_derivatives(**water, salinity_percent=salinity)
     return salinity, result.sigma(names[0]) / abs(float(rates.d_salinity))
 
 

@@ -9,7 +9,7 @@ that index, derivatives and inverses come from the same coefficients.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -253,7 +253,12 @@ def water_index_derivatives(
     (0.002, -4e-05)
     """
     given = _checked(wavelength_nm, temperature_c, salinity_percent, depth)
-    parts = []
+    slopes = _slopes(formula, given)
+    return WaterIndexDerivatives(_sum_of_terms(formula.terms, given), *slopes)
+
+
+def _slopes(formula: WaterFormula, given: tuple[FloatArray, ...]) -> Iterator[FloatArray]:
+    """Yield the derivatives by wavelength, temperature, salinity and depth."""
     for variable in range(4):
         terms = []
         for coefficient, *powers in formula.terms:
@@ -261,8 +266,7 @@ def water_index_derivatives(
             if power:
                 powers[variable] = power - 1
                 terms.append(Term(coefficient * power, *powers))
-        parts.append(_sum_of_terms(terms, given))
-    return WaterIndexDerivatives(_sum_of_terms(formula.terms, given), *parts)
+        yield _sum_of_terms(terms, given)
 
 
 def water_index_sigma(
@@ -307,17 +311,10 @@ def water_index_sigma(
     >>> round(float(sigma), 6)
     0.000201
     """
-    _, *slopes = water_index_derivatives(
-        wavelength_nm=wavelength_nm,
-        temperature_c=temperature_c,
-        salinity_percent=salinity_percent,
-        depth=depth,
-        formula=formula,
-    )
-    names = ("wavelength_nm", "temperature_c", "salinity_percent", "depth")
+    slopes = _slopes(formula, _checked(wavelength_nm, temperature_c, salinity_percent, depth))
     sigmas = (sigma_wavelength_nm, sigma_temperature_c, sigma_salinity_percent, sigma_depth)
     variance = np.zeros(())
-    for name, slope, sigma in zip(names, slopes, sigmas, strict=True):
+    for (name, *_), slope, sigma in zip(_LIMITS, slopes, sigmas, strict=True):
         spread = as_floats(sigma, f"sigma_{name}")
         if (spread < 0).any():
             raise InputError(f"sigma_{name}: a standard deviation cannot be negative.")

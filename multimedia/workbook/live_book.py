@@ -8,18 +8,16 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from openpyxl import Workbook
-from openpyxl.styles import Border, Font, PatternFill, Side
+from openpyxl.styles import Font
 from openpyxl.utils import get_column_letter
 from openpyxl.workbook.defined_name import DefinedName
 from openpyxl.worksheet.datavalidation import DataValidation
 from openpyxl.worksheet.worksheet import Worksheet
 
 from photocore.workbook.cells import CellValue
+from photocore.workbook.look import HEAD_FILL, INPUT_EDGE, INPUT_FILL
 from photocore.workbook.newbook import finish_book, new_workbook
 
-INPUT = PatternFill("solid", start_color="FFF9DB", end_color="FFF9DB")
-HEAD = PatternFill("solid", start_color="DCE6F1", end_color="DCE6F1")
-EDGE = Border(*(Side(style="hair", color="BFBFBF"),) * 4)
 FORMULA, TITLE, BOLD = Font(color="1F3FA8"), Font(bold=True, size=14), Font(bold=True)
 SMALL, NOTE = Font(size=9), Font(italic=True, color="595959")
 
@@ -61,7 +59,7 @@ class LiveBook:
                 cell.data_type = "s"  # a name like =A1 is a name, not a formula
             elif isinstance(value, float):
                 self.results[sheet.title][cell.coordinate] = value
-        cell.fill, cell.border = INPUT, EDGE
+        cell.fill, cell.border = INPUT_FILL, INPUT_EDGE
 
     def name(self, name: str, sheet: Worksheet, row: int, column: int) -> None:
         """Give a cell a name."""
@@ -80,7 +78,7 @@ def headings(sheet: Worksheet, row: int, words: Sequence[str]) -> None:
     """Write a row of headings."""
     for column, word in enumerate(words, start=1):
         cell = sheet.cell(row, column, word)
-        cell.font, cell.fill = BOLD, HEAD
+        cell.font, cell.fill = BOLD, HEAD_FILL
 
 
 def allow_between(sheet: Worksheet, cells: str, limits: tuple[float, float], prompt: str) -> None:

@@ -7,18 +7,14 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import ArrayLike
-from openpyxl.formatting.rule import FormulaRule
-from openpyxl.styles import Alignment, Font, PatternFill
+from openpyxl.styles import Alignment, Font
 from openpyxl.utils import get_column_letter
-from openpyxl.worksheet.table import Table, TableFormula, TableStyleInfo
 
 from multimedia.refraction.layers import HIGHEST_INDEX
 from multimedia.refraction.unrolled import STEPS, TOLERANCE, unrolled_shift
 from multimedia.workbook.index_sheet import write_index_sheet
 from multimedia.workbook.live_book import (
     BOLD,
-    HEAD,
-    INPUT,
     NOTE,
     SMALL,
     LiveBook,
@@ -30,6 +26,7 @@ from photocore.arrays import BoolArray
 from photocore.errors import InputError
 from photocore.output import check_writable
 from photocore.workbook.cells import CellValue
+from photocore.workbook.look import HEAD_FILL, INPUT_FILL, add_table, colour_words
 
 #: More rows make a workbook that is slow to open; text tables have no limit.
 MOST_ROWS = 20_000
@@ -153,7 +150,7 @@ def _media(book: LiveBook, setup: ShiftSetup, *, live: bool) -> int:
         sheet.cell(row, 1, f"n_{i}")
         if i == count and live:
             book.formula(sheet, row, 2, "n_w", index)
-            sheet.cell(row, 2).fill = INPUT
+            sheet.cell(row, 2).fill = INPUT_FILL
         else:
             book.typed(sheet, row, 2, index)
         words = "Refractive index, at least 1; the camera's first."
@@ -196,7 +193,7 @@ def _points(
     values = table_values(setup, points, count, steps)
     for number, (key, label, text) in enumerate(columns, start=1):
         above, head = sheet.cell(first - 1, number, label), sheet.cell(first, number, key)
-        above.font, head.font, head.fill = SMALL, BOLD, HEAD
+        above.font, head.font, head.fill = SMALL, BOLD, HEAD_FILL
         above.alignment = Alignment(wrap_text=True, horizontal="center", vertical="bottom")
         head.alignment = Alignment(horizontal="center")
         sheet.column_dimensions[get_column_letter(number)].width = 13 if number > 1 else 11
@@ -209,22 +206,10 @@ def _points(
             sheet.cell(row, number).number_format = _number_format(key)
     sheet.row_dimensions[first - 1].height = 42
     last = get_column_letter(len(columns))
-    table = Table(displayName="tblMM", name="tblMM", ref=f"A{first}:{last}{first + count}")
-    table._initialise_columns()
-    for described, (key, _, text) in zip(table.tableColumns, columns, strict=True):
-        described.name = key
-        if text:
-            described.calculatedColumnFormula = TableFormula(attr_text=text)
-    table.tableStyleInfo = TableStyleInfo(name="TableStyleLight1", showRowStripes=False)
-    sheet.add_table(table)
-    for flag, (fill, ink) in _FLAGS.items():
-        rule = FormulaRule(
-            formula=[f'${last}{first + 1}="{flag}"'],
-            fill=PatternFill("solid", start_color=fill, end_color=fill),
-            font=Font(color=ink, bold=flag != "OK"),
-            stopIfTrue=True,
-        )
-        sheet.conditional_formatting.add(f"{last}{first + 1}:{last}{first + count}", rule)
+    keyed = ((key, text) for key, _, text in columns)
+    add_table(sheet, "tblMM", f"A{first}:{last}{first + count}", keyed)
+    flags = f"{last}{first + 1}:{last}{first + count}"
+    colour_words(sheet, flags, _FLAGS, bold=_FLAGS.keys() - {"OK"}, stop=True)
     letters = {key: get_column_letter(i) for i, (key, _, _) in enumerate(columns, start=1)}
     for key in ("R", "ZP"):
         place = f"{letters[key]}{first + 1}:{letters[key]}{first + count}"

@@ -43,6 +43,7 @@ from bifocal.survey.workbook.sheets import (
 from bifocal.survey.workbook.words import readme, term
 from photocore.workbook.cells import CellValue
 from photocore.workbook.grid import column_letters
+from photocore.workbook.look import colour_words
 from photocore.workbook.newbook import finish_book, new_workbook
 
 #: Row of the keys in `Points` and `Results`.
@@ -192,7 +193,8 @@ def _long_sheet(
     )
     flag = column_letters([column.key for column in columns].index("flag") + 1)
     bold = ("OFF-RADIAL", "NADIR", "CHECK")
-    sheet.colour(f"{flag}{HEAD + 1}:{flag}{HEAD + rows}", FLAG_COLOURS, bold=bold, stop=True)
+    flags = f"{flag}{HEAD + 1}:{flag}{HEAD + rows}"
+    colour_words(sheet.worksheet, flags, FLAG_COLOURS, bold=bold, stop=True)
     repeat = f"{HEAD - 1}:{HEAD}"
     sheet.finish(landscape=name == "Points", freeze=f"B{HEAD + 1}", repeat=repeat)
     return sheet

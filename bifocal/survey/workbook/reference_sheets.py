@@ -35,6 +35,7 @@ from bifocal.survey.workbook.sheets import (
 from bifocal.survey.workbook.words import word
 from photocore.workbook.cells import CellValue
 from photocore.workbook.grid import column_letters
+from photocore.workbook.look import colour_words
 
 #: Row of the keys of the two tables; statistics and parameters stand above.
 CHECK_HEAD, CONTROL_HEAD = 12, 27
@@ -106,10 +107,8 @@ def _verdict(sheet: SheetBuilder, content: SurveyContent, accuracy: float) -> No
     )
     first, last = CHECK_HEAD + 1, CHECK_HEAD + len(verdicts)
     letter = column_letters(VERDICT_LEFT + 3)
-    sheet.colour(
-        f"{letter}{first}:{letter}{last}",
-        {holds: ("E2F0D9", "1E5B12"), fails: ("F8CBCB", "8B0000")},
-    )
+    colours = {holds: ("E2F0D9", "1E5B12"), fails: ("F8CBCB", "8B0000")}
+    colour_words(sheet.worksheet, f"{letter}{first}:{letter}{last}", colours)
 
 
 def georeference(builder: BookBuilder, content: SurveyContent) -> None:

@@ -7,24 +7,20 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from openpyxl import Workbook
-from openpyxl.formatting.rule import FormulaRule
-from openpyxl.styles import Alignment, Border, Font, PatternFill, Protection, Side
+from openpyxl.styles import Alignment, Font, PatternFill, Protection
 from openpyxl.utils import absolute_coordinate, get_column_letter
 from openpyxl.workbook.defined_name import DefinedName
 from openpyxl.worksheet.datavalidation import DataValidation
-from openpyxl.worksheet.table import Table, TableFormula, TableStyleInfo
 from openpyxl.worksheet.worksheet import Worksheet
 
 from bifocal.survey.workbook.columns import TEXT_KEYS, SurveyColumn, row_formula
 from bifocal.survey.workbook.words import label, word
 from photocore.workbook.cells import CellValue
+from photocore.workbook.look import HEAD_FILL, INPUT_EDGE, INPUT_FILL, add_table
 from photocore.workbook.newbook import RowBlock
 
-INPUT_FILL = PatternFill("solid", start_color="FFF9DB", end_color="FFF9DB")
-HEAD_FILL = PatternFill("solid", start_color="DCE6F1", end_color="DCE6F1")
 _FACE = "Calibri"
 FORMULA_FONT = Font(name=_FACE, size=11, color="1F3FA8")
-INPUT_EDGE = Border(*(Side(style="hair", color="BFBFBF"),) * 4)
 TITLE_FONT = Font(name=_FACE, size=14, bold=True)
 HEAD_FONT, LABEL_FONT = Font(name=_FACE, size=11, bold=True), Font(name=_FACE, size=9)
 NOTE_FONT = Font(name=_FACE, size=11, italic=True, color="595959")
@@ -198,33 +194,9 @@ class SheetBuilder:
         head, left = at
         last = get_column_letter(left + len(columns) - 1)
         reference = f"{get_column_letter(left)}{head}:{last}{head + rows}"
-        table = Table(displayName=name, name=name, ref=reference)
-        table._initialise_columns()
-        for described, column in zip(table.tableColumns, columns, strict=True):
-            described.name = column.key
-            if column.kind == "formula":
-                text = row_formula(name, column.formula)[1:]
-                described.calculatedColumnFormula = TableFormula(attr_text=text)
-        table.tableStyleInfo = TableStyleInfo(name="TableStyleLight1", showRowStripes=False)
-        self.worksheet.add_table(table)
-
-    def colour(
-        self,
-        area: str,
-        colours: Mapping[str, tuple[str, str]],
-        *,
-        bold: Sequence[str] = (),
-        stop: bool | None = None,
-    ) -> None:
-        """Colour the cells of a column by the word they hold, which tells the same."""
-        for text, (fill, ink) in colours.items():
-            rule = FormulaRule(
-                formula=[f'${area.partition(":")[0]}="{text}"'],
-                fill=PatternFill("solid", start_color=fill, end_color=fill),
-                font=Font(color=ink, bold=text in bold) if bold else Font(color=ink),
-                stopIfTrue=stop,
-            )
-            self.worksheet.conditional_formatting.add(area, rule)
+        texts = [row_formula(name, c.formula)[1:] if c.kind == "formula" else "" for c in columns]
+        keyed = zip((column.key for column in columns), texts, strict=True)
+        add_table(self.worksheet, name, reference, keyed)
 
     def validate(
         self, cells: str, *, choices: str = "", above_zero: bool = False, limit: float = 1e7

@@ -27,7 +27,6 @@ def test_sampling_a_slope_is_exact_between_pixel_centres():
 def test_sampling_outside_the_map_is_nan_and_unknown():
     places = [[-0.1, 1.0], [4.1, 1.0], [2.0, 3.1], [np.nan, 1.0]]
     assert np.isnan(slope().sample(places)).all()
-    assert (slope().sample_quality(places) == Quality.UNKNOWN).all()
 
 
 def test_beside_an_unknown_pixel_the_nearest_known_one_counts():
