@@ -97,10 +97,8 @@ class Lens:
         """
         if Path(path).suffix.lower() in {".txt", ".xml", ".yml", ".yaml"}:
             foreign = read_foreign_lens(path)
-            try:
+            with located(path):
                 return cls(**foreign._asdict())
-            except InputError as error:
-                raise InputError(f"{path}: {error}") from None
         data = read_object(path, what="lens file")
         if str(data.get("format", "")).startswith("bifocal-pair"):
             raise InputError(f"{path}: is a pair file, not a lens file; name the lens.json.")

@@ -15,14 +15,7 @@ from bifocal.model.flags import SIGMA_PIXEL, FlagLimits
 from bifocal.model.intersection import Intersection, PlanePicks, intersect
 from bifocal.model.lens import Lens
 from bifocal.precision import base_factor
-from photocore.arrays import (
-    BoolArray,
-    FloatArray,
-    as_points,
-    not_negative,
-    positive,
-    read_only,
-)
+from photocore.arrays import BoolArray, FloatArray, as_points, not_negative, positive, read_only
 from photocore.errors import GeometryError, InputError, located
 from photocore.jsonfile import read_object, write_object
 

@@ -22,12 +22,7 @@ from bifocal.model.surface import FlatSurface, MapSurface, Surface
 from bifocal.orthophotos.compose import TILE
 from bifocal.orthophotos.drawing import Drawing, Legend, PrintSheet, round_step
 from bifocal.orthophotos.drawing_files import write_drawing, write_section_dxf, write_section_svg
-from bifocal.orthophotos.ortho_workflow import (
-    OrthoTask,
-    make_ortho,
-    open_surface,
-    planned_grid,
-)
+from bifocal.orthophotos.ortho_workflow import OrthoTask, make_ortho, open_surface, planned_grid
 from bifocal.orthophotos.pdf_sheet import write_sheet
 from bifocal.orthophotos.sections import contours, section
 from bifocal.orthophotos.shading import shaded, tints

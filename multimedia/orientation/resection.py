@@ -11,12 +11,7 @@ from numpy.typing import ArrayLike
 from multimedia.media.camera import EXTERIOR, INTERIOR, Camera
 from multimedia.media.flat_interface import FlatInterface
 from multimedia.media.optical_media import OpticalMedia
-from multimedia.media.projection import (
-    Media,
-    as_media,
-    project_with_jacobian,
-    refuse_pixels,
-)
+from multimedia.media.projection import Media, as_media, project_with_jacobian, refuse_pixels
 from multimedia.orientation.pose_starts import pose_starts
 from photocore.adjustment import OUTLIER_LIMIT, correlations, fit, minimise
 from photocore.arrays import BoolArray, FloatArray, as_points

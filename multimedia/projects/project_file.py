@@ -32,7 +32,7 @@ from multimedia.projects.point_tables import (
 from multimedia.refraction.layers import Layers
 from photocore.arrays import is_finite_number
 from photocore.distortion import NAMES, Brown, Convention
-from photocore.errors import GeometryError, InputError
+from photocore.errors import GeometryError, InputError, located
 from photocore.output import atomic_path, check_all_writable
 from photocore.textfile import read_text
 
@@ -236,12 +236,10 @@ def _surfaces(value: Mapping[str, Any], where: str) -> Interfaces:
     indices = value.get("indices")
     if not isinstance(indices, list):
         raise InputError(f"{where}: indices must be a list of numbers, camera side first.")
-    try:
+    with located(where):
         return Interfaces(
             surfaces=tuple(surfaces), indices=tuple(indices), with_camera=tuple(moving)
         )
-    except InputError as error:
-        raise InputError(f"{where}: {error}") from None
 
 
 def _media_data(media: FlatInterface | Interfaces) -> dict[str, Any]:

@@ -13,14 +13,7 @@ from openpyxl.utils import get_column_letter
 from multimedia.refraction.layers import HIGHEST_INDEX
 from multimedia.refraction.unrolled import STEPS, TOLERANCE, unrolled_shift
 from multimedia.workbook.index_sheet import write_index_sheet
-from multimedia.workbook.live_book import (
-    BOLD,
-    NOTE,
-    SMALL,
-    LiveBook,
-    allow_between,
-    headings,
-)
+from multimedia.workbook.live_book import BOLD, NOTE, SMALL, LiveBook, allow_between, headings
 from multimedia.workbook.shift_points import IN_PLANE, ShiftPoints, ShiftResult, ShiftSetup
 from photocore.arrays import BoolArray
 from photocore.errors import InputError

@@ -26,13 +26,7 @@ from photocore.workbook.grid import (
     split_area,
     split_cell,
 )
-from photocore.workbook.package import (
-    local,
-    open_package,
-    understood,
-    xml_elements,
-    xml_root,
-)
+from photocore.workbook.package import local, open_package, understood, xml_elements, xml_root
 
 #: Number formats 14-22, 27-36, 45-47, 50-58 are dates and times in every language of Excel.
 _BUILT_IN_DATES = {

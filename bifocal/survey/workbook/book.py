@@ -9,13 +9,7 @@ from pathlib import Path
 from openpyxl.styles import Alignment
 
 from bifocal.survey.workbook.charts import charts
-from bifocal.survey.workbook.columns import (
-    IDEAL_POINTS,
-    LOG,
-    RESULTS,
-    SurveyColumn,
-    pair_points,
-)
+from bifocal.survey.workbook.columns import IDEAL_POINTS, LOG, RESULTS, SurveyColumn, pair_points
 from bifocal.survey.workbook.content import (
     STRUCTURED_ROWS,
     SurveyContent,

@@ -19,19 +19,8 @@ from bifocal.survey.workbook.columns import (
     UNCERTAINTY,
     verdict_columns,
 )
-from bifocal.survey.workbook.content import (
-    SurveyContent,
-    check_cells,
-    control_cells,
-    setup_cells,
-)
-from bifocal.survey.workbook.sheets import (
-    HEAD_FONT,
-    LABEL_FONT,
-    BookBuilder,
-    Cells,
-    SheetBuilder,
-)
+from bifocal.survey.workbook.content import SurveyContent, check_cells, control_cells, setup_cells
+from bifocal.survey.workbook.sheets import HEAD_FONT, LABEL_FONT, BookBuilder, Cells, SheetBuilder
 from bifocal.survey.workbook.words import word
 from photocore.workbook.cells import CellValue
 from photocore.workbook.grid import column_letters
