@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from abc import ABC, abstractmethod
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
@@ -200,7 +201,7 @@ class Grid:
         return (c0, r0, c1 - c0, r1 - r0), *np.meshgrid(x, y)
 
 
-class Gridded:
+class Gridded(ABC):
     """An image on the reference plane that knows where its pixels are.
 
     Attributes
@@ -213,9 +214,9 @@ class Gridded:
     plane_from_pixel: FloatArray
 
     @property
+    @abstractmethod
     def shape(self) -> tuple[int, int]:
         """Height and width. [px]"""
-        raise NotImplementedError
 
     @property
     def grid(self) -> Grid:
