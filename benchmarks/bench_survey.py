@@ -34,18 +34,17 @@ def observations(rows):
     return PointObservations(ids=ids, xy1=images[0], xy2=images[1])
 
 
-def setup():
-    from bifocal.survey.setup import SurveySetup
-
-    return SurveySetup(d1=D1, d2=D2, c1=C1, c2=C2)
-
-
 def write_workbook(path, rows):
+    from bifocal import Pair
+    from bifocal.survey.observations import PointObservations
     from bifocal.survey.template_workflow import write_survey
 
-    points, geometry = observations(rows), setup()
+    pair = Pair.ideal(d1=D1, d2=D2, c1=C1, c2=C2, pitch=0.004)
+    pixels1, pixels2 = pair.project(truth(rows))
+    ids = tuple(f"P{i}" for i in range(rows))
+    points = PointObservations(ids=ids, pixels1=pixels1, pixels2=pixels2)
     begin = time.process_time()
-    write_survey(path, points, setup=geometry, overwrite=True)
+    write_survey(path, points, pair=pair, overwrite=True)
     return time.process_time() - begin
 
 
