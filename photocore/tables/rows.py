@@ -70,8 +70,7 @@ class RowSorter:
         if not self.filling & cells.keys():
             return False
         if self.headings and any(isinstance(cells.get(n), str) for n in self.headings):
-            shown = {n: bare(str(cells.get(n, ""))) for n in self.headings}
-            if shown == self.headings:
+            if all(bare(str(cells.get(n, ""))) == text for n, text in self.headings.items()):
                 self.previous = row
                 return False
         if row != self.previous + 1 and self.numeric and not self.numeric & cells.keys():

@@ -349,17 +349,21 @@ class _Splicer:
 
     def add_rows(self, before: int, place: tuple[int, int, str, str]) -> None:
         """Insert the new rows whose numbers lie before one."""
-        pieces: list[str] = []
+        rows = []
         while self.new_rows and self.new_rows[0] < before:
-            row = self.new_rows.popleft()
-            if len(self.changes.added) == 1 and row not in self.changes.inputs:
-                cells = self.changes.added[0].xml(row, self.prefix)
-            else:
-                new = self.changes.cells(row).items()
-                cells = "".join([self.xml(column, cell, row) for column, cell in new])
-            if cells:
-                pieces.append(f'<{self.prefix}row r="{row}">{cells}</{self.prefix}row>')
-        self.insert("".join(pieces), place)
+            rows.append(self.new_rows.popleft())
+        if rows and len(self.changes.added) == 1 and self.changes.inputs.keys().isdisjoint(rows):
+            lines = self.changes.added[0].xml(range(rows[0], rows[-1] + 1), self.prefix)
+        else:
+            lines = map(self.row_xml, rows)
+        tag = f"{self.prefix}row"
+        pieces = zip(rows, lines, strict=True)
+        self.insert("".join([f'<{tag} r="{n}">{xml}</{tag}>' for n, xml in pieces if xml]), place)
+
+    def row_xml(self, row: int) -> str:
+        """Return the XML of the cells of a new row."""
+        new = self.changes.cells(row).items()
+        return "".join([self.xml(column, cell, row) for column, cell in new])
 
     def insert(self, xml: str, place: tuple[int, int, str, str]) -> None:
         """Insert XML at a place (start, end, text before, text behind)."""
