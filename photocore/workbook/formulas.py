@@ -110,7 +110,7 @@ class References:
 
     def _formulas(self, sheet: SheetPart) -> str:
         """Return the formulas of a sheet as one text, those that differ only in cells once."""
-        shapes = set()
+        shapes: set[str] = set()
         for element in xml_elements(self.path, self.package, sheet.part, "row", "f"):
             kind = element.tag.removesuffix(local(element.tag)) + "f"
             shapes.update(_ANY_CELL.sub("#", own.text or "") for own in element.iter(kind))
