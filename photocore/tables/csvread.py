@@ -295,17 +295,11 @@ def _arrow_chunks(text: str, delimiter: str, width: int) -> Iterator[list[Sequen
     if text.startswith("\ufeff"):  # Arrow would take it off
         yield None
     names = [str(number) for number in range(width)]
+    read = arrow.ReadOptions(column_names=names, block_size=_ARROW_BLOCK, use_threads=False)
+    parse = arrow.ParseOptions(delimiter=delimiter, quote_char=False, ignore_empty_lines=False)
+    kinds = arrow.ConvertOptions(column_types=dict.fromkeys(names, string()))
     try:
-        with arrow.open_csv(
-            BytesIO(text.encode()),
-            read_options=arrow.ReadOptions(
-                column_names=names, block_size=_ARROW_BLOCK, use_threads=False
-            ),
-            parse_options=arrow.ParseOptions(
-                delimiter=delimiter, quote_char=False, ignore_empty_lines=False
-            ),
-            convert_options=arrow.ConvertOptions(column_types=dict.fromkeys(names, string())),
-        ) as batches:
+        with arrow.open_csv(BytesIO(text.encode()), read, parse, kinds) as batches:
             for batch in batches:
                 yield [ArrowTexts(column) for column in batch.columns]
     except ArrowInvalid:

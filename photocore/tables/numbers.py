@@ -223,18 +223,20 @@ class ArrowTexts(Sequence[str]):
     def __getitem__(self, index: Any) -> Any:
         return self.texts[index]
 
+    def has(self, text: str) -> bool:
+        """Whether any of the texts contains another one."""
+        from pyarrow import compute
+
+        return bool(compute.any(compute.match_substring(self.column, text)).as_py())
+
     def floats(self, mark: str) -> FloatArray | None:
         """Return numbers (NaN where empty), exact to the last bit; None if any is not clean."""
         from pyarrow import ArrowInvalid, compute, scalar
 
         blank = scalar(None, self.column.type)
         filled = compute.if_else(compute.equal(self.column, ""), blank, self.column)
-        if mark == ",":
-            if compute.any(compute.match_substring(filled, ".")).as_py():
-                return None
-            filled = compute.replace_substring(filled, ",", ".")
         try:
-            array = compute.cast(filled, "float64")
+            array = compute.cast(compute.replace_substring(filled, mark, "."), "float64")
         except ArrowInvalid:
             return None
         numbers: FloatArray = array.to_numpy(zero_copy_only=False)
@@ -245,6 +247,9 @@ class ArrowTexts(Sequence[str]):
 def _floats(texts: Sequence[str], mark: str) -> FloatArray | None:
     """Return numbers with this decimal mark (NaN where blank); None if any is not plain."""
     if isinstance(texts, ArrowTexts):
+        # No number with the other mark can be read; Arrow takes long to find out.
+        if texts.has("," if mark == "." else "."):
+            return None
         numbers = texts.floats(mark)
         if numbers is not None:
             return numbers

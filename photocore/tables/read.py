@@ -244,10 +244,7 @@ def _reach_below(grid: CellGrid, match: Match, bottom: int) -> None:
 
 
 def _in_sheet(
-    book: SheetFile,
-    title: str,
-    columns: Sequence[Column],
-    column_map: Mapping[str, str] | None,
+    book: SheetFile, title: str, columns: Sequence[Column], column_map: Mapping[str, str] | None
 ) -> _Place | None:
     """Look for the columns anywhere in a sheet."""
     grid = book.grid(title)

@@ -129,8 +129,7 @@ def splice_sheet(
             f"{path}: the part {part} is not stored as UTF-8. Open the file in the spreadsheet "
             "program, save it there, and try again."
         )
-    splicer = _Splicer(path, part, data, changes, strings)
-    return splicer.run()
+    return _Splicer(path, part, data, changes, strings).run()
 
 
 class _Splicer:
@@ -258,8 +257,9 @@ class _Splicer:
             self.replace(name, self.new.pop(self.column))
         elif self.column in self.cached:
             self.put_result(name, self.cached[self.column])
-        elif len(self.children) > 1 and self.child("f"):
-            self.strip(name)
+        elif len(self.children) > 1 and self.child("f") and self.child("v"):
+            # How to take the cached result out, should it be stale.
+            self.result.strips.append(self.with_result(name, "", ""))
 
     def replace(self, name: str, new: NewCell) -> None:
         """Give this cell another typed value, or a formula if it is empty."""
@@ -292,11 +292,6 @@ class _Splicer:
                 self.edits.append((*stored, new))
             return
         self.edits.append(self.with_result(name, kind, content))
-
-    def strip(self, name: str) -> None:
-        """Note how to take the cached result out of this formula cell."""
-        if self.child("v"):
-            self.result.strips.append(self.with_result(name, "", ""))
 
     def with_result(self, name: str, kind: str, content: str) -> tuple[int, int, bytes]:
         """Return the edit that gives a formula cell this result and keeps all else of it."""
