@@ -25,6 +25,8 @@ POINT_ROWS, CHECK_ROWS, CONTROL_ROWS, SPARE_ROWS = 300, 25, 12, 10
 STRUCTURED_ROWS = 2000
 #: The charts show the first points only.
 CHART_ROWS = 1000
+#: Columns that are blank where a point has no place on the wall.
+_PLACES = ("X", "Y", "sigma_X", "sigma_Y")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -168,7 +170,7 @@ def point_cells(content: SurveyContent) -> dict[str, list[CellValue]]:
     if not content.is_pair and table.image_scale is None:
         placeless[:] = True
     for key, values in table.columns.items():
-        blank = placeless if key in ("X", "Y") else incomplete
+        blank = placeless if key in _PLACES or key.startswith("cov_") else incomplete
         if key in ("q", "theta_used"):
             blank = np.isnan(values)
         cells[key] = [
@@ -176,11 +178,39 @@ def point_cells(content: SurveyContent) -> dict[str, list[CellValue]]:
             for empty, value in zip(blank.tolist(), values.tolist(), strict=True)
         ]
     cells |= {key: inputs(values) for key, values in table.carried.items()}
+    cells |= _radial_variances(content, placeless) if not content.is_pair else {}
     typed = points.has_pixels | points.is_cartesian | points.is_polar
     cells["flag"] = [
         flag if given else None for flag, given in zip(table.flags, typed, strict=True)
     ]
     return cells
+
+
+def _radial_variances(content: SurveyContent, blank: BoolArray) -> dict[str, list[CellValue]]:
+    """Return the variances that the covariance of a point on an ideal pair is made of."""
+    table, setup = content.table, content.setup
+    assert table is not None
+    assert setup is not None
+    first, second = content.photos
+    m1 = first.scale_number or np.nan
+    k12 = 1.0 if second.scale_number is None else second.scale_number / m1
+    d1, d2, sigma = first.distance, second.distance, setup.precision
+    r, den = table["r"], table["den"]
+    near, far = table["s2_used"] / d2, table["s1_used"] / d1
+    with np.errstate(divide="ignore", invalid="ignore"):
+        v1 = ((1 - r / d1) * sigma / den) ** 2
+        v2 = ((1 - r / d2) * k12 * sigma / den) ** 2
+    found = {
+        "v_1": v1,
+        "v_2": v2,
+        "v_s": (v1 * near**2 + v2 * far**2) * (m1 / 1000) ** 2,
+        "v_t": ((1 - r / d1) * sigma * m1 / 1000) ** 2,
+        "v_sr": -(v1 * near + v2 * far) * m1 / 1000,
+    }
+    return {
+        key: [None if no else v for no, v in zip(blank.tolist(), values.tolist(), strict=True)]
+        for key, values in found.items()
+    }
 
 
 def result_cells(
@@ -190,13 +220,16 @@ def result_cells(
     if content.table is None:
         return {}
     xyz = content.table.xyz
-    world = np.full_like(xyz, np.nan)
+    world, sigma = np.full_like(xyz, np.nan), np.full_like(xyz, np.nan)
     if content.georeference is not None:
         world = content.georeference.world_from_wall(xyz)
+        sigma = content.georeference.sigma(content.table.covariance)
     return {
         "id": cells["id"],
-        **{key: inputs(content.table[key]) for key in ("X", "Y", "Z", "sigma_r")},
+        **{key: inputs(content.table[key]) for key in ("X", "Y", "Z")},
+        **{key: inputs(content.table[key]) for key in ("sigma_X", "sigma_Y", "sigma_r")},
         **{key: inputs(world[:, i]) for i, key in enumerate("ENH")},
+        **{f"sigma_{key}": inputs(sigma[:, i]) for i, key in enumerate("ENH")},
         "flag": cells["flag"],
         "note": cells["note"],
     }
