@@ -316,4 +316,10 @@ def _as_georeference(task: _Task, best: _Fit, usable: BoolArray) -> Georeference
         offset=best.offset,
         sums=best.sums,
         covariance=task.covariance,
+        near=_flattened(task.world - best.origin, flat=flat),
     )
+
+
+def _flattened(near: FloatArray, *, flat: bool) -> FloatArray:
+    """Return coordinates with zero heights where heights play no part."""
+    return np.where([False, False, flat], 0.0, near)

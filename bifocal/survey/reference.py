@@ -176,6 +176,8 @@ class Georeference:
         What the weighted fit is made of, for the workbook; None where all weights are equal.
     covariance : ndarray, shape (n, 3, 3), or None
         Of X, Y, Z of the control points, as solved. [m²]
+    near : ndarray, shape (n, 3)
+        E, N, H of the control points about ``origin``; H is 0 for the model 2D. [m]
     """
 
     ids: tuple[str, ...]
@@ -192,6 +194,7 @@ class Georeference:
     error_ratio: float = float("nan")
     sums: WeightedSums | None = None
     covariance: FloatArray | None = None
+    near: FloatArray = field(default_factory=lambda: np.zeros((0, 3)))
 
     def sigma(self, covariance: FloatArray | None) -> FloatArray:
         """Return the standard deviations of E, N, H of points on the wall, shape (n, 3). [m]

@@ -44,12 +44,12 @@ class WeightedSums:
         Sum of weights times design, and ``inverse @ mixed``.
     right, mean : ndarray, shape (3,)
         Sum of weights times coordinates, and ``inverse @ right``.
-    normal, reduced : ndarray, shape (3, 3)
-        Normal matrix of p, q, m; the same freed of the shifts.
-    target, left : ndarray, shape (3,)
-        Right-hand side of p, q, m; the same freed of the shifts.
-    turns : ndarray, shape (TURNS, 4)
-        c, s, p, q of every turn.
+    reduced : ndarray, shape (3, 3)
+        Normal matrix of p, q, m, freed of the shifts.
+    left : ndarray, shape (3,)
+        Right-hand side of p, q, m, freed of the shifts.
+    turns : ndarray, shape (TURNS, 7)
+        Cosine and sine of the direction, the three entries of the normal matrix, and p, q.
     """
 
     weights: FloatArray
@@ -60,16 +60,20 @@ class WeightedSums:
     shift: FloatArray
     right: FloatArray
     mean: FloatArray
-    normal: FloatArray
     reduced: FloatArray
-    target: FloatArray
     left: FloatArray
     turns: FloatArray
 
     @property
+    def determinant(self) -> float:
+        """Of the sum of the weights."""
+        (a, b, c), (_, d, e), (_, _, f) = self.total
+        return float(a * (d * f - e * e) + b * (c * e - b * f) + c * (b * e - c * d))
+
+    @property
     def unknowns(self) -> FloatArray:
         """p, q and the scale m of the last turn, shape (3,)."""
-        p, q = self.turns[-1, 2:]
+        p, q = self.turns[-1, 5:]
         return np.array([p, q, np.sqrt(p**2 + q**2)])
 
     @property
@@ -135,13 +139,13 @@ def weighted_sums(
     reduced, left = normal - mixed.T @ shift, target - mixed.T @ mean
     return WeightedSums(
         weights=weights, design=design, total=total, inverse=inverse, mixed=mixed, shift=shift,
-        right=right, mean=mean, normal=normal, reduced=reduced, target=target, left=left,
+        right=right, mean=mean, reduced=reduced, left=left,
         turns=_turns(reduced, left, start.rotation[:2, 0]),
     )  # fmt: skip
 
 
 def _turns(reduced: FloatArray, left: FloatArray, direction: FloatArray) -> FloatArray:
-    """Return c, s, p, q of every turn: m is p c + q s in the direction of the one before."""
+    """Return every turn: m is p c + q s in the direction of the turn before."""
     rows = []
     for _ in range(TURNS):
         c, s = direction
@@ -151,7 +155,7 @@ def _turns(reduced: FloatArray, left: FloatArray, direction: FloatArray) -> Floa
         h1, h2 = left[0] + c * left[2], left[1] + s * left[2]
         det = n11 * n22 - n12**2
         p, q = (h1 * n22 - h2 * n12) / det, (h2 * n11 - h1 * n12) / det
-        rows.append((c, s, p, q))
+        rows.append((c, s, n11, n12, n22, p, q))
         length = np.sqrt(p**2 + q**2)
         if not length > 0:
             raise GeometryError(

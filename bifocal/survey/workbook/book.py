@@ -17,7 +17,8 @@ from bifocal.survey.workbook.content import (
     result_cells,
     setup_cells,
 )
-from bifocal.survey.workbook.reference_sheets import check, georeference, planning
+from bifocal.survey.workbook.georeference_sheet import georeference
+from bifocal.survey.workbook.reference_sheets import check, planning
 from bifocal.survey.workbook.setup_cells import (
     FORMS,
     IDEAL_FORMULAS,

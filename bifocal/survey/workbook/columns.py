@@ -52,8 +52,14 @@ def row_formula(table: str, text: str) -> str:
     return "=" + re.sub(r"\[@(\w+)\]", rf"{table}[[#This Row],[\1]]", text)
 
 
-def _f(key: str, formula: str, places: int | None = None, **more: object) -> SurveyColumn:
+def formula_column(
+    key: str, formula: str, places: int | None = None, **more: object
+) -> SurveyColumn:
+    """Return a column that is calculated."""
     return SurveyColumn(key=key, kind="formula", formula=formula, places=places, **more)  # type: ignore[arg-type]
+
+
+_f = formula_column
 
 
 def _of_r(key: str, formula: str) -> SurveyColumn:
@@ -89,7 +95,8 @@ _RELIEF = (
     _f("r", 'IF([@den]="","",IF(AND([@s1_used]>0,[@den]*(d_1-d_2)>0),[@ds]/[@den],NA()))', 4),
 )
 
-_COVARIANCES = ("XX", "XY", "YY", "XZ", "YZ", "ZZ")
+#: Entries of the covariance of X, Y, Z.
+COVARIANCES = ("XX", "XY", "YY", "XZ", "YZ", "ZZ")
 
 
 def _of_x(key: str, formula: str, *, folded: bool = True) -> SurveyColumn:
@@ -232,7 +239,7 @@ def pair_points(*, undistorted: bool) -> tuple[SurveyColumn, ...]:
             SurveyColumn(key=key, kind="value", places=6, folded=True)
             for key in ("g1x", "g1y", "g2x", "g2y", "k_q", "k_r")
         ),
-        *(SurveyColumn(key=f"k_{key}", kind="value", folded=True) for key in _COVARIANCES),
+        *(SurveyColumn(key=f"k_{key}", kind="value", folded=True) for key in COVARIANCES),
         _f("s1_used", f'IF([@q]="","",{radius(1, moved)})', 4, folded=True),
         _f("s2_used", f'IF([@q]="","",{radius(2, moved)})', 4, folded=True),
         _f(
@@ -252,7 +259,7 @@ def pair_points(*, undistorted: bool) -> tuple[SurveyColumn, ...]:
             "IF(ISNUMBER([@r]),sigma_px*[@k_r],NA())",
             tuple(
                 _of_x(f"cov_{key}", f"IF(ISNUMBER([@r]),sigma_px^2*[@k_{key}],NA())")
-                for key in _COVARIANCES
+                for key in COVARIANCES
             ),
         ),
         _f(
@@ -282,7 +289,7 @@ def _world_sigma(row: int) -> str:
     terms = [
         f"{'2*' if i != j else ''}g_{row}{'XYZ'.index(i) + 1}*g_{row}{'XYZ'.index(j) + 1}"
         f"*INDEX(tblPoints[cov_{i}{j}],{_AT})"
-        for i, j in _COVARIANCES
+        for i, j in COVARIANCES
     ]
     known = f"AND(ISNUMBER(g_k),ISNUMBER(INDEX(tblPoints[cov_XX],{_AT})))"
     return f'IF({known},g_k*SQRT({"+".join(terms)}),"")'

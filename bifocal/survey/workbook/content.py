@@ -12,9 +12,10 @@ from bifocal.model.pair import Pair, Photo
 from bifocal.survey.georeferencing import residuals
 from bifocal.survey.observations import PointObservations
 from bifocal.survey.reference import CheckResult, Georeference, KnownPoints
-from bifocal.survey.relief_table import ReliefTable
+from bifocal.survey.relief_table import ReliefTable, entries
 from bifocal.survey.setup import SurveySetup
 from bifocal.survey.tolerances import RULES, ToleranceRule
+from bifocal.survey.weighted_similarity import weights_of
 from bifocal.survey.workbook.setup_cells import MATRICES, NADIRS
 from photocore.arrays import BoolArray, FloatArray
 from photocore.workbook.cells import CellValue
@@ -257,16 +258,38 @@ def control_cells(content: SurveyContent) -> dict[str, list[CellValue]]:
     cells["found_bad"] = [0 if name in geo.bad else None for name in geo.ids]
     used, fit = geo.used, geo.world_from_wall
     centred = geo.solved - fit.source_centre
-    near = control.xyz - geo.origin
-    left = residuals(fit, geo.solved, near, geo.offset)
-    if geo.model == "2D":
-        near[:, 2] = 0.0
+    left = residuals(fit, geo.solved, control.xyz - geo.origin, geo.offset)
+    near = geo.near
     for i, (axis, world) in enumerate(zip("XYZ", "ENH", strict=True)):
         cells[axis] = inputs(geo.solved[:, i])
         cells[f"c{axis}"] = inputs(np.where(used, centred[:, i], 0.0))
         cells[f"c{world}"] = inputs(np.where(used, near[:, i], 0.0))
         cells[f"v{world}"] = inputs(left[:, i])
     cells["w"] = [int(value) for value in used]
+    return cells | _weight_cells(geo)
+
+
+def _weight_cells(geo: Georeference) -> dict[str, list[CellValue]]:
+    """Return covariances of the control points, their weights, and weights times design."""
+    if geo.covariance is None:
+        return {}
+    cells = {key: inputs(values) for key, values in entries(geo.covariance, "q_").items()}
+    size, used = len(geo.ids), geo.used
+    flat = geo.model == "2D"
+    weights = np.zeros((size, 3, 3))
+    weights[used] = weights_of(geo.covariance[used], flat=flat)
+    centred = np.zeros((size, 3))
+    centred[used] = geo.solved[used] - geo.world_from_wall.source_centre
+    east, north, height = np.where(used[:, None], geo.near, 0.0).T
+    zero, turned = np.zeros(size), 1.0 if flat else 0.0
+    design = [
+        (east, turned * north, -north), (north, -turned * east, east), (zero, height, zero)
+    ]  # fmt: skip
+    cells |= {key: inputs(values) for key, values in entries(weights, "p_").items()}
+    columns = {f"u_{{}}{name}": np.stack(d, axis=-1) for name, d in zip("pqm", design, strict=True)}
+    for key, column in {**columns, "h_{}": centred}.items():
+        weighted = np.einsum("nij,nj->ni", weights, column)
+        cells |= {key.format(axis): inputs(weighted[:, i]) for i, axis in enumerate("XYZ")}
     return cells
 
 

@@ -20,8 +20,9 @@ from bifocal.survey.reference import KnownPoints
 from bifocal.survey.setup import SurveySetup
 from bifocal.survey.template_workflow import write_template
 from bifocal.survey.workbook.book import write_book
-from bifocal.survey.workbook.columns import GEOREFERENCE, IDEAL_POINTS, RESULTS, pair_points
+from bifocal.survey.workbook.columns import IDEAL_POINTS, RESULTS, pair_points
 from bifocal.survey.workbook.content import SurveyContent
+from bifocal.survey.workbook.georeference_columns import GEOREFERENCE
 from photocore.errors import InputError
 from tests.recalculate import recalculated
 from tests.workbook_lint import lint
@@ -60,10 +61,12 @@ def test_sheets_names_and_keys_are_those_of_the_contract():
         assert book.defined_names[name].attr_text.startswith("'Setup'!$C$")
     keys = [cell.value for cell in book["Points"][4]]
     assert keys[:11] == "id x1 y1 x2 y2 s1 s2 theta use code note".split()  # noqa: SIM905
-    computed = "ds den r e1 e2 s_c X Y Z q sigma_r flag".split()  # noqa: SIM905
+    computed = "ds den r e1 e2 s_c X Y Z q sigma_X sigma_Y sigma_r flag".split()  # noqa: SIM905
     assert [key for key in keys if key in computed] == computed
     results = [cell.value for cell in book["Results"][4]]
-    assert results == "id X Y Z E N H sigma_r flag note".split()  # noqa: SIM905
+    assert results == (
+        "id X Y Z E N H sigma_X sigma_Y sigma_r sigma_E sigma_N sigma_H flag note".split()  # noqa: SIM905
+    )
 
 
 @pytest.mark.parametrize("language", ["en", "it", "de"])
