@@ -68,7 +68,8 @@ _GROUPS: tuple[tuple[str, str, tuple[tuple[str, str], ...]], ...] = (
         "bifocal/precision.py",
         "bifocal/precision.py tests/papers/test_midulla.py tests/bifocal/planning/test_planning.py",
         (
-            ("by_1, by_2 = reduction(r, d1)", "by_1, by_2 = (1 + r / d1)"),
+            ("return r, -reduction(r, d1)", "return r, -(1 + r / d1)"),
+            ("(r + s2 * by_2) * sigma_2", "(r - s2 * by_2) * sigma_2"),
             ("(d1 - r) * (d2 - r) / (d1 - d2) * spread", "(d1 - r) * d2 / (d1 - d2) * spread"),
         ),
     ),
