@@ -102,8 +102,8 @@ def sigma_displacements(
 
     Examples
     --------
-    On the plane s1 = s2 and q = s / B: the sigma of e2 is d1 / (d1 - d2) times that of
-    s2 - s1, that of e1 d2 / (d1 - d2) times. Of 17.5 m and 9.5 m, picks of 1 um: 1.414 um times 35/16 and 19/16.
+    On the plane s1 = s2 and q = s / B: the sigma of e1 is d2 / (d1 - d2) times that of s2 - s1,
+    that of e2 d1 / (d1 - d2) times. 17.5 m, 9.5 m, picks of 1 um: 1.414 um times 19/16 and 35/16.
 
     >>> e1, e2 = sigma_displacements(4, 4, d1=17.5, d2=9.5, sigma_1=1, sigma_2=1)
     >>> round(float(e1), 3), round(float(e2), 3)

@@ -228,6 +228,11 @@ class Camera:
         """Unit vector of the viewing direction in the world, shape (3,)."""
         return -self.rotation[:, 2]
 
+    def vectors_to(self, points: FloatArray) -> FloatArray:
+        """Return the vectors from the projection centre in the camera frame, shape (..., 3)."""
+        vectors: FloatArray = (points - self.centre) @ self.rotation
+        return vectors
+
     def value(self, name: str) -> float:
         """Return the parameter of `EXTERIOR` or `INTERIOR` called ``name``."""
         if name in DISTORTION:

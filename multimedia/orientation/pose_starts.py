@@ -9,6 +9,7 @@ import numpy as np
 from multimedia.media.camera import Camera
 from multimedia.media.optical_media import OpticalMedia
 from photocore.arrays import FloatArray
+from photocore.camera import cameras_seeing
 from photocore.errors import GeometryError
 
 #: Camera frame with y down and z forwards (OpenCV) from ours.
@@ -92,28 +93,16 @@ def _straight(camera: Camera, control: FloatArray, ideal: FloatArray) -> list[Ca
     """Return the poses OpenCV finds for straight rays."""
     import cv2
 
-    centre = control.mean(axis=0)
-    scale = float(np.abs(control - centre).max()) or 1.0
-    points = np.ascontiguousarray((control - centre) / scale, dtype=np.float64)
-    rays = np.ascontiguousarray(ideal * (1.0, -1.0) / camera.principal_distance, dtype=np.float64)
-    flags = [cv2.SOLVEPNP_SQPNP]
-    spread = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
-    if len(points) >= 4 and spread[2] < 1e-3 * spread[0]:
-        flags.append(cv2.SOLVEPNP_IPPE)
-    if len(points) == 3:
-        flags.append(cv2.SOLVEPNP_P3P)
-    if len(points) >= 6:
-        flags.append(cv2.SOLVEPNP_EPNP)
-    poses = []
-    for flag in flags:
-        try:
-            _, turns, shifts_, _ = cv2.solvePnPGeneric(points, rays, np.eye(3), None, flags=flag)
-        except cv2.error:
-            # A solver that does not take this configuration; the others remain.
-            continue
-        for turn, shift in zip(turns, shifts_, strict=True):
-            rotation, _ = cv2.Rodrigues(turn)
-            position = -(rotation.T @ shift).ravel() * scale + centre
-            if np.isfinite(position).all() and np.isfinite(rotation).all():
-                poses.append(replace(camera, centre=position, rotation=rotation.T @ _FLIP))
-    return poses
+    methods = [cv2.SOLVEPNP_SQPNP]
+    spread = np.linalg.svd(control - control.mean(axis=0), compute_uv=False)
+    if len(control) >= 4 and spread[2] < 1e-3 * spread[0]:
+        methods.append(cv2.SOLVEPNP_IPPE)
+    if len(control) == 3:
+        methods.append(cv2.SOLVEPNP_P3P)
+    if len(control) >= 6:
+        methods.append(cv2.SOLVEPNP_EPNP)
+    rays = ideal * (1.0, -1.0) / camera.principal_distance
+    return [
+        replace(camera, centre=found.centre, rotation=found.rotation.T @ _FLIP)
+        for found in cameras_seeing(control, rays, np.eye(3), methods=methods)
+    ]
