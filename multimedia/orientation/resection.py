@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from multimedia.media.camera import EXTERIOR, INTERIOR, Camera
-from multimedia.media.flat_interface import FlatInterface
 from multimedia.media.optical_media import OpticalMedia
 from multimedia.media.projection import Media, as_media, project_with_jacobian, refuse_pixels
 from multimedia.orientation.pose_starts import pose_starts
@@ -298,11 +297,7 @@ def _refuse_mirrored(camera: Camera, sigma0: float, problem: _ControlImages) -> 
     size = float(np.sqrt(np.mean(problem.image**2)))
     if not sigma0 > 0.005 * size:
         return
-    if not isinstance(problem.interface, FlatInterface):
-        normal = np.linalg.svd(problem.control - problem.control.mean(axis=0))[2][0]
-    else:
-        # Mirrored along the faces, so that the points stay beyond them.
-        normal = problem.interface.tangents[0]
+    normal = problem.interface.mirror_normal(problem.control)
     offset = (problem.control - problem.control.mean(axis=0)) @ normal
     mirrored = replace(
         problem, control=problem.control - 2.0 * offset[:, None] * normal, names=EXTERIOR

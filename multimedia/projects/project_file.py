@@ -163,10 +163,7 @@ def _project(data: dict[str, Any], folder: Path) -> Project:
     cameras = tuple(camera for camera, _ in pairs)
     refuse_repeated([camera.name for camera in cameras], "cameras")
     remarks = [
-        f"media.{label}: {remark}"
-        for label, item in media.items()
-        if isinstance(item, FlatInterface)
-        for remark in item.layers.remarks
+        f"media.{label}: {remark}" for label, item in media.items() for remark in item.remarks
     ]
     objects, images = ObjectPoints(), ImagePoints()
     if "object_points" in data:
