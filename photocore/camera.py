@@ -9,10 +9,9 @@ K and R back: eight numbers and three are the eleven of a pinhole camera.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from photocore.arrays import FloatArray
 from photocore.rotation import AXES_CROSS, by_turn, rotation_from_vector, skew
@@ -22,19 +21,6 @@ from photocore.rotation import AXES_CROSS, by_turn, rotation_from_vector, skew
 PARAMETERS = (
     "focal length", "aspect", "column", "row", "turn X", "turn Y", "turn Z", "X", "Y", "Z"
 )  # fmt: skip
-
-
-class LensModel(Protocol):
-    """What bends the rays of a photo: ideal pixels to seen ones and back."""
-
-    def distort(self, pixels: ArrayLike) -> FloatArray:
-        """Return where ideal points are seen, shape (..., 2). [px]"""
-
-    def undistort(self, pixels: ArrayLike) -> FloatArray:
-        """Return where seen points would be without distortion, shape (..., 2). [px]"""
-
-    def distorted_by_ideal(self, pixels: ArrayLike) -> FloatArray:
-        """Return the derivative of `distort` at ideal points, shape (..., 2, 2)."""
 
 
 class Pinhole(NamedTuple):

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from photocore.arrays import FloatArray, as_floats
+from photocore.arrays import FloatArray, as_floats, read_only
+from photocore.errors import GeometryError
 
 #: The matrices of e_k x v, for the three axes e_k: shape (3, 3, 3).
 AXES_CROSS = np.array(
@@ -124,6 +125,28 @@ def rotation_from_vector(vector: ArrayLike) -> FloatArray:
     first = np.sinc(angle / np.pi)
     second = 0.5 * np.sinc(angle / (2.0 * np.pi)) ** 2
     return np.eye(3) + first * cross + second * (cross @ cross)
+
+
+def checked_rotation(matrix: ArrayLike, name: str, *, tolerance: float = 1e-6) -> FloatArray:
+    """Return a read-only copy of a rotation matrix, shape (3, 3).
+
+    Raises
+    ------
+    GeometryError
+        If its rows are no unit vectors at right angles to ``tolerance``, or it mirrors.
+    """
+    rotation = read_only(matrix, name, shape=(3, 3))
+    if not np.allclose(rotation @ rotation.T, np.eye(3), atol=tolerance):
+        raise GeometryError(
+            f"{name} is not a rotation matrix: its rows must be unit vectors at right angles. "
+            "Check the nine numbers, or give the three angles."
+        )
+    if np.linalg.det(rotation) < 0:
+        raise GeometryError(
+            f"{name} is not a rotation but mirrors the world: one of the coordinate systems is "
+            "left-handed. Exchange two axes or change the sign of one."
+        )
+    return rotation
 
 
 def nearest_rotation(matrix: ArrayLike) -> FloatArray:

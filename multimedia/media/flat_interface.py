@@ -148,12 +148,7 @@ class FlatInterface(OpticalMedia):
                 f"layers are {thickness:g} thick. Check the signs of the normal (it points from "
                 "the object to the camera) and the units of centre, point and thicknesses."
             )
-        return Medium(
-            normal=normal,
-            height=height,
-            thicknesses=tuple(self.layers.thicknesses),
-            indices=tuple(self.layers.indices),
-        )
+        return Medium(normal=normal, height=height, layers=self.layers)
 
     def apparent_vectors(self, camera: Camera, points: FloatArray) -> FloatArray:
         """Return the vectors to the points, raised along the normal."""

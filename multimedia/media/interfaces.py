@@ -17,7 +17,7 @@ from multimedia.media.surfaces import Plane, RefractingSurface
 from multimedia.refraction.layers import Layers
 from photocore.arrays import FloatArray, read_only
 from photocore.errors import InputError
-from photocore.rotation import skew
+from photocore.rotation import checked_rotation, skew
 
 #: Step of central differences as a share of the distance: paths are exact to 1e-13 of the scene,
 #: so differences are good to 1e-8.
@@ -111,15 +111,11 @@ class Interfaces(SurfaceSequence, OpticalMedia):
 
         Raises
         ------
-        InputError
+        GeometryError
             If the matrix is not a rotation (a scale, or a mirrored frame).
         """
-        rotation = read_only(world_from_camera, "world_from_camera", shape=(3, 3))
+        rotation = checked_rotation(world_from_camera, "world_from_camera", tolerance=1e-9)
         translation = read_only(centre, "centre", shape=(3,))
-        if not (
-            np.allclose(rotation @ rotation.T, np.eye(3), atol=1e-9) and np.linalg.det(rotation) > 0
-        ):
-            raise InputError("world_from_camera: not a rotation matrix (orthogonal, det = +1).")
         surfaces = tuple(
             surface.moved(rotation, translation) if moves else surface
             for surface, moves in zip(self.surfaces, self.with_camera, strict=True)
@@ -181,24 +177,22 @@ class Interfaces(SurfaceSequence, OpticalMedia):
         distances = np.linalg.norm(points - camera.centre, axis=1)
         distance = float(np.median(distances)) if len(points) else 1.0
 
-        def changed(names: tuple[str, ...], size: float) -> FloatArray:
-            def by(name: str) -> FloatArray:
-                def at(step: float) -> FloatArray:
-                    values = [step * (other == name) for other in EXTERIOR]
-                    return self._directions(camera.stepped(EXTERIOR, values), points)
+        def changed(steps: FloatArray) -> FloatArray:
+            def at(sign: float, step: FloatArray) -> FloatArray:
+                return self._directions(camera.stepped(EXTERIOR, sign * step), points)
 
-                return _difference(at, size)
-
-            return np.stack([by(name) for name in names], axis=-1)
+            sizes = np.linalg.norm(steps, axis=1)
+            both = [(at(1.0, step) - at(-1.0, step)) / 2.0 for step in steps]
+            return np.stack(both, axis=-1) / sizes
 
         # R^T d turns by R^T (d x v): d is the ray where the interfaces stand still, the vector to
         # the point where they turn with the camera.
         by_turn: FloatArray
         by_centre, by_turn = -by_point, by_point @ skew(points - camera.centre)
         if not all(self.with_camera):
-            by_centre = changed(EXTERIOR[:3], STEP * distance)
+            by_centre = changed(STEP * distance * np.eye(6)[:3])
             turned = camera.rotation.T @ skew(directions)
-            by_turn = changed(EXTERIOR[3:], STEP) if any(self.with_camera) else turned
+            by_turn = changed(STEP * np.eye(6)[3:]) if any(self.with_camera) else turned
         return np.concatenate([by_centre, by_turn], axis=-1)
 
     def _by_index(self, camera: Camera, points: FloatArray, name: str) -> FloatArray:

@@ -211,9 +211,6 @@ def _through_lens(
 def _image_of(seen: FloatArray, camera: Camera) -> FloatArray:
     """Return measured image coordinates of camera-frame vectors in the first medium, (n, 2)."""
     ideal = central(seen, -camera.principal_distance)
-    if camera.distortion.is_identity:
-        ideal += camera.principal_point
-        return ideal
     return camera.distortion.measured(ideal, camera.principal_point)
 
 

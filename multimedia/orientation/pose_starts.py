@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -20,13 +21,13 @@ _ROUNDS = 4
 
 def pose_starts(
     camera: Camera, control: FloatArray, image: FloatArray, media: OpticalMedia
-) -> list[Camera]:
-    """Return poses from which ``camera`` may have seen the control points.
+) -> Iterator[Camera]:
+    """Yield the camera itself, then poses from which it may have seen the control points.
 
     Parameters
     ----------
     camera : Camera
-        Its interior orientation is used, its pose is not.
+        Beyond the first pose only its interior orientation is used.
     control : ndarray, shape (n, 3)
         At least 3 points.
     image : ndarray, shape (n, 2)
@@ -34,10 +35,10 @@ def pose_starts(
     media : OpticalMedia
         What the camera looks through.
 
-    Returns
-    -------
-    list of Camera
-        Possibly empty; best guesses first is not promised.
+    Yields
+    ------
+    Camera
+        Best guesses first is not promised; those that take time to find are found when asked for.
 
     Notes
     -----
@@ -46,13 +47,15 @@ def pose_starts(
     those of a camera looking along the normal, which need no pose; then the pose found gives
     better ones.
     """
+    yield camera
     ideal = camera.distortion.ideal(image, camera.principal_point)
     good = np.isfinite(ideal).all(axis=1)
     if good.sum() < 3:
-        return []
+        return
     control, ideal = control[good], ideal[good]
     if len(set(media.indices)) == 1:
-        return _straight(camera, control, ideal)
+        yield from _straight(camera, control, ideal)
+        return
     apparent = media.seen_from_afar(control)
     if apparent is not None:
         starts = _straight(camera, apparent, ideal)
@@ -65,7 +68,8 @@ def pose_starts(
         starts += [
             replace(pose, principal_distance=distance) for pose in _straight(longer, control, ideal)
         ]
-    return [better for start in starts for better in _refined(start, control, ideal, media)]
+    for start in starts:
+        yield from _refined(start, control, ideal, media)
 
 
 def _refined(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -214,7 +214,8 @@ def _best_start(camera: Camera, problem: _ControlImages) -> Camera:
     """Return the pose of the smallest square sum that any start leads to."""
     poses: list[tuple[float, Camera]] = []
     count = 1
-    for count, start in enumerate(_starts(camera, problem), start=2):  # noqa: B007
+    starts = pose_starts(camera, problem.control, problem.image, problem.interface)
+    for count, start in enumerate(starts, start=2):  # noqa: B007
         if not np.isfinite(problem.cost(start)):
             continue
         pose = minimise(
@@ -233,12 +234,6 @@ def _best_start(camera: Camera, problem: _ControlImages) -> Camera:
             residual=float("nan"),
         )
     return min(poses, key=lambda pair: pair[0])[1]
-
-
-def _starts(camera: Camera, problem: _ControlImages) -> Iterator[Camera]:
-    """Yield the pose given, then those found without it, which cost some time to find."""
-    yield camera
-    yield from pose_starts(camera, problem.control, problem.image, problem.interface)
 
 
 def _checked_names(estimate: Sequence[str]) -> tuple[str, ...]:
