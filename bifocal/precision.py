@@ -82,12 +82,8 @@ def sigma_displacements(
 
     Parameters
     ----------
-    s1, s2 : array_like, shape (...)
-        Radial distances. [mm]
-    d1, d2 : float
-        Distances to the reference plane. [m]
-    sigma_1, sigma_2 : float
-        Standard deviations of s1 and s2. [unit of s]
+    s1, s2, d1, d2, sigma_1, sigma_2
+        As in `sigma_relief`.
 
     Returns
     -------
