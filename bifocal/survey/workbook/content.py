@@ -254,7 +254,9 @@ def setup_cells(content: SurveyContent) -> dict[str, CellValue]:
             f"m_{image}": photo.scale_number,
         }
     first, second = content.photos
-    cells["b_lever"] = content.pair.base_factor
+    d1, d2 = first.distance, second.distance
+    # As its formula has it: of photos typed the other way round it is negative.
+    cells["b_lever"] = d1 * d2 / (d1 - d2)
     cells["sigma_r_max"] = limits.relief_limit(content.pair.d2)
     if setup is None:
         return cells | _pair_cells(content, first, second)
