@@ -12,7 +12,7 @@ from photocore.output import check_writable
 
 def export(
     source: Path, out: Path, *, world: bool = False, order: str = "PNEZD",
-    flavour: str = "plain", overwrite: bool = False,
+    flavour: str = "plain", ellipses: float = 10.0, overwrite: bool = False,
 ) -> tuple[str, ...]:  # fmt: skip
     """Write the points of a result in the format the ending of ``out`` names; return remarks."""
     if out.exists() and source.exists() and out.samefile(source):
@@ -20,6 +20,7 @@ def export(
     check_writable(out, overwrite=overwrite)
     points, remarks = read_survey_points(source)
     more = export_points(
-        out, points, world=world, order=order, flavour=flavour, overwrite=overwrite
-    )
+        out, points, world=world, order=order, flavour=flavour, ellipses=ellipses,
+        overwrite=overwrite,
+    )  # fmt: skip
     return (*remarks, *more)

@@ -8,6 +8,8 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from bifocal.survey.check_points import check_points
 from bifocal.survey.georeferencing import georeference
 from bifocal.survey.point_survey import solve_points
@@ -24,7 +26,7 @@ from photocore.output import relative_name
 from photocore.tables import write_csv
 from photocore.workbook.newbook import is_untouched, other_name
 
-_NUMBERS = ("r", "e1", "e2", "s_c", "X", "Y", "Z", "q", "sigma_r")
+_NUMBERS = ("r", "e1", "e2", "s_c", "X", "Y", "Z", "q", "sigma_X", "sigma_Y", "sigma_r")
 
 
 def write_result(
@@ -170,8 +172,11 @@ def _csv_columns(solution: SolvedSurvey) -> dict[str, Any]:
         columns[f"{key} [m]"] = table[key]
     if solution.georeference is not None:
         columns |= {f"{key} [m]": world[:, i] for i, key in enumerate("ENH")}
-    for key in ("r", "e1", "e2", "s_c", "q", "sigma_r"):
+    for key in ("r", "e1", "e2", "s_c", "q", "sigma_X", "sigma_Y", "sigma_r"):
         columns[f"{key} [{units.get(key, 'm')}]"] = table[key]
+    if solution.georeference is not None:
+        sigma = solution.world_sigma
+        columns |= {f"sigma_{key} [m]": sigma[:, i] for i, key in enumerate("ENH")}
     columns["flag"] = list(table.flags)
     if any(solution.points.note):
         columns["note"] = list(solution.points.note)
@@ -189,8 +194,11 @@ def solution_json(solution: SolvedSurvey) -> str:
 def _records(solution: SolvedSurvey) -> list[str]:
     table = solution.table
     columns = [table[key].tolist() for key in _NUMBERS]
-    world = [solution.world[:, i].tolist() for i in range(3)] if solution.georeference else []
-    keys = [*_NUMBERS, *("ENH" if world else "")]
+    world, keys = [], list(_NUMBERS)
+    if solution.georeference is not None:
+        placed = np.hstack([solution.world, solution.world_sigma])
+        world = placed.T.tolist()
+        keys += ["E", "N", "H", "sigma_E", "sigma_N", "sigma_H"]
     numbers = [
         [repr(value) if math.isfinite(value) else "null" for value in values]
         for values in (*columns, *world)
@@ -221,7 +229,14 @@ def _head(solution: SolvedSurvey) -> dict[str, Any]:
         "georeference": _georeference(solution),
         "setup_check": _orientation_check(solution),
         "sigma_px": solution.sigma_px,
-        "units": {"r": "m", "X": "m", "e1": length_unit(solution), "sigma_r": "m"},
+        "units": {
+            "r": "m",
+            "X": "m",
+            "e1": length_unit(solution),
+            "sigma_X": "m",
+            "sigma_Y": "m",
+            "sigma_r": "m",
+        },
         "remarks": list(solution.remarks),
     }
 
@@ -241,6 +256,7 @@ def _georeference(solution: SolvedSurvey) -> dict[str, Any] | None:
         "n": int(geo.used.sum()),
         "left_out": list(geo.bad),
         "sigma0": geo.sigma0,
+        "error_ratio": geo.error_ratio,
         "scale": geo.world_from_wall.scale,
         "rotation": geo.world_from_wall.rotation,
         "wall_centre": geo.world_from_wall.source_centre,
