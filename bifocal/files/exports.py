@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path
 
@@ -74,7 +74,7 @@ def export_points(
     path = Path(path)
     ending = path.suffix.lower()
     drawn = (not_negative(ellipses, "ellipses"), world)
-    writers = {
+    writers: dict[str, Callable[[Path, SurveyPoints, FloatArray], None]] = {
         ".dxf": partial(_write_dxf, drawn=drawn),
         ".geojson": partial(_write_geojson, world=world),
         ".xlsx": _write_xlsx,

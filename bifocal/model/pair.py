@@ -311,6 +311,11 @@ class Pair:
             return cls.from_dict(data, folder=Path(path).parent)
 
     @classmethod
+    def of(cls, source: Pair | Path | str) -> Pair:
+        """Return a pair as it is, or read its file."""
+        return source if isinstance(source, Pair) else cls.read(source)
+
+    @classmethod
     def from_dict(cls, data: Mapping[str, Any], *, folder: Path = Path()) -> Pair:
         """Return the pair described by a pair file's content."""
         data = dict(data)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import compress
+from typing import Any
 
 import numpy as np
 
@@ -34,6 +35,8 @@ class SurveyPoints:
         Standard deviations of X, Y and of E, N, H; NaN or None where unknown. [m]
     cov_xy, cov_en : ndarray, shape (n,), or None
         Covariance of X with Y and of E with N. [m²]
+    name : str
+        Where they come from, for messages.
     """
 
     ids: tuple[str, ...]
@@ -46,6 +49,7 @@ class SurveyPoints:
     sigma_world: FloatArray | None = None
     cov_xy: FloatArray | None = None
     cov_en: FloatArray | None = None
+    name: str = "points"
 
     def __post_init__(self) -> None:
         count = len(self.ids)
@@ -87,11 +91,12 @@ class SurveyPoints:
 
     def take(self, keep: BoolArray) -> SurveyPoints:
         """Return the points where ``keep`` is true."""
-        arrays = {name: getattr(self, name) for name in _WIDTHS}
-        kept = {name: None if v is None else v[keep] for name, v in arrays.items()}
+        kept: dict[str, Any] = {name: getattr(self, name) for name in _WIDTHS}
+        kept = {name: None if v is None else v[keep] for name, v in kept.items()}
         return SurveyPoints(
             ids=tuple(compress(self.ids, keep)),
             **kept,
             flags=tuple(compress(self.flags, keep)),
             notes=tuple(compress(self.notes, keep)),
+            name=self.name,
         )

@@ -17,7 +17,7 @@ from photocore.tables import write_csv
 
 
 def match_photos(
-    pair_path: Path,
+    pair_path: Pair | Path,
     out: Path,
     settings: MatchSettings,
     *,
@@ -33,7 +33,7 @@ def match_photos(
     """
     check_ending(out, "points are written as .xlsx (survey workbook) or .csv.", ".xlsx", ".csv")
     check_writable(out, overwrite=overwrite)
-    pair = Pair.read(pair_path)
+    pair = Pair.of(pair_path)
     images = (read_grey(pair.photo_file(1)), read_grey(pair.photo_file(2)))
     matches = match_pair(pair, images, settings)
     if out.suffix.lower() == ".csv":
@@ -50,7 +50,7 @@ def match_photos(
             note=tuple(f"sigma {s:.2f} px, misfit {abs(m):.2f} px" for s, m in notes),
         ),
         pair=pair,
-        pair_path=pair_path,
+        pair_path=None if isinstance(pair_path, Pair) else pair_path,
         sigma_px=round(precision(matches), 3),
         language=language,
         what=f"{len(matches.ids)} points found by bifocal match",

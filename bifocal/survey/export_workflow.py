@@ -6,6 +6,7 @@ from pathlib import Path
 
 from bifocal.files.exports import export_points
 from bifocal.files.point_tables import read_survey_points
+from bifocal.survey.pair_workflow import is_survey, is_workbook, points_of
 from photocore.errors import InputError
 from photocore.output import check_writable
 
@@ -18,7 +19,14 @@ def export(
     if out.exists() and source.exists() and out.samefile(source):
         raise InputError(f"{out}: is the survey itself; name another file to export to.")
     check_writable(out, overwrite=overwrite)
-    points, remarks = read_survey_points(source)
+    try:
+        points, remarks = read_survey_points(source)
+    except InputError:
+        # A survey workbook that no program has calculated yet: its points, its set-up as typed.
+        found = points_of(source) if is_workbook(source) and is_survey(source) else None
+        if found is None:
+            raise
+        points, remarks = found, ()
     more = export_points(
         out, points, world=world, order=order, flavour=flavour, ellipses=ellipses,
         overwrite=overwrite,

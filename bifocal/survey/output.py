@@ -10,10 +10,12 @@ from typing import Any
 
 import numpy as np
 
+from bifocal.survey.basis import basis
 from bifocal.survey.check_points import check_points
 from bifocal.survey.georeferencing import georeference
 from bifocal.survey.point_survey import solve_points
 from bifocal.survey.reference import KnownPoints
+from bifocal.survey.setup import SurveySetup
 from bifocal.survey.template_workflow import MOST_ROWS, log_row
 from bifocal.survey.tolerances import RULES, sentence
 from bifocal.survey.workbook.book import write_book
@@ -27,6 +29,9 @@ from photocore.tables import write_csv
 from photocore.workbook.newbook import is_untouched, other_name
 
 _NUMBERS = ("r", "e1", "e2", "s_c", "X", "Y", "Z", "q", "sigma_X", "sigma_Y", "sigma_r")
+
+#: Columns shown on the screen.
+SHOWN = ("r", "e1", "e2", "X", "Y", "sigma_X", "sigma_Y", "sigma_r")
 
 
 def write_result(
@@ -159,8 +164,25 @@ def result_content(solution: SolvedSurvey, path: Path, language: str | None) -> 
         solution,
         language=language or solution.language,
         pair_file="" if pair_path is None else relative_name(pair_path, path.parent),
+        setup=_moved(solution.setup, solution.source.parent, path.parent),
+        photo_files=_photo_files(solution, path.parent),
         log=[log_row(what, solution.source)],
     )
+
+
+def _moved(setup: SurveySetup | None, old: Path, new: Path) -> SurveySetup | None:
+    """Return the set-up with its photos as seen from another folder."""
+    if setup is None or not (setup.photo1 or setup.photo2):
+        return setup
+    names = [name and relative_name(old / name, new) for name in (setup.photo1, setup.photo2)]
+    return replace(setup, photo1=names[0], photo2=names[1])
+
+
+def _photo_files(solution: SolvedSurvey, folder: Path) -> tuple[str, str]:
+    """Return the photos that the survey's workbook names, as seen from a folder."""
+    setup, old = solution.survey.setup, solution.source.parent
+    first, second = (n and relative_name(old / n, folder) for n in (setup.photo1, setup.photo2))
+    return first, second
 
 
 def _csv_columns(solution: SolvedSurvey) -> dict[str, Any]:
@@ -229,6 +251,7 @@ def _head(solution: SolvedSurvey) -> dict[str, Any]:
         "georeference": _georeference(solution),
         "setup_check": _orientation_check(solution),
         "sigma_px": solution.sigma_px,
+        "rests_on": basis(solution),
         "units": {
             "r": "m",
             "X": "m",
@@ -289,18 +312,18 @@ def verdict_lines(solution: SolvedSurvey) -> list[str]:
 
 
 def point_rows(solution: SolvedSurvey, most: int) -> list[tuple[str, ...]]:
-    """Return the first points as rows of text: id, r, e1, e2, X, Y, sigma_r, flag."""
+    """Return the first points as rows of text: id, the columns of `SHOWN`, flag."""
     table = solution.table
     rows = []
     for i in range(min(most, len(table))):
-        shown = [_shown(table[key][i], 4) for key in ("r", "e1", "e2", "X", "Y", "sigma_r")]
+        shown = [_shown(table[key][i], 4) for key in SHOWN]
         rows.append((table.ids[i], *shown, table.flags[i]))
     return rows
 
 
 def summary(solution: SolvedSurvey) -> list[str]:
-    """Return check points, verdict and georeference in words."""
-    lines = []
+    """Return what the sigmas rest on, check points, verdict and georeference in words."""
+    lines = [basis(solution)]
     for axis, errors in solution.check.axes.items():
         if errors.n:
             lines.append(

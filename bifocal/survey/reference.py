@@ -206,8 +206,9 @@ class Georeference:
         """
         if covariance is None:
             return np.full((0, 3), np.nan)
+        return np.sqrt(np.diagonal(self.covariance_of(covariance), axis1=1, axis2=2))
+
+    def covariance_of(self, covariance: FloatArray) -> FloatArray:
+        """Return the covariance of E, N, H of points of known X, Y, Z, shape (n, 3, 3). [m²]"""
         turn = self.world_from_wall.scale * self.world_from_wall.rotation
-        variance = np.einsum("ai,nij,aj->na", turn, covariance, turn)
-        if self.model == "2D":
-            variance[:, 2] = turn[2, 2] ** 2 * covariance[:, 2, 2]
-        return np.asarray(np.sqrt(variance))
+        return np.asarray(turn @ covariance @ turn.T)

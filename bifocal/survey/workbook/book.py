@@ -25,6 +25,7 @@ from bifocal.survey.workbook.setup_cells import (
     IDEAL_GROUPS,
     PAIR_FORMULAS,
     PAIR_GROUPS,
+    PHOTOS,
     POSITIVE,
 )
 from bifocal.survey.workbook.sheets import (
@@ -146,7 +147,7 @@ def _setup_cell(
     if name == "input_unit":
         sheet.worksheet[cell].alignment = Alignment(horizontal="right")
         sheet.validate(cell, choices="mm,px")
-    elif name != "pair_file":
+    elif name not in ("pair_file", *PHOTOS):
         sheet.validate(cell, above_zero=name in POSITIVE)
 
 

@@ -286,11 +286,12 @@ def _text_from_points(key: str) -> str:
 
 
 def _world_sigma(row: int) -> str:
-    terms = [
-        f"{'2*' if i != j else ''}g_{row}{'XYZ'.index(i) + 1}*g_{row}{'XYZ'.index(j) + 1}"
-        f"*INDEX(tblPoints[cov_{i}{j}],{_AT})"
-        for i, j in COVARIANCES
-    ]
+    terms = []
+    for key in COVARIANCES:
+        i, j = ("XYZ".index(axis) + 1 for axis in key)
+        double = "2*" if i != j else ""
+        cell = f"INDEX(tblPoints[cov_{key}],{_AT})"
+        terms.append(f"{double}g_{row}{i}*g_{row}{j}*{cell}")
     known = f"AND(ISNUMBER(g_k),ISNUMBER(INDEX(tblPoints[cov_XX],{_AT})))"
     return f'IF({known},g_k*SQRT({"+".join(terms)}),"")'
 

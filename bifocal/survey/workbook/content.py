@@ -16,7 +16,7 @@ from bifocal.survey.relief_table import ReliefTable, entries
 from bifocal.survey.setup import SurveySetup
 from bifocal.survey.tolerances import RULES, ToleranceRule
 from bifocal.survey.weighted_similarity import weights_of
-from bifocal.survey.workbook.setup_cells import MATRICES, NADIRS
+from bifocal.survey.workbook.setup_cells import MATRICES, NADIRS, PHOTOS
 from photocore.arrays import BoolArray, FloatArray
 from photocore.workbook.cells import CellValue
 
@@ -46,6 +46,8 @@ class SurveyContent:
         Whether points and set-up stand in the order in which an exchanged pair was given.
     pair_file : str
         Its file, as seen from the workbook.
+    photo_files : tuple of str
+        Both photos as seen from the workbook, for a general pair without a file.
     sigma_px : float or None
         Measuring precision of raw pixels. [px]
     points, table : PointObservations, ReliefTable or None
@@ -73,6 +75,7 @@ class SurveyContent:
     pair: Pair | None = None
     as_given: bool = False
     pair_file: str = ""
+    photo_files: tuple[str, str] = ("", "")
     sigma_px: float | None = None
     points: PointObservations | None = None
     table: ReliefTable | None = None
@@ -318,6 +321,7 @@ def setup_cells(content: SurveyContent) -> dict[str, CellValue]:
         return cells | _pair_cells(content, first, second)
     if first.scale_number is not None and second.scale_number is not None:
         cells["k_12"] = second.scale_number / first.scale_number
+    cells |= {"photo_1": setup.photo1 or None, "photo_2": setup.photo2 or None}
     cells |= {"pitch": setup.pitch, "input_unit": setup.unit, "sigma_s": setup.precision}
     if setup.unit == "px" and setup.pitch is not None:
         cells |= {"unit_x": setup.pitch, "unit_y": -setup.pitch}
@@ -336,6 +340,7 @@ def _pair_cells(content: SurveyContent, first: Photo, second: Photo) -> dict[str
     sigma = first.precision(content.sigma_px or first.sigma_pixel or second.sigma_pixel)
     cells: dict[str, CellValue] = {
         "pair_file": content.pair_file,
+        **{key: name or None for key, name in zip(PHOTOS, content.photo_files, strict=True)},
         "input_unit": "px",
         "pitch": first.pixel_size,
         "sigma_px": sigma,

@@ -9,11 +9,14 @@ from bifocal.survey.setup import SIGMA_RADIAL
 
 Groups = tuple[tuple[str, ...], ...]
 
+#: Cells that name the photo files.
+PHOTOS = ("photo_1", "photo_2")
 #: Cells of an ideal pair, group by group; the last group is calculated, the others are typed.
 IDEAL_GROUPS: Groups = (
     (
         *("c_1", "c_2", "d_2", "delta_d", "d_1", "input_unit", "pitch"),
         *("nadir_1_col", "nadir_1_row", "nadir_2_col", "nadir_2_row"),
+        *PHOTOS,
     ),
     ("sigma_s", "sigma_r_max", "k_off", "k_plane"),
     (
@@ -29,7 +32,7 @@ NADIRS: Groups = tuple(tuple(f"n{image}_{axis}" for axis in "xy") for image in "
 PAIR_GROUPS: Groups = (
     (
         *("pair_file", "d_2", "delta_d", "d_1", *NADIRS[0], *NADIRS[1]),
-        *("c_1", "c_2", "pitch", "input_unit"),
+        *("c_1", "c_2", "pitch", "input_unit", *PHOTOS),
     ),
     ("sigma_px", "sigma_r_max", "k_off", "k_plane", "pixel_mm"),
     *MATRICES,
@@ -41,6 +44,7 @@ FORMS: Mapping[str, str] = {
     **dict.fromkeys(("pitch", "sigma_s", "k_12"), "0.000000"),
     **dict.fromkeys(("m_1", "m_2"), "0.00"),
     "sigma_r_max": "0.0000",
+    **dict.fromkeys(PHOTOS, "@"),
 }
 #: Typed numbers that must be above zero; of the others the sheet only asks that they are numbers.
 POSITIVE = ("c_1", "c_2", "d_1", "d_2", "pitch", "sigma_s", "sigma_px", "sigma_r_max")
