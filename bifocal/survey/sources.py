@@ -12,6 +12,7 @@ from bifocal.model.pair import Pair, Photo
 from bifocal.survey.observations import PointObservations
 from bifocal.survey.pick_lists import joined, left_over, read_picks
 from bifocal.survey.setup import SurveySetup
+from bifocal.survey.workbook.known_reader import with_measured
 from bifocal.survey.workbook.reader import ReadOptions, SurveyInput, read_survey
 from photocore.errors import InputError
 
