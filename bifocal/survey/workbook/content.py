@@ -356,6 +356,6 @@ def _pair_cells(content: SurveyContent, first: Photo, second: Photo) -> dict[str
             jacobian = photo.metres_per_pixel(pixels[~np.isnan(pixels).any(axis=1)])
             if len(jacobian):
                 spacing.append(float(np.median(np.sqrt((jacobian**2).sum(axis=(1, 2)) / 2))))
-    # What one pixel is on the wall, typically, in millimetres of the image scale.
-    pixel = (sum(spacing) / len(spacing) if spacing else 0.0) * 1000.0 / scale
-    return cells | {"pixel_mm": pixel, "sigma_s": sigma * pixel}
+    # What one pixel is on the wall, typically: whatever image scale is typed later.
+    pixel = 1000.0 * sum(spacing) / len(spacing) if spacing else 0.0
+    return cells | {"pixel_wall": pixel, "sigma_s": sigma * pixel / scale}

@@ -107,13 +107,18 @@ def planning(builder: BookBuilder, content: SurveyContent) -> None:
         sheet.word(f"A{row}", name)
         sheet.input(f"B{row}", size, form="0.00", name=name)
         sheet.validate(f"B{row}", above_zero=True)
+    # By the principal distance: without it the image scale of a general pair is only nominal.
+    c1, d1 = (float(cells.get(name) or math.nan) for name in ("c_1", "d_1"))
     for letter, name, size in zip("BC", _SENSOR, sizes, strict=True):
-        body, covered = f'IF(COUNT({name},m_1)=2,{name}*m_1/1000,"")', _known(size * scale / 1000)
+        body, covered = f'IF(COUNT({name},c_1,d_1)=3,{name}*d_1/c_1,"")', _known(size * d1 / c1)
         named = name.replace("sensor", "covered")
         sheet.formula(f"{letter}6", body, covered, form="0.00", name=named)
     sheet.word("A7", "gsd")
-    body = 'IF(COUNT(pitch,m_1)=2,pitch*m_1,"")'
-    sheet.formula("B7", body, _known(pitch * scale), form="0.00", name="gsd_mm")
+    body, pixel = 'IF(COUNT(pitch,m_1)=2,pitch*m_1,"")', pitch * scale
+    if content.is_pair:
+        body = 'IF(COUNT(pixel_wall)=1,pixel_wall,"")'
+        pixel = float(cells.get("pixel_wall") or math.nan)
+    sheet.formula("B7", body, _known(pixel), form="0.00", name="gsd_mm")
     diagonal = math.hypot(*sizes)
     sheet.word("A9", "uncertainty", HEAD_FONT)
     shown = _uncertainty(content, sigma, scale, diagonal)

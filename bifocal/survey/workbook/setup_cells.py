@@ -34,7 +34,7 @@ PAIR_GROUPS: Groups = (
         *("pair_file", "d_2", "delta_d", "d_1", *NADIRS[0], *NADIRS[1]),
         *("c_1", "c_2", "pitch", "input_unit", *PHOTOS),
     ),
-    ("sigma_px", "sigma_r_max", "k_off", "k_plane", "pixel_mm"),
+    ("sigma_px", "sigma_r_max", "k_off", "k_plane", "pixel_wall"),
     *MATRICES,
     ("m_1", "b_lever", "e_x", "e_y", "sigma_s"),
 )
@@ -69,7 +69,7 @@ IDEAL_FORMULAS: Mapping[str, str] = {
 }
 PAIR_FORMULAS: Mapping[str, str] = {
     **{key: IDEAL_FORMULAS[key] for key in ("d_1", "sigma_r_max", "b_lever")},
-    "sigma_s": "sigma_px*pixel_mm",
+    "sigma_s": 'IF(COUNT(pixel_wall)=1,sigma_px*pixel_wall/m_1,"")',
     "m_1": "IF(COUNT(c_1)=1,1000*d_1/c_1,1000)",
     "e_x": "(d_1*n2_x-d_2*n1_x)/(d_1-d_2)",
     "e_y": "(d_1*n2_y-d_2*n1_y)/(d_1-d_2)",

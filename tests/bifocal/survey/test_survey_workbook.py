@@ -311,3 +311,29 @@ def test_rows_are_prepared_as_many_as_wanted(tmp_path):
 def test_unknown_language_is_refused(tmp_path):
     with pytest.raises(InputError, match="fr"):
         write_template(tmp_path / "survey.xlsx", language="fr")
+
+
+def named(book, name):
+    sheet, cell = book.defined_names[name].attr_text.replace("$", "").replace("'", "").split("!")
+    return book[sheet][cell]
+
+
+@pytest.mark.office
+def test_planning_of_a_pair_without_focal_lengths_follows_when_they_are_typed(tmp_path):
+    write_book(tmp_path / "pair.xlsx", pair_content())
+    book = openpyxl.load_workbook(tmp_path / "pair.xlsx")
+    named(book, "sensor_w").value, named(book, "sensor_h").value = 22.7, 15.1
+    book.save(tmp_path / "sensor.xlsx")
+    before = recalculated(tmp_path / "sensor.xlsx", tmp_path)
+    assert named(before, "covered_w").value in (None, "")
+    # The homographies of `pair_content` have 4 mm per pixel, more or less.
+    assert named(before, "gsd_mm").value == pytest.approx(4.0, abs=0.3)
+    named(book, "c_1").value, named(book, "c_2").value = 36.0, 18.0
+    book.save(tmp_path / "typed.xlsx")
+    after = recalculated(tmp_path / "typed.xlsx", tmp_path)
+    assert named(after, "covered_w").value == pytest.approx(22.7 * 18 / 36)
+    radii = [
+        [book["Planning"][f"C{row}"].value for row in range(12, 19)] for book in (before, after)
+    ]
+    assert radii[1] == pytest.approx(radii[0], rel=1e-9)
+    assert radii[0][0] > 0
