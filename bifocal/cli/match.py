@@ -93,3 +93,4 @@ def _lines(summary: dict[str, Any]) -> Iterator[str]:
         f"Relief from {low:.2f} to {high:.2f} m, sigma of r {1000 * summary['sigma_r_median']:.1f} "
         "mm at the median."
     )
+    yield summary["rests_on"]

@@ -438,7 +438,8 @@ class Pair:
         second = as_points(pixels2, "pixels2", dimension=2)
         if first.shape != second.shape:
             raise InputError(
-                f"pixels1 {first.shape} and pixels2 {second.shape} must both have shape (..., 2), the same."
+                f"pixels1 {first.shape} and pixels2 {second.shape} must both have shape (..., 2), "
+                "the same."
             )
         shape = first.shape[:-1]
         first, second = first.reshape(-1, 2), second.reshape(-1, 2)

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from bifocal.files.images import read_grey
+from bifocal.model.basis import rests_on
 from bifocal.model.pair import Pair
 from bifocal.orientation.matching import Matches, MatchSettings, match_pair
 from bifocal.survey.observations import PointObservations
@@ -98,4 +99,9 @@ def match_summary(pair: Pair, matches: Matches) -> dict[str, Any]:
         "misfit_px": float(np.median(np.abs(matches.misfit)) * 1.4826),
         "relief_range": np.nanpercentile(solved.xyz[:, 2], [1, 99]),
         "sigma_r_median": float(np.nanmedian(solved.sigma[:, 2])),
+        "rests_on": rests_on(
+            pair,
+            setup="the pair as given",
+            picks=f"matches of {precision(matches):.2g} px measured",
+        ),
     }
