@@ -36,6 +36,21 @@ def check_writable(path: Path | str, *, overwrite: bool) -> Path:
     return path
 
 
+def check_ending(path: Path | None, *endings: str, what: str) -> None:
+    """Refuse a path that does not end as its content must; None stands for no file.
+
+    Parameters
+    ----------
+    path : Path or None
+    *endings : str
+        ``.toml``
+    what : str
+        What is written, with its article: ``"a project"``.
+    """
+    if path is not None and path.suffix.lower() not in endings:
+        raise InputError(f"{path}: {what} is written as {' or '.join(endings)}.")
+
+
 def check_all_writable(*paths: Path | None, overwrite: bool) -> None:
     """Refuse each path that is given as `check_writable` does; None stands for no file."""
     for path in paths:

@@ -34,6 +34,8 @@ def read_text(path: Path, what: str, *, form: str = "") -> str:
 @contextmanager
 def readable(path: Path, what: str, *, missing: str = "file") -> Iterator[None]:
     """Say what is wrong with a file that cannot be read: missing, a folder, a pipe, locked."""
+    if "\0" in str(path):
+        raise InputError(f"{str(path)!r}: is no {missing}'s name; it must not hold NUL characters.")
     if path.is_dir():
         raise InputError(f"{path}: is a folder, expected a {what}.")
     try:

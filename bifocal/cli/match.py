@@ -56,6 +56,8 @@ def command(
     from bifocal.orientation.match_workflow import match_photos, match_summary
     from bifocal.orientation.matching import MatchSettings
 
+    if relief_min is not None and relief_max is not None and relief_min >= relief_max:
+        raise click.UsageError("--relief-min must be below --relief-max.")
     reliefs = None
     if relief_min is not None or relief_max is not None:
         near = Pair.read(pair).image2.distance

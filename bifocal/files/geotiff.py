@@ -213,5 +213,5 @@ def _check_space(path: Path, grid: Grid, bytes_per_pixel: int) -> None:
 
 def _size(count: float) -> str:
     """Return a number of bytes in words."""
-    power = min(int(np.log10(max(count, 1))) // 3, 3)
+    power = min(int(np.log10(float(max(count, 1)))) // 3, 3)
     return f"{count / 1000**power:.4g} {('bytes', 'kB', 'MB', 'GB')[power]}"

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from bifocal.files.exports import export_points
 from bifocal.files.point_tables import read_survey_points
-from photocore.errors import InputError
+from photocore.errors import InputError, located
 from photocore.output import check_writable
 
 
@@ -19,7 +19,8 @@ def export(
         raise InputError(f"{out}: is the survey itself; name another file to export to.")
     check_writable(out, overwrite=overwrite)
     points, remarks = read_survey_points(source)
-    more = export_points(
-        out, points, world=world, order=order, flavour=flavour, overwrite=overwrite
-    )
+    with located(source):
+        more = export_points(
+            out, points, world=world, order=order, flavour=flavour, overwrite=overwrite
+        )
     return (*remarks, *more)

@@ -13,7 +13,7 @@ from multimedia.adjustment.unknowns import Adjustment, ScaleBar, Unknowns
 from multimedia.projects.project_file import read_project, write_project
 from multimedia.refraction.water import salinity_from_index, water_index_derivatives
 from photocore.errors import InputError
-from photocore.output import check_all_writable
+from photocore.output import check_all_writable, check_ending
 
 
 def adjust_project(
@@ -33,6 +33,8 @@ def adjust_project(
     """
     if out is not None and report is not None and out.resolve() == report.resolve():
         raise InputError(f"{out}: is named for the project and for the report; name two files.")
+    check_ending(out, ".toml", what="a project")
+    check_ending(report, ".html", what="a report")
     check_all_writable(out, report, overwrite=overwrite)
     project = read_project(source)
     result = bundle_adjust(project, unknowns)

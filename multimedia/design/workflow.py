@@ -27,10 +27,12 @@ from multimedia.projects.project_file import read_project
 from multimedia.refraction.layers import Layers
 from photocore.arrays import FloatArray
 from photocore.errors import GeometryError, InputError
-from photocore.output import check_all_writable
+from photocore.output import check_all_writable, check_ending
 
 #: A millimetre in the units that projects use.
 MILLIMETRE = {"m": 1e-3, "cm": 0.1, "mm": 1.0}
+#: No object space is larger, in distances of the cameras: it would be seen at no angle.
+FARTHEST = 1000.0
 
 
 def design_ring(
@@ -48,6 +50,16 @@ def design_ring(
     unit: str = "m",
 ) -> Design:
     """Study cameras on a cone above a water surface or a glass; arguments as in the solvers."""
+    if not 0 <= depths[0] < depths[1]:
+        raise InputError(
+            f"depths: {depths[0]:g} to {depths[1]:g}: give the least and the largest depth under "
+            "the last face, positive downwards."
+        )
+    if max(*extent, depths[1]) > FARTHEST * distance:
+        raise InputError(
+            f"extent, depths: the object space is more than {FARTHEST:g} times as large as the "
+            f"distance of the cameras, {distance:g}; check the units."
+        )
     interface = FlatInterface(layers=Layers(indices=tuple(indices), thicknesses=tuple(thicknesses)))
     points = object_grid(extent, depths)
     cameras = ring_of_cameras(
@@ -173,6 +185,8 @@ def _by_depth(study: Study) -> FloatArray:
 
 def write_design(design: Design, *, out: Path | None, plot: Path | None, overwrite: bool) -> None:
     """Write the workbook and the picture where asked."""
+    check_ending(out, ".xlsx", what="a study")
+    check_ending(plot, ".png", ".svg", ".pdf", what="a drawing of a study")
     check_all_writable(out, plot, overwrite=overwrite)
     if out is not None:
         write_design_workbook(out, design, overwrite=overwrite)

@@ -25,7 +25,7 @@ from multimedia.projects.point_tables import read_image_points, read_object_poin
 from multimedia.projects.project_file import read_project, write_project
 from photocore.arrays import FloatArray, IntArray
 from photocore.errors import InputError
-from photocore.output import check_all_writable
+from photocore.output import check_all_writable, check_ending
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -172,6 +172,7 @@ def resect_project(
     overwrite: bool = False,
 ) -> Resected:
     """Orient the cameras of a project, each on its own, from its control points."""
+    check_ending(out, ".toml", what="a project")
     check_all_writable(out, residuals, overwrite=overwrite)
     project = read_project(path)
     unknown = [name for name in cameras if name not in project.camera_names]

@@ -170,11 +170,11 @@ def _project(data: dict[str, Any], folder: Path) -> Project:
     ]
     objects, images = ObjectPoints(), ImagePoints()
     if "object_points" in data:
-        table = folder / str(data.pop("object_points"))
+        table = folder / _file_name(data.pop("object_points"), "object_points")
         objects, odd = read_object_points(table, unit=unit)
         remarks += [f"{table.name}: {text}" for text in odd]
     if "image_points" in data:
-        table = folder / str(data.pop("image_points"))
+        table = folder / _file_name(data.pop("image_points"), "image_points")
         images, odd = read_image_points(table, cameras)
         remarks += [f"{table.name}: {text}" for text in odd]
     return Project(
@@ -330,7 +330,7 @@ def _sensor(value: Any, where: str) -> Sensor:
     if (size > 0.2).any():
         raise InputError(f"{where}: a pitch of {size.tolist()} mm? Typical are 0.002 to 0.03 mm.")
     origin = _vector(value, "origin", where) if "origin" in value else None
-    width, height = (int(_number(value, key, where)) for key in ("width", "height"))
+    width, height = (_number(value, key, where) for key in ("width", "height"))
     return Sensor(width=width, height=height, pitch=size, origin=origin)  # type: ignore[arg-type]
 
 
@@ -363,6 +363,12 @@ def _only(value: Any, where: str, keys: tuple[str, ...]) -> None:
             near = get_close_matches(key, keys, n=1)
             hint = f" Did you mean {near[0]!r}?" if near else ""
             raise InputError(f"{where}: unknown key {key!r}.{hint} Known: {', '.join(keys)}.")
+
+
+def _file_name(value: Any, key: str) -> str:
+    if not isinstance(value, str):
+        raise InputError(f"{key}: expected the name of a table, found {value!r:.40}.")
+    return value
 
 
 def _given(value: Mapping[str, Any], key: str, where: str) -> Any:

@@ -13,7 +13,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from photocore.arrays import FloatArray
-from photocore.cloud.model import PIECE, Cloud, CloudPiece, NewAttributes, PieceWriter
+from photocore.cloud.model import (
+    PIECE,
+    Cloud,
+    CloudPiece,
+    NewAttributes,
+    PieceWriter,
+    checked_positions,
+)
 from photocore.errors import InputError
 
 #: Coordinates of new files are whole multiples of this. [m]
@@ -89,7 +96,7 @@ class LasCloud(Cloud):
                 seen += len(points)
                 xyz = np.column_stack([np.asarray(points[axis], float) for axis in "xyz"])
                 wanted = {k: np.asarray(points[k], float) for k in numbers if self.has(k)}
-                yield CloudPiece(xyz=xyz, raw=points, numbers=wanted)
+                yield CloudPiece(xyz=checked_positions(self.path, xyz), raw=points, numbers=wanted)
         if seen != self._header.point_count:
             raise InputError(
                 f"{self.path}: its header promises {self._header.point_count} points, the file "

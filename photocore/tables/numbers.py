@@ -10,6 +10,7 @@ from typing import Literal
 import numpy as np
 
 from photocore.arrays import FloatArray
+from photocore.errors import LARGEST
 
 Decimal = Literal["point", "comma"]
 Evidence = Literal["point", "comma", "none", "grouped comma", "grouped point"]
@@ -220,6 +221,6 @@ def _floats(texts: Sequence[str]) -> FloatArray | None:
         except ValueError:
             return None
     # Python also reads "nan", "inf" and "1_000", which no surveyor means as numbers.
-    if np.count_nonzero(~np.isfinite(array)) != blanks or "_" in "".join(texts):
+    if np.count_nonzero(~(np.abs(array) <= LARGEST)) != blanks or "_" in "".join(texts):
         return None
     return array

@@ -74,7 +74,7 @@ def check_header(path: Path) -> None:
     with readable(path, "table file"), path.open("rb") as file:
         start = file.read(8)
     if not start:
-        raise InputError(f"{path}: the file is empty (0 bytes).")
+        raise InputError(f"{path}: the file is empty (0 bytes); save or copy it again.")
     if start == _OLE:
         raise InputError(
             f"{path}: is protected by a password or of the old .xls format. Save it as .xlsx "
