@@ -16,7 +16,7 @@ import numpy as np
 from photocore.arrays import FloatArray
 from photocore.camera import camera_matrix
 from photocore.errors import InputError
-from photocore.textfile import read_text
+from photocore.textfile import check_name, read_text
 
 
 class LensData(NamedTuple):
@@ -40,6 +40,7 @@ def read_foreign_lens(path: Path | str) -> LensData:
         If the file is missing, of another kind, or uses terms OpenCV's model does not have.
     """
     path = Path(path)
+    check_name(path)
     if not path.is_file():
         raise InputError(f"{path}: no such lens file.")
     ending = path.suffix.lower()

@@ -11,6 +11,7 @@ from itertools import count
 from pathlib import Path
 
 from photocore.errors import InputError
+from photocore.textfile import check_name
 
 
 def check_writable(path: Path | str, *, overwrite: bool) -> Path:
@@ -23,6 +24,7 @@ def check_writable(path: Path | str, *, overwrite: bool) -> Path:
         its folder is missing or read-only.
     """
     path = Path(path)
+    check_name(path)
     if path.is_dir():
         raise InputError(f"{path}: is a folder; name a file to write.")
     if path.exists() and not overwrite:
@@ -129,6 +131,7 @@ def atomic_folder(path: Path | str, *, overwrite: bool) -> Iterator[Path]:
         If a file of the same name exists and ``overwrite`` is false, or writing fails.
     """
     path = Path(path)
+    check_name(path)
     if path.exists() and not path.is_dir():
         raise InputError(f"{path}: is a file; name a folder.")
     try:

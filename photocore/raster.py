@@ -19,6 +19,7 @@ from numpy.typing import DTypeLike, NDArray
 from photocore.arrays import FloatArray
 from photocore.errors import InputError
 from photocore.output import atomic_path
+from photocore.textfile import check_name
 
 #: Side of a tile of the file; GDAL's and most viewers' sweet spot. [px]
 BLOCK = 512
@@ -85,6 +86,7 @@ class RasterFile(ExitStack):
 
         super().__init__()
         self.path = Path(path)
+        check_name(self.path)
         if self.path.is_dir():
             raise InputError(f"{self.path}: is a folder; name the raster file in it.")
         if not self.path.is_file():

@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from photocore.cli import remark, text_table
+from photocore.cli import print_json, remark, text_table
 from photocore.options import FILE, FOCAL, as_json, choice, number, overwrite
 
 EXAMPLE = """\b
@@ -101,7 +101,7 @@ def command(
         noun = "point" if count == 1 else "points"
         remark(f"{out}: {count} {noun} written{'; ' + said if said else '.'}")
     if as_json:
-        click.echo(solution_json(solution))
+        print_json(solution_json(solution))
         return
     unit = length_unit(solution)
     headings = ["id", "r [m]", f"e1 [{unit}]", f"e2 [{unit}]", "X [m]", "Y [m]", "sigma_r [m]"]

@@ -22,6 +22,7 @@ from photocore.arrays import ByteArray
 from photocore.errors import InputError
 from photocore.output import atomic_path, check_ending
 from photocore.raster import RasterFile
+from photocore.textfile import check_name
 
 ImageArray = NDArray[np.uint8] | NDArray[np.uint16]
 
@@ -243,6 +244,7 @@ def write_image(path: Path | str, image: ImageArray, *, overwrite: bool = False)
 
 def _refuse_early(path: Path) -> None:
     """Refuse what can be told from the name and the file system."""
+    check_name(path)
     if path.is_dir():
         raise InputError(f"{path}: is a folder, expected a photo.")
     if not path.is_file():

@@ -10,7 +10,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from photocore.arrays import FloatArray, as_floats, as_points, is_finite_number, not_negative, read_only
+from photocore.arrays import (
+    FloatArray,
+    as_floats,
+    as_points,
+    is_finite_number,
+    not_negative,
+    read_only,
+)
 from photocore.errors import InputError, located
 from photocore.jsonfile import read_object, write_object
 from photocore.lensformats import read_foreign_lens

@@ -15,6 +15,7 @@ from photocore.cloud.ply import read_ply_mesh
 from photocore.errors import LARGEST, InputError
 from photocore.jsonfile import read_object
 from photocore.raster import Window
+from photocore.textfile import check_name
 
 FORMAT = "multimedia-waterlevel/1"
 #: A water surface of more cells is coarser than it looks: averaging it down loses nothing.
@@ -55,6 +56,7 @@ def read_water_surface(given: str, *, crs: Any = None) -> WaterSurface:
     if kind == ".json":
         return _read_fitted(path)
     if kind == ".ply":
+        check_name(path)
         if not path.is_file():
             raise InputError(f"{path}: no such water surface.")
         vertices, triangles = read_ply_mesh(path)

@@ -34,7 +34,7 @@ from photocore.arrays import is_finite_number
 from photocore.distortion import NAMES, Brown, Convention
 from photocore.errors import GeometryError, InputError, located
 from photocore.output import atomic_path, check_all_writable
-from photocore.textfile import read_text
+from photocore.textfile import check_name, read_text
 
 FORMAT = "multimedia-project/1"
 #: Each kind of ray-traced surface and its keys.
@@ -128,6 +128,7 @@ def project_data(project: Project) -> dict[str, Any]:
 
 
 def _toml(path: Path) -> dict[str, Any]:
+    check_name(path)
     if path.is_dir():
         raise InputError(
             f"{path}: is a folder. Give the project file in it; for an OpenPTV experiment make "

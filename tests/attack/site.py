@@ -1,4 +1,4 @@
-"""A folder with one small, valid file of every kind the commands take, made once for the attacks."""
+"""A folder with one small, valid file of every kind that the commands take."""
 
 from __future__ import annotations
 
@@ -28,6 +28,25 @@ PROGRAMS = {"bifocal": bifocal.cli.main.main, "multimedia": multimedia.cli.main.
 #: Columns, rows and metres per pixel of the photos and rasters.
 WIDTH, HEIGHT, GSD = 240, 160, 0.048
 
+YAML = """%YAML:1.0
+---
+image_width: 240
+image_height: 160
+camera_matrix: !!opencv-matrix
+   rows: 3
+   cols: 3
+   dt: d
+   data: [ 350., 0., 120., 0., 350., 80., 0., 0., 1. ]
+distortion_coefficients: !!opencv-matrix
+   rows: 1
+   cols: 5
+   dt: d
+   data: [ -0.05, 0.01, 0., 0., 0. ]
+"""
+XML = """<?xml version="1.0" encoding="UTF-8"?>
+<calibration><projection>frame</projection><width>240</width><height>160</height><f>350</f>
+<cx>0</cx><cy>0</cy><k1>-0.05</k1><k2>0.01</k2></calibration>
+"""
 ODS = """<?xml version="1.0" encoding="UTF-8"?>
 <office:document-content xmlns:office="o" xmlns:table="t" xmlns:text="x">
 <office:body><office:spreadsheet><table:table table:name="Points">{rows}</table:table>
@@ -71,6 +90,9 @@ def _photos_and_pair(folder: Path, rng: np.random.Generator) -> None:
         "camera_matrix": [[350, 0, 120], [0, 350, 80], [0, 0, 1]],
         "coefficients": [-0.05, 0.01, 0, 0, 0],
     }  # fmt: skip
+    (folder / "cameras.txt").write_text("1 OPENCV 240 160 350 350 120 80 -0.05 0.01 0 0\n")
+    (folder / "lens.yml").write_text(YAML)
+    (folder / "lens.xml").write_text(XML)
     for name, content in (("wall.pair.json", pair), ("lens.json", lens)):
         (folder / name).write_text(json.dumps(content, indent=1), encoding="utf-8")
 
@@ -90,7 +112,9 @@ def _point_tables(folder: Path, rng: np.random.Generator) -> None:
     _csv(folder / "control.csv", f"id,X [m],Y [m],r [m],{px}", ids, xy, relief, px1, px2)
     _csv(folder / "lengths.csv", "from,to,length [m]", ["P0"], [["P1"]],
          [[f"{np.linalg.norm(xy[0] - xy[1]):.4f}"]])  # fmt: skip
-    bow = [(line, x, 5 + 48 * line + 1e-4 * (x - 120) ** 2) for line in range(4) for x in range(240)]
+    bow = [
+        (line, x, 5 + 48 * line + 1e-4 * (x - 120) ** 2) for line in range(4) for x in range(240)
+    ]
     _csv(folder / "lines.csv", "line,col [px],row [px]", [str(a) for a, *_ in bow],
          [rest for _, *rest in bow])  # fmt: skip
     rows = [["id", "x1 [mm]", "y1 [mm]", "x2 [mm]", "y2 [mm]"]]
@@ -134,6 +158,11 @@ def _rasters_and_clouds(folder: Path, rng: np.random.Generator) -> None:
     names = "".join(f"property float {axis}\n" for axis in "xyz")
     (folder / "cloud.ply").write_text(
         f"ply\nformat ascii 1.0\nelement vertex 400\n{names}end_header\n{text}\n"
+    )
+    (folder / "mesh.ply").write_text(
+        f"ply\nformat ascii 1.0\nelement vertex 4\n{names}element face 2\n"
+        "property list uchar int vertex_indices\nend_header\n"
+        "-9 -9 1\n9 -9 1\n9 9 1\n-9 9 1\n3 0 1 2\n3 0 2 3\n"
     )
     (folder / "cloud.csv").write_text("X,Y,Z\n" + text.replace(" ", ",") + "\n")
     las = laspy.create(point_format=1, file_version="1.2")
