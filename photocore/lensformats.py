@@ -145,12 +145,17 @@ def _opencv(path: Path) -> LensData:
                 return np.asarray(node.mat() if node.isMap() else node.real(), dtype=np.float64)
         return None
 
-    matrix = first("camera_matrix", "cameraMatrix", "Camera_Matrix", "K", "M1")
-    terms = first(
-        "distortion_coefficients", "dist_coeffs", "distCoeffs", "Distortion_Coefficients", "D", "D1"
-    )
-    width, height = first("image_width", "image_Width"), first("image_height", "image_Height")
-    storage.release()
+    try:
+        matrix = first("camera_matrix", "cameraMatrix", "Camera_Matrix", "K", "M1")
+        terms = first(
+            "distortion_coefficients", "dist_coeffs", "distCoeffs", "Distortion_Coefficients",
+            "D", "D1",
+        )  # fmt: skip
+        width, height = first("image_width", "image_Width"), first("image_height", "image_Height")
+    except (cv2.error, TypeError, ValueError) as error:
+        raise InputError(f"{path}: one of its matrices is damaged; export it again.") from error
+    finally:
+        storage.release()
     if matrix is None or matrix.shape != (3, 3) or terms is None:
         raise InputError(f"{path}: lacks camera_matrix (3x3) or distortion_coefficients.")
     if width is None or height is None:

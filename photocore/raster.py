@@ -143,7 +143,8 @@ class RasterFile(ExitStack):
 
         def known(window: Any) -> NDArray[Any]:
             block = self._file.read(1, window=window)
-            values = block.astype(dtype)
+            with np.errstate(invalid="ignore", over="ignore"):  # what float32 cannot hold
+                values = block.astype(dtype)
             for empty in self._empty:
                 values[block == empty] = np.nan
             if self.masked:

@@ -154,7 +154,8 @@ _GROUPS: tuple[tuple[str, str, tuple[tuple[str, str], ...]], ...] = (
     ),
     (
         "bifocal/survey/output.py",
-        "tests/bifocal/survey/test_solve.py tests/bifocal/survey/test_cli_solve.py",
+        "tests/bifocal/survey/test_solve.py tests/bifocal/survey/test_cli_solve.py "
+        "tests/bifocal/survey/test_cli_solve_refusals.py",
         (
             (
                 'dict.fromkeys(("e1", "e2", "s_c", "q"), length',

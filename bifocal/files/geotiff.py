@@ -175,10 +175,11 @@ def read_relief(path: Path | str) -> ReliefMap:
         sigma = np.where(np.isnan(r), r, np.float32(0))
         quality = np.where(np.isnan(r), Quality.UNKNOWN, Quality.MEASURED).astype(np.uint8)
         if reader.bands >= 2:
-            sigma = np.asarray(reader.read(*size, bands=[2])[:, :, 0], np.float32)
+            with np.errstate(invalid="ignore", over="ignore"):
+                sigma = np.asarray(reader.read(*size, bands=[2])[:, :, 0], np.float32)
         if reader.bands >= 3:
             band = np.asarray(reader.read(*size, bands=[3])[:, :, 0], np.float64)
-            quality = np.nan_to_num(band).astype(np.uint8)
+            quality = np.nan_to_num(np.clip(band, 0, 255)).astype(np.uint8)
         return ReliefMap(
             r=r, sigma=sigma, quality=quality, plane_from_pixel=reader.grid.plane_from_pixel
         )

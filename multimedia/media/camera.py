@@ -128,7 +128,7 @@ class Camera:
         set_ = object.__setattr__
         who = f"camera {self.name}: " if self.name else ""
         rotation = read_only(self.rotation, f"{who}rotation", shape=(3, 3))
-        if not np.allclose(rotation @ rotation.T, np.eye(3), atol=1e-6):
+        if not (np.abs(rotation @ rotation.T - np.eye(3)) <= 1e-6 + 1e-5 * np.eye(3)).all():
             raise GeometryError(
                 f"{who}rotation is not a rotation matrix: its rows must be unit vectors at right "
                 "angles. Check the nine numbers, or give the three angles."

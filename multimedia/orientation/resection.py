@@ -214,13 +214,12 @@ class _ControlImages:
 def _best_start(camera: Camera, problem: _ControlImages) -> Camera:
     """Return the pose of the smallest square sum that any start leads to."""
     poses: list[tuple[float, Camera]] = []
-    count = 1
+    functions, count = (problem.equations, problem.advance), 1
     for count, start in enumerate(_starts(camera, problem), start=2):  # noqa: B007
-        if not np.isfinite(problem.cost(start)):
+        try:
+            pose = minimise(start, *functions, most=60, settle=1e-4, rounding=problem.floor)
+        except GeometryError:  # from there the camera does not see all points
             continue
-        pose = minimise(
-            start, problem.equations, problem.advance, most=60, settle=1e-4, rounding=problem.floor
-        )
         poses.append((float(pose.residuals @ pose.residuals), pose.state))
         if problem.is_beyond_doubt(poses[-1][0]):
             break

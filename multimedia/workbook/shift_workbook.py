@@ -24,11 +24,7 @@ from photocore.workbook.look import HEAD_FILL, INPUT_FILL, add_table, colour_wor
 #: More rows make a workbook that is slow to open; text tables have no limit.
 MOST_ROWS = 20_000
 
-_FLAGS = {
-    "OK": ("E2F0D9", "1E5B12"),
-    "CHECK": ("E4DFEC", "3F2A63"),
-    "DRY": ("FCE4D6", "9C3D00"),
-}
+_FLAGS = {"OK": ("E2F0D9", "1E5B12"), "CHECK": ("E4DFEC", "3F2A63"), "DRY": ("FCE4D6", "9C3D00")}
 
 _WORDS = {
     "z_0": "distance from the camera's centre to the first interface",

@@ -62,6 +62,32 @@ class LasCloud(Cloud):
                 f"promises {records} records)."
             )
 
+        if len(head) > 104 and head[104] & 0x80:
+            self._check_chunks(struct.unpack_from("<I", head, 96)[0], size)
+
+    def _check_chunks(self, start: int, size: int) -> None:
+        """Refuse a compressed cloud whose table of chunks cannot be: it would end the program.
+
+        The decompressor asks for the memory of as many chunks as the table promises.
+        """
+        with self.path.open("rb") as file:
+            file.seek(start)
+            place = file.read(8)
+            at = struct.unpack("<q", place)[0] if len(place) == 8 else -2
+            if at == -1 and size >= 8:  # written to a stream: the place stands at the end
+                file.seek(size - 8)
+                at = struct.unpack("<q", file.read(8))[0]
+            table = b""
+            if start < at < size:
+                file.seek(at)
+                table = file.read(8)
+        # A chunk takes a byte or more of the points.
+        if len(table) < 8 or struct.unpack_from("<I", table, 4)[0] > at - start:
+            raise InputError(
+                f"{self.path}: cannot be read as LAZ; it is damaged or cut off (its table of "
+                "chunks). Copy or export it again."
+            )
+
     @contextmanager
     def _reading(self) -> Iterator[Any]:
         """Yield an open reader; a damaged file becomes a message."""
