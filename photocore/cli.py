@@ -181,7 +181,7 @@ def print_json(value: Any) -> None:
 
     text = value if isinstance(value, str) else to_text(value)
     try:
-        text.encode(sys.stdout.encoding or "utf-8")
+        text.encode(getattr(sys.stdout, "encoding", None) or "utf-8")  # None: stdout is closed
     except UnicodeEncodeError:
         # Outside of its texts JSON is ASCII, so each letter may be escaped where it stands.
         text = re.sub(r"[^\x00-\x7f]", lambda letter: json.dumps(letter[0])[1:-1], text)

@@ -179,7 +179,7 @@ def read_relief(path: Path | str) -> ReliefMap:
                 sigma = np.asarray(reader.read(*size, bands=[2])[:, :, 0], np.float32)
         if reader.bands >= 3:
             band = np.asarray(reader.read(*size, bands=[3])[:, :, 0], np.float64)
-            quality = np.nan_to_num(np.clip(band, 0, 255)).astype(np.uint8)
+            quality = np.clip(np.nan_to_num(band), 0, 255).astype(np.uint8)
         return ReliefMap(
             r=r, sigma=sigma, quality=quality, plane_from_pixel=reader.grid.plane_from_pixel
         )

@@ -142,7 +142,10 @@ class LasCloud(Cloud):
             ]
         )
         compressed = self.path.suffix.lower() == ".laz"
-        with laspy.open(path, mode="w", header=header, do_compress=compressed) as out:
+        with (
+            _disk_errors(),
+            laspy.open(path, mode="w", header=header, do_compress=compressed) as out,
+        ):
 
             def write(piece: CloudPiece, xyz: FloatArray, values: Mapping[str, Any]) -> None:
                 points = laspy.ScaleAwarePointRecord.zeros(len(xyz), header=header)
@@ -186,6 +189,17 @@ def check_extent(path: Path, xyz: FloatArray) -> None:
         )
 
 
+@contextmanager
+def _disk_errors() -> Iterator[None]:
+    """Turn what the compressor says when it cannot write into what Python says."""
+    from lazrs import LazrsError
+
+    try:
+        yield
+    except LazrsError as error:
+        raise OSError(f"writing failed, is the disk full? ({error})") from error
+
+
 def write_las(
     path: Path,
     xyz: FloatArray,
@@ -222,4 +236,5 @@ def write_las(
     cloud.x, cloud.y, cloud.z = xyz.T
     for name, values in columns.items():
         cloud[name] = values
-    cloud.write(str(path))
+    with _disk_errors():
+        cloud.write(str(path))

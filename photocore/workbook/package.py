@@ -170,7 +170,10 @@ def xml_events(
     """
     parser: Any = ElementTree.XMLPullParser(events)
     for _ in _fed(path, package, name, parser):
-        yield from parser.read_events()
+        try:
+            yield from parser.read_events()
+        except ElementTree.ParseError as error:  # found while feeding, raised here
+            raise InputError(f"{path}: {name} is damaged ({error}); save the file again.") from None
 
 
 def xml_elements(path: Path, package: zipfile.ZipFile, name: str, *kinds: str) -> Iterator[Element]:
