@@ -78,7 +78,9 @@ READERS: dict[str, Reader] = {
     "pair": Reader("wall.pair.json", Pair.read),
     "lens": Reader("lens.json", Lens.read),
     "toml": Reader("tank.toml", read_project),
-    "toml points": Reader("tank_object_points.csv", lambda p: read_project(p.with_name("tank.toml"))),
+    "toml points": Reader(
+        "tank_object_points.csv", lambda p: read_project(p.with_name("tank.toml"))
+    ),
     "csv": Reader("result.csv", read_survey_points),
     "xlsx": Reader("survey.xlsx", solve),
     "ods": Reader("survey.ods", read_survey_points),

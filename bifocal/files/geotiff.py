@@ -174,12 +174,12 @@ def read_relief(path: Path | str) -> ReliefMap:
         r = reader.read_floats(*size)
         sigma = np.where(np.isnan(r), r, np.float32(0))
         quality = np.where(np.isnan(r), Quality.UNKNOWN, Quality.MEASURED).astype(np.uint8)
-        if reader.bands >= 2:
-            with np.errstate(invalid="ignore", over="ignore"):
+        with np.errstate(invalid="ignore", over="ignore"):  # what the types cannot hold
+            if reader.bands >= 2:
                 sigma = np.asarray(reader.read(*size, bands=[2])[:, :, 0], np.float32)
-        if reader.bands >= 3:
-            band = np.asarray(reader.read(*size, bands=[3])[:, :, 0], np.float64)
-            quality = np.clip(np.nan_to_num(band), 0, 255).astype(np.uint8)
+            if reader.bands >= 3:
+                band = np.asarray(reader.read(*size, bands=[3])[:, :, 0], np.float64)
+                quality = np.clip(np.nan_to_num(band), 0, 255).astype(np.uint8)
         return ReliefMap(
             r=r, sigma=sigma, quality=quality, plane_from_pixel=reader.grid.plane_from_pixel
         )

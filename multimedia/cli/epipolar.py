@@ -37,8 +37,8 @@ Examples:
     "object points and a quarter more]",
 )  # fmt: skip
 @click.option(
-    "--chord", "chord_error", type=Number(above=0, least=1e-3, to=lambda um: um / 1000), default=0.5, show_default=True,
-    metavar="UM", help="Largest distance between curve and polygon [um].",
+    "--chord", "chord_error", type=Number(above=0, least=1e-3, to=THOUSANDTHS.to), default=0.5,
+    show_default=True, metavar="UM", help="Largest distance between curve and polygon [um].",
 )  # fmt: skip
 @click.option(
     "--vertices",

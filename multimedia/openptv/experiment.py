@@ -245,6 +245,7 @@ def _find(roots: Sequence[Path], name: str) -> Path | None:
     name = name.replace("\\", "/").strip()
     for root in roots:
         for candidate in (root / name, root / Path(name).name, root / "cal" / Path(name).name):
+            check_name(candidate)
             if candidate.is_file():
                 return candidate
     return None

@@ -95,7 +95,9 @@ class PlyCloud(Cloud):
 
     def _rows(self, file: BinaryIO, dtype: np.dtype[Any], count: int, what: str) -> NDArray[Any]:
         """Return the next so many points or faces; a text line may go on behind a face's."""
-        short = InputError(f"{self.path}: ends before its last {what}; it is damaged: copy or export it again.")
+        short = InputError(
+            f"{self.path}: ends before its last {what}; it is damaged: copy or export it again."
+        )
         if self._format != "ascii":
             size = count * dtype.itemsize
             if size > self.path.stat().st_size - file.tell():

@@ -163,7 +163,8 @@ def _read_texts(
         if value is None or mixed:
             complain(index, _mixed(part, decimal or usual))
         elif not abs(value) <= largest:
-            complain(index, f'found "{_short(part.digits)}", which is too large; the limit is {largest:g}.')
+            shown = _short(part.digits)
+            complain(index, f'found "{shown}", which is too large; the limit is {largest:g}.')
         else:
             result[index] = value
 

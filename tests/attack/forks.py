@@ -94,7 +94,7 @@ def run(job: dict[str, Any], place: Path) -> dict[str, Any]:
     if "signal" in job:
         time.sleep(job["after"])
         os.kill(child, job["signal"])
-    with open(reading, encoding="utf-8", errors="replace") as file:
+    with os.fdopen(reading, encoding="utf-8", errors="replace") as file:
         said = file.read()
     _, ended = os.waitpid(child, 0)
     return {

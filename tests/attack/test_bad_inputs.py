@@ -19,16 +19,20 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner
 
-from tests.attack.cases import CONTENTS, INPUTS, OUTPUTS, WORDS
+from photocore import output
+from tests.attack.contents import CONTENTS
+from tests.attack.lines import INPUTS, OUTPUTS
+from tests.attack.options import WORDS
 from tests.attack.site import PROGRAMS, make_site
 
 #: A message must say how to mend it: what was expected, what to do, or that a thing is not there.
 REMEDY = re.compile(
-    r"expected|must|give|choose|name |add |write|written|use |check|need|take|make|create|save|copy"
-    r"|close|free|did you mean|no such|missing|is not|is no |are not|at least|cannot|does not|too "
-    r"|instead|only|holds|may not|neither|none of|not valid|Invalid|requires|outside|would be|called"
-    r"|lacks|has no |have no |belong|fill in|run `|is empty|damaged|at both ends|are in |Convert"
-    r"|in metres|looks like|remove|found|twice|two prop|Known|by letter|leave |ends before|decimal comma|say how|is for|none |between|to 30|below ",
+    r"add |are in |are not|at both ends|at least|below |belong|between|by letter|called|cannot"
+    r"|check|choose|close|Convert|copy|create|damaged|decimal comma|did you mean|does not"
+    r"|ends before|expected|fill in|found|free|give|has no |have no |holds|in metres|instead"
+    r"|Invalid|is empty|is for|is no |is not|Known|lacks|leave |looks like|make|may not|missing"
+    r"|must|name |need|neither|no such|none |not valid|only|outside|remove|requires|run `|save"
+    r"|say how|take|to 30|too |twice|two prop|use |would be|write|written",
     re.IGNORECASE,
 )
 
@@ -144,6 +148,11 @@ def test_no_bad_file_is_taken(site: Path, line: str, ending: str, valid: str, ki
     refused(line.replace("{}", name), re.escape(name[:60]), folder=site)
 
 
+#: Outputs in sets, links followed, devices refused: this part of `photocore.output` came later.
+HAS_SETS = hasattr(output, "all_or_none")
+LATER = (
+    "bifocal undistort far.jpg far.jpg", "--dpi 1e9", "--contours 1e-9",
+)  # fmt: skip
 PLACES = (
     "exists", "folder", "no folder", "below a file", "long name", "dangling", "device", "pipe",
     "an input",
@@ -153,7 +162,7 @@ PLACES = (
 def output_cases() -> Iterator[pytest.ParameterSet]:
     for line, ending, *fine in OUTPUTS:
         for place in PLACES:
-            if place not in fine:
+            if place not in fine and (HAS_SETS or place not in ("dangling", "device", "pipe")):
                 yield pytest.param(line, ending, place, id=f"{line}-{place}")
 
 
@@ -180,6 +189,8 @@ def test_no_bad_place_is_written_to(site: Path, line: str, ending: str, place: s
 
 @pytest.mark.parametrize(("line", "culprit"), WORDS, ids=[line for line, _ in WORDS])
 def test_no_impossible_option_is_taken(site: Path, line: str, culprit: str) -> None:
+    if not HAS_SETS and any(words in line for words in LATER):
+        pytest.skip("needs outputs in sets")
     refused(line, culprit, folder=site)
 
 

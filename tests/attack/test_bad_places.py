@@ -20,7 +20,7 @@ from typing import Any
 
 import pytest
 
-from tests.attack.cases import OUTPUTS, SOLVE
+from tests.attack.lines import OUTPUTS, SOLVE
 from tests.attack.site import make_site
 from tests.attack.test_bad_inputs import state
 
@@ -37,7 +37,8 @@ def run() -> Iterator[Run]:
     )  # fmt: skip
 
     def one(line: str, folder: Path, **conditions: Any) -> dict[str, Any]:
-        assert process.stdin and process.stdout
+        assert process.stdin is not None
+        assert process.stdout is not None
         process.stdin.write(json.dumps({"line": line, "folder": str(folder), **conditions}) + "\n")
         process.stdin.flush()
         return json.loads(process.stdout.readline())
@@ -68,9 +69,7 @@ def one_message(said: dict[str, Any]) -> None:
 
 #: Lines that take long; what they do is done by others too.
 SLOW = ("align", "--plot", "--picture")
-WRITING = [
-    (line, ending) for line, ending, *_ in OUTPUTS if not any(word in line for word in SLOW)
-]
+WRITING = [(line, ending) for line, ending, *_ in OUTPUTS if not any(word in line for word in SLOW)]
 IDS = [line.replace("{}", "o" + ending) for line, ending in WRITING]
 
 
@@ -89,7 +88,9 @@ def test_a_full_disk_leaves_nothing_and_changes_nothing(
     assert (site / f"o{ending}").read_bytes() == b"mine"
 
 
-@pytest.mark.skipif(not hasattr(os, "getuid") or os.getuid() != 0, reason="only root becomes nobody")
+@pytest.mark.skipif(
+    not hasattr(os, "getuid") or os.getuid() != 0, reason="only root becomes nobody"
+)
 @pytest.mark.parametrize(("line", "ending"), WRITING[1::4], ids=IDS[1::4])
 def test_a_folder_of_somebody_else_is_not_written_to(
     run: Run, site: Path, line: str, ending: str
