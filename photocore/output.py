@@ -38,26 +38,23 @@ def check_writable(path: Path | str, *, overwrite: bool) -> Path:
     return path
 
 
-def check_ending(path: Path | None, *endings: str, what: str) -> None:
-    """Refuse a path that does not end as its content must; None stands for no file.
-
-    Parameters
-    ----------
-    path : Path or None
-    *endings : str
-        ``.toml``
-    what : str
-        What is written, with its article: ``"a project"``.
-    """
-    if path is not None and path.suffix.lower() not in endings:
-        raise InputError(f"{path}: {what} is written as {' or '.join(endings)}.")
-
-
 def check_all_writable(*paths: Path | None, overwrite: bool) -> None:
     """Refuse each path that is given as `check_writable` does; None stands for no file."""
     for path in paths:
         if path is not None:
             check_writable(path, overwrite=overwrite)
+
+
+def check_ending(path: Path | None, rule: str, *endings: str) -> None:
+    """Refuse a file with another ending than these, given in small letters; None is no file.
+
+    Raises
+    ------
+    InputError
+        With the rule as its message.
+    """
+    if path is not None and path.suffix.lower() not in endings:
+        raise InputError(f"{path}: {rule}")
 
 
 def check_not_open(path: Path) -> None:

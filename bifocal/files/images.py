@@ -231,7 +231,7 @@ def write_image(path: Path | str, image: ImageArray, *, overwrite: bool = False)
     """Write RGB, RGBA or grey pixels as the ending says (.png, .jpg, .tif), whole or not at all."""
     path = Path(path)
     ending = path.suffix.lower()
-    check_ending(path, *WRITTEN, what="an image")
+    check_ending(path, "images are written as .png, .jpg or .tif.", *WRITTEN)
     order = {3: cv2.COLOR_RGB2BGR, 4: cv2.COLOR_RGBA2BGRA}
     pixels = image if image.ndim == 2 else cv2.cvtColor(image, order[image.shape[2]])
     options = [cv2.IMWRITE_JPEG_QUALITY, 95] if ending in {".jpg", ".jpeg"} else []

@@ -18,7 +18,7 @@ from bifocal.orientation.interior_orientation import Interior, lens_of_photo
 from bifocal.orientation.orientation_stages import PhotoInput
 from photocore.arrays import FloatArray
 from photocore.errors import InputError
-from photocore.output import check_ending, check_writable, relative_name
+from photocore.output import check_all_writable, check_ending, relative_name
 
 #: A wall point given without r lies on the plane to this. [m]
 SIGMA_ON_WALL = 0.005
@@ -97,12 +97,10 @@ def align_photos(
         raise InputError(
             f"{out.name}: a pair file ends in .json; write --out {out.stem}.pair.json."
         )
-    check_ending(picture, *WRITTEN, what="a picture")
+    check_ending(picture, "a picture is written as .png, .jpg or .tif.", *WRITTEN)
     way, options = _way(options)
     _check_metres(options)
-    for path in (out, picture):
-        if path is not None:
-            check_writable(path, overwrite=overwrite)
+    check_all_writable(out, picture, overwrite=overwrite)
     infos = image_info(far), image_info(near)
     first, second = (
         PhotoInput(

@@ -33,8 +33,8 @@ def adjust_project(
     """
     if out is not None and report is not None and out.resolve() == report.resolve():
         raise InputError(f"{out}: is named for the project and for the report; name two files.")
-    check_ending(out, ".toml", what="a project")
-    check_ending(report, ".html", what="a report")
+    check_ending(out, "a project is written as .toml.", ".toml")
+    check_ending(report, "a report is written as .html.", ".html")
     check_all_writable(out, report, overwrite=overwrite)
     project = read_project(source)
     result = bundle_adjust(project, unknowns)

@@ -185,8 +185,8 @@ def _by_depth(study: Study) -> FloatArray:
 
 def write_design(design: Design, *, out: Path | None, plot: Path | None, overwrite: bool) -> None:
     """Write the workbook and the picture where asked."""
-    check_ending(out, ".xlsx", what="a study")
-    check_ending(plot, ".png", ".svg", ".pdf", what="a drawing of a study")
+    check_ending(out, "a study is written as .xlsx.", ".xlsx")
+    check_ending(plot, "a study is drawn as .png, .svg or .pdf.", ".png", ".svg", ".pdf")
     check_all_writable(out, plot, overwrite=overwrite)
     if out is not None:
         write_design_workbook(out, design, overwrite=overwrite)

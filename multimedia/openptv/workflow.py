@@ -75,7 +75,7 @@ def import_openptv(
     radius : float
         Farthest a target may lie from where the stored orientation expects it. [px]
     """
-    check_ending(out, ".toml", what="a project")
+    check_ending(out, "a project is written as .toml.", ".toml")
     check_all_writable(out, overwrite=overwrite)
     # The stored orientation belongs to the indices as stored, whatever is thought of them.
     experiment = read_experiment(folder)

@@ -172,7 +172,7 @@ def resect_project(
     overwrite: bool = False,
 ) -> Resected:
     """Orient the cameras of a project, each on its own, from its control points."""
-    check_ending(out, ".toml", what="a project")
+    check_ending(out, "a project is written as .toml.", ".toml")
     check_all_writable(out, residuals, overwrite=overwrite)
     project = read_project(path)
     unknown = [name for name in cameras if name not in project.camera_names]

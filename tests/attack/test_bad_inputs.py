@@ -29,7 +29,7 @@ from tests.attack.site import PROGRAMS, make_site
 REMEDY = re.compile(
     r"add |are in |are not|at both ends|at least|below |belong|between|by letter|called|cannot"
     r"|check|choose|close|Convert|copy|create|damaged|decimal comma|did you mean|does not"
-    r"|ends before|expected|fill in|found|free|give|has no |have no |holds|in metres|instead"
+    r"|ends before|drawn|expected|fill in|found|free|give|has no |have no |holds|in metres|instead"
     r"|Invalid|is empty|is for|is no |is not|Known|lacks|leave |looks like|make|may not|missing"
     r"|must|name |need|neither|no such|none |not valid|only|outside|remove|requires|run `|save"
     r"|say how|take|to 30|too |twice|two prop|use |would be|write|written",
