@@ -70,6 +70,7 @@ def command(
     """
     from multimedia.design import workflow as design
 
+    design.check_outputs(out, plot, overwrite=overwrite)
     if project is not None:
         context = click.get_current_context()
         for name in ring:

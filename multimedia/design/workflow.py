@@ -183,11 +183,16 @@ def _by_depth(study: Study) -> FloatArray:
     return np.array(rows)
 
 
-def write_design(design: Design, *, out: Path | None, plot: Path | None, overwrite: bool) -> None:
-    """Write the workbook and the picture where asked."""
+def check_outputs(out: Path | None, plot: Path | None, *, overwrite: bool) -> None:
+    """Refuse what `write_design` could not write; call it before the work."""
     check_ending(out, "a study is written as .xlsx.", ".xlsx")
     check_ending(plot, "a study is drawn as .png, .svg or .pdf.", ".png", ".svg", ".pdf")
     check_all_writable(out, plot, overwrite=overwrite)
+
+
+def write_design(design: Design, *, out: Path | None, plot: Path | None, overwrite: bool) -> None:
+    """Write the workbook and the picture where asked."""
+    check_outputs(out, plot, overwrite=overwrite)
     if out is not None:
         write_design_workbook(out, design, overwrite=overwrite)
     if plot is not None:
