@@ -19,7 +19,6 @@ from photocore.arrays import (
     BoolArray,
     FloatArray,
     as_points,
-    is_finite_number,
     not_negative,
     positive,
     read_only,
@@ -491,9 +490,8 @@ def _photo_from_dict(data: Any, key: str, folder: Path) -> Photo:
         raise InputError(f'"{key}.lens" must name a lens file, found {lens!r}.')
     with located(f'"{key}"'):
         for name in ("distance", *_OPTIONAL):
-            value = data.get(name)
-            if not is_finite_number(value) and (value is not None or name == "distance"):
-                raise InputError(f"{name}: expected a number, found {value!r:.40}.")
+            if isinstance(data.get(name), list):  # an array of one would pass for a number
+                raise InputError(f"{name}: expected one number, found {data[name]!r:.40}.")
         return Photo(
             file=file,
             lens=Lens.read(folder / lens) if lens else None,
