@@ -18,7 +18,7 @@ from bifocal.model.lens import Lens
 from photocore.arrays import FloatArray
 from photocore.cli import Progress, no_progress
 from photocore.errors import InputError
-from photocore.output import check_writable
+from photocore.output import all_or_none, check_all_writable, check_writable
 from photocore.tables import Column, read_table
 
 
@@ -101,6 +101,7 @@ def write_database_lens(
     return known.lens, (known.remark,)
 
 
+@all_or_none()
 def undistort_images(
     images: Sequence[Path],
     lens: str,
@@ -126,10 +127,10 @@ def undistort_images(
     remarks : tuple of str
     """
     one = None if lens.lower() == "exif" else Lens.read(lens)
-    targets = []
-    for path in images:
-        target = (folder or path.parent) / f"{path.stem}_undistorted{path.suffix}"
-        targets.append(check_writable(target, overwrite=overwrite))
+    targets = [
+        (folder or path.parent) / f"{path.stem}_undistorted{path.suffix}" for path in images
+    ]
+    check_all_writable(*targets, overwrite=overwrite)
     remarks: list[str] = []
     for done, (path, target) in enumerate(zip(images, targets, strict=True)):
         progress(done, len(images), path.name)

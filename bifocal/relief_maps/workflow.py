@@ -21,7 +21,7 @@ from photocore.arrays import FloatArray
 from photocore.cli import Progress, no_progress
 from photocore.cloud import write_cloud
 from photocore.errors import GeometryError, InputError
-from photocore.output import check_writable
+from photocore.output import all_or_none, check_all_writable
 
 _ROWS = 256
 
@@ -57,6 +57,7 @@ class ReliefJob:
     overwrite: bool = False
 
 
+@all_or_none()
 def relief_of_pair(
     pair_file: Path, job: ReliefJob, *, progress: Progress = no_progress
 ) -> tuple[dict[str, Any], tuple[str, ...]]:
@@ -141,12 +142,11 @@ def coloured_cloud(
 
 def _check_outputs(job: ReliefJob) -> None:
     """Refuse, before any work, outputs that could not be written."""
+    check_all_writable(job.out, job.preview, job.cloud, overwrite=job.overwrite)
     for path, endings, rule in (
         (job.out, {".tif", ".tiff"}, "the relief map is written as .tif."),
         (job.preview, {".png"}, "the preview is written as .png."),
         (job.cloud, {".ply", ".las", ".laz"}, "point clouds are written as .ply, .las or .laz."),
     ):
-        if path is not None:
-            check_writable(path, overwrite=job.overwrite)
-            if path.suffix.lower() not in endings:
-                raise InputError(f"{path}: {rule}")
+        if path is not None and path.suffix.lower() not in endings:
+            raise InputError(f"{path}: {rule}")

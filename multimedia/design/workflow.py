@@ -27,7 +27,7 @@ from multimedia.projects.project_file import read_project
 from multimedia.refraction.layers import Layers
 from photocore.arrays import FloatArray
 from photocore.errors import GeometryError, InputError
-from photocore.output import check_all_writable
+from photocore.output import all_or_none, check_all_writable
 
 #: A millimetre in the units that projects use.
 MILLIMETRE = {"m": 1e-3, "cm": 0.1, "mm": 1.0}
@@ -171,6 +171,7 @@ def _by_depth(study: Study) -> FloatArray:
     return np.array(rows)
 
 
+@all_or_none()
 def write_design(design: Design, *, out: Path | None, plot: Path | None, overwrite: bool) -> None:
     """Write the workbook and the picture where asked."""
     check_all_writable(out, plot, overwrite=overwrite)

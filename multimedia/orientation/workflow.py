@@ -25,7 +25,7 @@ from multimedia.projects.point_tables import read_image_points, read_object_poin
 from multimedia.projects.project_file import read_project, write_project
 from photocore.arrays import FloatArray, IntArray
 from photocore.errors import InputError
-from photocore.output import check_all_writable
+from photocore.output import all_or_none, check_all_writable
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -162,6 +162,7 @@ class Resected:
     remarks: tuple[str, ...]
 
 
+@all_or_none()
 def resect_project(
     path: Path,
     *,
