@@ -127,9 +127,7 @@ def undistort_images(
     remarks : tuple of str
     """
     one = None if lens.lower() == "exif" else Lens.read(lens)
-    targets = [
-        (folder or path.parent) / f"{path.stem}_undistorted{path.suffix}" for path in images
-    ]
+    targets = [(folder or path.parent) / f"{path.stem}_undistorted{path.suffix}" for path in images]
     check_all_writable(*targets, overwrite=overwrite)
     remarks: list[str] = []
     for done, (path, target) in enumerate(zip(images, targets, strict=True)):

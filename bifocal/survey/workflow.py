@@ -71,8 +71,10 @@ class SolvedSurvey(SurveyContent):
         What the points of the reference plane tell.
     adjusted : bool
         Whether the orientation was corrected by it.
-    overridden : bool
-        Whether options took the place of what the workbook says.
+    correction : ndarray, shape (3, 3), or None
+        Homography that corrected the coordinates in mm of image 2, where the pair is ideal.
+    given : mapping
+        The options that took the place of what the workbook says, by name.
     remarks : tuple of str
         What the user should know.
     """
@@ -86,7 +88,8 @@ class SolvedSurvey(SurveyContent):
     pair_path: Path | None
     orientation_check: OrientationCheck | None
     adjusted: bool
-    overridden: bool
+    correction: FloatArray | None
+    given: Mapping[str, Any]
     remarks: tuple[str, ...]
 
     @property
@@ -234,15 +237,21 @@ def solve(
         check=check,
         control=survey.control,
         georeference=world,
-        model=survey.model,
+        model=model or survey.model,
         sensor=setup.sensor,
         limits=setup.limits,
         orientation_check=solved.check,
         adjusted=adjust_setup,
-        overridden=bool(given or unit or pair) or solved.sigma_px not in (None, setup.sigma_px),
+        correction=solved.correction,
+        given=_options(given, unit=unit, pair=pair, sigma_px=sigma_px, model=model),
         rules=judged,
         remarks=tuple(dict.fromkeys(remarks)),
     )
+
+
+def _options(given: Mapping[str, Any], **more: Any) -> dict[str, Any]:
+    """Return the options that were given, those that are None left out."""
+    return {name: value for name, value in {**given, **more}.items() if value is not None}
 
 
 def _checked(**numbers: float | None) -> dict[str, Any]:
@@ -285,6 +294,7 @@ class _SolvedPoints:
     setup: SurveySetup | None = None
     sigma_px: float | None = None
     check: OrientationCheck | None = None
+    correction: FloatArray | None = None
     remarks: tuple[str, ...] = ()
 
 
@@ -457,15 +467,20 @@ def _solve_ideal(survey: SurveyInput, scale_tolerance: float, *, adjust: bool) -
     measured = setup.in_millimetres(points)
     xy1, xy2 = _all_xy(measured)
     check = _check_plane(pair, points, (xy1, xy2), None, survey, adjust)
+    correction: FloatArray | None = None
     if check is not None:
         remarks += check.remarks
         if adjust:
             scale = pair.image1.plane_from_pixel[0, 0]
-            moved = apply_homography(check.matrix, pair.image2.plane_from_pixels(xy2)) / scale
+            to_scale = np.diag([1 / scale, 1 / scale, 1.0])
+            correction = to_scale @ check.matrix @ pair.image2.plane_from_pixel
+            moved = apply_homography(correction, xy2)
+            if setup.adjusted[1] is not None:
+                correction = correction @ setup.adjusted[1]
             only_theta = points.polar * np.array([np.nan, np.nan, 1.0])
             points = measured = replace(measured, xy1=xy1, xy2=moved, polar=only_theta)
             c2 = None if setup.c1 is None else setup.c1 * pair.d2 / pair.d1
-            setup = replace(setup, unit="mm", c2=c2)
+            setup = replace(setup, unit="mm", c2=c2, adjusted=(None, None))
             pair = setup.pair()
             remarks.append(
                 "Set-up: image 2 was corrected by the points of the reference plane; its "
@@ -479,6 +494,7 @@ def _solve_ideal(survey: SurveyInput, scale_tolerance: float, *, adjust: bool) -
         pair=pair,
         setup=setup,
         check=check,
+        correction=correction,
         remarks=tuple(filter(None, remarks)),
     )
 

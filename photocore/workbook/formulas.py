@@ -13,7 +13,13 @@ from xml.sax.saxutils import unescape as unescape_xml
 
 from photocore.workbook.grid import TableArea, cell_name, split_area
 from photocore.workbook.package import local, read_part, understood, xml_elements
-from photocore.workbook.xlsx import SheetPart, Workbook, row_cells
+from photocore.workbook.xlsx import (
+    SheetPart,
+    Workbook,
+    part_of_kind,
+    read_relations,
+    row_cells,
+)
 
 _RANGE = re.compile(
     r"(?P<sheet>(?:'(?:[^']|'')+'|[A-Za-z0-9_.À-ɏ]+)!)?"
@@ -115,7 +121,7 @@ class References:
         shapes = {_ANY_CELL.sub("#", element.text or "") for element in elements}
         return "\n".join(sorted(shapes))
 
-    def grow(self, area: TableArea, bottom: int, parts: dict[str, bytes]) -> None:
+    def grow(self, area: TableArea, bottom: int, parts: dict[str, bytes | None]) -> None:
         """Let a table, and all that reaches to its last row, reach down to a new one.
 
         Parameters
@@ -135,11 +141,12 @@ class References:
                 self._replace(name, parts, area, bottom, tag=rb"f")
         self._replace(self.book.part, parts, area, bottom, tag=rb"definedName")
 
-    def _now(self, name: str, parts: dict[str, bytes]) -> bytes:
-        return parts[name] if name in parts else read_part(self.path, self.package, name)
+    def _now(self, name: str, parts: dict[str, bytes | None]) -> bytes:
+        changed = parts.get(name)
+        return read_part(self.path, self.package, name) if changed is None else changed
 
     def _replace(
-        self, name: str, parts: dict[str, bytes], area: TableArea, bottom: int, *, tag: bytes
+        self, name: str, parts: dict[str, bytes | None], area: TableArea, bottom: int, *, tag: bytes
     ) -> None:
         """Let the ranges in the text of certain elements grow."""
         data = self._now(name, parts)
@@ -216,8 +223,37 @@ def _grown_sheet(data: bytes, area: TableArea, bottom: int) -> bytes:
     return re.sub(rb"(<(?:\w+:)?sqref>)([^<]*)(</)", attribute, data)
 
 
+def charts_of(path: Path, package: zipfile.ZipFile, sheet: SheetPart) -> list[str]:
+    """Return the parts of the charts that are drawn on a sheet."""
+    drawings = [part for kind, part in sheet.relations.values() if kind == "drawing"]
+    return [
+        part
+        for drawing in drawings
+        for kind, part in read_relations(path, package, drawing).values()
+        if kind == "chart"
+    ]
+
+
+def drop_order(
+    path: Path, package: zipfile.ZipFile, book: Workbook, parts: dict[str, bytes | None]
+) -> None:
+    """Leave out the list of formulas in the order of calculation: it names one that is gone.
+
+    Excel makes it anew, and takes a workbook for damaged whose list is wrong.
+    """
+    part = part_of_kind(package, book, "calcChain")
+    if not part:
+        return
+    parts[part] = None
+    folder, file = posixpath.split(book.part)
+    for name in (f"{folder}/_rels/{file}.rels".lstrip("/"), "[Content_Types].xml"):
+        data = parts.get(name) or read_part(path, package, name)
+        entry = rb"<(?:\w+:)?(?:Relationship|Override)\s[^>]*%s[\"'][^>]*?/>"
+        parts[name] = re.sub(entry % re.escape(posixpath.basename(part).encode()), b"", data)
+
+
 def recalculate_on_load(
-    path: Path, package: zipfile.ZipFile, book: Workbook, parts: dict[str, bytes]
+    path: Path, package: zipfile.ZipFile, book: Workbook, parts: dict[str, bytes | None]
 ) -> None:
     """Tell spreadsheet programs to calculate all formulas when they open the workbook."""
     data = parts.get(book.part) or read_part(path, package, book.part)

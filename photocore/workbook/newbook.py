@@ -96,6 +96,30 @@ def finish_book(
     blocks : mapping, optional
         Sheet name to the rows that repeat its prototype row.
     """
+    parts = _finished_parts(source, target, results=results, blocks=blocks)
+    rewrite_package(source, target, parts, date=PART_TIME)
+
+
+def finished_parts(
+    source: BinaryIO,
+    *,
+    results: Mapping[str, Mapping[str, CellValue]],
+    blocks: Mapping[str, RowBlock] | None = None,
+) -> dict[str, bytes]:
+    """Return all parts of a finished package, to take sheets from; as `finish_book` otherwise."""
+    made = _finished_parts(source, Path("new sheets"), results=results, blocks=blocks)
+    with zipfile.ZipFile(source) as package:
+        return {name: made.get(name) or package.read(name) for name in package.namelist()}
+
+
+def _finished_parts(
+    source: BinaryIO,
+    target: Path,
+    *,
+    results: Mapping[str, Mapping[str, CellValue]],
+    blocks: Mapping[str, RowBlock] | None,
+) -> dict[str, bytes]:
+    """Return the parts that change."""
     with zipfile.ZipFile(source) as package:
         parts = {}
         for sheet in read_directory(target, package).sheets:
@@ -115,7 +139,7 @@ def finish_book(
         core = read_part(target, package, "docProps/core.xml")
         moment = rb"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\dZ"
         parts["docProps/core.xml"] = re.sub(moment, b"1980-01-01T00:00:00Z", core)
-    rewrite_package(source, target, parts, date=PART_TIME)
+    return parts
 
 
 def _typed(value: CellValue) -> CellValue:

@@ -17,6 +17,7 @@ from photocore.workbook.grid import cell_name, column_number, split_area
 from photocore.workbook.package import local, new_parser, understood
 from photocore.workbook.xlsx import unescape
 
+_QUOTES = {"&quot;": '"', "&apos;": "'"}
 _TAG = re.compile(rb"""<[^\s/>]+(?:\s+[^\s=]+\s*=\s*(?:"[^"]*"|'[^']*'))*\s*(/?)>""")
 
 
@@ -29,6 +30,8 @@ class SheetChanges:
     inputs : dict
         Row to (column to value): typed cells, made where they are missing. The cell's format
         stays. A cell that holds a formula is never overwritten.
+    placed : dict
+        Row to (column to cell): cells with formulas, or that may take the place of one.
     cached : dict
         Row to (column to result): results of formulas that are there. Cells that hold no formula
         (any more) are left as they are.
@@ -41,23 +44,24 @@ class SheetChanges:
     inputs: dict[int, dict[int, CellValue]] = field(default_factory=dict)
     cached: dict[int, dict[int, CellValue]] = field(default_factory=dict)
     added: list[NewRows] = field(default_factory=list)
+    placed: dict[int, dict[int, NewCell]] = field(default_factory=dict)
     restates: bool = False
 
     def __bool__(self) -> bool:
-        return bool(self.inputs or self.cached or self.added)
+        return bool(self.inputs or self.cached or self.added or self.placed)
 
     def rows(self) -> list[int]:
         """Return the numbers of the rows with cells to be typed or added, in order."""
         added = (range(block.first, block.first + block.size) for block in self.added)
-        return sorted(set(self.inputs).union(*added))
+        return sorted(set(self.inputs).union(self.placed, *added))
 
     def cells(self, row: int) -> dict[int, NewCell]:
         """Return the cells to be typed or added in one row, in order."""
         typed = self.inputs.get(row, {}).items()
         cells = {column: NewCell(None if value == "" else value) for column, value in typed}
         for block in self.added:
-            cells |= block.cells(row)
-        return dict(sorted(cells.items()))
+            cells = block.cells(row) | cells
+        return dict(sorted((cells | self.placed.get(row, {})).items()))
 
 
 @dataclass(slots=True)
@@ -72,12 +76,15 @@ class Spliced:
         The changes asked for; the results of all other formulas, to be taken out.
     inputs_changed : bool
         Whether any typed value differs from what was there.
+    formula_lost : bool
+        Whether a value took the place of a formula.
     """
 
     data: bytes
     edits: list[tuple[int, int, bytes]] = field(default_factory=list)
     strips: list[tuple[int, int, bytes]] = field(default_factory=list)
     inputs_changed: bool = False
+    formula_lost: bool = False
 
     def joined(self, *, strip: bool) -> bytes:
         """Return the changed sheet, without results of other formulas if ``strip``."""
@@ -149,6 +156,7 @@ class _Splicer:
         self.result = Spliced(data)
         self.edits = self.result.edits
         self.new_rows = deque(changes.rows())
+        self.is_plain = len(changes.added) == 1 and not changes.placed
         self.parser = new_parser(path, part, start=self.start, end=self.end)
         self.kinds: dict[str, str] = {}
         self.inside = False
@@ -264,16 +272,32 @@ class _Splicer:
     def replace(self, name: str, new: NewCell) -> None:
         """Give this cell another typed value, or a formula if it is empty."""
         where = f"{self.path} › {cell_name(self.row, self.column)}"
-        if self.child("f"):
-            raise InputError(f"{where}: holds a formula, which is not overwritten.")
-        if not new.is_typed and self.children:
-            raise InputError(f"{where}: is not empty; a new row cannot be put there.")
-        if new.is_typed and self.holds(new.value):
+        formula = self.child("f")
+        if formula and (new.rule == "filled" or self.same_formula(formula, new)):
+            self.put_result(name, new.value)
             return
+        if self.children and new.rule == "filled":
+            return
+        if formula and (new.rule != "over" or b" ref=" in self.data[slice(*formula)]):
+            raise InputError(f"{where}: holds a formula, which is not overwritten.")
+        if new.rule == "prepared" and self.children:
+            raise InputError(f"{where}: is not empty; a new row cannot be put there.")
+        if not new.formula and not formula and self.holds(new.value):
+            return
+        self.result.formula_lost |= bool(formula) and not new.formula
         new = new._replace(style=self.attributes.get("s", "") or new.style)
         edit = self.xml(self.column, new).encode()
         self.edits.append((self.cell_start, self.element_end(name, self.cell_start), edit))
         self.result.inputs_changed = True
+
+    def same_formula(self, place: tuple[int, int], new: NewCell) -> bool:
+        """Whether a formula that would be replaced is the same already."""
+        text = new.formula(self.row) if callable(new.formula) else new.formula
+        if new.rule != "over" or not text:
+            return False
+        start = self.tag_end(place[0])
+        stands = self.data[start : max(start, self.data.rfind(b"<", start, place[1]))]
+        return unescape_xml(stands.decode("utf-8"), _QUOTES) == unescape_xml(text, _QUOTES)
 
     def put_result(self, name: str, value: CellValue) -> None:
         """Give this cell's formula another cached result."""
@@ -317,7 +341,7 @@ class _Splicer:
         if content is None:
             return value is None or value == ""
         inner = self.data[self.tag_end(content[0]) : self.data.rfind(b"<", content[0], content[1])]
-        text = unescape_xml(inner.decode("utf-8"), {"&quot;": '"', "&apos;": "'"})
+        text = unescape_xml(inner.decode("utf-8"), _QUOTES)
         try:
             if kind == "n" and not isinstance(value, str | bool) and value is not None:
                 return float(text) == float(value)
@@ -344,15 +368,16 @@ class _Splicer:
 
     def xml(self, column: int, cell: NewCell, row: int = 0) -> str:
         """Return the XML of a cell of this row, or of another one."""
-        reference = cell_name(row or self.row, column)
-        return cell_xml(reference, cell.value, cell.formula, self.prefix, cell.style)
+        row = row or self.row
+        formula = cell.formula(row) if callable(cell.formula) else cell.formula
+        return cell_xml(cell_name(row, column), cell.value, formula, self.prefix, cell.style)
 
     def add_rows(self, before: int, place: tuple[int, int, str, str]) -> None:
         """Insert the new rows whose numbers lie before one."""
         pieces: list[str] = []
         while self.new_rows and self.new_rows[0] < before:
             row = self.new_rows.popleft()
-            if len(self.changes.added) == 1 and row not in self.changes.inputs:
+            if self.is_plain and row not in self.changes.inputs:
                 cells = self.changes.added[0].xml(row, self.prefix)
             else:
                 new = self.changes.cells(row).items()
@@ -398,7 +423,8 @@ class _Splicer:
 
     def grow_dimension(self, start: int, end: int, reference: str) -> None:
         """Let the sheet's stated extent take in the cells that were made."""
-        made = [(row, column) for row, cells in self.changes.inputs.items() for column in cells]
+        listed = (*self.changes.inputs.items(), *self.changes.placed.items())
+        made = [(row, column) for row, cells in listed for column in cells]
         for block in self.changes.added:
             numbers = [column.column for column in block.columns]
             made += [(block.first, min(numbers)), (block.first + block.size - 1, max(numbers))]

@@ -118,13 +118,13 @@ def read_directory(path: Path, package: zipfile.ZipFile) -> Workbook:
         raise InputError(f"{path}: is an OpenDocument file; give it the ending .ods.")
     if _CONTENT_TYPES not in names or "_rels/.rels" not in names:
         raise InputError(f"{path}: is a zip file but not a workbook.")
-    roots = _relations(path, package, "")
+    roots = read_relations(path, package, "")
     part = next((target for kind, target in roots.values() if kind == "officeDocument"), "")
     if part.endswith(".bin"):
         raise InputError(f"{path}: is a binary workbook (.xlsb); save it as .xlsx.")
     if part not in names:
         raise InputError(f"{path}: is a zip file but not a workbook.")
-    relations = _relations(path, package, part)
+    relations = read_relations(path, package, part)
     book = Workbook(part=part, sheets=[], names={}, relations=relations)
     root = xml_root(path, package, part)
     if local(root.tag) != "workbook":
@@ -138,7 +138,7 @@ def read_directory(path: Path, package: zipfile.ZipFile) -> Workbook:
             kind, target = relations.get(key, ("", ""))
             if kind == "worksheet" and target in names:
                 hidden = element.get("state", "visible") != "visible"
-                parts = _relations(path, package, target)
+                parts = read_relations(path, package, target)
                 book.sheets.append(SheetPart(element.get("name", ""), target, hidden, parts))
         elif kind == "definedName" and "localSheetId" not in element.attrib:
             book.names[element.get("name", "")] = element.text or ""
@@ -147,7 +147,7 @@ def read_directory(path: Path, package: zipfile.ZipFile) -> Workbook:
     return book
 
 
-def _relations(path: Path, package: zipfile.ZipFile, part: str) -> dict[str, tuple[str, str]]:
+def read_relations(path: Path, package: zipfile.ZipFile, part: str) -> dict[str, tuple[str, str]]:
     """Return id -> (kind, target part) of a part's relations; external targets are left out."""
     folder, name = posixpath.split(part)
     rels = posixpath.join(folder, "_rels", f"{name}.rels")
@@ -188,7 +188,7 @@ def _table(title: str, part: str, root: Element) -> TableArea:
     )
 
 
-def _part_of_kind(package: zipfile.ZipFile, book: Workbook, kind: str) -> str:
+def part_of_kind(package: zipfile.ZipFile, book: Workbook, kind: str) -> str:
     """Return the one part of a workbook of a kind, empty where it has none."""
     part = next((target for own, target in book.relations.values() if own == kind), "")
     return part if part in package.namelist() else ""
@@ -196,7 +196,7 @@ def _part_of_kind(package: zipfile.ZipFile, book: Workbook, kind: str) -> str:
 
 def read_shared_strings(path: Path, package: zipfile.ZipFile, book: Workbook) -> list[str]:
     """Return the texts that cells of type ``s`` point to."""
-    part = _part_of_kind(package, book, "sharedStrings")
+    part = part_of_kind(package, book, "sharedStrings")
     items = xml_elements(path, package, part, "si") if part else ()
     return [unescape(_rich_text(item)) for item in items]
 
@@ -215,7 +215,7 @@ def _rich_text(item: Element) -> str:
 
 def _date_styles(path: Path, package: zipfile.ZipFile, book: Workbook) -> dict[str, str]:
     """Return the cell styles (as the ``s`` attribute writes them) that show dates."""
-    part = _part_of_kind(package, book, "styles")
+    part = part_of_kind(package, book, "styles")
     if not part:
         return {}
     codes: dict[int, str] = dict(_BUILT_IN_DATES)
