@@ -405,9 +405,9 @@ class WorkbookEditor:
             for area, bottom in self.grown.values():
                 references.grow(area, bottom, parts)
             for name, old, new in self.texts:
-                own = parts.get(name) or read_part(self.path, package, name)
-                before, cells, after = own.partition(b"</sheetData>")
-                kept, rest = (before + cells, after) if cells else (b"", own)
+                data = parts.get(name) or read_part(self.path, package, name)
+                before, cells, after = data.partition(b"</sheetData>")
+                kept, rest = (before + cells, after) if cells else (b"", data)
                 parts[name] = kept + rest.replace(old, new)
             if stripped:
                 formulas.recalculate_on_load(self.path, package, self.book, parts)
@@ -415,7 +415,7 @@ class WorkbookEditor:
                 formulas.drop_order(self.path, package, self.book, parts)
             self._graft(package, parts)
             own = {*package.namelist()}
-            original = {name: read_part(self.path, package, name) for name in own & parts.keys()}
+            original = {n: read_part(self.path, package, n) for n in own & parts.keys()}
         return {name: data for name, data in parts.items() if data != original.get(name, b"")}
 
     def _graft(self, package: zipfile.ZipFile, parts: dict[str, bytes | None]) -> None:

@@ -131,12 +131,16 @@ class Graft:
         if listed:
             self._put(self.book.part, data[: listed.start()] + entry + data[listed.start() :])
             return
+        names = f"<{prefix}definedNames>".encode() + entry + f"</{prefix}definedNames>".encode()
+        empty = re.search(rb"<(?:\w+:)?definedNames\s*/>", data)
+        if empty:
+            self._put(self.book.part, data[: empty.start()] + names + data[empty.end() :])
+            return
         before = re.search(rb"</(?:\w+:)?externalReferences\s*>", data) or re.search(
             rb"</(?:\w+:)?functionGroups\s*>|<(?:\w+:)?functionGroups\b[^>]*/>", data
         )
         before = before or re.search(rb"</(?:\w+:)?sheets\s*>", data)
         assert before is not None
-        names = f"<{prefix}definedNames>".encode() + entry + f"</{prefix}definedNames>".encode()
         self._put(self.book.part, data[: before.end()] + names + data[before.end() :])
 
     def _add_sheet(self, title: str, part: str) -> None:

@@ -423,8 +423,8 @@ class _Splicer:
 
     def grow_dimension(self, start: int, end: int, reference: str) -> None:
         """Let the sheet's stated extent take in the cells that were made."""
-        listed = (*self.changes.inputs.items(), *self.changes.placed.items())
-        made = [(row, column) for row, cells in listed for column in cells]
+        made = [(row, column) for row, cells in self.changes.inputs.items() for column in cells]
+        made += [(row, column) for row, cells in self.changes.placed.items() for column in cells]
         for block in self.changes.added:
             numbers = [column.column for column in block.columns]
             made += [(block.first, min(numbers)), (block.first + block.size - 1, max(numbers))]
