@@ -46,6 +46,8 @@ class WorkbookEditor:
     ----------
     path : path
         The workbook, .xlsx or .xlsm.
+    file : SheetFile, optional
+        The same workbook, read already.
 
     Raises
     ------
@@ -54,6 +56,7 @@ class WorkbookEditor:
     """
 
     path: Path
+    file: SheetFile | None = None
     book: Workbook = field(init=False)
     tables: list[TableArea] = field(init=False)
     changes: dict[str, SheetChanges] = field(init=False, default_factory=dict)
@@ -64,7 +67,6 @@ class WorkbookEditor:
     )
     texts: list[tuple[str, bytes, bytes]] = field(init=False, default_factory=list)
     _styles: StyleSheet | None = field(init=False, default=None)
-    _file: SheetFile | None = field(init=False, default=None)
 
     def __post_init__(self) -> None:
         self.path = Path(self.path)
@@ -95,9 +97,9 @@ class WorkbookEditor:
     def grid(self, title: str) -> CellGrid:
         """Return a sheet's cells as they stand in the file."""
         self._sheet(title)
-        if self._file is None:
-            self._file = open_xlsx(self.path, max_rows=2**20)
-        return self._file.grid(title)
+        if self.file is None:
+            self.file = open_xlsx(self.path, max_rows=2**20)
+        return self.file.grid(title)
 
     def set_value(self, title: str, row: int, column: int, value: CellValue) -> None:
         """Type a value into a cell; its format stays. None clears the cell."""
@@ -388,9 +390,13 @@ class WorkbookEditor:
         """Return the parts of the package that change or are new, with their new content."""
         with open_package(self.path) as package:
             spliced = self._splice(package)
-            tainted = {title for title, sheet in spliced.items() if sheet.inputs_changed}
+            tainted = set[str]()
+            if any(sheet.inputs_changed for sheet in spliced.values()):
+                # New results of other sheets follow from what was typed.
+                tainted = {title for title, sheet in spliced.items() if sheet.edits}
             references = formulas.References(self.path, package, self.book, self.tables)
-            stale = references.dependents(tainted)
+            settled = [title for title, sheet in spliced.items() if not sheet.strips]
+            stale = references.dependents(tainted, settled)
             parts: dict[str, bytes | None] = {}
             stripped = False
             for sheet in self.book.sheets:

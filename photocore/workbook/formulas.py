@@ -5,7 +5,7 @@ from __future__ import annotations
 import posixpath
 import re
 import zipfile
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from xml.sax.saxutils import escape as escape_xml
@@ -28,6 +28,8 @@ _RANGE = re.compile(
 _AREA = re.compile(r"[A-Z]{1,3}\d{1,7}(:[A-Z]{1,3}\d{1,7})?")
 #: A cell without its sheet; all are alike when only sheets, tables and names matter.
 _ANY_CELL = re.compile(r"(?<![\w.'$])\$?[A-Z]{1,3}\$?\d+(?![\w.!'(])")
+_FORMULA = re.compile(rb"<(?:\w+:)?f(?:\s[^>]*)?>([^<]+)</")
+_QUOTES = {"&quot;": '"', "&apos;": "'"}
 #: Functions whose result may depend on any cell, whatever their text names.
 _FAR_REACHING = re.compile(r"\b(INDIRECT|OFFSET|CELL|INFO)\s*\(", re.IGNORECASE)
 
@@ -79,16 +81,18 @@ class References:
     book: Workbook
     tables: Sequence[TableArea]
 
-    def dependents(self, changed: Iterable[str]) -> set[str]:
+    def dependents(self, changed: Iterable[str], settled: Collection[str] = ()) -> set[str]:
         """Return the sheets with formulas that may depend on changed sheets, those included.
 
         Errs on the safe side: a formula depends on a sheet when it names it, one of its tables, or
-        a defined name that leads there.
+        a defined name that leads there. Sheets are settled whose every formula has its new result.
         """
         stale = set(changed)
         if not stale:
             return stale
-        texts = {sheet.title: self._formulas(sheet) for sheet in self.book.sheets}
+        known = stale.union(settled)
+        others = [sheet for sheet in self.book.sheets if sheet.title not in known]
+        texts = {sheet.title: self._formulas(sheet) for sheet in others}
         names = dict(self.book.names)
         while True:
             words = self._words(stale)
@@ -116,9 +120,9 @@ class References:
 
     def _formulas(self, sheet: SheetPart) -> str:
         """Return the formulas of a sheet as one text, those that differ only in cells once."""
-        # Rows are asked for too, since what is passed over is kept in memory.
-        elements = xml_elements(self.path, self.package, sheet.part, "f", "row")
-        shapes = {_ANY_CELL.sub("#", element.text or "") for element in elements}
+        data = read_part(self.path, self.package, sheet.part)
+        texts = {match.decode("utf-8", "replace") for match in _FORMULA.findall(data)}
+        shapes = {_ANY_CELL.sub("#", unescape_xml(text, _QUOTES)) for text in texts}
         return "\n".join(sorted(shapes))
 
     def grow(self, area: TableArea, bottom: int, parts: dict[str, bytes | None]) -> None:
@@ -153,7 +157,7 @@ class References:
         pattern = re.compile(rb"(<(?:\w+:)?%s(?:\s[^>]*)?>)([^<]+)(</)" % tag)
 
         def replace(match: re.Match[bytes]) -> bytes:
-            text = unescape_xml(match[2].decode("utf-8"), {"&quot;": '"', "&apos;": "'"})
+            text = unescape_xml(match[2].decode("utf-8"), _QUOTES)
             new = grown_reference(text, area, bottom)
             return match[0] if new == text else match[1] + escape_xml(new).encode() + match[3]
 

@@ -15,6 +15,7 @@ from photocore.errors import InputError
 from photocore.workbook.cells import CellValue, NewCell, NewRows, cell_xml, type_and_content
 from photocore.workbook.grid import cell_name, column_number, split_area
 from photocore.workbook.package import local, new_parser, understood
+from photocore.workbook.plainsheet import NotPlain, plain_rows, sheet_data
 from photocore.workbook.xlsx import unescape
 
 _QUOTES = {"&quot;": '"', "&apos;": "'"}
@@ -162,7 +163,7 @@ class _Splicer:
         self.inside = False
         self.prefix = ""
         self.row = self.column = 0
-        self.row_start = self.cell_start = self.data_start = 0
+        self.row_start = self.cell_start = self.cell_end = self.data_start = 0
         self.attributes: dict[str, str] = {}
         self.children: list[tuple[str, int, int]] = []
         self.child_start = self.depth = 0
@@ -172,14 +173,14 @@ class _Splicer:
 
     def run(self) -> Spliced:
         """Parse, and return the edits in the order of the file."""
-        with understood(
-            lambda: (
-                f"{self.path}: damaged, the part {self.part} cannot be understood near row "
-                f"{self.row}."
-            )
-        ):
+        complaint = f"{self.path}: damaged, the part {self.part} cannot be understood near row "
+        with understood(lambda: f"{complaint}{self.row}."):
             try:
-                self.parser.Parse(self.data, True)
+                try:
+                    self.run_plain()
+                except NotPlain:
+                    self.begin_anew()
+                    self.parser.Parse(self.data, True)
             except expat.ExpatError as error:
                 raise InputError(
                     f"{self.path}: damaged, the part {self.part} is not valid XML ({error})."
@@ -189,6 +190,57 @@ class _Splicer:
         self.edits.sort(key=lambda edit: edit[:2])
         return self.result
 
+    def begin_anew(self) -> None:
+        """Forget all that was found so far."""
+        self.result = Spliced(self.data)
+        self.edits = self.result.edits
+        self.new_rows = deque(self.changes.rows())
+        self.parser = new_parser(self.path, self.part, start=self.start, end=self.end)
+        self.dimension = None
+        self.prefix, self.depth, self.inside = "", 0, False
+
+    def run_plain(self) -> None:
+        """Take a sheet of the plain form apart, all but its rows by the XML parser."""
+        start, end = sheet_data(self.data)
+        self.parser.Parse(self.data[:start], False)
+        self.inside, self.prefix = False, ""
+        for row in plain_rows(self.data, start, end):
+            self.start_row(row.number, row.start, "")
+            new, cached = self.new, self.cached
+            for cell in row.cells:
+                column = column_number(cell[1].decode())
+                if new and next(iter(new)) < column:
+                    self.add_cells(column, (cell.start(), cell.start(), "", ""))
+                is_asked = column in new or column in cached
+                if is_asked or (cell[5] and cell[6]):
+                    self.take_cell(cell, column)
+                    self.end_cell("c")
+            if new:
+                place = (row.end, row.end, "", "")
+                if row.is_closed:
+                    opening = self.data[row.start : row.end].decode("utf-8")[:-2].rstrip()
+                    place = (row.start, row.end, f"{opening}>", "</row>")
+                self.add_cells(10**6, place)
+        self.add_rows(10**9, (end, end, "", ""))
+        self.parser.Parse(self.data[end:], True)
+
+    def take_cell(self, cell: re.Match[bytes], column: int) -> None:
+        """Note where a cell of the plain form and its parts lie."""
+        start, end = cell.span()
+        while self.data[start] != 60:  # "<": blanks may stand before
+            start += 1
+        self.cell_start, self.cell_end, self.column = start, end, column
+        attributes = {"r": f"{cell[1].decode()}{self.row}"}
+        if cell[3]:
+            attributes["s"] = cell[3].decode()
+        if cell[4]:
+            attributes["t"] = cell[4].decode()
+        self.attributes = attributes
+        self.children = [("f", *cell.span(5))] if cell[5] else []
+        if cell[6]:
+            kind = "v" if cell[6].startswith(b"<v") else "is"
+            self.children.append((kind, *cell.span(6)))
+
     def start(self, name: str, attributes: dict[str, str]) -> None:
         """Handle an opening tag."""
         kind = self.kinds.get(name)
@@ -197,7 +249,8 @@ class _Splicer:
         if kind == "c" and self.inside and not self.depth:
             self.start_cell(attributes)
         elif kind == "row" and self.inside and not self.depth:
-            self.start_row(name, attributes)
+            number = int(attributes.get("r", self.row + 1))
+            self.start_row(number, self.parser.CurrentByteIndex, name[: len(name) - 3])
         elif self.inside:
             # Only direct children of a cell count; "t" and "r" lie deeper, in a rich text.
             if not self.depth:
@@ -217,6 +270,7 @@ class _Splicer:
         if not self.inside:
             return
         if kind == "c" and not self.depth:
+            self.cell_end = self.element_end(name, self.cell_start)
             self.end_cell(name)
         elif kind == "row" and not self.depth:
             self.end_row(name)
@@ -229,14 +283,12 @@ class _Splicer:
                 end = self.element_end(name, self.child_start)
                 self.children.append((kind, self.child_start, end))
 
-    def start_row(self, name: str, attributes: dict[str, str]) -> None:
+    def start_row(self, number: int, start: int, prefix: str) -> None:
         """Insert the new rows before this one and note what is to happen in it."""
-        self.row_start = self.parser.CurrentByteIndex
-        self.row = int(attributes.get("r", self.row + 1))
-        self.column = 0
+        self.row, self.row_start, self.column = number, start, 0
         if self.new_rows and self.new_rows[0] < self.row:
             self.add_rows(self.row, (self.row_start, self.row_start, "", ""))
-        self.prefix = name[: len(name) - 3]
+        self.prefix = prefix
         self.cached = self.changes.cached.get(self.row, {})
         self.new = {}
         if self.new_rows and self.new_rows[0] == self.row:
@@ -287,7 +339,7 @@ class _Splicer:
         self.result.formula_lost |= bool(formula) and not new.formula
         new = new._replace(style=self.attributes.get("s", "") or new.style)
         edit = self.xml(self.column, new).encode()
-        self.edits.append((self.cell_start, self.element_end(name, self.cell_start), edit))
+        self.edits.append((self.cell_start, self.cell_end, edit))
         self.result.inputs_changed = True
 
     def same_formula(self, place: tuple[int, int], new: NewCell) -> bool:
@@ -332,7 +384,7 @@ class _Splicer:
         after = b"".join(self.data[s:e] for k, s, e in self.children if k not in ("f", "v", "is"))
         opening = f"<{name}{''.join(kept)}>".encode()
         replacement = opening + before + content.encode() + after + f"</{name}>".encode()
-        return self.cell_start, self.element_end(name, self.cell_start), replacement
+        return self.cell_start, self.cell_end, replacement
 
     def holds(self, value: CellValue) -> bool:
         """Whether this cell holds the value already."""

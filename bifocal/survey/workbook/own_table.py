@@ -80,7 +80,7 @@ def add_results(
         raise InputError(
             f"{target}: results go into the table of {source.name} itself, or into a new .xlsx."
         )
-    editor = WorkbookEditor(source)
+    editor = WorkbookEditor(source, survey.book)
     content = replace(content, links=_links(editor, survey, given))
     built = build(content)
     needed = [

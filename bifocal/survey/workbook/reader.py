@@ -73,6 +73,8 @@ class SurveyInput:
         Whether it is a survey workbook with live formulas.
     table : Table
         The table of points, with the way back to its cells.
+    book : SheetFile or None
+        The workbook as read; None for a text table.
     titles : tuple of str
         The sheets of the file; empty for a text table.
     known_rows, control_rows : tuple of int
@@ -91,6 +93,7 @@ class SurveyInput:
     language: str = "en"
     is_ours: bool = False
     table: Table
+    book: SheetFile | None = None
     titles: tuple[str, ...] = ()
     known_rows: tuple[int, ...] = ()
     control_rows: tuple[int, ...] = ()
@@ -215,6 +218,7 @@ def read_survey(path: Path | str, options: ReadOptions | None = None) -> SurveyI
         language=language,
         is_ours=is_ours,
         table=table,
+        book=sheets,
         titles=() if sheets is None else tuple(sheets.titles),
         known_rows=check.rows,
         control_rows=control.rows,

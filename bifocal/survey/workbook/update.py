@@ -70,7 +70,7 @@ def update_book(
         If the workbook's formulas are made for another kind of measurement, or it cannot be
         changed.
     """
-    editor, built = WorkbookEditor(source), build(content)
+    editor, built = WorkbookEditor(source, survey.book), build(content)
     points = editor.table("tblPoints")
     if points is None or content.is_pair != ("col1" in survey.table.present):
         raise InputError(
