@@ -13,8 +13,8 @@ from bifocal.orientation.matching import Matches, MatchSettings, match_pair
 from bifocal.survey.observations import PointObservations
 from bifocal.survey.template_workflow import write_survey
 from photocore.errors import InputError
-from photocore.output import check_writable
 from photocore.tables import write_csv
+from photocore.workbook.newbook import check_new_workbook
 
 
 def match_photos(
@@ -34,7 +34,7 @@ def match_photos(
     """
     if out.suffix.lower() not in {".xlsx", ".csv"}:
         raise InputError(f"{out}: points are written as .xlsx (survey workbook) or .csv.")
-    check_writable(out, overwrite=overwrite)
+    check_new_workbook(out, overwrite=overwrite)
     pair = Pair.read(pair_path)
     images = (read_grey(pair.photo_file(1)), read_grey(pair.photo_file(2)))
     matches = match_pair(pair, images, settings)

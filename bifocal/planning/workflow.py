@@ -11,7 +11,7 @@ from bifocal.planning.camera_plan import CameraSensor, Plan
 from bifocal.planning.plan_workbook import write_plan
 from bifocal.planning.stations import plan_stations
 from photocore.errors import InputError
-from photocore.output import check_writable
+from photocore.workbook.newbook import check_new_workbook
 
 
 def make_plan(
@@ -29,7 +29,7 @@ def make_plan(
     if out is not None:
         if out.suffix.lower() != ".xlsx":
             raise InputError(f"{out}: a plan is written as a workbook; name it .xlsx.")
-        check_writable(out, overwrite=overwrite)
+        check_new_workbook(out, overwrite=overwrite)
     plan = plan_stations(focal_lengths, sensor, **wishes)
     if out is not None:
         write_plan(out, plan, overwrite=overwrite)

@@ -28,6 +28,7 @@ from multimedia.refraction.layers import Layers
 from photocore.arrays import FloatArray
 from photocore.errors import GeometryError, InputError
 from photocore.output import all_or_none, check_all_writable
+from photocore.workbook.newbook import check_new_workbook
 
 #: A millimetre in the units that projects use.
 MILLIMETRE = {"m": 1e-3, "cm": 0.1, "mm": 1.0}
@@ -174,6 +175,8 @@ def _by_depth(study: Study) -> FloatArray:
 @all_or_none()
 def write_design(design: Design, *, out: Path | None, plot: Path | None, overwrite: bool) -> None:
     """Write the workbook and the picture where asked."""
+    if out is not None:
+        check_new_workbook(out, overwrite=overwrite)
     check_all_writable(out, plot, overwrite=overwrite)
     if out is not None:
         write_design_workbook(out, design, overwrite=overwrite)

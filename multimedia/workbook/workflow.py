@@ -12,8 +12,8 @@ from multimedia.workbook.shift_points import ShiftPoints, ShiftResult, ShiftSetu
 from multimedia.workbook.shift_update import add_columns, is_template, update_template
 from multimedia.workbook.shift_workbook import write_shift_workbook
 from photocore.errors import InputError
-from photocore.output import check_all_writable
 from photocore.tables import write_csv
+from photocore.workbook.newbook import check_new_workbook
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -90,7 +90,8 @@ def shift_file(
         If a cell, an option or a file is at fault.
     """
     out = None if out is None else Path(out)
-    check_all_writable(out, overwrite=overwrite)
+    if out is not None:
+        check_new_workbook(out, overwrite=overwrite, source=None if new else path)
     if out is not None and out.suffix.lower() not in (".xlsx", ".xlsm", ".csv"):
         raise InputError(f"{out}: results are written as .xlsx or .csv.")
     replaced = {f"n_{i}": n for i, n in enumerate(indices or (), start=1)}

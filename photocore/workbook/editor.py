@@ -19,6 +19,7 @@ from photocore.workbook import formulas
 from photocore.workbook.cells import CellValue, NewCell, NewColumn, NewRows, RowFormula, escape
 from photocore.workbook.graft import Graft
 from photocore.workbook.grid import CellGrid, SheetFile, TableArea, cell_name
+from photocore.workbook.newbook import check_new_workbook, new_workbook
 from photocore.workbook.package import check_header, open_package, read_part, rewrite_package
 from photocore.workbook.splice import SheetChanges, Spliced, splice_sheet
 from photocore.workbook.styles import StyleSheet
@@ -354,7 +355,8 @@ class WorkbookEditor:
         Raises
         ------
         InputError
-            If the target is open in another program, exists, or has another ending.
+            If the target is open in another program, has another ending, exists, or is another
+            workbook that holds anybody else's work.
         """
         target = self.path if target is None else Path(target)
         in_place = target.exists() and target.samefile(self.path)
@@ -363,14 +365,17 @@ class WorkbookEditor:
                 f"{target}: must end in {self.path.suffix} like {self.path.name}, so that macros "
                 "stay what they are."
             )
-        check_writable(target, overwrite=overwrite or in_place)
+        if not in_place:
+            check_new_workbook(target, overwrite=overwrite)
+            parts = self.changed_parts()
+            with new_workbook(target, overwrite=overwrite) as temporary:
+                rewrite_package(self.path, temporary, parts)
+            return None
+        check_writable(target, overwrite=True)
         parts = self.changed_parts()
-        kept: Path | None = None
-        with atomic_path(target, overwrite=overwrite or in_place) as temporary:
+        with atomic_path(target, overwrite=True) as temporary:
             rewrite_package(self.path, temporary, parts)
-            if in_place:
-                kept = self._kept()
-        return kept
+            return self._kept()
 
     def _kept(self) -> Path:
         """Return the backup of the file as it is, made where there is none yet."""

@@ -377,10 +377,43 @@ def test_every_writer_respects_locks_and_foreign_workbooks(tmp_path, name):
         assert f"is open in {program}" in result.stderr
         (tmp_path / lock).unlink()
     kept = own_table(out).read_bytes()
-    result = run(*command(out))
-    assert result.exit_code == 1
-    assert "out-result.xlsx" in result.stderr
+    proposed = "out2.xlsx" if name == "template" else "out-result.xlsx"
+    # Without --overwrite too: the option would only lead into the same refusal.
+    for arguments in (command(out), [a for a in command(out) if a != "--overwrite"]):
+        result = run(*arguments)
+        assert result.exit_code == 1
+        assert proposed in result.stderr
+        assert "add --overwrite" not in result.stderr
     assert out.read_bytes() == kept
+
+
+def test_a_changed_copy_never_replaces_another_workbook_of_the_user(tmp_path):
+    source, out = fill(tmp_path / "s.xlsx"), own_table(tmp_path / "mine.xlsx")
+    kept = out.read_bytes()
+    result = run("solve", source, "--out", out, "--overwrite")
+    assert result.exit_code == 1
+    assert "mine-result.xlsx" in result.stderr
+    assert out.read_bytes() == kept
+    for _ in range(2):
+        copy = tmp_path / "copy.xlsx"
+        assert run("solve", source, "--out", copy, "--overwrite").exit_code == 0
+
+
+def test_the_mode_of_a_workbook_changed_in_place_stays_and_a_link_is_followed(tmp_path):
+    folder = tmp_path / "elsewhere"
+    folder.mkdir()
+    real, link = fill(folder / "s.xlsx"), tmp_path / "link.xlsx"
+    real.chmod(0o600)
+    link.symlink_to(real)
+    before = real.read_bytes()
+    result = run("solve", link, "--out", link, "--overwrite")
+    assert result.exit_code == 0, result.stderr
+    assert link.is_symlink()
+    assert real.stat().st_mode & 0o777 == 0o600
+    backup = tmp_path / "link.xlsx.bak"
+    assert backup.read_bytes() == before
+    assert backup.stat().st_mode & 0o777 == 0o600
+    assert str(backup) in result.stderr
 
 
 def test_the_first_state_stays_in_its_backup(tmp_path):

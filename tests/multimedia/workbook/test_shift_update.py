@@ -171,3 +171,30 @@ def test_a_state_that_a_backup_holds_is_not_saved_again(own: Path) -> None:
         own.write_bytes(before)
         assert run(own, *MEDIA, "--out", own, "--overwrite").exit_code == 0
     assert [path.name for path in own.parent.glob("*.bak*")] == ["becken.xlsx.bak"]
+
+
+@pytest.mark.parametrize(
+    ("command", "proposed"), [("template", "out2.xlsx"), ("shift", "out-result.xlsx")]
+)
+def test_every_writer_respects_locks_and_the_users_workbooks(
+    tmp_path: Path, command: str, proposed: str
+) -> None:
+    out, points = tmp_path / "out.xlsx", tmp_path / "points.csv"
+    points.write_text("id,R,ZP\nA,0.3,0.2\n", encoding="utf-8")
+    arguments = {"template": [out], "shift": [points, *MEDIA, "--out", out]}[command]
+
+    def written() -> Result:
+        texts = [command, *map(str, arguments), "--overwrite"]
+        return CliRunner().invoke(main, texts)
+
+    assert [written().exit_code for _ in range(2)] == [0, 0]
+    for lock, program in (("~$out.xlsx", "Excel"), (".~lock.out.xlsx#", "LibreOffice")):
+        (tmp_path / lock).touch()
+        assert f"is open in {program}" in written().stderr
+        (tmp_path / lock).unlink()
+    book = openpyxl.load_workbook(out)
+    book.create_sheet("Meine")
+    book.save(out)
+    kept = out.read_bytes()
+    assert proposed in written().stderr
+    assert out.read_bytes() == kept
