@@ -12,6 +12,7 @@ from multimedia.workbook.shift_points import ShiftPoints, ShiftResult, ShiftSetu
 from multimedia.workbook.shift_update import add_columns, is_template, update_template
 from multimedia.workbook.shift_workbook import write_shift_workbook
 from photocore.errors import InputError
+from photocore.output import check_ending
 from photocore.tables import write_csv
 from photocore.workbook.newbook import check_new_workbook
 
@@ -92,8 +93,7 @@ def shift_file(
     out = None if out is None else Path(out)
     if out is not None:
         check_new_workbook(out, overwrite=overwrite, source=None if new else path)
-    if out is not None and out.suffix.lower() not in (".xlsx", ".xlsm", ".csv"):
-        raise InputError(f"{out}: results are written as .xlsx or .csv.")
+    check_ending(out, "results are written as .xlsx or .csv.", ".xlsx", ".xlsm", ".csv")
     replaced = {f"n_{i}": n for i, n in enumerate(indices or (), start=1)}
     replaced |= {f"t_{i}": t for i, t in enumerate(thicknesses or (), start=1)}
     if z0 is not None:

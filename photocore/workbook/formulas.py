@@ -223,8 +223,10 @@ def _grown_sheet(data: bytes, area: TableArea, bottom: int) -> bytes:
         return re.sub(rb"""(\ssqref\s*=\s*["'])([^"']*)(["'])""", attribute, match[0])
 
     tags = rb"<(?:\w+:)?(?:conditionalFormatting|dataValidation|ignoredError)\s[^>]*>"
-    data = re.sub(tags, element, data)
-    return re.sub(rb"(<(?:\w+:)?sqref>)([^<]*)(</)", attribute, data)
+    # All of these stand behind the rows, which may be millions of bytes.
+    start = data.rfind(b"</row>") + 1
+    rest = re.sub(tags, element, data[start:])
+    return data[:start] + re.sub(rb"(<(?:\w+:)?sqref>)([^<]*)(</)", attribute, rest)
 
 
 def charts_of(path: Path, package: zipfile.ZipFile, sheet: SheetPart) -> list[str]:

@@ -101,16 +101,8 @@ def _flag(inputs: str, miss: str) -> str:
 
 _RELIEF = (
     _f("ds", 'IF([@s1_used]="","",[@s2_used]-[@s1_used])', 4),
-    _f(
-        "den",
-        'IF(OR([@s1_used]="",COUNT(d_1,d_2)<2),"",[@s2_used]/d_2-[@s1_used]/d_1)',
-        6,
-    ),
-    _f(
-        "r",
-        'IF([@den]="","",IF(AND([@s1_used]>0,[@den]*(d_1-d_2)>0),[@ds]/[@den],NA()))',
-        4,
-    ),
+    _f("den", 'IF(OR([@s1_used]="",COUNT(d_1,d_2)<2),"",[@s2_used]/d_2-[@s1_used]/d_1)', 6),
+    _f("r", 'IF([@den]="","",IF(AND([@s1_used]>0,[@den]*(d_1-d_2)>0),[@ds]/[@den],NA()))', 4),
 )
 
 
