@@ -74,7 +74,7 @@ class SolvedSurvey(SurveyContent):
     correction : ndarray, shape (3, 3), or None
         Homography that corrected the coordinates in mm of image 2, where the pair is ideal.
     given : mapping
-        The options that took the place of what the workbook says, by name.
+        The options that took the place of what the workbook says.
     remarks : tuple of str
         What the user should know.
     """
@@ -190,9 +190,8 @@ def solve(
     >>> survey.table.xyz.round(9).tolist(), survey.table.flags
     ([[2.0, 0.0, 1.0]], ('OK',))
     """
-    given = _checked(
-        d1=d1, d2=d2, c1=c1, c2=c2, pitch=pitch, sigma_s=sigma_s, sigma_r_max=sigma_r_max
-    )
+    lengths = {"d1": d1, "d2": d2, "c1": c1, "c2": c2, "pitch": pitch}
+    given = _checked(**lengths, sigma_s=sigma_s, sigma_r_max=sigma_r_max)
     _checked(sigma_px=sigma_px, scale_tolerance=scale_tolerance)
     judged = tuple(as_rule(rule) for rule in rules) or RULES
     options = ReadOptions(
@@ -223,6 +222,7 @@ def solve(
         *opposite_signs_remark(table, survey.known),
         *world_remarks,
     )
+    asked = {**given, "unit": unit, "pair": pair, "sigma_px": sigma_px, "model": model}
     return SolvedSurvey(
         language=survey.language,
         source=path,
@@ -243,15 +243,10 @@ def solve(
         orientation_check=solved.check,
         adjusted=adjust_setup,
         correction=solved.correction,
-        given=_options(given, unit=unit, pair=pair, sigma_px=sigma_px, model=model),
+        given={name: value for name, value in asked.items() if value is not None},
         rules=judged,
         remarks=tuple(dict.fromkeys(remarks)),
     )
-
-
-def _options(given: Mapping[str, Any], **more: Any) -> dict[str, Any]:
-    """Return the options that were given, those that are None left out."""
-    return {name: value for name, value in {**given, **more}.items() if value is not None}
 
 
 def _checked(**numbers: float | None) -> dict[str, Any]:
@@ -472,8 +467,7 @@ def _solve_ideal(survey: SurveyInput, scale_tolerance: float, *, adjust: bool) -
         remarks += check.remarks
         if adjust:
             scale = pair.image1.plane_from_pixel[0, 0]
-            to_scale = np.diag([1 / scale, 1 / scale, 1.0])
-            correction = to_scale @ check.matrix @ pair.image2.plane_from_pixel
+            correction = check.matrix @ pair.image2.plane_from_pixel / [[scale], [scale], [1.0]]
             moved = apply_homography(correction, xy2)
             if setup.adjusted[1] is not None:
                 correction = correction @ setup.adjusted[1]
