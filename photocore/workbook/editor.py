@@ -388,7 +388,8 @@ class WorkbookEditor:
                 return backup
         kept = free_path(self.path.parent, stem)
         with atomic_path(kept, overwrite=False) as temporary:
-            shutil.copy2(self.path, temporary)
+            shutil.copyfile(self.path, temporary)
+        shutil.copystat(self.path, kept)
         return kept
 
     def changed_parts(self) -> dict[str, bytes | None]:
