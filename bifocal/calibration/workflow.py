@@ -18,7 +18,7 @@ from bifocal.model.lens import Lens
 from photocore.arrays import FloatArray
 from photocore.cli import Progress, no_progress
 from photocore.errors import InputError, located
-from photocore.output import check_writable
+from photocore.output import all_or_none, check_all_writable, check_writable
 from photocore.tables import Column, read_table
 
 
@@ -102,6 +102,7 @@ def write_database_lens(
     return known.lens, (known.remark,)
 
 
+@all_or_none()
 def undistort_images(
     images: Sequence[Path],
     lens: str,
@@ -130,8 +131,8 @@ def undistort_images(
     targets = []
     for path in images:
         image_info(path)
-        target = (folder or path.parent) / f"{path.stem}_undistorted{path.suffix}"
-        targets.append(check_writable(target, overwrite=overwrite))
+        targets.append((folder or path.parent) / f"{path.stem}_undistorted{path.suffix}")
+    check_all_writable(*targets, overwrite=overwrite)
     remarks: list[str] = []
     for done, (path, target) in enumerate(zip(images, targets, strict=True)):
         progress(done, len(images), path.name)

@@ -88,10 +88,10 @@ def command(
     """
     from bifocal.survey.output import length_unit, point_rows, solution_json, summary, write_result
     from bifocal.survey.workflow import solve
-    from photocore.output import check_writable
+    from photocore.workbook.newbook import check_new_workbook
 
     if out is not None:
-        check_writable(out, overwrite=overwrite)
+        check_new_workbook(out, overwrite=overwrite, source=survey)
     solution = solve(survey, **options)
     for text in solution.remarks:
         remark(text)

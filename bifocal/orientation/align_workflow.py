@@ -18,7 +18,7 @@ from bifocal.orientation.interior_orientation import Interior, lens_of_photo
 from bifocal.orientation.orientation_stages import PhotoInput
 from photocore.arrays import FloatArray
 from photocore.errors import InputError
-from photocore.output import check_all_writable, check_ending, relative_name
+from photocore.output import all_or_none, check_all_writable, check_ending, relative_name
 
 #: A wall point given without r lies on the plane to this. [m]
 SIGMA_ON_WALL = 0.005
@@ -77,6 +77,7 @@ class AlignOptions:
     unit: str = ""
 
 
+@all_or_none()
 def align_photos(
     far: Path,
     near: Path,

@@ -7,7 +7,7 @@ from pathlib import Path
 from bifocal.files.exports import export_points
 from bifocal.files.point_tables import read_survey_points
 from photocore.errors import InputError, located
-from photocore.output import check_writable
+from photocore.workbook.newbook import check_new_workbook
 
 
 def export(
@@ -17,7 +17,7 @@ def export(
     """Write the points of a result in the format the ending of ``out`` names; return remarks."""
     if out.exists() and source.exists() and out.samefile(source):
         raise InputError(f"{out}: is the survey itself; name another file to export to.")
-    check_writable(out, overwrite=overwrite)
+    check_new_workbook(out, overwrite=overwrite)
     points, remarks = read_survey_points(source)
     with located(source):
         more = export_points(

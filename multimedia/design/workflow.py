@@ -27,7 +27,8 @@ from multimedia.projects.project_file import read_project
 from multimedia.refraction.layers import Layers
 from photocore.arrays import FloatArray
 from photocore.errors import GeometryError, InputError
-from photocore.output import check_all_writable, check_ending
+from photocore.output import all_or_none, check_all_writable, check_ending
+from photocore.workbook.newbook import check_new_workbook
 
 #: A millimetre in the units that projects use.
 MILLIMETRE = {"m": 1e-3, "cm": 0.1, "mm": 1.0}
@@ -187,9 +188,12 @@ def check_outputs(out: Path | None, plot: Path | None, *, overwrite: bool) -> No
     """Refuse what `write_design` could not write; call it before the work."""
     check_ending(out, "a study is written as .xlsx.", ".xlsx")
     check_ending(plot, "a study is drawn as .png, .svg or .pdf.", ".png", ".svg", ".pdf")
+    if out is not None:
+        check_new_workbook(out, overwrite=overwrite)
     check_all_writable(out, plot, overwrite=overwrite)
 
 
+@all_or_none()
 def write_design(design: Design, *, out: Path | None, plot: Path | None, overwrite: bool) -> None:
     """Write the workbook and the picture where asked."""
     check_outputs(out, plot, overwrite=overwrite)

@@ -18,7 +18,7 @@ from multimedia.projects.point_tables import write_columns
 from multimedia.projects.project_file import read_project
 from photocore.arrays import FloatArray
 from photocore.errors import GeometryError, InputError
-from photocore.output import check_all_writable
+from photocore.output import all_or_none, check_all_writable
 
 #: The depth range without --z-range: that of the object points, this share of it wider.
 _MARGIN = 0.25
@@ -46,6 +46,7 @@ class EpipolarResult:
     remarks: tuple[str, ...]
 
 
+@all_or_none()
 def epipolar_project(
     path: Path,
     *,

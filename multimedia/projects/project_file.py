@@ -33,7 +33,7 @@ from multimedia.refraction.layers import Layers
 from photocore.arrays import is_finite_number, positive
 from photocore.distortion import NAMES, Brown, Convention
 from photocore.errors import GeometryError, InputError, located
-from photocore.output import atomic_path, check_all_writable
+from photocore.output import all_or_none, atomic_path, check_all_writable
 from photocore.textfile import check_name, read_text
 
 FORMAT = "multimedia-project/1"
@@ -103,11 +103,12 @@ def write_project(path: Path | str, project: Project, *, overwrite: bool = False
     # Tables (arrays of them too) must follow the plain keys.
     order = sorted(data, key=lambda key: isinstance(data[key], dict | list))
     check_all_writable(path, *tables, overwrite=overwrite)
-    for table, columns in tables.items():
-        write_columns(table, columns, overwrite=overwrite)
-    with atomic_path(path, overwrite=overwrite) as temporary:
-        text = _HEAD + tomli_w.dumps({key: data[key] for key in order})
-        temporary.write_text(text, encoding="utf-8")
+    with all_or_none():
+        for table, columns in tables.items():
+            write_columns(table, columns, overwrite=overwrite)
+        with atomic_path(path, overwrite=overwrite) as temporary:
+            text = _HEAD + tomli_w.dumps({key: data[key] for key in order})
+            temporary.write_text(text, encoding="utf-8")
     return [path, *tables]
 
 
