@@ -57,6 +57,8 @@ def command(
     from bifocal.orientation.matching import MatchSettings
     from bifocal.survey.pair_workflow import is_workbook, read_pair
 
+    if relief_min is not None and relief_max is not None and relief_min >= relief_max:
+        raise click.UsageError("--relief-min must be below --relief-max.")
     source = read_pair(pair)
     reliefs = None
     if relief_min is not None or relief_max is not None:
@@ -75,9 +77,26 @@ def command(
         source if is_workbook(pair) else pair, out, settings, language=lang, overwrite=overwrite
     )
     summary = match_summary(*found)
-    print_result({**summary, "out": out}, _lines(summary), as_json=as_json)
+    print_result(
+        {**summary, "out": out}, _lines(summary), as_json=as_json,
+        remarks=_remarks(summary["kinds"], what),
+    )  # fmt: skip
     if not as_json:
         remark(f"Points written to {out}")
+
+
+def _remarks(kinds: dict[str, int], what: str) -> Iterator[str]:
+    """Yield what the user should look at."""
+    if kinds.get("chequer"):
+        yield (
+            f"{kinds['chequer']} chequers: crossing joints and corners of stones can look like "
+            "them; check those of code chequer, or leave them out."
+        )
+    if what == "targets":
+        yield (
+            "Only targets found in both photos are listed: discs 5 to 120 px across on a plate of "
+            "one grey, two-by-two chequers, coded markers. Pick the others by hand."
+        )
 
 
 def _lines(summary: dict[str, Any]) -> Iterator[str]:

@@ -137,6 +137,12 @@ def command(
     own: Path | SurveyPoints | None = points
     if relief is None and points is None and plane is None and is_workbook(pair):
         own = points_of(pair)
+    if breaklines and own is None:
+        raise click.UsageError("--breakline joins measured points; give their table by --points.")
+    drawn = {"--section": sections, "--contours": contours, "--mark": mark, "--control": control}
+    for name, given in drawn.items():
+        if given and folder is None:
+            raise click.UsageError(f"{name} is drawn into a folder; give --deliver DIR.")
     if relief is None and own is None and plane is None:
         remark("No relief given: the wall is taken as flat (as with --plane).")
     task = OrthoTask(

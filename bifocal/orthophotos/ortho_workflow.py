@@ -199,6 +199,8 @@ def _triangles(
                 f"breakline {','.join(line)}: {source.name} has no usable point "
                 f"{', '.join(missing)}."
             )
+        if len(set(line)) < 2:
+            raise InputError(f"breakline {','.join(line)}: name two points or more.")
         lines.append([index[name] for name in line])
     remarks.append(
         "Relief between the points is interpolated; outside of them the orthophoto is empty."

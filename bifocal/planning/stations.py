@@ -69,7 +69,8 @@ def plan_stations(
     Notes
     -----
     Same scale: d = m c / 1000 for both lenses, so B = m / (1000 (1/c2 - 1/c1)): at equal scale
-    the difference of the reciprocals of the focal lengths decides. sigma_r = sqrt(2) sigma_px GSD B / s'.
+    the difference of the reciprocals of the focal lengths decides.
+    sigma_r = sqrt(2) sigma_px GSD B / s'.
 
     Examples
     --------

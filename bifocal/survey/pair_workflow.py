@@ -8,12 +8,13 @@ from pathlib import Path
 import numpy as np
 
 from bifocal.files.images import image_info
-from bifocal.model.pair import Pair
+from bifocal.model.pair import Pair, Photo
 from bifocal.model.points import SurveyPoints
 from bifocal.survey.setup import SurveySetup
 from bifocal.survey.sources import BOOKS, described_pair
 from bifocal.survey.workbook.reader import read_survey
 from bifocal.survey.workflow import SolvedSurvey, solve
+from photocore.arrays import FloatArray
 from photocore.errors import InputError, located
 
 
@@ -123,13 +124,25 @@ def _ideal(setup: SurveySetup, folder: Path) -> Pair:
         d1=setup.d1 or np.nan, d2=setup.d2 or np.nan, c1=setup.c1, c2=setup.c2, pitch=pitch,
         nadir1=nadirs[0], nadir2=nadirs[1], sigma=setup.precision / pitch,
     )  # fmt: skip
-    first, second = pair.as_given
+    photos = [
+        replace(photo, file=name, plane_from_pixel=_corrected(photo, matrix))
+        for photo, name, matrix in zip(pair.as_given, names, setup.adjusted, strict=True)
+    ]
     return Pair(
-        image1=replace(first, file=names[0]),
-        image2=replace(second, file=names[1]),
+        image1=photos[0],
+        image2=photos[1],
         folder=folder,
         remarks=tuple(f"{setup.where}: {remark}" for remark in remarks),
     )
+
+
+def _corrected(photo: Photo, matrix: FloatArray | None) -> FloatArray:
+    """Return the homography of a photo whose millimetres the set-up corrects by a matrix."""
+    if matrix is None:
+        return photo.plane_from_pixel
+    metres = (photo.scale_number or 1000.0) / 1000.0
+    scale = np.diag([metres, metres, 1.0])
+    return np.asarray(scale @ matrix @ np.linalg.inv(scale) @ photo.plane_from_pixel)
 
 
 def survey_points(solution: SolvedSurvey) -> SurveyPoints:
