@@ -123,7 +123,7 @@ def test_a_workbook_is_the_pair_it_states(tmp_path):
     from PIL import Image
 
     book = set_up(tmp_path)
-    with pytest.raises(InputError, match="far.tif"):
+    with pytest.raises(InputError, match=r"far\.tif"):
         read_pair(book)
     for name in ("far.tif", "near.tif"):
         Image.new("L", SIZE).save(tmp_path / "photos" / name)
