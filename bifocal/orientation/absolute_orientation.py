@@ -12,21 +12,27 @@ import numpy as np
 from bifocal.orientation import validation
 from bifocal.orientation.control_points import Control, SiteMeasures
 from bifocal.orientation.features import find_features
-from bifocal.orientation.interior_orientation import Cameras, Interiors
+from bifocal.orientation.interior_orientation import Cameras, Interiors, with_one_lens
 from bifocal.orientation.orientation_stages import (
+    ONE_LENS,
     SIGMA_PARALLEL,
     OrientedPair,
     Photos,
     oriented_in_stages,
     without_gross,
 )
-from bifocal.orientation.pair_adjustment import tie_misfit
 from bifocal.orientation.pair_observations import PairObservations, PairUnknowns
-from bifocal.orientation.relative_orientation import Ties, find_ties, first_cameras, plane_scale
+from bifocal.orientation.relative_orientation import (
+    Ties,
+    epipolar_distance,
+    find_ties,
+    first_cameras,
+    plane_scale,
+)
 from bifocal.orientation.space_resection import resect
 from bifocal.orientation.tie_points import robust_sigma
 from photocore.arrays import BoolArray
-from photocore.camera import ray_on_plane
+from photocore.camera import fundamental, ray_on_plane
 from photocore.errors import GeometryError, located
 from photocore.similarity import Similarity, fit_plane
 
@@ -67,6 +73,9 @@ def orient_pair(photos: Photos, *, control: Control, site: SiteMeasures) -> Orie
     GeometryError
         If the photos and measurements do not make a pair; the message says why and what to do.
     """
+    interiors, one_lens = with_one_lens((photos[0].interior, photos[1].interior))
+    first, second = (replace(p, interior=i) for p, i in zip(photos, interiors, strict=True))
+    photos = (first, second)
     given = _Given(photos=photos, control=control, site=site)
     known = control.positioned
     enough = all(
@@ -76,7 +85,7 @@ def orient_pair(photos: Photos, *, control: Control, site: SiteMeasures) -> Orie
     ties, remarks = _ties(given, needed=not enough)
     cameras, agree, interiors = _start(given, ties, enough)
     if enough and ties is not None:
-        misfit = _contradiction(cameras, interiors, ties)
+        misfit = _contradiction(cameras, ties)
         if misfit > 2 * ties.tolerance and _picks_exchanged(given, ties, misfit):
             return _with_picks_exchanged(given)
     if cameras[0].centre[2] < cameras[1].centre[2]:
@@ -86,7 +95,12 @@ def orient_pair(photos: Photos, *, control: Control, site: SiteMeasures) -> Orie
     elif ties is not None:
         validation.check_parallax(ties, interiors, given.names, flat_is_fine=site.parallel)
     observations = _observations(given, interiors, ties, agree)
-    pair = oriented_in_stages(observations, cameras, photos, site, with_control=enough)
+    if one_lens:
+        observations = replace(observations, sigma_zoom=ONE_LENS)
+    start = PairUnknowns(cameras=cameras)
+    if ties is not None:
+        start = replace(start, radial=np.array([[ties.radial, 0.0]] * 2))
+    pair = oriented_in_stages(observations, start, photos, site, with_control=enough)
     pair = without_gross(pair)
     validation.check_determined(pair.adjusted)
     validation.check_movement(pair.adjusted)
@@ -95,10 +109,9 @@ def orient_pair(photos: Photos, *, control: Control, site: SiteMeasures) -> Orie
     return replace(pair, remarks=told, assumed=assumed)
 
 
-def _contradiction(cameras: Cameras, interiors: Interiors, ties: Ties) -> float:
+def _contradiction(cameras: Cameras, ties: Ties) -> float:
     """Return how far the common points are from the cameras' epipolar lines. [px]"""
-    observations = PairObservations(interiors=interiors, tie1=ties.pixels1, tie2=ties.pixels2)
-    return robust_sigma(tie_misfit(observations, PairUnknowns(cameras=cameras)))
+    return robust_sigma(epipolar_distance(fundamental(*cameras), ties.pixels1, ties.pixels2))
 
 
 def _picks_exchanged(given: _Given, ties: Ties, misfit: float) -> bool:
@@ -111,8 +124,8 @@ def _picks_exchanged(given: _Given, ties: Ties, misfit: float) -> bool:
     """
     try:
         turned = replace(given, control=given.control.exchanged())
-        cameras, _, interiors = _start(turned, ties, True)
-        other = _contradiction(cameras, interiors, ties)
+        cameras = _start(turned, ties, True)[0]
+        other = _contradiction(cameras, ties)
     except GeometryError:
         other = np.inf
     if other < 0.5 * misfit:
@@ -272,12 +285,12 @@ def _observations(
         return base
     return replace(
         base,
-        tie1=ties.pixels1,
-        tie2=ties.pixels2,
+        tie1=ties.seen1,
+        tie2=ties.seen2,
         sigma_tie=ties.tolerance / 2,
-        tie_used=np.ones(len(ties.pixels1), dtype=bool),
+        tie_used=np.ones(len(ties.seen1), dtype=bool),
         wall=ties.on_plane,
-        sigma_wall=np.full(len(ties.pixels1), 2 * ties.tolerance),
+        wall_rows=np.zeros((3, len(ties.seen1))),
     )
 
 

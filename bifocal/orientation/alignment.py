@@ -98,8 +98,8 @@ def make_alignment(
         cameras, note = _in_facade_axes(cameras, photos[0], direction)
         oriented = replace(oriented, assumed=(*oriented.assumed, note))
     far, near = (
-        _photo(camera, interior, _lens_of(interior, k))
-        for camera, interior, k in zip(
+        _photo(camera, interior, _lens_of(interior, radial))
+        for camera, interior, radial in zip(
             cameras, observations.interiors, adjusted.radial, strict=True
         )
     )
@@ -197,15 +197,15 @@ def _facade_turn(image: ByteArray, camera: Pinhole, interior: Interior) -> tuple
     return float(np.deg2rad(best)), float(weight[close].sum() / weight.sum())
 
 
-def _lens_of(interior: Interior, k: float) -> Lens | None:
+def _lens_of(interior: Interior, radial: FloatArray) -> Lens | None:
     """Return the lens the pair's pixels need: the file's, or the estimated radial one."""
-    if interior.lens is not None or k == 0:
+    if interior.lens is not None or not radial.any():
         return interior.lens
-    # r_u = r_d / (1 + k r_d²) turned round: r_d / r_u as an even polynomial of r_u.
+    # r_u = r_d / (1 + k1 r_d² + k2 r_d⁴) turned round: r_d / r_u as an even polynomial of r_u.
     reach = np.hypot(*interior.image_size) / 2 / interior.focal
     seen = np.linspace(0, reach, 200)[1:]
     along = np.column_stack([seen, np.zeros_like(seen)])
-    ideal = RadialDivision(k, np.zeros(2), 1.0).undistort(along)[:, 0]
+    ideal = RadialDivision(radial[0], np.zeros(2), 1.0, radial[1]).undistort(along)[:, 0]
     powers = np.stack([ideal**2, ideal**4, ideal**6], axis=1)
     terms = np.linalg.lstsq(powers * ideal[:, None], seen - ideal, rcond=None)[0]
     return Lens(

@@ -8,13 +8,19 @@ one unknown, the position along that line, under the zoom k(r) that the relief i
 from __future__ import annotations
 
 from dataclasses import dataclass, fields, replace
-from itertools import chain, pairwise
+from itertools import chain
 from typing import Any
 
 import numpy as np
 
 from bifocal.model.pair import Pair, Photo, apply_homography
-from bifocal.orientation.features import Features, drop_repeated, find_features, match_along_lines
+from bifocal.orientation.features import (
+    FEATURE_PIXELS,
+    Features,
+    drop_repeated,
+    find_features,
+    match_along_lines,
+)
 from bifocal.orientation.interior_orientation import Images
 from bifocal.orientation.patches import PatchResult, refine, same_scale
 from bifocal.orientation.targets import SurveyTargets, find_targets
@@ -77,7 +83,7 @@ class MatchSettings:
     relief_range: tuple[float, float] | None = None
     features: bool = True
     targets: bool = True
-    budget: float = 6e6
+    budget: float = FEATURE_PIXELS
 
 
 def match_pair(pair: Pair, images: Images, settings: MatchSettings | None = None) -> Matches:
@@ -116,9 +122,7 @@ def _feature_matches(
     pair: Pair, images: Images, reliefs: tuple[float, float], settings: MatchSettings
 ) -> Matches:
     """Return matched features, spread evenly."""
-    limit = int(np.clip(6 * settings.count, 6000, 24000))
-    first = _tiled_features(images[0], settings.budget, limit)
-    second = _tiled_features(images[1], settings.budget, 3 * limit // 2)
+    first, second = (find_features(image, budget=settings.budget) for image in images)
     rows1, rows2 = _guided(pair, first, second, reliefs)
     pixels1, pixels2 = first.pixels[rows1], second.pixels[rows2]
     keep = drop_repeated(pixels1, pixels2)
@@ -221,30 +225,6 @@ def pair_targets(
     alone = table & (table.sum(axis=1) == 1)[:, None] & (table.sum(axis=0) == 1)[None, :]
     rows1, rows2 = np.nonzero(alone)
     return rows1.astype(np.int64), rows2.astype(np.int64)
-
-
-def _tiled_features(image: ByteArray, budget: float, limit: int) -> Features:
-    """Return features found in overlapping strips (SIFT's memory grows with its input)."""
-    reduction = max(1.0, float(np.sqrt(image.size / budget)))
-    strips = max(1, int(np.ceil(image.size / reduction**2 / 2.5e6)))
-    if strips == 1:
-        return find_features(image, limit=limit, budget=budget)
-    height = image.shape[0]
-    margin = int(64 * reduction)
-    edges = np.linspace(0, height, strips + 1).astype(int)
-    parts = []
-    for top, bottom in pairwise(edges.tolist()):
-        start, stop = max(top - margin, 0), min(bottom + margin, height)
-        strip = image[start:stop]
-        part = find_features(
-            strip, limit=int(1.3 * limit / strips), budget=strip.size / reduction**2
-        )
-        row = part.pixels[:, 1] + start
-        inside = (row >= top - 0.5) & (row < bottom - 0.5)
-        pixels = np.column_stack([part.pixels[:, 0], row])
-        parts.append((pixels[inside], part.size[inside], part.descriptors[inside]))
-    pixels, size, descriptors = (np.concatenate(items) for items in zip(*parts, strict=True))
-    return Features(pixels=pixels, size=size, descriptors=descriptors, reduction=reduction)
 
 
 def seen_at(pair: Pair, pixels1: FloatArray, relief: FloatArray | float) -> FloatArray:

@@ -13,7 +13,7 @@ import numpy as np
 
 from bifocal.orientation.control_points import SiteMeasures
 from bifocal.orientation.interior_orientation import Cameras, Interior, Interiors
-from photocore.arrays import FloatArray, IntArray
+from photocore.arrays import BoolArray, FloatArray, IntArray
 from photocore.errors import GeometryError
 
 #: Half the thickness of a face, as a share of the far distance.
@@ -171,6 +171,80 @@ def refitted(xyz: FloatArray, plane: FloatArray, *, band: float) -> FloatArray:
             break
         plane = np.linalg.lstsq(lifted[near], xyz[near, 2], rcond=None)[0]
     return np.asarray(plane)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class NarrowFace:
+    """A wall's own face, found among everything near it.
+
+    Attributes
+    ----------
+    plane : ndarray, shape (3,)
+        z = a + b X + c Y. [m, -, -]
+    roughness : float
+        Standard deviation of the face's own unevenness. [m]
+    members : ndarray of bool, shape (n,)
+        Points that are more likely of the face than of anything else.
+    """
+
+    plane: FloatArray
+    roughness: float
+    members: BoolArray
+
+
+def narrow_face(xyz: FloatArray, sigma: FloatArray, *, band: float) -> NarrowFace:
+    """Return the face nearest to Z = 0 on which most points gather, however narrow it is.
+
+    Parameters
+    ----------
+    xyz : ndarray, shape (n, 3)
+        Points around the reference plane. [m]
+    sigma : ndarray, shape (n,)
+        Standard deviations of their heights. [m]
+    band : float
+        Points farther than this from Z = 0 are not asked. [m]
+
+    Notes
+    -----
+    Planes through three points compete by their truncated cost at four of each point's own sigma;
+    the best is refined by expectation-maximisation of a normal core of unknown roughness in a
+    uniform rest. A band of fixed width would average plinths and joints into the wall: 6.2 mm of
+    relief on a rendered façade, against 0.35 mm.
+    """
+    near = np.abs(xyz[:, 2]) < np.maximum(band, 4 * sigma)
+    lifted = np.column_stack([np.ones(len(xyz)), xyz[:, :2]])
+    if near.sum() < 20:
+        return NarrowFace(np.zeros(3), 0.0, np.zeros(len(xyz), dtype=bool))
+    some, height, spread = lifted[near], xyz[near, 2], sigma[near]
+    generator = np.random.default_rng(7)
+    precise = np.argsort(spread)[: max(len(spread) // 2, 20)]
+    triples = generator.choice(precise, (600, 3))
+    design = some[triples]
+    wide = np.abs(np.linalg.det(design)) > 0.02 * np.ptp(some[:, 1:], axis=0).prod()
+    planes = np.linalg.solve(design[wide], height[triples][wide][..., None])[..., 0]
+    planes = planes[np.abs(planes[:, 1:]).max(axis=1) < STEEPEST]
+    planes = np.concatenate([np.zeros((1, 3)), planes])
+    tested = generator.choice(len(height), min(len(height), 2000), replace=False)
+    away = height[tested] - planes @ some[tested].T
+    costs = np.minimum((away / (4 * np.maximum(spread[tested], 0.05 * band))) ** 2, 1.0).sum(axis=1)
+    plane = planes[int(costs.argmin())]
+    roughness, share = float(np.median(spread)) + 0.02 * band, 0.5
+    for _ in range(30):
+        away = height - some @ plane
+        variance = roughness**2 + spread**2
+        core = share * np.exp(-0.5 * away**2 / variance) / np.sqrt(2 * np.pi * variance)
+        chance = core / (core + (1 - share) / (2 * band))
+        weight = chance / variance
+        plane = np.linalg.solve((some * weight[:, None]).T @ some, some.T @ (weight * height))
+        away = height - some @ plane
+        share = float(np.clip(chance.mean(), 0.02, 0.98))
+        # The core's variance beyond the points' own, each weighted by how much it tells of it.
+        tell = chance / variance**2
+        extra = (tell * (away**2 - spread**2)).sum() / tell.sum()
+        roughness = float(np.sqrt(max(extra, (0.002 * band) ** 2)))
+    members = np.zeros(len(xyz), dtype=bool)
+    members[np.flatnonzero(near)[chance > 0.5]] = True
+    return NarrowFace(plane, roughness, members)
 
 
 def is_one_scale(interiors: Interiors, site: SiteMeasures) -> bool:
