@@ -10,12 +10,13 @@ import cv2
 import numpy as np
 
 from bifocal.model.lens import Lens
+from bifocal.model.orientation_precision import CAMERA, NAMES, moved
 from bifocal.model.pair import Pair, Photo, apply_homography
 from bifocal.orientation.interior_orientation import Cameras, Interior
 from bifocal.orientation.orientation_report import orientation_in_words
 from bifocal.orientation.orientation_stages import OrientedPair, PhotoInput, Photos
 from bifocal.orientation.pair_adjustment import AdjustedPair
-from bifocal.orientation.pair_observations import NAMES, at
+from bifocal.orientation.pair_observations import PairObservations, at
 from bifocal.orientation.reference_plane import rivals
 from bifocal.orientation.tie_points import robust_sigma
 from photocore.arrays import BoolArray, ByteArray, FloatArray
@@ -94,8 +95,12 @@ def make_alignment(
     """
     observations, adjusted = oriented.observations, oriented.adjusted
     cameras = adjusted.cameras
+    covariance = _of_pixels(adjusted, observations)
     if observations.free_datum:
-        cameras, note = _in_facade_axes(cameras, photos[0], direction)
+        axes, note = _facade_axes(cameras[0], photos[0], direction)
+        origin = cameras[0].centre * [1.0, 1.0, 0.0]
+        cameras = cameras[0].moved(axes, origin), cameras[1].moved(axes, origin)
+        covariance = moved(covariance, axes)
         oriented = replace(oriented, assumed=(*oriented.assumed, note))
     far, near = (
         _photo(camera, interior, _lens_of(interior, radial))
@@ -113,7 +118,7 @@ def make_alignment(
     first, second = observations.interiors
     homography = plane_from_pixel(cameras[0])
     return Alignment(
-        pair=Pair(image1=far, image2=near),
+        pair=Pair(image1=far, image2=near, orientation=covariance),
         way=way,
         deviations=deviations,
         control_ids=observations.control.ids,
@@ -130,11 +135,23 @@ def make_alignment(
     )
 
 
-def _in_facade_axes(
-    cameras: Cameras, photo: PhotoInput, direction: tuple[FloatArray, bool] | None
-) -> tuple[Cameras, str]:
-    """Return cameras in axes along the façade, origin in the far nadir, and what they rest on."""
-    far = cameras[0]
+def _of_pixels(adjusted: AdjustedPair, observations: PairObservations) -> FloatArray:
+    """Return the covariance of the cameras as the pair file counts it, shape (24, 24)."""
+    unit = np.ones(len(NAMES))
+    for number, (camera, interior) in enumerate(
+        zip(adjusted.cameras, observations.interiors, strict=True)
+    ):
+        # The distortion's radius counts in principal distances: there of the camera as adjusted.
+        ratio = (camera.matrix[0, 0] / interior.focal) ** 2
+        first = number * len(CAMERA) + CAMERA.index("k1")
+        unit[first : first + 2] = ratio, ratio**2
+    return adjusted.covariance * np.outer(unit, unit)
+
+
+def _facade_axes(
+    far: Pinhole, photo: PhotoInput, direction: tuple[FloatArray, bool] | None
+) -> tuple[FloatArray, str]:
+    """Return axes along the façade, shape (3, 3), and what they rest on."""
     if direction is not None:
         pixels, vertical = direction
         ends = apply_homography(plane_from_pixel(far), photo.interior.ideal(pixels))
@@ -150,9 +167,7 @@ def _in_facade_axes(
         if share < 0.25:
             turn, note = 0.0, "Y axis as upright as the far photo"
     cosine, sine = np.cos(turn), np.sin(turn)
-    axes = np.array([[cosine, sine, 0.0], [-sine, cosine, 0.0], [0.0, 0.0, 1.0]])
-    origin = far.centre * [1.0, 1.0, 0.0]
-    return (far.moved(axes, origin), cameras[1].moved(axes, origin)), note
+    return np.array([[cosine, sine, 0.0], [-sine, cosine, 0.0], [0.0, 0.0, 1.0]]), note
 
 
 def _facade_turn(image: ByteArray, camera: Pinhole, interior: Interior) -> tuple[float, float]:

@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from photocore.arrays import BoolArray, ByteArray, Float32Array, FloatArray
+from photocore.arrays import BoolArray, ByteArray, Float32Array, FloatArray, IntArray
 
 #: Photos are searched at full resolution up to this; larger ones are reduced to it. [px]
 FEATURE_PIXELS = 12e6
@@ -103,7 +103,8 @@ def find_features(
         found = [
             key
             for key in detector.detect(strip, None)
-            if top - 0.5 <= key.pt[1] + start < bottom - 0.5 or height == bottom <= key.pt[1] + start
+            if top - 0.5 <= key.pt[1] + start < bottom - 0.5
+            or height == bottom <= key.pt[1] + start
         ]
         # Descriptors cost as much as the search: only those of the strongest are made.
         found.sort(key=lambda key: -key.response)
@@ -274,6 +275,26 @@ def _best_on_segment(
         np.where(good, candidates[best], -1).astype(np.intp),
         np.where(good, value, -1.0).astype(np.float32),
     )
+
+
+def spread_evenly(
+    pixels: FloatArray, sigma: FloatArray, shape: tuple[int, ...], count: int
+) -> IntArray:
+    """Return the indices of about ``count`` points, the best of every part of the photo first.
+
+    The photo is divided into cells, half as many as points are wanted; the best point of each cell
+    comes first, then the second best of each, until there are enough.
+    """
+    if len(pixels) <= count:
+        return np.arange(len(pixels), dtype=np.int64)
+    side = np.sqrt(2.0 * shape[0] * shape[1] / count)
+    cell = (pixels[:, 1] // side) * 100_000 + pixels[:, 0] // side
+    order = np.lexsort((sigma, cell))
+    start = np.r_[True, np.diff(cell[order]) != 0]
+    first = np.maximum.accumulate(np.where(start, np.arange(len(order)), 0))
+    rank = np.arange(len(order)) - first
+    by_rank = np.lexsort((sigma[order], rank))
+    return np.sort(order[by_rank[:count]]).astype(np.int64)
 
 
 #: Smaller photos hold no detail to speak of. [px]

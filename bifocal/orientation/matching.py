@@ -20,6 +20,7 @@ from bifocal.orientation.features import (
     drop_repeated,
     find_features,
     match_along_lines,
+    spread_evenly,
 )
 from bifocal.orientation.interior_orientation import Images
 from bifocal.orientation.patches import PatchResult, refine, same_scale
@@ -354,23 +355,3 @@ def _accepted(
     with np.errstate(divide="ignore", invalid="ignore"):
         good &= sigma / rate < 0.05 * pair.image2.distance
     return np.asarray(good)
-
-
-def spread_evenly(
-    pixels: FloatArray, sigma: FloatArray, shape: tuple[int, ...], count: int
-) -> IntArray:
-    """Return the indices of about ``count`` points, the best of every part of the photo first.
-
-    The photo is divided into cells, half as many as points are wanted; the best point of each cell
-    comes first, then the second best of each, until there are enough.
-    """
-    if len(pixels) <= count:
-        return np.arange(len(pixels), dtype=np.int64)
-    side = np.sqrt(2.0 * shape[0] * shape[1] / count)
-    cell = (pixels[:, 1] // side) * 100_000 + pixels[:, 0] // side
-    order = np.lexsort((sigma, cell))
-    start = np.r_[True, np.diff(cell[order]) != 0]
-    first = np.maximum.accumulate(np.where(start, np.arange(len(order)), 0))
-    rank = np.arange(len(order)) - first
-    by_rank = np.lexsort((sigma[order], rank))
-    return np.sort(order[by_rank[:count]]).astype(np.int64)

@@ -21,6 +21,8 @@ from bifocal.orientation.tie_points import (
     refine_ties,
     robust_sigma,
     tie_positions,
+    wall_roughness,
+    wall_test,
     with_support,
     with_wall,
     without_gross_ties,
@@ -36,6 +38,9 @@ SIGMA_PARALLEL = np.deg2rad(0.3)
 UNEVEN = 0.004
 #: A control point's misfit beyond this many standard deviations is a gross error.
 GROSS_LIMIT = 4.0
+#: Control points of so small a relief, in their sigma, say that they lie on the wall; it is
+#: believed if its plane is no further from theirs, in sigma.
+ON_WALL, WALL_LIMIT = 4.0, 3.0
 #: The wall is the reference plane itself. [m, m/m]
 FREE = (1e-5, 1e-6)
 #: Relative standard deviation with which two photos of one lens have one principal distance.
@@ -134,7 +139,7 @@ def oriented_in_stages(
     else:
         # Distances count from the wall, and which face that is shows only in the relative model.
         few = _relative_measures(observations)
-        first = with_wall(replace(observations, measured=few), start, FREE)
+        first = with_wall(replace(observations, measured=few), start, FREE, known=True)
         pair = OrientedPair(
             observations=first, adjusted=adjust(first, start), wall_named=named
         ).settled()
@@ -145,6 +150,8 @@ def oriented_in_stages(
             pair = _refined(pair, (images[0], images[1]), photos)
             if not with_control:
                 pair = _on_the_wall(pair, (images[0], images[1]), site)
+        if with_control:
+            pair = _with_named_wall(pair)
     if not with_control:
         pair = pair.readjusted(measured=observations.measured).settled()
         if pair.observations.free_datum and pair.observations.sigma_tilt is None:
@@ -297,6 +304,41 @@ def _on_the_wall(pair: OrientedPair, images: Images, site: SiteMeasures) -> Orie
     start = evaluated(ties, replace(adjusted, cameras=_onto_plane(adjusted.cameras, plane)))
     ties = with_wall(ties, start, FREE)
     return replace(pair, observations=ties).readjusted(start).settled()
+
+
+def _with_named_wall(pair: OrientedPair) -> OrientedPair:
+    """Return a pair oriented by control points with the wall that some of them say they lie on.
+
+    Both planes are averaged by their covariances: the control points' own, and that of the wall's
+    ties, which lies on the former as closely as the points and the wall's roughness allow. Where
+    they contradict each other, control decides alone.
+    """
+    observations = pair.observations
+    control = observations.control
+    height, sigma = control.xyz[:, 2], control.sigma[:, 2]
+    with np.errstate(invalid="ignore"):
+        on = control.positioned & observations.pick_used & (np.abs(height) <= ON_WALL * sigma)
+    if on.sum() < 3:
+        return pair
+    spread = np.linalg.svd(control.xyz[on, :2] - control.xyz[on, :2].mean(axis=0))[1]
+    if spread[1] < 0.1 * spread[0]:
+        return pair
+    usual = float(np.hypot(np.median(sigma[on]), wall_roughness(observations, pair.adjusted)))
+    tolerance = (usual / float(np.sqrt(on.sum())), usual / float(spread[1]))
+    walled = with_wall(observations, pair.adjusted, tolerance)
+    if not walled.wall.any():
+        return pair.told(
+            "Hardly any detail lies on the control points' plane; relief counts from the control "
+            "points alone."
+        )
+    test = wall_test(walled, pair.adjusted)
+    if test > WALL_LIMIT:
+        return pair.told(
+            f"The details around the control points' plane lie on another plane (by {test:.0f} "
+            "standard deviations): relief counts from the control points alone. Check which face "
+            "of the wall they were measured on, and their relief r."
+        )
+    return replace(pair, observations=walled).readjusted()
 
 
 def _onto_plane(cameras: Cameras, plane: FloatArray) -> Cameras:

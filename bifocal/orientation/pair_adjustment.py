@@ -11,10 +11,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from bifocal.model.orientation_precision import CAMERA, NAMES
 from bifocal.orientation.interior_orientation import Cameras
 from bifocal.orientation.pair_observations import (
-    CAMERA,
-    NAMES,
     Equations,
     PairObservations,
     PairUnknowns,
@@ -151,15 +150,13 @@ def evaluated(observations: PairObservations, adjusted: AdjustedPair) -> Adjuste
 
 def pair_equations(observations: PairObservations, state: PairUnknowns) -> Equations:
     """Return everything observed against computed in standard deviations, and derivatives."""
-    used, wall = observations.tie_used, observations.tie_used & observations.wall
+    used, wall = observations.tie_used, observations.wall
     parts = [_priors(observations, state)]
     if used.any():
         values, by = _epipolar(observations, state, used)
         parts.append((values / observations.sigma_ties, by / observations.sigma_ties))
     if wall.any():
-        values, by = _transfer(observations, state, wall)
-        rows = observations.wall_rows[:, wall]
-        parts.append((rows @ values, rows @ by))
+        parts.append(wall_equations(observations, state))
     if observations.control.ids:
         control = _control(observations, state)
         parts.append((control.misfit.ravel(), control.by_unknowns.reshape(-1, len(NAMES))))
@@ -169,6 +166,14 @@ def pair_equations(observations: PairObservations, state: PairUnknowns) -> Equat
     lost = ~np.isfinite(residuals)
     residuals[lost], jacobian[lost] = 1e3, 0.0
     return residuals, jacobian
+
+
+def wall_equations(observations: PairObservations, state: PairUnknowns) -> Equations:
+    """Return what the wall's ties tell of the reference plane: height and slopes, in sigma."""
+    wall = observations.wall
+    values, by = _transfer(observations, state, wall)
+    rows = observations.wall_rows[:, wall]
+    return rows @ values, rows @ by
 
 
 def _priors(observations: PairObservations, state: PairUnknowns) -> Equations:

@@ -6,16 +6,12 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from bifocal.model.orientation_precision import CAMERA, NAMES
 from bifocal.orientation.control_points import Control
 from bifocal.orientation.interior_orientation import Cameras, Interiors
 from photocore.arrays import BoolArray, FloatArray
-from photocore.camera import PARAMETERS
 from photocore.distortion import RadialDivision
 
-#: Parameters of one camera of the pair: those of a pinhole, and radial distortion.
-CAMERA = (*PARAMETERS, "k1", "k2")
-#: All parameters, in the order of the covariance.
-NAMES = tuple(f"{name} {number}" for number in (1, 2) for name in CAMERA)
 #: Ties count as so many independent ones: their errors are smooth over the photo. With 700 the
 #: fitted offset, slopes and scale of relief were up to 2.2 of their sigma off, with 100 0.4 to 1.4.
 INDEPENDENT = 100

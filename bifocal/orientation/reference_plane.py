@@ -211,11 +211,12 @@ def narrow_face(xyz: FloatArray, sigma: FloatArray, *, band: float) -> NarrowFac
     uniform rest. A band of fixed width would average plinths and joints into the wall: 6.2 mm of
     relief on a rendered façade, against 0.35 mm.
     """
-    near = np.abs(xyz[:, 2]) < np.maximum(band, 4 * sigma)
+    reach = np.maximum(band, 4 * sigma)
+    near = np.abs(xyz[:, 2]) < reach
     lifted = np.column_stack([np.ones(len(xyz)), xyz[:, :2]])
     if near.sum() < 20:
         return NarrowFace(np.zeros(3), 0.0, np.zeros(len(xyz), dtype=bool))
-    some, height, spread = lifted[near], xyz[near, 2], sigma[near]
+    some, height, spread, reach = lifted[near], xyz[near, 2], sigma[near], reach[near]
     generator = np.random.default_rng(7)
     precise = np.argsort(spread)[: max(len(spread) // 2, 20)]
     triples = generator.choice(precise, (600, 3))
@@ -233,7 +234,7 @@ def narrow_face(xyz: FloatArray, sigma: FloatArray, *, band: float) -> NarrowFac
         away = height - some @ plane
         variance = roughness**2 + spread**2
         core = share * np.exp(-0.5 * away**2 / variance) / np.sqrt(2 * np.pi * variance)
-        chance = core / (core + (1 - share) / (2 * band))
+        chance = core / (core + (1 - share) / (2 * reach))
         weight = chance / variance
         plane = np.linalg.solve((some * weight[:, None]).T @ some, some.T @ (weight * height))
         away = height - some @ plane

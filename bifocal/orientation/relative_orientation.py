@@ -20,6 +20,7 @@ from bifocal.orientation.features import (
     drop_repeated,
     match_along_lines,
     match_features,
+    spread_evenly,
 )
 from bifocal.orientation.interior_orientation import Cameras, Interiors
 from photocore.arrays import BoolArray, FloatArray
@@ -32,6 +33,8 @@ FEWEST_MATCHES = 40
 FEWEST_ON_PLANE = 0.12
 #: So many of the strongest features are compared with each other first; all, if too few agree.
 FIRST_TRIED, ENOUGH = 8000, 400
+#: More ties than this, spread evenly, tell nothing more: their errors are common to stretches.
+MOST_TIES = 6000
 #: How far along its line a partner is looked for around the plane, as a share of the width.
 ALONG = 0.2
 #: Neighbours asked for support, and how many must move alike against the plane, within so many
@@ -119,6 +122,9 @@ def find_ties(
     kept = kept[supported(x1[kept], x2[kept] - apply_homography(homography, x1[kept]), width)]
     if len(kept) < FEWEST_MATCHES:
         kept = np.arange(len(x1))
+    # Strongest first: rank serves as precision.
+    shape = interiors[0].image_size[::-1]
+    kept = kept[spread_evenly(x1[kept], rows1[kept].astype(np.float64), shape, MOST_TIES)]
     x1, x2, rows1, rows2 = x1[kept], x2[kept], rows1[kept], rows2[kept]
     homography, on_plane = _dominant_plane(x1, x2, 1.5 * tolerance, 8000)
     count = len(x1)

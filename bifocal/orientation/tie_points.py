@@ -8,10 +8,10 @@ import numpy as np
 
 from bifocal.model.pair import apply_homography
 from bifocal.orientation.interior_orientation import Cameras, Images, Interiors
-from bifocal.orientation.pair_adjustment import AdjustedPair
+from bifocal.orientation.pair_adjustment import AdjustedPair, wall_equations
 from bifocal.orientation.pair_observations import PairObservations, PairUnknowns
 from bifocal.orientation.patches import refine, same_scale
-from bifocal.orientation.reference_plane import narrow_face
+from bifocal.orientation.reference_plane import NarrowFace, narrow_face
 from bifocal.orientation.relative_orientation import supported
 from photocore.arrays import BoolArray, FloatArray
 from photocore.camera import (
@@ -125,7 +125,11 @@ def relief_per_pixel(observations: PairObservations, state: PairUnknowns) -> Flo
 
 
 def with_wall(
-    observations: PairObservations, state: PairUnknowns, tolerance: tuple[float, float]
+    observations: PairObservations,
+    state: PairUnknowns,
+    tolerance: tuple[float, float],
+    *,
+    known: bool = False,
 ) -> PairObservations:
     """Return the observations with the wall's ties and what they tell of the reference plane.
 
@@ -136,6 +140,8 @@ def with_wall(
     tolerance : pair of float
         How far the wall may lie from the reference plane [m] and slope against it [m/m], beyond
         what its own roughness leaves open.
+    known : bool
+        Whether the wall's ties are known roughly, from the dominant homography.
 
     Notes
     -----
@@ -144,19 +150,18 @@ def with_wall(
     Roughness is common to stretches of the wall: only every fourth cell of a tenth of the photo's
     width counts as independent.
     """
-    xyz = tie_positions(observations, state)
-    metres = relief_per_pixel(observations, state)
-    known = observations.tie_used & np.isfinite(xyz).all(axis=1) & np.isfinite(metres)
-    sigma = np.hypot(np.sqrt(2.0) * observations.sigma_tie * np.abs(metres), 1e-6)
-    none = replace(
-        observations, wall=np.zeros_like(known), wall_rows=np.zeros((3, len(known)))
-    )
-    if known.sum() < FEWEST_ON_WALL:
-        return none
-    face = narrow_face(xyz[known], sigma[known], band=WALL_BAND * float(state.cameras[0].centre[2]))
-    on = np.flatnonzero(known)[face.members]
+    xyz, metres, sigma, face = _wall_of(observations, state)
+    if known:
+        rough = WALL_BAND * float(state.cameras[0].centre[2])
+        on_wall = observations.wall & np.isfinite(xyz).all(axis=1) & np.isfinite(metres)
+        face = replace(face, roughness=rough, members=on_wall)
+    on = np.flatnonzero(face.members)
     if len(on) < FEWEST_ON_WALL:
-        return none
+        return replace(
+            observations,
+            wall=np.zeros_like(face.members),
+            wall_rows=np.zeros((3, len(face.members))),
+        )
     middle = xyz[on, :2].mean(axis=0)
     lifted = np.column_stack([np.ones(len(on)), xyz[on, :2]])
     weight = 1.0 / (sigma[on] ** 2 + face.roughness**2)
@@ -170,8 +175,35 @@ def with_wall(
     about = np.array([[1.0, -middle[0], -middle[1]], [0, 1, 0], [0, 0, 1]])
     slack[1:, 1:] = np.eye(2) * tolerance[1] ** 2
     whitening = np.linalg.cholesky(np.linalg.inv(covariance + about @ slack @ about.T)).T
-    rows = np.zeros((3, len(known)))
+    rows = np.zeros((3, len(xyz)))
     rows[:, on] = whitening @ inverse @ (lifted * (weight * metres[on])[:, None]).T
-    wall = np.zeros_like(known)
-    wall[on] = True
-    return replace(observations, wall=wall, wall_rows=rows)
+    return replace(observations, wall=face.members, wall_rows=rows)
+
+
+def _wall_of(
+    observations: PairObservations, state: PairUnknowns
+) -> tuple[FloatArray, FloatArray, FloatArray, NarrowFace]:
+    """Return the ties' places [m], relief per pixel [m/px] and sigma of height [m], and the wall."""
+    xyz = tie_positions(observations, state)
+    metres = relief_per_pixel(observations, state)
+    known = observations.tie_used & np.isfinite(xyz).all(axis=1) & np.isfinite(metres)
+    sigma = np.hypot(np.sqrt(2.0) * observations.sigma_tie * np.abs(metres), 1e-6)
+    face = narrow_face(xyz[known], sigma[known], band=WALL_BAND * float(state.cameras[0].centre[2]))
+    members = np.zeros(len(xyz), dtype=bool)
+    members[known] = face.members
+    return xyz, metres, sigma, replace(face, members=members)
+
+
+def wall_roughness(observations: PairObservations, state: PairUnknowns) -> float:
+    """Return the standard deviation of the wall's own unevenness. [m]"""
+    return _wall_of(observations, state)[3].roughness
+
+
+def wall_test(observations: PairObservations, adjusted: AdjustedPair) -> float:
+    """Return how far the wall's ties lie from the reference plane, adjusted without them, in sigma.
+
+    Root mean square of height and slopes over their standard deviations, the cameras' included.
+    """
+    values, by = wall_equations(observations, adjusted)
+    covariance = np.eye(3) + by @ adjusted.covariance @ by.T
+    return float(np.sqrt(values @ np.linalg.solve(covariance, values) / 3.0))

@@ -19,6 +19,8 @@ from photocore.arrays import BoolArray, FloatArray
 #: length one, is below this share of the largest. Double precision leaves 1e-16 times the condition
 #: of the columns; perfect but weak networks reach 1e-8.
 RANK_TOLERANCE = 1e-11
+#: Rows decomposed at a time.
+BLOCK = 250
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -57,7 +59,7 @@ class DenseEquations:
         count = self.unknowns
         # The triangle of matrix and residuals holds all a step needs: no large factor is formed.
         table = np.column_stack([self.jacobian / self.scale, self.residuals])
-        triangle = qr(table, mode="r", overwrite_a=True, check_finite=False)[0][:count]
+        triangle = _triangle(table)[:count]
         left, some, right = svd(triangle[:, :count], check_finite=False)
         values, target = np.zeros(count), np.zeros(count)
         values[: len(some)] = some
@@ -111,6 +113,21 @@ class DenseEquations:
         """Share of every observation's error that shows in its own residual, shape (n,)."""
         base = qr(self.jacobian / self.scale, mode="economic", check_finite=False)[0]
         return 1.0 - np.einsum("ij,ij->i", base, base)
+
+
+def _triangle(table: FloatArray) -> FloatArray:
+    """Return the triangle R of a QR decomposition, that of tall tables from those of its blocks.
+
+    6000 rows of 25: 5 ms by blocks that stay in the cache, 24 ms whole (2 cores, OpenBLAS, idle;
+    220 ms where other programs hold the cores, because its threads wait for each other).
+    """
+    columns = table.shape[1]
+    block = max(BLOCK, 4 * columns)
+    while len(table) >= 2 * block:
+        whole = len(table) - len(table) % block
+        parts = np.linalg.qr(table[:whole].reshape(-1, block, columns), mode="r")
+        table = np.concatenate([parts.reshape(-1, columns), table[whole:]])
+    return np.asarray(np.linalg.qr(table, mode="r"))
 
 
 def undetermined(jacobian: FloatArray, names: Sequence[str]) -> list[str]:
