@@ -10,9 +10,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from bifocal.orientation import validation
+from bifocal.orientation.bend import MOST_BENT, wall_bend
 from bifocal.orientation.control_points import Control, SiteMeasures
 from bifocal.orientation.features import find_features
 from bifocal.orientation.interior_orientation import Cameras, Interiors, with_one_lens
+from bifocal.orientation.orientation_remarks import (
+    assumptions,
+    control_remarks,
+    distance_remarks,
+    model_remarks,
+)
 from bifocal.orientation.orientation_stages import (
     ONE_LENS,
     SIGMA_PARALLEL,
@@ -101,12 +108,31 @@ def orient_pair(photos: Photos, *, control: Control, site: SiteMeasures) -> Orie
     if ties is not None:
         start = replace(start, radial=np.array([[ties.radial, 0.0]] * 2))
     pair = oriented_in_stages(observations, start, photos, site, with_control=enough)
-    pair = without_gross(pair)
+    bend = _bend(pair)
+    pair = replace(pair, bend=bend)
+    # A model that does not fit leaves honest points with large misfits.
+    pair = pair if bend > MOST_BENT else without_gross(pair)
     validation.check_determined(pair.adjusted)
     validation.check_movement(pair.adjusted)
-    told = (*remarks, *pair.remarks, *_control_remarks(control, pair), *_distance_remarks(pair))
-    assumed = (*pair.assumed, *_assumptions(pair.observations, site))
+    told = (
+        *remarks,
+        *model_remarks(pair, site),
+        *pair.remarks,
+        *control_remarks(control, pair),
+        *distance_remarks(pair),
+    )
+    assumed = (*pair.assumed, *assumptions(pair.observations, site))
     return replace(pair, remarks=told, assumed=assumed)
+
+
+def _bend(pair: OrientedPair) -> float:
+    """Return how far the wall is from a plane between the photos. [px at 3000 px of width]"""
+    observations = pair.observations
+    used = observations.tie_used
+    if used.sum() < 30:
+        return float("nan")
+    seen1, seen2 = observations.straight_ties(pair.adjusted.radial)
+    return wall_bend(seen1[used], seen2[used], observations.interiors[0].image_size)
 
 
 def _contradiction(cameras: Cameras, ties: Ties) -> float:
@@ -301,55 +327,3 @@ def _same_body(interiors: Interiors) -> float | None:
     if first.is_calibrated or second.is_calibrated or first.image_size != second.image_size:
         return None
     return 0.002 * float(np.hypot(*first.image_size))
-
-
-def _control_remarks(control: Control, pair: OrientedPair) -> list[str]:
-    """Return what the control points lack."""
-    remarks = [
-        f"Control point {control.ids[index]} is a gross error "
-        f"({pair.adjusted.control_test[index]:.0f} standard deviations) and was left out. Check "
-        "its coordinates and its picks."
-        for index in np.flatnonzero(~pair.observations.pick_used)
-    ]
-    count = int(control.positioned.sum())
-    if 4 <= count < 9:
-        remarks.append(
-            f"{count} control points; CIPA advises nine, spread over the photo, so that an error "
-            "in one is found."
-        )
-    return remarks
-
-
-def _distance_remarks(pair: OrientedPair) -> list[str]:
-    """Return which distances are poorly determined."""
-    remarks = []
-    for number, camera in enumerate(pair.adjusted.cameras, start=1):
-        distance, sigma = float(camera.centre[2]), pair.adjusted.sigma("Z", number)
-        if sigma > 0.03 * distance:
-            remarks.append(
-                f"The distance of camera {number} is poorly determined ({distance:.2f} ± "
-                f"{sigma:.2f} m). Give the focal lengths, the distances, or more points off the "
-                "wall."
-            )
-    return remarks
-
-
-def _assumptions(observations: PairObservations, site: SiteMeasures) -> list[str]:
-    """Return what only the prior holds."""
-    out = []
-    for number, interior in enumerate(observations.interiors, start=1):
-        if interior.is_assumed:
-            out.append(f"focal length of photo {number}: {interior.source}")
-        if not interior.is_calibrated:
-            out.append(
-                f"principal point of photo {number} in its centre "
-                f"(within {interior.sigma_centre:.0f} px)"
-            )
-    uncorrected = [i for i in observations.interiors if not i.is_calibrated and not i.sigma_radial]
-    if uncorrected:
-        out.append("photos free of lens distortion (else calibrate and give --lens)")
-    if site.parallel:
-        out.append("image planes parallel to the wall within 0.3°")
-    if observations.sigma_zoom is not None:
-        out.append("one focal length for both photos (they agree)")
-    return out

@@ -18,7 +18,7 @@ from bifocal.orientation.orientation_stages import OrientedPair, PhotoInput, Pho
 from bifocal.orientation.pair_adjustment import AdjustedPair
 from bifocal.orientation.pair_observations import PairObservations, at
 from bifocal.orientation.reference_plane import rivals
-from bifocal.orientation.tie_points import robust_sigma
+from bifocal.orientation.tie_points import robust_sigma, tie_positions
 from photocore.arrays import BoolArray, ByteArray, FloatArray
 from photocore.camera import Pinhole, camera_matrix, plane_from_pixel
 from photocore.distortion import RadialDivision
@@ -296,6 +296,9 @@ def _diagnostics(
             {"offset": face.offset, "share": face.share, "pixel": list(face.pixel)}
             for face in oriented.faces
         ],
+        "wall_bend_px": oriented.bend if np.isfinite(oriented.bend) else None,
+        "focal_given_px": [interior.focal for interior in observations.interiors],
+        "wall_relief_mm": wall_relief(oriented),
         "assumed": oriented.assumed,
         "words": list(words),
     }
@@ -309,6 +312,35 @@ def _diagnostics(
             }
             for index, name in enumerate(control.ids)
         ]
+    return out
+
+
+def wall_relief(oriented: OrientedPair) -> list[dict[str, Any]]:
+    """Return the relief of the wall's own points by zone of the far photo, left to right, downwards.
+
+    Nine zones; those with fewer than five points of the wall are left out. [mm]
+    """
+    observations = oriented.observations
+    wall = observations.wall & observations.tie_used
+    if not wall.any():
+        return []
+    height = 1000 * tie_positions(observations, oriented.adjusted)[wall, 2]
+    size = np.array(observations.interiors[0].image_size)
+    place = np.clip(observations.interiors[0].raw(observations.tie1[wall]) * 3 // size, 0, 2)
+    out = []
+    for row, line in enumerate(("top", "middle", "bottom")):
+        for column, side in enumerate(("left", "centre", "right")):
+            inside = height[(place[:, 0] == column) & (place[:, 1] == row)]
+            if len(inside) >= 5:
+                spread = 1.4826 * float(np.median(np.abs(inside - np.median(inside))))
+                out.append(
+                    {
+                        "zone": f"{line} {side}",
+                        "points": len(inside),
+                        "median": float(np.median(inside)),
+                        "spread": spread,
+                    }
+                )
     return out
 
 

@@ -10,12 +10,13 @@ from typing import Any
 
 import numpy as np
 
+from bifocal.model.orientation_precision import NAMES
 from bifocal.orientation import validation
 from bifocal.orientation.area_points import even_points
 from bifocal.orientation.control_points import SiteMeasures
 from bifocal.orientation.interior_orientation import SIGMA_RADIAL, Cameras, Images, Interior
 from bifocal.orientation.pair_adjustment import AdjustedPair, adjust, evaluated
-from bifocal.orientation.pair_observations import PairObservations, PairUnknowns
+from bifocal.orientation.pair_observations import PairObservations, PairUnknowns, at
 from bifocal.orientation.reference_plane import Face, choose_wall, rivals_in_words
 from bifocal.orientation.tie_points import (
     refine_ties,
@@ -86,6 +87,8 @@ class OrientedPair:
         Whether the user said which of them is the wall.
     tolerance : pair of float
         How far the wall may lie from the reference plane [m] and slope against it [m/m].
+    bend : float
+        How far the wall is from a plane between the photos. [px at 3000 px of width]
     """
 
     observations: PairObservations
@@ -96,6 +99,7 @@ class OrientedPair:
     faces: tuple[Face, ...] = ()
     wall_named: bool = False
     tolerance: tuple[float, float] = FREE
+    bend: float = float("nan")
 
     def readjusted(self, start: PairUnknowns | None = None, **changes: Any) -> OrientedPair:
         """Return the pair adjusted with changed observations, from here or another start."""
@@ -298,12 +302,24 @@ def _on_the_wall(pair: OrientedPair, images: Images, site: SiteMeasures) -> Orie
     if fair.sum() < 20:
         return replace(pair, observations=ties).readjusted().settled()
     seen = ties.interiors[0].raw(ties.tie1[fair])
-    plane, faces = choose_wall(xyz[fair], seen, adjusted.cameras, ties.interiors, site)
+    plane, faces = choose_wall(
+        xyz[fair], seen, adjusted.cameras, ties.interiors, site, sigma_ratio=_sigma_ratio(pair)
+    )
     pair = replace(pair, faces=tuple(faces))
     pair = pair.told(*(text for text in [rivals_in_words(faces, site)] if text))
     start = evaluated(ties, replace(adjusted, cameras=_onto_plane(adjusted.cameras, plane)))
     ties = with_wall(ties, start, FREE)
     return replace(pair, observations=ties).readjusted(start).settled()
+
+
+def _sigma_ratio(pair: OrientedPair) -> float:
+    """Return the standard deviation of ln(d1 / d2); infinite where both tapes are in already."""
+    if len(pair.observations.measured) > 1:
+        return np.inf
+    row = np.zeros(len(NAMES))
+    for number, (camera, sign) in enumerate(zip(pair.adjusted.cameras, (1.0, -1.0), strict=True)):
+        row[at("Z", number + 1)] = sign / camera.centre[2]
+    return float(np.sqrt(row @ pair.adjusted.covariance @ row))
 
 
 def _with_named_wall(pair: OrientedPair) -> OrientedPair:

@@ -24,6 +24,9 @@ STEEPEST = 0.02
 RIVAL = 0.5
 #: With this share of the largest face's points, a face at one scale is preferred to it.
 COMPARABLE = 0.5
+#: With this share of the largest face's points a face may be chosen by the measured distances; it
+#: fits them within so many standard deviations, and the next does not.
+FAIR, FITS = 0.25, 2.0
 #: Nominal scales this close mean that the photos were planned for one scale.
 ONE_SCALE = 0.02
 #: Faces nearer than this many bands are one face, unevenly built.
@@ -95,12 +98,19 @@ def _midst(pixels: FloatArray, members: IntArray) -> tuple[float, float]:
 
 
 def choose_wall(
-    xyz: FloatArray, pixels: FloatArray, cameras: Cameras, interiors: Interiors, site: SiteMeasures
+    xyz: FloatArray,
+    pixels: FloatArray,
+    cameras: Cameras,
+    interiors: Interiors,
+    site: SiteMeasures,
+    *,
+    sigma_ratio: float = np.inf,
 ) -> tuple[FloatArray, list[Face]]:
     """Return the wall's plane z = a + b X + c Y and all faces parallel to it, the wall first.
 
-    The spot the user named decides; else, where the photos were planned for one scale, the face of
-    comparable size on which the scales differ least; else the largest.
+    The spot the user named decides; else the face whose distances stand in the ratio of those
+    measured, where that is precise enough to tell; else, where the photos were planned for one
+    scale, the face of comparable size on which the scales differ least; else the largest.
 
     Parameters
     ----------
@@ -110,6 +120,8 @@ def choose_wall(
         The same in the far photo. [px]
     cameras, interiors : pairs
     site : SiteMeasures
+    sigma_ratio : float
+        Standard deviation of ln(d1 / d2) of the cameras, found without both measured distances.
 
     Raises
     ------
@@ -122,6 +134,10 @@ def choose_wall(
     offset = 0.0
     if site.wall is not None:
         offset = _height_at(heights, pixels, site.wall, interiors[0])
+    elif (
+        by_ratio := _face_by_ratio(heights, pixels, cameras, plane, site, sigma_ratio)
+    ) is not None:
+        offset = by_ratio
     elif is_one_scale(interiors, site):
         planes = faces(heights, pixels, band=band)
         fair = [f for f in planes if f.share >= COMPARABLE * planes[0].share]
@@ -132,6 +148,33 @@ def choose_wall(
         heights = _heights(xyz, plane)
     planes = faces(heights, pixels, band=band)
     return plane, sorted(planes, key=lambda face: (abs(face.offset) > band, -face.share))
+
+
+def _face_by_ratio(
+    heights: FloatArray,
+    pixels: FloatArray,
+    cameras: Cameras,
+    plane: FloatArray,
+    site: SiteMeasures,
+    sigma: float,
+) -> float | None:
+    """Return the offset of the face whose distances have the measured ratio; None: cannot tell."""
+    d1, d2 = site.distances
+    if not (d1 and d2):
+        return None
+    planes = faces(heights, pixels, band=BAND * float(cameras[0].centre[2]))
+    fair = [face for face in planes if face.share >= FAIR * planes[0].share]
+    if len(fair) < 2:
+        return None
+    far, near = (float(c.centre[2] - plane[0] - c.centre[:2] @ plane[1:]) for c in cameras)
+    sigma = float(np.hypot(sigma, np.hypot(site.sigma / d1, site.sigma / d2)))
+    ratios = [np.log((far - face.offset) / (near - face.offset)) for face in fair]
+    tests = np.abs(np.array(ratios) - np.log(d1 / d2)) / sigma
+    order = np.argsort(tests)
+    # The nearest must fit, and the next must not.
+    if tests[order[0]] > FITS or tests[order[1]] < max(FITS, 2 * tests[order[0]]):
+        return None
+    return fair[int(order[0])].offset
 
 
 def largest_plane(xyz: FloatArray, *, band: float) -> FloatArray:
