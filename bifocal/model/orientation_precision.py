@@ -142,7 +142,7 @@ def from_dict(data: Any) -> FloatArray:
             f"{len(NAMES)} parameters that `bifocal align` writes; leave the key out if the "
             "orientation's precision is not known."
         )
-    return checked(as_floats(data.get("covariance"), "orientation.covariance"))
+    return checked(as_floats(data.get("covariance", ()), "orientation.covariance"))
 
 
 def checked(covariance: FloatArray) -> FloatArray:

@@ -316,7 +316,7 @@ def _diagnostics(
 
 
 def wall_relief(oriented: OrientedPair) -> list[dict[str, Any]]:
-    """Return the relief of the wall's own points by zone of the far photo, left to right, downwards.
+    """Return the relief of the wall's own points by zone of the far photo.
 
     Nine zones; those with fewer than five points of the wall are left out. [mm]
     """

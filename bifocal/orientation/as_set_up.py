@@ -44,7 +44,8 @@ def pair_as_set_up(photos: Photos, site: SiteMeasures) -> OrientedPair:
         if photo.interior.is_assumed:
             raise InputError(
                 f"--as-set-up needs the focal length of {photo.name}, which its EXIF data do not "
-                f"tell: give --focal{number} with --sensor-width or --pixel-size, or --lens{number}."
+                f"tell: give --focal{number} with --sensor-width or --pixel-size, or "
+                f"--lens{number}."
             )
     square_on = np.diag([1.0, -1.0, -1.0])
     first, second = (

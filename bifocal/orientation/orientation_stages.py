@@ -178,10 +178,9 @@ def _with_ties(pair: OrientedPair, observations: PairObservations) -> OrientedPa
     """Return a pair oriented by control points with its ties, on their epipolar lines only."""
     # Control leaves the epipolar lines uncertain by some pixels: the majority shows by how much.
     sigma = max(robust_sigma(pair.adjusted.tie_misfit), observations.sigma_tie)
-    interiors = observations.interiors
-    if pair.observations.sigma_zoom is None and not observations.sigma_zoom:
-        # Two lenses: their distortions are not told apart by ties.
-        interiors = pair.observations.interiors
+    # Distortions of two lenses are not told apart by ties: they stay as they are.
+    one_lens = pair.observations.sigma_zoom is not None
+    interiors = observations.interiors if one_lens else pair.observations.interiors
     ties = replace(pair.observations, interiors=interiors)
     ties = without_gross_ties(ties, pair.adjusted, sigma=sigma)
     return replace(pair, observations=ties).readjusted().settled()

@@ -116,7 +116,7 @@ def tie_positions(observations: PairObservations, state: PairUnknowns) -> FloatA
 def relief_per_pixel(observations: PairObservations, state: PairUnknowns) -> FloatArray:
     """Return the relief of a pixel along the line in photo 2 at the ties, signed, (m,). [m/px]"""
     far, near = state.cameras
-    seen1, seen2 = observations.straight_ties(state.radial)
+    seen1 = observations.straight_ties(state.radial)[0]
     on_plane = ray_on_plane(far, seen1)
     line = homogeneous(seen1) @ fundamental(far, near).T
     along = np.column_stack([-line[:, 1], line[:, 0]]) / np.hypot(line[:, 0], line[:, 1])[:, None]
@@ -183,7 +183,7 @@ def with_wall(
 def _wall_of(
     observations: PairObservations, state: PairUnknowns
 ) -> tuple[FloatArray, FloatArray, FloatArray, NarrowFace]:
-    """Return the ties' places [m], relief per pixel [m/px] and sigma of height [m], and the wall."""
+    """Return the ties' places [m], relief per pixel [m/px], sigma of height [m]; the wall."""
     xyz = tie_positions(observations, state)
     metres = relief_per_pixel(observations, state)
     known = observations.tie_used & np.isfinite(xyz).all(axis=1) & np.isfinite(metres)

@@ -121,10 +121,10 @@ def check_distortion(radial: FloatArray, interior: Interior) -> None:
     if moved > MOST_DISTORTION:
         raise GeometryError(
             f"the common points fit only if the lens distorted the photo's corners by "
-            f"{min(100 * moved, 999):.0f} % of the half diagonal (k1 = {radial[0]:.2f}): the sensor width "
-            "or the focal length is probably wrong. Check --sensor-width (--pixel-size), --focal1 "
-            "and --focal2; a lens that does distort so much has to be calibrated (`bifocal "
-            "calibrate`, --lens)."
+            f"{min(100 * moved, 999):.0f} % of the half diagonal (k1 = {radial[0]:.2f}): the "
+            "sensor width or the focal length is probably wrong. Check --sensor-width "
+            "(--pixel-size), --focal1 and --focal2; a lens that does distort so much has to be "
+            "calibrated (`bifocal calibrate`, --lens)."
         )
 
 

@@ -214,7 +214,8 @@ def zoom_centre_of_points(
     ``e x (q2 - q1) = q1 x q2``. Robust: residuals beyond three sigma count less (Huber).
     """
     known = np.isfinite(np.hstack([q1, q2])).all(axis=1)
-    q1, q2, sigma = q1[known], q2[known], np.broadcast_to(sigma, known.shape)[known]
+    q1, q2 = q1[known], q2[known]
+    sigma = np.asarray(np.broadcast_to(sigma, known.shape)[known])
     move = q2 - q1
     off = np.linalg.norm(move, axis=1) > OFF_PLANE * sigma
     if off.sum() < 3:

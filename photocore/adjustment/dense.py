@@ -125,7 +125,7 @@ def _triangle(table: FloatArray) -> FloatArray:
     block = max(BLOCK, 4 * columns)
     while len(table) >= 2 * block:
         whole = len(table) - len(table) % block
-        parts = np.linalg.qr(table[:whole].reshape(-1, block, columns), mode="r")
+        parts = np.asarray(np.linalg.qr(table[:whole].reshape(-1, block, columns), mode="r"))
         table = np.concatenate([parts.reshape(-1, columns), table[whole:]])
     return np.asarray(np.linalg.qr(table, mode="r"))
 
