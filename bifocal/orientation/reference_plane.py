@@ -270,25 +270,42 @@ def narrow_face(xyz: FloatArray, sigma: FloatArray, *, band: float) -> NarrowFac
     planes = np.concatenate([np.zeros((1, 3)), planes])
     tested = generator.choice(len(height), min(len(height), 2000), replace=False)
     away = height[tested] - planes @ some[tested].T
-    costs = np.minimum((away / (4 * np.maximum(spread[tested], 0.05 * band))) ** 2, 1.0).sum(axis=1)
-    plane = planes[int(costs.argmin())]
-    roughness, share = float(np.median(spread)) + 0.02 * band, 0.5
-    for _ in range(30):
-        away = height - some @ plane
-        variance = roughness**2 + spread**2
-        core = share * np.exp(-0.5 * away**2 / variance) / np.sqrt(2 * np.pi * variance)
-        chance = core / (core + (1 - share) / (2 * reach))
-        weight = chance / variance
-        plane = np.linalg.solve((some * weight[:, None]).T @ some, some.T @ (weight * height))
-        away = height - some @ plane
-        share = float(np.clip(chance.mean(), 0.02, 0.98))
-        # The core's variance beyond the points' own, each weighted by how much it tells of it.
-        tell = chance / variance**2
-        extra = (tell * (away**2 - spread**2)).sum() / tell.sum()
-        roughness = float(np.sqrt(max(extra, (0.002 * band) ** 2)))
+    cores = []
+    for least in (0.01, 0.05):  # an even wall, a rough one: the likelier is it
+        wide = 4 * np.maximum(spread[tested], least * band)
+        start = planes[int(np.minimum((away / wide) ** 2, 1.0).sum(axis=1).argmin())]
+        cores.append(_core(some, height, spread, reach, start, least * band))
+    _, plane, roughness, chance = max(cores, key=lambda core: core[0])
     members = np.zeros(len(xyz), dtype=bool)
     members[np.flatnonzero(near)[chance > 0.5]] = True
     return NarrowFace(plane, roughness, members)
+
+
+def _core(
+    lifted: FloatArray,
+    height: FloatArray,
+    spread: FloatArray,
+    reach: FloatArray,
+    plane: FloatArray,
+    roughness: float,
+) -> tuple[float, FloatArray, float, FloatArray]:
+    """Return log-likelihood, plane, roughness and chances of a normal core in a uniform rest."""
+    share, least = 0.5, 0.2 * roughness
+    for _ in range(30):
+        away = height - lifted @ plane
+        variance = roughness**2 + spread**2
+        core = share * np.exp(-0.5 * away**2 / variance) / np.sqrt(2 * np.pi * variance)
+        density = core + (1 - share) / (2 * reach)
+        chance = core / density
+        weight = chance / variance
+        plane = np.linalg.solve((lifted * weight[:, None]).T @ lifted, lifted.T @ (weight * height))
+        away = height - lifted @ plane
+        share = float(np.clip(chance.mean(), 0.02, 0.98))
+        # The core's variance beyond the points' own, each weighted by how much it tells of it.
+        tell = chance / variance**2
+        extra = (tell * (away**2 - spread**2)).sum() / max(tell.sum(), 1e-300)
+        roughness = float(np.sqrt(max(extra, least**2)))
+    return float(np.log(density).sum()), plane, roughness, chance
 
 
 def is_one_scale(interiors: Interiors, site: SiteMeasures) -> bool:

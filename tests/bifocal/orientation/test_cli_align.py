@@ -191,10 +191,13 @@ def test_a_pair_file_ends_in_json(folder) -> None:
 
 def test_distortion_no_lens_has_is_refused() -> None:
     interior = Interior.from_focal(1500.0, image_size=(960, 640), sigma=0.02, source="test")
-    check_distortion(0.1, interior)
+    check_distortion((0.1, 0.0), interior)
+    # A compact camera moves its corners by 11 % of the half diagonal; that is no wrong sensor.
+    compact = Interior.from_focal(900.0, image_size=(960, 640), sigma=0.04, source="test")
+    check_distortion((-0.24, 0.29), compact)
     for k in (3.2, -3.2, -40.0):
         with pytest.raises(GeometryError, match="sensor width or the focal length is probably"):
-            check_distortion(k, interior)
+            check_distortion((k, 0.0), interior)
 
 
 def test_an_existing_pair_is_kept(folder) -> None:
