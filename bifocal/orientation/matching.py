@@ -36,6 +36,8 @@ from photocore.errors import GeometryError
 OPTIMISM = 1.7
 #: Patches that agree less than this are not the same detail.
 LEAST_AGREEMENT = 0.8
+#: Fewer matched features than this are chance.
+FEWEST_MATCHED = 20
 #: A feature whose patch disagrees is kept this near to its line, and is so precise. [px]
 FEATURE_ACROSS, SIGMA_FEATURE = 0.7, 0.35
 #: Neighbours asked for support, how many must agree, and to what share of d1 in relief. On two
@@ -118,7 +120,8 @@ def match_pair(pair: Pair, images: Images, settings: MatchSettings | None = None
     if settings.features:
         parts.append(_feature_matches(pair, images, reliefs, settings))
     matches = _joined(parts)
-    if not len(matches.ids) or (settings.features and len(matches.ids) < 20):
+    few = settings.features and len(matches.ids) < FEWEST_MATCHED
+    if not len(matches.ids) or few:
         raise GeometryError(
             f"only {len(matches.ids)} points match: photos and pair file do not belong together, "
             "or a photo is blurred. Make the pair file again with `bifocal align`."
@@ -147,6 +150,7 @@ def _feature_matches(
     seen = seen_at(pair, pixels1, np.where(inside, rest, 0.0))
     along = directions_at(pair, pixels1, np.where(inside, rest, 0.0))
     off = (pixels2 - seen)[:, 0] * -along[:, 1] + (pixels2 - seen)[:, 1] * along[:, 0]
+    inside &= good.sum() >= FEWEST_MATCHED  # else pair and photos do not belong together
     kept = ~good & inside & (np.abs(off) < FEATURE_ACROSS * first.reduction)
     on_line = np.where(kept[:, None], seen, on_line)
     relief, misfit = np.where(kept, rest, relief), np.where(kept, off, misfit)
