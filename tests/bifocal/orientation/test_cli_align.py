@@ -155,7 +155,8 @@ def test_picks_of_the_other_photo_are_exchanged_and_said(folder) -> None:
     [
         ([], "say how the pair is to be set up"),
         (["--distance1", "16"], "say how the pair is to be set up"),
-        (["--auto"], "focal lengths are unknown"),
+        (["--auto"], "--auto needs one measure for the scale"),
+        (["--auto", "--distance1", "16"], "focal lengths are unknown"),
         (["--control", "nowhere.csv"], "nowhere.csv"),
         (["--distance1", "16", "--distance2", "9", "--delta-d", "7"], "give two of"),
         (["--auto", "--lens", "absent.json", "--distance1", "16"], "absent.json"),
