@@ -168,8 +168,8 @@ def _control_alone(
 ) -> OrientedPair:
     """Return the pair oriented by control points alone, the lens as undistorted as scanned."""
     none = np.zeros(len(observations.tie1), dtype=bool)
-    held = tuple(replace(i, sigma_radial=0.0) for i in observations.interiors)
-    alone = replace(observations, tie_used=none, wall=none, interiors=held)
+    first, second = (replace(i, sigma_radial=0.0) for i in observations.interiors)
+    alone = replace(observations, tie_used=none, wall=none, interiors=(first, second))
     pair = OrientedPair(observations=alone, adjusted=adjust(alone, start), wall_named=named)
     return _one_zoom(pair)
 
