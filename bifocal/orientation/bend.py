@@ -13,7 +13,7 @@ from bifocal.model.pair import apply_homography
 from photocore.arrays import FloatArray
 
 #: A wall bent by more than this, at 3000 px of width, is not that of an honest pair. Six real
-#: clean pairs reach 0.19 px, and two rendered façades, whose ties crowd on mouldings, 0.26 and 0.37;
+#: clean pairs reach 0.19 px, two rendered façades, whose ties crowd on mouldings, 0.26 and 0.37;
 #: photos through a port 6.3, through a water surface 2.9, with a distorting compact camera 0.44. A
 #: weak distortion (k = -0.05) bends by 0.2 to 0.4 and passes. Seen before it was set. [px]
 MOST_BENT = 0.4
