@@ -14,6 +14,7 @@ SUMMARIES: dict[str, str] = {
     "calibrate": "Lens calibration from board photos or straight lines.",
     "undistort": "Photos freed of lens distortion.",
     "align": "A pair file from two photos: control points, site distances or automatic.",
+    "pick": "The page: orient photos, pick points, draw, in the browser.",
     "match": "Homologous points found automatically, as a survey workbook.",
     "solve": "Relief, coordinates and precision of measured points.",
     "relief": "Dense relief map of the wall.",
