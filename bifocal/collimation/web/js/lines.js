@@ -10,6 +10,7 @@ export class Lines {
     this.app = app;
     this.picker = picker;
     this.current = null;
+    this.first = null;
     this.body = h("tbody");
     this.state = h("p", { class: "hint", role: "status" });
     this.layer = h("input", { type: "text", value: LAYERS[0], list: "layer-names", id: "line-layer" });
@@ -30,6 +31,7 @@ export class Lines {
     let index = 1;
     while (taken.has(`L${index}`)) index++;
     this.current = `L${index}`;
+    this.first = null;
     this.update();
     this.app.say(t("line.begun", { name: this.current }));
   }
@@ -39,9 +41,14 @@ export class Lines {
     const { selected } = this.picker;
     if (!selected) return this.app.say(t("say.nothing"), "warning");
     if (!this.current) this.begin();
-    const { points = [], closed = false, layer = this.layer.value || LAYERS[0] } = this.#line ?? {};
+    const line = this.#line;
+    const { points = this.first ? [this.first] : [], closed = false } = line ?? {};
+    const layer = line?.layer ?? (this.layer.value || LAYERS[0]);
     if (points.at(-1) === selected) return undefined;
     if (points.length > 2 && points[0] === selected) return this.#set({ layer, points, closed: true });
+    this.first = points.length ? null : selected;
+    // A line is one from its second point on.
+    if (this.first) return this.update();
     return this.#set({ layer, points: [...points, selected], closed });
   }
 
@@ -57,7 +64,7 @@ export class Lines {
   update() {
     const { lines } = this.app.state;
     setText(this.state, this.current ? t("line.inHand", { name: this.current,
-      corners: this.#line?.points.join(" – ") ?? "" }) : t("line.hint"));
+      corners: this.#line?.points.join(" – ") ?? this.first ?? "" }) : t("line.hint"));
     keyedRows(this.body, lines, { key: ({ name }) => name,
       signature: (line) => JSON.stringify([line, line.name === this.current]),
       build: (line) => this.#row(line) });

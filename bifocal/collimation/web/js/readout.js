@@ -51,8 +51,9 @@ export class Readout {
     const result = item.result ?? {};
     for (const [key, unit, digits, sigma] of VALUES) {
       const value = number(result[key], digits);
+      const shown = unit === "mm" ? this.app.state.length_unit ?? unit : unit;
       const spread = sigma && Number.isFinite(result[sigma]) ? ` ± ${number(result[sigma], 4)}` : "";
-      setText(this.cells[key], value === "–" ? value : `${value}${spread} ${unit}`);
+      setText(this.cells[key], value === "–" ? value : `${value}${spread} ${shown}`);
     }
     const flag = result.flag ?? null;
     setText(this.flag, item.result ? flagWords(flag, result.uncertain_area) : t("flag.incomplete"));
