@@ -97,6 +97,7 @@ export function centre(context, [x, y], text) {
  */
 export function picks(context, pane, { items, images, pick, selected }) {
   const seen = [];
+  const named = new Set();
   const inside = ([x, y]) => x > -20 && y > -20 && x < pane.width + 20 && y < pane.height + 20;
   for (const image of images) {
     const places = [];
@@ -114,6 +115,8 @@ export function picks(context, pane, { items, images, pick, selected }) {
   const crowded = seen.length > LABELS_FROM && pane.zoom < 1;
   for (const [item, [x, y]] of seen) {
     const chosen = item.name === selected;
+    if (named.has(item.name)) continue;
+    named.add(item.name);
     if (!crowded || chosen) label(context, item.name, [x + (chosen ? 15 : 9), y - 8]);
   }
 }

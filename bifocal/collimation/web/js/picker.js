@@ -30,6 +30,12 @@ export class Picker extends EventTarget {
     return this.items().find(({ name }) => name === this.selected) ?? null;
   }
 
+  /** The photo in which the point in hand is still to be picked, or null. */
+  get lacking() {
+    const { item } = this;
+    return (item && [1, 2].find((image) => !this.pick(item, image))) ?? null;
+  }
+
   pick(item, image) {
     return this.connection.pick(this.kind, item, image);
   }
@@ -48,7 +54,7 @@ export class Picker extends EventTarget {
     this.forget();
     const { item } = this;
     if (item) {
-      const missing = [1, 2].find((image) => !this.pick(item, image));
+      const missing = this.lacking;
       this.target = missing ? { name, image: missing } : this.#fresh();
       if (!this.pick(item, this.image)) this.image = missing ? other(missing) : 1;
       if (this.partner) this.#guide(item, missing);
@@ -121,7 +127,7 @@ export class Picker extends EventTarget {
     const known = name ?? this.#freeControl();
     const args = { name: known, image, column, row };
     const answer = await (known ? this.connection.move(op, args) : this.connection.send(op, args));
-    this.selected = known ?? answer.name;
+    this.selected = known ?? answer.name ?? answer;
     this.cursor = null;
     this.image = image;
     await this.#advance();
@@ -138,7 +144,7 @@ export class Picker extends EventTarget {
 
   async #advance() {
     const { item } = this;
-    const missing = item && [1, 2].find((image) => !this.pick(item, image));
+    const missing = this.lacking;
     this.target = missing ? { name: item.name, image: missing } : this.#fresh();
     this.changed();
     if (!item) return;
@@ -175,7 +181,7 @@ export class Picker extends EventTarget {
   async suggest() {
     const { item } = this;
     if (!item) return this.say("say.nothing");
-    const image = [1, 2].find((one) => !this.pick(item, one)) ?? other(this.image);
+    const image = this.lacking ?? other(this.image);
     const from = this.pick(item, other(image));
     if (!from) return this.say("say.nothing");
     const [column, row] = from;
@@ -196,7 +202,8 @@ export class Picker extends EventTarget {
 
   /** Take the proposed partner. */
   async accept() {
-    if (!this.proposal) await this.suggest();
+    await this.latest;
+    if (!this.proposal && this.lacking) await this.suggest();
     if (!this.proposal) return;
     const { name, image, column, row } = this.proposal;
     await this.#next(() => this.#place(name, image, [column, row]));

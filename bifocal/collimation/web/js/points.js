@@ -34,6 +34,9 @@ export class PointsStage {
     this.target = h("p", { class: "target", role: "status", testid: "target" });
     this.quality = h("p", { class: "quality", testid: "quality" });
     this.buttons = this.#buttons();
+    this.areaButton = button(t("pick.area"), () => this.toggleArea(), { class: "quiet",
+      testid: "uncertainty", "aria-pressed": "false" });
+    this.layers.element.append(this.areaButton);
     const hand = h("section", { class: "hand" }, this.target, h("div", { class: "row" },
       Object.values(this.buttons)), this.quality);
     this.element = h("main", { class: "stage work", id: "stage-points" },
@@ -51,9 +54,6 @@ export class PointsStage {
       accept: button(t("pick.accept"), () => picker.accept(), { class: "primary", testid: "accept" }),
       snap: button(t("pick.snap"), () => picker.snap(), { class: "quiet", testid: "snap" }),
       fresh: button(t("pick.new"), () => picker.fresh(), { class: "quiet", testid: "point-new" }),
-      remove: button(t("pick.delete"), () => this.remove(), { class: "quiet", testid: "point-delete" }),
-      area: button(t("pick.area"), () => this.toggleArea(), { class: "quiet", testid: "uncertainty",
-        "aria-pressed": "false" }),
     };
   }
 
@@ -119,7 +119,7 @@ export class PointsStage {
     if (!this.view) return;
     this.area = this.area ? null : pictureLayer(this.view, "layer-area", `/uncertainty.png?v=${Date.now()}`,
       [-0.5, -0.5, width - 0.5, height - 0.5]);
-    this.buttons.area.setAttribute("aria-pressed", String(Boolean(this.area)));
+    this.areaButton.setAttribute("aria-pressed", String(Boolean(this.area)));
     this.#arrange();
   }
 
@@ -199,7 +199,8 @@ export class PointsStage {
     setText(this.target, picking ? t("pick.next", words) : t("pick.off"));
     this.target.dataset.image = target.image;
     this.buttons.pick.setAttribute("aria-pressed", String(picking));
-    for (const key of ["suggest", "accept", "snap", "remove"]) this.buttons[key].disabled = !selected;
+    for (const key of ["suggest", "snap"]) this.buttons[key].disabled = !selected;
+    this.buttons.accept.disabled = !proposal && !this.picker.lacking;
     const level = !proposal ? "" : proposal.kept ? "good" : proposal.quality > 0.5 ? "fair" : "poor";
     setText(this.quality, proposal ? t(`quality.${level}`, { percent: Math.round(100 * proposal.quality),
       sigma: proposal.sigma_px?.toFixed(2) ?? "?" }) : "");

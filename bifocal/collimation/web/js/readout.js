@@ -1,6 +1,6 @@
 /** The point in hand: its name, type, reference and everything that follows from its picks. */
 import { h, number, setText } from "./dom.js";
-import { choice, fill, labelled, numberInput, textInput } from "./fields.js";
+import { button, choice, fill, labelled, numberInput, textInput } from "./fields.js";
 import { t } from "./words/words.js";
 
 export const TYPES = ["plain", "wall", "check", "control"];
@@ -30,8 +30,10 @@ export class Readout {
     this.values = h("dl", { class: "values" }, VALUES.map(([key]) =>
       h("div", { class: key === "r" ? "main" : "" }, h("dt", {}, t(`value.${key}`)), this.cells[key])));
     this.empty = h("p", { class: "hint" }, t("point.none"));
+    this.remove = button(t("pick.delete"), () => app.stages.points.remove(), { class: "quiet", testid: "point-delete" });
+    this.foot = h("div", { class: "row between" }, this.flag, this.remove);
     this.element = h("section", { class: "card readout", "aria-label": t("point.inHand") },
-      this.empty, this.fields, this.values, this.flag, this.references);
+      this.empty, this.fields, this.values, this.references, this.foot);
   }
 
   #refer(key, value) {
@@ -42,7 +44,7 @@ export class Readout {
   update() {
     const { item } = this.picker;
     this.empty.hidden = Boolean(item);
-    for (const part of [this.fields, this.values, this.flag]) part.hidden = !item;
+    for (const part of [this.fields, this.values, this.foot]) part.hidden = !item;
     this.references.hidden = !item || !["check", "control"].includes(item.type);
     if (!item) return;
     fill(this.name, item.name);

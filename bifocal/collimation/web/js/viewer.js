@@ -34,6 +34,21 @@ export function pixelView(width, height) {
   });
 }
 
+/** The tiles at the right and lower edge are smaller: padded, for the viewer would stretch them. */
+async function loadTile(tile, address) {
+  const image = new Image();
+  image.src = address;
+  try {
+    await image.decode();
+  } catch {
+    return tile.setState(3); // OpenLayers' ERROR
+  }
+  if (image.naturalWidth === TILE && image.naturalHeight === TILE) return tile.setImage(image);
+  const whole = h("canvas", { width: TILE, height: TILE });
+  whole.getContext("2d").drawImage(image, 0, 0);
+  return tile.setImage(whole);
+}
+
 /** Layer of one tile pyramid; `info` is what the server says of it. `place`: where its grid lies. */
 export function tileLayer(view, className, address, info, place = null) {
   const [left, top, scale] = place ?? [0, 0, 1];
@@ -48,10 +63,11 @@ export function tileLayer(view, className, address, info, place = null) {
       extent,
       origin: [left, top],
       resolutions,
-      tileSize: info.tile ?? TILE,
+      tileSize: TILE,
     }),
     tileUrlFunction: ([level, column, row]) =>
       `${address}/${level}/${column}_${row}.jpg?v=${info.version}`,
+    tileLoadFunction: loadTile,
     transition: 0,
   });
   return new ol.layer.Tile({ className, extent, source, preload: 2 });
@@ -189,7 +205,8 @@ export class Pane extends EventTarget {
     this.map.updateSize();
     if (this.width && !this.seen) {
       this.seen = true;
-      this.fit();
+      if (!this.view.get("fitted")) this.fit();
+      this.view.set("fitted", true);
       this.dispatchEvent(new Event("seen"));
     }
     this.#draw();
