@@ -18,10 +18,13 @@ from starlette.responses import JSONResponse, Response, StreamingResponse
 from starlette.routing import Mount, Route
 from starlette.staticfiles import StaticFiles
 
+from bifocal.collimation.commands import image_of, pixel_of, positive_of
 from bifocal.collimation.security import COOKIE, Guard, TooLarge
 from bifocal.collimation.session import Session
 from bifocal.collimation.state_view import state_of
-from photocore.errors import PhotogrammetryError
+from photocore.arrays import as_points
+from photocore.errors import InputError, PhotogrammetryError
+from photocore.jsonfile import plain
 
 #: The page itself.
 WEB = Path(__file__).parent / "web"
@@ -45,6 +48,11 @@ def application(session: Session, token: str) -> Starlette:
         Route("/api/state", _state),
         Route("/api/events", _events),
         Route("/api/command", _command, methods=["POST"]),
+        Route("/api/suggest", _suggest, methods=["POST"]),
+        Route("/api/line", _line, methods=["POST"]),
+        Route("/api/snap", _snap, methods=["POST"]),
+        Route("/api/measure", _measure, methods=["POST"]),
+        Route("/api/convert", _convert, methods=["POST"]),
         Route("/tiles/{space}/{image:int}/info", _tile_info),
         Route("/tiles/{space}/{image:int}/{level:int}/{column:int}_{row:int}.jpg", _tile),
         Mount("/", StaticFiles(directory=WEB)),
@@ -136,6 +144,44 @@ async def _command(request: Request) -> Response:
             return {"revision": session.revision, "result": result, "state": state_of(session)}
 
     return answer(await in_thread(carry_out))
+
+
+async def _suggest(request: Request) -> Response:
+    body = await json_body(request)
+    image, pixel = image_of(body), pixel_of(body)
+    return answer(await in_thread(session_of(request).suggest, image, pixel))
+
+
+async def _line(request: Request) -> Response:
+    body = await json_body(request)
+    image, pixel = image_of(body), pixel_of(body)
+    return answer({"line": await in_thread(session_of(request).line, image, pixel)})
+
+
+async def _snap(request: Request) -> Response:
+    body = await json_body(request)
+    image, pixel, radius = image_of(body), pixel_of(body), positive_of(body, "radius")
+    return answer(await in_thread(session_of(request).snap, image, pixel, radius or 8.0))
+
+
+async def _measure(request: Request) -> Response:
+    names = (await json_body(request)).get("points")
+    if not isinstance(names, list) or len(names) > 1000:
+        raise InputError("points: expected a list of names.")
+    return answer(await in_thread(session_of(request).measure, [str(name) for name in names]))
+
+
+async def _convert(request: Request) -> Response:
+    body = await json_body(request)
+    source = body.get("from", "photo")
+    if source not in ("photo", "wall"):
+        raise InputError("from: photo or wall.")
+    pixels = as_points(body.get("pixels") or [], "pixels", dimension=2)
+    if pixels.ndim != 2:
+        raise InputError("pixels: expected a list of [column, row].")
+    session = session_of(request)
+    moved = await in_thread(session.convert, image_of(body), pixels, source)
+    return answer({"pixels": plain(moved)})
 
 
 async def _events(request: Request) -> Response:

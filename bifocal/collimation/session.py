@@ -5,7 +5,8 @@ from __future__ import annotations
 import copy
 import queue
 import threading
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
@@ -15,19 +16,28 @@ import numpy as np
 from bifocal.collimation.commands import changes_of
 from bifocal.collimation.journal import Journal
 from bifocal.collimation.live_results import LiveResults
+from bifocal.collimation.measures import measure
 from bifocal.collimation.project import SurveyFiles
 from bifocal.collimation.pyramids import Pyramid, RectifiedPhoto, wall_grid
-from bifocal.collimation.records import Change, SurveyState
+from bifocal.collimation.records import Change, PickedPoint, Pixel, SurveyState
+from bifocal.collimation.snapping import snap
+from bifocal.collimation.suggestions import radial_line, suggest
 from bifocal.collimation.tile_store import TileStore
+from bifocal.collimation.workbook_rows import PointRow, row_of
+from bifocal.collimation.workbook_sync import WorkbookSync
 from bifocal.files.images import ImageInfo, image_info, read_image
+from bifocal.model.flags import FlagLimits
 from bifocal.model.grid import Grid
 from bifocal.model.pair import Pair
-from photocore.arrays import FloatArray
+from photocore.arrays import ByteArray, FloatArray
 from photocore.errors import InputError
+from photocore.jsonfile import plain
 from photocore.output import relative_name
 
 #: Commands that were answered already, by their ids.
 MOST_ANSWERS = 10_000
+#: Records of the journal that are notes, not commands.
+_NO_COMMANDS = ("files", "workbook.saved", "workbook.read")
 
 
 class Session:
@@ -59,13 +69,14 @@ class Session:
         self.pyramids: list[Pyramid] = []
         self.results: LiveResults | None = None
         self.tiles = TileStore(files.folder / f".{files.stem}.tiles")
+        self.sync = WorkbookSync(self)
         self._open_files()
         self.state = SurveyState()
         self.journal = Journal(files.journal)
         try:
-            for record in self.journal.records:
-                self._replay(record)
+            self._replay_all()
             self._remember_files()
+            self.sync.step()
         except BaseException:
             self.journal.close()
             raise
@@ -184,13 +195,60 @@ class Session:
         target.append(changes)
         return changes[-1].key
 
-    def _replay(self, record: dict[str, Any]) -> None:
-        """Carry out a command of the journal; what is none of the page's own is for others."""
-        if record["op"] == "files":
-            return
-        self._carry_out(record, write=False)
-        if isinstance(record.get("id"), str):
-            self._remember_answer(record["id"], record.get("name"))
+    def _replay_all(self) -> None:
+        """Carry out the journal, and find out what of it stands in the workbook."""
+        saved = [record for record in self.journal.records if record["op"] == "workbook.saved"]
+        at = saved[-1].get("at") if saved else None
+        for record in self.journal.records:
+            if record["op"] == "workbook.read":
+                rows, gone = _rows_of(record)
+                self._apply_rows(rows, gone)
+                self.sync.take(rows, gone)
+            elif record["op"] == "workbook.saved":
+                self.sync.digest = record.get("sha256", "")
+            elif record["op"] not in _NO_COMMANDS:
+                self._carry_out(record, write=False)
+                if isinstance(record.get("id"), str):
+                    self._remember_answer(record["id"], record.get("name"))
+            if self.state.revision == at:
+                self.sync.synced = {n: row_of(p) for n, p in self.state.points.items()}
+
+    # ---- the workbook
+
+    def take_rows(self, rows: Mapping[str, PointRow], gone: Sequence[str]) -> None:
+        """Take over points that were changed in the workbook by others."""
+        record = {
+            "op": "workbook.read",
+            "rows": {name: asdict(row) for name, row in rows.items()},
+            "gone": list(gone),
+        }
+        self._write(record)
+        self._apply_rows(rows, gone)
+
+    def _apply_rows(self, rows: Mapping[str, PointRow], gone: Sequence[str]) -> None:
+        points = self.state.points
+        for name, row in rows.items():
+            before = points.get(name)
+            order = before.order if before is not None else self.state.next_order()
+            points[name] = PickedPoint(
+                name=name, order=order, picks=row.picks, code=row.code, note=row.note,
+                # What is picked in one photo only was left out for that alone.
+                use=row.use or None in row.picks, reference=row.reference,
+            )  # fmt: skip
+        for name in gone:
+            points.pop(name, None)
+        self.state.revision += 1
+
+    def note_saved(self, digest: str, revision: int) -> None:
+        """Say in the journal that the workbook holds the survey as of a revision."""
+        with self.lock:
+            self._write({"op": "workbook.saved", "sha256": digest, "at": revision})
+
+    def set_precision(self, sigma_px: float | None, limits: FlagLimits) -> None:
+        """Let the results follow the precision and limits of the workbook."""
+        known = self.results
+        if known is not None and (known.sigma_px, known.limits) != (sigma_px, limits):
+            self.results = LiveResults(known.pair, sigma_px, limits)
 
     def _write(self, record: Mapping[str, Any]) -> None:
         stamp = datetime.now(UTC).isoformat(timespec="milliseconds")
@@ -213,7 +271,8 @@ class Session:
     # ---- listeners
 
     def changed(self) -> None:
-        """Tell all listeners that the state is another."""
+        """Tell all listeners that the state is another, and the workbook's writer."""
+        self.sync.touch()
         with self.lock:
             self.revision += 1
             self.tell({"revision": self.revision})
@@ -232,7 +291,73 @@ class Session:
     def close(self) -> None:
         """End the session."""
         self.tell(None)
+        self.sync.stop()
         self.journal.close()
+
+    # ---- measuring
+
+    def photos(self) -> tuple[ByteArray, ByteArray]:
+        """Return both photos, 8 bit; they are read once.
+
+        Raises
+        ------
+        InputError
+            If there are no two photos yet.
+        """
+        if len(self.pyramids) < 2:
+            raise InputError("there are no photos yet; give two.")
+        return self.pyramids[0].halved(0), self.pyramids[1].halved(0)
+
+    def suggest(self, image: int, pixel: Pixel) -> dict[str, Any]:
+        """Return where the other photo shows a pick, with the line on which it must lie."""
+        pair = self.needed_pair()
+        found = suggest(pair, self.photos(), image, np.array(pixel))
+        return plain(
+            {
+                "column": found.pixel[0],
+                "row": found.pixel[1],
+                "quality": found.quality,
+                "score": found.score,
+                "sigma_px": found.sigma_px,
+                "misfit_px": found.misfit_px,
+                "kept": found.kept,
+                "line": self.line(image, pixel),
+            }
+        )
+
+    def line(self, image: int, pixel: Pixel) -> list[list[float]]:
+        """Return the line in the other photo on which a pick must lie. [px]"""
+        pair, size = self.needed_pair(), self.infos[2 - image].size
+        return radial_line(pair, image, np.array(pixel), size).tolist()
+
+    def snap(self, image: int, pixel: Pixel, radius: float) -> dict[str, Any]:
+        """Return the target's centre or the corner next to a pick."""
+        return snap(self.photos()[image - 1], pixel, radius)._asdict()
+
+    def measure(self, names: Sequence[str]) -> dict[str, float | None]:
+        """Return distances and angles between points."""
+        self.needed_pair()
+        places = []
+        for name in names:
+            point = self.state.points.get(name)
+            if point is None:
+                raise InputError(f"there is no point {name}.")
+            place = None if self.results is None else self.results.place(point)
+            if place is None:
+                raise InputError(f"point {name} is not picked in both photos yet.")
+            places.append(place)
+        return measure(places)
+
+    def convert(self, image: int, pixels: FloatArray, source: str) -> FloatArray:
+        """Return pixels of a photo as pixels of the wall or back, shape (n, 2); any lens model."""
+        photo, grid = self.needed_pair().photo(image), self.grid
+        assert grid is not None
+        if source == "photo":
+            return grid.pixel_of(photo.plane_from_pixels(pixels))
+        plane = np.column_stack(
+            [grid.x0 + grid.gsd * pixels[:, 0], grid.y0 - grid.gsd * pixels[:, 1]]
+        )
+        return photo.pixels_from_plane(plane)
 
     # ---- geometry
 
@@ -254,6 +379,16 @@ class Session:
         assert grid is not None
         matrix = np.linalg.inv(pair.photo(number).plane_from_pixel) @ grid.plane_from_pixel
         return np.asarray(matrix / matrix[2, 2])
+
+
+def _rows_of(record: Mapping[str, Any]) -> tuple[dict[str, PointRow], list[str]]:
+    """Return the rows that a record of the journal holds."""
+    rows = {}
+    for name, row in record["rows"].items():
+        first, second = (None if pick is None else tuple(pick) for pick in row["picks"])
+        known = None if row["reference"] is None else tuple(row["reference"])
+        rows[name] = PointRow((first, second), row["code"], row["note"], row["use"], known)
+    return rows, list(record["gone"])
 
 
 def _facts(path: Path) -> tuple[str, int, int]:

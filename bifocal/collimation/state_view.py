@@ -22,7 +22,7 @@ def state_of(session: Session) -> dict[str, Any]:
             "title": session.files.stem,
             "stage": state.stage or _stage(session),
             "workbook": session.files.workbook.name,
-            "workbook_waiting": None,
+            "workbook_waiting": session.sync.waiting,
             "photos": _photos(session),
             "setup": {key: state.setup.get(key) for key in SETUP},
             "pair": None if session.pair is None else _pair(session, session.pair),
@@ -37,6 +37,7 @@ def state_of(session: Session) -> dict[str, Any]:
                 {"name": x.name, "layer": x.layer, "points": list(x.points), "closed": x.closed}
                 for x in state.lines.values()
             ],
+            "length_unit": _length_unit(session),
             "selection": None,
             "products": {"relief": None, "ortho": None, "files": []},
             "jobs": [],
@@ -50,6 +51,12 @@ def _stage(session: Session) -> str:
     if len(session.infos) < 2:
         return "photos"
     return "orientation" if session.pair is None else "points"
+
+
+def _length_unit(session: Session) -> str:
+    """Return the unit of s1, s2, delta_s and e1: on the wall where no camera constant is known."""
+    known = session.pair is not None and session.pair.image1.principal_distance is not None
+    return "mm" if known else "m"
 
 
 def _photos(session: Session) -> list[dict[str, Any]]:

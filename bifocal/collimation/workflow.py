@@ -82,6 +82,7 @@ def page_server(
                 application(session, token), log_level="error", access_log=False,
                 lifespan="off", server_header=False, timeout_graceful_shutdown=1,
             )  # fmt: skip
+            session.sync.start()
             url = f"http://{HOST}:{number}/?token={token}"
             yield PageServer(url, token, session, uvicorn.Server(config), listening)
     finally:
