@@ -9,6 +9,7 @@ import shutil
 import signal
 import subprocess
 import sys
+import uuid
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -54,6 +55,10 @@ class Served:
         self.url, self.token = told["url"], told["token"]
         self.port = int(self.url.split(":")[2].split("/")[0])
         return self
+
+    @property
+    def origin(self) -> str:
+        return self.url.split("/?")[0]
 
     def kill(self) -> None:
         """End it as a power failure does."""
@@ -105,6 +110,7 @@ class Driver:
 
     def __init__(self, browser: Any, server: Served, **context: Any) -> None:
         size = {"width": 1280, "height": 720}
+        self.server = server
         self.context = browser.new_context(**({"viewport": size} | context))
         self.requests: list[str] = []
         self.faults: list[str] = []
@@ -165,16 +171,35 @@ class Driver:
         )
         return self.state
 
+    def command(self, op: str, **fields: Any) -> Any:
+        """Send a command past the page, as another tab would."""
+        body = {"id": uuid.uuid4().hex, "op": op, **fields}
+        answer = self.context.request.post(self.server.origin + "/api/command", data=body)
+        assert answer.ok, answer.text()
+        return answer.json()["result"]
+
+    def empty(self) -> None:
+        """Delete all points: the next test begins with none."""
+        for point in self.state["points"]:
+            self.command("point.delete", name=point["name"])
+
+    def still(self, image: int, pixel: tuple[float, float]) -> tuple[float, float]:
+        """Return where a pixel of a photo is once the view has come to rest. [CSS px]"""
+        seen = None
+        while (place := self.screen(image, pixel)) != seen:
+            seen = place
+            self.tab.wait_for_timeout(120)
+        return place
+
     def zoom_to(self, image: int, pixel: tuple[float, float], zoom: float) -> None:
         """Bring a pixel of a photo to the middle of the pane, at screen pixels a wall pixel."""
         for _ in range(12):
-            x, y = self.screen(image, pixel)
+            x, y = self.still(image, pixel)
             width = self.screen(image, (pixel[0] + 1, pixel[1]))[0] - x
             if abs(width / zoom - 1) < 0.3:
                 break
             self.tab.mouse.move(x, y)
             self.tab.mouse.wheel(0, -120 if width < zoom else 120)
-            self.tab.wait_for_timeout(180)
 
 
 def tab_of(browser: Any, server: Served, **context: Any) -> contextlib.closing[Driver]:

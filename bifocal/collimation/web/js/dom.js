@@ -42,7 +42,9 @@ export function keyedRows(body, items, { key, signature, build }) {
     if (row && row.dataset.mark !== mark && !row.querySelector("input:focus, select:focus")) {
       const fresh = build(item);
       if (place === row) place = fresh;
+      const focused = row.contains(document.activeElement);
       row.replaceWith(fresh);
+      if (focused) fresh.querySelector("button, input, select")?.focus();
       row = fresh;
     }
     old.delete(name);

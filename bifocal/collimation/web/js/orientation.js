@@ -96,19 +96,23 @@ export class OrientationStage {
     const mark = photoMark(state);
     if (state.photos.length < 2 || this.mark === mark) return;
     this.mark = mark;
-    const infos = await this.app.pyramids.both("photo", mark);
-    this.panes = infos.map((info, index) => this.#pane(index + 1, info));
+    this.panes = state.photos.map((photo) => this.#pane(photo));
     this.photos.replaceChildren(...this.panes.map(({ element }) => element));
-    infos.forEach((info, index) => this.loupe.source(index + 1, info));
+    for (const pane of this.panes) pane.mounted();
+    const infos = await this.app.pyramids.both("photo", mark);
+    infos.forEach((info, index) => {
+      const { view, image } = this.panes[index];
+      this.panes[index].setLayers([tileLayer(view, `layer-${image}`, `/tiles/photo/${image}`, info)]);
+      this.loupe.source(image, info);
+    });
   }
 
-  #pane(image, info) {
-    const view = pixelView(info.width, info.height);
+  #pane({ image, width, height }) {
+    const view = pixelView(width, height);
     const role = t(image === 1 ? "photo.far" : "photo.near");
     const pane = new Pane({ label: t("pane.photo", { image, role }), view, frame: asTaken,
       painter: (context, self) => this.#draw(context, self) });
     Object.assign(pane, { image, images: [image] });
-    pane.setLayers([tileLayer(view, `layer-${image}`, `/tiles/photo/${image}`, info)]);
     this.app.follow(pane, this.picker);
     pane.element.append(h("span", { class: `badge ink-${image}` }, `${image} · ${role}`));
     return pane;

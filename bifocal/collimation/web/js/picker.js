@@ -50,6 +50,7 @@ export class Picker extends EventTarget {
 
   /** Take a point in hand; what it lacks is picked next. */
   select(name) {
+    if (name === this.selected && this.item) return this.changed();
     this.selected = name;
     this.forget();
     const { item } = this;
@@ -57,11 +58,12 @@ export class Picker extends EventTarget {
       const missing = this.lacking;
       this.target = missing ? { name, image: missing } : this.#fresh();
       if (!this.pick(item, this.image)) this.image = missing ? other(missing) : 1;
-      if (this.partner) this.#guide(item, missing);
+      if (this.partner && missing) this.suggest();
+      else if (this.partner) this.#guide(item, null);
     } else {
       this.target = this.#fresh();
     }
-    this.changed();
+    return this.changed();
   }
 
   forget() {
@@ -222,6 +224,8 @@ export class Picker extends EventTarget {
     const { image } = this;
     const args = { name: item.name, image, column, row };
     this.hovered = null;
+    // What is complete and was moved by hand stays: the next click is a new point's.
+    if (!this.lacking) this.target = this.#fresh();
     this.connection.move(`${this.kind}.pick`, args).catch((error) => {
       this.dispatchEvent(new CustomEvent("refused", { detail: error }));
     });

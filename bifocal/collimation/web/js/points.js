@@ -66,19 +66,22 @@ export class PointsStage {
     return { done: true, text: t("status.points.some", { count: points.length }) };
   }
 
+  /** Panes at once, so that pixels have their place; tiles as soon as the server tells of them. */
   async prepare(state) {
     const mark = wallMark(state);
     if (!state.pair || this.mark === mark) return;
     this.mark = mark;
     this.wall = new Wall(state.pair);
+    this.view = pixelView(this.wall.width, this.wall.height);
+    this.tileLayers = null;
+    this.area = null;
+    this.#makePanes();
     const [walls, photos] = await Promise.all([this.app.pyramids.both("wall", mark),
       this.app.pyramids.both("photo", photoMark(state))]);
-    const { width, height } = this.wall;
-    this.view = pixelView(width, height);
+    if (this.mark !== mark) return;
     this.tileLayers = Object.fromEntries([1, 2].map((image) => [image,
       tileLayer(this.view, `layer-${image}`, `/tiles/wall/${image}`, walls[image - 1])]));
     photos.forEach((info, index) => this.loupe.source(index + 1, info));
-    this.#makePanes();
     this.layers.use(this.tileLayers);
     this.#arrange();
   }
@@ -93,6 +96,8 @@ export class PointsStage {
     this.main = pane(t("pane.wall"));
     this.second = pane(t("pane.photo", { image: 2, role: t("photo.near") }));
     this.photos.replaceChildren(this.main.element, this.second.element, this.layers.handle);
+    this.#arrange();
+    for (const one of this.panes) one.mounted();
   }
 
   /** One pane for both photos, or one each that share the view. */
@@ -105,12 +110,13 @@ export class PointsStage {
     this.second.image = split ? 2 : null;
     this.main.images = split ? [1] : [1, 2];
     this.second.images = [2];
+    this.panes = split ? [this.main, this.second] : [this.main];
+    if (!this.tileLayers) return;
     const { 1: far, 2: near } = this.tileLayers;
     const area = this.area ? [this.area] : [];
     this.second.setLayers([]);
     this.main.setLayers(split ? [far, ...area] : [far, near, ...area]);
     this.second.setLayers(split ? [near] : []);
-    this.panes = split ? [this.main, this.second] : [this.main];
     this.#paint();
   }
 

@@ -119,6 +119,7 @@ export class ProductsStage {
       this.profile.click(this.wall.toPlane(this.pane.unplace(detail.pixel)));
     });
     this.photos.replaceChildren(this.pane.element);
+    this.pane.mounted();
   }
 
   /** Outer edges on the plane [m] -> outer edges on the wall's grid, in columns and rows. */

@@ -15,7 +15,7 @@ export class Readout {
     this.picker = picker;
     const { send } = app;
     this.name = textInput({ label: t("point.name"), testid: "point-name",
-      save: (text) => text && send("point.rename", { name: picker.selected, new: text }) });
+      save: (text) => text && this.#rename(text) });
     this.type = choice({ label: t("point.type"), testid: "point-type",
       options: Object.fromEntries(TYPES.map((type) => [type, t(`type.${type}`)])),
       save: (type) => send("point.type", { name: picker.selected, type }) });
@@ -34,6 +34,18 @@ export class Readout {
     this.foot = h("div", { class: "row between" }, this.flag, this.remove);
     this.element = h("section", { class: "card readout", "aria-label": t("point.inHand") },
       this.empty, this.fields, this.values, this.references, this.foot);
+  }
+
+  /** The point stays in hand under its new name. */
+  async #rename(name) {
+    const { selected } = this.picker;
+    try {
+      await this.app.connection.send("point.rename", { name: selected, new: name });
+      if (this.picker.selected === selected) this.picker.select(name);
+    } catch (error) {
+      this.app.refuse(error);
+      this.update();
+    }
   }
 
   #refer(key, value) {

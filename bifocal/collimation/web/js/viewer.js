@@ -198,6 +198,11 @@ export class Pane extends EventTarget {
     this.dispatchEvent(new CustomEvent(type, { detail: { pixel, pane: this } }));
   }
 
+  /** Take the size of the place it was just put in. */
+  mounted() {
+    this.#resize();
+  }
+
   #resize() {
     const ratio = window.devicePixelRatio;
     this.canvas.width = Math.round(this.width * ratio);
