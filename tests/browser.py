@@ -179,9 +179,15 @@ class Driver:
         return answer.json()["result"]
 
     def empty(self) -> None:
-        """Delete all points: the next test begins with none."""
+        """Delete all points and let go of everything: the next test begins afresh."""
         for point in self.state["points"]:
             self.command("point.delete", name=point["name"])
+        self.settled("state.points.length === 0")
+        self.click("mode-points")
+        self.tab.locator(".pane").first.focus()
+        self.keys("Escape", "Escape", "n", "v", "0")
+        self.tab.get_by_test_id("layer-opacity").fill("50")
+        self.tab.locator(".pane").first.focus()
 
     def still(self, image: int, pixel: tuple[float, float]) -> tuple[float, float]:
         """Return where a pixel of a photo is once the view has come to rest. [CSS px]"""

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from tests.browser import Driver, Served, launched, sample_survey, tab_of
+from tests.browser import Driver, launched, sample_survey, tab_of
 
 #: Of the sample: metres on the wall a pixel, principal point, distances. (tests/scenes/make_sample)
 GSD, CENTRE, DISTANCE = 0.00738, (767.5, 511.5), {1: 17.5, 2: 9.5}
@@ -27,23 +27,17 @@ def true_pixel(image: int, name: str) -> tuple[float, float]:
 
 
 @pytest.fixture(scope="module")
-def browser() -> Iterator[Any]:
-    with launched() as found:
-        yield found
-
-
-@pytest.fixture(scope="module")
-def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
-    with sample_survey(tmp_path_factory.mktemp("survey")) as started:
-        yield started
+def tab(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Driver]:
+    folder = tmp_path_factory.mktemp("survey")
+    with launched() as browser, sample_survey(folder) as server, tab_of(browser, server) as driver:
+        yield driver
 
 
 @pytest.fixture
-def page(browser: Any, server: Served) -> Iterator[Driver]:
-    """Return a tab on a survey without points."""
-    with tab_of(browser, server) as driver:
-        yield driver
-        driver.empty()
+def page(tab: Driver) -> Driver:
+    """Return the page with no points, both photos whole and superimposed."""
+    tab.empty()
+    return tab
 
 
 def distance(a: Any, b: Any) -> float:

@@ -259,10 +259,12 @@ async function start() {
   app.build();
   let waiting = 0;
   connection.addEventListener("state", () => {
-    if (connection.state.language !== language && !connection.unsent.length) return location.reload();
     // Many answers in one frame are drawn once.
-    waiting ||= requestAnimationFrame(() => { waiting = 0; app.update(); });
-    return undefined;
+    waiting ||= requestAnimationFrame(() => {
+      waiting = 0;
+      if (connection.state.language === language) app.update();
+      else location.reload();
+    });
   });
   connection.addEventListener("reach", () => app.reach());
   connection.addEventListener("refused", ({ detail }) => app.refuse(detail));
