@@ -206,8 +206,12 @@ def _control(state: SurveyState, command: Fields) -> PickedControl:
     return state.control[name]
 
 
+def _control_name(state: SurveyState, command: Fields) -> str:
+    return text_of(command, "name") if command.get("name") else state.free_name("C")
+
+
 def _control_set(state: SurveyState, command: Fields) -> list[Change]:
-    name, known = text_of(command, "name"), _known(command)
+    name, known = _control_name(state, command), _known(command)
     before = state.control.get(name)
     after = replace(
         before or PickedControl(name=name, order=state.next_order()), known=known
@@ -216,7 +220,7 @@ def _control_set(state: SurveyState, command: Fields) -> list[Change]:
 
 
 def _control_pick(state: SurveyState, command: Fields) -> list[Change]:
-    name, image = text_of(command, "name"), image_of(command)
+    name, image = _control_name(state, command), image_of(command)
     pixel = None if command.get("column") is None else pixel_of(command)
     before = state.control.get(name)
     if before is None and pixel is None:
@@ -308,6 +312,34 @@ def _setup_set(state: SurveyState, command: Fields) -> None:
     state.setup |= given
 
 
+def _exchange(state: SurveyState, command: Fields) -> None:  # noqa: ARG001
+    """Exchange far and near photo; what was picked goes with them."""
+    state.points = {n: replace(p, picks=p.picks[::-1]) for n, p in state.points.items()}
+    state.control = {n: replace(p, picks=p.picks[::-1]) for n, p in state.control.items()}
+    state.lenses = {3 - image: lens for image, lens in state.lenses.items()}
+    state.done, state.undone = [], []
+
+
+def _points_add(state: SurveyState, command: Fields) -> list[Change]:
+    """Add points that a job found; names that are taken get another number."""
+    found = command.get("points")
+    if not isinstance(found, list) or len(found) + len(state.points) > MOST_POINTS:
+        raise InputError(f"points: expected a list; a survey holds at most {MOST_POINTS}.")
+    changes, taken = [], set(state.points)
+    for entry in found:
+        name = text_of(entry, "name")
+        while name in taken:
+            name = f"{name}b"
+        taken.add(name)
+        first, second = (pixel_of({"column": c, "row": r}) for c, r in entry["picks"])
+        point = PickedPoint(
+            name=name, order=state.next_order(), picks=(first, second),
+            code=str(entry.get("code", ""))[:LONGEST_NAME], note=str(entry.get("note", ""))[:200],
+        )  # fmt: skip
+        changes.append(Change("points", name, None, point))
+    return changes
+
+
 def _stage_set(state: SurveyState, command: Fields) -> None:
     if command.get("stage") not in STAGES:
         raise InputError(f"stage: one of {', '.join(STAGES)}.")
@@ -327,6 +359,7 @@ _RECORDS: dict[Any, Callable[[SurveyState, Fields], list[Change]]] = {
     "point.type": _type,
     "point.reference": _reference,
     "point.delete": _delete,
+    "points.add": _points_add,
     "line.set": _line_set,
     "line.delete": _line_delete,
     "control.set": _control_set,
@@ -340,6 +373,7 @@ _RECORDS: dict[Any, Callable[[SurveyState, Fields], list[Change]]] = {
 _SETTINGS: dict[Any, Callable[[SurveyState, Fields], None]] = {
     "photo.set": _lens_set,
     "setup.set": _setup_set,
+    "photos.exchange": _exchange,
     "stage.set": _stage_set,
     "language.set": _language_set,
 }

@@ -6,38 +6,32 @@ import copy
 import queue
 import threading
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from bifocal.collimation.commands import changes_of
+from bifocal.collimation.jobs import JobRunner
 from bifocal.collimation.journal import Journal
+from bifocal.collimation.live_orientation import LiveOrientation, live_orientation
 from bifocal.collimation.live_results import LiveResults
 from bifocal.collimation.measures import measure
+from bifocal.collimation.pictures import Pictures
+from bifocal.collimation.products import Products, accept_pair
 from bifocal.collimation.project import SurveyFiles
-from bifocal.collimation.pyramids import Pyramid, RectifiedPhoto, wall_grid
-from bifocal.collimation.records import Change, PickedPoint, Pixel, SurveyState
-from bifocal.collimation.snapping import snap
-from bifocal.collimation.suggestions import radial_line, suggest
-from bifocal.collimation.tile_store import TileStore
+from bifocal.collimation.records import Change, PickedPoint, SurveyState
 from bifocal.collimation.workbook_rows import PointRow, row_of
 from bifocal.collimation.workbook_sync import WorkbookSync
-from bifocal.files.images import ImageInfo, image_info, read_image
 from bifocal.model.flags import FlagLimits
-from bifocal.model.grid import Grid
 from bifocal.model.pair import Pair
-from photocore.arrays import ByteArray, FloatArray
 from photocore.errors import InputError
-from photocore.jsonfile import plain
 from photocore.output import relative_name
 
 #: Commands that were answered already, by their ids.
 MOST_ANSWERS = 10_000
 #: Records of the journal that are notes, not commands.
-_NO_COMMANDS = ("files", "workbook.saved", "workbook.read")
+_NO_COMMANDS = ("files", "workbook.saved", "workbook.read", "made", "proposed", "accepted")
 
 
 class Session:
@@ -63,19 +57,23 @@ class Session:
         self.listeners: set[queue.SimpleQueue[dict[str, Any] | None]] = set()
         self.revision = 0
         self.answered: dict[str, Any] = {}
-        self.pair: Pair | None = None
-        self.grid: Grid | None = None
-        self.infos: list[ImageInfo] = []
-        self.pyramids: list[Pyramid] = []
         self.results: LiveResults | None = None
-        self.tiles = TileStore(files.folder / f".{files.stem}.tiles")
-        self.sync = WorkbookSync(self)
-        self._open_files()
+        self.orientation: tuple[object, LiveOrientation] | None = None
+        self.proposal: dict[str, Any] | None = None
         self.state = SurveyState()
         self.journal = Journal(files.journal)
         try:
+            pair = Pair.read(files.pair) if files.pair is not None else None
+            photos = files.photos if pair is None else (pair.photo_file(1), pair.photo_file(2))
+            self.pictures = Pictures(files.folder / f".{files.stem}.tiles", photos, pair)
+            self.results = None if pair is None else LiveResults(pair)
+            self.products = Products(files)
+            self.jobs = JobRunner(self)
+            self.sync = WorkbookSync(self)
             self._replay_all()
             self._remember_files()
+            self._show_proposal()
+            self.show_products()
             self.sync.step()
         except BaseException:
             self.journal.close()
@@ -83,37 +81,103 @@ class Session:
 
     # ---- the survey's files
 
-    def _open_files(self) -> None:
-        """Read the pair and the headers of the photos, and offer their pictures."""
-        self.pair = Pair.read(self.files.pair) if self.files.pair is not None else None
-        photos = self.files.photos
-        if self.pair is not None:
-            photos = (self.pair.photo_file(1), self.pair.photo_file(2))
-        self.infos = [image_info(path) for path in photos]
-        self.pyramids = [
-            Pyramid(info.size, lambda path=info.path: read_image(path))  # type: ignore[misc]
-            for info in self.infos
-        ]
-        for number, (info, pyramid) in enumerate(
-            zip(self.infos, self.pyramids, strict=True), start=1
-        ):
-            self.tiles.register(f"photo-{number}", pyramid, *_facts(info.path))
-        self.grid = self.results = None
-        if self.pair is not None:
-            self._open_pair(self.pair)
+    def give_photos(self, photos: Sequence[Path]) -> None:
+        """Begin with two photos; what was picked in others is of no use any more.
 
-    def _open_pair(self, pair: Pair) -> None:
-        sizes = (self.infos[0].size, self.infos[1].size)
-        self.grid = wall_grid(pair, sizes)
-        for number, pyramid in enumerate(self.pyramids, start=1):
-            photo = pair.photo(number)
-            picture = RectifiedPhoto.of(photo, number, pyramid, self.grid)
-            lens = photo.lens and (photo.lens.camera_matrix.tolist(), photo.lens.model,
-                                   photo.lens.coefficients.tolist())  # fmt: skip
-            facts = (*_facts(pyramid_path(self.infos, number)), photo.plane_from_pixel.tolist(),
-                     lens, self.grid)  # fmt: skip
-            self.tiles.register(f"wall-{number}", picture, *facts)
+        Raises
+        ------
+        InputError
+            If they are none, or picks were made already.
+        """
+        with self.lock:
+            self.check_new_photos()
+            self.pictures.show_photos(photos)
+            self.files = replace(self.files, photos=tuple(photos), pair=None)
+            self.results, self.proposal = None, None
+            self._remember_files()
+            self.changed()
+
+    def check_new_photos(self) -> None:
+        """Refuse other photos where points were picked already.
+
+        Raises
+        ------
+        InputError
+            Then.
+        """
+        if self.state.points or self.state.control:
+            raise InputError(
+                "points are picked already in the photos given before; begin another survey in "
+                "another folder for other photos."
+            )
+
+    def propose(self, path: Path, report: Mapping[str, Any]) -> None:
+        """Show the orientation that a job found; `align.accept` makes it the survey's own."""
+        with self.lock:
+            record = {"op": "proposed", "pair": path.name, "report": dict(report)}
+            self._write(record)
+            self.proposal = record
+            first = Pair.read(path).photo_file(1)
+            if not first.samefile(self.pictures.infos[0].path):
+                self.command({"op": "photos.exchange"})
+            self._show_proposal()
+            self.changed()
+
+    def _show_proposal(self) -> None:
+        path = self.proposed_path
+        if path is not None:
+            pair = Pair.read(path)
+            self.pictures.show_pair(pair)
+            self.results = LiveResults(pair)
+
+    @property
+    def proposed_path(self) -> Path | None:
+        """The pair file that waits to be accepted."""
+        if self.proposal is None:
+            return None
+        path = self.files.folder / self.proposal["pair"]
+        return path if path.is_file() else None
+
+    @property
+    def accepted_pair(self) -> Pair | None:
+        """The orientation that the workbook is written for; None before one is accepted."""
+        return None if self.proposed_path is not None else self.pictures.pair
+
+    def _accept(self) -> None:
+        """Make the proposed orientation the survey's own pair file."""
+        path = self.proposed_path
+        if path is None:
+            raise InputError("there is no orientation to accept; align the photos first.")
+        target = self.products.place("pair", ".pair.json")
+        accept_pair(path, target)
+        self.files = replace(self.files, pair=target)
+        self.note_made("pair", [target.name])
+        self._write({"op": "accepted"})
+        self.proposal = None
+        self._remember_files()
+        pair = Pair.read(target)
+        self.pictures.show_pair(pair)
         self.results = LiveResults(pair)
+        if self.sync.read is not None:
+            self.set_precision(self.sync.read.sigma_px, self.sync.read.limits)
+
+    def _exchange_photos(self) -> None:
+        photos = [info.path for info in self.pictures.infos][::-1]
+        self.pictures.show_photos(photos)
+        self.files = replace(self.files, photos=tuple(photos))
+        self._remember_files()
+
+    def note_made(self, kind: str, names: Sequence[str]) -> None:
+        """Say in the journal which files the page made: these it may replace."""
+        with self.lock:
+            self._write({"op": "made", "kind": kind, "names": list(names)})
+            self.products.note(kind, names)
+
+    def show_products(self) -> None:
+        """Show the orthophoto, where there is one."""
+        ortho = self.products.current("ortho")
+        if ortho is not None:
+            self.pictures.show_ortho(ortho)
 
     def _remember_files(self) -> None:
         """Say in the journal which files belong to the survey, where that is new."""
@@ -122,11 +186,12 @@ class Session:
             "op": "files",
             "stem": self.files.stem,
             "pair": relative_name(pair, folder) if pair else None,
-            "photos": [relative_name(info.path, folder) for info in self.infos],
+            "photos": [relative_name(info.path, folder) for info in self.pictures.infos],
         }
         known = [old for old in self.journal.records if old["op"] == "files"]
         if not known or {key: known[-1].get(key) for key in record} != record:
             self._write(record)
+            self.journal.records.append(record)
 
     # ---- commands
 
@@ -144,12 +209,25 @@ class Session:
             known = command.get("id")
             if isinstance(known, str) and known in self.answered:
                 return self.answered[known]
-            self._check_pick(command)
-            result = self._carry_out(dict(command), write=True)
+            result = self._checked(dict(command))
             if isinstance(known, str):
                 self._remember_answer(known, result)
             self.changed()
             return result
+
+    def _checked(self, command: dict[str, Any]) -> Any:
+        """Carry out a command where the survey's files allow it."""
+        op = command.get("op")
+        if op == "align.accept":
+            return self._accept()
+        if op == "photos.exchange":
+            if self.files.pair is not None or len(self.pictures.infos) != 2:
+                raise InputError("photos are exchanged before they are oriented.")
+            result = self._carry_out(command, write=True)
+            self._exchange_photos()
+            return result
+        self._check_pick(command)
+        return self._carry_out(command, write=True)
 
     def _remember_answer(self, known: str, result: Any) -> None:
         self.answered[known] = result
@@ -165,13 +243,13 @@ class Session:
         trial.setup = dict(trial.setup)
         trial.lenses = {image: dict(lens) for image, lens in trial.lenses.items()}
         changes = changes_of(trial, command)
-        if op == "point.pick" and not command.get("name"):
+        if op in ("point.pick", "control.set", "control.pick") and not command.get("name"):
             command["name"] = changes[0].key
         if write:
             self._write(command)
         self.state = trial
         self._apply(changes)
-        return changes[-1].key if changes else None
+        return {"name": changes[-1].key} if changes else None
 
     def _apply(self, changes: list[Change]) -> None:
         self.state.apply(changes)
@@ -193,7 +271,7 @@ class Session:
         self.state.apply(changes)
         self.state.revision += 1
         target.append(changes)
-        return changes[-1].key
+        return {"name": changes[-1].key}
 
     def _replay_all(self) -> None:
         """Carry out the journal, and find out what of it stands in the workbook."""
@@ -206,10 +284,14 @@ class Session:
                 self.sync.take(rows, gone)
             elif record["op"] == "workbook.saved":
                 self.sync.digest = record.get("sha256", "")
+            elif record["op"] == "made":
+                self.products.note(record["kind"], record["names"])
+            elif record["op"] in ("proposed", "accepted"):
+                self.proposal = record if record["op"] == "proposed" else None
             elif record["op"] not in _NO_COMMANDS:
                 self._carry_out(record, write=False)
                 if isinstance(record.get("id"), str):
-                    self._remember_answer(record["id"], record.get("name"))
+                    self._remember_answer(record["id"], {"name": record.get("name")})
             if self.state.revision == at:
                 self.sync.synced = {n: row_of(p) for n, p in self.state.points.items()}
 
@@ -261,9 +343,9 @@ class Session:
         image, column, row = (command.get(key) for key in ("image", "column", "row"))
         if image not in (1, 2) or not isinstance(column, int | float):
             return  # the command itself says what is wrong
-        if len(self.infos) < 2:
+        if len(self.pictures.infos) < 2:
             raise InputError("there are no photos yet; give two.")
-        width, height = self.infos[image - 1].size
+        width, height = self.pictures.infos[image - 1].size
         inside = -0.5 <= column <= width - 0.5
         if isinstance(row, int | float) and not (inside and -0.5 <= row <= height - 0.5):
             raise InputError(f"the pick lies outside photo {image} ({width} x {height} px).")
@@ -291,52 +373,26 @@ class Session:
     def close(self) -> None:
         """End the session."""
         self.tell(None)
+        self.jobs.stop()
         self.sync.stop()
         self.journal.close()
 
     # ---- measuring
 
-    def photos(self) -> tuple[ByteArray, ByteArray]:
-        """Return both photos, 8 bit; they are read once.
-
-        Raises
-        ------
-        InputError
-            If there are no two photos yet.
-        """
-        if len(self.pyramids) < 2:
-            raise InputError("there are no photos yet; give two.")
-        return self.pyramids[0].halved(0), self.pyramids[1].halved(0)
-
-    def suggest(self, image: int, pixel: Pixel) -> dict[str, Any]:
-        """Return where the other photo shows a pick, with the line on which it must lie."""
-        pair = self.needed_pair()
-        found = suggest(pair, self.photos(), image, np.array(pixel))
-        return plain(
-            {
-                "column": found.pixel[0],
-                "row": found.pixel[1],
-                "quality": found.quality,
-                "score": found.score,
-                "sigma_px": found.sigma_px,
-                "misfit_px": found.misfit_px,
-                "kept": found.kept,
-                "line": self.line(image, pixel),
-            }
-        )
-
-    def line(self, image: int, pixel: Pixel) -> list[list[float]]:
-        """Return the line in the other photo on which a pick must lie. [px]"""
-        pair, size = self.needed_pair(), self.infos[2 - image].size
-        return radial_line(pair, image, np.array(pixel), size).tolist()
-
-    def snap(self, image: int, pixel: Pixel, radius: float) -> dict[str, Any]:
-        """Return the target's centre or the corner next to a pick."""
-        return snap(self.photos()[image - 1], pixel, radius)._asdict()
+    def oriented_live(self) -> LiveOrientation | None:
+        """Return what the control points tell by themselves; None without photos."""
+        state, infos = self.state, self.pictures.infos
+        if len(infos) != 2:
+            return None
+        language = state.language or self.language
+        facts = (dict(state.control), dict(state.tapes), state.setup, state.lenses, language)
+        if self.orientation is None or self.orientation[0] != facts:
+            self.orientation = facts, live_orientation(state, infos, language)
+        return self.orientation[1]
 
     def measure(self, names: Sequence[str]) -> dict[str, float | None]:
         """Return distances and angles between points."""
-        self.needed_pair()
+        self.pictures.needed_pair()
         places = []
         for name in names:
             point = self.state.points.get(name)
@@ -348,38 +404,6 @@ class Session:
             places.append(place)
         return measure(places)
 
-    def convert(self, image: int, pixels: FloatArray, source: str) -> FloatArray:
-        """Return pixels of a photo as pixels of the wall or back, shape (n, 2); any lens model."""
-        photo, grid = self.needed_pair().photo(image), self.grid
-        assert grid is not None
-        if source == "photo":
-            return grid.pixel_of(photo.plane_from_pixels(pixels))
-        plane = np.column_stack(
-            [grid.x0 + grid.gsd * pixels[:, 0], grid.y0 - grid.gsd * pixels[:, 1]]
-        )
-        return photo.pixels_from_plane(plane)
-
-    # ---- geometry
-
-    def needed_pair(self) -> Pair:
-        """Return the pair.
-
-        Raises
-        ------
-        InputError
-            If the photos are not oriented yet.
-        """
-        if self.pair is None:
-            raise InputError("the photos are not oriented yet; align them first.")
-        return self.pair
-
-    def photo_from_wall(self, number: int) -> FloatArray:
-        """Return the homography from wall pixels to ideal pixels of a photo, shape (3, 3)."""
-        pair, grid = self.needed_pair(), self.grid
-        assert grid is not None
-        matrix = np.linalg.inv(pair.photo(number).plane_from_pixel) @ grid.plane_from_pixel
-        return np.asarray(matrix / matrix[2, 2])
-
 
 def _rows_of(record: Mapping[str, Any]) -> tuple[dict[str, PointRow], list[str]]:
     """Return the rows that a record of the journal holds."""
@@ -389,14 +413,3 @@ def _rows_of(record: Mapping[str, Any]) -> tuple[dict[str, PointRow], list[str]]
         known = None if row["reference"] is None else tuple(row["reference"])
         rows[name] = PointRow((first, second), row["code"], row["note"], row["use"], known)
     return rows, list(record["gone"])
-
-
-def _facts(path: Path) -> tuple[str, int, int]:
-    """Return what tells whether a photo is still the same."""
-    known = path.stat()
-    return path.name, known.st_size, known.st_mtime_ns
-
-
-def pyramid_path(infos: list[ImageInfo], number: int) -> Path:
-    """Return the file of photo 1 or 2."""
-    return infos[number - 1].path

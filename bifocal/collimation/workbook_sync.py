@@ -141,7 +141,7 @@ class WorkbookSync:
         session, path = self.session, self.session.files.workbook
         with session.lock:
             points = session.state.sorted_points()
-            pair, pair_path = session.pair, session.files.pair
+            pair, pair_path = session.accepted_pair, session.files.pair
             revision = session.state.revision
             language = session.state.language or session.language
         wanted = {point.name: row_of(point) for point in points}

@@ -106,7 +106,7 @@ def align_photos(
     first, second = (
         PhotoInput(
             grey=read_grey(info.path),
-            interior=_interior(info, known, number),
+            interior=interior_of_photo(info, known, number),
             name=info.path.name,
         )
         for number, (info, known) in enumerate(zip(infos, options.lenses, strict=True), start=1)
@@ -182,7 +182,7 @@ def _check_metres(options: AlignOptions) -> None:
             )
 
 
-def _interior(info: ImageInfo, data: KnownLens, number: int) -> Interior:
+def interior_of_photo(info: ImageInfo, data: KnownLens, number: int) -> Interior:
     """Return the best that is known of a photo's interior orientation."""
     if data.lens is not None:
         lens = lens_of_photo(Lens.read(data.lens), info.size, orientation=info.orientation)

@@ -35,9 +35,7 @@ def match_photos(
     if out.suffix.lower() not in {".xlsx", ".csv"}:
         raise InputError(f"{out}: points are written as .xlsx (survey workbook) or .csv.")
     check_writable(out, overwrite=overwrite)
-    pair = Pair.read(pair_path)
-    images = (read_grey(pair.photo_file(1)), read_grey(pair.photo_file(2)))
-    matches = match_pair(pair, images, settings)
+    pair, matches = match_pair_file(pair_path, settings)
     if out.suffix.lower() == ".csv":
         write_csv(out, csv_columns(matches), formats=_FORMATS, overwrite=overwrite)
         return pair, matches
@@ -59,6 +57,19 @@ def match_photos(
         overwrite=overwrite,
     )
     return pair, matches
+
+
+def match_pair_file(pair_path: Path, settings: MatchSettings) -> tuple[Pair, Matches]:
+    """Return a pair from its file, and the homologous points found in its photos.
+
+    Raises
+    ------
+    InputError, GeometryError
+        If a file is at fault, or photos and pair do not belong together.
+    """
+    pair = Pair.read(pair_path)
+    images = (read_grey(pair.photo_file(1)), read_grey(pair.photo_file(2)))
+    return pair, match_pair(pair, images, settings)
 
 
 def precision(matches: Matches) -> float:
