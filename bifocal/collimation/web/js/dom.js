@@ -21,7 +21,7 @@ export function setText(node, text) {
 
 /** A number for people: `digits` after the point, "–" where there is none. */
 export function number(value, digits) {
-  return Number.isFinite(value) ? value.toFixed(digits) : "–";
+  return Number.isFinite(value) ? value.toFixed(digits).replace(/^-(?=0\.?0*$)/, "") : "–";
 }
 
 /** What a person typed as a number, comma or point; null when empty, NaN when it is none. */

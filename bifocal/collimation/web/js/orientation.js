@@ -9,7 +9,7 @@ import { asTaken } from "./geometry.js";
 import { Loupe } from "./loupe.js";
 import { Picker } from "./picker.js";
 import { photoMark } from "./tiles.js";
-import { Pane, pixelView, tileLayer } from "./viewer.js";
+import { Pane, pixelView, spread, tileLayer } from "./viewer.js";
 import { t } from "./words/words.js";
 
 const COORDINATES = ["X", "Y", "r"];
@@ -27,6 +27,7 @@ export class OrientationStage {
     this.tapes = h("tbody");
     this.advice = h("ul", { class: "advice" });
     this.remarks = h("ul", { class: "remarks" });
+    this.known = h("dl", { class: "values one", testid: "orientation-values" });
     this.align = button(t("align.run"), () => app.job("align"), { class: "primary", testid: "align" });
     this.acceptAlign = button(t("align.accept"), () => app.send("align.accept"),
       { testid: "align-accept" });
@@ -74,7 +75,7 @@ export class OrientationStage {
 
   #result() {
     return h("section", { class: "card" }, h("h2", {}, t("align.title")), this.advice,
-      h("div", { class: "row" }, this.align, this.acceptAlign), this.app.jobBox("align"),
+      this.known, h("div", { class: "row" }, this.align, this.acceptAlign), this.app.jobBox("align"),
       this.remarks);
   }
 
@@ -97,6 +98,9 @@ export class OrientationStage {
     if (state.photos.length < 2 || this.mark === mark) return;
     this.mark = mark;
     this.panes = state.photos.map((photo) => this.#pane(photo));
+    const [{ width, height }] = state.photos;
+    this.spread ??= new ResizeObserver(() => spread(this.photos, width, height)).observe(this.photos);
+    spread(this.photos, width, height);
     this.photos.replaceChildren(...this.panes.map(({ element }) => element));
     for (const pane of this.panes) pane.mounted();
     const infos = await this.app.pyramids.both("photo", mark);
@@ -150,8 +154,21 @@ export class OrientationStage {
       keyedRows(list, lines, { key: (text) => text, signature: (text) => text,
         build: (text) => h("li", {}, text) });
     }
+    this.#tellKnown(state);
     this.acceptAlign.disabled = !state.pair || state.pair.accepted !== false;
     this.#refresh();
+  }
+
+  /** Distances and nadirs with their sigmas: of the proposal, else of the control points alone. */
+  #tellKnown({ pair, live }) {
+    const distances = pair?.images.map(({ distance }) => distance) ?? live?.distances ?? [];
+    const sigmas = pair?.report?.standard_deviations ?? live?.deviations ?? {};
+    const rows = distances.flatMap((distance, index) => [
+      [t("known.distance", { image: index + 1 }), distance, sigmas[`distance${index + 1}`]],
+      [t("known.nadir", { image: index + 1 }), null, sigmas[`nadir${index + 1}`]]]);
+    this.known.replaceChildren(...rows.filter(([, value, sigma]) => value !== null || Number.isFinite(sigma))
+      .map(([name, value, sigma]) => h("div", {}, h("dt", {}, name), h("dd", {},
+        `${value === null ? "" : number(value, 3)}${Number.isFinite(sigma) ? ` ± ${number(sigma, 3)}` : ""} m`.trim()))));
   }
 
   #controlRow(item) {

@@ -77,7 +77,7 @@ export class PhotosStage {
   status(state) {
     if (state.photos.length < 2) return { text: t("status.photos.drop") };
     const open = state.photos.flatMap(({ missing }) => missing).length;
-    return open ? { text: t("status.photos.missing", { open }) } : { done: true, text: t("status.done") };
+    return open && !state.pair ? { text: t("status.photos.missing", { open }) } : { done: true, text: t("status.done") };
   }
 
   update(state) {

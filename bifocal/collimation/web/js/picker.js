@@ -126,22 +126,12 @@ export class Picker extends EventTarget {
     this.forget();
     this.hovered = null;
     const op = `${this.kind}.pick`;
-    const known = name ?? this.#freeControl();
-    const args = { name: known, image, column, row };
-    const answer = await (known ? this.connection.move(op, args) : this.connection.send(op, args));
-    this.selected = known ?? answer.name ?? answer;
+    const args = { name, image, column, row };
+    const answer = await (name ? this.connection.move(op, args) : this.connection.send(op, args));
+    this.selected = name ?? answer.name;
     this.cursor = null;
     this.image = image;
     await this.#advance();
-  }
-
-  /** Points are named by the server; control points by the first free number. */
-  #freeControl() {
-    if (this.kind !== "control") return null;
-    const taken = new Set(this.items().map(({ name }) => name));
-    let number = 1;
-    while (taken.has(`C${number}`)) number++;
-    return `C${number}`;
   }
 
   async #advance() {

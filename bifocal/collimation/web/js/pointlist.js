@@ -1,5 +1,6 @@
 /** All points: sorted by any column, named, found, deleted. */
 import { h, keyedRows, number, setText } from "./dom.js";
+import { isWarning } from "./readout.js";
 import { t } from "./words/words.js";
 
 const COLUMNS = [
@@ -19,7 +20,8 @@ function compare(a, b) {
 }
 
 export class PointList {
-  constructor(app, picker) {
+  /** `tools`: what stands beside the heading; `progress`: below it. */
+  constructor(app, picker, tools, progress) {
     this.app = app;
     this.picker = picker;
     this.sort = { column: null, down: false };
@@ -31,7 +33,8 @@ export class PointList {
       h("caption", { class: "unseen" }, t("list.title")),
       h("thead", {}, h("tr", {}, this.heads)), this.body);
     this.element = h("section", { class: "card list" },
-      h("h2", {}, t("list.title"), " ", this.count), h("div", { class: "scroll" }, this.table));
+      h("div", { class: "row between" }, h("h2", {}, t("list.title"), " ", this.count),
+        h("span", { class: "row" }, tools)), progress, h("div", { class: "scroll" }, this.table));
     this.table.addEventListener("keydown", (event) => this.#key(event));
   }
 
@@ -67,8 +70,18 @@ export class PointList {
       this.marked?.setAttribute("aria-selected", "false");
       this.marked = selected && [...this.body.children].find((row) => row.dataset.key === selected);
       this.marked?.setAttribute("aria-selected", "true");
-      this.marked?.scrollIntoView?.({ block: "nearest" });
+      if (this.marked) this.#show(this.marked);
     }
+  }
+
+  /** Scroll the list, never the page, until a row is seen. */
+  #show(row) {
+    const { parentElement: box } = this.table;
+    const head = this.table.tHead.offsetHeight;
+    const above = row.offsetTop - head - box.scrollTop;
+    const below = row.offsetTop + row.offsetHeight - box.scrollTop - box.clientHeight;
+    if (above < 0) box.scrollTop += above;
+    else if (below > 0) box.scrollTop += below;
   }
 
   #row(item) {
@@ -81,7 +94,7 @@ export class PointList {
       const content = value(item);
       if (key in DIGITS) return h("td", { class: "number" }, number(content, DIGITS[key]));
       const text = key === "type" ? t(`type.${content}`) : content;
-      return h("td", { class: key === "flag" && !["OK", "…"].includes(content) ? "warn" : "" }, text);
+      return h("td", { class: key === "flag" && content !== "…" && isWarning(content) ? "warn" : "" }, text);
     });
     return h("tr", { "aria-selected": "false", onclick: ({ target }) => {
       if (target.tagName !== "BUTTON") this.picker.select(name);

@@ -10,7 +10,7 @@ import { Picker } from "./picker.js";
 import { PointList } from "./pointlist.js";
 import { Readout, TYPES } from "./readout.js";
 import { photoMark, wallMark } from "./tiles.js";
-import { Pane, pictureLayer, pixelView, tileLayer } from "./viewer.js";
+import { Pane, pictureLayer, pixelView, spread, tileLayer } from "./viewer.js";
 import { t } from "./words/words.js";
 
 const LINE_INK = "#b9f27c";
@@ -23,22 +23,27 @@ export class PointsStage {
       items: () => app.points(), panes: () => this.panes });
     app.listen(this.picker, () => this.#refresh(), () => this.#look());
     this.loupe = new Loupe();
+    this.buttons = this.#buttons();
     this.readout = new Readout(app, this.picker);
-    this.list = new PointList(app, this.picker);
+    this.list = new PointList(app, this.picker,
+      [this.buttons.match, h("a", { class: "button quiet", href: "/download/points.dxf", download: "" }, "DXF")],
+      app.jobBox("match"));
     this.lines = new Lines(app, this.picker);
     this.measure = new Measure(app, this.picker);
     this.photos = h("div", { class: "viewer" });
     this.layers = new Superposition(this.photos);
     this.layers.addEventListener("mode", () => this.#arrange());
+    new ResizeObserver(() => this.wall && spread(this.photos, this.wall.width, this.wall.height))
+      .observe(this.photos);
     this.layers.addEventListener("blink", () => this.#paint());
     this.target = h("p", { class: "target", role: "status", testid: "target" });
     this.quality = h("p", { class: "quality", testid: "quality" });
-    this.buttons = this.#buttons();
     this.areaButton = button(t("pick.area"), () => this.toggleArea(), { class: "quiet",
       testid: "uncertainty", "aria-pressed": "false" });
     this.layers.element.append(this.areaButton);
     const hand = h("section", { class: "hand" }, this.target, h("div", { class: "row" },
-      Object.values(this.buttons)), this.quality);
+      this.buttons.pick, this.buttons.suggest, this.buttons.accept, this.buttons.snap, this.buttons.fresh),
+    this.quality);
     this.element = h("main", { class: "stage work", id: "stage-points" },
       h("div", { class: "table-top" }, this.layers.element, this.photos),
       h("aside", { class: "panel" }, hand, this.loupe.element, this.readout.element,
@@ -53,6 +58,7 @@ export class PointsStage {
       suggest: button(t("pick.suggest"), () => picker.suggest(), { class: "quiet", testid: "suggest" }),
       accept: button(t("pick.accept"), () => picker.accept(), { class: "primary", testid: "accept" }),
       snap: button(t("pick.snap"), () => picker.snap(), { class: "quiet", testid: "snap" }),
+      match: button(t("pick.match"), () => this.app.job("match"), { class: "quiet", testid: "match" }),
       fresh: button(t("pick.new"), () => picker.fresh(), { class: "quiet", testid: "point-new" }),
     };
   }
@@ -105,6 +111,7 @@ export class PointsStage {
     if (!this.main) return;
     const split = this.layers.mode === "split";
     this.photos.classList.toggle("two", split);
+    spread(this.photos, this.wall.width, this.wall.height);
     this.second.element.hidden = !split;
     this.main.image = split ? 1 : null;
     this.second.image = split ? 2 : null;

@@ -10,6 +10,7 @@ import { t } from "./words/words.js";
 
 const SCALES = ["1:10", "1:20", "1:25", "1:50", "1:100", "1:200"];
 const SHEETS = ["A4", "A3", "A2", "A1", "A0"];
+const GRADES = ["fast", "standard", "best"];
 const ASK_MS = 80;
 
 export class ProductsStage {
@@ -18,7 +19,7 @@ export class ProductsStage {
     this.swipe = 1;
     this.photos = h("div", { class: "viewer" });
     this.value = h("p", { class: "value", role: "status", testid: "relief-value" });
-    this.profile = new Profile(app, () => this.pane?.paint());
+    this.profile = new Profile(app, () => this.pane?.paint(), () => this.pane?.fit());
     this.element = h("main", { class: "stage work", id: "stage-products" },
       h("div", { class: "table-top" }, this.#bar(), this.photos, this.profile.element),
       h("aside", { class: "panel" }, this.#reliefBox(), this.#orthoBox(), this.#deliverBox()));
@@ -39,11 +40,13 @@ export class ProductsStage {
   }
 
   #reliefBox() {
-    this.runRelief = button(t("relief.run"), () => this.app.job("relief"),
+    this.grade = choice({ label: t("relief.quality"), value: "standard", testid: "relief-quality",
+      options: Object.fromEntries(GRADES.map((grade) => [grade, t(`relief.${grade}`)])), save: () => {} });
+    this.runRelief = button(t("relief.run"), () => this.app.job("relief", { quality: this.grade.value }),
       { class: "primary", testid: "run-relief" });
     this.reliefState = h("p", { class: "hint" });
     return h("section", { class: "card" }, h("h2", {}, t("relief.title")), this.reliefState,
-      h("div", { class: "row" }, this.runRelief), this.app.jobBox("relief"));
+      h("div", { class: "row" }, this.grade, this.runRelief), this.app.jobBox("relief"));
   }
 
   #orthoBox() {

@@ -22,8 +22,9 @@ function ticks(low, high, count) {
 }
 
 export class Profile {
-  constructor(app, paint) {
-    Object.assign(this, { app, paint, ends: [], drawing: false, data: null, at: null });
+  /** `paint`: draw the line on the wall; `shown`: the chart has taken its room. */
+  constructor(app, paint, shown) {
+    Object.assign(this, { app, paint, shown, ends: [], drawing: false, data: null, at: null });
     this.chart = svg("svg", { viewBox: `0 0 ${WIDTH} ${HEIGHT}`, role: "img", class: "chart" });
     this.caption = h("p", { class: "hint", role: "status" });
     this.element = h("section", { class: "profile", hidden: true, "aria-label": t("profile.title") },
@@ -43,6 +44,7 @@ export class Profile {
   close() {
     this.ends = [];
     this.element.hidden = true;
+    this.shown();
     this.paint();
   }
 
@@ -93,6 +95,7 @@ export class Profile {
       svg("path", { d: band.join(""), class: "band" }), svg("path", { d: line.join(""), class: "curve" }));
     this.chart.setAttribute("aria-label", t("profile.alt", { low: number(low, 3), high: number(high, 3) }));
     this.element.hidden = false;
+    this.shown();
     setText(this.caption, t("profile.caption", { length: number(this.length, 3), low: number(low, 3), high: number(high, 3) }));
     return undefined;
   }

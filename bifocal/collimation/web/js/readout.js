@@ -71,9 +71,12 @@ export class Readout {
     }
     const flag = result.flag ?? null;
     setText(this.flag, item.result ? flagWords(flag, result.uncertain_area) : t("flag.incomplete"));
-    this.flag.dataset.level = !item.result ? "open" : flag && flag !== "OK" ? "warn" : "good";
+    this.flag.dataset.level = !item.result ? "open" : isWarning(flag) ? "warn" : "good";
   }
 }
+
+/** That a point lies on the plane is said, not warned of. */
+export const isWarning = (flag) => Boolean(flag) && !["OK", "ON-PLANE"].includes(flag);
 
 /** The flag as the workbook has it, and what it means. */
 function flagWords(flag, uncertain) {

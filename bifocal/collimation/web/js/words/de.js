@@ -246,4 +246,12 @@ export default {
   "key.fit": "Alles zeigen",
   "key.line": "An die Linie anfügen (Umschalt: beenden)",
   "key.measure": "Zum gewählten Punkt messen",
+  "known.distance": "Abstand {image}",
+  "known.nadir": "Nadir {image}",
+  "pick.match": "Punkte suchen",
+  "job.match": "Punkte",
+  "relief.quality": "Güte",
+  "relief.fast": "schnell",
+  "relief.standard": "normal",
+  "relief.best": "beste",
 };

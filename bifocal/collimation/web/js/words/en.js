@@ -246,4 +246,12 @@ export default {
   "key.fit": "Show everything",
   "key.line": "Add to the line (Shift: end it)",
   "key.measure": "Measure to the point in hand",
+  "known.distance": "Distance {image}",
+  "known.nadir": "Nadir {image}",
+  "pick.match": "Find points",
+  "job.match": "Points",
+  "relief.quality": "Quality",
+  "relief.fast": "fast",
+  "relief.standard": "standard",
+  "relief.best": "best",
 };

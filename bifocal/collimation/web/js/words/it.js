@@ -246,4 +246,12 @@ export default {
   "key.fit": "Mostra tutto",
   "key.line": "Aggiungi alla linea (Maiusc: termina)",
   "key.measure": "Misura al punto in mano",
+  "known.distance": "Distanza {image}",
+  "known.nadir": "Nadir {image}",
+  "pick.match": "Trova punti",
+  "job.match": "Punti",
+  "relief.quality": "Qualità",
+  "relief.fast": "veloce",
+  "relief.standard": "normale",
+  "relief.best": "migliore",
 };
