@@ -31,18 +31,35 @@ export function marker(context, image, [x, y], { selected = false, proposed = fa
   context.setLineDash([]);
 }
 
-/** Many markers at once: one path a colour, so that a thousand cost one stroke. */
+const SPRITE = 18;
+const sprites = new Map();
+
+/** A small marker, drawn once for each image and screen. */
+function sprite(image) {
+  const ratio = window.devicePixelRatio;
+  const key = `${image}/${ratio}`;
+  let canvas = sprites.get(key);
+  if (!canvas) {
+    canvas = document.createElement("canvas");
+    canvas.width = canvas.height = Math.ceil(SPRITE * ratio);
+    const context = canvas.getContext("2d");
+    context.scale(ratio, ratio);
+    const middle = SPRITE / 2;
+    stroke(context, INK[image], 1.3, (path) => {
+      if (image === 1) path.arc(middle, middle, 5, 0, 2 * Math.PI);
+      else path.rect(middle - 5, middle - 5, 10, 10);
+    });
+    sprites.set(key, canvas);
+  }
+  return canvas;
+}
+
+/** Many markers at once: a thousand in every frame. */
 export function markers(context, image, places) {
-  stroke(context, INK[image], 1.2, (path) => {
-    for (const [x, y] of places) {
-      if (image === 1) {
-        path.moveTo(x + 5, y);
-        path.arc(x, y, 5, 0, 2 * Math.PI);
-      } else {
-        path.rect(x - 5, y - 5, 10, 10);
-      }
-    }
-  });
+  const canvas = sprite(image);
+  for (const [x, y] of places) {
+    context.drawImage(canvas, x - SPRITE / 2, y - SPRITE / 2, SPRITE, SPRITE);
+  }
 }
 
 export function polyline(context, style, places, { width = 2, dash = [], closed = false } = {}) {
@@ -97,45 +114,41 @@ export function centre(context, [x, y], text) {
  */
 export function picks(context, pane, { items, images, pick, selected }) {
   const seen = [];
-  const named = new Set();
-  const inside = ([x, y]) => x > -20 && y > -20 && x < pane.width + 20 && y < pane.height + 20;
-  for (const image of images) {
-    const places = [];
-    for (const item of items) {
+  for (const item of items) {
+    const places = images.map((image) => {
       const pixel = pick(item, image);
-      if (!pixel) continue;
-      const place = pane.screen(image, pixel);
-      if (!inside(place)) continue;
-      seen.push([item, place]);
-      if (item.name !== selected) places.push(place);
-    }
-    markers(context, image, places);
+      return pixel && pane.screen(image, pixel);
+    });
+    if (places.some((place) => place && inside(pane, place))) seen.push([item, places]);
   }
-  shifts(context, pane, images, seen, selected, pick);
+  shifts(context, seen);
+  images.forEach((image, index) => markers(context, image, seen
+    .filter(([item, places]) => places[index] && item.name !== selected)
+    .map(([, places]) => places[index])));
   const crowded = seen.length > LABELS_FROM && pane.zoom < 1;
-  for (const [item, [x, y]] of seen) {
+  for (const [item, places] of seen) {
     const chosen = item.name === selected;
-    if (named.has(item.name)) continue;
-    named.add(item.name);
+    if (chosen) {
+      images.forEach((image, index) => {
+        if (places[index]) marker(context, image, places[index], { selected: true });
+      });
+    }
+    const [x, y] = places.find(Boolean);
     if (!crowded || chosen) label(context, item.name, [x + (chosen ? 15 : 9), y - 8]);
   }
 }
 
-function shifts(context, pane, images, seen, selected, pick) {
-  for (const [item] of seen) {
-    if (images.length === 2 && images.every((image) => pick(item, image))) {
-      const ends = images.map((image) => pane.screen(image, pick(item, image)));
-      context.beginPath();
-      context.moveTo(...ends[0]);
-      context.lineTo(...ends[1]);
-      context.strokeStyle = "rgba(255, 255, 255, 0.6)";
-      context.lineWidth = 1;
-      context.stroke();
-    }
-    if (item.name !== selected) continue;
-    for (const image of images) {
-      const pixel = pick(item, image);
-      if (pixel) marker(context, image, pane.screen(image, pixel), { selected: true });
-    }
+const inside = (pane, [x, y]) => x > -20 && y > -20 && x < pane.width + 20 && y < pane.height + 20;
+
+/** From each pick to its partner, where both are shown. */
+function shifts(context, seen) {
+  context.beginPath();
+  for (const [, [from, to]] of seen) {
+    if (!from || !to) continue;
+    context.moveTo(...from);
+    context.lineTo(...to);
   }
+  context.strokeStyle = "rgba(255, 255, 255, 0.6)";
+  context.lineWidth = 1;
+  context.stroke();
 }

@@ -13,6 +13,7 @@ export class Wall {
     [this.xmin, , , this.ymax] = pair.plane_bounds;
     this.photoFromWall = pair.images.map((image) => image.photo_from_wall);
     this.wallFromPhoto = this.photoFromWall.map(invert);
+    this.known = [new WeakMap(), new WeakMap()];
     this.lenses = pair.images.map((image) => (image.lens ? new Lens(image.lens) : null));
   }
 
@@ -22,10 +23,16 @@ export class Wall {
     return this.lenses[image - 1]?.distort(straight) ?? straight;
   }
 
-  /** Pixel of the original photo `image` (1 or 2) -> wall pixel. */
+  /** Pixel of the original photo `image` (1 or 2) -> wall pixel; drawn in every frame, so kept. */
   fromPhoto(image, pixel) {
-    const straight = this.lenses[image - 1]?.undistort(pixel) ?? pixel;
-    return project(this.wallFromPhoto[image - 1], straight);
+    const known = this.known[image - 1];
+    let place = known.get(pixel);
+    if (!place) {
+      const straight = this.lenses[image - 1]?.undistort(pixel) ?? pixel;
+      place = project(this.wallFromPhoto[image - 1], straight);
+      known.set(pixel, place);
+    }
+    return place;
   }
 
   /** Wall pixel -> (X, Y) on the reference plane [m]. */

@@ -95,6 +95,8 @@ export class Pane extends EventTarget {
     super();
     this.frame = frame;
     this.painter = painter;
+    this.width = 0;
+    this.height = 0;
     this.canvas = h("canvas", { class: "drawing", "aria-hidden": "true" });
     this.element = h("div", { class: "pane", tabindex: "0", role: "application" });
     this.element.setAttribute("aria-label", label);
@@ -160,14 +162,6 @@ export class Pane extends EventTarget {
     return this.frame.toPhoto(image, this.unplace(pixel));
   }
 
-  get width() {
-    return this.element.clientWidth;
-  }
-
-  get height() {
-    return this.element.clientHeight;
-  }
-
   setLayers(layers) {
     this.map.setLayers(layers);
   }
@@ -212,6 +206,8 @@ export class Pane extends EventTarget {
   }
 
   #resize() {
+    this.width = this.element.clientWidth;
+    this.height = this.element.clientHeight;
     const ratio = window.devicePixelRatio;
     this.canvas.width = Math.round(this.width * ratio);
     this.canvas.height = Math.round(this.height * ratio);
