@@ -15,15 +15,9 @@ from typing import Any
 import cv2
 import numpy as np
 
-from tests.browser import SAMPLE, Driver, Served, launched, served, tab_of
+from tests.browser import SAMPLE, WATCH, Driver, Served, launched, served, tab_of
 
 WIDTH, HEIGHT, POINTS = 6000, 4000, 1000
-WATCH = """() => {
-  window.frames_seen = [];
-  let last = performance.now();
-  const next = (now) => { frames_seen.push(now - last); last = now; requestAnimationFrame(next); };
-  requestAnimationFrame(next);
-}"""
 
 
 def enlarged(folder: Path) -> None:
@@ -47,26 +41,14 @@ def spread(times: Any) -> str:
     return f"median {low:6.1f} ms, 95 % {high:6.1f} ms, largest {worst:6.1f} ms"
 
 
-def frames(page: Driver) -> Any:
-    """Return the milliseconds between frames while dragging and zooming."""
-    box = page.tab.locator(".pane").first.bounding_box()
-    x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
-    page.tab.mouse.move(x, y)
-    page.tab.evaluate(WATCH)
-    for k in range(6):
-        page.tab.mouse.down()
-        page.tab.mouse.move(x + 180 * (-1) ** k, y + 90 * (k % 3 - 1), steps=30)
-        page.tab.mouse.up()
-        page.tab.mouse.wheel(0, -240 if k < 3 else 240)
-    return np.array(page.tab.evaluate("() => frames_seen"))
-
-
 def first_paint(browser: Any, server: Served) -> float:
     """Return seconds from asking for the page to its photos standing there."""
     started = time.perf_counter()
     with tab_of(browser, server) as page:
-        page.wait("() => performance.getEntriesByType('resource')"
-                  ".filter((one) => one.name.includes('/tiles/wall/') && one.responseEnd).length >= 3")
+        page.wait(
+            "() => performance.getEntriesByType('resource')"
+            ".filter((one) => one.name.includes('/tiles/wall/') && one.responseEnd).length >= 3"
+        )
         page.tab.evaluate("() => new Promise((done) => requestAnimationFrame(done))")
         return time.perf_counter() - started
 
@@ -90,13 +72,15 @@ def main() -> None:
             print(f"first paint, not yet tiled     {first_paint(browser, server):.2f} s")
             time.sleep(8)
             times = [first_paint(browser, server) for _ in range(5)]
-            print(f"first paint, tiled             {np.median(times):.2f} s ({min(times):.2f} to {max(times):.2f})")
+            print(
+                f"first paint, tiled             {np.median(times):.2f} s ({min(times):.2f} to {max(times):.2f})"
+            )
             with tab_of(browser, server) as page:
                 page.tab.wait_for_timeout(1500)
                 asked(page, 2)
                 print(f"suggestion                     {spread(asked(page))}")
-                frames(page)
-                print(f"frames, two layers             {spread(frames(page))}")
+                page.frames()
+                print(f"frames, two layers             {spread(page.frames())}")
                 rng = np.random.default_rng(5)
                 places = rng.uniform((20, 20), (WIDTH - 20, HEIGHT - 20), (POINTS, 2)).tolist()
                 points = [{"name": f"Q{k:04d}", "picks": [p, p]} for k, p in enumerate(places)]
@@ -105,7 +89,7 @@ def main() -> None:
                 page.settled(f"state.points.length === {POINTS}")
                 print(f"{POINTS} points arrive            {time.perf_counter() - started:.2f} s")
                 page.tab.wait_for_timeout(500)
-                print(f"frames, {POINTS} points           {spread(frames(page))}")
+                print(f"frames, {POINTS} points           {spread(page.frames())}")
                 page.tab.evaluate("() => bifocal.flyTo('Q0001')")
                 started = time.perf_counter()
                 page.keys("1", *["ArrowRight"] * 10)

@@ -18,8 +18,22 @@ from typing import Any
 import pytest
 
 SAMPLE = Path(__file__).parents[1] / "bifocal" / "demo" / "sample"
+#: Of the sample: metres a pixel on the wall, principal point, distances. (tests/scenes/make_sample)
+GSD, CENTRE, DISTANCE = 0.00738, (767.5, 511.5), {1: 17.5, 2: 9.5}
+#: Where targets of the sample are: X, Y, r. [m] (tests/scenes/facade)
+TARGETS = {
+    "T01": (-4.15, -2.15, 0.0), "T04": (4.15, -2.15, 0.0), "T08": (-4.40, 0.42, 0.0),
+    "T09": (4.40, 0.42, 0.0), "T15": (4.30, 2.25, 0.0), "T19": (5.0, 1.6, 0.08684),
+    "T20": (-4.6, -3.2, 0.1442), "T28": (-0.80, 1.45, -0.11908), "T30": (-2.65, 2.84, 0.22),
+}  # fmt: skip
 #: Milliseconds until a missing thing is missing; the machine may be busy.
 PATIENCE = 30_000
+
+
+def true_pixel(image: int, place: tuple[float, float, float]) -> tuple[float, float]:
+    """Return where (X, Y, r) is in a photo of the sample, by Eqs. (1) and (7) on paper. [px]"""
+    stretched = DISTANCE[image] / (DISTANCE[image] - place[2]) / GSD
+    return CENTRE[0] + place[0] * stretched, CENTRE[1] - place[1] * stretched
 
 
 def chromium() -> str:
@@ -31,6 +45,15 @@ def chromium() -> str:
     if os.environ.get("CI"):
         pytest.fail("Chromium is not installed, but CI is set")
     pytest.skip("Chromium is not installed")
+
+
+#: Note in the page how long each frame takes. [ms]
+WATCH = """() => {
+  window.frames_seen = [];
+  let last = performance.now();
+  const next = (now) => { frames_seen.push(now - last); last = now; requestAnimationFrame(next); };
+  requestAnimationFrame(next);
+}"""
 
 
 @dataclass
@@ -188,6 +211,52 @@ class Driver:
         self.keys("Escape", "Escape", "n", "v", "0")
         self.tab.get_by_test_id("layer-opacity").fill("50")
         self.tab.locator(".pane").first.focus()
+
+    def pick_control(self, points: dict[str, tuple[float, float, float]]) -> None:
+        """Hand control points over as Excel does, then pick and snap each in both photos."""
+        rows = [f"{name}\t{x}\t{y}\t{r}" for name, (x, y, r) in points.items()]
+        self.click("control-paste")
+        self.tab.get_by_test_id("paste-area").fill("\n".join(rows))
+        self.click("dialog-yes")
+        self.settled(f"state.control.length === {len(points)}")
+        for name, place in points.items():
+            for image in (1, 2):
+                label = f"{name}: pick in photo {image}"
+                self.tab.get_by_role("button", name=label, exact=True).click()
+                self.pick(image, true_pixel(image, place))
+                self.settled(f"state.control.find((one) => one.name === '{name}').picks[{image}]")
+                self.click("control-snap")
+                self.wait(
+                    "() => document.querySelector('[data-testid=toast]').textContent.includes('±')"
+                )
+                self.settled("true")
+
+    def finished(self, kind: str) -> dict[str, Any]:
+        """Wait until a job has ended; return it."""
+        self.tab.wait_for_function(
+            "(kind) => !['running', undefined].includes("
+            "bifocal.state().jobs.filter((job) => job.kind === kind).at(-1)?.state)",
+            arg=kind,
+            timeout=8 * PATIENCE,
+        )
+        return next(job for job in reversed(self.state["jobs"]) if job["kind"] == kind)
+
+    def frames(self) -> list[float]:
+        """Return how long the frames take while the photos are dragged and zoomed. [ms]"""
+        box = self.tab.locator(".pane").first.bounding_box()
+        x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+        self.tab.mouse.move(x, y)
+        self.tab.evaluate(WATCH)
+        for k in range(6):
+            self.tab.mouse.down()
+            self.tab.mouse.move(x + 180 * (-1) ** k, y + 90 * (k % 3 - 1), steps=25)
+            self.tab.mouse.up()
+            self.tab.mouse.wheel(0, -240 if k < 3 else 240)
+        return list(self.tab.evaluate("() => frames_seen"))
+
+    def suggested(self) -> None:
+        """Wait for the proposed partner of the point in hand."""
+        self.wait("() => document.querySelector('[data-testid=quality]').dataset.level")
 
     def still(self, image: int, pixel: tuple[float, float]) -> tuple[float, float]:
         """Return where a pixel of a photo is once the view has come to rest. [CSS px]"""

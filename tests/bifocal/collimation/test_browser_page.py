@@ -1,4 +1,4 @@
-"""The page as a whole: languages, sizes, touch, names for those who listen, nothing from outside."""
+"""The page as a whole: languages, sizes, touch, names and contrast, nothing from outside."""
 
 from __future__ import annotations
 
@@ -67,7 +67,9 @@ def page(browser: Any, server: Served) -> Iterator[Driver]:
 LENSES = {
     "opencv": (-0.11, 0.04, 0.0007, -0.0004, 0.01),
     "rational": (-0.1, 0.04, 0.0007, -0.0004, 0.01, 0.02, -0.01, 0.003),
-    "tilted": (-0.1, 0.04, 0.0007, -0.0004, 0.01, 0.02, -0.01, 0.003, 1e-3, 2e-4, -1e-3, 1e-4, 0.02, -0.03),
+    "tilted": (
+        -0.1, 0.04, 0.0007, -0.0004, 0.01, 0.02, -0.01, 0.003, 1e-3, 2e-4, -1e-3, 1e-4, 0.02, -0.03,
+    ),
     "fisheye": (0.02, -0.01, 0.003, -0.0005),
     "radial": (0.0, 1.0, 600.0, 0.998, 1300.0, 0.989, 2100.0, 0.975, 3200.0, 0.95, 4200.0, 0.93),
 }  # fmt: skip
@@ -102,7 +104,7 @@ def test_nothing_is_asked_of_anybody_else(page: Driver) -> None:
 
 
 NAMELESS = """() => [...document.querySelectorAll(
-    "button, a[href], input, select, textarea, [role=slider], [role=application], canvas[role=img]")]
+    "button, a[href], input, select, textarea, [role=slider], [role=application], [role=img]")]
   .filter((node) => node.checkVisibility())
   .filter((node) => !(node.getAttribute("aria-label") || node.textContent.trim() || node.title
     || (node.labels && node.labels.length)))
@@ -123,7 +125,8 @@ PALE = """() => {
   const found = [];
   for (const node of document.querySelectorAll("body *")) {
     const own = [...node.childNodes].some((one) => one.nodeType === 3 && one.data.trim());
-    if (!own || !node.checkVisibility({ visibilityProperty: true, opacityProperty: true })) continue;
+    const seen = { visibilityProperty: true, opacityProperty: true };
+    if (!own || !node.checkVisibility(seen)) continue;
     const [a, b] = [light(channels(getComputedStyle(node).color)), light(ground(node))];
     const ratio = (Math.max(a, b) + 0.05) / (Math.min(a, b) + 0.05);
     if (ratio < %s) found.push(`${ratio.toFixed(2)} ${node.outerHTML.slice(0, 120)}`);

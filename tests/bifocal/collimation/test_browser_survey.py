@@ -72,9 +72,7 @@ def test_two_tabs_see_each_other_and_lose_nothing(browser: Any, server: Served) 
         assert np.subtract(first["picks"]["2"], moved) == pytest.approx((0.1, 0.1), abs=1e-9)
 
 
-def test_a_killed_server_loses_nothing_and_the_page_goes_on(
-    browser: Any, server: Served
-) -> None:
+def test_a_killed_server_loses_nothing_and_the_page_goes_on(browser: Any, server: Served) -> None:
     with tab_of(browser, server) as page:
         before = pick_both(page, 1, *PICKS[0])["points"][0]["picks"]["2"]
         server.kill()
