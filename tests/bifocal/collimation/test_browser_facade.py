@@ -15,7 +15,6 @@ import pytest
 from tests.browser import (
     SAMPLE,
     TARGETS,
-    Driver,
     launched,
     sample_survey,
     served,

@@ -141,7 +141,7 @@ export class Picker extends EventTarget {
     this.changed();
     if (!item) return;
     this.say(missing ? "say.picked" : "say.complete", { name: item.name, image: this.image });
-    if (this.partner && missing) await this.suggest();
+    if (this.partner && missing) await this.#suggest();
     else if (this.partner) await this.#guide(item, null);
   }
 
@@ -170,35 +170,34 @@ export class Picker extends EventTarget {
   }
 
   /** Ask for the homologous point of the one in hand. */
-  async suggest() {
+  suggest() {
+    return this.#next(() => this.#suggest());
+  }
+
+  async #suggest() {
     const { item } = this;
     if (!item) return this.say("say.nothing");
     const image = this.lacking ?? other(this.image);
     const from = this.pick(item, other(image));
     if (!from) return this.say("say.nothing");
     const [column, row] = from;
-    try {
-      const found = await this.connection.ask("/api/suggest", { image: other(image), column, row });
-      if (this.selected !== item.name) return undefined;
-      this.guide = { image, line: found.line };
-      this.proposal = Number.isFinite(found.column) ? { image, name: item.name, ...found } : null;
-      this.say(this.proposal ? "say.proposed" : "say.none", {
-        quality: Math.round(100 * (found.quality ?? 0)),
-      });
-    } catch (error) {
-      this.dispatchEvent(new CustomEvent("refused", { detail: error }));
-    }
-    this.changed();
-    return undefined;
+    const found = await this.connection.ask("/api/suggest", { image: other(image), column, row });
+    if (this.selected !== item.name) return undefined;
+    this.guide = { image, line: found.line };
+    this.proposal = Number.isFinite(found.column) ? { image, name: item.name, ...found } : null;
+    const quality = Math.round(100 * (found.quality ?? 0));
+    this.say(this.proposal ? "say.proposed" : "say.none", { quality });
+    return this.changed();
   }
 
   /** Take the proposed partner. */
-  async accept() {
-    await this.latest;
-    if (!this.proposal && this.lacking) await this.suggest();
-    if (!this.proposal) return;
-    const { name, image, column, row } = this.proposal;
-    await this.#next(() => this.#place(name, image, [column, row]));
+  accept() {
+    return this.#next(async () => {
+      if (!this.proposal && this.lacking) await this.#suggest();
+      if (!this.proposal) return;
+      const { name, image, column, row } = this.proposal;
+      await this.#place(name, image, [column, row]);
+    });
   }
 
   /** Move the pick in hand by some pixels of its photo. */
@@ -206,12 +205,11 @@ export class Picker extends EventTarget {
     const { item } = this;
     const from = item && this.pick(item, this.image);
     if (!from) return false;
-    this.#shift(item, from[0] + columns, from[1] + rows);
+    this.#shift(item, this.image, from[0] + columns, from[1] + rows);
     return true;
   }
 
-  #shift(item, column, row) {
-    const { image } = this;
+  #shift(item, image, column, row) {
     const args = { name: item.name, image, column, row };
     this.hovered = null;
     // What is complete and was moved by hand stays: the next click is a new point's.
@@ -233,21 +231,17 @@ export class Picker extends EventTarget {
   }
 
   /** Centre the pick in hand on the corner or target that lies there. */
-  async snap(radius = 8) {
-    await this.latest;
-    const { item, image } = this;
-    const from = item && this.pick(item, image);
-    if (!from) return this.say("say.nothing");
-    const [column, row] = from;
-    try {
+  snap(radius = 8) {
+    return this.#next(async () => {
+      const { item, image } = this;
+      const from = item && this.pick(item, image);
+      if (!from) return this.say("say.nothing");
+      const [column, row] = from;
       const found = await this.connection.ask("/api/snap", { image, column, row, radius });
       if (found.kind === "none") return this.say("say.unsnapped");
-      this.#shift(item, found.column, found.row);
-      this.say(`say.${found.kind}`, { sigma: found.sigma_px?.toFixed(2) ?? "?" });
-    } catch (error) {
-      this.dispatchEvent(new CustomEvent("refused", { detail: error }));
-    }
-    return undefined;
+      this.#shift(item, image, found.column, found.row);
+      return this.say(`say.${found.kind}`, { sigma: found.sigma_px?.toFixed(2) ?? "?" });
+    });
   }
 
   #nearest(pane, [x, y]) {

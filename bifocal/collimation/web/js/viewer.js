@@ -81,12 +81,12 @@ export function pictureLayer(view, className, url, [left, top, right, bottom]) {
   return new ol.layer.Image({ className, source });
 }
 
-/** Two panes in a viewer, beside or above each other: as the pictures come out larger. */
+/** Two panes in a viewer beside each other, or above where pictures come out clearly larger. */
 export function spread(viewer, width, height) {
   const { clientWidth: w, clientHeight: h } = viewer;
   const beside = Math.min(w / 2 / width, h / height);
   const above = Math.min(w / width, h / 2 / height);
-  viewer.classList.toggle("stacked", above > beside);
+  viewer.classList.toggle("stacked", above > 1.15 * beside);
 }
 
 export class Pane extends EventTarget {
