@@ -25,6 +25,7 @@ SUMMARIES: dict[str, str] = {
 
 EPILOG = """\b
 First steps:
+  bifocal pick                      the page: from two photos to the drawing, in the browser
   bifocal demo                      the whole workflow on a sample pair
   bifocal template survey.xlsx      an empty survey workbook
   bifocal COMMAND --help            options and an example for each command

@@ -41,14 +41,17 @@ class Journal:
                 f"{path}: the journal cannot be written ({error.strerror}); choose a folder that "
                 "can be written to."
             ) from error
-        self._lock()
-        self.records = self._read()
+        try:
+            self._lock()
+            self.records = self._read()
+        except BaseException:
+            self._file.close()
+            raise
 
     def _lock(self) -> None:
         try:
             lock(self._file.fileno())
         except OSError:
-            self._file.close()
             raise InputError(
                 f"{self.path}: this survey is open already in another `bifocal pick`; use its page "
                 "(several may work on it at once), or end it first."

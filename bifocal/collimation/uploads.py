@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import shutil
 import tempfile
+import warnings
 from collections.abc import Sequence
 from pathlib import Path
 from typing import BinaryIO
+
+from PIL import Image
 
 from bifocal.collimation.project import PHOTOS
 from bifocal.files.images import ImageInfo, image_info, read_image
@@ -15,8 +18,6 @@ from photocore.output import atomic_path, free_path
 
 #: Photos of more pixels per byte than any camera writes are no photos. [px/byte, px]
 EMPTIEST, FROM = 400, 20_000_000
-#: The largest photo that is taken. [px]
-LARGEST = 250_000_000
 
 
 def take_photos(folder: Path, sent: Sequence[tuple[str, BinaryIO]]) -> tuple[Path, ...]:
@@ -75,17 +76,36 @@ def far_first(infos: Sequence[ImageInfo]) -> list[ImageInfo]:
 def _checked(path: Path) -> ImageInfo:
     """Return the facts of a photo, after a look at every byte of it."""
     try:
+        _refuse_bomb(path)
         info = image_info(path)
-        pixels, size = info.size[0] * info.size[1], path.stat().st_size
-        if pixels > LARGEST or (pixels > FROM and pixels > EMPTIEST * size):
-            raise InputError(
-                f"{path.name}: claims {info.size[0]} x {info.size[1]} px in {size // 1024} kB; "
-                "that is no photo."
-            )
         read_image(path)
     except InputError as error:
         raise InputError(str(error).replace(f"{path.parent}/", "")) from None
     return info
+
+
+def _refuse_bomb(path: Path) -> None:
+    """Refuse, by its header alone, what would grow beyond all bounds when it is decoded.
+
+    What Pillow cannot open, `image_info` refuses.
+    """
+    size = path.stat().st_size
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            with Image.open(path) as image:
+                width, height = image.size
+    except Image.DecompressionBombError:
+        raise InputError(
+            f"{path.name}: is larger than the page takes (178 MP); start the page with its file: "
+            "bifocal pick FAR NEAR"
+        ) from None
+    except (OSError, SyntaxError, ValueError):
+        return
+    if width * height > FROM and width * height > EMPTIEST * size:
+        raise InputError(
+            f"{path.name}: claims {width} x {height} px in {size // 1024} kB; that is no photo."
+        )
 
 
 def _kept(folder: Path, path: Path) -> Path:

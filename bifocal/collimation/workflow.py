@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import os
 import socket
 import threading
 import webbrowser
@@ -13,8 +14,8 @@ from pathlib import Path
 
 import uvicorn
 
+from bifocal.collimation.access import Access
 from bifocal.collimation.project import find_files
-from bifocal.collimation.security import new_token
 from bifocal.collimation.server import application
 from bifocal.collimation.session import Session
 from photocore.errors import InputError
@@ -75,17 +76,20 @@ def page_server(
     """
     files = find_files([Path(s) for s in sources], None if workbook is None else Path(workbook))
     session = Session(files, language=language)
+    access = Access.of(files.folder / f".{files.stem}.page.json")
     try:
-        with _listening(port) as listening:
-            token, number = new_token(), listening.getsockname()[1]
+        with _listening(port, access.port) as listening:
+            number = listening.getsockname()[1]
             config = uvicorn.Config(
-                application(session, token), log_level="error", access_log=False,
+                application(session, access.token), log_level="critical", access_log=False,
                 lifespan="off", server_header=False, timeout_graceful_shutdown=1,
             )  # fmt: skip
+            access.keep(number)
             session.sync.start()
-            url = f"http://{HOST}:{number}/?token={token}"
-            yield PageServer(url, token, session, uvicorn.Server(config), listening)
+            url = f"http://{HOST}:{number}/?token={access.token}"
+            yield PageServer(url, access.token, session, uvicorn.Server(config), listening)
     finally:
+        access.forget()
         session.close()
 
 
@@ -122,14 +126,19 @@ def open_browser(url: str) -> None:
 
 
 @contextmanager
-def _listening(port: int) -> Iterator[socket.socket]:
-    """Yield a socket on this computer only."""
+def _listening(port: int, last: int) -> Iterator[socket.socket]:
+    """Yield a socket on this computer only; the last one's port where none is asked for."""
     with socket.socket(socket.AF_INET, socket.SOCK_STREAM) as listening:
+        if os.name != "nt":  # there it would let two servers share one port
+            listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         try:
-            listening.bind((HOST, port))
+            listening.bind((HOST, port or last))
         except (OSError, OverflowError) as error:
-            reason = getattr(error, "strerror", None) or error
-            raise InputError(
-                f"port {port} cannot be used ({reason}); leave --port out and one is found."
-            ) from None
+            if port:
+                reason = getattr(error, "strerror", None) or error
+                raise InputError(
+                    f"port {port} cannot be used ({reason}); leave --port out and one is found."
+                ) from None
+            listening.bind((HOST, 0))
+        listening.listen(256)  # a browser that is quicker than the server waits
         yield listening
