@@ -19,7 +19,10 @@ export class ProductsStage {
     this.swipe = 1;
     this.photos = h("div", { class: "viewer" });
     this.value = h("p", { class: "value", role: "status", testid: "relief-value" });
-    this.profile = new Profile(app, () => this.pane?.paint(), () => this.pane?.fit());
+    this.profile = new Profile(app, () => this.pane?.paint(), () => {
+      this.pane?.mounted();
+      this.pane?.fit();
+    });
     this.element = h("main", { class: "stage work", id: "stage-products" },
       h("div", { class: "table-top" }, this.#bar(), this.photos, this.profile.element),
       h("aside", { class: "panel" }, this.#reliefBox(), this.#orthoBox(), this.#deliverBox()));
@@ -158,7 +161,8 @@ export class ProductsStage {
       if (wanted) {
         const [X, Y] = this.wall.toPlane(this.pane.unplace(wanted));
         const { r, sigma } = await this.app.connection.get(`/relief/value?X=${X}&Y=${Y}`).catch(() => ({}));
-        setText(this.value, `X ${number(X, 3)}  Y ${number(Y, 3)}  r ${number(r ?? NaN, 3)} ± ${number(sigma ?? NaN, 3)} m`);
+        const relief = Number.isFinite(r) ? `r ${number(r, 3)} ± ${number(sigma, 3)} m` : t("relief.unknown");
+        setText(this.value, `X ${number(X, 3)} · Y ${number(Y, 3)} · ${relief}`);
       }
       this.asking = null;
       if (this.wanted && this.wanted !== wanted) this.#ask(this.wanted);

@@ -19,7 +19,7 @@ export default {
   "status.orientation.align": "bereit zum Orientieren",
   "status.orientation.accept": "Orientierung annehmen",
   "status.points.pair": "zuerst orientieren",
-  "status.points.half": "{half} Punkte ohne Gegenstück",
+  "status.points.half": "ohne Gegenstück: {half}",
   "status.points.none": "ersten Punkt messen",
   "status.points.some": "{count} Punkte",
   "status.products.relief": "Relief rechnen",
@@ -254,4 +254,5 @@ export default {
   "relief.fast": "schnell",
   "relief.standard": "normal",
   "relief.best": "beste",
+  "relief.unknown": "hier ist kein Relief bekannt",
 };

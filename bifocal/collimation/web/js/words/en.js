@@ -19,7 +19,7 @@ export default {
   "status.orientation.align": "ready to align",
   "status.orientation.accept": "accept the orientation",
   "status.points.pair": "orientation first",
-  "status.points.half": "{half} points lack their partner",
+  "status.points.half": "without partner: {half}",
   "status.points.none": "pick the first point",
   "status.points.some": "{count} points",
   "status.products.relief": "run the relief",
@@ -254,4 +254,5 @@ export default {
   "relief.fast": "fast",
   "relief.standard": "standard",
   "relief.best": "best",
+  "relief.unknown": "no relief known here",
 };

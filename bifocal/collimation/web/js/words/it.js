@@ -19,7 +19,7 @@ export default {
   "status.orientation.align": "pronto per l’orientamento",
   "status.orientation.accept": "accetta l’orientamento",
   "status.points.pair": "prima l’orientamento",
-  "status.points.half": "{half} punti senza omologo",
+  "status.points.half": "senza omologo: {half}",
   "status.points.none": "colloca il primo punto",
   "status.points.some": "{count} punti",
   "status.products.relief": "calcola il rilievo",
@@ -254,4 +254,5 @@ export default {
   "relief.fast": "veloce",
   "relief.standard": "normale",
   "relief.best": "migliore",
+  "relief.unknown": "qui il rilievo non è noto",
 };
