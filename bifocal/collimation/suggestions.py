@@ -25,8 +25,8 @@ from photocore.errors import InputError
 NEAREST, FARTHEST = 0.4, -0.5
 #: Half the window of the search, in samples of the coarser photo: wider than that of the match.
 HALF = 10
-#: Samples along the line: half a pixel apart, at most so many.
-STEP, MOST = 0.5, 4000
+#: Samples along the line: so many pixels apart, at most so many; the match reaches 4 px.
+STEP, MOST = 1.0, 3000
 #: A second place this much worse in correlation leaves no doubt.
 CLEAR = 0.1
 #: Suggestions of this quality are taken without asking back.
@@ -191,7 +191,7 @@ def suggest(
 def _reliefs(
     pair: Pair, image: int, pixel: FloatArray, ends: tuple[float, float], shape: tuple[int, ...]
 ) -> FloatArray:
-    """Return the reliefs of places half a pixel apart on the line, inside the other photo."""
+    """Return the reliefs of places a pixel apart on the line, inside the other photo."""
     factors = zoom_factor(np.array(ends), d1=pair.d1, d2=pair.d2)
     probe = relief_from_zoom(np.linspace(factors[0], factors[1], 33), d1=pair.d1, d2=pair.d2)
     places = seen_in_other(pair, image, pixel, probe)

@@ -6,6 +6,8 @@ import threading
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
+from bifocal.collimation.workbook_process import FROM as LARGE
+from bifocal.collimation.workbook_process import change_in_process
 from bifocal.collimation.workbook_rows import (
     PointRow,
     ReadBook,
@@ -153,7 +155,10 @@ class WorkbookSync:
             if (written or wanted == self.read.rows) and not self._oriented_anew(pair):
                 return
             keep = self.seen != self.digest
-            change_rows(path, self.read, points, pair, pair_path, keep=keep)
+            if len(points) < LARGE:
+                change_rows(path, self.read, points, pair, pair_path, keep=keep)
+            else:
+                change_in_process(path, points, pair_path, keep=keep)
         else:
             if not any(point.is_complete for point in points):
                 return
