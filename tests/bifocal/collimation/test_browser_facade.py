@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+import base64
 import io
-import shutil
 import zipfile
 from collections.abc import Iterator
 from pathlib import Path
@@ -15,6 +15,7 @@ import pytest
 from tests.browser import (
     SAMPLE,
     TARGETS,
+    Driver,
     launched,
     sample_survey,
     served,
@@ -31,18 +32,28 @@ def browser() -> Iterator[Any]:
         yield found
 
 
+DROP = """(files) => {
+  const transfer = new DataTransfer();
+  for (const [name, data] of files) {
+    const bytes = Uint8Array.from(atob(data), (one) => one.charCodeAt(0));
+    transfer.items.add(new File([bytes], name, { type: "image/jpeg" }));
+  }
+  window.dispatchEvent(new DragEvent("drop", { dataTransfer: transfer, cancelable: true }));
+}"""
+
+
+def dropped(page: Driver, photos: list[Path]) -> None:
+    """Drop files on the page, as a file manager does."""
+    files = [[photo.name, base64.b64encode(photo.read_bytes()).decode()] for photo in photos]
+    page.tab.evaluate(DROP, files)
+
+
 @pytest.mark.acceptance
 def test_a_facade_from_two_photos_to_the_drawing_by_clicks_alone(
     browser: Any, tmp_path: Path
 ) -> None:
-    photos, survey = tmp_path / "photos", tmp_path / "survey"
-    photos.mkdir()
-    survey.mkdir()
-    for name in ("far.jpg", "near.jpg"):
-        shutil.copy(SAMPLE / name, photos)
-    with served(survey) as server, tab_of(browser, server) as page:
-        chosen = [str(photos / name) for name in ("far.jpg", "near.jpg")]
-        page.tab.get_by_test_id("photo-files").set_input_files(chosen)
+    with served(tmp_path) as server, tab_of(browser, server) as page:
+        dropped(page, [SAMPLE / name for name in ("near.jpg", "far.jpg")])
         page.settled("state.photos.length === 2")
         page.tab.get_by_label("Far distance d1").fill("17.50")
         page.tab.get_by_label("Sigma of d1").fill("0,01")
@@ -66,6 +77,10 @@ def test_a_facade_from_two_photos_to_the_drawing_by_clicks_alone(
         page.click("mode-products")
         page.tab.get_by_test_id("relief-quality").select_option("fast")
         page.click("run-relief")
+        page.click("cancel-relief")
+        assert page.finished("relief")["state"] == "cancelled"
+        page.click("run-relief")
+        page.settled("state.jobs.filter((job) => job.kind === 'relief').length === 2")
         assert page.finished("relief")["state"] == "done"
         page.click("run-ortho")
         assert page.finished("ortho")["state"] == "done"

@@ -205,6 +205,32 @@ def test_a_finger_picks_and_two_fingers_zoom(browser: Any, server: Served) -> No
         touch.empty()
 
 
+def test_control_points_and_tapes_are_typed_and_mended(page: Driver) -> None:
+    page.click("mode-orientation")
+    page.click("control-paste")
+    page.tab.get_by_test_id("paste-area").fill("A\t0,5\t1,25\t\nB\t3,5\t1,25\t0,2")
+    page.click("dialog-yes")
+    state = page.settled("state.control.length === 2")
+    assert [state["control"][0][key] for key in ("X", "Y", "r")] == [0.5, 1.25, None]
+    page.tab.get_by_label("r A").fill("0,1")
+    page.keys("Enter")
+    page.settled("state.control[0].r === 0.1")
+    for index, text in enumerate(("A", "B", "3,002", "0.005")):
+        page.tab.get_by_test_id(f"tape-{index}").fill(text)
+    page.click("tape-add")
+    tape = page.settled("state.tapes.length === 1")["tapes"][0]
+    assert (tape["length"], tape["sigma"]) == (3.002, 0.005)
+    page.tab.get_by_label("r A").fill("ten")
+    page.keys("Enter")
+    # No number: said at the field, and nothing sent.
+    assert page.tab.get_by_label("r A").evaluate("(field) => !field.validity.valid")
+    assert page.state["control"][0]["r"] == 0.1
+    page.tab.get_by_role("button", name="Delete A", exact=True).click()
+    page.settled("state.control.length === 1 && state.tapes.length === 0")
+    page.click("undo")
+    page.settled("state.control.length === 2 && state.tapes.length === 1")
+
+
 def test_a_token_is_needed(browser: Any, server: Served) -> None:
     context = browser.new_context()
     tab = context.new_page()

@@ -218,3 +218,37 @@ def test_both_photos_side_by_side_move_together(page: Driver) -> None:
     page.pick(2, true_pixel(2, SHADED))
     state = page.settled("state.points[0].result")
     assert abs(state["points"][0]["result"]["r"]) < 0.2
+
+
+def seen(page: Driver) -> Any:
+    """Return what the pane shows, markers and all, as grey values."""
+    page.tab.wait_for_timeout(350)
+    shot = page.tab.locator(".pane").first.screenshot()
+    return np.asarray(Image.open(io.BytesIO(shot)).convert("L"), dtype=float)
+
+
+def test_opacity_swipe_blink_and_contrast_show_what_they_say(page: Driver) -> None:
+    slider = page.tab.get_by_test_id("layer-opacity")
+    shots = {}
+    for percent in ("0", "50", "100"):
+        slider.fill(percent)
+        shots[percent] = seen(page)
+    far, near = shots["0"], shots["100"]
+    # The photos differ where something stands out, and only there.
+    assert np.abs(far - near).max() > 60
+    assert np.median(np.abs(far - near)) < 10
+    assert np.median(np.abs(shots["50"] - (far + near) / 2)) < 1.5
+    page.keys("x")
+    swept, middle = seen(page), far.shape[1] // 2
+    assert np.abs(swept - far)[:, : middle - 20].mean() < 0.5
+    assert np.abs(swept - near)[:, middle + 20 :].mean() < 0.5
+    page.keys("b")
+    blinks = [seen(page) for _ in range(5)]
+    apart = [min(np.abs(one - photo).mean() for photo in (far, near)) for one in blinks]
+    assert max(apart) < 0.5
+    assert len({np.abs(one - far).mean() < 0.5 for one in blinks}) == 2
+    page.keys("v")
+    slider.fill("0")
+    page.tab.get_by_test_id("contrast-1").fill("200")
+    assert seen(page).std() > 1.3 * far.std()
+    page.tab.get_by_test_id("contrast-1").fill("100")
