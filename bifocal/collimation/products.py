@@ -47,8 +47,9 @@ class Products:
 
     def place(self, kind: str, ending: str) -> Path:
         """Return where a product goes: over the page's own older one, never over another file."""
-        path = self.folder / f"{self.stem}{ending}"
-        if not path.exists() or self.made.get(path.name) == kind:
+        current = self.current(kind)
+        path = current or self.folder / f"{self.stem}{ending}"
+        if current is not None or not path.exists():
             return path
         return free_path(self.folder, f"{self.stem}-page", ending)
 

@@ -122,7 +122,9 @@ def _target(grey: ByteArray, pick: FloatArray, radius: float) -> tuple[FloatArra
             best = float(sigma[index]), places[index, ::-1], size
     if best is None:
         return None
-    refined = _refined(values, best[1], best[2])
+    from scipy.ndimage import spline_filter
+
+    refined = _refined(spline_filter(values.astype(np.float64)), best[1], best[2])
     if refined is None or refined[1] > WORST_TARGET:
         return None
     place = _disc_centre(grey, refined[0])
@@ -144,6 +146,8 @@ def _disc_centre(grey: ByteArray, place: FloatArray) -> FloatArray:
     if abs(high - low) < 2 * LEAST_CONTRAST or grey[inner].std() > 0.2 * abs(high - low):
         return place
     share = np.clip((high - grey.astype(np.float64)) / (high - low), 0.0, 1.0)
+    if (share[plate] > 0.5).mean() > 0.1:  # a cross or a chequer
+        return place
     share[(away > size + 1.5) | (share < 0.06)] = 0.0
     total = share.sum()
     centre = np.array([(share * columns).sum() / total, (share * rows).sum() / total])
@@ -185,14 +189,18 @@ def _symmetry(
     return np.where(good, sigma, np.inf)
 
 
-def _refined(
-    values: Float32Array, start: FloatArray, size: float
-) -> tuple[FloatArray, float] | None:
-    """Return the centre of symmetry by least squares, and its precision."""
+def _refined(values: FloatArray, start: FloatArray, size: float) -> tuple[FloatArray, float] | None:
+    """Return the centre of symmetry by least squares, and its precision.
+
+    Parameters
+    ----------
+    values : ndarray, shape (h, w)
+        Spline coefficients of the picture.
+    """
     offsets = _half_disc(size).astype(np.float64)
     place = start.copy()
     sigma, symmetry = np.inf, 0.0
-    for _ in range(12):
+    for turn in range(16):
         one, other = (_at(values, place + sign * offsets) for sign in (1, -1))
         slopes = []
         for axis in np.eye(2) * 0.5:
@@ -204,7 +212,8 @@ def _refined(
         design = np.column_stack([*slopes, offsets / size])
         difference = one - other
         weight = np.ones(len(difference))
-        for _ in range(3):  # a shadow across the target must not pull its centre
+        # A shadow across the target must not pull its centre; far from it edges are no shadows.
+        for _ in range(3 if turn > 3 else 1):
             normal = design.T @ (weight[:, None] * design) + 1e-6 * np.eye(4)
             step = -np.linalg.solve(normal, design.T @ (weight * difference))
             rest = difference + design @ step
@@ -213,7 +222,7 @@ def _refined(
         place = place + np.clip(step[:2], -1.0, 1.0)
         if np.linalg.norm(place - start) > 2.5:
             return None
-        if np.abs(step[:2]).max() < 1e-4:
+        if turn > 4 and np.abs(step[:2]).max() < 1e-3:
             break
     left = max(float(np.sqrt((weight * rest**2).sum() / weight.sum())), NOISE)
     sigma = left * float(np.sqrt(np.linalg.inv(normal)[[0, 1], [0, 1]].max()))
@@ -225,17 +234,21 @@ def _refined(
     return place, sigma
 
 
-def _at(image: Float32Array, places: FloatArray) -> FloatArray:
-    """Return a picture at places, shape (n, 2), cubic."""
-    flat = places.astype(np.float32)[None]
-    found = cv2.remap(image, flat, None, cv2.INTER_CUBIC, borderMode=cv2.BORDER_REPLICATE)
-    return np.asarray(found, dtype=np.float64)[0]
+def _at(coefficients: FloatArray, places: FloatArray) -> FloatArray:
+    """Return a picture, given by its spline, at places, shape (n, 2).
+
+    Not by cv2.remap: it rounds places to 1/32 px.
+    """
+    from scipy.ndimage import map_coordinates
+
+    found = map_coordinates(coefficients, places.T[::-1], order=3, mode="nearest", prefilter=False)
+    return np.asarray(found)
 
 
 def _corner(grey: ByteArray, pick: FloatArray, radius: float) -> tuple[FloatArray, float] | None:
     """Return the nearest strong corner and its precision; None without one."""
     smooth = cv2.GaussianBlur(grey.astype(np.float32), (0, 0), 0.7)
-    strength = np.asarray(cv2.cornerMinEigenVal(smooth, 2 * _HALF + 1, 3))
+    strength = np.asarray(cv2.cornerMinEigenVal(smooth, 5, 3))
     rows, columns = np.mgrid[0 : grey.shape[0], 0 : grey.shape[1]]
     near = np.hypot(columns - pick[0], rows - pick[1]) <= radius
     if not near.any():

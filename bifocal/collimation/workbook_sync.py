@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from bifocal.collimation.workbook_process import FROM as LARGE
 from bifocal.collimation.workbook_process import change_in_process
@@ -17,6 +17,7 @@ from bifocal.collimation.workbook_rows import (
     row_of,
     write_new,
 )
+from bifocal.model.pair import Pair
 from photocore.errors import InputError, PhotogrammetryError
 from photocore.output import check_not_open
 
@@ -172,12 +173,17 @@ class WorkbookSync:
         self.read = read
         session.note_saved(self.digest, revision)
 
-    def _oriented_anew(self, pair: Any) -> bool:
-        """Whether the workbook's homographies are not the pair's."""
-        matrices = None if self.read is None else self.read.survey.setup.matrices
-        if matrices is None:
+    def _oriented_anew(self, pair: Pair) -> bool:
+        """Whether the workbook's homographies, nadirs or distances are not the pair's."""
+        if self.read is None or self.read.survey.setup.matrices is None:
             return False
+        setup = self.read.survey.setup
+        known = zip(setup.matrices or (), setup.nadirs, (setup.d1, setup.d2), strict=True)
         return any(
-            (matrix != pair.photo(number).plane_from_pixel).any()
-            for number, matrix in enumerate(matrices, start=1)
+            (matrix != photo.plane_from_pixel).any()
+            or (nadir != photo.nadir).any()
+            or distance != photo.distance
+            for (matrix, nadir, distance), photo in zip(
+                known, (pair.image1, pair.image2), strict=True
+            )
         )
