@@ -18,9 +18,11 @@ from bifocal.collimation.access import Access
 from bifocal.collimation.project import find_files
 from bifocal.collimation.server import application
 from bifocal.collimation.session import Session
-from photocore.errors import InputError
+from photocore.errors import InputError, PhotogrammetryError
 
 HOST = "127.0.0.1"
+#: After the first paint, from kept tiles, the photos are read for suggestion and snap. [s]
+WARM_UP = 1.5
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,6 +79,8 @@ def page_server(
     files = find_files([Path(s) for s in sources], None if workbook is None else Path(workbook))
     session = Session(files, language=language)
     access = Access.of(files.folder / f".{files.stem}.page.json")
+    warm = threading.Timer(WARM_UP, _warm_up, [session])
+    warm.daemon = True
     try:
         with _listening(port, access.port) as listening:
             number = listening.getsockname()[1]
@@ -86,11 +90,19 @@ def page_server(
             )  # fmt: skip
             access.keep(number)
             session.sync.start()
+            warm.start()
             url = f"http://{HOST}:{number}/?token={access.token}"
             yield PageServer(url, access.token, session, uvicorn.Server(config), listening)
     finally:
+        warm.cancel()
         access.forget()
         session.close()
+
+
+def _warm_up(session: Session) -> None:
+    """Read both photos meanwhile; what is wrong with them is said where they are asked for."""
+    with contextlib.suppress(PhotogrammetryError, OSError, MemoryError):
+        session.pictures.warm_up()
 
 
 def pick(

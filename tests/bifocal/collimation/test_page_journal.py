@@ -194,3 +194,11 @@ def test_a_killed_server_resumes_with_everything_and_an_open_page_finds_it(tmp_p
         assert process.stdout.read() == ""
         assert process.wait(20) in (0, 1)
     assert not (folder / ".facade.page.json").exists()
+
+
+def test_the_bare_command_tells_of_the_page() -> None:
+    from click.testing import CliRunner
+
+    from bifocal.cli.main import main
+
+    assert "bifocal pick" in CliRunner().invoke(main, []).output

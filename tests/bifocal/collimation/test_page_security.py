@@ -173,7 +173,7 @@ def _jpeg() -> bytes:
         ("near.svg", b"<svg/>", "no photo"),
         ("near", _jpeg(), "no photo"),
         ("near.png", _png(60_000, 60_000), "larger than the page"),
-        ("near.png", _png(15_000, 15_000), "no photo"),
+        ("near.png", _png(12_000, 12_000), "no photo"),
         ("near.jpg", _jpeg()[:900], "damaged|cut off"),
         ("near.tif", b"II*\x00" + bytes(100), "TIFF"),
     ],
