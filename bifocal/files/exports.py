@@ -83,7 +83,7 @@ def export_points(
     if world and points.world is None:
         raise InputError(
             "the survey has no world coordinates; fill the Georeference sheet and solve again, "
-            "or export in the plane frame."
+            "or leave the world coordinates out."
         )
     coordinates = points.world if world and points.world is not None else points.xyz
     keep: BoolArray = np.all(np.isfinite(coordinates), axis=1)

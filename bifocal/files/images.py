@@ -20,8 +20,9 @@ from numpy.typing import NDArray
 from bifocal.model.image import as_photo
 from photocore.arrays import ByteArray
 from photocore.errors import InputError
-from photocore.output import atomic_path
+from photocore.output import atomic_path, check_ending
 from photocore.raster import RasterFile
+from photocore.textfile import check_name
 
 ImageArray = NDArray[np.uint8] | NDArray[np.uint16]
 
@@ -29,6 +30,8 @@ ImageArray = NDArray[np.uint8] | NDArray[np.uint16]
 MAX_PIXELS = 400_000_000
 #: Larger photos are decoded some rows at a time, to hold them in memory once only.
 _BY_STRIPS = 60_000_000
+#: Endings of the images that are written.
+WRITTEN = (".png", ".jpg", ".jpeg", ".tif", ".tiff")
 RAW_ENDINGS = frozenset(
     f".{ending}"
     for ending in (
@@ -229,8 +232,7 @@ def write_image(path: Path | str, image: ImageArray, *, overwrite: bool = False)
     """Write RGB, RGBA or grey pixels as the ending says (.png, .jpg, .tif), whole or not at all."""
     path = Path(path)
     ending = path.suffix.lower()
-    if ending not in {".png", ".jpg", ".jpeg", ".tif", ".tiff"}:
-        raise InputError(f"{path}: images are written as .png, .jpg or .tif.")
+    check_ending(path, "images are written as .png, .jpg or .tif.", *WRITTEN)
     order = {3: cv2.COLOR_RGB2BGR, 4: cv2.COLOR_RGBA2BGRA}
     pixels = image if image.ndim == 2 else cv2.cvtColor(image, order[image.shape[2]])
     options = [cv2.IMWRITE_JPEG_QUALITY, 95] if ending in {".jpg", ".jpeg"} else []
@@ -243,12 +245,13 @@ def write_image(path: Path | str, image: ImageArray, *, overwrite: bool = False)
 
 def _refuse_early(path: Path) -> None:
     """Refuse what can be told from the name and the file system."""
+    check_name(path)
     if path.is_dir():
         raise InputError(f"{path}: is a folder, expected a photo.")
     if not path.is_file():
         raise InputError(f"{path}: no such image.")
     if path.stat().st_size == 0:
-        raise InputError(f"{path}: the file is empty.")
+        raise InputError(f"{path}: the file is empty; save or copy it again.")
     if path.suffix.lower() in RAW_ENDINGS:
         raise InputError(
             f"{path}: camera raw is not read. Develop it to a 16-bit TIFF (or JPEG) without any "

@@ -12,8 +12,9 @@ from bifocal.model.pair import Pair
 from bifocal.orientation.matching import Matches, MatchSettings, match_pair
 from bifocal.survey.observations import PointObservations
 from bifocal.survey.template_workflow import write_survey
-from photocore.output import check_ending, check_writable
+from photocore.output import check_ending
 from photocore.tables import write_csv
+from photocore.workbook.newbook import check_new_workbook
 
 
 def match_photos(
@@ -32,7 +33,7 @@ def match_photos(
         If a file is at fault, or photos and pair do not belong together.
     """
     check_ending(out, "points are written as .xlsx (survey workbook) or .csv.", ".xlsx", ".csv")
-    check_writable(out, overwrite=overwrite)
+    check_new_workbook(out, overwrite=overwrite)
     pair, matches = match_pair_file(pair_path, settings)
     if out.suffix.lower() == ".csv":
         write_csv(out, csv_columns(matches), formats=_FORMATS, overwrite=overwrite)
