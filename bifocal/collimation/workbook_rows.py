@@ -21,7 +21,7 @@ from bifocal.survey.template_workflow import write_survey
 from bifocal.survey.workbook.content import SurveyContent, name_cell, setup_cells
 from bifocal.survey.workbook.reader import SurveyInput, read_survey
 from bifocal.survey.workbook.setup_cells import MATRICES, NADIRS
-from bifocal.survey.workbook.update import can_update, update_book
+from bifocal.survey.workbook.update import update_book
 from bifocal.survey.workflow import solve
 from photocore.errors import InputError, PhotogrammetryError
 from photocore.output import check_not_open, free_path, relative_name
@@ -213,9 +213,10 @@ def _solved(typed: Path, target: Path) -> bool:
     except PhotogrammetryError:  # nothing to solve yet: the formulas stay live
         return False
     own = as_typed(solution, replace(result_content(solution, typed, None), log=()))
-    if can_update(typed, target, solution.survey, own):
+    try:
+        update_book(typed, target, solution.survey, own, given={}, overwrite=True)
+    except InputError:  # a workbook changed beyond recognition still takes the picks
         return False
-    update_book(typed, target, solution.survey, own, overwrite=True)
     return True
 
 
