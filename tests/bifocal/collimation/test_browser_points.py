@@ -222,6 +222,7 @@ def test_both_photos_side_by_side_move_together(page: Driver) -> None:
 
 def seen(page: Driver) -> Any:
     """Return what the pane shows within its frame, as grey values."""
+    page.wait("() => !document.querySelector('.toast').classList.contains('on')")
     page.tab.wait_for_timeout(350)
     shot = page.tab.locator(".pane").first.screenshot()
     return np.asarray(Image.open(io.BytesIO(shot)).convert("L"), dtype=float)[6:-6, 6:-6]
