@@ -166,7 +166,7 @@ OUTSIDE = """() => [...document.querySelectorAll("header *, .layer-bar *, .hand 
   .map((node) => node.outerHTML.slice(0, 120))"""
 
 
-@pytest.mark.parametrize("size", [(1280, 720), (3840, 2160), (820, 1180)])
+@pytest.mark.parametrize("size", [(1280, 720), (3840, 2160)])
 def test_it_fits_small_screens_and_large(page: Driver, size: tuple[int, int]) -> None:
     page.tab.set_viewport_size({"width": size[0], "height": size[1]})
     for stage in STAGES:
@@ -188,6 +188,7 @@ def test_it_speaks_italian_and_german(page: Driver, language: str, word: str) ->
     page.wait("() => document.documentElement.lang === 'en' && window.bifocal")
 
 
+@pytest.mark.acceptance
 def test_a_finger_picks_and_two_fingers_zoom(browser: Any, server: Served) -> None:
     with tab_of(browser, server, has_touch=True) as touch:
         touch.empty()

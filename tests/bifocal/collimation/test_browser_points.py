@@ -228,6 +228,7 @@ def seen(page: Driver) -> Any:
     return np.asarray(Image.open(io.BytesIO(shot)).convert("L"), dtype=float)[6:-6, 6:-6]
 
 
+@pytest.mark.acceptance
 def test_opacity_swipe_blink_and_contrast_show_what_they_say(page: Driver) -> None:
     slider = page.tab.get_by_test_id("layer-opacity")
     shots = {}
