@@ -113,3 +113,13 @@ def _lines(summary: dict[str, Any]) -> Iterator[str]:
         "mm at the median."
     )
     yield summary["rests_on"]
+    if summary["empty"]:
+        named = "; ".join(
+            f"columns {c[0]}-{c[1]}, rows {r[0]}-{r[1]}"
+            for c, r in ((part["columns"], part["rows"]) for part in summary["empty"][:8])
+        )
+        more = len(summary["empty"]) - 8
+        yield (
+            f"NOTHING FOUND in {len(summary['empty'])} of 24 parts of the far photo, seen by both: "
+            f"{named}{f' and {more} more' if more > 0 else ''} (no texture, or hidden)."
+        )

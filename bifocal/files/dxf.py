@@ -51,3 +51,15 @@ def add_ellipse(model: Any, place: tuple[float, ...], ellipse: FloatArray, layer
     # A ratio of 1e-6 is the least that the format allows.
     ratio = max(short / long, 1e-6)
     model.add_ellipse(place, major_axis=axis, ratio=ratio, dxfattribs={"layer": layer})
+
+
+def layer_name(text: str) -> str:
+    """Return a text as the name of a layer that every CAD program takes.
+
+    Examples
+    --------
+    >>> layer_name("window/edge: left")
+    'window_edge_ left'
+    """
+    name = "".join("_" if c in '<>/\\":;?*|=`' or not c.isprintable() else c for c in text).strip()
+    return name[:120] or "0"

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 
 import numpy as np
 
-from bifocal.files.dxf import add_ellipse, add_text, new_drawing
-from bifocal.model.points import SurveyPoints
+from bifocal.files.dxf import add_ellipse, add_text, layer_name, new_drawing
+from bifocal.model.points import PointLine, SurveyPoints
 from photocore.arrays import BoolArray, FloatArray, not_negative
 from photocore.cloud import write_cloud
 from photocore.errors import InputError
@@ -40,6 +40,7 @@ def export_points(
     order: str = "PNEZD",
     flavour: str = "plain",
     ellipses: float = 10.0,
+    lines: Sequence[PointLine] = (),
     overwrite: bool = False,
 ) -> tuple[str, ...]:
     """Write points in the format that the file's ending names.
@@ -58,6 +59,8 @@ def export_points(
         ``plain``, ``excel-it`` or ``excel-de``: delimiter, decimal sign and encoding of a .csv.
     ellipses : float
         How many times one sigma the error ellipses of a .dxf are drawn; 0 for none.
+    lines : sequence of PointLine
+        Polylines of a .dxf, in space; points without coordinates are left out of them.
     overwrite : bool
         Replace an existing file.
 
@@ -75,7 +78,7 @@ def export_points(
     ending = path.suffix.lower()
     drawn = (not_negative(ellipses, "ellipses"), world)
     writers: dict[str, Callable[[Path, SurveyPoints, FloatArray], None]] = {
-        ".dxf": partial(_write_dxf, drawn=drawn),
+        ".dxf": partial(_write_dxf, drawn=drawn, lines=lines),
         ".geojson": partial(_write_geojson, world=world),
         ".xlsx": _write_xlsx,
     }
@@ -131,9 +134,14 @@ def _sigmas(points: SurveyPoints) -> dict[str, FloatArray]:
 
 
 def _write_dxf(
-    path: Path, points: SurveyPoints, coordinates: FloatArray, *, drawn: tuple[float, bool]
+    path: Path,
+    points: SurveyPoints,
+    coordinates: FloatArray,
+    *,
+    drawn: tuple[float, bool],
+    lines: Sequence[PointLine],
 ) -> None:
-    """Write a drawing: a POINT, its name, its relief and its error ellipse for each point."""
+    """Write a drawing: a POINT, name, relief and error ellipse of each point; lines in space."""
     times, world = drawn
     layer_of_ellipses = ELLIPSES.format(times)
     ellipses = points.ellipses(world=world) * [times, times, 1.0]
@@ -152,6 +160,14 @@ def _write_dxf(
         add_text(model, relief, (left, y - 1.4 * height, z), height, "BIFOCAL_RELIEF")
         if has_ellipses and np.isfinite(ellipses[i]).all() and ellipses[i, 1] > 0:
             add_ellipse(model, (x, y, z), ellipses[i], layer_of_ellipses)
+    places = dict(zip(points.ids, coordinates.tolist(), strict=True))
+    for line in lines:
+        vertices = [places[name] for name in line.ids if name in places]
+        layer = layer_name(line.layer)
+        if layer not in drawing.layers:
+            drawing.layers.add(layer)
+        if len(vertices) > 1:
+            model.add_polyline3d(vertices, close=line.closed, dxfattribs={"layer": layer})
     drawing.saveas(path)
 
 

@@ -111,6 +111,7 @@ def image_info(path: Path | str) -> ImageInfo:
                 )
             _check_mode(path, image.mode)
             bits = 16 if image.mode.startswith("I") else 8
+            _check_size(path, image.size)  # Pillow decodes a PNG to look for its EXIF data
             return _info_from_exif(path, image.size, bits, image.getexif())
     except UnidentifiedImageError:
         raise InputError(f"{path}: is not an image (JPEG, PNG or TIFF).") from None
@@ -298,10 +299,7 @@ def _named_exif(tag: Any) -> dict[int, Any]:
 def _info_from_exif(path: Path, size: tuple[int, int], bits: int, exif: Any) -> ImageInfo:
     """Return the facts given the stored size and a mapping of EXIF tags."""
     width, height = size
-    if width * height > MAX_PIXELS:
-        raise InputError(
-            f"{path}: claims {width} x {height} px; more than {MAX_PIXELS // 10**6} MP is refused."
-        )
+    _check_size(path, size)
     tags = dict(exif)
     if hasattr(exif, "get_ifd"):
         tags |= dict(exif.get_ifd(34665))
@@ -321,6 +319,15 @@ def _info_from_exif(path: Path, size: tuple[int, int], bits: int, exif: Any) -> 
         aperture=_number(tags.get(33437)),
         subject_distance=_number(tags.get(37382)),
     )
+
+
+def _check_size(path: Path, size: tuple[int, int]) -> None:
+    """Refuse what is larger than any photo."""
+    width, height = size
+    if width * height > MAX_PIXELS:
+        raise InputError(
+            f"{path}: claims {width} x {height} px; more than {MAX_PIXELS // 10**6} MP is refused."
+        )
 
 
 def _text(value: Any) -> str:

@@ -28,7 +28,7 @@ def rests_on(pair: Pair, *, setup: str, picks: str, more: str = "") -> str:
 of relief and in no sigma.'
     """
     slip = float(false_relief_of_scale(0.01, d1=pair.d1, d2=pair.d2))
-    return (
-        f"Sigmas rest on: {picks}; {setup}, of which 1 % of scale is {slip:.2f} m of relief and in "
-        f"no sigma{'; ' + more if more else ''}."
-    )
+    share = f"of which 1 % of scale is {slip:.2f} m of relief and in no sigma"
+    if pair.orientation is not None:
+        share = "with the covariance of its orientation"
+    return f"Sigmas rest on: {picks}; {setup}, {share}{'; ' + more if more else ''}."

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import compress
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -15,6 +15,15 @@ from photocore.errors import InputError
 _WIDTHS = {
     "xyz": 3, "world": 3, "sigma_r": 0, "sigma_xy": 2, "sigma_world": 3, "cov_xy": 0, "cov_en": 0
 }  # fmt: skip
+
+
+class PointLine(NamedTuple):
+    """A polyline through surveyed points, by their names, on a layer of the drawing."""
+
+    name: str
+    layer: str
+    ids: tuple[str, ...]
+    closed: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

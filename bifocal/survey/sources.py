@@ -82,10 +82,11 @@ def described_pair(setup: SurveySetup, file: Path | None, folder: Path) -> Pair 
     if setup.matrices is None or setup.d1 is None or setup.d2 is None:
         return None
     lenses: list[Lens | None] = [None, None]
+    orientation = None
     if file is not None:
         try:
             given = Pair.read(file)
-            lenses = [given.image1.lens, given.image2.lens]
+            lenses, orientation = [given.image1.lens, given.image2.lens], given.orientation
         except InputError:
             lenses = [None, None]
     photos = [
@@ -97,4 +98,4 @@ def described_pair(setup: SurveySetup, file: Path | None, folder: Path) -> Pair 
             strict=True,
         )
     ]  # fmt: skip
-    return Pair(image1=photos[0], image2=photos[1], folder=folder)
+    return Pair(image1=photos[0], image2=photos[1], folder=folder, orientation=orientation)

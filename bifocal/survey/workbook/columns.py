@@ -270,9 +270,13 @@ def pair_points(*, undistorted: bool) -> tuple[SurveyColumn, ...]:
         ),
         *(
             SurveyColumn(key=key, kind="value", places=6, folded=True)
-            for key in ("g1x", "g1y", "g2x", "g2y", "k_q", "k_r")
+            for key in ("g1x", "g1y", "g2x", "g2y", "k_q", "k_r", "o_r")
         ),
-        *(SurveyColumn(key=f"k_{key}", kind="value", folded=True) for key in COVARIANCES),
+        *(
+            SurveyColumn(key=f"{kind}_{key}", kind="value", folded=True)
+            for kind in "ko"
+            for key in COVARIANCES
+        ),
         _f("s1_used", f'IF([@q]="","",{radius(1, moved)})', 4, folded=True),
         _f("s2_used", f'IF([@q]="","",{radius(2, moved)})', 4, folded=True),
         _f(
@@ -289,9 +293,12 @@ def pair_points(*, undistorted: bool) -> tuple[SurveyColumn, ...]:
         _of_r("Y", place("y")),
         _of_r("Z", "[@r]"),
         *_sigmas(
-            "IF(ISNUMBER([@r]),sigma_px*[@k_r],NA())",
+            "IF(ISNUMBER([@r]),SQRT((sigma_px*[@k_r])^2+N([@o_r])^2),NA())",
             tuple(
-                _of_x(f"cov_{key}", f"IF(ISNUMBER([@r]),sigma_px^2*[@k_{key}],NA())")
+                _of_x(
+                    f"cov_{key}",
+                    f"IF(ISNUMBER([@r]),sigma_px^2*[@k_{key}]+N([@o_{key}]),NA())",
+                )
                 for key in COVARIANCES
             ),
         ),
