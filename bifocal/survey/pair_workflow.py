@@ -171,9 +171,9 @@ def survey_points(solution: SolvedSurvey) -> SurveyPoints:
 
 
 def is_survey(path: Path | str) -> bool:
-    """Tell whether a file is a workbook that states the distances of its set-up."""
+    """Tell whether a workbook is taken as a pair: it states distances and names its photos."""
     setup = read_survey(path).setup
-    return setup.d1 is not None and setup.d2 is not None
+    return None not in (setup.d1, setup.d2) and bool(setup.photo1 and setup.photo2)
 
 
 def points_of(path: Path | str) -> SurveyPoints | None:

@@ -137,6 +137,8 @@ def test_template_to_orthophoto_and_cad(c2, d2, tmp_path, photo):
     for name in ("far.tif", "near.tif"):
         shutil.copy(photo, tmp_path / "photos" / name)
     # The sheet as the user saved it, never solved by the program:
+    run("export", tmp_path / "survey.xlsx", "--out", tmp_path / "unsolved.csv")
+    assert len((tmp_path / "unsolved.csv").read_text().splitlines()) == 23
     run("ortho", tmp_path / "survey.xlsx", "--out", tmp_path / "ortho.tif", "--gsd", "0.02")
     with rasterio.open(tmp_path / "ortho.tif") as ortho:
         assert (ortho.read(4) == 1).mean() > 0.9
