@@ -228,7 +228,7 @@ def zoom_map(frame: Frame, relief: Float32Array) -> tuple[Float32Array, Float32A
 
 
 def values_at(band: NDArray[Any], places: NDArray[np.floating], how: int) -> NDArray[Any]:
-    """Return a band or picture at (column, row), shape (n, 2); NaN or 0 outside it.
+    """Return a band or picture at (column, row), shape (n, 2) or (h, w, 2); NaN or 0 outside it.
 
     Parameters
     ----------
@@ -236,6 +236,8 @@ def values_at(band: NDArray[Any], places: NDArray[np.floating], how: int) -> NDA
         OpenCV's interpolation, ``cv2.INTER_NEAREST`` or another.
     """
     outside = np.nan if band.dtype.kind == "f" else 0
+    if places.ndim == 3:
+        return np.asarray(cv2.remap(band, places, None, how, borderValue=outside))
     values = [np.zeros((0, *band.shape[2:]), band.dtype)]
     # cv2.remap counts the places of one call in 16 bits.
     for part in np.array_split(places.astype(np.float32), len(places) // 30000 + 1):
