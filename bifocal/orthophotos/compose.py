@@ -15,6 +15,7 @@ from bifocal.model.image import ImageArray
 from bifocal.model.pair import Pair
 from bifocal.model.relief_map import ReliefMap
 from bifocal.model.surface import FlatSurface, MapSurface, Surface
+from bifocal.orthophotos import mask_tidying
 from bifocal.orthophotos.ortho_image import OrthoOptions, Orthophoto, Source
 from bifocal.orthophotos.pull_push import fill_holes
 from bifocal.orthophotos.rectify import SourcePhoto, footprint
@@ -200,6 +201,8 @@ def render_window(
 ) -> Tile:
     """Return one window of an orthophoto."""
     margin = _FILL_REACH if options.fill else 0
+    if options.mask_hidden:
+        margin = max(margin, mask_tidying.MARGIN)
     if len(views) > 1:
         margin = max(margin, math.ceil(2 * options.feather))
     wide = window
@@ -236,7 +239,7 @@ def _look(
         return _Look(np.zeros(shape, view.image.dtype), inside, np.zeros(grid.shape, bool))
     hidden = np.zeros(grid.shape, bool)
     if options.mask_hidden:
-        hidden = hidden_from(surface, grid, view.photo.foot, relief) & inside
+        hidden = mask_tidying.tidied(hidden_from(surface, grid, view.photo.foot, relief)) & inside
     return _Look(view.sample(column, row, options.interpolation), inside, hidden)
 
 

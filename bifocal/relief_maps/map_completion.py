@@ -7,7 +7,7 @@ import numpy as np
 
 from bifocal.model.grid import Grid
 from bifocal.model.relief_map import Quality
-from bifocal.relief_maps import forward_projection, smoothing
+from bifocal.relief_maps import evidence, forward_projection, smoothing
 from bifocal.relief_maps.forward_projection import MapBands
 from bifocal.relief_maps.frame import Frame
 from photocore.arrays import BoolArray, Float32Array
@@ -20,6 +20,11 @@ NOISE, NOISE_UNMEASURED = 0.25, 2.0
 GUARD = 1
 #: Share of a step within 5 x 5 px that is added to sigma: which side a pixel is on is uncertain.
 SIGMA_OF_STEP = 0.25
+#: The outline of what is known is that of most pixels in a window of this side. [px]
+OUTLINE = 7
+#: A piece of map with nothing around it goes if it has fewer pixels and is less than this share of
+#: the largest piece; a hole of so few pixels is closed.
+SCRAP, SCRAP_SHARE, HOLE = 4000, 0.05, 25
 
 
 def complete(frame: Frame, bands: MapBands, grid: Grid) -> MapBands:
@@ -50,6 +55,7 @@ def complete(frame: Frame, bands: MapBands, grid: Grid) -> MapBands:
     )
     _guard(frame, bands, grid)
     forward_projection.forget_outside(bands)
+    _tidy_outline(bands)
     return bands
 
 
@@ -84,7 +90,29 @@ def _sigma_at_steps(bands: MapBands, per_pixel: Float32Array) -> Float32Array:
 
 def _guard(frame: Frame, bands: MapBands, grid: Grid) -> None:
     """Call nothing measured that camera 2 cannot see, or hardly (in place)."""
+    vague = ~(bands.sigma < evidence.SIGMA_SHARE * frame.distances[1])
+    bands.quality[vague & (bands.quality == Quality.MEASURED)] = Quality.INTERPOLATED
     hidden = forward_projection.hidden_on_map(bands.r, grid, frame.pair.image2.foot)
     square = np.ones((2 * GUARD + 1,) * 2, np.uint8)
     near = cv2.dilate(hidden.astype(np.uint8), square) > 0
     bands.quality[near & (bands.quality == Quality.MEASURED)] = Quality.HIDDEN
+
+
+def _tidy_outline(bands: MapBands) -> None:
+    """Round the outline of what is known, drop pieces that float, close pinholes (in place)."""
+    known = np.isfinite(bands.r)
+    wanted = cv2.medianBlur(known.astype(np.uint8), OUTLINE)
+    _, label, stats, _ = cv2.connectedComponentsWithStats(wanted, connectivity=8)
+    area = stats[:, cv2.CC_STAT_AREA]
+    if len(area) > 1:
+        scrap = area < min(SCRAP, SCRAP_SHARE * area[1:].max())
+        scrap[0] = False
+        wanted[scrap[label]] = 0
+    _, label, stats, _ = cv2.connectedComponentsWithStats(1 - wanted, connectivity=4)
+    pinhole = stats[:, cv2.CC_STAT_AREA] < HOLE
+    pinhole[0] = False
+    wanted[pinhole[label]] = 1
+    forward_projection.fill_small(bands, (wanted > 0) & ~known)
+    lost = wanted == 0
+    bands.r[lost] = bands.sigma[lost] = np.nan
+    bands.quality[lost] = Quality.UNKNOWN
