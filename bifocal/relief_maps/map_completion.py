@@ -7,7 +7,7 @@ import numpy as np
 
 from bifocal.model.grid import Grid
 from bifocal.model.relief_map import Quality
-from bifocal.relief_maps import evidence, forward_projection, smoothing
+from bifocal.relief_maps import evidence, forward_projection, levels, smoothing
 from bifocal.relief_maps.forward_projection import MapBands
 from bifocal.relief_maps.frame import Frame
 from photocore.arrays import BoolArray, Float32Array
@@ -49,10 +49,9 @@ def complete(frame: Frame, bands: MapBands, grid: Grid) -> MapBands:
         np.minimum(bands.sigma, np.float32(NOISE) * per_pixel),
         np.minimum(bands.sigma, np.float32(NOISE_UNMEASURED) * per_pixel),
     )
-    bands = bands._replace(
-        r=smoothing.shrink_noise(bands.r, quiet, smoothing.MAP_WINDOWS),
-        sigma=_sigma_at_steps(bands, per_pixel),
-    )
+    relief = smoothing.shrink_noise(bands.r, quiet, smoothing.MAP_WINDOWS)
+    relief = levels.drawn_to_levels(relief, bands.sigma, bands.quality == Quality.MEASURED)
+    bands = bands._replace(r=relief, sigma=_sigma_at_steps(bands, per_pixel))
     _guard(frame, bands, grid)
     forward_projection.forget_outside(bands)
     _tidy_outline(bands)
