@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 
 from bifocal import rays
-from bifocal.relief_maps.frame import Frame, offsets, zoom_map
+from bifocal.relief_maps.frame import Frame, offsets, radial_stretch, zoom_map
 from photocore.arrays import BoolArray, ByteArray, Float32Array
 
 #: Weight of smoothness; 30 is as good before noise is taken out, 20 keeps more detail for it.
@@ -43,7 +43,7 @@ class Measurement:
     loop : ndarray of float32
         Distance between a pixel and itself after flow there and back. [px]
     sigma_px : ndarray of float32
-        Local RMS of ``across``: matching precision. [px]
+        Local RMS of ``across``, times `radial_stretch`: matching precision along the radius. [px]
     """
 
     r: Float32Array
@@ -104,9 +104,10 @@ def measure(frame: Frame, coarse: Float32Array, *, stride: int = STRIDE) -> Meas
     flow = seeded_flow(photos.image1, photos.image2, seed, finest=0, stride=stride, alpha=alpha)
     loop = _loop(photos, flow, alpha)
     relief, across = split(frame, flow)
+    stretched = radial_stretch(frame)
     rms = cv2.blur(np.minimum(across * across, CLIP * CLIP), (WINDOW, WINDOW))
     return Measurement(
-        r=relief, across=across, loop=loop, sigma_px=np.sqrt(rms + np.float32(FLOOR**2))
+        r=relief, across=across, loop=loop, sigma_px=np.sqrt(rms + np.float32(FLOOR**2)) * stretched
     )
 
 
