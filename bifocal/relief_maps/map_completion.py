@@ -9,15 +9,17 @@ from bifocal.model.grid import Grid
 from bifocal.model.relief_map import Quality
 from bifocal.relief_maps import evidence, forward_projection, levels, smoothing
 from bifocal.relief_maps.forward_projection import MapBands
-from bifocal.relief_maps.frame import Frame
-from photocore.arrays import BoolArray, Float32Array
+from bifocal.relief_maps.frame import Frame, offsets
+from photocore.arrays import BoolArray, Float32Array, FloatArray
 
 #: Noise that is taken out of the map, of measured and of other relief, in parallax: what is smaller
 #: casts shadows that are not there (94 % of the small holes of a church). [px]
 NOISE, NOISE_UNMEASURED = 0.25, 2.0
-#: Pixels this near to what camera 2 cannot see are not called measured: steps are known to a pixel,
-#: and 87 % of the wrongly measured pixels of façade 11 lay within two of the rim. [px]
-GUARD = 1
+#: Pixels this far inwards of what camera 2 cannot see are not called measured: raised parts come
+#: out too fat, and 87 % of the wrongly measured pixels lay within two pixels of the rim. Façade 61:
+#: wrong / measured % 15.5 / 94.9 without, 9.4 / 94.3 with 3, 8.1 / 93.7 with 5; three pixels on all
+#: sides 4.2 / 92.0. [px]
+GUARD = 3
 #: Share of a step within 5 x 5 px that is added to sigma: which side a pixel is on is uncertain.
 SIGMA_OF_STEP = 0.25
 #: The outline of what is known is that of most pixels in a window of this side. [px]
@@ -92,9 +94,21 @@ def _guard(frame: Frame, bands: MapBands, grid: Grid) -> None:
     vague = ~(bands.sigma < evidence.SIGMA_SHARE * frame.distances[1])
     bands.quality[vague & (bands.quality == Quality.MEASURED)] = Quality.INTERPOLATED
     hidden = forward_projection.hidden_on_map(bands.r, grid, frame.pair.image2.foot)
-    square = np.ones((2 * GUARD + 1,) * 2, np.uint8)
-    near = cv2.dilate(hidden.astype(np.uint8), square) > 0
+    near = _spread_inwards(hidden, grid.pixel_of(frame.pair.image2.nadir), GUARD)
     bands.quality[near & (bands.quality == Quality.MEASURED)] = Quality.HIDDEN
+
+
+def _spread_inwards(mask: BoolArray, middle: FloatArray, reach: int) -> BoolArray:
+    """Return a mask grown towards a point (column, row) by some pixels."""
+    x, y = (np.asarray(axis) for axis in offsets(mask.shape, middle))
+    outwards = 1 / np.maximum(np.sqrt(x * x + y * y), np.float32(1))
+    flags = mask.astype(np.uint8)
+    result = mask.copy()
+    column, row = offsets(mask.shape)
+    for step in range(1, reach + 1):
+        maps = (column + step * x * outwards, row + step * y * outwards)
+        result |= cv2.remap(flags, *maps, cv2.INTER_NEAREST) > 0
+    return result
 
 
 def _tidy_outline(bands: MapBands) -> None:
