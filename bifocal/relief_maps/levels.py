@@ -89,13 +89,16 @@ def _count(
     r = relief[use]
     cell = place[use] * count + ((r - low) / CLASS).astype(np.int64)
     share = 1 / np.maximum(sigma[use], np.float32(BEST)) ** 2
-    disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (SURROUNDINGS, SURROUNDINGS))
-    kernel = disc.astype(np.float32)
+    # A full square: fewer blocks at the corners would draw a slope to the middle of its block.
+    side = (SURROUNDINGS, SURROUNDINGS)
 
     def around(weights: FloatArray) -> Float32Array:
         sums = np.bincount(cell, weights, shape[0] * shape[1] * count).astype(np.float32)
         layers = np.ascontiguousarray(sums.reshape(-1, count).T).reshape(count, *shape)
-        spread = [cv2.filter2D(x, -1, kernel, borderType=cv2.BORDER_CONSTANT) for x in layers]
+        spread = [
+            cv2.boxFilter(x, -1, side, normalize=False, borderType=cv2.BORDER_CONSTANT)
+            for x in layers
+        ]
         return np.ascontiguousarray(np.stack(spread).reshape(count, -1).T)
 
     return around(share), around(share * r)
