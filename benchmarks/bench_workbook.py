@@ -115,6 +115,9 @@ def memory():
 def child(job, path):
     import openpyxl  # noqa: F401
 
+    import photocore.tables
+    import photocore.workbook.editor  # noqa: F401
+
     base, begin = memory(), time.process_time()
     JOBS[job](path)
     print(json.dumps([time.process_time() - begin, memory() - base]))

@@ -312,9 +312,10 @@ class RadialDivision(NamedTuple):
 
 
 def inverse_2x2(matrices: FloatArray) -> FloatArray:
-    """Return the inverses of matrices, shape (..., 2, 2)."""
+    """Return the inverses of matrices, shape (..., 2, 2); nothing finite where singular."""
     a, b = matrices[..., 0, 0], matrices[..., 0, 1]
     c, d = matrices[..., 1, 0], matrices[..., 1, 1]
     out = np.empty_like(matrices)
     out[..., 0, 0], out[..., 0, 1], out[..., 1, 0], out[..., 1, 1] = d, -b, -c, a
-    return out / (a * d - b * c)[..., None, None]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return out / (a * d - b * c)[..., None, None]

@@ -43,6 +43,18 @@ def check_all_writable(*paths: Path | None, overwrite: bool) -> None:
             check_writable(path, overwrite=overwrite)
 
 
+def check_ending(path: Path | None, rule: str, *endings: str) -> None:
+    """Refuse a file with another ending than these, given in small letters; None is no file.
+
+    Raises
+    ------
+    InputError
+        With the rule as its message.
+    """
+    if path is not None and path.suffix.lower() not in endings:
+        raise InputError(f"{path}: {rule}")
+
+
 def check_not_open(path: Path) -> None:
     """Refuse a file that a spreadsheet program has open.
 

@@ -9,6 +9,7 @@ import numpy as np
 from bifocal import rays
 from bifocal.model.flags import FlagLimits, point_flags
 from photocore.arrays import FloatArray
+from photocore.distortion import inverse_2x2
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -148,13 +149,6 @@ def _square(jacobian: FloatArray) -> FloatArray:
     return product
 
 
-def _inverse2(matrix: FloatArray) -> FloatArray:
-    """Return the inverses of 2x2 matrices; NaN where singular."""
-    (a, b), (c, d) = matrix.transpose(1, 2, 0)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        return (np.array([[d, -b], [-c, a]]) / (a * d - b * c)).transpose(2, 0, 1)
-
-
 def _inverse3(matrix: FloatArray) -> FloatArray:
     """Return the inverses of symmetric 3x3 matrices by cofactors; NaN where singular."""
     cofactor = np.cross(matrix[:, [1, 2, 0]], matrix[:, [2, 0, 1]])
@@ -177,7 +171,7 @@ def _covariance(
     normal = np.zeros((len(xyz), 3, 3))
     for camera, cov in ((far, cov1), (near, cov2)):
         rows = rays.design_rows(xyz, camera)
-        product = rows.transpose(0, 2, 1) @ _inverse2(cov)
+        product = rows.transpose(0, 2, 1) @ inverse_2x2(cov)
         weighted.append(product)
         normal += product @ rows
     covariance = _inverse3(normal)
@@ -200,7 +194,7 @@ def _covariance(
 
 def _pixels(metres: FloatArray, shift: FloatArray) -> FloatArray:
     """Return a shift on the plane in pixels of the image."""
-    shift_px: FloatArray = (_inverse2(metres) @ shift[:, :, None])[:, :, 0]
+    shift_px: FloatArray = (inverse_2x2(metres) @ shift[:, :, None])[:, :, 0]
     return shift_px
 
 

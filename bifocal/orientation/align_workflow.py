@@ -18,7 +18,7 @@ from bifocal.orientation.interior_orientation import Interior, lens_of_photo
 from bifocal.orientation.orientation_stages import PhotoInput
 from photocore.arrays import FloatArray
 from photocore.errors import InputError
-from photocore.output import check_writable, relative_name
+from photocore.output import check_all_writable, relative_name
 
 #: A wall point given without r lies on the plane to this. [m]
 SIGMA_ON_WALL = 0.005
@@ -99,9 +99,7 @@ def align_photos(
         )
     way, options = _way(options)
     _check_metres(options)
-    for path in (out, picture):
-        if path is not None:
-            check_writable(path, overwrite=overwrite)
+    check_all_writable(out, picture, overwrite=overwrite)
     infos = image_info(far), image_info(near)
     first, second = (
         PhotoInput(

@@ -12,8 +12,7 @@ from bifocal.model.pair import Pair
 from bifocal.orientation.matching import Matches, MatchSettings, match_pair
 from bifocal.survey.observations import PointObservations
 from bifocal.survey.template_workflow import write_survey
-from photocore.errors import InputError
-from photocore.output import check_writable
+from photocore.output import check_ending, check_writable
 from photocore.tables import write_csv
 
 
@@ -32,8 +31,7 @@ def match_photos(
     InputError, GeometryError
         If a file is at fault, or photos and pair do not belong together.
     """
-    if out.suffix.lower() not in {".xlsx", ".csv"}:
-        raise InputError(f"{out}: points are written as .xlsx (survey workbook) or .csv.")
+    check_ending(out, "points are written as .xlsx (survey workbook) or .csv.", ".xlsx", ".csv")
     check_writable(out, overwrite=overwrite)
     pair = Pair.read(pair_path)
     images = (read_grey(pair.photo_file(1)), read_grey(pair.photo_file(2)))

@@ -34,6 +34,7 @@ from photocore.camera import (
     triangulate,
 )
 from photocore.errors import GeometryError
+from photocore.rotation import skew
 
 #: A coordinate that was not measured, as a standard deviation. [m]
 UNKNOWN = 1e6
@@ -189,11 +190,9 @@ def _priors(observations: PairObservations, state: PairUnknowns) -> Equations:
         linear += [({at(name, number): 1.0}, value, sigma) for name, value, sigma in known]
         if observations.sigma_tilt is not None:
             axis, turn = camera.rotation[2], at("turn X", number)
-            by_turn = np.cross(axis, np.eye(3))
+            turned = skew(axis)
             by = np.zeros((2, len(NAMES)))
-            by[:, turn : turn + 3] = (
-                -(by_turn[:, :2].T + np.outer(camera.tilt, by_turn[:, 2])) / axis[2]
-            )
+            by[:, turn : turn + 3] = -(turned[:2] + np.outer(camera.tilt, turned[2])) / axis[2]
             tilts.append(camera.tilt / observations.sigma_tilt)
             by_tilts.append(by / observations.sigma_tilt)
     body = observations.sigma_body

@@ -15,7 +15,7 @@ from bifocal.survey.workbook.book import write_book
 from bifocal.survey.workbook.content import POINT_ROWS, SurveyContent
 from bifocal.survey.workbook.words import LANGUAGES
 from photocore.errors import InputError
-from photocore.output import check_writable, relative_name
+from photocore.output import check_ending, check_writable, relative_name
 
 #: Beyond this many points a spreadsheet is no tool any more.
 MOST_ROWS = 100_000
@@ -116,8 +116,7 @@ def check_book_path(path: Path | str) -> Path:
         If it does not end in ``.xlsx``.
     """
     path = Path(path)
-    if path.suffix.lower() != ".xlsx":
-        raise InputError(f"{path}: a new workbook must end in .xlsx.")
+    check_ending(path, "a new workbook must end in .xlsx.", ".xlsx")
     return path
 
 

@@ -32,7 +32,7 @@ from photocore.cli import Progress, no_progress
 from photocore.cloud import open_cloud
 from photocore.cloud.model import Cloud, CloudPiece
 from photocore.errors import GeometryError, InputError
-from photocore.output import check_writable
+from photocore.output import check_ending, check_writable
 from photocore.raster import Window
 from photocore.tables import write_csv
 
@@ -240,8 +240,7 @@ def _sensor_positions(job: Job, cloud: Cloud) -> Callable[[CloudPiece], FloatArr
 
 def _correct_dem(job: Job, progress: Progress) -> Outcome:
     """Correct an elevation model window by window."""
-    if job.target.suffix.lower() not in (".tif", ".tiff"):
-        raise InputError(f"{job.target}: a DEM is written as .tif.")
+    check_ending(job.target, "a DEM is written as .tif.", ".tif", ".tiff")
     if job.beams or job.visibility:
         raise InputError(
             f"{job.source}: cells of a DEM have no beams and no names; --beams, --trajectory and "
@@ -347,8 +346,7 @@ def _correct_window(
 
 def _correct_rays(job: Job) -> Outcome:
     """Refract and intersect a table of measured rays."""
-    if job.target.suffix.lower() != ".csv":
-        raise InputError(f"{job.target}: intersected rays are written as .csv.")
+    check_ending(job.target, "intersected rays are written as .csv.", ".csv")
     table = read_rays(job.source)
     surface = read_water_surface(job.water_level)
     points = intersect_refracted_rays(

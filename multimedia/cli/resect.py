@@ -68,11 +68,7 @@ def _lines(cameras: list[dict[str, Any]]) -> Iterator[str]:
             f"redundancy {camera['redundancy']}, {camera['iterations']} iterations"
         )
         rows = [
-            (
-                name,
-                f"{camera[name]:.8g}",
-                f"{camera['sigma'][name]:.2g}" if known else "unknown",
-            )
+            (name, f"{camera[name]:.8g}", f"{camera['sigma'][name]:.2g}" if known else "unknown")
             for name in camera["estimated"]
         ]
         yield text_table(("parameter", "value", "sigma"), rows)

@@ -51,12 +51,7 @@ class Approximation(NamedTuple):
 
 
 def lavest(
-    radius: ArrayLike,
-    *,
-    z0: float,
-    zp: ArrayLike,
-    layers: Layers,
-    principal_distance: float,
+    radius: ArrayLike, *, z0: float, zp: ArrayLike, layers: Layers, principal_distance: float
 ) -> Approximation:
     r"""Model refraction as a longer focal length: f times n [1]_.
 
@@ -106,12 +101,7 @@ def lavest(
 
 
 def agrafiotis(
-    radius: ArrayLike,
-    *,
-    z0: float,
-    zp: ArrayLike,
-    layers: Layers,
-    principal_distance: float,
+    radius: ArrayLike, *, z0: float, zp: ArrayLike, layers: Layers, principal_distance: float
 ) -> Approximation:
     r"""Model refraction as a focal length from the shares of air and water [1]_.
 

@@ -14,6 +14,7 @@ from photocore.distortion import Brown
 from photocore.errors import GeometryError, InputError
 from photocore.rotation import (
     angles_from_rotation,
+    checked_rotation,
     rotation_from_vector,
     rotation_vector_from_angle_rates,
     world_from_camera,
@@ -124,18 +125,7 @@ class Camera:
     def __post_init__(self) -> None:
         set_ = object.__setattr__
         who = f"camera {self.name}: " if self.name else ""
-        rotation = read_only(self.rotation, f"{who}rotation", shape=(3, 3))
-        if not np.allclose(rotation @ rotation.T, np.eye(3), atol=1e-6):
-            raise GeometryError(
-                f"{who}rotation is not a rotation matrix: its rows must be unit vectors at right "
-                "angles. Check the nine numbers, or give the three angles."
-            )
-        if np.linalg.det(rotation) < 0:
-            raise GeometryError(
-                f"{who}rotation mirrors the world: one of the coordinate systems is left-handed. "
-                "Exchange two axes or change the sign of one."
-            )
-        set_(self, "rotation", rotation)
+        set_(self, "rotation", checked_rotation(self.rotation, f"{who}rotation"))
         set_(self, "centre", read_only(self.centre, f"{who}centre", shape=(3,)))
         distance = positive(self.principal_distance, f"{who}principal_distance", unit="mm")
         set_(self, "principal_distance", distance)
@@ -227,6 +217,11 @@ class Camera:
     def looks_along(self) -> FloatArray:
         """Unit vector of the viewing direction in the world, shape (3,)."""
         return -self.rotation[:, 2]
+
+    def vectors_to(self, points: FloatArray) -> FloatArray:
+        """Return the vectors from the projection centre in the camera frame, shape (..., 3)."""
+        vectors: FloatArray = (points - self.centre) @ self.rotation
+        return vectors
 
     def value(self, name: str) -> float:
         """Return the parameter of `EXTERIOR` or `INTERIOR` called ``name``."""

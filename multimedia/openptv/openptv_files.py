@@ -13,8 +13,8 @@ from multimedia.media.flat_interface import FlatInterface
 from multimedia.refraction.layers import Layers
 from photocore.arrays import FloatArray, IntArray
 from photocore.distortion import Brown, Convention
-from photocore.errors import LARGEST, GeometryError, InputError
-from photocore.rotation import nearest_rotation, world_from_camera
+from photocore.errors import LARGEST, InputError
+from photocore.rotation import checked_rotation, nearest_rotation, world_from_camera
 from photocore.textfile import read_text
 
 #: A printed matrix has 7 decimals; angles and matrix of one camera differ by a few of the last.
@@ -297,13 +297,8 @@ def _rotation(
     if np.abs(world_from_camera(*np.radians(angles)) - matrix).max() < MATRIX_ROUNDING:
         odd = "the angles are in degrees, though OpenPTV wants radians; its matrix tells, and "
         odd += "is used."
-    elif np.abs(matrix @ matrix.T - np.eye(3)).max() > 1e-3:
-        raise InputError(f"{path}: the 3 x 3 matrix is not a rotation; a number is wrong.")
-    elif np.linalg.det(matrix) < 0:
-        raise GeometryError(
-            f"{path}: the 3 x 3 matrix mirrors the world: a coordinate system is left-handed."
-        )
     else:
+        checked_rotation(matrix, f"{path}: the 3 x 3 matrix", tolerance=1e-3)
         odd = "angles and matrix disagree; the matrix is used."
     return nearest_rotation(matrix), (f"{path.name}: {odd}",)
 

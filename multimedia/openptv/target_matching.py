@@ -69,11 +69,7 @@ def match_targets(
 
 
 def _nearest(
-    camera: Camera,
-    control: FloatArray,
-    targets: FloatArray,
-    interface: Media,
-    radius: float,
+    camera: Camera, control: FloatArray, targets: FloatArray, interface: Media, radius: float
 ) -> IntArray:
     """Return mutual nearest neighbours within a radius."""
     from scipy.spatial import cKDTree

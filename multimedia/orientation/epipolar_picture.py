@@ -9,7 +9,7 @@ import numpy as np
 
 from photocore.arrays import FloatArray
 from photocore.errors import InputError
-from photocore.output import atomic_path
+from photocore.output import atomic_path, check_ending
 
 
 def draw_epipolar(
@@ -52,8 +52,7 @@ def draw_epipolar(
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    if path.suffix.lower() not in (".png", ".svg", ".pdf"):
-        raise InputError(f"{path}: a picture is written as .png, .svg or .pdf.")
+    check_ending(path, "a picture is written as .png, .svg or .pdf.", ".png", ".svg", ".pdf")
     figure = Figure(figsize=(9.0, 9.0 * size[1] / size[0] + 0.4), layout="constrained")
     FigureCanvasAgg(figure)
     axes = figure.add_subplot()

@@ -159,9 +159,7 @@ def _parts(image: FloatArray) -> list[slice]:
 
 
 def intersect_rays(
-    cameras: Sequence[Camera],
-    image_points: ArrayLike,
-    layers: Media | Sequence[Media] = None,
+    cameras: Sequence[Camera], image_points: ArrayLike, layers: Media | Sequence[Media] = None
 ) -> FloatArray:
     """Return the points nearest to the rays in the object's medium: fast, linear, no precision.
 
@@ -184,9 +182,7 @@ def intersect_rays(
 
 
 def intersect_pairs(
-    cameras: Sequence[Camera],
-    image_points: ArrayLike,
-    layers: Media | Sequence[Media] = None,
+    cameras: Sequence[Camera], image_points: ArrayLike, layers: Media | Sequence[Media] = None
 ) -> tuple[FloatArray, FloatArray]:
     """Return the mean of the midpoints of all pairs of rays, as OpenPTV's point positions.
 
@@ -241,10 +237,7 @@ def _pair_block(
 
 
 def _block(
-    cameras: Sequence[Camera],
-    image: FloatArray,
-    sigmas: FloatArray,
-    placed: Sequence[OpticalMedia],
+    cameras: Sequence[Camera], image: FloatArray, sigmas: FloatArray, placed: Sequence[OpticalMedia]
 ) -> IntersectedPoints:
     """Intersect one block of points."""
     m, n, _ = image.shape

@@ -30,7 +30,7 @@ from multimedia.projects.point_tables import (
     write_columns,
 )
 from multimedia.refraction.layers import Layers
-from photocore.arrays import is_finite_number
+from photocore.arrays import is_finite_number, positive
 from photocore.distortion import NAMES, Brown, Convention
 from photocore.errors import GeometryError, InputError, located
 from photocore.output import atomic_path, check_all_writable
@@ -163,10 +163,7 @@ def _project(data: dict[str, Any], folder: Path) -> Project:
     cameras = tuple(camera for camera, _ in pairs)
     refuse_repeated([camera.name for camera in cameras], "cameras")
     remarks = [
-        f"media.{label}: {remark}"
-        for label, item in media.items()
-        if isinstance(item, FlatInterface)
-        for remark in item.layers.remarks
+        f"media.{label}: {remark}" for label, item in media.items() for remark in item.remarks
     ]
     objects, images = ObjectPoints(), ImagePoints()
     if "object_points" in data:
@@ -196,9 +193,7 @@ def _sigma(data: dict[str, Any], cameras: tuple[Camera, ...]) -> float:
     if "sigma_image" in data:
         value = _number(data, "sigma_image", "project")
         del data["sigma_image"]
-        if not value > 0:
-            raise InputError(f"sigma_image: must be above zero [mm], found {value:g}.")
-        return value
+        return positive(value, "sigma_image", unit="mm")
     pitches = [camera.sensor.pitch.mean() for camera in cameras if camera.sensor is not None]
     return SIGMA_PIXEL * float(np.mean(pitches)) if pitches else SIGMA_IMAGE
 

@@ -126,9 +126,7 @@ def iterated_radius(
         bar[active] += factor[active] * correction[active]
         count[active] += 1
     return ShiftIteration(
-        bar.reshape(shape),
-        count.reshape(shape),
-        (np.abs(correction) < tolerance).reshape(shape),
+        bar.reshape(shape), count.reshape(shape), (np.abs(correction) < tolerance).reshape(shape)
     )
 
 

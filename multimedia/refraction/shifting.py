@@ -16,12 +16,7 @@ from photocore.arrays import FloatArray
 
 
 def radial_shift(
-    radius: ArrayLike,
-    *,
-    z0: ArrayLike,
-    zp: ArrayLike,
-    layers: Layers,
-    compiled: bool | None = None,
+    radius: ArrayLike, *, z0: ArrayLike, zp: ArrayLike, layers: Layers, compiled: bool | None = None
 ) -> FloatArray:
     r"""Radius :math:`\bar R` of the points as straight rays in the camera's medium would see them.
 

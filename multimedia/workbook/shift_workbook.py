@@ -17,18 +17,14 @@ from multimedia.workbook.live_book import BOLD, NOTE, SMALL, LiveBook, allow_bet
 from multimedia.workbook.shift_points import IN_PLANE, ShiftPoints, ShiftResult, ShiftSetup
 from photocore.arrays import BoolArray
 from photocore.errors import InputError
-from photocore.output import check_writable
+from photocore.output import check_ending, check_writable
 from photocore.workbook.cells import CellValue
 from photocore.workbook.look import HEAD_FILL, INPUT_FILL, add_table, colour_words
 
 #: More rows make a workbook that is slow to open; text tables have no limit.
 MOST_ROWS = 20_000
 
-_FLAGS = {
-    "OK": ("E2F0D9", "1E5B12"),
-    "CHECK": ("E4DFEC", "3F2A63"),
-    "DRY": ("FCE4D6", "9C3D00"),
-}
+_FLAGS = {"OK": ("E2F0D9", "1E5B12"), "CHECK": ("E4DFEC", "3F2A63"), "DRY": ("FCE4D6", "9C3D00")}
 
 _WORDS = {
     "z_0": "distance from the camera's centre to the first interface",
@@ -97,8 +93,7 @@ def write_shift_workbook(
         If the file cannot be written, or rows or steps are out of range.
     """
     path = Path(path)
-    if path.suffix.lower() != ".xlsx":
-        raise InputError(f"{path}: the workbook must end in .xlsx.")
+    check_ending(path, "the workbook must end in .xlsx.", ".xlsx")
     if not 1 <= steps <= 30:
         raise InputError(f"newton: 1 to 30 steps, found {steps}.")
     count = max(rows, len(points.ids) if points else 0)

@@ -12,7 +12,7 @@ from multimedia.workbook.shift_points import ShiftPoints, ShiftResult, ShiftSetu
 from multimedia.workbook.shift_update import add_columns, is_template, update_template
 from multimedia.workbook.shift_workbook import write_shift_workbook
 from photocore.errors import InputError
-from photocore.output import check_all_writable
+from photocore.output import check_all_writable, check_ending
 from photocore.tables import write_csv
 
 
@@ -91,8 +91,7 @@ def shift_file(
     """
     out = None if out is None else Path(out)
     check_all_writable(out, overwrite=overwrite)
-    if out is not None and out.suffix.lower() not in (".xlsx", ".xlsm", ".csv"):
-        raise InputError(f"{out}: results are written as .xlsx or .csv.")
+    check_ending(out, "results are written as .xlsx or .csv.", ".xlsx", ".xlsm", ".csv")
     given = read_shift_input(path, decimal=decimal, sheet=sheet)
     setup = _setup(given.setup, camera, z0, indices, thicknesses)
     points, rows = points_of(given.table, setup.nadir)

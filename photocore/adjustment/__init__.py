@@ -1,7 +1,7 @@
 """The one adjustment: Levenberg-Marquardt with its precision; dense, or with points eliminated."""
 
 from photocore.adjustment.blocks import BlockEquations
-from photocore.adjustment.dense import DenseEquations, undetermined
+from photocore.adjustment.dense import DenseEquations
 from photocore.adjustment.iteration import LARGEST, Fit, correlations, fit, minimise
 from photocore.adjustment.outliers import OUTLIER_LIMIT, huber_weights, standardised
 
@@ -16,5 +16,4 @@ __all__ = [
     "huber_weights",
     "minimise",
     "standardised",
-    "undetermined",
 ]

@@ -78,7 +78,7 @@ class BlockEquations:
         """Return inverse blocks, mixed part times these, and the Schur complement."""
         own, mixed, blocks = self._normal
         inverse = np.linalg.inv(blocks * (1.0 + damping * np.eye(3)))
-        solved = np.einsum("upi,pij->upj", mixed, inverse)
+        solved = np.einsum("upi,pij->upj", mixed, inverse, order="C")  # else reshaping copies it
         schur = own + damping * np.diag(np.diag(own))
         shape = (len(own), self.free.size)
         schur -= solved.reshape(shape) @ mixed.reshape(shape).T
@@ -106,7 +106,9 @@ class BlockEquations:
     @cached_property
     def _solved(self) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Inverse blocks, mixed part times these, Schur complement; undamped."""
-        return self._reduced(0.0)
+        solved = self._reduced(0.0)
+        self.__dict__.pop("_normal")  # with many points its mixed part is as large as the solved
+        return solved
 
     def undetermined(self, names: Sequence[str]) -> list[str]:
         """Return the remaining unknowns that the equations leave open, at most 20 of them."""
@@ -128,8 +130,9 @@ class BlockEquations:
     @cached_property
     def _mixed_cofactor(self) -> FloatArray:
         """Cofactors between remaining unknowns and coordinates, shape (u, p, 3)."""
-        solved = self._solved[1]
-        return -np.tensordot(self.cofactor, solved, axes=(1, 0)) * self.free
+        mixed = np.tensordot(-self.cofactor, self._solved[1], axes=(1, 0))
+        mixed *= self.free  # in place: with many points this is the largest array of all
+        return mixed
 
     @cached_property
     def block_cofactor(self) -> FloatArray:

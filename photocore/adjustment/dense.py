@@ -11,7 +11,8 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
-from scipy.linalg import qr, svd
+from scipy.linalg import qr
+from scipy.linalg.lapack import dgeqrf
 
 from photocore.arrays import BoolArray, FloatArray
 
@@ -56,9 +57,12 @@ class DenseEquations:
         """Singular values of the scaled matrix, their rows, the residuals' share in each."""
         count = self.unknowns
         # The triangle of matrix and residuals holds all a step needs: no large factor is formed.
-        table = np.column_stack([self.jacobian / self.scale, self.residuals])
-        triangle = qr(table, mode="r", overwrite_a=True, check_finite=False)[0][:count]
-        left, some, right = svd(triangle[:, :count], check_finite=False)
+        # LAPACK itself: for 400 residuals scipy's checks take as long as the work.
+        table = np.empty((len(self.residuals), count + 1), order="F")
+        np.divide(self.jacobian, self.scale, out=table[:, :count])
+        table[:, count] = self.residuals
+        triangle = np.triu(dgeqrf(table, overwrite_a=True)[0][:count])
+        left, some, right = np.linalg.svd(triangle[:, :count])
         values, target = np.zeros(count), np.zeros(count)
         values[: len(some)] = some
         target[: len(some)] = (left.T @ triangle[:, count])[: len(some)]
@@ -82,8 +86,24 @@ class DenseEquations:
         return moved
 
     def undetermined(self, names: Sequence[str]) -> list[str]:
-        """Return the unknowns that the equations leave open."""
-        return undetermined(self.jacobian, names)
+        """Return the unknowns that the equations leave open, with those they are mixed with.
+
+        Examples
+        --------
+        Only the sum of a and b acts:
+
+        >>> jacobian = np.array([[1.0, 1.0, 0.0], [2.0, 2.0, 1.0]])
+        >>> equations = DenseEquations(residuals=np.zeros(2), jacobian=jacobian)
+        >>> equations.undetermined(["a", "b", "c"])
+        ['a', 'b']
+        """
+        values, right, _ = self.factors
+        columns = zip(names, self.jacobian.T, strict=True)
+        silent = [name for name, column in columns if not column.any()]
+        weak = right[values <= max(values.max(initial=0.0), 1e-300) * RANK_TOLERANCE]
+        share = np.abs(weak).max(axis=0, initial=0.0)
+        mixed = [name for name, part in zip(names, share, strict=True) if part > 0.05]
+        return list(dict.fromkeys(silent + mixed))
 
     @cached_property
     def _inverse(self) -> FloatArray:
@@ -111,21 +131,3 @@ class DenseEquations:
         """Share of every observation's error that shows in its own residual, shape (n,)."""
         base = qr(self.jacobian / self.scale, mode="economic", check_finite=False)[0]
         return 1.0 - np.einsum("ij,ij->i", base, base)
-
-
-def undetermined(jacobian: FloatArray, names: Sequence[str]) -> list[str]:
-    """Return the unknowns that the equations leave open, with those they are mixed with.
-
-    Examples
-    --------
-    Only the sum of a and b acts:
-
-    >>> undetermined(np.array([[1.0, 1.0, 0.0], [2.0, 2.0, 1.0]]), ["a", "b", "c"])
-    ['a', 'b']
-    """
-    values, right, _ = DenseEquations(residuals=np.zeros(len(jacobian)), jacobian=jacobian).factors
-    silent = [name for name, column in zip(names, jacobian.T, strict=True) if not column.any()]
-    weak = right[values <= max(values.max(initial=0.0), 1e-300) * RANK_TOLERANCE]
-    share = np.abs(weak).max(axis=0, initial=0.0)
-    mixed = [name for name, part in zip(names, share, strict=True) if part > 0.05]
-    return list(dict.fromkeys(silent + mixed))

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import codecs
 import csv
-import io
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from importlib.util import find_spec
+from io import BytesIO, StringIO
 from itertools import islice
 from pathlib import Path
 
@@ -17,7 +18,7 @@ from photocore.arrays import FloatArray
 from photocore.errors import CellError, InputError
 from photocore.tables.headings import Match, describe, find_columns
 from photocore.tables.model import Column
-from photocore.tables.numbers import Decimal, is_clear, plain_numbers
+from photocore.tables.numbers import ArrowTexts, Decimal, is_clear, plain_numbers
 from photocore.textfile import readable
 from photocore.workbook.grid import CellGrid, SheetFile, Value, cell_name
 
@@ -27,6 +28,8 @@ _SAMPLE = 200
 _SAMPLE_TEXT = 2**18
 #: Few enough records to stay in the processor's cache.
 _CHUNK = 4000
+#: Characters from which Arrow, where it is installed, pays its import (60 ms), and its blocks.
+_LARGE, _ARROW_BLOCK = 2**21, 2**22
 
 
 @dataclass(slots=True)
@@ -55,7 +58,7 @@ class CsvFile:
         text = self.text
         if sample and len(text) > _SAMPLE_TEXT:
             text = text[: text.rfind("\n", 0, _SAMPLE_TEXT) + 1] or text
-        lines = io.StringIO(text, newline="")
+        lines = StringIO(text, newline="")
         if self.delimiter:
             lines.readline()
             # The line that names the delimiter keeps its number, as spreadsheets count it.
@@ -97,7 +100,7 @@ def open_csv(path: Path) -> CsvFile:
     """
     with readable(path, "table file"):
         content = path.read_bytes()
-    if not content.strip():
+    if not content or content.isspace():
         raise InputError(f"{path}: the file is empty.")
     if content.startswith((b"PK\x03\x04", b"\xd0\xcf\x11\xe0")):
         raise InputError(f"{path}: is a workbook, not a text table; give it the ending .xlsx.")
@@ -236,7 +239,7 @@ def plain_rows(
             if not filled[index] or not any(fields[key][index].strip() for key in others):
                 return None
         for key in others:
-            texts[key] += fields[key]
+            texts[key] += fields[key][:]
         last += len(filled)
     if last < match.first:
         return None
@@ -271,6 +274,9 @@ def _full_chunks(
     start = 0
     for _ in range(skipped):
         start = text.find("\n", start) + 1 or len(text)
+    if len(text) > _LARGE and find_spec("pyarrow") is not None:
+        yield from _arrow_chunks(text[start:], delimiter, width)
+        return
     while start < len(text):
         end = text.find("\n", start + 40 * _CHUNK)
         part = text[start : end if end > 0 else None]
@@ -279,6 +285,25 @@ def _full_chunks(
         fields = part.replace("\n", delimiter).split(delimiter)
         yield [fields[number::width] for number in range(width)]
         start += len(part) + 1
+
+
+def _arrow_chunks(text: str, delimiter: str, width: int) -> Iterator[list[Sequence[str]] | None]:
+    """Yield lines of a large text as columns of a few megabytes; None where one is not full."""
+    from pyarrow import ArrowInvalid, string
+    from pyarrow import csv as arrow
+
+    if text.startswith("\ufeff"):  # Arrow would take it off
+        yield None
+    names = [str(number) for number in range(width)]
+    read = arrow.ReadOptions(column_names=names, block_size=_ARROW_BLOCK, use_threads=False)
+    parse = arrow.ParseOptions(delimiter=delimiter, quote_char=False, ignore_empty_lines=False)
+    kinds = arrow.ConvertOptions(column_types=dict.fromkeys(names, string()))
+    try:
+        with arrow.open_csv(BytesIO(text.encode()), read, parse, kinds) as batches:
+            for batch in batches:
+                yield [ArrowTexts(column) for column in batch.columns]
+    except ArrowInvalid:
+        yield None
 
 
 def too_wide(file: CsvFile, grid: CellGrid, width: int, rows: Iterable[int]) -> Iterator[CellError]:

@@ -5,7 +5,8 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Sequence, Set
 from dataclasses import dataclass
-from typing import Literal
+from functools import cached_property
+from typing import Any, Literal
 
 import numpy as np
 
@@ -177,11 +178,9 @@ def plain_numbers(texts: Sequence[str]) -> tuple[FloatArray, set[str]] | None:
     is a decimal ``"point"`` or ``"comma"``, or only ``"grouped point"`` / ``"grouped comma"`` where
     each mark may also separate thousands.
     """
-    numbers, decimal, mark = _floats(texts), "point", "."
+    numbers, decimal, mark = _floats(texts, "."), "point", "."
     if numbers is None:
-        if any("." in text for text in texts):
-            return None
-        numbers, decimal, mark = _floats([text.replace(",", ".") for text in texts]), "comma", ","
+        numbers, decimal, mark = _floats(texts, ","), "comma", ","
     if numbers is None:
         return None
     # Only numbers of three decimals can be mistaken for thousands; look at their texts alone.
@@ -207,8 +206,58 @@ def is_clear(proven: Set[str], others: Set[str], decimal: Decimal | None) -> boo
     return proven == {"grouped point"} and "comma" not in others
 
 
-def _floats(texts: Sequence[str]) -> FloatArray | None:
-    """Return numbers with a decimal point (NaN where blank); None if any is not plain."""
+class ArrowTexts(Sequence[str]):
+    """A column of texts in Arrow's memory, which reads clean numbers without Python objects."""
+
+    def __init__(self, column: Any) -> None:
+        self.column = column
+
+    @cached_property
+    def texts(self) -> list[str]:
+        """Texts as Python knows them."""
+        return self.column.to_pylist()
+
+    def __len__(self) -> int:
+        return len(self.column)
+
+    def __getitem__(self, index: Any) -> Any:
+        return self.texts[index]
+
+    def has(self, text: str) -> bool:
+        """Whether any of the texts contains another one."""
+        from pyarrow import compute
+
+        return bool(compute.any(compute.match_substring(self.column, text)).as_py())
+
+    def floats(self, mark: str) -> FloatArray | None:
+        """Return numbers (NaN where empty), exact to the last bit; None if any is not clean."""
+        from pyarrow import ArrowInvalid, compute, scalar
+
+        blank = scalar(None, self.column.type)
+        filled = compute.if_else(compute.equal(self.column, ""), blank, self.column)
+        try:
+            array = compute.cast(compute.replace_substring(filled, mark, "."), "float64")
+        except ArrowInvalid:
+            return None
+        numbers: FloatArray = array.to_numpy(zero_copy_only=False)
+        is_clean = np.isfinite(numbers).sum() == len(array) - array.null_count
+        return numbers if is_clean else None
+
+
+def _floats(texts: Sequence[str], mark: str) -> FloatArray | None:
+    """Return numbers with this decimal mark (NaN where blank); None if any is not plain."""
+    if isinstance(texts, ArrowTexts):
+        # No number with the other mark can be read; Arrow takes long to find out.
+        if texts.has("," if mark == "." else "."):
+            return None
+        numbers = texts.floats(mark)
+        if numbers is not None:
+            return numbers
+        texts = texts.texts
+    if mark == ",":
+        if any("." in text for text in texts):
+            return None
+        texts = [text.replace(",", ".") for text in texts]
     blanks = 0
     try:
         array = np.fromiter(map(float, texts), dtype=np.float64, count=len(texts))

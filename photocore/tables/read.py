@@ -244,10 +244,7 @@ def _reach_below(grid: CellGrid, match: Match, bottom: int) -> None:
 
 
 def _in_sheet(
-    book: SheetFile,
-    title: str,
-    columns: Sequence[Column],
-    column_map: Mapping[str, str] | None,
+    book: SheetFile, title: str, columns: Sequence[Column], column_map: Mapping[str, str] | None
 ) -> _Place | None:
     """Look for the columns anywhere in a sheet."""
     grid = book.grid(title)
@@ -310,7 +307,7 @@ def _read_text(
         table = _new_table(file, place, rows)
         cells, proven = {**plain.texts}, plain.proven
         table.values |= plain.numbers
-    for column in columns:
+    for column in columns if "'" in file.text else ():
         if column.kind in ("text", "flag") and column.key in cells:
             cells[column.key] = [unguarded(text) for text in cells[column.key]]  # type: ignore[arg-type]
     rest = [column for column in columns if column.key not in table.values]

@@ -69,11 +69,10 @@ class RowSorter:
                 return False
         if not self.filling & cells.keys():
             return False
-        if self.headings and any(isinstance(cells.get(n), str) for n in self.headings):
-            shown = {n: bare(str(cells.get(n, ""))) for n in self.headings}
-            if shown == self.headings:
-                self.previous = row
-                return False
+        has_text = self.headings and any(isinstance(cells.get(n), str) for n in self.headings)
+        if has_text and all(bare(str(cells.get(n, ""))) == h for n, h in self.headings.items()):
+            self.previous = row
+            return False
         if row != self.previous + 1 and self.numeric and not self.numeric & cells.keys():
             self.left_out.append(row)
             return False

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from itertools import repeat
 from typing import NamedTuple
 
 import numpy as np
@@ -146,6 +147,8 @@ class RowFormula:
 
     def at(self, row: int) -> str:
         """Return the formula as it stands in another row."""
+        if not self.offsets:
+            return self.rest
         moved = [
             f"{piece}{row + offset}"
             for piece, offset in zip(self.pieces, self.offsets, strict=True)
@@ -203,18 +206,13 @@ class NewRows(NamedTuple):
             for column, values, style, formula in self.columns
         }
 
-    def xml(self, row: int, prefix: str) -> str:
-        """Return the XML of the cells of one of the rows."""
-        index = row - self.first
-        return "".join(
-            [
-                cell_xml(
-                    f"{column_letters(column)}{row}",
-                    values[index],
-                    formula(row) if formula else "",
-                    prefix,
-                    style,
-                )
-                for column, values, style, formula in self.columns
-            ]
-        )
+    def xml(self, rows: range, prefix: str) -> Iterator[str]:
+        """Yield the XML of the cells of rows, row by row."""
+        part = slice(rows.start - self.first, rows.stop - self.first)
+        columns = []
+        for column, values, style, formula in self.columns:
+            names = [f"{column_letters(column)}{row}" for row in rows]
+            formulas = map(formula, rows) if formula else repeat("")
+            others = repeat(prefix), repeat(style)
+            columns.append(map(cell_xml, names, values[part], formulas, *others))
+        return map("".join, zip(*columns, strict=True))

@@ -110,9 +110,10 @@ class References:
 
     def _formulas(self, sheet: SheetPart) -> str:
         """Return the formulas of a sheet as one text, those that differ only in cells once."""
-        # Rows are asked for too, since what is passed over is kept in memory.
-        elements = xml_elements(self.path, self.package, sheet.part, "f", "row")
-        shapes = {_ANY_CELL.sub("#", element.text or "") for element in elements}
+        shapes: set[str] = set()
+        for element in xml_elements(self.path, self.package, sheet.part, "row", "f"):
+            kind = element.tag.removesuffix(local(element.tag)) + "f"
+            shapes.update(_ANY_CELL.sub("#", own.text or "") for own in element.iter(kind))
         return "\n".join(sorted(shapes))
 
     def grow(self, area: TableArea, bottom: int, parts: dict[str, bytes]) -> None:
@@ -212,8 +213,10 @@ def _grown_sheet(data: bytes, area: TableArea, bottom: int) -> bytes:
         return re.sub(rb"""(\ssqref\s*=\s*["'])([^"']*)(["'])""", attribute, match[0])
 
     tags = rb"<(?:\w+:)?(?:conditionalFormatting|dataValidation|ignoredError)\s[^>]*>"
-    data = re.sub(tags, element, data)
-    return re.sub(rb"(<(?:\w+:)?sqref>)([^<]*)(</)", attribute, data)
+    # All of these stand behind the rows, which may be millions of bytes.
+    start = data.rfind(b"</row>") + 1
+    rest = re.sub(tags, element, data[start:])
+    return data[:start] + re.sub(rb"(<(?:\w+:)?sqref>)([^<]*)(</)", attribute, rest)
 
 
 def recalculate_on_load(

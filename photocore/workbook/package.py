@@ -169,6 +169,39 @@ def xml_events(
         bombs; no spreadsheet program writes one).
     """
     parser: Any = ElementTree.XMLPullParser(events)
+    for _ in _fed(path, package, name, parser):
+        yield from parser.read_events()
+
+
+def xml_elements(path: Path, package: zipfile.ZipFile, name: str, *kinds: str) -> Iterator[Element]:
+    """Yield the elements of some kinds of one XML part, those inside of which are not looked for.
+
+    As `xml_events`, several times as fast: the tree grows chunk by chunk without a word to Python,
+    and is emptied of what is complete.
+    """
+    builder = ElementTree.TreeBuilder()
+    tree = builder.start("", {})
+    for _ in _fed(path, package, name, ElementTree.XMLParser(target=builder)):
+        yield from _taken(tree, kinds, whole=False)
+    yield from _taken(tree, kinds, whole=True)
+
+
+def _taken(tree: Element, kinds: tuple[str, ...], *, whole: bool) -> Iterator[Element]:
+    """Take the parts of an element out, unless ``whole`` all but the last, which may still grow."""
+    parts = tree[:] if whole else tree[:-1]
+    del tree[: len(parts)]
+    for part in parts:
+        if local(part.tag) in kinds:
+            yield part
+        else:
+            yield from _taken(part, kinds, whole=True)
+    for part in tree:
+        if local(part.tag) not in kinds:
+            yield from _taken(part, kinds, whole=False)
+
+
+def _fed(path: Path, package: zipfile.ZipFile, name: str, parser: Any) -> Iterator[None]:
+    """Feed one XML part to a parser, with a pause after each chunk."""
     rooted: list[str] = []
     guard = new_parser(path, name, start=lambda root, _: rooted.append(root))
     try:
@@ -177,27 +210,14 @@ def xml_events(
                 if not rooted:  # a document type can only stand before the root
                     guard.Parse(chunk, False)
                 parser.feed(chunk)
-                yield from parser.read_events()
+                yield
             parser.close()
-            yield from parser.read_events()
+            yield
     except (expat.ExpatError, ElementTree.ParseError, LookupError) as error:
         raise InputError(
             f"{path}: damaged, the part {name} is not valid XML ({error}). Open it in the "
             "spreadsheet program and save it again."
         ) from None
-
-
-def xml_elements(path: Path, package: zipfile.ZipFile, name: str, *kinds: str) -> Iterator[Element]:
-    """Yield the elements of some kinds of one XML part, emptied when the next one is asked for."""
-    wanted: dict[str, bool] = {}
-    for _, element in xml_events(path, package, name, "end"):
-        try:
-            is_wanted = wanted[element.tag]
-        except KeyError:
-            is_wanted = wanted[element.tag] = local(element.tag) in kinds
-        if is_wanted:
-            yield element
-            element.clear()
 
 
 def xml_root(path: Path, package: zipfile.ZipFile, name: str) -> Element:

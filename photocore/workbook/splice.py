@@ -129,8 +129,7 @@ def splice_sheet(
             f"{path}: the part {part} is not stored as UTF-8. Open the file in the spreadsheet "
             "program, save it there, and try again."
         )
-    splicer = _Splicer(path, part, data, changes, strings)
-    return splicer.run()
+    return _Splicer(path, part, data, changes, strings).run()
 
 
 class _Splicer:
@@ -258,8 +257,9 @@ class _Splicer:
             self.replace(name, self.new.pop(self.column))
         elif self.column in self.cached:
             self.put_result(name, self.cached[self.column])
-        elif len(self.children) > 1 and self.child("f"):
-            self.strip(name)
+        elif len(self.children) > 1 and self.child("f") and self.child("v"):
+            # How to take the cached result out, should it be stale.
+            self.result.strips.append(self.with_result(name, "", ""))
 
     def replace(self, name: str, new: NewCell) -> None:
         """Give this cell another typed value, or a formula if it is empty."""
@@ -292,11 +292,6 @@ class _Splicer:
                 self.edits.append((*stored, new))
             return
         self.edits.append(self.with_result(name, kind, content))
-
-    def strip(self, name: str) -> None:
-        """Note how to take the cached result out of this formula cell."""
-        if self.child("v"):
-            self.result.strips.append(self.with_result(name, "", ""))
 
     def with_result(self, name: str, kind: str, content: str) -> tuple[int, int, bytes]:
         """Return the edit that gives a formula cell this result and keeps all else of it."""
@@ -349,17 +344,21 @@ class _Splicer:
 
     def add_rows(self, before: int, place: tuple[int, int, str, str]) -> None:
         """Insert the new rows whose numbers lie before one."""
-        pieces: list[str] = []
+        rows = []
         while self.new_rows and self.new_rows[0] < before:
-            row = self.new_rows.popleft()
-            if len(self.changes.added) == 1 and row not in self.changes.inputs:
-                cells = self.changes.added[0].xml(row, self.prefix)
-            else:
-                new = self.changes.cells(row).items()
-                cells = "".join([self.xml(column, cell, row) for column, cell in new])
-            if cells:
-                pieces.append(f'<{self.prefix}row r="{row}">{cells}</{self.prefix}row>')
-        self.insert("".join(pieces), place)
+            rows.append(self.new_rows.popleft())
+        if rows and len(self.changes.added) == 1 and self.changes.inputs.keys().isdisjoint(rows):
+            lines = self.changes.added[0].xml(range(rows[0], rows[-1] + 1), self.prefix)
+        else:
+            lines = map(self.row_xml, rows)
+        tag = f"{self.prefix}row"
+        pieces = zip(rows, lines, strict=True)
+        self.insert("".join([f'<{tag} r="{n}">{xml}</{tag}>' for n, xml in pieces if xml]), place)
+
+    def row_xml(self, row: int) -> str:
+        """Return the XML of the cells of a new row."""
+        new = self.changes.cells(row).items()
+        return "".join([self.xml(column, cell, row) for column, cell in new])
 
     def insert(self, xml: str, place: tuple[int, int, str, str]) -> None:
         """Insert XML at a place (start, end, text before, text behind)."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from photocore.adjustment import fit, minimise, undetermined
+from photocore.adjustment import DenseEquations, fit, minimise
 from photocore.errors import ConvergenceError, GeometryError
 
 X = np.arange(6.0)
@@ -56,13 +56,17 @@ def test_unknowns_that_act_only_together_are_named():
     def double(s):
         return (s[0] + s[1]) * X - Y, np.stack([X, X], axis=1)
 
-    assert undetermined(double([0, 0])[1], ("a", "b")) == ["a", "b"]
+    residuals, jacobian = double([0, 0])
+    equations = DenseEquations(residuals=residuals, jacobian=jacobian)
+    assert equations.undetermined(("a", "b")) == ["a", "b"]
     with pytest.raises(GeometryError, match="cannot determine a, b"):
         fit(np.zeros(2), double, move, names=("a", "b"), what="line")
 
 
 def test_an_unknown_without_effect_is_named():
-    assert undetermined(np.array([[1.0, 0.0], [2.0, 0.0]]), ("a", "b")) == ["b"]
+    jacobian = np.array([[1.0, 0.0], [2.0, 0.0]])
+    equations = DenseEquations(residuals=np.zeros(2), jacobian=jacobian)
+    assert equations.undetermined(("a", "b")) == ["b"]
 
 
 def test_an_impossible_start_is_refused():

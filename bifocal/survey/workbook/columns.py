@@ -85,16 +85,8 @@ def _flag(inputs: str, miss: str) -> str:
 
 _RELIEF = (
     _f("ds", 'IF([@s1_used]="","",[@s2_used]-[@s1_used])', 4),
-    _f(
-        "den",
-        'IF(OR([@s1_used]="",COUNT(d_1,d_2)<2),"",[@s2_used]/d_2-[@s1_used]/d_1)',
-        6,
-    ),
-    _f(
-        "r",
-        'IF([@den]="","",IF(AND([@s1_used]>0,[@den]*(d_1-d_2)>0),[@ds]/[@den],NA()))',
-        4,
-    ),
+    _f("den", 'IF(OR([@s1_used]="",COUNT(d_1,d_2)<2),"",[@s2_used]/d_2-[@s1_used]/d_1)', 6),
+    _f("r", 'IF([@den]="","",IF(AND([@s1_used]>0,[@den]*(d_1-d_2)>0),[@ds]/[@den],NA()))', 4),
 )
 
 #: The `Points` table of an ideal pair.
@@ -137,10 +129,7 @@ IDEAL_POINTS: tuple[SurveyColumn, ...] = (
     _of_r("sigma_r", "sigma_s*SQRT((1-[@r]/d_1)^2+(k_12*(1-[@r]/d_2))^2)/ABS([@den])"),
     _f(
         "flag",
-        _flag(
-            f"{_XY},[@s1],[@s2]",
-            "ABS(N([@q]))>k_off*sigma_s*SQRT(1+([@s2_used]/[@s1_used])^2)",
-        ),
+        _flag(f"{_XY},[@s1],[@s2]", "ABS(N([@q]))>k_off*sigma_s*SQRT(1+([@s2_used]/[@s1_used])^2)"),
         width=13,
     ),
 )

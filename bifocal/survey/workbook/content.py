@@ -255,10 +255,9 @@ def setup_cells(content: SurveyContent) -> dict[str, CellValue]:
         }
     first, second = content.photos
     d1, d2 = first.distance, second.distance
-    cells |= {
-        "b_lever": d1 * d2 / (d1 - d2),
-        "sigma_r_max": limits.relief_limit(content.pair.d2),
-    }
+    # As its formula has it: of photos typed the other way round it is negative.
+    cells["b_lever"] = d1 * d2 / (d1 - d2)
+    cells["sigma_r_max"] = limits.relief_limit(content.pair.d2)
     if setup is None:
         return cells | _pair_cells(content, first, second)
     if first.scale_number is not None and second.scale_number is not None:

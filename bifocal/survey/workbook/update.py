@@ -140,12 +140,7 @@ def _result(value: CellValue) -> CellValue:
     return "" if value is None else value
 
 
-def _table(
-    editor: WorkbookEditor,
-    built: BookBuilder,
-    name: str,
-    rows: Sequence[int],
-) -> None:
+def _table(editor: WorkbookEditor, built: BookBuilder, name: str, rows: Sequence[int]) -> None:
     """Store the results of a table; ``rows`` counts from its first row, the others are blank."""
     area, content = editor.table(name), built.tables[name]
     if area is None:
