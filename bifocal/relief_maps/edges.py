@@ -26,6 +26,8 @@ WINDOW, SOFTNESS = 3, 50.0
 #: rises outwards, for photo 1 sees the step's side face there and its pixels are nobody's (façade
 #: 11: raised parts were too fat in two thirds of the errors at steps). [grey levels]
 MARGIN, MARGIN_RISING = 0.25, 1.5
+#: Steps of less parallax fit nearly as well on either side: their margin is less in proportion. [px]
+WIDE_STEP = 4.0
 #: Plain parts cannot tell: the margin fades out below this contrast in 15 x 15 px. [grey levels]
 CONTRAST, CONTRAST_WINDOW = 8.0, 15
 #: What the measured value is favoured by. [grey levels]
@@ -56,7 +58,7 @@ def sharpen(frame: Frame, relief: Float32Array, sigma_px: float = 0.0) -> Float3
     for candidate, favour in ((relief, FAVOUR), (upper, 0.0), (lower, 0.0)):
         costs.append(guide.smooth(_mismatch(frame, far, near, candidate)) - favour)
     own, high, low = costs
-    margin = _margin(frame, median)
+    margin = _margin(frame, median) * np.clip(parallax / np.float32(WIDE_STEP), 0, 1)
     up = band & (high + margin <= low) & (high + margin < own)
     down = band & (low - margin < own) & (low < high + margin)
     result[up] = upper[up]
