@@ -26,7 +26,7 @@ WINDOW, SOFTNESS = 3, 50.0
 #: rises outwards, for photo 1 sees the step's side face there and its pixels are nobody's (façade
 #: 11: raised parts were too fat in two thirds of the errors at steps). [grey levels]
 MARGIN, MARGIN_RISING = 0.25, 1.5
-#: Steps of less parallax fit nearly as well on either side: their margin is less in proportion. [px]
+#: Steps of less parallax fit nearly as well on both sides: their margin is less in proportion. [px]
 WIDE_STEP = 4.0
 #: Plain parts cannot tell: the margin fades out below this contrast in 15 x 15 px. [grey levels]
 CONTRAST, CONTRAST_WINDOW = 8.0, 15
