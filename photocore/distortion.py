@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from photocore.arrays import FloatArray, as_points
-from photocore.errors import InputError
+from photocore.errors import LARGEST, InputError
 
 #: Names of the parameters in the order of `Brown`'s fields.
 NAMES = ("k1", "k2", "k3", "p1", "p2", "scale", "shear")
@@ -76,7 +76,7 @@ class Brown:
 
     def __post_init__(self) -> None:
         values = np.array([getattr(self, name) for name in NAMES], dtype=np.float64)
-        if not np.isfinite(values).all():
+        if not (np.abs(values) <= LARGEST).all():
             raise InputError(f"distortion: every coefficient must be a number, found {values}.")
         if not (0.5 < self.scale < 2.0 and abs(self.shear) < 0.5):
             raise InputError(

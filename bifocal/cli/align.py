@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from photocore.cli import print_result, remark
-from photocore.options import FILE, Numbers, as_json, choice, number, overwrite
+from photocore.options import FILE, FOCAL, Numbers, as_json, choice, number, overwrite
 
 if TYPE_CHECKING:
     from bifocal.orientation.alignment import Alignment
@@ -36,8 +36,8 @@ points.csv, one line per control point; r blank = on the wall; pixels in both ph
 @number("--distance1", "M", "Far camera to the wall [m].")
 @number("--distance2", "M", "Near camera to the wall [m].")
 @number("--delta-d", "M", "Difference of the two distances [m].")
-@number("--focal1", "MM", "Focal length, far photo [mm].  [default: EXIF]")
-@number("--focal2", "MM", "Focal length, near photo [mm].  [default: EXIF]")
+@number("--focal1", "MM", "Focal length, far photo [mm].  [default: EXIF]", type=FOCAL)
+@number("--focal2", "MM", "Focal length, near photo [mm].  [default: EXIF]", type=FOCAL)
 @number("--sensor-width", "MM", "Longer side of the sensor, both photos [mm].")
 @number("--sensor-width1", "MM", "The same, far photo only [mm].")
 @number("--sensor-width2", "MM", "The same, near photo only [mm].")

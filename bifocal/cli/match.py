@@ -56,6 +56,8 @@ def command(
     from bifocal.orientation.match_workflow import match_photos, match_summary
     from bifocal.orientation.matching import MatchSettings
 
+    if relief_min is not None and relief_max is not None and relief_min >= relief_max:
+        raise click.UsageError("--relief-min must be below --relief-max.")
     reliefs = None
     if relief_min is not None or relief_max is not None:
         near = Pair.read(pair).image2.distance
@@ -71,9 +73,26 @@ def command(
     )
     found = match_photos(pair, out, settings, language=lang, overwrite=overwrite)
     summary = match_summary(*found)
-    print_result({**summary, "out": out}, _lines(summary), as_json=as_json)
+    print_result(
+        {**summary, "out": out}, _lines(summary), as_json=as_json,
+        remarks=_remarks(summary["kinds"], what),
+    )  # fmt: skip
     if not as_json:
         remark(f"Points written to {out}")
+
+
+def _remarks(kinds: dict[str, int], what: str) -> Iterator[str]:
+    """Yield what the user should look at."""
+    if kinds.get("chequer"):
+        yield (
+            f"{kinds['chequer']} chequers: crossing joints and corners of stones can look like "
+            "them; check those of code chequer, or leave them out."
+        )
+    if what == "targets":
+        yield (
+            "Only targets found in both photos are listed: discs 5 to 120 px across on a plate of "
+            "one grey, two-by-two chequers, coded markers. Pick the others by hand."
+        )
 
 
 def _lines(summary: dict[str, Any]) -> Iterator[str]:

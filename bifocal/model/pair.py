@@ -15,7 +15,14 @@ from bifocal.model.flags import SIGMA_PIXEL, FlagLimits
 from bifocal.model.intersection import Intersection, PlanePicks, intersect
 from bifocal.model.lens import Lens
 from bifocal.precision import base_factor
-from photocore.arrays import BoolArray, FloatArray, as_points, not_negative, positive, read_only
+from photocore.arrays import (
+    BoolArray,
+    FloatArray,
+    as_points,
+    not_negative,
+    positive,
+    read_only,
+)
 from photocore.errors import GeometryError, InputError, located
 from photocore.jsonfile import read_object, write_object
 
@@ -482,6 +489,9 @@ def _photo_from_dict(data: Any, key: str, folder: Path) -> Photo:
     if lens is not None and not isinstance(lens, str):
         raise InputError(f'"{key}.lens" must name a lens file, found {lens!r}.')
     with located(f'"{key}"'):
+        for name in ("distance", *_OPTIONAL):
+            if isinstance(data.get(name), list):  # an array of one would pass for a number
+                raise InputError(f"{name}: expected one number, found {data[name]!r:.40}.")
         return Photo(
             file=file,
             lens=Lens.read(folder / lens) if lens else None,

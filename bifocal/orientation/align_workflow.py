@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from bifocal.files.images import ImageInfo, image_info, read_grey
+from bifocal.files.images import WRITTEN, ImageInfo, image_info, read_grey
 from bifocal.model.lens import Lens
 from bifocal.orientation.absolute_orientation import orient_pair
 from bifocal.orientation.alignment import Alignment, make_alignment, with_files
@@ -18,7 +18,7 @@ from bifocal.orientation.interior_orientation import Interior, lens_of_photo
 from bifocal.orientation.orientation_stages import PhotoInput
 from photocore.arrays import FloatArray
 from photocore.errors import InputError
-from photocore.output import check_all_writable, relative_name
+from photocore.output import all_or_none, check_all_writable, check_ending, relative_name
 
 #: A wall point given without r lies on the plane to this. [m]
 SIGMA_ON_WALL = 0.005
@@ -77,6 +77,7 @@ class AlignOptions:
     unit: str = ""
 
 
+@all_or_none()
 def align_photos(
     far: Path,
     near: Path,
@@ -97,6 +98,7 @@ def align_photos(
         raise InputError(
             f"{out.name}: a pair file ends in .json; write --out {out.stem}.pair.json."
         )
+    check_ending(picture, "a picture is written as .png, .jpg or .tif.", *WRITTEN)
     way, options = _way(options)
     _check_metres(options)
     check_all_writable(out, picture, overwrite=overwrite)
@@ -104,11 +106,13 @@ def align_photos(
     first, second = (
         PhotoInput(
             grey=read_grey(info.path),
-            interior=_interior(info, known, number),
+            interior=interior_of_photo(info, known, number),
             name=info.path.name,
         )
         for number, (info, known) in enumerate(zip(infos, options.lenses, strict=True), start=1)
     )
+    if way == "site" and options.length is None:
+        _check_focal((first, second))
     control = _control(options, (first.interior.image_size, second.interior.image_size))
     oriented = orient_pair((first, second), control=control, site=options.site)
     paths, ordered = (far, near), (first, second)
@@ -167,6 +171,16 @@ def _way(options: AlignOptions) -> tuple[str, AlignOptions]:
     )
 
 
+def _check_focal(photos: tuple[PhotoInput, PhotoInput]) -> None:
+    """Refuse a pair that only distances describe and whose lenses nobody knows."""
+    if all(photo.interior.is_assumed for photo in photos):
+        raise InputError(
+            f"{photos[0].name} and {photos[1].name} do not tell their focal lengths (no EXIF "
+            "data). Give --focal1 and --focal2 with --sensor-width, e.g. --focal1 35 --focal2 19 "
+            "--sensor-width 22.7; or a length on the wall (--length)."
+        )
+
+
 def _check_metres(options: AlignOptions) -> None:
     """Refuse distances and lengths in millimetres."""
     site = options.site
@@ -180,7 +194,7 @@ def _check_metres(options: AlignOptions) -> None:
             )
 
 
-def _interior(info: ImageInfo, data: KnownLens, number: int) -> Interior:
+def interior_of_photo(info: ImageInfo, data: KnownLens, number: int) -> Interior:
     """Return the best that is known of a photo's interior orientation."""
     if data.lens is not None:
         lens = lens_of_photo(Lens.read(data.lens), info.size, orientation=info.orientation)

@@ -12,8 +12,9 @@ from bifocal.model.pair import Pair
 from bifocal.orientation.matching import Matches, MatchSettings, match_pair
 from bifocal.survey.observations import PointObservations
 from bifocal.survey.template_workflow import write_survey
-from photocore.output import check_ending, check_writable
+from photocore.output import check_ending
 from photocore.tables import write_csv
+from photocore.workbook.newbook import check_new_workbook
 
 
 def match_photos(
@@ -32,10 +33,8 @@ def match_photos(
         If a file is at fault, or photos and pair do not belong together.
     """
     check_ending(out, "points are written as .xlsx (survey workbook) or .csv.", ".xlsx", ".csv")
-    check_writable(out, overwrite=overwrite)
-    pair = Pair.read(pair_path)
-    images = (read_grey(pair.photo_file(1)), read_grey(pair.photo_file(2)))
-    matches = match_pair(pair, images, settings)
+    check_new_workbook(out, overwrite=overwrite)
+    pair, matches = match_pair_file(pair_path, settings)
     if out.suffix.lower() == ".csv":
         write_csv(out, csv_columns(matches), formats=_FORMATS, overwrite=overwrite)
         return pair, matches
@@ -57,6 +56,19 @@ def match_photos(
         overwrite=overwrite,
     )
     return pair, matches
+
+
+def match_pair_file(pair_path: Path, settings: MatchSettings) -> tuple[Pair, Matches]:
+    """Return a pair from its file, and the homologous points found in its photos.
+
+    Raises
+    ------
+    InputError, GeometryError
+        If a file is at fault, or photos and pair do not belong together.
+    """
+    pair = Pair.read(pair_path)
+    images = (read_grey(pair.photo_file(1)), read_grey(pair.photo_file(2)))
+    return pair, match_pair(pair, images, settings)
 
 
 def precision(matches: Matches) -> float:

@@ -212,6 +212,8 @@ def _triangles(
             raise InputError(
                 f"breakline {','.join(line)}: {path} has no usable point {', '.join(missing)}."
             )
+        if len(set(line)) < 2:
+            raise InputError(f"breakline {','.join(line)}: name two points or more.")
         lines.append([index[name] for name in line])
     remarks.append(
         "Relief between the points is interpolated; outside of them the orthophoto is empty."

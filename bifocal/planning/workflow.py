@@ -10,7 +10,8 @@ from typing import Any
 from bifocal.planning.camera_plan import CameraSensor, Plan
 from bifocal.planning.plan_workbook import write_plan
 from bifocal.planning.stations import plan_stations
-from photocore.output import check_all_writable, check_ending
+from photocore.output import check_ending
+from photocore.workbook.newbook import check_new_workbook
 
 
 def make_plan(
@@ -26,7 +27,8 @@ def make_plan(
     ``wishes`` are the keyword arguments of `bifocal.planning.stations.plan_stations`.
     """
     check_ending(out, "a plan is written as a workbook; name it .xlsx.", ".xlsx")
-    check_all_writable(out, overwrite=overwrite)
+    if out is not None:
+        check_new_workbook(out, overwrite=overwrite)
     plan = plan_stations(focal_lengths, sensor, **wishes)
     if out is not None:
         write_plan(out, plan, overwrite=overwrite)

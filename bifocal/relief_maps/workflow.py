@@ -21,7 +21,7 @@ from photocore.arrays import FloatArray
 from photocore.cli import Progress, no_progress
 from photocore.cloud import write_cloud
 from photocore.errors import GeometryError
-from photocore.output import check_all_writable, check_ending
+from photocore.output import all_or_none, check_all_writable, check_ending
 
 _ROWS = 256
 
@@ -57,6 +57,7 @@ class ReliefJob:
     overwrite: bool = False
 
 
+@all_or_none()
 def relief_of_pair(
     pair_file: Path, job: ReliefJob, *, progress: Progress = no_progress
 ) -> tuple[dict[str, Any], tuple[str, ...]]:

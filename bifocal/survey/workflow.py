@@ -71,8 +71,10 @@ class SolvedSurvey(SurveyContent):
         What the points of the reference plane tell.
     adjusted : bool
         Whether the orientation was corrected by it.
-    overridden : bool
-        Whether options took the place of what the workbook says.
+    correction : ndarray, shape (3, 3), or None
+        Homography that corrected the coordinates in mm of image 2, where the pair is ideal.
+    given : mapping
+        The options that took the place of what the workbook says.
     remarks : tuple of str
         What the user should know.
     """
@@ -86,7 +88,8 @@ class SolvedSurvey(SurveyContent):
     pair_path: Path | None
     orientation_check: OrientationCheck | None
     adjusted: bool
-    overridden: bool
+    correction: FloatArray | None
+    given: Mapping[str, Any]
     remarks: tuple[str, ...]
 
     @property
@@ -187,9 +190,8 @@ def solve(
     >>> survey.table.xyz.round(9).tolist(), survey.table.flags
     ([[2.0, 0.0, 1.0]], ('OK',))
     """
-    given = _checked(
-        d1=d1, d2=d2, c1=c1, c2=c2, pitch=pitch, sigma_s=sigma_s, sigma_r_max=sigma_r_max
-    )
+    lengths = {"d1": d1, "d2": d2, "c1": c1, "c2": c2, "pitch": pitch}
+    given = _checked(**lengths, sigma_s=sigma_s, sigma_r_max=sigma_r_max)
     _checked(sigma_px=sigma_px, scale_tolerance=scale_tolerance)
     judged = tuple(as_rule(rule) for rule in rules) or RULES
     options = ReadOptions(
@@ -220,6 +222,7 @@ def solve(
         *opposite_signs_remark(table, survey.known),
         *world_remarks,
     )
+    asked = {**given, "unit": unit, "pair": pair, "sigma_px": sigma_px, "model": model}
     return SolvedSurvey(
         language=survey.language,
         source=path,
@@ -234,12 +237,13 @@ def solve(
         check=check,
         control=survey.control,
         georeference=world,
-        model=survey.model,
+        model=model or survey.model,
         sensor=setup.sensor,
         limits=setup.limits,
         orientation_check=solved.check,
         adjusted=adjust_setup,
-        overridden=bool(given or unit or pair) or solved.sigma_px not in (None, setup.sigma_px),
+        correction=solved.correction,
+        given={name: value for name, value in asked.items() if value is not None},
         rules=judged,
         remarks=tuple(dict.fromkeys(remarks)),
     )
@@ -285,6 +289,7 @@ class _SolvedPoints:
     setup: SurveySetup | None = None
     sigma_px: float | None = None
     check: OrientationCheck | None = None
+    correction: FloatArray | None = None
     remarks: tuple[str, ...] = ()
 
 
@@ -457,15 +462,19 @@ def _solve_ideal(survey: SurveyInput, scale_tolerance: float, *, adjust: bool) -
     measured = setup.in_millimetres(points)
     xy1, xy2 = _all_xy(measured)
     check = _check_plane(pair, points, (xy1, xy2), None, survey, adjust)
+    correction: FloatArray | None = None
     if check is not None:
         remarks += check.remarks
         if adjust:
             scale = pair.image1.plane_from_pixel[0, 0]
-            moved = apply_homography(check.matrix, pair.image2.plane_from_pixels(xy2)) / scale
+            correction = check.matrix @ pair.image2.plane_from_pixel / [[scale], [scale], [1.0]]
+            moved = apply_homography(correction, xy2)
+            if setup.adjusted[1] is not None:
+                correction = correction @ setup.adjusted[1]
             only_theta = points.polar * np.array([np.nan, np.nan, 1.0])
             points = measured = replace(measured, xy1=xy1, xy2=moved, polar=only_theta)
             c2 = None if setup.c1 is None else setup.c1 * pair.d2 / pair.d1
-            setup = replace(setup, unit="mm", c2=c2)
+            setup = replace(setup, unit="mm", c2=c2, adjusted=(None, None))
             pair = setup.pair()
             remarks.append(
                 "Set-up: image 2 was corrected by the points of the reference plane; its "
@@ -479,6 +488,7 @@ def _solve_ideal(survey: SurveyInput, scale_tolerance: float, *, adjust: bool) -
         pair=pair,
         setup=setup,
         check=check,
+        correction=correction,
         remarks=tuple(filter(None, remarks)),
     )
 

@@ -59,7 +59,10 @@ class Sensor:
     def __post_init__(self) -> None:
         set_ = object.__setattr__
         for name in ("width", "height"):
-            set_(self, name, round(positive(getattr(self, name), f"sensor {name}", unit="px")))
+            size = positive(getattr(self, name), f"sensor {name}", unit="px")
+            if size != round(size):
+                raise InputError(f"sensor {name}: must be a whole number of pixels, got {size:g}.")
+            set_(self, name, round(size))
         pitch = np.broadcast_to(as_floats(self.pitch, "pitch"), (2,))
         if not (pitch > 0).all():
             raise InputError(f"pitch: a pixel is {pitch} mm wide and high; both must be above 0.")

@@ -312,6 +312,9 @@ def _floats(path: Path, words: Sequence[str], what: str) -> FloatArray:
         except ValueError:
             where = what.format(place + 1)
             raise InputError(f"{path}, {where}: expected a number, found {word!r:.40}.") from None
+        if not abs(values[place]) <= LARGEST:
+            where = what.format(place + 1)
+            raise InputError(f"{path}, {where}: {word:.40} is no finite number.")
     return values
 
 
@@ -319,16 +322,11 @@ def _number(path: Path, lines: list[str], index: int, what: str) -> float:
     if index >= len(lines):
         raise InputError(f"{path}: ends before line {index + 1} ({what}).")
     words = lines[index].split()[:1] or [""]
-    number = float(_floats(path, words, f"line {index + 1} ({what})")[0])
-    if not abs(number) <= LARGEST:
-        raise InputError(f"{path}, line {index + 1} ({what}): {words[0]:.40} is no finite number.")
-    return number
+    return float(_floats(path, words, f"line {index + 1} ({what})")[0])
 
 
 def _numbers(path: Path, least: int, what: str) -> FloatArray:
     values = _floats(path, read_text(path, _KIND).split(), "value {}")
     if len(values) < least:
         raise InputError(f"{path}: {len(values)} numbers, expected at least {least}: {what}.")
-    if not np.isfinite(values).all():
-        raise InputError(f"{path}: holds a value that is not a finite number.")
     return values

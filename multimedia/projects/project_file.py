@@ -33,8 +33,8 @@ from multimedia.refraction.layers import Layers
 from photocore.arrays import is_finite_number, positive
 from photocore.distortion import NAMES, Brown, Convention
 from photocore.errors import GeometryError, InputError, located
-from photocore.output import atomic_path, check_all_writable
-from photocore.textfile import read_text
+from photocore.output import all_or_none, atomic_path, check_all_writable
+from photocore.textfile import check_name, read_text
 
 FORMAT = "multimedia-project/1"
 #: Each kind of ray-traced surface and its keys.
@@ -103,11 +103,12 @@ def write_project(path: Path | str, project: Project, *, overwrite: bool = False
     # Tables (arrays of them too) must follow the plain keys.
     order = sorted(data, key=lambda key: isinstance(data[key], dict | list))
     check_all_writable(path, *tables, overwrite=overwrite)
-    for table, columns in tables.items():
-        write_columns(table, columns, overwrite=overwrite)
-    with atomic_path(path, overwrite=overwrite) as temporary:
-        text = _HEAD + tomli_w.dumps({key: data[key] for key in order})
-        temporary.write_text(text, encoding="utf-8")
+    with all_or_none():
+        for table, columns in tables.items():
+            write_columns(table, columns, overwrite=overwrite)
+        with atomic_path(path, overwrite=overwrite) as temporary:
+            text = _HEAD + tomli_w.dumps({key: data[key] for key in order})
+            temporary.write_text(text, encoding="utf-8")
     return [path, *tables]
 
 
@@ -128,6 +129,7 @@ def project_data(project: Project) -> dict[str, Any]:
 
 
 def _toml(path: Path) -> dict[str, Any]:
+    check_name(path)
     if path.is_dir():
         raise InputError(
             f"{path}: is a folder. Give the project file in it; for an OpenPTV experiment make "
@@ -167,11 +169,11 @@ def _project(data: dict[str, Any], folder: Path) -> Project:
     ]
     objects, images = ObjectPoints(), ImagePoints()
     if "object_points" in data:
-        table = folder / str(data.pop("object_points"))
+        table = folder / _file_name(data.pop("object_points"), "object_points")
         objects, odd = read_object_points(table, unit=unit)
         remarks += [f"{table.name}: {text}" for text in odd]
     if "image_points" in data:
-        table = folder / str(data.pop("image_points"))
+        table = folder / _file_name(data.pop("image_points"), "image_points")
         images, odd = read_image_points(table, cameras)
         remarks += [f"{table.name}: {text}" for text in odd]
     return Project(
@@ -325,7 +327,7 @@ def _sensor(value: Any, where: str) -> Sensor:
     if (size > 0.2).any():
         raise InputError(f"{where}: a pitch of {size.tolist()} mm? Typical are 0.002 to 0.03 mm.")
     origin = _vector(value, "origin", where) if "origin" in value else None
-    width, height = (int(_number(value, key, where)) for key in ("width", "height"))
+    width, height = (_number(value, key, where) for key in ("width", "height"))
     return Sensor(width=width, height=height, pitch=size, origin=origin)  # type: ignore[arg-type]
 
 
@@ -358,6 +360,12 @@ def _only(value: Any, where: str, keys: tuple[str, ...]) -> None:
             near = get_close_matches(key, keys, n=1)
             hint = f" Did you mean {near[0]!r}?" if near else ""
             raise InputError(f"{where}: unknown key {key!r}.{hint} Known: {', '.join(keys)}.")
+
+
+def _file_name(value: Any, key: str) -> str:
+    if not isinstance(value, str):
+        raise InputError(f"{key}: expected the name of a table, found {value!r:.40}.")
+    return value
 
 
 def _given(value: Mapping[str, Any], key: str, where: str) -> Any:

@@ -209,6 +209,30 @@ def test_closed_forms_agree_with_monte_carlo(pair, r):
     np.testing.assert_allclose(xyz.std(axis=0) / adjusted, 1.0, atol=0.05)
 
 
+@pytest.mark.parametrize("pair", PAIRS)
+@pytest.mark.parametrize("r", [-3.0, 0.5, 4.0])
+def test_sigmas_of_the_displacements_propagate_equation_5(pair, r):
+    c1, d1, c2, d2 = PAIRS[pair]
+    s1, s2 = seen(c1, d1, c2, d2, 2.0, r)
+    sigma_1, sigma_2 = 0.003, 0.005  # unequal, so that no term hides behind another
+    with mpmath.workdps(50):
+
+        def displaced(which, first, second):
+            depth = (second - first) / (second / d2 - first / d1)
+            return (first / d1, second / d2)[which] * depth
+
+        for which, sigma in enumerate(
+            sigma_displacements(s1, s2, d1=d1, d2=d2, sigma_1=sigma_1, sigma_2=sigma_2)
+        ):
+            at = (mpmath.mpf(s1), mpmath.mpf(s2))
+            by_1, by_2 = (
+                mpmath.diff(lambda *s, which=which: displaced(which, *s), at, order)
+                for order in ((1, 0), (0, 1))
+            )
+            expected = float(mpmath.hypot(by_1 * sigma_1, by_2 * sigma_2))
+            assert sigma == pytest.approx(expected, rel=1e-12)
+
+
 def test_across_the_radius_a_point_moves_as_far_as_relief_leaves_of_its_distance():
     # Towards +y only the pick across the radius moves x', by (1 - r / d1): 2 m before the wall,
     # camera at 16 m, 7/8 of 4 um, 2 m behind it 9/8. Towards +x it is y'. The other photo's picks
