@@ -159,7 +159,7 @@ def dense_relief(
     source, usable = surfaces(frame, matched, relief_range)
     progress(0.85, 1.0, "Relief map")
     bands = forward_projection.to_plane(frame, source, usable, target)
-    bands = complete(frame, bands, target)
+    bands = complete(frame, bands, target, plain=matched.plain)
     progress(1.0, 1.0)
     bands = _resampled(bands, target, wanted)
     known = np.isfinite(bands.r)

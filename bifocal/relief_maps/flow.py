@@ -44,12 +44,15 @@ class Measurement:
         Distance between a pixel and itself after flow there and back. [px]
     sigma_px : ndarray of float32
         Local RMS of ``across``, times `radial_stretch`: matching precision along the radius. [px]
+    plain : bool
+        Whether photo 1 has hardly more contrast than noise.
     """
 
     r: Float32Array
     across: Float32Array
     loop: Float32Array
     sigma_px: Float32Array
+    plain: bool = False
 
 
 def seeded_flow(
@@ -96,7 +99,8 @@ def measure(frame: Frame, coarse: Float32Array, *, stride: int = STRIDE) -> Meas
     columns, rows = zoom_map(frame, seed_relief)
     x, y = offsets((height, width))
     seed, photos, alpha = np.dstack([columns - x, rows - y]), frame, ALPHA
-    if _is_plain(frame):
+    plain = _is_plain(frame)
+    if plain:
         first, second = (
             cv2.GaussianBlur(image, (0, 0), PLAIN_BLUR) for image in (frame.image1, frame.image2)
         )
@@ -106,9 +110,8 @@ def measure(frame: Frame, coarse: Float32Array, *, stride: int = STRIDE) -> Meas
     relief, across = split(frame, flow)
     stretched = radial_stretch(frame)
     rms = cv2.blur(np.minimum(across * across, CLIP * CLIP), (WINDOW, WINDOW))
-    return Measurement(
-        r=relief, across=across, loop=loop, sigma_px=np.sqrt(rms + np.float32(FLOOR**2)) * stretched
-    )
+    sigma_px = np.sqrt(rms + np.float32(FLOOR**2)) * stretched
+    return Measurement(r=relief, across=across, loop=loop, sigma_px=sigma_px, plain=plain)
 
 
 def _is_plain(frame: Frame) -> bool:

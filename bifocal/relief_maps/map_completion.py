@@ -13,8 +13,9 @@ from bifocal.relief_maps.frame import Frame, offsets
 from photocore.arrays import BoolArray, Float32Array, FloatArray
 
 #: Noise that is taken out of the map, of measured and of other relief, in parallax: what is smaller
-#: casts shadows that are not there (94 % of the small holes of a church). [px]
-NOISE, NOISE_UNMEASURED = 0.25, 2.0
+#: casts shadows that are not there (94 % of the small holes of a church). More of the measured
+#: takes detail (semireal church: 0.25 px 3.39 mm, 0.05 px 3.27 mm). [px]
+NOISE, NOISE_UNMEASURED = 0.05, 2.0
 #: Pixels this far inwards of what camera 2 cannot see are not called measured: raised parts come
 #: out too fat, and 87 % of the wrongly measured pixels lay within two pixels of the rim. Façade 61:
 #: wrong / measured % 15.5 / 94.9 without, 9.4 / 94.3 with 3, 8.1 / 93.7 with 5; three pixels on all
@@ -29,7 +30,7 @@ OUTLINE = 7
 SCRAP, SCRAP_SHARE, HOLE = 4000, 0.05, 25
 
 
-def complete(frame: Frame, bands: MapBands, grid: Grid) -> MapBands:
+def complete(frame: Frame, bands: MapBands, grid: Grid, *, plain: bool = False) -> MapBands:
     """Return the map with hidden strips filled, noise taken out and its precision stated.
 
     Parameters
@@ -39,6 +40,9 @@ def complete(frame: Frame, bands: MapBands, grid: Grid) -> MapBands:
         Map with holes.
     grid : Grid
         Of the map.
+    plain : bool
+        Walls without texture: relief is drawn to the levels around it. On texture sigma is up to
+        three times too large, and drawing costs detail (semireal church: 3.39 to 3.55 mm).
     """
     # Holes outside what both photos see stay unknown.
     holes = ~np.isfinite(bands.r) & _cover(frame, grid)
@@ -52,7 +56,8 @@ def complete(frame: Frame, bands: MapBands, grid: Grid) -> MapBands:
         np.minimum(bands.sigma, np.float32(NOISE_UNMEASURED) * per_pixel),
     )
     relief = smoothing.shrink_noise(bands.r, quiet, smoothing.MAP_WINDOWS)
-    relief = levels.drawn_to_levels(relief, bands.sigma, bands.quality == Quality.MEASURED)
+    if plain:
+        relief = levels.drawn_to_levels(relief, bands.sigma, bands.quality == Quality.MEASURED)
     bands = bands._replace(r=relief, sigma=_sigma_at_steps(bands, per_pixel))
     _guard(frame, bands, grid)
     forward_projection.forget_outside(bands)
