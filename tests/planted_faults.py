@@ -193,7 +193,7 @@ _GROUPS: tuple[tuple[str, str, tuple[tuple[str, str], ...]], ...] = (
     (
         "bifocal/relief_maps/orientation_sigma.py",
         "tests/bifocal/relief_maps/test_dense_relief.py",
-        (("rate1, rate2 = d2", "rate2, rate1 = d2"),),
+        (("(high_ - low_) / 2, (high_ + low_)", "(low_ - high_) / 2, (high_ + low_)"),),
     ),
     (
         "bifocal/relief_maps/evidence.py",
