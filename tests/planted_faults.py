@@ -77,10 +77,12 @@ _GROUPS: tuple[tuple[str, str, tuple[tuple[str, str], ...]], ...] = (
     (
         "bifocal/model/pair.py",
         "tests/bifocal/model/test_pair.py",
-        (
-            ("[0, -scale, scale * row]", "[0, -scale, -scale * row]"),
-            ("matrix[None, :2, :2] - mapped", "matrix[None, :2, :2] + mapped"),
-        ),
+        (("[0, -scale, scale * row]", "[0, -scale, -scale * row]"),),
+    ),
+    (
+        "bifocal/model/homography.py",
+        "tests/bifocal/model/test_pair.py",
+        (("matrix[None, :2, :2] - mapped", "matrix[None, :2, :2] + mapped"),),
     ),
     (
         "bifocal/model/intersection.py",

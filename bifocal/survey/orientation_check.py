@@ -12,7 +12,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from bifocal.model.pair import Pair, apply_homography
+from bifocal.model.homography import apply_homography
+from bifocal.model.pair import Pair
 from photocore import adjustment
 from photocore.arrays import BoolArray, FloatArray, as_points
 from photocore.errors import GeometryError, InputError

@@ -9,8 +9,10 @@ from typing import Any
 
 import numpy as np
 
+from bifocal.model.homography import apply_homography
 from bifocal.model.lens import Lens
-from bifocal.model.pair import Pair, Photo, apply_homography
+from bifocal.model.pair import Pair
+from bifocal.model.photo import Photo
 from bifocal.survey.check_points import check_points
 from bifocal.survey.georeferencing import georeference
 from bifocal.survey.observations import PointObservations
