@@ -163,7 +163,8 @@ def _consistency(file: CsvFile, delimiter: str) -> float:
     """Return the share of sample records with the commonest number of fields, 0 for one field."""
     records = islice(file.records(delimiter, sample=True), _SAMPLE)
     counts = [len(record) for record in records if any(record)]
-    commonest = max(set(counts), key=counts.count, default=1)
+    # Of two numbers equally common the larger: block labels stand alone in their lines.
+    commonest = max(set(counts), key=lambda fields: (counts.count(fields), fields), default=1)
     return counts.count(commonest) / len(counts) if commonest > 1 else 0.0
 
 
