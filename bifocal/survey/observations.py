@@ -154,6 +154,12 @@ class PointObservations:
         direction = np.stack([np.sin(angle), np.cos(angle)], axis=-1)
         return self.polar[:, :1] * direction, self.polar[:, 1:2] * direction
 
+    def all_xy(self) -> tuple[FloatArray, FloatArray]:
+        """Return x and y of all points, radial distances turned into them, each (n, 2). [mm]"""
+        cartesian = self.is_cartesian[:, None]
+        first, second = self.polar_xy()
+        return np.where(cartesian, self.xy1, first), np.where(cartesian, self.xy2, second)
+
     @property
     def on_plane(self) -> BoolArray:
         """Which used points the user marks as lying on the reference plane, shape (n,)."""

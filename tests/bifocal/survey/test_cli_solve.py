@@ -291,6 +291,11 @@ def test_raw_pixels_with_a_pair_file_and_the_workbook_made_of_them(tmp_path):
     assert run("solve", points, "--pair", pair, "--out", out).exit_code == 0
     again, _ = solved(out)
     assert again["points"] == answer["points"]
+    # Without its pair file nobody knows the lenses: that is said.
+    pair.write_text("{}")
+    assert "wall.pair.json cannot be used" in run("solve", out).stderr
+    pair.unlink()
+    assert "wall.pair.json is not found: pixels are taken as free of" in run("solve", out).stderr
 
 
 def test_millimetres_with_a_pair_file_need_the_principal_distances(tmp_path):
