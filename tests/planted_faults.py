@@ -48,7 +48,7 @@ _GROUPS: tuple[tuple[str, str, tuple[tuple[str, str], ...]], ...] = (
         (
             ("rate = s2 / d2 - s1 / d1", "rate = s2 / d1 - s1 / d2"),
             ("relief_displacement(s2, r, d=d2)", "relief_displacement(s2, r, d=d1)"),
-            ('as_floats(s, "s") - as_floats(e, "e")', 'as_floats(s, "s") + as_floats(e, "e")'),
+            ("s_prime = s - e", "s_prime = s + e"),
         ),
     ),
     (
@@ -77,10 +77,12 @@ _GROUPS: tuple[tuple[str, str, tuple[tuple[str, str], ...]], ...] = (
     (
         "bifocal/model/pair.py",
         "tests/bifocal/model/test_pair.py",
-        (
-            ("[0, -scale, scale * row]", "[0, -scale, -scale * row]"),
-            ("matrix[None, :2, :2] - mapped", "matrix[None, :2, :2] + mapped"),
-        ),
+        (("[0, -scale, scale * row]", "[0, -scale, -scale * row]"),),
+    ),
+    (
+        "bifocal/model/homography.py",
+        "tests/bifocal/model/test_pair.py",
+        (("matrix[None, :2, :2] - mapped", "matrix[None, :2, :2] + mapped"),),
     ),
     (
         "bifocal/model/intersection.py",

@@ -121,11 +121,11 @@ def _options(given: dict[str, Any]) -> Any:
     lenses = tuple(
         KnownLens(
             **{
-                name: given[f"{name}{number}"] or given.get(name)
+                name: given[f"{name}{image}"] or given.get(name)
                 for name in ("lens", "focal", "pixel_size", "sensor_width")
             }
         )
-        for number in (1, 2)
+        for image in (1, 2)
     )
     site = ("distance1", "distance2", "delta_d", "sigma_control", "sigma_pick", "wall")
     line = given["horizontal"] or given["vertical"]

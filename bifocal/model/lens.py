@@ -115,6 +115,9 @@ class Lens:
             for name in known[:3]:
                 if name not in stated:
                     raise InputError(f"the key {name!r} is missing.")
+            sigma0 = stated.get("sigma0")
+            if isinstance(sigma0, list | bool):  # an array of one, or true, would pass for a number
+                raise InputError(f"sigma0: expected one number, found {sigma0!r:.40}.")
             return cls(**stated, extra=data)
 
     def to_dict(self) -> dict[str, Any]:
