@@ -129,8 +129,8 @@ def resect(
     >>> water = Layers(indices=(1.0, 1.337))
     >>> control = [(0, 0, -0.2), (0.1, 0, -0.3), (0, 0.1, -0.1), (0.1, 0.1, -0.2), (0, 0, -0.4)]
     >>> start = Camera.from_angles((0, 0, 1), 0, 0, 0, principal_distance=25.0)
-    >>> found = resect(start, control, project(truth, control, water), water)
-    >>> found.camera.centre.round(9).tolist()
+    >>> resection = resect(start, control, project(truth, control, water), water)
+    >>> resection.camera.centre.round(9).tolist()
     [0.1, 0.2, 0.6]
     """
     names = _checked_names(estimate)
