@@ -146,6 +146,8 @@ def object_grid(
         Width and height of the object space. [object unit]
     depths : tuple of float
         Least and largest depth below the last face, both above 0. [object unit]
+    count : int
+        Points along X, along Y, and levels.
 
     Examples
     --------
