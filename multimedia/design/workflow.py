@@ -52,8 +52,8 @@ def design_ring(
 ) -> Design:
     """Study cameras on a cone above a water surface or a glass.
 
-    Arguments as in `Layers`, `ring_of_cameras`, `object_grid` and `study_setup`; the seed is that of
-    the noise of the simulated calibrations.
+    Arguments as in `Layers`, `ring_of_cameras`, `object_grid` and `study_setup`; ``seed`` is that
+    of the noise in the simulated calibrations.
     """
     if not 0 <= depths[0] < depths[1]:
         raise InputError(
