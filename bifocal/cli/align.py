@@ -19,6 +19,8 @@ Examples:
   bifocal align far.jpg near.jpg --control points.csv --out wall.pair.json
   bifocal align far.jpg near.jpg --distance1 17.5 --distance2 9.5 --focal1 35 --focal2 19
                --sensor-width 22.7 --out wall.pair.json
+  bifocal align far.jpg near.jpg --as-set-up --distance1 17.5 --distance2 9.5 --focal1 35
+               --focal2 19 --sensor-width 22.7 --out wall.pair.json
   bifocal align far.jpg near.jpg --auto --distance1 17.5 --out wall.pair.json
 \b
 points.csv, one line per control point; r blank = on the wall; pixels in both photos:
@@ -32,6 +34,16 @@ points.csv, one line per control point; r blank = on the wall; pixels in both ph
 @click.argument("near", type=FILE)
 @click.option("--out", type=FILE, required=True, help="Pair file to write (*.pair.json).")
 @click.option("--control", type=FILE, help="Table of control points: id, X, Y, r [m] and pixels.")
+@click.option(
+    "--columns", metavar="MAP",
+    help='Which column of --control is which: "id=A,X=East" or "id,X,Y,r,col1,row1,col2,row2" for '
+    "tables without headings.  [default: found by heading]",
+)  # fmt: skip
+@click.option(
+    "--as-set-up", is_flag=True,
+    help="Take the set-up exactly as typed (distances, focal lengths, nadir in the photo's middle, "
+    "square to the wall); nothing is registered anew.",
+)  # fmt: skip
 @click.option("--auto", is_flag=True, help="From the photos alone; needs one distance or length.")
 @number("--distance1", "M", "Far camera to the wall [m].")
 @number("--distance2", "M", "Near camera to the wall [m].")
@@ -80,9 +92,10 @@ def command(
 ) -> None:  # fmt: skip
     """Set up a pair: where both cameras stood, how they looked, at which scale.
 
-    FAR is the photo taken from afar with the long lens, NEAR the other one. Three ways: control
+    FAR is the photo taken from afar with the long lens, NEAR the other one. Four ways: control
     points measured on the wall (--control), distances measured on site with the cameras square to
-    the wall (--distance1, --distance2), or the photos alone (--auto) and one distance or length.
+    the wall (--distance1, --distance2), the same taken as they are (--as-set-up), or the photos
+    alone (--auto) and one distance or length.
     """
     from bifocal.orientation.align_workflow import align_photos, alignment_as_dict
 
@@ -120,7 +133,7 @@ def _options(given: dict[str, Any]) -> Any:
     return AlignOptions(
         lenses=(lenses[0], lenses[1]),
         site=SiteMeasures(sigma=given["sigma_distance"], **{name: given[name] for name in site}),
-        **{name: given[name] for name in ("auto", "control", "lengths")},
+        **{name: given[name] for name in ("auto", "as_set_up", "control", "columns", "lengths")},
         length=(length[:4], length[4]) if length else None,
         line=(line, given["horizontal"] is None) if line else None,
         unit=given["unit"] or "",
@@ -136,6 +149,7 @@ def _lines(alignment: Alignment) -> Iterator[str]:
             f"{ties['count']} common points, {ties['on_wall']} of them on the wall, precise to "
             f"{ties['sigma_px']:.2f} px."
         )
+    yield from _found(alignment)
     if alignment.control_ids:
         yield "Control point residuals [px]: far column, row; near column, row; test"
         for index, name in enumerate(alignment.control_ids):
@@ -144,3 +158,18 @@ def _lines(alignment: Alignment) -> Iterator[str]:
             yield f"  {name:>12}  {values}  {alignment.control_test[index]:6.1f}{mark}"
     for text in alignment.setup["assumed"]:
         yield f"Assumed: {text}."
+
+
+def _found(alignment: Alignment) -> Iterator[str]:
+    """Yield the focal lengths found beside those given, and the wall's own relief by zone."""
+    setup = alignment.setup
+    if "focal_given_px" in setup:
+        pairs = zip(setup["focal_px"], setup["focal_given_px"], strict=True)
+        found = ", ".join(
+            f"{f:.1f} px (given {g:.1f}, {100 * (f / g - 1):+.2f} %)" for f, g in pairs
+        )
+        yield f"Focal lengths found: {found}."
+    zones = setup.get("wall_relief_mm") or []
+    if zones:
+        parts = "; ".join(f"{z['zone']} {z['median']:+.1f} ± {z['spread']:.1f}" for z in zones)
+        yield f"Relief of the wall's own points by zone of the far photo [mm]: {parts}."

@@ -108,3 +108,13 @@ def _lines(summary: dict[str, Any]) -> Iterator[str]:
         f"Relief from {low:.2f} to {high:.2f} m, sigma of r {1000 * summary['sigma_r_median']:.1f} "
         "mm at the median."
     )
+    if summary["empty"]:
+        named = "; ".join(
+            f"columns {c[0]}-{c[1]}, rows {r[0]}-{r[1]}"
+            for c, r in ((part["columns"], part["rows"]) for part in summary["empty"][:8])
+        )
+        more = len(summary["empty"]) - 8
+        yield (
+            f"NOTHING FOUND in {len(summary['empty'])} of 24 parts of the far photo, seen by both: "
+            f"{named}{f' and {more} more' if more > 0 else ''} (no texture, or hidden)."
+        )

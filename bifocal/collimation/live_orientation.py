@@ -9,13 +9,14 @@ import numpy as np
 from bifocal.collimation.records import PickedControl, SurveyState
 from bifocal.collimation.wording import say
 from bifocal.files.images import ImageInfo
+from bifocal.model.orientation_precision import CAMERA, NAMES
 from bifocal.orientation.absolute_orientation import orient_pair
 from bifocal.orientation.align_workflow import SIGMA_ON_WALL, KnownLens, interior_of_photo
 from bifocal.orientation.alignment import standard_deviations
 from bifocal.orientation.control_points import Control, SiteMeasures
 from bifocal.orientation.interior_orientation import Interior
 from bifocal.orientation.orientation_stages import OrientedPair, PhotoInput
-from bifocal.orientation.pair_observations import CAMERA, NAMES, at
+from bifocal.orientation.pair_observations import at
 from photocore.arrays import FloatArray
 from photocore.camera import PARAMETERS, project_with_jacobian, ray_on_plane
 from photocore.errors import PhotogrammetryError

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -97,6 +98,7 @@ def intersect(
     *,
     limits: FlagLimits,
     sigma_orientation: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0),
+    of_orientation: Callable[[FloatArray], FloatArray] | None = None,
 ) -> Intersection:
     """Intersect the rays of the same picks in both photos; see `bifocal.Pair.intersect`.
 
@@ -108,6 +110,8 @@ def intersect(
         Where the flags begin.
     sigma_orientation : tuple of float
         Standard deviations of d1 [m], d2 [m], the relative scale, each nadir coordinate [m].
+    of_orientation : callable, optional
+        Points (n, 3) to the covariance (n, 3, 3) that the orientation adds to theirs. [m²]
     """
     q1, q2 = far.positions, near.positions
     centre = rays.zoom_centre(far.foot, near.foot)
@@ -118,6 +122,8 @@ def intersect(
     relief = np.where(relief < near.foot.distance, relief, np.nan)
     xyz = rays.point_on_ray(a1, relief, far.foot)
     covariance = _covariance(xyz, a2, cov1, cov2, far.foot, near.foot, sigma_orientation)
+    if of_orientation is not None:
+        covariance = covariance + of_orientation(xyz)
     radius = q1 - centre
     residuals = [_pixels(far.metres_per_pixel, q1 - a1), _pixels(near.metres_per_pixel, q2 - a2)]
     return Intersection(

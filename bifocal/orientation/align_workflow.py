@@ -13,6 +13,7 @@ from bifocal.model.lens import Lens
 from bifocal.orientation.absolute_orientation import orient_pair
 from bifocal.orientation.alignment import Alignment, make_alignment, with_files
 from bifocal.orientation.alignment_picture import write_alignment_picture
+from bifocal.orientation.as_set_up import pair_as_set_up
 from bifocal.orientation.control_points import Control, SiteMeasures, read_control, read_lengths
 from bifocal.orientation.interior_orientation import Interior, lens_of_photo
 from bifocal.orientation.orientation_stages import PhotoInput
@@ -57,6 +58,10 @@ class AlignOptions:
     lenses : pair of KnownLens
     site : SiteMeasures
     auto : bool
+    as_set_up : bool
+        Whether the distances and focal lengths are taken exactly as they are.
+    columns : str or None
+        Which column of the control table is which.
     control, lengths : Path or None
         Tables of control points and of taped lengths.
     length : (pixels (4,), metres) or None
@@ -70,6 +75,8 @@ class AlignOptions:
     lenses: tuple[KnownLens, KnownLens] = field(default_factory=lambda: (KnownLens(), KnownLens()))
     site: SiteMeasures = field(default_factory=SiteMeasures)
     auto: bool = False
+    as_set_up: bool = False
+    columns: str | None = None
     control: Path | None = None
     lengths: Path | None = None
     length: tuple[tuple[float, ...], float] | None = None
@@ -111,10 +118,13 @@ def align_photos(
         )
         for number, (info, known) in enumerate(zip(infos, options.lenses, strict=True), start=1)
     )
-    if way == "site" and options.length is None:
-        _check_focal((first, second))
-    control = _control(options, (first.interior.image_size, second.interior.image_size))
-    oriented = orient_pair((first, second), control=control, site=options.site)
+    if way == "as set up":
+        oriented = pair_as_set_up((first, second), options.site)
+    else:
+        if way == "site" and options.length is None:
+            _check_focal((first, second))
+        control = _control(options, (first.interior.image_size, second.interior.image_size))
+        oriented = orient_pair((first, second), control=control, site=options.site)
     paths, ordered = (far, near), (first, second)
     if oriented.exchanged:
         paths, ordered = (near, far), (second, first)
@@ -158,9 +168,19 @@ def _way(options: AlignOptions) -> tuple[str, AlignOptions]:
     measured = [value for value in (site.distance1, site.distance2, site.delta_d) if value]
     if site.distance1 and site.distance2 and site.delta_d:
         raise InputError("give two of --distance1, --distance2 and --delta-d; the third follows.")
+    if options.as_set_up:
+        if options.control is not None or options.auto:
+            raise InputError("--as-set-up registers nothing: leave out --control and --auto.")
+        return "as set up", options
     if options.control is not None:
         return "control", options
     if options.auto:
+        if not (measured or options.length or options.lengths):
+            raise InputError(
+                "--auto needs one measure for the scale, two photos alone have none: the distance "
+                "from a camera to the wall (--distance1 or --distance2) or one length on the wall "
+                "(--length)."
+            )
         return "auto", options
     if len(measured) >= 2:
         return "site", replace(options, site=replace(site, parallel=True))
@@ -238,6 +258,7 @@ def _control(options: AlignOptions, sizes: tuple[tuple[int, int], tuple[int, int
             sigma=options.site.sigma_control,
             sigma_plane=SIGMA_ON_WALL,
             unit=options.unit,
+            columns=options.columns,
         )
     if options.lengths is not None:
         if options.control is None:

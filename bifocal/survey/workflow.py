@@ -14,7 +14,12 @@ from bifocal.model.pair import Pair, Photo, apply_homography
 from bifocal.survey.check_points import check_points
 from bifocal.survey.georeferencing import georeference
 from bifocal.survey.observations import PointObservations
-from bifocal.survey.orientation_check import OrientationCheck, check_orientation
+from bifocal.survey.orientation_check import (
+    OrientationCheck,
+    check_orientation,
+    with_zoom_centre,
+    zoom_centre_of_points,
+)
 from bifocal.survey.point_survey import solve_points
 from bifocal.survey.reference import CheckResult, Georeference
 from bifocal.survey.relief_table import ReliefTable
@@ -316,10 +321,11 @@ def _described_pair(setup: SurveySetup, file: Path | None, folder: Path) -> Pair
     if setup.matrices is None or setup.d1 is None or setup.d2 is None:
         return None
     lenses: list[Lens | None] = [None, None]
+    orientation = None
     if file is not None:
         try:
             given = Pair.read(file)
-            lenses = [given.image1.lens, given.image2.lens]
+            lenses, orientation = [given.image1.lens, given.image2.lens], given.orientation
         except InputError:
             lenses = [None, None]
     photos = [
@@ -331,7 +337,7 @@ def _described_pair(setup: SurveySetup, file: Path | None, folder: Path) -> Pair
             strict=True,
         )
     ]  # fmt: skip
-    return Pair(image1=photos[0], image2=photos[1], folder=folder)
+    return Pair(image1=photos[0], image2=photos[1], folder=folder, orientation=orientation)
 
 
 def _solve_pair(
@@ -348,7 +354,8 @@ def _solve_pair(
         sigma, remarks = _sigma_from_misfits(pair, points)
     check = _check_plane(pair, points, (points.pixels1, points.pixels2), sigma, survey, adjust)
     if check is not None and adjust:
-        pair = check.corrected
+        pair, said = _with_centre(check.corrected, points, (points.pixels1, points.pixels2), sigma)
+        remarks = (*remarks, *said)
     return _SolvedPoints(
         points=points,
         table=solve_points(pair, points, sigma_px=sigma, limits=setup.limits),
@@ -357,6 +364,34 @@ def _solve_pair(
         check=check,
         remarks=(*remarks, *(check.remarks if check else ())),
     )
+
+
+def _with_centre(
+    pair: Pair,
+    points: PointObservations,
+    pixels: tuple[FloatArray, FloatArray],
+    sigma_px: float | None,
+) -> tuple[Pair, tuple[str, ...]]:
+    """Return a pair corrected by its plane points with the centre of zoom that the others show."""
+    rows = points.use & ~points.on_plane
+    first, second = (
+        photo.picks(picked[rows], sigma_px)
+        for photo, picked in zip((pair.image1, pair.image2), pixels, strict=True)
+    )
+    variance = sum(np.trace(p.covariance, axis1=1, axis2=2) / 4 for p in (first, second))
+    found = zoom_centre_of_points(
+        pair, np.array(first.positions), np.array(second.positions), np.sqrt(variance)
+    )
+    if found is None:
+        return pair, ()
+    move = found[0] - pair.zoom_centre
+    spread = float(np.sqrt(np.trace(found[1]) / 2))
+    remark = (
+        f"Set-up: relief spreads from a point {1000 * move[0]:+.0f} mm, {1000 * move[1]:+.0f} mm "
+        f"(sigma {1000 * spread:.0f} mm) from the one assumed, as the points off the plane show; "
+        "taken into account."
+    )
+    return with_zoom_centre(pair, found[0]), (remark,)
 
 
 def _check_plane(
@@ -472,10 +507,18 @@ def _solve_ideal(survey: SurveyInput, scale_tolerance: float, *, adjust: bool) -
             if setup.adjusted[1] is not None:
                 correction = correction @ setup.adjusted[1]
             only_theta = points.polar * np.array([np.nan, np.nan, 1.0])
-            points = measured = replace(measured, xy1=xy1, xy2=moved, polar=only_theta)
+            found, said = _with_centre(check.corrected, points, (xy1, xy2), None)
+            # An ideal pair counts from its nadir; relief spreads from the centre of zoom.
+            centre = found.zoom_centre / scale if said else np.zeros(2)
+            points = measured = replace(
+                measured, xy1=xy1 - centre, xy2=moved - centre, polar=only_theta
+            )
             c2 = None if setup.c1 is None else setup.c1 * pair.d2 / pair.d1
             setup = replace(setup, unit="mm", c2=c2, adjusted=(None, None))
             pair = setup.pair()
+            remarks += said
+            if said:
+                remarks.append("Set-up: coordinates count from the centre of zoom found.")
             remarks.append(
                 "Set-up: image 2 was corrected by the points of the reference plane; its "
                 "coordinates are now in mm at the scale of image 1."

@@ -225,7 +225,7 @@ def pair_points(*, undistorted: bool) -> tuple[SurveyColumn, ...]:
         ),
         *(
             SurveyColumn(key=key, kind="value", places=6, folded=True)
-            for key in ("g1x", "g1y", "g2x", "g2y", "k_q", "k_r")
+            for key in ("g1x", "g1y", "g2x", "g2y", "k_q", "k_r", "o_r")
         ),
         _f("s1_used", f'IF([@q]="","",{radius(1, moved)})', 4, folded=True),
         _f("s2_used", f'IF([@q]="","",{radius(2, moved)})', 4, folded=True),
@@ -242,7 +242,7 @@ def pair_points(*, undistorted: bool) -> tuple[SurveyColumn, ...]:
         _of_r("X", place("x")),
         _of_r("Y", place("y")),
         _of_r("Z", "[@r]"),
-        _of_r("sigma_r", "IF(ISNUMBER([@r]),sigma_px*[@k_r],NA())"),
+        _of_r("sigma_r", "IF(ISNUMBER([@r]),SQRT((sigma_px*[@k_r])^2+N([@o_r])^2),NA())"),
         _f(
             "flag",
             _flag(_XY, "ABS(N([@q]))>k_off*sigma_px*N([@k_q])").replace(
