@@ -239,6 +239,16 @@ def test_precisions_that_nothing_would_use_are_refused(tmp_path: Path, kind: str
         assert "--nodata is for the cells of a DEM, these are rays" in message
 
 
+def test_a_mark_that_the_numbers_of_a_dem_cannot_reach_becomes_nan(tmp_path: Path) -> None:
+    heights = np.random.default_rng(1).uniform(95, 100, (20, 20)).astype(np.float32)
+    write_dem(tmp_path / "in.tif", heights, nodata=None)
+    status, _, said = bathymetry(tmp_path / "in.tif", tmp_path / "o.tif", "--nodata", -1e300)
+    assert status == 0, said
+    assert np.isfinite(read_band(tmp_path / "o.tif")).all()
+    with rasterio.open(tmp_path / "o.tif") as dem:
+        assert np.isnan(dem.nodata)
+
+
 def test_a_las_header_of_junk_is_refused_at_once(tmp_path: Path) -> None:
     path = tmp_path / "junk.laz"
     for seed in range(8):
