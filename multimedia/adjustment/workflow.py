@@ -32,9 +32,9 @@ def adjust_project(
     result : Adjustment
     remarks : tuple of str
     """
+    check_all_writable(out, report, overwrite=overwrite)
     check_ending(out, "a project is written as .toml.", ".toml")
     check_ending(report, "a report is written as .html.", ".html")
-    check_all_writable(out, report, overwrite=overwrite)
     project = read_project(source)
     result = bundle_adjust(project, unknowns)
     if out is not None:
