@@ -97,7 +97,8 @@ def salinity_of(
     water: dict[str, Any] = {"wavelength_nm": wavelength_nm, "temperature_c": temperature_c}
     water["depth"] = depth
     salinity = float(salinity_from_index(result.value(names[0]), **water))
-    rates = water_index_derivatives(**water, salinity_percent=salinity)
+    # Within the error of the index fresh water may come out slightly below zero.
+    rates = water_index_derivatives(**water, salinity_percent=min(max(salinity, 0.0), 30.0))
     return salinity, result.sigma(names[0]) / abs(float(rates.d_salinity))
 
 
