@@ -39,7 +39,7 @@ from photocore.arrays import FloatArray
 from photocore.errors import GeometryError, InputError
 from photocore.tables.numbers import Decimal
 
-Source = Path | str | PointObservations | Mapping[str, Any]
+Source = Path | str | PointObservations | SurveyInput | Mapping[str, Any]
 
 #: From this many points on, the picks' precision is taken from their misfits.
 MINIMUM_FOR_SIGMA = 20
@@ -123,7 +123,7 @@ def solve(
 
     Parameters
     ----------
-    source : path, mapping or PointObservations
+    source : path, mapping, PointObservations or SurveyInput
         A survey workbook or table (``.xlsx .xlsm .ods .csv``), or columns by key: ``id`` and
         ``x1 y1 x2 y2`` [mm or px], or ``s1 s2`` [mm] and ``theta`` [deg], or ``col1 row1 col2
         row2`` [px]; each of shape (n,), NaN where blank.
@@ -260,7 +260,9 @@ def _measured(source: Source, options: ReadOptions) -> tuple[SurveyInput, Path]:
     if isinstance(source, Mapping):
         source = PointObservations.from_columns(source)
     if isinstance(source, PointObservations):
-        return SurveyInput.of_points(source), Path("points")
+        source = SurveyInput.of_points(source)
+    if isinstance(source, SurveyInput):
+        return source, Path(source.table.file)
     return read_survey(source, options), Path(source)
 
 
