@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import os
 import shutil
 import tempfile
@@ -11,6 +12,8 @@ from itertools import count
 from pathlib import Path
 
 from photocore.errors import InputError
+
+_LOG = logging.getLogger(__name__)
 
 
 def check_writable(path: Path | str, *, overwrite: bool) -> Path:
@@ -93,6 +96,7 @@ def atomic_path(path: Path | str, *, overwrite: bool) -> Iterator[Path]:
         yield temporary
         _give_usual_mode(temporary)
         temporary.replace(path)
+        _LOG.info("written: %s", path)
     except OSError as error:
         raise InputError(
             f"{path}: could not be written ({error.strerror or error}); nothing was left behind. "

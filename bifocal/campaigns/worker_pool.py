@@ -14,6 +14,7 @@ from multiprocessing.process import BaseProcess
 from typing import Any
 
 from bifocal.campaigns.pair_job import PairJob, PairOutcome
+from photocore.machine import cores, free_memory
 
 #: A pair whose process died is tried so often; memory that ran short may be there again.
 ATTEMPTS = 2
@@ -36,27 +37,6 @@ class _Worker:
     process: BaseProcess
     connection: Connection
     job: PairJob | None = None
-
-
-def free_memory() -> int:
-    """Return the memory that programs may still take; 4 GiB where the system does not tell.
-
-    In bytes.
-    """
-    with suppress(OSError, ValueError, StopIteration):
-        with open("/proc/meminfo", encoding="ascii") as file:  # noqa: PTH123
-            line = next(line for line in file if line.startswith("MemAvailable"))
-        return int(line.split()[1]) * 1024
-    with suppress(AttributeError, ValueError, OSError):
-        return os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") // 2
-    return 4 << 30
-
-
-def cores() -> int:
-    """Return the processor cores this process may use."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
 
 
 def run_here(

@@ -23,6 +23,7 @@ SUMMARIES: dict[str, str] = {
     "survey": "The same for many pairs: resumable, in parallel, here or on a cluster.",
     "report": "What was measured and how good it is, as one HTML or PDF file.",
     "export": "Points as DXF, PLY, LAS, CSV, GeoJSON or workbook.",
+    "doctor": "Versions, extras, LibreOffice, memory: what a fault report needs.",
 }
 
 EPILOG = """\b

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from bifocal.files.dxf import add_text, new_drawing
+from bifocal.files.dxf import add_text, new_drawing, save_drawing
 from bifocal.model.points import SurveyPoints
 from photocore.arrays import BoolArray, FloatArray
 from photocore.cloud import write_cloud
@@ -116,7 +116,7 @@ def _write_dxf(path: Path, points: SurveyPoints, coordinates: FloatArray) -> Non
         left = x + height / 2
         add_text(model, points.ids[i], (left, y + 0.4 * height, z), height, "BIFOCAL_NAMES")
         add_text(model, relief, (left, y - 1.4 * height, z), height, "BIFOCAL_RELIEF")
-    drawing.saveas(path)
+    save_drawing(drawing, path)
 
 
 def _write_csv(

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import textwrap
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
 from bifocal.reports.document import Banner, Block, Document, Heading, Paragraph, Picture, TextTable
 from photocore.cli import Progress, no_progress
 from photocore.output import atomic_path
+from photocore.provenance import today
 
 #: Page and margins. [mm]
 PAGE, MARGIN = (210.0, 297.0), 18.0
@@ -23,7 +25,11 @@ def write_pdf(
     """Write a report as PDF."""
     from matplotlib.backends.backend_pdf import PdfPages
 
-    info = {"Title": document.title, "Creator": document.subject, "Producer": "bifocal"}
+    made = datetime.fromisoformat(today()).replace(tzinfo=UTC)
+    info = {
+        "Title": document.title, "Creator": document.subject, "Producer": "bifocal",
+        "CreationDate": made, "ModDate": made,
+    }  # fmt: skip
     with (
         atomic_path(path, overwrite=overwrite) as temporary,
         PdfPages(temporary, metadata=info) as file,
