@@ -65,7 +65,7 @@ def run_on_cluster(
                 run_pair, job, key=f"pair-{job.folder}-{job.name}", pure=False, resources=resources
             )
             names[future] = job.name
-        for future in cluster.as_completed(names):
+        for future in cluster.as_completed(names, loop=client.loop):
             outcome = _outcome(future, names[future])
             listener.ended(outcome)
             yield outcome

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import textwrap
+from collections.abc import Sequence
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
@@ -16,7 +17,9 @@ from photocore.provenance import today
 PAGE, MARGIN = (210.0, 297.0), 18.0
 INNER = PAGE[0] - 2 * MARGIN
 #: Points of type to mm, height of a line over that of its type, widths of letters over it.
-_MM, _LINE, _WIDE, _MONO = 0.3528, 1.35, 0.53, 0.6
+_MM, _LINE, _WIDE, _MONO = 0.3528, 1.35, 0.55, 0.61
+#: Widths of letters where none may touch the next column or the frame: figures and bold type.
+_WIDEST = 0.66
 
 
 def write_pdf(
@@ -37,8 +40,13 @@ def write_pdf(
         pages = _Pages(file, document.title)
         for index, block in enumerate(document.blocks):
             progress(index, len(document.blocks), "report")
-            pages.add(block)
+            pages.add(block, before=document.blocks[index + 1 : index + 2])
         pages.end()
+
+
+def _height(block: Picture) -> float:
+    """Return the height of a figure on the page: two of them and a heading fit on one. [mm]"""
+    return min(INNER * block.ratio, (PAGE[1] - 2 * MARGIN - 40) / 2)
 
 
 class _Pages:
@@ -63,11 +71,12 @@ class _Pages:
         """Write the last page."""
         self.file.savefig(self.figure)
 
-    def add(self, block: Block) -> None:
-        """Set a block, on a new page where it does not fit."""
+    def add(self, block: Block, *, before: Sequence[Block] = ()) -> None:
+        """Set a block, on a new page where it does not fit; a heading beside what it is before."""
         if isinstance(block, Heading):
             size = {1: 17, 2: 12.5}.get(block.level, 10)
-            self._room(size * _MM * 2.2 + 30)
+            pictures = [_height(item) + 12 for item in before if isinstance(item, Picture)]
+            self._room(size * _MM * 2.2 + max(pictures, default=30.0))
             self.y -= size * _MM * 0.7
             self._text(block.text, size=size, weight="bold")
             if block.level <= 2:
@@ -121,7 +130,7 @@ class _Pages:
     def _banner(self, block: Banner) -> None:
         from matplotlib.patches import Rectangle
 
-        lines = textwrap.wrap(block.text, int((INNER - 8) / (12 * _MM * _WIDE * 1.08)))
+        lines = textwrap.wrap(block.text, int((INNER - 8) / (12 * _MM * _WIDEST)))
         details = [
             line for text in block.details
             for line in textwrap.wrap(text, int((INNER - 8) / (10 * _MM * _WIDE)))
@@ -153,10 +162,10 @@ class _Pages:
         lengths = [max(4, *(len(cell) for cell in column)) for column in columns]
         size = 8.0
         # Columns of a table that is too wide share what there is, and their cells are folded.
-        letters = INNER / (size * _MM * _WIDE) - 2.0 * len(lengths)
+        letters = INNER / (size * _MM * _WIDEST) - 2.0 * len(lengths)
         while sum(lengths) > letters and max(lengths) > 12:
             lengths[lengths.index(max(lengths))] -= 1
-        widths = [(length + 2.0) * size * _MM * _WIDE for length in lengths]
+        widths = [(length + 2.0) * size * _MM * _WIDEST for length in lengths]
         for index, row in enumerate([block.headings, *block.rows]):
             cells = [
                 textwrap.wrap(cell, length) or [""]
@@ -191,7 +200,7 @@ class _Pages:
         )  # fmt: skip
 
     def _picture(self, block: Picture) -> None:
-        height = min(INNER * block.ratio, PAGE[1] - 2 * MARGIN - 16)
+        height = _height(block)
         wide = height / block.ratio
         self._room(height + 12)
         grid = self.figure.add_gridspec(
