@@ -30,6 +30,10 @@ The whole wall
     mosaic, Mosaic            several orthophotos or relief maps made one
     MosaicOptions             how they are joined
 
+The page
+    pick                      orient, pick and draw in the browser, as the command `bifocal pick`
+    page_server, PageServer   the same without a browser, for programs that drive it
+
 Files in, files out: the command `bifocal`. Errors are ValueErrors with one message that says what
 is wrong, where, and how to mend it.
 """

@@ -1,5 +1,6 @@
 from .calibration.board_calibration import Calibration
 from .calibration.board_photos import calibrate
+from .collimation.workflow import PageServer, page_server, pick
 from .equations import (
     plane_coordinates,
     relief,
@@ -42,6 +43,7 @@ __all__ = [
     "MosaicOptions",
     "OrthoOptions",
     "Orthophoto",
+    "PageServer",
     "Pair",
     "Photo",
     "Quality",
@@ -55,6 +57,8 @@ __all__ = [
     "match",
     "mosaic",
     "orthophoto",
+    "page_server",
+    "pick",
     "plane_coordinates",
     "relief",
     "relief_displacement",

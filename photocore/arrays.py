@@ -29,7 +29,8 @@ def as_floats(value: ArrayLike, name: str) -> FloatArray:
     """
     try:
         array = np.asarray(value)
-        if array.dtype.kind in "US":  # numpy would take the text "17.5"; no file of ours means it
+        # numpy would take the text "17.5", and true for 1; no file of ours means it.
+        if array.dtype.kind in "USb":
             raise TypeError
         return np.asarray(array, dtype=np.float64)
     except OverflowError as error:
@@ -66,18 +67,20 @@ def as_points(value: ArrayLike, name: str, *, dimension: int) -> FloatArray:
 
 
 def read_only(value: ArrayLike, name: str, *, shape: tuple[int, ...] | None = None) -> FloatArray:
-    """Return a read-only float64 copy, checked for shape and finiteness (for frozen objects).
+    """Return a read-only float64 copy, checked for shape and size (for frozen objects).
 
     Raises
     ------
     InputError
-        If the shape differs or a value is not finite.
+        If the shape differs or a value is not finite, or beyond `LARGEST`.
     """
     array = np.array(as_floats(value, name))
     if shape is not None and array.shape != shape:
         raise InputError(f"{name}: expected shape {shape}, found {array.shape}.")
     if not np.isfinite(array).all():
         raise InputError(f"{name}: every value must be a finite number.")
+    if (np.abs(array) > LARGEST).any():
+        raise InputError(f"{name}: {np.abs(array).max():.3g} is beyond reason; check the unit.")
     array.setflags(write=False)
     return array
 

@@ -8,37 +8,19 @@ K and R back: eight numbers and three are the eleven of a pinhole camera.
 
 from __future__ import annotations
 
-from typing import NamedTuple, Protocol
+from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from photocore.arrays import FloatArray
-from photocore.rotation import rotation_from_vector
+from photocore.rotation import AXES_CROSS, by_turn, rotation_from_vector, skew
 
 #: What a camera is differentiated by: logarithms of fx and fy / fx, principal point [px], a small
 #: turn about the object frame's axes [rad], projection centre [m].
 PARAMETERS = (
     "focal length", "aspect", "column", "row", "turn X", "turn Y", "turn Z", "X", "Y", "Z"
 )  # fmt: skip
-#: The matrices of e_k x v, for the three axes e_k: shape (3, 3, 3).
-CROSS = np.array(
-    [[[0, 0, 0], [0, 0, -1], [0, 1, 0]], [[0, 0, 1], [0, 0, 0], [-1, 0, 0]],
-     [[0, -1, 0], [1, 0, 0], [0, 0, 0]]], dtype=np.float64,
-)  # fmt: skip
-
-
-class LensModel(Protocol):
-    """What bends the rays of a photo: ideal pixels to seen ones and back."""
-
-    def distort(self, pixels: ArrayLike) -> FloatArray:
-        """Return where ideal points are seen, shape (..., 2). [px]"""
-
-    def undistort(self, pixels: ArrayLike) -> FloatArray:
-        """Return where seen points would be without distortion, shape (..., 2). [px]"""
-
-    def distorted_by_ideal(self, pixels: ArrayLike) -> FloatArray:
-        """Return the derivative of `distort` at ideal points, shape (..., 2, 2)."""
 
 
 class Pinhole(NamedTuple):
@@ -105,29 +87,73 @@ def plane_from_pixel(camera: Pinhole) -> FloatArray:
     return matrix / matrix[2, 2] if abs(matrix[2, 2]) > 1e-12 else matrix
 
 
+def central(vectors: FloatArray, distance: float = 1.0) -> FloatArray:
+    """Return the central projection (x, y) = distance (u_x, u_y) / u_z; NaN behind the camera.
+
+    Parameters
+    ----------
+    vectors : ndarray, shape (..., 3)
+        u, from the projection centre to the points, or as refraction lets them seem.
+    distance : float
+        Principal distance: 1 for vectors that K has been applied to, in pixels; negative where the
+        camera's z axis points backwards. Points before the camera have distance / u_z > 0.
+
+    Returns
+    -------
+    ndarray, shape (..., 2)
+        In the unit of the distance.
+
+    Examples
+    --------
+    >>> central(np.array([0.5, 0.25, -2.0]), -20.0).tolist()
+    [5.0, 2.5]
+    """
+    return _central(vectors, distance)[0]
+
+
+def central_with_jacobian(
+    vectors: FloatArray, distance: float = 1.0
+) -> tuple[FloatArray, FloatArray]:
+    """Return `central` of vectors (n, 3) and its derivatives by them, shape (n, 2, 3)."""
+    image, scale = _central(vectors, distance)
+    by_vectors: FloatArray = np.zeros((len(vectors), 2, 3))
+    by_vectors[:, 0, 0] = by_vectors[:, 1, 1] = scale
+    scale = scale / -distance
+    np.multiply(image[:, 0], scale, out=by_vectors[:, 0, 2])
+    np.multiply(image[:, 1], scale, out=by_vectors[:, 1, 2])
+    return image, by_vectors
+
+
+def _central(vectors: FloatArray, distance: float) -> tuple[FloatArray, FloatArray]:
+    """Return `central` and distance / u_z, the scale of the image."""
+    with np.errstate(divide="ignore", over="ignore"):
+        scale = distance / vectors[..., 2]
+    # At depth 0 the scale is infinite, of either sign.
+    if not (before := (scale > 0) & (scale < np.inf)).all():
+        scale = np.where(before, scale, np.nan)
+    image: FloatArray = np.empty((*vectors.shape[:-1], 2))
+    np.multiply(vectors[..., 0], scale, out=image[..., 0])
+    np.multiply(vectors[..., 1], scale, out=image[..., 1])
+    return image, scale
+
+
 def project(camera: Pinhole, xyz: FloatArray) -> FloatArray:
     """Return pixels of points (..., 3), shape (..., 2); NaN for points behind the camera."""
-    seen = (xyz - camera.centre) @ (camera.matrix @ camera.rotation).T
-    depth = seen[..., 2:]
-    with np.errstate(divide="ignore", invalid="ignore"):
-        return np.where(depth > 0, seen[..., :2] / depth, np.nan)
+    return central((xyz - camera.centre) @ (camera.matrix @ camera.rotation).T)
 
 
 def project_with_jacobian(camera: Pinhole, xyz: FloatArray) -> ProjectedPoints:
     """Return pixels of points (n, 3) with their derivatives; all NaN behind the camera."""
-    mapped = camera.matrix @ camera.rotation
-    away = xyz - camera.centre
-    pixels = project(camera, xyz)
-    depth = (away @ mapped[2])[:, None, None]
-    with np.errstate(divide="ignore", invalid="ignore"):
-        by_point = (mapped[:2] - pixels[:, :, None] * mapped[2]) / depth
+    mapped, away = camera.matrix @ camera.rotation, xyz - camera.centre
+    pixels, by_mapped = central_with_jacobian(away @ mapped.T)
+    by_point = (by_mapped.reshape(-1, 3) @ mapped).reshape(-1, 2, 3)
     by_camera = np.zeros((len(xyz), 2, len(PARAMETERS)))
     offset = pixels - camera.matrix[:2, 2]
     by_camera[:, :, 0] = offset
     by_camera[:, 1, 1] = offset[:, 1]
     by_camera[:, :, 2:4] = np.eye(2)
-    # Turned by a small v the camera sees R (P - C + v x (P - C)): row . (v x a) = (a x row) . v.
-    by_camera[:, :, 4:7] = np.cross(away[:, None], by_point)
+    # Turned by a small v the camera sees R (P - C + v x (P - C)).
+    by_camera[:, :, 4:7] = by_turn(by_point, away)
     by_camera[:, :, 7:] = -by_point
     return ProjectedPoints(pixels, by_point, by_camera)
 
@@ -160,14 +186,14 @@ def fundamental_with_jacobian(first: Pinhole, second: Pinhole) -> tuple[FloatArr
     With M = K R the rays of pixels x1, x2 are M1⁻¹ x1 and M2⁻¹ x2; they and the base b = C1 - C2
     lie in one plane: ``F = M2⁻ᵀ [b]x M1⁻¹``.
     """
-    base = np.einsum("k,kij->ij", first.centre - second.centre, CROSS)
+    base = skew(first.centre - second.centre)
     rays, by_rays = [], []
     for camera in (first, second):
         inverse = np.linalg.inv(camera.matrix @ camera.rotation)
         rays.append(inverse)
         by_rays.append(-inverse @ _mapped_by_camera(camera) @ inverse)
     left, right = rays[1].T, rays[0]
-    by_centre = left @ CROSS @ right
+    by_centre = left @ AXES_CROSS @ right
     by_turned = np.swapaxes(by_rays[1], 1, 2) @ base @ right
     parts = [left @ base @ by_rays[0], by_centre, by_turned, -by_centre]
     return left @ base @ right, np.concatenate(parts)
@@ -205,7 +231,7 @@ def _mapped_by_camera(camera: Pinhole) -> FloatArray:
     by_matrix[0, 0, 0] = camera.matrix[0, 0]
     by_matrix[:2, 1, 1] = camera.matrix[1, 1]
     by_matrix[2, 0, 2] = by_matrix[3, 1, 2] = 1.0
-    turned = camera.matrix @ camera.rotation @ CROSS
+    turned = camera.matrix @ camera.rotation @ AXES_CROSS
     return np.concatenate([by_matrix @ camera.rotation, turned])
 
 
@@ -227,3 +253,44 @@ def triangulate(
     right = np.einsum("nij,ni->nj", rows[known], side[known])
     xyz[known] = np.linalg.solve(normal[known], right[..., None])[..., 0]
     return xyz
+
+
+def cameras_seeing(
+    xyz: FloatArray, pixels: FloatArray, matrix: FloatArray, *, methods: Sequence[int]
+) -> list[Pinhole]:
+    """Return the cameras from which points are seen where they were measured: space resection.
+
+    Parameters
+    ----------
+    xyz : ndarray, shape (n, 3)
+        At least 3 points.
+    pixels : ndarray, shape (n, 2)
+        Free of distortion; x right, y down.
+    matrix : ndarray, shape (3, 3)
+        Camera matrix.
+    methods : sequence of int
+        OpenCV's ``SOLVEPNP_...``; those that do not take this configuration are passed over.
+
+    Returns
+    -------
+    list of Pinhole
+        All solutions of all methods; possibly none, or some with points behind them.
+    """
+    import cv2
+
+    middle = xyz.mean(axis=0)
+    scale = float(np.abs(xyz - middle).max()) or 1.0
+    points, cameras = np.ascontiguousarray((xyz - middle) / scale), []
+    for method in methods:
+        try:
+            _, turns, shifts, _ = cv2.solvePnPGeneric(
+                points, np.ascontiguousarray(pixels), matrix, None, flags=method
+            )
+        except cv2.error:
+            continue
+        for turn, shift in zip(turns, shifts, strict=True):
+            rotation = cv2.Rodrigues(turn)[0]
+            centre = middle - scale * (rotation.T @ shift).ravel()
+            if np.isfinite(centre).all() and np.isfinite(rotation).all():
+                cameras.append(Pinhole(matrix, rotation, centre))
+    return cameras

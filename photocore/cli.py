@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import json
 import logging
+import re
 import signal
 import sys
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -180,10 +182,19 @@ def _show_details(ctx: click.Context) -> None:
 
 
 def print_json(value: Any) -> None:
-    """Print one JSON object on stdout; NaN becomes null."""
+    """Print one JSON object on stdout, given as such or as its text; NaN becomes null.
+
+    Letters that the encoding of stdout lacks become JSON's own escapes.
+    """
     from photocore.jsonfile import to_text
 
-    click.echo(to_text(value))
+    text = value if isinstance(value, str) else to_text(value)
+    try:
+        text.encode(getattr(sys.stdout, "encoding", None) or "utf-8")  # None: stdout is closed
+    except UnicodeEncodeError:
+        # Outside of its texts JSON is ASCII, so each letter may be escaped where it stands.
+        text = re.sub(r"[^\x00-\x7f]", lambda letter: json.dumps(letter[0])[1:-1], text)
+    click.echo(text)
 
 
 def remark(message: str) -> None:

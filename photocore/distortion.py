@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from photocore.arrays import FloatArray, as_points
-from photocore.errors import InputError
+from photocore.errors import LARGEST, InputError
 
 #: Names of the parameters in the order of `Brown`'s fields.
 NAMES = ("k1", "k2", "k3", "p1", "p2", "scale", "shear")
@@ -76,7 +76,7 @@ class Brown:
 
     def __post_init__(self) -> None:
         values = np.array([getattr(self, name) for name in NAMES], dtype=np.float64)
-        if not np.isfinite(values).all():
+        if not (np.abs(values) <= LARGEST).all():
             raise InputError(f"distortion: every coefficient must be a number, found {values}.")
         if not (0.5 < self.scale < 2.0 and abs(self.shear) < 0.5):
             raise InputError(
@@ -265,45 +265,69 @@ class Brown:
 
 
 class RadialDivision(NamedTuple):
-    """Distortion of one term, ideal = c + (seen - c) / (1 + k rho^2), for a lens that is unknown.
+    """Radial distortion of a lens that is unknown: ideal = c + (seen - c) / (1 + q).
 
-    rho is the seen radius over the principal distance; c is the centre [px].
+    q = k1 rho^2 + k2 rho^4, rho the seen radius over the principal distance; c is the centre [px].
 
     Examples
     --------
-    >>> bent = RadialDivision(0.1, np.array([500.0, 400.0]), 1000.0)
+    >>> bent = RadialDivision(0.1, np.array([500.0, 400.0]), 1000.0, -0.02)
     >>> bent.distort(bent.undistort([900.0, 400.0])).round(9).tolist()
     [900.0, 400.0]
     """
 
-    k: float
+    k1: float
     centre: FloatArray
     focal: float
+    k2: float = 0.0
 
     def undistort(self, pixels: ArrayLike) -> FloatArray:
         """Return where seen points would be without distortion, shape (..., 2). [px]"""
         away, square = self._polar(pixels)
-        return self.centre + away / (1.0 + self.k * square)
+        return self.centre + away / self._divisor(square)
 
     def undistorted_by_k(self, pixels: ArrayLike) -> FloatArray:
-        """Return the derivative of `undistort` by k, shape (..., 2). [px]"""
+        """Return the derivative of `undistort` by k1 and k2, shape (..., 2, 2). [px]"""
         away, square = self._polar(pixels)
-        return -away * square / (1.0 + self.k * square) ** 2
+        by_divisor = -away / self._divisor(square) ** 2
+        return np.stack([by_divisor * square, by_divisor * square**2], axis=-1)
+
+    def undistorted_by_seen(self, pixels: ArrayLike) -> FloatArray:
+        """Return the derivative of `undistort` by the seen point, shape (..., 2, 2)."""
+        away, square = self._polar(pixels)
+        divisor, square = self._divisor(square)[..., None], square[..., None]
+        outer = away[..., :, None] * away[..., None, :] / self.focal**2
+        slope = 2.0 * (self.k1 + 2.0 * self.k2 * square)
+        return np.eye(2) / divisor - outer * slope / divisor**2
 
     def distort(self, pixels: ArrayLike) -> FloatArray:
-        """Return where ideal points are seen, shape (..., 2); NaN where none is. [px]"""
+        """Return where ideal points are seen, shape (..., 2); NaN where none is. [px]
+
+        Newton from the root for k1 alone, so that k2 = 0 is closed: seen = ideal (1 + q).
+        """
         away, square = self._polar(pixels)
-        # The root of k ideal seen^2 - seen + ideal = 0 that is 1 at k = 0.
-        with np.errstate(invalid="ignore"):
-            return self.centre + away * 2.0 / (1.0 + np.sqrt(1.0 - 4.0 * self.k * square))
+        with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
+            factor = 2.0 / (1.0 + np.sqrt(1.0 - 4.0 * self.k1 * square))
+            if self.k2:
+                factor = np.where(np.isfinite(factor), factor, 1.0)
+                for _ in range(_STEPS):
+                    t = factor**2 * square
+                    miss = 1.0 + t * (self.k1 + t * self.k2) - factor
+                    slope = 2.0 * factor * square * (self.k1 + 2.0 * self.k2 * t) - 1.0
+                    factor = factor - miss / slope
+                    if not (np.abs(miss) > 1e-13).any():
+                        break
+                t = factor**2 * square
+                miss = np.abs(1.0 + t * (self.k1 + t * self.k2) - factor)
+                factor = np.where((miss < 1e-9) & (factor > 0), factor, np.nan)
+        return self.centre + away * factor
 
     def distorted_by_ideal(self, pixels: ArrayLike) -> FloatArray:
         """Return the derivative of `distort` at ideal points, shape (..., 2, 2)."""
-        away, square = self._polar(pixels)
-        with np.errstate(invalid="ignore"):
-            root = np.sqrt(1.0 - 4.0 * self.k * square)[..., None]
-        outer = away[..., :, None] * away[..., None, :] / self.focal**2
-        return 2.0 / (1.0 + root) * (np.eye(2) + 4.0 * self.k * outer / (root * (1.0 + root)))
+        return inverse_2x2(self.undistorted_by_seen(self.distort(pixels)))
+
+    def _divisor(self, square: FloatArray) -> FloatArray:
+        return 1.0 + square * (self.k1 + square * self.k2)
 
     def _polar(self, pixels: ArrayLike) -> tuple[FloatArray, FloatArray]:
         """Return the way from the centre and its squared length over the principal distance's."""
@@ -312,9 +336,10 @@ class RadialDivision(NamedTuple):
 
 
 def inverse_2x2(matrices: FloatArray) -> FloatArray:
-    """Return the inverses of matrices, shape (..., 2, 2)."""
+    """Return the inverses of matrices, shape (..., 2, 2); nothing finite where singular."""
     a, b = matrices[..., 0, 0], matrices[..., 0, 1]
     c, d = matrices[..., 1, 0], matrices[..., 1, 1]
     out = np.empty_like(matrices)
     out[..., 0, 0], out[..., 0, 1], out[..., 1, 0], out[..., 1, 1] = d, -b, -c, a
-    return out / (a * d - b * c)[..., None, None]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return out / (a * d - b * c)[..., None, None]

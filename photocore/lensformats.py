@@ -16,7 +16,7 @@ import numpy as np
 from photocore.arrays import FloatArray
 from photocore.camera import camera_matrix
 from photocore.errors import InputError
-from photocore.textfile import read_text
+from photocore.textfile import check_name, read_text
 
 
 class LensData(NamedTuple):
@@ -40,6 +40,7 @@ def read_foreign_lens(path: Path | str) -> LensData:
         If the file is missing, of another kind, or uses terms OpenCV's model does not have.
     """
     path = Path(path)
+    check_name(path)
     if not path.is_file():
         raise InputError(f"{path}: no such lens file.")
     ending = path.suffix.lower()
@@ -144,12 +145,17 @@ def _opencv(path: Path) -> LensData:
                 return np.asarray(node.mat() if node.isMap() else node.real(), dtype=np.float64)
         return None
 
-    matrix = first("camera_matrix", "cameraMatrix", "Camera_Matrix", "K", "M1")
-    terms = first(
-        "distortion_coefficients", "dist_coeffs", "distCoeffs", "Distortion_Coefficients", "D", "D1"
-    )
-    width, height = first("image_width", "image_Width"), first("image_height", "image_Height")
-    storage.release()
+    try:
+        matrix = first("camera_matrix", "cameraMatrix", "Camera_Matrix", "K", "M1")
+        terms = first(
+            "distortion_coefficients", "dist_coeffs", "distCoeffs", "Distortion_Coefficients",
+            "D", "D1",
+        )  # fmt: skip
+        width, height = first("image_width", "image_Width"), first("image_height", "image_Height")
+    except (cv2.error, TypeError, ValueError) as error:
+        raise InputError(f"{path}: one of its matrices is damaged; export it again.") from error
+    finally:
+        storage.release()
     if matrix is None or matrix.shape != (3, 3) or terms is None:
         raise InputError(f"{path}: lacks camera_matrix (3x3) or distortion_coefficients.")
     if width is None or height is None:

@@ -95,6 +95,8 @@ class Number(click.ParamType):  # type: ignore[type-arg,unused-ignore]
 #: Takes the place of click's FLOAT in every command.
 NUMBER = Number()
 POSITIVE, NOT_NEGATIVE = Number(above=0), Number(least=0)
+#: A principal distance in millimetres: from a pinhole's to a telescope's.
+FOCAL = Number(least=0.1, most=1e5)
 #: Millimetres or micrometres, handed on as metres or millimetres.
 THOUSANDTHS = Number(above=0, to=lambda value: value / 1000)
 

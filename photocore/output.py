@@ -4,14 +4,30 @@ from __future__ import annotations
 
 import logging
 import os
+import re
 import shutil
+import socket
+import stat
 import tempfile
-from collections.abc import Iterator
-from contextlib import contextmanager
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, suppress
+from contextvars import ContextVar
+from hashlib import sha256
 from itertools import count
 from pathlib import Path
 
 from photocore.errors import InputError
+from photocore.textfile import check_name
+
+#: Temporary names tell the machine and the process, so that what a killed run left is known.
+_NODE = sha256(socket.gethostname().encode()).hexdigest()[:6]
+#: Where processes of others cannot be asked, a temporary file of this age is left over. [s]
+_LEFT_OVER = 86_400.0
+#: Temporary files and folders in use by this process.
+_in_use: set[str] = set()
+#: Finished outputs, under their temporary names, that wait for the others of their set.
+_waiting: ContextVar[list[tuple[Path, Path]] | None] = ContextVar("waiting", default=None)
 
 _LOG = logging.getLogger(__name__)
 
@@ -19,31 +35,64 @@ _LOG = logging.getLogger(__name__)
 def check_writable(path: Path | str, *, overwrite: bool) -> Path:
     """Return path if a file may be created there; call it before any long work.
 
+    A link to a file stands for that file.
+
     Raises
     ------
     InputError
-        If it exists and ``overwrite`` is false, is a folder, is open in a spreadsheet program, or
-        its folder is missing or read-only.
+        If it exists and ``overwrite`` is false, is a folder, a device or a pipe, is a link that
+        leads nowhere, is open in a spreadsheet program, or its folder is missing or read-only.
     """
     path = Path(path)
+    check_name(path)
     if path.is_dir():
         raise InputError(f"{path}: is a folder; name a file to write.")
+    if path.is_symlink() and not path.exists():
+        raise InputError(
+            f"{path}: is a link to {path.readlink()}, which does not exist. Remove the link, or "
+            "name another file."
+        )
+    if path.exists() and not path.is_file():
+        raise InputError(f"{path}: is a device or a pipe; name a file to write.")
     if path.exists() and not overwrite:
         raise InputError(f"{path}: exists already; add --overwrite to replace it.")
-    folder = path.parent
-    if not folder.is_dir():
-        raise InputError(f"{path}: the folder {folder} does not exist; create it first.")
-    if not os.access(folder, os.W_OK):
-        raise InputError(f"{path}: the folder {folder} is read-only; choose another place.")
-    check_not_open(path)
+    real = path.resolve()
+    if not real.parent.is_dir():
+        raise InputError(f"{path}: the folder {path.parent} does not exist; create it first.")
+    if not os.access(real.parent, os.W_OK):
+        raise InputError(f"{path}: the folder {real.parent} is read-only; choose another place.")
+    for place in dict.fromkeys((path, real)):
+        check_not_open(place)
     return path
 
 
 def check_all_writable(*paths: Path | None, overwrite: bool) -> None:
-    """Refuse each path that is given as `check_writable` does; None stands for no file."""
-    for path in paths:
-        if path is not None:
-            check_writable(path, overwrite=overwrite)
+    """Refuse each path that is given as `check_writable` does, and one named twice.
+
+    Parameters
+    ----------
+    *paths : Path or None
+        The outputs of one command; None stands for no file.
+    overwrite : bool
+        Replace existing files.
+    """
+    given = [path for path in paths if path is not None]
+    for number, path in enumerate(given):
+        check_writable(path, overwrite=overwrite)
+        if path.resolve() in [other.resolve() for other in given[:number]]:
+            raise InputError(f"{path}: is named for two outputs; name two files.")
+
+
+def check_ending(path: Path | None, rule: str, *endings: str) -> None:
+    """Refuse a file with another ending than these, given in small letters; None is no file.
+
+    Raises
+    ------
+    InputError
+        With the rule as its message.
+    """
+    if path is not None and path.suffix.lower() not in endings:
+        raise InputError(f"{path}: {rule}")
 
 
 def check_not_open(path: Path) -> None:
@@ -78,10 +127,41 @@ def free_path(folder: Path, stem: str, ending: str = "") -> Path:
 
 
 @contextmanager
+def all_or_none() -> Iterator[None]:
+    """Let all outputs that the body writes appear together at its end, or none of them.
+
+    Usable as a decorator too. Until the end the outputs bear temporary names, so the body cannot
+    read them back. A set within a set is part of it.
+
+    Raises
+    ------
+    InputError
+        If two outputs are one file, or one of them cannot be put in its place.
+    """
+    if _waiting.get() is not None:
+        yield
+        return
+    finished: list[tuple[Path, Path]] = []
+    token = _waiting.set(finished)
+    try:
+        yield
+        try:
+            _put_in_place(finished)
+        except OSError as error:
+            raise _not_written(finished[0][1], error) from error
+    finally:
+        _waiting.reset(token)
+        for temporary, _ in finished:
+            _forget(temporary)
+
+
+@contextmanager
 def atomic_path(path: Path | str, *, overwrite: bool) -> Iterator[Path]:
     """Yield a temporary path beside ``path``; rename it on success, remove it on any failure.
 
-    The temporary name keeps the ending, so libraries that choose a format by it work.
+    The temporary name keeps the ending, so libraries that choose a format by it work. A file that
+    is replaced hands on its mode; a link is followed. What earlier, killed runs left of the same
+    output is removed.
 
     Raises
     ------
@@ -89,26 +169,33 @@ def atomic_path(path: Path | str, *, overwrite: bool) -> Iterator[Path]:
         As `check_writable`, and when the disk is full or the rename is refused.
     """
     path = check_writable(path, overwrite=overwrite)
-    handle, name = tempfile.mkstemp(prefix=f".{path.stem}-", suffix=path.suffix, dir=path.parent)
-    os.close(handle)
-    temporary = Path(name)
+    real, finished = path.resolve(), _waiting.get()
+    if finished is not None and any(real == place for _, place in finished):
+        raise InputError(f"{path}: is named for two outputs; name two files.")
+    try:
+        temporary = _temporary_file(real)
+    except OSError as error:
+        raise _not_written(path, error) from error
+    waits = False
     try:
         yield temporary
-        _give_usual_mode(temporary)
-        temporary.replace(path)
-        _LOG.info("written: %s", path)
+        temporary.chmod(_mode_for(real))
+        if finished is None:
+            temporary.replace(real)
+            _LOG.info("written: %s", path)
+        else:
+            finished.append((temporary, real))
+            waits = True
     except OSError as error:
-        raise InputError(
-            f"{path}: could not be written ({error.strerror or error}); nothing was left behind. "
-            "Free some space or choose another place, and close the file in other programs."
-        ) from error
+        raise _not_written(path, error) from error
     finally:
-        temporary.unlink(missing_ok=True)
+        if not waits:
+            _forget(temporary)
 
 
 @contextmanager
 def atomic_folder(path: Path | str, *, overwrite: bool) -> Iterator[Path]:
-    """Yield a temporary folder; on success its files move into ``path`` one by one.
+    """Yield a temporary folder; on success all its files move into ``path``, otherwise none.
 
     Existing files of other names in ``path`` stay.
 
@@ -118,37 +205,149 @@ def atomic_folder(path: Path | str, *, overwrite: bool) -> Iterator[Path]:
         If a file of the same name exists and ``overwrite`` is false, or writing fails.
     """
     path = Path(path)
-    if path.exists() and not path.is_dir():
+    check_name(path)
+    if os.path.lexists(path) and not path.is_dir():
         raise InputError(f"{path}: is a file; name a folder.")
+    made_folders: list[Path] = []
+    temporary: Path | None = None
+    done = False
     try:
-        path.mkdir(parents=True, exist_ok=True)
-        temporary = Path(tempfile.mkdtemp(prefix=".writing-", dir=path))
-    except OSError as error:
-        raise InputError(f"{path}: cannot be written to ({error.strerror or error}).") from error
-    try:
+        _make_folder(path, made_folders)
+        _remove_left_over(path, ".writing", "")
+        temporary = Path(tempfile.mkdtemp(prefix=_prefix(".writing"), dir=path))
+        _in_use.add(temporary.name)
         yield temporary
-        made = [item.relative_to(temporary) for item in temporary.rglob("*") if item.is_file()]
-        taken = [str(name) for name in made if (path / name).exists()]
+        files = [item.relative_to(temporary) for item in temporary.rglob("*") if item.is_file()]
+        taken = [str(name) for name in files if os.path.lexists(path / name)]
         if taken and not overwrite:
             raise InputError(
                 f"{path}: holds {', '.join(sorted(taken)[:5])} already; add --overwrite to replace."
             )
-        for name in made:
-            check_not_open(path / name)
-        for name in made:
-            (path / name).parent.mkdir(parents=True, exist_ok=True)
-            (temporary / name).replace(path / name)
+        for name in files:
+            _make_folder((path / name).parent, made_folders)
+            check_writable(path / name, overwrite=overwrite)
+            (temporary / name).chmod(_mode_for((path / name).resolve()))
+        _put_in_place([(temporary / name, (path / name).resolve()) for name in files])
+        done = True
     except OSError as error:
         raise InputError(f"{path}: could not be written ({error.strerror or error}).") from error
     finally:
-        shutil.rmtree(temporary, ignore_errors=True)
+        if temporary is not None:
+            shutil.rmtree(temporary, ignore_errors=True)
+            _in_use.discard(temporary.name)
+        for folder in () if done else reversed(made_folders):
+            with suppress(OSError):
+                folder.rmdir()
 
 
-def _give_usual_mode(path: Path) -> None:
-    """Replace mkstemp's owner-only mode by what a plain open() would have given."""
+def _make_folder(path: Path, made: list[Path]) -> None:
+    """Make a folder and those above it that are missing; note which."""
+    missing = [folder for folder in (path, *path.parents) if not folder.exists()]
+    for folder in reversed(missing):
+        folder.mkdir(exist_ok=True)
+        made.append(folder)
+
+
+def _put_in_place(finished: Sequence[tuple[Path, Path]]) -> None:
+    """Rename all files to their places; where one fails, put the old state of all back.
+
+    Each place holds its old or its new file at any moment, also if the program is killed.
+    """
+    done: list[tuple[Path, Path | None]] = []
+    try:
+        for temporary, place in finished:
+            old = _second_name(place) if len(finished) > 1 and place.exists() else None
+            done.append((place, old))
+            temporary.replace(place)
+            _LOG.info("written: %s", place)
+    except OSError:
+        for (temporary, _), (place, old) in zip(finished, done, strict=False):
+            if not temporary.exists():
+                place.unlink() if old is None else old.replace(place)
+        raise
+    finally:
+        for _, old in done:
+            if old is not None:
+                _forget(old)
+
+
+def _second_name(place: Path) -> Path:
+    """Return another name under which a file can be had back."""
+    second = _temporary_file(place)
+    second.unlink()
+    try:
+        os.link(place, second)
+    except OSError:  # a file system without links
+        shutil.copy2(place, second)
+    return second
+
+
+def _not_written(path: Path, error: OSError) -> InputError:
+    return InputError(
+        f"{path}: could not be written ({error.strerror or error}); nothing was left behind. "
+        "Free some space or choose another place, and close the file in other programs."
+    )
+
+
+def _prefix(stem: str) -> str:
+    return f"{stem}-{_NODE}-{os.getpid()}-"
+
+
+def _temporary_file(place: Path) -> Path:
+    """Make an empty file beside a place, of the same ending, and remove left-over ones."""
+    # Names have an end; Python's random letters and the process number take some of it.
+    stem = f".{place.stem[:60]}"
+    _remove_left_over(place.parent, stem, place.suffix)
+    handle, name = tempfile.mkstemp(prefix=_prefix(stem), suffix=place.suffix, dir=place.parent)
+    os.close(handle)
+    _in_use.add(Path(name).name)
+    return Path(name)
+
+
+def _forget(temporary: Path) -> None:
+    temporary.unlink(missing_ok=True)
+    _in_use.discard(temporary.name)
+
+
+def _remove_left_over(folder: Path, stem: str, ending: str) -> None:
+    """Remove temporary files and folders of an output whose process is gone."""
+    pattern = re.compile(
+        rf"{re.escape(stem)}-(?P<node>[0-9a-f]{{6}})-(?P<process>\d+)-\w{{8}}{re.escape(ending)}.*"
+    )
+    for entry in os.scandir(folder):
+        match = pattern.fullmatch(entry.name)
+        with suppress(OSError):
+            if match and entry.name not in _in_use and _is_left_over(match, entry.stat()):
+                if entry.is_dir(follow_symlinks=False):
+                    shutil.rmtree(entry.path, ignore_errors=True)
+                else:
+                    Path(entry.path).unlink()
+
+
+def _is_left_over(match: re.Match[str], status: os.stat_result) -> bool:
+    if match["node"] == _NODE and os.name == "posix":
+        process = int(match["process"])
+        return process == os.getpid() or not _is_running(process)
+    return time.time() - status.st_mtime > _LEFT_OVER
+
+
+def _is_running(process: int) -> bool:
+    try:
+        os.kill(process, 0)
+    except (ProcessLookupError, OverflowError):
+        return False
+    except PermissionError:
+        return True
+    return True
+
+
+def _mode_for(place: Path) -> int:
+    """Return the mode of the file that is replaced, or what a plain open() would give."""
+    if place.exists():
+        return stat.S_IMODE(place.stat().st_mode)
     mask = os.umask(0)
     os.umask(mask)
-    path.chmod(0o666 & ~mask)
+    return 0o666 & ~mask
 
 
 def relative_name(path: Path | str, folder: Path) -> str:

@@ -36,6 +36,9 @@ def public_names(
 
         near = get_close_matches(name, everything, n=1)
         hint = f"; did you mean '{near[0]}'?" if near else "."
-        raise AttributeError(f"{package} has no '{name}'{hint} Public names: help({package})")
+        raise AttributeError(
+            f"{package} has no '{name}'{hint} Public names: help({package})",
+            name=name,  # with it, Python adds no second guess of its own
+        )
 
     return attribute, names, everything

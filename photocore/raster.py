@@ -19,6 +19,7 @@ from numpy.typing import DTypeLike, NDArray
 from photocore.arrays import FloatArray
 from photocore.errors import InputError
 from photocore.output import atomic_path
+from photocore.textfile import check_name
 
 #: Side of a tile of the file; GDAL's and most viewers' sweet spot. [px]
 BLOCK = 512
@@ -85,6 +86,7 @@ class RasterFile(ExitStack):
 
         super().__init__()
         self.path = Path(path)
+        check_name(self.path)
         if self.path.is_dir():
             raise InputError(f"{self.path}: is a folder; name the raster file in it.")
         if not self.path.is_file():
@@ -141,7 +143,8 @@ class RasterFile(ExitStack):
 
         def known(window: Any) -> NDArray[Any]:
             block = self._file.read(1, window=window)
-            values = block.astype(dtype)
+            with np.errstate(invalid="ignore", over="ignore"):  # what float32 cannot hold
+                values = block.astype(dtype)
             for empty in self._empty:
                 values[block == empty] = np.nan
             if self.masked:

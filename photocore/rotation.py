@@ -5,7 +5,14 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from photocore.arrays import FloatArray, as_floats
+from photocore.arrays import FloatArray, as_floats, read_only
+from photocore.errors import GeometryError
+
+#: The matrices of e_k x v, for the three axes e_k: shape (3, 3, 3).
+AXES_CROSS = np.array(
+    [[[0, 0, 0], [0, 0, -1], [0, 1, 0]], [[0, 0, 1], [0, 0, 0], [-1, 0, 0]],
+     [[0, -1, 0], [1, 0, 0], [0, 0, 0]]], dtype=np.float64,
+)  # fmt: skip
 
 
 def world_from_camera(omega: float, phi: float, kappa: float) -> FloatArray:
@@ -70,6 +77,40 @@ def rotation_vector_from_angle_rates(omega: float, phi: float) -> FloatArray:
     return np.array([[1.0, 0.0, sp], [0.0, co, -so * cp], [0.0, so, co * cp]])
 
 
+def skew(vectors: ArrayLike) -> FloatArray:
+    """Return the matrices with ``skew(a) @ v = a x v``, shape (..., 3, 3).
+
+    Examples
+    --------
+    >>> (skew([1.0, 2.0, 3.0]) @ [0.0, 0.0, 1.0]).tolist()
+    [2.0, -1.0, 0.0]
+    """
+    a = as_floats(vectors, "vectors")
+    return (a @ AXES_CROSS.reshape(9, 3).T).reshape(*a.shape, 3)
+
+
+def by_turn(rows: FloatArray, arms: FloatArray) -> FloatArray:
+    """Return derivatives by a small turn v of arms: ``row . (v x arm) = (arm x row) . v``.
+
+    Parameters
+    ----------
+    rows : ndarray, shape (n, m, 3)
+        Derivatives of m things by the end of each arm.
+    arms : ndarray, shape (n, 3)
+        What turns.
+
+    Returns
+    -------
+    ndarray, shape (n, m, 3)
+    """
+    x, y, z = arms.T
+    turned: FloatArray = np.empty(rows.shape)
+    for row, out in zip(np.moveaxis(rows, 1, 0), np.moveaxis(turned, 1, 0), strict=True):
+        a, b, c = row.T
+        out[:, 0], out[:, 1], out[:, 2] = y * c - z * b, z * a - x * c, x * b - y * a
+    return turned
+
+
 def rotation_from_vector(vector: ArrayLike) -> FloatArray:
     """Return the rotation about a vector by its length, shape (3, 3) (Rodrigues).
 
@@ -78,13 +119,34 @@ def rotation_from_vector(vector: ArrayLike) -> FloatArray:
     >>> rotation_from_vector([0.0, 0.0, np.pi / 2]).round(9)[:, 0].tolist()
     [0.0, 1.0, 0.0]
     """
-    x, y, z = as_floats(vector, "vector")
-    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    angle = float(np.sqrt(x * x + y * y + z * z))
+    cross = skew(vector)
+    angle = float(np.linalg.norm(vector))
     # np.sinc keeps both factors exact down to angle 0.
     first = np.sinc(angle / np.pi)
     second = 0.5 * np.sinc(angle / (2.0 * np.pi)) ** 2
     return np.eye(3) + first * cross + second * (cross @ cross)
+
+
+def checked_rotation(matrix: ArrayLike, name: str, *, tolerance: float = 1e-6) -> FloatArray:
+    """Return a read-only copy of a rotation matrix, shape (3, 3).
+
+    Raises
+    ------
+    GeometryError
+        If its rows are no unit vectors at right angles to ``tolerance``, or it mirrors.
+    """
+    rotation = read_only(matrix, name, shape=(3, 3))
+    if not np.allclose(rotation @ rotation.T, np.eye(3), atol=tolerance):
+        raise GeometryError(
+            f"{name} is not a rotation matrix: its rows must be unit vectors at right angles. "
+            "Check the nine numbers, or give the three angles."
+        )
+    if np.linalg.det(rotation) < 0:
+        raise GeometryError(
+            f"{name} is not a rotation but mirrors the world: one of the coordinate systems is "
+            "left-handed. Exchange two axes or change the sign of one."
+        )
+    return rotation
 
 
 def nearest_rotation(matrix: ArrayLike) -> FloatArray:

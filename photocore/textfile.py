@@ -4,9 +4,27 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from errno import ENAMETOOLONG
 from pathlib import Path
 
 from photocore.errors import InputError
+
+
+def check_name(path: Path) -> None:
+    """Refuse a name that no file can have, whether there is one or not.
+
+    Raises
+    ------
+    InputError
+        If it holds NUL or is longer than the file system takes.
+    """
+    if "\0" in str(path):
+        raise InputError(f"{str(path)!r}: is no file's name; it holds a NUL character.")
+    try:
+        path.lstat()
+    except OSError as error:
+        if error.errno == ENAMETOOLONG:
+            raise InputError(f"{path}: is too long a name for a file; choose another.") from None
 
 
 def read_text(path: Path, what: str, *, form: str = "") -> str:
@@ -34,9 +52,10 @@ def read_text(path: Path, what: str, *, form: str = "") -> str:
 @contextmanager
 def readable(path: Path, what: str, *, missing: str = "file") -> Iterator[None]:
     """Say what is wrong with a file that cannot be read: missing, a folder, a pipe, locked."""
-    if path.is_dir():
-        raise InputError(f"{path}: is a folder, expected a {what}.")
+    check_name(path)
     try:
+        if path.is_dir():
+            raise InputError(f"{path}: is a folder, expected a {what}.")
         if path.exists() and not path.is_file():  # reading it may wait for ever
             raise InputError(f"{path}: is a pipe or a device; save what it gives as a file first.")
         yield

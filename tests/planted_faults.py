@@ -68,7 +68,8 @@ _GROUPS: tuple[tuple[str, str, tuple[tuple[str, str], ...]], ...] = (
         "bifocal/precision.py",
         "bifocal/precision.py tests/papers/test_midulla.py tests/bifocal/planning/test_planning.py",
         (
-            ("by_1, by_2 = reduction(r, d1)", "by_1, by_2 = (1 + r / d1)"),
+            ("return r, -reduction(r, d1)", "return r, -(1 + r / d1)"),
+            ("(r + s2 * by_2) * sigma_2", "(r - s2 * by_2) * sigma_2"),
             ("(d1 - r) * (d2 - r) / (d1 - d2) * spread", "(d1 - r) * d2 / (d1 - d2) * spread"),
         ),
     ),
@@ -251,12 +252,15 @@ _GROUPS: tuple[tuple[str, str, tuple[tuple[str, str], ...]], ...] = (
     (
         "photocore/camera.py",
         "tests/photocore/test_camera.py",
-        (("np.cross(away[:, None], by_point)", "np.cross(by_point, away[:, None])"),),
+        (("scale = scale / -distance", "scale = scale / distance"),),
     ),
     (
         "photocore/rotation.py",
         "tests/photocore/test_rotation.py",
-        (("[0.0, co, -so * cp], [0.0, so, co * cp]", "[0.0, co, so * cp], [0.0, so, co * cp]"),),
+        (
+            ("[0.0, co, -so * cp], [0.0, so, co * cp]", "[0.0, co, so * cp], [0.0, so, co * cp]"),
+            ("y * c - z * b", "z * b - y * c"),
+        ),
     ),
     (
         "photocore/similarity.py",
@@ -316,7 +320,7 @@ _GROUPS: tuple[tuple[str, str, tuple[tuple[str, str], ...]], ...] = (
     (
         "multimedia/media/projection.py",
         "tests/multimedia/media/test_projection.py",
-        (("by_seen[:, 1, 2] = lever", "by_seen[:, 1, 2] = -lever"),),
+        (("by_c = ideal / camera.principal_distance", "by_c = ideal"),),
     ),
     (
         "multimedia/media/ray_tracing.py",
@@ -361,7 +365,7 @@ _GROUPS: tuple[tuple[str, str, tuple[tuple[str, str], ...]], ...] = (
     (
         "multimedia/adjustment/bundle_equations.py",
         "tests/multimedia/adjustment/test_bundle.py",
-        (("np.cross(arm[:, None, :], by_point[on])", "np.cross(by_point[on], arm[:, None, :])"),),
+        (("by_turn(by_point[on], arm)", "by_turn(by_point[on], -arm)"),),
     ),
 )
 

@@ -23,6 +23,8 @@ SUSPICIOUS, DROPPED = 4.0, 8.0
 SIGNIFICANCE = 0.01
 COVERAGE_CELLS = (8, 6)
 PATTERNS = ("chessboard", "circles", "asymmetric-circles", "charuco")
+#: Fewer corners each way are not told from the pattern of a window. OpenCV takes no fewer.
+LEAST_CORNERS = 3
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bifocal.calibration.board_calibration import (
+    LEAST_CORNERS,
     PATTERNS,
     BoardView,
     Calibration,
@@ -95,6 +96,11 @@ def calibrate(
         raise InputError(f"pattern: {pattern!r} is not one of {', '.join(PATTERNS)}.")
     if board is None and pattern != "chessboard":
         raise InputError(f"give the size of the {pattern} board, e.g. --board 7x5.")
+    if board is not None and min(board) < LEAST_CORNERS:
+        raise InputError(
+            f"board: {board[0]}x{board[1]} is too small; at least {LEAST_CORNERS} each way are "
+            "needed. Count the inner corners of a chessboard, not its squares."
+        )
     photos: Iterator[ByteArray] = (
         as_grey(image, f"photo {number}") for number, image in enumerate(images, start=1)
     )
@@ -115,6 +121,12 @@ def calibrate(
             without.append(name)
         else:
             views.append(view)
+    if without and not views:
+        raise InputError(
+            f"{', '.join(without[:3])}{', ...' if without[3:] else ''}: the board was not found in "
+            "any photo. Check --pattern and --board; the whole board must be seen, sharp and lit "
+            "evenly."
+        )
     progress(1, 1, "adjusting")
     calibration = lens_of_views(views, next(iter(sizes), (0, 0)), model=model)
     return replace(calibration, without_board=tuple(without))

@@ -17,8 +17,8 @@ from bifocal.files.images import ImageArray, image_info, read_grey, read_image, 
 from bifocal.model.lens import Lens
 from photocore.arrays import FloatArray
 from photocore.cli import Progress, no_progress
-from photocore.errors import InputError
-from photocore.output import check_writable
+from photocore.errors import InputError, located
+from photocore.output import all_or_none, check_all_writable, check_writable
 from photocore.tables import Column, read_table
 
 
@@ -81,7 +81,8 @@ def calibrate_from_edges(
         chains = _picked_lines(lines)
     else:
         chains = [line for path in images for line in find_straight_edges(read_grey(path))]
-    result = calibrate_from_lines(chains, size, focal_px=focal_px)
+    with located(lines or ", ".join(map(str, images[:3]))):
+        result = calibrate_from_lines(chains, size, focal_px=focal_px)
     if result.rms_after > 0.8 * result.rms_before:
         remarks.append(
             "the correction hardly straightens the lines: either the lens has little distortion, "
@@ -101,6 +102,7 @@ def write_database_lens(
     return known.lens, (known.remark,)
 
 
+@all_or_none()
 def undistort_images(
     images: Sequence[Path],
     lens: str,
@@ -128,8 +130,9 @@ def undistort_images(
     one = None if lens.lower() == "exif" else Lens.read(lens)
     targets = []
     for path in images:
-        target = (folder or path.parent) / f"{path.stem}_undistorted{path.suffix}"
-        targets.append(check_writable(target, overwrite=overwrite))
+        image_info(path)
+        targets.append((folder or path.parent) / f"{path.stem}_undistorted{path.suffix}")
+    check_all_writable(*targets, overwrite=overwrite)
     remarks: list[str] = []
     for done, (path, target) in enumerate(zip(images, targets, strict=True)):
         progress(done, len(images), path.name)

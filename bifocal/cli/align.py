@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from photocore.cli import print_result, remark
-from photocore.options import FILE, Numbers, as_json, choice, number, overwrite
+from photocore.options import FILE, FOCAL, Numbers, as_json, choice, number, overwrite
 
 if TYPE_CHECKING:
     from bifocal.orientation.alignment import Alignment
@@ -19,6 +19,8 @@ Examples:
   bifocal align far.jpg near.jpg --control points.csv --out wall.pair.json
   bifocal align far.jpg near.jpg --distance1 17.5 --distance2 9.5 --focal1 35 --focal2 19
                --sensor-width 22.7 --out wall.pair.json
+  bifocal align far.jpg near.jpg --as-set-up --distance1 17.5 --distance2 9.5 --focal1 35
+               --focal2 19 --sensor-width 22.7 --out wall.pair.json
   bifocal align far.jpg near.jpg --auto --distance1 17.5 --out wall.pair.json
 \b
 points.csv, one line per control point; r blank = on the wall; pixels in both photos:
@@ -32,12 +34,22 @@ points.csv, one line per control point; r blank = on the wall; pixels in both ph
 @click.argument("near", type=FILE)
 @click.option("--out", type=FILE, required=True, help="Pair file to write (*.pair.json).")
 @click.option("--control", type=FILE, help="Table of control points: id, X, Y, r [m] and pixels.")
+@click.option(
+    "--columns", metavar="MAP",
+    help='Which column of --control is which: "id=A,X=East" or "id,X,Y,r,col1,row1,col2,row2" for '
+    "tables without headings.  [default: found by heading]",
+)  # fmt: skip
+@click.option(
+    "--as-set-up", is_flag=True,
+    help="Take the set-up exactly as typed (distances, focal lengths, nadir in the photo's middle, "
+    "square to the wall); nothing is registered anew.",
+)  # fmt: skip
 @click.option("--auto", is_flag=True, help="From the photos alone; needs one distance or length.")
 @number("--distance1", "M", "Far camera to the wall [m].")
 @number("--distance2", "M", "Near camera to the wall [m].")
 @number("--delta-d", "M", "Difference of the two distances [m].")
-@number("--focal1", "MM", "Focal length, far photo [mm].  [default: EXIF]")
-@number("--focal2", "MM", "Focal length, near photo [mm].  [default: EXIF]")
+@number("--focal1", "MM", "Focal length, far photo [mm].  [default: EXIF]", type=FOCAL)
+@number("--focal2", "MM", "Focal length, near photo [mm].  [default: EXIF]", type=FOCAL)
 @number("--sensor-width", "MM", "Longer side of the sensor, both photos [mm].")
 @number("--sensor-width1", "MM", "The same, far photo only [mm].")
 @number("--sensor-width2", "MM", "The same, near photo only [mm].")
@@ -80,9 +92,10 @@ def command(
 ) -> None:  # fmt: skip
     """Set up a pair: where both cameras stood, how they looked, at which scale.
 
-    FAR is the photo taken from afar with the long lens, NEAR the other one. Three ways: control
+    FAR is the photo taken from afar with the long lens, NEAR the other one. Four ways: control
     points measured on the wall (--control), distances measured on site with the cameras square to
-    the wall (--distance1, --distance2), or the photos alone (--auto) and one distance or length.
+    the wall (--distance1, --distance2), the same taken as they are (--as-set-up), or the photos
+    alone (--auto) and one distance or length.
     """
     from bifocal.orientation.align_workflow import AlignOptions, align_photos, alignment_as_dict
 
@@ -109,6 +122,7 @@ def _lines(alignment: Alignment) -> Iterator[str]:
             f"{ties['count']} common points, {ties['on_wall']} of them on the wall, precise to "
             f"{ties['sigma_px']:.2f} px."
         )
+    yield from _found(alignment)
     if alignment.control_ids:
         yield "Control point residuals [px]: far column, row; near column, row; test"
         for index, name in enumerate(alignment.control_ids):
@@ -117,3 +131,18 @@ def _lines(alignment: Alignment) -> Iterator[str]:
             yield f"  {name:>12}  {values}  {alignment.control_test[index]:6.1f}{mark}"
     for text in alignment.setup["assumed"]:
         yield f"Assumed: {text}."
+
+
+def _found(alignment: Alignment) -> Iterator[str]:
+    """Yield the focal lengths found beside those given, and the wall's own relief by zone."""
+    setup = alignment.setup
+    if "focal_given_px" in setup:
+        pairs = zip(setup["focal_px"], setup["focal_given_px"], strict=True)
+        found = ", ".join(
+            f"{f:.1f} px (given {g:.1f}, {100 * (f / g - 1):+.2f} %)" for f, g in pairs
+        )
+        yield f"Focal lengths found: {found}."
+    zones = setup.get("wall_relief_mm") or []
+    if zones:
+        parts = "; ".join(f"{z['zone']} {z['median']:+.1f} ± {z['spread']:.1f}" for z in zones)
+        yield f"Relief of the wall's own points by zone of the far photo [mm]: {parts}."

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 from photocore.cli import print_result, progress_bar, remark, text_table
-from photocore.options import FILE, Size, as_json, choice, number, overwrite
+from photocore.options import FILE, FOCAL, Size, as_json, choice, number, overwrite
 
 if TYPE_CHECKING:
     from bifocal.calibration.board_calibration import Calibration
@@ -53,7 +53,7 @@ One lens file holds for one lens at one focus and one zoom mark.
 @click.option("--database", is_flag=True, help="Take the lens database's data for this photo.")
 @click.option("--camera-name", default="", help="With --database: camera, if EXIF lacks it.")
 @click.option("--lens-name", default="", help="With --database: lens, if EXIF lacks it.")
-@number("--focal", "MM", "With --database: focal length [mm], if EXIF lacks it.")
+@number("--focal", "MM", "With --database: focal length [mm], if EXIF lacks it.", type=FOCAL)
 @overwrite
 @as_json
 def command(

@@ -14,6 +14,7 @@ SUMMARIES: dict[str, str] = {
     "calibrate": "Lens calibration from board photos or straight lines.",
     "undistort": "Photos freed of lens distortion.",
     "align": "A pair file from two photos: control points, site distances or automatic.",
+    "pick": "The page: orient photos, pick points, draw, in the browser.",
     "match": "Homologous points found automatically, as a survey workbook.",
     "solve": "Relief, coordinates and precision of measured points.",
     "relief": "Dense relief map of the wall.",
@@ -28,6 +29,7 @@ SUMMARIES: dict[str, str] = {
 
 EPILOG = """\b
 First steps:
+  bifocal pick                      the page: from two photos to the drawing, in the browser
   bifocal demo                      the whole workflow on a sample pair
   bifocal template survey.xlsx      an empty survey workbook
   bifocal COMMAND --help            options and an example for each command

@@ -56,6 +56,8 @@ def command(
     from bifocal.orientation.match_workflow import match_photos, match_summary
     from bifocal.orientation.matching import MatchSettings
 
+    if relief_min is not None and relief_max is not None and relief_min >= relief_max:
+        raise click.UsageError("--relief-min must be below --relief-max.")
     reliefs = None
     if relief_min is not None or relief_max is not None:
         near = Pair.read(pair).image2.distance
@@ -71,9 +73,26 @@ def command(
     )
     found = match_photos(pair, out, settings, language=lang, overwrite=overwrite)
     summary = match_summary(*found)
-    print_result({**summary, "out": out}, _lines(summary), as_json=as_json)
+    print_result(
+        {**summary, "out": out}, _lines(summary), as_json=as_json,
+        remarks=_remarks(summary["kinds"], what),
+    )  # fmt: skip
     if not as_json:
         remark(f"Points written to {out}")
+
+
+def _remarks(kinds: dict[str, int], what: str) -> Iterator[str]:
+    """Yield what the user should look at."""
+    if kinds.get("chequer"):
+        yield (
+            f"{kinds['chequer']} chequers: crossing joints and corners of stones can look like "
+            "them; check those of code chequer, or leave them out."
+        )
+    if what == "targets":
+        yield (
+            "Only targets found in both photos are listed: discs 5 to 120 px across on a plate of "
+            "one grey, two-by-two chequers, coded markers. Pick the others by hand."
+        )
 
 
 def _lines(summary: dict[str, Any]) -> Iterator[str]:
@@ -89,3 +108,13 @@ def _lines(summary: dict[str, Any]) -> Iterator[str]:
         f"Relief from {low:.2f} to {high:.2f} m, sigma of r {1000 * summary['sigma_r_median']:.1f} "
         "mm at the median."
     )
+    if summary["empty"]:
+        named = "; ".join(
+            f"columns {c[0]}-{c[1]}, rows {r[0]}-{r[1]}"
+            for c, r in ((part["columns"], part["rows"]) for part in summary["empty"][:8])
+        )
+        more = len(summary["empty"]) - 8
+        yield (
+            f"NOTHING FOUND in {len(summary['empty'])} of 24 parts of the far photo, seen by both: "
+            f"{named}{f' and {more} more' if more > 0 else ''} (no texture, or hidden)."
+        )

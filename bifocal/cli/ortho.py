@@ -127,6 +127,12 @@ def command(
         raise click.UsageError("--deliver needs the scale of the drawing, e.g. --scale 1:50.")
     if sum(choice is not None for choice in (relief, points, plane)) > 1:
         raise click.UsageError("Give one of --relief, --points and --plane.")
+    if breaklines and points is None:
+        raise click.UsageError("--breakline joins measured points; give their table by --points.")
+    drawn = {"--section": sections, "--contours": contours, "--mark": mark, "--control": control}
+    for name, given in drawn.items():
+        if given and folder is None:
+            raise click.UsageError(f"{name} is drawn into a folder; give --deliver DIR.")
     if relief is None and points is None and plane is None:
         remark("No relief given: the wall is taken as flat (as with --plane).")
     task = OrthoTask(

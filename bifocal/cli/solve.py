@@ -7,8 +7,8 @@ from typing import Any
 
 import click
 
-from photocore.cli import remark, text_table
-from photocore.options import FILE, as_json, choice, number, overwrite
+from photocore.cli import print_json, remark, text_table
+from photocore.options import FILE, FOCAL, as_json, choice, number, overwrite
 
 EXAMPLE = """\b
 Examples:
@@ -42,8 +42,8 @@ SHOWN = 40
 @click.option("--visible-only", is_flag=True, help="Leave out hidden and filtered rows.")
 @number("--d1", "M", "Distance of camera 1 [m].  [default: Setup]")
 @number("--d2", "M", "Distance of camera 2 [m].  [default: Setup]")
-@number("--c1", "MM", "Principal distance of image 1 [mm].  [default: Setup]")
-@number("--c2", "MM", "Principal distance of image 2 [mm].  [default: Setup]")
+@number("--c1", "MM", "Principal distance of image 1 [mm].  [default: Setup]", type=FOCAL)
+@number("--c2", "MM", "Principal distance of image 2 [mm].  [default: Setup]", type=FOCAL)
 @number("--pitch", "MM", "Size of a pixel [mm].  [default: Setup]")
 @choice("--unit", "mm|px", "Unit of x1 y1 x2 y2.  [default: as headings or Setup say, else mm]")
 @number("--sigma-s", "MM", "Precision of an image coordinate [mm].  [default: Setup, else 0.5 px]")
@@ -88,10 +88,10 @@ def command(
     """
     from bifocal.survey.output import length_unit, point_rows, solution_json, summary, write_result
     from bifocal.survey.workflow import solve
-    from photocore.output import check_writable
+    from photocore.workbook.newbook import check_new_workbook
 
     if out is not None:
-        check_writable(out, overwrite=overwrite)
+        check_new_workbook(out, overwrite=overwrite, source=survey)
     solution = solve(survey, **options)
     for text in solution.remarks:
         remark(text)
@@ -101,7 +101,7 @@ def command(
         noun = "point" if count == 1 else "points"
         remark(f"{out}: {count} {noun} written{'; ' + said if said else '.'}")
     if as_json:
-        click.echo(solution_json(solution))
+        print_json(solution_json(solution))
         return
     unit = length_unit(solution)
     headings = ["id", "r [m]", f"e1 [{unit}]", f"e2 [{unit}]", "X [m]", "Y [m]", "sigma_r [m]"]

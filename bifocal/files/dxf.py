@@ -63,3 +63,15 @@ def add_text(model: Any, text: str, place: tuple[float, ...], height: float, lay
     model.add_text(
         text.replace("\n", " "), height=height, dxfattribs={"layer": layer, "insert": place}
     )
+
+
+def layer_name(text: str) -> str:
+    """Return a text as the name of a layer that every CAD program takes.
+
+    Examples
+    --------
+    >>> layer_name("window/edge: left")
+    'window_edge_ left'
+    """
+    name = "".join("_" if c in '<>/\\":;?*|=`' or not c.isprintable() else c for c in text).strip()
+    return name[:120] or "0"

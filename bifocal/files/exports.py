@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 
-from bifocal.files.dxf import add_text, new_drawing, save_drawing
-from bifocal.model.points import SurveyPoints
+from bifocal.files.dxf import add_text, layer_name, new_drawing, save_drawing
+from bifocal.model.points import PointLine, SurveyPoints
 from photocore.arrays import BoolArray, FloatArray
 from photocore.cloud import write_cloud
 from photocore.errors import InputError
@@ -36,6 +37,7 @@ def export_points(
     world: bool = False,
     order: str = "PNEZD",
     flavour: str = "plain",
+    lines: Sequence[PointLine] = (),
     overwrite: bool = False,
 ) -> tuple[str, ...]:
     """Write points in the format that the file's ending names.
@@ -52,6 +54,8 @@ def export_points(
         Column order of a .csv: ``PNEZD`` or ``PENZD``. In the plane frame N is Y, E is X, Z is r.
     flavour : str
         ``plain``, ``excel-it`` or ``excel-de``: delimiter, decimal sign and encoding of a .csv.
+    lines : sequence of PointLine
+        Polylines of a .dxf, in space; points without coordinates are left out of them.
     overwrite : bool
         Replace an existing file.
 
@@ -67,7 +71,11 @@ def export_points(
     """
     path = Path(path)
     ending = path.suffix.lower()
-    writers = {".dxf": _write_dxf, ".geojson": _write_geojson, ".xlsx": _write_xlsx}
+    writers: dict[str, Callable[[Path, SurveyPoints, FloatArray], None]] = {
+        ".dxf": partial(_write_dxf, lines=lines),
+        ".geojson": _write_geojson,
+        ".xlsx": _write_xlsx,
+    }
     if ending not in writers and ending not in (".ply", ".las", ".laz", ".csv"):
         raise InputError(
             f"{path}: ending not known; use one of .dxf .ply .las .laz .geojson .xlsx .csv."
@@ -75,7 +83,7 @@ def export_points(
     if world and points.world is None:
         raise InputError(
             "the survey has no world coordinates; fill the Georeference sheet and solve again, "
-            "or export in the plane frame."
+            "or leave the world coordinates out."
         )
     coordinates = points.world if world and points.world is not None else points.xyz
     keep: BoolArray = np.all(np.isfinite(coordinates), axis=1)
@@ -103,8 +111,10 @@ def export_points(
     return tuple(remarks)
 
 
-def _write_dxf(path: Path, points: SurveyPoints, coordinates: FloatArray) -> None:
-    """Write a drawing: a POINT, its name and its relief for each point."""
+def _write_dxf(
+    path: Path, points: SurveyPoints, coordinates: FloatArray, *, lines: Sequence[PointLine]
+) -> None:
+    """Write a drawing: a POINT, its name and its relief for each point; lines in space."""
     extent = float(np.ptp(coordinates[:, :2], axis=0).max())
     height = max(0.01, round(extent / 150, 3))
     drawing, model = new_drawing(LAYERS, point_style=3, point_size=height)
@@ -116,6 +126,14 @@ def _write_dxf(path: Path, points: SurveyPoints, coordinates: FloatArray) -> Non
         left = x + height / 2
         add_text(model, points.ids[i], (left, y + 0.4 * height, z), height, "BIFOCAL_NAMES")
         add_text(model, relief, (left, y - 1.4 * height, z), height, "BIFOCAL_RELIEF")
+    places = dict(zip(points.ids, coordinates.tolist(), strict=True))
+    for line in lines:
+        vertices = [places[name] for name in line.ids if name in places]
+        layer = layer_name(line.layer)
+        if layer not in drawing.layers:
+            drawing.layers.add(layer)
+        if len(vertices) > 1:
+            model.add_polyline3d(vertices, close=line.closed, dxfattribs={"layer": layer})
     save_drawing(drawing, path)
 
 

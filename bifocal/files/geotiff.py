@@ -17,7 +17,7 @@ from numpy.typing import DTypeLike
 from bifocal.model.grid import Grid
 from bifocal.model.relief_map import Quality, ReliefMap
 from photocore.errors import InputError
-from photocore.output import atomic_path, check_writable
+from photocore.output import all_or_none, atomic_path, check_all_writable
 from photocore.provenance import program, today
 from photocore.raster import BLOCK, RasterFile, RasterWriter, corner_transform, create_geotiff
 
@@ -99,27 +99,28 @@ def create_raster(
     """
     from rasterio.crs import CRS
 
-    path = check_writable(path, overwrite=overwrite)
+    path = Path(path)
     world = path.with_suffix(".tfw")
-    if world_file:
-        check_writable(world, overwrite=overwrite)
+    check_all_writable(path, world if world_file else None, overwrite=overwrite)
     _check_space(path, grid, bands * np.dtype(dtype).itemsize)
     known = {"TIFFTAG_SOFTWARE": program(), "BIFOCAL_DATE": today(), **(tags or {})}
     if dpi is not None:
         known |= {f"TIFFTAG_{axis}RESOLUTION": f"{dpi:.10g}" for axis in "XY"}
         known["TIFFTAG_RESOLUTIONUNIT"] = "2"
-    with create_geotiff(
-        path, width=grid.width, height=grid.height, bands=bands, dtype=dtype, names=names,
-        colour=colour, nodata=nodata, overviews=overviews, overwrite=overwrite, tags=known,
-        crs=CRS.from_wkt(LOCAL_CRS.format(name=crs_name.replace('"', "'"))),
-        transform=corner_transform(grid.plane_from_pixel),
-    ) as writer:  # fmt: skip
-        yield writer
-    if world_file:
-        # A, D, B, E, C, F: pixel size and the centre of the top-left pixel.
-        values = (grid.gsd, 0.0, 0.0, -grid.gsd, grid.x0, grid.y0)
-        with atomic_path(world, overwrite=overwrite) as temporary:
-            temporary.write_text("".join(f"{value:.12f}\n" for value in values), encoding="ascii")
+    with all_or_none():
+        with create_geotiff(
+            path, width=grid.width, height=grid.height, bands=bands, dtype=dtype, names=names,
+            colour=colour, nodata=nodata, overviews=overviews, overwrite=overwrite, tags=known,
+            crs=CRS.from_wkt(LOCAL_CRS.format(name=crs_name.replace('"', "'"))),
+            transform=corner_transform(grid.plane_from_pixel),
+        ) as writer:  # fmt: skip
+            yield writer
+        if world_file:
+            # A, D, B, E, C, F: pixel size and the centre of the top-left pixel.
+            values = (grid.gsd, 0.0, 0.0, -grid.gsd, grid.x0, grid.y0)
+            with atomic_path(world, overwrite=overwrite) as temporary:
+                text = "".join(f"{value:.12f}\n" for value in values)
+                temporary.write_text(text, encoding="ascii")
 
 
 def dpi_at_scale(gsd: float, scale: float) -> float:
@@ -175,11 +176,12 @@ def read_relief(path: Path | str) -> ReliefMap:
         r = reader.read_floats(*size)
         sigma = np.where(np.isnan(r), r, np.float32(0))
         quality = np.where(np.isnan(r), Quality.UNKNOWN, Quality.MEASURED).astype(np.uint8)
-        if reader.bands >= 2:
-            sigma = np.asarray(reader.read(*size, bands=[2])[:, :, 0], np.float32)
-        if reader.bands >= 3:
-            band = np.asarray(reader.read(*size, bands=[3])[:, :, 0], np.float64)
-            quality = np.nan_to_num(band).astype(np.uint8)
+        with np.errstate(invalid="ignore", over="ignore"):  # what the types cannot hold
+            if reader.bands >= 2:
+                sigma = np.asarray(reader.read(*size, bands=[2])[:, :, 0], np.float32)
+            if reader.bands >= 3:
+                band = np.asarray(reader.read(*size, bands=[3])[:, :, 0], np.float64)
+                quality = np.clip(np.nan_to_num(band), 0, 255).astype(np.uint8)
         return ReliefMap(
             r=r, sigma=sigma, quality=quality, plane_from_pixel=reader.grid.plane_from_pixel
         )
@@ -214,5 +216,5 @@ def _check_space(path: Path, grid: Grid, bytes_per_pixel: int) -> None:
 
 def _size(count: float) -> str:
     """Return a number of bytes in words."""
-    power = min(int(np.log10(max(count, 1))) // 3, 3)
+    power = min(int(np.log10(float(max(count, 1)))) // 3, 3)
     return f"{count / 1000**power:.4g} {('bytes', 'kB', 'MB', 'GB')[power]}"

@@ -20,8 +20,9 @@ from numpy.typing import NDArray
 from bifocal.model.image import as_photo
 from photocore.arrays import ByteArray
 from photocore.errors import InputError
-from photocore.output import atomic_path
+from photocore.output import atomic_path, check_ending
 from photocore.raster import RasterFile
+from photocore.textfile import check_name
 
 ImageArray = NDArray[np.uint8] | NDArray[np.uint16]
 
@@ -29,6 +30,8 @@ ImageArray = NDArray[np.uint8] | NDArray[np.uint16]
 MAX_PIXELS = 400_000_000
 #: Larger photos are decoded some rows at a time, to hold them in memory once only.
 _BY_STRIPS = 60_000_000
+#: Endings of the images that are written.
+WRITTEN = (".png", ".jpg", ".jpeg", ".tif", ".tiff")
 RAW_ENDINGS = frozenset(
     f".{ending}"
     for ending in (
@@ -108,6 +111,7 @@ def image_info(path: Path | str) -> ImageInfo:
                 )
             _check_mode(path, image.mode)
             bits = 16 if image.mode.startswith("I") else 8
+            _check_size(path, image.size)  # Pillow decodes a PNG to look for its EXIF data
             return _info_from_exif(path, image.size, bits, image.getexif())
     except UnidentifiedImageError:
         raise InputError(f"{path}: is not an image (JPEG, PNG or TIFF).") from None
@@ -228,8 +232,7 @@ def write_image(path: Path | str, image: ImageArray, *, overwrite: bool = False)
     """Write RGB, RGBA or grey pixels as the ending says (.png, .jpg, .tif), whole or not at all."""
     path = Path(path)
     ending = path.suffix.lower()
-    if ending not in {".png", ".jpg", ".jpeg", ".tif", ".tiff"}:
-        raise InputError(f"{path}: images are written as .png, .jpg or .tif.")
+    check_ending(path, "images are written as .png, .jpg or .tif.", *WRITTEN)
     order = {3: cv2.COLOR_RGB2BGR, 4: cv2.COLOR_RGBA2BGRA}
     pixels = image if image.ndim == 2 else cv2.cvtColor(image, order[image.shape[2]])
     options = [cv2.IMWRITE_JPEG_QUALITY, 95] if ending in {".jpg", ".jpeg"} else []
@@ -242,12 +245,13 @@ def write_image(path: Path | str, image: ImageArray, *, overwrite: bool = False)
 
 def _refuse_early(path: Path) -> None:
     """Refuse what can be told from the name and the file system."""
+    check_name(path)
     if path.is_dir():
         raise InputError(f"{path}: is a folder, expected a photo.")
     if not path.is_file():
         raise InputError(f"{path}: no such image.")
     if path.stat().st_size == 0:
-        raise InputError(f"{path}: the file is empty.")
+        raise InputError(f"{path}: the file is empty; save or copy it again.")
     if path.suffix.lower() in RAW_ENDINGS:
         raise InputError(
             f"{path}: camera raw is not read. Develop it to a 16-bit TIFF (or JPEG) without any "
@@ -295,10 +299,7 @@ def _named_exif(tag: Any) -> dict[int, Any]:
 def _info_from_exif(path: Path, size: tuple[int, int], bits: int, exif: Any) -> ImageInfo:
     """Return the facts given the stored size and a mapping of EXIF tags."""
     width, height = size
-    if width * height > MAX_PIXELS:
-        raise InputError(
-            f"{path}: claims {width} x {height} px; more than {MAX_PIXELS // 10**6} MP is refused."
-        )
+    _check_size(path, size)
     tags = dict(exif)
     if hasattr(exif, "get_ifd"):
         tags |= dict(exif.get_ifd(34665))
@@ -318,6 +319,15 @@ def _info_from_exif(path: Path, size: tuple[int, int], bits: int, exif: Any) -> 
         aperture=_number(tags.get(33437)),
         subject_distance=_number(tags.get(37382)),
     )
+
+
+def _check_size(path: Path, size: tuple[int, int]) -> None:
+    """Refuse what is larger than any photo."""
+    width, height = size
+    if width * height > MAX_PIXELS:
+        raise InputError(
+            f"{path}: claims {width} x {height} px; more than {MAX_PIXELS // 10**6} MP is refused."
+        )
 
 
 def _text(value: Any) -> str:

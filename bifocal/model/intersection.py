@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,6 +10,7 @@ import numpy as np
 from bifocal import rays
 from bifocal.model.flags import FlagLimits, point_flags
 from photocore.arrays import FloatArray
+from photocore.distortion import inverse_2x2
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -96,6 +98,7 @@ def intersect(
     *,
     limits: FlagLimits,
     sigma_orientation: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0),
+    of_orientation: Callable[[FloatArray], FloatArray] | None = None,
 ) -> Intersection:
     """Intersect the rays of the same picks in both photos; see `bifocal.Pair.intersect`.
 
@@ -107,6 +110,8 @@ def intersect(
         Where the flags begin.
     sigma_orientation : tuple of float
         Standard deviations of d1 [m], d2 [m], the relative scale, each nadir coordinate [m].
+    of_orientation : callable, optional
+        Points (n, 3) to the covariance (n, 3, 3) that the orientation adds to theirs. [m²]
     """
     q1, q2 = far.positions, near.positions
     centre = rays.zoom_centre(far.foot, near.foot)
@@ -117,6 +122,8 @@ def intersect(
     relief = np.where(relief < near.foot.distance, relief, np.nan)
     xyz = rays.point_on_ray(a1, relief, far.foot)
     covariance = _covariance(xyz, a2, cov1, cov2, far.foot, near.foot, sigma_orientation)
+    if of_orientation is not None:
+        covariance = covariance + of_orientation(xyz)
     radius = q1 - centre
     residuals = [_pixels(far.metres_per_pixel, q1 - a1), _pixels(near.metres_per_pixel, q2 - a2)]
     return Intersection(
@@ -148,13 +155,6 @@ def _square(jacobian: FloatArray) -> FloatArray:
     return product
 
 
-def _inverse2(matrix: FloatArray) -> FloatArray:
-    """Return the inverses of 2x2 matrices; NaN where singular."""
-    (a, b), (c, d) = matrix.transpose(1, 2, 0)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        return (np.array([[d, -b], [-c, a]]) / (a * d - b * c)).transpose(2, 0, 1)
-
-
 def _inverse3(matrix: FloatArray) -> FloatArray:
     """Return the inverses of symmetric 3x3 matrices by cofactors; NaN where singular."""
     cofactor = np.cross(matrix[:, [1, 2, 0]], matrix[:, [2, 0, 1]])
@@ -177,7 +177,7 @@ def _covariance(
     normal = np.zeros((len(xyz), 3, 3))
     for camera, cov in ((far, cov1), (near, cov2)):
         rows = rays.design_rows(xyz, camera)
-        product = rows.transpose(0, 2, 1) @ _inverse2(cov)
+        product = rows.transpose(0, 2, 1) @ inverse_2x2(cov)
         weighted.append(product)
         normal += product @ rows
     covariance = _inverse3(normal)
@@ -200,7 +200,7 @@ def _covariance(
 
 def _pixels(metres: FloatArray, shift: FloatArray) -> FloatArray:
     """Return a shift on the plane in pixels of the image."""
-    shift_px: FloatArray = (_inverse2(metres) @ shift[:, :, None])[:, :, 0]
+    shift_px: FloatArray = (inverse_2x2(metres) @ shift[:, :, None])[:, :, 0]
     return shift_px
 
 

@@ -10,7 +10,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from photocore.arrays import FloatArray, as_floats, as_points, not_negative, read_only
+from photocore.arrays import (
+    FloatArray,
+    as_floats,
+    as_points,
+    is_finite_number,
+    not_negative,
+    read_only,
+)
 from photocore.errors import InputError, located
 from photocore.jsonfile import read_object, write_object
 from photocore.lensformats import read_foreign_lens
@@ -109,6 +116,9 @@ class Lens:
             for name in known[:3]:
                 if name not in stated:
                     raise InputError(f"the key {name!r} is missing.")
+            sigma0 = stated.get("sigma0")
+            if sigma0 is not None and not is_finite_number(sigma0):
+                raise InputError(f"sigma0: expected a number, found {sigma0!r:.40}.")
             return cls(**stated, extra=data)
 
     def to_dict(self) -> dict[str, Any]:

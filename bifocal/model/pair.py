@@ -11,11 +11,19 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from bifocal import rays
+from bifocal.model import orientation_precision
 from bifocal.model.flags import SIGMA_PIXEL, FlagLimits
 from bifocal.model.intersection import Intersection, PlanePicks, intersect
 from bifocal.model.lens import Lens
 from bifocal.precision import base_factor
-from photocore.arrays import BoolArray, FloatArray, as_points, not_negative, positive, read_only
+from photocore.arrays import (
+    BoolArray,
+    FloatArray,
+    as_points,
+    not_negative,
+    positive,
+    read_only,
+)
 from photocore.errors import GeometryError, InputError, located
 from photocore.jsonfile import read_object, write_object
 
@@ -198,6 +206,9 @@ class Pair:
     exchanged : bool
         Whether the images stand the other way round than they were given: measurements in the
         order given have to be exchanged too.
+    orientation : ndarray, shape (24, 24), or None
+        Covariance of both cameras (`bifocal.model.orientation_precision.NAMES`), common to all
+        points; None where it is not known.
     """
 
     image1: Photo
@@ -206,8 +217,11 @@ class Pair:
     extra: Mapping[str, Any] = field(default_factory=dict)
     remarks: tuple[str, ...] = ()
     exchanged: bool = False
+    orientation: FloatArray | None = None
 
     def __post_init__(self) -> None:
+        if self.orientation is not None:
+            object.__setattr__(self, "orientation", orientation_precision.checked(self.orientation))
         d1, d2 = self.image1.distance, self.image2.distance
         if d1 == d2:
             raise GeometryError(
@@ -219,6 +233,9 @@ class Pair:
             object.__setattr__(self, "image1", far)
             object.__setattr__(self, "image2", near)
             object.__setattr__(self, "exchanged", not self.exchanged)
+            if self.orientation is not None:
+                turned = orientation_precision.exchanged(self.orientation)
+                object.__setattr__(self, "orientation", turned)
             note = f"image1 was the near camera ({d1:g} m < {d2:g} m); the two were exchanged."
             object.__setattr__(self, "remarks", (*self.remarks, note))
 
@@ -322,16 +339,21 @@ class Pair:
                 '"layers": pairs seen through other media are not supported by this version.'
             )
         far, near = (_photo_from_dict(data.pop(k, None), k, folder) for k in ("image1", "image2"))
-        return cls(image1=far, image2=near, folder=folder, extra=data)
+        stated = data.pop("orientation", None)
+        precision = None if stated is None else orientation_precision.from_dict(stated)
+        return cls(image1=far, image2=near, folder=folder, extra=data, orientation=precision)
 
     def to_dict(self) -> dict[str, Any]:
         """Return the content of a pair file."""
-        return {
+        data = {
             "format": FORMAT,
             "image1": self.image1.to_dict(),
             "image2": self.image2.to_dict(),
             **self.extra,
         }
+        if self.orientation is not None:
+            data["orientation"] = orientation_precision.as_dict(self.orientation)
+        return data
 
     def write(self, path: Path | str, *, overwrite: bool = False) -> None:
         """Write a pair file, whole or not at all."""
@@ -425,8 +447,9 @@ class Pair:
         -----
         The weighted sum of squared pixel corrections is minimised under the condition that both
         rays meet (`bifocal.rays.adjust_onto_epipolar_line`). On consistent data the relief is
-        Midulla's Eq. (6). The distances', scale's and nadirs' uncertainty is common to all points:
-        it is in every point's covariance, but not independent from point to point.
+        Midulla's Eq. (6). The uncertainty of the orientation (the pair's own, and what is given
+        here) is common to all points: it is in every point's covariance, but not independent from
+        point to point.
         """
         first = as_points(pixels1, "pixels1", dimension=2)
         second = as_points(pixels2, "pixels2", dimension=2)
@@ -443,7 +466,26 @@ class Pair:
             self.image2.picks(second, sigma_px),
             limits=FlagLimits(sigma_r_max=sigma_r_max),
             sigma_orientation=(d1, d2, scale, nadir),
+            of_orientation=self.covariance_of_orientation,
         )
+
+    def covariance_of_orientation(self, xyz: FloatArray) -> FloatArray:
+        """Return what the pair's own covariance adds to that of points, shape (n, 3, 3). [m²]
+
+        Parameters
+        ----------
+        xyz : ndarray, shape (n, 3)
+            Points. [m]
+
+        Returns
+        -------
+        ndarray, shape (n, 3, 3)
+            Zero where the pair does not state it. Common to all points: neighbours share it.
+        """
+        if self.orientation is None:
+            return np.zeros((len(xyz), 3, 3))
+        photos = (self.image1, self.image2)
+        return orientation_precision.orientation_covariance(photos, self.orientation, xyz)
 
 
 def apply_homography(matrix: FloatArray, points: FloatArray) -> FloatArray:
@@ -482,6 +524,9 @@ def _photo_from_dict(data: Any, key: str, folder: Path) -> Photo:
     if lens is not None and not isinstance(lens, str):
         raise InputError(f'"{key}.lens" must name a lens file, found {lens!r}.')
     with located(f'"{key}"'):
+        for name in ("distance", *_OPTIONAL):
+            if isinstance(data.get(name), list):  # an array of one would pass for a number
+                raise InputError(f"{name}: expected one number, found {data[name]!r:.40}.")
         return Photo(
             file=file,
             lens=Lens.read(folder / lens) if lens else None,

@@ -4,11 +4,21 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import compress
+from typing import NamedTuple
 
 import numpy as np
 
 from photocore.arrays import BoolArray, FloatArray, as_floats
 from photocore.errors import InputError
+
+
+class PointLine(NamedTuple):
+    """A polyline through surveyed points, by their names, on a layer of the drawing."""
+
+    name: str
+    layer: str
+    ids: tuple[str, ...]
+    closed: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

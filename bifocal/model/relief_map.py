@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import IntEnum
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -109,18 +110,25 @@ class ReliefMap(Gridded):
         Bilinear between four known pixels; beside unknown ones the nearest pixel; NaN outside the
         map and where the nearest pixel is unknown.
         """
-        bilinear, _ = self._interpolated(positions, order=1)
-        nearest, inside = self._interpolated(positions, order=0)
+        bilinear, _ = self._interpolated(self.r, positions, order=1)
+        nearest, inside = self._interpolated(self.r, positions, order=0)
         known = np.where(np.isfinite(bilinear), bilinear, nearest)
         return np.where(inside, known, np.nan)
 
-    def _interpolated(self, positions: ArrayLike, *, order: int) -> tuple[FloatArray, BoolArray]:
-        """Return the relief at positions, nearest (order 0) or bilinear, and which are inside."""
+    def sample_quality(self, positions: ArrayLike) -> ByteArray:
+        """Return the `Quality` of the nearest pixel, shape (...); UNKNOWN outside the map."""
+        nearest, inside = self._interpolated(self.quality, positions, order=0)
+        return np.where(inside, nearest, Quality.UNKNOWN).astype(np.uint8)
+
+    def _interpolated(
+        self, band: NDArray[Any], positions: ArrayLike, *, order: int
+    ) -> tuple[FloatArray, BoolArray]:
+        """Return a band at positions, nearest (order 0) or bilinear, and which are inside."""
         from scipy.ndimage import map_coordinates
 
         pixels = self.grid.pixel_of(as_points(positions, "positions", dimension=2))
         with np.errstate(invalid="ignore"):
             inside = np.all((pixels >= -0.5) & (pixels < np.array(self.shape[::-1]) - 0.5), -1)
         at = np.where(inside[..., None], pixels, 0.0).reshape(-1, 2).T[::-1]
-        values = map_coordinates(self.r, at, np.float64, order=order, mode="nearest")
+        values = map_coordinates(band, at, np.float64, order=order, mode="nearest")
         return values.reshape(inside.shape), inside

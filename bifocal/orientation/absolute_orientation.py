@@ -10,23 +10,36 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from bifocal.orientation import validation
+from bifocal.orientation.bend import MOST_BENT, wall_bend
 from bifocal.orientation.control_points import Control, SiteMeasures
 from bifocal.orientation.features import find_features
-from bifocal.orientation.interior_orientation import Cameras, Interiors
+from bifocal.orientation.interior_orientation import Cameras, Interiors, with_one_lens
+from bifocal.orientation.orientation_remarks import (
+    assumptions,
+    control_remarks,
+    distance_remarks,
+    model_remarks,
+)
 from bifocal.orientation.orientation_stages import (
+    ONE_LENS,
     SIGMA_PARALLEL,
     OrientedPair,
     Photos,
     oriented_in_stages,
     without_gross,
 )
-from bifocal.orientation.pair_adjustment import tie_misfit
 from bifocal.orientation.pair_observations import PairObservations, PairUnknowns
-from bifocal.orientation.relative_orientation import Ties, find_ties, first_cameras, plane_scale
+from bifocal.orientation.relative_orientation import (
+    Ties,
+    epipolar_distance,
+    find_ties,
+    first_cameras,
+    plane_scale,
+)
 from bifocal.orientation.space_resection import resect
 from bifocal.orientation.tie_points import robust_sigma
 from photocore.arrays import BoolArray
-from photocore.camera import ray_on_plane
+from photocore.camera import fundamental, ray_on_plane
 from photocore.errors import GeometryError, located
 from photocore.similarity import Similarity, fit_plane
 
@@ -67,6 +80,9 @@ def orient_pair(photos: Photos, *, control: Control, site: SiteMeasures) -> Orie
     GeometryError
         If the photos and measurements do not make a pair; the message says why and what to do.
     """
+    interiors, one_lens = with_one_lens((photos[0].interior, photos[1].interior))
+    first, second = (replace(p, interior=i) for p, i in zip(photos, interiors, strict=True))
+    photos = (first, second)
     given = _Given(photos=photos, control=control, site=site)
     known = control.positioned
     enough = all(
@@ -76,7 +92,7 @@ def orient_pair(photos: Photos, *, control: Control, site: SiteMeasures) -> Orie
     ties, remarks = _ties(given, needed=not enough)
     cameras, agree, interiors = _start(given, ties, enough)
     if enough and ties is not None:
-        misfit = _contradiction(cameras, interiors, ties)
+        misfit = _contradiction(cameras, ties)
         if misfit > 2 * ties.tolerance and _picks_exchanged(given, ties, misfit):
             return _with_picks_exchanged(given)
     if cameras[0].centre[2] < cameras[1].centre[2]:
@@ -86,19 +102,42 @@ def orient_pair(photos: Photos, *, control: Control, site: SiteMeasures) -> Orie
     elif ties is not None:
         validation.check_parallax(ties, interiors, given.names, flat_is_fine=site.parallel)
     observations = _observations(given, interiors, ties, agree)
-    pair = oriented_in_stages(observations, cameras, photos, site, with_control=enough)
-    pair = without_gross(pair)
+    if one_lens:
+        observations = replace(observations, sigma_zoom=ONE_LENS)
+    start = PairUnknowns(cameras=cameras)
+    if ties is not None:
+        start = replace(start, radial=np.array([[ties.radial, 0.0]] * 2))
+    pair = oriented_in_stages(observations, start, photos, site, with_control=enough)
+    bend = _bend(pair)
+    pair = replace(pair, bend=bend)
+    # A model that does not fit leaves honest points with large misfits.
+    pair = pair if bend > MOST_BENT else without_gross(pair)
     validation.check_determined(pair.adjusted)
     validation.check_movement(pair.adjusted)
-    told = (*remarks, *pair.remarks, *_control_remarks(control, pair), *_distance_remarks(pair))
-    assumed = (*pair.assumed, *_assumptions(pair.observations, site))
+    told = (
+        *remarks,
+        *model_remarks(pair, site),
+        *pair.remarks,
+        *control_remarks(control, pair),
+        *distance_remarks(pair),
+    )
+    assumed = (*pair.assumed, *assumptions(pair.observations, site))
     return replace(pair, remarks=told, assumed=assumed)
 
 
-def _contradiction(cameras: Cameras, interiors: Interiors, ties: Ties) -> float:
+def _bend(pair: OrientedPair) -> float:
+    """Return how far the wall is from a plane between the photos. [px at 3000 px of width]"""
+    observations = pair.observations
+    used = observations.tie_used
+    if used.sum() < 30:
+        return float("nan")
+    seen1, seen2 = observations.straight_ties(pair.adjusted.radial)
+    return wall_bend(seen1[used], seen2[used], observations.interiors[0].image_size)
+
+
+def _contradiction(cameras: Cameras, ties: Ties) -> float:
     """Return how far the common points are from the cameras' epipolar lines. [px]"""
-    observations = PairObservations(interiors=interiors, tie1=ties.pixels1, tie2=ties.pixels2)
-    return robust_sigma(tie_misfit(observations, PairUnknowns(cameras=cameras)))
+    return robust_sigma(epipolar_distance(fundamental(*cameras), ties.pixels1, ties.pixels2))
 
 
 def _picks_exchanged(given: _Given, ties: Ties, misfit: float) -> bool:
@@ -111,8 +150,8 @@ def _picks_exchanged(given: _Given, ties: Ties, misfit: float) -> bool:
     """
     try:
         turned = replace(given, control=given.control.exchanged())
-        cameras, _, interiors = _start(turned, ties, True)
-        other = _contradiction(cameras, interiors, ties)
+        cameras = _start(turned, ties, True)[0]
+        other = _contradiction(cameras, ties)
     except GeometryError:
         other = np.inf
     if other < 0.5 * misfit:
@@ -272,12 +311,12 @@ def _observations(
         return base
     return replace(
         base,
-        tie1=ties.pixels1,
-        tie2=ties.pixels2,
+        tie1=ties.seen1,
+        tie2=ties.seen2,
         sigma_tie=ties.tolerance / 2,
-        tie_used=np.ones(len(ties.pixels1), dtype=bool),
+        tie_used=np.ones(len(ties.seen1), dtype=bool),
         wall=ties.on_plane,
-        sigma_wall=np.full(len(ties.pixels1), 2 * ties.tolerance),
+        wall_rows=np.zeros((3, len(ties.seen1))),
     )
 
 
@@ -288,55 +327,3 @@ def _same_body(interiors: Interiors) -> float | None:
     if first.is_calibrated or second.is_calibrated or first.image_size != second.image_size:
         return None
     return 0.002 * float(np.hypot(*first.image_size))
-
-
-def _control_remarks(control: Control, pair: OrientedPair) -> list[str]:
-    """Return what the control points lack."""
-    remarks = [
-        f"Control point {control.ids[index]} is a gross error "
-        f"({pair.adjusted.control_test[index]:.0f} standard deviations) and was left out. Check "
-        "its coordinates and its picks."
-        for index in np.flatnonzero(~pair.observations.pick_used)
-    ]
-    count = int(control.positioned.sum())
-    if 4 <= count < 9:
-        remarks.append(
-            f"{count} control points; CIPA advises nine, spread over the photo, so that an error "
-            "in one is found."
-        )
-    return remarks
-
-
-def _distance_remarks(pair: OrientedPair) -> list[str]:
-    """Return which distances are poorly determined."""
-    remarks = []
-    for number, camera in enumerate(pair.adjusted.cameras, start=1):
-        distance, sigma = float(camera.centre[2]), pair.adjusted.sigma("Z", number)
-        if sigma > 0.03 * distance:
-            remarks.append(
-                f"The distance of camera {number} is poorly determined ({distance:.2f} ± "
-                f"{sigma:.2f} m). Give the focal lengths, the distances, or more points off the "
-                "wall."
-            )
-    return remarks
-
-
-def _assumptions(observations: PairObservations, site: SiteMeasures) -> list[str]:
-    """Return what only the prior holds."""
-    out = []
-    for number, interior in enumerate(observations.interiors, start=1):
-        if interior.is_assumed:
-            out.append(f"focal length of photo {number}: {interior.source}")
-        if not interior.is_calibrated:
-            out.append(
-                f"principal point of photo {number} in its centre "
-                f"(within {interior.sigma_centre:.0f} px)"
-            )
-    uncorrected = [i for i in observations.interiors if not i.is_calibrated and not i.sigma_radial]
-    if uncorrected:
-        out.append("photos free of lens distortion (else calibrate and give --lens)")
-    if site.parallel:
-        out.append("image planes parallel to the wall within 0.3°")
-    if observations.sigma_zoom is not None:
-        out.append("one focal length for both photos (they agree)")
-    return out

@@ -9,17 +9,18 @@ from typing import Any
 
 import numpy as np
 
-from bifocal.files.images import ImageInfo, image_info, read_grey
+from bifocal.files.images import WRITTEN, ImageInfo, image_info, read_grey
 from bifocal.model.lens import Lens
 from bifocal.orientation.absolute_orientation import orient_pair
 from bifocal.orientation.alignment import Alignment, make_alignment, with_files
 from bifocal.orientation.alignment_picture import write_alignment_picture
+from bifocal.orientation.as_set_up import pair_as_set_up
 from bifocal.orientation.control_points import Control, SiteMeasures, read_control, read_lengths
 from bifocal.orientation.interior_orientation import Interior, lens_of_photo
 from bifocal.orientation.orientation_stages import PhotoInput
 from photocore.arrays import FloatArray
 from photocore.errors import InputError
-from photocore.output import check_writable, relative_name
+from photocore.output import all_or_none, check_all_writable, check_ending, relative_name
 
 #: A wall point given without r lies on the plane to this. [m]
 SIGMA_ON_WALL = 0.005
@@ -58,6 +59,10 @@ class AlignOptions:
     lenses : pair of KnownLens
     site : SiteMeasures
     auto : bool
+    as_set_up : bool
+        Whether the distances and focal lengths are taken exactly as they are.
+    columns : str or None
+        Which column of the control table is which.
     control, lengths : Path or None
         Tables of control points and of taped lengths.
     length : (pixels (4,), metres) or None
@@ -71,6 +76,8 @@ class AlignOptions:
     lenses: tuple[KnownLens, KnownLens] = field(default_factory=lambda: (KnownLens(), KnownLens()))
     site: SiteMeasures = field(default_factory=SiteMeasures)
     auto: bool = False
+    as_set_up: bool = False
+    columns: str | None = None
     control: Path | None = None
     lengths: Path | None = None
     length: tuple[tuple[float, ...], float] | None = None
@@ -99,6 +106,8 @@ class AlignOptions:
             lenses=(lenses[0], lenses[1]),
             site=SiteMeasures(**measures),
             auto=bool(given.get("auto")),
+            as_set_up=bool(given.get("as_set_up")),
+            columns=given.get("columns"),
             control=given.get("control"),
             lengths=given.get("lengths"),
             length=(tuple(length[:4]), length[4]) if length else None,
@@ -107,6 +116,7 @@ class AlignOptions:
         )
 
 
+@all_or_none()
 def align_photos(
     far: Path,
     near: Path,
@@ -127,22 +137,26 @@ def align_photos(
         raise InputError(
             f"{out.name}: a pair file ends in .json; write --out {out.stem}.pair.json."
         )
+    check_ending(picture, "a picture is written as .png, .jpg or .tif.", *WRITTEN)
     way, options = _way(options)
     _check_metres(options)
-    for path in (out, picture):
-        if path is not None:
-            check_writable(path, overwrite=overwrite)
+    check_all_writable(out, picture, overwrite=overwrite)
     infos = image_info(far), image_info(near)
     first, second = (
         PhotoInput(
             grey=read_grey(info.path),
-            interior=_interior(info, known, number),
+            interior=interior_of_photo(info, known, number),
             name=info.path.name,
         )
         for number, (info, known) in enumerate(zip(infos, options.lenses, strict=True), start=1)
     )
-    control = _control(options, (first.interior.image_size, second.interior.image_size))
-    oriented = orient_pair((first, second), control=control, site=options.site)
+    if way == "as set up":
+        oriented = pair_as_set_up((first, second), options.site)
+    else:
+        if way == "site" and options.length is None:
+            _check_focal((first, second))
+        control = _control(options, (first.interior.image_size, second.interior.image_size))
+        oriented = orient_pair((first, second), control=control, site=options.site)
     paths, ordered = (far, near), (first, second)
     if oriented.exchanged:
         paths, ordered = (near, far), (second, first)
@@ -186,9 +200,19 @@ def _way(options: AlignOptions) -> tuple[str, AlignOptions]:
     measured = [value for value in (site.distance1, site.distance2, site.delta_d) if value]
     if site.distance1 and site.distance2 and site.delta_d:
         raise InputError("give two of --distance1, --distance2 and --delta-d; the third follows.")
+    if options.as_set_up:
+        if options.control is not None or options.auto:
+            raise InputError("--as-set-up registers nothing: leave out --control and --auto.")
+        return "as set up", options
     if options.control is not None:
         return "control", options
     if options.auto:
+        if not (measured or options.length or options.lengths):
+            raise InputError(
+                "--auto needs one measure for the scale, two photos alone have none: the distance "
+                "from a camera to the wall (--distance1 or --distance2) or one length on the wall "
+                "(--length)."
+            )
         return "auto", options
     if len(measured) >= 2:
         return "site", replace(options, site=replace(site, parallel=True))
@@ -197,6 +221,16 @@ def _way(options: AlignOptions) -> tuple[str, AlignOptions]:
         "--distance1 and --distance2 (or one of them and --delta-d) with the cameras square to "
         "the wall, or --auto with one distance or length."
     )
+
+
+def _check_focal(photos: tuple[PhotoInput, PhotoInput]) -> None:
+    """Refuse a pair that only distances describe and whose lenses nobody knows."""
+    if all(photo.interior.is_assumed for photo in photos):
+        raise InputError(
+            f"{photos[0].name} and {photos[1].name} do not tell their focal lengths (no EXIF "
+            "data). Give --focal1 and --focal2 with --sensor-width, e.g. --focal1 35 --focal2 19 "
+            "--sensor-width 22.7; or a length on the wall (--length)."
+        )
 
 
 def _check_metres(options: AlignOptions) -> None:
@@ -212,7 +246,7 @@ def _check_metres(options: AlignOptions) -> None:
             )
 
 
-def _interior(info: ImageInfo, data: KnownLens, number: int) -> Interior:
+def interior_of_photo(info: ImageInfo, data: KnownLens, number: int) -> Interior:
     """Return the best that is known of a photo's interior orientation."""
     if data.lens is not None:
         lens = lens_of_photo(Lens.read(data.lens), info.size, orientation=info.orientation)
@@ -256,6 +290,7 @@ def _control(options: AlignOptions, sizes: tuple[tuple[int, int], tuple[int, int
             sigma=options.site.sigma_control,
             sigma_plane=SIGMA_ON_WALL,
             unit=options.unit,
+            columns=options.columns,
         )
     if options.lengths is not None:
         if options.control is None:

@@ -10,14 +10,15 @@ import cv2
 import numpy as np
 
 from bifocal.model.lens import Lens
+from bifocal.model.orientation_precision import CAMERA, NAMES, moved
 from bifocal.model.pair import Pair, Photo, apply_homography
 from bifocal.orientation.interior_orientation import Cameras, Interior
 from bifocal.orientation.orientation_report import orientation_in_words
 from bifocal.orientation.orientation_stages import OrientedPair, PhotoInput, Photos
 from bifocal.orientation.pair_adjustment import AdjustedPair
-from bifocal.orientation.pair_observations import NAMES, at
+from bifocal.orientation.pair_observations import PairObservations, at
 from bifocal.orientation.reference_plane import rivals
-from bifocal.orientation.tie_points import robust_sigma
+from bifocal.orientation.tie_points import robust_sigma, tie_positions
 from photocore.arrays import BoolArray, ByteArray, FloatArray
 from photocore.camera import Pinhole, camera_matrix, plane_from_pixel
 from photocore.distortion import RadialDivision
@@ -94,12 +95,16 @@ def make_alignment(
     """
     observations, adjusted = oriented.observations, oriented.adjusted
     cameras = adjusted.cameras
+    covariance = _of_pixels(adjusted, observations)
     if observations.free_datum:
-        cameras, note = _in_facade_axes(cameras, photos[0], direction)
+        axes, note = _facade_axes(cameras[0], photos[0], direction)
+        origin = cameras[0].centre * [1.0, 1.0, 0.0]
+        cameras = cameras[0].moved(axes, origin), cameras[1].moved(axes, origin)
+        covariance = moved(covariance, axes)
         oriented = replace(oriented, assumed=(*oriented.assumed, note))
     far, near = (
-        _photo(camera, interior, _lens_of(interior, k))
-        for camera, interior, k in zip(
+        _photo(camera, interior, _lens_of(interior, radial))
+        for camera, interior, radial in zip(
             cameras, observations.interiors, adjusted.radial, strict=True
         )
     )
@@ -113,7 +118,7 @@ def make_alignment(
     first, second = observations.interiors
     homography = plane_from_pixel(cameras[0])
     return Alignment(
-        pair=Pair(image1=far, image2=near),
+        pair=Pair(image1=far, image2=near, orientation=covariance),
         way=way,
         deviations=deviations,
         control_ids=observations.control.ids,
@@ -130,11 +135,23 @@ def make_alignment(
     )
 
 
-def _in_facade_axes(
-    cameras: Cameras, photo: PhotoInput, direction: tuple[FloatArray, bool] | None
-) -> tuple[Cameras, str]:
-    """Return cameras in axes along the façade, origin in the far nadir, and what they rest on."""
-    far = cameras[0]
+def _of_pixels(adjusted: AdjustedPair, observations: PairObservations) -> FloatArray:
+    """Return the covariance of the cameras as the pair file counts it, shape (24, 24)."""
+    unit = np.ones(len(NAMES))
+    for number, (camera, interior) in enumerate(
+        zip(adjusted.cameras, observations.interiors, strict=True)
+    ):
+        # The distortion's radius counts in principal distances: there of the camera as adjusted.
+        ratio = (camera.matrix[0, 0] / interior.focal) ** 2
+        first = number * len(CAMERA) + CAMERA.index("k1")
+        unit[first : first + 2] = ratio, ratio**2
+    return adjusted.covariance * np.outer(unit, unit)
+
+
+def _facade_axes(
+    far: Pinhole, photo: PhotoInput, direction: tuple[FloatArray, bool] | None
+) -> tuple[FloatArray, str]:
+    """Return axes along the façade, shape (3, 3), and what they rest on."""
     if direction is not None:
         pixels, vertical = direction
         ends = apply_homography(plane_from_pixel(far), photo.interior.ideal(pixels))
@@ -150,9 +167,7 @@ def _in_facade_axes(
         if share < 0.25:
             turn, note = 0.0, "Y axis as upright as the far photo"
     cosine, sine = np.cos(turn), np.sin(turn)
-    axes = np.array([[cosine, sine, 0.0], [-sine, cosine, 0.0], [0.0, 0.0, 1.0]])
-    origin = far.centre * [1.0, 1.0, 0.0]
-    return (far.moved(axes, origin), cameras[1].moved(axes, origin)), note
+    return np.array([[cosine, sine, 0.0], [-sine, cosine, 0.0], [0.0, 0.0, 1.0]]), note
 
 
 def _facade_turn(image: ByteArray, camera: Pinhole, interior: Interior) -> tuple[float, float]:
@@ -197,15 +212,15 @@ def _facade_turn(image: ByteArray, camera: Pinhole, interior: Interior) -> tuple
     return float(np.deg2rad(best)), float(weight[close].sum() / weight.sum())
 
 
-def _lens_of(interior: Interior, k: float) -> Lens | None:
+def _lens_of(interior: Interior, radial: FloatArray) -> Lens | None:
     """Return the lens the pair's pixels need: the file's, or the estimated radial one."""
-    if interior.lens is not None or k == 0:
+    if interior.lens is not None or not radial.any():
         return interior.lens
-    # r_u = r_d / (1 + k r_d²) turned round: r_d / r_u as an even polynomial of r_u.
+    # r_u = r_d / (1 + k1 r_d² + k2 r_d⁴) turned round: r_d / r_u as an even polynomial of r_u.
     reach = np.hypot(*interior.image_size) / 2 / interior.focal
     seen = np.linspace(0, reach, 200)[1:]
     along = np.column_stack([seen, np.zeros_like(seen)])
-    ideal = RadialDivision(k, np.zeros(2), 1.0).undistort(along)[:, 0]
+    ideal = RadialDivision(radial[0], np.zeros(2), 1.0, radial[1]).undistort(along)[:, 0]
     powers = np.stack([ideal**2, ideal**4, ideal**6], axis=1)
     terms = np.linalg.lstsq(powers * ideal[:, None], seen - ideal, rcond=None)[0]
     return Lens(
@@ -281,6 +296,9 @@ def _diagnostics(
             {"offset": face.offset, "share": face.share, "pixel": list(face.pixel)}
             for face in oriented.faces
         ],
+        "wall_bend_px": oriented.bend if np.isfinite(oriented.bend) else None,
+        "focal_given_px": [interior.focal for interior in observations.interiors],
+        "wall_relief_mm": wall_relief(oriented),
         "assumed": oriented.assumed,
         "words": list(words),
     }
@@ -294,6 +312,35 @@ def _diagnostics(
             }
             for index, name in enumerate(control.ids)
         ]
+    return out
+
+
+def wall_relief(oriented: OrientedPair) -> list[dict[str, Any]]:
+    """Return the relief of the wall's own points by zone of the far photo.
+
+    Nine zones; those with fewer than five points of the wall are left out. [mm]
+    """
+    observations = oriented.observations
+    wall = observations.wall & observations.tie_used
+    if not wall.any():
+        return []
+    height = 1000 * tie_positions(observations, oriented.adjusted)[wall, 2]
+    size = np.array(observations.interiors[0].image_size)
+    place = np.clip(observations.interiors[0].raw(observations.tie1[wall]) * 3 // size, 0, 2)
+    out = []
+    for row, line in enumerate(("top", "middle", "bottom")):
+        for column, side in enumerate(("left", "centre", "right")):
+            inside = height[(place[:, 0] == column) & (place[:, 1] == row)]
+            if len(inside) >= 5:
+                spread = 1.4826 * float(np.median(np.abs(inside - np.median(inside))))
+                out.append(
+                    {
+                        "zone": f"{line} {side}",
+                        "points": len(inside),
+                        "median": float(np.median(inside)),
+                        "spread": spread,
+                    }
+                )
     return out
 
 

@@ -74,7 +74,7 @@ def _pixels(
     xyz = np.concatenate([positions, np.zeros((*positions.shape[:-1], 1))], axis=-1)
     ideal = project(adjusted.cameras[number], xyz)
     interior = observations.interiors[number]
-    return interior.raw(interior.radial(adjusted.radial[number]).distort(ideal))
+    return interior.raw(interior.radial(*adjusted.radial[number]).distort(ideal))
 
 
 def resampled(image: ByteArray, pixels: FloatArray) -> ByteArray:

@@ -9,7 +9,7 @@ import numpy as np
 
 from photocore.arrays import BoolArray, FloatArray
 from photocore.errors import CellError, InputError, WorkbookError
-from photocore.tables import Column, Table, read_table
+from photocore.tables import Column, Table, parse_column_map, read_table
 
 #: Length units a heading may say, in metres.
 METRES = {"m": 1.0, "cm": 0.01, "mm": 0.001, "km": 1000.0}
@@ -99,7 +99,14 @@ class SiteMeasures:
         return d1, d2
 
 
-def read_control(path: Path | str, *, sigma: float, sigma_plane: float, unit: str = "") -> Control:
+def read_control(
+    path: Path | str,
+    *,
+    sigma: float,
+    sigma_plane: float,
+    unit: str = "",
+    columns: str | None = None,
+) -> Control:
     """Read control points: id, X, Y, r and their pixels col1, row1, col2, row2.
 
     Parameters
@@ -112,6 +119,8 @@ def read_control(path: Path | str, *, sigma: float, sigma_plane: float, unit: st
         That of r = 0 for a point on the wall whose r is blank. [m]
     unit : str
         Unit of the coordinates; by default the headings', else metres.
+    columns : str, optional
+        Which column is which, ``"id=A,X=East"``; by default as the headings say.
 
     Returns
     -------
@@ -123,7 +132,8 @@ def read_control(path: Path | str, *, sigma: float, sigma_plane: float, unit: st
     WorkbookError, InputError
         Naming every bad cell; if there are no pixels.
     """
-    table = read_table(path, COLUMNS)
+    places = parse_column_map(columns, [column.key for column in COLUMNS]) if columns else None
+    table = read_table(path, COLUMNS, column_map=places)
     keys = ("col1", "row1", "col2", "row2")
     missing = [key for key in keys if key not in table.present]
     if missing:

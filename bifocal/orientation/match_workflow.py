@@ -7,14 +7,14 @@ from typing import Any
 
 import numpy as np
 
-from bifocal.files.images import read_grey
+from bifocal.files.images import image_info, read_grey
 from bifocal.model.pair import Pair
-from bifocal.orientation.matching import Matches, MatchSettings, match_pair
+from bifocal.orientation.matching import Matches, MatchSettings, match_pair, precision
 from bifocal.survey.observations import PointObservations
 from bifocal.survey.template_workflow import write_survey
-from photocore.errors import InputError
-from photocore.output import check_writable
+from photocore.output import check_ending
 from photocore.tables import write_csv
+from photocore.workbook.newbook import check_new_workbook
 
 
 def match_photos(
@@ -32,12 +32,9 @@ def match_photos(
     InputError, GeometryError
         If a file is at fault, or photos and pair do not belong together.
     """
-    if out.suffix.lower() not in {".xlsx", ".csv"}:
-        raise InputError(f"{out}: points are written as .xlsx (survey workbook) or .csv.")
-    check_writable(out, overwrite=overwrite)
-    pair = Pair.read(pair_path)
-    images = (read_grey(pair.photo_file(1)), read_grey(pair.photo_file(2)))
-    matches = match_pair(pair, images, settings)
+    check_ending(out, "points are written as .xlsx (survey workbook) or .csv.", ".xlsx", ".csv")
+    check_new_workbook(out, overwrite=overwrite)
+    pair, matches = match_pair_file(pair_path, settings)
     if out.suffix.lower() == ".csv":
         write_csv(out, csv_columns(matches), formats=_FORMATS, overwrite=overwrite)
         return pair, matches
@@ -61,15 +58,21 @@ def match_photos(
     return pair, matches
 
 
-def precision(matches: Matches) -> float:
-    """Return the precision of the points: what the patches say, or the misfits if worse. [px]
+def match_pair_file(pair_path: Path, settings: MatchSettings) -> tuple[Pair, Matches]:
+    """Return a pair from its file, and the homologous points found in its photos.
 
-    A misfit holds the noise of both photos and what the set-up leaves.
+    Raises
+    ------
+    InputError, GeometryError
+        If a file is at fault, or photos and pair do not belong together.
     """
-    misfit = 1.4826 * float(np.median(np.abs(matches.misfit))) / np.sqrt(2.0)
-    return float(np.clip(max(float(np.median(matches.sigma)), misfit), 0.01, 2.0))
+    pair = Pair.read(pair_path)
+    images = (read_grey(pair.photo_file(1)), read_grey(pair.photo_file(2)))
+    return pair, match_pair(pair, images, settings)
 
 
+#: A part of the photo with fewer points counts as empty.
+FEWEST_IN_PART = 3
 _PIXELS = ("col1 [px]", "row1 [px]", "col2 [px]", "row2 [px]")
 _FORMATS = dict.fromkeys(_PIXELS, ".4f") | dict.fromkeys(
     ("sigma [px]", "misfit [px]", "agreement"), ".3f"
@@ -100,4 +103,34 @@ def match_summary(pair: Pair, matches: Matches) -> dict[str, Any]:
         "misfit_px": float(np.median(np.abs(matches.misfit)) * 1.4826),
         "relief_range": np.nanpercentile(solved.xyz[:, 2], [1, 99]),
         "sigma_r_median": float(np.nanmedian(solved.sigma[:, 2])),
+        "empty": empty_parts(pair, matches),
     }
+
+
+def empty_parts(pair: Pair, matches: Matches) -> list[dict[str, list[int]]]:
+    """Return the parts of the far photo, of six by four, that both photos show without a point.
+
+    Each as ``columns`` and ``rows``, first and last. [px]
+    """
+    sizes = [image_info(pair.photo_file(number)).size for number in (1, 2)]
+    parts = np.array([6, 4])
+    side = np.array(sizes[0]) / parts
+    place = np.clip((matches.pixels1 + 0.5) // side, 0, parts - 1).astype(int)
+    counts = np.zeros(parts, dtype=int)
+    np.add.at(counts, (place[:, 0], place[:, 1]), 1)
+    out = []
+    for row in range(int(parts[1])):
+        for column in range(int(parts[0])):
+            low = np.array([column, row]) * side
+            corners = low + side * np.array([[0.2, 0.2], [0.8, 0.2], [0.2, 0.8], [0.8, 0.8]])
+            near = pair.image2.pixels_from_plane(pair.image1.plane_from_pixels(corners))
+            shown = ((near > 0) & (near < sizes[1])).all()
+            if shown and counts[column, row] < FEWEST_IN_PART:
+                last = low + side - 1
+                out.append(
+                    {
+                        "columns": [round(low[0]), round(last[0])],
+                        "rows": [round(low[1]), round(last[1])],
+                    }
+                )
+    return out

@@ -45,24 +45,29 @@ def _mm(value: float) -> str:
     return f"{1000 * value:.0f} mm" if value < 1 else f"{value:.1f} m"
 
 
+def _cm(value: float) -> str:
+    """Return a length in centimetres, from a metre on in metres."""
+    return f"{abs(value):.2f} m" if abs(value) >= 0.995 else f"{abs(100 * value):.0f} cm"
+
+
 def _offset(far: Pinhole, near: Pinhole) -> str:
     """Say how the near camera stands beside the far one's axis."""
     shift = near.centre[:2] - far.centre[:2]
     sides = [("right", "left"), ("high", "low")]
     parts = [
-        f"{abs(100 * value):.0f} cm too far {side[int(value < 0)]}"
+        f"{_cm(value)} too far {side[int(value < 0)]}"
         if axis == 0
-        else f"{abs(100 * value):.0f} cm too {side[int(value < 0)]}"
+        else f"{_cm(value)} too {side[int(value < 0)]}"
         for axis, (value, side) in enumerate(zip(shift, sides, strict=True))
         if abs(value) >= 0.005
     ]
     if not parts:
         return "Both cameras stand on one axis to within 5 mm."
     centre = rays.zoom_centre(_foot(far), _foot(near)) - far.centre[:2]
-    moved = 100 * float(np.linalg.norm(centre))
+    moved = _cm(float(np.linalg.norm(centre)))
     return (
         f"The near camera stands {' and '.join(parts)} of the far camera's axis; relief therefore "
-        f"spreads from a point {moved:.0f} cm from the far nadir (taken into account)."
+        f"spreads from a point {moved} from the far nadir (taken into account)."
     )
 
 
@@ -128,7 +133,7 @@ def _zone(far: Pinhole, near: Pinhole, base: float, sigma_px: float, relief_scal
     )
     return (
         f"With {sigma_px:.2g} px per point, relief is good to {1000 * sigma_m * base / at:.1f} mm "
-        f"at {at:.1f} m from the centre of zoom{share}; within {100 * radius:.0f} cm of it worse "
+        f"at {at:.1f} m from the centre of zoom{share}; within {_cm(radius)} of it worse "
         "than 1 cm (area of uncertainty)."
     )
 

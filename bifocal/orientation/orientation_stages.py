@@ -10,16 +10,26 @@ from typing import Any
 
 import numpy as np
 
+from bifocal.model.orientation_precision import NAMES
 from bifocal.orientation import validation
 from bifocal.orientation.area_points import even_points
 from bifocal.orientation.control_points import SiteMeasures
-from bifocal.orientation.interior_orientation import Cameras, Images, Interior
+from bifocal.orientation.interior_orientation import SIGMA_RADIAL, Cameras, Images, Interior
 from bifocal.orientation.pair_adjustment import AdjustedPair, adjust, evaluated
-from bifocal.orientation.pair_observations import PairObservations, PairUnknowns
+from bifocal.orientation.pair_observations import PairObservations, PairUnknowns, at
 from bifocal.orientation.reference_plane import Face, choose_wall, rivals_in_words
-from bifocal.orientation.tie_points import ROUGHNESS, classify, refine_ties, robust_sigma
+from bifocal.orientation.tie_points import (
+    refine_ties,
+    robust_sigma,
+    tie_positions,
+    wall_roughness,
+    wall_test,
+    with_support,
+    with_wall,
+    without_gross_ties,
+)
 from photocore.arrays import ByteArray, FloatArray
-from photocore.camera import plane_transfer, triangulate
+from photocore.camera import plane_transfer
 from photocore.errors import GeometryError
 from photocore.rotation import rotation_from_vector
 
@@ -29,8 +39,13 @@ SIGMA_PARALLEL = np.deg2rad(0.3)
 UNEVEN = 0.004
 #: A control point's misfit beyond this many standard deviations is a gross error.
 GROSS_LIMIT = 4.0
-#: Ties within about this share of d1 of the control points' plane are taken for the wall at first.
-PLANE_SHARE = 0.003
+#: Control points of so small a relief, in their sigma, say that they lie on the wall; it is
+#: believed if its plane is no further from theirs, in sigma.
+ON_WALL, WALL_LIMIT = 4.0, 3.0
+#: The wall is the reference plane itself. [m, m/m]
+FREE = (1e-5, 1e-6)
+#: Relative standard deviation with which two photos of one lens have one principal distance.
+ONE_LENS = 1e-3
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -70,6 +85,10 @@ class OrientedPair:
         Where no control points define the plane: the wall, and the planes parallel to it.
     wall_named : bool
         Whether the user said which of them is the wall.
+    tolerance : pair of float
+        How far the wall may lie from the reference plane [m] and slope against it [m/m].
+    bend : float
+        How far the wall is from a plane between the photos. [px at 3000 px of width]
     """
 
     observations: PairObservations
@@ -79,6 +98,8 @@ class OrientedPair:
     remarks: tuple[str, ...] = ()
     faces: tuple[Face, ...] = ()
     wall_named: bool = False
+    tolerance: tuple[float, float] = FREE
+    bend: float = float("nan")
 
     def readjusted(self, start: PairUnknowns | None = None, **changes: Any) -> OrientedPair:
         """Return the pair adjusted with changed observations, from here or another start."""
@@ -90,80 +111,104 @@ class OrientedPair:
         """Return the pair with remarks added."""
         return replace(self, remarks=(*self.remarks, *remarks))
 
-    def settled(self, shares: tuple[float, ...] = ROUGHNESS) -> OrientedPair:
-        """Return the pair after the wall and the gross ties are settled."""
+    def settled(self, rounds: int = 2) -> OrientedPair:
+        """Return the pair after its gross ties and its wall are settled."""
         pair = self
-        for share in shares:
-            sigma = max(robust_sigma(pair.adjusted.tie_misfit[pair.observations.tie_used]), 0.03)
-            ties = classify(pair.observations, pair.adjusted, share=share, sigma=sigma)
+        for _ in range(rounds):
+            sigma = robust_sigma(pair.adjusted.tie_misfit[pair.observations.tie_used])
+            ties = without_gross_ties(pair.observations, pair.adjusted, sigma=sigma)
+            if ties.free_datum:
+                ties = with_wall(ties, pair.adjusted, pair.tolerance)
             pair = replace(pair, observations=ties).readjusted()
         return pair
 
 
 def oriented_in_stages(
     observations: PairObservations,
-    cameras: Cameras,
+    start: PairUnknowns,
     photos: Photos,
     site: SiteMeasures,
     *,
     with_control: bool,
 ) -> OrientedPair:
-    """Return the pair after ties, wall, lens assumptions and refinement are settled."""
+    """Return the pair after ties, lens, wall and refinement are settled.
+
+    Ties carry the relative orientation and nothing else: they only have to lie on their epipolar
+    lines. The plane is found afterwards, and comes from the control points where there are some.
+    """
     images = photos[0].grey, photos[1].grey
-    remarks: tuple[str, ...] = ()
+    named = site.wall is not None
     if with_control:
-        observations, cameras, remarks = _control_first(observations, cameras)
-    pair = OrientedPair(
-        observations=observations,
-        adjusted=adjust(observations, PairUnknowns(cameras=cameras)),
-        remarks=remarks,
-        wall_named=site.wall is not None,
-    )
-    if with_control:
-        pair = _one_zoom(pair)
-    if len(observations.tie1) and images[0] is not None and images[1] is not None:
-        pictures = images[0], images[1]
-        pair = _with_even_points(_unbent(pair.settled()), pictures, site)
-        for _ in range(2):  # the second pass searches around better places
-            moved, good = refine_ties(pair.observations, pair.adjusted, pictures)
-            ties = pair.observations
-            used = ties.tie_used & good
-            if used.sum() < 20:
-                raise GeometryError(
-                    f"{photos[0].name} and {photos[1].name} match only roughly: one is blurred, or "
-                    "they show different states of the wall. Take sharper photos."
-                )
-            tie2 = np.where(good[:, None], moved, ties.tie2)
-            pair = pair.readjusted(tie2=tie2, tie_used=used, wall=ties.wall & good)
-            pair = pair.settled(ROUGHNESS[1:])
-    if pair.observations.free_datum and pair.observations.sigma_tilt is None:
-        pair = _parallel_if_so(pair)
+        pair = _control_alone(observations, start, named)
+    else:
+        # Distances count from the wall, and which face that is shows only in the relative model.
+        few = _relative_measures(observations)
+        first = with_wall(replace(observations, measured=few), start, FREE, known=True)
+        pair = OrientedPair(
+            observations=first, adjusted=adjust(first, start), wall_named=named
+        ).settled()
+    if len(observations.tie1):
+        pair = _with_ties(pair, observations) if with_control else pair
+        pair = _unbent(pair)
+        if images[0] is not None and images[1] is not None:
+            pair = _refined(pair, (images[0], images[1]), photos)
+            if not with_control:
+                pair = _on_the_wall(pair, (images[0], images[1]), site)
+        if with_control:
+            pair = _with_named_wall(pair)
+    if not with_control:
+        pair = pair.readjusted(measured=observations.measured).settled()
+        if pair.observations.free_datum and pair.observations.sigma_tilt is None:
+            pair = _parallel_if_so(pair)
     return pair
 
 
-def _control_first(
-    observations: PairObservations, cameras: Cameras
-) -> tuple[PairObservations, Cameras, tuple[str, ...]]:
-    """Return the observations with the ties that fit the control's cameras, those, remarks."""
+def _control_alone(
+    observations: PairObservations, start: PairUnknowns, named: bool
+) -> OrientedPair:
+    """Return the pair oriented by control points alone, the lens as undistorted as scanned."""
     none = np.zeros(len(observations.tie1), dtype=bool)
-    start = PairUnknowns(cameras=cameras)
-    alone = adjust(replace(observations, tie_used=none, wall=none), start)
-    if not len(observations.tie1):
-        return observations, alone.cameras, ()
+    first, second = (replace(i, sigma_radial=0.0) for i in observations.interiors)
+    alone = replace(observations, tie_used=none, wall=none, interiors=(first, second))
+    pair = OrientedPair(observations=alone, adjusted=adjust(alone, start), wall_named=named)
+    return _one_zoom(pair)
+
+
+def _with_ties(pair: OrientedPair, observations: PairObservations) -> OrientedPair:
+    """Return a pair oriented by control points with its ties, on their epipolar lines only."""
     # Control leaves the epipolar lines uncertain by some pixels: the majority shows by how much.
-    sigma = max(robust_sigma(alone.tie_misfit), observations.sigma_tie)
-    joined = classify(observations, alone, share=PLANE_SHARE, sigma=sigma)
-    if joined.wall.sum() < 20:
-        remark = (
-            "Hardly any detail lies on the control points' plane; relief counts from the control "
-            "points alone."
-        )
-        return replace(joined, wall=none), alone.cameras, (remark,)
-    control = observations.control
-    flat = control.sigma[np.abs(np.nan_to_num(control.xyz[:, 2])) < 0.05, 2]
-    tight = max(float(np.median(flat)) if len(flat) else 0.003, 0.001)
-    slope = 2 * tight / float(alone.cameras[0].centre[2])
-    return replace(joined, sigma_plane=tight, sigma_slope=slope), alone.cameras, ()
+    sigma = max(robust_sigma(pair.adjusted.tie_misfit), observations.sigma_tie)
+    # Distortions of two lenses are not told apart by ties: they stay as they are.
+    one_lens = pair.observations.sigma_zoom is not None
+    interiors = observations.interiors if one_lens else pair.observations.interiors
+    ties = replace(pair.observations, interiors=interiors)
+    ties = without_gross_ties(ties, pair.adjusted, sigma=sigma)
+    return replace(pair, observations=ties).readjusted().settled()
+
+
+def _refined(pair: OrientedPair, images: Images, photos: Photos) -> OrientedPair:
+    """Return the pair with its ties matched to a tenth of a pixel and supported by neighbours."""
+    for _ in range(2):  # the second pass searches around better places
+        moved, good = refine_ties(pair.observations, pair.adjusted, images)
+        ties = pair.observations
+        used = ties.tie_used & good
+        if used.sum() < 20:
+            raise GeometryError(
+                f"{photos[0].name} and {photos[1].name} match only roughly: one is blurred, or "
+                "they show different states of the wall. Take sharper photos."
+            )
+        ties = replace(ties, tie2=np.where(good[:, None], moved, ties.tie2), tie_used=used)
+        ties = with_support(ties, pair.adjusted)
+        pair = replace(pair, observations=ties).readjusted().settled()
+    return pair
+
+
+def _relative_measures(observations: PairObservations) -> dict[str, tuple[float, float]]:
+    """Return one distance for the scale; all where an unknown lens needs their ratio."""
+    measured = observations.measured
+    if any(interior.is_assumed for interior in observations.interiors) or len(measured) < 2:
+        return measured
+    return dict(list(measured.items())[:1])
 
 
 def _one_zoom(pair: OrientedPair) -> OrientedPair:
@@ -179,80 +224,136 @@ def _one_zoom(pair: OrientedPair) -> OrientedPair:
     sigma = float(np.hypot(adjusted.sigma("focal length", 1), adjusted.sigma("focal length", 2)))
     if abs(difference) > min(3 * sigma, 0.03) or sigma > 0.05:
         return pair
-    return pair.readjusted(sigma_zoom=5e-4)
+    return pair.readjusted(sigma_zoom=ONE_LENS)
 
 
 def _unbent(pair: OrientedPair) -> OrientedPair:
-    """Return the pair with estimated lens distortion where the photos clearly show some."""
-    interiors, misfit = pair.observations.interiors, pair.adjusted.tie_misfit
+    """Return the pair with the lens distortion that its photos show, said if there is some."""
+    observations = pair.observations
+    interiors, misfit = observations.interiors, pair.adjusted.tie_misfit
     if any(i.is_calibrated for i in interiors):
         return pair
-    before = robust_sigma(misfit)
-    bent = pair.readjusted(
-        interiors=tuple(replace(i, sigma_radial=0.1) for i in interiors),
-        tie_used=np.abs(misfit) < 8 * before,
-    )
     wide = max(interiors[0].image_size) / 2
-    radial = bent.adjusted.radial
-    corner = max(
-        abs(k) * (wide / i.focal) ** 2 * wide for k, i in zip(radial, interiors, strict=True)
-    )
-    if robust_sigma(bent.adjusted.tie_misfit) > 0.85 * before or corner < 3.0:
+    if not interiors[0].sigma_radial:
+        before = robust_sigma(misfit[observations.tie_used])
+        bent = pair.readjusted(
+            interiors=tuple(replace(i, sigma_radial=SIGMA_RADIAL) for i in interiors),
+            tie_used=np.abs(misfit) < 8 * before,
+        )
+        after = robust_sigma(bent.adjusted.tie_misfit[bent.observations.tie_used])
+        if after > 0.85 * before or _corner(bent) < 3.0 * wide / 1500:
+            return pair
+        pair = bent.settled()
+    for radial, interior in zip(pair.adjusted.radial, interiors, strict=True):
+        validation.check_distortion(radial, interior)
+    corner = _corner(pair)
+    if corner < 1.0 * wide / 1500:
         return pair
-    for k, interior in zip(radial, interiors, strict=True):
-        validation.check_distortion(k, interior)
-    bent = bent.settled()
-    return bent.told(
+    values = ", ".join(f"{k1:.4f} {k2:+.4f}" for k1, k2 in pair.adjusted.radial)
+    return pair.told(
         f"The photos show lens distortion of about {corner:.0f} px at the edge; it was estimated "
-        "from the common points (k = "
-        + ", ".join(f"{k:.4f}" for k in bent.adjusted.radial)
-        + "). A calibrated lens (`bifocal calibrate`, --lens) is more reliable."
+        f"from the common points (k1, k2 = {values}). A calibrated lens (`bifocal calibrate`, "
+        "--lens) is more reliable."
     )
 
 
-def _with_even_points(pair: OrientedPair, images: Images, site: SiteMeasures) -> OrientedPair:
-    """Return the pair with points from the whole area, on the face that is the wall.
+def _corner(pair: OrientedPair) -> float:
+    """Return how far the estimated distortion moves the middle of the photos' short edge. [px]"""
+    out = []
+    for radial, interior in zip(pair.adjusted.radial, pair.observations.interiors, strict=True):
+        wide = max(interior.image_size) / 2
+        square = (wide / interior.focal) ** 2
+        out.append(abs(square * (radial[0] + square * radial[1])) * wide)
+    return max(out)
 
-    Where control points define the plane, the frame stays theirs.
+
+def _on_the_wall(pair: OrientedPair, images: Images, site: SiteMeasures) -> OrientedPair:
+    """Return the pair in the frame of the face that is the wall, with points from its whole area.
+
+    Features crowd on mouldings; points of the whole area show which face is the largest.
     """
     old, adjusted = pair.observations, pair.adjusted
-    count = len(old.tie1)
     raw1, raw2 = even_points(old, adjusted, images)
     extra = len(raw1)
+    even = np.arange(len(old.tie1) + extra) >= len(old.tie1)
     ties = replace(
         old,
         tie1=np.concatenate([old.tie1, old.interiors[0].ideal(raw1)]),
         tie2=np.concatenate([old.tie2, old.interiors[1].ideal(raw2)]),
         tie_used=np.concatenate([old.tie_used, np.ones(extra, dtype=bool)]),
         wall=np.concatenate([old.wall, np.zeros(extra, dtype=bool)]),
-        sigma_wall=np.concatenate([old.sigma_wall, np.ones(extra)]),
+        wall_rows=np.concatenate([old.wall_rows, np.zeros((3, extra))], axis=1),
     )
     # What the flow suggests is no observation until the patches agree.
     moved, good = refine_ties(ties, adjusted, images)
-    even = np.arange(len(good)) >= count
     ties = replace(
         ties,
         tie2=np.where((good & even)[:, None], moved, ties.tie2),
         tie_used=ties.tie_used & (good | ~even),
     )
-    if not ties.free_datum:
-        sigma = max(robust_sigma(adjusted.tie_misfit[old.tie_used]), 0.03)
-        held = ties.wall.any()
-        ties = classify(ties, evaluated(ties, adjusted), share=ROUGHNESS[1], sigma=sigma)
-        return replace(pair, observations=ties).readjusted(wall=ties.wall & held)
-    xyz = triangulate(*adjusted.cameras, *ties.straight_ties(adjusted.radial))
+    ties = with_support(ties, adjusted)
+    ties = without_gross_ties(ties, evaluated(ties, adjusted), sigma=old.sigma_tie)
+    xyz = tie_positions(ties, adjusted)
     d1 = float(adjusted.cameras[0].centre[2])
     fair = ties.tie_used & even & (np.abs(xyz[:, 2]) < 0.1 * d1)
     if fair.sum() < 200:
-        return replace(pair, observations=ties).readjusted()
+        fair = ties.tie_used & (np.abs(xyz[:, 2]) < 0.1 * d1)
+    if fair.sum() < 20:
+        return replace(pair, observations=ties).readjusted().settled()
     seen = ties.interiors[0].raw(ties.tie1[fair])
-    plane, faces = choose_wall(xyz[fair], seen, adjusted.cameras, ties.interiors, site)
+    plane, faces = choose_wall(
+        xyz[fair], seen, adjusted.cameras, ties.interiors, site, sigma_ratio=_sigma_ratio(pair)
+    )
     pair = replace(pair, faces=tuple(faces))
     pair = pair.told(*(text for text in [rivals_in_words(faces, site)] if text))
     start = evaluated(ties, replace(adjusted, cameras=_onto_plane(adjusted.cameras, plane)))
-    sigma = max(robust_sigma(start.tie_misfit[ties.tie_used]), 0.03)
-    ties = classify(ties, start, share=ROUGHNESS[1], sigma=sigma)
-    return replace(pair, observations=ties).readjusted(start).settled(ROUGHNESS[1:])
+    ties = with_wall(ties, start, FREE)
+    return replace(pair, observations=ties).readjusted(start).settled()
+
+
+def _sigma_ratio(pair: OrientedPair) -> float:
+    """Return the standard deviation of ln(d1 / d2); infinite where both tapes are in already."""
+    if len(pair.observations.measured) > 1:
+        return np.inf
+    row = np.zeros(len(NAMES))
+    for number, (camera, sign) in enumerate(zip(pair.adjusted.cameras, (1.0, -1.0), strict=True)):
+        row[at("Z", number + 1)] = sign / camera.centre[2]
+    return float(np.sqrt(row @ pair.adjusted.covariance @ row))
+
+
+def _with_named_wall(pair: OrientedPair) -> OrientedPair:
+    """Return a pair oriented by control points with the wall that some of them say they lie on.
+
+    Both planes are averaged by their covariances: the control points' own, and that of the wall's
+    ties, which lies on the former as closely as the points and the wall's roughness allow. Where
+    they contradict each other, control decides alone.
+    """
+    observations = pair.observations
+    control = observations.control
+    height, sigma = control.xyz[:, 2], control.sigma[:, 2]
+    with np.errstate(invalid="ignore"):
+        on = control.positioned & observations.pick_used & (np.abs(height) <= ON_WALL * sigma)
+    if on.sum() < 3:
+        return pair
+    spread = np.linalg.svd(control.xyz[on, :2] - control.xyz[on, :2].mean(axis=0))[1]
+    if spread[1] < 0.1 * spread[0]:
+        return pair
+    usual = float(np.hypot(np.median(sigma[on]), wall_roughness(observations, pair.adjusted)))
+    tolerance = (usual / float(np.sqrt(on.sum())), usual / float(spread[1]))
+    walled = with_wall(observations, pair.adjusted, tolerance)
+    if not walled.wall.any():
+        return pair.told(
+            "Hardly any detail lies on the control points' plane; relief counts from the control "
+            "points alone."
+        )
+    test = wall_test(walled, pair.adjusted)
+    if test > WALL_LIMIT:
+        return pair.told(
+            f"The details around the control points' plane lie on another plane (by {test:.0f} "
+            "standard deviations): relief counts from the control points alone. Check which face "
+            "of the wall they were measured on, and their relief r."
+        )
+    return replace(pair, observations=walled).readjusted()
 
 
 def _onto_plane(cameras: Cameras, plane: FloatArray) -> Cameras:
@@ -282,7 +383,10 @@ def _parallel_if_so(pair: OrientedPair) -> OrientedPair:
     if sigma < SIGMA_PARALLEL / 2:
         # Better than any wall is flat: the reference plane is then parallel to the image planes
         # and touches the wall, which may slope against it.
-        changes |= {"sigma_plane": 1e-4, "sigma_slope": UNEVEN}
+        tolerance = (1e-4, UNEVEN)
+        pair = replace(pair, tolerance=tolerance)
+        observations = with_wall(pair.observations, pair.adjusted, tolerance)
+        changes["wall_rows"], changes["wall"] = observations.wall_rows, observations.wall
     note = (
         f"image planes parallel to the wall within {np.rad2deg(sigma):.2g}° (as they are to each "
         "other)"

@@ -11,11 +11,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from bifocal.model.orientation_precision import CAMERA, NAMES
 from bifocal.orientation.interior_orientation import Cameras
 from bifocal.orientation.pair_observations import (
-    CAMERA,
-    NAMES,
-    WALL,
     Equations,
     PairObservations,
     PairUnknowns,
@@ -34,6 +32,7 @@ from photocore.camera import (
     triangulate,
 )
 from photocore.errors import GeometryError
+from photocore.rotation import skew
 
 #: A coordinate that was not measured, as a standard deviation. [m]
 UNKNOWN = 1e6
@@ -41,6 +40,8 @@ UNKNOWN = 1e6
 ROUNDING = 1e-9
 #: Relative standard deviation with which one camera body has one aspect.
 SIGMA_ASPECT = 2e-4
+#: Two photos of one lens have one distortion.
+SAME_LENS = 1e-5
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -49,7 +50,7 @@ class AdjustedPair(PairUnknowns):
 
     Attributes
     ----------
-    covariance : ndarray, shape (25, 25)
+    covariance : ndarray, shape (24, 24)
         Of all `NAMES`; zero where held.
     sigma0 : float
         Standard deviation of unit weight.
@@ -83,7 +84,7 @@ def adjust(observations: PairObservations, start: PairUnknowns) -> AdjustedPair:
     ----------
     observations : PairObservations
     start : PairUnknowns
-        Approximate cameras, distortion and wall plane.
+        Approximate cameras and distortion.
 
     Raises
     ------
@@ -102,7 +103,7 @@ def adjust(observations: PairObservations, start: PairUnknowns) -> AdjustedPair:
         return state.stepped(whole)
 
     names = [name for name, estimated in zip(NAMES, free, strict=True) if estimated]
-    start = PairUnknowns(cameras=start.cameras, radial=start.radial, plane=start.plane)
+    start = PairUnknowns(cameras=start.cameras, radial=start.radial)
     try:
         fit = adjustment.fit(
             start, equations, advance, names=names, what="the pair", rounding=ROUNDING
@@ -120,7 +121,6 @@ def adjust(observations: PairObservations, start: PairUnknowns) -> AdjustedPair:
     return AdjustedPair(
         cameras=state.cameras,
         radial=state.radial,
-        plane=state.plane,
         covariance=covariance * max(sigma0, 1.0) ** 2,
         sigma0=sigma0,
         control_residuals=_control_residuals(observations, state),
@@ -151,15 +151,13 @@ def evaluated(observations: PairObservations, adjusted: AdjustedPair) -> Adjuste
 
 def pair_equations(observations: PairObservations, state: PairUnknowns) -> Equations:
     """Return everything observed against computed in standard deviations, and derivatives."""
-    used, wall = observations.tie_used, observations.tie_used & observations.wall
+    used, wall = observations.tie_used, observations.wall
     parts = [_priors(observations, state)]
     if used.any():
         values, by = _epipolar(observations, state, used)
-        parts.append((values / observations.sigma_tie, by / observations.sigma_tie))
+        parts.append((values / observations.sigma_ties, by / observations.sigma_ties))
     if wall.any():
-        values, by = _transfer(observations, state, wall)
-        sigma = observations.sigma_wall[wall]
-        parts.append((values / sigma, by / sigma[:, None]))
+        parts.append(wall_equations(observations, state))
     if observations.control.ids:
         control = _control(observations, state)
         parts.append((control.misfit.ravel(), control.by_unknowns.reshape(-1, len(NAMES))))
@@ -169,6 +167,14 @@ def pair_equations(observations: PairObservations, state: PairUnknowns) -> Equat
     lost = ~np.isfinite(residuals)
     residuals[lost], jacobian[lost] = 1e3, 0.0
     return residuals, jacobian
+
+
+def wall_equations(observations: PairObservations, state: PairUnknowns) -> Equations:
+    """Return what the wall's ties tell of the reference plane: height and slopes, in sigma."""
+    wall = observations.wall
+    values, by = _transfer(observations, state, wall)
+    rows = observations.wall_rows[:, wall]
+    return rows @ values, rows @ by
 
 
 def _priors(observations: PairObservations, state: PairUnknowns) -> Equations:
@@ -184,21 +190,22 @@ def _priors(observations: PairObservations, state: PairUnknowns) -> Equations:
             ("aspect", np.log(interior.aspect), interior.sigma_aspect),
             ("column", interior.centre[0], interior.sigma_centre),
             ("row", interior.centre[1], interior.sigma_centre),
-            ("radial", 0.0, interior.sigma_radial),
+            ("k1", 0.0, interior.sigma_radial),
+            ("k2", 0.0, interior.sigma_radial),
         ]
         linear += [({at(name, number): 1.0}, value, sigma) for name, value, sigma in known]
         if observations.sigma_tilt is not None:
             axis, turn = camera.rotation[2], at("turn X", number)
-            by_turn = np.cross(axis, np.eye(3))
+            turned = skew(axis)
             by = np.zeros((2, len(NAMES)))
-            by[:, turn : turn + 3] = (
-                -(by_turn[:, :2].T + np.outer(camera.tilt, by_turn[:, 2])) / axis[2]
-            )
+            by[:, turn : turn + 3] = -(turned[:2] + np.outer(camera.tilt, turned[2])) / axis[2]
             tilts.append(camera.tilt / observations.sigma_tilt)
             by_tilts.append(by / observations.sigma_tilt)
     body = observations.sigma_body
     same = [("focal length", observations.sigma_zoom), ("column", body), ("row", body)]
     same += [("aspect", None if body is None else SIGMA_ASPECT)]
+    if observations.sigma_zoom is not None and observations.estimated[at("k1", 1)]:
+        same += [("k1", SAME_LENS), ("k2", SAME_LENS)]
     linear += [
         ({at(name, 1): 1.0, at(name, 2): -1.0}, 0.0, sigma)
         for name, sigma in same
@@ -210,9 +217,6 @@ def _priors(observations: PairObservations, state: PairUnknowns) -> Equations:
         "delta_d": {at("Z", 1): 1.0, at("Z", 2): -1.0},
     }
     linear += [(distances[name], *known) for name, known in observations.measured.items()]
-    if observations.estimated[-1]:
-        sigmas = (observations.sigma_plane, observations.sigma_slope, observations.sigma_slope)
-        linear += [({NAMES.index(name): 1.0}, 0.0, s) for name, s in zip(WALL, sigmas, strict=True)]
     linear = [row for row in linear if row[2] > 0]
     jacobian = np.zeros((len(linear), len(NAMES)))
     for row, (terms, _, sigma) in enumerate(linear):
@@ -227,8 +231,8 @@ def _priors(observations: PairObservations, state: PairUnknowns) -> Equations:
 def _straight(
     observations: PairObservations, state: PairUnknowns, which: BoolArray
 ) -> tuple[tuple[FloatArray, FloatArray], tuple[FloatArray, FloatArray]]:
-    """Return ties freed of the radial distortion, homogeneous, and their derivatives by k."""
-    models = [i.radial(k) for i, k in zip(observations.interiors, state.radial, strict=True)]
+    """Return ties freed of the radial distortion, homogeneous, and derivatives by k (m, 2, 2)."""
+    models = observations.radial_models(state.radial)
     ties = (observations.tie1[which], observations.tie2[which])
     straight = [homogeneous(m.undistort(x)) for m, x in zip(models, ties, strict=True)]
     by_k = [m.undistorted_by_k(x) for m, x in zip(models, ties, strict=True)]
@@ -257,16 +261,17 @@ def _epipolar(observations: PairObservations, state: PairUnknowns, which: BoolAr
     by = np.zeros((len(x1), len(NAMES)))
     by[:, _CAMERAS] = by_matrix.reshape(-1, 9) @ by_cameras.reshape(-1, 9).T
     by_x1, by_x2 = line1 - share2 @ matrix[:2, :2], line2 - share1 @ matrix[:2, :2].T
-    by[:, at("radial", 1)] = (by_x1 * x1_by_k).sum(1) / length[:, 0]
-    by[:, at("radial", 2)] = (by_x2 * x2_by_k).sum(1) / length[:, 0]
+    by[:, _RADIAL[0]] = (by_x1[:, :, None] * x1_by_k).sum(1) / length
+    by[:, _RADIAL[1]] = (by_x2[:, :, None] * x2_by_k).sum(1) / length
     return misfit, by
 
 
 def _transfer(observations: PairObservations, state: PairUnknowns, which: BoolArray) -> Equations:
-    """Return how far ties lie from the wall plane's transfer along the line, by `NAMES`. [px]"""
+    """Return how far ties lie from the plane's transfer along the line, by `NAMES`. [px]"""
     (x1, x2), (x1_by_k, x2_by_k) = _straight(observations, state, which)
     matrix, by_cameras = fundamental_with_jacobian(*state.cameras)
-    transfer, by_transfer = plane_transfer_with_jacobian(*state.cameras, state.plane)
+    transfer, by_transfer = plane_transfer_with_jacobian(*state.cameras, np.zeros(3))
+    by_transfer = by_transfer[: len(_CAMERAS)]
     line = (x1 @ matrix.T)[:, :2]
     carried = x1 @ transfer.T
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -282,10 +287,10 @@ def _transfer(observations: PairObservations, state: PairUnknowns, which: BoolAr
     by_matrix = (by_line[:, :, None] * x1[:, None, :]).reshape(-1, 6)
     by[:, _CAMERAS] = by_matrix @ by_cameras[:, :2].reshape(-1, 6).T
     by_matrix = (by_carried[:, :, None] * x1[:, None, :]).reshape(-1, 9)
-    by[:, _CAMERAS_AND_WALL] += by_matrix @ by_transfer.reshape(-1, 9).T
+    by[:, _CAMERAS] += by_matrix @ by_transfer.reshape(-1, 9).T
     by_x1 = (by_line @ matrix[:2] + by_carried @ transfer)[:, :2]
-    by[:, at("radial", 1)] = (by_x1 * x1_by_k).sum(1)
-    by[:, at("radial", 2)] = (along * x2_by_k).sum(1)
+    by[:, _RADIAL[0]] = (by_x1[:, :, None] * x1_by_k).sum(1)
+    by[:, _RADIAL[1]] = (along[:, :, None] * x2_by_k).sum(1)
     return misfit, by
 
 
@@ -298,10 +303,10 @@ class _AdjustedControl:
     misfit : ndarray, shape (n, 4)
         What picks and coordinates contradict each other, in four independent directions; zero in
         those of picks that are missing or not used. [standard deviations]
-    by_unknowns : ndarray, shape (n, 4, 25)
+    by_unknowns : ndarray, shape (n, 4, 24)
     xyz : ndarray, shape (n, 3)
         Adjusted points. [m]
-    xyz_by_unknowns : ndarray, shape (n, 3, 25)
+    xyz_by_unknowns : ndarray, shape (n, 3, 24)
     """
 
     misfit: FloatArray
@@ -325,7 +330,7 @@ def _control(
     """
     control, sigma_pick = observations.control, observations.sigma_pick
     used = observations.pick_used if used is None else used
-    models = [i.radial(k) for i, k in zip(observations.interiors, state.radial, strict=True)]
+    models = observations.radial_models(state.radial)
     raw = (control.pixels1, control.pixels2)
     picks = np.concatenate([m.undistort(x) for m, x in zip(models, raw, strict=True)], axis=1)
     known, sigma = _known_points(observations, state.cameras, picks)
@@ -346,7 +351,7 @@ def _control(
     for number, (view, model, x) in enumerate(zip(views, models, raw, strict=True)):
         half, first = slice(2 * number, 2 * number + 2), number * len(CAMERA)
         by[:, half, first : first + len(PARAMETERS)] = -view.by_camera
-        by[:, half, first + len(PARAMETERS)] = model.undistorted_by_k(x)
+        by[:, half, first + len(PARAMETERS) : first + len(CAMERA)] = model.undistorted_by_k(x)
     split_by = turn[:, :, :4] @ np.where(seen[:, :, None], np.nan_to_num(by / sigma_pick), 0.0)
     return _AdjustedControl(
         misfit=split[:, 3:, 0],
@@ -380,9 +385,9 @@ def _control_residuals(observations: PairObservations, state: PairUnknowns) -> F
         return np.zeros((0, 4))
     xyz = np.where(np.isfinite(control.xyz), control.xyz, _control(observations, state).xyz)
     parts = [
-        interior.radial(k).undistort(pixels) - project(camera, xyz)
-        for interior, k, pixels, camera in zip(
-            observations.interiors, state.radial, (control.pixels1, control.pixels2),
+        model.undistort(pixels) - project(camera, xyz)
+        for model, pixels, camera in zip(
+            observations.radial_models(state.radial), (control.pixels1, control.pixels2),
             state.cameras, strict=True,
         )
     ]  # fmt: skip
@@ -440,6 +445,6 @@ def _control_test(
     return out
 
 
-#: Where the cameras' `PARAMETERS` stand in `NAMES`, without and with the wall's.
+#: Where the cameras' `PARAMETERS` and the distortions stand in `NAMES`.
 _CAMERAS = [at(name, number) for number in (1, 2) for name in PARAMETERS]
-_CAMERAS_AND_WALL = [*_CAMERAS, *(NAMES.index(name) for name in WALL)]
+_RADIAL = [[at(name, number) for name in ("k1", "k2")] for number in (1, 2)]

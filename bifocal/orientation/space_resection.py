@@ -7,7 +7,7 @@ import numpy as np
 
 from bifocal.orientation.interior_orientation import Interior
 from photocore.arrays import BoolArray, FloatArray
-from photocore.camera import Pinhole, camera_matrix, project
+from photocore.camera import Pinhole, camera_matrix, cameras_seeing, project
 from photocore.errors import GeometryError
 
 #: Picks that miss by more than this share of the image width are gross, whatever the lens.
@@ -84,24 +84,9 @@ def _candidates(
 
 
 def _solve(xyz: FloatArray, pixels: FloatArray, matrix: FloatArray) -> list[Pinhole]:
-    """Return OpenCV's solutions of one set of points in front of the wall."""
-    try:
-        _, turns, shifts, _ = cv2.solvePnPGeneric(
-            np.ascontiguousarray(xyz),
-            np.ascontiguousarray(pixels),
-            matrix,
-            None,
-            flags=cv2.SOLVEPNP_SQPNP,
-        )
-    except cv2.error:
-        return []
-    cameras = []
-    for turn, shift in zip(turns, shifts, strict=True):
-        rotation = cv2.Rodrigues(turn)[0]
-        centre = -rotation.T @ shift.ravel()
-        if np.isfinite(centre).all() and centre[2] > 0:
-            cameras.append(Pinhole(matrix, rotation, centre))
-    return cameras
+    """Return the solutions of one set of points in front of the wall."""
+    found = cameras_seeing(xyz, pixels, matrix, methods=[cv2.SOLVEPNP_SQPNP])
+    return [camera for camera in found if camera.centre[2] > 0]
 
 
 def _refuse_line(xyz: FloatArray) -> None:

@@ -15,6 +15,8 @@ from photocore.arrays import BoolArray, ByteArray, Float32Array, FloatArray
 SMALLEST, LARGEST = 5.0, 120.0
 #: Grey levels between a disc and its plate.
 LEAST_CONTRAST = 40.0
+#: How far the grey of a chequer's sectors may be from their medians, share of the contrast.
+UNEVEN = 0.06
 #: Families of coded markers looked for, most common first.
 FAMILIES = ("DICT_4X4_250", "DICT_5X5_250", "DICT_6X6_250", "DICT_APRILTAG_36h11")
 
@@ -165,7 +167,7 @@ def _crossing(
     image: ByteArray, smooth: Float32Array, column: int, row: int
 ) -> tuple[float, float, float] | None:
     """Return the crossing near a pixel and the size used, None if it is no chequer."""
-    reach = 6
+    reach = 8
     height, width = image.shape
     if not (reach < column < width - reach - 1 and reach < row < height - reach - 1):
         return None
@@ -181,6 +183,17 @@ def _crossing(
     # Opposite sectors of a chequer are equal.
     if np.abs(ring - np.roll(ring, 16)).mean() > 0.2 * (ring.max() - ring.min()):
         return None
+    # Its sectors are of one grey, and straight: stones that touch and crossing joints are not.
+    low, high = float(np.median(ring[~bright])), float(np.median(ring[bright]))
+    for radius in (4.0, 6.0, 7.5):
+        around = image[
+            np.round(row + radius * np.sin(angles)).astype(int),
+            np.round(column + radius * np.cos(angles)).astype(int),
+        ].astype(np.float64)
+        off = np.minimum(np.abs(around - low), np.abs(around - high))
+        same = (around > (low + high) / 2) == bright
+        if np.median(off) > UNEVEN * (high - low) or same.mean() < 0.8:
+            return None
     y, x = np.mgrid[-3:4, -3:4].astype(np.float64)
     design = np.stack([x * x, y * y, x * y, x, y, np.ones_like(x)], axis=-1).reshape(-1, 6)
     part = smooth[row - 3 : row + 4, column - 3 : column + 4].astype(np.float64).ravel()

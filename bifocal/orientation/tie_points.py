@@ -6,18 +6,31 @@ from dataclasses import replace
 
 import numpy as np
 
+from bifocal.model.pair import apply_homography
 from bifocal.orientation.interior_orientation import Cameras, Images, Interiors
-from bifocal.orientation.pair_adjustment import AdjustedPair
-from bifocal.orientation.pair_observations import PairObservations
+from bifocal.orientation.pair_adjustment import AdjustedPair, wall_equations
+from bifocal.orientation.pair_observations import PairObservations, PairUnknowns
 from bifocal.orientation.patches import refine, same_scale
+from bifocal.orientation.reference_plane import NarrowFace, narrow_face
+from bifocal.orientation.relative_orientation import supported
 from photocore.arrays import BoolArray, FloatArray
-from photocore.camera import project_with_jacobian, triangulate
+from photocore.camera import (
+    fundamental,
+    homogeneous,
+    plane_transfer,
+    project_with_jacobian,
+    ray_on_plane,
+    triangulate,
+)
 
-#: Ties of a wall that count as independent of each other.
-INDEPENDENT = 50
-#: Roughness of a wall as a share of the far distance, at successive passes: a first plane may
-#: swallow ashlar of some centimetres, the last holds the wall's own face.
-ROUGHNESS = (0.004, 0.002, 0.0012)
+#: A tie farther than this many sigma from its line is gross.
+GROSS = 3.5
+#: Ties are never believed to be more precise than this. [px]
+BEST_TIE = 0.03
+#: Fewer ties than this are no wall.
+FEWEST_ON_WALL = 20
+#: Half the band, as a share of the far distance, in which the wall's own face is looked for.
+WALL_BAND = 0.005
 
 
 def robust_sigma(values: FloatArray) -> float:
@@ -52,7 +65,7 @@ def refine_ties(
 ) -> tuple[FloatArray, BoolArray]:
     """Return the ties' positions in photo 2 to a tenth of a pixel, and which could be refined."""
     interiors, ties = observations.interiors, (observations.tie1, observations.tie2)
-    xyz = triangulate(*adjusted.cameras, *observations.straight_ties(adjusted.radial))
+    xyz = tie_positions(observations, adjusted)
     raw1, raw2 = interiors[0].raw(ties[0]), interiors[1].raw(ties[1])
     local = local_maps(adjusted.cameras, interiors, xyz, ties)
     usable = observations.tie_used & np.isfinite(local).all(axis=(1, 2))
@@ -63,30 +76,134 @@ def refine_ties(
     return interiors[1].ideal(patches.pixels2), good
 
 
-def classify(
-    observations: PairObservations, adjusted: AdjustedPair, *, share: float, sigma: float
+def without_gross_ties(
+    observations: PairObservations, adjusted: AdjustedPair, *, sigma: float
 ) -> PairObservations:
-    """Return the observations with gross ties left out and the wall's ties found anew.
+    """Return the observations with the ties that lie on their lines and before both cameras.
 
     Parameters
     ----------
-    share : float
-        Roughness of the wall, as a share of the far distance.
     sigma : float
         Precision of a tie's coordinate. [px]
     """
-    cameras = adjusted.cameras
-    used = np.abs(adjusted.tie_misfit) < 3.5 * sigma
-    xyz = triangulate(*cameras, observations.tie1, observations.tie2)
-    lowest = min(camera.centre[2] for camera in cameras)
+    sigma = max(sigma, BEST_TIE)
+    used = np.abs(adjusted.tie_misfit) < GROSS * sigma
+    xyz = tie_positions(observations, adjusted)
+    lowest = min(camera.centre[2] for camera in adjusted.cameras)
     used &= np.isfinite(xyz).all(axis=1) & (xyz[:, 2] < 0.95 * lowest)
-    on_plane = np.column_stack([xyz[:, :2], np.zeros(len(xyz))])
-    rate = np.linalg.norm(np.nan_to_num(relief_rate(cameras, on_plane)), axis=1)
-    sigma_wall = np.hypot(1.5 * sigma, rate * share * cameras[0].centre[2] / 2)
-    wall = used & (np.abs(adjusted.wall_misfit) < 2.0 * sigma_wall)
-    # Unevenness is common to whole stretches of wall: a thousand ties know its plane no better
-    # than some fifty independent ones.
-    sigma_wall = sigma_wall * np.sqrt(max(wall.sum() / INDEPENDENT, 1.0))
-    return replace(
-        observations, tie_used=used, wall=wall, sigma_wall=sigma_wall, sigma_tie=max(sigma, 0.03)
-    )
+    return replace(observations, tie_used=used, wall=observations.wall & used, sigma_tie=sigma)
+
+
+def with_support(observations: PairObservations, adjusted: AdjustedPair) -> PairObservations:
+    """Return the observations without ties that move unlike their neighbours (`supported`)."""
+    used = np.flatnonzero(observations.tie_used)
+    seen1, seen2 = observations.straight_ties(adjusted.radial)
+    transfer = plane_transfer(*adjusted.cameras, np.zeros(3))
+    parallax = seen2[used] - apply_homography(transfer, seen1[used])
+    width = max(observations.interiors[0].image_size)
+    keep = np.zeros(len(seen1), dtype=bool)
+    keep[used[supported(seen1[used], parallax, width)]] = True
+    if keep.sum() < FEWEST_ON_WALL:
+        return observations
+    return replace(observations, tie_used=keep, wall=observations.wall & keep)
+
+
+def tie_positions(observations: PairObservations, state: PairUnknowns) -> FloatArray:
+    """Return where the rays of the ties meet, shape (m, 3). [m]"""
+    return triangulate(*state.cameras, *observations.straight_ties(state.radial))
+
+
+def relief_per_pixel(observations: PairObservations, state: PairUnknowns) -> FloatArray:
+    """Return the relief of a pixel along the line in photo 2 at the ties, signed, (m,). [m/px]"""
+    far, near = state.cameras
+    seen1 = observations.straight_ties(state.radial)[0]
+    on_plane = ray_on_plane(far, seen1)
+    line = homogeneous(seen1) @ fundamental(far, near).T
+    along = np.column_stack([-line[:, 1], line[:, 0]]) / np.hypot(line[:, 0], line[:, 1])[:, None]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return 1.0 / (relief_rate(state.cameras, on_plane) * along).sum(axis=1)
+
+
+def with_wall(
+    observations: PairObservations,
+    state: PairUnknowns,
+    tolerance: tuple[float, float],
+    *,
+    known: bool = False,
+) -> PairObservations:
+    """Return the observations with the wall's ties and what they tell of the reference plane.
+
+    Parameters
+    ----------
+    observations, state
+        Cameras in whose frame the wall lies near the reference plane.
+    tolerance : pair of float
+        How far the wall may lie from the reference plane [m] and slope against it [m/m], beyond
+        what its own roughness leaves open.
+    known : bool
+        Whether the wall's ties are known roughly, from the dominant homography.
+
+    Notes
+    -----
+    The heights of the wall's ties are fitted by a plane, weighted by their own precision and the
+    wall's roughness; its height and slopes, whitened by their covariance, are three observations.
+    Roughness is common to stretches of the wall: only every fourth cell of a tenth of the photo's
+    width counts as independent.
+    """
+    xyz, metres, sigma, face = _wall_of(observations, state)
+    if known:
+        rough = WALL_BAND * float(state.cameras[0].centre[2])
+        on_wall = observations.wall & np.isfinite(xyz).all(axis=1) & np.isfinite(metres)
+        face = replace(face, roughness=rough, members=on_wall)
+    on = np.flatnonzero(face.members)
+    if len(on) < FEWEST_ON_WALL:
+        return replace(
+            observations,
+            wall=np.zeros_like(face.members),
+            wall_rows=np.zeros((3, len(face.members))),
+        )
+    middle = xyz[on, :2].mean(axis=0)
+    lifted = np.column_stack([np.ones(len(on)), xyz[on, :2]])
+    weight = 1.0 / (sigma[on] ** 2 + face.roughness**2)
+    inverse = np.linalg.inv((lifted * weight[:, None]).T @ lifted)
+    cell = np.floor(observations.tie1[on] / (0.1 * max(observations.interiors[0].image_size)))
+    independent = max(len(np.unique(cell, axis=0)) / 4.0, 3.0)
+    covariance = inverse * max(len(on) / independent, 1.0)
+    # The height is that of the wall's middle; slopes act about it.
+    slack = np.zeros((3, 3))
+    slack[0, 0] = tolerance[0] ** 2
+    about = np.array([[1.0, -middle[0], -middle[1]], [0, 1, 0], [0, 0, 1]])
+    slack[1:, 1:] = np.eye(2) * tolerance[1] ** 2
+    whitening = np.linalg.cholesky(np.linalg.inv(covariance + about @ slack @ about.T)).T
+    rows = np.zeros((3, len(xyz)))
+    rows[:, on] = whitening @ inverse @ (lifted * (weight * metres[on])[:, None]).T
+    return replace(observations, wall=face.members, wall_rows=rows)
+
+
+def _wall_of(
+    observations: PairObservations, state: PairUnknowns
+) -> tuple[FloatArray, FloatArray, FloatArray, NarrowFace]:
+    """Return the ties' places [m], relief per pixel [m/px], sigma of height [m]; the wall."""
+    xyz = tie_positions(observations, state)
+    metres = relief_per_pixel(observations, state)
+    known = observations.tie_used & np.isfinite(xyz).all(axis=1) & np.isfinite(metres)
+    sigma = np.hypot(np.sqrt(2.0) * observations.sigma_tie * np.abs(metres), 1e-6)
+    face = narrow_face(xyz[known], sigma[known], band=WALL_BAND * float(state.cameras[0].centre[2]))
+    members = np.zeros(len(xyz), dtype=bool)
+    members[known] = face.members
+    return xyz, metres, sigma, replace(face, members=members)
+
+
+def wall_roughness(observations: PairObservations, state: PairUnknowns) -> float:
+    """Return the standard deviation of the wall's own unevenness. [m]"""
+    return _wall_of(observations, state)[3].roughness
+
+
+def wall_test(observations: PairObservations, adjusted: AdjustedPair) -> float:
+    """Return how far the wall's ties lie from the reference plane, adjusted without them, in sigma.
+
+    Root mean square of height and slopes over their standard deviations, the cameras' included.
+    """
+    values, by = wall_equations(observations, adjusted)
+    covariance = np.eye(3) + by @ adjusted.covariance @ by.T
+    return float(np.sqrt(values @ np.linalg.solve(covariance, values) / 3.0))

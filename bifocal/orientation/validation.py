@@ -11,7 +11,7 @@ from bifocal.orientation.features import sharpness
 from bifocal.orientation.interior_orientation import Cameras, Images, Interior, Interiors
 from bifocal.orientation.pair_adjustment import AdjustedPair
 from bifocal.orientation.relative_orientation import Ties, rotation_only
-from photocore.arrays import ByteArray
+from photocore.arrays import ByteArray, FloatArray
 from photocore.errors import GeometryError, InputError
 
 #: Below this a photo is blurred (sharp photos: 0.3 to 0.6; blurred by 3 px: below 0.17).
@@ -20,8 +20,9 @@ BLURRED = 0.15
 FARTHEST = 300.0
 #: The distances must differ by this share; relief errors grow with its inverse.
 LEAST_CHANGE = 0.03
-#: Lenses for façades bend less than this in the corner, as a share of the half diagonal.
-MOST_DISTORTION = 0.05
+#: Lenses for façades bend less than this in the corner, as a share of the half diagonal: compact
+#: cameras reach 11 %.
+MOST_DISTORTION = 0.25
 
 
 class SamePhotoError(GeometryError):
@@ -110,19 +111,20 @@ def check_units(cameras: Cameras, site: SiteMeasures) -> None:
         )
 
 
-def check_distortion(k: float, interior: Interior) -> None:
-    """Refuse an estimated radial distortion that no lens for façades has."""
+def check_distortion(radial: FloatArray, interior: Interior) -> None:
+    """Refuse an estimated radial distortion (k1, k2) that no lens for façades has."""
     half = float(np.hypot(*interior.image_size)) / 2
-    bend = k * (half / interior.focal) ** 2
+    square = (half / interior.focal) ** 2
+    bend = float(square * (radial[0] + square * radial[1]))
     # r / (1 + bend), so that a bend of -1 and below folds the photo over.
     moved = abs(bend / (1 + bend)) if bend > -0.9 else np.inf
     if moved > MOST_DISTORTION:
         raise GeometryError(
             f"the common points fit only if the lens distorted the photo's corners by "
-            f"{min(100 * moved, 999):.0f} % of the half diagonal (k = {k:.2f}): the sensor width "
-            "or the focal length is probably wrong. Check --sensor-width (--pixel-size), --focal1 "
-            "and --focal2; a lens that does distort so much has to be calibrated (`bifocal "
-            "calibrate`, --lens)."
+            f"{min(100 * moved, 999):.0f} % of the half diagonal (k1 = {radial[0]:.2f}): the "
+            "sensor width or the focal length is probably wrong. Check --sensor-width "
+            "(--pixel-size), --focal1 and --focal2; a lens that does distort so much has to be "
+            "calibrated (`bifocal calibrate`, --lens)."
         )
 
 

@@ -118,7 +118,12 @@ def deliver(
             result = make_ortho(
                 pair_path, place / f"{name}.tif", task, world_file=True, progress=progress
             )
-            _pictures(place, name, drawing, sheet)
+            nameless = _pictures(place, name, drawing, sheet)
+            if nameless:
+                remarks += (
+                    f"{nameless} marked points stand on the sheet without name, since names would "
+                    "lie over each other; the drawing (.dxf) has them all.",
+                )
             if not isinstance(surface, FlatSurface):
                 surfaces = (surface, _measured(reader) or surface)
                 share = _relief(place, f"{name}_relief", surfaces, drawing, sheet, wish)
@@ -149,13 +154,13 @@ def file_name(title: str) -> str:
     return "_".join(words) or "ortho"
 
 
-def _pictures(place: Path, name: str, drawing: Drawing, sheet: PrintSheet) -> None:
-    """Write PNG, drawing and print sheet of the raster of that name."""
+def _pictures(place: Path, name: str, drawing: Drawing, sheet: PrintSheet) -> int:
+    """Write PNG, drawing and print sheet of a raster; return how many points bear no name."""
     dpi = dpi_at_scale(drawing.grid.gsd, drawing.scale)
     with RasterReader(place / f"{name}.tif") as reader:
         write_png(place / f"{name}.png", reader, dpi=dpi, overwrite=False)
         write_drawing(place / f"{name}.dxf", drawing, f"{name}.png", overwrite=False)
-        write_sheet(place / f"{name}.pdf", drawing, sheet, reader, overwrite=False)
+        return write_sheet(place / f"{name}.pdf", drawing, sheet, reader, overwrite=False)
 
 
 def _relief(

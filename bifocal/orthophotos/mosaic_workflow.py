@@ -98,6 +98,8 @@ def make_mosaic(
         If inputs are missing, differ in kind, or the output cannot be written.
     """
     check_writable(out, overwrite=overwrite)
+    if out.exists() and any(path.exists() and path.samefile(out) for path in inputs):
+        raise InputError(f"{out}: is one of the inputs; name another file for --out.")
     if len(inputs) < 2:
         raise InputError("a mosaic needs two rasters or more.")
     if len(inputs) > _MOST_INPUTS:

@@ -24,7 +24,7 @@ from bifocal.orthophotos.triangles import TriangleSurface
 from photocore.arrays import ByteArray
 from photocore.cli import Progress, no_progress
 from photocore.errors import InputError, located
-from photocore.output import check_writable
+from photocore.output import check_ending, check_writable
 
 #: A pixel this many times finer or coarser than the photo's own is asked back about.
 FINEST, COARSEST = 1 / 16, 40.0
@@ -103,8 +103,7 @@ def make_ortho(
         If an input is missing or does not fit, the size is not plausible, or writing fails.
     """
     check_writable(out, overwrite=overwrite)
-    if out.suffix.lower() not in {".tif", ".tiff"}:
-        raise InputError(f"{out}: an orthophoto is written as GeoTIFF; name it .tif.")
+    check_ending(out, "an orthophoto is written as GeoTIFF; name it .tif.", ".tif", ".tiff")
     pair = Pair.read(pair_path)
     with open_surface(task, pair) as (surface, _, remarks):
         numbers = {"1": (1,), "2": (2,), "both": (1, 2)}[task.image]
@@ -197,6 +196,8 @@ def _triangles(
             raise InputError(
                 f"breakline {','.join(line)}: {path} has no usable point {', '.join(missing)}."
             )
+        if len(set(line)) < 2:
+            raise InputError(f"breakline {','.join(line)}: name two points or more.")
         lines.append([index[name] for name in line])
     remarks.append(
         "Relief between the points is interpolated; outside of them the orthophoto is empty."

@@ -21,12 +21,18 @@ from photocore.output import atomic_path
 _UNITS_PER_MM = 72 / 25.4
 #: Mean width of Helvetica's letters in its size; digits have exactly this.
 _WIDTH = 0.556
+#: More points than this are drawn smaller, and their names further apart.
+_MANY = 60
 
 
 def write_sheet(
     path: Path, drawing: Drawing, sheet: PrintSheet, reader: RasterReader, *, overwrite: bool
-) -> None:
-    """Write a drawing on a sheet; empty pixels are white."""
+) -> int:
+    """Write a drawing on a sheet; empty pixels are white; return how many points bear no name.
+
+    Names that would lie over others are left out, and where points are many their names keep
+    apart, so that they never bury the picture.
+    """
     with atomic_path(path, overwrite=overwrite) as temporary, temporary.open("wb") as file:
         pdf = _Pdf(file)
         picture = pdf.begin_stream(
@@ -41,7 +47,9 @@ def write_sheet(
             pdf.add(predicted(pixels, above))
             above = pixels[-1:]
         pdf.end_stream()
-        pdf.finish(_Page(drawing, sheet).commands(), picture, sheet)
+        page = _Page(drawing, sheet)
+        pdf.finish(page.commands(), picture, sheet)
+    return page.nameless
 
 
 class _Pdf:
@@ -121,6 +129,9 @@ class _Page:
         self.parts = [f"{_UNITS_PER_MM:.8f} 0 0 {_UNITS_PER_MM:.8f} 0 0 cm"]
         self.origin = sheet.origin(drawing)
         self.factor = 1000.0 / drawing.scale
+        #: Left, right, bottom, top of the names of points; how many points have none. [mm]
+        self.labels: list[tuple[float, float, float, float]] = []
+        self.nameless = 0
 
     def commands(self) -> str:
         """Return all commands."""
@@ -241,23 +252,36 @@ class _Page:
         self._text(x + 5, y + 0.3, f"not measured {legend.guessed:.1%}", size=2.2)
 
     def _points(self) -> None:
-        edge = self.origin[0] + self.drawing.paper_size[0]
-        for points, size in ((self.drawing.points, 1.0), (self.drawing.control, 1.6)):
+        """Draw all points, and the names that have room; control points come first."""
+        for points, size in ((self.drawing.control, 1.6), (self.drawing.points, 1.0)):
             if points is None:
                 continue
+            if len(points.ids) > _MANY:
+                size /= 2
             for name, (x, y, _) in zip(points.ids, points.xyz.tolist(), strict=True):
-                if not (np.isfinite(x) and np.isfinite(y)):
-                    continue
-                px, py = self._place(x, y)
-                corners = [(px - size, py - size), (px + size, py - size), (px, py + size)]
-                if points is self.drawing.control:
-                    self._line([*corners, corners[0]], width=0.25)
-                else:
-                    self._cross(px, py, size)
-                beside, wide = px + size + 0.4, _WIDTH * 2.0 * len(name)
-                if px <= edge < beside + wide:  # the edge of the picture would cut it
-                    beside = px - size - 0.4 - wide
-                self._label(beside, py + 0.4, name, size=2.0)
+                if np.isfinite(x) and np.isfinite(y):
+                    self._point(name, self._place(x, y), size, points is self.drawing.control)
+
+    def _point(self, name: str, place: tuple[float, float], size: float, is_control: bool) -> None:
+        px, py = place
+        if is_control:
+            corners = [(px - size, py - size), (px + size, py - size), (px, py + size)]
+            self._line([*corners, corners[0]], width=0.25)
+        else:
+            self._cross(px, py, size)
+        edge = self.origin[0] + self.drawing.paper_size[0]
+        beside, wide = px + size + 0.4, _WIDTH * 2.0 * len(name)
+        if px <= edge < beside + wide:  # the edge of the picture would cut it
+            beside = px - size - 0.4 - wide
+        boxes = np.reshape(self.labels, (-1, 4))
+        near = (boxes[:, 0] < beside + wide) & (beside < boxes[:, 1])
+        if (near & (boxes[:, 2] < py + 2.4) & (py + 0.4 < boxes[:, 3])).any():
+            self.nameless += 1
+            return
+        # Where points are many, names take a share of the picture, not all of it.
+        clear = 3.0 if len(self.labels) > _MANY else 0.0
+        self.labels.append((beside - clear, beside + wide + clear, py - clear, py + 2.0 + clear))
+        self._label(beside, py + 0.4, name, size=2.0)
 
     def _title(self) -> None:
         left, bottom, right, _ = self.sheet.frame

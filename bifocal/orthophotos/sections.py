@@ -48,11 +48,13 @@ def contours(
     relief = surface.window(coarse).astype(np.float64)
     if min(relief.shape) < 2 or not np.isfinite(relief).any():
         return ()
-    levels = multiples(float(np.nanmin(relief)), float(np.nanmax(relief)), interval)
-    if len(levels) > _MOST_LEVELS:
+    low, high = float(np.nanmin(relief)), float(np.nanmax(relief))
+    if (high - low) / interval > _MOST_LEVELS:
         raise InputError(
-            f"contours every {interval:g} m make {len(levels)} levels; choose a larger interval."
+            f"contours every {interval:g} m make {(high - low) / interval:.0f} levels; choose a "
+            "larger interval."
         )
+    levels = multiples(low, high, interval)
     generator = contour_generator(
         coarse.columns_x, coarse.rows_y, np.ma.masked_invalid(relief), name="serial"
     )
@@ -127,4 +129,7 @@ def _path(name: str, grid: Grid) -> tuple[str, FloatArray]:
             f'section {name!r}: write x=1.5 (upright), y=2.0 (level) or corners "0,1 2,1 2,3" '
             "in metres."
         )
-    return kind, np.array(numbers).reshape(-1, 2)
+    corners = np.array(numbers).reshape(-1, 2)
+    if not np.ptp(corners, axis=0).any():
+        raise InputError(f"section {name!r}: its corners are one point; write two or more.")
+    return kind, corners

@@ -10,8 +10,8 @@ from typing import Any
 from bifocal.planning.camera_plan import CameraSensor, Plan
 from bifocal.planning.plan_workbook import write_plan
 from bifocal.planning.stations import plan_stations
-from photocore.errors import InputError
-from photocore.output import check_writable
+from photocore.output import check_ending
+from photocore.workbook.newbook import check_new_workbook
 
 
 def make_plan(
@@ -26,10 +26,9 @@ def make_plan(
 
     ``wishes`` are the keyword arguments of `bifocal.planning.stations.plan_stations`.
     """
+    check_ending(out, "a plan is written as a workbook; name it .xlsx.", ".xlsx")
     if out is not None:
-        if out.suffix.lower() != ".xlsx":
-            raise InputError(f"{out}: a plan is written as a workbook; name it .xlsx.")
-        check_writable(out, overwrite=overwrite)
+        check_new_workbook(out, overwrite=overwrite)
     plan = plan_stations(focal_lengths, sensor, **wishes)
     if out is not None:
         write_plan(out, plan, overwrite=overwrite)

@@ -171,7 +171,9 @@ def dense_relief(
     return DenseRelief(
         r=bands.r,
         sigma=np.where(
-            known, np.hypot(bands.sigma, orientation_sigma(pair, bands.r)), np.float32("nan")
+            known,
+            np.hypot(bands.sigma, orientation_sigma(pair, bands.r, wanted)),
+            np.float32("nan"),
         ),
         quality=np.where(known, bands.quality, np.uint8(Quality.UNKNOWN)),
         plane_from_pixel=wanted.plane_from_pixel,

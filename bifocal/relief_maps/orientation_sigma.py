@@ -1,38 +1,67 @@
-"""What the orientation's own uncertainty does to relief, where the pair file states it."""
+"""What the orientation's own uncertainty does to a relief map, where the pair file states it."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 import numpy as np
 
+from bifocal.model.grid import Grid
 from bifocal.model.pair import Pair
-from bifocal.precision import false_relief_of_scale
-from photocore.arrays import Float32Array
+from photocore.arrays import Float32Array, FloatArray
+
+#: Cells of the map in either direction between which the covariance is interpolated. It is a
+#: polynomial of low degree: on a pair tilted by 20 degrees this is exact to 0.1 %.
+NODES = 24
 
 
-def orientation_sigma(pair: Pair, relief: Float32Array) -> Float32Array:
-    """Return the standard deviation of relief that comes from scale and distances. [m]
+def orientation_sigma(pair: Pair, relief: Float32Array, grid: Grid) -> Float32Array:
+    """Return the standard deviation of relief that comes from the orientation, cell by cell. [m]
+
+    Parameters
+    ----------
+    pair : Pair
+        Its ``orientation`` is the covariance that `bifocal align` wrote; zero without it.
+    relief : ndarray, shape (h, w)
+        [m]
+    grid : Grid
+        Of the map.
 
     Notes
     -----
-    To first order a relative scale error eps shifts r by B eps, an error of d1 by
-    ``-r d2 / (d1 (d1 - d2))`` per metre and one of d2 by ``r d1 / (d2 (d1 - d2))``. The standard
-    deviations are those `bifocal align` writes in the pair file (``setup``); zero without them.
-    These errors are common to the whole map.
+    At a place of the plane the variance is nearly quadratic in relief; it is found at three reliefs
+    on a coarse net and interpolated. These errors are common to the whole map: a profile or an area
+    does not average them out.
     """
-    scale, sigma1, sigma2 = (_stated(pair, name) for name in ("scale", "distance1", "distance2"))
-    d1, d2 = pair.image1.distance, pair.image2.distance
-    rate1, rate2 = d2 / (d1 * (d1 - d2)), d1 / (d2 * (d1 - d2))
-    per_metre = np.hypot(rate1 * sigma1, rate2 * sigma2)
-    by_scale = false_relief_of_scale(scale, d1=d1, d2=d2)
-    return np.hypot(np.float32(by_scale), relief * np.float32(per_metre))
+    if pair.orientation is None:
+        return np.zeros(relief.shape, dtype=np.float32)
+    import cv2
+
+    height, width = relief.shape
+    columns = np.linspace(0, width - 1, min(NODES, width))
+    rows = np.linspace(0, height - 1, min(NODES, height))
+    x, y = grid.columns_x[np.rint(columns).astype(int)], grid.rows_y[np.rint(rows).astype(int)]
+    places = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
+    known = relief[np.isfinite(relief)]
+    low, high = (float(known.min()), float(known.max())) if len(known) else (0.0, 0.0)
+    middle, half = (low + high) / 2, max((high - low) / 2, 1e-3 * pair.d2)
+    low_, mid_, high_ = (
+        _variance(pair, places, level).reshape(len(rows), len(columns))
+        for level in (middle - half, middle, middle + half)
+    )
+    at = np.clip((relief - middle) / half, -1.0, 1.0)
+    terms = (mid_, (high_ - low_) / 2, (high_ + low_) / 2 - mid_)
+    across, down = np.meshgrid(
+        np.interp(np.arange(width), columns, np.arange(len(columns))).astype(np.float32),
+        np.interp(np.arange(height), rows, np.arange(len(rows))).astype(np.float32),
+    )
+    constant, linear, square = (
+        cv2.remap(term.astype(np.float32), across, down, cv2.INTER_LINEAR) for term in terms
+    )
+    variance = constant + at * (linear + at * square)
+    return np.sqrt(np.maximum(variance, 0.0)).astype(np.float32)
 
 
-def _stated(pair: Pair, name: str) -> float:
-    """Return a standard deviation of the pair file, 0 where there is none."""
-    orientation = pair.extra.get("setup")
-    stated = orientation.get("standard_deviations") if isinstance(orientation, Mapping) else None
-    value = stated.get(name) if isinstance(stated, Mapping) else None
-    usable = isinstance(value, int | float) and np.isfinite(value) and value > 0
-    return float(value) if usable and value is not None else 0.0
+def _variance(pair: Pair, places: FloatArray, relief: float) -> FloatArray:
+    """Return the variance of relief at places of one relief; the near ones' where none is. [m²]"""
+    xyz = np.column_stack([places, np.full(len(places), relief)])
+    variance = pair.covariance_of_orientation(xyz)[:, 2, 2]
+    return np.nan_to_num(variance, nan=float(np.nanmax(variance, initial=0.0)))

@@ -9,8 +9,7 @@ from numpy.typing import NDArray
 
 from bifocal.model.relief_map import Quality, ReliefMap
 from photocore.arrays import Float32Array, FloatArray
-from photocore.errors import InputError
-from photocore.output import atomic_path
+from photocore.output import atomic_path, check_ending
 
 #: Longer side of a preview. [px]
 PREVIEW_SIDE = 2000
@@ -24,8 +23,7 @@ def write_preview(path: Path | str, relief: ReliefMap, *, overwrite: bool = Fals
     from matplotlib.figure import Figure
 
     path = Path(path)
-    if path.suffix.lower() != ".png":
-        raise InputError(f"{path}: the preview is written as .png.")
+    check_ending(path, "the preview is written as .png.", ".png")
     step = max(1, -(-max(relief.shape) // PREVIEW_SIDE))
     r = relief.r[::step, ::step]
     known = np.isfinite(r)

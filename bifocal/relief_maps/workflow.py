@@ -20,8 +20,8 @@ from bifocal.relief_maps.relief_files import write_preview
 from photocore.arrays import FloatArray
 from photocore.cli import Progress, no_progress
 from photocore.cloud import write_cloud
-from photocore.errors import GeometryError, InputError
-from photocore.output import check_writable
+from photocore.errors import GeometryError
+from photocore.output import all_or_none, check_all_writable, check_ending
 
 _ROWS = 256
 
@@ -57,6 +57,7 @@ class ReliefJob:
     overwrite: bool = False
 
 
+@all_or_none()
 def relief_of_pair(
     pair_file: Path, job: ReliefJob, *, progress: Progress = no_progress
 ) -> tuple[dict[str, Any], tuple[str, ...]]:
@@ -141,12 +142,8 @@ def coloured_cloud(
 
 def _check_outputs(job: ReliefJob) -> None:
     """Refuse, before any work, outputs that could not be written."""
-    for path, endings, rule in (
-        (job.out, {".tif", ".tiff"}, "the relief map is written as .tif."),
-        (job.preview, {".png"}, "the preview is written as .png."),
-        (job.cloud, {".ply", ".las", ".laz"}, "point clouds are written as .ply, .las or .laz."),
-    ):
-        if path is not None:
-            check_writable(path, overwrite=job.overwrite)
-            if path.suffix.lower() not in endings:
-                raise InputError(f"{path}: {rule}")
+    check_all_writable(job.out, job.preview, job.cloud, overwrite=job.overwrite)
+    check_ending(job.out, "the relief map is written as .tif.", ".tif", ".tiff")
+    check_ending(job.preview, "the preview is written as .png.", ".png")
+    rule = "point clouds are written as .ply, .las or .laz."
+    check_ending(job.cloud, rule, ".ply", ".las", ".laz")

@@ -6,8 +6,8 @@ from pathlib import Path
 
 from bifocal.files.exports import export_points
 from bifocal.files.point_tables import read_survey_points
-from photocore.errors import InputError
-from photocore.output import check_writable
+from photocore.errors import InputError, located
+from photocore.workbook.newbook import check_new_workbook
 
 
 def export(
@@ -17,9 +17,10 @@ def export(
     """Write the points of a result in the format the ending of ``out`` names; return remarks."""
     if out.exists() and source.exists() and out.samefile(source):
         raise InputError(f"{out}: is the survey itself; name another file to export to.")
-    check_writable(out, overwrite=overwrite)
+    check_new_workbook(out, overwrite=overwrite)
     points, remarks = read_survey_points(source)
-    more = export_points(
-        out, points, world=world, order=order, flavour=flavour, overwrite=overwrite
-    )
+    with located(source):
+        more = export_points(
+            out, points, world=world, order=order, flavour=flavour, overwrite=overwrite
+        )
     return (*remarks, *more)

@@ -21,6 +21,8 @@ from photocore.errors import GeometryError, InputError
 NAMES = ("scale", "rotation", "shift X", "shift Y", "tilt X", "tilt Y")
 #: Beyond this many sigma a plane point is taken for one that is not on the plane.
 OUTLIER_LIMIT = 4.0
+#: Points that move against the plane by more than this many sigma show the centre of zoom.
+OFF_PLANE = 10.0
 #: Tilt needs this many points: 6 unknowns, 2 observations a point, and some redundancy.
 MINIMUM_FOR_TILT = 5
 
@@ -181,6 +183,67 @@ def check_orientation(
         sigma0=sigma0,
         corrected=replace(pair, image2=corrected),
     )
+
+
+def zoom_centre_of_points(
+    pair: Pair, q1: FloatArray, q2: FloatArray, sigma: FloatArray | float
+) -> tuple[FloatArray, FloatArray] | None:
+    """Return the centre of zoom that points off the plane show, and its covariance.
+
+    Parameters
+    ----------
+    pair : Pair
+        Corrected by its plane points.
+    q1, q2 : ndarray, shape (n, 2)
+        Where the rays of both photos meet the plane. [m]
+    sigma : float or ndarray, shape (n,)
+        Precision of either position. [m]
+
+    Returns
+    -------
+    centre : ndarray, shape (2,)
+        [m]
+    covariance : ndarray, shape (2, 2)
+        [m²]
+        None instead of both where fewer than three points stand off the plane, or they do not
+        determine it.
+
+    Notes
+    -----
+    q1, q2 and e lie on one line, ``(q1 - e) x (q2 - e) = 0``, which is linear in e:
+    ``e x (q2 - q1) = q1 x q2``. Robust: residuals beyond three sigma count less (Huber).
+    """
+    known = np.isfinite(np.hstack([q1, q2])).all(axis=1)
+    q1, q2 = q1[known], q2[known]
+    sigma = np.asarray(np.broadcast_to(sigma, known.shape)[known])
+    move = q2 - q1
+    off = np.linalg.norm(move, axis=1) > OFF_PLANE * sigma
+    if off.sum() < 3:
+        return None
+    rows = np.column_stack([move[:, 1], -move[:, 0]])[off]
+    side = (q1[:, 0] * q2[:, 1] - q1[:, 1] * q2[:, 0])[off]
+    centre, usual = pair.zoom_centre, np.ones(int(off.sum()))
+    for _ in range(10):
+        away1, away2 = q1[off] - centre, q2[off] - centre
+        spread = sigma[off] * np.sqrt((away1**2).sum(axis=1) + (away2**2).sum(axis=1))
+        weight = usual / np.maximum(spread, 1e-12) ** 2
+        normal = (rows * weight[:, None]).T @ rows
+        if np.linalg.cond(normal) > 1e8:
+            return None
+        centre = np.linalg.solve(normal, rows.T @ (weight * side))
+        left = np.abs(rows @ centre - side) / np.maximum(spread, 1e-12)
+        unit = max(1.4826 * float(np.median(left)), 1.0)
+        usual = np.minimum(1.0, 3.0 * unit / np.maximum(left, 1e-12))
+    return centre, np.linalg.inv(normal) * unit**2
+
+
+def with_zoom_centre(pair: Pair, centre: FloatArray) -> Pair:
+    """Return the pair with its near nadir moved so that relief spreads from a centre of zoom.
+
+    e = (d1 N2 - d2 N1) / (d1 - d2); the far nadir stays where it was stated.
+    """
+    nadir = (centre * (pair.d1 - pair.d2) + pair.d2 * pair.image1.nadir) / pair.d1
+    return replace(pair, image2=replace(pair.image2, nadir=nadir))
 
 
 def _root_weights(pair: Pair, first: FloatArray, second: FloatArray, sigma: float) -> FloatArray:

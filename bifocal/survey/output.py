@@ -8,22 +8,31 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from bifocal.survey.check_points import check_points
 from bifocal.survey.georeferencing import georeference
+from bifocal.survey.observations import PointObservations
 from bifocal.survey.point_survey import solve_points
 from bifocal.survey.reference import KnownPoints
+from bifocal.survey.setup import SurveySetup
 from bifocal.survey.template_workflow import MOST_ROWS, log_row
 from bifocal.survey.tolerances import RULES, sentence
 from bifocal.survey.workbook.book import write_book
 from bifocal.survey.workbook.content import SurveyContent
-from bifocal.survey.workbook.update import can_update, update_book
+from bifocal.survey.workbook.own_table import add_results
+from bifocal.survey.workbook.update import update_book
 from bifocal.survey.workflow import SolvedSurvey
 from photocore.errors import InputError
 from photocore.jsonfile import to_text
 from photocore.output import relative_name
 from photocore.tables import write_csv
-from photocore.workbook.newbook import is_untouched, other_name
+from photocore.tables.headings import bare
 
+#: Sheets of a survey workbook, as `bare` writes them.
+_OURS = {
+    *("readme", "setup", "points", "results", "check", "georeference", "planning", "charts", "log")
+}
 _NUMBERS = ("r", "e1", "e2", "s_c", "X", "Y", "Z", "q", "sigma_r")
 
 
@@ -50,14 +59,15 @@ def write_result(
     Returns
     -------
     str
-        Where the old state of a workbook changed in place is kept, or why the survey's own
-        workbook was not carried over; empty where there is nothing to say.
+        Where the old state of a workbook changed in place is kept, or what a new workbook leaves
+        behind; empty where there is nothing to say.
 
     Notes
     -----
-    A survey workbook is carried over with all the user put into it, results filled in; any other
-    table gives a new workbook. That never replaces the survey, nor a workbook that holds anything
-    but what this program wrote.
+    A survey workbook is carried over with all the user put into it, results filled in and options
+    written into its cells. A workbook of the user's own that is named as output too gets the
+    results as new columns of its table, live formulas. Any other table gives a new workbook, which
+    never replaces one that holds anything but what this program wrote.
 
     Raises
     ------
@@ -80,52 +90,77 @@ def write_result(
             f" Write a text table instead: --out {path.with_suffix('.csv').name}"
         )
     content = result_content(solution, path, language)
-    reason = _why_new(solution, language)
-    if not reason:
-        own = as_typed(solution, content)
-        reason = can_update(solution.source, path, solution.survey, own)
-        if not reason:
-            kept = update_book(solution.source, path, solution.survey, own, overwrite=overwrite)
-            return f"the workbook as it was is kept as {kept.name}." if kept else ""
-    if ending == ".xlsm":
-        raise InputError(
-            f"{path}: the macros of {solution.source.name} cannot be carried over, since {reason}. "
-            "Write the result as .xlsx."
-        )
-    if _is_same_file(path, solution.source) or not is_untouched(path):
-        raise InputError(
-            f"{path}: would be replaced by a new workbook, since {reason}, and all else it holds "
-            f"would be lost. Write to another file: --out {other_name(path).name}"
-        )
+    if solution.survey.is_ours and solution.source.suffix.lower() in (".xlsx", ".xlsm"):
+        return _update(path, solution, content, overwrite=overwrite)
+    if ending == ".xlsm" or _is_same_file(path, solution.source):
+        return _add_columns(path, solution, content, overwrite=overwrite)
     write_book(path, content, overwrite=overwrite)
-    return f"a new workbook was made, since {reason}." if solution.survey.is_ours else ""
+    return _left_behind(solution)
+
+
+def _update(path: Path, solution: SolvedSurvey, content: SurveyContent, *, overwrite: bool) -> str:
+    """Put the results into a survey workbook; return where its old state is kept."""
+    own = as_typed(solution, content)
+    kept = update_book(
+        solution.source, path, solution.survey, own, given=_options(solution), overwrite=overwrite
+    )
+    return _kept_as(kept)
+
+
+def _options(solution: SolvedSurvey) -> dict[str, Any]:
+    """Return all that options put in the place of what a workbook says."""
+    given = dict(solution.given)
+    if solution.rules != RULES:
+        given["rules"] = solution.rules
+    if solution.adjusted:
+        given["adjust_setup"] = True
+    return given
+
+
+def _add_columns(
+    path: Path, solution: SolvedSurvey, content: SurveyContent, *, overwrite: bool
+) -> str:
+    """Put the results beside the user's own table; return where its old state is kept."""
+    if solution.source.suffix.lower() not in (".xlsx", ".xlsm"):
+        raise InputError(
+            f"{path}: a workbook with macros is made from one only; write the result as .xlsx."
+        )
+    own = as_typed(solution, content)
+    kept = add_results(
+        solution.source, path, solution.survey, own, given=_options(solution), overwrite=overwrite
+    )
+    said = "the results are new columns of your table"
+    return f"{said}; {_kept_as(kept)}" if kept else f"{said}."
+
+
+def _left_behind(solution: SolvedSurvey) -> str:
+    """Return what a new workbook does not hold of the one that the points come from."""
+    source, survey = solution.source, solution.survey
+    if not survey.titles:
+        return ""
+    others = [title for title in survey.titles if bare(title) not in _OURS or not survey.is_ours]
+    said = f"a new workbook; {source.name} stays as it is"
+    if source.suffix.lower() in (".xlsx", ".xlsm"):
+        return f"{said} (--out {source} --overwrite puts the results into its own table)."
+    if not others:
+        return f"{said}."
+    return f"{said}, and what else it holds is not in the new one: {', '.join(others)}."
+
+
+def _kept_as(kept: Path | None) -> str:
+    return f"the workbook as it was is kept as {kept}." if kept else ""
 
 
 def _is_same_file(path: Path, source: Path) -> bool:
     return path.exists() and source.exists() and path.samefile(source)
 
 
-def _why_new(solution: SolvedSurvey, language: str | None) -> str:
-    """Return why the survey's own workbook cannot take the results; empty if it can."""
-    if not solution.survey.is_ours:
-        return "the points do not come from a survey workbook"
-    if solution.adjusted:
-        return "the set-up was corrected"
-    if solution.overridden:
-        return "the set-up was given by options"
-    if solution.pair.exchanged and solution.setup is None:
-        return "the images were exchanged"
-    if language not in (None, solution.survey.language):
-        return "another language was asked for"
-    if solution.rules != RULES:
-        return "other tolerance rules were asked for"
-    return ""
-
-
 def as_typed(solution: SolvedSurvey, content: SurveyContent) -> SurveyContent:
     """Return the content as the workbook's formulas see it: images in the order they were typed."""
     table, setup, points = solution.table, solution.setup, solution.points
     world, exchanged = solution.georeference, solution.pair.exchanged
+    if solution.correction is not None and setup is not None:
+        setup, points = _uncorrected(solution, setup)
     if exchanged and setup is not None:
         setup, points = setup.exchanged(), points.exchanged()
         table = solve_points(
@@ -147,6 +182,29 @@ def as_typed(solution: SolvedSurvey, content: SurveyContent) -> SurveyContent:
         check=check_points(table, known),
         georeference=world,
     )
+
+
+def _uncorrected(
+    solution: SolvedSurvey, setup: SurveySetup
+) -> tuple[SurveySetup, PointObservations]:
+    """Return set-up and points as typed, the correction of image 2 beside them.
+
+    Points given by radial distances get coordinates, since only these can be corrected.
+    """
+    typed, points = solution.survey.setup, solution.survey.points
+    if solution.pair.exchanged:
+        typed, points = typed.exchanged(), points.exchanged()
+    rows = (points.is_polar & ~points.is_cartesian)[:, None]
+    polar = points.polar_xy()
+    if typed.unit == "px" and typed.pitch is not None:
+        flip = np.array([1, -1]) / typed.pitch
+        nadirs = [np.array(nadir or (0.0, 0.0)) for nadir in (typed.nadir1, typed.nadir2)]
+        polar = (nadirs[0] + polar[0] * flip, nadirs[1] + polar[1] * flip)
+    points = replace(
+        points, xy1=np.where(rows, polar[0], points.xy1), xy2=np.where(rows, polar[1], points.xy2)
+    )
+    corrections = (typed.adjusted[0], solution.correction)
+    return replace(setup, unit=typed.unit, adjusted=corrections), points
 
 
 def result_content(solution: SolvedSurvey, path: Path, language: str | None) -> SurveyContent:

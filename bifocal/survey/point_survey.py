@@ -72,7 +72,7 @@ def solve_points(
     first, second = pair.as_given if as_given else (pair.image1, pair.image2)
     limits = limits or FlagLimits()
     if points.has_pixels.any():
-        radii = _adjusted_radii(first, second, points, sigma_px, limits)
+        radii = _adjusted_radii(first, second, points, sigma_px, limits, pair)
     else:
         radii = _measured_radii(first, second, points, sigma_px)
     s1, s2, d1, d2 = radii.s1, radii.s2, first.distance, second.distance
@@ -185,6 +185,7 @@ def _adjusted_radii(
     points: PointObservations,
     sigma_px: float | None,
     limits: FlagLimits,
+    pair: Pair,
 ) -> _Radii:
     """Return radial distances of raw pixels after least squares moved them onto one line.
 
@@ -207,6 +208,7 @@ def _adjusted_radii(
         )
         k_q = _misfit_spread(x1, x2, picks, to_mm) / solved.sigma_px
         k_r = solved.sigma[:, 2] / solved.sigma_px
+        o_r = np.sqrt(pair.covariance_of_orientation(np.array(solved.xyz))[:, 2, 2])
         standardised = q / (solved.sigma_px * k_q)
     moved1, moved2 = x1 - q[:, None] * gain1, x2 - q[:, None] * gain2
     own1, own2 = (
@@ -227,8 +229,8 @@ def _adjusted_radii(
         q=q,
         standardised=standardised,
         at_nadir=radius == 0,
-        sigma_r=solved.sigma_px * k_r,
-        carried=carried | {"k_q": k_q, "k_r": k_r, "misfit_px": solved.misfit},
+        sigma_r=np.hypot(solved.sigma_px * k_r, o_r),
+        carried=carried | {"k_q": k_q, "k_r": k_r, "o_r": o_r, "misfit_px": solved.misfit},
     )
 
 

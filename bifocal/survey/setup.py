@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 
 from bifocal.model.flags import SIGMA_PIXEL, FlagLimits
-from bifocal.model.pair import Pair
+from bifocal.model.pair import Pair, apply_homography
 from bifocal.precision import false_relief_of_scale
 from bifocal.survey.observations import PointObservations
 from photocore.arrays import FloatArray, positive
@@ -52,6 +53,11 @@ class SurveySetup:
         Pair file, as seen from the workbook.
     matrices, nadirs : tuple of ndarray
         Homographies (3, 3) to the wall, None for an ideal pair, and nadir points (2,) on it. [m]
+    adjusted : tuple of ndarray or None
+        Of each photo the homography (3, 3) that corrects its coordinates in millimetres, found
+        from points of the reference plane; None where there is no correction.
+    places : mapping
+        Where each value was found: key to sheet and cell.
     where : str
         File and sheet, for messages.
     remarks, text_cells : tuple of str
@@ -75,6 +81,8 @@ class SurveySetup:
     pair_file: str = ""
     matrices: tuple[FloatArray, FloatArray] | None = None
     nadirs: tuple[FloatArray, FloatArray] = (np.zeros(2), np.zeros(2))
+    adjusted: tuple[FloatArray | None, FloatArray | None] = (None, None)
+    places: Mapping[str, tuple[str, str]] = field(default_factory=dict)
     where: str = ""
     remarks: tuple[str, ...] = ()
     text_cells: tuple[str, ...] = ()
@@ -134,13 +142,19 @@ class SurveySetup:
 
     def in_millimetres(self, points: PointObservations) -> PointObservations:
         """Return the points as image coordinates of `pair`, without raw pixels."""
-        if self.unit == "mm" and not points.has_pixels.any():
+        first, second = self.adjusted
+        is_plain = first is None and second is None
+        if self.unit == "mm" and is_plain and not points.has_pixels.any():
             return points
         typed = (points.xy1, points.xy2)
         if self.unit == "px" and self.pitch is not None:
             flip = np.array([self.pitch, -self.pitch])
             nadirs = (self.nadir1 or (0.0, 0.0), self.nadir2 or (0.0, 0.0))
             typed = ((typed[0] - nadirs[0]) * flip, (typed[1] - nadirs[1]) * flip)
+        if first is not None:
+            typed = (apply_homography(first, typed[0]), typed[1])
+        if second is not None:
+            typed = (typed[0], apply_homography(second, typed[1]))
         blank = np.full((len(points), 2), np.nan)
         return replace(points, xy1=typed[0], xy2=typed[1], pixels1=blank, pixels2=blank)
 
@@ -152,7 +166,7 @@ class SurveySetup:
             for name in ("d", "c", "nadir")
             for image in "12"
         }
-        return replace(self, **swapped)
+        return replace(self, **swapped, adjusted=self.adjusted[::-1])
 
     def check_scales(self, tolerance: float = SCALE_TOLERANCE) -> str:
         """Return a remark on the scales of the photos; empty where they agree.

@@ -11,8 +11,9 @@ from bifocal.survey.workbook.book import write_book
 from bifocal.survey.workbook.content import POINT_ROWS, SurveyContent
 from bifocal.survey.workbook.words import LANGUAGES
 from photocore.errors import InputError
-from photocore.output import check_writable, relative_name
+from photocore.output import check_ending, relative_name
 from photocore.provenance import file_hash, program, today
+from photocore.workbook.newbook import check_new_workbook
 
 #: Beyond this many points a spreadsheet is no tool any more.
 MOST_ROWS = 100_000
@@ -45,6 +46,7 @@ def write_template(
     if not 1 <= rows <= MOST_ROWS:
         raise InputError(f"rows: must be 1 to {MOST_ROWS}, got {rows}.")
     check_book_path(path)
+    check_new_workbook(path, overwrite=overwrite, other="")
     write_book(path, SurveyContent(language=language, rows=rows), overwrite=overwrite)
 
 
@@ -91,7 +93,7 @@ def write_survey(
     scale about the zoom centre. `bifocal solve` gives the same from the workbook as from the pair.
     """
     path = check_book_path(path)
-    check_writable(path, overwrite=overwrite)
+    check_new_workbook(path, overwrite=overwrite)
     content = SurveyContent(
         language=language,
         pair=pair,
@@ -113,8 +115,7 @@ def check_book_path(path: Path | str) -> Path:
         If it does not end in ``.xlsx``.
     """
     path = Path(path)
-    if path.suffix.lower() != ".xlsx":
-        raise InputError(f"{path}: a new workbook must end in .xlsx.")
+    check_ending(path, "a new workbook must end in .xlsx.", ".xlsx")
     return path
 
 

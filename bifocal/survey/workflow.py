@@ -14,7 +14,12 @@ from bifocal.model.pair import Pair, Photo, apply_homography
 from bifocal.survey.check_points import check_points
 from bifocal.survey.georeferencing import georeference
 from bifocal.survey.observations import PointObservations
-from bifocal.survey.orientation_check import OrientationCheck, check_orientation
+from bifocal.survey.orientation_check import (
+    OrientationCheck,
+    check_orientation,
+    with_zoom_centre,
+    zoom_centre_of_points,
+)
 from bifocal.survey.point_survey import solve_points
 from bifocal.survey.reference import CheckResult, Georeference
 from bifocal.survey.relief_table import ReliefTable
@@ -71,8 +76,10 @@ class SolvedSurvey(SurveyContent):
         What the points of the reference plane tell.
     adjusted : bool
         Whether the orientation was corrected by it.
-    overridden : bool
-        Whether options took the place of what the workbook says.
+    correction : ndarray, shape (3, 3), or None
+        Homography that corrected the coordinates in mm of image 2, where the pair is ideal.
+    given : mapping
+        The options that took the place of what the workbook says.
     remarks : tuple of str
         What the user should know.
     """
@@ -86,7 +93,8 @@ class SolvedSurvey(SurveyContent):
     pair_path: Path | None
     orientation_check: OrientationCheck | None
     adjusted: bool
-    overridden: bool
+    correction: FloatArray | None
+    given: Mapping[str, Any]
     remarks: tuple[str, ...]
 
     @property
@@ -187,9 +195,8 @@ def solve(
     >>> survey.table.xyz.round(9).tolist(), survey.table.flags
     ([[2.0, 0.0, 1.0]], ('OK',))
     """
-    given = _checked(
-        d1=d1, d2=d2, c1=c1, c2=c2, pitch=pitch, sigma_s=sigma_s, sigma_r_max=sigma_r_max
-    )
+    lengths = {"d1": d1, "d2": d2, "c1": c1, "c2": c2, "pitch": pitch}
+    given = _checked(**lengths, sigma_s=sigma_s, sigma_r_max=sigma_r_max)
     _checked(sigma_px=sigma_px, scale_tolerance=scale_tolerance)
     judged = tuple(as_rule(rule) for rule in rules) or RULES
     options = ReadOptions(
@@ -220,6 +227,7 @@ def solve(
         *opposite_signs_remark(table, survey.known),
         *world_remarks,
     )
+    asked = {**given, "unit": unit, "pair": pair, "sigma_px": sigma_px, "model": model}
     return SolvedSurvey(
         language=survey.language,
         source=path,
@@ -234,12 +242,13 @@ def solve(
         check=check,
         control=survey.control,
         georeference=world,
-        model=survey.model,
+        model=model or survey.model,
         sensor=setup.sensor,
         limits=setup.limits,
         orientation_check=solved.check,
         adjusted=adjust_setup,
-        overridden=bool(given or unit or pair) or solved.sigma_px not in (None, setup.sigma_px),
+        correction=solved.correction,
+        given={name: value for name, value in asked.items() if value is not None},
         rules=judged,
         remarks=tuple(dict.fromkeys(remarks)),
     )
@@ -287,6 +296,7 @@ class _SolvedPoints:
     setup: SurveySetup | None = None
     sigma_px: float | None = None
     check: OrientationCheck | None = None
+    correction: FloatArray | None = None
     remarks: tuple[str, ...] = ()
 
 
@@ -313,10 +323,11 @@ def _described_pair(setup: SurveySetup, file: Path | None, folder: Path) -> Pair
     if setup.matrices is None or setup.d1 is None or setup.d2 is None:
         return None
     lenses: list[Lens | None] = [None, None]
+    orientation = None
     if file is not None:
         try:
             given = Pair.read(file)
-            lenses = [given.image1.lens, given.image2.lens]
+            lenses, orientation = [given.image1.lens, given.image2.lens], given.orientation
         except InputError:
             lenses = [None, None]
     photos = [
@@ -328,7 +339,7 @@ def _described_pair(setup: SurveySetup, file: Path | None, folder: Path) -> Pair
             strict=True,
         )
     ]  # fmt: skip
-    return Pair(image1=photos[0], image2=photos[1], folder=folder)
+    return Pair(image1=photos[0], image2=photos[1], folder=folder, orientation=orientation)
 
 
 def _solve_pair(
@@ -345,7 +356,8 @@ def _solve_pair(
         sigma, remarks = _sigma_from_misfits(pair, points)
     check = _check_plane(pair, points, (points.pixels1, points.pixels2), sigma, survey, adjust)
     if check is not None and adjust:
-        pair = check.corrected
+        pair, said = _with_centre(check.corrected, points, (points.pixels1, points.pixels2), sigma)
+        remarks = (*remarks, *said)
     return _SolvedPoints(
         points=points,
         table=solve_points(pair, points, sigma_px=sigma, limits=setup.limits),
@@ -354,6 +366,34 @@ def _solve_pair(
         check=check,
         remarks=(*remarks, *(check.remarks if check else ())),
     )
+
+
+def _with_centre(
+    pair: Pair,
+    points: PointObservations,
+    pixels: tuple[FloatArray, FloatArray],
+    sigma_px: float | None,
+) -> tuple[Pair, tuple[str, ...]]:
+    """Return a pair corrected by its plane points with the centre of zoom that the others show."""
+    rows = points.use & ~points.on_plane
+    first, second = (
+        photo.picks(picked[rows], sigma_px)
+        for photo, picked in zip((pair.image1, pair.image2), pixels, strict=True)
+    )
+    variance = sum(np.trace(p.covariance, axis1=1, axis2=2) / 4 for p in (first, second))
+    found = zoom_centre_of_points(
+        pair, np.array(first.positions), np.array(second.positions), np.sqrt(variance)
+    )
+    if found is None:
+        return pair, ()
+    move = found[0] - pair.zoom_centre
+    spread = float(np.sqrt(np.trace(found[1]) / 2))
+    remark = (
+        f"Set-up: relief spreads from a point {1000 * move[0]:+.0f} mm, {1000 * move[1]:+.0f} mm "
+        f"(sigma {1000 * spread:.0f} mm) from the one assumed, as the points off the plane show; "
+        "taken into account."
+    )
+    return with_zoom_centre(pair, found[0]), (remark,)
 
 
 def _check_plane(
@@ -459,16 +499,28 @@ def _solve_ideal(survey: SurveyInput, scale_tolerance: float, *, adjust: bool) -
     measured = setup.in_millimetres(points)
     xy1, xy2 = _all_xy(measured)
     check = _check_plane(pair, points, (xy1, xy2), None, survey, adjust)
+    correction: FloatArray | None = None
     if check is not None:
         remarks += check.remarks
         if adjust:
             scale = pair.image1.plane_from_pixel[0, 0]
-            moved = apply_homography(check.matrix, pair.image2.plane_from_pixels(xy2)) / scale
+            correction = check.matrix @ pair.image2.plane_from_pixel / [[scale], [scale], [1.0]]
+            moved = apply_homography(correction, xy2)
+            if setup.adjusted[1] is not None:
+                correction = correction @ setup.adjusted[1]
             only_theta = points.polar * np.array([np.nan, np.nan, 1.0])
-            points = measured = replace(measured, xy1=xy1, xy2=moved, polar=only_theta)
+            found, said = _with_centre(check.corrected, points, (xy1, xy2), None)
+            # An ideal pair counts from its nadir; relief spreads from the centre of zoom.
+            centre = found.zoom_centre / scale if said else np.zeros(2)
+            points = measured = replace(
+                measured, xy1=xy1 - centre, xy2=moved - centre, polar=only_theta
+            )
             c2 = None if setup.c1 is None else setup.c1 * pair.d2 / pair.d1
-            setup = replace(setup, unit="mm", c2=c2)
+            setup = replace(setup, unit="mm", c2=c2, adjusted=(None, None))
             pair = setup.pair()
+            remarks += said
+            if said:
+                remarks.append("Set-up: coordinates count from the centre of zoom found.")
             remarks.append(
                 "Set-up: image 2 was corrected by the points of the reference plane; its "
                 "coordinates are now in mm at the scale of image 1."
@@ -481,6 +533,7 @@ def _solve_ideal(survey: SurveyInput, scale_tolerance: float, *, adjust: bool) -
         pair=pair,
         setup=setup,
         check=check,
+        correction=correction,
         remarks=tuple(filter(None, remarks)),
     )
 

@@ -14,7 +14,6 @@ from multimedia.adjustment.bundle_equations import (
     BundleState,
     ImageObservations,
     Pose,
-    turn_arm,
 )
 from multimedia.adjustment.unknowns import Adjustment, Unknowns
 from multimedia.media.camera import EXTERIOR, Camera
@@ -23,6 +22,7 @@ from multimedia.projects.model import ObjectPoints, Project
 from photocore.adjustment import Fit, huber_weights
 from photocore.arrays import BoolArray, FloatArray, IntArray
 from photocore.errors import GeometryError, InputError
+from photocore.rotation import skew
 from photocore.similarity import fit_similarity
 
 #: Robust weights settle in a few rounds; more change nothing that matters.
@@ -278,8 +278,8 @@ def _points(bundle: Bundle, result: Fit[BundleState]) -> tuple[ObjectPoints, Flo
     for plate, at in enumerate(place.plates):
         pose = cofactor[np.ix_(list(at.values()), list(at.values()))]
         for j in np.flatnonzero(bundle.plate_of == plate):
-            arm = turn_arm(state.points[j] - state.poses[plate][1])
-            rows = np.concatenate([np.eye(3), arm], axis=1)
+            arm = state.points[j] - state.poses[plate][1]
+            rows = np.concatenate([np.eye(3), -skew(arm)], axis=1)
             covariance[j] = rows @ pose @ rows.T
     control = bundle.project.object_points
     group = dict(zip(control.ids, control.groups, strict=True))

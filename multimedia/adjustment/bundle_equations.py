@@ -19,7 +19,7 @@ from multimedia.projects.model import Project
 from photocore.adjustment import LARGEST, BlockEquations, Fit, fit
 from photocore.arrays import BoolArray, FloatArray, IntArray
 from photocore.errors import GeometryError, InputError
-from photocore.rotation import rotation_from_vector
+from photocore.rotation import by_turn, rotation_from_vector, skew
 
 #: A motion of everything is a datum defect if it moves image points by less than this share of
 #: what its parts would move them on their own.
@@ -198,9 +198,7 @@ class Bundle:
             on = self.plate_of[which] == plate
             arm = points[on] - state.poses[plate][1]
             design.add(lines[on], _columns(pose, EXTERIOR[:3]), by_point[on])
-            # A small turn v moves the point by v x arm: row . (v x arm) = (arm x row) . v.
-            by_turn = np.cross(arm[:, None, :], by_point[on])
-            design.add(lines[on], _columns(pose, EXTERIOR[3:]), by_turn)
+            design.add(lines[on], _columns(pose, EXTERIOR[3:]), by_turn(by_point[on], arm))
         column = place.points[which]
         end, axis = np.nonzero(column >= 0)
         design.add(lines[end, :, 0], column[end, axis][:, None], by_point[end, :, axis])
@@ -322,11 +320,6 @@ def _columns(places: Places, names: tuple[str, ...]) -> list[int]:
 
 def _moved(place: FloatArray, middle: FloatArray, reach: float) -> FloatArray:
     """Return how the seven motions move one place, shape (3, 7)."""
-    x, y, z = (place - middle) / reach
-    return np.concatenate([np.eye(3), turn_arm((x, y, z)), np.array([[x], [y], [z]])], axis=1)
-
-
-def turn_arm(arm: ArrayLike) -> FloatArray:
-    """Return what a small turn v moves the end of an arm by: ``turn_arm(arm) @ v``, (3, 3)."""
-    x, y, z = np.asarray(arm)
-    return np.array([[0.0, z, -y], [-z, 0.0, x], [y, -x, 0.0]])
+    arm = (place - middle) / reach
+    # A small turn v moves the end of an arm by v x arm.
+    return np.column_stack([np.eye(3), -skew(arm), arm])

@@ -13,9 +13,10 @@ from multimedia.adjustment.unknowns import Adjustment, ScaleBar, Unknowns
 from multimedia.projects.project_file import read_project, write_project
 from multimedia.refraction.water import salinity_from_index, water_index_derivatives
 from photocore.errors import InputError
-from photocore.output import check_all_writable
+from photocore.output import all_or_none, check_all_writable, check_ending
 
 
+@all_or_none()
 def adjust_project(
     source: Path,
     unknowns: Unknowns,
@@ -31,8 +32,8 @@ def adjust_project(
     result : Adjustment
     remarks : tuple of str
     """
-    if out is not None and report is not None and out.resolve() == report.resolve():
-        raise InputError(f"{out}: is named for the project and for the report; name two files.")
+    check_ending(out, "a project is written as .toml.", ".toml")
+    check_ending(report, "a report is written as .html.", ".html")
     check_all_writable(out, report, overwrite=overwrite)
     project = read_project(source)
     result = bundle_adjust(project, unknowns)

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from multimedia.media.height_field import HeightField
 from multimedia.media.surfaces import Plane
 from multimedia.refraction.layers import checked_index
-from photocore.arrays import FloatArray, IntArray, as_floats
+from photocore.arrays import FloatArray, IntArray, as_floats, not_negative
 from photocore.errors import GeometryError, InputError
 from photocore.labelled import LabelledCode
 
@@ -53,9 +53,7 @@ class Precision:
 
     def __post_init__(self) -> None:
         for name in ("index", "level", "point"):
-            value = float(as_floats(getattr(self, name), f"sigma of the {name}"))
-            if not 0 <= value < np.inf:
-                raise InputError(f"sigma of the {name}: must be zero or more, got {value}.")
+            not_negative(getattr(self, name), f"sigma of the {name}")
 
     @property
     def is_given(self) -> bool:

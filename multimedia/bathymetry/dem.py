@@ -25,10 +25,20 @@ class Dem(RasterFile):
     ----------
     remarks : list of str
         What the user should know about the file.
+
+    Raises
+    ------
+    InputError
+        If it is a picture.
     """
 
     def __init__(self, path: Path | str, *, nodata: float | None = None) -> None:
         super().__init__(path, nodata=nodata)
+        if self.dtype == np.uint8 and self.bands > 2:
+            raise InputError(
+                f"{path}: is a picture of {self.bands} bands, expected a raster of heights [m] in "
+                "its band 1."
+            )
         self._unmarked = self.nodata is None and not self.masked
         name = self.path.name
         told = {

@@ -17,7 +17,7 @@ from multimedia.bathymetry.corrected_points import (
 from multimedia.media.ray_tracing import trace_rays
 from multimedia.media.surface_sequence import SurfaceSequence
 from photocore.arrays import BoolArray, FloatArray, IntArray, as_points
-from photocore.errors import InputError
+from photocore.errors import InputError, located
 
 #: Two rays of a smaller angle do not fix a point. [rad]
 SMALLEST_ANGLE = 1e-4
@@ -201,7 +201,8 @@ def correct_lidar_beams(
     shape = echo.shape
     start, echo = start.reshape(-1, 3), echo.reshape(-1, 3)
     surface, n_water = as_water_surface(water_level), checked_water_index(index)
-    slowed = n_water if group_index is None else checked_water_index(group_index)
+    with located("" if group_index is None else "group index"):
+        slowed = n_water if group_index is None else checked_water_index(group_index)
     finite = np.asarray(np.isfinite(start + echo).all(-1))
     offset = np.round(echo[finite].mean(0)) if finite.any() else np.zeros(3)
     start, echo, local = start - offset, echo - offset, surface.shifted(-offset)

@@ -25,6 +25,7 @@ from multimedia.media.collinearity import Medium, shifts
 from multimedia.media.ray_tracing import aim_rays
 from multimedia.media.surface_sequence import SurfaceSequence
 from multimedia.media.surfaces import Plane
+from multimedia.refraction.layers import Layers
 from photocore.arrays import BoolArray, FloatArray, IntArray, as_points
 from photocore.errors import GeometryError, InputError
 
@@ -272,7 +273,7 @@ def _pointing(
     # A point that Newton lifts out of the water for a moment is treated as if just under it.
     above = vectors @ up + height * (1 + JUST_UNDER)
     vectors -= np.maximum(above, 0.0)[:, None] * up
-    medium = Medium(normal=up, height=height, thicknesses=(), indices=(1.0, task.n_water))
+    medium = Medium(normal=up, height=height, layers=Layers(indices=(1.0, task.n_water)))
     shift = shifts(vectors, medium, media=False)
     ray = vectors + shift.g[:, None] * up
     length = np.sqrt((ray * ray).sum(-1))[:, None]

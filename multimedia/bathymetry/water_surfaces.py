@@ -5,17 +5,17 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from multimedia.bathymetry.corrected_points import WaterSurface
 from multimedia.bathymetry.dem import Dem
 from multimedia.media.height_field import RasterSurface
 from multimedia.media.mesh_surface import MeshSurface
 from multimedia.media.surfaces import Plane
+from photocore.arrays import is_finite_number
 from photocore.cloud.ply import read_ply_mesh
-from photocore.errors import InputError
+from photocore.errors import LARGEST, InputError
 from photocore.jsonfile import read_object
 from photocore.raster import Window
+from photocore.textfile import check_name
 
 FORMAT = "multimedia-waterlevel/1"
 #: A water surface of more cells is coarser than it looks: averaging it down loses nothing.
@@ -43,7 +43,7 @@ def read_water_surface(given: str, *, crs: Any = None) -> WaterSurface:
     except ValueError:
         height = None
     if height is not None:
-        if not np.isfinite(height):
+        if not abs(height) <= LARGEST:
             raise InputError(f"water level: {given} is no height; give metres.")
         return Plane.level(height)
     path = Path(given)
@@ -56,6 +56,7 @@ def read_water_surface(given: str, *, crs: Any = None) -> WaterSurface:
     if kind == ".json":
         return _read_fitted(path)
     if kind == ".ply":
+        check_name(path)
         if not path.is_file():
             raise InputError(f"{path}: no such water surface.")
         vertices, triangles = read_ply_mesh(path)
@@ -78,10 +79,12 @@ def read_water_surface(given: str, *, crs: Any = None) -> WaterSurface:
 def _read_fitted(path: Path) -> Plane:
     value = read_object(path, what="water level file")
     try:
-        level, (x, y) = float(value["level"]), value["centre"]
-        slope_x, slope_y = value["slope"]
+        level, (x, y) = value["level"], value["centre"]
+        slope_x, slope_y = slope = value["slope"]
+        if not all(is_finite_number(v) and abs(v) <= LARGEST for v in (level, x, y, *slope)):
+            raise TypeError
         return Plane(
-            point=(float(x), float(y), level),  # type: ignore[arg-type]
+            point=(float(x), float(y), float(level)),  # type: ignore[arg-type]
             normal=(-float(slope_x), -float(slope_y), 1.0),  # type: ignore[arg-type]
         )
     except (KeyError, TypeError, ValueError):

@@ -10,9 +10,8 @@ import numpy as np
 from multimedia.bathymetry.mean_water_level import WaterLevel, mean_water_level
 from multimedia.bathymetry.water_surfaces import FORMAT
 from photocore.cloud import open_cloud
-from photocore.errors import InputError
 from photocore.jsonfile import write_object
-from photocore.output import check_all_writable
+from photocore.output import check_all_writable, check_ending
 
 #: A level whose standard deviation exceeds this is no level of a lab or a river: millimetres? [m]
 COARSEST = 1.0
@@ -58,8 +57,7 @@ def fit_water_level(
         If the file cannot be read or shows no water surface.
     """
     check_all_writable(target, overwrite=overwrite)
-    if target is not None and target.suffix.lower() != ".json":
-        raise InputError(f"{target}: a water level is written as .json.")
+    check_ending(target, "a water level is written as .json.", ".json")
     cloud = open_cloud(source)
     points = np.concatenate([piece.xyz for piece in cloud.pieces()])
     fitted = FittedLevel(

@@ -31,8 +31,8 @@ from photocore.arrays import BoolArray, FloatArray
 from photocore.cli import Progress, no_progress
 from photocore.cloud import open_cloud
 from photocore.cloud.model import Cloud, CloudPiece
-from photocore.errors import GeometryError, InputError
-from photocore.output import check_writable
+from photocore.errors import GeometryError, InputError, located
+from photocore.output import check_ending, check_writable
 from photocore.raster import Window
 from photocore.tables import write_csv
 
@@ -68,7 +68,7 @@ def correct_file(job: Job, *, progress: Progress = no_progress) -> Outcome:
             f"--index: {job.index:g} is no water's; relative to the air water has {lowest:g} to "
             f"{highest:g} (`multimedia index` computes it)."
         )
-    if job.source.resolve() == job.target.resolve():
+    if job.source.exists() and job.target.exists() and job.source.samefile(job.target):
         raise InputError(f"{job.target}: is the input itself; name another file for --out.")
     if job.rays:
         return _correct_rays(job)
@@ -118,7 +118,8 @@ def _correct_cloud(job: Job, progress: Progress) -> Outcome:
             write(piece, result.xyz, dict(zip(gained, (status, result.depth, *sigma), strict=True)))
             done += len(piece.xyz)
             progress(done, done + 1, f"{done} points")
-        outcome.judge(surface, allow_dry=job.allow_dry)
+        with located(job.source):
+            outcome.judge(surface, allow_dry=job.allow_dry)
     return outcome
 
 
@@ -240,8 +241,7 @@ def _sensor_positions(job: Job, cloud: Cloud) -> Callable[[CloudPiece], FloatArr
 
 def _correct_dem(job: Job, progress: Progress) -> Outcome:
     """Correct an elevation model window by window."""
-    if job.target.suffix.lower() not in (".tif", ".tiff"):
-        raise InputError(f"{job.target}: a DEM is written as .tif.")
+    check_ending(job.target, "a DEM is written as .tif.", ".tif", ".tiff")
     if job.beams or job.visibility:
         raise InputError(
             f"{job.source}: cells of a DEM have no beams and no names; --beams, --trajectory and "
@@ -281,7 +281,8 @@ def _correct_dem(job: Job, progress: Progress) -> Outcome:
                 )
                 write(window, bands_of)
                 progress(number, len(windows), "DEM windows")
-            outcome.judge(surface, allow_dry=job.allow_dry)
+            with located(job.source):
+                outcome.judge(surface, allow_dry=job.allow_dry)
         outcome.remarks[:0] = dem.remarks
     return outcome
 
@@ -347,8 +348,7 @@ def _correct_window(
 
 def _correct_rays(job: Job) -> Outcome:
     """Refract and intersect a table of measured rays."""
-    if job.target.suffix.lower() != ".csv":
-        raise InputError(f"{job.target}: intersected rays are written as .csv.")
+    check_ending(job.target, "intersected rays are written as .csv.", ".csv")
     table = read_rays(job.source)
     surface = read_water_surface(job.water_level)
     points = intersect_refracted_rays(
@@ -361,7 +361,8 @@ def _correct_rays(job: Job) -> Outcome:
     outcome = Outcome()
     depth = np.maximum(surface.height_at(points.xyz[:, :2]) - points.xyz[:, 2], 0.0)
     outcome.add(points.xyz, CorrectedPoints(xyz=points.xyz, depth=depth, status=points.status))
-    outcome.judge(surface, allow_dry=job.allow_dry)
+    with located(job.source):
+        outcome.judge(surface, allow_dry=job.allow_dry)
     columns = {
         "id": list(table.ids),
         **dict(zip("XYZ", points.xyz.T, strict=True)),

@@ -77,6 +77,8 @@ def command(
     from multimedia.adjustment import workflow as adjust
     from multimedia.adjustment.unknowns import Unknowns
 
+    if (wavelength is None) != (temperature is None):
+        raise click.UsageError("the salinity needs both --wavelength and --temperature.")
     unknowns = Unknowns(
         fixed_cameras=fix_camera, plates=plate, **choices,
         scale_bars=tuple(adjust.parse_scale_bar(text) for text in scale_bar),

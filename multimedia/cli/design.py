@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from photocore.cli import print_result, tell_written, text_table
-from photocore.options import FILE, POSITIVE, Number, Numbers, Size, as_json, number, overwrite
+from photocore.options import FILE, FOCAL, Number, Numbers, Size, as_json, number, overwrite
 
 if TYPE_CHECKING:
     from multimedia.design.studies import Design
@@ -26,7 +26,7 @@ Examples:
 @click.command(epilog=EXAMPLE)
 @click.argument("project", required=False, type=FILE)
 @click.option(
-    "--cameras", "count", type=click.IntRange(min=1), default=4, show_default=True,
+    "--cameras", "count", type=click.IntRange(1, 100), default=4, show_default=True,
     help="Cameras on the cone.",
 )  # fmt: skip
 @number("--distance", "M", "From the last face to each camera [m].")
@@ -34,7 +34,7 @@ Examples:
     "--half-angle", type=Number(above=0, below=90, to=radians), default=30.0, show_default=True,
     help="Half opening of the cone of cameras, in air [deg].",
 )  # fmt: skip
-@click.option("--c", "principal_distance", type=POSITIVE, help="Principal distance [mm].")
+@click.option("--c", "principal_distance", type=FOCAL, help="Principal distance [mm].")
 @click.option(
     "--indices", type=Numbers(above=0), default="1,1.337", show_default=True,
     help="Refractive indices from camera to object.",
@@ -43,12 +43,12 @@ Examples:
     "--thicknesses", type=Numbers(least=0), default="",
     help="Of media between [m].  [default: none]",
 )  # fmt: skip
-@click.option("--extent", type=Size(least=0), help="Width x height of the object space [m].")
+@click.option("--extent", type=Size(above=0), help="Width x height of the object space [m].")
 @click.option(
     "--depths", type=Size(), metavar="LEASTxLARGEST", help="Depths of the object space [m]."
 )
 @click.option(
-    "--sigma", "sigma_image", type=POSITIVE, default=0.001, show_default=True,
+    "--sigma", "sigma_image", type=Number(above=0, most=1), default=0.001, show_default=True,
     help="Precision of an image coordinate [mm].",
 )  # fmt: skip
 @click.option(
@@ -70,7 +70,14 @@ def command(
     """
     from multimedia.design import workflow as design
 
+    design.check_outputs(out, plot, overwrite=overwrite)
     if project is not None:
+        context = click.get_current_context()
+        for name in ring:
+            if context.get_parameter_source(name) is click.core.ParameterSource.COMMANDLINE:
+                raise click.UsageError(
+                    "cameras come from the PROJECT file or from options; give one of them."
+                )
         result = design.design_project(project, seed=seed)
     else:
         needed = {"--distance": "distance", "--c": "principal_distance", "--extent": "extent",

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from photocore.cli import print_result, tell_written, text_table
-from photocore.options import FILE, THOUSANDTHS, Numbers, as_json, number, overwrite
+from photocore.options import FILE, THOUSANDTHS, Number, Numbers, as_json, number, overwrite
 
 if TYPE_CHECKING:
     from multimedia.orientation.epipolar_workflow import EpipolarResult
@@ -37,8 +37,8 @@ Examples:
     "object points and a quarter more]",
 )  # fmt: skip
 @click.option(
-    "--chord", "chord_error", type=THOUSANDTHS, default=0.5, show_default=True,
-    metavar="UM", help="Largest distance between curve and polygon [um].",
+    "--chord", "chord_error", type=Number(above=0, least=1e-3, to=THOUSANDTHS.to), default=0.5,
+    show_default=True, metavar="UM", help="Largest distance between curve and polygon [um].",
 )  # fmt: skip
 @click.option(
     "--vertices",
@@ -63,6 +63,8 @@ def command(
     whose chords stay within --chord. The image points of the other camera near it are listed with
     the object point each of them would give.
     """
+    if options["photo"] is not None and picture is None:
+        raise click.UsageError("--photo goes under a picture; give --picture as well.")
     from multimedia.orientation.epipolar_workflow import epipolar_project
 
     result = epipolar_project(project, out=out, picture=picture, **options)

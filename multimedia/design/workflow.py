@@ -27,10 +27,13 @@ from multimedia.projects.project_file import read_project
 from multimedia.refraction.layers import Layers
 from photocore.arrays import FloatArray
 from photocore.errors import GeometryError, InputError
-from photocore.output import check_all_writable
+from photocore.output import all_or_none, check_all_writable, check_ending
+from photocore.workbook.newbook import check_new_workbook
 
 #: A millimetre in the units that projects use.
 MILLIMETRE = {"m": 1e-3, "cm": 0.1, "mm": 1.0}
+#: No object space is larger, in distances of the cameras: it would be seen at no angle.
+FARTHEST = 1000.0
 
 
 def design_ring(
@@ -48,6 +51,16 @@ def design_ring(
     unit: str = "m",
 ) -> Design:
     """Study cameras on a cone above a water surface or a glass; arguments as in the solvers."""
+    if not 0 <= depths[0] < depths[1]:
+        raise InputError(
+            f"depths: {depths[0]:g} to {depths[1]:g}: give the least and the largest depth under "
+            "the last face, positive downwards."
+        )
+    if max(*extent, depths[1]) > FARTHEST * distance:
+        raise InputError(
+            f"extent, depths: the object space is more than {FARTHEST:g} times as large as the "
+            f"distance of the cameras, {distance:g}; check the units."
+        )
     interface = FlatInterface(layers=Layers(indices=tuple(indices), thicknesses=tuple(thicknesses)))
     points = object_grid(extent, depths)
     cameras = ring_of_cameras(
@@ -171,9 +184,19 @@ def _by_depth(study: Study) -> FloatArray:
     return np.array(rows)
 
 
+def check_outputs(out: Path | None, plot: Path | None, *, overwrite: bool) -> None:
+    """Refuse what `write_design` could not write; call it before the work."""
+    check_ending(out, "a study is written as .xlsx.", ".xlsx")
+    check_ending(plot, "a study is drawn as .png, .svg or .pdf.", ".png", ".svg", ".pdf")
+    if out is not None:
+        check_new_workbook(out, overwrite=overwrite)
+    check_all_writable(out, plot, overwrite=overwrite)
+
+
+@all_or_none()
 def write_design(design: Design, *, out: Path | None, plot: Path | None, overwrite: bool) -> None:
     """Write the workbook and the picture where asked."""
-    check_all_writable(out, plot, overwrite=overwrite)
+    check_outputs(out, plot, overwrite=overwrite)
     if out is not None:
         write_design_workbook(out, design, overwrite=overwrite)
     if plot is not None:

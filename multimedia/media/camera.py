@@ -14,6 +14,7 @@ from photocore.distortion import Brown
 from photocore.errors import GeometryError, InputError
 from photocore.rotation import (
     angles_from_rotation,
+    checked_rotation,
     rotation_from_vector,
     rotation_vector_from_angle_rates,
     world_from_camera,
@@ -58,7 +59,10 @@ class Sensor:
     def __post_init__(self) -> None:
         set_ = object.__setattr__
         for name in ("width", "height"):
-            set_(self, name, round(positive(getattr(self, name), f"sensor {name}", unit="px")))
+            size = positive(getattr(self, name), f"sensor {name}", unit="px")
+            if size != round(size):
+                raise InputError(f"sensor {name}: must be a whole number of pixels, got {size:g}.")
+            set_(self, name, round(size))
         pitch = np.broadcast_to(as_floats(self.pitch, "pitch"), (2,))
         if not (pitch > 0).all():
             raise InputError(f"pitch: a pixel is {pitch} mm wide and high; both must be above 0.")
@@ -124,18 +128,7 @@ class Camera:
     def __post_init__(self) -> None:
         set_ = object.__setattr__
         who = f"camera {self.name}: " if self.name else ""
-        rotation = read_only(self.rotation, f"{who}rotation", shape=(3, 3))
-        if not (np.abs(rotation @ rotation.T - np.eye(3)) <= 1e-6 + 1e-5 * np.eye(3)).all():
-            raise GeometryError(
-                f"{who}rotation is not a rotation matrix: its rows must be unit vectors at right "
-                "angles. Check the nine numbers, or give the three angles."
-            )
-        if np.linalg.det(rotation) < 0:
-            raise GeometryError(
-                f"{who}rotation mirrors the world: one of the coordinate systems is left-handed. "
-                "Exchange two axes or change the sign of one."
-            )
-        set_(self, "rotation", rotation)
+        set_(self, "rotation", checked_rotation(self.rotation, f"{who}rotation"))
         set_(self, "centre", read_only(self.centre, f"{who}centre", shape=(3,)))
         distance = positive(self.principal_distance, f"{who}principal_distance", unit="mm")
         set_(self, "principal_distance", distance)
@@ -227,6 +220,11 @@ class Camera:
     def looks_along(self) -> FloatArray:
         """Unit vector of the viewing direction in the world, shape (3,)."""
         return -self.rotation[:, 2]
+
+    def vectors_to(self, points: FloatArray) -> FloatArray:
+        """Return the vectors from the projection centre in the camera frame, shape (..., 3)."""
+        vectors: FloatArray = (points - self.centre) @ self.rotation
+        return vectors
 
     def value(self, name: str) -> float:
         """Return the parameter of `EXTERIOR` or `INTERIOR` called ``name``."""

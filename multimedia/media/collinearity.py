@@ -26,6 +26,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from multimedia.refraction.layers import Layers
 from multimedia.refraction.shift import shift_ratio
 from photocore.arrays import FloatArray
 
@@ -41,21 +42,18 @@ class Medium:
     height : float or ndarray, shape (n,)
         Height of the projection centre above the last face; one per point where the points are
         seen from several centres.
-    thicknesses : tuple of float
-        Of the layers between the first and the last medium.
-    indices : tuple of float
+    layers : Layers
         From the camera's medium to the object's.
     """
 
     normal: FloatArray
     height: float | FloatArray
-    thicknesses: tuple[float, ...]
-    indices: tuple[float, ...]
+    layers: Layers
 
     @property
     def first_height(self) -> float | FloatArray:
         """Height of the projection centre above the first face (Maas' Z0)."""
-        return self.height - sum(self.thicknesses)
+        return self.height - self.layers.thickness
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -125,7 +123,7 @@ def shifts(vectors: FloatArray, medium: Medium, *, media: bool = True) -> Shifts
     w = vectors @ medium.normal
     rho2, q, heights = _inverse_ratio(vectors, w, medium)
     whole = -w
-    n = medium.indices
+    n = medium.layers.indices
     with np.errstate(all="ignore"):
         # tan(beta_1) = R_bar / whole = rho / (q whole), and the invariant from it.
         tan2 = rho2 / (q * whole) ** 2
@@ -190,7 +188,7 @@ def rays_in_object_space(directions: FloatArray, medium: Medium) -> tuple[FloatA
         Unit vectors in the last medium. NaN for rays away from the interface and after total
         reflection.
     """
-    m, n = medium.normal, medium.indices
+    m, n = medium.normal, medium.layers.indices
     unit = directions / np.sqrt(np.einsum("ni,ni->n", directions, directions))[:, None]
     cosine = -(unit @ m)
     # Snell: n_i times the component along the interface is the same in every medium.
@@ -198,7 +196,7 @@ def rays_in_object_space(directions: FloatArray, medium: Medium) -> tuple[FloatA
     along2 = np.einsum("ni,ni->n", along, along)
     with np.errstate(invalid="ignore", divide="ignore"):
         travel = medium.first_height / np.where(cosine > 0, n[0] * cosine, np.nan)
-        for index, thickness in zip(n[1:-1], medium.thicknesses, strict=True):
+        for index, thickness in zip(n[1:-1], medium.layers.thicknesses, strict=True):
             travel += thickness / np.sqrt(index**2 - along2)
         last = np.sqrt(n[-1] ** 2 - along2)
     origins = travel[:, None] * along - medium.height * m
@@ -215,10 +213,11 @@ def _inverse_ratio(
     below = depth >= 0
     if not below.all():
         depth = np.where(below, depth, np.nan)
-    heights: list[FloatArray | float] = [medium.first_height, *medium.thicknesses, depth]
+    indices = medium.layers.indices
+    heights: list[FloatArray | float] = [medium.first_height, *medium.layers.thicknesses, depth]
     if below.all():
-        return rho2, 1.0 / shift_ratio(np.sqrt(rho2), heights, medium.indices), heights
+        return rho2, 1.0 / shift_ratio(np.sqrt(rho2), heights, indices), heights
     q = np.full_like(w, np.nan)
     inside = [h[below] if isinstance(h, np.ndarray) else h for h in heights]
-    q[below] = 1.0 / shift_ratio(np.sqrt(rho2[below]), inside, medium.indices)
+    q[below] = 1.0 / shift_ratio(np.sqrt(rho2[below]), inside, indices)
     return rho2, q, heights

@@ -84,6 +84,15 @@ class FlatInterface(OpticalMedia):
         )
 
     @property
+    def remarks(self) -> tuple[str, ...]:
+        """What is odd about the layers."""
+        return self.layers.remarks
+
+    def mirror_normal(self, points: FloatArray) -> FloatArray:  # noqa: ARG002
+        """Return a direction in the faces: mirrored along them, points stay beyond them."""
+        return self.tangents[0]
+
+    @property
     def tangents(self) -> FloatArray:
         """Two unit vectors in the faces, at right angles, shape (2, 3)."""
         return tangents_of(self.normal)
@@ -139,16 +148,11 @@ class FlatInterface(OpticalMedia):
                 f"layers are {thickness:g} thick. Check the signs of the normal (it points from "
                 "the object to the camera) and the units of centre, point and thicknesses."
             )
-        return Medium(
-            normal=normal,
-            height=height,
-            thicknesses=tuple(self.layers.thicknesses),
-            indices=tuple(self.layers.indices),
-        )
+        return Medium(normal=normal, height=height, layers=self.layers)
 
     def apparent_vectors(self, camera: Camera, points: FloatArray) -> FloatArray:
         """Return the vectors to the points, raised along the normal."""
-        return image_vectors((points - camera.centre) @ camera.rotation, self.medium(camera))
+        return image_vectors(camera.vectors_to(points), self.medium(camera))
 
     def seen_from_afar(self, points: FloatArray) -> FloatArray | None:
         """Return where points seem to be along the normal; None if that moves with the camera."""
@@ -163,7 +167,7 @@ class FlatInterface(OpticalMedia):
     def seen(self, camera: Camera, points: FloatArray) -> tuple[FloatArray, NDArray[np.object_]]:
         """Return `apparent_vectors`, and which points lie before the last face."""
         medium = self.medium(camera)
-        vectors = (points - camera.centre) @ camera.rotation
+        vectors = camera.vectors_to(points)
         before = vectors @ medium.normal + medium.height > 0
         reasons = np.where(before, "before the interface", "").astype(object)
         return image_vectors(vectors, medium), reasons
@@ -178,7 +182,7 @@ class FlatInterface(OpticalMedia):
     ) -> Sight:
         """Return the vectors of `apparent_vectors` with analytic derivatives."""
         medium = self.medium(camera)
-        vectors = (points - camera.centre) @ camera.rotation
+        vectors = camera.vectors_to(points)
         shift = shifts(vectors, medium, media=bool(names))
         seen = vectors + shift.g[:, None] * medium.normal
 

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from multimedia.media.surfaces import RefractingSurface
-from photocore.arrays import BoolArray, FloatArray, as_floats, as_points, read_only
+from photocore.arrays import BoolArray, FloatArray, as_floats, as_points, positive, read_only
 from photocore.errors import InputError
 
 #: Newton reaches the last digit in 4 to 7 steps; bisection from 1 km needs 60.
@@ -233,9 +233,7 @@ class WaveSurface(HeightField):
         phase: float = 0.0,
     ) -> WaveSurface:
         """Return one wave; ``direction`` of travel clockwise from +Y, both angles in rad."""
-        if not wavelength > 0:
-            raise InputError(f"wavelength: must be above zero, got {wavelength}.")
-        number = 2 * np.pi / wavelength
+        number = 2 * np.pi / positive(wavelength, "wavelength")
         vector = (number * np.sin(direction), number * np.cos(direction))
         return cls(level=level, amplitude=amplitude, wave_vector=vector, phase=phase)  # type: ignore[arg-type]
 

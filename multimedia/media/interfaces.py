@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -13,10 +13,11 @@ from multimedia.media.optical_media import OpticalMedia, Sight, SightDerivatives
 from multimedia.media.ray_paths import RayStatus
 from multimedia.media.ray_tracing import aim_rays, trace_rays
 from multimedia.media.surface_sequence import SurfaceSequence
-from multimedia.media.surfaces import Plane, RefractingSurface, RigidSurface
+from multimedia.media.surfaces import Plane, RefractingSurface
 from multimedia.refraction.layers import Layers
 from photocore.arrays import FloatArray, read_only
-from photocore.errors import GeometryError, InputError
+from photocore.errors import InputError
+from photocore.rotation import checked_rotation, skew
 
 #: Step of central differences as a share of the distance: paths are exact to 1e-13 of the scene,
 #: so differences are good to 1e-8.
@@ -61,11 +62,8 @@ class Interfaces(SurfaceSequence, OpticalMedia):
                 f"found {len(self.with_camera)}."
             )
         for surface, moves in zip(self.surfaces, self.with_camera, strict=True):
-            if moves and not isinstance(surface, RigidSurface):
-                raise GeometryError(
-                    f"with_camera: a {type(surface).__name__} stands still in the object frame; "
-                    "only a Plane, Sphere or Cylinder can be fixed to the camera."
-                )
+            if moves:
+                surface.moved(np.eye(3), np.zeros(3))  # refuses what is not rigid
 
     @classmethod
     def flat_water(cls, level: float, *, index: float, air: float = 1.0) -> Interfaces:
@@ -113,33 +111,22 @@ class Interfaces(SurfaceSequence, OpticalMedia):
 
         Raises
         ------
-        InputError
+        GeometryError
             If the matrix is not a rotation (a scale, or a mirrored frame).
         """
-        rotation = read_only(world_from_camera, "world_from_camera", shape=(3, 3))
+        rotation = checked_rotation(world_from_camera, "world_from_camera", tolerance=1e-9)
         translation = read_only(centre, "centre", shape=(3,))
-        if not (
-            np.allclose(rotation @ rotation.T, np.eye(3), atol=1e-9) and np.linalg.det(rotation) > 0
-        ):
-            raise InputError("world_from_camera: not a rotation matrix (orthogonal, det = +1).")
         surfaces = tuple(
-            surface.moved(rotation, translation)
-            if moves and isinstance(surface, RigidSurface)
-            else surface
+            surface.moved(rotation, translation) if moves else surface
             for surface, moves in zip(self.surfaces, self.with_camera, strict=True)
         )
         return Interfaces(surfaces=surfaces, indices=self.indices)
 
-    def with_indices(self, indices: Sequence[float]) -> Interfaces:
-        """Return the same surfaces between other media."""
-        return replace(self, indices=tuple(indices))
-
-    def apparent_vectors(self, camera: Camera, points: FloatArray) -> FloatArray:
-        """Return vectors as long as those to the points, along the rays that reach them."""
-        return self.seen(camera, points)[0]
-
     def seen(self, camera: Camera, points: FloatArray) -> tuple[FloatArray, NDArray[np.object_]]:
-        """Return `apparent_vectors`, and the label of the ray's `RayStatus` where there is none."""
+        """Return vectors as long as those to the points, along the rays that reach them.
+
+        Where there is no ray, also the label of its `RayStatus`.
+        """
         fixed = self.seen_from(camera.centre, camera.rotation)
         paths = aim_rays(camera.centre, points, fixed)
         labels = np.array(["", *(code.label for code in RayStatus if code)], dtype=object)
@@ -190,24 +177,22 @@ class Interfaces(SurfaceSequence, OpticalMedia):
         distances = np.linalg.norm(points - camera.centre, axis=1)
         distance = float(np.median(distances)) if len(points) else 1.0
 
-        def changed(names: tuple[str, ...], size: float) -> FloatArray:
-            def by(name: str) -> FloatArray:
-                def at(step: float) -> FloatArray:
-                    values = [step * (other == name) for other in EXTERIOR]
-                    return self._directions(camera.stepped(EXTERIOR, values), points)
+        def changed(steps: FloatArray) -> FloatArray:
+            def at(sign: float, step: FloatArray) -> FloatArray:
+                return self._directions(camera.stepped(EXTERIOR, sign * step), points)
 
-                return _difference(at, size)
-
-            return np.stack([by(name) for name in names], axis=-1)
+            sizes = np.linalg.norm(steps, axis=1)
+            both = [(at(1.0, step) - at(-1.0, step)) / 2.0 for step in steps]
+            return np.stack(both, axis=-1) / sizes
 
         # R^T d turns by R^T (d x v): d is the ray where the interfaces stand still, the vector to
         # the point where they turn with the camera.
         by_turn: FloatArray
-        by_centre, by_turn = -by_point, by_point @ _crossed(points - camera.centre)
+        by_centre, by_turn = -by_point, by_point @ skew(points - camera.centre)
         if not all(self.with_camera):
-            by_centre = changed(EXTERIOR[:3], STEP * distance)
-            turned = camera.rotation.T @ _crossed(directions)
-            by_turn = changed(EXTERIOR[3:], STEP) if any(self.with_camera) else turned
+            by_centre = changed(STEP * distance * np.eye(6)[:3])
+            turned = camera.rotation.T @ skew(directions)
+            by_turn = changed(STEP * np.eye(6)[3:]) if any(self.with_camera) else turned
         return np.concatenate([by_centre, by_turn], axis=-1)
 
     def _by_index(self, camera: Camera, points: FloatArray, name: str) -> FloatArray:
@@ -229,11 +214,6 @@ class Interfaces(SurfaceSequence, OpticalMedia):
             here, one, two = at(0.0), at(STEP), at(2 * STEP)
             return (4.0 * one - 3.0 * here - two) / (2 * STEP)
         return _difference(at, STEP)
-
-
-def _crossed(vectors: FloatArray) -> FloatArray:
-    """Return the matrices whose columns are v x e_k, shape (n, 3, 3)."""
-    return np.cross(vectors[:, None, :], np.eye(3)).transpose(0, 2, 1)
 
 
 def _difference(function: Callable[[float], FloatArray], size: float) -> FloatArray:

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from multimedia.media.camera import Camera
 from photocore.arrays import FloatArray
 from photocore.errors import InputError
+from photocore.rotation import by_turn
 
 
 class SightDerivatives(NamedTuple):
@@ -56,9 +57,22 @@ class OpticalMedia(ABC):
             raise InputError(f"interface parameter {names[0]}: these media have none to estimate.")
         return self
 
-    @abstractmethod
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """What is odd about the media, in words; nothing unless a subclass says so."""
+        return ()
+
     def apparent_vectors(self, camera: Camera, points: FloatArray) -> FloatArray:
         """Return where points seem to be: vectors in the camera frame, (n, 3); NaN if unseen."""
+        return self.seen(camera, points)[0]
+
+    def mirror_normal(self, points: FloatArray) -> FloatArray:
+        """Return a unit vector along which to mirror points so that they stay in their medium.
+
+        Where nothing is known of the faces, the direction in which the points spread most.
+        """
+        normal: FloatArray = np.linalg.svd(points - points.mean(axis=0))[2][0]
+        return normal
 
     def seen_from_afar(self, points: FloatArray) -> FloatArray | None:  # noqa: ARG002
         """Return where points seem to be to any camera far away, (n, 3); None where that varies."""
@@ -109,8 +123,7 @@ class StraightRays(OpticalMedia):
 
     def apparent_vectors(self, camera: Camera, points: FloatArray) -> FloatArray:
         """Return the vectors to the points themselves."""
-        vectors: FloatArray = (points - camera.centre) @ camera.rotation
-        return vectors
+        return camera.vectors_to(points)
 
     def seen(self, camera: Camera, points: FloatArray) -> tuple[FloatArray, NDArray[np.object_]]:
         """Return the vectors; nothing is in the way."""
@@ -163,11 +176,8 @@ def by_pose(
     by_point = (by_vector.reshape(-1, 3) @ camera.rotation.T).reshape(-1, 2, 3)
     if turning is None:
         return by_point, np.empty((len(by_point), 2, 0))
-    # Turning the camera by a small vector v of the world: R^T d changes by R^T (d x v), and
-    # row . (a x v) = (row x a) . v in the camera frame; then v back to the world.
+    # Turning the camera by a small vector v of the world: R^T d changes by R^T (d x v), as
+    # turning -d by v would; then v back from the camera frame to the world.
     turned, vectors = turning
-    x, y, z = vectors.T[:, :, None]
-    by_x, by_y, by_z = np.moveaxis(turned, -1, 0)
-    # numpy's cross takes several times as long for few points.
-    by_turn = np.stack([by_y * z - by_z * y, by_z * x - by_x * z, by_x * y - by_y * x], axis=-1)
-    return by_point, np.concatenate([-by_point, by_turn @ camera.rotation.T], axis=-1)
+    by_vector = by_turn(turned, -vectors) @ camera.rotation.T
+    return by_point, np.concatenate([-by_point, by_vector], axis=-1)

@@ -13,6 +13,7 @@ from multimedia.media.flat_interface import FlatInterface
 from multimedia.media.optical_media import OpticalMedia, StraightRays
 from multimedia.refraction.layers import Layers
 from photocore.arrays import BoolArray, FloatArray, as_points
+from photocore.camera import central, central_with_jacobian
 from photocore.errors import InputError
 
 #: What may be given to look through: parallel layers whose last face is the plane Z = 0, the same
@@ -170,68 +171,47 @@ def project_with_jacobian(
     """
     exterior = any(name in EXTERIOR for name in camera_names)
     sight = as_media(layers).sight(camera, points, exterior=exterior, names=interface_names)
-    lens = _through_lens(camera, sight.vectors, camera_names)
-    by_point, by_exterior, by_interface = sight.derivatives(lens.by_seen)
+    image, by_seen, by_interior = _through_lens(camera, sight.vectors, camera_names)
+    by_point, by_exterior, by_interface = sight.derivatives(by_seen)
     by_camera = np.empty((len(points), 2, len(camera_names)))
     for k, name in enumerate(camera_names):
         by_camera[:, :, k] = (
-            by_exterior[:, :, EXTERIOR.index(name)] if name in EXTERIOR else lens.by_interior[name]
+            by_exterior[:, :, EXTERIOR.index(name)] if name in EXTERIOR else by_interior[name]
         )
     return Projection(
-        image=lens.image, by_point=by_point, by_camera=by_camera, by_interface=by_interface
+        image=image, by_point=by_point, by_camera=by_camera, by_interface=by_interface
     )
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _LensImage:
-    """Image points of camera-frame vectors, and their derivatives."""
+def _through_lens(
+    camera: Camera, seen: FloatArray, names: Sequence[str]
+) -> tuple[FloatArray, FloatArray, dict[str, FloatArray]]:
+    """Return the images of camera-frame vectors with their derivatives.
 
-    image: FloatArray
-    by_seen: FloatArray  # (n, 2, 3)
-    by_interior: dict[str, FloatArray]  # each (n, 2)
-
-
-def _through_lens(camera: Camera, seen: FloatArray, names: Sequence[str]) -> _LensImage:
-    """Apply central projection and distortion to vectors in the first medium."""
-    ideal = _central(seen, camera)
+    Returns
+    -------
+    image : ndarray, shape (n, 2)
+    by_seen : ndarray, shape (n, 2, 3)
+    by_interior : dict of ndarray, shape (n, 2)
+        By each of ``names`` that belongs to the interior orientation.
+    """
+    ideal, by_seen = central_with_jacobian(seen, -camera.principal_distance)
     own = [name for name in names if name in INTERIOR and name != "c"]
-    # d(ideal)/du = -(c / u_z) [1 0 x/c; 0 1 y/c]  with x = -c u_x / u_z.
-    lever = -camera.principal_distance / seen[:, 2]
-    by_seen: FloatArray = np.zeros((len(seen), 2, 3))
-    by_seen[:, 0, 0] = by_seen[:, 1, 1] = lever
-    by_seen[:, 0, 2] = lever * (ideal[:, 0] / camera.principal_distance)
-    by_seen[:, 1, 2] = lever * (ideal[:, 1] / camera.principal_distance)
     by_c = ideal / camera.principal_distance
     if camera.distortion.is_identity and not own:
-        return _LensImage(ideal + camera.principal_point, by_seen, {"c": by_c})
+        return ideal + camera.principal_point, by_seen, {"c": by_c}
     image, by_ideal, by_own = camera.distortion.measured_with_jacobian(
         ideal, camera.principal_point, own
     )
     by_interior = {name: by_own[:, :, k] for k, name in enumerate(own)}
     by_interior["c"] = (by_ideal @ by_c[..., None])[..., 0]
-    return _LensImage(image, by_ideal @ by_seen, by_interior)
+    return image, by_ideal @ by_seen, by_interior
 
 
 def _image_of(seen: FloatArray, camera: Camera) -> FloatArray:
     """Return measured image coordinates of camera-frame vectors in the first medium, (n, 2)."""
-    ideal = _central(seen, camera)
-    if camera.distortion.is_identity:
-        ideal += camera.principal_point
-        return ideal
+    ideal = central(seen, -camera.principal_distance)
     return camera.distortion.measured(ideal, camera.principal_point)
-
-
-def _central(seen: FloatArray, camera: Camera) -> FloatArray:
-    """Return the central projection of camera-frame vectors; NaN behind the camera."""
-    depth = seen[:, 2]
-    with np.errstate(divide="ignore", invalid="ignore"):
-        factor = -camera.principal_distance / depth
-    if not (depth < 0).all():
-        factor = np.where(depth < 0, factor, np.nan)
-    image: FloatArray = np.empty((len(seen), 2))
-    np.multiply(seen[:, 0], factor, out=image[:, 0])
-    np.multiply(seen[:, 1], factor, out=image[:, 1])
-    return image
 
 
 def refuse_pixels(camera: Camera, image: FloatArray) -> None:

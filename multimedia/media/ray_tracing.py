@@ -297,7 +297,7 @@ def _by_stages(
         # Geometric mean of "no refraction" and the real indices.
         share = stage / stages
         indices = [path.indices[0] ** (1 - share) * index**share for index in path.indices]
-        heading = _newton(start, end, heading, path.between(indices))[0]
+        heading = _newton(start, end, heading, path.with_indices(indices))[0]
     _, march, _, reached = _newton(start, end, heading, path)
     return march, reached
 

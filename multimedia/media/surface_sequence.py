@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Self
 
 import numpy as np
 
@@ -41,9 +42,9 @@ class SurfaceSequence:
         """Return the same media in the order of a ray from the object."""
         return SurfaceSequence(surfaces=self.surfaces[::-1], indices=self.indices[::-1])
 
-    def between(self, indices: Sequence[float]) -> SurfaceSequence:
+    def with_indices(self, indices: Sequence[float]) -> Self:
         """Return the same surfaces between other media."""
-        return SurfaceSequence(surfaces=self.surfaces, indices=tuple(indices))
+        return replace(self, indices=tuple(indices))
 
     def separates(self, starts: FloatArray, ends: FloatArray) -> BoolArray:
         """Return whether each pair of points lies on the sides the sequence demands, shape (n,).

@@ -52,6 +52,19 @@ class RefractingSurface(ABC):
     def shifted(self, vector: ArrayLike) -> Self:
         """Return the surface moved by a vector."""
 
+    def moved(self, rotation: FloatArray, translation: FloatArray) -> Self:  # noqa: ARG002
+        """Return the surface of one frame as seen in another, x' = rotation x + translation.
+
+        Raises
+        ------
+        GeometryError
+            Unless it is a `RigidSurface`.
+        """
+        raise GeometryError(
+            f"with_camera: a {type(self).__name__} stands still in the object frame; "
+            "only a Plane, Sphere or Cylinder can be fixed to the camera."
+        )
+
 
 class RigidSurface(RefractingSurface):
     """A surface that can be fixed to a camera: it is known wherever it is moved and turned."""

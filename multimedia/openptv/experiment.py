@@ -28,6 +28,7 @@ from photocore.arrays import FloatArray, IntArray
 from photocore.distortion import Brown, Convention
 from photocore.errors import InputError
 from photocore.output import atomic_folder
+from photocore.textfile import check_name
 
 #: OpenPTV's usual places, in the order of search.
 _PARAMETERS = ("", "parameters", "parametersRun1", "parametersMultiPlane")
@@ -79,6 +80,7 @@ def read_experiment(folder: Path | str, *, swap_indices: bool = False) -> Experi
         If a file the experiment needs is missing or damaged; the message names it.
     """
     folder = Path(folder)
+    check_name(folder)
     if not folder.is_dir():
         raise InputError(f"{folder}: is no folder; give the folder of an OpenPTV experiment.")
     control_path = _control_path(folder)
@@ -243,6 +245,7 @@ def _find(roots: Sequence[Path], name: str) -> Path | None:
     name = name.replace("\\", "/").strip()
     for root in roots:
         for candidate in (root / name, root / Path(name).name, root / "cal" / Path(name).name):
+            check_name(candidate)
             if candidate.is_file():
                 return candidate
     return None

@@ -13,8 +13,8 @@ from multimedia.media.flat_interface import FlatInterface
 from multimedia.refraction.layers import Layers
 from photocore.arrays import FloatArray, IntArray
 from photocore.distortion import Brown, Convention
-from photocore.errors import LARGEST, GeometryError, InputError
-from photocore.rotation import nearest_rotation, world_from_camera
+from photocore.errors import LARGEST, InputError
+from photocore.rotation import checked_rotation, nearest_rotation, world_from_camera
 from photocore.textfile import read_text
 
 #: A printed matrix has 7 decimals; angles and matrix of one camera differ by a few of the last.
@@ -297,13 +297,8 @@ def _rotation(
     if np.abs(world_from_camera(*np.radians(angles)) - matrix).max() < MATRIX_ROUNDING:
         odd = "the angles are in degrees, though OpenPTV wants radians; its matrix tells, and "
         odd += "is used."
-    elif np.abs(matrix @ matrix.T - np.eye(3)).max() > 1e-3:
-        raise InputError(f"{path}: the 3 x 3 matrix is not a rotation; a number is wrong.")
-    elif np.linalg.det(matrix) < 0:
-        raise GeometryError(
-            f"{path}: the 3 x 3 matrix mirrors the world: a coordinate system is left-handed."
-        )
     else:
+        checked_rotation(matrix, f"{path}: the 3 x 3 matrix", tolerance=1e-3)
         odd = "angles and matrix disagree; the matrix is used."
     return nearest_rotation(matrix), (f"{path.name}: {odd}",)
 
@@ -317,6 +312,9 @@ def _floats(path: Path, words: Sequence[str], what: str) -> FloatArray:
         except ValueError:
             where = what.format(place + 1)
             raise InputError(f"{path}, {where}: expected a number, found {word!r:.40}.") from None
+        if not abs(values[place]) <= LARGEST:
+            where = what.format(place + 1)
+            raise InputError(f"{path}, {where}: {word:.40} is no finite number.")
     return values
 
 
@@ -324,16 +322,11 @@ def _number(path: Path, lines: list[str], index: int, what: str) -> float:
     if index >= len(lines):
         raise InputError(f"{path}: ends before line {index + 1} ({what}).")
     words = lines[index].split()[:1] or [""]
-    number = float(_floats(path, words, f"line {index + 1} ({what})")[0])
-    if not abs(number) <= LARGEST:
-        raise InputError(f"{path}, line {index + 1} ({what}): {words[0]:.40} is no finite number.")
-    return number
+    return float(_floats(path, words, f"line {index + 1} ({what})")[0])
 
 
 def _numbers(path: Path, least: int, what: str) -> FloatArray:
     values = _floats(path, read_text(path, _KIND).split(), "value {}")
     if len(values) < least:
         raise InputError(f"{path}: {len(values)} numbers, expected at least {least}: {what}.")
-    if not np.isfinite(values).all():
-        raise InputError(f"{path}: holds a value that is not a finite number.")
     return values

@@ -21,7 +21,7 @@ from multimedia.projects.model import ImagePoints, Project
 from multimedia.projects.project_file import read_project, write_project
 from photocore.arrays import FloatArray, IntArray
 from photocore.errors import PhotogrammetryError
-from photocore.output import check_all_writable
+from photocore.output import check_all_writable, check_ending
 
 #: Fewer control points than this cannot be called matched.
 _FEWEST = 6
@@ -75,6 +75,7 @@ def import_openptv(
     radius : float
         Farthest a target may lie from where the stored orientation expects it. [px]
     """
+    check_ending(out, "a project is written as .toml.", ".toml")
     check_all_writable(out, overwrite=overwrite)
     # The stored orientation belongs to the indices as stored, whatever is thought of them.
     experiment = read_experiment(folder)

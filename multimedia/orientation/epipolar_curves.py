@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from multimedia.media.camera import Camera
 from multimedia.media.projection import Media, as_media, project
 from multimedia.orientation.object_rays import image_rays
-from photocore.arrays import FloatArray, IntArray, as_points
+from photocore.arrays import FloatArray, IntArray, as_points, positive
 from photocore.errors import InputError
 
 #: Intervals of the first look at a curve.
@@ -126,8 +126,7 @@ def epipolar_curve(
         raise InputError(f"z_range: {z_range} is no range of depths.")
     if vertices is not None and not 2 <= vertices <= _MOST:
         raise InputError(f"vertices: expected 2 to {_MOST}, found {vertices}.")
-    if not chord_error > 0:
-        raise InputError(f"chord_error: must be above zero [mm], found {chord_error}.")
+    positive(chord_error, "chord_error", unit="mm")
     second = as_media(second)
     flat = measured.reshape(-1, 2)
     origins, directions = image_rays(camera, flat, first)
@@ -181,8 +180,7 @@ def epipolar_candidates(
     >>> near.targets.tolist(), near.points.tolist()
     ([0], [[0.0, 0.0, -1.5]])
     """
-    if not tolerance > 0:
-        raise InputError(f"tolerance: must be above zero [mm], found {tolerance}.")
+    positive(tolerance, "tolerance", unit="mm")
     seen = as_points(targets, "targets", dimension=2).reshape(-1, 2)
     polygons = curves.image.reshape(-1, *curves.image.shape[-2:])
     points = curves.points.reshape(-1, *curves.points.shape[-2:])

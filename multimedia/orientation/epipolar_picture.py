@@ -9,7 +9,8 @@ import numpy as np
 
 from photocore.arrays import FloatArray
 from photocore.errors import InputError
-from photocore.output import atomic_path
+from photocore.output import atomic_path, check_ending
+from photocore.textfile import readable
 
 
 def draw_epipolar(
@@ -52,8 +53,7 @@ def draw_epipolar(
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    if path.suffix.lower() not in (".png", ".svg", ".pdf"):
-        raise InputError(f"{path}: a picture is written as .png, .svg or .pdf.")
+    check_ending(path, "a picture is written as .png, .svg or .pdf.", ".png", ".svg", ".pdf")
     figure = Figure(figsize=(9.0, 9.0 * size[1] / size[0] + 0.4), layout="constrained")
     FigureCanvasAgg(figure)
     axes = figure.add_subplot()
@@ -83,10 +83,13 @@ def _grey(photo: Path) -> np.ndarray[tuple[int, ...], np.dtype[np.uint8]]:
     """Return a photo as grey values."""
     from PIL import Image, UnidentifiedImageError
 
-    try:
-        with Image.open(photo) as image:
-            return np.asarray(image.convert("L"), dtype=np.uint8)
-    except FileNotFoundError:
-        raise InputError(f"{photo}: no such image.") from None
-    except (UnidentifiedImageError, OSError) as error:
-        raise InputError(f"{photo}: is no image that can be read ({error}).") from None
+    with readable(photo, "photo", missing="image"):
+        try:
+            with Image.open(photo) as image:
+                return np.asarray(image.convert("L"), dtype=np.uint8)
+        except (UnidentifiedImageError, SyntaxError, ValueError) as error:
+            raise InputError(f"{photo}: is no image that can be read ({error}).") from None
+        except OSError as error:
+            if error.errno is not None:
+                raise
+            raise InputError(f"{photo}: is no image that can be read ({error}).") from None

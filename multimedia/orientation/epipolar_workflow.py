@@ -17,8 +17,8 @@ from multimedia.projects.model import SHOWN, Project
 from multimedia.projects.point_tables import write_columns
 from multimedia.projects.project_file import read_project
 from photocore.arrays import FloatArray
-from photocore.errors import InputError
-from photocore.output import check_all_writable
+from photocore.errors import GeometryError, InputError
+from photocore.output import all_or_none, check_all_writable
 
 #: The depth range without --z-range: that of the object points, this share of it wider.
 _MARGIN = 0.25
@@ -46,6 +46,7 @@ class EpipolarResult:
     remarks: tuple[str, ...]
 
 
+@all_or_none()
 def epipolar_project(
     path: Path,
     *,
@@ -105,6 +106,12 @@ def epipolar_project(
         for name, vertex, point, count in parts
     ]
     lost = [c["id"] for c in curves if not np.isfinite(c["image"]).all()]
+    if not any(np.isfinite(c["image"]).any() for c in curves):
+        raise GeometryError(
+            f"{other} sees nothing of the rays of {camera} between Z {depths[0]:g} and "
+            f"{depths[1]:g}. Check --z-range, which must lie on the object's side of the "
+            "interface, and that --at names a pixel of the photo."
+        )
     if lost:
         remarks.append(
             f"{other} cannot see the whole ray of {', '.join(lost[:SHOWN])}: is the depth range "

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -9,6 +10,7 @@ import numpy as np
 from multimedia.media.camera import Camera
 from multimedia.media.optical_media import OpticalMedia
 from photocore.arrays import FloatArray
+from photocore.camera import cameras_seeing
 from photocore.errors import GeometryError
 
 #: Camera frame with y down and z forwards (OpenCV) from ours.
@@ -19,13 +21,13 @@ _ROUNDS = 4
 
 def pose_starts(
     camera: Camera, control: FloatArray, image: FloatArray, media: OpticalMedia
-) -> list[Camera]:
-    """Return poses from which ``camera`` may have seen the control points.
+) -> Iterator[Camera]:
+    """Yield the camera itself, then poses from which it may have seen the control points.
 
     Parameters
     ----------
     camera : Camera
-        Its interior orientation is used, its pose is not.
+        Beyond the first pose only its interior orientation is used.
     control : ndarray, shape (n, 3)
         At least 3 points.
     image : ndarray, shape (n, 2)
@@ -33,10 +35,10 @@ def pose_starts(
     media : OpticalMedia
         What the camera looks through.
 
-    Returns
-    -------
-    list of Camera
-        Possibly empty; best guesses first is not promised.
+    Yields
+    ------
+    Camera
+        Best guesses first is not promised; those that take time to find are found when asked for.
 
     Notes
     -----
@@ -45,13 +47,15 @@ def pose_starts(
     those of a camera looking along the normal, which need no pose; then the pose found gives
     better ones.
     """
+    yield camera
     ideal = camera.distortion.ideal(image, camera.principal_point)
     good = np.isfinite(ideal).all(axis=1)
     if good.sum() < 3:
-        return []
+        return
     control, ideal = control[good], ideal[good]
     if len(set(media.indices)) == 1:
-        return _straight(camera, control, ideal)
+        yield from _straight(camera, control, ideal)
+        return
     apparent = media.seen_from_afar(control)
     if apparent is not None:
         starts = _straight(camera, apparent, ideal)
@@ -64,7 +68,8 @@ def pose_starts(
         starts += [
             replace(pose, principal_distance=distance) for pose in _straight(longer, control, ideal)
         ]
-    return [better for start in starts for better in _refined(start, control, ideal, media)]
+    for start in starts:
+        yield from _refined(start, control, ideal, media)
 
 
 def _refined(
@@ -92,28 +97,16 @@ def _straight(camera: Camera, control: FloatArray, ideal: FloatArray) -> list[Ca
     """Return the poses OpenCV finds for straight rays."""
     import cv2
 
-    centre = control.mean(axis=0)
-    scale = float(np.abs(control - centre).max()) or 1.0
-    points = np.ascontiguousarray((control - centre) / scale, dtype=np.float64)
-    rays = np.ascontiguousarray(ideal * (1.0, -1.0) / camera.principal_distance, dtype=np.float64)
-    flags = [cv2.SOLVEPNP_SQPNP]
-    spread = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
-    if len(points) >= 4 and spread[2] < 1e-3 * spread[0]:
-        flags.append(cv2.SOLVEPNP_IPPE)
-    if len(points) == 3:
-        flags.append(cv2.SOLVEPNP_P3P)
-    if len(points) >= 6:
-        flags.append(cv2.SOLVEPNP_EPNP)
-    poses = []
-    for flag in flags:
-        try:
-            _, turns, shifts_, _ = cv2.solvePnPGeneric(points, rays, np.eye(3), None, flags=flag)
-        except cv2.error:
-            # A solver that does not take this configuration; the others remain.
-            continue
-        for turn, shift in zip(turns, shifts_, strict=True):
-            rotation, _ = cv2.Rodrigues(turn)
-            position = -(rotation.T @ shift).ravel() * scale + centre
-            if np.isfinite(position).all() and np.isfinite(rotation).all():
-                poses.append(replace(camera, centre=position, rotation=rotation.T @ _FLIP))
-    return poses
+    methods = [cv2.SOLVEPNP_SQPNP]
+    spread = np.linalg.svd(control - control.mean(axis=0), compute_uv=False)
+    if len(control) >= 4 and spread[2] < 1e-3 * spread[0]:
+        methods.append(cv2.SOLVEPNP_IPPE)
+    if len(control) == 3:
+        methods.append(cv2.SOLVEPNP_P3P)
+    if len(control) >= 6:
+        methods.append(cv2.SOLVEPNP_EPNP)
+    rays = ideal * (1.0, -1.0) / camera.principal_distance
+    return [
+        replace(camera, centre=found.centre, rotation=found.rotation.T @ _FLIP)
+        for found in cameras_seeing(control, rays, np.eye(3), methods=methods)
+    ]

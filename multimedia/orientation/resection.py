@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from multimedia.media.camera import EXTERIOR, INTERIOR, Camera
-from multimedia.media.flat_interface import FlatInterface
 from multimedia.media.optical_media import OpticalMedia
 from multimedia.media.projection import Media, as_media, project_with_jacobian, refuse_pixels
 from multimedia.orientation.pose_starts import pose_starts
@@ -215,7 +214,8 @@ def _best_start(camera: Camera, problem: _ControlImages) -> Camera:
     """Return the pose of the smallest square sum that any start leads to."""
     poses: list[tuple[float, Camera]] = []
     functions, count = (problem.equations, problem.advance), 1
-    for count, start in enumerate(_starts(camera, problem), start=2):  # noqa: B007
+    starts = pose_starts(camera, problem.control, problem.image, problem.interface)
+    for count, start in enumerate(starts, start=2):  # noqa: B007
         try:
             pose = minimise(start, *functions, most=60, settle=1e-4, rounding=problem.floor)
         except GeometryError:  # from there the camera does not see all points
@@ -233,12 +233,6 @@ def _best_start(camera: Camera, problem: _ControlImages) -> Camera:
             residual=float("nan"),
         )
     return min(poses, key=lambda pair: pair[0])[1]
-
-
-def _starts(camera: Camera, problem: _ControlImages) -> Iterator[Camera]:
-    """Yield the pose given, then those found without it, which cost some time to find."""
-    yield camera
-    yield from pose_starts(camera, problem.control, problem.image, problem.interface)
 
 
 def _checked_names(estimate: Sequence[str]) -> tuple[str, ...]:
@@ -297,11 +291,7 @@ def _refuse_mirrored(camera: Camera, sigma0: float, problem: _ControlImages) -> 
     size = float(np.sqrt(np.mean(problem.image**2)))
     if not sigma0 > 0.005 * size:
         return
-    if not isinstance(problem.interface, FlatInterface):
-        normal = np.linalg.svd(problem.control - problem.control.mean(axis=0))[2][0]
-    else:
-        # Mirrored along the faces, so that the points stay beyond them.
-        normal = problem.interface.tangents[0]
+    normal = problem.interface.mirror_normal(problem.control)
     offset = (problem.control - problem.control.mean(axis=0)) @ normal
     mirrored = replace(
         problem, control=problem.control - 2.0 * offset[:, None] * normal, names=EXTERIOR

@@ -25,7 +25,8 @@ from multimedia.projects.point_tables import read_image_points, read_object_poin
 from multimedia.projects.project_file import read_project, write_project
 from photocore.arrays import FloatArray, IntArray
 from photocore.errors import InputError
-from photocore.output import check_all_writable
+from photocore.output import all_or_none, check_all_writable, check_ending
+from photocore.workbook.newbook import check_new_workbook
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -48,7 +49,8 @@ def project_project(
     path: Path, *, points: Path | None, out: Path | None, overwrite: bool = False
 ) -> PointTable:
     """Project the object points of a project, or of another table, into all its cameras."""
-    check_all_writable(out, overwrite=overwrite)
+    if out is not None:
+        check_new_workbook(out, overwrite=overwrite)
     project = read_project(path)
     objects, remarks = _objects(project, points)
     views = list(zip(project.cameras, project.interfaces, strict=True))
@@ -82,7 +84,8 @@ def intersect_project(
     overwrite: bool = False,
 ) -> PointTable:
     """Intersect the image points of a project, or of another table."""
-    check_all_writable(out, overwrite=overwrite)
+    if out is not None:
+        check_new_workbook(out, overwrite=overwrite)
     project = read_project(path)
     images, remarks = _images(project, points)
     ids = images.names
@@ -162,6 +165,7 @@ class Resected:
     remarks: tuple[str, ...]
 
 
+@all_or_none()
 def resect_project(
     path: Path,
     *,
@@ -172,6 +176,7 @@ def resect_project(
     overwrite: bool = False,
 ) -> Resected:
     """Orient the cameras of a project, each on its own, from its control points."""
+    check_ending(out, "a project is written as .toml.", ".toml")
     check_all_writable(out, residuals, overwrite=overwrite)
     project = read_project(path)
     unknown = [name for name in cameras if name not in project.camera_names]

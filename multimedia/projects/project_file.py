@@ -30,11 +30,11 @@ from multimedia.projects.point_tables import (
     write_columns,
 )
 from multimedia.refraction.layers import Layers
-from photocore.arrays import is_finite_number
+from photocore.arrays import is_finite_number, positive
 from photocore.distortion import NAMES, Brown, Convention
 from photocore.errors import GeometryError, InputError, located
-from photocore.output import atomic_path, check_all_writable
-from photocore.textfile import read_text
+from photocore.output import all_or_none, atomic_path, check_all_writable
+from photocore.textfile import check_name, read_text
 
 FORMAT = "multimedia-project/1"
 #: Each kind of ray-traced surface and its keys.
@@ -103,11 +103,12 @@ def write_project(path: Path | str, project: Project, *, overwrite: bool = False
     # Tables (arrays of them too) must follow the plain keys.
     order = sorted(data, key=lambda key: isinstance(data[key], dict | list))
     check_all_writable(path, *tables, overwrite=overwrite)
-    for table, columns in tables.items():
-        write_columns(table, columns, overwrite=overwrite)
-    with atomic_path(path, overwrite=overwrite) as temporary:
-        text = _HEAD + tomli_w.dumps({key: data[key] for key in order})
-        temporary.write_text(text, encoding="utf-8")
+    with all_or_none():
+        for table, columns in tables.items():
+            write_columns(table, columns, overwrite=overwrite)
+        with atomic_path(path, overwrite=overwrite) as temporary:
+            text = _HEAD + tomli_w.dumps({key: data[key] for key in order})
+            temporary.write_text(text, encoding="utf-8")
     return [path, *tables]
 
 
@@ -128,6 +129,7 @@ def project_data(project: Project) -> dict[str, Any]:
 
 
 def _toml(path: Path) -> dict[str, Any]:
+    check_name(path)
     if path.is_dir():
         raise InputError(
             f"{path}: is a folder. Give the project file in it; for an OpenPTV experiment make "
@@ -163,18 +165,15 @@ def _project(data: dict[str, Any], folder: Path) -> Project:
     cameras = tuple(camera for camera, _ in pairs)
     refuse_repeated([camera.name for camera in cameras], "cameras")
     remarks = [
-        f"media.{label}: {remark}"
-        for label, item in media.items()
-        if isinstance(item, FlatInterface)
-        for remark in item.layers.remarks
+        f"media.{label}: {remark}" for label, item in media.items() for remark in item.remarks
     ]
     objects, images = ObjectPoints(), ImagePoints()
     if "object_points" in data:
-        table = folder / str(data.pop("object_points"))
+        table = folder / _file_name(data.pop("object_points"), "object_points")
         objects, odd = read_object_points(table, unit=unit)
         remarks += [f"{table.name}: {text}" for text in odd]
     if "image_points" in data:
-        table = folder / str(data.pop("image_points"))
+        table = folder / _file_name(data.pop("image_points"), "image_points")
         images, odd = read_image_points(table, cameras)
         remarks += [f"{table.name}: {text}" for text in odd]
     return Project(
@@ -196,9 +195,7 @@ def _sigma(data: dict[str, Any], cameras: tuple[Camera, ...]) -> float:
     if "sigma_image" in data:
         value = _number(data, "sigma_image", "project")
         del data["sigma_image"]
-        if not value > 0:
-            raise InputError(f"sigma_image: must be above zero [mm], found {value:g}.")
-        return value
+        return positive(value, "sigma_image", unit="mm")
     pitches = [camera.sensor.pitch.mean() for camera in cameras if camera.sensor is not None]
     return SIGMA_PIXEL * float(np.mean(pitches)) if pitches else SIGMA_IMAGE
 
@@ -330,7 +327,7 @@ def _sensor(value: Any, where: str) -> Sensor:
     if (size > 0.2).any():
         raise InputError(f"{where}: a pitch of {size.tolist()} mm? Typical are 0.002 to 0.03 mm.")
     origin = _vector(value, "origin", where) if "origin" in value else None
-    width, height = (int(_number(value, key, where)) for key in ("width", "height"))
+    width, height = (_number(value, key, where) for key in ("width", "height"))
     return Sensor(width=width, height=height, pitch=size, origin=origin)  # type: ignore[arg-type]
 
 
@@ -363,6 +360,12 @@ def _only(value: Any, where: str, keys: tuple[str, ...]) -> None:
             near = get_close_matches(key, keys, n=1)
             hint = f" Did you mean {near[0]!r}?" if near else ""
             raise InputError(f"{where}: unknown key {key!r}.{hint} Known: {', '.join(keys)}.")
+
+
+def _file_name(value: Any, key: str) -> str:
+    if not isinstance(value, str):
+        raise InputError(f"{key}: expected the name of a table, found {value!r:.40}.")
+    return value
 
 
 def _given(value: Mapping[str, Any], key: str, where: str) -> Any:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -10,8 +10,10 @@ import numpy as np
 
 from multimedia.refraction.layers import Layers
 from multimedia.workbook.shift_points import ShiftPoints, ShiftSetup
-from photocore.errors import InputError, WorkbookError, located
+from photocore.errors import CellError, InputError, WorkbookError, located
 from photocore.tables import Column, Table, open_tables, read_named_values, read_table
+from photocore.tables.csvread import CsvFile
+from photocore.workbook.grid import SheetFile
 
 #: Most layers a workbook is searched for.
 MOST_LAYERS = 9
@@ -46,7 +48,11 @@ class ShiftInput:
 
 
 def read_shift_input(
-    path: Path | str, *, decimal: str | None = None, sheet: str | None = None
+    path: Path | str,
+    *,
+    decimal: str | None = None,
+    sheet: str | None = None,
+    given: Mapping[str, float] | None = None,
 ) -> ShiftInput:
     """Read a table of points, and the set-up if the workbook has one.
 
@@ -58,6 +64,9 @@ def read_shift_input(
         Decimal separator of numbers typed as text.
     sheet : str, optional
         The only sheet to look at.
+    given : mapping, optional
+        Values of the set-up that options replace, by the names of their cells; what these cells
+        hold does not matter.
 
     Raises
     ------
@@ -67,6 +76,7 @@ def read_shift_input(
         Naming every bad cell.
     """
     book = open_tables(path)
+    _refuse_survey(book)
     table = read_table(book, COLUMNS, name="Multimedia", sheet=sheet, decimal=decimal)  # type: ignore[arg-type]
     if not {"R", "ZP"} <= table.present and not {"X", "Y", "Z"} <= table.present:
         raise InputError(
@@ -85,8 +95,18 @@ def read_shift_input(
     names = [Column(f"n_{i}") for i in range(1, MOST_LAYERS + 1)]
     names += [Column(f"t_{i}") for i in range(1, MOST_LAYERS - 1)]
     names += [Column("z_0"), Column("X_0"), Column("Y_0")]
-    values = read_named_values(book, names, sheet="Multimedia")
+    errors: list[CellError] = []
+    values = read_named_values(book, names, sheet="Multimedia", errors=errors)
+    given = given or {}
+    if errors := [error for error in errors if error.column not in given]:
+        raise WorkbookError(errors)
     numbers = {column.key: values.number(column.key) for column in names}
+    # A cell that cannot be read differs from what takes its place.
+    numbers |= {
+        key: np.nextafter(value, np.inf)
+        for key, value in given.items()
+        if key in values.places and np.isnan(numbers.get(key, np.nan))
+    }
     indices = [n for i in range(1, MOST_LAYERS + 1) if not np.isnan(n := numbers[f"n_{i}"])]
     if len(indices) < 2 or np.isnan(numbers["z_0"]):
         return ShiftInput(table=table, setup=None)
@@ -101,6 +121,16 @@ def read_shift_input(
             nadir=(float(np.nan_to_num(numbers["X_0"])), float(np.nan_to_num(numbers["Y_0"]))),
         )
     return ShiftInput(table=table, setup=setup)
+
+
+def _refuse_survey(book: SheetFile | CsvFile) -> None:
+    """Refuse a survey of a bifocal pair: its headings would be taken for coordinates."""
+    names = {area.name for area in book.tables} if isinstance(book, SheetFile) else set()
+    if "tblPoints" in names and "tblMM" not in names:
+        raise InputError(
+            f"{book.label}: is a survey of a bifocal pair (it holds the table tblPoints); solve it "
+            "with `bifocal solve`. The radial shift needs a table with X, Y, Z or R, ZP."
+        )
 
 
 def points_of(table: Table, nadir: tuple[float, float]) -> tuple[ShiftPoints, list[int]]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -13,10 +13,18 @@ from photocore.errors import InputError
 from photocore.tables import Table, open_tables
 from photocore.workbook.cells import CellValue
 from photocore.workbook.editor import WorkbookEditor
-from photocore.workbook.grid import SheetFile, cell_name
+from photocore.workbook.grid import SheetFile
+from photocore.workbook.result_columns import (
+    OwnTable,
+    ResultColumn,
+    head_row,
+    put_result_columns,
+)
 
 #: Columns added to a table that has none of them yet.
 ADDED = ("Rbar", "dR", "Xbar", "Ybar", "flag")
+#: Name of the headings of the results in a workbook of the user's own.
+MARK = "multimedia_results"
 
 
 def is_template(path: Path | str) -> bool:
@@ -60,7 +68,7 @@ def update_template(
     Raises
     ------
     InputError
-        If the number of media differs, a changed value is a formula, or the file cannot be written.
+        If the number of media differs or the file cannot be written.
     """
     editor = WorkbookEditor(Path(path))
     if len(setup.layers.indices) != len(own.layers.indices):
@@ -95,7 +103,7 @@ def add_columns(
     """Write the shifted points beside the user's table, in columns of their own.
 
     Columns called Rbar, dR, Xbar, Ybar or flag are filled; those that are missing are added to
-    the right of everything on the sheet.
+    the right of everything on the sheet, see `photocore.workbook.result_columns`.
 
     Parameters
     ----------
@@ -115,24 +123,27 @@ def add_columns(
         If the file cannot be written.
     """
     editor = WorkbookEditor(Path(path))
-    grid = editor.grid(table.sheet)
-    head = _head_row(grid.rows, table)
-    headed = {str(value).strip(): c for c, value in grid.rows[head].items() if value is not None}
-    last = max(max(cells, default=0) for cells in grid.rows.values())
-    for key, values in result.columns(points).items():
-        if key not in ADDED:
-            continue
-        column = headed.get(key)
-        if column is None:
-            last += 1
-            column = last
-            editor.set_value(table.sheet, head, column, key)
-        for position, row in enumerate(rows):
-            value: CellValue = values[position]
-            if not isinstance(value, str):
-                value = None if np.isnan(values[position]) else float(values[position])
-            editor.set_value(table.sheet, table.rows[row], column, value)
+    grid = editor.grid(table.sheet).rows
+    own = OwnTable(
+        sheet=table.sheet,
+        head=head_row(grid, table.columns, table.headings, table.rows[0]),
+        rows=[table.rows[row] for row in rows],
+        columns=table.columns,
+    )
+    columns = [
+        ResultColumn(key=key, heading=key, values=[_shown(value) for value in values])
+        for key, values in result.columns(points).items()
+        if key in ADDED
+    ]
+    put_result_columns(editor, own, columns, mark=MARK, adopted=ADDED)
     return editor.save(out, overwrite=overwrite)
+
+
+def _shown(value: str | np.float64) -> CellValue:
+    """Return a result as a cell, blank where there is none."""
+    if isinstance(value, str):
+        return value
+    return None if np.isnan(value) else float(value)
 
 
 def _store_setup(editor: WorkbookEditor, setup: ShiftSetup, own: ShiftSetup) -> None:
@@ -152,41 +163,10 @@ def _store_setup(editor: WorkbookEditor, setup: ShiftSetup, own: ShiftSetup) -> 
             raise InputError(
                 f"{editor.path.name}: has no cell named {name}; add --new for a new workbook."
             )
-        title, row, column = places[name.casefold()]
-        formula = _formula_in(editor.path, title, row, column)
-        if formula:
-            raise InputError(
-                f"{editor.path.name} › {title}!{cell_name(row, column)} ({name}): holds the "
-                f"formula {formula}, which is never overwritten. Change what it refers to, or add "
-                "--new for a new workbook."
-            )
-        editor.set_value(title, row, column, value)
+        editor.put(*places[name.casefold()], value)
     lowest = min(setup.layers.indices)
     for i, index in enumerate(setup.layers.indices, start=1):
         k = lowest / index
         for name, value in ((f"k_{i}", k), (f"q_{i}", 1 - k * k)):
             if name in places:
                 editor.set_result(*places[name], value)
-
-
-def _formula_in(path: Path, title: str, row: int, column: int) -> str:
-    """Return the formula of a cell, empty if it has none."""
-    from openpyxl import load_workbook
-
-    book = load_workbook(path, read_only=True)
-    try:
-        value = book[title].cell(row, column).value
-    finally:
-        book.close()
-    return value if isinstance(value, str) and value.startswith("=") else ""
-
-
-def _head_row(rows: Mapping[int, Mapping[int, object]], table: Table) -> int:
-    """Return the row of the headings."""
-    key = next(iter(table.columns))
-    first = table.rows[0]
-    for row in range(first - 1, 0, -1):
-        cell = rows.get(row, {}).get(table.columns[key])
-        if isinstance(cell, str) and cell.strip() == table.headings.get(key, "").strip():
-            return row
-    return first - 1

@@ -17,9 +17,10 @@ from multimedia.workbook.live_book import BOLD, NOTE, SMALL, LiveBook, allow_bet
 from multimedia.workbook.shift_points import IN_PLANE, ShiftPoints, ShiftResult, ShiftSetup
 from photocore.arrays import BoolArray
 from photocore.errors import InputError
-from photocore.output import check_writable
+from photocore.output import check_ending
 from photocore.workbook.cells import CellValue
 from photocore.workbook.look import HEAD_FILL, INPUT_FILL, add_table, colour_words
+from photocore.workbook.newbook import check_new_workbook
 
 #: More rows make a workbook that is slow to open; text tables have no limit.
 MOST_ROWS = 20_000
@@ -93,8 +94,7 @@ def write_shift_workbook(
         If the file cannot be written, or rows or steps are out of range.
     """
     path = Path(path)
-    if path.suffix.lower() != ".xlsx":
-        raise InputError(f"{path}: the workbook must end in .xlsx.")
+    check_ending(path, "the workbook must end in .xlsx.", ".xlsx")
     if not 1 <= steps <= 30:
         raise InputError(f"newton: 1 to 30 steps, found {steps}.")
     count = max(rows, len(points.ids) if points else 0)
@@ -102,7 +102,7 @@ def write_shift_workbook(
         raise InputError(
             f"{path}: {count} rows; a workbook may have 1 to {MOST_ROWS}. Write a .csv file."
         )
-    check_writable(path, overwrite=overwrite)
+    check_new_workbook(path, overwrite=overwrite, other="" if points is None else "-result")
     book = LiveBook()
     readme = book.sheet("Readme", "Photogrammetry through water", "", first=True)
     readme.column_dimensions["A"].width = 110

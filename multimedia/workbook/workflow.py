@@ -12,8 +12,9 @@ from multimedia.workbook.shift_points import ShiftPoints, ShiftResult, ShiftSetu
 from multimedia.workbook.shift_update import add_columns, is_template, update_template
 from multimedia.workbook.shift_workbook import write_shift_workbook
 from photocore.errors import InputError
-from photocore.output import check_all_writable
+from photocore.output import check_ending
 from photocore.tables import write_csv
+from photocore.workbook.newbook import check_new_workbook
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -90,10 +91,14 @@ def shift_file(
         If a cell, an option or a file is at fault.
     """
     out = None if out is None else Path(out)
-    check_all_writable(out, overwrite=overwrite)
-    if out is not None and out.suffix.lower() not in (".xlsx", ".xlsm", ".csv"):
-        raise InputError(f"{out}: results are written as .xlsx or .csv.")
-    given = read_shift_input(path, decimal=decimal, sheet=sheet)
+    if out is not None:
+        check_new_workbook(out, overwrite=overwrite, source=None if new else path)
+    check_ending(out, "results are written as .xlsx or .csv.", ".xlsx", ".xlsm", ".csv")
+    replaced = {f"n_{i}": n for i, n in enumerate(indices or (), start=1)}
+    replaced |= {f"t_{i}": t for i, t in enumerate(thicknesses or (), start=1)}
+    if z0 is not None:
+        replaced["z_0"] = z0
+    given = read_shift_input(path, decimal=decimal, sheet=sheet, given=replaced)
     setup = _setup(given.setup, camera, z0, indices, thicknesses)
     points, rows = points_of(given.table, setup.nadir)
     result = points.shifted(setup)
@@ -111,7 +116,7 @@ def shift_file(
         kept = add_columns(path, out, table, rows, points, result, overwrite=overwrite)
     remarks = [*given.table.remarks]
     if kept is not None:
-        remarks.append(f"{out}: the workbook as it was is kept as {kept.name}.")
+        remarks.append(f"{out}: the workbook as it was is kept as {kept}.")
     remarks += setup.layers.remarks_about(z0=setup.z0, zp=points.depth)
     unseen = [name for name, flag in zip(points.ids, result.flags, strict=True) if flag != "OK"]
     if unseen:

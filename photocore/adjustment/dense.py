@@ -20,6 +20,8 @@ from photocore.arrays import BoolArray, FloatArray
 #: length one, is below this share of the largest. Double precision leaves 1e-16 times the condition
 #: of the columns; perfect but weak networks reach 1e-8.
 RANK_TOLERANCE = 1e-11
+#: Rows decomposed at a time.
+BLOCK = 250
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -57,11 +59,10 @@ class DenseEquations:
         """Singular values of the scaled matrix, their rows, the residuals' share in each."""
         count = self.unknowns
         # The triangle of matrix and residuals holds all a step needs: no large factor is formed.
-        # LAPACK itself: for 400 residuals scipy's checks take as long as the work.
         table = np.empty((len(self.residuals), count + 1), order="F")
         np.divide(self.jacobian, self.scale, out=table[:, :count])
         table[:, count] = self.residuals
-        triangle = np.triu(dgeqrf(table, overwrite_a=True)[0][:count])
+        triangle = _triangle(table)[:count]
         left, some, right = np.linalg.svd(triangle[:, :count])
         values, target = np.zeros(count), np.zeros(count)
         values[: len(some)] = some
@@ -131,3 +132,20 @@ class DenseEquations:
         """Share of every observation's error that shows in its own residual, shape (n,)."""
         base = qr(self.jacobian / self.scale, mode="economic", check_finite=False)[0]
         return 1.0 - np.einsum("ij,ij->i", base, base)
+
+
+def _triangle(table: FloatArray) -> FloatArray:
+    """Return the triangle R of a QR decomposition, that of tall tables from those of its blocks.
+
+    6000 rows of 25: 5 ms by blocks that stay in the cache, 24 ms whole (2 cores, OpenBLAS, idle;
+    220 ms where other programs hold the cores, because its threads wait for each other).
+    """
+    columns = table.shape[1]
+    block = max(BLOCK, 4 * columns)
+    while len(table) >= 2 * block:
+        whole = len(table) - len(table) % block
+        parts = np.ascontiguousarray(table[:whole]).reshape(-1, block, columns)
+        triangles = np.asarray(np.linalg.qr(parts, mode="r"))
+        table = np.concatenate([triangles.reshape(-1, columns), table[whole:]])
+    # LAPACK itself: for 400 residuals scipy's checks take as long as the work.
+    return np.asarray(np.triu(dgeqrf(np.asfortranarray(table), overwrite_a=True)[0][:columns]))

@@ -13,7 +13,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from photocore.arrays import FloatArray
-from photocore.cloud.model import PIECE, Cloud, CloudPiece, NewAttributes, PieceWriter
+from photocore.cloud.model import (
+    PIECE,
+    Cloud,
+    CloudPiece,
+    NewAttributes,
+    PieceWriter,
+    checked_positions,
+)
 from photocore.errors import InputError
 
 #: Coordinates of new files are whole multiples of this. [m]
@@ -55,6 +62,32 @@ class LasCloud(Cloud):
                 f"promises {records} records)."
             )
 
+        if len(head) > 104 and head[104] & 0x80:
+            self._check_chunks(struct.unpack_from("<I", head, 96)[0], size)
+
+    def _check_chunks(self, start: int, size: int) -> None:
+        """Refuse a compressed cloud whose table of chunks cannot be: it would end the program.
+
+        The decompressor asks for the memory of as many chunks as the table promises.
+        """
+        with self.path.open("rb") as file:
+            file.seek(start)
+            place = file.read(8)
+            at = struct.unpack("<q", place)[0] if len(place) == 8 else -2
+            if at == -1 and size >= 8:  # written to a stream: the place stands at the end
+                file.seek(size - 8)
+                at = struct.unpack("<q", file.read(8))[0]
+            table = b""
+            if start < at < size:
+                file.seek(at)
+                table = file.read(8)
+        # A chunk takes a byte or more of the points.
+        if len(table) < 8 or struct.unpack_from("<I", table, 4)[0] > at - start:
+            raise InputError(
+                f"{self.path}: cannot be read as LAZ; it is damaged or cut off (its table of "
+                "chunks). Copy or export it again."
+            )
+
     @contextmanager
     def _reading(self) -> Iterator[Any]:
         """Yield an open reader; a damaged file becomes a message."""
@@ -89,7 +122,7 @@ class LasCloud(Cloud):
                 seen += len(points)
                 xyz = np.column_stack([np.asarray(points[axis], float) for axis in "xyz"])
                 wanted = {k: np.asarray(points[k], float) for k in numbers if self.has(k)}
-                yield CloudPiece(xyz=xyz, raw=points, numbers=wanted)
+                yield CloudPiece(xyz=checked_positions(self.path, xyz), raw=points, numbers=wanted)
         if seen != self._header.point_count:
             raise InputError(
                 f"{self.path}: its header promises {self._header.point_count} points, the file "
@@ -109,7 +142,10 @@ class LasCloud(Cloud):
             ]
         )
         compressed = self.path.suffix.lower() == ".laz"
-        with laspy.open(path, mode="w", header=header, do_compress=compressed) as out:
+        with (
+            _disk_errors(),
+            laspy.open(path, mode="w", header=header, do_compress=compressed) as out,
+        ):
 
             def write(piece: CloudPiece, xyz: FloatArray, values: Mapping[str, Any]) -> None:
                 points = laspy.ScaleAwarePointRecord.zeros(len(xyz), header=header)
@@ -153,6 +189,17 @@ def check_extent(path: Path, xyz: FloatArray) -> None:
         )
 
 
+@contextmanager
+def _disk_errors() -> Iterator[None]:
+    """Turn what the compressor says when it cannot write into what Python says."""
+    from lazrs import LazrsError
+
+    try:
+        yield
+    except LazrsError as error:
+        raise OSError(f"writing failed, is the disk full? ({error})") from error
+
+
 def write_las(
     path: Path,
     xyz: FloatArray,
@@ -189,4 +236,5 @@ def write_las(
     cloud.x, cloud.y, cloud.z = xyz.T
     for name, values in columns.items():
         cloud[name] = values
-    cloud.write(str(path))
+    with _disk_errors():
+        cloud.write(str(path))

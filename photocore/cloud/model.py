@@ -9,7 +9,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from photocore.arrays import FloatArray
+from photocore.errors import LARGEST, InputError
 from photocore.output import atomic_path
 
 #: Points per piece: some 100 MB at the most, whatever the attributes.
@@ -35,6 +38,20 @@ class CloudPiece:
     raw: Any
     numbers: Mapping[str, FloatArray] = field(default_factory=dict)
     texts: Mapping[str, list[str]] = field(default_factory=dict)
+
+
+def checked_positions(path: Path, xyz: FloatArray) -> FloatArray:
+    """Return positions, shape (n, 3), as they are; NaN stands for unknown.
+
+    Raises
+    ------
+    InputError
+        If one is infinite or beyond `LARGEST`.
+    """
+    if (np.abs(xyz) > LARGEST).any():
+        worst = np.nanmax(np.abs(xyz))
+        raise InputError(f"{path}: a coordinate of {worst:.3g} cannot be; expected metres.")
+    return xyz
 
 
 #: Writes a piece with new positions and the values of the new attributes, by name; rows whose

@@ -16,7 +16,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from photocore.arrays import FloatArray, IntArray
-from photocore.cloud.model import PIECE, Cloud, CloudPiece, NewAttributes, PieceWriter
+from photocore.cloud.model import (
+    PIECE,
+    Cloud,
+    CloudPiece,
+    NewAttributes,
+    PieceWriter,
+    checked_positions,
+)
 from photocore.errors import InputError
 
 _TYPES = {
@@ -84,11 +91,13 @@ class PlyCloud(Cloud):
                 rows = self._rows(file, self._dtype, min(PIECE, self._count - first), "point")
                 xyz = np.column_stack([rows[axis].astype(np.float64) for axis in "xyz"])
                 wanted = {k: rows[k].astype(np.float64) for k in numbers if self.has(k)}
-                yield CloudPiece(xyz=xyz, raw=rows, numbers=wanted)
+                yield CloudPiece(xyz=checked_positions(self.path, xyz), raw=rows, numbers=wanted)
 
     def _rows(self, file: BinaryIO, dtype: np.dtype[Any], count: int, what: str) -> NDArray[Any]:
         """Return the next so many points or faces; a text line may go on behind a face's."""
-        short = InputError(f"{self.path}: ends before its last {what}; it is damaged.")
+        short = InputError(
+            f"{self.path}: ends before its last {what}; it is damaged: copy or export it again."
+        )
         if self._format != "ascii":
             size = count * dtype.itemsize
             if size > self.path.stat().st_size - file.tell():

@@ -17,7 +17,7 @@ import numpy as np
 
 from photocore.arrays import FloatArray
 from photocore.cloud.model import PIECE, Cloud, CloudPiece, NewAttributes, PieceWriter
-from photocore.errors import CellError, InputError, WorkbookError
+from photocore.errors import LARGEST, CellError, InputError, WorkbookError
 from photocore.tables.headings import bare
 
 #: Headings of each coordinate and of the columns other commands ask for.
@@ -42,11 +42,14 @@ class TextCloud(Cloud):
     def __init__(self, path: Path) -> None:
         super().__init__(path)
         self._encoding = _encoding_of(path)
-        with self._open() as file:
-            lines = (line for line in file if line.strip())
-            first, second = next(lines, ""), next(lines, "")
+        try:
+            with self._open() as file:
+                lines = (line for line in file if line.strip())
+                first, second = next(lines, ""), next(lines, "")
+        except UnicodeDecodeError:
+            raise InputError(f"{path}: is not a text file.") from None
         if not first:
-            raise InputError(f"{path}: the file is empty.")
+            raise InputError(f"{path}: the file is empty; save or copy it again.")
         self._delimiter = next((mark for mark in ";\t,|" if mark in first), " ")
         self._comma = self._delimiter != "," and bool(
             re.search(r"\d,\d", second or first) and not re.search(r"\d\.\d", second)
@@ -137,7 +140,9 @@ class TextCloud(Cloud):
         texts = [cells[place] for _, cells in piece]
         with suppress(ValueError):  # all filled, as most are
             plain = [text.replace(",", ".") for text in texts] if self._comma else texts
-            return np.array(list(map(float, plain)))
+            numbers = np.array(list(map(float, plain)))
+            if not (np.abs(numbers) > LARGEST).any():
+                return numbers
         values = list(map(self._number, texts))
         decimal = " with a decimal comma" if self._comma else ""
         errors += [
@@ -153,9 +158,10 @@ class TextCloud(Cloud):
         return np.array(values, dtype=np.float64)  # None becomes NaN
 
     def _number(self, text: str) -> float | None:
-        """Return a number, NaN for a blank cell, None for anything else."""
+        """Return a number, NaN for a blank cell, None for anything else, infinity too."""
         try:
-            return float(text.replace(",", ".") if self._comma else text)
+            number = float(text.replace(",", ".") if self._comma else text)
+            return None if abs(number) > LARGEST else number
         except ValueError:
             return None if text.strip() else np.nan
 
@@ -197,7 +203,7 @@ def _encoding_of(path: Path) -> str:
     with path.open("rb") as file:
         head = file.read(65_536)
     if not head.strip():
-        raise InputError(f"{path}: the file is empty.")
+        raise InputError(f"{path}: the file is empty; save or copy it again.")
     if head.startswith((b"\xff\xfe", b"\xfe\xff")):
         return "utf-16"
     if b"\0" in head or head.startswith(b"PK\x03\x04"):

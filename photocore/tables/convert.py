@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-import math
+import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
 
 import numpy as np
 
 from photocore.arrays import FloatArray
+from photocore.errors import LARGEST
 from photocore.tables.model import Column
 from photocore.tables.numbers import (
     Decimal,
@@ -64,11 +65,13 @@ def numbers(
     texts: dict[int, NumberText] = {}
     unfinished: list[int] = []
     wanted = unit or column.unit
+    # What has a unit was measured; other columns of foreign tables hold what they like.
+    largest = LARGEST if wanted else sys.float_info.max
     for index, value in enumerate(values):
         if isinstance(value, float):
             result[index] = value
-            if not math.isfinite(value):
-                complain(index, f"found {value}, expected a finite number.")
+            if not abs(value) <= largest:
+                complain(index, f"found {value}, expected a finite number up to {largest:g}.")
         elif value is None:
             continue
         elif isinstance(value, str):
@@ -85,7 +88,7 @@ def numbers(
         more = f" (and {len(unfinished) - 1} more in this column)" if len(unfinished) > 1 else ""
         complain(unfinished[0], _not_calculated(more))
     common_unit = _typed_unit(texts, wanted, complain, has_bare=bool(np.isfinite(result).any()))
-    _read_texts(result, texts, decimal, elsewhere, complain)
+    _read_texts(result, texts, decimal, elsewhere, complain, largest)
     typed = sum(bool(part.unit) for part in texts.values())
     taken_off = f"{column.key}: the unit typed into {typed} cells was taken off."
     if column.kind == "integer":
@@ -137,6 +140,7 @@ def _read_texts(
     decimal: Decimal | None,
     elsewhere: set[Decimal],
     complain: Complain,
+    largest: float,
 ) -> None:
     """Fill in the numbers that were typed as text, with one decimal separator for the column."""
     proven = proven_by(parts.values())
@@ -158,8 +162,9 @@ def _read_texts(
         mixed = decimal is None and len(proven) == 2 and mark != usual and part.evidence != "none"
         if value is None or mixed:
             complain(index, _mixed(part, decimal or usual))
-        elif not math.isfinite(value):
-            complain(index, f'found "{_short(part.digits)}", which is too large for a number.')
+        elif not abs(value) <= largest:
+            shown = _short(part.digits)
+            complain(index, f'found "{shown}", which is too large; the limit is {largest:g}.')
         else:
             result[index] = value
 

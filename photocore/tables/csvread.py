@@ -101,7 +101,7 @@ def open_csv(path: Path) -> CsvFile:
     with readable(path, "table file"):
         content = path.read_bytes()
     if not content or content.isspace():
-        raise InputError(f"{path}: the file is empty.")
+        raise InputError(f"{path}: the file is empty; save or copy it again.")
     if content.startswith((b"PK\x03\x04", b"\xd0\xcf\x11\xe0")):
         raise InputError(f"{path}: is a workbook, not a text table; give it the ending .xlsx.")
     remarks = []

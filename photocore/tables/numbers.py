@@ -11,6 +11,7 @@ from typing import Any, Literal
 import numpy as np
 
 from photocore.arrays import FloatArray
+from photocore.errors import LARGEST
 
 Decimal = Literal["point", "comma"]
 Evidence = Literal["point", "comma", "none", "grouped comma", "grouped point"]
@@ -240,7 +241,7 @@ class ArrowTexts(Sequence[str]):
         except ArrowInvalid:
             return None
         numbers: FloatArray = array.to_numpy(zero_copy_only=False)
-        is_clean = np.isfinite(numbers).sum() == len(array) - array.null_count
+        is_clean = (np.abs(numbers) <= LARGEST).sum() == len(array) - array.null_count
         return numbers if is_clean else None
 
 
@@ -269,6 +270,6 @@ def _floats(texts: Sequence[str], mark: str) -> FloatArray | None:
         except ValueError:
             return None
     # Python also reads "nan", "inf" and "1_000", which no surveyor means as numbers.
-    if np.count_nonzero(~np.isfinite(array)) != blanks or "_" in "".join(texts):
+    if np.count_nonzero(~(np.abs(array) <= LARGEST)) != blanks or "_" in "".join(texts):
         return None
     return array

@@ -24,6 +24,7 @@ from photocore.tables.headings import Match, bare, describe, find_columns
 from photocore.tables.model import Column, NamedValues, Table
 from photocore.tables.numbers import Decimal, take_apart
 from photocore.tables.rows import DataRows, block_above, data_rows
+from photocore.textfile import check_name
 from photocore.workbook.grid import CellGrid, SheetFile, TableArea, Value, cell_name
 from photocore.workbook.package import check_header
 
@@ -54,6 +55,7 @@ def open_tables(path: Path | str, *, max_rows: int = 100_000) -> SheetFile | Csv
     ending = path.suffix.lower()
     if ending in (".csv", ".tsv", ".txt"):
         return open_csv(path)
+    check_name(path)
     if not path.exists():
         raise InputError(f"{path}: no such file.")
     if ending in (".xls", ".xlsb", ".numbers", ".fods"):

@@ -6,7 +6,7 @@ import math
 import re
 from collections.abc import Callable, Iterator, Sequence
 from itertools import repeat
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 
@@ -156,16 +156,22 @@ class RowFormula:
         return "".join(moved) + self.rest
 
 
+#: What a new cell may do to what stands in its place. ``typed``: replace a typed value, never a
+#: formula. ``prepared``: nothing may stand there. ``filled``: what stands there stays, a formula
+#: takes the result. ``over``: replace anything.
+Rule = Literal["typed", "prepared", "filled", "over"]
+
+
 class NewCell(NamedTuple):
     """A cell to be made, with its formula as `escape` leaves it and the index of its format.
 
-    A typed cell may take the place of another one, a prepared one (of a new row) may not.
+    A formula may be given as a function of the row, so that it is written only where it is needed.
     """
 
     value: CellValue
-    formula: str = ""
+    formula: str | Callable[[int], str] = ""
     style: str = ""
-    is_typed: bool = True
+    rule: Rule = "typed"
 
 
 class NewColumn(NamedTuple):
@@ -190,11 +196,15 @@ class NewColumn(NamedTuple):
 
 
 class NewRows(NamedTuple):
-    """Rows to be added to a sheet: the first one, how many, their columns from left to right."""
+    """Rows to be added to a sheet: the first one, how many, their columns from left to right.
+
+    Where rows are there already, the rule says what happens to their cells.
+    """
 
     first: int
     size: int
     columns: Sequence[NewColumn]
+    rule: Rule = "prepared"
 
     def cells(self, row: int) -> dict[int, NewCell]:
         """Return the cells of one row by column; none if it is not one of these."""
@@ -202,7 +212,7 @@ class NewRows(NamedTuple):
         if not 0 <= index < self.size:
             return {}
         return {
-            column: NewCell(values[index], formula(row) if formula else "", style, False)
+            column: NewCell(values[index], formula or "", style, self.rule)
             for column, values, style, formula in self.columns
         }
 

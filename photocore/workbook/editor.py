@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import filecmp
 import shutil
 import zipfile
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import count as counted
 from pathlib import Path
 
 import numpy as np
@@ -14,14 +16,18 @@ from numpy.typing import ArrayLike
 from photocore.errors import InputError
 from photocore.output import atomic_path, check_writable, free_path
 from photocore.workbook import formulas
-from photocore.workbook.cells import CellValue, NewColumn, NewRows, RowFormula, escape
+from photocore.workbook.cells import CellValue, NewCell, NewColumn, NewRows, RowFormula, escape
+from photocore.workbook.graft import Graft
 from photocore.workbook.grid import CellGrid, SheetFile, TableArea, cell_name
+from photocore.workbook.newbook import check_new_workbook, new_workbook
 from photocore.workbook.package import check_header, open_package, read_part, rewrite_package
 from photocore.workbook.splice import SheetChanges, Spliced, splice_sheet
+from photocore.workbook.styles import StyleSheet
 from photocore.workbook.xlsx import (
     SheetPart,
     Workbook,
     open_xlsx,
+    part_of_kind,
     read_directory,
     read_shared_strings,
     read_tables,
@@ -33,14 +39,16 @@ class WorkbookEditor:
     """Gathers changes to a workbook and writes them in one go.
 
     Sheets, styles, drawings, charts, macros, comments: whatever the changes do not touch is copied
-    byte for byte. Formulas are never overwritten. Where a typed value changes, the stored results
-    of all formulas that may depend on it are taken out unless a new one is given, so that no
-    program shows a stale number.
+    byte for byte. Formulas are never overwritten by `set_value`. Where a typed value changes, the
+    stored results of all formulas that may depend on it are taken out unless a new one is given, so
+    that no program shows a stale number.
 
     Parameters
     ----------
     path : path
         The workbook, .xlsx or .xlsm.
+    file : SheetFile, optional
+        The same workbook, read already.
 
     Raises
     ------
@@ -49,11 +57,17 @@ class WorkbookEditor:
     """
 
     path: Path
+    file: SheetFile | None = None
     book: Workbook = field(init=False)
     tables: list[TableArea] = field(init=False)
     changes: dict[str, SheetChanges] = field(init=False, default_factory=dict)
     grown: dict[str, tuple[TableArea, int]] = field(init=False, default_factory=dict)
-    _file: SheetFile | None = field(init=False, default=None)
+    names: dict[str, str] = field(init=False, default_factory=dict)
+    grafts: list[tuple[Mapping[str, bytes], Mapping[str, str]]] = field(
+        init=False, default_factory=list
+    )
+    texts: list[tuple[str, bytes, bytes]] = field(init=False, default_factory=list)
+    _styles: StyleSheet | None = field(init=False, default=None)
 
     def __post_init__(self) -> None:
         self.path = Path(self.path)
@@ -84,9 +98,9 @@ class WorkbookEditor:
     def grid(self, title: str) -> CellGrid:
         """Return a sheet's cells as they stand in the file."""
         self._sheet(title)
-        if self._file is None:
-            self._file = open_xlsx(self.path, max_rows=2**20)
-        return self._file.grid(title)
+        if self.file is None:
+            self.file = open_xlsx(self.path, max_rows=2**20)
+        return self.file.grid(title)
 
     def set_value(self, title: str, row: int, column: int, value: CellValue) -> None:
         """Type a value into a cell; its format stays. None clears the cell."""
@@ -123,6 +137,98 @@ class WorkbookEditor:
         for column, values in columns.items():
             for row, value in enumerate(_plain(values), start=first_row):
                 cached.setdefault(row, {})[column] = value
+
+    def put(
+        self,
+        title: str,
+        row: int,
+        column: int,
+        value: CellValue,
+        *,
+        formula: str = "",
+        style: str = "",
+    ) -> None:
+        """Put a value, or a formula with its result, into a cell, whatever stands there.
+
+        Parameters
+        ----------
+        title : str
+            Sheet.
+        row, column : int
+            Where.
+        value : float, int, str, bool or None
+            The value, or the result of the formula.
+        formula : str
+            English names, comma as separator, without the equals sign.
+        style : str
+            Index of the format for a cell that has none; an own format stays.
+        """
+        cell = NewCell(value, escape(formula), style, "over")
+        self._changes(title).placed.setdefault(row, {})[column] = cell
+
+    def fill_rows(self, title: str, first: int, columns: Sequence[NewColumn]) -> None:
+        """Fill rows of columns: what stands in a cell stays, a formula there takes the result.
+
+        Parameters
+        ----------
+        title : str
+            Sheet.
+        first : int
+            First row.
+        columns : sequence of NewColumn
+            Values, or formulas with results, for the cells that are empty, from left to right.
+        """
+        size = max((len(column.values) for column in columns), default=0)
+        if size:
+            self._changes(title).added.append(NewRows(first, size, columns, "filled"))
+
+    def extend(self, table: str, bottom: int) -> None:
+        """Let a named table reach down to a row, over what stands there; as `append_rows`."""
+        area, last = self._growing(table)
+        if bottom > last:
+            self.grown[area.name] = (area, bottom)
+
+    def styles_of(self, title: str, row: int) -> dict[int, str]:
+        """Return the formats of a row's cells by column."""
+        return {column: cell.style for column, cell in self.models(title, row).items()}
+
+    def models(self, title: str, row: int) -> dict[int, formulas.ModelCell]:
+        """Return formats and formulas of a row's cells by column."""
+        with open_package(self.path) as package:
+            return formulas.model_cells(self.path, package, self._sheet(title), row)
+
+    def style_like(self, style: str, number_format: str) -> str:
+        """Return a format like another one, that shows numbers in another way."""
+        return self._style_sheet().like(style, number_format)
+
+    def define(self, name: str, reference: str) -> None:
+        """Let a defined name lead to a place, e.g. ``'Sheet 1'!$B$3``."""
+        self.names[name] = reference
+
+    def add_sheets(self, content: Mapping[str, bytes], titles: Mapping[str, str]) -> None:
+        """Add sheets of a package made for it behind all others.
+
+        Parameters
+        ----------
+        content : mapping
+            Its parts, from `photocore.workbook.newbook.finished_parts`.
+        titles : mapping
+            Which sheets, and their titles in this workbook.
+        """
+        self.grafts.append((content, titles))
+
+    def replace_text(self, title: str, old: str, new: str) -> None:
+        """Replace a text outside the cells of a sheet: in its rules, footer and charts."""
+        with open_package(self.path) as package:
+            sheet = self._sheet(title)
+            for part in [sheet.part, *formulas.charts_of(self.path, package, sheet)]:
+                self.texts.append((part, escape(old).encode(), escape(new).encode()))
+
+    def free_title(self, title: str) -> str:
+        """Return a title, or one with a number if a sheet has it already."""
+        taken = {name.casefold() for name in self.titles}
+        names = (f"{title}{f' {number}' if number > 1 else ''}" for number in counted(1))
+        return next(name for name in names if name.casefold() not in taken)
 
     def append_rows(
         self,
@@ -196,8 +302,8 @@ class WorkbookEditor:
         if unknown:
             raise InputError(f'{where}: the table {area.name} has no column "{unknown[0]}".')
         given = {name: _plain(values) for name, values in (*inputs.items(), *results.items())}
-        count = count or max((len(values) for values in given.values()), default=0)
-        new_rows = list(range(bottom + 1, bottom + 1 + count))
+        size = count or max((len(values) for values in given.values()), default=0)
+        new_rows = list(range(bottom + 1, bottom + 1 + size))
         if not new_rows:
             return []
         last = area.area[2]
@@ -210,9 +316,9 @@ class WorkbookEditor:
             formula = RowFormula(escape(like.formula), last).at if like.formula else None
             fits = name in (results if formula else inputs)
             values = [*given[name]] if fits else []
-            values += [None] * (count - len(values))
+            values += [None] * (size - len(values))
             columns.append(NewColumn(column, values, like.style, formula))
-        self._changes(area.sheet).added.append(NewRows(bottom + 1, count, columns))
+        self._changes(area.sheet).added.append(NewRows(bottom + 1, size, columns))
         self.grown[area.name] = (area, new_rows[-1])
         return new_rows
 
@@ -237,19 +343,20 @@ class WorkbookEditor:
         target : path, optional
             Where to; the workbook itself when None. Then the old file is kept beside it with
             ``.bak`` added to its name, or ``.bak2``, ``.bak3`` ... where that is taken: no
-            backup is ever replaced.
+            backup is ever replaced, and none is made of a state that one holds already.
         overwrite : bool
             Whether to replace another existing file.
 
         Returns
         -------
         Path or None
-            The backup, None where none was made.
+            The file that holds the old state; None where it was not changed in place.
 
         Raises
         ------
         InputError
-            If the target is open in another program, exists, or has another ending.
+            If the target is open in another program, has another ending, exists, or is another
+            workbook that holds anybody else's work.
         """
         target = self.path if target is None else Path(target)
         in_place = target.exists() and target.samefile(self.path)
@@ -258,24 +365,45 @@ class WorkbookEditor:
                 f"{target}: must end in {self.path.suffix} like {self.path.name}, so that macros "
                 "stay what they are."
             )
-        check_writable(target, overwrite=overwrite or in_place)
+        if not in_place:
+            check_new_workbook(target, overwrite=overwrite)
+            parts = self.changed_parts()
+            with new_workbook(target, overwrite=overwrite) as temporary:
+                rewrite_package(self.path, temporary, parts)
+            return None
+        check_writable(target, overwrite=True)
         parts = self.changed_parts()
-        kept: Path | None = None
-        with atomic_path(target, overwrite=overwrite or in_place) as temporary:
+        with atomic_path(target, overwrite=True) as temporary:
             rewrite_package(self.path, temporary, parts)
-            if in_place:
-                kept = free_path(self.path.parent, f"{self.path.name}.bak")
-                shutil.copy2(self.path, kept)
+            return self._kept()
+
+    def _kept(self) -> Path:
+        """Return the backup of the file as it is, made where there is none yet."""
+        stem = f"{self.path.name}.bak"
+        for number in counted(1):
+            backup = self.path.with_name(f"{stem}{number if number > 1 else ''}")
+            if not backup.is_file():
+                break
+            if filecmp.cmp(backup, self.path, shallow=False):
+                return backup
+        kept = free_path(self.path.parent, stem)
+        with atomic_path(kept, overwrite=False) as temporary:
+            shutil.copyfile(self.path, temporary)
+        shutil.copystat(self.path, kept)
         return kept
 
-    def changed_parts(self) -> dict[str, bytes]:
-        """Return the parts of the package that change, with their new content."""
+    def changed_parts(self) -> dict[str, bytes | None]:
+        """Return the parts of the package that change or are new, with their new content."""
         with open_package(self.path) as package:
             spliced = self._splice(package)
-            tainted = {title for title, sheet in spliced.items() if sheet.inputs_changed}
+            tainted = set[str]()
+            if any(sheet.inputs_changed for sheet in spliced.values()):
+                # New results of other sheets follow from what was typed.
+                tainted = {title for title, sheet in spliced.items() if sheet.edits}
             references = formulas.References(self.path, package, self.book, self.tables)
-            stale = references.dependents(tainted)
-            parts: dict[str, bytes] = {}
+            settled = [title for title, sheet in spliced.items() if not sheet.strips]
+            stale = references.dependents(tainted, settled)
+            parts: dict[str, bytes | None] = {}
             stripped = False
             for sheet in self.book.sheets:
                 changed = spliced.get(sheet.title)
@@ -288,10 +416,42 @@ class WorkbookEditor:
                     stripped |= strip and bool(changed.strips)
             for area, bottom in self.grown.values():
                 references.grow(area, bottom, parts)
+            for name, old, new in self.texts:
+                data = parts.get(name) or read_part(self.path, package, name)
+                before, cells, after = data.partition(b"</sheetData>")
+                kept, rest = (before + cells, after) if cells else (b"", data)
+                parts[name] = kept + rest.replace(old, new)
             if stripped:
                 formulas.recalculate_on_load(self.path, package, self.book, parts)
-            original = {name: read_part(self.path, package, name) for name in parts}
-        return {name: data for name, data in parts.items() if data != original[name]}
+            if any(sheet.formula_lost for sheet in spliced.values()):
+                formulas.drop_order(self.path, package, self.book, parts)
+            self._graft(package, parts)
+            own = {*package.namelist()}
+            original = {n: read_part(self.path, package, n) for n in own & parts.keys()}
+        return {name: data for name, data in parts.items() if data != original.get(name, b"")}
+
+    def _graft(self, package: zipfile.ZipFile, parts: dict[str, bytes | None]) -> None:
+        """Add new sheets, names and formats."""
+        if self.grafts or self.names:
+            graft = Graft(self.path, package, self.book, parts, self._style_sheet())
+            for content, titles in self.grafts:
+                graft.add_sheets(content, titles)
+            for name, reference in self.names.items():
+                graft.redefine(name, reference)
+        if self._styles is not None and self._styles.added:
+            parts[part_of_kind(package, self.book, "styles")] = self._styles.written()
+
+    def _style_sheet(self) -> StyleSheet:
+        if self._styles is None:
+            with open_package(self.path) as package:
+                part = part_of_kind(package, self.book, "styles")
+                if not part:
+                    raise InputError(
+                        f"{self.path}: has no cell formats. Open it in the spreadsheet program, "
+                        "save it there, and try again."
+                    )
+                self._styles = StyleSheet(read_part(self.path, package, part))
+        return self._styles
 
     def _splice(self, package: zipfile.ZipFile) -> dict[str, Spliced]:
         """Return the changed sheets."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import posixpath
 import re
 import zipfile
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from xml.sax.saxutils import escape as escape_xml
@@ -13,7 +13,13 @@ from xml.sax.saxutils import unescape as unescape_xml
 
 from photocore.workbook.grid import TableArea, cell_name, split_area
 from photocore.workbook.package import local, read_part, understood, xml_elements
-from photocore.workbook.xlsx import SheetPart, Workbook, row_cells
+from photocore.workbook.xlsx import (
+    SheetPart,
+    Workbook,
+    part_of_kind,
+    read_relations,
+    row_cells,
+)
 
 _RANGE = re.compile(
     r"(?P<sheet>(?:'(?:[^']|'')+'|[A-Za-z0-9_.À-ɏ]+)!)?"
@@ -22,6 +28,8 @@ _RANGE = re.compile(
 _AREA = re.compile(r"[A-Z]{1,3}\d{1,7}(:[A-Z]{1,3}\d{1,7})?")
 #: A cell without its sheet; all are alike when only sheets, tables and names matter.
 _ANY_CELL = re.compile(r"(?<![\w.'$])\$?[A-Z]{1,3}\$?\d+(?![\w.!'(])")
+_FORMULA = re.compile(rb"<(?:\w+:)?f(?:\s[^>]*)?>([^<]+)</")
+_QUOTES = {"&quot;": '"', "&apos;": "'"}
 #: Functions whose result may depend on any cell, whatever their text names.
 _FAR_REACHING = re.compile(r"\b(INDIRECT|OFFSET|CELL|INFO)\s*\(", re.IGNORECASE)
 
@@ -73,16 +81,18 @@ class References:
     book: Workbook
     tables: Sequence[TableArea]
 
-    def dependents(self, changed: Iterable[str]) -> set[str]:
+    def dependents(self, changed: Iterable[str], settled: Collection[str] = ()) -> set[str]:
         """Return the sheets with formulas that may depend on changed sheets, those included.
 
         Errs on the safe side: a formula depends on a sheet when it names it, one of its tables, or
-        a defined name that leads there.
+        a defined name that leads there. Sheets are settled whose every formula has its new result.
         """
         stale = set(changed)
         if not stale:
             return stale
-        texts = {sheet.title: self._formulas(sheet) for sheet in self.book.sheets}
+        known = stale.union(settled)
+        others = [sheet for sheet in self.book.sheets if sheet.title not in known]
+        texts = {sheet.title: self._formulas(sheet) for sheet in others}
         names = dict(self.book.names)
         while True:
             words = self._words(stale)
@@ -110,13 +120,12 @@ class References:
 
     def _formulas(self, sheet: SheetPart) -> str:
         """Return the formulas of a sheet as one text, those that differ only in cells once."""
-        shapes: set[str] = set()
-        for element in xml_elements(self.path, self.package, sheet.part, "row", "f"):
-            kind = element.tag.removesuffix(local(element.tag)) + "f"
-            shapes.update(_ANY_CELL.sub("#", own.text or "") for own in element.iter(kind))
+        data = read_part(self.path, self.package, sheet.part)
+        texts = {match.decode("utf-8", "replace") for match in _FORMULA.findall(data)}
+        shapes = {_ANY_CELL.sub("#", unescape_xml(text, _QUOTES)) for text in texts}
         return "\n".join(sorted(shapes))
 
-    def grow(self, area: TableArea, bottom: int, parts: dict[str, bytes]) -> None:
+    def grow(self, area: TableArea, bottom: int, parts: dict[str, bytes | None]) -> None:
         """Let a table, and all that reaches to its last row, reach down to a new one.
 
         Parameters
@@ -136,18 +145,19 @@ class References:
                 self._replace(name, parts, area, bottom, tag=rb"f")
         self._replace(self.book.part, parts, area, bottom, tag=rb"definedName")
 
-    def _now(self, name: str, parts: dict[str, bytes]) -> bytes:
-        return parts[name] if name in parts else read_part(self.path, self.package, name)
+    def _now(self, name: str, parts: dict[str, bytes | None]) -> bytes:
+        changed = parts.get(name)
+        return read_part(self.path, self.package, name) if changed is None else changed
 
     def _replace(
-        self, name: str, parts: dict[str, bytes], area: TableArea, bottom: int, *, tag: bytes
+        self, name: str, parts: dict[str, bytes | None], area: TableArea, bottom: int, *, tag: bytes
     ) -> None:
         """Let the ranges in the text of certain elements grow."""
         data = self._now(name, parts)
         pattern = re.compile(rb"(<(?:\w+:)?%s(?:\s[^>]*)?>)([^<]+)(</)" % tag)
 
         def replace(match: re.Match[bytes]) -> bytes:
-            text = unescape_xml(match[2].decode("utf-8"), {"&quot;": '"', "&apos;": "'"})
+            text = unescape_xml(match[2].decode("utf-8"), _QUOTES)
             new = grown_reference(text, area, bottom)
             return match[0] if new == text else match[1] + escape_xml(new).encode() + match[3]
 
@@ -219,8 +229,37 @@ def _grown_sheet(data: bytes, area: TableArea, bottom: int) -> bytes:
     return data[:start] + re.sub(rb"(<(?:\w+:)?sqref>)([^<]*)(</)", attribute, rest)
 
 
+def charts_of(path: Path, package: zipfile.ZipFile, sheet: SheetPart) -> list[str]:
+    """Return the parts of the charts that are drawn on a sheet."""
+    drawings = [part for kind, part in sheet.relations.values() if kind == "drawing"]
+    return [
+        part
+        for drawing in drawings
+        for kind, part in read_relations(path, package, drawing).values()
+        if kind == "chart"
+    ]
+
+
+def drop_order(
+    path: Path, package: zipfile.ZipFile, book: Workbook, parts: dict[str, bytes | None]
+) -> None:
+    """Leave out the list of formulas in the order of calculation: it names one that is gone.
+
+    Excel makes it anew, and takes a workbook for damaged whose list is wrong.
+    """
+    part = part_of_kind(package, book, "calcChain")
+    if not part:
+        return
+    parts[part] = None
+    folder, file = posixpath.split(book.part)
+    for name in (f"{folder}/_rels/{file}.rels".lstrip("/"), "[Content_Types].xml"):
+        data = parts.get(name) or read_part(path, package, name)
+        entry = rb"<(?:\w+:)?(?:Relationship|Override)\s[^>]*%s[\"'][^>]*?/>"
+        parts[name] = re.sub(entry % re.escape(posixpath.basename(part).encode()), b"", data)
+
+
 def recalculate_on_load(
-    path: Path, package: zipfile.ZipFile, book: Workbook, parts: dict[str, bytes]
+    path: Path, package: zipfile.ZipFile, book: Workbook, parts: dict[str, bytes | None]
 ) -> None:
     """Tell spreadsheet programs to calculate all formulas when they open the workbook."""
     data = parts.get(book.part) or read_part(path, package, book.part)

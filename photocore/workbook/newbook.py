@@ -96,6 +96,30 @@ def finish_book(
     blocks : mapping, optional
         Sheet name to the rows that repeat its prototype row.
     """
+    parts = _finished_parts(source, target, results=results, blocks=blocks)
+    rewrite_package(source, target, parts, date=PART_TIME)
+
+
+def finished_parts(
+    source: BinaryIO,
+    *,
+    results: Mapping[str, Mapping[str, CellValue]],
+    blocks: Mapping[str, RowBlock] | None = None,
+) -> dict[str, bytes]:
+    """Return all parts of a finished package, to take sheets from; as `finish_book` otherwise."""
+    made = _finished_parts(source, Path("new sheets"), results=results, blocks=blocks)
+    with zipfile.ZipFile(source) as package:
+        return {name: made.get(name) or package.read(name) for name in package.namelist()}
+
+
+def _finished_parts(
+    source: BinaryIO,
+    target: Path,
+    *,
+    results: Mapping[str, Mapping[str, CellValue]],
+    blocks: Mapping[str, RowBlock] | None,
+) -> dict[str, bytes]:
+    """Return the parts that change."""
     with zipfile.ZipFile(source) as package:
         parts = {}
         for sheet in read_directory(target, package).sheets:
@@ -115,7 +139,7 @@ def finish_book(
         core = read_part(target, package, "docProps/core.xml")
         moment = rb"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\dZ"
         parts["docProps/core.xml"] = re.sub(moment, b"1980-01-01T00:00:00Z", core)
-    rewrite_package(source, target, parts, date=PART_TIME)
+    return parts
 
 
 def _typed(value: CellValue) -> CellValue:
@@ -147,17 +171,51 @@ def new_workbook(path: Path | str, *, overwrite: bool) -> Iterator[Path]:
         As `photocore.output.atomic_path`, and if the path holds a workbook that is not exactly as
         this function left it.
     """
-    path = check_writable(path, overwrite=overwrite)
-    if not is_untouched(path):
-        raise InputError(
-            f"{path}: was not written by this program, or was changed since; a new workbook in its "
-            "place would lose what it holds. Write to another file, e.g. "
-            f"{other_name(path).name}, or move this one away."
-        )
+    path = check_new_workbook(path, overwrite=overwrite)
     with atomic_path(path, overwrite=overwrite) as temporary:
         yield temporary
         with zipfile.ZipFile(temporary, "a") as package:
             package.comment = _seal(package)
+
+
+def check_new_workbook(
+    path: Path | str,
+    *,
+    overwrite: bool,
+    source: Path | str | None = None,
+    other: str = "-result",
+) -> Path:
+    """Return path if a workbook or another file may be written there; call it before long work.
+
+    Parameters
+    ----------
+    path : path
+        The output; only workbooks are looked into.
+    overwrite : bool
+        Replace an existing file.
+    source : path, optional
+        A workbook that may be changed in place.
+    other : str
+        What the name of another file, which is proposed, ends in.
+
+    Raises
+    ------
+    InputError
+        As `photocore.output.check_writable`, and if a workbook stands there that is neither
+        ``source`` nor as this program left it: no option would help, so none is named.
+    """
+    path = Path(path)
+    in_place = source is not None and path.exists() and Path(source).exists()
+    in_place = in_place and path.samefile(source or path)
+    is_book = path.suffix.lower() in (".xlsx", ".xlsm") and path.is_file()
+    if is_book and not in_place and not is_untouched(path):
+        stem = path.stem if other and path.stem.endswith(other) else f"{path.stem}{other}"
+        raise InputError(
+            f"{path}: was not written by this program, or was changed since; a new workbook in its "
+            "place would lose what it holds. Write to another file, e.g. "
+            f"{free_path(path.parent, stem, path.suffix).name}, or move this one away."
+        )
+    return check_writable(path, overwrite=overwrite)
 
 
 def is_untouched(path: Path) -> bool:
@@ -169,12 +227,6 @@ def is_untouched(path: Path) -> bool:
             return package.comment == _seal(package)
     except (zipfile.BadZipFile, OSError, ValueError, NotImplementedError):
         return False
-
-
-def other_name(path: Path) -> Path:
-    """Return a name that is free beside a path: ``own-result.xlsx`` for ``own.xlsx``."""
-    stem = path.stem if path.stem.endswith("-result") else f"{path.stem}-result"
-    return free_path(path.parent, stem, path.suffix)
 
 
 def _seal(package: zipfile.ZipFile) -> bytes:

@@ -24,6 +24,8 @@ SMALL = 16 * 2**20
 LARGEST_PART = 256 * 2**20
 LARGEST_TOTAL = 512 * 2**20
 MOST_MEMBERS = 10_000
+#: Date of parts that are added, so that equal input makes equal files.
+NEW_PART_TIME = (1980, 1, 1, 0, 0, 0)
 _RATIO_MATTERS_FROM = 2**20
 _OLE = b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1"
 #: Small, since the elements of a chunk are made before the first is looked at.
@@ -74,7 +76,7 @@ def check_header(path: Path) -> None:
     with readable(path, "table file"), path.open("rb") as file:
         start = file.read(8)
     if not start:
-        raise InputError(f"{path}: the file is empty (0 bytes).")
+        raise InputError(f"{path}: the file is empty (0 bytes); save or copy it again.")
     if start == _OLE:
         raise InputError(
             f"{path}: is protected by a password or of the old .xls format. Save it as .xlsx "
@@ -138,21 +140,33 @@ def read_part(path: Path, package: zipfile.ZipFile, name: str) -> bytes:
 def rewrite_package(
     source: Path | BinaryIO,
     target: Path,
-    parts: Mapping[str, bytes],
+    parts: Mapping[str, bytes | None],
     *,
     date: tuple[int, int, int, int, int, int] | None = None,
 ) -> None:
-    """Copy a zip package with some parts replaced; order, methods and (without one) dates stay."""
+    """Copy a zip package with parts replaced, left out (None), or added at its end.
+
+    Order, methods and (without one) dates stay.
+    """
     with zipfile.ZipFile(source) as old, target.open("wb") as file:
         with zipfile.ZipFile(file, "w", compresslevel=4) as new:
             new.comment = old.comment
-            for info in old.infolist():
+            listed = old.infolist()
+            for info in listed:
                 data = parts.get(info.filename)
+                if data is None and info.filename in parts:
+                    continue
                 copy = zipfile.ZipInfo(info.filename, date or info.date_time)
                 stored = info.compress_type == zipfile.ZIP_STORED
                 copy.compress_type = zipfile.ZIP_STORED if stored else zipfile.ZIP_DEFLATED
                 copy.external_attr, copy.create_system = info.external_attr, info.create_system
                 new.writestr(copy, read_part(target, old, info.filename) if data is None else data)
+            known = {info.filename for info in listed}
+            for name in [name for name in parts if name not in known]:
+                added = zipfile.ZipInfo(name, date or NEW_PART_TIME)
+                added.compress_type = zipfile.ZIP_DEFLATED
+                added.external_attr = 0o600 << 16
+                new.writestr(added, parts[name] or b"")
         file.flush()
         os.fsync(file.fileno())
 
@@ -170,7 +184,10 @@ def xml_events(
     """
     parser: Any = ElementTree.XMLPullParser(events)
     for _ in _fed(path, package, name, parser):
-        yield from parser.read_events()
+        try:
+            yield from parser.read_events()
+        except ElementTree.ParseError as error:  # found while feeding, raised here
+            raise InputError(f"{path}: {name} is damaged ({error}); save the file again.") from None
 
 
 def xml_elements(path: Path, package: zipfile.ZipFile, name: str, *kinds: str) -> Iterator[Element]:

@@ -15,8 +15,10 @@ from photocore.errors import InputError
 from photocore.workbook.cells import CellValue, NewCell, NewRows, cell_xml, type_and_content
 from photocore.workbook.grid import cell_name, column_number, split_area
 from photocore.workbook.package import local, new_parser, understood
+from photocore.workbook.plainsheet import NotPlain, plain_rows, sheet_data
 from photocore.workbook.xlsx import unescape
 
+_QUOTES = {"&quot;": '"', "&apos;": "'"}
 _TAG = re.compile(rb"""<[^\s/>]+(?:\s+[^\s=]+\s*=\s*(?:"[^"]*"|'[^']*'))*\s*(/?)>""")
 
 
@@ -29,6 +31,8 @@ class SheetChanges:
     inputs : dict
         Row to (column to value): typed cells, made where they are missing. The cell's format
         stays. A cell that holds a formula is never overwritten.
+    placed : dict
+        Row to (column to cell): cells with formulas, or that may take the place of one.
     cached : dict
         Row to (column to result): results of formulas that are there. Cells that hold no formula
         (any more) are left as they are.
@@ -41,23 +45,24 @@ class SheetChanges:
     inputs: dict[int, dict[int, CellValue]] = field(default_factory=dict)
     cached: dict[int, dict[int, CellValue]] = field(default_factory=dict)
     added: list[NewRows] = field(default_factory=list)
+    placed: dict[int, dict[int, NewCell]] = field(default_factory=dict)
     restates: bool = False
 
     def __bool__(self) -> bool:
-        return bool(self.inputs or self.cached or self.added)
+        return bool(self.inputs or self.cached or self.added or self.placed)
 
     def rows(self) -> list[int]:
         """Return the numbers of the rows with cells to be typed or added, in order."""
         added = (range(block.first, block.first + block.size) for block in self.added)
-        return sorted(set(self.inputs).union(*added))
+        return sorted(set(self.inputs).union(self.placed, *added))
 
     def cells(self, row: int) -> dict[int, NewCell]:
         """Return the cells to be typed or added in one row, in order."""
         typed = self.inputs.get(row, {}).items()
         cells = {column: NewCell(None if value == "" else value) for column, value in typed}
         for block in self.added:
-            cells |= block.cells(row)
-        return dict(sorted(cells.items()))
+            cells = block.cells(row) | cells
+        return dict(sorted((cells | self.placed.get(row, {})).items()))
 
 
 @dataclass(slots=True)
@@ -72,12 +77,15 @@ class Spliced:
         The changes asked for; the results of all other formulas, to be taken out.
     inputs_changed : bool
         Whether any typed value differs from what was there.
+    formula_lost : bool
+        Whether a value took the place of a formula.
     """
 
     data: bytes
     edits: list[tuple[int, int, bytes]] = field(default_factory=list)
     strips: list[tuple[int, int, bytes]] = field(default_factory=list)
     inputs_changed: bool = False
+    formula_lost: bool = False
 
     def joined(self, *, strip: bool) -> bytes:
         """Return the changed sheet, without results of other formulas if ``strip``."""
@@ -148,12 +156,13 @@ class _Splicer:
         self.result = Spliced(data)
         self.edits = self.result.edits
         self.new_rows = deque(changes.rows())
+        self.is_plain = len(changes.added) == 1 and not changes.placed
         self.parser = new_parser(path, part, start=self.start, end=self.end)
         self.kinds: dict[str, str] = {}
         self.inside = False
         self.prefix = ""
         self.row = self.column = 0
-        self.row_start = self.cell_start = self.data_start = 0
+        self.row_start = self.cell_start = self.cell_end = self.data_start = 0
         self.attributes: dict[str, str] = {}
         self.children: list[tuple[str, int, int]] = []
         self.child_start = self.depth = 0
@@ -163,14 +172,14 @@ class _Splicer:
 
     def run(self) -> Spliced:
         """Parse, and return the edits in the order of the file."""
-        with understood(
-            lambda: (
-                f"{self.path}: damaged, the part {self.part} cannot be understood near row "
-                f"{self.row}."
-            )
-        ):
+        complaint = f"{self.path}: damaged, the part {self.part} cannot be understood near row "
+        with understood(lambda: f"{complaint}{self.row}."):
             try:
-                self.parser.Parse(self.data, True)
+                try:
+                    self.run_plain()
+                except NotPlain:
+                    self.begin_anew()
+                    self.parser.Parse(self.data, True)
             except expat.ExpatError as error:
                 raise InputError(
                     f"{self.path}: damaged, the part {self.part} is not valid XML ({error})."
@@ -180,6 +189,57 @@ class _Splicer:
         self.edits.sort(key=lambda edit: edit[:2])
         return self.result
 
+    def begin_anew(self) -> None:
+        """Forget all that was found so far."""
+        self.result = Spliced(self.data)
+        self.edits = self.result.edits
+        self.new_rows = deque(self.changes.rows())
+        self.parser = new_parser(self.path, self.part, start=self.start, end=self.end)
+        self.dimension = None
+        self.prefix, self.depth, self.inside = "", 0, False
+
+    def run_plain(self) -> None:
+        """Take a sheet of the plain form apart, all but its rows by the XML parser."""
+        start, end = sheet_data(self.data)
+        self.parser.Parse(self.data[:start], False)
+        self.inside, self.prefix = False, ""
+        for row in plain_rows(self.data, start, end):
+            self.start_row(row.number, row.start, "")
+            new, cached = self.new, self.cached
+            for cell in row.cells:
+                column = column_number(cell[1].decode())
+                if new and next(iter(new)) < column:
+                    self.add_cells(column, (cell.start(), cell.start(), "", ""))
+                is_asked = column in new or column in cached
+                if is_asked or (cell[5] and cell[6]):
+                    self.take_cell(cell, column)
+                    self.end_cell("c")
+            if new:
+                place = (row.end, row.end, "", "")
+                if row.is_closed:
+                    opening = self.data[row.start : row.end].decode("utf-8")[:-2].rstrip()
+                    place = (row.start, row.end, f"{opening}>", "</row>")
+                self.add_cells(10**6, place)
+        self.add_rows(10**9, (end, end, "", ""))
+        self.parser.Parse(self.data[end:], True)
+
+    def take_cell(self, cell: re.Match[bytes], column: int) -> None:
+        """Note where a cell of the plain form and its parts lie."""
+        start, end = cell.span()
+        while self.data[start] != 60:  # "<": blanks may stand before
+            start += 1
+        self.cell_start, self.cell_end, self.column = start, end, column
+        attributes = {"r": f"{cell[1].decode()}{self.row}"}
+        if cell[3]:
+            attributes["s"] = cell[3].decode()
+        if cell[4]:
+            attributes["t"] = cell[4].decode()
+        self.attributes = attributes
+        self.children = [("f", *cell.span(5))] if cell[5] else []
+        if cell[6]:
+            kind = "v" if cell[6].startswith(b"<v") else "is"
+            self.children.append((kind, *cell.span(6)))
+
     def start(self, name: str, attributes: dict[str, str]) -> None:
         """Handle an opening tag."""
         kind = self.kinds.get(name)
@@ -188,7 +248,8 @@ class _Splicer:
         if kind == "c" and self.inside and not self.depth:
             self.start_cell(attributes)
         elif kind == "row" and self.inside and not self.depth:
-            self.start_row(name, attributes)
+            number = int(attributes.get("r", self.row + 1))
+            self.start_row(number, self.parser.CurrentByteIndex, name[: len(name) - 3])
         elif self.inside:
             # Only direct children of a cell count; "t" and "r" lie deeper, in a rich text.
             if not self.depth:
@@ -208,6 +269,7 @@ class _Splicer:
         if not self.inside:
             return
         if kind == "c" and not self.depth:
+            self.cell_end = self.element_end(name, self.cell_start)
             self.end_cell(name)
         elif kind == "row" and not self.depth:
             self.end_row(name)
@@ -220,14 +282,12 @@ class _Splicer:
                 end = self.element_end(name, self.child_start)
                 self.children.append((kind, self.child_start, end))
 
-    def start_row(self, name: str, attributes: dict[str, str]) -> None:
+    def start_row(self, number: int, start: int, prefix: str) -> None:
         """Insert the new rows before this one and note what is to happen in it."""
-        self.row_start = self.parser.CurrentByteIndex
-        self.row = int(attributes.get("r", self.row + 1))
-        self.column = 0
+        self.row, self.row_start, self.column = number, start, 0
         if self.new_rows and self.new_rows[0] < self.row:
             self.add_rows(self.row, (self.row_start, self.row_start, "", ""))
-        self.prefix = name[: len(name) - 3]
+        self.prefix = prefix
         self.cached = self.changes.cached.get(self.row, {})
         self.new = {}
         if self.new_rows and self.new_rows[0] == self.row:
@@ -264,16 +324,32 @@ class _Splicer:
     def replace(self, name: str, new: NewCell) -> None:
         """Give this cell another typed value, or a formula if it is empty."""
         where = f"{self.path} › {cell_name(self.row, self.column)}"
-        if self.child("f"):
-            raise InputError(f"{where}: holds a formula, which is not overwritten.")
-        if not new.is_typed and self.children:
-            raise InputError(f"{where}: is not empty; a new row cannot be put there.")
-        if new.is_typed and self.holds(new.value):
+        formula = self.child("f")
+        if formula and (new.rule == "filled" or self.same_formula(formula, new)):
+            self.put_result(name, new.value)
             return
+        if self.children and new.rule == "filled":
+            return
+        if formula and (new.rule != "over" or b" ref=" in self.data[slice(*formula)]):
+            raise InputError(f"{where}: holds a formula, which is not overwritten.")
+        if new.rule == "prepared" and self.children:
+            raise InputError(f"{where}: is not empty; a new row cannot be put there.")
+        if not new.formula and not formula and self.holds(new.value):
+            return
+        self.result.formula_lost |= bool(formula) and not new.formula
         new = new._replace(style=self.attributes.get("s", "") or new.style)
         edit = self.xml(self.column, new).encode()
-        self.edits.append((self.cell_start, self.element_end(name, self.cell_start), edit))
+        self.edits.append((self.cell_start, self.cell_end, edit))
         self.result.inputs_changed = True
+
+    def same_formula(self, place: tuple[int, int], new: NewCell) -> bool:
+        """Whether a formula that would be replaced is the same already."""
+        text = new.formula(self.row) if callable(new.formula) else new.formula
+        if new.rule != "over" or not text:
+            return False
+        start = self.tag_end(place[0])
+        stands = self.data[start : max(start, self.data.rfind(b"<", start, place[1]))]
+        return unescape_xml(stands.decode("utf-8"), _QUOTES) == unescape_xml(text, _QUOTES)
 
     def put_result(self, name: str, value: CellValue) -> None:
         """Give this cell's formula another cached result."""
@@ -303,7 +379,7 @@ class _Splicer:
         after = b"".join(self.data[s:e] for k, s, e in self.children if k not in ("f", "v", "is"))
         opening = f"<{name}{''.join(kept)}>".encode()
         replacement = opening + before + content.encode() + after + f"</{name}>".encode()
-        return self.cell_start, self.element_end(name, self.cell_start), replacement
+        return self.cell_start, self.cell_end, replacement
 
     def holds(self, value: CellValue) -> bool:
         """Whether this cell holds the value already."""
@@ -312,7 +388,7 @@ class _Splicer:
         if content is None:
             return value is None or value == ""
         inner = self.data[self.tag_end(content[0]) : self.data.rfind(b"<", content[0], content[1])]
-        text = unescape_xml(inner.decode("utf-8"), {"&quot;": '"', "&apos;": "'"})
+        text = unescape_xml(inner.decode("utf-8"), _QUOTES)
         try:
             if kind == "n" and not isinstance(value, str | bool) and value is not None:
                 return float(text) == float(value)
@@ -339,15 +415,17 @@ class _Splicer:
 
     def xml(self, column: int, cell: NewCell, row: int = 0) -> str:
         """Return the XML of a cell of this row, or of another one."""
-        reference = cell_name(row or self.row, column)
-        return cell_xml(reference, cell.value, cell.formula, self.prefix, cell.style)
+        row = row or self.row
+        formula = cell.formula(row) if callable(cell.formula) else cell.formula
+        return cell_xml(cell_name(row, column), cell.value, formula, self.prefix, cell.style)
 
     def add_rows(self, before: int, place: tuple[int, int, str, str]) -> None:
         """Insert the new rows whose numbers lie before one."""
         rows = []
         while self.new_rows and self.new_rows[0] < before:
             rows.append(self.new_rows.popleft())
-        if rows and len(self.changes.added) == 1 and self.changes.inputs.keys().isdisjoint(rows):
+        is_plain = self.is_plain and self.changes.inputs.keys().isdisjoint(rows)
+        if rows and is_plain:
             lines = self.changes.added[0].xml(range(rows[0], rows[-1] + 1), self.prefix)
         else:
             lines = map(self.row_xml, rows)
@@ -398,6 +476,7 @@ class _Splicer:
     def grow_dimension(self, start: int, end: int, reference: str) -> None:
         """Let the sheet's stated extent take in the cells that were made."""
         made = [(row, column) for row, cells in self.changes.inputs.items() for column in cells]
+        made += [(row, column) for row, cells in self.changes.placed.items() for column in cells]
         for block in self.changes.added:
             numbers = [column.column for column in block.columns]
             made += [(block.first, min(numbers)), (block.first + block.size - 1, max(numbers))]

@@ -5,12 +5,14 @@ from __future__ import annotations
 import posixpath
 import re
 import zipfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from datetime import datetime
 from functools import partial
 from pathlib import Path
 from xml.etree.ElementTree import Element
+from xml.parsers import expat
+from xml.sax.saxutils import unescape as unescape_xml
 
 from photocore.errors import InputError
 from photocore.workbook.grid import (
@@ -26,7 +28,16 @@ from photocore.workbook.grid import (
     split_area,
     split_cell,
 )
-from photocore.workbook.package import local, open_package, understood, xml_elements, xml_root
+from photocore.workbook.package import (
+    local,
+    new_parser,
+    open_package,
+    read_part,
+    understood,
+    xml_elements,
+    xml_root,
+)
+from photocore.workbook.plainsheet import LARGEST, NotPlain, plain_rows, sheet_data
 
 #: Number formats 14-22, 27-36, 45-47, 50-58 are dates and times in every language of Excel.
 _BUILT_IN_DATES = {
@@ -118,13 +129,13 @@ def read_directory(path: Path, package: zipfile.ZipFile) -> Workbook:
         raise InputError(f"{path}: is an OpenDocument file; give it the ending .ods.")
     if _CONTENT_TYPES not in names or "_rels/.rels" not in names:
         raise InputError(f"{path}: is a zip file but not a workbook.")
-    roots = _relations(path, package, "")
+    roots = read_relations(path, package, "")
     part = next((target for kind, target in roots.values() if kind == "officeDocument"), "")
     if part.endswith(".bin"):
         raise InputError(f"{path}: is a binary workbook (.xlsb); save it as .xlsx.")
     if part not in names:
         raise InputError(f"{path}: is a zip file but not a workbook.")
-    relations = _relations(path, package, part)
+    relations = read_relations(path, package, part)
     book = Workbook(part=part, sheets=[], names={}, relations=relations)
     root = xml_root(path, package, part)
     if local(root.tag) != "workbook":
@@ -138,7 +149,7 @@ def read_directory(path: Path, package: zipfile.ZipFile) -> Workbook:
             kind, target = relations.get(key, ("", ""))
             if kind == "worksheet" and target in names:
                 hidden = element.get("state", "visible") != "visible"
-                parts = _relations(path, package, target)
+                parts = read_relations(path, package, target)
                 book.sheets.append(SheetPart(element.get("name", ""), target, hidden, parts))
         elif kind == "definedName" and "localSheetId" not in element.attrib:
             book.names[element.get("name", "")] = element.text or ""
@@ -147,7 +158,7 @@ def read_directory(path: Path, package: zipfile.ZipFile) -> Workbook:
     return book
 
 
-def _relations(path: Path, package: zipfile.ZipFile, part: str) -> dict[str, tuple[str, str]]:
+def read_relations(path: Path, package: zipfile.ZipFile, part: str) -> dict[str, tuple[str, str]]:
     """Return id -> (kind, target part) of a part's relations; external targets are left out."""
     folder, name = posixpath.split(part)
     rels = posixpath.join(folder, "_rels", f"{name}.rels")
@@ -188,7 +199,7 @@ def _table(title: str, part: str, root: Element) -> TableArea:
     )
 
 
-def _part_of_kind(package: zipfile.ZipFile, book: Workbook, kind: str) -> str:
+def part_of_kind(package: zipfile.ZipFile, book: Workbook, kind: str) -> str:
     """Return the one part of a workbook of a kind, empty where it has none."""
     part = next((target for own, target in book.relations.values() if own == kind), "")
     return part if part in package.namelist() else ""
@@ -196,7 +207,7 @@ def _part_of_kind(package: zipfile.ZipFile, book: Workbook, kind: str) -> str:
 
 def read_shared_strings(path: Path, package: zipfile.ZipFile, book: Workbook) -> list[str]:
     """Return the texts that cells of type ``s`` point to."""
-    part = _part_of_kind(package, book, "sharedStrings")
+    part = part_of_kind(package, book, "sharedStrings")
     items = xml_elements(path, package, part, "si") if part else ()
     return [unescape(_rich_text(item)) for item in items]
 
@@ -215,7 +226,7 @@ def _rich_text(item: Element) -> str:
 
 def _date_styles(path: Path, package: zipfile.ZipFile, book: Workbook) -> dict[str, str]:
     """Return the cell styles (as the ``s`` attribute writes them) that show dates."""
-    part = _part_of_kind(package, book, "styles")
+    part = part_of_kind(package, book, "styles")
     if not part:
         return {}
     codes: dict[int, str] = dict(_BUILT_IN_DATES)
@@ -296,6 +307,10 @@ class _SheetReader:
                 "Open the file in the spreadsheet program and save it again."
             )
         ):
+            try:
+                return self.read_plain(package, title, part)
+            except NotPlain:
+                pass
             for element in xml_elements(self.path, package, part, "row", "mergeCell"):
                 if local(element.tag) == "mergeCell":
                     grid.merged.append(split_area(element.attrib["ref"]))
@@ -310,6 +325,61 @@ class _SheetReader:
                 if cells:
                     grid.rows[row] = cells
         return grid
+
+    def read_plain(self, package: zipfile.ZipFile, title: str, part: str) -> CellGrid:
+        """Return the cells of a sheet of the plain form."""
+        if part in package.namelist() and package.getinfo(part).file_size > LARGEST:
+            raise NotPlain
+        data, grid = read_part(self.path, package, part), CellGrid(title)
+        start, end = sheet_data(data)
+
+        def note(name: str, attributes: dict[str, str]) -> None:
+            if local(name) == "mergeCell":
+                grid.merged.append(split_area(attributes["ref"]))
+
+        parser = new_parser(self.path, part, start=note)
+        try:
+            parser.Parse(data[:start], False)
+            parser.Parse(data[end:], True)
+        except expat.ExpatError:
+            raise NotPlain from None
+        for row in plain_rows(data, start, end):
+            if b'hidden="1"' in row.attributes or b'hidden="true"' in row.attributes:
+                grid.hidden.add(row.number)
+            cells = self.plain_cells(row.cells) if row.cells else None
+            if cells and len(grid.rows) >= self.max_rows:
+                grid.truncated = True
+                break
+            if cells:
+                grid.rows[row.number] = cells
+        return grid
+
+    def plain_cells(self, row: Sequence[re.Match[bytes]]) -> dict[int, Value]:
+        """Return the typed values of a row of the plain form by column number."""
+        cells: dict[int, Value] = {}
+        for cell in row:
+            letters, _, style, kind, formula, content = cell.groups()
+            text = b"" if content is None else content[content.find(b">") + 1 : content.rfind(b"<")]
+            if text and kind is None:
+                date = self.dates.get(style.decode()) if style else None
+                number = float(text)
+                value: Value | None = number if date is None else self.date(number, date)
+            elif text and kind == b"s":
+                value = self.strings[int(text)] or None
+            elif text and kind == b"inlineStr":
+                inner = text[text.find(b">") + 1 : text.rfind(b"<")]
+                value = unescape(_plain_text(inner)) or None
+            elif text:
+                like = Element("c", {"s": (style or b"").decode()})
+                value = self.value(_plain_text(text), (kind or b"n").decode(), like)
+            elif formula is not None and kind != b"str":
+                inner = formula[formula.find(b">") + 1 : max(formula.rfind(b"<"), 0)]
+                value = NotCalculated(_plain_text(inner))
+            else:
+                value = None
+            if value is not None:
+                cells[column_number(letters.decode())] = value
+        return cells
 
     def cells(self, row: Element) -> dict[int, Value]:
         """Return the typed values of a row by column number, without those that are blank."""
@@ -343,6 +413,13 @@ class _SheetReader:
             return CellDate(date_of_serial(number, since_1904=self.since_1904), style)
         except (OverflowError, ValueError):
             return number
+
+
+def _plain_text(text: bytes) -> str:
+    """Return the text that stands between two tags."""
+    if b"&#" in text:
+        raise NotPlain
+    return unescape_xml(text.decode("utf-8"), {"&quot;": '"', "&apos;": "'"})
 
 
 def _without_text(kind: str, cell: Element) -> Value | None:

@@ -23,6 +23,7 @@ from bifocal.model.intersection import PlanePicks, intersect
 from bifocal.precision import (
     base_factor,
     false_relief_of_scale,
+    sigma_displacements,
     sigma_relief,
     uncertainty_radius,
 )
@@ -164,32 +165,72 @@ def plane_picks(point, distance, sigma):
     )
 
 
+def rough_across(picks, direction):
+    """Return picks that say no more than how far from the nadir a point lies."""
+    across = np.array([direction[1], -direction[0]])
+    return replace(picks, metres_per_pixel=(np.eye(2) + 1e4 * np.outer(across, across))[None])
+
+
 @pytest.mark.parametrize("pair", PAIRS)
 @pytest.mark.parametrize("r", [-0.6, 0.0, 1.0])
 def test_closed_forms_agree_with_monte_carlo(pair, r):
-    _, d1, _, d2 = PAIRS[pair]
+    c1, d1, c2, d2 = PAIRS[pair]
     rng = np.random.default_rng(20240601)
-    radius, theta, noise, draws = 3.1, 0.7, 0.0007, 100_000
+    radius, theta, noise, draws = 3.1, 0.7, 0.0074, 100_000
+    s1, s2 = seen(c1, d1, c2, d2, radius, r)
+    # Picks are x, y with equal noise in both images [mm]; s and theta follow from them.
     direction = np.array([np.sin(theta), np.cos(theta)])
-    exact = [plane_picks([*radius * direction, r], d, noise) for d in (d1, d2)]
-    formal = intersect(*exact, limits=FlagLimits()).sigma[0]
-    # Picks are x, y with equal noise in both images; the point follows from them.
-    drawn = [
+    pick1 = s1 * direction + rng.normal(0, noise, (draws, 2))
+    pick2 = s2 * direction + rng.normal(0, noise, (draws, 2))
+    n1, n2 = np.hypot(*pick1.T), np.hypot(*pick2.T)
+    e1, e2 = relief_displacements(n1, n2, d1=d1, d2=d2)
+    x, y = plane_coordinates(n1, e1, np.arctan2(pick1[:, 0], pick1[:, 1]))
+    drawn = [np.std(v) for v in (relief(n1, n2, d1=d1, d2=d2), e1, e2, x, y)]
+    both = {"d1": d1, "d2": d2, "sigma_1": noise, "sigma_2": noise}
+    # In the image plane's scale the cameras stand c from the wall, all lengths in mm. x' and y' of
+    # Eq. (7) have their direction from image 1 alone.
+    at_scale = np.array([*radius * direction, r]) * c1 / d1
+    exact = [plane_picks(at_scale, c, noise) for c in (c1, c2)]
+    alone = intersect(exact[0], rough_across(exact[1], direction), limits=FlagLimits()).sigma[0]
+    formal = [sigma_relief(s1, s2, **both), *sigma_displacements(s1, s2, **both), *alone[:2]]
+    np.testing.assert_allclose(np.array(drawn) / np.array(formal), 1.0, atol=0.05)
+    assert alone[2] * d1 / c1 == pytest.approx(float(formal[0]), rel=1e-6)
+    # All four coordinates by least squares, as the program solves them.
+    free = [
         replace(
             pick,
-            positions=pick.positions + rng.normal(0, noise, (draws, 2)),
+            positions=drawn_picks,
             metres_per_pixel=np.broadcast_to(np.eye(2), (draws, 2, 2)),
         )
-        for pick in exact
+        for pick, drawn_picks in zip(exact, (pick1, pick2), strict=True)
     ]
-    xyz = intersect(*drawn, limits=FlagLimits()).xyz
-    np.testing.assert_allclose(xyz.std(axis=0) / formal, 1.0, atol=0.05)
-    # Of the radial distances alone, as Eq. (6) has it.
-    s1, s2 = (np.hypot(*pick.positions.T) for pick in drawn)
-    scatter = relief(s1, s2, d1=d1, d2=d2).std()
-    s1, s2 = (np.hypot(*pick.positions[0]) for pick in exact)
-    both = {"d1": d1, "d2": d2, "sigma_1": noise, "sigma_2": noise}
-    assert sigma_relief(s1, s2, **both) == pytest.approx(scatter, rel=0.05)
+    xyz = intersect(*free, limits=FlagLimits()).xyz
+    adjusted = intersect(*exact, limits=FlagLimits()).sigma[0]
+    np.testing.assert_allclose(xyz.std(axis=0) / adjusted, 1.0, atol=0.05)
+
+
+@pytest.mark.parametrize("pair", PAIRS)
+@pytest.mark.parametrize("r", [-3.0, 0.5, 4.0])
+def test_sigmas_of_the_displacements_propagate_equation_5(pair, r):
+    c1, d1, c2, d2 = PAIRS[pair]
+    s1, s2 = seen(c1, d1, c2, d2, 2.0, r)
+    sigma_1, sigma_2 = 0.003, 0.005  # unequal, so that no term hides behind another
+    with mpmath.workdps(50):
+
+        def displaced(which, first, second):
+            depth = (second - first) / (second / d2 - first / d1)
+            return (first / d1, second / d2)[which] * depth
+
+        for which, sigma in enumerate(
+            sigma_displacements(s1, s2, d1=d1, d2=d2, sigma_1=sigma_1, sigma_2=sigma_2)
+        ):
+            at = (mpmath.mpf(s1), mpmath.mpf(s2))
+            by_1, by_2 = (
+                mpmath.diff(lambda *s, which=which: displaced(which, *s), at, order)
+                for order in ((1, 0), (0, 1))
+            )
+            expected = float(mpmath.hypot(by_1 * sigma_1, by_2 * sigma_2))
+            assert sigma == pytest.approx(expected, rel=1e-12)
 
 
 def test_across_the_radius_a_point_moves_as_far_as_relief_leaves_of_its_distance():

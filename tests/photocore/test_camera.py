@@ -1,14 +1,19 @@
 """A pinhole camera is a homography, a nadir and a distance."""
 
+import cv2
 import numpy as np
 import pytest
 from scipy.linalg import rq
 
+import multimedia.media.projection
 from bifocal import Pair, Photo
 from photocore.camera import (
     PARAMETERS,
     Pinhole,
     camera_matrix,
+    cameras_seeing,
+    central,
+    central_with_jacobian,
     fundamental,
     fundamental_with_jacobian,
     pixel_from_plane,
@@ -171,3 +176,48 @@ def test_a_moved_plane_moves_its_transfer(index: int) -> None:
     slope = plane_transfer(far, near, plane + step) - plane_transfer(far, near, plane - step)
     by = plane_transfer_with_jacobian(far, near, plane)[1][20 + index]
     np.testing.assert_allclose(by, slope / 2e-6, atol=2e-7 * np.abs(by).max())
+
+
+def test_a_camera_of_millimetres_is_the_same_camera() -> None:
+    """`multimedia` looks backwards along z, in mm, and turns itself; photocore turns the object."""
+    seen_from = multimedia.Camera.looking_at((0.3, -0.2, 2.0), (0, 0, 0), principal_distance=20.0)
+    pinhole = Pinhole(
+        camera_matrix(20.0, 1.0, 0.0, 0.0),
+        np.diag([1.0, 1.0, -1.0]) @ seen_from.rotation.T,
+        seen_from.centre,
+    )
+    xyz = np.random.default_rng(5).uniform(-0.5, 0.5, (20, 3))
+    one = project_with_jacobian(pinhole, xyz)
+    other = multimedia.media.projection.project_with_jacobian(
+        seen_from, xyz, camera_names=(*multimedia.media.camera.EXTERIOR, "c")
+    )
+    near = {"rtol": 1e-12, "atol": 200 * EPS}
+    np.testing.assert_allclose(other.image, one.pixels, **near)
+    np.testing.assert_allclose(other.image, multimedia.project(seen_from, xyz), **near)
+    np.testing.assert_allclose(other.by_point, one.by_point, **near)
+    np.testing.assert_allclose(other.by_camera[:, :, :3], one.by_camera[:, :, 7:], **near)
+    np.testing.assert_allclose(other.by_camera[:, :, 3:6], -one.by_camera[:, :, 4:7], **near)
+    np.testing.assert_allclose(other.by_camera[:, :, 6] * 20.0, one.by_camera[:, :, 0], **near)
+
+
+@pytest.mark.parametrize("distance", [1.0, -20.0])
+def test_points_level_with_the_camera_or_behind_it_have_no_image(distance: float) -> None:
+    depths = np.sign(distance) * np.array([2.0, 0.0, -0.0, -2.0, np.nan])
+    vectors = np.column_stack([np.full(5, 0.5), np.full(5, 0.25), depths])
+    image, by_vectors = central_with_jacobian(vectors, distance)
+    np.testing.assert_array_equal(central(vectors, distance), image)
+    assert image[0].tolist() == [0.25 * abs(distance), 0.125 * abs(distance)]
+    assert np.isnan(image[1:]).all()
+    assert np.isnan(by_vectors[1:, [0, 1], [0, 1]]).all()
+
+
+@pytest.mark.parametrize("size", [1.0, 400_000.0])
+def test_the_camera_that_sees_the_points_is_among_those_found(size: float) -> None:
+    truth = make(2, 9.0)
+    xyz = np.random.default_rng(6).uniform(-1, 1, (7, 3))
+    pixels = project(truth, xyz)
+    # Map coordinates lose no digits: OpenCV is given points about their middle.
+    moved = truth._replace(centre=truth.centre + size)
+    found = cameras_seeing(xyz + size, pixels, truth.matrix, methods=[cv2.SOLVEPNP_SQPNP])
+    gap = min(np.abs(c.centre - moved.centre).max() for c in found)
+    assert gap < 1e-7 + 1e-9 * size

@@ -102,11 +102,25 @@ def test_the_division_model_by_hand_and_back(k: float) -> None:
 
 def test_derivatives_of_the_division_model() -> None:
     centre = np.array([500.0, 300.0])
-    lens = RadialDivision(0.1, centre, 1000.0)
+    lens = RadialDivision(0.1, centre, 1000.0, -0.05)
     pixels = np.random.default_rng(1).uniform(0, 900, (20, 2))
     for axis, step in enumerate(1e-3 * np.eye(2)):
         slope = (lens.distort(pixels + step) - lens.distort(pixels - step)) / 2e-3
         np.testing.assert_allclose(lens.distorted_by_ideal(pixels)[..., axis], slope, atol=1e-8)
-    more, less = (RadialDivision(0.1 + d, centre, 1000.0).undistort(pixels) for d in (1e-6, -1e-6))
-    slope = (more - less) / 2e-6
-    np.testing.assert_allclose(lens.undistorted_by_k(pixels), slope, atol=1e-6)
+        slope = (lens.undistort(pixels + step) - lens.undistort(pixels - step)) / 2e-3
+        np.testing.assert_allclose(lens.undistorted_by_seen(pixels)[..., axis], slope, atol=1e-8)
+    for term, (by_k1, by_k2) in enumerate(1e-6 * np.eye(2)):
+        more, less = (
+            RadialDivision(0.1 + s * by_k1, centre, 1000.0, -0.05 + s * by_k2).undistort(pixels)
+            for s in (1, -1)
+        )
+        slope = (more - less) / 2e-6
+        np.testing.assert_allclose(lens.undistorted_by_k(pixels)[..., term], slope, atol=1e-6)
+
+
+def test_the_division_model_with_two_terms_by_hand_and_back() -> None:
+    lens = RadialDivision(-0.24, np.array([500.0, 300.0]), 1000.0, 0.29)
+    # Seen 500 px off the centre, rho = 0.5: 500 / (1 - 0.24 / 4 + 0.29 / 16).
+    assert lens.undistort([1000.0, 300.0]) == pytest.approx([500 + 500 / 0.958125, 300.0])
+    pixels = np.random.default_rng(0).uniform(0, 900, (40, 2))
+    np.testing.assert_allclose(lens.distort(lens.undistort(pixels)), pixels, atol=1e-9)

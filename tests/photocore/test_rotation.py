@@ -7,9 +7,11 @@ import pytest
 
 from photocore.rotation import (
     angles_from_rotation,
+    by_turn,
     nearest_rotation,
     rotation_from_vector,
     rotation_vector_from_angle_rates,
+    skew,
     world_from_camera,
 )
 from tests.rounding import EPS
@@ -62,3 +64,12 @@ def test_nearest_rotation_mends_rounding():
         mended = nearest_rotation(matrix.round(5))
         assert np.abs(mended @ mended.T - np.eye(3)).max() < 8 * EPS
         assert np.abs(mended - matrix).max() < 1e-5
+
+
+def test_the_derivative_by_a_turn_is_the_change_of_a_row_times_the_turned_arm():
+    rng = np.random.default_rng(8)
+    rows, arms, turn = rng.normal(size=(4, 2, 3)), rng.normal(size=(4, 3)), rng.normal(size=3)
+    wanted = np.einsum("nmi,ni->nm", rows, np.cross(turn, arms))
+    np.testing.assert_allclose(by_turn(rows, arms) @ turn, wanted, atol=40 * EPS)
+    np.testing.assert_allclose(skew(turn) @ arms[0], np.cross(turn, arms[0]), atol=8 * EPS)
+    np.testing.assert_allclose((skew(arms) @ turn), np.cross(arms, turn), atol=8 * EPS)

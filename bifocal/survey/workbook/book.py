@@ -9,7 +9,7 @@ from pathlib import Path
 from openpyxl.styles import Alignment
 
 from bifocal.survey.workbook.charts import charts
-from bifocal.survey.workbook.columns import IDEAL_POINTS, LOG, RESULTS, SurveyColumn, pair_points
+from bifocal.survey.workbook.columns import LOG, RESULTS, SurveyColumn, adjustment_names
 from bifocal.survey.workbook.content import (
     STRUCTURED_ROWS,
     SurveyContent,
@@ -34,7 +34,7 @@ from bifocal.survey.workbook.sheets import (
     Cells,
     SheetBuilder,
 )
-from bifocal.survey.workbook.words import readme, term
+from bifocal.survey.workbook.words import readme, term, word
 from photocore.workbook.cells import CellValue
 from photocore.workbook.grid import column_letters
 from photocore.workbook.look import colour_words
@@ -112,6 +112,13 @@ def _setup(builder: BookBuilder, content: SurveyContent) -> None:
             _setup_cell(sheet, row, name, cells, content, typed=group is not groups[-1])
             row += 1
         row += 1
+    for image in (1, 2):
+        names = [name for name in adjustment_names(image) if name in cells]
+        for name in names:
+            sheet.text(f"A{row}", name)
+            sheet.text(f"B{row}", word("correction", builder.language).format(n=image))
+            sheet.input(f"C{row}", cells[name], name=name)
+            row += 1
     sheet.finish(freeze="A5")
 
 
@@ -132,6 +139,9 @@ def _setup_cell(
     sheet.text(f"D{row}", known.unit if known else "", LABEL_FONT)
     sheet.worksheet[f"D{row}"].alignment = Alignment(indent=1)
     cell, form, value = f"C{row}", FORMS.get(name, "General"), cells.get(name)
+    if name in content.links:
+        sheet.formula(cell, content.links[name], value, form=form, name=name, editable=True)
+        return
     formulas = PAIR_FORMULAS if content.is_pair else IDEAL_FORMULAS
     is_default = {
         "d_1": content.pair is None,
@@ -150,7 +160,7 @@ def _setup_cell(
 
 
 def _points(builder: BookBuilder, content: SurveyContent, cells: Cells) -> None:
-    columns = pair_points(undistorted=content.undistorted) if content.is_pair else IDEAL_POINTS
+    columns = content.point_columns
     note = "points_pair" if content.is_pair else "points_how"
     sheet = _long_sheet(builder, "Points", note, columns, content.point_rows, cells)
 

@@ -8,6 +8,7 @@ Names never look like cells, so `d_1` and not the paper's `d1`.
 from __future__ import annotations
 
 import re
+from collections.abc import Collection
 from dataclasses import dataclass
 
 from bifocal.model.flags import FlagLimits
@@ -62,15 +63,30 @@ def _of_r(key: str, formula: str) -> SurveyColumn:
 
 
 _XY = "[@x1],[@y1],[@x2],[@y2]"
-_X1, _Y1 = "([@x1]-off_x1)*unit_x", "([@y1]-off_y1)*unit_y"
-_X2, _Y2 = "([@x2]-off_x2)*unit_x", "([@y2]-off_y2)*unit_y"
 
 
-def _radius(x: str, y: str, polar: str, factor: str) -> str:
-    return (
-        f"IF(COUNT({_XY})=4,SQRT(({x})^2+({y})^2){factor},"
-        f'IF(AND(COUNT({_XY})=0,COUNT([@s1],[@s2])=2),{polar}{factor},""))'
-    )
+def adjustment_names(image: int) -> tuple[str, ...]:
+    """Return the names of the nine cells that correct the coordinates of an image, row by row."""
+    return tuple(f"a{image}_{row}{column}" for row in "123" for column in "123")
+
+
+def _millimetres(image: int, *, adjusted: bool) -> tuple[str, str]:
+    """Return formulas of x and y in millimetres from the nadir, y up."""
+    x, y = (f"([@{axis}{image}]-off_{axis}{image})*unit_{axis}" for axis in "xy")
+    if not adjusted:
+        return x, y
+    rows = [adjustment_names(image)[i : i + 3] for i in (0, 3, 6)]
+    above, right, below = (f"({a}*{x}+{b}*{y}+{c})" for a, b, c in rows)
+    return f"{above}/{below}", f"{right}/{below}"
+
+
+def _radius(x: str, y: str, polar: str, factor: str, *, has_xy: bool, has_polar: bool) -> str:
+    of_xy, of_polar = f"SQRT(({x})^2+({y})^2){factor}", f"{polar}{factor}"
+    if not has_polar:
+        return f'IF(COUNT({_XY})=4,{of_xy},"")'
+    if not has_xy:
+        return f'IF(COUNT([@s1],[@s2])=2,{of_polar},"")'
+    return f'IF(COUNT({_XY})=4,{of_xy},IF(AND(COUNT({_XY})=0,COUNT([@s1],[@s2])=2),{of_polar},""))'
 
 
 def _flag(inputs: str, miss: str) -> str:
@@ -89,28 +105,31 @@ _RELIEF = (
     _f("r", 'IF([@den]="","",IF(AND([@s1_used]>0,[@den]*(d_1-d_2)>0),[@ds]/[@den],NA()))', 4),
 )
 
-#: The `Points` table of an ideal pair.
-IDEAL_POINTS: tuple[SurveyColumn, ...] = (
-    SurveyColumn(key="id", width=12),
-    *(SurveyColumn(key=key, places=4) for key in ("x1", "y1", "x2", "y2", "s1", "s2")),
-    SurveyColumn(key="theta", places=4, width=11),
-    SurveyColumn(key="use", width=6),
-    SurveyColumn(key="code", width=10),
-    SurveyColumn(key="note", width=18),
-    _f("s1_used", _radius(_X1, _Y1, "[@s1]", ""), 4, folded=True),
-    _f("s2_used", _radius(_X2, _Y2, "[@s2]", "*k_12"), 4, folded=True),
-    _f(
-        "theta_used",
-        'IF([@s1_used]="","",IF(COUNT([@x1],[@y1])=2,IF([@s1_used]=0,0,'
-        f'DEGREES(ATAN2({_Y1},{_X1}))),IF(COUNT([@theta])=1,[@theta],"")))',
-        4,
-        folded=True,
-    ),
-    *_RELIEF,
-    _of_r("e1", "[@s1_used]*[@r]/d_1"),
-    _of_r("e2", "[@s2_used]*[@r]/d_2"),
-    _of_r("s_c", "[@s1_used]-[@e1]"),
-    *(
+
+def ideal_points(
+    *,
+    xy: bool = True,
+    polar: bool = True,
+    theta: bool = True,
+    adjusted: Collection[int] = (),
+) -> tuple[SurveyColumn, ...]:
+    """Return the `Points` table of an ideal pair.
+
+    Parameters
+    ----------
+    xy, polar, theta : bool
+        Whether the table has the columns x1 y1 x2 y2, s1 s2, and theta; formulas name no others.
+    adjusted : collection of int
+        Images whose coordinates are corrected by the cells a1_11 ..., a2_11 ... of `Setup`.
+    """
+    (x1, y1), (x2, y2) = (_millimetres(image, adjusted=image in adjusted) for image in (1, 2))
+    kinds = {"has_xy": xy, "has_polar": polar}
+    measured = ",".join(([_XY] if xy else []) + (["[@s1],[@s2]"] if polar else []))
+    of_theta = 'IF(COUNT([@theta])=1,[@theta],"")' if theta else '""'
+    if xy:
+        of_xy = f"IF([@s1_used]=0,0,DEGREES(ATAN2({y1},{x1})))"
+        of_theta = f"IF(COUNT([@x1],[@y1])=2,{of_xy},{of_theta})"
+    place = [
         _f(
             axis,
             'IF(OR([@den]="",[@theta_used]="",m_1=""),"",'
@@ -118,21 +137,36 @@ IDEAL_POINTS: tuple[SurveyColumn, ...] = (
             4,
         )
         for axis, turn in (("X", "SIN"), ("Y", "COS"))
-    ),
-    _of_r("Z", "[@r]"),
-    _f(
-        "q",
-        f"IF(COUNT({_XY})=4,IF([@s1_used]>0,"
-        f'(({_X1})*({_Y2})-({_Y1})*({_X2}))*k_12/[@s1_used],0),"")',
-        5,
-    ),
-    _of_r("sigma_r", "sigma_s*SQRT((1-[@r]/d_1)^2+(k_12*(1-[@r]/d_2))^2)/ABS([@den])"),
-    _f(
-        "flag",
-        _flag(f"{_XY},[@s1],[@s2]", "ABS(N([@q]))>k_off*sigma_s*SQRT(1+([@s2_used]/[@s1_used])^2)"),
-        width=13,
-    ),
-)
+    ]
+    miss = f"(({x1})*({y2})-({y1})*({x2}))*k_12/[@s1_used]"
+    off = "ABS(N([@q]))>k_off*sigma_s*SQRT(1+([@s2_used]/[@s1_used])^2)" if xy else "FALSE"
+    return (
+        SurveyColumn(key="id", width=12),
+        *(SurveyColumn(key=key, places=4) for key in ("x1", "y1", "x2", "y2") if xy),
+        *(SurveyColumn(key=key, places=4) for key in ("s1", "s2") if polar),
+        *(SurveyColumn(key=key, places=4, width=11) for key in ("theta",) if theta),
+        SurveyColumn(key="use", width=6),
+        SurveyColumn(key="code", width=10),
+        SurveyColumn(key="note", width=18),
+        _f("s1_used", _radius(x1, y1, "[@s1]", "", **kinds), 4, folded=True),
+        _f("s2_used", _radius(x2, y2, "[@s2]", "*k_12", **kinds), 4, folded=True),
+        _f("theta_used", f'IF([@s1_used]="","",{of_theta})', 4, folded=True),
+        *_RELIEF,
+        _of_r("e1", "[@s1_used]*[@r]/d_1"),
+        _of_r("e2", "[@s2_used]*[@r]/d_2"),
+        _of_r("s_c", "[@s1_used]-[@e1]"),
+        *place,
+        _of_r("Z", "[@r]"),
+        *(
+            _f("q", f'IF(COUNT({_XY})=4,IF([@s1_used]>0,{miss},0),"")', 5)
+            for _ in range(1 if xy else 0)
+        ),
+        _of_r("sigma_r", "sigma_s*SQRT((1-[@r]/d_1)^2+(k_12*(1-[@r]/d_2))^2)/ABS([@den])"),
+        _f("flag", _flag(measured, off), width=13),
+    )
+
+
+IDEAL_POINTS = ideal_points()
 
 
 def pair_points(*, undistorted: bool) -> tuple[SurveyColumn, ...]:
@@ -191,7 +225,7 @@ def pair_points(*, undistorted: bool) -> tuple[SurveyColumn, ...]:
         ),
         *(
             SurveyColumn(key=key, kind="value", places=6, folded=True)
-            for key in ("g1x", "g1y", "g2x", "g2y", "k_q", "k_r")
+            for key in ("g1x", "g1y", "g2x", "g2y", "k_q", "k_r", "o_r")
         ),
         _f("s1_used", f'IF([@q]="","",{radius(1, moved)})', 4, folded=True),
         _f("s2_used", f'IF([@q]="","",{radius(2, moved)})', 4, folded=True),
@@ -208,7 +242,7 @@ def pair_points(*, undistorted: bool) -> tuple[SurveyColumn, ...]:
         _of_r("X", place("x")),
         _of_r("Y", place("y")),
         _of_r("Z", "[@r]"),
-        _of_r("sigma_r", "IF(ISNUMBER([@r]),sigma_px*[@k_r],NA())"),
+        _of_r("sigma_r", "IF(ISNUMBER([@r]),SQRT((sigma_px*[@k_r])^2+N([@o_r])^2),NA())"),
         _f(
             "flag",
             _flag(_XY, "ABS(N([@q]))>k_off*sigma_px*N([@k_q])").replace(
@@ -229,7 +263,8 @@ def _from_points(key: str) -> str:
 
 def _text_from_points(key: str) -> str:
     cell = f"INDEX(tblPoints[{key}],{_AT})"
-    return f'IF({cell}="","",{cell})'
+    # Fewer rows in Points, where some were deleted, leave the rest of Results blank.
+    return f'IF({_AT}>ROWS(tblPoints[id]),"",IF({cell}="","",{cell}))'
 
 
 def _world(row: int, name: str) -> str:
@@ -353,7 +388,8 @@ def verdict_columns(holds: str, fails: str) -> tuple[SurveyColumn, ...]:
         SurveyColumn(key="tolerance", places=1, width=11),
         _f(
             "verdict",
-            f'IF(check_worst="","",IF(check_worst<=[@tolerance]/1000,"{holds}","{fails}"))',
+            'IF(OR(check_worst="",[@tolerance]=""),"",'
+            f'IF(check_worst<=[@tolerance]/1000,"{holds}","{fails}"))',
             width=11,
         ),
     )

@@ -15,6 +15,12 @@ from bifocal.survey.reference import CheckResult, Georeference, KnownPoints
 from bifocal.survey.relief_table import ReliefTable
 from bifocal.survey.setup import SurveySetup
 from bifocal.survey.tolerances import RULES, ToleranceRule
+from bifocal.survey.workbook.columns import (
+    SurveyColumn,
+    adjustment_names,
+    ideal_points,
+    pair_points,
+)
 from bifocal.survey.workbook.setup_cells import MATRICES, NADIRS
 from photocore.arrays import BoolArray, FloatArray
 from photocore.workbook.cells import CellValue
@@ -59,6 +65,9 @@ class SurveyContent:
         Width and height. [mm]
     limits : FlagLimits
         Where the flags begin.
+    links : mapping
+        Values of `Setup` that stand elsewhere in the workbook: name to the cell, as formulas
+        write it.
     log : sequence of tuple of str
         Rows of the sheet `Log`: date, program, what, file, SHA-256.
     rows : int
@@ -81,6 +90,7 @@ class SurveyContent:
     rules: tuple[ToleranceRule, ...] = RULES
     sensor: tuple[float, float] | None = None
     limits: FlagLimits = field(default_factory=FlagLimits)
+    links: Mapping[str, str] = field(default_factory=dict)
     log: Sequence[tuple[str, str, str, str, str]] = ()
     rows: int = POINT_ROWS
 
@@ -100,6 +110,16 @@ class SurveyContent:
     def undistorted(self) -> bool:
         """Whether raw pixels are freed of lens distortion beside the raw ones."""
         return any(photo.lens is not None for photo in self.photos)
+
+    @property
+    def point_columns(self) -> tuple[SurveyColumn, ...]:
+        """The columns of `Points`."""
+        if self.is_pair:
+            return pair_points(undistorted=self.undistorted)
+        corrected = self.setup.adjusted if self.setup is not None else ()
+        return ideal_points(
+            adjusted=[image for image, matrix in enumerate(corrected, 1) if matrix is not None]
+        )
 
     @property
     def point_rows(self) -> int:
@@ -255,7 +275,9 @@ def setup_cells(content: SurveyContent) -> dict[str, CellValue]:
         }
     first, second = content.photos
     d1, d2 = first.distance, second.distance
-    cells |= {"b_lever": d1 * d2 / (d1 - d2), "sigma_r_max": limits.relief_limit(content.pair.d2)}
+    # As its formula has it: of photos typed the other way round it is negative.
+    cells["b_lever"] = d1 * d2 / (d1 - d2)
+    cells["sigma_r_max"] = limits.relief_limit(content.pair.d2)
     if setup is None:
         return cells | _pair_cells(content, first, second)
     if first.scale_number is not None and second.scale_number is not None:
@@ -263,6 +285,9 @@ def setup_cells(content: SurveyContent) -> dict[str, CellValue]:
     cells |= {"pitch": setup.pitch, "input_unit": setup.unit, "sigma_s": setup.precision}
     if setup.unit == "px" and setup.pitch is not None:
         cells |= {"unit_x": setup.pitch, "unit_y": -setup.pitch}
+    for image, matrix in enumerate(setup.adjusted, start=1):
+        if matrix is not None:
+            cells |= dict(zip(adjustment_names(image), matrix.ravel().tolist(), strict=True))
     for image, nadir in ((1, setup.nadir1), (2, setup.nadir2)):
         column, row = nadir or (0.0, 0.0)
         cells |= {f"nadir_{image}_col": column, f"nadir_{image}_row": row}

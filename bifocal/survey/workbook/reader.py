@@ -47,8 +47,8 @@ _SHARED = {"x1": "x", "y1": "y", "x2": "x", "y2": "y"} | {
 }  # fmt: skip
 #: Headings of image coordinates in other programs: i counts columns, j rows.
 _OTHER = {"col1": "i", "row1": "j", "col2": "i", "row2": "j"}
-_TO_DEGREES = {"deg": 1.0, "gon": 0.9, "rad": float(np.degrees(1.0))}
-_TO_MM = {"mm": 1.0, "cm": 10.0, "um": 1e-3, "m": 1000.0}
+TO_DEGREES = {"deg": 1.0, "gon": 0.9, "rad": float(np.degrees(1.0))}
+TO_MM = {"mm": 1.0, "cm": 10.0, "um": 1e-3, "m": 1000.0}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -73,6 +73,10 @@ class SurveyInput:
         Whether it is a survey workbook with live formulas.
     table : Table
         The table of points, with the way back to its cells.
+    book : SheetFile or None
+        The workbook as read; None for a text table.
+    titles : tuple of str
+        The sheets of the file; empty for a text table.
     known_rows, control_rows : tuple of int
         Rows of the sheets `Check` and `Georeference`; check points given beside the points follow
         after these.
@@ -89,6 +93,8 @@ class SurveyInput:
     language: str = "en"
     is_ours: bool = False
     table: Table
+    book: SheetFile | None = None
+    titles: tuple[str, ...] = ()
     known_rows: tuple[int, ...] = ()
     control_rows: tuple[int, ...] = ()
     remarks: tuple[str, ...] = ()
@@ -212,6 +218,8 @@ def read_survey(path: Path | str, options: ReadOptions | None = None) -> SurveyI
         language=language,
         is_ours=is_ours,
         table=table,
+        book=sheets,
+        titles=() if sheets is None else tuple(sheets.titles),
         known_rows=check.rows,
         control_rows=control.rows,
         remarks=tuple(dict.fromkeys(remarks)),
@@ -310,7 +318,7 @@ def _observations(table: Table, errors: list[CellError]) -> tuple[PointObservati
     used: BoolArray = np.isnan(use) | (use != 0)
     unit, factor = _unit_of_xy(table, errors)
     xy = _stack(table, _XY) * factor
-    scales = [_TO_MM, _TO_MM, _TO_DEGREES]
+    scales = [TO_MM, TO_MM, TO_DEGREES]
     polar = _stack(table, _POLAR) * [
         factor_of(table, key, factors, errors) for key, factors in zip(_POLAR, scales, strict=True)
     ]
@@ -369,10 +377,10 @@ def _unit_of_xy(table: Table, errors: list[CellError]) -> tuple[str, float]:
         errors.append(table.error(row, key, message))
     if symbol == "px":
         return "px", 1.0
-    if symbol not in _TO_MM:
+    if symbol not in TO_MM:
         errors.append(unit_error(table, next(iter(said)), symbol, "mm or px"))
         return "", 1.0
-    return "mm", _TO_MM[symbol]
+    return "mm", TO_MM[symbol]
 
 
 def _check_rows(

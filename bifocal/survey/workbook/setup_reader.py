@@ -10,6 +10,7 @@ import numpy as np
 
 from bifocal.model.flags import FlagLimits
 from bifocal.survey.setup import SurveySetup
+from bifocal.survey.workbook.columns import adjustment_names
 from bifocal.survey.workbook.known_reader import LARGEST
 from bifocal.survey.workbook.setup_cells import MATRICES, NADIRS, TYPED_FORMULAS
 from bifocal.survey.workbook.words import headings, term
@@ -85,10 +86,24 @@ def read_setup(
         pair_file=_text(values, "pair_file"),
         matrices=matrices,
         nadirs=nadirs,
+        adjusted=_adjusted(book),
+        places=values.places,
         where=where,
         remarks=tuple(values.remarks),
         text_cells=tuple(values.text_cells),
     )
+
+
+def _adjusted(book: SheetFile) -> tuple[FloatArray | None, FloatArray | None]:
+    """Return the corrections of both photos' coordinates, None where the workbook has none."""
+    found: list[FloatArray | None] = []
+    for image in (1, 2):
+        names = adjustment_names(image)
+        places = [book.names[name] for name in names if name in book.names]
+        cells = [book.grid(sheet).rows.get(row, {}).get(column) for sheet, row, column in places]
+        numbers = [cell for cell in cells if isinstance(cell, float)]
+        found.append(np.reshape(numbers, (3, 3)) if len(numbers) == len(names) else None)
+    return found[0], found[1]
 
 
 def is_general(book: SheetFile) -> bool:

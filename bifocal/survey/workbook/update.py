@@ -1,44 +1,33 @@
-"""Put results into a survey workbook that exists: its own formula cells, and nothing else."""
+"""Put results, options and language into a survey workbook that exists, and nothing else."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 from bifocal.survey.workbook.book import build
 from bifocal.survey.workbook.charts import HEAD, LEFT
-from bifocal.survey.workbook.columns import TEXT_KEYS
+from bifocal.survey.workbook.columns import TEXT_KEYS, row_formula
 from bifocal.survey.workbook.content import SurveyContent
 from bifocal.survey.workbook.reader import SurveyInput
 from bifocal.survey.workbook.setup_cells import TYPED_FORMULAS
+from bifocal.survey.workbook.setup_update import (
+    add_missing_sheets,
+    place_of,
+    type_value,
+    write_corrections,
+    write_options,
+)
 from bifocal.survey.workbook.sheets import BookBuilder
-from photocore.workbook.cells import CellValue
+from bifocal.survey.workbook.translate import translate
+from bifocal.survey.workbook.words import word
+from photocore.errors import InputError
+from photocore.workbook.cells import CellValue, NewColumn, escape
 from photocore.workbook.editor import WorkbookEditor
-from photocore.workbook.grid import TableArea, split_cell
+from photocore.workbook.grid import TableArea
 from photocore.workbook.newbook import RowBlock
-
-
-def can_update(source: Path, target: Path, survey: SurveyInput, content: SurveyContent) -> str:
-    """Return why a survey's file cannot be carried over with results put in; empty if it can."""
-    if not survey.is_ours:
-        return "it is not a survey workbook of this program"
-    if source.suffix.lower() not in (".xlsx", ".xlsm") or (
-        target.suffix.lower() != source.suffix.lower()
-    ):
-        return f"{source.suffix} and {target.suffix} are different kinds of file"
-    editor = WorkbookEditor(source)
-    area = editor.table("tblPoints")
-    if area is None:
-        return "its table tblPoints is gone"
-    if content.is_pair != ("col1" in survey.table.present):
-        return "its formulas are made for another kind of measurement"
-    if survey.table.rows and survey.table.rows[-1] > area.area[2]:
-        return f"{survey.table.rows[-1] - area.area[2]} points stand below its prepared rows"
-    results = editor.table("tblResults")
-    if results is not None and _length(results) < _length(area):
-        return "its sheet Results is shorter than Points"
-    return ""
 
 
 def update_book(
@@ -47,9 +36,13 @@ def update_book(
     survey: SurveyInput,
     content: SurveyContent,
     *,
+    given: Mapping[str, Any],
     overwrite: bool = False,
 ) -> Path | None:
     """Copy a survey workbook with fresh results in its formula cells; all else byte for byte.
+
+    Rows that hold points but no formulas get them, tables grow over points below them, sheets that
+    are missing are added, options and language are written where they belong.
 
     Parameters
     ----------
@@ -60,7 +53,9 @@ def update_book(
     survey : SurveyInput
         What was read from it.
     content : SurveyContent
-        What came out, evaluated as the workbook's own formulas do.
+        What came out, evaluated as the workbook's own formulas do, in the language wanted.
+    given : mapping
+        The options that take the place of what the workbook says, by name.
     overwrite : bool
         Replace an existing file.
 
@@ -68,64 +63,73 @@ def update_book(
     -------
     Path or None
         The backup of a workbook changed in place.
+
+    Raises
+    ------
+    InputError
+        If the workbook's formulas are made for another kind of measurement, or it cannot be
+        changed.
     """
-    editor, built = WorkbookEditor(source), build(content)
-    _named_cells(editor, built, content)
-    area = editor.table("tblPoints")
-    assert area is not None
-    first = area.area[0] + 1
+    editor, built = WorkbookEditor(source, survey.book), build(content)
+    points = editor.table("tblPoints")
+    if points is None or content.is_pair != ("col1" in survey.table.present):
+        raise InputError(
+            f"{source}: its formulas are made for another kind of measurement "
+            f"({'coordinates in mm or px' if content.is_pair else 'raw pixels of a pair'}). "
+            "Solve its points from a table of their own (.csv)."
+        )
+    other_words = content.language != survey.language
+    if other_words:
+        translate(editor, content, survey.language)
+    add_missing_sheets(editor, built)
+    store_named_cells(editor, built, content)
+    write_options(editor, content, given)
+    write_corrections(editor, content)
+    first = points.area[0] + 1
     rows = [row - first for row in survey.table.rows]
-    _table(editor, built, "tblPoints", rows)
-    _table(editor, built, "tblResults", rows)
+    length = max([_length(points), *(row + 1 for row in rows)])
+    _table(editor, built, "tblPoints", rows, length, anew=_corrected(content))
+    _table(editor, built, "tblResults", rows, length)
     for name, sheet_rows in (("tblCheck", survey.known_rows), ("tblGeo", survey.control_rows)):
         own = editor.table(name)
         if own is not None:
             _table(editor, built, name, [row - own.area[0] - 1 for row in sheet_rows])
-    for name, key in (("tblPlan", "relief_cm"), ("tblFrame", "share"), ("tblVerdict", "tolerance")):
+    for name, key in (("tblPlan", "relief_cm"), ("tblFrame", "share")):
         _fixed_table(editor, built, name, key)
+    _verdict(editor, built, content, rules="rules" in given, words=other_words)
     _charts(editor, built, rows)
     _log(editor, content)
     return editor.save(target, overwrite=overwrite)
+
+
+def _corrected(content: SurveyContent) -> Sequence[str]:
+    """Return the columns whose formulas depend on whether coordinates are corrected."""
+    if content.setup is None or all(matrix is None for matrix in content.setup.adjusted):
+        return ()
+    return ("s1_used", "s2_used", "theta_used", "q")
 
 
 def _length(area: TableArea) -> int:
     return area.area[2] - area.area[0]
 
 
-def _named_cells(editor: WorkbookEditor, built: BookBuilder, content: SurveyContent) -> None:
+def store_named_cells(editor: WorkbookEditor, built: BookBuilder, content: SurveyContent) -> None:
     """Store the results of single formulas, found by their names; type what was found."""
     typed = {"g_auto", "s3_k", *(f"s3_{i}{j}" for i in "123" for j in "123")}
     for name, defined in built.book.defined_names.items():
         sheet, _, cell = defined.attr_text.partition("!")
         sheet, cell = sheet.strip("'"), cell.replace("$", "")
-        place = _place(editor, name)
+        place = place_of(editor, name)
         if place is None:
             continue
         value = built.results[sheet].get(cell)
         if name in typed and content.georeference is not None:
             shown = built.book[sheet][cell].value
-            _type(editor, place, shown if value is None else value)
+            type_value(editor, place, shown if value is None else value)
         elif built.book[sheet][cell].data_type == "f" or name in TYPED_FORMULAS:
             editor.set_result(*place, _result(value))
         if built.book[sheet][cell].data_type != "f" and name not in typed:
             _make_number(editor, place, value)
-
-
-def _place(editor: WorkbookEditor, name: str) -> tuple[str, int, int] | None:
-    """Return sheet, row and column of a named cell."""
-    place = next((v for k, v in editor.book.names.items() if k.casefold() == name.casefold()), "")
-    sheet, _, cell = place.rpartition("!")
-    sheet = sheet.strip("'").replace("''", "'")
-    if sheet not in editor.titles or ":" in cell or not cell:
-        return None
-    return (sheet, *split_cell(cell))
-
-
-def _type(editor: WorkbookEditor, place: tuple[str, int, int], value: CellValue) -> None:
-    """Type a value unless it stands there already."""
-    sheet, row, column = place
-    if editor.grid(sheet).rows.get(row, {}).get(column) != value:
-        editor.set_value(sheet, row, column, value)
 
 
 def _make_number(editor: WorkbookEditor, place: tuple[str, int, int], value: CellValue) -> None:
@@ -140,32 +144,84 @@ def _result(value: CellValue) -> CellValue:
     return "" if value is None else value
 
 
-def _table(editor: WorkbookEditor, built: BookBuilder, name: str, rows: Sequence[int]) -> None:
-    """Store the results of a table; ``rows`` counts from its first row, the others are blank."""
+def _table(
+    editor: WorkbookEditor,
+    built: BookBuilder,
+    name: str,
+    rows: Sequence[int],
+    length: int = 0,
+    *,
+    anew: Sequence[str] = (),
+) -> None:
+    """Store the results of a table, formulas where they are missing.
+
+    Parameters
+    ----------
+    rows : sequence of int
+        Row of each entry, counted from the table's first; all others are blank.
+    length : int
+        Rows it must have at least.
+    anew : sequence of str
+        Columns whose formulas are written whatever stands there.
+    """
     area, content = editor.table(name), built.tables[name]
     if area is None:
         return
-    headings = area.headings()
-    first = area.area[0] + 1
+    headings, first = area.headings(), area.area[0] + 1
+    length = max([length, _length(area), *(row + 1 for row in rows)])
+    editor.extend(name, area.area[0] + length)
+    styles = editor.styles_of(area.sheet, first)
+    filled, prepared = [], []
     for column in content.columns:
         if column.key not in headings:
             continue
         given = content.cells.get(column.key, ())
         number = headings[column.key]
+        style = styles.get(number, "")
+        if column.kind == "input" and column.key not in TEXT_KEYS:
+            for row, value in zip(rows, given, strict=False):
+                _make_number(editor, (area.sheet, first + row, number), value)
+        if anew and column.kind == "input" and column.key in ("x1", "y1", "x2", "y2"):
+            _complete(editor, (area.sheet, first, number), rows, given)
+        if column.kind != "formula":
+            prepared.append(NewColumn(number, [None] * (length - _length(area)), style))
         if column.kind == "input":
-            if column.key not in TEXT_KEYS:
-                for row, value in zip(rows, given, strict=False):
-                    _make_number(editor, (area.sheet, first + row, number), value)
             continue
-        values: list[CellValue] = [_result(column.spare)] * _length(area)
+        values: list[CellValue] = [_result(column.spare)] * length
         for row, value in zip(rows, given, strict=False):
             if 0 <= row < len(values):
                 values[row] = _result(value)
-        if column.kind == "formula":
-            editor.set_results(area.sheet, first, {number: values})
+        if column.kind == "value":
+            for row, value in enumerate(values, start=first):
+                type_value(editor, (area.sheet, row, number), None if value == "" else value)
             continue
-        for row, value in enumerate(values, start=first):
-            _type(editor, (area.sheet, row, number), None if value == "" else value)
+        text = row_formula(area.name, column.formula)[1:]
+        if column.key in anew:
+            for row, value in enumerate(values, start=first):
+                editor.put(area.sheet, row, number, value, formula=text, style=style)
+            continue
+        filled.append(NewColumn(number, values, style, _constant(escape(text))))
+    editor.fill_rows(area.sheet, first, filled)
+    editor.fill_rows(area.sheet, first + _length(area), prepared)
+
+
+def _complete(
+    editor: WorkbookEditor,
+    place: tuple[str, int, int],
+    rows: Sequence[int],
+    values: Sequence[CellValue],
+) -> None:
+    """Type coordinates where there are none, of points given by radial distances."""
+    sheet, first, column = place
+    grid = editor.grid(sheet).rows
+    for row, value in zip(rows, values, strict=False):
+        if grid.get(first + row, {}).get(column) is None and value is not None:
+            editor.set_value(sheet, first + row, column, value)
+
+
+def _constant(text: str) -> Callable[[int], str]:
+    """Return a function of the row that is the same formula in all."""
+    return lambda _: text
 
 
 def _fixed_table(editor: WorkbookEditor, built: BookBuilder, name: str, key: str) -> None:
@@ -180,12 +236,48 @@ def _fixed_table(editor: WorkbookEditor, built: BookBuilder, name: str, key: str
         return
     first = area.area[0] + 1
     stand = [grid.get(first + i, {}).get(headings[key]) for i in range(len(given))]
-    same = (
-        isinstance(there, float) and math.isclose(there, float(value or 0), rel_tol=1e-12)
-        for there, value in zip(stand, given, strict=True)
-    )
-    if all(same):
+    if stand == [float(value or 0) for value in given]:
         _table(editor, built, name, range(len(given)))
+
+
+def _verdict(
+    editor: WorkbookEditor, built: BookBuilder, content: SurveyContent, *, rules: bool, words: bool
+) -> None:
+    """Judge the accuracy by the rules that stand in the workbook, or by those asked for.
+
+    Parameters
+    ----------
+    rules, words : bool
+        Whether the rules, and the formulas with their two words, are written anew.
+    """
+    area, wanted = editor.table("tblVerdict"), built.tables["tblVerdict"]
+    if area is None or not {"tolerance", "verdict"} <= area.headings().keys():
+        return
+    headings, first, grid = area.headings(), area.area[0] + 1, editor.grid(area.sheet).rows
+    accuracy = content.check.accuracy if content.check is not None else math.nan
+    holds, fails = word("holds", content.language), word("fails", content.language)
+    formula = row_formula(area.name, wanted.columns[-1].formula)[1:]
+    count = len(wanted.cells["rule"]) if rules else 0
+    length = max(_length(area), count)
+    style = editor.styles_of(area.sheet, first)
+    for i in range(length):
+        row = first + i
+        tolerance = grid.get(row, {}).get(headings["tolerance"])
+        if rules:
+            asked = {key: wanted.cells[key][i] if i < count else None for key in headings}
+            tolerance = asked.pop("tolerance")
+            asked.pop("verdict")
+            for key, value in (asked | {"tolerance": tolerance}).items():
+                type_value(editor, (area.sheet, row, headings[key]), value)
+        result = ""
+        if isinstance(tolerance, int | float) and not math.isnan(accuracy):
+            result = holds if accuracy <= tolerance / 1000 else fails
+        place = (area.sheet, row, headings["verdict"])
+        if rules or words:
+            editor.put(*place, result, formula=formula, style=style.get(headings["verdict"], ""))
+        else:
+            editor.set_result(*place, result)
+    editor.extend(area.name, area.area[0] + length)
 
 
 def _charts(editor: WorkbookEditor, built: BookBuilder, rows: Sequence[int]) -> None:

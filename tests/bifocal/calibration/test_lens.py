@@ -452,3 +452,21 @@ def test_mistakes_with_lenses_are_named(tmp_path):
         assert result.exit_code == 1, arguments
         assert message in result.stderr
     assert not (tmp_path / "o.json").exists()
+
+
+def test_photos_are_undistorted_all_or_none(tmp_path):
+    rng = np.random.default_rng(2)
+    lens = Lens(
+        camera_matrix=[[300, 0, 20], [0, 300, 15], [0, 0, 1]],
+        image_size=(40, 30),
+        coefficients=[0.01, 0, 0, 0, 0],
+    )
+    for name, size in (("a.png", (30, 40, 3)), ("b.png", (30, 50, 3))):
+        write_image(tmp_path / name, rng.integers(0, 255, size).astype(np.uint8))
+    lens.write(tmp_path / "l.json")
+    before = sorted(tmp_path.iterdir())
+    photos = [str(tmp_path / name) for name in ("a.png", "b.png")]
+    done = CliRunner().invoke(main, ["undistort", *photos, "--lens", str(tmp_path / "l.json")])
+    assert done.exit_code == 1
+    assert "b.png" in done.stderr
+    assert sorted(tmp_path.iterdir()) == before

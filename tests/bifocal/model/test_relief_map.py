@@ -27,6 +27,7 @@ def test_sampling_a_slope_is_exact_between_pixel_centres():
 def test_sampling_outside_the_map_is_nan_and_unknown():
     places = [[-0.1, 1.0], [4.1, 1.0], [2.0, 3.1], [np.nan, 1.0]]
     assert np.isnan(slope().sample(places)).all()
+    assert (slope().sample_quality(places) == Quality.UNKNOWN).all()
 
 
 def test_beside_an_unknown_pixel_the_nearest_known_one_counts():
@@ -37,6 +38,10 @@ def test_beside_an_unknown_pixel_the_nearest_known_one_counts():
     assert np.isnan(holed.sample([1.4, 2.4]))
     assert holed.quality[0, 1] == Quality.UNKNOWN
     assert holed.quality[0, 0] == Quality.MEASURED
+    assert holed.sample_quality([[1.4, 2.4], [0.7, 2.4]]).tolist() == [
+        Quality.UNKNOWN,
+        Quality.MEASURED,
+    ]
 
 
 def test_a_map_of_one_pixel_can_be_sampled():

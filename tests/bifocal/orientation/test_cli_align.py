@@ -155,7 +155,8 @@ def test_picks_of_the_other_photo_are_exchanged_and_said(folder) -> None:
     [
         ([], "say how the pair is to be set up"),
         (["--distance1", "16"], "say how the pair is to be set up"),
-        (["--auto"], "focal lengths are unknown"),
+        (["--auto"], "--auto needs one measure for the scale"),
+        (["--auto", "--distance1", "16"], "focal lengths are unknown"),
         (["--control", "nowhere.csv"], "nowhere.csv"),
         (["--distance1", "16", "--distance2", "9", "--delta-d", "7"], "give two of"),
         (["--auto", "--lens", "absent.json", "--distance1", "16"], "absent.json"),
@@ -191,10 +192,13 @@ def test_a_pair_file_ends_in_json(folder) -> None:
 
 def test_distortion_no_lens_has_is_refused() -> None:
     interior = Interior.from_focal(1500.0, image_size=(960, 640), sigma=0.02, source="test")
-    check_distortion(0.1, interior)
+    check_distortion((0.1, 0.0), interior)
+    # A compact camera moves its corners by 11 % of the half diagonal; that is no wrong sensor.
+    compact = Interior.from_focal(900.0, image_size=(960, 640), sigma=0.04, source="test")
+    check_distortion((-0.24, 0.29), compact)
     for k in (3.2, -3.2, -40.0):
         with pytest.raises(GeometryError, match="sensor width or the focal length is probably"):
-            check_distortion(k, interior)
+            check_distortion((k, 0.0), interior)
 
 
 def test_an_existing_pair_is_kept(folder) -> None:
@@ -274,3 +278,49 @@ def test_photos_of_a_pixel_are_refused_in_words(tmp_path):
     assert done.exit_code == 1
     assert done.stderr.startswith("Error: ")
     assert not out.exists()
+
+
+def test_a_set_up_is_taken_exactly_as_typed(folder) -> None:
+    site = ["--distance1", "16", "--distance2", "9", "--sigma-distance", "0.01"]
+    result = align(folder, "--as-set-up", *site, *lens(), out="typed.pair.json")
+    assert result.exit_code == 0, result.output
+    assert "exactly as typed" in result.stdout
+    pair = Pair.read(folder / "typed.pair.json")
+    assert (pair.d1, pair.d2) == (16.0, 9.0)
+    for photo, cam in ((pair.image1, FAR), (pair.image2, NEAR)):
+        metres = photo.distance / cam.matrix[0, 0]
+        wanted = [[metres, 0, -metres * 479.5], [0, -metres, metres * 319.5], [0, 0, 1]]
+        np.testing.assert_allclose(photo.plane_from_pixel, wanted, rtol=1e-9, atol=1e-12)
+        assert photo.nadir.tolist() == [0.0, 0.0]
+    # By hand, of 1 m of relief: 9 / (16 * 7) * 10 mm (1 - 1/9) and 16 / (9 * 7) * 10 mm (1 - 1/16).
+    added = pair.covariance_of_orientation(np.array([[2.0, 1.0, 1.0]]))[0, 2, 2]
+    assert 1000 * np.sqrt(added) == pytest.approx(
+        np.hypot(0.8036 * 8 / 9, 2.5397 * 15 / 16), rel=0.01
+    )
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (["--as-set-up", "--distance1", "16"], "give --distance1 and --distance2"),
+        (["--as-set-up", "--distance1", "9", "--distance2", "16"], "the far photo comes first"),
+        (["--as-set-up", "--auto", "--distance1", "16"], "leave out --control and --auto"),
+        (["--auto"], "--auto needs one measure for the scale"),
+    ],
+)
+def test_what_a_set_up_lacks_is_said_at_once(folder, options, said) -> None:
+    result = align(folder, *options, out="none.pair.json")
+    assert result.exit_code == 1
+    assert said in " ".join(result.stderr.split())
+
+
+def test_a_control_table_without_headings_is_read_by_columns(folder) -> None:
+    lines = (folder / "control.csv").read_text(encoding="utf-8").splitlines()
+    (folder / "bare.csv").write_text("\n".join(lines[1:]), encoding="utf-8")
+    result = align(folder, "--control", "bare.csv", out="bare.pair.json")
+    assert result.exit_code == 1
+    columns = "id,X,Y,r,col1,row1,col2,row2"
+    given = ["--control", "bare.csv", "--columns", columns, *lens()]
+    result = align(folder, *given, out="bare.pair.json")
+    assert result.exit_code == 0, result.output
+    assert Pair.read(folder / "bare.pair.json").d1 == pytest.approx(16.0, rel=0.005)

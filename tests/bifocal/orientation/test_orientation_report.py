@@ -37,7 +37,7 @@ def test_uncertain_distances_are_part_of_the_precision_of_relief() -> None:
 
 
 def test_relief_scale_is_the_spread_of_relief_under_the_distances_own() -> None:
-    covariance = np.zeros((25, 25))
+    covariance = np.zeros((24, 24))
     rows = [at("Z", 1), at("Z", 2)]
     covariance[np.ix_(rows, rows)] = [[0.3**2, 0.2 * 0.3 * 0.05], [0.2 * 0.3 * 0.05, 0.05**2]]
     none = np.zeros(0)

@@ -12,6 +12,7 @@ from bifocal.orientation.orientation_stages import PhotoInput
 from bifocal.orientation.pair_adjustment import adjust, pair_equations
 from bifocal.orientation.pair_observations import NAMES, PairObservations, PairUnknowns, at
 from bifocal.orientation.space_resection import resect
+from bifocal.orientation.tie_points import with_wall
 from photocore.camera import project
 from photocore.errors import GeometryError, InputError
 from tests.bifocal.orientation.layered_wall import SIZE, camera
@@ -212,11 +213,13 @@ def test_common_points_alone_need_a_tilt_or_a_tape_but_give_the_ratio_of_distanc
         tie2=project(NEAR, xyz),
         sigma_tie=0.1,
         tie_used=np.ones(300, bool),
-        wall=xyz[:, 2] == 0,
-        sigma_wall=np.full(300, 0.1),
         measured={"distance1": (16.0, 0.01)},
         free_datum=True,
     )
+    problem = with_wall(problem, PairUnknowns(cameras=(FAR, NEAR)), (1e-4, 1e-5))
+    # Of the hundred points off the wall a few lie within the noise of it.
+    assert problem.wall[:200].all()
+    assert problem.wall.sum() < 225
     start = tuple(
         cam._replace(centre=cam.centre + np.array([0.05, -0.05, 0.1])) for cam in (FAR, NEAR)
     )
@@ -235,9 +238,9 @@ def everything() -> tuple[PairObservations, PairUnknowns]:
     xyz = np.column_stack([rng.uniform(-3, 3, (60, 2)), np.zeros(60)])
     xyz[40:, 2] = rng.uniform(-0.6, 0.6, 20)
     bent = tuple(replace(interior(focal=cam.matrix[0, 0]), sigma_radial=0.1) for cam in (FAR, NEAR))
-    radial, plane = (0.02, -0.03), np.array([0.01, 0.002, -0.001])
+    radial = np.array([[0.02, -0.01], [-0.03, 0.02]])
     seen = [
-        i.radial(k).distort(project(cam, POINTS))
+        i.radial(*k).distort(project(cam, POINTS))
         for i, k, cam in zip(bent, radial, (FAR, NEAR), strict=True)
     ]
     points = replace(
@@ -253,15 +256,13 @@ def everything() -> tuple[PairObservations, PairUnknowns]:
         tie2=project(NEAR, xyz) + rng.normal(0, 2, (60, 2)),
         tie_used=np.arange(60) % 7 > 0,
         wall=xyz[:, 2] == 0,
-        sigma_wall=rng.uniform(0.5, 2.0, 60),
+        wall_rows=rng.uniform(0.5, 2.0, (3, 60)),
         sigma_body=3.0,
         sigma_zoom=0.01,
-        sigma_plane=0.01,
-        sigma_slope=0.002,
         measured={"distance1": (16.1, 0.01), "delta_d": (7.0, 0.02)},
         sigma_tilt=0.01,
     )
-    return observations, PairUnknowns(cameras=(FAR, NEAR), radial=radial, plane=plane)
+    return observations, PairUnknowns(cameras=(FAR, NEAR), radial=radial)
 
 
 def test_the_jacobian_is_the_derivative_by_every_name() -> None:

@@ -3,7 +3,7 @@
 import cv2
 import numpy as np
 
-from bifocal.orientation.matching import spread_evenly
+from bifocal.orientation.features import spread_evenly
 from bifocal.orientation.targets import find_targets
 
 

@@ -334,3 +334,34 @@ def test_the_relief_sheet_hatches_what_was_not_measured_and_has_a_legend(wall: P
     lines = model.query('LWPOLYLINE[layer=="BIFOCAL_CONTOURS"]')
     assert len(lines) > 0
     assert min(x for line in lines for x, *_ in line.get_points()) > -1.3
+
+
+def test_many_marked_points_do_not_bury_the_sheet_under_their_names(wall: Path) -> None:
+    rng = np.random.default_rng(3)
+    lines = [
+        f"P{i},{x:.4f},{y:.4f},0" for i, (x, y) in enumerate(rng.uniform(-1.4, 1.4, (3000, 2)))
+    ]
+    (wall / "m.csv").write_text("\n".join(["id,X,Y,Z", *lines]), encoding="utf-8")
+    (wall / "c.csv").write_text("id,X,Y,Z\nCONTROL,0,0,0\n", encoding="utf-8")
+    done = run(
+        wall,
+        "--plane",
+        "--deliver",
+        "d",
+        "--scale",
+        "1:50",
+        "--mark",
+        "m.csv",
+        "--control",
+        "c.csv",
+    )
+    assert done.exit_code == 0, done.output
+    page = page_of(wall / "d" / "Torre_est.pdf")
+    names = set(re.findall(r"\((P\d+|CONTROL)\) Tj", page))
+    assert "CONTROL" in names
+    assert 60 <= len(names) <= 200
+    assert f"{3001 - len(names)} marked points stand on the sheet without name" in done.stderr
+    # Names of 2 mm cover at most a sixth of the picture of 84 mm by 60 mm.
+    assert sum(0.556 * 2.0 * len(name) * 2.0 for name in names) < 84 * 60 / 6
+    model = ezdxf.readfile(wall / "d" / "Torre_est.dxf").modelspace()
+    assert len(model.query('POINT[layer=="BIFOCAL_POINTS"]')) == 3000

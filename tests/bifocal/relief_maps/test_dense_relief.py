@@ -11,6 +11,7 @@ import pytest
 from bifocal import Pair, Photo, Quality, dense_relief
 from bifocal.files.images import as_grey
 from bifocal.model.grid import Grid
+from bifocal.orientation.pair_observations import at
 from bifocal.relief_maps import edges, flow, forward_projection, seed, smoothing
 from bifocal.relief_maps.frame import common_bounds, make_frame, working_grid
 from bifocal.relief_maps.orientation_sigma import orientation_sigma
@@ -258,15 +259,33 @@ def test_sigma_is_the_base_factor_times_the_matching_precision_over_the_radius()
     assert sigma[255, int(x)] == pytest.approx(0.1 * 20.78125 / 300.5, rel=1e-4)
 
 
-def test_the_precision_of_the_set_up_is_added_where_it_is_stated():
-    setup = {"standard_deviations": {"scale": 1e-4, "distance1": 0.01, "distance2": 0.02}}
-    pair = replace(shot().pair, extra={"setup": setup})
-    sigma = orientation_sigma(pair, np.array([0.0, 1.0], dtype=np.float32))
+def test_the_precision_of_the_set_up_is_added_cell_by_cell_where_it_is_stated():
+    covariance = np.zeros((24, 24))
+    # Of the scale of photo 2, and of distances at the scales as they are: f goes with d.
+    covariance[at("focal length", 2), at("focal length", 2)] = 1e-8
+    for number, distance, sigma in ((1, 17.5, 0.01), (2, 9.5, 0.02)):
+        rows = [at("Z", number), at("focal length", number)]
+        both = np.array([sigma, sigma / distance])
+        covariance[np.ix_(rows, rows)] += np.outer(both, both)
+    pair = replace(shot().pair, orientation=covariance)
+    grid = Grid.from_bounds((-2.0, -1.0, 2.0, 1.0), gsd=0.02)
+    relief = np.tile(np.linspace(0.0, 1.0, grid.width, dtype=np.float32), (grid.height, 1))
+    sigma = orientation_sigma(pair, relief, grid)
     # By hand: B 1e-4 = 2.078 mm; per metre of relief 9.5 / (17.5 * 8) * 10 mm = 0.679 mm and
-    # 17.5 / (9.5 * 8) * 20 mm = 4.605 mm.
-    wanted = [2.078e-3, np.sqrt(2.078**2 + 0.679**2 + 4.605**2) * 1e-3]
-    np.testing.assert_allclose(sigma, wanted, rtol=1e-3)
-    assert orientation_sigma(shot().pair, np.ones(2, np.float32)).tolist() == [0.0, 0.0]
+    # 17.5 / (9.5 * 8) * 20 mm = 4.605 mm. From k = (1 - r/d1) / (1 - r/d2) they shrink, as relief
+    # comes nearer, with both brackets, with the second and with the first.
+    for column, r in ((0, 0.0), (-1, 1.0)):
+        far, near = 1 - r / 17.5, 1 - r / 9.5
+        parts = (2.078 * far * near, 0.679 * r * near, 4.605 * r * far)
+        wanted = np.linalg.norm(parts)
+        away = np.abs(grid.rows_y) > 0.3
+        np.testing.assert_allclose(1000 * sigma[away, column], wanted, rtol=0.02)
+    everywhere = pair.covariance_of_orientation(
+        np.column_stack([grid.columns_x, np.full(grid.width, 0.5), relief[0].astype(float)])
+    )
+    row = int(np.argmin(np.abs(grid.rows_y - 0.5)))
+    np.testing.assert_allclose(sigma[row], np.sqrt(everywhere[:, 2, 2]), rtol=0.02)
+    assert not orientation_sigma(shot().pair, relief, grid).any()
 
 
 def test_flow_of_a_known_zoom_gives_its_relief_and_nothing_across():

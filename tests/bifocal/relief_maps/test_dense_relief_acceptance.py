@@ -87,9 +87,7 @@ def test_real_oblique_photos_of_a_church_agree_with_the_reference(data_dir, name
     assert np.isfinite(error).mean() > 0.98
     assert 1e3 * np.nanmedian(error) < median
     assert (~(error < 0.1)).mean() < 0.20
-    column, row = np.rint(found.grid.pixel_of(xyz[:, :2])).astype(int).T
-    inside = (column >= 0) & (column < found.r.shape[1]) & (row >= 0) & (row < found.r.shape[0])
-    measured = inside & (found.quality[row * inside, column * inside] == Quality.MEASURED)
+    measured = found.sample_quality(xyz[:, :2]) == Quality.MEASURED
     assert measured.mean() > 0.5
     assert (error[measured] > 0.1).mean() < 0.15
 

@@ -332,7 +332,7 @@ def test_the_corrected_survey_solves_to_the_same_again(tmp_path):
     out = tmp_path / "out.xlsx"
     result = run("solve", fill(tmp_path / "s.xlsx", table), "--adjust-setup", "--out", out)
     assert result.exit_code == 0, result.stderr
-    assert "the set-up was corrected" in result.stderr
+    assert "image 2 was corrected by the points of the reference plane" in result.stderr
     answer, _ = solved(out)
     for name, x, y, r in POINTS:
         found = by_id(answer)[name]

@@ -7,9 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bifocal import Pair, Photo
+from bifocal import Pair, Photo, solve
 from bifocal.survey.orientation_check import check_orientation
 from photocore.errors import GeometryError, InputError
+from tests.scenes import SetupErrors, bifocal_cameras
 
 METRES = np.array([[0.00369, 0, -5.67], [0, -0.00369, 3.78], [0, 0, 1.0]])
 IDEAL = Pair(
@@ -106,3 +107,43 @@ def test_one_point_is_refused():
 def test_coinciding_points_are_refused():
     with pytest.raises(GeometryError, match="spread over the photo"):
         check_orientation(IDEAL, np.full((6, 2), 300.0), np.full((6, 2), 301.0))
+
+
+@pytest.mark.parametrize(("noise", "limit"), [(0.0, 0.006), (0.35, 0.025)])
+def test_points_off_the_plane_show_the_centre_of_zoom(noise, limit):
+    """58 mm of relief without it; typed distances up to 1 % wrong leave a few."""
+    rng = np.random.default_rng(6)
+    cameras = bifocal_cameras(errors=SetupErrors(), rng=rng)
+    span = (rng.uniform(-5, 5, 60), rng.uniform(-3, 3, 60), rng.uniform(-0.5, 0.6, 60))
+    xyz = np.column_stack(span)
+    xyz[:14, 2] = 0.0
+    seen = [p + rng.normal(0, noise, p.shape) for p in cameras.exact.project(xyz)]
+    data = dict(zip(("col1", "row1", "col2", "row2"), np.hstack(seen).T, strict=True))
+    data |= {"id": [str(i) for i in range(60)], "code": ["PLANE"] * 14 + [""] * 46}
+    survey = solve(data, pair=cameras.nominal, sigma_px=0.5, adjust_setup=True)
+    error = (survey.table["r"] - xyz[:, 2])[np.hypot(xyz[:, 0], xyz[:, 1]) > 1.5]
+    assert np.sqrt(np.mean(error**2)) < limit
+    assert any("relief spreads from a point" in text for text in survey.remarks)
+    # Without points off the plane nothing shows it.
+    plane = {key: values[:14] for key, values in data.items()}
+    flat = solve(plane, pair=cameras.nominal, sigma_px=0.5, adjust_setup=True)
+    assert not any("relief spreads" in text for text in flat.remarks)
+
+
+def test_an_ideal_survey_in_millimetres_finds_the_same_centre():
+    rng = np.random.default_rng(8)
+    near = replace(IDEAL.image2, nadir=[0.06, -0.04])
+    span = (rng.uniform(-5, 5, 60), rng.uniform(-3, 3, 60), rng.uniform(-0.5, 0.6, 60))
+    xyz = np.column_stack(span)
+    xyz[:14, 2] = 0.0
+    photos = (IDEAL.image1, near)
+    positions = [
+        photo.nadir + (xyz[:, :2] - photo.nadir) * (d / (d - xyz[:, 2]))[:, None]
+        for photo, d in zip(photos, (17.5, 9.5), strict=True)
+    ]
+    millimetres = np.hstack([positions[0] * 35 / 17.5, positions[1] * 19 / 9.5])
+    data = dict(zip(("x1", "y1", "x2", "y2"), millimetres.T, strict=True))
+    data |= {"id": [str(i) for i in range(60)], "code": ["PLANE"] * 14 + [""] * 46}
+    survey = solve(data, d1=17.5, d2=9.5, c1=35, c2=19, sigma_s=0.002, adjust_setup=True)
+    away = np.hypot(xyz[:, 0], xyz[:, 1]) > 1.5
+    np.testing.assert_allclose(survey.table["r"][away], xyz[away, 2], atol=2e-4)

@@ -2,13 +2,26 @@
 
 from __future__ import annotations
 
+import json
 import zipfile
 
+import numpy as np
 import openpyxl
 import pytest
 from openpyxl.chart import BarChart, Reference
 
-from tests.bifocal.survey.test_cli_solve import POINTS, SETUP, fill, rows, run, write_csv
+from tests.bifocal.survey.test_cli_solve import (
+    POINTS,
+    SETUP,
+    fill,
+    pixel_rows,
+    rows,
+    run,
+    write_csv,
+    write_pair,
+)
+from tests.bifocal.survey.test_survey_workbook import assert_recalculated_equals_cached, parts
+from tests.recalculate import recalculated
 
 TABLE = "\n".join(["id,x1,y1,x2,y2", *(",".join(map(str, row)) for row in rows(POINTS))])
 DISTANCES = ("--d1", 17.5, "--d2", 9.5, "--c1", 35, "--c2", 19)
@@ -35,49 +48,277 @@ def own_table(path):
     return with_own_chart(path)
 
 
-def refused(path, *options, reason):
-    before = path.read_bytes()
-    files = sorted(path.parent.iterdir())
+def solved_in_place(path, *options):
+    """Solve a workbook in place; return stderr, and which of its parts are not as they were."""
+    before = parts(path)
     result = run("solve", path, "--out", path, "--overwrite", *options)
-    assert result.exit_code == 1
-    assert path.read_bytes() == before
-    assert sorted(path.parent.iterdir()) == files
-    assert reason in result.stderr
-    assert f"--out {path.stem}-result.xlsx" in result.stderr
+    assert result.exit_code == 0, result.stderr
+    after = parts(path)
+    assert before.keys() <= after.keys()
+    assert "is kept as" in result.stderr
+    return result.stderr, {name for name in after if before.get(name) != after[name]}
 
 
-@pytest.mark.parametrize(
-    ("options", "reason"),
-    [
-        (("--d1", 17.6), "the set-up was given by options"),
-        (("--unit", "mm"), "the set-up was given by options"),
-        (("--sigma-s", 0.01), "the set-up was given by options"),
-        (("--lang", "it"), "another language"),
-        (("--tolerance-rule", "2cm"), "other tolerance rules"),
-        (("--adjust-setup",), "the set-up was corrected"),
-    ],
-)
-def test_options_never_replace_the_users_workbook_by_a_new_one(tmp_path, options, reason):
-    path = with_own_chart(fill(tmp_path / "own.xlsx"))
+def with_plane_points(path):
     book = openpyxl.load_workbook(path)
     heads = {cell.value: cell.column for cell in book["Points"][4]}
     for row in (5, 8):
         book["Points"].cell(row, heads["code"], "PLANE")
     book.save(path)
-    refused(path, *options, reason=reason)
-    other = path.with_name("own-result.xlsx")
-    for _ in range(2):
-        result = run("solve", path, "--out", other, "--overwrite", *options)
-        assert result.exit_code == 0, result.stderr
+    return path
 
 
-def test_rows_below_the_prepared_ones_do_not_cost_the_workbook(tmp_path):
+def named(path, name):
+    book = openpyxl.load_workbook(path)
+    sheet, _, cell = book.defined_names[name].attr_text.partition("!")
+    return book[sheet.strip("'")][cell.replace("$", "")].value
+
+
+#: LibreOffice takes seconds a workbook: it recalculates those whose formulas change.
+RECALCULATED = ("--d1", "--tolerance-rule", "--adjust-setup")
+OPTIONS = [
+    (("--d1", 17.6), {"d_2": 9.5, "delta_d": 8.1}),
+    (("--d2", 9.4), {"d_2": 9.4, "delta_d": 8.1}),
+    (("--c1", 35.5, "--sigma-s", 0.01), {"c_1": 35.5, "sigma_s": 0.01}),
+    (("--unit", "mm"), {"input_unit": "mm"}),
+    (("--sigma-r-max", 0.5), {"sigma_r_max": 0.5}),
+    (("--lang", "it"), {}),
+    (("--tolerance-rule", "2cm"), {}),
+    (("--adjust-setup",), {}),
+]
+
+
+@pytest.mark.office
+@pytest.mark.parametrize(("options", "cells"), OPTIONS, ids=lambda value: str(value)[:20])
+def test_options_are_written_into_the_cells_of_the_users_workbook(tmp_path, options, cells):
+    path = with_plane_points(with_own_chart(fill(tmp_path / "own.xlsx")))
+    table = json.loads(run("solve", path, "--json", *options).stdout)["points"]
+    own = {name for name in parts(path) if "chart4" in name or "sheet10" in name}
+    assert len(own) >= 2
+    _, changed = solved_in_place(path, *options)
+    assert not own & changed
+    for name, value in cells.items():
+        assert named(path, name) == value
+    if options[0] in RECALCULATED:
+        assert_recalculated_equals_cached(path, tmp_path)
+    # What is solved from the workbook alone is the same: the options are in it now.
+    again = json.loads(run("solve", path, "--json").stdout)["points"]
+    for one, other in zip(table, again, strict=True):
+        for key in ("r", "X", "Y", "sigma_r"):
+            assert other[key] == pytest.approx(one[key], rel=1e-9, abs=1e-12)
+
+
+def test_another_language_changes_labels_and_nothing_the_user_wrote(tmp_path):
+    path = with_own_chart(fill(tmp_path / "own.xlsx"))
+    book = openpyxl.load_workbook(path)
+    book["Points"]["K5"], book["Points"]["A20"] = "Point", "Results"
+    book.save(path)
+    solved_in_place(path, "--lang", "it")
+    book = openpyxl.load_workbook(path)
+    assert book["Points"]["A1"].value == "Punti misurati e loro rilievo"
+    assert book["Points"]["A3"].value == "Punto"
+    assert book["Points"]["K5"].value == "Point"
+    assert '"tiene"' in book["Check"]["Q13"].value
+    assert "Pagina" in book["Setup"].oddFooter.right.text
+    with zipfile.ZipFile(path) as package:
+        assert b"Punti sul muro" in package.read("xl/charts/chart1.xml")
+        assert b'="tiene"' in package.read("xl/worksheets/sheet5.xml")
+    solved_in_place(path, "--lang", "en")
+    assert openpyxl.load_workbook(path)["Points"]["A3"].value == "Point"
+
+
+@pytest.mark.office
+def test_rows_below_the_prepared_ones_get_formulas(tmp_path):
     table = rows([(f"Q{i}", 1 + i / 50, 2, 0.3) for i in range(30)])
-    refused(with_own_chart(fill(tmp_path / "own.xlsx", table)), reason="10 points stand below")
+    path = with_own_chart(fill(tmp_path / "own.xlsx", table))
+    solved_in_place(path)
+    assert_recalculated_equals_cached(path, tmp_path)
+    book = openpyxl.load_workbook(path, data_only=True)
+    assert [book["Results"].cell(34, column).value for column in (1, 4)] == [
+        "Q29",
+        pytest.approx(0.3),
+    ]
+    assert book["Points"].tables["tblPoints"].ref.endswith("34")
+    assert book["Results"].tables["tblResults"].ref.endswith("34")
 
 
-def test_a_table_of_the_users_own_is_not_replaced(tmp_path):
-    refused(own_table(tmp_path / "own.xlsx"), *DISTANCES, reason="not come from a survey workbook")
+@pytest.mark.office
+def test_a_row_inserted_without_formulas_gets_them(tmp_path):
+    path = fill(tmp_path / "own.xlsx")
+    book = openpyxl.load_workbook(path)
+    sheet = book["Points"]
+    for cell in sheet[6]:
+        cell.value = None
+    for column, value in enumerate(rows([("NEW", 1, 1, 0.7)])[0], start=1):
+        sheet.cell(6, column, value)
+    book.save(path)
+    solved_in_place(path)
+    assert_recalculated_equals_cached(path, tmp_path)
+    assert openpyxl.load_workbook(path, data_only=True)["Results"]["D6"].value == pytest.approx(0.7)
+
+
+@pytest.mark.office
+def test_check_and_control_points_below_their_tables_are_seen_by_every_sum(tmp_path):
+    points = [(f"Q{i}", i / 5 - 3, 2 - i % 7, 0.1 * (i % 5)) for i in range(40)]
+    checks = [(name, None, None, r + 0.01) for name, _, _, r in points[:30]]
+    control = [(name, 100 + x, 200 - r, 5 + y) for name, x, y, r in points]
+    path = fill(tmp_path / "own.xlsx", rows(points), Check=checks, Georeference=control)
+    solved_in_place(path)
+    assert_recalculated_equals_cached(path, tmp_path)
+    book = openpyxl.load_workbook(path, data_only=True)
+    assert [book["Check"]["D5"].value, book["Georeference"]["B7"].value] == [30, 40]
+
+
+@pytest.mark.office
+def test_deleted_rows_leave_no_errors_in_results(tmp_path):
+    path = fill(tmp_path / "own.xlsx")
+    book = openpyxl.load_workbook(path)
+    book["Points"].delete_rows(20, 5)
+    book["Points"].tables["tblPoints"].ref = "A4:AB19"
+    book.save(path)
+    for values in recalculated(path, tmp_path)["Results"].iter_rows(min_row=20, values_only=True):
+        assert not any(values)
+    solved_in_place(path)
+    assert_recalculated_equals_cached(path, tmp_path)
+
+
+@pytest.mark.office
+@pytest.mark.parametrize("title", ["Setup", "Results", "Check", "Georeference", "Planning", "Log"])
+def test_a_sheet_that_is_missing_is_added(tmp_path, title):
+    path = with_own_chart(fill(tmp_path / "own.xlsx"))
+    book = openpyxl.load_workbook(path)
+    del book[title]
+    if title == "Setup":
+        book.defined_names = {k: v for k, v in book.defined_names.items() if "Setup" not in
+                              v.attr_text}  # fmt: skip
+    book.save(path)
+    solved_in_place(path, *(DISTANCES if title == "Setup" else ()))
+    book = openpyxl.load_workbook(path)
+    assert book.sheetnames[-2:] == ["My chart", title]
+    if title in ("Setup", "Georeference"):
+        assert_recalculated_equals_cached(path, tmp_path)
+    assert json.loads(run("solve", path, "--json").stdout)["points"][0]["r"] == pytest.approx(1.0)
+
+
+ALONE = {"d_1": 17.5, "d_2": 9.5, "c_1": 35, "c_2": 19}
+
+
+def foreign(path, *, heads, table, head=1, title="Facciata", setup=()):
+    """A workbook of the user's own, in any language, the table anywhere."""
+    book = openpyxl.Workbook()
+    book.active.title = "Note"
+    for label, value in setup:
+        book.active.append([label, value])
+    sheet = book.create_sheet(title)
+    sheet.cell(max(head - 2, 1), 1, "Rilievo 2026" if head > 2 else None)
+    for row, values in enumerate([heads, *table], start=head):
+        for column, value in enumerate(values, start=3):
+            sheet.cell(row, column, value)
+    book.save(path)
+    return with_own_chart(path)
+
+
+GON = [(n, *np.hypot([x1, x2], [y1, y2]), np.degrees(np.arctan2(x1, y1)) / 0.9)
+       for n, x1, y1, x2, y2 in rows(POINTS)]  # fmt: skip
+CM = [(name, *(value / 10 for value in values)) for name, *values in rows(POINTS)]
+TEXT = [(name, *(f"{v:.12f}".replace(".", ",") for v in values)) for name, *values in rows(POINTS)]
+FOREIGN = {
+    "plain": (("id", "x1", "y1", "x2", "y2"), rows(POINTS), 1),
+    "italian": (("Punto", "distanza radiale 1", "distanza radiale 2", "anomalia [gon]"), GON, 5),
+    "german": (
+        ("Punkt", "x Bild 1 [cm]", "y Bild 1 [cm]", "x Bild 2 [cm]", "y Bild 2 [cm]"),
+        CM,
+        9,
+    ),
+    "text": (("Punto", "x foto 1", "y foto 1", "x foto 2", "y foto 2"), TEXT, 3),
+}
+
+
+@pytest.mark.office
+@pytest.mark.parametrize("name", FOREIGN)
+def test_results_are_new_live_columns_of_the_users_own_table(tmp_path, name):
+    heads, table, head = FOREIGN[name]
+    path = foreign(tmp_path / "own.xlsx", heads=heads, table=table, head=head)
+    own = {name for name in parts(path) if "chart" in name or "drawing" in name or "sheet1" in name}
+    stderr, changed = solved_in_place(path, *DISTANCES)
+    assert "the results are new columns of your table" in stderr
+    assert not own & changed
+    book = openpyxl.load_workbook(path, data_only=True)
+    assert book.sheetnames == ["Note", "Facciata", "My chart", "Setup"]
+    found = {cell.value: cell.column for cell in book["Facciata"][head]}
+    assert list(found)[: len(heads) + 2] == [None, *heads, "s1_used [mm]"][: len(heads) + 2]
+    live = openpyxl.load_workbook(path)["Facciata"]
+    for row, (_, x, y, r) in enumerate(POINTS, start=head + 1):
+        values = [book["Facciata"].cell(row, found[f"{key} [m]"]).value for key in "XYrZ"]
+        assert values == pytest.approx([x, y, r, r], abs=1e-9)
+        assert live.cell(row, found["r [m]"]).value.startswith("=IF(")
+    # Once more, with a point more: the same columns, no second Setup, options from its cells.
+    book = openpyxl.load_workbook(path)
+    row = head + 1 + len(table)
+    for column, value in enumerate(("P9", *table[0][1:]), start=3):
+        book["Facciata"].cell(row, column, value)
+    book.save(path)
+    solved_in_place(path, "--d1", 17.6)
+    again = openpyxl.load_workbook(path, data_only=True)
+    assert again.sheetnames == ["Note", "Facciata", "My chart", "Setup"]
+    assert {cell.value: cell.column for cell in again["Facciata"][head]} == found
+    values = [again["Facciata"].cell(i, found["r [m]"]).value for i in (head + 1, row)]
+    assert values[0] == pytest.approx(values[1], rel=1e-12)
+    assert_recalculated_equals_cached(path, tmp_path)
+
+
+@pytest.mark.office
+def test_values_of_the_users_own_setup_stay_where_they_are_and_live(tmp_path):
+    heads, table, head = FOREIGN["plain"]
+    path = foreign(
+        tmp_path / "own.xlsx", heads=heads, table=table, head=head, title="S", setup=ALONE.items()
+    )
+    solved_in_place(path)
+    book = openpyxl.load_workbook(path)
+    assert named(path, "d_1") == "='Note'!$B$1"
+    book["Note"]["B1"] = 17.6
+    book.save(path)
+    place = {cell.value: cell.column for cell in book["S"][1]}["r [m]"]
+    fresh = recalculated(path, tmp_path)["S"].cell(2, place).value
+    _, x1, y1, x2, y2 = table[0]
+    s1, s2 = np.hypot(x1, y1), np.hypot(x2, y2) * (9.5 / 19) / (17.6 / 35)
+    assert fresh == pytest.approx((s2 - s1) / (s2 / 9.5 - s1 / 17.6), rel=1e-12)
+
+
+@pytest.mark.office
+def test_pixels_of_a_pair_in_the_users_own_table(tmp_path):
+    pair = write_pair(tmp_path / "w.pair.json")
+    lines = [line.split(",") for line in pixel_rows().splitlines()]
+    table = [(name, *map(float, values)) for name, *values in lines[1:]]
+    path = foreign(tmp_path / "own.xlsx", heads=lines[0], table=table)
+    answer = json.loads(run("solve", path, "--pair", pair, "--json").stdout)
+    solved_in_place(path, "--pair", pair)
+    assert_recalculated_equals_cached(path, tmp_path)
+    again = json.loads(run("solve", path, "--json").stdout)
+    for one, other in zip(answer["points"], again["points"], strict=True):
+        assert other["r"] == pytest.approx(one["r"], rel=1e-9)
+
+
+def test_a_macro_workbook_of_the_users_own_keeps_its_macros(tmp_path):
+    path, out = own_table(tmp_path / "own.xlsx"), tmp_path / "out.xlsm"
+    macro = path.rename(tmp_path / "own.xlsm")
+    with zipfile.ZipFile(macro, "a") as package:
+        package.writestr("xl/vbaProject.bin", b"MACROS")
+    result = run("solve", macro, "--out", out, *DISTANCES)
+    assert result.exit_code == 0, result.stderr
+    assert parts(out)["xl/vbaProject.bin"] == b"MACROS"
+
+
+def test_sheets_of_an_ods_are_not_dropped_without_a_word(tmp_path):
+    path = foreign(tmp_path / "own.xlsx", heads=FOREIGN["plain"][0], table=rows(POINTS))
+    from tests.office import convert
+
+    ods = convert(path, tmp_path, "ods")
+    kept = ods.read_bytes()
+    result = run("solve", ods, "--out", tmp_path / "r.xlsx", *DISTANCES)
+    assert result.exit_code == 0, result.stderr
+    assert "what else it holds is not in the new one: Note, Facciata, My chart" in result.stderr
+    assert ods.read_bytes() == kept
 
 
 def test_a_text_table_is_not_replaced_by_its_own_results(tmp_path):
@@ -97,7 +338,7 @@ def test_a_result_is_replaced_until_somebody_else_saved_it(tmp_path):
     kept = out.read_bytes()
     result = run("solve", source, "--out", out, "--overwrite", *DISTANCES)
     assert result.exit_code == 1
-    assert "--out r-result.xlsx" in result.stderr
+    assert "r-result.xlsx" in result.stderr
     assert out.read_bytes() == kept
 
 
@@ -107,12 +348,6 @@ def test_a_result_with_a_part_put_in_is_no_longer_ours(tmp_path):
     with zipfile.ZipFile(out, "a") as package:
         package.writestr("xl/vbaProject.bin", b"MACROS")
     assert run("solve", source, "--out", out, "--overwrite", *DISTANCES).exit_code == 1
-
-
-def test_a_solved_table_is_not_replaced_by_a_new_one_either(tmp_path):
-    source, out = write_csv(tmp_path / "p.csv", TABLE), tmp_path / "r.xlsx"
-    assert run("solve", source, "--out", out, *DISTANCES).exit_code == 0
-    refused(out, "--d1", 17.6, reason="the set-up was given by options")
 
 
 def commands(folder):
@@ -142,10 +377,43 @@ def test_every_writer_respects_locks_and_foreign_workbooks(tmp_path, name):
         assert f"is open in {program}" in result.stderr
         (tmp_path / lock).unlink()
     kept = own_table(out).read_bytes()
-    result = run(*command(out))
-    assert result.exit_code == 1
-    assert "out-result.xlsx" in result.stderr
+    proposed = "out2.xlsx" if name == "template" else "out-result.xlsx"
+    # Without --overwrite too: the option would only lead into the same refusal.
+    for arguments in (command(out), [a for a in command(out) if a != "--overwrite"]):
+        result = run(*arguments)
+        assert result.exit_code == 1
+        assert proposed in result.stderr
+        assert "add --overwrite" not in result.stderr
     assert out.read_bytes() == kept
+
+
+def test_a_changed_copy_never_replaces_another_workbook_of_the_user(tmp_path):
+    source, out = fill(tmp_path / "s.xlsx"), own_table(tmp_path / "mine.xlsx")
+    kept = out.read_bytes()
+    result = run("solve", source, "--out", out, "--overwrite")
+    assert result.exit_code == 1
+    assert "mine-result.xlsx" in result.stderr
+    assert out.read_bytes() == kept
+    for _ in range(2):
+        copy = tmp_path / "copy.xlsx"
+        assert run("solve", source, "--out", copy, "--overwrite").exit_code == 0
+
+
+def test_the_mode_of_a_workbook_changed_in_place_stays_and_a_link_is_followed(tmp_path):
+    folder = tmp_path / "elsewhere"
+    folder.mkdir()
+    real, link = fill(folder / "s.xlsx"), tmp_path / "link.xlsx"
+    real.chmod(0o600)
+    link.symlink_to(real)
+    before = real.read_bytes()
+    result = run("solve", link, "--out", link, "--overwrite")
+    assert result.exit_code == 0, result.stderr
+    assert link.is_symlink()
+    assert real.stat().st_mode & 0o777 == 0o600
+    backup = tmp_path / "link.xlsx.bak"
+    assert backup.read_bytes() == before
+    assert backup.stat().st_mode & 0o777 == 0o600
+    assert str(backup) in result.stderr
 
 
 def test_the_first_state_stays_in_its_backup(tmp_path):
@@ -155,7 +423,8 @@ def test_the_first_state_stays_in_its_backup(tmp_path):
         states.append(path.read_bytes())
         result = run("solve", path, "--out", path, "--overwrite")
         assert result.exit_code == 0
-        assert f"is kept as s.xlsx.bak{number + 1 if number else ''}." in result.stderr
+        backup = path.with_name(f"s.xlsx.bak{number + 1 if number else ''}")
+        assert f"is kept as {backup}." in result.stderr
     for name, state in zip(("s.xlsx.bak", "s.xlsx.bak2", "s.xlsx.bak3"), states, strict=True):
         assert (tmp_path / name).read_bytes() == state
 

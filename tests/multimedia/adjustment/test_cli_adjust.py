@@ -11,6 +11,7 @@ from click.testing import CliRunner
 
 from multimedia import read_project, write_project
 from multimedia.cli.main import main
+from photocore.errors import InputError
 
 
 def bundle_project(**changes):
@@ -90,3 +91,20 @@ def test_the_real_cavity_is_adjusted_to_the_known_sigma0(data_dir, tmp_path):
     sigma0 = json.loads(done.stdout)["sigma0_mm_of"]
     for camera, limit in (("cam1", 5.67), ("cam2", 3.54), ("cam3", 4.54), ("cam4", 3.54)):
         assert sigma0[camera] * 1000 <= limit
+
+
+def test_the_files_of_an_adjustment_appear_together_or_not_at_all(
+    project: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from multimedia.adjustment import workflow
+
+    def full(path: Path, *_: object, **__: object) -> None:
+        raise InputError(f"{path}: could not be written (No space left on device).")
+
+    monkeypatch.setattr(workflow, "write_adjustment_report", full)
+    arguments = ["adjust", str(project), "--interior", "c", "--media", "index3"]
+    arguments += ["--out", str(tmp_path / "o.toml"), "--report", str(tmp_path / "r.html")]
+    result = CliRunner().invoke(main, arguments)
+    assert result.exit_code == 1
+    assert "No space left on device" in result.stderr
+    assert not list(tmp_path.iterdir())

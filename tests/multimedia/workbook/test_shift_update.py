@@ -13,7 +13,6 @@ from openpyxl.chart import ScatterChart
 
 from multimedia import Layers, radial_shift
 from multimedia.cli.main import main
-from photocore.workbook.editor import WorkbookEditor
 from tests import office
 from tests.rounding import EPS
 
@@ -77,8 +76,9 @@ def test_a_second_run_fills_the_same_columns_and_keeps_a_backup(own: Path) -> No
 
 def test_the_backup_is_named_and_never_replaced(own: Path) -> None:
     before = own.read_bytes()
-    assert "is kept as becken.xlsx.bak." in run(own, *MEDIA, "--out", own, "--overwrite").stderr
-    assert "is kept as becken.xlsx.bak2." in run(own, *MEDIA, "--out", own, "--overwrite").stderr
+    assert f"is kept as {own}.bak." in run(own, *MEDIA, "--out", own, "--overwrite").stderr
+    other = (*MEDIA[:-1], "0,0,0.61")
+    assert f"is kept as {own}.bak2." in run(own, *other, "--out", own, "--overwrite").stderr
     assert own.with_name("becken.xlsx.bak").read_bytes() == before
 
 
@@ -134,17 +134,67 @@ def test_a_template_for_other_media_is_refused(tmp_path: Path) -> None:
     assert "formulas are for 3 media, the options give 2" in result.stderr
 
 
-def test_an_option_does_not_overwrite_a_formula(tmp_path: Path) -> None:
-    path = tmp_path / "tank.xlsx"
+@pytest.mark.office
+def test_an_option_takes_the_place_of_a_formula_that_was_never_calculated(tmp_path: Path) -> None:
+    path, out = tmp_path / "tank.xlsx", tmp_path / "out.xlsx"
     CliRunner().invoke(main, ["template", str(path), "--rows", "2"])
-    editor = WorkbookEditor(path)
+    book = openpyxl.load_workbook(path)
     for column, value in ((1, "A"), (5, 120.0), (6, 80.0)):
-        editor.set_value("Multimedia", 15, column, value)
-    editor.save()
-    editor = WorkbookEditor(path)
-    editor.set_result("Multimedia", 7, 2, 1.33464)
-    editor.save()
-    result = run(path, "--indices", "1,1.5,1.4", "--out", tmp_path / "out.xlsx")
+        book["Multimedia"].cell(15, column, value)
+    book.save(path)
+    result = run(path, "--out", out)
     assert result.exit_code == 1
-    assert "Multimedia!B7 (n_3): holds the formula =n_w" in result.stderr
-    assert run(path, "--indices", "1,1.5,1.4", "--out", tmp_path / "x.xlsx", "--new").exit_code == 0
+    assert "has never been calculated" in result.stderr
+    result = run(path, "--indices", "1,1.5,1.4", "--out", out, "--json")
+    assert result.exit_code == 0, result.stderr
+    assert office.formulas_of(out)["Multimedia"].get("B7") is None
+    assert office.stored(out)["Multimedia"]["B7"] == 1.4
+    told = json.loads(result.stdout)["points"][0]["Rbar"]
+    live = office.recalculated(out, tmp_path)["Multimedia"].values()
+    assert any(v == pytest.approx(told, rel=1e-12) for v in live if isinstance(v, float))
+
+
+def test_a_bifocal_survey_is_refused_in_one_line(tmp_path: Path) -> None:
+    from bifocal.cli.main import main as bifocal
+
+    path = tmp_path / "survey.xlsx"
+    assert CliRunner().invoke(bifocal, ["template", str(path)]).exit_code == 0
+    result = run(path, *MEDIA, "--json")
+    assert result.exit_code == 1
+    assert len(result.stderr.splitlines()) == 1
+    assert "solve it with `bifocal solve`" in result.stderr
+
+
+def test_a_state_that_a_backup_holds_is_not_saved_again(own: Path) -> None:
+    before = own.read_bytes()
+    for _ in range(3):
+        own.write_bytes(before)
+        assert run(own, *MEDIA, "--out", own, "--overwrite").exit_code == 0
+    assert [path.name for path in own.parent.glob("*.bak*")] == ["becken.xlsx.bak"]
+
+
+@pytest.mark.parametrize(
+    ("command", "proposed"), [("template", "out2.xlsx"), ("shift", "out-result.xlsx")]
+)
+def test_every_writer_respects_locks_and_the_users_workbooks(
+    tmp_path: Path, command: str, proposed: str
+) -> None:
+    out, points = tmp_path / "out.xlsx", tmp_path / "points.csv"
+    points.write_text("id,R,ZP\nA,0.3,0.2\n", encoding="utf-8")
+    arguments = {"template": [out], "shift": [points, *MEDIA, "--out", out]}[command]
+
+    def written() -> Result:
+        texts = [command, *map(str, arguments), "--overwrite"]
+        return CliRunner().invoke(main, texts)
+
+    assert [written().exit_code for _ in range(2)] == [0, 0]
+    for lock, program in (("~$out.xlsx", "Excel"), (".~lock.out.xlsx#", "LibreOffice")):
+        (tmp_path / lock).touch()
+        assert f"is open in {program}" in written().stderr
+        (tmp_path / lock).unlink()
+    book = openpyxl.load_workbook(out)
+    book.create_sheet("Meine")
+    book.save(out)
+    kept = out.read_bytes()
+    assert proposed in written().stderr
+    assert out.read_bytes() == kept

@@ -364,3 +364,47 @@ def test_a_formula_copied_downwards_moves_its_relative_rows_only(formula, moved)
     assert RowFormula(formula, 2).at(7) == moved
     if "_x" not in formula:
         assert Translator(f"={formula}", "F2").translate_formula("F7") == f"={moved}"
+
+
+PLAIN_CHANGES = [
+    {"inputs": {2: {1: "new", 3: 7.5}, 9: {2: True}}},
+    {"cached": {3: {4: 0.25, 2: 5.0}, 4: {4: math.nan}}, "restates": True},
+    {"added": [("filled", 2, 4)], "inputs": {3: {2: 9.0}}},
+    {"placed": {2: {4: 1.5}, 3: {1: "over"}, 12: {4: 2.5}}},
+]
+
+
+@pytest.mark.parametrize("changes", PLAIN_CHANGES)
+def test_a_plain_sheet_changes_as_by_the_parser(changes):
+    from photocore.workbook.cells import NewCell, NewColumn, NewRows
+
+    cells = (
+        '<row r="2" spans="1:4"><c r="A2" t="inlineStr"><is><t>P1 &amp; Ö</t></is></c>'
+        '<c r="B2" s="3"><v>1.5</v></c><c r="D2" s="1"><f>A2&lt;B2</f><v>0.5</v></c></row>'
+        '<row r="3" hidden="1"><c r="A3" t="s"><v>0</v></c><c r="B3"><v>2</v></c>'
+        '<c r="D3" t="str"><f>"x"</f><v>x</v></c></row><row r="4"><c r="D4"><f>1/0</f></c></row>'
+        '<row r="5"/><row r="7"><c r="B7" s="2"/></row>'
+    )
+    plain = f'<worksheet><dimension ref="A2:D7"/><sheetData>{cells}</sheetData></worksheet>'
+    # A comment is beyond the plain form: the XML parser takes over.
+    other = plain.replace("</sheetData>", "<!-- --></sheetData>")
+    kinds = dict(changes)
+    if "added" in kinds:
+        rule, first, size = kinds["added"][0]
+        columns = [NewColumn(4, [1.0, "", None, 4.0], "5", lambda row: f"B{row}*2")]
+        kinds["added"] = [NewRows(first, size, columns, rule)]
+    if "placed" in kinds:
+        kinds["placed"] = {
+            row: {column: NewCell(value, "B2*3", "6", "over") for column, value in given.items()}
+            for row, given in kinds["placed"].items()
+        }
+
+    def spliced(text):
+        found = splice_sheet(None, "s", text.encode(), SheetChanges(**kinds), lambda: ["P2"])
+        return [found.joined(strip=strip).replace(b"<!-- -->", b"") for strip in (False, True)] + [
+            found.inputs_changed,
+            found.formula_lost,
+        ]
+
+    assert spliced(plain) == spliced(other)
+    assert spliced(plain)[0] != plain.encode()

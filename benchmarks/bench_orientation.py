@@ -1,0 +1,130 @@
+"""Orientation of real pairs from random control, beside the geometry they were published with.
+
+    python benchmarks/bench_orientation.py --draws 30 church_1 church_2
+
+Each draw takes six wall points and three points off the wall of a pair in $BIFOCAL_DATA as control,
+with nothing known of the lens, and solves all other reference points (4 m and more from the near
+nadir) with the pair found and with the published one. The run fails if an alignment fails.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+
+from bifocal import Control, Interior, Pair, Photo, SiteMeasures
+from bifocal.files.images import read_grey
+from bifocal.orientation.photo_alignment import align
+from photocore.errors import PhotogrammetryError
+
+#: Points this near to the plane serve as wall points, those this far off it as others. [m]
+ON_WALL, OFF_WALL = 0.015, 0.3
+#: Precision of the picks given (SIFT), and of the reference. [px, m]
+SIGMA_PICK, SIGMA_REFERENCE = 0.4, 0.003
+
+
+class RealPair:
+    """Photos, published geometry and reference points of a pair."""
+
+    def __init__(self, folder: Path) -> None:
+        geometry = json.loads((folder / "geometry.json").read_text())
+        table = np.genfromtxt(folder / "points.csv", delimiter=",", names=True)
+        self.name = folder.name
+        self.xyz = np.column_stack([table["X_m"], table["Y_m"], table["relief_m"]])
+        self.far = np.column_stack([table["x_far_px"], table["y_far_px"]])
+        self.near = np.column_stack([table["x_near_px"], table["y_near_px"]])
+        photos = [
+            Photo(
+                plane_from_pixel=np.linalg.inv(np.array(geometry[key]["H_wall_to_pixel"])),
+                nadir=geometry[key]["nadir_wall_m"],
+                distance=geometry[key]["height_over_plane_m"],
+            )
+            for key in ("far", "near")
+        ]
+        self.truth = Pair(image1=photos[0], image2=photos[1])
+        self.greys = [read_grey(folder / f"{key}.jpg") for key in ("far", "near")]
+
+    def control(self, rng: np.random.Generator, wall: int = 6, off: int = 3) -> np.ndarray:
+        """Return the numbers of random control points."""
+        on = np.flatnonzero(np.abs(self.xyz[:, 2]) < ON_WALL)
+        others = np.flatnonzero(np.abs(self.xyz[:, 2]) > OFF_WALL)
+        return np.concatenate([rng.choice(on, wall, False), rng.choice(others, off, False)])
+
+    def compared(self, chosen: np.ndarray) -> tuple[float, float, float]:
+        """Return median error of relief, that of the published pair, and the share below 2 sigma.
+
+        With ``chosen`` as control. [m, m, 1]
+        """
+        control = Control(
+            ids=tuple(str(number) for number in chosen),
+            xyz=self.xyz[chosen],
+            sigma=np.full((len(chosen), 3), 0.003),
+            pixels1=self.far[chosen],
+            pixels2=self.near[chosen],
+        )
+        sizes = [(grey.shape[1], grey.shape[0]) for grey in self.greys]
+        interiors = Interior.unknown(sizes[0]), Interior.unknown(sizes[1])
+        found = align(
+            self.greys[0], self.greys[1], interiors=interiors, control=control, site=SiteMeasures()
+        )
+        away = np.hypot(*(self.xyz[:, :2] - self.truth.image2.nadir).T) > 4
+        rest = np.setdiff1d(np.flatnonzero(away), chosen)
+        picks = self.far[rest], self.near[rest]
+        solved = found.pair.intersect(*picks, sigma_px=SIGMA_PICK)
+        error = solved.xyz[:, 2] - self.xyz[rest, 2]
+        best = self.truth.intersect(*picks).xyz[:, 2] - self.xyz[rest, 2]
+        sigma = np.hypot(solved.sigma[:, 2], SIGMA_REFERENCE)
+        return (
+            float(np.median(np.abs(error))),
+            float(np.median(np.abs(best))),
+            float((np.abs(error) < 2 * sigma).mean()),
+        )
+
+
+def main() -> None:
+    """Run the draws and print what they give."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--draws", type=int, default=5)
+    parser.add_argument("--seed", type=int, default=11)
+    parser.add_argument("pairs", nargs="*", default=["church_1", "church_2"])
+    given = parser.parse_args()
+    failed = 0
+    for name in given.pairs:
+        pair = RealPair(Path(os.environ["BIFOCAL_DATA"]) / "facade_pairs" / name)
+        rng = np.random.default_rng(given.seed)
+        ratios, below, spent = [], [], []
+        for number in range(given.draws):
+            chosen = pair.control(rng)
+            start = time.process_time()
+            try:
+                error, best, share = pair.compared(chosen)
+            except PhotogrammetryError as trouble:
+                failed += 1
+                print(f"{name} {number}: FAILED: {trouble}")
+                continue
+            spent.append(time.process_time() - start)
+            ratios.append(error / best)
+            below.append(share)
+            print(
+                f"{name} {number}: {1000 * error:.1f} mm, published pair {1000 * best:.1f} mm, "
+                f"ratio {error / best:.2f}, below 2 sigma {100 * share:.0f} %, "
+                f"{spent[-1]:.1f} s CPU",
+                flush=True,
+            )
+        print(
+            f"{name}: {len(ratios)} of {given.draws} draws; ratio median {np.median(ratios):.2f}, "
+            f"90th percentile {np.percentile(ratios, 90):.2f}, worst {max(ratios):.2f}; below 2 "
+            f"sigma {100 * np.mean(below):.0f} % (least {100 * min(below):.0f} %); "
+            f"{np.median(spent):.1f} s CPU each"
+        )
+    sys.exit(1 if failed else 0)
+
+
+if __name__ == "__main__":
+    main()

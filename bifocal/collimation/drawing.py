@@ -1,0 +1,62 @@
+"""The points and lines of a survey as a drawing in space."""
+
+from __future__ import annotations
+
+import tempfile
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from bifocal.files.exports import export_points
+from bifocal.model.points import PointLine, SurveyPoints
+from photocore.errors import InputError
+
+if TYPE_CHECKING:
+    from bifocal.collimation.session import Session
+
+
+def drawn_points(session: Session) -> tuple[SurveyPoints, tuple[PointLine, ...]]:
+    """Return the solved points and the lines of a survey.
+
+    Raises
+    ------
+    InputError
+        If no point is picked in both photos yet.
+    """
+    with session.lock:
+        results, points = session.results, session.state.sorted_points()
+        lines = tuple(
+            PointLine(line.name, line.layer, line.points, line.closed)
+            for line in session.state.lines.values()
+        )
+        rows = [] if results is None else [(p, results.row(p)) for p in points if p.use]
+    solved = [(point, row) for point, row in rows if row is not None]
+    if not solved:
+        raise InputError("there is nothing to draw yet: pick a point in both photos.")
+    nan = float("nan")
+
+    def number(value: float | None) -> float:
+        return nan if value is None else value
+
+    return SurveyPoints(
+        ids=tuple(point.name for point, _ in solved),
+        xyz=np.array([[number(row[key]) for key in ("X", "Y", "r")] for _, row in solved]),
+        sigma_r=np.array([number(row["sigma_r"]) for _, row in solved]),
+        flags=tuple(row["flag"] for _, row in solved),
+        notes=tuple(point.note for point, _ in solved),
+    ), lines
+
+
+def write_points_drawing(session: Session, path: Path) -> None:
+    """Write the drawing over what may stand there."""
+    points, lines = drawn_points(session)
+    export_points(path, points, lines=lines, overwrite=True)
+
+
+def points_drawing(session: Session) -> bytes:
+    """Return the drawing as the content of a DXF file."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "points.dxf"
+        write_points_drawing(session, path)
+        return path.read_bytes()

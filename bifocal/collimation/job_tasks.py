@@ -1,0 +1,203 @@
+"""What a job is told, and what becomes of its result."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from bifocal.collimation.commands import number_of, positive_of
+from bifocal.collimation.drawing import write_points_drawing
+from bifocal.collimation.live_orientation import control_of, lenses_of, site_of
+from bifocal.orientation.control_points import Control
+from photocore.errors import InputError
+from photocore.jsonfile import plain
+from photocore.output import free_path
+from photocore.tables import write_csv
+
+if TYPE_CHECKING:
+    from bifocal.collimation.session import Session
+
+KINDS = ("align", "match", "relief", "ortho", "deliver")
+Options = Mapping[str, Any]
+
+
+def task_of(session: Session, kind: str, options: Options) -> dict[str, Any]:
+    """Return what the worker of a job is told.
+
+    Raises
+    ------
+    InputError
+        If the survey is not far enough for it, or an option is impossible.
+    """
+    if kind not in KINDS:
+        raise InputError(f"kind: one of {', '.join(KINDS)}.")
+    if kind == "align":
+        return {"kind": kind, **_align_task(session, options)}
+    if session.files.pair is None:
+        raise InputError("the photos are not oriented yet; align them and accept it first.")
+    pair = {"kind": kind, "pair": str(session.files.pair.resolve())}
+    if kind == "match":
+        count = positive_of(options, "count") or 500
+        return pair | {"count": int(min(count, 5000)), "features": options.get("what") != "targets"}
+    task = pair | {"gsd": positive_of(options, "gsd"), "bounds": _bounds(options)}
+    products = session.products
+    if kind == "relief":
+        quality = options.get("quality", "standard")
+        if quality not in ("fast", "standard", "best"):
+            raise InputError("quality: fast, standard or best.")
+        out = products.place("relief", ".relief.tif")
+        return task | {"out": str(out), "quality": quality, "overwrite": products.is_own(out)}
+    task |= _ortho_options(session, options)
+    if kind == "ortho":
+        out = products.place("ortho", ".ortho.tif")
+        return task | {"out": str(out), "overwrite": products.is_own(out)}
+    return task | _deliver_options(session, options)
+
+
+def _bounds(options: Options) -> list[float] | None:
+    bounds = options.get("bounds")
+    if bounds is None:
+        return None
+    if not isinstance(bounds, list) or len(bounds) != 4:
+        raise InputError("bounds: xmin, ymin, xmax, ymax in metres.")
+    values = [number_of({"bounds": value}, "bounds") for value in bounds]
+    if None in values:
+        raise InputError("bounds: xmin, ymin, xmax, ymax in metres.")
+    return [value for value in values if value is not None]
+
+
+def scale_of(options: Options) -> float | None:
+    """Return N of a scale given as ``"1:50"``, ``50`` or ``"50"``."""
+    scale = options.get("scale")
+    if isinstance(scale, str):
+        scale = scale.strip().removeprefix("1:")
+    return positive_of({"scale": scale}, "scale")
+
+
+def _ortho_options(session: Session, options: Options) -> dict[str, Any]:
+    image = str(options.get("image", "1"))
+    if image not in ("1", "2", "both"):
+        raise InputError("image: 1, 2 or both.")
+    relief = session.products.current("relief")
+    points = None
+    if relief is None and options.get("surface") == "points":
+        points = session.files.workbook if session.files.workbook.is_file() else None
+    return {
+        "relief": str(relief.resolve()) if relief else None,
+        "points": str(points.resolve()) if points else None,
+        "image": image,
+        "scale": scale_of(options),
+        "dpi": positive_of(options, "dpi"),
+    }
+
+
+def _deliver_options(session: Session, options: Options) -> dict[str, Any]:
+    products = session.products
+    folder = products.folder / f"{products.stem}-delivered"
+    own = any(kind == "deliver" for kind in products.made.values())
+    if folder.exists() and not own:
+        folder = free_path(products.folder, f"{products.stem}-delivered")
+    sheet = options.get("sheet")
+    if sheet is not None and sheet not in ("A4", "A3", "A2", "A1", "A0"):
+        raise InputError("sheet: A4, A3, A2, A1, A0 or none.")
+    sections = options.get("sections", [])
+    if not isinstance(sections, list) or not all(isinstance(cut, str) for cut in sections):
+        raise InputError('sections: a list like ["x=1.5"].')
+    title = options.get("title") or ""
+    if not isinstance(title, str) or len(title) > 120:
+        raise InputError("title: a line of text.")
+    return {
+        "out": str(folder),
+        "overwrite": own,
+        "title": title,
+        "paper": sheet,
+        "sections": sections,
+        "marked": None if not _solved_points(session) else str(session.files.workbook.resolve()),
+    }
+
+
+def _solved_points(session: Session) -> bool:
+    session.sync.step()
+    return session.files.workbook.is_file() and any(
+        point.is_complete for point in session.state.points.values()
+    )
+
+
+def _align_task(session: Session, options: Options) -> dict[str, Any]:
+    infos, state, products = session.pictures.infos, session.state, session.products
+    if len(infos) != 2:
+        raise InputError("there are no photos yet; give two.")
+    control, site = control_of(state), site_of(state)
+    given = [site.distance1, site.distance2, site.delta_d]
+    way = options.get("way") or ("control" if len(control.ids) else "site")
+    if way == "site" and sum(value is not None for value in given) < 2:
+        way = "auto"
+    if way == "auto" and not any(given) and not control.lengths:
+        raise InputError(
+            "nothing says how large the wall is: pick four control points with X and Y, or type "
+            "one distance to the wall."
+        )
+    tables: dict[str, Path | None] = {"control": None, "lengths": None}
+    if way == "control":
+        tables = _write_control(session, control)
+    out = products.folder / f"{products.stem}.proposed.pair.json"
+    return {
+        "far": str(infos[0].path.resolve()),
+        "near": str(infos[1].path.resolve()),
+        "out": str(out.resolve()),
+        "site": plain(asdict(site)),
+        "lenses": [plain(asdict(lens)) for lens in lenses_of(state)],
+        "auto": way == "auto",
+        **{key: None if path is None else str(path.resolve()) for key, path in tables.items()},
+    }
+
+
+def _write_control(session: Session, control: Control) -> dict[str, Path | None]:
+    """Write the control points and tapes as the tables that `bifocal align` reads."""
+    tables: dict[str, Path | None] = {"control": None, "lengths": None}
+    columns: dict[str, Any] = {"id": list(control.ids)}
+    measured = np.where(control.sigma[:, 2:] > control.sigma[:, :1], np.nan, control.xyz[:, 2:])
+    xyz = np.hstack([control.xyz[:, :2], measured])
+    for key, values in zip(("X [m]", "Y [m]", "r [m]"), xyz.T, strict=True):
+        columns[key] = values
+    pixels = np.hstack([control.pixels1, control.pixels2]).T
+    columns |= dict(zip(("col1 [px]", "row1 [px]", "col2 [px]", "row2 [px]"), pixels, strict=True))
+    contents = {"control": columns}
+    if control.lengths:
+        starts, ends, lengths = zip(*control.lengths, strict=True)
+        contents["lengths"] = {
+            "from": [control.ids[i] for i in starts],
+            "to": [control.ids[i] for i in ends],
+            "length [m]": np.array(lengths),
+        }
+    for key, content in contents.items():
+        path = session.products.place(key, f".{key}.csv")
+        write_csv(path, content, overwrite=session.products.is_own(path))
+        session.note_made(key, [path.name])
+        tables[key] = path
+    return tables
+
+
+def finish(session: Session, task: Mapping[str, Any], result: Mapping[str, Any]) -> str:
+    """Take over what a job made; return what the user should know."""
+    kind = task["kind"]
+    if kind == "align":
+        session.propose(Path(task["out"]), result)
+        return " ".join(result.get("remarks", ()))
+    if kind == "match":
+        session.command({"op": "points.add", "points": result["points"]})
+        return ""
+    names = [Path(task["out"]).name]
+    if kind == "deliver":
+        folder = Path(task["out"])
+        names = [f"{folder.name}/{name}" for name in result["files"]]
+        if any(point.is_complete for point in session.state.points.values()):
+            write_points_drawing(session, folder / f"{session.products.stem}_points.dxf")
+            names.append(f"{folder.name}/{session.products.stem}_points.dxf")
+    session.note_made(kind, names)
+    session.show_products()
+    return " ".join(str(remark) for remark in result.get("remarks", ()))

@@ -1,0 +1,187 @@
+"""Long jobs, each in a process of its own: started, watched, cancelled."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+import threading
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from bifocal.collimation.job_tasks import finish, task_of
+from photocore.errors import InputError, PhotogrammetryError
+
+if TYPE_CHECKING:
+    from bifocal.collimation.session import Session
+
+#: Jobs that are remembered; older ones are forgotten once they have ended.
+MOST_JOBS = 20
+
+
+@dataclass(slots=True)
+class Job:
+    """A job.
+
+    Attributes
+    ----------
+    number : str
+    kind : str
+    state : str
+        ``running``, ``done``, ``failed`` or ``cancelled``.
+    progress : float
+        0 to 1.
+    message : str
+    process : Popen or None
+        The worker, while it runs.
+    """
+
+    number: str
+    kind: str
+    state: str = "running"
+    progress: float = 0.0
+    message: str = ""
+    process: subprocess.Popen[str] | None = None
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return what the page shows of it."""
+        return {
+            "id": self.number,
+            "kind": self.kind,
+            "state": self.state,
+            "progress": self.progress,
+            "message": self.message,
+        }
+
+
+class JobRunner:
+    """Runs one job at a time.
+
+    Parameters
+    ----------
+    session : Session
+    """
+
+    def __init__(self, session: Session) -> None:
+        self.session = session
+        self.jobs: dict[str, Job] = {}
+        self._count = 0
+        self._threads: list[threading.Thread] = []
+
+    def start(self, kind: str, options: Mapping[str, Any]) -> Job:
+        """Start a job.
+
+        Raises
+        ------
+        InputError
+            If another one runs, or it cannot be done as the survey stands.
+        """
+        session = self.session
+        with session.lock:
+            running = [job for job in self.jobs.values() if job.state == "running"]
+            if running:
+                raise InputError(
+                    f"the job {running[0].kind} is still running; wait for it or cancel it."
+                )
+            task = task_of(session, kind, options)
+            self._count += 1
+            job = Job(str(self._count), kind)
+            self.jobs[job.number] = job
+            for number in list(self.jobs)[:-MOST_JOBS]:
+                del self.jobs[number]
+            thread = threading.Thread(target=self._run, args=(job, task), daemon=True)
+            self._threads = [t for t in self._threads if t.is_alive()] + [thread]
+        thread.start()
+        self.session.changed()
+        return job
+
+    def cancel(self, number: str) -> None:
+        """End a job; what it was writing is not left behind.
+
+        Raises
+        ------
+        InputError
+            If there is no such job.
+        """
+        job = self.jobs.get(number)
+        if job is None:
+            raise InputError("there is no such job.")
+        with self.session.lock:
+            if job.state == "running":
+                job.state = "cancelled"
+                if job.process is not None:
+                    job.process.terminate()
+        self._tell(job)
+
+    def stop(self) -> None:
+        """End all jobs."""
+        for number in list(self.jobs):
+            self.cancel(number)
+        for thread in self._threads:
+            thread.join(timeout=10)
+
+    def _run(self, job: Job, task: dict[str, Any]) -> None:
+        command = [sys.executable, "-m", "bifocal.collimation.job_process"]
+        try:
+            process = subprocess.Popen(
+                command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL,
+                text=True, encoding="utf-8", cwd=Path.cwd(),
+            )  # fmt: skip
+        except OSError as error:
+            self._end(job, "failed", f"the job could not be started ({error.strerror}).")
+            return
+        with process:
+            with self.session.lock:
+                job.process = process
+                if job.state == "cancelled":
+                    process.terminate()
+            answer = self._follow(job, process, task)
+        job.process = None
+        if job.state == "cancelled":
+            self._tell(job)
+        elif "result" in answer:
+            self._finish(job, task, answer["result"])
+        else:
+            self._end(job, "failed", answer.get("error", "the job ended without a result."))
+
+    def _follow(
+        self, job: Job, process: subprocess.Popen[str], task: dict[str, Any]
+    ) -> dict[str, Any]:
+        """Return the last line of a worker, telling its progress meanwhile."""
+        assert process.stdin is not None
+        assert process.stdout is not None
+        answer: dict[str, Any] = {}
+        try:
+            process.stdin.write(json.dumps(task))
+            process.stdin.close()
+        except OSError:
+            return answer
+        for line in process.stdout:
+            try:
+                told = json.loads(line)
+            except ValueError:
+                continue
+            if "progress" in told and job.state == "running":
+                job.progress, job.message = told["progress"], told["message"]
+                self._tell(job)
+            answer = told
+        return answer
+
+    def _finish(self, job: Job, task: dict[str, Any], result: dict[str, Any]) -> None:
+        try:
+            remarks = finish(self.session, task, result)
+        except (PhotogrammetryError, OSError) as error:
+            self._end(job, "failed", str(error))
+            return
+        job.progress = 1.0
+        self._end(job, "done", remarks)
+
+    def _end(self, job: Job, state: str, message: str) -> None:
+        job.state, job.message = state, message
+        self.session.changed()
+        self._tell(job)
+
+    def _tell(self, job: Job) -> None:
+        self.session.tell({"job": job.as_dict()})

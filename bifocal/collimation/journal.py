@@ -1,0 +1,121 @@
+"""The journal: one line of JSON for every command, on the disk before the page is answered."""
+
+from __future__ import annotations
+
+import importlib
+import json
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from photocore.errors import InputError
+
+
+class Journal:
+    """An append-only file of commands.
+
+    Parameters
+    ----------
+    path : Path
+        Made where there is none.
+
+    Attributes
+    ----------
+    records : list of dict
+        What it held when opened. A last line that a crash cut off is not among them; it is taken
+        off the file.
+
+    Raises
+    ------
+    InputError
+        If it cannot be written, another server has it open, or a line is no command.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        try:
+            self._file = path.open("a+b", buffering=0)
+        except OSError as error:
+            raise InputError(
+                f"{path}: the journal cannot be written ({error.strerror}); choose a folder that "
+                "can be written to."
+            ) from error
+        try:
+            self._lock()
+            self.records = self._read()
+        except BaseException:
+            self._file.close()
+            raise
+
+    def _lock(self) -> None:
+        try:
+            lock(self._file.fileno())
+        except OSError:
+            raise InputError(
+                f"{self.path}: this survey is open already in another `bifocal pick`; use its page "
+                "(several may work on it at once), or end it first."
+            ) from None
+
+    def _read(self) -> list[dict[str, Any]]:
+        self._file.seek(0)
+        data = self._file.read()
+        whole = data.rfind(b"\n") + 1
+        if whole < len(data):
+            self._file.truncate(whole)
+        records = []
+        for number, line in enumerate(data[:whole].splitlines(), start=1):
+            try:
+                record = json.loads(line)
+            except ValueError:
+                record = None
+            if not isinstance(record, dict) or "op" not in record:
+                raise InputError(
+                    f"{self.path}, line {number}: is no command of a survey's journal. Restore the "
+                    "file from a backup, or delete this line."
+                )
+            records.append(record)
+        return records
+
+    def append(self, record: Mapping[str, Any]) -> None:
+        """Add a command; on return it is on the disk.
+
+        Raises
+        ------
+        InputError
+            If it could not be written; the journal is then as it was before.
+        """
+        line = json.dumps(record, ensure_ascii=False, allow_nan=False).encode() + b"\n"
+        end = os.fstat(self._file.fileno()).st_size
+        try:
+            written = 0
+            while written < len(line):
+                written += self._file.write(line[written:])
+            os.fsync(self._file.fileno())
+        except OSError as error:
+            self._file.truncate(end)
+            raise InputError(
+                f"{self.path}: could not be written ({error.strerror or error}); the last change "
+                "was not taken, all before it is safe. Free some space and repeat it."
+            ) from error
+
+    def close(self) -> None:
+        """Close the file."""
+        self._file.close()
+
+
+def lock(handle: int) -> None:
+    """Lock a file for this process; the system frees it even when the process is killed.
+
+    Raises
+    ------
+    OSError
+        If another process has locked it.
+    """
+    if os.name == "nt":  # a byte far behind the end, for Windows locks reading too
+        windows: Any = importlib.import_module("msvcrt")
+        os.lseek(handle, 1 << 30, os.SEEK_SET)
+        windows.locking(handle, windows.LK_NBLCK, 1)
+        return
+    unix: Any = importlib.import_module("fcntl")
+    unix.flock(handle, unix.LOCK_EX | unix.LOCK_NB)

@@ -1,0 +1,237 @@
+"""The orientation while control points are picked: residuals, precision, what would help most."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from bifocal.collimation.records import PickedControl, SurveyState
+from bifocal.collimation.wording import say
+from bifocal.files.images import ImageInfo
+from bifocal.model.orientation_precision import CAMERA, NAMES
+from bifocal.orientation.absolute_orientation import orient_pair
+from bifocal.orientation.align_workflow import SIGMA_ON_WALL, KnownLens, interior_of_photo
+from bifocal.orientation.alignment import standard_deviations
+from bifocal.orientation.control_points import Control, SiteMeasures
+from bifocal.orientation.interior_orientation import Interior
+from bifocal.orientation.orientation_stages import OrientedPair, PhotoInput
+from bifocal.orientation.pair_observations import at
+from photocore.arrays import FloatArray
+from photocore.camera import PARAMETERS, project_with_jacobian, ray_on_plane
+from photocore.errors import PhotogrammetryError
+
+#: Points that stand out or lie back by this part of the near distance are thought of.
+DEPTH = 0.05
+#: A point that betters the distances by less than this share is not worth a walk.
+WORTH = 0.05
+#: A misfit beyond so many standard deviations is spoken of.
+SUSPECT = 3.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LiveOrientation:
+    """What the control points alone tell of both cameras.
+
+    Attributes
+    ----------
+    error : str
+        Why they tell nothing yet; empty where they do.
+    deviations : dict of str to float
+        Standard deviations: ``distance1``, ``nadir1`` ... [m]
+    distances : tuple of float
+        Of the cameras to the wall. [m]
+    residuals : dict of str to tuple of float
+        Observed minus computed column 1, row 1, column 2, row 2. [px]
+    advice : tuple of str
+        What would help most next.
+    """
+
+    error: str = ""
+    deviations: dict[str, float]
+    distances: tuple[float, ...] = ()
+    residuals: dict[str, tuple[float, ...]]
+    advice: tuple[str, ...] = ()
+
+
+def site_of(state: SurveyState) -> SiteMeasures:
+    """Return the distances that were measured on site."""
+    setup = state.setup
+    sigmas = [setup.get(f"sigma_{name}") for name in ("d", "d1", "d2", "delta_d")]
+    given = [sigma for sigma in sigmas if sigma]
+    site = SiteMeasures(
+        distance1=setup.get("d1"), distance2=setup.get("d2"), delta_d=setup.get("delta_d")
+    )
+    if all((site.distance1, site.distance2, site.delta_d)):
+        site = replace(site, delta_d=None)
+    return replace(site, sigma=max(given)) if given else site
+
+
+def lenses_of(state: SurveyState) -> tuple[KnownLens, KnownLens]:
+    """Return what was typed of both lenses."""
+    first, second = (state.lenses.get(image, {}) for image in (1, 2))
+    return (
+        KnownLens(focal=first.get("focal_mm"), sensor_width=first.get("sensor_width_mm")),
+        KnownLens(focal=second.get("focal_mm"), sensor_width=second.get("sensor_width_mm")),
+    )
+
+
+def control_of(state: SurveyState) -> Control:
+    """Return the control points and tapes as `bifocal align` takes them."""
+    points = [point for point in state.sorted_control() if point.picks != (None, None)]
+    site, nowhere = SiteMeasures(), (np.nan, np.nan)
+    xyz = np.array([_known(point) for point in points]).reshape(-1, 3)
+    sigma = np.full((len(points), 3), site.sigma_control)
+    on_wall = np.isfinite(xyz[:, :2]).all(axis=1) & np.isnan(xyz[:, 2])
+    xyz[on_wall, 2], sigma[on_wall, 2] = 0.0, SIGMA_ON_WALL
+    index = {point.name: number for number, point in enumerate(points)}
+    return Control(
+        ids=tuple(index),
+        xyz=xyz,
+        sigma=sigma,
+        pixels1=np.array([p.picks[0] or nowhere for p in points], dtype=float).reshape(-1, 2),
+        pixels2=np.array([p.picks[1] or nowhere for p in points], dtype=float).reshape(-1, 2),
+        lengths=tuple(
+            (index[tape.start], index[tape.end], tape.length)
+            for tape in state.tapes.values()
+            if tape.start in index and tape.end in index
+        ),
+    )
+
+
+def _known(point: PickedControl) -> list[float]:
+    return [np.nan if value is None else value for value in point.known]
+
+
+def live_orientation(state: SurveyState, infos: list[ImageInfo], language: str) -> LiveOrientation:
+    """Return what the control points tell, without a look at the photos' content."""
+    control = control_of(state)
+    complete = [
+        point for point in state.control.values()
+        if None not in point.picks and None not in point.known[:2]
+    ]  # fmt: skip
+    hints = _to_complete(state, len(complete), language)
+    if len(complete) < 4:
+        return LiveOrientation(deviations={}, residuals={}, advice=tuple(hints))
+    try:
+        interiors = [
+            interior_of_photo(info, known, number)
+            for number, (info, known) in enumerate(
+                zip(infos, lenses_of(state), strict=True), start=1
+            )
+        ]
+        oriented = orient_pair(
+            (_unseen(interiors[0], infos[0]), _unseen(interiors[1], infos[1])),
+            control=control,
+            site=site_of(state),
+        )
+    except PhotogrammetryError as error:
+        return LiveOrientation(
+            error=str(error), deviations={}, residuals={}, advice=(*hints, str(error))
+        )
+    adjusted = oriented.adjusted
+    residuals = adjusted.control_residuals
+    if oriented.exchanged:
+        residuals = residuals[:, [2, 3, 0, 1]]
+    return LiveOrientation(
+        deviations=standard_deviations(adjusted),
+        distances=tuple(float(camera.centre[2]) for camera in adjusted.cameras),
+        residuals={
+            name: tuple(row) for name, row in zip(control.ids, residuals.tolist(), strict=True)
+        },
+        advice=(*_suspects(oriented, language), *hints, *_most_help(oriented, language)),
+    )
+
+
+def _unseen(interior: Interior, info: ImageInfo) -> PhotoInput:
+    return PhotoInput(grey=None, interior=interior, name=info.path.name)
+
+
+def _to_complete(state: SurveyState, complete: int, language: str) -> list[str]:
+    """Return what is missing of the control points, the nearest step first."""
+    if not state.control:
+        return [say("advice", "none", language)]
+    hints = []
+    for point in state.sorted_control():
+        if None in point.picks and point.picks != (None, None):
+            hints.append(say("advice", "other", language, name=point.name))
+        if None in point.known[:2] and None not in point.picks and not state.tapes:
+            hints.append(say("advice", "place", language, name=point.name))
+    if complete < 4:
+        hints.append(say("advice", "more", language, count=4 - complete))
+    return hints[:3]
+
+
+def _suspects(oriented: OrientedPair, language: str) -> list[str]:
+    """Name the control point that fits worst, where it fits badly."""
+    test = np.nan_to_num(oriented.adjusted.control_test)
+    if not len(test) or test.max() < SUSPECT:
+        return []
+    row = int(test.argmax())
+    name = oriented.observations.control.ids[row]
+    return [say("advice", "worst", language, name=name, test=float(test[row]))]
+
+
+def _most_help(oriented: OrientedPair, language: str) -> list[str]:
+    """Say which further control point would better the distances most."""
+    cameras, covariance = oriented.adjusted.cameras, oriented.adjusted.covariance
+    width, height = oriented.observations.interiors[0].image_size
+    watched = [at("Z", number) for number in (1, 2)]
+    before = float(np.sqrt(np.mean(np.diag(covariance)[watched])))
+    depth = DEPTH * float(cameras[1].centre[2])
+    offers: list[tuple[float, str, str, float]] = []
+    for kind, relief in (("wall", 0.0), ("out", depth), ("back", -depth)):
+        for across in range(3):
+            for down in range(3):
+                pixel = np.array([[width * (0.1 + 0.4 * across), height * (0.1 + 0.4 * down)]])
+                place = ray_on_plane(cameras[0], pixel)
+                place[:, 2] = relief
+                design, noise = _control_rows(oriented, place)
+                after = _sigma_with(covariance, design, noise, watched)
+                offers.append((after, kind, f"{across}{down}", abs(relief)))
+    measured = oriented.observations.measured
+    for number in (1, 2):
+        if f"distance{number}" not in measured:
+            design = np.zeros((1, len(NAMES)))
+            design[0, at("Z", number)] = 1.0
+            noise = np.array([[SiteMeasures().sigma ** 2]])
+            after = _sigma_with(covariance, design, noise, watched)
+            offers.append((after, "tape", str(number), 0.0))
+    after, kind, where, relief = min(offers, key=lambda offer: np.nan_to_num(offer[0], nan=np.inf))
+    if not after < (1.0 - WORTH) * before:
+        return [say("advice", "enough", language)]
+    if kind == "tape":
+        return [say("advice", "tape", language, photo=say("photo", where, language))]
+    return [
+        say(
+            "advice", "next", language, depth=say("depth", kind, language, r=relief),
+            where=say("where", where, language), before=1000 * before, after=1000 * after,
+        )
+    ]  # fmt: skip
+
+
+def _control_rows(oriented: OrientedPair, place: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return the rates of a control point's four pixels by all `NAMES`, and their covariance."""
+    rows, by_points = [], []
+    for number, camera in enumerate(oriented.adjusted.cameras):
+        seen = project_with_jacobian(camera, place)
+        design = np.zeros((2, len(NAMES)))
+        first = number * len(CAMERA)
+        design[:, first : first + len(PARAMETERS)] = seen.by_camera[0]
+        rows.append(design)
+        by_points.append(seen.by_point[0])
+    by_point = np.concatenate(by_points)
+    noise = np.eye(4) * oriented.observations.sigma_pick**2
+    noise += by_point @ by_point.T * SiteMeasures().sigma_control ** 2
+    return np.concatenate(rows), noise
+
+
+def _sigma_with(
+    covariance: FloatArray, design: FloatArray, noise: FloatArray, watched: list[int]
+) -> float:
+    """Return the mean standard deviation of the distances with more observations; or NaN. [m]"""
+    gain = covariance @ design.T
+    if not np.isfinite(gain).all():
+        return float("nan")
+    smaller = covariance - gain @ np.linalg.solve(design @ gain + noise, gain.T)
+    return float(np.sqrt(np.mean(np.diag(smaller)[watched])))

@@ -1,0 +1,90 @@
+"""Results of the points as they are picked: the survey's own solver, point by point."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from bifocal.collimation.records import PickedPoint, Picks
+from bifocal.model.flags import FlagLimits
+from bifocal.model.pair import Pair
+from bifocal.survey.observations import PointObservations
+from bifocal.survey.point_survey import solve_points
+from photocore.arrays import FloatArray
+from photocore.jsonfile import plain
+
+_KEYS = {"s1": "s1_used", "s2": "s2_used", "delta_s": "ds"} | {
+    key: key for key in ("e1", "e2", "r", "X", "Y", "Z", "sigma_r")
+}
+
+
+def observations(points: Iterable[PickedPoint]) -> PointObservations:
+    """Return points as the survey's solver takes them; NaN where a photo is not picked."""
+    listed = list(points)
+    nowhere = (np.nan, np.nan)
+    return PointObservations(
+        ids=tuple(point.name for point in listed),
+        pixels1=np.array([p.picks[0] or nowhere for p in listed]).reshape(-1, 2),
+        pixels2=np.array([p.picks[1] or nowhere for p in listed]).reshape(-1, 2),
+        # What is picked in one photo only takes no part yet.
+        use=np.array([p.use and p.is_complete for p in listed], dtype=bool),
+        code=tuple(p.code for p in listed),
+        note=tuple(p.note for p in listed),
+    )
+
+
+@dataclass(slots=True, eq=False)
+class LiveResults:
+    """Results of complete points, kept until their picks change.
+
+    Parameters
+    ----------
+    pair : Pair
+    sigma_px : float or None
+        Precision of a pick; default the pair's own, else 0.5. [px]
+    limits : FlagLimits
+        Where the flags begin.
+    """
+
+    pair: Pair
+    sigma_px: float | None = None
+    limits: FlagLimits = field(default_factory=FlagLimits)
+    _rows: dict[Picks, dict[str, Any]] = field(default_factory=dict)
+    _places: dict[Picks, tuple[FloatArray, FloatArray]] = field(default_factory=dict)
+
+    def solve(self, points: Iterable[PickedPoint]) -> None:
+        """Solve all points whose picks are new, at once."""
+        new = list({p.picks: p for p in points if p.is_complete and p.picks not in self._rows}
+                   .values())  # fmt: skip
+        if not new:
+            return
+        seen = observations(new)
+        table = solve_points(self.pair, seen, sigma_px=self.sigma_px, limits=self.limits)
+        places = self.pair.intersect(seen.pixels1, seen.pixels2, sigma_px=self.sigma_px)
+        for row, point in enumerate(new):
+            sigma = places.sigma[row]
+            misfit = table.carried.get("misfit_px")
+            self._rows[point.picks] = plain(
+                {key: float(table[column][row]) for key, column in _KEYS.items()}
+                | {
+                    "sigma_X": float(sigma[0]),
+                    "sigma_Y": float(sigma[1]),
+                    "flag": table.flags[row],
+                    "misfit_px": None if misfit is None else float(misfit[row]),
+                    "uncertain_area": table.flags[row] in ("UNCERTAIN", "NADIR"),
+                }
+            )
+            self._places[point.picks] = places.xyz[row], places.covariance[row]
+
+    def row(self, point: PickedPoint) -> Mapping[str, Any] | None:
+        """Return a point's results: lengths on the photos in mm, on the wall in m."""
+        self.solve([point])
+        return self._rows.get(point.picks)
+
+    def place(self, point: PickedPoint) -> tuple[FloatArray, FloatArray] | None:
+        """Return X, Y, r [m], shape (3,), and their covariance [m²]; None if incomplete."""
+        self.solve([point])
+        return self._places.get(point.picks)

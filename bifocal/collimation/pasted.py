@@ -1,0 +1,72 @@
+"""Control points pasted from a spreadsheet: name, X, Y, r, and pixels where they are known."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from bifocal.collimation.records import Known, Picks, Pixel
+from bifocal.orientation.control_points import COLUMNS, METRES
+from photocore.arrays import FloatArray
+from photocore.errors import InputError
+from photocore.tables import Table, read_table
+from photocore.tables.csvread import CsvFile
+
+#: No wall carries more.
+MOST_ROWS = 5000
+
+
+def pasted_control(text: str) -> list[tuple[str, Known, Picks]]:
+    """Return name, X, Y, r [m] and picks [px] of each row; None where blank.
+
+    Raises
+    ------
+    InputError
+        If no table is recognised, a number is none, or a row has no name.
+    """
+    text = text.strip("\r\n")
+    if not text.strip():
+        raise InputError("nothing was pasted; copy the rows of a table first.")
+    table = read_table(CsvFile("what was pasted", _with_headings(text)), COLUMNS)
+    if not len(table) or len(table) > MOST_ROWS:
+        raise InputError(f"what was pasted holds {len(table)} points; expected 1 to {MOST_ROWS}.")
+    known = np.column_stack([_metres(table, key) for key in ("X", "Y", "r")])
+    picks = np.column_stack([table.numbers(key) for key in ("col1", "row1", "col2", "row2")])
+    rows = []
+    for name, place, pixels in zip(table.texts("id"), known.tolist(), picks.tolist(), strict=True):
+        if not name:
+            raise InputError("a pasted row has no name; the first column names the point.")
+        x, y, r = (None if math.isnan(value) else value for value in place)
+        rows.append((name[:80], (x, y, r), (_pixel(pixels[:2]), _pixel(pixels[2:]))))
+    return rows
+
+
+def _with_headings(text: str) -> str:
+    """Return the text, with headings put above numbers pasted without them."""
+    first = text.splitlines()[0]
+    delimiter = next((mark for mark in "\t;|," if mark in first), " ")
+    fields = [field.strip() for field in first.split(delimiter)]
+    if len(fields) < 2 or not any(_is_number(field) for field in fields[1:]):
+        return text
+    keys = [column.key for column in COLUMNS][: len(fields)]
+    return f"{delimiter.join(keys)}\n{text}"
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text.replace(",", "."))
+    except ValueError:
+        return False
+    return True
+
+
+def _metres(table: Table, key: str) -> FloatArray:
+    unit = table.units.get(key, "m")
+    if unit not in METRES:
+        raise InputError(f"{key}: the unit {unit!r} is not a length; use m, cm or mm.")
+    return np.asarray(table.numbers(key) * METRES[unit])
+
+
+def _pixel(values: list[float]) -> Pixel | None:
+    return None if any(math.isnan(value) for value in values) else (values[0], values[1])

@@ -1,0 +1,173 @@
+"""Both photos of a survey: their pyramids, their tiles, and what is measured in them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from bifocal.collimation.pyramids import Pyramid, RectifiedPhoto, wall_grid
+from bifocal.collimation.records import Pixel
+from bifocal.collimation.snapping import snap
+from bifocal.collimation.suggestions import radial_line, suggest
+from bifocal.collimation.tile_store import TileStore
+from bifocal.files.geotiff import RasterReader
+from bifocal.files.images import ImageArray, ImageInfo, image_info, read_image
+from bifocal.model.grid import Grid
+from bifocal.model.pair import Pair
+from photocore.arrays import ByteArray, FloatArray
+from photocore.errors import InputError
+from photocore.jsonfile import plain
+
+
+class Pictures:
+    """The pictures of a survey.
+
+    Parameters
+    ----------
+    folder : Path
+        Where tiles are kept.
+    photos : sequence of Path
+        Far and near photo, as far as they are given.
+    pair : Pair or None
+        None before they are oriented.
+
+    Raises
+    ------
+    InputError, GeometryError
+        If a photo or the pair is unusable.
+    """
+
+    def __init__(self, folder: Path, photos: Sequence[Path], pair: Pair | None) -> None:
+        self.tiles = TileStore(folder)
+        self.infos: list[ImageInfo] = []
+        self.pyramids: list[Pyramid] = []
+        self.pair: Pair | None = None
+        self.grid: Grid | None = None
+        self.show_photos(photos)
+        if pair is not None:
+            self.show_pair(pair)
+
+    def show_photos(self, photos: Sequence[Path]) -> None:
+        """Show other photos, not oriented yet."""
+        infos = [image_info(path) for path in photos]
+        self.infos, self.pair, self.grid = infos, None, None
+        self.pyramids = [Pyramid(info.size, _reader(info.path)) for info in infos]
+        for number, (info, pyramid) in enumerate(zip(infos, self.pyramids, strict=True), start=1):
+            self.tiles.register(f"photo-{number}", pyramid, *_facts(info.path))
+            self.tiles.forget(f"wall-{number}")
+
+    def show_pair(self, pair: Pair) -> None:
+        """Show the photos on the wall, as a pair orients them."""
+        if len(self.infos) != 2:
+            raise InputError("a pair needs two photos.")
+        grid = wall_grid(pair, (self.infos[0].size, self.infos[1].size))
+        for number, pyramid in enumerate(self.pyramids, start=1):
+            photo = pair.photo(number)
+            lens = photo.lens and (
+                photo.lens.camera_matrix.tolist(), photo.lens.model,
+                photo.lens.coefficients.tolist(),
+            )  # fmt: skip
+            self.tiles.register(
+                f"wall-{number}",
+                RectifiedPhoto.of(photo, number, pyramid, grid),
+                *_facts(self.infos[number - 1].path), photo.plane_from_pixel.tolist(), lens, grid,
+            )  # fmt: skip
+        self.pair, self.grid = pair, grid
+
+    def show_ortho(self, path: Path) -> None:
+        """Show an orthophoto."""
+        with RasterReader(path) as file:
+            size = (file.width, file.height)
+        self.tiles.register("ortho-0", Pyramid(size, lambda: _ortho_pixels(path)), *_facts(path))
+
+    def warm_up(self) -> None:
+        """Read both photos, so that the first suggestion does not wait for it."""
+        for pyramid in self.pyramids:
+            pyramid.halved(0)
+
+    def photos(self) -> tuple[ByteArray, ByteArray]:
+        """Return both photos, 8 bit; they are read once.
+
+        Raises
+        ------
+        InputError
+            If there are no two photos yet.
+        """
+        if len(self.pyramids) < 2:
+            raise InputError("there are no photos yet; give two.")
+        return self.pyramids[0].halved(0), self.pyramids[1].halved(0)
+
+    def needed_pair(self) -> Pair:
+        """Return the pair.
+
+        Raises
+        ------
+        InputError
+            If the photos are not oriented yet.
+        """
+        if self.pair is None:
+            raise InputError("the photos are not oriented yet; align them first.")
+        return self.pair
+
+    def suggest(self, image: int, pixel: Pixel) -> dict[str, Any]:
+        """Return where the other photo shows a pick, with the line on which it must lie."""
+        found = suggest(self.needed_pair(), self.photos(), image, np.array(pixel))
+        return plain(
+            {
+                "column": found.pixel[0],
+                "row": found.pixel[1],
+                "quality": found.quality,
+                "score": found.score,
+                "sigma_px": found.sigma_px,
+                "misfit_px": found.misfit_px,
+                "kept": found.kept,
+                "line": self.line(image, pixel),
+            }
+        )
+
+    def line(self, image: int, pixel: Pixel) -> list[list[float]]:
+        """Return the line in the other photo on which a pick must lie. [px]"""
+        size = self.infos[2 - image].size
+        return radial_line(self.needed_pair(), image, np.array(pixel), size).tolist()
+
+    def snap(self, image: int, pixel: Pixel, radius: float) -> dict[str, Any]:
+        """Return the target's centre or the corner next to a pick."""
+        return snap(self.photos()[image - 1], pixel, radius)._asdict()
+
+    def convert(self, image: int, pixels: FloatArray, source: str) -> FloatArray:
+        """Return pixels of a photo as pixels of the wall or back, shape (n, 2); any lens model."""
+        photo, grid = self.needed_pair().photo(image), self.grid
+        assert grid is not None
+        if source == "photo":
+            return grid.pixel_of(photo.plane_from_pixels(pixels))
+        plane = np.column_stack(
+            [grid.x0 + grid.gsd * pixels[:, 0], grid.y0 - grid.gsd * pixels[:, 1]]
+        )
+        return photo.pixels_from_plane(plane)
+
+    def photo_from_wall(self, number: int) -> FloatArray:
+        """Return the homography from wall pixels to ideal pixels of a photo, shape (3, 3)."""
+        pair, grid = self.needed_pair(), self.grid
+        assert grid is not None
+        matrix = np.linalg.inv(pair.photo(number).plane_from_pixel) @ grid.plane_from_pixel
+        return np.asarray(matrix / matrix[2, 2])
+
+
+def _reader(path: Path) -> Any:
+    return lambda: read_image(path)
+
+
+def _ortho_pixels(path: Path) -> ImageArray:
+    with RasterReader(path) as file:
+        bands = [1, 2, 3] if file.bands >= 3 else [1]
+        pixels = file.read(0, 0, file.width, file.height, bands=bands)
+    return pixels if pixels.shape[2] == 3 else pixels[:, :, 0]
+
+
+def _facts(path: Path) -> tuple[str, int, int]:
+    """Return what tells whether a picture is still the same."""
+    known = path.stat()
+    return path.name, known.st_size, known.st_mtime_ns

@@ -1,0 +1,192 @@
+"""Relief, orthophoto and drawings of a survey: where they lie, and what the page asks of them."""
+
+from __future__ import annotations
+
+import io
+import zipfile
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+
+from bifocal.collimation.project import SurveyFiles
+from bifocal.files.geotiff import RasterReader, read_relief
+from bifocal.model.pair import Pair
+from bifocal.model.relief_map import ReliefMap
+from photocore.arrays import FloatArray
+from photocore.errors import InputError
+from photocore.jsonfile import read_object, write_object
+from photocore.output import free_path
+
+#: Longer side of the relief's picture. [px]
+OVERLAY_SIDE = 2048
+#: Points of a profile, at most.
+PROFILE_POINTS = 2000
+
+
+class Products:
+    """Files that the page made in the survey's folder.
+
+    Parameters
+    ----------
+    files : SurveyFiles
+    """
+
+    def __init__(self, files: SurveyFiles) -> None:
+        self.folder, self.stem = files.folder, files.stem
+        self.made: dict[str, str] = {}
+        self._relief: tuple[tuple[str, int], ReliefMap] | None = None
+
+    def note(self, kind: str, names: Sequence[str]) -> None:
+        """Remember that files were made."""
+        for name in names:
+            self.made.pop(name, None)
+            self.made[name] = kind
+
+    def place(self, kind: str, ending: str) -> Path:
+        """Return where a product goes: over the page's own older one, never over another file."""
+        current = self.current(kind)
+        path = current or self.folder / f"{self.stem}{ending}"
+        if current is not None or not path.exists():
+            return path
+        return free_path(self.folder, f"{self.stem}-page", ending)
+
+    def is_own(self, path: Path) -> bool:
+        """Whether a file was made by the page."""
+        return path.name in self.made
+
+    def current(self, kind: str) -> Path | None:
+        """Return the last product of a kind that is still there."""
+        paths = [self.folder / name for name, what in self.made.items() if what == kind]
+        return next((path for path in reversed(paths) if path.is_file()), None)
+
+    def downloads(self, workbook: Path) -> dict[str, Path]:
+        """Return the files offered for download by name."""
+        names = [name for name in self.made if (self.folder / name).is_file()]
+        offered = {Path(name).name: self.folder / name for name in names}
+        if workbook.is_file():
+            offered[workbook.name] = workbook
+        return offered
+
+    def listed(self, workbook: Path) -> list[dict[str, Any]]:
+        """Return names and sizes of the files offered for download."""
+        offered = self.downloads(workbook)
+        return [{"name": n, "bytes": p.stat().st_size} for n, p in sorted(offered.items())]
+
+    def zipped(self, workbook: Path) -> bytes:
+        """Return all files offered for download as one archive."""
+        buffer = io.BytesIO()
+        with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED) as archive:
+            for name, path in sorted(self.downloads(workbook).items()):
+                archive.write(path, name)
+        return buffer.getvalue()
+
+    def facts(self, kind: str) -> dict[str, Any] | None:
+        """Return size and place of the relief or the orthophoto; None where there is none."""
+        path = self.current(kind)
+        if path is None:
+            return None
+        with RasterReader(path) as file:
+            grid = file.grid
+        return {
+            "ready": True,
+            "name": path.name,
+            "rows": grid.height,
+            "cols": grid.width,
+            "bounds": grid.bounds,
+            "gsd": grid.gsd,
+        }
+
+    def relief(self) -> ReliefMap:
+        """Return the relief map.
+
+        Raises
+        ------
+        InputError
+            If there is none yet.
+        """
+        path = self.current("relief")
+        if path is None:
+            raise InputError("there is no relief yet; run it first.")
+        facts = (path.name, path.stat().st_mtime_ns)
+        if self._relief is None or self._relief[0] != facts:
+            self._relief = facts, read_relief(path)
+        return self._relief[1]
+
+    def overlay(self) -> bytes:
+        """Return the relief as a picture with transparent holes, PNG."""
+        relief = self.relief()
+        step = max(1, -(-max(relief.shape) // OVERLAY_SIDE))
+        r = relief.r[::step, ::step]
+        known = np.isfinite(r)
+        low, high = relief_limits(relief)
+        scaled = np.clip((np.nan_to_num(r) - low) / max(high - low, 1e-6), 0, 1)
+        colours = cv2.applyColorMap((255 * scaled).astype(np.uint8), cv2.COLORMAP_VIRIDIS)
+        return _png(np.dstack([colours, np.where(known, 255, 0).astype(np.uint8)]))
+
+    def value(self, x: float, y: float) -> dict[str, float | None]:
+        """Return relief and its standard deviation at a place of the wall. [m]"""
+        relief = self.relief()
+        place = np.array([[x, y]])
+        return {
+            "r": _plain(float(relief.sample(place)[0])),
+            "sigma": _plain(float(_nearest(relief, place)[0])),
+        }
+
+    def profile(self, start: FloatArray, end: FloatArray) -> dict[str, list[float | None]]:
+        """Return the relief along a line on the wall. [m]"""
+        relief = self.relief()
+        length = float(np.linalg.norm(end - start))
+        if not np.isfinite(length) or length > 1e5:
+            raise InputError("from, to: two places on the wall, in metres.")
+        count = int(np.clip(length / relief.gsd, 2, PROFILE_POINTS))
+        along = np.linspace(0.0, 1.0, count)
+        places = start + along[:, None] * (end - start)
+        return {
+            "distance": (along * length).tolist(),
+            "r": [_plain(value) for value in relief.sample(places).tolist()],
+            "sigma": [_plain(value) for value in _nearest(relief, places).tolist()],
+        }
+
+
+def relief_limits(relief: ReliefMap) -> tuple[float, float]:
+    """Return the relief at both ends of the colours. [m]"""
+    known = relief.r[np.isfinite(relief.r)]
+    if not len(known):
+        return 0.0, 0.0
+    low, high = np.percentile(known, [0.5, 99.5])
+    return float(low), float(high)
+
+
+def accept_pair(proposed: Path, target: Path) -> None:
+    """Move a proposed pair file, and the lens files it names, to its final name."""
+    data = read_object(proposed, what="pair file")
+    stem = target.name.removesuffix(".json").removesuffix(".pair")
+    for number in (1, 2):
+        photo = data.get(f"image{number}")
+        if isinstance(photo, dict) and photo.get("lens"):
+            name = f"{stem}.lens{number}.json"
+            (proposed.parent / photo["lens"]).replace(target.parent / name)
+            photo["lens"] = name
+    write_object(target, data, overwrite=True)
+    Pair.read(target)
+    proposed.unlink()
+
+
+def _nearest(relief: ReliefMap, places: FloatArray) -> FloatArray:
+    """Return the standard deviation at the nearest pixel of places, shape (n,). [m]"""
+    pixels = np.rint(relief.grid.pixel_of(places))
+    height, width = relief.shape
+    inside = (pixels >= 0).all(axis=1) & (pixels[:, 0] < width) & (pixels[:, 1] < height)
+    column, row = np.where(inside[:, None], pixels, 0).astype(int).T
+    return np.where(inside, relief.sigma[row, column], np.nan)
+
+
+def _plain(value: float) -> float | None:
+    return value if np.isfinite(value) else None
+
+
+def _png(picture: Any) -> bytes:
+    return cv2.imencode(".png", picture)[1].tobytes()

@@ -1,0 +1,191 @@
+"""The files of a survey: found from whatever the page is started with."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from bifocal.files.images import image_info
+from bifocal.survey.workbook.reader import read_survey
+from photocore.errors import InputError
+
+#: Endings of photos looked for in a folder.
+PHOTOS = frozenset({".jpg", ".jpeg", ".png", ".tif", ".tiff"})
+_PAIR, _JOURNAL = ".pair.json", ".journal.jsonl"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SurveyFiles:
+    """Where a survey's files lie, all in one folder unless the user says otherwise.
+
+    Attributes
+    ----------
+    folder : Path
+        Of the workbook, the journal and all results.
+    stem : str
+        What results are named after.
+    workbook, journal : Path
+        The workbook may not exist yet.
+    pair : Path or None
+        Pair file; None before the photos are oriented.
+    photos : tuple of Path
+        Far and near photo; empty before they are given.
+    """
+
+    folder: Path
+    stem: str
+    workbook: Path
+    pair: Path | None = None
+    photos: tuple[Path, ...] = ()
+
+    @property
+    def journal(self) -> Path:
+        """The journal, beside the workbook."""
+        return self.folder / f"{self.workbook.stem}{_JOURNAL}"
+
+    @property
+    def own_pair(self) -> Path:
+        """Where the page writes the pair file it makes."""
+        return self.folder / f"{self.stem}{_PAIR}"
+
+    def beside(self, ending: str) -> Path:
+        """Return the path of a result: the stem with an ending."""
+        return self.folder / f"{self.stem}{ending}"
+
+
+def find_files(sources: Sequence[Path], workbook: Path | None = None) -> SurveyFiles:
+    """Return the files of the survey that the page is started with.
+
+    Parameters
+    ----------
+    sources : sequence of Path
+        A pair file, a survey workbook, a folder, two photos; nothing: the current folder.
+    workbook : Path, optional
+        Where the points go; default the workbook given, else one named after the pair.
+
+    Raises
+    ------
+    InputError
+        If they are none of these, do not exist, or leave more than one choice.
+    """
+    if len(sources) == 2:
+        return _of_photos((sources[0], sources[1]), workbook)
+    if len(sources) > 2:
+        raise InputError(
+            "give one pair file, one workbook, one folder, or two photos (far near); found "
+            f"{len(sources)} files."
+        )
+    source = sources[0] if sources else Path()
+    if source.is_dir():
+        return _of_folder(source, workbook)
+    if not source.exists():
+        raise InputError(f"{source}: no such file or folder.")
+    ending = source.suffix.lower()
+    if ending == ".json":
+        return _of_pair(source, workbook)
+    if ending in (".xlsx", ".xlsm"):
+        if workbook is not None and not (workbook.exists() and workbook.samefile(source)):
+            raise InputError(f"two workbooks were given, {source} and {workbook}; give one.")
+        return _of_workbook(source)
+    if ending in PHOTOS:
+        raise InputError(f"{source}: is one photo; give two, the far one first.")
+    raise InputError(
+        f"{source}: expected a pair file (.pair.json), a survey workbook (.xlsx), a folder or two "
+        "photos."
+    )
+
+
+def _of_pair(pair: Path, workbook: Path | None) -> SurveyFiles:
+    stem = pair.name.removesuffix(".json").removesuffix(".pair")
+    book = _workbook(workbook or pair.parent / f"{stem}.xlsx")
+    return SurveyFiles(folder=book.parent, stem=stem, workbook=book, pair=pair)
+
+
+def _of_photos(photos: tuple[Path, Path], workbook: Path | None) -> SurveyFiles:
+    for photo in photos:
+        image_info(photo)
+    if photos[0].samefile(photos[1]):
+        raise InputError(f"{photos[0]}: is given twice; give the far and the near photo.")
+    book = _workbook(workbook or photos[0].parent / "survey.xlsx")
+    return _remembered(
+        SurveyFiles(folder=book.parent, stem=book.stem, workbook=book, photos=photos)
+    )
+
+
+def _of_workbook(workbook: Path) -> SurveyFiles:
+    book = _workbook(workbook)
+    files = _remembered(SurveyFiles(folder=book.parent, stem=book.stem, workbook=book))
+    if files.pair is not None or files.photos:
+        return files
+    named = read_survey(book).setup.pair_file
+    if not named:
+        raise InputError(
+            f"{workbook}: names no pair file in its sheet Setup (pair_file), so the page cannot "
+            f"tell its photos. Start it with the pair: bifocal pick PAIR.pair.json --workbook "
+            f"{workbook.name}"
+        )
+    pair = book.parent / named
+    if not pair.is_file():
+        raise InputError(f"{workbook}: its pair file {named} is not there.")
+    return replace(files, pair=pair)
+
+
+def _of_folder(folder: Path, workbook: Path | None) -> SurveyFiles:
+    if workbook is not None and workbook.exists():
+        return _of_workbook(workbook)
+    names = sorted(folder.iterdir())
+    journals = [path for path in names if path.name.endswith(_JOURNAL)]
+    pairs = [path for path in names if path.name.endswith(_PAIR)]
+    photos = [path for path in names if path.suffix.lower() in PHOTOS]
+    for found, what in ((journals, "surveys"), (pairs, "pair files")):
+        if len(found) > 1:
+            shown = ", ".join(path.name for path in found[:5])
+            raise InputError(f"{folder}: holds {len(found)} {what} ({shown}); name one.")
+    if journals:
+        stem = journals[0].name.removesuffix(_JOURNAL)
+        book = _workbook(workbook or folder / f"{stem}.xlsx")
+        return _remembered(SurveyFiles(folder=folder, stem=stem, workbook=book))
+    if pairs:
+        return _of_pair(pairs[0], workbook)
+    if len(photos) == 2:
+        return _of_photos((photos[0], photos[1]), workbook)
+    book = _workbook(workbook or folder / "survey.xlsx")
+    return SurveyFiles(folder=book.parent, stem=book.stem, workbook=book)
+
+
+def _workbook(path: Path) -> Path:
+    """Return the path of the workbook, refusing what can be none."""
+    if path.suffix.lower() not in (".xlsx", ".xlsm"):
+        raise InputError(f"{path}: the survey workbook must end in .xlsx.")
+    if not path.parent.is_dir():
+        raise InputError(f"{path}: the folder {path.parent} does not exist; create it first.")
+    return path
+
+
+def _remembered(files: SurveyFiles) -> SurveyFiles:
+    """Return the files with pair and photos as the journal last named them."""
+    record = last_opened(files.journal)
+    if record is None:
+        return files
+    folder = files.folder
+    pair = folder / record["pair"] if record.get("pair") else None
+    photos = tuple(folder / name for name in record.get("photos", ()))
+    stem = str(record.get("stem") or files.stem)
+    return replace(files, stem=stem, pair=files.pair or pair, photos=files.photos or photos)
+
+
+def last_opened(journal: Path) -> dict[str, Any] | None:
+    """Return the last record of a journal that names the survey's files; None without one."""
+    if not journal.is_file():
+        return None
+    last = None
+    for line in journal.read_bytes().splitlines():
+        if b'"op": "files"' in line:
+            try:
+                last = json.loads(line)
+            except ValueError:
+                continue
+    return last if isinstance(last, dict) else None

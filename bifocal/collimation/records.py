@@ -1,0 +1,184 @@
+"""What a survey on the page consists of: frozen records, and changes that can be taken back."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+from bifocal.survey.observations import PLANE_CODES
+
+#: A pick: column and row in the photo as taken. [px]
+Pixel = tuple[float, float]
+#: Picks in the far and the near photo; None where there is none.
+Picks = tuple[Pixel | None, Pixel | None]
+#: X, Y, r as measured otherwise; None where unknown. [m]
+Known = tuple[float | None, float | None, float | None]
+
+#: Types of points and the code that stands for them in the workbook's column `code`.
+CODES = {"plain": "", "wall": "PLANE", "check": "CHECK", "control": "CONTROL"}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PickedPoint:
+    """A point of the survey.
+
+    Attributes
+    ----------
+    name : str
+    order : int
+        Place in the list; stays when the point is renamed.
+    picks : Picks
+    code, note : str
+        As in the workbook.
+    use : bool
+        False for points that are listed but take no part.
+    reference : Known or None
+        What was measured otherwise, to check against. [m]
+    """
+
+    name: str
+    order: int
+    picks: Picks = (None, None)
+    code: str = ""
+    note: str = ""
+    use: bool = True
+    reference: Known | None = None
+
+    @property
+    def type(self) -> str:
+        """One of `CODES`; other codes of the user's count as plain."""
+        code = self.code.strip().upper()
+        if code in PLANE_CODES:
+            return "wall"
+        return next((name for name, word in CODES.items() if word and word == code), "plain")
+
+    @property
+    def is_complete(self) -> bool:
+        """Whether both photos are picked."""
+        return None not in self.picks
+
+    def picked(self, image: int, pixel: Pixel | None) -> PickedPoint:
+        """Return the point with a pick of photo 1 or 2 set or taken away."""
+        return replace(self, picks=with_pick(self.picks, image, pixel))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PickedControl:
+    """A control point of the orientation: where it is on the wall, and in the photos."""
+
+    name: str
+    order: int
+    known: Known = (None, None, None)
+    picks: Picks = (None, None)
+
+    def picked(self, image: int, pixel: Pixel | None) -> PickedControl:
+        """Return the point with a pick of photo 1 or 2 set or taken away."""
+        return replace(self, picks=with_pick(self.picks, image, pixel))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TapedLength:
+    """A distance taped between two control points. [m]"""
+
+    start: str
+    end: str
+    length: float
+    sigma: float | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DrawnLine:
+    """A polyline through points, on a layer of the drawing."""
+
+    name: str
+    layer: str
+    points: tuple[str, ...]
+    closed: bool = False
+
+
+Record = PickedPoint | PickedControl | TapedLength | DrawnLine
+
+
+@dataclass(frozen=True, slots=True)
+class Change:
+    """One record that came, went or changed; None where there is none."""
+
+    kind: str
+    key: str
+    before: Record | None
+    after: Record | None
+
+    @property
+    def reversed(self) -> Change:
+        """The change that takes this one back."""
+        return Change(self.kind, self.key, self.after, self.before)
+
+
+@dataclass(slots=True)
+class SurveyState:
+    """The survey as it stands after a number of commands.
+
+    Attributes
+    ----------
+    points, control, tapes, lines : dict
+        Records by name; tapes by ``from|to``.
+    setup : dict of str to float or None
+        Distances and principal distances asked of the user. [m, mm]
+    lenses : dict of int to dict
+        Focal length and sensor width of each photo, where typed. [mm]
+    stage, language : str
+        Where the user is, and in which language.
+    revision : int
+        Number of the last command.
+    undone, done : list of lists of Change
+        What redo and undo take up.
+    """
+
+    points: dict[str, PickedPoint] = field(default_factory=dict)
+    control: dict[str, PickedControl] = field(default_factory=dict)
+    tapes: dict[str, TapedLength] = field(default_factory=dict)
+    lines: dict[str, DrawnLine] = field(default_factory=dict)
+    setup: dict[str, float | None] = field(default_factory=dict)
+    lenses: dict[int, dict[str, float | None]] = field(default_factory=dict)
+    stage: str = ""
+    language: str = ""
+    revision: int = 0
+    count: int = 0
+    done: list[list[Change]] = field(default_factory=list)
+    undone: list[list[Change]] = field(default_factory=list)
+
+    def apply(self, changes: Iterable[Change]) -> None:
+        """Put changes into effect."""
+        for change in changes:
+            records: dict[str, Any] = getattr(self, change.kind)
+            if change.after is None:
+                records.pop(change.key, None)
+            else:
+                records[change.key] = change.after
+
+    def next_order(self) -> int:
+        """Return a place in the list after all given so far."""
+        self.count += 1
+        return self.count
+
+    def free_name(self, prefix: str = "P") -> str:
+        """Return the next unused name of points and control points."""
+        taken = self.points.keys() | self.control.keys()
+        number = len(self.points if prefix == "P" else self.control) + 1
+        while f"{prefix}{number:02d}" in taken:
+            number += 1
+        return f"{prefix}{number:02d}"
+
+    def sorted_points(self) -> list[PickedPoint]:
+        """Return the points in the order in which they came."""
+        return sorted(self.points.values(), key=lambda point: point.order)
+
+    def sorted_control(self) -> list[PickedControl]:
+        """Return the control points in the order in which they came."""
+        return sorted(self.control.values(), key=lambda point: point.order)
+
+
+def with_pick(picks: Picks, image: int, pixel: Pixel | None) -> Picks:
+    """Return both picks with that of photo 1 or 2 replaced."""
+    return (pixel, picks[1]) if image == 1 else (picks[0], pixel)

@@ -1,0 +1,155 @@
+"""The page's server: routes to the session, nothing else."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+from collections.abc import AsyncIterator
+from pathlib import Path
+from typing import Any
+
+from starlette.applications import Starlette
+from starlette.exceptions import HTTPException
+from starlette.middleware import Middleware
+from starlette.requests import Request
+from starlette.responses import Response, StreamingResponse
+from starlette.routing import Mount, Route
+from starlette.staticfiles import StaticFiles
+
+from bifocal.collimation.measuring_routes import ROUTES as MEASURING
+from bifocal.collimation.product_routes import ROUTES as PRODUCTS
+from bifocal.collimation.requests import answer, in_thread, json_body, session_of
+from bifocal.collimation.security import COOKIE, Guard, TooLarge
+from bifocal.collimation.session import Session
+from bifocal.collimation.state_view import state_of
+from photocore.errors import PhotogrammetryError
+
+#: The page itself.
+WEB = Path(__file__).parent / "web"
+#: Pictures are named with their version, so a browser need not ask again.
+_KEEP = "private, max-age=31536000, immutable"
+#: Seconds after which an idle stream of events says that it is alive.
+_ALIVE = 15.0
+
+
+def application(session: Session, token: str) -> Starlette:
+    """Return the page's server for a survey.
+
+    Parameters
+    ----------
+    session : Session
+    token : str
+        Every request has to know it.
+    """
+    routes = [
+        Route("/", _page),
+        Route("/api/state", _state),
+        Route("/api/events", _events),
+        Route("/api/command", _command, methods=["POST"]),
+        Route("/tiles/{space}/{image:int}/info", _tile_info),
+        Route("/tiles/{space}/{image:int}/{level:int}/{column:int}_{row:int}.jpg", _tile),
+        *MEASURING,
+        *PRODUCTS,
+        Mount("/web", StaticFiles(directory=WEB)),
+        Mount("/", StaticFiles(directory=WEB)),
+    ]
+    app = Starlette(
+        routes=routes,
+        middleware=[Middleware(Guard, token=token)],
+        exception_handlers={
+            PhotogrammetryError: _refused, HTTPException: _plain_error, TooLarge: _too_large,
+        },
+    )  # fmt: skip
+    app.state.session, app.state.token = session, token
+    return app
+
+
+async def _refused(request: Request, error: Exception) -> Response:  # noqa: ARG001
+    return answer({"error": str(error)}, 422)
+
+
+async def _plain_error(request: Request, error: Exception) -> Response:  # noqa: ARG001
+    assert isinstance(error, HTTPException)
+    return answer({"error": error.detail}, error.status_code)
+
+
+async def _too_large(request: Request, error: Exception) -> Response:  # noqa: ARG001
+    return answer({"error": "the request is too large."}, 413)
+
+
+async def _page(request: Request) -> Response:
+    text = (WEB / "index.html").read_bytes()
+    response = Response(text, media_type="text/html", headers={"cache-control": "no-store"})
+    if "token" in request.query_params:
+        response.set_cookie(
+            COOKIE, request.app.state.token, httponly=True, samesite="strict", path="/"
+        )
+    return response
+
+
+async def _state(request: Request) -> Response:
+    return answer(await in_thread(state_of, session_of(request)))
+
+
+async def _command(request: Request) -> Response:
+    session, body = session_of(request), await json_body(request)
+
+    def carry_out() -> dict[str, Any]:
+        with session.lock:
+            result = session.command(body)
+            return {"revision": session.revision, "result": result, "state": state_of(session)}
+
+    return answer(await in_thread(carry_out))
+
+
+async def _events(request: Request) -> Response:
+    session = session_of(request)
+    events, leave = session.listen()
+
+    async def stream() -> AsyncIterator[str]:
+        waited = 0.0
+        try:
+            yield f"data: {json.dumps({'revision': session.revision})}\n\n"
+            while not await request.is_disconnected():
+                if events.empty():
+                    await asyncio.sleep(0.05)
+                    waited += 0.05
+                    if waited > _ALIVE:
+                        waited = 0.0
+                        yield ": alive\n\n"
+                    continue
+                event = events.get()
+                if event is None:
+                    return
+                yield f"data: {json.dumps(event)}\n\n"
+        finally:
+            leave()
+
+    headers = {"cache-control": "no-store", "x-accel-buffering": "no"}
+    return StreamingResponse(stream(), media_type="text/event-stream", headers=headers)
+
+
+def _picture(request: Request) -> str:
+    return f"{request.path_params['space']}-{request.path_params['image']}"
+
+
+async def _tile_info(request: Request) -> Response:
+    info = session_of(request).pictures.tiles.info(_picture(request))
+    if info is None:
+        raise HTTPException(404, "there is no such picture.")
+    return answer(info)
+
+
+async def _tile(request: Request) -> Response:
+    place = [request.path_params[key] for key in ("level", "column", "row")]
+    tile = await in_thread(session_of(request).pictures.tiles.tile, _picture(request), *place)
+    if tile is None:
+        raise HTTPException(404, "there is no such tile.")
+    data, version = tile
+    tag = f'"{version}"'
+    # A tile asked for without its version may be another one after the next orientation.
+    named = request.query_params.get("v") == version
+    headers = {"etag": tag, "cache-control": _KEEP if named else "private, no-cache"}
+    if request.headers.get("if-none-match") == tag:
+        return Response(status_code=304, headers=headers)
+    return Response(data, media_type="image/jpeg", headers=headers)

@@ -1,0 +1,415 @@
+"""A survey open on the page: its state, its journal, its pictures."""
+
+from __future__ import annotations
+
+import copy
+import queue
+import threading
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, replace
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+from bifocal.collimation.commands import changes_of
+from bifocal.collimation.jobs import JobRunner
+from bifocal.collimation.journal import Journal
+from bifocal.collimation.live_orientation import LiveOrientation, live_orientation
+from bifocal.collimation.live_results import LiveResults
+from bifocal.collimation.measures import measure
+from bifocal.collimation.pictures import Pictures
+from bifocal.collimation.products import Products, accept_pair
+from bifocal.collimation.project import SurveyFiles
+from bifocal.collimation.records import Change, PickedPoint, SurveyState
+from bifocal.collimation.workbook_rows import PointRow, row_of
+from bifocal.collimation.workbook_sync import WorkbookSync
+from bifocal.model.flags import FlagLimits
+from bifocal.model.pair import Pair
+from photocore.errors import InputError
+from photocore.output import relative_name
+
+#: Commands that were answered already, by their ids.
+MOST_ANSWERS = 10_000
+#: Records of the journal that are notes, not commands.
+_NO_COMMANDS = ("files", "workbook.saved", "workbook.read", "made", "proposed", "accepted")
+
+
+class Session:
+    """A survey open on the page.
+
+    Parameters
+    ----------
+    files : SurveyFiles
+        Where its files lie.
+    language : str
+        Of the page, unless the journal says otherwise.
+
+    Raises
+    ------
+    InputError
+        If the journal cannot be opened, or pair file or photos are unusable.
+    """
+
+    def __init__(self, files: SurveyFiles, *, language: str = "en") -> None:
+        self.files = files
+        self.language = language
+        self.lock = threading.RLock()
+        self.listeners: set[queue.SimpleQueue[dict[str, Any] | None]] = set()
+        self.revision = 0
+        self.answered: dict[str, Any] = {}
+        self.results: LiveResults | None = None
+        self.orientation: tuple[object, LiveOrientation] | None = None
+        self.proposal: dict[str, Any] | None = None
+        self.state = SurveyState()
+        self.journal = Journal(files.journal)
+        try:
+            pair = Pair.read(files.pair) if files.pair is not None else None
+            photos = files.photos if pair is None else (pair.photo_file(1), pair.photo_file(2))
+            self.pictures = Pictures(files.folder / f".{files.stem}.tiles", photos, pair)
+            self.results = None if pair is None else LiveResults(pair)
+            self.products = Products(files)
+            self.jobs = JobRunner(self)
+            self.sync = WorkbookSync(self)
+            self._replay_all()
+            self._remember_files()
+            self._show_proposal()
+            self.show_products()
+            self.sync.step()
+        except BaseException:
+            self.journal.close()
+            raise
+
+    # ---- the survey's files
+
+    def give_photos(self, photos: Sequence[Path]) -> None:
+        """Begin with two photos; what was picked in others is of no use any more.
+
+        Raises
+        ------
+        InputError
+            If they are none, or picks were made already.
+        """
+        with self.lock:
+            self.check_new_photos()
+            self.pictures.show_photos(photos)
+            self.files = replace(self.files, photos=tuple(photos), pair=None)
+            self.results, self.proposal = None, None
+            self._remember_files()
+            self.changed()
+
+    def check_new_photos(self) -> None:
+        """Refuse other photos where points were picked already.
+
+        Raises
+        ------
+        InputError
+            Then.
+        """
+        if self.state.points or self.state.control:
+            raise InputError(
+                "points are picked already in the photos given before; begin another survey in "
+                "another folder for other photos."
+            )
+
+    def propose(self, path: Path, report: Mapping[str, Any]) -> None:
+        """Show the orientation that a job found; `align.accept` makes it the survey's own."""
+        with self.lock:
+            record = {"op": "proposed", "pair": path.name, "report": dict(report)}
+            self._write(record)
+            self.proposal = record
+            first = Pair.read(path).photo_file(1)
+            if not first.samefile(self.pictures.infos[0].path):
+                self.command({"op": "photos.exchange"})
+            self._show_proposal()
+            self.changed()
+
+    def _show_proposal(self) -> None:
+        path = self.proposed_path
+        if path is not None:
+            pair = Pair.read(path)
+            self.pictures.show_pair(pair)
+            self.results = LiveResults(pair)
+
+    @property
+    def proposed_path(self) -> Path | None:
+        """The pair file that waits to be accepted."""
+        if self.proposal is None:
+            return None
+        path = self.files.folder / self.proposal["pair"]
+        return path if path.is_file() else None
+
+    @property
+    def accepted_pair(self) -> Pair | None:
+        """The orientation that the workbook is written for; None before one is accepted."""
+        return None if self.proposed_path is not None else self.pictures.pair
+
+    def _accept(self) -> None:
+        """Make the proposed orientation the survey's own pair file."""
+        path = self.proposed_path
+        if path is None:
+            raise InputError("there is no orientation to accept; align the photos first.")
+        target = self.products.place("pair", ".pair.json")
+        accept_pair(path, target)
+        self.files = replace(self.files, pair=target)
+        self.note_made("pair", [target.name])
+        self._write({"op": "accepted"})
+        self.proposal = None
+        self._remember_files()
+        pair = Pair.read(target)
+        self.pictures.show_pair(pair)
+        self.results = LiveResults(pair)
+        if self.sync.read is not None:
+            self.set_precision(self.sync.read.sigma_px, self.sync.read.limits)
+
+    def _exchange_photos(self) -> None:
+        photos = [info.path for info in self.pictures.infos][::-1]
+        self.pictures.show_photos(photos)
+        self.files = replace(self.files, photos=tuple(photos))
+        self._remember_files()
+
+    def note_made(self, kind: str, names: Sequence[str]) -> None:
+        """Say in the journal which files the page made: these it may replace."""
+        with self.lock:
+            self._write({"op": "made", "kind": kind, "names": list(names)})
+            self.products.note(kind, names)
+
+    def show_products(self) -> None:
+        """Show the orthophoto, where there is one."""
+        ortho = self.products.current("ortho")
+        if ortho is not None:
+            self.pictures.show_ortho(ortho)
+
+    def _remember_files(self) -> None:
+        """Say in the journal which files belong to the survey, where that is new."""
+        folder, pair = self.files.folder, self.files.pair
+        record = {
+            "op": "files",
+            "stem": self.files.stem,
+            "pair": relative_name(pair, folder) if pair else None,
+            "photos": [relative_name(info.path, folder) for info in self.pictures.infos],
+        }
+        known = [old for old in self.journal.records if old["op"] == "files"]
+        if not known or {key: known[-1].get(key) for key in record} != record:
+            self._write(record)
+            self.journal.records.append(record)
+
+    # ---- commands
+
+    def command(self, command: Mapping[str, Any]) -> Any:
+        """Carry out a command of the page and return its result.
+
+        A command whose ``id`` was answered already is not done twice.
+
+        Raises
+        ------
+        InputError
+            If it is impossible, or could not be written to the journal; nothing changed then.
+        """
+        with self.lock:
+            known = command.get("id")
+            if isinstance(known, str) and known in self.answered:
+                return self.answered[known]
+            result = self._checked(dict(command))
+            if isinstance(known, str):
+                self._remember_answer(known, result)
+            self.changed()
+            return result
+
+    def _checked(self, command: dict[str, Any]) -> Any:
+        """Carry out a command where the survey's files allow it."""
+        op = command.get("op")
+        if op == "align.accept":
+            return self._accept()
+        if op == "photos.exchange":
+            if self.files.pair is not None or len(self.pictures.infos) != 2:
+                raise InputError("photos are exchanged before they are oriented.")
+            result = self._carry_out(command, write=True)
+            self._exchange_photos()
+            return result
+        self._check_pick(command)
+        return self._carry_out(command, write=True)
+
+    def _remember_answer(self, known: str, result: Any) -> None:
+        self.answered[known] = result
+        if len(self.answered) > MOST_ANSWERS:
+            del self.answered[next(iter(self.answered))]
+
+    def _carry_out(self, command: dict[str, Any], *, write: bool) -> Any:
+        """Change the state by a command, after it stands in the journal."""
+        op = command.get("op")
+        if op in ("undo", "redo"):
+            return self._undo(command, back=op == "undo", write=write)
+        trial = copy.copy(self.state)
+        trial.setup = dict(trial.setup)
+        trial.lenses = {image: dict(lens) for image, lens in trial.lenses.items()}
+        changes = changes_of(trial, command)
+        if op in ("point.pick", "control.set", "control.pick") and not command.get("name"):
+            command["name"] = changes[0].key
+        if write:
+            self._write(command)
+        self.state = trial
+        self._apply(changes)
+        return {"name": changes[-1].key} if changes else None
+
+    def _apply(self, changes: list[Change]) -> None:
+        self.state.apply(changes)
+        self.state.revision += 1
+        if changes:
+            self.state.done.append(changes)
+            self.state.undone.clear()
+
+    def _undo(self, command: dict[str, Any], *, back: bool, write: bool) -> Any:
+        """Take the last changes back, or make them again."""
+        source, target = self.state.done, self.state.undone
+        if not back:
+            source, target = target, source
+        if not source:
+            raise InputError("there is nothing to undo." if back else "there is nothing to redo.")
+        if write:
+            self._write(command)
+        changes = [change.reversed for change in reversed(source.pop())]
+        self.state.apply(changes)
+        self.state.revision += 1
+        target.append(changes)
+        return {"name": changes[-1].key}
+
+    def _replay_all(self) -> None:
+        """Carry out the journal, and find out what of it stands in the workbook."""
+        saved = [record for record in self.journal.records if record["op"] == "workbook.saved"]
+        at = saved[-1].get("at") if saved else None
+        for record in self.journal.records:
+            if record["op"] == "workbook.read":
+                rows, gone = _rows_of(record)
+                self._apply_rows(rows, gone)
+                self.sync.take(rows, gone)
+            elif record["op"] == "workbook.saved":
+                self.sync.digest = record.get("sha256", "")
+            elif record["op"] == "made":
+                self.products.note(record["kind"], record["names"])
+            elif record["op"] in ("proposed", "accepted"):
+                self.proposal = record if record["op"] == "proposed" else None
+            elif record["op"] not in _NO_COMMANDS:
+                self._carry_out(record, write=False)
+                if isinstance(record.get("id"), str):
+                    self._remember_answer(record["id"], {"name": record.get("name")})
+            if self.state.revision == at:
+                self.sync.synced = {n: row_of(p) for n, p in self.state.points.items()}
+
+    # ---- the workbook
+
+    def take_rows(self, rows: Mapping[str, PointRow], gone: Sequence[str]) -> None:
+        """Take over points that were changed in the workbook by others."""
+        record = {
+            "op": "workbook.read",
+            "rows": {name: asdict(row) for name, row in rows.items()},
+            "gone": list(gone),
+        }
+        self._write(record)
+        self._apply_rows(rows, gone)
+
+    def _apply_rows(self, rows: Mapping[str, PointRow], gone: Sequence[str]) -> None:
+        points = self.state.points
+        for name, row in rows.items():
+            before = points.get(name)
+            order = before.order if before is not None else self.state.next_order()
+            points[name] = PickedPoint(
+                name=name, order=order, picks=row.picks, code=row.code, note=row.note,
+                # What is picked in one photo only was left out for that alone.
+                use=row.use or None in row.picks, reference=row.reference,
+            )  # fmt: skip
+        for name in gone:
+            points.pop(name, None)
+        self.state.revision += 1
+
+    def note_saved(self, digest: str, revision: int) -> None:
+        """Say in the journal that the workbook holds the survey as of a revision."""
+        with self.lock:
+            self._write({"op": "workbook.saved", "sha256": digest, "at": revision})
+
+    def set_precision(self, sigma_px: float | None, limits: FlagLimits) -> None:
+        """Let the results follow the precision and limits of the workbook."""
+        known = self.results
+        if known is not None and (known.sigma_px, known.limits) != (sigma_px, limits):
+            self.results = LiveResults(known.pair, sigma_px, limits)
+
+    def _write(self, record: Mapping[str, Any]) -> None:
+        stamp = datetime.now(UTC).isoformat(timespec="milliseconds")
+        self.journal.append({**record, "time": stamp})
+
+    def _check_pick(self, command: Mapping[str, Any]) -> None:
+        """Refuse a pick outside its photo."""
+        if command.get("op") not in ("point.pick", "control.pick"):
+            return
+        image, column, row = (command.get(key) for key in ("image", "column", "row"))
+        if image not in (1, 2) or not isinstance(column, int | float):
+            return  # the command itself says what is wrong
+        if len(self.pictures.infos) < 2:
+            raise InputError("there are no photos yet; give two.")
+        width, height = self.pictures.infos[image - 1].size
+        inside = -0.5 <= column <= width - 0.5
+        if isinstance(row, int | float) and not (inside and -0.5 <= row <= height - 0.5):
+            raise InputError(f"the pick lies outside photo {image} ({width} x {height} px).")
+
+    # ---- listeners
+
+    def changed(self) -> None:
+        """Tell all listeners that the state is another, and the workbook's writer."""
+        self.sync.touch()
+        with self.lock:
+            self.revision += 1
+            self.tell({"revision": self.revision})
+
+    def tell(self, event: dict[str, Any] | None) -> None:
+        """Tell all listeners something; None ends them."""
+        for listener in list(self.listeners):
+            listener.put(event)
+
+    def listen(self) -> tuple[queue.SimpleQueue[dict[str, Any] | None], Callable[[], None]]:
+        """Return a queue of events, and how to leave it."""
+        events: queue.SimpleQueue[dict[str, Any] | None] = queue.SimpleQueue()
+        self.listeners.add(events)
+        return events, lambda: self.listeners.discard(events)
+
+    def close(self) -> None:
+        """End the session."""
+        self.tell(None)
+        self.jobs.stop()
+        self.sync.stop()
+        self.journal.close()
+
+    # ---- measuring
+
+    def oriented_live(self) -> LiveOrientation | None:
+        """Return what the control points tell by themselves; None without photos."""
+        state, infos = self.state, self.pictures.infos
+        if len(infos) != 2:
+            return None
+        language = state.language or self.language
+        facts = (dict(state.control), dict(state.tapes), state.setup, state.lenses, language)
+        if self.orientation is None or self.orientation[0] != facts:
+            self.orientation = facts, live_orientation(state, infos, language)
+        return self.orientation[1]
+
+    def measure(self, names: Sequence[str]) -> dict[str, float | None]:
+        """Return distances and angles between points."""
+        self.pictures.needed_pair()
+        places = []
+        for name in names:
+            point = self.state.points.get(name)
+            if point is None:
+                raise InputError(f"there is no point {name}.")
+            place = None if self.results is None else self.results.place(point)
+            if place is None:
+                raise InputError(f"point {name} is not picked in both photos yet.")
+            places.append(place)
+        return measure(places)
+
+
+def _rows_of(record: Mapping[str, Any]) -> tuple[dict[str, PointRow], list[str]]:
+    """Return the rows that a record of the journal holds."""
+    rows = {}
+    for name, row in record["rows"].items():
+        first, second = (None if pick is None else tuple(pick) for pick in row["picks"])
+        known = None if row["reference"] is None else tuple(row["reference"])
+        rows[name] = PointRow((first, second), row["code"], row["note"], row["use"], known)
+    return rows, list(record["gone"])

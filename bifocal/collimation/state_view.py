@@ -1,0 +1,220 @@
+"""The state of a survey as the page gets it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from bifocal.collimation.commands import SETUP
+from bifocal.collimation.live_orientation import LiveOrientation
+from bifocal.collimation.session import Session
+from bifocal.collimation.wording import say
+from bifocal.files.images import ImageInfo
+from bifocal.model.pair import Pair
+from photocore.jsonfile import plain
+
+
+def state_of(session: Session) -> dict[str, Any]:
+    """Return everything the page shows, as plain data; see docs/picking.md."""
+    with session.lock:
+        state, live = session.state, None
+        if session.files.pair is None or state.control:
+            live = session.oriented_live()
+        return {
+            "revision": session.revision,
+            "language": state.language or session.language,
+            "title": session.files.stem,
+            "stage": state.stage or _stage(session),
+            "workbook": session.files.workbook.name,
+            "workbook_waiting": session.sync.waiting,
+            "photos": _photos(session),
+            "setup": {key: state.setup.get(key) for key in SETUP},
+            "pair": None
+            if session.pictures.pair is None
+            else _pair(session, session.pictures.pair),
+            "control": _control(session, live),
+            "tapes": [
+                {"from": t.start, "to": t.end, "length": t.length, "sigma": t.sigma}
+                for t in state.tapes.values()
+            ],
+            "live": _live(live),
+            "advice": _advice(session, live),
+            "points": _points(session),
+            "lines": [
+                {"name": x.name, "layer": x.layer, "points": list(x.points), "closed": x.closed}
+                for x in state.lines.values()
+            ],
+            "length_unit": _length_unit(session),
+            "selection": None,
+            "products": {
+                "relief": session.products.facts("relief"),
+                "ortho": session.products.facts("ortho"),
+                "files": session.products.listed(session.files.workbook),
+            },
+            "jobs": [job.as_dict() for job in session.jobs.jobs.values()],
+            "undo": bool(state.done),
+            "redo": bool(state.undone),
+        }
+
+
+def _stage(session: Session) -> str:
+    """Return where the user is, where he did not say."""
+    if len(session.pictures.infos) < 2:
+        return "photos"
+    return "orientation" if session.pictures.pair is None else "points"
+
+
+def _length_unit(session: Session) -> str:
+    """Return the unit of s1, s2, delta_s and e1: on the wall where no camera constant is known."""
+    known = (
+        session.pictures.pair is not None
+        and session.pictures.pair.image1.principal_distance is not None
+    )
+    return "mm" if known else "m"
+
+
+def _photos(session: Session) -> list[dict[str, Any]]:
+    shown, language = [], session.state.language or session.language
+    for number, info in enumerate(session.pictures.infos, start=1):
+        typed = session.state.lenses.get(number, {})
+        shown.append(
+            {
+                "image": number,
+                "name": info.path.name,
+                "width": info.size[0],
+                "height": info.size[1],
+                "camera": " ".join(word for word in (info.make, info.model, info.lens) if word),
+                "focal_mm": typed.get("focal_mm") or info.focal_length,
+                "sensor_width_mm": typed.get("sensor_width_mm"),
+                "missing": _missing(info, typed, language),
+            }
+        )
+    return shown
+
+
+def _missing(info: ImageInfo, typed: Mapping[str, float | None], language: str) -> list[str]:
+    """Return what has to be asked of a photo's lens."""
+    name = info.path.name
+    pitch = typed.get("sensor_width_mm") or info.focal_plane_pitch
+    if typed.get("focal_mm") or (info.focal_length and not info.focal_pixels):
+        from_equivalent = info.focal_length and info.focal_pixels
+        return [] if pitch or from_equivalent else [say("ask", "sensor", language, name=name)]
+    return [] if info.focal_pixels else [say("ask", "focal", language, name=name)]
+
+
+def _pair(session: Session, pair: Pair) -> dict[str, Any]:
+    grid = session.pictures.grid
+    assert grid is not None
+    images = []
+    for number in (1, 2):
+        lens = pair.photo(number).lens
+        images.append(
+            {
+                "photo_from_wall": session.pictures.photo_from_wall(number),
+                "lens": None
+                if lens is None
+                else {
+                    "camera_matrix": lens.camera_matrix,
+                    "model": lens.model,
+                    "coefficients": lens.coefficients,
+                },
+                "distance": pair.photo(number).distance,
+            }
+        )
+    centre = np.asarray(pair.zoom_centre)
+    return plain(
+        {
+            "name": str(pair.extra.get("name") or session.files.stem),
+            "plane_bounds": grid.bounds,
+            "gsd": grid.gsd,
+            "wall_size": [grid.width, grid.height],
+            "nadir": [pair.photo(n).pixels_from_plane(pair.photo(n).nadir) for n in (1, 2)],
+            "zoom_centre": {
+                "plane": centre,
+                "wall": grid.pixel_of(centre),
+                "photo": [pair.photo(n).pixels_from_plane(centre) for n in (1, 2)],
+            },
+            "images": images,
+            "accepted": session.proposed_path is None,
+            "report": session.proposal and session.proposal["report"],
+            "remarks": [
+                *pair.remarks,
+                *((session.proposal or {}).get("report", {}).get("remarks", ())),
+            ],
+        }
+    )
+
+
+def _control(session: Session, live: LiveOrientation | None) -> list[dict[str, Any]]:
+    residuals = _residuals(session, live)
+    return [
+        {
+            "name": point.name,
+            **dict(zip(("X", "Y", "r"), point.known, strict=True)),
+            "picks": picks_as_dict(point.picks),
+            "residual": residuals.get(point.name),
+        }
+        for point in session.state.sorted_control()
+    ]
+
+
+def _residuals(session: Session, live: LiveOrientation | None) -> dict[str, Any]:
+    """Return the residuals of the proposed orientation, else those of control points alone."""
+    found: dict[str, Any] = {} if live is None else dict(live.residuals)
+    if session.proposal is not None:
+        report = session.proposal["report"].get("control", [])
+        found |= {entry["id"]: entry["residual_px"] for entry in report}
+    return {
+        name: plain({"1": _both(values[:2]), "2": _both(values[2:])})
+        for name, values in found.items()
+    }
+
+
+def _both(values: Any) -> list[float] | None:
+    shown = [value for value in values if value is not None and np.isfinite(value)]
+    return shown if len(shown) == 2 else None
+
+
+def _live(live: LiveOrientation | None) -> dict[str, Any] | None:
+    if live is None:
+        return None
+    return plain({"error": live.error, "deviations": live.deviations, "distances": live.distances})
+
+
+def _advice(session: Session, live: LiveOrientation | None) -> list[str]:
+    """Return what would help most next."""
+    language = session.state.language or session.language
+    if len(session.pictures.infos) < 2:
+        return [say("ask", "photos", language)]
+    if session.files.pair is not None:
+        return [] if session.state.points else [say("advice", "points", language)]
+    return [] if live is None else list(live.advice)
+
+
+def _points(session: Session) -> list[dict[str, Any]]:
+    points = session.state.sorted_points()
+    results = session.results
+    if results is not None:
+        results.solve(points)
+    return [
+        {
+            "name": point.name,
+            "type": point.type,
+            "code": point.code,
+            "note": point.note,
+            "use": point.use,
+            "picks": picks_as_dict(point.picks),
+            "reference": point.reference
+            and dict(zip(("X", "Y", "r"), point.reference, strict=True)),
+            "deleted": False,
+            "result": None if results is None else results.row(point),
+        }
+        for point in points
+    ]
+
+
+def picks_as_dict(picks: Any) -> dict[str, list[float] | None]:
+    """Return both picks by the number of the photo."""
+    return {str(n): None if pick is None else list(pick) for n, pick in enumerate(picks, start=1)}

@@ -1,0 +1,281 @@
+"""The homologous point of one pick: searched along its radial line, then matched to 0.05 px."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+from bifocal.model.pair import Pair
+from bifocal.orientation.matching import (
+    LEAST_AGREEMENT,
+    OPTIMISM,
+    directions_at,
+    local_zoom,
+    relief_at,
+    seen_at,
+)
+from bifocal.orientation.patches import PatchResult, refine, same_scale
+from bifocal.rays import relief_from_zoom, zoom_factor
+from photocore.arrays import ByteArray, Float32Array, FloatArray
+from photocore.errors import InputError
+
+#: Relief searched, in parts of the near distance; as `bifocal match` does.
+NEAREST, FARTHEST = 0.4, -0.5
+#: Half the window of the search, in samples of the coarser photo: wider than that of the match.
+HALF = 10
+#: Samples along the line: so many pixels apart, at most so many; the match reaches 4 px.
+STEP, MOST = 1.0, 3000
+#: A second place this much worse in correlation leaves no doubt.
+CLEAR = 0.1
+#: Suggestions of this quality are taken without asking back.
+KEPT = 0.5
+#: A place far off the wall has to correlate better: by this much per near distance.
+OFF_WALL = 0.2
+#: Best precision of a match; neighbouring samples are not independent. [px]
+_BEST = 0.02
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Suggestion:
+    """Where the other photo shows what was picked.
+
+    Attributes
+    ----------
+    pixel : ndarray, shape (2,)
+        In the other photo. [px]
+    score : float
+        Correlation of both patches, up to 1.
+    quality : float
+        0 to 1: how well they agree, and how much better than anywhere else on the line.
+    sigma_px : float
+        Precision along the line. [px]
+    misfit_px : float
+        How far off the line it fits best. [px]
+    kept : bool
+        Whether it is good enough to be taken.
+    """
+
+    pixel: FloatArray
+    score: float
+    quality: float
+    sigma_px: float
+    misfit_px: float
+    kept: bool
+
+
+def radial_line(
+    pair: Pair, image: int, pixel: FloatArray, size: tuple[int, int], *, count: int = 129
+) -> FloatArray:
+    """Return where the other photo may show a pick, shape (n, 2), as its relief grows. [px]
+
+    Parameters
+    ----------
+    pair : Pair
+    image : int
+        The photo picked, 1 or 2.
+    pixel : ndarray, shape (2,)
+    size : tuple of int
+        Width and height of the other photo; what lies far outside is left out. [px]
+    count : int
+        Points along the line; it is bent where a lens distorts.
+    """
+    d1, d2 = pair.d1, pair.d2
+    ends = zoom_factor(np.array([-2.0 * d2, 0.7 * d2]), d1=d1, d2=d2)
+    reliefs = relief_from_zoom(np.linspace(ends[0], ends[1], count), d1=d1, d2=d2)
+    line = seen_in_other(pair, image, pixel, reliefs)
+    margin = 0.25 * max(size)
+    inside = np.isfinite(line).all(axis=1) & (line > -margin).all(axis=1)
+    inside &= (line < np.array(size) + margin).all(axis=1)
+    return line[inside]
+
+
+def seen_in_other(pair: Pair, image: int, pixel: FloatArray, reliefs: FloatArray) -> FloatArray:
+    """Return where the other photo shows a pick of one photo, for each relief, shape (n, 2)."""
+    pixels = np.broadcast_to(pixel, (len(reliefs), 2))
+    if image == 1:
+        return seen_at(pair, pixels, reliefs)
+    centre = pair.zoom_centre
+    factor = zoom_factor(reliefs, d1=pair.d1, d2=pair.d2)[:, None]
+    q2 = pair.image2.plane_from_pixels(pixels)
+    return pair.image1.pixels_from_plane(centre + (q2 - centre) / factor)
+
+
+def _zooms(
+    pair: Pair, image: int, here: FloatArray, there: FloatArray, r: FloatArray
+) -> FloatArray:
+    """Return the derivative of the other photo by the picked one, shape (n, 2, 2)."""
+    if image == 1:
+        return local_zoom(pair, here, r)
+    return np.asarray(np.linalg.inv(local_zoom(pair, there, r)))
+
+
+def suggest(
+    pair: Pair,
+    images: tuple[ByteArray, ByteArray],
+    image: int,
+    pixel: FloatArray,
+    *,
+    relief_range: tuple[float, float] | None = None,
+) -> Suggestion:
+    """Return the homologous point of a pick.
+
+    Parameters
+    ----------
+    pair : Pair
+    images : two ndarrays, shape (h, w) or (h, w, 3), uint8
+        Far and near photo.
+    image : int
+        The photo picked, 1 or 2.
+    pixel : ndarray, shape (2,)
+        The pick. [px]
+    relief_range : tuple of float, optional
+        Least and greatest relief searched; default -0.5 to 0.4 of the near distance. [m]
+
+    Returns
+    -------
+    Suggestion
+
+    Raises
+    ------
+    InputError
+        If the pick lies at the rim of its photo, or its line outside the other one.
+
+    Notes
+    -----
+    Normalised correlation of 21 x 21 samples along the line, each seen under the zoom k(r) that its
+    relief implies; then least-squares matching along the line (`bifocal.orientation.patches`).
+    """
+    own, other = images[image - 1], images[2 - image]
+    low, high = relief_range or (FARTHEST * pair.d2, NEAREST * pair.d2)
+    reliefs = _reliefs(pair, image, pixel, (low, high), other.shape)
+    there = seen_in_other(pair, image, pixel, reliefs)
+    here = np.broadcast_to(pixel, there.shape)
+    local = _zooms(pair, image, here, there, reliefs)
+    scale = float(np.median(np.sqrt(np.abs(np.linalg.det(local)))))
+    reach = (HALF + 3) * max(1.0, 1.0 / scale) + 4
+    first, corner1 = _crop(own, pixel[None], reach)
+    second, corner2 = _crop(other, there, reach * max(1.0, scale) * 1.5)
+    smooth = same_scale(first, second, local)
+    correlation = _correlation(smooth, pixel - corner1, there - corner2, local)
+    if not np.isfinite(correlation).any():
+        raise InputError("too near to the rim of a photo for a suggestion; pick it by hand.")
+    judged = correlation - OFF_WALL * np.abs(reliefs) / pair.d2
+    best = int(np.nanargmax(judged))
+    apart = np.linalg.norm(there - there[best], axis=1) > HALF * max(1.0, scale) / 2
+    second_best = float(np.nanmax(np.where(apart, judged, -1.0))) if apart.any() else -1.0
+    row = slice(best, best + 1)
+    along = _directions(pair, image, here[row], reliefs[row])
+    result, misfit, across = _refined(
+        smooth, pixel - corner1, there[row] - corner2, local[row], along
+    )
+    moved = result.pixels2[0] + corner2
+    score = float(result.zncc[0])
+    sigma = float(np.hypot(OPTIMISM * result.sigma[0], _BEST))
+    clear = float(np.clip((judged[best] - second_best) / CLEAR, 0.0, 1.0))
+    agreement = float(np.clip((score - 0.5) / 0.5, 0.0, 1.0))
+    fits = bool(result.converged[0]) and abs(misfit) < 2.0 and sigma < 0.5
+    quality = agreement * (0.3 + 0.7 * clear) * (1.0 if fits else 0.3)
+    return Suggestion(
+        # As `bifocal match` does: the misfit stays in the point, for the survey to judge.
+        pixel=moved + (across * misfit if fits else 0.0),
+        score=score,
+        quality=quality,
+        sigma_px=sigma,
+        misfit_px=misfit,
+        kept=fits and score > LEAST_AGREEMENT and quality >= KEPT,
+    )
+
+
+def _reliefs(
+    pair: Pair, image: int, pixel: FloatArray, ends: tuple[float, float], shape: tuple[int, ...]
+) -> FloatArray:
+    """Return the reliefs of places a pixel apart on the line, inside the other photo."""
+    factors = zoom_factor(np.array(ends), d1=pair.d1, d2=pair.d2)
+    probe = relief_from_zoom(np.linspace(factors[0], factors[1], 33), d1=pair.d1, d2=pair.d2)
+    places = seen_in_other(pair, image, pixel, probe)
+    length = float(np.nansum(np.linalg.norm(np.diff(places, axis=0), axis=1)))
+    count = int(np.clip(length / STEP, 33, MOST))
+    reliefs = relief_from_zoom(np.linspace(factors[0], factors[1], count), d1=pair.d1, d2=pair.d2)
+    places = seen_in_other(pair, image, pixel, reliefs)
+    inside = (places > HALF).all(axis=1) & (places < np.array(shape[1::-1]) - HALF).all(axis=1)
+    if not inside.any():
+        raise InputError("the other photo does not show this place.")
+    return np.asarray(reliefs[inside])
+
+
+def _crop(image: ByteArray, places: FloatArray, reach: float) -> tuple[ByteArray, FloatArray]:
+    """Return the grey part of a photo around places, and its first column and row."""
+    low = np.maximum(np.floor(places.min(axis=0) - reach), 0).astype(int)
+    high = np.ceil(places.max(axis=0) + reach).astype(int) + 1
+    part = image[low[1] : high[1], low[0] : high[0]]
+    if not part.size:
+        raise InputError("the pick lies outside its photo.")
+    if part.ndim == 3:
+        part = np.asarray(cv2.transform(part, np.full((1, 3), 1 / 3)), dtype=np.uint8)
+    return np.ascontiguousarray(part), low.astype(np.float64)
+
+
+def _correlation(
+    images: tuple[Float32Array, Float32Array], pixel: FloatArray, there: FloatArray,
+    local: FloatArray,
+) -> FloatArray:  # fmt: skip
+    """Return the correlation of the pick's patch with those along the line, shape (n,)."""
+    scale = np.sqrt(np.abs(np.linalg.det(local)))
+    step = float(np.median(np.maximum(1.0, 1.0 / np.clip(scale, 0.1, 10.0))))
+    axis = np.arange(-HALF, HALF + 1, dtype=np.float64)
+    grid = np.stack(np.meshgrid(axis, axis), axis=-1).reshape(-1, 2)
+    weight = np.exp(-(grid**2).sum(1) / (2 * (0.75 * HALF) ** 2)).astype(np.float32)
+    weight /= weight.sum()
+    template = _sampled(images[0], (pixel + grid * step)[None])[0]
+    template = template - template @ weight
+    places = there[:, None] + (grid * step)[None] @ local.transpose(0, 2, 1)
+    values = _sampled(images[1], places)
+    values = values - (values @ weight)[:, None]
+    both = (values * template) @ weight
+    power = ((values * values) @ weight) * float((template * template) @ weight)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.asarray(both / np.sqrt(power), dtype=np.float64)
+
+
+def _sampled(image: Float32Array, places: FloatArray) -> Float32Array:
+    """Return a picture at places, shape (n, m, 2); NaN outside."""
+    flat = places.astype(np.float32)
+    values = [
+        cv2.remap(image, flat[k : k + 4096], None, cv2.INTER_LINEAR, borderValue=float("nan"))
+        for k in range(0, len(flat), 4096)
+    ]
+    return np.concatenate(values).astype(np.float32)
+
+
+def _directions(pair: Pair, image: int, here: FloatArray, relief: FloatArray) -> FloatArray:
+    """Return the unit vector along the line in the other photo, shape (1, 2)."""
+    if image == 1:
+        along = directions_at(pair, here, relief)
+    else:
+        step = 1e-3 * pair.d2
+        ends = [seen_in_other(pair, 2, here[0], relief + sign * step) for sign in (-1, 1)]
+        rate = ends[1] - ends[0]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            along = rate / np.linalg.norm(rate, axis=1, keepdims=True)
+    return np.where(np.isfinite(along), along, [[1.0, 0.0]])
+
+
+def _refined(
+    images: tuple[Float32Array, Float32Array], pixel: FloatArray, there: FloatArray,
+    local: FloatArray, along: FloatArray,
+) -> tuple[PatchResult, float, FloatArray]:  # fmt: skip
+    """Return the match moved along the line, its misfit across, and that direction."""
+    across = np.array([-along[0, 1], along[0, 0]])
+    on_line = refine(*images, pixel[None], there, local, along[:, :, None])
+    both = np.stack([along, across[None]], axis=2)
+    free = refine(*images, pixel[None], on_line.pixels2, local, both, iterations=4)
+    misfit = float((free.pixels2[0] - on_line.pixels2[0]) @ across)
+    return on_line, misfit if np.isfinite(misfit) else 0.0, across
+
+
+def relief_of(pair: Pair, image: int, pixel: FloatArray, other: FloatArray) -> float:
+    """Return the relief of a pick and its homologous point. [m]"""
+    first, second = (pixel, other) if image == 1 else (other, pixel)
+    return float(relief_at(pair, first[None], second[None])[0])

@@ -1,0 +1,79 @@
+"""Where on the wall relief is precise: contour lines of its sigma, and the area of uncertainty."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+
+from bifocal.collimation.live_results import LiveResults
+from bifocal.collimation.pictures import Pictures
+from photocore.arrays import FloatArray
+
+#: Longer sides of the computed grid and of the picture. [px]
+COMPUTED, SHOWN = 256, 1024
+#: Contour lines of sigma of r. [mm]
+LEVELS = (1, 2, 5, 10, 20, 50, 100, 200, 500)
+_SHADE, _LINE = (60, 60, 220, 110), (250, 250, 250, 255)  # BGRA
+_DARK = (30, 30, 30, 255)
+
+
+def relief_sigma(pictures: Pictures, results: LiveResults) -> FloatArray:
+    """Return sigma of the relief of points on the wall, shape (h, w), over the wall's grid. [m]
+
+    NaN where not both photos show the wall.
+    """
+    pair, grid = pictures.needed_pair(), pictures.grid
+    assert grid is not None
+    step = max(grid.width, grid.height) / COMPUTED
+    width, height = (max(2, round(side / step)) for side in (grid.width, grid.height))
+    xmin, ymin, xmax, ymax = grid.bounds
+    x = xmin + (np.arange(width) + 0.5) * (xmax - xmin) / width
+    y = ymax - (np.arange(height) + 0.5) * (ymax - ymin) / height
+    plane = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
+    seen = [pair.photo(number).pixels_from_plane(plane) for number in (1, 2)]
+    inside = np.ones(len(plane), dtype=bool)
+    for pixels, info in zip(seen, pictures.infos, strict=True):
+        inside &= (pixels > -0.5).all(axis=1) & (pixels < np.array(info.size) - 0.5).all(axis=1)
+    sigma = np.full(len(plane), np.nan)
+    if inside.any():
+        solved = pair.intersect(seen[0][inside], seen[1][inside], sigma_px=results.sigma_px)
+        sigma[inside] = solved.sigma[:, 2]
+    return sigma.reshape(height, width)
+
+
+def uncertainty_picture(pictures: Pictures, results: LiveResults) -> bytes:
+    """Return the shaded area of uncertainty and the precision contours over the wall, PNG."""
+    sigma = relief_sigma(pictures, results)
+    limit = results.limits.relief_limit(pictures.needed_pair().d2)
+    height, width = sigma.shape
+    factor = SHOWN / max(height, width)
+    size = (round(width * factor), round(height * factor))
+    known = np.isfinite(sigma)
+    filled = np.where(known, sigma, np.nanmax(sigma) if known.any() else 1.0)
+    smooth = cv2.resize(np.log(filled), size, interpolation=cv2.INTER_CUBIC)
+    shown = cv2.resize(known.astype(np.uint8), size, interpolation=cv2.INTER_NEAREST) > 0
+    picture = np.zeros((size[1], size[0], 4), np.uint8)
+    picture[(smooth > np.log(limit)) & shown] = _SHADE
+    for level in LEVELS:
+        _draw_level(picture, smooth, shown, level)
+    return cv2.imencode(".png", picture)[1].tobytes()
+
+
+def _draw_level(picture: FloatArray, smooth: FloatArray, shown: FloatArray, level: int) -> None:
+    """Draw one contour line with its number."""
+    from contourpy import contour_generator
+
+    values = np.where(shown, smooth, np.nan)
+    lines = contour_generator(z=np.ma.masked_invalid(values)).lines(np.log(level / 1000))
+    for line in lines:
+        points = np.round(np.asarray(line)).astype(np.int32)
+        if len(points) < 12:
+            continue
+        for colour, thickness in ((_DARK, 3), (_LINE, 1)):
+            cv2.polylines(picture, [points], False, colour, thickness, cv2.LINE_AA)
+        column, row = points[len(points) // 3].tolist()
+        for colour, thickness in ((_DARK, 3), (_LINE, 1)):
+            cv2.putText(
+                picture, f"{level} mm", (column + 4, row - 4), cv2.FONT_HERSHEY_SIMPLEX, 0.5,
+                colour, thickness, cv2.LINE_AA,
+            )  # fmt: skip

@@ -1,0 +1,119 @@
+"""Photos dropped on the page: checked before anything of them reaches the survey's folder."""
+
+from __future__ import annotations
+
+import shutil
+import tempfile
+import warnings
+from collections.abc import Sequence
+from pathlib import Path
+from typing import BinaryIO
+
+from PIL import Image
+
+from bifocal.collimation.project import PHOTOS
+from bifocal.files.images import ImageInfo, image_info, read_image
+from photocore.errors import InputError
+from photocore.output import atomic_path, free_path
+
+#: Photos of more pixels per byte than any camera writes are no photos. [px/byte, px]
+EMPTIEST, FROM = 400, 20_000_000
+
+
+def take_photos(folder: Path, sent: Sequence[tuple[str, BinaryIO]]) -> tuple[Path, ...]:
+    """Put two photos into a folder, far one first, and return where they lie.
+
+    Parameters
+    ----------
+    folder : Path
+    sent : sequence of (name, file)
+        As the browser sent them; of the name only letters, digits and its ending are used.
+
+    Raises
+    ------
+    InputError
+        If they are not two photos; nothing is written then.
+    """
+    if len(sent) != 2:
+        raise InputError(f"expected two photos, got {len(sent)}.")
+    with tempfile.TemporaryDirectory() as place:
+        checked = []
+        for number, (name, file) in enumerate(sent):
+            path = Path(place) / str(number) / safe_name(name)
+            path.parent.mkdir()
+            with path.open("wb") as target:
+                shutil.copyfileobj(file, target)
+            checked.append(_checked(path))
+        return tuple(_kept(folder, info.path) for info in far_first(checked))
+
+
+def safe_name(name: str) -> str:
+    r"""Return a file name without anything that a file system may take for more than a name.
+
+    Examples
+    --------
+    >>> safe_name("../../etc/Façade 1.JPG"), safe_name("C:\\\\x\\\\far.tif")
+    ('Fa_ade_1.jpg', 'far.tif')
+    """
+    last = name.replace("\\", "/").rpartition("/")[2]
+    stem, dot, ending = last.rpartition(".")
+    ending = f".{ending.lower()}"
+    if not dot or ending not in PHOTOS:
+        raise InputError(f"{last[:60]}: is no photo (JPEG, PNG or TIFF).")
+    letters = "".join(c if c.isascii() and (c.isalnum() or c in "-_") else "_" for c in stem)
+    return f"{letters.strip('_')[:80] or 'photo'}{ending}"
+
+
+def far_first(infos: Sequence[ImageInfo]) -> list[ImageInfo]:
+    """Return two photos with that of the longer lens first, where they tell their lens."""
+    first, second = infos
+    focal = [info.focal_pixels or info.focal_length for info in (first, second)]
+    if focal[0] and focal[1] and focal[1] > focal[0]:
+        return [second, first]
+    return [first, second]
+
+
+def _checked(path: Path) -> ImageInfo:
+    """Return the facts of a photo, after a look at every byte of it."""
+    try:
+        _refuse_bomb(path)
+        info = image_info(path)
+        read_image(path)
+    except InputError as error:
+        raise InputError(str(error).replace(f"{path.parent}/", "")) from None
+    return info
+
+
+def _refuse_bomb(path: Path) -> None:
+    """Refuse, by its header alone, what would grow beyond all bounds when it is decoded.
+
+    What Pillow cannot open, `image_info` refuses.
+    """
+    size = path.stat().st_size
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            with Image.open(path) as image:
+                width, height = image.size
+    except Image.DecompressionBombError:
+        raise InputError(
+            f"{path.name}: is larger than the page takes (178 MP); start the page with its file: "
+            "bifocal pick FAR NEAR"
+        ) from None
+    except (OSError, SyntaxError, ValueError):
+        return
+    if width * height > FROM and width * height > EMPTIEST * size:
+        raise InputError(
+            f"{path.name}: claims {width} x {height} px in {size // 1024} kB; that is no photo."
+        )
+
+
+def _kept(folder: Path, path: Path) -> Path:
+    """Copy a photo into the folder; one that lies there already is not copied again."""
+    target = folder / path.name
+    if target.is_file() and target.read_bytes() == path.read_bytes():
+        return target
+    target = free_path(folder, path.stem, path.suffix)
+    with atomic_path(target, overwrite=False) as temporary:
+        shutil.copyfile(path, temporary)
+    return target

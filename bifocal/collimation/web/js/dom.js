@@ -1,0 +1,58 @@
+/** Build DOM nodes without markup strings: nothing a user types is ever parsed as HTML. */
+
+/** `h("button", {class: "quiet", onclick: f, testid: "pick"}, "Pick")` */
+export function h(tag, attributes = {}, ...children) {
+  const node = document.createElement(tag);
+  for (const [key, value] of Object.entries(attributes)) {
+    if (value === null || value === undefined || value === false) continue;
+    if (key.startsWith("on")) node.addEventListener(key.slice(2), value);
+    else if (key === "testid") node.dataset.testid = value;
+    else if (key === "value" || key === "checked") node[key] = value;
+    else node.setAttribute(key, value === true ? "" : value);
+  }
+  node.append(...children.flat().filter((child) => child !== null && child !== undefined));
+  return node;
+}
+
+/** Write text only where it differs: no layout, no announcement for nothing. */
+export function setText(node, text) {
+  if (node.textContent !== text) node.textContent = text;
+}
+
+/** A number for people: `digits` after the point, "–" where there is none. */
+export function number(value, digits) {
+  return Number.isFinite(value) ? value.toFixed(digits).replace(/^-(?=0\.?0*$)/, "") : "–";
+}
+
+/** What a person typed as a number, comma or point; null when empty, NaN when it is none. */
+export function parseNumber(text) {
+  const tidy = text.trim().replace("−", "-");
+  if (tidy === "") return null;
+  return Number(/^-?\d*,\d+$/.test(tidy) ? tidy.replace(",", ".") : tidy);
+}
+
+/** Keep keyed rows of a table body: rebuild only those whose signature changed, in the new order. */
+export function keyedRows(body, items, { key, signature, build }) {
+  const old = new Map([...body.children].map((row) => [row.dataset.key, row]));
+  let place = body.firstElementChild;
+  for (const item of items) {
+    const name = key(item);
+    const mark = signature(item);
+    let row = old.get(name);
+    if (row && row.dataset.mark !== mark && !row.querySelector("input:focus, select:focus")) {
+      const fresh = build(item);
+      if (place === row) place = fresh;
+      const focused = row.contains(document.activeElement);
+      row.replaceWith(fresh);
+      if (focused) fresh.querySelector("button, input, select")?.focus();
+      row = fresh;
+    }
+    old.delete(name);
+    row ??= build(item);
+    row.dataset.key = name;
+    row.dataset.mark = mark;
+    if (row === place) place = place.nextElementSibling;
+    else body.insertBefore(row, place);
+  }
+  for (const row of old.values()) row.remove();
+}

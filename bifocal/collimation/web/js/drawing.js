@@ -1,0 +1,154 @@
+/** What is drawn above the photos. Each image has a colour and a shape of its own. */
+
+export const INK = { 1: "#63c7ff", 2: "#ffb454" };
+const DARK = "rgba(0, 0, 0, 0.75)";
+const LABELS_FROM = 60;
+
+function stroke(context, style, width, path) {
+  context.beginPath();
+  path(context);
+  context.lineCap = "round";
+  context.strokeStyle = DARK;
+  context.lineWidth = width + 2;
+  context.stroke();
+  context.strokeStyle = style;
+  context.lineWidth = width;
+  context.stroke();
+}
+
+/** A cross that leaves its centre free: round for photo 1, square for photo 2. */
+export function marker(context, image, [x, y], { selected = false, proposed = false } = {}) {
+  const size = selected ? 11 : 7;
+  if (proposed) context.setLineDash([3, 3]);
+  stroke(context, INK[image], selected ? 2 : 1.5, (path) => {
+    if (image === 1) path.arc(x, y, size, 0, 2 * Math.PI);
+    else path.rect(x - size, y - size, 2 * size, 2 * size);
+    for (const [dx, dy] of [[1, 0], [-1, 0], [0, 1], [0, -1]]) {
+      path.moveTo(x + dx * size, y + dy * size);
+      path.lineTo(x + dx * 2.5, y + dy * 2.5);
+    }
+  });
+  context.setLineDash([]);
+}
+
+const SPRITE = 18;
+const sprites = new Map();
+
+/** A small marker, drawn once for each image and screen. */
+function sprite(image) {
+  const ratio = window.devicePixelRatio;
+  const key = `${image}/${ratio}`;
+  let canvas = sprites.get(key);
+  if (!canvas) {
+    canvas = document.createElement("canvas");
+    canvas.width = canvas.height = Math.ceil(SPRITE * ratio);
+    const context = canvas.getContext("2d");
+    context.scale(ratio, ratio);
+    const middle = SPRITE / 2;
+    stroke(context, INK[image], 1.3, (path) => {
+      if (image === 1) path.arc(middle, middle, 5, 0, 2 * Math.PI);
+      else path.rect(middle - 5, middle - 5, 10, 10);
+    });
+    sprites.set(key, canvas);
+  }
+  return canvas;
+}
+
+/** Many markers at once: a thousand in every frame. */
+export function markers(context, image, places) {
+  const canvas = sprite(image);
+  for (const [x, y] of places) {
+    context.drawImage(canvas, x - SPRITE / 2, y - SPRITE / 2, SPRITE, SPRITE);
+  }
+}
+
+export function polyline(context, style, places, { width = 2, dash = [], closed = false } = {}) {
+  if (places.length < 2) return;
+  context.setLineDash(dash);
+  stroke(context, style, width, (path) => {
+    places.forEach(([x, y], index) => (index ? path.lineTo(x, y) : path.moveTo(x, y)));
+    if (closed) path.closePath();
+  });
+  context.setLineDash([]);
+}
+
+export function label(context, text, [x, y], style = "#ffffff") {
+  context.font = "500 12px system-ui, sans-serif";
+  context.lineJoin = "round";
+  context.lineWidth = 3;
+  context.strokeStyle = DARK;
+  context.strokeText(text, x, y);
+  context.fillStyle = style;
+  context.fillText(text, x, y);
+}
+
+/** Full cross through the keyboard's cursor. */
+export function cursor(context, pane, [x, y], image) {
+  stroke(context, INK[image], 1, (path) => {
+    path.moveTo(0, y);
+    path.lineTo(x - 6, y);
+    path.moveTo(x + 6, y);
+    path.lineTo(pane.width, y);
+    path.moveTo(x, 0);
+    path.lineTo(x, y - 6);
+    path.moveTo(x, y + 6);
+    path.lineTo(x, pane.height);
+  });
+}
+
+/** The zoom centre or nadir: where relief moves nothing. */
+export function centre(context, [x, y], text) {
+  stroke(context, "#f2f2f2", 1.5, (path) => {
+    path.arc(x, y, 4, 0, 2 * Math.PI);
+    path.moveTo(x - 12, y);
+    path.lineTo(x + 12, y);
+    path.moveTo(x, y - 12);
+    path.lineTo(x, y + 12);
+  });
+  label(context, text, [x + 10, y - 10]);
+}
+
+/**
+ * All picks of `items` in the images a pane shows; the chosen one stands out, names appear where
+ * there is room. `pick(item, image)` says where one is, or null.
+ */
+export function picks(context, pane, { items, images, pick, selected }) {
+  const seen = [];
+  for (const item of items) {
+    const places = images.map((image) => {
+      const pixel = pick(item, image);
+      return pixel && pane.screen(image, pixel);
+    });
+    if (places.some((place) => place && inside(pane, place))) seen.push([item, places]);
+  }
+  shifts(context, seen);
+  images.forEach((image, index) => markers(context, image, seen
+    .filter(([item, places]) => places[index] && item.name !== selected)
+    .map(([, places]) => places[index])));
+  const crowded = seen.length > LABELS_FROM && pane.zoom < 1;
+  for (const [item, places] of seen) {
+    const chosen = item.name === selected;
+    if (chosen) {
+      images.forEach((image, index) => {
+        if (places[index]) marker(context, image, places[index], { selected: true });
+      });
+    }
+    const [x, y] = places.find(Boolean);
+    if (!crowded || chosen) label(context, item.name, [x + (chosen ? 15 : 9), y - 8]);
+  }
+}
+
+const inside = (pane, [x, y]) => x > -20 && y > -20 && x < pane.width + 20 && y < pane.height + 20;
+
+/** From each pick to its partner, where both are shown. */
+function shifts(context, seen) {
+  context.beginPath();
+  for (const [, [from, to]] of seen) {
+    if (!from || !to) continue;
+    context.moveTo(...from);
+    context.lineTo(...to);
+  }
+  context.strokeStyle = "rgba(255, 255, 255, 0.6)";
+  context.lineWidth = 1;
+  context.stroke();
+}

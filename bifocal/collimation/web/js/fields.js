@@ -1,0 +1,55 @@
+/** Fields that a person types into: a command is sent when the value has changed. */
+import { h, parseNumber } from "./dom.js";
+import { t } from "./words/words.js";
+
+let count = 0;
+
+/** Write a value into a field unless somebody is typing in it. */
+export function fill(input, value) {
+  const text = value === null || value === undefined ? "" : String(value);
+  if (document.activeElement !== input && input.value !== text) input.value = text;
+  input.dataset.known = text;
+}
+
+/** A number field: `save(number or null)`; refuses what is no number, in words. */
+export function numberInput({ save, label, ...attributes }) {
+  const input = h("input", { type: "text", inputmode: "decimal", autocomplete: "off",
+    "aria-label": label, ...attributes });
+  input.addEventListener("change", () => {
+    const value = parseNumber(input.value);
+    input.setCustomValidity(Number.isNaN(value) ? t("field.number") : "");
+    if (!input.reportValidity()) return;
+    if (input.value !== input.dataset.known) save(value);
+  });
+  return input;
+}
+
+export function textInput({ save, label, ...attributes }) {
+  const input = h("input", { type: "text", autocomplete: "off", "aria-label": label, ...attributes });
+  input.addEventListener("change", () => {
+    const value = input.value.trim();
+    if (value !== input.dataset.known) save(value);
+  });
+  return input;
+}
+
+/** A field under its visible label, with its unit. */
+export function labelled(text, input, unit = null) {
+  input.id ||= `field-${count++}`;
+  input.removeAttribute("aria-label");
+  const mark = unit ? h("span", { class: "unit" }, unit) : null;
+  return h("div", { class: "field" }, h("label", { for: input.id }, text),
+    h("span", { class: "with-unit" }, input, mark));
+}
+
+export function choice({ label, options, value, save, ...attributes }) {
+  const select = h("select", { "aria-label": label, ...attributes,
+    onchange: () => save(select.value) },
+  Object.entries(options).map(([key, text]) => h("option", { value: key }, text)));
+  if (value !== undefined) select.value = value;
+  return select;
+}
+
+export function button(text, onclick, attributes = {}) {
+  return h("button", { type: "button", onclick, ...attributes }, text);
+}

@@ -1,0 +1,50 @@
+/**
+ * The wall and the photos: pixels of one carried to the other. Same conventions as the library:
+ * (column, row), integers at pixel centres; matrices 3x3, rows first.
+ */
+import { Lens } from "./lens.js";
+import { invert, project } from "./matrices.js";
+
+/** The wall's pixel grid, common to both images. */
+export class Wall {
+  constructor(pair) {
+    [this.width, this.height] = pair.wall_size;
+    this.gsd = pair.gsd;
+    [this.xmin, , , this.ymax] = pair.plane_bounds;
+    this.photoFromWall = pair.images.map((image) => image.photo_from_wall);
+    this.wallFromPhoto = this.photoFromWall.map(invert);
+    this.known = [new WeakMap(), new WeakMap()];
+    this.lenses = pair.images.map((image) => (image.lens ? new Lens(image.lens) : null));
+  }
+
+  /** Wall pixel -> pixel of the original photo `image` (1 or 2). */
+  toPhoto(image, pixel) {
+    const straight = project(this.photoFromWall[image - 1], pixel);
+    return this.lenses[image - 1]?.distort(straight) ?? straight;
+  }
+
+  /** Pixel of the original photo `image` (1 or 2) -> wall pixel; drawn in every frame, so kept. */
+  fromPhoto(image, pixel) {
+    const known = this.known[image - 1];
+    let place = known.get(pixel);
+    if (!place) {
+      const straight = this.lenses[image - 1]?.undistort(pixel) ?? pixel;
+      place = project(this.wallFromPhoto[image - 1], straight);
+      known.set(pixel, place);
+    }
+    return place;
+  }
+
+  /** Wall pixel -> (X, Y) on the reference plane [m]. */
+  toPlane([column, row]) {
+    return [this.xmin + (column + 0.5) * this.gsd, this.ymax - (row + 0.5) * this.gsd];
+  }
+
+  /** (X, Y) on the reference plane [m] -> wall pixel. */
+  fromPlane([x, y]) {
+    return [(x - this.xmin) / this.gsd - 0.5, (this.ymax - y) / this.gsd - 0.5];
+  }
+}
+
+/** The photo's own pixels as a place to draw in: nothing to convert. */
+export const asTaken = { toPhoto: (_image, pixel) => pixel, fromPhoto: (_image, pixel) => pixel };

@@ -1,0 +1,142 @@
+/** The two photos over each other: opacity, blink, swipe, side by side, contrast of each. */
+import { h, setText } from "./dom.js";
+import { button } from "./fields.js";
+import { t } from "./words/words.js";
+
+export const MODES = ["overlay", "blink", "swipe", "split"];
+const BLINK_MS = 400;
+
+export class Superposition extends EventTarget {
+  /** `stage`: the element that holds the panes; `layers(image)`: the layer of an image. */
+  constructor(viewer) {
+    super();
+    this.viewer = viewer;
+    this.mode = "overlay";
+    this.opacity = 0.5;
+    this.swipe = 0.5;
+    this.contrast = { 1: 1, 2: 1 };
+    this.layers = { 1: null, 2: null };
+    this.front = 2;
+    this.element = this.#bar();
+    this.handle = h("div", { class: "swipe-handle", hidden: true, role: "slider", tabindex: "0",
+      "aria-label": t("layer.swipe"), "aria-valuemin": "0", "aria-valuemax": "100" });
+    this.handle.addEventListener("pointerdown", (event) => this.#drag(event));
+    this.handle.addEventListener("keydown", (event) => {
+      const step = { ArrowLeft: -0.02, ArrowRight: 0.02 }[event.key];
+      if (!step) return;
+      event.preventDefault();
+      event.stopPropagation();
+      this.setSwipe(this.swipe + step);
+    });
+  }
+
+  #bar() {
+    this.modes = Object.fromEntries(MODES.map((mode) => [mode, button(t(`layer.${mode}`),
+      () => this.setMode(mode), { testid: `layer-${mode}`, title: t(`layer.${mode}Hint`) })]));
+    this.slider = h("input", { type: "range", min: "0", max: "100", step: "1", id: "layer-opacity",
+      testid: "layer-opacity", oninput: () => this.setOpacity(this.slider.value / 100) });
+    this.percent = h("output", { for: "layer-opacity" });
+    const contrasts = [1, 2].map((image) => {
+      const input = h("input", { type: "range", min: "50", max: "250", step: "5", value: "100",
+        id: `contrast-${image}`, testid: `contrast-${image}`, class: `range-${image}`,
+        oninput: () => this.setContrast(image, input.value / 100) });
+      return h("span", { class: "slider small" }, h("label", { for: `contrast-${image}` },
+        t("layer.contrast", { image })), input);
+    });
+    return h("div", { class: "layer-bar", role: "toolbar", "aria-label": t("layer.bar") },
+      h("div", { class: "segments", role: "group", "aria-label": t("layer.mode") },
+        Object.values(this.modes)),
+      h("span", { class: "slider" }, h("span", { class: "ink-1", "aria-hidden": "true" }, "1"),
+        h("label", { for: "layer-opacity", class: "unseen" }, t("layer.opacity")), this.slider,
+        h("span", { class: "ink-2", "aria-hidden": "true" }, "2"), this.percent), contrasts);
+  }
+
+  /** Give it the layers of photo 1 and 2 once they exist. */
+  use(layers) {
+    this.layers = layers;
+    this.#apply();
+  }
+
+  setMode(mode) {
+    this.mode = this.mode === mode && mode !== "overlay" ? "overlay" : mode;
+    this.#apply();
+    this.dispatchEvent(new Event("mode"));
+  }
+
+  setOpacity(value) {
+    this.opacity = Math.min(Math.max(value, 0), 1);
+    this.#apply();
+  }
+
+  setSwipe(value) {
+    this.swipe = Math.min(Math.max(value, 0), 1);
+    this.#apply();
+  }
+
+  setContrast(image, value) {
+    this.contrast[image] = value;
+    this.#apply();
+  }
+
+  /** The images whose photo is to be seen, the upper one last. */
+  get shown() {
+    if (this.mode === "blink") return [this.front];
+    if (this.mode === "overlay" && this.opacity === 0) return [1];
+    if (this.mode === "overlay" && this.opacity === 1) return [2];
+    return [1, 2];
+  }
+
+  #apply() {
+    for (const [mode, control] of Object.entries(this.modes)) {
+      control.setAttribute("aria-pressed", String(mode === this.mode));
+    }
+    const percent = Math.round(100 * this.opacity);
+    this.slider.value = percent;
+    setText(this.percent, `${percent} %`);
+    this.slider.setAttribute("aria-valuetext", t("layer.opacityValue", { percent }));
+    this.handle.hidden = this.mode !== "swipe";
+    this.handle.setAttribute("aria-valuenow", String(Math.round(100 * this.swipe)));
+    const { style } = this.viewer;
+    style.setProperty("--swipe", this.mode === "swipe" ? `${100 * this.swipe}%` : "0%");
+    this.handle.style.left = `${100 * this.swipe}%`;
+    for (const image of [1, 2]) {
+      const value = this.contrast[image];
+      style.setProperty(`--filter-${image}`, value === 1 ? "none" : `contrast(${value})`);
+    }
+    this.#blink();
+    this.#visibility();
+  }
+
+  #visibility() {
+    if (!this.layers[1]) return;
+    this.layers[2].setOpacity(this.mode === "overlay" ? this.opacity : 1);
+    for (const image of [1, 2]) this.layers[image].setVisible(this.shown.includes(image));
+  }
+
+  #blink() {
+    const blinking = this.mode === "blink";
+    if (!blinking && this.timer) {
+      clearInterval(this.timer);
+      this.timer = null;
+      this.front = 2;
+    } else if (blinking && !this.timer) {
+      this.timer = setInterval(() => {
+        this.front = 3 - this.front;
+        this.#visibility();
+        this.dispatchEvent(new Event("blink"));
+      }, BLINK_MS);
+    }
+  }
+
+  #drag(event) {
+    event.preventDefault();
+    this.handle.setPointerCapture(event.pointerId);
+    const move = ({ clientX }) => {
+      const { left, width } = this.viewer.getBoundingClientRect();
+      this.setSwipe((clientX - left) / width);
+    };
+    this.handle.addEventListener("pointermove", move);
+    this.handle.addEventListener("lostpointercapture", () =>
+      this.handle.removeEventListener("pointermove", move), { once: true });
+  }
+}

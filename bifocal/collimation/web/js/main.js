@@ -1,0 +1,275 @@
+/** The page: its four stages, what they share, and what outsiders may ask of it. */
+import { Connection, Refusal } from "./connection.js";
+import { h, setText } from "./dom.js";
+import { button, choice } from "./fields.js";
+import { KEYS, listen } from "./keys.js";
+import { OrientationStage } from "./orientation.js";
+import { PhotosStage } from "./photos.js";
+import { PointsStage } from "./points.js";
+import { ProductsStage } from "./products.js";
+import { Pyramids } from "./tiles.js";
+import { LANGUAGES, load, t } from "./words/words.js";
+
+const STAGES = {
+  photos: PhotosStage, orientation: OrientationStage, points: PointsStage, products: ProductsStage,
+};
+const TOAST_MS = 6000;
+
+class App {
+  constructor(connection) {
+    this.connection = connection;
+    this.pyramids = new Pyramids(connection);
+    this.boxes = [];
+    this.send = (op, args) => connection.send(op, args).catch((error) => this.refuse(error));
+  }
+
+  get state() {
+    return this.connection.state;
+  }
+
+  /** The points that are not deleted. */
+  points() {
+    return this.state.points.filter(({ deleted }) => !deleted);
+  }
+
+  build() {
+    this.stages = Object.fromEntries(Object.entries(STAGES).map(([key, Stage]) => [key, new Stage(this)]));
+    this.tabs = Object.fromEntries(Object.keys(STAGES).map((key, index) => [key, this.#tab(key, index)]));
+    this.title = h("h1", {}, "bifocal");
+    this.undoButton = button("↶", () => this.undo(), { class: "icon", testid: "undo", "aria-label": t("top.undo"), title: `${t("top.undo")} (Ctrl+Z)` });
+    this.redoButton = button("↷", () => this.redo(), { class: "icon", testid: "redo", "aria-label": t("top.redo"), title: `${t("top.redo")} (Ctrl+Y)` });
+    this.link = h("p", { class: "link-state", role: "status", testid: "link" });
+    const language = choice({ label: t("top.language"), options: LANGUAGES, value: document.documentElement.lang,
+      testid: "language", save: (code) => this.send("language.set", { language: code }) });
+    this.toast = h("div", { class: "toast", role: "status", "aria-live": "polite", testid: "toast" });
+    document.body.replaceChildren(
+      h("a", { class: "skip", href: "#stage" }, t("top.skip")),
+      h("header", { class: "top" }, this.title,
+        h("nav", { role: "tablist", "aria-label": t("top.stages") }, Object.values(this.tabs)),
+        h("div", { class: "tools" }, this.link, this.undoButton, this.redoButton, language,
+          button("?", () => this.help(), { class: "icon", "aria-label": t("top.help"), testid: "help" }))),
+      h("div", { id: "stage", tabindex: "-1" }, Object.values(this.stages).map(({ element }) => element)),
+      this.toast);
+    this.open(this.state.stage, false);
+    listen(this);
+  }
+
+  #tab(key, index) {
+    const status = h("span", { class: "missing" });
+    const tab = h("button", { type: "button", role: "tab", id: `tab-${key}`, testid: `mode-${key}`,
+      "aria-controls": `stage-${key}`, onclick: () => this.open(key) },
+    h("span", { class: "step", "aria-hidden": "true" }, String(index + 1)),
+    h("span", { class: "words" }, h("span", { class: "name" }, t(`stage.${key}`)), status));
+    tab.addEventListener("keydown", (event) => {
+      const by = { ArrowLeft: -1, ArrowRight: 1 }[event.key];
+      if (!by) return;
+      event.preventDefault();
+      this.turn(by);
+      this.tabs[this.current].focus();
+    });
+    tab.status = status;
+    return tab;
+  }
+
+  /** Show a stage; `tell` the survey, so that the next start opens there. */
+  open(key, tell = true) {
+    this.current = key;
+    for (const [name, stage] of Object.entries(this.stages)) {
+      stage.element.hidden = name !== key;
+      this.tabs[name].setAttribute("aria-selected", String(name === key));
+      this.tabs[name].tabIndex = name === key ? 0 : -1;
+      stage.element.setAttribute("role", "tabpanel");
+      stage.element.setAttribute("aria-labelledby", `tab-${name}`);
+    }
+    if (tell && this.state.stage !== key) this.send("stage.set", { stage: key });
+    this.update();
+  }
+
+  turn(by) {
+    const keys = Object.keys(STAGES);
+    const next = keys[keys.indexOf(this.current) + by];
+    if (next) this.open(next);
+  }
+
+  get stage() {
+    return this.stages[this.current];
+  }
+
+  update() {
+    const { state } = this;
+    document.title = `${state.title || t("title.untitled")} · bifocal`;
+    for (const [key, stage] of Object.entries(this.stages)) {
+      const { done, text } = stage.status(state);
+      setText(this.tabs[key].status, text);
+      this.tabs[key].title = text;
+      this.tabs[key].classList.toggle("done", Boolean(done));
+    }
+    this.undoButton.disabled = !state.undo;
+    this.redoButton.disabled = !state.redo;
+    for (const paint of this.boxes) paint(state);
+    this.reach();
+    this.stage.update(state);
+  }
+
+  /** Say whether the server is there and everything written. */
+  reach() {
+    const { online, locked, unsent } = this.connection;
+    const { workbook_waiting: waiting } = this.state;
+    const key = locked ? "link.locked" : !online ? "link.away" : waiting ? "link.waiting" : unsent.length ? "link.sending" : "link.saved";
+    setText(this.link, t(key, { count: unsent.length }));
+    this.link.title = waiting ?? "";
+    this.link.dataset.level = locked || !online ? "warn" : waiting ? "fair" : "good";
+  }
+
+  undo() {
+    if (this.state.undo || this.connection.unsent.length) this.send("undo");
+  }
+
+  redo() {
+    if (this.state.redo) this.send("redo");
+  }
+
+  /** Enter: place at the keyboard's cursor, else accept what is proposed. */
+  enter() {
+    const { picker } = this.stage;
+    const { cursor } = picker;
+    if (cursor) picker.click(cursor.pane, cursor.place);
+    else if (picker.proposal) picker.accept();
+  }
+
+  flyTo(name) {
+    if (this.stage.flyTo?.(name)) return true;
+    for (const key of ["points", "orientation"]) {
+      if (key === this.current) continue;
+      const known = key === "points" ? this.points() : this.state.control;
+      if (!known.some((item) => item.name === name)) continue;
+      this.open(key);
+      requestAnimationFrame(() => this.stage.flyTo(name));
+      return true;
+    }
+    return false;
+  }
+
+  /** Join a picker with the page: what it says is shown, what it changes is drawn. */
+  listen(picker, changed, hovered) {
+    picker.addEventListener("change", changed);
+    picker.addEventListener("hover", hovered);
+    picker.addEventListener("say", ({ detail }) => this.say(t(detail.key, detail.values)));
+    picker.addEventListener("refused", ({ detail }) => this.refuse(detail));
+  }
+
+  /** Join a pane with a picker: clicks, the pointer. */
+  follow(pane, picker) {
+    pane.addEventListener("pick", ({ detail }) => picker.click(pane, detail.pixel));
+    pane.addEventListener("hover", ({ detail }) => picker.hover(pane, detail.pixel));
+  }
+
+  async job(kind, options = {}) {
+    try {
+      await this.connection.ask("/api/jobs", { kind, options });
+      this.say(t("job.started", { kind: t(`job.${kind}`) }));
+    } catch (error) {
+      this.refuse(error);
+    }
+  }
+
+  /** Progress of the latest job of a kind, with cancel. */
+  jobBox(kind) {
+    const bar = h("progress", { max: "1", "aria-label": t(`job.${kind}`) });
+    const words = h("p", { class: "hint", role: "status" });
+    const cancel = button(t("job.cancel"), () => {
+      this.connection.remove(`/api/jobs/${cancel.dataset.job}`).catch((error) => this.refuse(error));
+    }, { class: "quiet", testid: `cancel-${kind}` });
+    const box = h("div", { class: "job", hidden: true, testid: `job-${kind}` }, h("div", { class: "row" }, bar, cancel), words);
+    this.boxes.push((state) => {
+      const job = state.jobs.filter((one) => one.kind === kind).at(-1);
+      box.hidden = !job;
+      if (!job) return;
+      const running = job.state === "running";
+      bar.value = job.state === "done" ? 1 : job.progress ?? 0;
+      bar.hidden = cancel.hidden = !running;
+      cancel.dataset.job = job.id;
+      box.dataset.state = job.state;
+      const percent = Math.round(100 * (job.progress ?? 0));
+      const doing = running ? `${percent} %` : t(`job.state.${job.state}`);
+      setText(words, [doing, job.message].filter(Boolean).join(" · "));
+    });
+    return box;
+  }
+
+  say(text, level = "info") {
+    this.toast.dataset.level = level;
+    this.toast.classList.add("on");
+    setText(this.toast, text);
+    clearTimeout(this.quiet);
+    this.quiet = setTimeout(() => this.toast.classList.remove("on"), TOAST_MS);
+  }
+
+  refuse(error) {
+    if (!(error instanceof Refusal)) console.error(error);
+    this.say(error.message, "warning");
+  }
+
+  dialog(title, content, action = null, act = null) {
+    const box = h("dialog", { "aria-label": title }, h("form", { method: "dialog" }, h("h2", {}, title), content,
+      h("div", { class: "row end" },
+        h("button", { value: "", class: "quiet" }, action ? t("dialog.cancel") : t("dialog.close")),
+        action && h("button", { value: "yes", class: "primary", testid: "dialog-yes" }, action))));
+    box.addEventListener("close", () => {
+      if (box.returnValue === "yes") act();
+      box.remove();
+    });
+    document.body.append(box);
+    box.showModal();
+  }
+
+  help() {
+    const rows = KEYS.map(([name, shown]) => h("div", {}, h("dt", {}, shown.split("  ").map((key) => h("kbd", {}, key))),
+      h("dd", {}, t(`key.${name}`))));
+    this.dialog(t("help.title"), [h("p", { class: "hint" }, t("help.hint")), h("dl", { class: "keys" }, rows)]);
+  }
+}
+
+/** What `window.bifocal` offers: image 1 or 2, original photo pixels, CSS pixels of the page. */
+function outside(app) {
+  const box = (pane) => pane.element.getBoundingClientRect();
+  return {
+    state: () => app.state,
+    photoFromScreen(image, x, y) {
+      const pane = app.stage.paneOf(image);
+      const { left, top } = box(pane);
+      return pane.photo(image, [x - left, y - top]);
+    },
+    screenFromPhoto(image, column, row) {
+      const pane = app.stage.paneOf(image);
+      const { left, top } = box(pane);
+      const [x, y] = pane.screen(image, [column, row]);
+      return [x + left, y + top];
+    },
+    flyTo: (name) => app.flyTo(name),
+  };
+}
+
+async function start() {
+  const connection = new Connection();
+  await connection.start();
+  const { language } = connection.state;
+  await load(language);
+  const app = new App(connection);
+  app.build();
+  let waiting = 0;
+  connection.addEventListener("state", () => {
+    // Many answers in one frame are drawn once.
+    waiting ||= requestAnimationFrame(() => {
+      waiting = 0;
+      if (connection.state.language === language) app.update();
+      else location.reload();
+    });
+  });
+  connection.addEventListener("reach", () => app.reach());
+  connection.addEventListener("refused", ({ detail }) => app.refuse(detail));
+  window.bifocal = outside(app);
+  if (location.search) history.replaceState(null, "", "/");
+}
+
+start();

@@ -1,0 +1,247 @@
+/**
+ * Stage 2: control points and tape distances beside the two photos, what they say of the pair, and
+ * what would help most next.
+ */
+import { h, keyedRows, number, setText } from "./dom.js";
+import * as drawing from "./drawing.js";
+import { button, fill, numberInput, textInput } from "./fields.js";
+import { asTaken } from "./geometry.js";
+import { Loupe } from "./loupe.js";
+import { Picker } from "./picker.js";
+import { photoMark } from "./tiles.js";
+import { Pane, pixelView, spread, tileLayer } from "./viewer.js";
+import { t } from "./words/words.js";
+
+const COORDINATES = ["X", "Y", "r"];
+
+export class OrientationStage {
+  constructor(app) {
+    this.app = app;
+    this.loupe = new Loupe();
+    this.panes = [];
+    this.picker = new Picker({ connection: app.connection, kind: "control", partner: false,
+      items: () => app.state.control, panes: () => this.panes });
+    app.listen(this.picker, () => this.#refresh(), () => this.#look());
+    this.photos = h("div", { class: "viewer two" });
+    this.body = h("tbody");
+    this.tapes = h("tbody");
+    this.advice = h("ul", { class: "advice" });
+    this.remarks = h("ul", { class: "remarks" });
+    this.known = h("dl", { class: "values one", testid: "orientation-values" });
+    this.align = button(t("align.run"), () => app.job("align"), { class: "primary", testid: "align" });
+    this.acceptAlign = button(t("align.accept"), () => app.send("align.accept"),
+      { testid: "align-accept" });
+    this.target = h("p", { class: "target", role: "status" });
+    this.element = h("main", { class: "stage work", id: "stage-orientation" }, this.photos,
+      h("aside", { class: "panel" }, this.#targetBox(), this.loupe.element, this.#controlTable(),
+        this.#tapeTable(), this.#result()));
+  }
+
+  #targetBox() {
+    const { picker } = this;
+    return h("section", { class: "hand" }, this.target, h("div", { class: "row" },
+      button(t("control.new"), () => picker.fresh(1), { class: "quiet", testid: "control-new" }),
+      button(t("pick.snap"), () => picker.snap(), { class: "quiet", testid: "control-snap" }),
+      button(t("control.paste"), () => this.#paste(), { class: "quiet", testid: "control-paste" })));
+  }
+
+  #controlTable() {
+    const heads = ["control.name", "control.X", "control.Y", "control.r", "control.seen", "control.residual"];
+    return h("section", { class: "card" }, h("h2", {}, t("control.title")),
+      h("p", { class: "hint" }, t("control.hint")),
+      h("table", { class: "grid", testid: "control-table", onpaste: (event) => this.#pasted(event) },
+        h("thead", {}, h("tr", {}, heads.map((key) => h("th", { scope: "col" }, t(key))),
+          h("th", {}, h("span", { class: "unseen" }, t("list.delete"))))), this.body));
+  }
+
+  #tapeTable() {
+    const heads = ["tape.from", "tape.to", "tape.length", "tape.sigma"];
+    const inputs = heads.map((key, index) => h("input", { type: "text", "aria-label": t(key),
+      placeholder: t(key), inputmode: index > 1 ? "decimal" : "text", testid: `tape-${index}` }));
+    const add = () => {
+      const [from, to, ...numbers] = inputs.map(({ value }) => value.trim());
+      const [length, sigma] = numbers.map((text) => (text ? Number(text.replace(",", ".")) : null));
+      if (!from || !to || !(length > 0)) return this.app.say(t("tape.incomplete"), "warning");
+      this.app.send("tape.set", { from, to, length, sigma });
+      for (const input of inputs) input.value = "";
+      return inputs[0].focus();
+    };
+    return h("section", { class: "card" }, h("h2", {}, t("tape.title")),
+      h("table", { class: "grid" }, h("thead", {}, h("tr", {},
+        heads.map((key) => h("th", { scope: "col" }, t(key))), h("th"))), this.tapes),
+      h("form", { class: "row add", onsubmit: (event) => { event.preventDefault(); add(); } },
+        inputs, h("button", { type: "submit", class: "quiet", testid: "tape-add" }, t("tape.add"))));
+  }
+
+  #result() {
+    return h("section", { class: "card" }, h("h2", {}, t("align.title")), this.advice,
+      this.known, h("div", { class: "row" }, this.align, this.acceptAlign), this.app.jobBox("align"),
+      this.remarks);
+  }
+
+  #pasted(event) {
+    const text = event.clipboardData.getData("text/plain");
+    if (!/[\t\n;]/.test(text.trim())) return;
+    event.preventDefault();
+    this.app.send("control.paste", { text });
+  }
+
+  #paste() {
+    const area = h("textarea", { rows: "8", "aria-label": t("control.pasteArea"),
+      placeholder: t("control.pasteArea"), testid: "paste-area" });
+    this.app.dialog(t("control.paste"), [h("p", { class: "hint" }, t("control.pasteHint")), area],
+      t("control.pasteTake"), () => this.app.send("control.paste", { text: area.value }));
+  }
+
+  async prepare(state) {
+    const mark = photoMark(state);
+    if (state.photos.length < 2 || this.mark === mark) return;
+    this.mark = mark;
+    this.panes = state.photos.map((photo) => this.#pane(photo));
+    const [{ width, height }] = state.photos;
+    this.spread ??= new ResizeObserver(() => spread(this.photos, width, height)).observe(this.photos);
+    spread(this.photos, width, height);
+    this.photos.replaceChildren(...this.panes.map(({ element }) => element));
+    for (const pane of this.panes) pane.mounted();
+    const infos = await this.app.pyramids.both("photo", mark);
+    infos.forEach((info, index) => {
+      const { view, image } = this.panes[index];
+      this.panes[index].setLayers([tileLayer(view, `layer-${image}`, `/tiles/photo/${image}`, info)]);
+      this.loupe.source(image, info);
+    });
+  }
+
+  #pane({ image, width, height }) {
+    const view = pixelView(width, height);
+    const role = t(image === 1 ? "photo.far" : "photo.near");
+    const pane = new Pane({ label: t("pane.photo", { image, role }), view, frame: asTaken,
+      painter: (context, self) => this.#draw(context, self) });
+    Object.assign(pane, { image, images: [image] });
+    this.app.follow(pane, this.picker);
+    pane.element.append(h("span", { class: `badge ink-${image}` }, `${image} · ${role}`));
+    return pane;
+  }
+
+  #draw(context, pane) {
+    const { control, pair } = this.app.state;
+    const { image } = pane;
+    if (pair?.nadir?.[image - 1]) {
+      drawing.centre(context, pane.screen(image, pair.nadir[image - 1]), t("draw.nadir"));
+    }
+    drawing.picks(context, pane, { items: control, images: [image],
+      pick: (item, one) => this.picker.pick(item, one), selected: this.picker.selected });
+    const { cursor } = this.picker;
+    if (cursor?.pane === pane) drawing.cursor(context, pane, cursor.place, image);
+  }
+
+  status(state) {
+    if (state.photos.length < 2) return { text: t("status.orientation.photos") };
+    if (state.pair && state.pair.accepted === false) return { text: t("status.orientation.accept") };
+    if (state.pair) return { done: true, text: t("status.done") };
+    const seen = state.control.filter(({ picks }) => picks[1] && picks[2]).length;
+    if (seen < 4) return { text: t("status.orientation.control", { seen }) };
+    return { text: state.advice[0] ?? t("status.orientation.align") };
+  }
+
+  update(state) {
+    this.prepare(state).catch((error) => this.app.refuse(error));
+    keyedRows(this.body, state.control, { key: ({ name }) => name,
+      signature: (item) => JSON.stringify([item, item.name === this.picker.selected]),
+      build: (item) => this.#controlRow(item) });
+    keyedRows(this.tapes, state.tapes, { key: ({ from, to }) => `${from}\t${to}`,
+      signature: JSON.stringify, build: (tape) => this.#tapeRow(tape) });
+    for (const [list, lines] of [[this.advice, state.advice], [this.remarks, state.pair?.remarks ?? []]]) {
+      keyedRows(list, lines, { key: (text) => text, signature: (text) => text,
+        build: (text) => h("li", {}, text) });
+    }
+    this.#tellKnown(state);
+    this.acceptAlign.disabled = !state.pair || state.pair.accepted !== false;
+    this.#refresh();
+  }
+
+  /** Distances and nadirs with their sigmas: of the proposal, else of the control points alone. */
+  #tellKnown({ pair, live }) {
+    const distances = pair?.images.map(({ distance }) => distance) ?? live?.distances ?? [];
+    const sigmas = pair?.report?.standard_deviations ?? live?.deviations ?? {};
+    const rows = distances.flatMap((distance, index) => [
+      [t("known.distance", { image: index + 1 }), distance, sigmas[`distance${index + 1}`]],
+      [t("known.nadir", { image: index + 1 }), null, sigmas[`nadir${index + 1}`]]]);
+    this.known.replaceChildren(...rows.filter(([, value, sigma]) => value !== null || Number.isFinite(sigma))
+      .map(([name, value, sigma]) => h("div", {}, h("dt", {}, name), h("dd", {},
+        `${value === null ? "" : number(value, 3)}${Number.isFinite(sigma) ? ` ± ${number(sigma, 3)}` : ""} m`.trim()))));
+  }
+
+  #controlRow(item) {
+    const { name } = item;
+    const save = (key) => (value) => this.app.send("control.set", {
+      ...Object.fromEntries(COORDINATES.map((one) => [one, item[one]])), name, [key]: value });
+    const inputs = COORDINATES.map((key) => {
+      const input = numberInput({ label: `${key} ${name}`, save: save(key), size: "6" });
+      fill(input, item[key]);
+      return h("td", {}, input);
+    });
+    const label = textInput({ label: t("control.name"), size: "5",
+      save: (text) => this.app.send("control.rename", { name, new: text }) });
+    fill(label, name);
+    const seen = [1, 2].map((image) => h("button", { type: "button",
+      class: `chip ink-${image}${item.picks[image] ? " on" : ""}`,
+      "aria-label": t(item.picks[image] ? "control.again" : "control.pickIn", { name, image }),
+      onclick: () => { this.picker.select(name); this.picker.aim(image); this.#fly(item, image); } },
+    item.picks[image] ? `${image} ✓` : `${image}`));
+    const worst = Math.max(...[1, 2].map((image) => Math.hypot(...(item.residual?.[image] ?? [NaN]))).filter(Number.isFinite), -1);
+    const remove = button("×", () => this.app.send("control.delete", { name }),
+      { class: "icon", "aria-label": t("list.deleteOf", { name }) });
+    const row = h("tr", { "aria-selected": String(name === this.picker.selected),
+      onfocusin: () => { if (this.picker.selected !== name) this.picker.select(name); } },
+    h("td", {}, label), inputs, h("td", { class: "seen" }, seen),
+    h("td", { class: "number" }, worst < 0 ? "–" : number(worst, 2)), h("td", {}, remove));
+    return row;
+  }
+
+  #tapeRow(tape) {
+    const { from, to } = tape;
+    return h("tr", {}, h("td", {}, from), h("td", {}, to),
+      h("td", { class: "number" }, number(tape.length, 3)),
+      h("td", { class: "number" }, number(tape.sigma, 3)),
+      h("td", {}, button("×", () => this.app.send("tape.delete", { from, to }),
+        { class: "icon", "aria-label": t("list.deleteOf", { name: `${from}–${to}` }) })));
+  }
+
+  #fly(item, image) {
+    const pixel = this.picker.pick(item, image);
+    if (pixel) this.panes[image - 1]?.flyTo(pixel);
+  }
+
+  flyTo(name) {
+    const item = this.app.state.control.find((one) => one.name === name);
+    if (!item) return false;
+    this.picker.select(name);
+    for (const image of [1, 2]) this.#fly(item, image);
+    return true;
+  }
+
+  get activePane() {
+    return this.panes.find(({ element }) => element === document.activeElement) ??
+      this.panes[this.picker.target.image - 1];
+  }
+
+  #refresh() {
+    const { target, picking } = this.picker;
+    const words = { name: target.name ?? t("control.newName"), image: target.image };
+    setText(this.target, picking ? t("pick.next", words) : t("pick.off"));
+    for (const row of this.body.children) {
+      row.setAttribute("aria-selected", String(row.dataset.key === this.picker.selected));
+    }
+    for (const pane of this.panes) pane.paint();
+    this.#look();
+  }
+
+  #look() {
+    for (const image of [1, 2]) this.loupe.look(image, this.picker.sight(image));
+  }
+
+  /** Page coordinates of a photo pixel and back, for those who drive the page from outside. */
+  paneOf(image) {
+    return this.panes[image - 1];
+  }
+}

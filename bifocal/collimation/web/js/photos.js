@@ -1,0 +1,113 @@
+/** Stage 1: two photos dropped; what their files do not tell is asked in words. */
+import { h, keyedRows, setText } from "./dom.js";
+import { button, fill, labelled, numberInput } from "./fields.js";
+import { photoMark } from "./tiles.js";
+import { t } from "./words/words.js";
+
+const SITE = [["d1", "m"], ["sigma_d1", "m"], ["d2", "m"], ["sigma_d2", "m"]];
+const THUMB_LEVEL = 9;
+
+export class PhotosStage {
+  constructor(app) {
+    this.app = app;
+    this.cards = [1, 2].map((image) => this.#card(image));
+    this.input = h("input", { type: "file", accept: "image/*", multiple: true, class: "unseen",
+      id: "photo-files", testid: "photo-files", onchange: () => this.#drop([...this.input.files]) });
+    this.zone = h("div", { class: "drop-zone" },
+      h("div", { class: "drop-icon", "aria-hidden": "true" }),
+      h("p", { class: "lead" }, t("photos.drop")),
+      h("p", { class: "hint" }, t("photos.dropHint")),
+      h("label", { for: "photo-files", class: "button" }, t("photos.choose")), this.input);
+    this.site = Object.fromEntries(SITE.map(([key]) => [key, numberInput({
+      label: t(`setup.${key}`), save: (value) => app.send("setup.set", { [key]: value }) })]));
+    this.form = h("section", { class: "card site" }, h("h2", {}, t("photos.site")),
+      h("p", { class: "hint" }, t("photos.siteHint")), h("div", { class: "fields" },
+        SITE.map(([key, unit]) => labelled(t(`setup.${key}`), this.site[key], unit))));
+    this.exchange = button(t("photos.exchange"), () => app.send("photos.exchange"), { class: "quiet" });
+    this.next = button(t("photos.next"), () => app.open("orientation"), { class: "primary" });
+    this.element = h("main", { class: "stage photos", id: "stage-photos" }, this.zone,
+      h("div", { class: "cards" }, this.cards.map(({ element }) => element)), this.form,
+      h("div", { class: "row end" }, this.exchange, this.next));
+    this.#listen();
+  }
+
+  #card(image) {
+    const role = t(image === 1 ? "photo.far" : "photo.near");
+    const card = { image, name: h("p", { class: "file" }), facts: h("p", { class: "hint" }),
+      thumb: h("img", { alt: t("photo.alt", { role }) }), questions: h("ul", { class: "questions" }) };
+    const save = (key) => (value) => this.app.send("photo.set", { image, [key]: value });
+    card.focal_mm = numberInput({ label: t("photo.focal"), save: save("focal_mm") });
+    card.sensor_width_mm = numberInput({ label: t("photo.sensor"), save: save("sensor_width_mm") });
+    card.element = h("section", { class: "card photo" },
+      h("h2", { class: `ink-${image}` }, `${image} · ${role}`), card.thumb,
+      h("div", { class: "card-body" }, card.name, card.facts, h("div", { class: "fields" },
+        labelled(t("photo.focal"), card.focal_mm, "mm"),
+        labelled(t("photo.sensor"), card.sensor_width_mm, "mm")), card.questions));
+    return card;
+  }
+
+  #listen() {
+    const stop = (event) => event.preventDefault();
+    for (const type of ["dragover", "drop"]) window.addEventListener(type, stop);
+    window.addEventListener("dragenter", () => this.zone.classList.add("over"));
+    window.addEventListener("dragleave", ({ relatedTarget }) => {
+      if (!relatedTarget) this.zone.classList.remove("over");
+    });
+    window.addEventListener("drop", ({ dataTransfer }) => {
+      this.zone.classList.remove("over");
+      if (dataTransfer.files.length) this.#drop([...dataTransfer.files]);
+    });
+  }
+
+  async #drop(files) {
+    if (files.length !== 2) return this.app.say(t("photos.two"), "warning");
+    this.zone.classList.add("busy");
+    this.app.say(t("photos.reading"));
+    try {
+      await this.app.connection.upload(files);
+      this.app.say(t("photos.read"));
+    } catch (error) {
+      this.app.refuse(error);
+    }
+    this.zone.classList.remove("busy");
+    this.input.value = "";
+    return undefined;
+  }
+
+  status(state) {
+    if (state.photos.length < 2) return { text: t("status.photos.drop") };
+    const open = state.photos.flatMap(({ missing }) => missing).length;
+    return open && !state.pair ? { text: t("status.photos.missing", { open }) } : { done: true, text: t("status.done") };
+  }
+
+  update(state) {
+    const ready = state.photos.length === 2;
+    this.zone.classList.toggle("small", ready);
+    this.form.hidden = this.exchange.hidden = this.next.hidden = !ready;
+    for (const card of this.cards) this.#fillCard(card, state);
+    for (const [key] of SITE) fill(this.site[key], state.setup?.[key]);
+  }
+
+  #fillCard(card, state) {
+    const photo = state.photos.find(({ image }) => image === card.image);
+    card.element.hidden = !photo;
+    if (!photo) return;
+    setText(card.name, photo.name);
+    const size = `${photo.width} × ${photo.height} px`;
+    setText(card.facts, [size, photo.camera].filter(Boolean).join(" · "));
+    fill(card.focal_mm, photo.focal_mm);
+    fill(card.sensor_width_mm, photo.sensor_width_mm);
+    keyedRows(card.questions, photo.missing, { key: (text) => text, signature: (text) => text,
+      build: (text) => h("li", {}, text) });
+    this.#thumb(card, state);
+  }
+
+  async #thumb(card, state) {
+    const mark = photoMark(state);
+    if (card.mark === mark) return;
+    card.mark = mark;
+    const info = await this.app.pyramids.info("photo", card.image, mark);
+    const level = Math.min(THUMB_LEVEL, info.max_level);
+    card.thumb.src = `/tiles/photo/${card.image}/${level}/0_0.jpg?v=${info.version}`;
+  }
+}

@@ -1,0 +1,346 @@
+"""The survey workbook's points as rows, read and changed in place."""
+
+from __future__ import annotations
+
+import hashlib
+import tempfile
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from bifocal.collimation.live_results import observations
+from bifocal.collimation.records import Known, PickedPoint, Picks, Pixel
+from bifocal.model.flags import FlagLimits
+from bifocal.model.pair import Pair
+from bifocal.survey.output import as_typed, result_content
+from bifocal.survey.template_workflow import write_survey
+from bifocal.survey.workbook.content import SurveyContent, name_cell, setup_cells
+from bifocal.survey.workbook.reader import SurveyInput, read_survey
+from bifocal.survey.workbook.setup_cells import MATRICES, NADIRS
+from bifocal.survey.workbook.update import update_book
+from bifocal.survey.workflow import solve
+from photocore.errors import InputError, PhotogrammetryError
+from photocore.output import check_not_open, free_path, relative_name
+from photocore.workbook.cells import CellValue
+from photocore.workbook.editor import WorkbookEditor
+from photocore.workbook.grid import TableArea, split_cell
+
+#: Rows added at once where the prepared ones are used up.
+MORE_ROWS = 50
+#: Cells of the sheet Setup that hold the orientation.
+_TYPED = {
+    "pair_file", "d_1", "d_2", "c_1", "c_2", "pitch",
+    *(name for group in (*MATRICES, *NADIRS) for name in group),
+}  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True)
+class PointRow:
+    """A point as the workbook holds it."""
+
+    picks: Picks
+    code: str = ""
+    note: str = ""
+    use: bool = True
+    reference: Known | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ReadBook:
+    """What a workbook holds.
+
+    Attributes
+    ----------
+    rows : dict of str to PointRow
+    sigma_px : float or None
+        Precision of a pick. [px]
+    limits : FlagLimits
+    language : str
+    survey : SurveyInput
+    """
+
+    rows: dict[str, PointRow]
+    sigma_px: float | None
+    limits: FlagLimits
+    language: str
+    survey: SurveyInput
+
+
+def row_of(point: PickedPoint) -> PointRow:
+    """Return a point as a row; what is picked in one photo only takes no part yet."""
+    return PointRow(
+        point.picks, point.code, point.note, point.use and point.is_complete, point.reference
+    )
+
+
+def digest_of(path: Path) -> str:
+    """Return the SHA-256 of a file; empty where there is none."""
+    return hashlib.sha256(path.read_bytes()).hexdigest() if path.is_file() else ""
+
+
+def read_rows(path: Path) -> ReadBook:
+    """Return the points of a workbook.
+
+    Raises
+    ------
+    InputError
+        Naming every bad cell; or if it is made for another kind of measurement.
+    """
+    survey = read_survey(path)
+    points = survey.points
+    if len(points) and not points.has_pixels.any() and "col1" not in survey.table.present:
+        raise InputError(
+            f"{path.name}: its points are image coordinates of an ideal pair, the page picks raw "
+            "pixels; give another workbook with --workbook."
+        )
+    # Relief measured beside the points is the user's own column; the page keeps the sheet Check.
+    listed = len(survey.known_rows)
+    known = {
+        name: _known(xyz)
+        for name, xyz in zip(survey.known.ids[:listed], survey.known.xyz, strict=False)
+    }
+    rows = {}
+    for index, name in enumerate(points.ids):
+        if not name:
+            continue
+        rows[name] = PointRow(
+            (_pixel(points.pixels1[index]), _pixel(points.pixels2[index])),
+            points.code[index],
+            points.note[index],
+            bool(points.use[index]),
+            known.get(name),
+        )
+    return ReadBook(
+        rows=rows, sigma_px=survey.setup.sigma_px, limits=survey.setup.limits,
+        language=survey.language, survey=survey,
+    )  # fmt: skip
+
+
+def _pixel(values: Any) -> Pixel | None:
+    column, row = float(values[0]), float(values[1])
+    return None if np.isnan(column) or np.isnan(row) else (column, row)
+
+
+def _known(xyz: Any) -> Known | None:
+    x, y, r = (None if np.isnan(value) else float(value) for value in xyz)
+    return None if (x, y, r) == (None, None, None) else (x, y, r)
+
+
+def write_new(
+    path: Path, points: Sequence[PickedPoint], pair: Pair, pair_path: Path, language: str
+) -> None:
+    """Write a workbook where there is none."""
+    write_survey(
+        path, observations(points), pair=pair, pair_path=pair_path, language=language,
+        what="points picked with bifocal pick",
+    )  # fmt: skip
+    if any(point.reference for point in points):
+        read = read_rows(path)
+        change_rows(path, read, points, pair, pair_path, keep=False)
+
+
+def change_rows(
+    path: Path,
+    read: ReadBook,
+    points: Sequence[PickedPoint],
+    pair: Pair,
+    pair_path: Path,
+    *,
+    keep: bool,
+) -> None:
+    """Change the points of a workbook in place, and all that follows from them.
+
+    Parameters
+    ----------
+    path : Path
+    read : ReadBook
+        What it holds.
+    points : sequence of PickedPoint
+        What it shall hold.
+    pair, pair_path : Pair, Path
+        The geometry its formulas use.
+    keep : bool
+        Whether to keep a copy of the file as it is, under a name that is free.
+
+    Raises
+    ------
+    InputError
+        If the workbook is open elsewhere, or cannot take the points.
+    """
+    check_not_open(path)
+    before = digest_of(path)
+    with _beside(path) as typed, _beside(path) as solved:
+        editor = WorkbookEditor(path)
+        _edit(editor, read, points, pair, relative_name(pair_path, path.parent))
+        editor.save(typed, overwrite=True)
+        ready = solved if _solved(typed, solved) else typed
+        check_not_open(path)
+        if digest_of(path) != before:
+            raise InputError(f"{path.name}: was changed by another program just now.")
+        try:
+            if keep:
+                backup = free_path(path.parent, f"{path.name}.bak")
+                backup.write_bytes(path.read_bytes())
+            ready.replace(path)
+        except OSError as error:
+            raise InputError(
+                f"{path.name}: cannot be written ({error.strerror or error}); close it in other "
+                "programs."
+            ) from error
+
+
+@contextmanager
+def _beside(path: Path) -> Iterator[Path]:
+    """Yield a temporary name beside a workbook; the relative names in it stay true there."""
+    with tempfile.NamedTemporaryFile(
+        prefix=f".{path.stem}-", suffix=path.suffix, dir=path.parent, delete=False
+    ) as file:
+        temporary = Path(file.name)
+    try:
+        yield temporary
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+def _solved(typed: Path, target: Path) -> bool:
+    """Write a workbook with the results of all its formulas; tell whether it could be done."""
+    try:
+        solution = solve(typed)
+    except PhotogrammetryError:  # nothing to solve yet: the formulas stay live
+        return False
+    own = as_typed(solution, replace(result_content(solution, typed, None), log=()))
+    try:
+        update_book(typed, target, solution.survey, own, given={}, overwrite=True)
+    except InputError:  # a workbook changed beyond recognition still takes the picks
+        return False
+    return True
+
+
+def _edit(
+    editor: WorkbookEditor,
+    read: ReadBook,
+    points: Sequence[PickedPoint],
+    pair: Pair,
+    pair_file: str,
+) -> None:
+    area = editor.table("tblPoints")
+    if area is None or "col1" not in area.headings():
+        raise InputError(
+            f"{editor.path.name}: is no survey workbook for raw pixels; give another one with "
+            "--workbook."
+        )
+    has_lens = "ucol1" in area.headings()
+    if has_lens != any(pair.photo(number).lens is not None for number in (1, 2)):
+        raise InputError(
+            f"{editor.path.name}: its formulas are made for photos "
+            f"{'with' if has_lens else 'without'} lens distortion, the orientation is "
+            "not; give another workbook with --workbook."
+        )
+    _set_up(editor, read, pair, pair_file)
+    wanted = {point.name: _point_cells(point) for point in points}
+    stands = dict(zip(read.survey.table.texts("id"), read.survey.table.rows, strict=True))
+    _table(editor, area, wanted, stands, follower="tblResults")
+    check = editor.table("tblCheck")
+    if check is not None:
+        ids = read.survey.known.ids[: len(read.survey.known_rows)]
+        listed = dict(zip(ids, read.survey.known_rows, strict=True))
+        references = {
+            point.name: _reference_cells(point) for point in points if point.reference is not None
+        }
+        # Check points that no picked point is called after are the user's own.
+        own = {name: row for name, row in listed.items() if name in wanted or name in read.rows}
+        _table(editor, check, references, own)
+
+
+def _point_cells(point: PickedPoint) -> dict[str, CellValue]:
+    row, cells = row_of(point), dict[str, CellValue]()
+    for image, pick in enumerate(row.picks, start=1):
+        cells[f"col{image}"], cells[f"row{image}"] = pick or (None, None)
+    return {
+        "id": name_cell(point.name),
+        **cells,
+        "use": int(row.use),
+        "code": row.code or None,
+        "note": row.note or None,
+    }
+
+
+def _reference_cells(point: PickedPoint) -> dict[str, CellValue]:
+    assert point.reference is not None
+    known = dict(zip(("X_ref", "Y_ref", "Z_ref"), point.reference, strict=True))
+    return {"id": name_cell(point.name), "use": 1, **known}
+
+
+def _table(
+    editor: WorkbookEditor,
+    area: TableArea,
+    wanted: Mapping[str, Mapping[str, CellValue]],
+    stands: Mapping[str, int],
+    *,
+    follower: str = "",
+) -> None:
+    """Put rows into a table: changed ones where they stand, new ones into its blank rows."""
+    headings = area.headings()
+    cells = editor.grid(area.sheet).rows
+    keys = [key for key in next(iter(wanted.values()), {"id": None}) if key in headings]
+    first, last = area.area[0] + 1, area.area[2]
+    places = {name: row for name, row in stands.items() if name in wanted}
+    taken, freed = set(places.values()), set(stands.values()) - set(places.values())
+    blank = [
+        row
+        for row in range(first, last + 1)
+        if row not in taken
+        and (row in freed or cells.get(row, {}).get(headings["id"]) in (None, ""))
+    ]
+    new = [name for name in wanted if name not in places]
+    places |= dict(zip(new, blank, strict=False))
+    for name, row in places.items():
+        for key in keys:
+            _set(editor, area.sheet, row, headings[key], wanted[name][key], cells)
+    for row in freed - set(places.values()):
+        for key in keys:
+            _set(editor, area.sheet, row, headings[key], None, cells)
+    added = [wanted[name] for name in new if name not in places]
+    if added:
+        count = len(added) + MORE_ROWS
+        columns = {key: [values[key] for values in added] for key in keys}
+        editor.append_columns(area.name, columns, count=count)
+        if follower and editor.table(follower) is not None:
+            editor.append_columns(follower, {}, count=count)
+
+
+def _set(
+    editor: WorkbookEditor, sheet: str, row: int, column: int, value: CellValue,
+    cells: Mapping[int, Mapping[int, Any]],
+) -> None:  # fmt: skip
+    """Type a value where another one stands."""
+    stands = cells.get(row, {}).get(column)
+    if (stands in (None, "") and value in (None, "")) or (
+        stands == value and isinstance(stands, str) == isinstance(value, str)
+    ):
+        return
+    editor.set_value(sheet, row, column, value)
+
+
+def _set_up(editor: WorkbookEditor, read: ReadBook, pair: Pair, pair_file: str) -> None:
+    """Type the orientation into the sheet Setup, where it is another one."""
+    content = SurveyContent(pair=pair, pair_file=pair_file, sigma_px=read.sigma_px)
+    cells = {
+        name: value for name, value in setup_cells(content).items()
+        if name in _TYPED
+    }  # fmt: skip
+    names = {key.casefold(): place for key, place in editor.book.names.items()}
+    for name, value in cells.items():
+        place = names.get(name.casefold(), "")
+        sheet, _, cell = place.rpartition("!")
+        sheet, cell = sheet.strip("'"), cell.replace("$", "")
+        if not cell or sheet not in editor.titles:
+            continue
+        row, column = split_cell(cell)
+        stands = editor.grid(sheet).rows.get(row, {}).get(column)
+        if stands != value and not (stands in (None, "") and value in (None, "")):
+            editor.set_value(sheet, row, column, value)

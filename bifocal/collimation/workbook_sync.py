@@ -1,0 +1,189 @@
+"""The workbook kept in step with the page, in the background."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
+
+from bifocal.collimation.workbook_process import FROM as LARGE
+from bifocal.collimation.workbook_process import change_in_process
+from bifocal.collimation.workbook_rows import (
+    PointRow,
+    ReadBook,
+    change_rows,
+    digest_of,
+    read_rows,
+    row_of,
+    write_new,
+)
+from bifocal.model.pair import Pair
+from photocore.errors import InputError, PhotogrammetryError
+from photocore.output import check_not_open
+
+if TYPE_CHECKING:
+    from bifocal.collimation.session import Session
+
+#: Quiet seconds after a pick before the workbook is written, and between looks at the file.
+QUIET, LOOK = 0.7, 2.0
+
+
+class WorkbookSync:
+    """Keeps workbook and survey in step.
+
+    Parameters
+    ----------
+    session : Session
+
+    Attributes
+    ----------
+    waiting : str or None
+        Why picks wait in the journal: the workbook is open elsewhere, a cell in it is wrong ...
+    synced : dict of str to PointRow
+        The workbook's points as they stood after the last save or reading.
+    digest, seen : str
+        Of the file as the page wrote it last, and as it was read last.
+    """
+
+    def __init__(self, session: Session) -> None:
+        self.session = session
+        self.waiting: str | None = None
+        self.synced: dict[str, PointRow] = {}
+        self.digest = ""
+        self.seen = ""
+        self.read: ReadBook | None = None
+        self._busy = threading.Lock()
+        self._wake = threading.Event()
+        self._stopping = False
+        self._thread: threading.Thread | None = None
+
+    def start(self) -> None:
+        """Begin to write in the background."""
+        self._thread = threading.Thread(target=self._run, name="workbook", daemon=True)
+        self._thread.start()
+
+    def touch(self) -> None:
+        """Say that something was picked."""
+        self._wake.set()
+
+    def stop(self) -> None:
+        """Write what is left and end."""
+        self._stopping = True
+        self._wake.set()
+        if self._thread is not None:
+            self._thread.join(timeout=60)
+            self._thread = None
+        self.step()
+
+    def _run(self) -> None:
+        while not self._stopping:
+            touched = self._wake.wait(LOOK)
+            while touched and not self._stopping:  # until nothing is picked for a moment
+                self._wake.clear()
+                touched = self._wake.wait(QUIET)
+            if not self._stopping:
+                self.step()
+
+    def step(self) -> None:
+        """Bring in what others changed in the workbook, then write what changed on the page."""
+        with self._busy:
+            before = self.waiting
+            try:
+                self._merge()
+                self._write()
+                self.waiting = None
+            except (PhotogrammetryError, OSError) as error:
+                self.waiting = str(error)
+            if self.waiting != before:
+                self.session.changed()
+
+    def _merge(self) -> None:
+        """Take over rows that others changed, unless the page changed the same ones since."""
+        session, path = self.session, self.session.files.workbook
+        digest = digest_of(path)
+        if not digest or digest == self.seen:
+            return
+        read = read_rows(path)
+        with session.lock:
+            rows, gone = self._foreign(read.rows)
+            self.read, self.seen = read, digest
+            session.set_precision(read.sigma_px, read.limits)
+            if rows or gone:
+                session.take_rows(rows, gone)
+                self.take(rows, gone)
+            session.changed()
+
+    def take(self, rows: Mapping[str, PointRow], gone: Sequence[str]) -> None:
+        """Count rows that others changed as in step."""
+        self.synced.update(rows)
+        for name in gone:
+            self.synced.pop(name, None)
+
+    def _foreign(self, rows: Mapping[str, PointRow]) -> tuple[dict[str, PointRow], list[str]]:
+        """Return rows that others changed, and names that others took out."""
+        points = self.session.state.points
+        now = {name: row_of(point) for name, point in points.items()}
+
+        def page_changed(name: str) -> bool:
+            return now.get(name) != self.synced.get(name)
+
+        changed = {
+            name: row
+            for name, row in rows.items()
+            if row not in (self.synced.get(name), now.get(name)) and not page_changed(name)
+        }
+        gone = [
+            name
+            for name in self.synced
+            if name not in rows and name in points and not page_changed(name)
+        ]
+        return changed, gone
+
+    def _write(self) -> None:
+        """Write the page's points where they are others than the workbook's."""
+        session, path = self.session, self.session.files.workbook
+        with session.lock:
+            points = session.state.sorted_points()
+            pair, pair_path = session.accepted_pair, session.files.pair
+            revision = session.state.revision
+            language = session.state.language or session.language
+        wanted = {point.name: row_of(point) for point in points}
+        if pair is None or pair_path is None:
+            return
+        exists = bool(path.exists() and path.stat().st_size)
+        if exists and self.read is not None:
+            written = wanted == self.synced and self.seen == self.digest
+            if (written or wanted == self.read.rows) and not self._oriented_anew(pair):
+                return
+            keep = self.seen != self.digest
+            if len(points) < LARGE:
+                change_rows(path, self.read, points, pair, pair_path, keep=keep)
+            else:
+                change_in_process(path, points, pair_path, keep=keep)
+        else:
+            if not any(point.is_complete for point in points):
+                return
+            check_not_open(path)
+            write_new(path, points, pair, pair_path, language)
+        read = read_rows(path)
+        if lost := wanted.keys() - read.rows.keys():
+            raise InputError(f"{path.name}: did not take {len(lost)} points, {min(lost)} first.")
+        self.synced = wanted
+        self.digest = self.seen = digest_of(path)
+        self.read = read
+        session.note_saved(self.digest, revision)
+
+    def _oriented_anew(self, pair: Pair) -> bool:
+        """Whether the workbook's homographies, nadirs or distances are not the pair's."""
+        if self.read is None or self.read.survey.setup.matrices is None:
+            return False
+        setup = self.read.survey.setup
+        known = zip(setup.matrices or (), setup.nadirs, (setup.d1, setup.d2), strict=True)
+        return any(
+            (matrix != photo.plane_from_pixel).any()
+            or (nadir != photo.nadir).any()
+            or distance != photo.distance
+            for (matrix, nadir, distance), photo in zip(
+                known, (pair.image1, pair.image2), strict=True
+            )
+        )

@@ -1,0 +1,156 @@
+"""What the orientation's own covariance does to points: common to all of them, unlike their picks.
+
+A pair file may carry the covariance of its cameras, as `bifocal align` found it; then every point,
+map and report states what the whole measurement is worth, not the pick alone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, Protocol
+
+import numpy as np
+
+from photocore.arrays import FloatArray, as_floats, read_only
+from photocore.camera import PARAMETERS, Pinhole, camera_matrix, project_with_jacobian
+from photocore.errors import InputError
+
+#: What each camera's covariance counts: a pinhole's parameters and two terms of radial distortion.
+CAMERA = (*PARAMETERS, "k1", "k2")
+NAMES = tuple(f"{name} {number}" for number in (1, 2) for name in CAMERA)
+
+
+class PlanePhoto(Protocol):
+    """A photo as a homography with nadir and distance."""
+
+    @property
+    def plane_from_pixel(self) -> FloatArray:
+        """Homography from pixels to the plane, shape (3, 3)."""
+
+    @property
+    def nadir(self) -> FloatArray:
+        """Foot of the camera, shape (2,). [m]"""
+
+    @property
+    def distance(self) -> float:
+        """Distance of the camera. [m]"""
+
+
+def pinhole(photo: PlanePhoto) -> Pinhole:
+    """Return the camera that a homography, a nadir and a distance describe.
+
+    Notes
+    -----
+    ``pixel ~ K R [e1 e2 -C] (X, Y, 1)``; K R follows from the homography's inverse, and an
+    orthogonal decomposition splits it.
+    """
+    centre = np.array([*photo.nadir, photo.distance])
+    base = np.column_stack([np.eye(3)[:, :2], -centre])
+    mapped = np.linalg.inv(photo.plane_from_pixel) @ np.linalg.inv(base)
+    mapped /= np.cbrt(np.linalg.det(mapped))
+    # K R = (reversed QR of the transposed, reversed matrix), with a positive diagonal.
+    base, triangle = np.linalg.qr(mapped[::-1].T)
+    matrix, rotation = triangle.T[::-1, ::-1], base.T[::-1]
+    sign = np.sign(np.diag(matrix))
+    matrix, rotation = matrix * sign, rotation * sign[:, None]
+    scale = matrix[2, 2]
+    focal, aspect = matrix[0, 0] / scale, matrix[1, 1] / matrix[0, 0]
+    ideal = camera_matrix(focal, aspect, *(matrix[:2, 2] / scale))
+    ideal[0, 1] = matrix[0, 1] / scale  # a homography typed in may be skewed
+    return Pinhole(ideal, rotation, centre)
+
+
+def orientation_covariance(
+    photos: tuple[PlanePhoto, PlanePhoto], covariance: FloatArray, xyz: FloatArray
+) -> FloatArray:
+    """Return the covariance of points at fixed pixels from that of the orientation. [m²]
+
+    Parameters
+    ----------
+    photos : pair of photos
+    covariance : ndarray, shape (24, 24)
+        Of `NAMES`.
+    xyz : ndarray, shape (n, 3)
+        Points. [m]
+
+    Returns
+    -------
+    ndarray, shape (n, 3, 3)
+        NaN where a point is.
+
+    Notes
+    -----
+    The four pixels p of a point P in cameras c stay: ``A dP = -dp/dc dc`` by least squares with
+    ``A = dp/dP``, so ``J = -(AᵀA)⁻¹Aᵀ dp/dc`` and the covariance is ``J C Jᵀ``.
+    """
+    by_point, by_camera = [], np.zeros((len(xyz), 4, len(NAMES)))
+    for number, photo in enumerate(photos):
+        camera = pinhole(photo)
+        view = project_with_jacobian(camera, xyz)
+        by_point.append(view.by_point)
+        rows, first = slice(2 * number, 2 * number + 2), number * len(CAMERA)
+        by_camera[:, rows, first : first + len(PARAMETERS)] = view.by_camera
+        # Straightened by 1 / (1 + k1 rho² + k2 rho⁴), ideal pixels move inwards.
+        away = view.pixels - camera.matrix[:2, 2]
+        square = (away**2).sum(axis=1, keepdims=True) / camera.matrix[0, 0] ** 2
+        by_camera[:, rows, first + len(PARAMETERS)] = away * square
+        by_camera[:, rows, first + len(PARAMETERS) + 1] = away * square**2
+    design = np.concatenate(by_point, axis=1)
+    known = np.isfinite(design).all(axis=(1, 2))
+    out = np.full((len(xyz), 3, 3), np.nan)
+    jacobian = -np.linalg.pinv(design[known]) @ by_camera[known]
+    out[known] = jacobian @ covariance @ jacobian.transpose(0, 2, 1)
+    return out
+
+
+def exchanged(covariance: FloatArray) -> FloatArray:
+    """Return the covariance with both cameras exchanged."""
+    order = np.roll(np.arange(len(NAMES)), len(CAMERA))
+    return covariance[np.ix_(order, order)]
+
+
+def moved(covariance: FloatArray, axes: FloatArray) -> FloatArray:
+    """Return the covariance in a frame whose axes are the rows of ``axes``."""
+    turn = np.eye(len(NAMES))
+    for number in (0, 1):
+        for name in ("turn X", "X"):
+            first = number * len(CAMERA) + CAMERA.index(name)
+            turn[first : first + 3, first : first + 3] = axes
+    return turn @ covariance @ turn.T
+
+
+def as_dict(covariance: FloatArray) -> dict[str, Any]:
+    """Return what the pair file holds under ``orientation``."""
+    return {
+        "parameters": list(NAMES),
+        "units": "ln, ln, px, px, rad, rad, rad, m, m, m, 1, 1 for either camera",
+        "covariance": covariance,
+    }
+
+
+def from_dict(data: Any) -> FloatArray:
+    """Return the covariance that a pair file holds under ``orientation``.
+
+    Raises
+    ------
+    InputError
+        If it is not one of `NAMES`, or no covariance.
+    """
+    if not isinstance(data, Mapping) or list(data.get("parameters", ())) != list(NAMES):
+        raise InputError(
+            '"orientation": expected {"parameters": [...], "covariance": [[...]]} with the '
+            f"{len(NAMES)} parameters that `bifocal align` writes; leave the key out if the "
+            "orientation's precision is not known."
+        )
+    return checked(as_floats(data.get("covariance", ()), "orientation.covariance"))
+
+
+def checked(covariance: FloatArray) -> FloatArray:
+    """Return a read-only covariance of `NAMES`, refusing what is none."""
+    size = len(NAMES)
+    matrix = read_only(covariance, "orientation", shape=(size, size))
+    scale = np.sqrt(np.maximum(np.diag(matrix), 0.0))
+    wrong = np.abs(matrix) > 1.001 * np.outer(scale, scale) + 1e-30
+    if not np.isfinite(matrix).all() or (np.diag(matrix) < 0).any() or wrong.any():
+        raise InputError('"orientation": the matrix is no covariance (symmetric, not negative).')
+    return matrix

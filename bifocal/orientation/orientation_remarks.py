@@ -1,0 +1,109 @@
+"""What the user should be told of an oriented pair: what does not fit, what is weak or assumed."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from bifocal.orientation.bend import bend_in_words
+from bifocal.orientation.control_points import Control, SiteMeasures
+from bifocal.orientation.orientation_stages import OrientedPair
+from bifocal.orientation.pair_observations import PairObservations
+
+#: Common points that fit their lines no better than this, at 3000 px of width, do not fit. Clean
+#: pairs reach 0.19, a phone pair with its lens estimated 0.4. [px]
+WORST_FIT = 0.6
+#: Beyond this many standard deviations an adjusted value contradicts what was given.
+CONTRADICTS = 3.0
+
+
+def model_remarks(pair: OrientedPair, site: SiteMeasures) -> list[str]:
+    """Return where photos and what was given contradict each other, with the likely reason."""
+    observations, adjusted = pair.observations, pair.adjusted
+    known = any(i.is_calibrated or i.sigma_radial > 0 for i in observations.interiors)
+    remarks = [bend_in_words(pair.bend, with_lens=known)]
+    unit = max(observations.interiors[0].image_size) / 3000
+    sigma = observations.sigma_tie
+    if observations.tie_used.sum() >= 20 and sigma > WORST_FIT * unit:
+        remarks.append(
+            f"THE MODEL DOES NOT FIT: common points miss their lines by {sigma:.2f} px, good pairs "
+            "by 0.1 to 0.2. The likely reason is lens distortion (calibrate, give --lens), motion "
+            "in the scene, or two photos of different states."
+        )
+    for number, (interior, camera) in enumerate(
+        zip(observations.interiors, adjusted.cameras, strict=True), start=1
+    ):
+        change = float(np.log(camera.matrix[0, 0] / interior.focal))
+        if not interior.is_assumed and abs(change) > CONTRADICTS * interior.sigma_focal:
+            remarks.append(
+                f"The focal length of photo {number} came out {100 * np.expm1(change):+.1f} % from "
+                f"the one given ({interior.source}), {abs(change) / interior.sigma_focal:.0f} of "
+                "its standard deviations: check it, the lens distortion and the distances."
+            )
+    for name, camera, given in zip(
+        ("far", "near"), adjusted.cameras, (site.distance1, site.distance2), strict=True
+    ):
+        off = float(camera.centre[2]) - (given or 0.0)
+        if given and abs(off) > CONTRADICTS * site.sigma:
+            remarks.append(
+                f"The {name} camera's distance came out {off:+.3f} m from the one measured "
+                f"({given:g} m), {abs(off) / site.sigma:.0f} of its standard deviations: check the "
+                "tape, the plane it was measured to, the focal lengths and the lens distortion."
+            )
+    return [remark for remark in remarks if remark]
+
+
+def control_remarks(control: Control, pair: OrientedPair) -> list[str]:
+    """Return what the control points lack."""
+    remarks = [
+        f"Control point {control.ids[index]} is a gross error "
+        f"({pair.adjusted.control_test[index]:.0f} standard deviations) and was left out. Check "
+        "its coordinates and its picks."
+        for index in np.flatnonzero(~pair.observations.pick_used)
+    ]
+    count = int(control.positioned.sum())
+    if 0 < count < 4:
+        remarks.append(
+            f"{count} of at least 4 control points: they give scale and place, the photos the "
+            "rest. Four or more, spread over the photo, fix the plane."
+        )
+    if 4 <= count < 9:
+        remarks.append(
+            f"{count} control points; CIPA advises nine, spread over the photo, so that an error "
+            "in one is found."
+        )
+    return remarks
+
+
+def distance_remarks(pair: OrientedPair) -> list[str]:
+    """Return which distances are poorly determined."""
+    remarks = []
+    for number, camera in enumerate(pair.adjusted.cameras, start=1):
+        distance, sigma = float(camera.centre[2]), pair.adjusted.sigma("Z", number)
+        if sigma > 0.03 * distance:
+            remarks.append(
+                f"The distance of camera {number} is poorly determined ({distance:.2f} ± "
+                f"{sigma:.2f} m). Give the focal lengths, the distances, or more points off the "
+                "wall."
+            )
+    return remarks
+
+
+def assumptions(observations: PairObservations, site: SiteMeasures) -> list[str]:
+    """Return what only the prior holds."""
+    out = []
+    for number, interior in enumerate(observations.interiors, start=1):
+        if interior.is_assumed:
+            out.append(f"focal length of photo {number}: {interior.source}")
+        if not interior.is_calibrated:
+            out.append(
+                f"principal point of photo {number} in its centre "
+                f"(within {interior.sigma_centre:.0f} px)"
+            )
+    uncorrected = [i for i in observations.interiors if not i.is_calibrated and not i.sigma_radial]
+    if uncorrected:
+        out.append("photos free of lens distortion (else calibrate and give --lens)")
+    if site.parallel:
+        out.append("image planes parallel to the wall within 0.3°")
+    if observations.sigma_zoom is not None:
+        out.append("one focal length for both photos (they agree)")
+    return out

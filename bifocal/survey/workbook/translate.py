@@ -1,0 +1,51 @@
+"""Another language for a survey workbook that exists: its labels, not what the user wrote."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from bifocal.survey.workbook.book import build
+from bifocal.survey.workbook.content import SurveyContent
+from bifocal.survey.workbook.words import word
+from photocore.workbook.editor import WorkbookEditor
+
+#: Words in charts, footers and rules: they stand in no cell.
+_ELSEWHERE = ("chart_plan", "chart_sigma", "chart_error", "page", "holds", "fails")
+
+
+def translate(editor: WorkbookEditor, content: SurveyContent, language: str) -> None:
+    """Replace the words of the program by those of another language, wherever they were moved to.
+
+    Parameters
+    ----------
+    editor : WorkbookEditor
+        The workbook.
+    content : SurveyContent
+        What it holds, with the language wanted.
+    language : str
+        The language it is in.
+    """
+    new, old = build(content).book, build(replace(content, language=language)).book
+    for sheet in new.worksheets:
+        if sheet.title not in editor.titles:
+            continue
+        before = old[sheet.title]
+        words = {
+            before[cell.coordinate].value: cell.value
+            for row in sheet.iter_rows()
+            for cell in row
+            if cell.data_type == "s" and before[cell.coordinate].value != cell.value
+        }
+        inside = [area.area for area in editor.tables if area.sheet == sheet.title]
+        for row, cells in editor.grid(sheet.title).rows.items():
+            for column, value in cells.items():
+                is_data = any(
+                    top < row <= bottom and left <= column <= right
+                    for top, left, bottom, right in inside
+                )
+                if isinstance(value, str) and value in words and not is_data:
+                    editor.set_value(sheet.title, row, column, words[value])
+        for key in _ELSEWHERE:
+            texts = [word(key, spoken) for spoken in (language, content.language)]
+            quoted = {"page": "R{} &P", "holds": '="{}"', "fails": '="{}"'}.get(key, "{}")
+            editor.replace_text(sheet.title, *(quoted.format(text) for text in texts))

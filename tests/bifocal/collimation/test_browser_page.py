@@ -1,0 +1,248 @@
+"""The page as a whole: languages, sizes, touch, names and contrast, nothing from outside."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from bifocal.collimation.server import WEB
+from bifocal.model.lens import Lens
+from tests.browser import Driver, Served, launched, sample_survey, tab_of
+
+STAGES = ("photos", "orientation", "points", "products")
+#: WCAG 2.2, success criterion 1.4.3.
+CONTRAST = 4.5
+
+
+def words_of(language: str) -> dict[str, str]:
+    text = (WEB / "js" / "words" / f"{language}.js").read_text(encoding="utf-8")
+    body = text[text.index("{") : text.rindex("}")].rstrip().rstrip(",") + "}"
+    return dict(json.loads(body))
+
+
+def test_every_word_is_there_in_three_languages() -> None:
+    english, *others = (words_of(language) for language in ("en", "it", "de"))
+    for other in others:
+        assert list(other) == list(english)
+        for key, text in english.items():
+            assert re.findall(r"\{\w+\}", text) == re.findall(r"\{\w+\}", text)
+            assert sorted(re.findall(r"\{\w+\}", other[key])) == sorted(
+                re.findall(r"\{\w+\}", text)
+            ), key
+    code = "\n".join(path.read_text() for path in (WEB / "js").glob("*.js"))
+    said = set(re.findall(r"""(?:\bt\(|\bsay\()(["'])([\w.-]+)\1""", code))
+    assert {key for _, key in said} <= set(english)
+
+
+def test_what_is_not_ours_is_versioned_and_licensed() -> None:
+    for folder in (WEB / "vendor").iterdir():
+        assert re.fullmatch(r"[a-z]+-\d+\.\d+\.\d+", folder.name)
+        assert any(path.name.startswith("LICENSE") for path in folder.iterdir())
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Any]:
+    with launched() as found:
+        yield found
+
+
+@pytest.fixture(scope="module")
+def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
+    with sample_survey(tmp_path_factory.mktemp("survey")) as started:
+        yield started
+
+
+@pytest.fixture(scope="module")
+def page(browser: Any, server: Served) -> Iterator[Driver]:
+    with tab_of(browser, server) as driver:
+        yield driver
+
+
+LENSES = {
+    "opencv": (-0.11, 0.04, 0.0007, -0.0004, 0.01),
+    "rational": (-0.1, 0.04, 0.0007, -0.0004, 0.01, 0.02, -0.01, 0.003),
+    "tilted": (
+        -0.1, 0.04, 0.0007, -0.0004, 0.01, 0.02, -0.01, 0.003, 1e-3, 2e-4, -1e-3, 1e-4, 0.02, -0.03,
+    ),
+    "fisheye": (0.02, -0.01, 0.003, -0.0005),
+    "radial": (0.0, 1.0, 600.0, 0.998, 1300.0, 0.989, 2100.0, 0.975, 3200.0, 0.95, 4200.0, 0.93),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", LENSES)
+def test_the_page_bends_pixels_as_the_library_does(page: Driver, name: str) -> None:
+    model = name if name in ("fisheye", "radial") else "opencv"
+    matrix = [[4100.0, 0, 2990.0], [0, 4090.0, 2010.0], [0, 0, 1]]
+    lens = Lens(
+        camera_matrix=matrix, model=model, coefficients=LENSES[name], image_size=(6000, 4000)
+    )
+    pixels = [[2990.0, 2010.0], [10.0, 20.0], [5900.0, 3900.0], [3000.5, 100.25], [700.0, 2600.0]]
+    script = """async ([description, pixels]) => {
+        const { Lens } = await import("/js/lens.js");
+        const lens = new Lens(description);
+        return [pixels.map((one) => lens.distort(one)), pixels.map((one) => lens.undistort(one))];
+    }"""
+    described = {"camera_matrix": matrix, "model": model, "coefficients": list(LENSES[name])}
+    bent, straight = page.tab.evaluate(script, [described, pixels])
+    np.testing.assert_allclose(bent, lens.distort(pixels), rtol=0, atol=1e-8)
+    # OpenCV stops its own iteration at about 1e-6 px; the way back is the sharper check.
+    np.testing.assert_allclose(lens.distort(straight), pixels, rtol=0, atol=1e-7)
+
+
+def test_nothing_is_asked_of_anybody_else(page: Driver) -> None:
+    for stage in STAGES:
+        page.click(f"mode-{stage}")
+        page.tab.wait_for_timeout(150)
+    assert page.requests
+    assert all(url.startswith(page.server.origin) for url in page.requests)
+
+
+NAMELESS = """() => [...document.querySelectorAll(
+    "button, a[href], input, select, textarea, [role=slider], [role=application], [role=img]")]
+  .filter((node) => node.checkVisibility())
+  .filter((node) => !(node.getAttribute("aria-label") || node.textContent.trim() || node.title
+    || (node.labels && node.labels.length)))
+  .map((node) => node.outerHTML)"""
+
+PALE = """() => {
+  const channels = (text) => text.match(/[\\d.]+/g).map(Number);
+  const light = ([r, g, b]) => [r, g, b].map((v) => v / 255)
+    .map((v) => (v <= 0.04045 ? v / 12.92 : ((v + 0.055) / 1.055) ** 2.4))
+    .reduce((sum, v, i) => sum + v * [0.2126, 0.7152, 0.0722][i], 0);
+  const ground = (node) => {
+    for (let one = node; one; one = one.parentElement) {
+      const c = channels(getComputedStyle(one).backgroundColor);
+      if (c.length < 4 || c[3] > 0.8) return c;
+    }
+    return [0, 0, 0];
+  };
+  const found = [];
+  for (const node of document.querySelectorAll("body *")) {
+    const own = [...node.childNodes].some((one) => one.nodeType === 3 && one.data.trim());
+    const seen = { visibilityProperty: true, opacityProperty: true };
+    if (!own || !node.checkVisibility(seen)) continue;
+    const [a, b] = [light(channels(getComputedStyle(node).color)), light(ground(node))];
+    const ratio = (Math.max(a, b) + 0.05) / (Math.min(a, b) + 0.05);
+    if (ratio < %s) found.push(`${ratio.toFixed(2)} ${node.outerHTML.slice(0, 120)}`);
+  }
+  return found;
+}"""
+
+
+def test_everything_has_a_name_and_can_be_read(page: Driver) -> None:
+    for stage in STAGES:
+        page.click(f"mode-{stage}")
+        assert page.tab.evaluate(NAMELESS) == [], stage
+        assert page.tab.evaluate(PALE % CONTRAST) == [], stage
+    page.keys("F1")
+    assert page.tab.get_by_role("dialog").is_visible()
+    assert page.tab.evaluate(PALE % CONTRAST) == []
+    page.keys("Escape")
+    assert page.tab.get_by_role("dialog").count() == 0
+
+
+def test_the_stages_are_tabs_that_say_what_is_missing(page: Driver) -> None:
+    page.click("mode-points")
+    tab = page.tab.get_by_role("tab", selected=True)
+    assert "pick the first point" in str(tab.text_content())
+    page.keys("PageDown")
+    assert "run the relief" in str(page.tab.get_by_role("tab", selected=True).text_content())
+    page.tab.get_by_role("tab", selected=True).focus()
+    page.keys("ArrowLeft")
+    assert page.tab.get_by_role("tabpanel").get_attribute("id") == "stage-points"
+
+
+OUTSIDE = """() => [...document.querySelectorAll("header *, .layer-bar *, .hand *, .card *")]
+  .filter((node) => node.checkVisibility() && node.matches("button, input, select, label, td, dd"))
+  .filter((node) => !node.classList.contains("unseen"))
+  .filter((node) => { const box = node.getBoundingClientRect();
+    return box.left < -0.5 || box.right > innerWidth + 0.5; })
+  .map((node) => node.outerHTML.slice(0, 120))"""
+
+
+@pytest.mark.parametrize("size", [(1280, 720), (3840, 2160)])
+def test_it_fits_small_screens_and_large(page: Driver, size: tuple[int, int]) -> None:
+    page.tab.set_viewport_size({"width": size[0], "height": size[1]})
+    for stage in STAGES:
+        page.click(f"mode-{stage}")
+        assert page.tab.evaluate(OUTSIDE) == [], stage
+        assert page.tab.evaluate("() => document.documentElement.scrollWidth <= innerWidth")
+    page.tab.set_viewport_size({"width": 1280, "height": 720})
+
+
+@pytest.mark.parametrize(("language", "word"), [("it", "Orientamento"), ("de", "Orientierung")])
+def test_it_speaks_italian_and_german(page: Driver, language: str, word: str) -> None:
+    page.tab.get_by_test_id("language").select_option(language)
+    page.wait(f"() => document.documentElement.lang === '{language}' && window.bifocal")
+    assert word in str(page.tab.get_by_test_id("mode-orientation").text_content())
+    for stage in STAGES:
+        page.click(f"mode-{stage}")
+        assert page.tab.evaluate(OUTSIDE) == [], stage
+    page.tab.get_by_test_id("language").select_option("en")
+    page.wait("() => document.documentElement.lang === 'en' && window.bifocal")
+
+
+@pytest.mark.acceptance
+def test_a_finger_picks_and_two_fingers_zoom(browser: Any, server: Served) -> None:
+    with tab_of(browser, server, has_touch=True) as touch:
+        touch.empty()
+        x, y = touch.screen(1, (900.0, 400.0))
+        touch.tab.touchscreen.tap(x, y)
+        state = touch.settled("state.points.length === 1")
+        column, row = state["points"][0]["picks"]["1"]
+        assert np.hypot(column - 900, row - 400) < 1.5
+        before = touch.screen(1, (901.0, 400.0))[0] - x
+        session = touch.context.new_cdp_session(touch.tab)
+        pinch = {"x": x, "y": y, "scaleFactor": 2, "gestureSourceType": "touch"}
+        session.send("Input.synthesizePinchGesture", pinch)
+        x, _ = touch.still(1, (900.0, 400.0))
+        assert (touch.screen(1, (901.0, 400.0))[0] - x) / before > 1.5
+        touch.empty()
+
+
+def test_control_points_and_tapes_are_typed_and_mended(page: Driver) -> None:
+    page.click("mode-orientation")
+    page.click("control-paste")
+    page.tab.get_by_test_id("paste-area").fill("A\t0,5\t1,25\t\nB\t3,5\t1,25\t0,2")
+    page.click("dialog-yes")
+    state = page.settled("state.control.length === 2")
+    assert [state["control"][0][key] for key in ("X", "Y", "r")] == [0.5, 1.25, None]
+    page.tab.get_by_label("r A").fill("0,1")
+    page.keys("Enter")
+    page.settled("state.control[0].r === 0.1")
+    for index, text in enumerate(("A", "B", "3,002", "0.005")):
+        page.tab.get_by_test_id(f"tape-{index}").fill(text)
+    page.click("tape-add")
+    tape = page.settled("state.tapes.length === 1")["tapes"][0]
+    assert (tape["length"], tape["sigma"]) == (3.002, 0.005)
+    page.tab.get_by_label("r A").fill("ten")
+    page.keys("Enter")
+    # No number: said at the field, and nothing sent.
+    assert page.tab.get_by_label("r A").evaluate("(field) => !field.validity.valid")
+    assert page.state["control"][0]["r"] == 0.1
+    page.tab.get_by_role("button", name="Delete A", exact=True).click()
+    page.settled("state.control.length === 1 && state.tapes.length === 0")
+    page.click("undo")
+    page.settled("state.control.length === 2 && state.tapes.length === 1")
+
+
+def test_a_token_is_needed(browser: Any, server: Served) -> None:
+    context = browser.new_context()
+    tab = context.new_page()
+    answer = tab.goto(server.origin + "/")
+    assert answer is not None
+    assert answer.status == 403
+    context.close()
+
+
+def test_the_page_ships_with_the_package() -> None:
+    wanted = ("index.html", "style.css", "js/main.js", "js/words/de.js")
+    assert all((WEB / name).is_file() for name in wanted)
+    ignored = Path(".gitignore").read_text().split()
+    assert not any(f"/{name}/" in str(path) for path in WEB.rglob("*") for name in ignored)

@@ -1,0 +1,256 @@
+"""Points picked in the page, by mouse and by keys, in headless Chromium."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from tests.browser import TARGETS, Driver, launched, sample_survey, tab_of, true_pixel
+
+#: On the rim of a shadow; not among the control points for that.
+SHADED = (2.10, 2.25, 0.0)
+TENTHS = 0.05
+
+
+@pytest.fixture(scope="module")
+def tab(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Driver]:
+    folder = tmp_path_factory.mktemp("survey")
+    with launched() as browser, sample_survey(folder) as server, tab_of(browser, server) as driver:
+        yield driver
+
+
+@pytest.fixture
+def page(tab: Driver) -> Driver:
+    """Return the page with no points, both photos whole and superimposed."""
+    tab.empty()
+    return tab
+
+
+def distance(a: Any, b: Any) -> float:
+    return float(np.hypot(a[0] - b[0], a[1] - b[1]))
+
+
+def nudged(page: Driver, name: str, image: int, goal: tuple[float, float]) -> Any:
+    """Move the pick in hand to a pixel by the arrow keys and return where it is."""
+    page.keys(str(image))
+    for shift, axis in ((0, ("ArrowRight", "ArrowLeft")), (1, ("ArrowDown", "ArrowUp"))):
+        picks = page.point(name)["picks"]
+        gap = goal[shift] - picks[str(image)][shift]
+        page.keys(*[axis[gap < 0]] * round(abs(gap) / 0.1))
+        page.settled("true")
+    return page.point(name)["picks"][str(image)]
+
+
+def test_a_pick_is_nudged_to_a_known_centre_at_every_zoom(page: Driver) -> None:
+    truth = true_pixel(1, SHADED)
+    for index, zoom in enumerate((0.6, 2.0, 8.0), start=1):
+        page.zoom_to(1, truth, zoom)
+        page.keys("n")
+        page.pick(1, truth)
+        name = f"P{index:02d}"
+        page.settled(f"state.points.some(({{ name }}) => name === '{name}')")
+        clicked = page.point(name)["picks"]["1"]
+        assert distance(clicked, truth) < 1.2 / zoom
+        # Each axis stops within half a step of 0.1 px.
+        found = nudged(page, name, 1, truth)
+        assert max(abs(np.subtract(found, truth))) <= TENTHS + 1e-9
+
+
+def test_snap_centres_a_pick_on_the_target(page: Driver) -> None:
+    for index, name in enumerate(("T08", "T19", "T30"), start=1):
+        truth = true_pixel(1, TARGETS[name])
+        page.keys("n")
+        page.pick(1, (truth[0] + 1.7, truth[1] - 1.3))
+        page.settled(f"state.points.length === {index}")
+        before = page.point(f"P{index:02d}")["picks"]["1"]
+        page.keys("c")
+        page.wait(
+            "([name, column]) => bifocal.state().points.find((one) => one.name === name)"
+            ".picks[1][0] !== column",
+            [f"P{index:02d}", before[0]],
+        )
+        assert distance(page.point(f"P{index:02d}")["picks"]["1"], truth) < 0.05, name
+
+
+def test_what_the_screen_shows_at_a_pixel_is_that_pixel_of_the_photo(page: Driver) -> None:
+    """The dark disc of a target on a screenshot, against the target's own coordinates."""
+    truth = true_pixel(1, TARGETS["T08"])
+    page.zoom_to(1, truth, 8.0)
+    page.tab.get_by_test_id("layer-opacity").fill("0")
+    page.tab.wait_for_timeout(400)
+    x, y = page.screen(1, truth)
+    side = 56
+    clip = {"x": round(x) - side / 2, "y": round(y) - side / 2, "width": side, "height": side}
+    shot = Image.open(io.BytesIO(page.tab.screenshot(clip=clip))).convert("L")
+    dark = 255.0 - np.asarray(shot, dtype=float)
+    dark[dark < 160] = 0
+    rows, columns = np.mgrid[:side, :side] + 0.5
+    centre = (
+        round(x) - side / 2 + float((columns * dark).sum() / dark.sum()),
+        round(y) - side / 2 + float((rows * dark).sum() / dark.sum()),
+    )
+    zoom = page.screen(1, (truth[0] + 1, truth[1]))[0] - x
+    # A convention of half a pixel would be off by 0.5.
+    assert distance(centre, (x, y)) / zoom < 0.12
+
+
+def test_screen_and_photo_are_each_others_inverse(page: Driver) -> None:
+    for image in (1, 2):
+        for pixel in ((10.25, 20.5), (1400.0, 900.75)):
+            assert distance(page.photo(image, page.screen(image, pixel)), pixel) < 1e-9
+
+
+def test_a_point_is_picked_suggested_and_accepted_by_clicks(page: Driver) -> None:
+    page.click("mode-points")
+    page.click("pick")
+    page.pick(1, true_pixel(1, TARGETS["T19"]))
+    page.wait("() => document.querySelector('[data-testid=quality]').dataset.level === 'good'")
+    # Proposed is not picked.
+    assert page.point("P01")["picks"]["2"] is None
+    page.click("accept")
+    state = page.settled("state.points[0]?.result")
+    # The click was as good as a whole pixel of the screen, and its partner follows it.
+    assert distance(state["points"][0]["picks"]["2"], true_pixel(2, TARGETS["T19"])) < 1.5
+    assert page.tab.get_by_test_id("value-r").text_content() == (
+        f"{state['points'][0]['result']['r']:.4f} ± {state['points'][0]['result']['sigma_r']:.4f} m"
+    )
+
+
+def test_a_pick_off_the_line_is_taken_and_its_misfit_shown(page: Driver) -> None:
+    page.pick(1, true_pixel(1, SHADED))
+    page.settled("state.points.length === 1")
+    column, row = true_pixel(2, SHADED)
+    page.pick(2, (column + 20, row + 25))
+    result = page.settled("state.points[0].result")["points"][0]["result"]
+    assert abs(result["misfit_px"]) > 10
+    assert result["flag"] == "OFF-RADIAL"
+    assert "OFF-RADIAL" in str(page.tab.get_by_test_id("value-flag").text_content())
+    shown = str(page.tab.get_by_test_id("value-misfit_px").text_content())
+    assert shown == f"{result['misfit_px']:.2f} px"
+
+
+def test_a_point_is_picked_by_keys_alone(page: Driver) -> None:
+    """From the stage's own key to the accepted partner, and no mouse."""
+    page.keys("n", "k")
+    goal = true_pixel(1, TARGETS["T08"])
+    x, y = page.screen(1, goal)
+    box = page.tab.locator(".pane").first.bounding_box()
+    dx, dy = x - box["x"] - box["width"] / 2, y - box["y"] - box["height"] / 2
+    for gap, ahead, back in ((dx, "ArrowRight", "ArrowLeft"), (dy, "ArrowDown", "ArrowUp")):
+        key, steps = (ahead if gap > 0 else back), round(abs(gap))
+        page.keys(*[f"Shift+{key}"] * (steps // 50), *[key] * (steps % 50 // 10))
+        page.keys(*[f"Alt+{key}"] * (steps % 10))
+    page.keys("Enter")
+    page.suggested()
+    page.keys("c", "s", "a")
+    state = page.settled("state.points[0]?.result")
+    picks = state["points"][0]["picks"]
+    assert distance(picks["1"], goal) < 0.05
+    assert distance(picks["2"], true_pixel(2, TARGETS["T08"])) < 1.0
+
+
+def test_points_are_named_typed_joined_deleted_and_brought_back(page: Driver) -> None:
+    for place in (SHADED, TARGETS["T08"]):
+        page.keys("n")
+        page.pick(1, true_pixel(1, place))
+        page.suggested()
+        page.keys("a")
+        page.settled("state.points.at(-1)?.result")
+    page.tab.get_by_test_id("point-name").fill("corner")
+    page.keys("Enter")
+    page.settled("state.points[1].name === 'corner'")
+    page.keys("t")
+    assert page.settled("state.points[1].type === 'wall'")
+    page.keys("e", "j", "e")
+    line = page.settled("state.lines.length === 1")["lines"][0]
+    assert line["points"] == ["corner", "P01"]
+    page.keys("m", "j", "m")
+    page.wait("() => document.querySelector('[data-testid=measures]').textContent.includes('m')")
+    # Both on the wall: 2.10 + 4.40 m apart, and 1.83 m in height: 6.753 m.
+    assert "6.7" in str(page.tab.get_by_test_id("measures").text_content())
+    page.keys("Delete")
+    page.settled("state.points.filter(({ deleted }) => !deleted).length === 1")
+    page.keys("Control+z")
+    page.settled("state.points.filter(({ deleted }) => !deleted).length === 2")
+    page.keys("Control+y")
+    page.settled("state.points.filter(({ deleted }) => !deleted).length === 1")
+
+
+def test_the_list_is_sorted_by_a_column_and_flies_to_a_point(page: Driver) -> None:
+    for place in (TARGETS["T08"], SHADED):
+        page.keys("n")
+        page.pick(1, true_pixel(1, place))
+        page.suggested()
+        page.keys("a")
+        page.settled("state.points.at(-1)?.result")
+    table = page.tab.get_by_test_id("point-list")
+    table.get_by_role("button", name="Name").click()
+    table.get_by_role("button", name="Name").click()
+    assert [one.split("\t")[0][:3] for one in table.locator("tbody tr").all_inner_texts()] == [
+        "P02", "P01",
+    ]  # fmt: skip
+    assert page.tab.evaluate("() => bifocal.flyTo('P01')") is True
+    box = page.tab.locator(".pane").first.bounding_box()
+    x, y = page.screen(1, true_pixel(1, TARGETS["T08"]))
+    middle = (box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
+    assert distance((x, y), middle) < 3
+    assert page.tab.evaluate("() => bifocal.flyTo('nobody')") is False
+
+
+def test_both_photos_side_by_side_move_together(page: Driver) -> None:
+    page.keys("d")
+    page.tab.wait_for_timeout(200)
+    panes = page.tab.locator(".viewer .pane:visible")
+    boxes = [pane.bounding_box() for pane in panes.all()[:2]]
+    assert boxes[1]["x"] >= boxes[0]["x"] + boxes[0]["width"]
+    pixel = true_pixel(1, SHADED)
+    inside = [page.screen(image, true_pixel(image, SHADED)) for image in (1, 2)]
+    offsets = [np.subtract(inside[k], (boxes[k]["x"], boxes[k]["y"])) for k in (0, 1)]
+    # On the wall itself both photos coincide.
+    assert distance(*offsets) < 0.1
+    page.pick(1, pixel)
+    page.settled("state.points.length === 1")
+    page.pick(2, true_pixel(2, SHADED))
+    state = page.settled("state.points[0].result")
+    assert abs(state["points"][0]["result"]["r"]) < 0.2
+
+
+def seen(page: Driver) -> Any:
+    """Return what the pane shows within its frame, as grey values."""
+    page.wait("() => !document.querySelector('.toast').classList.contains('on')")
+    page.tab.wait_for_timeout(350)
+    shot = page.tab.locator(".pane").first.screenshot()
+    return np.asarray(Image.open(io.BytesIO(shot)).convert("L"), dtype=float)[6:-6, 6:-6]
+
+
+@pytest.mark.acceptance
+def test_opacity_swipe_blink_and_contrast_show_what_they_say(page: Driver) -> None:
+    slider = page.tab.get_by_test_id("layer-opacity")
+    shots = {}
+    for percent in ("0", "50", "100"):
+        slider.fill(percent)
+        shots[percent] = seen(page)
+    far, near = shots["0"], shots["100"]
+    # The photos differ where something stands out, and only there.
+    assert np.abs(far - near).max() > 60
+    assert np.median(np.abs(far - near)) < 10
+    assert np.median(np.abs(shots["50"] - (far + near) / 2)) < 1.5
+    page.keys("x")
+    swept, middle = seen(page), far.shape[1] // 2
+    assert np.abs(swept - far)[:, : middle - 20].mean() < 0.5
+    assert np.abs(swept - near)[:, middle + 20 :].mean() < 0.5
+    page.keys("b")
+    blinks = [seen(page) for _ in range(5)]
+    apart = [min(np.abs(one - photo).mean() for photo in (far, near)) for one in blinks]
+    assert max(apart) < 0.5
+    assert len({np.abs(one - far).mean() < 0.5 for one in blinks}) == 2
+    page.keys("v")
+    slider.fill("0")
+    page.tab.get_by_test_id("contrast-1").fill("200")
+    assert seen(page).std() > 1.3 * far.std()
+    page.tab.get_by_test_id("contrast-1").fill("100")

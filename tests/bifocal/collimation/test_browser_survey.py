@@ -1,0 +1,119 @@
+"""A survey in the browser survives: undo, reload, two tabs, a killed server; and equals `solve`."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from bifocal.cli.solve import command
+from tests.browser import Driver, Served, launched, sample_survey, tab_of
+
+PICKS = [((300.0, 330.0), (293.0, 325.0)), ((1190.0, 700.0), (1196.0, 703.0))]
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Any]:
+    with launched() as found:
+        yield found
+
+
+@pytest.fixture(scope="module")
+def shared(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
+    with sample_survey(tmp_path_factory.mktemp("survey")) as started:
+        yield started
+
+
+def pick_both(page: Driver, count: int, first: Any, second: Any) -> dict[str, Any]:
+    page.keys("n")
+    page.pick(1, first)
+    page.settled(f"state.points.length === {count}")
+    page.pick(2, second)
+    return page.settled(f"state.points[{count - 1}]?.result")
+
+
+def relief_of(book: Path) -> dict[str, float]:
+    """Return what `bifocal solve` says of a workbook, or nothing while it is not there."""
+    run = CliRunner().invoke(command, [str(book), "--json"]) if book.exists() else None
+    if run is None or run.exit_code:
+        return {}
+    return {point["id"]: point["r"] for point in json.loads(run.stdout)["points"]}
+
+
+def test_noisy_picks_give_the_relief_that_solve_gives(browser: Any, shared: Served) -> None:
+    """Clicks with 0.3 px of noise: the page's numbers against the workbook's, solved anew."""
+    rng = np.random.default_rng(14)
+    with tab_of(browser, shared) as page:
+        for count, (first, second) in enumerate(PICKS, start=1):
+            noise = rng.normal(0, 0.3, (2, 2))
+            pick_both(page, count, np.add(first, noise[0]), np.add(second, noise[1]))
+        shown = {point["name"]: point["result"]["r"] for point in page.state["points"]}
+        book = shared.folder / page.state["workbook"]
+        # The workbook is written a moment after the journal.
+        for _ in range(100):
+            solved = relief_of(book)
+            if solved.keys() == shown.keys():
+                break
+            page.tab.wait_for_timeout(300)
+    assert solved == pytest.approx(shown, abs=1e-9, rel=1e-9)
+
+
+def test_what_was_picked_is_there_after_a_reload_and_can_be_undone(
+    browser: Any, shared: Served
+) -> None:
+    with tab_of(browser, shared) as page:
+        page.empty()
+        before = pick_both(page, 1, *PICKS[0])["points"]
+        page.tab.reload()
+        page.wait("() => window.bifocal")
+        assert page.state["points"] == before
+        page.click("undo")
+        page.settled("state.points[0].picks[2] === null")
+        page.click("undo")
+        page.settled("state.points.length === 0")
+        page.click("redo")
+        page.click("redo")
+        assert page.settled("state.points[0]?.result")["points"] == before
+
+
+def test_two_tabs_see_each_other_and_lose_nothing(browser: Any, shared: Served) -> None:
+    with tab_of(browser, shared) as one, tab_of(browser, shared) as other:
+        one.empty()
+        first = pick_both(one, 1, *PICKS[0])["points"][0]
+        other.settled("state.points[0]?.result")
+        pick_both(other, 2, *PICKS[1])
+        state = one.settled("state.points[1]?.result")
+        assert state["points"][0] == first
+        # Both move the same pick: the last one wins in both tabs.
+        for page, key in ((one, "ArrowUp"), (other, "ArrowLeft")):
+            page.tab.evaluate("() => bifocal.flyTo('P01')")
+            page.keys("2", key)
+            page.settled("true")
+            revision = page.state["revision"]
+            for tab in (one, other):
+                tab.settled("state.revision >= argument", revision)
+        moved = other.state["points"][0]["picks"]["2"]
+        one.settled("state.points[0].picks[2][0] === argument", moved[0])
+        assert one.state["points"] == other.state["points"]
+        assert np.subtract(first["picks"]["2"], moved) == pytest.approx((0.1, 0.1), abs=1e-9)
+
+
+def test_a_killed_server_loses_nothing_and_the_page_goes_on(browser: Any, tmp_path: Path) -> None:
+    with sample_survey(tmp_path) as server, tab_of(browser, server) as page:
+        before = pick_both(page, 1, *PICKS[0])["points"][0]["picks"]["2"]
+        server.kill()
+        page.keys("2", "ArrowRight", "Shift+ArrowDown")
+        link = "() => document.querySelector('[data-testid=link]').dataset.level"
+        page.wait(f"() => ({link})() === 'warn'")
+        # Typed while nobody listens: shown, kept, and sent when the server is back.
+        server.start()
+        page.wait(f"() => ({link})() === 'good'")
+        state = page.settled("state.points.length === 1 && state.points[0].result")
+        after = state["points"][0]["picks"]["2"]
+        assert np.subtract(after, before) == pytest.approx((0.1, 1.0), abs=1e-9)
+        pick_both(page, 2, *PICKS[1])

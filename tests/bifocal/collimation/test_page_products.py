@@ -1,0 +1,309 @@
+"""Orientation as it comes, commands, jobs, relief and files of the page."""
+
+from __future__ import annotations
+
+import json
+import time
+import zipfile
+from io import BytesIO
+
+import ezdxf
+import numpy as np
+import pytest
+
+from bifocal import Pair, ReliefMap
+from bifocal.collimation.live_orientation import live_orientation
+from bifocal.collimation.project import find_files
+from bifocal.collimation.records import PickedControl, SurveyState
+from bifocal.demo import SAMPLE
+from bifocal.files.geotiff import write_relief
+from bifocal.files.images import image_info
+from photocore.errors import InputError
+from tests.page_session import (
+    client_of,
+    entries,
+    opened,
+    pick_both,
+    sample_folder,
+    sample_picks,
+)
+
+
+def control_state(count: int, *, seed: int = 1, blunder: float = 0.0) -> SurveyState:
+    """Return control points of the sample's wall, picked to 0.2 px."""
+    pair, rng = Pair.read(SAMPLE / "facade.pair.json"), np.random.default_rng(seed)
+    places = [(-5, -3, 0), (5, -3, 0), (5, 3, 0), (-5, 3, 0), (0, 0.3, 0.3), (-3, 2, 0), (2, 2, 0)]
+    state = SurveyState()
+    lens = {"sensor_width_mm": 1536 * 0.01476}
+    state.lenses = {1: {"focal_mm": 35.0, **lens}, 2: {"focal_mm": 19.0, **lens}}
+    for number, place in enumerate(places[:count]):
+        picks = [
+            tuple((p + rng.normal(0, 0.2, 2) + (blunder if number == 1 else 0)).tolist())
+            for p in pair.project(np.array(place, float))
+        ]
+        name = f"C{number}"
+        state.control[name] = PickedControl(
+            name=name, order=number, known=tuple(map(float, place)), picks=(picks[0], picks[1])
+        )
+    return state
+
+
+def infos():
+    return [image_info(SAMPLE / name) for name in ("far.jpg", "near.jpg")]
+
+
+def test_control_points_tell_the_cameras_as_they_come() -> None:
+    few = live_orientation(control_state(3), infos(), "en")
+    assert not few.deviations
+    assert "1 more control point" in few.advice[0]
+    enough = live_orientation(control_state(5), infos(), "en")
+    assert enough.distances == pytest.approx((17.5, 9.5), rel=0.05)
+    assert all(abs(value) < 1.5 for row in enough.residuals.values() for value in row)
+    assert "would help most" in enough.advice[-1]
+    state = control_state(5)
+    state.setup = {"d1": 17.5, "d2": 9.5, "sigma_d": 0.005}
+    taped = live_orientation(state, infos(), "de")
+    assert taped.deviations["distance1"] < 0.1 * enough.deviations["distance1"]
+    assert taped.advice[-1] != enough.advice[-1]
+
+
+def test_a_wrong_control_point_is_named() -> None:
+    wrong = live_orientation(control_state(7, blunder=6.0), infos(), "it")
+    assert "C1" in wrong.advice[0]
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("A\t1,5\t2\t0,1\nB\t3\t4\t", {"A": (1.5, 2.0, 0.1), "B": (3.0, 4.0, None)}),
+        ("name;X [mm];Y [mm]\nA;1500;2000", {"A": (1.5, 2.0, None)}),
+        ("id,X,Y,r\nA,1.5,2,0.25\n", {"A": (1.5, 2.0, 0.25)}),
+    ],
+)
+def test_control_points_are_pasted_from_a_spreadsheet(tmp_path, text, expected) -> None:
+    with opened(sample_folder(tmp_path)) as session:
+        session.command({"op": "control.paste", "text": text})
+        assert {n: point.known for n, point in session.state.control.items()} == expected
+
+
+@pytest.mark.parametrize(
+    ("command", "said"),
+    [
+        ({"op": "point.pick", "image": 3, "column": 1, "row": 1}, "image"),
+        ({"op": "point.pick", "image": 1, "column": 1}, "column, row"),
+        ({"op": "point.pick", "image": 1, "column": 1e9, "row": 1}, "outside photo|reason"),
+        ({"op": "point.pick", "image": 1, "column": 1536.0, "row": 1}, "outside photo 1"),
+        ({"op": "point.pick", "image": 1, "column": True, "row": 1}, "number"),
+        ({"op": "point.pick", "name": "x" * 99, "image": 1, "column": 1, "row": 1}, "name"),
+        ({"op": "point.pick", "name": 5, "image": 1, "column": 1, "row": 1}, "name"),
+        ({"op": "point.rename", "name": "nobody", "new": "x"}, "no point nobody"),
+        ({"op": "point.type", "name": "A", "type": "roof"}, "type"),
+        ({"op": "line.set", "name": "L", "layer": "x", "points": ["A", "Z"]}, "no point Z"),
+        ({"op": "control.paste", "text": "A\tfive\t2"}, "pasted|number|heading|table|X"),
+        ({"op": "tape.set", "from": "A", "to": "B", "length": -1}, "above zero"),
+        ({"op": "tape.set", "from": "A", "to": "B", "length": 1}, "no control point"),
+        ({"op": "setup.set", "d1": 0}, "above zero"),
+        ({"op": "setup.set", "d1": "far"}, "no number"),
+        ({"op": "stage.set", "stage": "roof"}, "stage"),
+        ({"op": "language.set", "language": "fr"}, "language"),
+        ({"op": "photos.exchange"}, "before they are oriented"),
+        ({"op": "align.accept"}, "no orientation"),
+        ({"op": "nonsense"}, "no command"),
+        ({}, "no command"),
+    ],
+)
+def test_an_impossible_command_changes_nothing(tmp_path, command, said) -> None:
+    with opened(sample_folder(tmp_path)) as session:
+        pick_both(session, "A", sample_picks()["T01"])
+        client = client_of(session)
+        before = client.get("/api/state").json()
+        written = (tmp_path / "facade.journal.jsonl").read_bytes()
+        answer = client.post("/api/command", json=command)
+        assert answer.status_code == 422
+        import re
+
+        assert re.search(said, answer.json()["error"]), answer.json()["error"]
+        assert client.get("/api/state").json() == before
+        assert (tmp_path / "facade.journal.jsonl").read_bytes() == written
+
+
+def test_photos_are_asked_about_and_exchanged_by_their_lenses(tmp_path) -> None:
+    from PIL import Image
+
+    far = Image.fromarray(np.random.default_rng(1).integers(0, 255, (64, 96, 3), np.uint8))
+    exif = Image.Exif()
+    for name, focal in (("long.jpg", 85), ("short.jpg", 50)):
+        exif.get_ifd(34665)[41989] = focal
+        far.save(tmp_path / name, exif=exif)
+    with opened(tmp_path / "short.jpg", tmp_path / "long.jpg") as session:
+        state = client_of(session).get("/api/state").json()
+        assert [photo["name"] for photo in state["photos"]] == ["short.jpg", "long.jpg"]
+        assert state["stage"] == "orientation"
+        session.command({"op": "control.pick", "name": "A", "image": 1, "column": 5, "row": 6})
+        session.command({"op": "photos.exchange"})
+        assert session.state.control["A"].picks == (None, (5.0, 6.0))
+    with opened(tmp_path) as again:
+        assert again.pictures.infos[0].path.name == "long.jpg"
+        assert again.state.control["A"].picks == (None, (5.0, 6.0))
+
+
+def test_dropped_photos_begin_a_survey_far_one_first(tmp_path) -> None:
+    from PIL import Image
+
+    far = Image.fromarray(np.random.default_rng(1).integers(0, 255, (64, 96, 3), np.uint8))
+    sent = {}
+    for key, focal in (("photo1", 24), ("photo2", 85)):
+        exif, buffer = Image.Exif(), BytesIO()
+        exif.get_ifd(34665)[41989] = focal
+        far.save(buffer, "JPEG", exif=exif)
+        sent[key] = (f"img{focal}.jpg", buffer.getvalue())
+    with opened(tmp_path) as session:
+        client = client_of(session)
+        assert client.get("/api/state").json()["stage"] == "photos"
+        state = client.post("/api/photos", files=sent).json()
+        assert [photo["name"] for photo in state["photos"]] == ["img85.jpg", "img24.jpg"]
+        assert not state["photos"][0]["missing"]
+        session.command({"op": "control.pick", "name": "A", "image": 1, "column": 5, "row": 6})
+        assert client.post("/api/photos", files=sent).status_code == 422
+
+
+def _wait(client, number: str) -> dict:
+    end = time.monotonic() + 120
+    while time.monotonic() < end:
+        jobs = {job["id"]: job for job in client.get("/api/state").json()["jobs"]}
+        if jobs[number]["state"] != "running":
+            return jobs[number]
+        time.sleep(0.05)
+    raise AssertionError("the job did not end")
+
+
+def test_an_orthophoto_is_made_shown_and_replaced(tmp_path) -> None:
+    folder = sample_folder(tmp_path)
+    (folder / "facade.ortho.tif").write_bytes(b"somebody else's")
+    with opened(folder) as session:
+        client = client_of(session)
+        for _ in range(2):
+            number = client.post("/api/jobs", json={"kind": "ortho", "gsd": 0.05}).json()["id"]
+            job = _wait(client, number)
+            assert job["state"] == "done", job
+        facts = client.get("/api/state").json()["products"]["ortho"]
+        assert facts["gsd"] == pytest.approx(0.05)
+        info = client.get("/tiles/ortho/0/info").json()
+        assert (info["width"], info["height"]) == (facts["cols"], facts["rows"])
+        assert client.get("/tiles/ortho/0/7/0_0.jpg").status_code == 200
+        assert client.get(f"/download/{facts['name']}").content[:2] in (b"II", b"MM")
+    assert (folder / "facade.ortho.tif").read_bytes() == b"somebody else's"
+    assert [name for name in entries(folder) if name.endswith("ortho.tif")] == [
+        "facade-page.ortho.tif", "facade.ortho.tif",
+    ]  # fmt: skip
+
+
+def test_a_job_that_fails_says_why_and_one_that_is_cancelled_leaves_nothing(tmp_path) -> None:
+    folder = sample_folder(tmp_path)
+    with opened(folder) as session:
+        client = client_of(session)
+        small = {"kind": "ortho", "bounds": [900, 900, 901, 901], "gsd": 0.01}
+        job = _wait(client, client.post("/api/jobs", json=small).json()["id"])
+        assert job["state"] == "failed"
+        assert job["message"]
+        number = client.post("/api/jobs", json={"kind": "relief"}).json()["id"]
+        assert client.post("/api/jobs", json={"kind": "match"}).status_code == 422
+        assert client.delete(f"/api/jobs/{number}").status_code == 200
+        assert _wait(client, number)["state"] == "cancelled"
+        for bad in ({"kind": "roof"}, {"kind": "deliver", "sheet": "../A3"}, {"kind": "relief",
+                    "quality": "x"}, {"kind": "ortho", "gsd": -1}, {"kind": "deliver",
+                    "scale": "big"}, {"kind": "relief", "bounds": [1]}):  # fmt: skip
+            assert client.post("/api/jobs", json=bad).status_code == 422
+    assert not [name for name in entries(folder) if name.endswith(".tif")]
+
+
+def test_relief_is_read_on_the_page(tmp_path) -> None:
+    folder = sample_folder(tmp_path)
+    r = np.tile(np.linspace(0, 1, 41, dtype=np.float32), (21, 1))
+    r[:3] = np.nan
+    relief = ReliefMap.from_relief(r, plane_from_pixel=[[0.1, 0, -2], [0, -0.1, 1], [0, 0, 1]])
+    with opened(folder) as session:
+        client = client_of(session)
+        assert "run it first" in client.get("/relief/value?X=0&Y=0").json()["error"]
+        write_relief(folder / "facade.relief.tif", relief)
+        session.note_made("relief", ["facade.relief.tif"])
+        # r rises by 1 m over 4 m from X = -2.
+        assert client.get("/relief/value?X=0.05&Y=0").json()["r"] == pytest.approx(0.5125, abs=1e-6)
+        assert client.get("/relief/value?X=0&Y=1").json() == {"r": None, "sigma": None}
+        ask = {"from": [-1, 0], "to": [1, 0]}
+        profile = client.post("/relief/profile", json=ask).json()
+        assert profile["distance"][-1] == pytest.approx(2.0)
+        slope = np.diff(profile["r"]) / np.diff(profile["distance"])
+        np.testing.assert_allclose(slope, 0.25, atol=1e-5)
+        assert client.get("/relief/overlay.png").content[:4] == b"\x89PNG"
+        assert client.get("/uncertainty.png").content[:4] == b"\x89PNG"
+        facts = client.get("/api/state").json()["products"]["relief"]
+        np.testing.assert_allclose(facts["bounds"], [-2.05, -1.05, 2.05, 1.05], atol=1e-9)
+
+
+def test_points_and_lines_become_a_drawing_in_space(tmp_path) -> None:
+    folder, picks = sample_folder(tmp_path), sample_picks()
+    with opened(folder) as session:
+        client = client_of(session)
+        assert client.get("/download/points.dxf").status_code == 422
+        for name in ("T01", "T16", "T20"):
+            pick_both(session, name, picks[name])
+        line = {"op": "line.set", "name": "L1", "layer": "win/dow", "points": ["T01", "T16", "T20"]}
+        session.command({**line, "closed": True})
+        data = client.get("/download/points.dxf").content
+        (tmp_path / "x.dxf").write_bytes(data)
+        drawn = ezdxf.readfile(tmp_path / "x.dxf").modelspace().query("POLYLINE").first
+        assert (drawn.dxf.layer, drawn.is_closed) == ("win_dow", True)
+        found = [tuple(vertex.dxf.location) for vertex in drawn.vertices]
+        for name, place in zip(line["points"], found, strict=True):
+            row = session.results.row(session.state.points[name])
+            np.testing.assert_allclose(place, [row["X"], row["Y"], row["r"]], atol=1e-9)
+        session.sync.step()
+        archive = zipfile.ZipFile(BytesIO(client.get("/download/all.zip").content))
+        assert archive.namelist() == ["facade.xlsx"]
+
+
+def test_a_proposed_orientation_is_shown_and_accepted(tmp_path) -> None:
+    folder = sample_folder(tmp_path)
+    pair = json.loads((folder / "facade.pair.json").read_text())
+    (folder / "facade.pair.json").unlink()
+    with opened(folder / "far.jpg", folder / "near.jpg") as session:
+        assert session.pictures.pair is None
+        proposed = folder / "survey.proposed.pair.json"
+        pair["image1"]["distance"] = 17.6
+        proposed.write_text(json.dumps(pair))
+        session.propose(proposed, {"words": ["fine"], "remarks": [], "control": []})
+        client = client_of(session)
+        shown = client.get("/api/state").json()["pair"]
+        assert (shown["accepted"], shown["images"][0]["distance"]) == (False, 17.6)
+        pick_both(session, "A", sample_picks()["T01"])
+        session.sync.step()
+        assert not (folder / "survey.xlsx").exists()
+        session.command({"op": "align.accept"})
+        assert client.get("/api/state").json()["pair"]["accepted"] is True
+        session.sync.step()
+        assert (folder / "survey.xlsx").exists()
+    assert Pair.read(folder / "survey.pair.json").d1 == 17.6
+    assert not proposed.exists()
+    with opened(folder) as again:
+        assert again.pictures.pair.d1 == 17.6
+
+
+@pytest.mark.parametrize(
+    ("names", "said"),
+    [
+        (["absent.pair.json"], "no such file"),
+        (["far.jpg"], "one photo"),
+        (["far.jpg", "far.jpg"], "twice"),
+        (["far.jpg", "near.jpg", "far.jpg"], "found 3"),
+        (["facade.journal"], "expected a pair file"),
+    ],
+)
+def test_what_is_no_survey_says_so(tmp_path, names, said) -> None:
+    folder = sample_folder(tmp_path)
+    (folder / "facade.journal").touch()
+    with pytest.raises(InputError, match=said):
+        find_files([folder / name for name in names])
+    (folder / "other.pair.json").touch()
+    with pytest.raises(InputError, match="2 pair files"):
+        find_files([folder])

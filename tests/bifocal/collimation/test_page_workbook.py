@@ -1,0 +1,193 @@
+"""Page, workbook and command line hold one survey: what one changes the others show."""
+
+from __future__ import annotations
+
+import openpyxl
+import pytest
+
+import bifocal
+from bifocal import Pair
+from bifocal.demo import SAMPLE
+from tests.bifocal.collimation.page_truth import noisy_picks
+from tests.page_session import opened, pick, pick_both, sample_folder, sample_picks
+from tests.workbook_lint import lint
+
+BOOK = "facade.xlsx"
+
+
+def assert_solved_alike(session, path) -> None:
+    """Assert that the page shows exactly what `bifocal solve` finds in the workbook."""
+    solved = bifocal.solve(path)
+    live = {p.name: session.results.row(p) for p in session.state.points.values() if p.is_complete}
+    rows = [i for i, name in enumerate(solved.table.ids) if solved.points.use[i]]
+    assert {solved.table.ids[i] for i in rows} == set(live)
+    for i in rows:
+        shown = live[solved.table.ids[i]]
+        for key in ("r", "X", "Y", "sigma_r", "e1"):
+            assert shown[key] == pytest.approx(solved.table[key][i], rel=0, abs=1e-9)
+        assert shown["flag"] == solved.table.flags[i]
+
+
+def test_picks_with_noise_give_the_relief_of_solve(tmp_path) -> None:
+    folder = sample_folder(tmp_path)
+    with opened(folder) as session:
+        for name, picks in noisy_picks(0.3, seed=5).items():
+            pick_both(session, name, picks)
+        pick(session, "half", 1, (100.0, 100.0))
+        session.sync.step()
+        assert session.sync.waiting is None
+        assert_solved_alike(session, folder / BOOK)
+        sheet = openpyxl.load_workbook(folder / BOOK)["Points"]
+        keys = [cell.value for cell in sheet[4]]
+        formulas = [sheet.cell(5, keys.index(key) + 1).value for key in ("r", "X", "sigma_r")]
+        assert all(str(formula).startswith("=") for formula in formulas)
+    assert not lint(folder / BOOK)
+
+
+def test_changes_go_into_the_workbook_in_place(tmp_path) -> None:
+    folder = sample_folder(tmp_path)
+    picks = sample_picks()
+    names = list(picks)
+    with opened(folder) as session:
+        for name in names[:6]:
+            pick_both(session, name, picks[name])
+        session.sync.step()
+        book = openpyxl.load_workbook(folder / BOOK)
+        book.create_sheet("My notes")["B2"] = "do not lose me"
+        book.save(folder / BOOK)
+        for number in range(30):  # more than the rows prepared
+            pick_both(session, f"N{number}", picks[names[number % 8]])
+        session.command({"op": "point.delete", "name": names[1]})
+        session.command({"op": "point.rename", "name": names[2], "new": "7"})
+        session.command({"op": "point.type", "name": names[3], "type": "wall"})
+        session.command({"op": "point.reference", "name": names[5], "r": 0.104})
+        session.sync.step()
+        assert session.sync.waiting is None
+        assert_solved_alike(session, folder / BOOK)
+        solved = bifocal.solve(folder / BOOK)
+        assert set(solved.table.ids) == set(session.state.points)
+        assert solved.points.code[solved.table.ids.index(names[3])] == "PLANE"
+        assert solved.check.ids == (names[5],)
+        error = session.results.row(session.state.points[names[5]])["r"] - 0.104
+        assert solved.check.errors[0, 2] == pytest.approx(error, abs=1e-9)
+    assert openpyxl.load_workbook(folder / BOOK)["My notes"]["B2"].value == "do not lose me"
+    # What somebody else saved is kept once, before the page's first change of it.
+    assert [path.name for path in folder.glob("*.bak*")] == [f"{BOOK}.bak"]
+    assert not lint(folder / BOOK)
+
+
+def _change(path, name: str, key: str, value: float | None) -> None:
+    """Change a cell as somebody with a spreadsheet program does."""
+    book = openpyxl.load_workbook(path)
+    sheet = book["Points"]
+    keys = [cell.value for cell in sheet[4]]
+    for row in sheet.iter_rows(min_row=5):
+        if row[0].value == name:
+            if key == "all":
+                for cell in row[: keys.index("note") + 1]:
+                    cell.value = None
+            else:
+                row[keys.index(key)].value = value
+    book.save(path)
+
+
+def test_rows_changed_by_others_are_taken_over(tmp_path) -> None:
+    folder, picks = sample_folder(tmp_path), sample_picks()
+    with opened(folder) as session:
+        for name in ("T01", "T02", "T03", "T04"):
+            pick_both(session, name, picks[name])
+        session.sync.step()
+        _change(folder / BOOK, "T01", "col2", 206.25)
+        _change(folder / BOOK, "T02", "all", None)
+        _change(folder / BOOK, "T03", "col2", 1051.0)
+        pick(session, "T03", 2, (1052.5, 803.0))  # the page changed it too: its pick is the last
+        session.sync.step()
+        assert session.state.points["T01"].picks[1] == (206.25, picks["T01"][1][1])
+        assert "T02" not in session.state.points
+        assert session.state.points["T03"].picks[1] == (1052.5, 803.0)
+        assert_solved_alike(session, folder / BOOK)
+        before = {name: point.picks for name, point in session.state.points.items()}
+    with opened(folder) as again:
+        assert {name: point.picks for name, point in again.state.points.items()} == before
+        assert again.sync.waiting is None
+
+
+@pytest.mark.parametrize("lock", ["~$facade.xlsx", ".~lock.facade.xlsx#"])
+def test_a_workbook_open_elsewhere_waits_in_the_journal(tmp_path, lock: str) -> None:
+    folder, picks = sample_folder(tmp_path), sample_picks()
+    with opened(folder) as session:
+        pick_both(session, "T01", picks["T01"])
+        session.sync.step()
+        before = (folder / BOOK).read_bytes()
+        (folder / lock).write_text("somebody")
+        pick_both(session, "T02", picks["T02"])
+        session.sync.step()
+        assert "is open in" in session.sync.waiting
+        assert (folder / BOOK).read_bytes() == before
+    with opened(folder) as again:  # the page may end meanwhile
+        assert set(again.state.points) == {"T01", "T02"}
+        assert "is open in" in again.sync.waiting
+        (folder / lock).unlink()
+        again.sync.step()
+        assert again.sync.waiting is None
+        assert_solved_alike(again, folder / BOOK)
+
+
+def test_a_wrong_cell_is_named_and_nothing_overwritten(tmp_path) -> None:
+    folder, picks = sample_folder(tmp_path), sample_picks()
+    with opened(folder) as session:
+        pick_both(session, "T01", picks["T01"])
+        session.sync.step()
+        _change(folder / BOOK, "T01", "col1", "about 200")  # type: ignore[arg-type]
+        before = (folder / BOOK).read_bytes()
+        pick_both(session, "T02", picks["T02"])
+        session.sync.step()
+        assert "col1" in session.sync.waiting
+        assert (folder / BOOK).read_bytes() == before
+        assert set(session.state.points) == {"T01", "T02"}
+
+
+def test_a_survey_of_the_command_line_opens_on_the_page(tmp_path) -> None:
+    folder = sample_folder(tmp_path)
+    solved = bifocal.solve(SAMPLE / "targets.csv", pair=folder / "facade.pair.json", sigma_px=0.2)
+    from bifocal.survey.output import write_result
+
+    write_result(folder / "mine.xlsx", solved)
+    with opened(folder / "mine.xlsx") as session:
+        assert len(session.state.points) == len(solved.table)
+        assert_solved_alike(session, folder / "mine.xlsx")
+        assert session.results.sigma_px == 0.2
+
+
+def test_another_orientation_reaches_the_formulas(tmp_path) -> None:
+    folder, picks = sample_folder(tmp_path), sample_picks()
+    pair = Pair.read(folder / "facade.pair.json")
+    with opened(folder) as session:
+        for name in ("T01", "T16", "T20"):
+            pick_both(session, name, picks[name])
+        session.sync.step()
+    data = pair.to_dict()
+    data["image1"]["distance"], data["image2"]["nadir"] = 17.7, [0.02, -0.01]
+    from photocore.jsonfile import write_object
+
+    write_object(folder / "facade.pair.json", data, overwrite=True)
+    with opened(folder) as session:
+        session.sync.step()
+        assert session.sync.waiting is None
+        assert_solved_alike(session, folder / BOOK)
+        found = bifocal.solve(folder / BOOK)
+        assert (found.pair.d1, found.pair.image2.nadir.tolist()) == (17.7, [0.02, -0.01])
+
+
+def test_many_points_are_written_by_a_process_of_its_own(tmp_path, monkeypatch) -> None:
+    monkeypatch.setattr("bifocal.collimation.workbook_sync.LARGE", 8)
+    folder, picks = sample_folder(tmp_path), sample_picks()
+    with opened(folder) as session:
+        for name in list(picks)[:9]:
+            pick_both(session, name, picks[name])
+        session.sync.step()
+        pick(session, "T03", 1, (1052.25, 803.0))
+        session.sync.step()
+        assert session.sync.waiting is None
+        assert_solved_alike(session, folder / BOOK)
+        assert bifocal.solve(folder / BOOK).points.pixels1[2].tolist() == [1052.25, 803.0]

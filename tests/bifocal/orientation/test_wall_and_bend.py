@@ -1,0 +1,97 @@
+"""Ties without support, the wall's own face, and walls bent by lens or refraction."""
+
+import numpy as np
+import pytest
+
+from bifocal.orientation.bend import MOST_BENT, bend_in_words, wall_bend
+from bifocal.orientation.features import Features, match_features
+from bifocal.orientation.reference_plane import narrow_face
+from bifocal.orientation.relative_orientation import supported
+from photocore.distortion import RadialDivision
+from tests.scenes import SetupErrors, bifocal_cameras
+
+SIZE = (3072, 2048)
+
+
+def wall_ties(k: float, *, seed: int = 1, relief: float = 0.3) -> tuple[np.ndarray, np.ndarray]:
+    """Return ties of a wall with a third of its points off it, through lenses of distortion k."""
+    rng = np.random.default_rng(seed)
+    cameras = bifocal_cameras(size=SIZE, errors=SetupErrors(tilt_deg=3.0), rng=rng)
+    xyz = np.column_stack([rng.uniform(-5, 5, 900), rng.uniform(-3, 3, 900), np.zeros(900)])
+    xyz[600:, 2] = rng.uniform(-relief, relief, 300)
+    out = []
+    for camera in (cameras.far, cameras.near):
+        seen = camera.view_of(xyz) + rng.normal(0, 0.1, (900, 2))
+        lens = RadialDivision(k, camera.matrix[:2, 2], float(camera.matrix[0, 0]))
+        out.append(lens.distort(seen))
+    return out[0], out[1]
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_a_flat_wall_is_not_bent_and_a_distorted_one_is(seed: int) -> None:
+    assert wall_bend(*wall_ties(0.0, seed=seed), SIZE) < 0.1
+    bent = wall_bend(*wall_ties(-0.15, seed=seed), SIZE)
+    assert bent > MOST_BENT
+    assert "calibrate" in bend_in_words(bent, with_lens=False)
+    assert "glass or water" in bend_in_words(bent, with_lens=True)
+    assert bend_in_words(0.1, with_lens=False) == ""
+
+
+def test_the_bend_counts_at_one_size_of_photo() -> None:
+    first, second = wall_ties(-0.15)
+    half = wall_bend(first / 2 - 0.25, second / 2 - 0.25, (SIZE[0] // 2, SIZE[1] // 2))
+    assert half == pytest.approx(wall_bend(first, second, SIZE), rel=0.15)
+
+
+def test_wrong_ties_on_their_lines_have_no_support() -> None:
+    rng = np.random.default_rng(4)
+    pixels = rng.uniform(0, 3000, (2000, 2))
+    parallax = 0.02 * (pixels - 1500) + rng.normal(0, 0.3, (2000, 2))
+    parallax[:60] *= rng.uniform(3, 10, (60, 1))  # along the radius, so on the line
+    far = np.linalg.norm(parallax - 0.02 * (pixels - 1500), axis=1) > 12
+    kept = supported(pixels, parallax, 3000)
+    assert not kept[far].any()
+    assert kept[60:].mean() > 0.99
+
+
+def test_the_walls_own_face_is_found_beside_plinth_and_joints() -> None:
+    rng = np.random.default_rng(5)
+    xyz = np.column_stack([rng.uniform(-5, 5, 3000), rng.uniform(-3, 3, 3000), np.zeros(3000)])
+    xyz[:1200, 2] = 0.001 * xyz[:1200, 0] + 0.004  # the face, tilted and displaced
+    xyz[1200:2000, 2] = 0.021  # within the band that a fixed width would average
+    xyz[2000:, 2] = rng.uniform(-0.08, 0.08, 1000)
+    sigma = np.full(3000, 0.0015)
+    xyz[:, 2] += rng.normal(0, 0.0015, 3000)
+    face = narrow_face(xyz, sigma, band=0.0875)
+    np.testing.assert_allclose(face.plane, [0.004, 0.001, 0.0], atol=3e-4)
+    assert face.roughness < 0.001
+    assert face.members[:1200].mean() > 0.9
+    assert face.members[1200:2000].mean() < 0.02
+
+
+def test_a_walls_roughness_is_told_from_the_precision_of_its_points() -> None:
+    rng = np.random.default_rng(6)
+    xyz = np.column_stack([rng.uniform(-5, 5, (3000, 2)), rng.normal(0, 0.012, 3000)])
+    sigma = rng.uniform(0.002, 0.009, 3000)
+    xyz[:, 2] += sigma * rng.normal(size=3000)
+    assert narrow_face(xyz, sigma, band=0.09).roughness == pytest.approx(0.012, rel=0.1)
+
+
+def test_one_detail_in_two_orientations_is_no_rival_of_itself() -> None:
+    rng = np.random.default_rng(7)
+    codes = np.abs(rng.normal(size=(40, 128))).astype(np.float32)
+    codes /= np.linalg.norm(codes, axis=1, keepdims=True)
+    pixels = rng.uniform(0, 900, (40, 2))
+
+    def features(places: np.ndarray, descriptors: np.ndarray) -> Features:
+        ones = np.ones(len(places))
+        return Features(pixels=places, size=ones, turn=ones, descriptors=descriptors, reduction=1.0)
+
+    # Each twice: another orientation of the same place has nearly the same descriptor.
+    twice = features(
+        np.repeat(pixels, 2, axis=0),
+        np.repeat(codes, 2, axis=0) + np.tile([[0.0], [1e-3]], (40, 1)).astype(np.float32),
+    )
+    rows1, rows2 = match_features(features(pixels, codes), twice)
+    assert len(rows1) == 40
+    np.testing.assert_array_equal(rows2 // 2, rows1)
