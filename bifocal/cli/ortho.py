@@ -27,6 +27,7 @@ Examples:
   bifocal ortho wall.pair.json --points result.xlsx --breakline P7,P8,P9 --out ortho.tif
   bifocal ortho wall.pair.json --plane --gsd 5mm --bounds -4,0,4,7.5 --out flat.tif
   bifocal ortho wall.pair.json --relief relief.tif --image both --fill --out ortho.tif
+  bifocal ortho wall.pair.json --relief relief.tif --image both --complete --out picture.tif
   bifocal ortho wall.pair.json --relief relief.tif --deliver drawing --scale 1:50 --dpi 254
                 --control control.csv --section x=1.5 --section y=2 --contours 0.05
 """
@@ -62,6 +63,11 @@ Examples:
 )  # fmt: skip
 @switch("mask", "Leave empty what relief hides from the camera, or show what hides it.")
 @click.option("--fill", is_flag=True, help="Close holes with the colours around them.")
+@click.option(
+    "--complete", is_flag=True,
+    help="A whole picture: unknown relief is interpolated, far from all else the plane; what is "
+    "not measured says so in the last band. Closes holes, too.",
+)  # fmt: skip
 @switch("match", "With --image both: bring photo 2 to the colours of photo 1.")
 @click.option(
     "--vignetting", default="", metavar="cos4|K1,K2,K3",
@@ -107,7 +113,8 @@ Examples:
 def command(
     pair: Path, out: Path | None, relief: Path | None, points: Path | None,
     breaklines: tuple[str, ...], plane: float | None, interpolation: str, mask: bool, fill: bool,
-    feather: float, folder: Path | None, scale: float | None, dpi: float, title: str,
+    complete: bool, feather: float, folder: Path | None, scale: float | None, dpi: float,
+    title: str,
     paper: str | None, mark: Path | None, control: Path | None, sections: tuple[str, ...],
     contours: float | None, tfw: bool, overwrite: bool, as_json: bool, **choices: Any,
 ) -> None:  # fmt: skip
@@ -115,7 +122,8 @@ def command(
 
     Every pixel is taken from the original photo, moved by its own relief. Relief comes from a
     map, from measured points, or is none (--plane). What the camera cannot see stays empty; the
-    last band says where each pixel comes from (0 nothing, 1 and 2 the photos, 3 both, 4 filled).
+    last band says where each pixel comes from (0 nothing, 1 and 2 the photos, 3 both, 4 filled,
+    5 a photo on interpolated relief, 6 a photo on the plane).
     """
     from bifocal.orthophotos.deliver_workflow import DeliverTask, deliver
     from bifocal.orthophotos.ortho_image import OrthoOptions
@@ -140,7 +148,7 @@ def command(
         plane=plane or 0.0, scale=scale, **choices,
         options=OrthoOptions(
             interpolation=interpolation,  # type: ignore[arg-type]
-            mask_hidden=mask, fill=fill, feather=feather,
+            mask_hidden=mask, fill=fill, complete=complete, feather=feather,
         ),
     )  # fmt: skip
     files: dict[str, object] = {}
@@ -163,6 +171,10 @@ def command(
         f"{result.path}: {grid.width} x {grid.height} px of {grid.gsd * 1000:g} mm; "
         f"{100 * (1 - shares['none']):.1f} % covered, {100 * shares['hidden']:.1f} % hidden"
     ]
+    estimated = {"interpolated": "on interpolated relief", "plane": "on the plane"}
+    told = [f"{100 * shares[key]:.1f} % {where}" for key, where in estimated.items() if shares[key]]
+    if told:
+        lines.append("Not measured: " + ", ".join(told))
     if files:
         lines.append(f"{folder}: {', '.join(done.files)} (sheet {done.sheet})")
     print_result(result.to_dict() | files, lines, as_json=as_json, remarks=result.remarks)

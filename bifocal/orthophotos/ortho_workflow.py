@@ -34,6 +34,8 @@ FINE, MANY_PIXELS = 1 / 5.5, 25_000_000
 MOST_PIXELS = 4_000_000_000
 #: Orthophotos of more pixels get reduced copies inside the file, for fast display.
 OVERVIEWS_FROM = 50_000_000
+#: An empty share of a picture from which ways to fill it are named.
+WORTH_A_REMARK = 0.1
 #: Flags of points that say nothing about the relief.
 _USELESS = frozenset({"UNCERTAIN", "NADIR", "OFF-RADIAL", "CHECK"})
 
@@ -143,9 +145,23 @@ def make_ortho(
                 raise InputError(NOTHING_IN_COMMON)
     shares = {source.name.lower(): float(counts[source]) / total for source in Source}
     shares["hidden"] = hidden / total
+    notes += _advice(shares, task)
     return RasterResult(
         path=out, grid=grid, shares=shares, remarks=(*pair.remarks, *remarks, *notes)
     )
+
+
+def _advice(shares: dict[str, float], task: OrthoTask) -> list[str]:
+    """Return what could be done about the empty part of a picture."""
+    if shares["none"] < WORTH_A_REMARK or task.options.complete:
+        return []
+    ways = []
+    if task.image != "both":
+        ways.append("--image both adds what the other photo sees")
+    if not task.options.fill:
+        ways.append("--fill closes holes with the colours around them")
+    ways.append("--complete makes a whole picture and marks what is not measured")
+    return [f"{shares['none']:.0%} of the picture are empty: {'; '.join(ways)}."]
 
 
 @contextmanager
