@@ -199,6 +199,7 @@ class _Count(Listener):
         """Keep it, and tell of it with the time that is left."""
         self.shares[outcome.name] = 1.0
         self.outcomes.append(outcome)
+        self.progress(sum(self.shares.values()), len(self.shares), outcome.name)
         self.kept += not outcome.done and not outcome.failed_step
         if self.tell is None or not (outcome.done or outcome.failed_step):
             return
