@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -21,10 +21,14 @@ from photocore.options import (
     switch,
 )
 
+if TYPE_CHECKING:
+    from bifocal.model.points import SurveyPoints
+
 EXAMPLE = """\b
 Examples:
   bifocal ortho wall.pair.json --relief relief.tif --out ortho.tif
   bifocal ortho wall.pair.json --points result.xlsx --breakline P7,P8,P9 --out ortho.tif
+  bifocal ortho result.xlsx --out ortho.tif
   bifocal ortho wall.pair.json --plane --gsd 5mm --bounds -4,0,4,7.5 --out flat.tif
   bifocal ortho wall.pair.json --relief relief.tif --image both --fill --out ortho.tif
   bifocal ortho wall.pair.json --relief relief.tif --image both --complete --out picture.tif
@@ -118,16 +122,18 @@ def command(
     paper: str | None, mark: Path | None, control: Path | None, sections: tuple[str, ...],
     contours: float | None, tfw: bool, overwrite: bool, as_json: bool, **choices: Any,
 ) -> None:  # fmt: skip
-    """Make the orthophoto of a wall from the photos of a PAIR file.
+    """Make the orthophoto of a wall from the photos of a PAIR file or survey workbook.
 
     Every pixel is taken from the original photo, moved by its own relief. Relief comes from a
-    map, from measured points, or is none (--plane). What the camera cannot see stays empty; the
+    map, from measured points, or is none (--plane); by default from the points of the workbook,
+    if PAIR is one: its set-up is then taken as typed. What the camera cannot see stays empty; the
     last band says where each pixel comes from (0 nothing, 1 and 2 the photos, 3 both, 4 filled,
     5 a photo on interpolated relief, 6 a photo on the plane).
     """
     from bifocal.orthophotos.deliver_workflow import DeliverTask, deliver
     from bifocal.orthophotos.ortho_image import OrthoOptions
     from bifocal.orthophotos.ortho_workflow import OrthoTask, make_ortho
+    from bifocal.survey.pair_workflow import is_workbook, points_of, read_pair
 
     if (out is None) == (folder is None):
         raise click.UsageError("Give either --out FILE or --deliver DIR.")
@@ -135,16 +141,20 @@ def command(
         raise click.UsageError("--deliver needs the scale of the drawing, e.g. --scale 1:50.")
     if sum(choice is not None for choice in (relief, points, plane)) > 1:
         raise click.UsageError("Give one of --relief, --points and --plane.")
-    if breaklines and points is None:
+    source = read_pair(pair)
+    own: Path | SurveyPoints | None = points
+    if relief is None and points is None and plane is None and is_workbook(pair):
+        own = points_of(pair)
+    if breaklines and own is None:
         raise click.UsageError("--breakline joins measured points; give their table by --points.")
     drawn = {"--section": sections, "--contours": contours, "--mark": mark, "--control": control}
     for name, given in drawn.items():
         if given and folder is None:
             raise click.UsageError(f"{name} is drawn into a folder; give --deliver DIR.")
-    if relief is None and points is None and plane is None:
+    if relief is None and own is None and plane is None:
         remark("No relief given: the wall is taken as flat (as with --plane).")
     task = OrthoTask(
-        relief=relief, points=points, breaklines=[line.split(",") for line in breaklines],
+        relief=relief, points=own, breaklines=[line.split(",") for line in breaklines],
         plane=plane or 0.0, scale=scale, **choices,
         options=OrthoOptions(
             interpolation=interpolation,  # type: ignore[arg-type]
@@ -158,12 +168,12 @@ def command(
                 scale=scale, dpi=dpi, title=title, paper=paper, marked=mark, control=control,
                 sections=sections, interval=contours,
             )  # fmt: skip
-            done = deliver(pair, folder, task, wish, overwrite=overwrite, progress=progress)
+            done = deliver(source, folder, task, wish, overwrite=overwrite, progress=progress)
             result = done.ortho
             files = {"folder": str(folder), "files": list(done.files), "sheet": done.sheet}
         else:
             result = make_ortho(
-                pair, out or Path("ortho.tif"), task, overwrite=overwrite, world_file=tfw,
+                source, out or Path("ortho.tif"), task, overwrite=overwrite, world_file=tfw,
                 progress=progress,
             )  # fmt: skip
     grid, shares = result.grid, result.shares
