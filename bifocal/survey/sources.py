@@ -18,7 +18,7 @@ from bifocal.survey.workbook.reader import ReadOptions, SurveyInput, read_survey
 from photocore.errors import GeometryError, InputError
 
 Lists = tuple[Path | str, Path | str]
-Source = Path | str | PointObservations | Mapping[str, Any] | Lists
+Source = Path | str | PointObservations | SurveyInput | Mapping[str, Any] | Lists
 #: Files that are workbooks, and so no pair files.
 BOOKS = (".xlsx", ".xlsm", ".ods")
 
@@ -38,7 +38,9 @@ def measured(source: Source, options: ReadOptions, unit: str | None) -> tuple[Su
     if isinstance(source, Mapping):
         source = PointObservations.from_columns(source)
     if isinstance(source, PointObservations):
-        return SurveyInput.of_points(source), Path("points")
+        source = SurveyInput.of_points(source)
+    if isinstance(source, SurveyInput):
+        return source, Path(source.table.file)
     return read_survey(source, options), Path(source)
 
 

@@ -138,7 +138,7 @@ def solve(
 
     Parameters
     ----------
-    source : path, mapping, PointObservations or tuple of two paths
+    source : path, mapping, PointObservations, SurveyInput or tuple of two paths
         A survey workbook or table (``.xlsx .xlsm .ods .csv``), or columns by key: ``id`` and
         ``x1 y1 x2 y2`` [mm or px], or ``s1 s2`` [mm] and ``theta`` [deg], or ``col1 row1 col2
         row2`` [px]; each of shape (n,), NaN where blank. Two paths: the picks of photo 1 and of
