@@ -14,7 +14,8 @@ from bifocal.files.geotiff import RasterReader, read_relief
 from bifocal.files.images import read_image, to_eight_bit
 from bifocal.files.strips import ROWS, colour_strips
 from bifocal.model.grid import Bounds
-from bifocal.model.pair import Pair, Photo
+from bifocal.model.pair import Pair
+from bifocal.model.photo import Photo
 from bifocal.model.relief_map import Quality, ReliefMap
 from bifocal.reports.control_survey import is_exchanged, solve_control
 from bifocal.survey.workflow import SolvedSurvey, solve

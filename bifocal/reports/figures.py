@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from bifocal.model.grid import Bounds
-from bifocal.model.pair import Photo
+from bifocal.model.photo import Photo
 from bifocal.model.relief_map import Quality, ReliefMap
 from bifocal.reports.content import SIDE, PairContent, SeenPhoto
 from bifocal.reports.words import Words

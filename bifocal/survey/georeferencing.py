@@ -108,32 +108,32 @@ def georeference(
     """
     if model != "auto" and model not in MODELS:
         raise InputError(f"georeference: model {model!r} is none of auto, {', '.join(MODELS)}.")
-    task = _task(points, control, covariance)
-    flat = bool(np.isnan(task.world[:, 2]).all())
+    measured = _measured_control(points, control, covariance)
+    flat = bool(np.isnan(measured.world[:, 2]).all())
     simplest = ("2D",) if flat else ("levelled", "3D")
     names = simplest if model == "auto" else (model,)
     first = MODELS[names[0]]
-    usable = {name: task.usable(MODELS[name]) for name in names}
+    usable = {name: measured.usable(MODELS[name]) for name in names}
     if usable[first.name].sum() < first.needed:
-        hint = f" Not among the measured points: {', '.join(task.missing[:5])}."
+        hint = f" Not among the measured points: {', '.join(measured.missing[:5])}."
         raise GeometryError(
             f"Georeference: {int(usable[first.name].sum())} usable control point(s), the model "
             f"{first.name} needs at least {first.needed} with relief and world coordinates."
-            f"{hint if task.missing else ''}"
+            f"{hint if measured.missing else ''}"
         )
     fuller = len(names) > 1 and usable["3D"].sum() >= MODELS["3D"].needed
     try:
-        best = _fit(task, first, usable[first.name])
+        best = _fit(measured, first, usable[first.name])
     except GeometryError:
         if not fuller:
             raise
-        best, fuller = _fit(task, MODELS["3D"], usable["3D"]), False
-    best = _explained(task, best, fuller=fuller)
-    return _as_georeference(task, best, usable[best.model.name])
+        best, fuller = _fit(measured, MODELS["3D"], usable["3D"]), False
+    best = _explained(measured, best, fuller=fuller)
+    return _as_georeference(measured, best, usable[best.model.name])
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class _Task:
+class _MeasuredControl:
     """Control points on the wall and in the world, shape (n, 3), with weights or without."""
 
     ids: tuple[str, ...]
@@ -152,11 +152,11 @@ class _Task:
         return known
 
 
-def _task(
+def _measured_control(
     points: NamedPoints | Mapping[str, Any],
     control: KnownPoints | Mapping[str, Any],
     covariance: FloatArray | None,
-) -> _Task:
+) -> _MeasuredControl:
     """Return what was measured and what is known of the same names."""
     if isinstance(points, ReliefTable) and covariance is None:
         covariance = points.covariance
@@ -172,7 +172,7 @@ def _task(
             )
         blank = np.full((1, 3, 3), np.nan)
         covariance = np.concatenate([covariance, blank])[control.rows_in(points)]
-    return _Task(
+    return _MeasuredControl(
         ids=control.ids,
         wall=control.coordinates_in(points),
         world=control.xyz,
@@ -183,7 +183,7 @@ def _task(
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class _Fit:
+class _FittedTransformation:
     """A transformation with the points it rests on, and how well it fits them."""
 
     model: TransformationModel
@@ -197,9 +197,11 @@ class _Fit:
     sums: WeightedSums | None = None
 
 
-def _fit(task: _Task, model: TransformationModel, used: BoolArray) -> _Fit:
+def _fit(
+    measured: _MeasuredControl, model: TransformationModel, used: BoolArray
+) -> _FittedTransformation:
     """Return the fit to the chosen points with its weighted sum of squares and redundancy."""
-    wall, target = task.wall[used], task.world[used].copy()
+    wall, target = measured.wall[used], measured.world[used].copy()
     if model.axes == 2:
         target[:, 2] = 0.0
     found = model.fit(wall, target)
@@ -212,11 +214,11 @@ def _fit(task: _Task, model: TransformationModel, used: BoolArray) -> _Fit:
     # Rounding noise of large coordinates is no contradiction.
     noise = (1e-9 * float(np.abs(target).max())) ** 2
     redundancy = model.axes * int(used.sum()) - model.parameters
-    if task.covariance is None:
+    if measured.covariance is None:
         left = residuals(found, wall, near, offset)[:, : model.axes]
         squares = float((left**2).sum())
     else:
-        weights = weights_of(task.covariance[used], flat=model.axes == 2)
+        weights = weights_of(measured.covariance[used], flat=model.axes == 2)
         about = wall - found.source_centre
         if model.name == "3D":
             found, offset = _about(fit_space(about, weights, near, found, origin), found)
@@ -226,7 +228,7 @@ def _fit(task: _Task, model: TransformationModel, used: BoolArray) -> _Fit:
         left = residuals(found, wall, near, offset) @ found.rotation / found.scale
         squares = float(np.einsum("ni,nij,nj->", left, weights, left))
         noise *= float(np.trace(weights.mean(axis=0))) / model.axes
-    return _Fit(
+    return _FittedTransformation(
         model=model, used=used, transformation=found, origin=origin, offset=offset,
         squares=squares, noise=noise, redundancy=redundancy, sums=sums,
     )  # fmt: skip
@@ -248,17 +250,19 @@ def residuals(
     return np.asarray(near - (offset + transformation.scale * turned))
 
 
-def _explained(task: _Task, best: _Fit, *, fuller: bool) -> _Fit:
+def _explained(
+    measured: _MeasuredControl, best: _FittedTransformation, *, fuller: bool
+) -> _FittedTransformation:
     """Return the fit after what contradicts it: a wall that leans, bad points."""
     while best.redundancy > 0 and best.squares > best.noise:
-        trials: list[tuple[float, _Fit]] = []
+        trials: list[tuple[float, _FittedTransformation]] = []
         if fuller and best.model.name != "3D":
-            trials += [(1 / ALPHA, trial) for trial in _tried(task, MODELS["3D"], best.used)]
+            trials += [(1 / ALPHA, trial) for trial in _tried(measured, MODELS["3D"], best.used)]
         rows = np.flatnonzero(best.used)
         for row in rows:
             without = best.used.copy()
             without[row] = False
-            found = _tried(task, best.model, without)
+            found = _tried(measured, best.model, without)
             trials += [(len(rows) / ALPHA_POINT, trial) for trial in found]
         # In shares of what is allowed; argmin takes the first of equals, the geometry.
         chances = [share * _chance(best, trial) for share, trial in trials]
@@ -268,17 +272,19 @@ def _explained(task: _Task, best: _Fit, *, fuller: bool) -> _Fit:
     return best
 
 
-def _tried(task: _Task, model: TransformationModel, used: BoolArray) -> list[_Fit]:
+def _tried(
+    measured: _MeasuredControl, model: TransformationModel, used: BoolArray
+) -> list[_FittedTransformation]:
     """Return the fit if there is one that leaves redundancy."""
     if model.axes * int(used.sum()) - model.parameters < 1:
         return []
     try:
-        return [_fit(task, model, used)]
+        return [_fit(measured, model, used)]
     except GeometryError:
         return []
 
 
-def _chance(simple: _Fit, full: _Fit) -> float:
+def _chance(simple: _FittedTransformation, full: _FittedTransformation) -> float:
     """Return how probable it is that honest errors alone make the fuller fit so much better."""
     from scipy.special import fdtrc  # a tenth of a second that only control points need
 
@@ -289,24 +295,26 @@ def _chance(simple: _Fit, full: _Fit) -> float:
     )
 
 
-def _as_georeference(task: _Task, best: _Fit, usable: BoolArray) -> Georeference:
+def _as_georeference(
+    measured: _MeasuredControl, best: _FittedTransformation, usable: BoolArray
+) -> Georeference:
     """Return the fit with the residuals of all control points."""
     flat = best.model.axes == 2
-    near = np.where(flat, task.world * [1, 1, np.nan], task.world) - best.origin
-    left = residuals(best.transformation, task.wall, near, best.offset)
+    near = np.where(flat, measured.world * [1, 1, np.nan], measured.world) - best.origin
+    left = residuals(best.transformation, measured.wall, near, best.offset)
     squares = float((left[best.used][:, : best.model.axes] ** 2).sum())
     redundant = best.redundancy > 0
-    weighted = redundant and task.covariance is not None
+    weighted = redundant and measured.covariance is not None
     return Georeference(
-        ids=task.ids,
+        ids=measured.ids,
         world_from_wall=best.transformation,
         model=best.model.name,
         residuals=left,
-        solved=task.wall,
+        solved=measured.wall,
         used=best.used,
         bad=tuple(
             name
-            for name, was, now in zip(task.ids, usable, best.used, strict=True)
+            for name, was, now in zip(measured.ids, usable, best.used, strict=True)
             if was and not now
         ),
         sigma0=float(np.sqrt(squares / best.redundancy)) if redundant else float("nan"),
@@ -315,8 +323,8 @@ def _as_georeference(task: _Task, best: _Fit, usable: BoolArray) -> Georeference
         origin=best.origin,
         offset=best.offset,
         sums=best.sums,
-        covariance=task.covariance,
-        near=_flattened(task.world - best.origin, flat=flat),
+        covariance=measured.covariance,
+        near=_flattened(measured.world - best.origin, flat=flat),
     )
 
 

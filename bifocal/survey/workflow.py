@@ -208,9 +208,8 @@ def solve(
     given = _checked(**lengths, sigma_s=sigma_s, sigma_r_max=sigma_r_max)
     _checked(sigma_px=sigma_px, scale_tolerance=scale_tolerance)
     judged = tuple(as_rule(rule) for rule in rules) or RULES
-    options = ReadOptions(
-        columns=column_map(columns), sheet=sheet, decimal=decimal, visible_only=visible_only
-    )
+    by_hand = column_map(columns)
+    options = ReadOptions(columns=by_hand, sheet=sheet, decimal=decimal, visible_only=visible_only)
     survey, path = measured(source, options, unit)
     if isinstance(pair, Path | str) and Path(pair).suffix.lower() in BOOKS:
         survey, pair = with_setup_of(Path(pair), survey), None

@@ -214,6 +214,26 @@ def ideal_points(
 IDEAL_POINTS = ideal_points()
 
 
+def _carried_to_the_plane(prefix: str) -> list[SurveyColumn]:
+    """Return x1, y1, x2, y2: both pixels on the reference plane, from e, at the scale of photo 1.
+
+    Parameters
+    ----------
+    prefix : str
+        Of the headings of the pixels: ``u`` for those freed of lens distortion.
+    """
+    columns = []
+    for image in (1, 2):
+        col, row = f"[@{prefix}col{image}]", f"[@{prefix}row{image}]"
+        h = f"h{image}_"
+        below = f"({h}31*{col}+{h}32*{row}+{h}33)"
+        for axis, line in (("x", 1), ("y", 2)):
+            above = f"({h}{line}1*{col}+{h}{line}2*{row}+{h}{line}3)"
+            formula = f'IF(COUNT({col},{row})=2,({above}/{below}-e_{axis})*1000/m_1,"")'
+            columns.append(_f(f"{axis}{image}", formula, 4))
+    return columns
+
+
 def pair_points(*, undistorted: bool) -> tuple[SurveyColumn, ...]:
     """Return the `Points` table of a general pair measured in raw pixels.
 
@@ -224,20 +244,6 @@ def pair_points(*, undistorted: bool) -> tuple[SurveyColumn, ...]:
         it are then written beside the raw ones.
     """
     prefix = "u" if undistorted else ""
-    pixels = [(f"[@{prefix}col{i}]", f"[@{prefix}row{i}]") for i in (1, 2)]
-    carried = []
-    for image, (col, row) in enumerate(pixels, start=1):
-        h = f"h{image}_"
-        below = f"({h}31*{col}+{h}32*{row}+{h}33)"
-        for axis, line in (("x", 1), ("y", 2)):
-            above = f"({h}{line}1*{col}+{h}{line}2*{row}+{h}{line}3)"
-            carried.append(
-                _f(
-                    f"{axis}{image}",
-                    f'IF(COUNT({col},{row})=2,({above}/{below}-e_{axis})*1000/m_1,"")',
-                    4,
-                )
-            )
     moved, own = {}, {}
     for image, axis in ((1, "x"), (1, "y"), (2, "x"), (2, "y")):
         at = f"{axis}{image}"
@@ -261,7 +267,7 @@ def pair_points(*, undistorted: bool) -> tuple[SurveyColumn, ...]:
             for key in ("col1", "row1", "col2", "row2")
             if undistorted
         ),
-        *carried,
+        *_carried_to_the_plane(prefix),
         _f(
             "q",
             f"IF(COUNT({_XY})=4,IF([@x1]^2+[@y1]^2>0,"
