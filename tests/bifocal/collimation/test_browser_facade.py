@@ -5,7 +5,6 @@ from __future__ import annotations
 import base64
 import io
 import zipfile
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +15,6 @@ from tests.browser import (
     SAMPLE,
     TARGETS,
     Driver,
-    launched,
     sample_survey,
     served,
     tab_of,
@@ -24,12 +22,6 @@ from tests.browser import (
 )
 
 CHECKED = {"T17": (-1.62, 1.6, 0.08332), "T18": (1.62, 1.6, 0.08282)}
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Any]:
-    with launched() as found:
-        yield found
 
 
 DROP = """(files) => {
