@@ -17,11 +17,13 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from photocore.arrays import FloatArray, as_floats, positive
+from photocore.arrays import FloatArray, all_positive, as_floats, check_shapes
 from photocore.errors import GeometryError
+from photocore.series import keeps_index
 
 
-def relief_displacement(s: ArrayLike, r: ArrayLike, *, d: float) -> FloatArray:
+@keeps_index
+def relief_displacement(s: ArrayLike, r: ArrayLike, *, d: ArrayLike) -> FloatArray:
     r"""Relief displacement e of points of known relief.
 
     Parameters
@@ -30,7 +32,7 @@ def relief_displacement(s: ArrayLike, r: ArrayLike, *, d: float) -> FloatArray:
         Distance from the nadir point to the displaced image point. [mm]
     r : array_like, shape (...)
         Relief, positive towards the camera. [m]
-    d : float
+    d : float or array_like, shape (...)
         Distance of the projection centre to the reference plane. [m]
 
     Returns
@@ -59,17 +61,20 @@ def relief_displacement(s: ArrayLike, r: ArrayLike, *, d: float) -> FloatArray:
     0.25
     """
     # Eq. (1)
-    return np.asarray(as_floats(s, "s") * as_floats(r, "r") / positive(d, "d", unit="m"))
+    s, r, d = as_floats(s, "s"), as_floats(r, "r"), all_positive(d, "d", unit="m")
+    check_shapes(s=s, r=r, d=d)
+    return np.asarray(s * r / d)
 
 
-def relief_from_displacement(s: ArrayLike, e: ArrayLike, *, d: float) -> FloatArray:
+@keeps_index
+def relief_from_displacement(s: ArrayLike, e: ArrayLike, *, d: ArrayLike) -> FloatArray:
     r"""Relief of points whose displacement on one image is known.
 
     Parameters
     ----------
     s, e : array_like, shape (...)
         Distance from the nadir to the displaced point, and its displacement. [mm]
-    d : float
+    d : float or array_like, shape (...)
         Distance of the projection centre to the reference plane. [m]
 
     Returns
@@ -95,12 +100,14 @@ def relief_from_displacement(s: ArrayLike, e: ArrayLike, *, d: float) -> FloatAr
     >>> float(relief_from_displacement(4.0, 0.25, d=16.0))
     1.0
     """
-    s, e = as_floats(s, "s"), as_floats(e, "e")
+    s, e, d = as_floats(s, "s"), as_floats(e, "e"), all_positive(d, "d", unit="m")
+    check_shapes(s=s, e=e, d=d)
     with np.errstate(divide="ignore", invalid="ignore"):
-        return np.where(s == 0, np.nan, positive(d, "d", unit="m") * e / s)  # Eq. (2)
+        return np.where(s == 0, np.nan, d * e / s)  # Eq. (2)
 
 
-def relief(s1: ArrayLike, s2: ArrayLike, *, d1: float, d2: float) -> FloatArray:
+@keeps_index
+def relief(s1: ArrayLike, s2: ArrayLike, *, d1: ArrayLike, d2: ArrayLike) -> FloatArray:
     r"""Relief of points seen at radial distances s1 and s2 on a bifocal pair.
 
     Parameters
@@ -108,7 +115,7 @@ def relief(s1: ArrayLike, s2: ArrayLike, *, d1: float, d2: float) -> FloatArray:
     s1, s2 : array_like, shape (...)
         Distance from the nadir point to the same point on images 1 and 2, free of lens
         distortion. [mm, or any unit common to both]
-    d1, d2 : float
+    d1, d2 : float or array_like, shape (...)
         Distance of projection centres 1 and 2 to the reference plane, d1 > d2. [m]
 
     Returns
@@ -144,14 +151,16 @@ def relief(s1: ArrayLike, s2: ArrayLike, *, d1: float, d2: float) -> FloatArray:
     """
     s1, s2 = as_floats(s1, "s1"), as_floats(s2, "s2")
     d1, d2 = _distances(d1, d2)
+    check_shapes(s1=s1, s2=s2, d1=d1, d2=d2)
     rate = s2 / d2 - s1 / d1
     with np.errstate(divide="ignore", invalid="ignore"):
         # r - d2 = -s1 (d1 - d2) / (d1 rate): only a positive rate meets before camera 2.
         return np.where((s1 > 0) & (rate > 0), (s2 - s1) / rate, np.nan)  # Eq. (6)
 
 
+@keeps_index
 def relief_displacements(
-    s1: ArrayLike, s2: ArrayLike, *, d1: float, d2: float
+    s1: ArrayLike, s2: ArrayLike, *, d1: ArrayLike, d2: ArrayLike
 ) -> tuple[FloatArray, FloatArray]:
     r"""Relief displacements e1 and e2 of points seen on a bifocal pair.
 
@@ -159,7 +168,7 @@ def relief_displacements(
     ----------
     s1, s2 : array_like, shape (...)
         As in `relief`. [mm]
-    d1, d2 : float
+    d1, d2 : float or array_like, shape (...)
         As in `relief`. [m]
 
     Returns
@@ -191,6 +200,7 @@ def relief_displacements(
     return relief_displacement(s1, r, d=d1), relief_displacement(s2, r, d=d2)  # Eq. (5)
 
 
+@keeps_index
 def plane_coordinates(
     s: ArrayLike, e: ArrayLike, theta: ArrayLike
 ) -> tuple[FloatArray, FloatArray]:
@@ -226,21 +236,25 @@ def plane_coordinates(
     >>> float(x), float(y)
     (0.0, 4.0)
     """
-    s_prime = as_floats(s, "s") - as_floats(e, "e")
-    theta = as_floats(theta, "theta")
+    s, e, theta = as_floats(s, "s"), as_floats(e, "e"), as_floats(theta, "theta")
+    check_shapes(s=s, e=e, theta=theta)
+    s_prime = s - e
     return np.asarray(s_prime * np.sin(theta)), np.asarray(s_prime * np.cos(theta))  # Eq. (7)
 
 
-def _distances(d1: float, d2: float) -> tuple[float, float]:
-    """Return both distances as floats, the far camera's first."""
-    d1, d2 = positive(d1, "d1", unit="m"), positive(d2, "d2", unit="m")
-    if d1 == d2:
+def _distances(d1: ArrayLike, d2: ArrayLike) -> tuple[FloatArray, FloatArray]:
+    """Return both distances, the far camera's first; one for all points or one for each."""
+    far, near = all_positive(d1, "d1", unit="m"), all_positive(d2, "d2", unit="m")
+    check_shapes(d1=far, d2=near)
+    if (far > near).all():
+        return far, near
+    both = np.broadcast_arrays(far, near)
+    one, other = (float(array[~(both[0] > both[1])].flat[0]) for array in both)
+    if one == other:
         raise GeometryError(
-            f"d1 and d2 are both {d1:g} m: the two photos must be taken from different distances."
+            f"d1 and d2 are both {one:g} m: the two photos must be taken from different distances."
         )
-    if d1 < d2:
-        raise GeometryError(
-            f"d1 = {d1:g} m is shorter than d2 = {d2:g} m, but camera 1 is the far one: exchange "
-            "the photos together with their distances."
-        )
-    return d1, d2
+    raise GeometryError(
+        f"d1 = {one:g} m is shorter than d2 = {other:g} m, but camera 1 is the far one: exchange "
+        "the photos together with their distances."
+    )

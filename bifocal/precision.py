@@ -75,6 +75,66 @@ def sigma_relief(
     return np.asarray(np.hypot(by_1 * sigma_1, by_2 * sigma_2))
 
 
+def point_covariance(
+    s1: ArrayLike, s2: ArrayLike, theta: ArrayLike, *, d1: float, d2: float, sigma_1: float,
+    sigma_2: float, metres: float,
+) -> FloatArray:  # fmt: skip
+    r"""Return the covariance of X, Y and r from the precision of the picks.
+
+    Parameters
+    ----------
+    s1, s2 : array_like, shape (n,)
+        Radial distances at the scale of image 1. [mm]
+    theta : array_like, shape (n,)
+        Direction of the point, clockwise from +y, taken from image 1. [rad]
+    d1, d2 : float
+        Distances to the reference plane, in either order. [m]
+    sigma_1, sigma_2 : float
+        Standard deviations of s1 and s2; sigma_1 also across the radius. [mm]
+    metres : float
+        Metres on the reference plane per millimetre of image 1.
+
+    Returns
+    -------
+    covariance : ndarray, shape (n, 3, 3)
+        NaN where the relief or the direction is. [m²]
+
+    Notes
+    -----
+    With :math:`f_i = 1 - r/d_i` and :math:`q = s_2/d_2 - s_1/d_1`, Eqs. (6) and (7) give along the
+    radius :math:`\delta s' = f_1 (s_2/d_2) \delta s_1/q - f_2 (s_1/d_1) \delta s_2/q` and
+    :math:`\delta r = -f_1 \delta s_1/q + f_2 \delta s_2/q`; across it the point moves by
+    :math:`f_1 \sigma_1`, since the direction is that of image 1.
+
+    Examples
+    --------
+    On the plane, 4 mm right of the nadir, 0.004 mm of precision, 35/19 mm: X is good to 5 mm, Y to
+    2 mm, r to 29 mm.
+
+    >>> found = point_covariance([4], [4], [np.pi / 2], d1=17.5, d2=9.5, sigma_1=0.004,
+    ...                          sigma_2=0.004, metres=0.5)
+    >>> (1000 * np.sqrt(np.diagonal(found[0]))).round(1).tolist()
+    [5.0, 2.0, 29.4]
+    """
+    s1, s2, theta = as_floats(s1, "s1"), as_floats(s2, "s2"), as_floats(theta, "theta")
+    with np.errstate(divide="ignore", invalid="ignore"):
+        rate = s2 / d2 - s1 / d1
+        r = np.where((s1 > 0) & (rate * (d1 - d2) > 0), (s2 - s1) / rate, np.nan)
+        first = ((1 - r / d1) * sigma_1 / rate) ** 2
+        second = ((1 - r / d2) * sigma_2 / rate) ** 2
+    along = (first * (s2 / d2) ** 2 + second * (s1 / d1) ** 2) * metres**2
+    across = ((1 - r / d1) * sigma_1 * metres) ** 2
+    mixed = -(first * (s2 / d2) + second * (s1 / d1)) * metres
+    sin, cos = np.sin(theta), np.cos(theta)
+    xy = (along - across) * sin * cos
+    rows = [
+        [along * sin**2 + across * cos**2, xy, mixed * sin],
+        [xy, along * cos**2 + across * sin**2, mixed * cos],
+        [mixed * sin, mixed * cos, first + second + 0.0 * theta],
+    ]
+    return np.moveaxis(np.array(rows), (0, 1), (-2, -1))
+
+
 def sigma_displacements(
     s1: ArrayLike, s2: ArrayLike, *, d1: float, d2: float, sigma_1: float, sigma_2: float
 ) -> tuple[FloatArray, FloatArray]:

@@ -20,7 +20,7 @@ ByteArray = NDArray[np.uint8]
 
 
 def as_floats(value: ArrayLike, name: str) -> FloatArray:
-    """Return value as a float64 array.
+    """Return value as a float64 array; what is masked becomes NaN.
 
     Raises
     ------
@@ -32,6 +32,9 @@ def as_floats(value: ArrayLike, name: str) -> FloatArray:
         # numpy would take the text "17.5", and true for 1; no file of ours means it.
         if array.dtype.kind in "USb":
             raise TypeError
+        if isinstance(value, np.ma.MaskedArray):
+            plain = np.asarray(value.data, dtype=np.float64)
+            return np.where(np.ma.getmaskarray(value), np.nan, plain)
         return np.asarray(array, dtype=np.float64)
     except OverflowError as error:
         largest = sys.float_info.max
@@ -119,6 +122,46 @@ def _within(value: float, name: str, unit: str, least: float, words: str) -> flo
             f"got {value!s:.40}."
         )
     return number
+
+
+def all_positive(value: ArrayLike, name: str, *, unit: str = "") -> FloatArray:
+    """Return one number or an array of them, refusing what `positive` refuses.
+
+    Raises
+    ------
+    InputError
+        Naming the first entry that is not above zero, or beyond `LARGEST`.
+    """
+    array = as_floats(value, name)
+    if array.size == 1:
+        return np.full(array.shape, positive(array, name, unit=unit))  # type: ignore[arg-type]
+    wrong = ~((array > 0) & (array <= LARGEST))
+    if wrong.any():
+        place = tuple(int(i) for i in np.argwhere(wrong)[0])
+        shown = ", ".join(map(str, place))
+        raise InputError(
+            f"{name}[{shown}]: must be above zero{unit and f' [{unit}]'} and no more than "
+            f"{LARGEST:g}, got {array[place]!s:.40}."
+        )
+    return array
+
+
+def check_shapes(**arrays: FloatArray) -> None:
+    """Refuse arrays that do not belong together.
+
+    Raises
+    ------
+    InputError
+        Naming each with its shape, if they do not broadcast.
+    """
+    try:
+        np.broadcast_shapes(*(np.shape(array) for array in arrays.values()))
+    except ValueError as error:
+        shown = ", ".join(f"{name} {np.shape(array)}" for name, array in arrays.items())
+        raise InputError(
+            f"{shown}: these shapes do not fit together; give one value for each point, or one for "
+            "all."
+        ) from error
 
 
 def contiguous_rows(

@@ -195,7 +195,27 @@ _GROUPS: tuple[tuple[str, str, tuple[tuple[str, str], ...]], ...] = (
         "tests/bifocal/relief_maps/test_dense_relief.py",
         (("rate1, rate2 = d2", "rate2, rate1 = d2"),),
     ),
+    (
+        "bifocal/relief_maps/evidence.py",
+        "tests/bifocal/relief_maps/test_tails.py",
+        (("low - slack), high + slack", "low - slack), high - slack"),),
+    ),
+    (
+        "bifocal/relief_maps/levels.py",
+        "tests/bifocal/relief_maps/test_tails.py",
+        (("result[chosen] = r + move", "result[chosen] = r - move"),),
+    ),
+    (
+        "bifocal/relief_maps/frame.py",
+        "tests/bifocal/relief_maps/test_tails.py",
+        (("squares[0] / squares[1]", "squares[1] / squares[0]"),),
+    ),
     # Orthophotos
+    (
+        "bifocal/orthophotos/whole_picture.py",
+        "tests/bifocal/orthophotos/test_whole_picture.py",
+        (("(far - away) / max", "(away - far) / max"),),
+    ),
     (
         "bifocal/orthophotos/rectify.py",
         "tests/bifocal/orthophotos/test_compose.py tests/bifocal/orthophotos/test_cli_ortho.py",

@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from photocore.cli import remark
-from photocore.options import FILE, choice, overwrite
+from photocore.options import FILE, NOT_NEGATIVE, choice, number, overwrite
 
 EXAMPLE = """\b
 Examples:
@@ -32,15 +32,21 @@ Examples:
     "--csv-flavour", "plain|excel-it|excel-de", "Separator, decimal sign and encoding of a .csv.",
     default="plain",
 )  # fmt: skip
+@number(
+    "--ellipses", "TIMES", "Error ellipses of a .dxf, times one sigma; 0 for none.", default=10.0,
+    type=NOT_NEGATIVE,
+)  # fmt: skip
 @overwrite
 def command(
-    result: Path, out: Path, world: bool, order: str, csv_flavour: str, overwrite: bool
-) -> None:
+    result: Path, out: Path, world: bool, order: str, csv_flavour: str, ellipses: float,
+    overwrite: bool,
+) -> None:  # fmt: skip
     """Write the points of a solved survey (RESULT: .xlsx, .ods or .csv) for other programs."""
     from bifocal.survey.export_workflow import export
 
     for note in export(
-        result, out, world=world, order=order, flavour=csv_flavour, overwrite=overwrite
-    ):
+        result, out, world=world, order=order, flavour=csv_flavour, ellipses=ellipses,
+        overwrite=overwrite,
+    ):  # fmt: skip
         remark(note)
     click.echo(out)

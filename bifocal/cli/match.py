@@ -14,6 +14,7 @@ from photocore.options import FILE, NUMBER, as_json, choice, number, overwrite
 EXAMPLE = """\b
 Examples:
   bifocal match wall.pair.json --out survey.xlsx
+  bifocal match survey.xlsx --out matched.xlsx
   bifocal match wall.pair.json --count 2000 --out points.csv
   bifocal match wall.pair.json --what targets --out targets.xlsx
 Then:
@@ -47,20 +48,21 @@ def command(
     pair: Path, out: Path, count: int, what: str, relief_min: float | None,
     relief_max: float | None, lang: str, overwrite: bool, as_json: bool,
 ) -> None:  # fmt: skip
-    """Find the same details of the wall in both photos of PAIR.
+    """Find the same details of the wall in both photos of PAIR, a pair file or survey workbook.
 
     Discs, chequers and coded markers are found and measured by their centres; natural detail is
     matched along the radial lines. Every point is checked by how far off its line it fits.
     """
-    from bifocal.model.pair import Pair
     from bifocal.orientation.match_workflow import match_photos, match_summary
     from bifocal.orientation.matching import MatchSettings
+    from bifocal.survey.pair_workflow import is_workbook, read_pair
 
     if relief_min is not None and relief_max is not None and relief_min >= relief_max:
         raise click.UsageError("--relief-min must be below --relief-max.")
+    source = read_pair(pair)
     reliefs = None
     if relief_min is not None or relief_max is not None:
-        near = Pair.read(pair).image2.distance
+        near = source.image2.distance
         reliefs = (
             -0.5 * near if relief_min is None else relief_min,
             0.4 * near if relief_max is None else relief_max,
@@ -71,7 +73,9 @@ def command(
         features=what != "targets",
         targets=what != "features",
     )
-    found = match_photos(pair, out, settings, language=lang, overwrite=overwrite)
+    found = match_photos(
+        source if is_workbook(pair) else pair, out, settings, language=lang, overwrite=overwrite
+    )
     summary = match_summary(*found)
     print_result(
         {**summary, "out": out}, _lines(summary), as_json=as_json,
@@ -108,6 +112,7 @@ def _lines(summary: dict[str, Any]) -> Iterator[str]:
         f"Relief from {low:.2f} to {high:.2f} m, sigma of r {1000 * summary['sigma_r_median']:.1f} "
         "mm at the median."
     )
+    yield summary["rests_on"]
     if summary["empty"]:
         named = "; ".join(
             f"columns {c[0]}-{c[1]}, rows {r[0]}-{r[1]}"

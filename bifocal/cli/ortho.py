@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -21,12 +21,17 @@ from photocore.options import (
     switch,
 )
 
+if TYPE_CHECKING:
+    from bifocal.model.points import SurveyPoints
+
 EXAMPLE = """\b
 Examples:
   bifocal ortho wall.pair.json --relief relief.tif --out ortho.tif
   bifocal ortho wall.pair.json --points result.xlsx --breakline P7,P8,P9 --out ortho.tif
+  bifocal ortho result.xlsx --out ortho.tif
   bifocal ortho wall.pair.json --plane --gsd 5mm --bounds -4,0,4,7.5 --out flat.tif
   bifocal ortho wall.pair.json --relief relief.tif --image both --fill --out ortho.tif
+  bifocal ortho wall.pair.json --relief relief.tif --image both --complete --out picture.tif
   bifocal ortho wall.pair.json --relief relief.tif --deliver drawing --scale 1:50 --dpi 254
                 --control control.csv --section x=1.5 --section y=2 --contours 0.05
 """
@@ -62,6 +67,11 @@ Examples:
 )  # fmt: skip
 @switch("mask", "Leave empty what relief hides from the camera, or show what hides it.")
 @click.option("--fill", is_flag=True, help="Close holes with the colours around them.")
+@click.option(
+    "--complete", is_flag=True,
+    help="A whole picture: unknown relief is interpolated, far from all else the plane; what is "
+    "not measured says so in the last band. Closes holes, too.",
+)  # fmt: skip
 @switch("match", "With --image both: bring photo 2 to the colours of photo 1.")
 @click.option(
     "--vignetting", default="", metavar="cos4|K1,K2,K3",
@@ -107,19 +117,23 @@ Examples:
 def command(
     pair: Path, out: Path | None, relief: Path | None, points: Path | None,
     breaklines: tuple[str, ...], plane: float | None, interpolation: str, mask: bool, fill: bool,
-    feather: float, folder: Path | None, scale: float | None, dpi: float, title: str,
+    complete: bool, feather: float, folder: Path | None, scale: float | None, dpi: float,
+    title: str,
     paper: str | None, mark: Path | None, control: Path | None, sections: tuple[str, ...],
     contours: float | None, tfw: bool, overwrite: bool, as_json: bool, **choices: Any,
 ) -> None:  # fmt: skip
-    """Make the orthophoto of a wall from the photos of a PAIR file.
+    """Make the orthophoto of a wall from the photos of a PAIR file or survey workbook.
 
     Every pixel is taken from the original photo, moved by its own relief. Relief comes from a
-    map, from measured points, or is none (--plane). What the camera cannot see stays empty; the
-    last band says where each pixel comes from (0 nothing, 1 and 2 the photos, 3 both, 4 filled).
+    map, from measured points, or is none (--plane); by default from the points of the workbook,
+    if PAIR is one: its set-up is then taken as typed. What the camera cannot see stays empty; the
+    last band says where each pixel comes from (0 nothing, 1 and 2 the photos, 3 both, 4 filled,
+    5 a photo on interpolated relief, 6 a photo on the plane).
     """
     from bifocal.orthophotos.deliver_workflow import DeliverTask, deliver
     from bifocal.orthophotos.ortho_image import OrthoOptions
     from bifocal.orthophotos.ortho_workflow import OrthoTask, make_ortho
+    from bifocal.survey.pair_workflow import is_workbook, points_of, read_pair
 
     if (out is None) == (folder is None):
         raise click.UsageError("Give either --out FILE or --deliver DIR.")
@@ -127,20 +141,24 @@ def command(
         raise click.UsageError("--deliver needs the scale of the drawing, e.g. --scale 1:50.")
     if sum(choice is not None for choice in (relief, points, plane)) > 1:
         raise click.UsageError("Give one of --relief, --points and --plane.")
-    if breaklines and points is None:
+    source = read_pair(pair)
+    own: Path | SurveyPoints | None = points
+    if relief is None and points is None and plane is None and is_workbook(pair):
+        own = points_of(pair)
+    if breaklines and own is None:
         raise click.UsageError("--breakline joins measured points; give their table by --points.")
     drawn = {"--section": sections, "--contours": contours, "--mark": mark, "--control": control}
     for name, given in drawn.items():
         if given and folder is None:
             raise click.UsageError(f"{name} is drawn into a folder; give --deliver DIR.")
-    if relief is None and points is None and plane is None:
+    if relief is None and own is None and plane is None:
         remark("No relief given: the wall is taken as flat (as with --plane).")
     task = OrthoTask(
-        relief=relief, points=points, breaklines=[line.split(",") for line in breaklines],
+        relief=relief, points=own, breaklines=[line.split(",") for line in breaklines],
         plane=plane or 0.0, scale=scale, **choices,
         options=OrthoOptions(
             interpolation=interpolation,  # type: ignore[arg-type]
-            mask_hidden=mask, fill=fill, feather=feather,
+            mask_hidden=mask, fill=fill, complete=complete, feather=feather,
         ),
     )  # fmt: skip
     files: dict[str, object] = {}
@@ -150,12 +168,12 @@ def command(
                 scale=scale, dpi=dpi, title=title, paper=paper, marked=mark, control=control,
                 sections=sections, interval=contours,
             )  # fmt: skip
-            done = deliver(pair, folder, task, wish, overwrite=overwrite, progress=progress)
+            done = deliver(source, folder, task, wish, overwrite=overwrite, progress=progress)
             result = done.ortho
             files = {"folder": str(folder), "files": list(done.files), "sheet": done.sheet}
         else:
             result = make_ortho(
-                pair, out or Path("ortho.tif"), task, overwrite=overwrite, world_file=tfw,
+                source, out or Path("ortho.tif"), task, overwrite=overwrite, world_file=tfw,
                 progress=progress,
             )  # fmt: skip
     grid, shares = result.grid, result.shares
@@ -163,6 +181,10 @@ def command(
         f"{result.path}: {grid.width} x {grid.height} px of {grid.gsd * 1000:g} mm; "
         f"{100 * (1 - shares['none']):.1f} % covered, {100 * shares['hidden']:.1f} % hidden"
     ]
+    estimated = {"interpolated": "on interpolated relief", "plane": "on the plane"}
+    told = [f"{100 * shares[key]:.1f} % {where}" for key, where in estimated.items() if shares[key]]
+    if told:
+        lines.append("Not measured: " + ", ".join(told))
     if files:
         lines.append(f"{folder}: {', '.join(done.files)} (sheet {done.sheet})")
     print_result(result.to_dict() | files, lines, as_json=as_json, remarks=result.remarks)

@@ -19,17 +19,21 @@ Examples:
   bifocal plan --focal 35 --focal 28 --focal 19 --sensor 22.7x15.1 --pixels 3072x2048 --scale 1:500
   bifocal plan --focal 35 --focal 18 --sensor 23.5x15.6 --pixels 6000x4000 --object 12x8
                --free-space 20 --out plan.xlsx
+  bifocal plan --equivalent 77 --equivalent 24 --pixels 4000x3000 --object 6x4
 """
 
 
 @click.command(epilog=EXAMPLE)
 @click.option(
-    "--focal", "focal_lengths", type=POSITIVE, multiple=True, required=True, metavar="MM",
+    "--focal", "focal_lengths", type=POSITIVE, multiple=True, metavar="MM",
     help="A focal length at hand [mm]; repeat it for every lens or zoom mark.",
 )  # fmt: skip
 @click.option(
-    "--sensor", type=Size(above=0), required=True, help="Width x height of the sensor [mm]."
-)
+    "--equivalent", "equivalents", type=POSITIVE, multiple=True, metavar="MM",
+    help="A 35 mm equivalent, as phones state it, in place of --focal and --sensor [mm]; repeat "
+    "it for every camera of the phone.",
+)  # fmt: skip
+@click.option("--sensor", type=Size(above=0), help="Width x height of the sensor [mm].")
 @click.option(
     "--pixels", type=Size(least=1, whole=True), required=True,
     help="Columns x rows of the photo [px].",
@@ -51,7 +55,8 @@ Examples:
 @overwrite
 @as_json
 def command(
-    focal_lengths: tuple[float, ...], sensor: tuple[float, float], pixels: tuple[int, int],
+    focal_lengths: tuple[float, ...], equivalents: tuple[float, ...],
+    sensor: tuple[float, float] | None, pixels: tuple[int, int],
     out: Path | None, as_json: bool, **wishes: Any,
 ) -> None:  # fmt: skip
     """Compare pairs of lenses: where to stand, what a photo covers, how precise it gets.
@@ -62,8 +67,15 @@ def command(
     from bifocal.planning.camera_plan import CameraSensor
     from bifocal.planning.workflow import make_plan, plan_as_dict
 
-    camera = CameraSensor(width=sensor[0], height=sensor[1], columns=pixels[0], rows=pixels[1])
-    plan = make_plan(focal_lengths, camera, out=out, **wishes)
+    if equivalents and (focal_lengths or sensor):
+        raise click.UsageError("Give --equivalent, or --focal with --sensor, not both.")
+    if equivalents:
+        camera = CameraSensor.of_film(*pixels)
+    elif sensor is None or not focal_lengths:
+        raise click.UsageError("Give --focal with --sensor, or --equivalent for a phone.")
+    else:
+        camera = CameraSensor(width=sensor[0], height=sensor[1], columns=pixels[0], rows=pixels[1])
+    plan = make_plan(equivalents or focal_lengths, camera, out=out, **wishes)
     print_result(plan_as_dict(plan), _lines(plan), as_json=as_json)
     if out is not None:
         remark(f"Plan written to {out}")
@@ -90,6 +102,7 @@ def _lines(plan: Plan) -> Iterator[str]:
     for station in plan.stations:
         if station.note:
             yield f"{station.c1:g}/{station.c2:g} mm: {station.note}"
+    yield plan.basis
     best = plan.best
     yield f"\nBest: {best.c1:g} mm from {best.d1:.2f} m and {best.c2:g} mm from {best.d2:.2f} m."
     x, y, sigma = plan.sigma_grid(best, columns=7, rows=5)

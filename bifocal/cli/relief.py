@@ -15,6 +15,7 @@ EXAMPLE = """\b
 Examples:
   bifocal relief wall.pair.json --out relief.tif --preview relief.png
   bifocal relief wall.pair.json --out relief.tif --gsd 0.005 --bounds -5,-3,5,3 --cloud wall.laz
+  bifocal relief survey.xlsx --out relief.tif
   bifocal relief wall.pair.json --out quick.tif --quality fast --json
 
 Bands of the GeoTIFF: relief [m], NaN where unknown; its sigma [m]; quality (1 measured in both
@@ -45,15 +46,18 @@ photos, 2 interpolated, 3 hidden from a camera, 0 unknown).
 @overwrite
 @as_json
 def command(pair_file: Path, as_json: bool, **wishes: Any) -> None:
-    """Measure the relief of the whole wall from the two photos of a pair file.
+    """Measure the relief of the whole wall from the photos of a pair file or survey workbook.
 
     Every pixel of the map gets its relief and the standard deviation of it, which comes from the
     photos themselves: points can only move along the radius, so what moves across it is error.
     """
     from bifocal.relief_maps.workflow import ReliefJob, relief_of_pair
+    from bifocal.survey.pair_workflow import read_pair
 
     with progress_bar("Relief", quiet=as_json) as progress:
-        summary, remarks = relief_of_pair(pair_file, ReliefJob(**wishes), progress=progress)
+        summary, remarks = relief_of_pair(
+            read_pair(pair_file), ReliefJob(**wishes), progress=progress
+        )
     data = summary | {"remarks": list(remarks)}
     print_result(data, _lines(summary), as_json=as_json, remarks=remarks)
 

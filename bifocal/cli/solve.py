@@ -14,6 +14,7 @@ EXAMPLE = """\b
 Examples:
   bifocal solve survey.xlsx --out result.xlsx
   bifocal solve points.csv --pair wall.pair.json --json
+  bifocal solve far.dxf near.dxf --pair setup.xlsx --out result.xlsx
   bifocal solve points.csv --d1 17.5 --d2 9.5 --c1 35 --c2 19 --out result.csv
   bifocal solve old.xlsx --columns "id=A,s1=distance far,s2=D" --d1 17.5 --d2 9.5
 """
@@ -22,14 +23,15 @@ SHOWN = 40
 
 
 @click.command(epilog=EXAMPLE)
-@click.argument("survey", type=FILE, metavar="SURVEY")
+@click.argument("survey", type=FILE, metavar="SURVEY...", nargs=-1, required=True)
 @click.option(
     "--out", type=FILE, metavar="FILE",
     help="Result: a workbook (.xlsx, .xlsm) or a text table (.csv).  [default: none]",
 )  # fmt: skip
 @click.option(
     "--pair", type=FILE, metavar="PAIR.pair.json",
-    help="Pair file, for points in raw pixels.  [default: the workbook's own set-up]",
+    help="Pair file, for points in raw pixels, or a survey workbook for its set-up.  "
+    "[default: the workbook's own set-up]",
 )  # fmt: skip
 @as_json
 @click.option(
@@ -78,21 +80,25 @@ SHOWN = 40
 )  # fmt: skip
 @overwrite
 def command(
-    survey: Path, out: Path | None, as_json: bool, language: str | None, overwrite: bool,
-    **options: Any,
+    survey: tuple[Path, ...], out: Path | None, as_json: bool, language: str | None,
+    overwrite: bool, **options: Any,
 ) -> None:  # fmt: skip
     """Solve measured points: relief r, displacements, coordinates, precision, check points.
 
     SURVEY is a survey workbook, or any table (.xlsx, .xlsm, .ods, .csv) with the headings id and
     x1 y1 x2 y2, or s1 s2 theta, or col1 row1 col2 row2 (raw pixels, with --pair).
+    Or give two lists of picks, of photo 1 and of photo 2 (.csv, .xlsx, .dxf), joined by the names
+    of the points, with --pair: a pair file, or a survey workbook for its set-up.
     """
     from bifocal.survey.output import length_unit, point_rows, solution_json, summary, write_result
     from bifocal.survey.workflow import solve
     from photocore.workbook.newbook import check_new_workbook
 
     if out is not None:
-        check_new_workbook(out, overwrite=overwrite, source=survey)
-    solution = solve(survey, **options)
+        check_new_workbook(out, overwrite=overwrite, source=survey[0])
+    if len(survey) > 2:
+        raise click.UsageError("Give one survey, or two lists of picks: photo 1 and photo 2.")
+    solution = solve(survey[0] if len(survey) == 1 else (survey[0], survey[1]), **options)
     for text in solution.remarks:
         remark(text)
     if out is not None:
@@ -104,7 +110,8 @@ def command(
         print_json(solution_json(solution))
         return
     unit = length_unit(solution)
-    headings = ["id", "r [m]", f"e1 [{unit}]", f"e2 [{unit}]", "X [m]", "Y [m]", "sigma_r [m]"]
+    headings = ["id", "r [m]", f"e1 [{unit}]", f"e2 [{unit}]", "X [m]", "Y [m]"]
+    headings += ["sigma_X [m]", "sigma_Y [m]", "sigma_r [m]"]
     click.echo(text_table([*headings, "flag"], point_rows(solution, SHOWN)))
     if len(solution.table) > SHOWN:
         click.echo(f"... and {len(solution.table) - SHOWN} more points (--json or --out for all).")

@@ -5,6 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+import numpy as np
+
+from photocore.arrays import FloatArray
+
 
 def new_drawing(
     layers: Mapping[str, int], *, point_style: int, point_size: float
@@ -37,6 +41,16 @@ def add_text(model: Any, text: str, place: tuple[float, ...], height: float, lay
     model.add_text(
         text.replace("\n", " "), height=height, dxfattribs={"layer": layer, "insert": place}
     )
+
+
+def add_ellipse(model: Any, place: tuple[float, ...], ellipse: FloatArray, layer: str) -> None:
+    """Draw an ellipse: half axes [m] and direction of the longer, clockwise from +Y [deg]."""
+    long, short, azimuth = ellipse.tolist()
+    direction = np.radians(azimuth)
+    axis = (long * float(np.sin(direction)), long * float(np.cos(direction)))
+    # A ratio of 1e-6 is the least that the format allows.
+    ratio = max(short / long, 1e-6)
+    model.add_ellipse(place, major_axis=axis, ratio=ratio, dxfattribs={"layer": layer})
 
 
 def layer_name(text: str) -> str:

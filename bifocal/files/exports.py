@@ -9,9 +9,9 @@ from pathlib import Path
 
 import numpy as np
 
-from bifocal.files.dxf import add_text, layer_name, new_drawing
+from bifocal.files.dxf import add_ellipse, add_text, layer_name, new_drawing
 from bifocal.model.points import PointLine, SurveyPoints
-from photocore.arrays import BoolArray, FloatArray
+from photocore.arrays import BoolArray, FloatArray, not_negative
 from photocore.cloud import write_cloud
 from photocore.errors import InputError
 from photocore.output import atomic_path
@@ -27,6 +27,8 @@ LAYERS: Mapping[str, int] = {
     "BIFOCAL_RELIEF": 5,
     "BIFOCAL_UNCERTAIN": 1,
 }
+#: The layer of the error ellipses says how many times one sigma they are drawn.
+ELLIPSES = "BIFOCAL_ELLIPSES_X{:g}"
 UNCERTAIN_FLAGS = frozenset({"UNCERTAIN", "NADIR", "OFF-RADIAL", "CHECK"})
 
 
@@ -37,6 +39,7 @@ def export_points(
     world: bool = False,
     order: str = "PNEZD",
     flavour: str = "plain",
+    ellipses: float = 10.0,
     lines: Sequence[PointLine] = (),
     overwrite: bool = False,
 ) -> tuple[str, ...]:
@@ -54,6 +57,8 @@ def export_points(
         Column order of a .csv: ``PNEZD`` or ``PENZD``. In the plane frame N is Y, E is X, Z is r.
     flavour : str
         ``plain``, ``excel-it`` or ``excel-de``: delimiter, decimal sign and encoding of a .csv.
+    ellipses : float
+        How many times one sigma the error ellipses of a .dxf are drawn; 0 for none.
     lines : sequence of PointLine
         Polylines of a .dxf, in space; points without coordinates are left out of them.
     overwrite : bool
@@ -71,9 +76,10 @@ def export_points(
     """
     path = Path(path)
     ending = path.suffix.lower()
+    drawn = (not_negative(ellipses, "ellipses"), world)
     writers: dict[str, Callable[[Path, SurveyPoints, FloatArray], None]] = {
-        ".dxf": partial(_write_dxf, lines=lines),
-        ".geojson": _write_geojson,
+        ".dxf": partial(_write_dxf, drawn=drawn, lines=lines),
+        ".geojson": partial(_write_geojson, world=world),
         ".xlsx": _write_xlsx,
     }
     if ending not in writers and ending not in (".ply", ".las", ".laz", ".csv"):
@@ -103,21 +109,47 @@ def export_points(
             writers[ending](temporary, points, coordinates)
     else:
         uncertain = np.array([flag in UNCERTAIN_FLAGS for flag in points.flags], dtype=np.uint8)
+        attributes = {
+            key: values.astype(np.float32)
+            for key, values in _sigmas(points).items()
+            if np.isfinite(values).any() or key == "sigma_r"
+        }
         write_cloud(
-            path, coordinates,
-            {"sigma_r": points.sigma_r.astype(np.float32), "uncertain": uncertain},
-            descriptions={"sigma_r": "sigma of relief, m"}, overwrite=overwrite,
+            path, coordinates, attributes | {"uncertain": uncertain},
+            descriptions={key: f"{key.replace('_', ' of ')}, m" for key in attributes}
+            | {"sigma_r": "sigma of relief, m"},
+            overwrite=overwrite,
         )  # fmt: skip
     return tuple(remarks)
 
 
+def _sigmas(points: SurveyPoints) -> dict[str, FloatArray]:
+    """Return the standard deviations as columns; NaN where unknown. [m]"""
+    blank = np.full((len(points), 3), np.nan)
+    xy = blank if points.sigma_xy is None else points.sigma_xy
+    world = blank if points.sigma_world is None else points.sigma_world
+    columns = {f"sigma_{axis}": xy[:, i] for i, axis in enumerate("XY")}
+    columns["sigma_r"] = points.sigma_r
+    return columns | {f"sigma_{axis}": world[:, i] for i, axis in enumerate("ENH")}
+
+
 def _write_dxf(
-    path: Path, points: SurveyPoints, coordinates: FloatArray, *, lines: Sequence[PointLine]
+    path: Path,
+    points: SurveyPoints,
+    coordinates: FloatArray,
+    *,
+    drawn: tuple[float, bool],
+    lines: Sequence[PointLine],
 ) -> None:
-    """Write a drawing: a POINT, its name and its relief for each point; lines in space."""
+    """Write a drawing: a POINT, name, relief and error ellipse of each point; lines in space."""
+    times, world = drawn
+    layer_of_ellipses = ELLIPSES.format(times)
+    ellipses = points.ellipses(world=world) * [times, times, 1.0]
+    has_ellipses = times > 0 and bool(np.isfinite(ellipses).any())
     extent = float(np.ptp(coordinates[:, :2], axis=0).max())
     height = max(0.01, round(extent / 150, 3))
-    drawing, model = new_drawing(LAYERS, point_style=3, point_size=height)
+    layers = {**LAYERS, layer_of_ellipses: 8} if has_ellipses else LAYERS
+    drawing, model = new_drawing(layers, point_style=3, point_size=height)
     for i, (x, y, z) in enumerate(coordinates.tolist()):
         uncertain = points.flags[i] in UNCERTAIN_FLAGS
         layer = "BIFOCAL_UNCERTAIN" if uncertain else "BIFOCAL_POINTS"
@@ -126,6 +158,8 @@ def _write_dxf(
         left = x + height / 2
         add_text(model, points.ids[i], (left, y + 0.4 * height, z), height, "BIFOCAL_NAMES")
         add_text(model, relief, (left, y - 1.4 * height, z), height, "BIFOCAL_RELIEF")
+        if has_ellipses and np.isfinite(ellipses[i]).all() and ellipses[i, 1] > 0:
+            add_ellipse(model, (x, y, z), ellipses[i], layer_of_ellipses)
     places = dict(zip(points.ids, coordinates.tolist(), strict=True))
     for line in lines:
         vertices = [places[name] for name in line.ids if name in places]
@@ -157,8 +191,16 @@ def _write_csv(
     )  # fmt: skip
 
 
-def _write_geojson(path: Path, points: SurveyPoints, coordinates: FloatArray) -> None:
+def _write_geojson(
+    path: Path, points: SurveyPoints, coordinates: FloatArray, *, world: bool
+) -> None:
     """Write a FeatureCollection in the survey's own metres (a local frame, not longitudes)."""
+    ellipses = points.ellipses(world=world)
+    numbers = {
+        "relief": points.xyz[:, 2],
+        **_sigmas(points),
+        **{key: ellipses[:, i] for i, key in enumerate(_ELLIPSE)},
+    }
     features = [
         {
             "type": "Feature",
@@ -166,8 +208,10 @@ def _write_geojson(path: Path, points: SurveyPoints, coordinates: FloatArray) ->
             "geometry": {"type": "Point", "coordinates": place},
             "properties": {
                 "id": points.ids[i],
-                "relief": points.xyz[i, 2] if np.isfinite(points.xyz[i, 2]) else None,
-                "sigma_r": points.sigma_r[i] if np.isfinite(points.sigma_r[i]) else None,
+                **{
+                    key: float(values[i]) if np.isfinite(values[i]) else None
+                    for key, values in numbers.items()
+                },
                 "flag": points.flags[i],
                 "note": points.notes[i],
             },
@@ -180,6 +224,10 @@ def _write_geojson(path: Path, points: SurveyPoints, coordinates: FloatArray) ->
     path.write_text(text, encoding="utf-8")
 
 
+#: The error ellipse of one sigma: half axes [m], direction of the longer, clockwise from +Y [deg].
+_ELLIPSE = ("ellipse_a", "ellipse_b", "ellipse_azimuth")
+
+
 def _write_xlsx(path: Path, points: SurveyPoints, coordinates: FloatArray) -> None:  # noqa: ARG001
     """Write all coordinates as a plain table of values."""
     from openpyxl import Workbook
@@ -187,10 +235,11 @@ def _write_xlsx(path: Path, points: SurveyPoints, coordinates: FloatArray) -> No
 
     book = Workbook(write_only=True)
     sheet = book.create_sheet("Results")
-    sheet.append(["id", "X", "Y", "Z", "E", "N", "H", "sigma_r", "flag", "note"])
+    sigmas = _sigmas(points)
+    sheet.append(["id", "X", "Y", "Z", "E", "N", "H", *sigmas, "flag", "note"])
     world = points.world if points.world is not None else np.full((len(points), 3), np.nan)
     for i, name in enumerate(points.ids):
-        numbers = [*points.xyz[i], *world[i], points.sigma_r[i]]
+        numbers = [*points.xyz[i], *world[i], *(values[i] for values in sigmas.values())]
         texts = []
         for text in (name, points.flags[i], points.notes[i]):
             cell = WriteOnlyCell(sheet, without_control(text))

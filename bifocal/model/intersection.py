@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -84,12 +84,23 @@ class Intersection:
                 array.setflags(write=False)
 
     def __len__(self) -> int:
-        return len(self.xyz)
+        return len(self.flags)
+
+    def reshaped(self, shape: tuple[int, ...]) -> Intersection:
+        """Return the same points in arrays that begin with another shape."""
+        if shape == (len(self),):
+            return self
+        arrays = {
+            name: array.reshape((*shape, *array.shape[1:]))
+            for name in self.__slots__
+            if isinstance(array := getattr(self, name), np.ndarray)
+        }
+        return replace(self, **arrays)  # type: ignore[arg-type]
 
     @property
     def sigma(self) -> FloatArray:
         """Standard deviations of X, Y and r, shape (n, 3). [m]"""
-        return np.sqrt(np.diagonal(self.covariance, axis1=1, axis2=2))
+        return np.sqrt(np.diagonal(self.covariance, axis1=-2, axis2=-1))
 
 
 def intersect(

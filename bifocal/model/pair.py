@@ -328,6 +328,11 @@ class Pair:
             return cls.from_dict(data, folder=Path(path).parent)
 
     @classmethod
+    def of(cls, source: Pair | Path | str) -> Pair:
+        """Return a pair as it is, or read its file."""
+        return source if isinstance(source, Pair) else cls.read(source)
+
+    @classmethod
     def from_dict(cls, data: Mapping[str, Any], *, folder: Path = Path()) -> Pair:
         """Return the pair described by a pair file's content."""
         data = dict(data)
@@ -421,7 +426,7 @@ class Pair:
 
         Parameters
         ----------
-        pixels1, pixels2 : array_like, shape (n, 2)
+        pixels1, pixels2 : array_like, shape (..., 2)
             (column, row) of the same points in both photos; NaN where a point was not measured.
         sigma_px : float, optional
             Measuring precision per coordinate; by default the pair's own, else 0.5. [px]
@@ -437,6 +442,7 @@ class Pair:
         Returns
         -------
         Intersection
+            Its arrays begin with the shape of the points; ``flags`` is one row after the other.
 
         Raises
         ------
@@ -453,10 +459,13 @@ class Pair:
         """
         first = as_points(pixels1, "pixels1", dimension=2)
         second = as_points(pixels2, "pixels2", dimension=2)
-        if first.shape != second.shape or first.ndim != 2:
+        if first.shape != second.shape:
             raise InputError(
-                f"pixels1 {first.shape} and pixels2 {second.shape} must both have shape (n, 2)."
+                f"pixels1 {first.shape} and pixels2 {second.shape} must both have shape (..., 2), "
+                "the same."
             )
+        shape = first.shape[:-1]
+        first, second = first.reshape(-1, 2), second.reshape(-1, 2)
         if sigma_r_max is not None:
             positive(sigma_r_max, "sigma_r_max", unit="m")
         common = {"d1": sigma_d1, "d2": sigma_d2, "scale": sigma_scale, "nadir": sigma_nadir}
@@ -467,7 +476,7 @@ class Pair:
             limits=FlagLimits(sigma_r_max=sigma_r_max),
             sigma_orientation=(d1, d2, scale, nadir),
             of_orientation=self.covariance_of_orientation,
-        )
+        ).reshaped(shape)
 
     def covariance_of_orientation(self, xyz: FloatArray) -> FloatArray:
         """Return what the pair's own covariance adds to that of points, shape (n, 3, 3). [m²]

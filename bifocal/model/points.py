@@ -4,12 +4,17 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import compress
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from photocore.arrays import BoolArray, FloatArray, as_floats
 from photocore.errors import InputError
+
+#: Columns of each array of a set of points; 0 for one number per point.
+_WIDTHS = {
+    "xyz": 3, "world": 3, "sigma_r": 0, "sigma_xy": 2, "sigma_world": 3, "cov_xy": 0, "cov_en": 0
+}  # fmt: skip
 
 
 class PointLine(NamedTuple):
@@ -35,6 +40,12 @@ class SurveyPoints:
     sigma_r : ndarray, shape (n,)
         Standard deviation of the relief; NaN where unknown. [m]
     flags, notes : tuple of str, length n
+    sigma_xy, sigma_world : ndarray, shape (n, 2) and (n, 3), or None
+        Standard deviations of X, Y and of E, N, H; NaN or None where unknown. [m]
+    cov_xy, cov_en : ndarray, shape (n,), or None
+        Covariance of X with Y and of E with N. [m²]
+    name : str
+        Where they come from, for messages.
     """
 
     ids: tuple[str, ...]
@@ -43,10 +54,15 @@ class SurveyPoints:
     sigma_r: FloatArray
     flags: tuple[str, ...]
     notes: tuple[str, ...]
+    sigma_xy: FloatArray | None = None
+    sigma_world: FloatArray | None = None
+    cov_xy: FloatArray | None = None
+    cov_en: FloatArray | None = None
+    name: str = "points"
 
     def __post_init__(self) -> None:
         count = len(self.ids)
-        for name, width in (("xyz", 3), ("world", 3), ("sigma_r", 0)):
+        for name, width in _WIDTHS.items():
             value = getattr(self, name)
             if value is None:
                 continue
@@ -62,13 +78,34 @@ class SurveyPoints:
     def __len__(self) -> int:
         return len(self.ids)
 
+    def ellipses(self, *, world: bool = False) -> FloatArray:
+        """Return the error ellipses in X, Y, or in E, N, shape (n, 3).
+
+        Returns
+        -------
+        ndarray, shape (n, 3)
+            Half axes of one sigma, the longer first [m], and the direction of the longer, clockwise
+            from +Y or north [deg]; NaN where it is not known.
+        """
+        sigma = self.sigma_world if world else self.sigma_xy
+        mixed = self.cov_en if world else self.cov_xy
+        if sigma is None or mixed is None:
+            return np.full((len(self), 3), np.nan)
+        xx, yy = sigma[:, 0] ** 2, sigma[:, 1] ** 2
+        middle, spread = (xx + yy) / 2, np.hypot((xx - yy) / 2, mixed)
+        # Where a circle's direction is anybody's, north is as good as any.
+        direction = np.degrees(np.arctan2(2 * mixed, yy - xx)) / 2 % 180
+        short = np.sqrt(np.maximum(middle - spread, 0.0))
+        return np.stack([np.sqrt(middle + spread), short, direction], axis=-1)
+
     def take(self, keep: BoolArray) -> SurveyPoints:
         """Return the points where ``keep`` is true."""
+        kept: dict[str, Any] = {name: getattr(self, name) for name in _WIDTHS}
+        kept = {name: None if v is None else v[keep] for name, v in kept.items()}
         return SurveyPoints(
             ids=tuple(compress(self.ids, keep)),
-            xyz=self.xyz[keep],
-            world=None if self.world is None else self.world[keep],
-            sigma_r=self.sigma_r[keep],
+            **kept,
             flags=tuple(compress(self.flags, keep)),
             notes=tuple(compress(self.notes, keep)),
+            name=self.name,
         )

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from bifocal.files.images import image_info, read_grey
+from bifocal.model.basis import rests_on
 from bifocal.model.pair import Pair
 from bifocal.orientation.matching import Matches, MatchSettings, match_pair, precision
 from bifocal.survey.observations import PointObservations
@@ -18,7 +19,7 @@ from photocore.workbook.newbook import check_new_workbook
 
 
 def match_photos(
-    pair_path: Path,
+    pair_path: Pair | Path,
     out: Path,
     settings: MatchSettings,
     *,
@@ -49,7 +50,7 @@ def match_photos(
             note=tuple(f"sigma {s:.2f} px, misfit {abs(m):.2f} px" for s, m in notes),
         ),
         pair=pair,
-        pair_path=pair_path,
+        pair_path=None if isinstance(pair_path, Pair) else pair_path,
         sigma_px=round(precision(matches), 3),
         language=language,
         what=f"{len(matches.ids)} points found by bifocal match",
@@ -58,7 +59,7 @@ def match_photos(
     return pair, matches
 
 
-def match_pair_file(pair_path: Path, settings: MatchSettings) -> tuple[Pair, Matches]:
+def match_pair_file(pair_path: Pair | Path, settings: MatchSettings) -> tuple[Pair, Matches]:
     """Return a pair from its file, and the homologous points found in its photos.
 
     Raises
@@ -66,7 +67,7 @@ def match_pair_file(pair_path: Path, settings: MatchSettings) -> tuple[Pair, Mat
     InputError, GeometryError
         If a file is at fault, or photos and pair do not belong together.
     """
-    pair = Pair.read(pair_path)
+    pair = Pair.of(pair_path)
     images = (read_grey(pair.photo_file(1)), read_grey(pair.photo_file(2)))
     return pair, match_pair(pair, images, settings)
 
@@ -103,6 +104,11 @@ def match_summary(pair: Pair, matches: Matches) -> dict[str, Any]:
         "misfit_px": float(np.median(np.abs(matches.misfit)) * 1.4826),
         "relief_range": np.nanpercentile(solved.xyz[:, 2], [1, 99]),
         "sigma_r_median": float(np.nanmedian(solved.sigma[:, 2])),
+        "rests_on": rests_on(
+            pair,
+            setup="the pair as given",
+            picks=f"matches of {precision(matches):.2g} px measured",
+        ),
         "empty": empty_parts(pair, matches),
     }
 

@@ -15,10 +15,12 @@ from bifocal.model.image import ImageArray
 from bifocal.model.pair import Pair
 from bifocal.model.relief_map import ReliefMap
 from bifocal.model.surface import FlatSurface, MapSurface, Surface
+from bifocal.orthophotos import mask_tidying
 from bifocal.orthophotos.ortho_image import OrthoOptions, Orthophoto, Source
 from bifocal.orthophotos.pull_push import fill_holes
 from bifocal.orthophotos.rectify import SourcePhoto, footprint
 from bifocal.orthophotos.visibility import hidden_from
+from bifocal.orthophotos.whole_picture import CompletedSurface
 from photocore.arrays import BoolArray, ByteArray, Float32Array
 from photocore.errors import InputError
 
@@ -191,6 +193,8 @@ def render(
     views: Sequence[SourcePhoto], surface: Surface, grid: Grid, options: OrthoOptions
 ) -> Iterator[tuple[int, int, Tile]]:
     """Yield (column, row, tile) of an orthophoto, each in memory that does not grow with it."""
+    if options.complete:
+        surface = CompletedSurface(surface, grid)
     for column, row, window in grid.tiles(TILE):
         yield column, row, render_window(views, surface, window, options)
 
@@ -199,7 +203,10 @@ def render_window(
     views: Sequence[SourcePhoto], surface: Surface, window: Grid, options: OrthoOptions
 ) -> Tile:
     """Return one window of an orthophoto."""
-    margin = _FILL_REACH if options.fill else 0
+    close = options.fill or options.complete
+    margin = _FILL_REACH if close else 0
+    if options.mask_hidden:
+        margin = max(margin, mask_tidying.MARGIN)
     if len(views) > 1:
         margin = max(margin, math.ceil(2 * options.feather))
     wide = window
@@ -215,7 +222,11 @@ def render_window(
     looks = [_look(view, surface, wide, relief, options) for view in views]
     image, source = _choose(views, looks, wide, options)
     hidden: BoolArray = (source == Source.NONE) & np.logical_or.reduce([o.hidden for o in looks])
-    if options.fill:
+    if isinstance(surface, CompletedSurface):
+        mark = surface.source(wide)
+        estimated = (mark > 0) & (source > 0)
+        source[estimated] = mark[estimated]
+    if close:
         source[unknown & (source > 0)] = Source.FILLED
         # Holes lie within the photos' own area: the rim of the orthophoto is not extended.
         area = np.logical_or.reduce([look.inside for look in looks])
@@ -236,7 +247,7 @@ def _look(
         return _Look(np.zeros(shape, view.image.dtype), inside, np.zeros(grid.shape, bool))
     hidden = np.zeros(grid.shape, bool)
     if options.mask_hidden:
-        hidden = hidden_from(surface, grid, view.photo.foot, relief) & inside
+        hidden = mask_tidying.tidied(hidden_from(surface, grid, view.photo.foot, relief)) & inside
     return _Look(view.sample(column, row, options.interpolation), inside, hidden)
 
 

@@ -12,7 +12,6 @@ from pathlib import Path
 import numpy as np
 
 from bifocal.files.geotiff import RasterReader, create_raster, dpi_at_scale, gsd_at_scale
-from bifocal.files.point_tables import read_survey_points
 from bifocal.files.strips import write_png
 from bifocal.model.grid import Grid
 from bifocal.model.pair import Pair
@@ -22,7 +21,13 @@ from bifocal.model.surface import FlatSurface, MapSurface, Surface
 from bifocal.orthophotos.compose import TILE
 from bifocal.orthophotos.drawing import Drawing, Legend, PrintSheet, round_step
 from bifocal.orthophotos.drawing_files import write_drawing, write_section_dxf, write_section_svg
-from bifocal.orthophotos.ortho_workflow import OrthoTask, make_ortho, open_surface, planned_grid
+from bifocal.orthophotos.ortho_workflow import (
+    OrthoTask,
+    make_ortho,
+    open_surface,
+    planned_grid,
+    survey_points_of,
+)
 from bifocal.orthophotos.pdf_sheet import write_sheet
 from bifocal.orthophotos.sections import contours, section
 from bifocal.orthophotos.shading import shaded, tints
@@ -80,7 +85,7 @@ class Delivery:
 
 
 def deliver(
-    pair_path: Path,
+    pair_path: Pair | Path,
     folder: Path,
     task: OrthoTask,
     wish: DeliverTask,
@@ -98,8 +103,8 @@ def deliver(
     scale = positive(wish.scale, "scale")
     gsd = task.gsd or gsd_at_scale(positive(wish.dpi, "dpi"), scale)
     task = replace(task, gsd=gsd, scale=scale, overviews=True)
-    pair = Pair.read(pair_path)
-    title = wish.title or str(pair.extra.get("name") or pair_path.name.split(".")[0])
+    pair = Pair.of(pair_path)
+    title = wish.title or str(pair.extra.get("name") or _name_of(pair_path))
     name = file_name(title)
     points, remarks = _points(wish.marked or task.points)
     control, notes_on_control = _points(wish.control)
@@ -223,13 +228,17 @@ def _measured(reader: RasterReader | None) -> Surface | None:
     return None
 
 
-def _points(path: Path | None) -> tuple[SurveyPoints | None, tuple[str, ...]]:
+def _name_of(source: Pair | Path) -> str:
+    return "wall" if isinstance(source, Pair) else source.name.split(".")[0]
+
+
+def _points(source: Path | SurveyPoints | None) -> tuple[SurveyPoints | None, tuple[str, ...]]:
     """Return the points of a table, and remarks."""
-    if path is None:
+    if source is None:
         return None, ()
-    points, remarks = read_survey_points(path)
+    points, remarks = survey_points_of(source)
     if not np.isfinite(points.xyz[:, :2]).all(axis=1).any():
-        raise InputError(f"{path}: no point has X and Y in the plane frame.")
+        raise InputError(f"{source.name}: no point has X and Y in the plane frame.")
     return points, tuple(remarks)
 
 

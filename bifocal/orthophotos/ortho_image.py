@@ -24,6 +24,9 @@ class Source(IntEnum):
     IMAGE_2 = 2
     BOTH = 3
     FILLED = 4
+    #: Seen by a photo, but put where it is by relief interpolated from around, or by the plane.
+    INTERPOLATED = 5
+    PLANE = 6
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -38,6 +41,10 @@ class OrthoOptions:
         Leave pixels empty that the camera cannot see; otherwise they show what hides them.
     fill : bool
         Close holes with the colours around them; such pixels are marked `Source.FILLED`.
+    complete : bool
+        A whole picture: where relief is unknown the photo is shown on relief interpolated from
+        around (`Source.INTERPOLATED`), far from all of it on the plane (`Source.PLANE`), and
+        holes are closed as by ``fill``.
     feather : float
         Width of the transition between two photos. [px]
     """
@@ -45,6 +52,7 @@ class OrthoOptions:
     interpolation: Interpolation = "cubic"
     mask_hidden: bool = True
     fill: bool = False
+    complete: bool = False
     feather: float = 8.0
 
     def __post_init__(self) -> None:

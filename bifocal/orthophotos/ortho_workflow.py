@@ -14,6 +14,7 @@ from bifocal.files.images import ImageArray, image_info, read_image
 from bifocal.files.point_tables import read_survey_points
 from bifocal.model.grid import Bounds, Grid
 from bifocal.model.pair import Pair
+from bifocal.model.points import SurveyPoints
 from bifocal.model.surface import EVERYWHERE, FlatSurface, MapSurface, Surface
 from bifocal.orthophotos.compose import NOTHING_IN_COMMON, choose_grid, render
 from bifocal.orthophotos.ortho_image import OrthoOptions, Source
@@ -34,6 +35,8 @@ FINE, MANY_PIXELS = 1 / 5.5, 25_000_000
 MOST_PIXELS = 4_000_000_000
 #: Orthophotos of more pixels get reduced copies inside the file, for fast display.
 OVERVIEWS_FROM = 50_000_000
+#: An empty share of a picture from which ways to fill it are named.
+WORTH_A_REMARK = 0.1
 #: Flags of points that say nothing about the relief.
 _USELESS = frozenset({"UNCERTAIN", "NADIR", "OFF-RADIAL", "CHECK"})
 
@@ -46,8 +49,8 @@ class OrthoTask:
     ----------
     relief : Path, optional
         Relief map; else ``points``, else the plane ``r = plane``.
-    points : Path, optional
-        Workbook or table of points.
+    points : Path or SurveyPoints, optional
+        Points, or the workbook or table that holds them.
     breaklines : sequence of sequences of str
         Ids of points along edges.
     plane : float
@@ -71,7 +74,7 @@ class OrthoTask:
     """
 
     relief: Path | None = None
-    points: Path | None = None
+    points: Path | SurveyPoints | None = None
     breaklines: Sequence[Sequence[str]] = ()
     plane: float = 0.0
     image: str = "1"
@@ -87,7 +90,7 @@ class OrthoTask:
 
 
 def make_ortho(
-    pair_path: Path,
+    pair_path: Pair | Path,
     out: Path,
     task: OrthoTask,
     *,
@@ -104,7 +107,7 @@ def make_ortho(
     """
     check_writable(out, overwrite=overwrite)
     check_ending(out, "an orthophoto is written as GeoTIFF; name it .tif.", ".tif", ".tiff")
-    pair = Pair.read(pair_path)
+    pair = Pair.of(pair_path)
     with open_surface(task, pair) as (surface, _, remarks):
         numbers = {"1": (1,), "2": (2,), "both": (1, 2)}[task.image]
         images = {number: read_image(pair.photo_file(number)) for number in numbers}
@@ -143,9 +146,23 @@ def make_ortho(
                 raise InputError(NOTHING_IN_COMMON)
     shares = {source.name.lower(): float(counts[source]) / total for source in Source}
     shares["hidden"] = hidden / total
+    notes += _advice(shares, task)
     return RasterResult(
         path=out, grid=grid, shares=shares, remarks=(*pair.remarks, *remarks, *notes)
     )
+
+
+def _advice(shares: dict[str, float], task: OrthoTask) -> list[str]:
+    """Return what could be done about the empty part of a picture."""
+    if shares["none"] < WORTH_A_REMARK or task.options.complete:
+        return []
+    ways = []
+    if task.image != "both":
+        ways.append("--image both adds what the other photo sees")
+    if not task.options.fill:
+        ways.append("--fill closes holes with the colours around them")
+    ways.append("--complete makes a whole picture and marks what is not measured")
+    return [f"{shares['none']:.0%} of the picture are empty: {'; '.join(ways)}."]
 
 
 @contextmanager
@@ -168,9 +185,10 @@ def open_surface(
             surface, remarks = _triangles(task.points, task.breaklines)
         low, high = surface.extremes(EVERYWHERE)
         nearest = min(pair.image1.distance, pair.image2.distance)
+        named = task.relief or (task.points.name if task.points is not None else "relief")
         if high >= nearest or low < -20 * pair.image1.distance:
             raise InputError(
-                f"{task.relief or task.points or 'relief'}: runs from {low:g} to {high:g} m, "
+                f"{named}: runs from {low:g} to {high:g} m, "
                 f"but the near camera stands {nearest:g} m from the plane. It must be in metres, "
                 "positive towards the cameras, and belong to this pair."
             )
@@ -178,10 +196,10 @@ def open_surface(
 
 
 def _triangles(
-    path: Path, breaklines: Sequence[Sequence[str]]
+    source: Path | SurveyPoints, breaklines: Sequence[Sequence[str]]
 ) -> tuple[TriangleSurface, tuple[str, ...]]:
     """Return the surface through the useful points of a table, and remarks."""
-    points, notes = read_survey_points(path)
+    points, notes = survey_points_of(source)
     remarks = list(notes)
     known = np.isfinite(points.xyz).all(axis=1)
     keep = known & np.array([flag not in _USELESS for flag in points.flags], dtype=bool)
@@ -194,7 +212,8 @@ def _triangles(
         missing = [name for name in line if name not in index]
         if missing:
             raise InputError(
-                f"breakline {','.join(line)}: {path} has no usable point {', '.join(missing)}."
+                f"breakline {','.join(line)}: {source.name} has no usable point "
+                f"{', '.join(missing)}."
             )
         if len(set(line)) < 2:
             raise InputError(f"breakline {','.join(line)}: name two points or more.")
@@ -202,8 +221,13 @@ def _triangles(
     remarks.append(
         "Relief between the points is interpolated; outside of them the orthophoto is empty."
     )
-    with located(path):
+    with located(source.name):
         return TriangleSurface(used.xyz, lines), tuple(remarks)
+
+
+def survey_points_of(source: Path | SurveyPoints) -> tuple[SurveyPoints, tuple[str, ...]]:
+    """Return points as they are, or those of a table, and remarks."""
+    return (source, ()) if isinstance(source, SurveyPoints) else read_survey_points(source)
 
 
 def planned_grid(pair: Pair, surface: Surface, task: OrthoTask) -> Grid:

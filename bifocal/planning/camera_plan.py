@@ -6,9 +6,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from bifocal.model.basis import rests_on
+from bifocal.model.pair import Pair
 from bifocal.precision import sigma_relief
 from photocore.arrays import FloatArray, positive
 from photocore.errors import InputError
+
+#: Of the frame of 36 x 24 mm, by which makers state equivalents. [mm]
+FILM_DIAGONAL = float(np.hypot(36.0, 24.0))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -38,6 +43,16 @@ class CameraSensor:
                 f" px makes pixels of {across * 1000:.2f} x {along * 1000:.2f} um: not square; "
                 "check both pairs of numbers, and that both are width x height."
             )
+
+    @classmethod
+    def of_film(cls, columns: int, rows: int) -> CameraSensor:
+        """Return the frame that 35 mm equivalents speak of, in the proportions of a photo.
+
+        Its diagonal is that of 36 x 24 mm, whatever the size of the sensors behind the lenses:
+        a phone's two cameras are planned as two lenses before one such frame.
+        """
+        share = FILM_DIAGONAL / float(np.hypot(columns, rows))
+        return cls(width=columns * share, height=rows * share, columns=columns, rows=rows)
 
     @property
     def pitch(self) -> float:
@@ -119,6 +134,15 @@ class Plan:
     def best(self) -> Station:
         """The feasible station of best precision; of equal precision, that of the largest photo."""
         return self.stations[0]
+
+    @property
+    def basis(self) -> str:
+        """What the sigmas rest on, in one line."""
+        pair = Pair.ideal(d1=self.best.d1, d2=self.best.d2)
+        return rests_on(
+            pair, setup="stations and focal lengths exactly as planned",
+            picks=f"picks of {self.sigma_px:g} px assumed in both photos",
+        )  # fmt: skip
 
     def sigma_grid(
         self, station: Station, *, columns: int = 9, rows: int = 7

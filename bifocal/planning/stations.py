@@ -68,8 +68,9 @@ def plan_stations(
 
     Notes
     -----
-    Same scale: d = m c / 1000 for both lenses, so B = m c1 c2 / (1000 (c1 - c2)): at equal scale
-    only the difference of the focal lengths matters. sigma_r = sqrt(2) sigma_px GSD B / s'.
+    Same scale: d = m c / 1000 for both lenses, so B = m / (1000 (1/c2 - 1/c1)): at equal scale
+    the difference of the reciprocals of the focal lengths decides.
+    sigma_r = sqrt(2) sigma_px GSD B / s'.
 
     Examples
     --------

@@ -41,6 +41,7 @@ def plan_as_dict(plan: Plan) -> dict[str, Any]:
     return {
         "stations": [asdict(station) for station in plan.stations],
         "sigma_px": plan.sigma_px,
+        "rests_on": plan.basis,
         "sigma_r_max": plan.sigma_r_max,
         "sigma_r_over_frame": {"x": x, "y": y, "sigma_r": sigma},
     }

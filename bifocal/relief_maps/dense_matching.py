@@ -13,20 +13,21 @@ from bifocal.model.grid import Bounds, Grid, bounds_of
 from bifocal.model.pair import Pair
 from bifocal.model.relief_map import Quality, ReliefMap
 from bifocal.rays import plane_position
-from bifocal.relief_maps import edges, flow, forward_projection, seed, smoothing
+from bifocal.relief_maps import flow, forward_projection, seed
 from bifocal.relief_maps.exposure import match_exposure
 from bifocal.relief_maps.forward_projection import MapBands
 from bifocal.relief_maps.frame import (
     LONGEST_SIDE,
-    Frame,
     common_bounds,
     make_frame,
     working_grid,
     zoomed_box,
 )
+from bifocal.relief_maps.map_completion import complete
 from bifocal.relief_maps.orientation_sigma import orientation_sigma
 from bifocal.relief_maps.registration import Registration, check_registration
-from photocore.arrays import BoolArray, ByteArray
+from bifocal.relief_maps.surfaces import surfaces
+from photocore.arrays import ByteArray
 from photocore.cli import Progress, no_progress
 from photocore.errors import InputError
 
@@ -34,10 +35,6 @@ from photocore.errors import InputError
 QUALITIES = {"fast": (2.0, 3.2e6), "standard": (1.0, 9e6), "best": (1.0, 30e6)}
 #: Working frames of fewer pixels can afford the finer search.
 SMALL = 3e6
-#: Limits of a validated pixel: across the radius and there and back. [px]
-ACROSS_LIMIT, LOOP_LIMIT = 0.5, 0.8
-#: A measured relief is known better than this share of d2.
-SIGMA_SHARE = 0.01
 #: Relief maps of more pixels than this are refused: a unit has been mistaken.
 LARGEST_MAP = 400e6
 #: A GSD coarser than this, and coarser than twice the far photo's pixel, is a slip, too. [m]
@@ -46,8 +43,6 @@ COARSEST_GSD = 0.2
 FEWEST_PIXELS = 64
 #: Matching needs this many working pixels a side.
 SMALLEST_WORK = 24
-#: Error across the radius that counts as noise rather than as an edge, for smoothing. [px]
-NOISE_CLIP = 0.25
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -161,10 +156,10 @@ def dense_relief(
     matched = flow.measure(frame, coarse, stride=flow.FINE_STRIDE if small else flow.STRIDE)
     registration = check_registration(frame, matched)
     progress(0.7, 1.0, "Edges")
-    source, usable = _surfaces(frame, matched, relief_range)
+    source, usable = surfaces(frame, matched, relief_range)
     progress(0.85, 1.0, "Relief map")
     bands = forward_projection.to_plane(frame, source, usable, target)
-    bands = _complete(frame, bands, target)
+    bands = complete(frame, bands, target, plain=matched.plain)
     progress(1.0, 1.0)
     bands = _resampled(bands, target, wanted)
     known = np.isfinite(bands.r)
@@ -256,58 +251,6 @@ def _seen_box(pair: Pair, box: Bounds, low: float, high: float) -> Bounds:
     reliefs = (low, 0.0, min(high, 0.6 * foot.distance))
     xyz = np.array([[x, y, r] for r in reliefs for x, y in corners])
     return bounds_of(plane_position(xyz, foot))
-
-
-def _surfaces(
-    frame: Frame, matched: flow.Measurement, relief_range: tuple[float, float] | None
-) -> tuple[MapBands, BoolArray]:
-    """Return relief, sigma and quality of the pixels of photo 1, and which of them to use."""
-    d2 = frame.distances[1]
-    base_factor = frame.pair.base_factor
-    low, high = relief_range or seed.usual_range(d2)
-    margin = 0.1 * (high - low)
-    relief = np.clip(np.nan_to_num(matched.r), low - margin, high + margin).astype(np.float32)
-    relief = edges.sharpen(frame, relief, float(np.median(matched.sigma_px[::8, ::8])))
-    quiet = np.minimum(matched.sigma_px, np.float32(NOISE_CLIP))
-    relief = smoothing.shrink_noise(relief, flow.sigma_of_relief(frame, relief, quiet))
-    sigma = flow.sigma_of_relief(frame, relief, matched.sigma_px)
-    valid = (np.abs(matched.across) < ACROSS_LIMIT) & (matched.loop < LOOP_LIMIT)
-    valid &= sigma < SIGMA_SHARE * d2
-    quality = np.where(valid, Quality.MEASURED, Quality.INTERPOLATED).astype(np.uint8)
-    x, y = frame.from_centre()
-    reach = np.maximum(np.sqrt(x * x + y * y), 1)
-    covered = forward_projection.hidden_in_second(
-        frame, relief, (1.5 * base_factor / reach + 0.002 * d2).astype(np.float32)
-    )
-    covered &= ~valid
-    bands = MapBands(relief, sigma, quality)
-    filled = forward_projection.fill_outwards(bands, covered, frame.grid, frame.pair.image1.nadir)
-    inside = flow.is_inside(frame, relief)
-    usable = inside & ~(forward_projection.ramps(frame, relief) & ~filled & ~valid)
-    bands.quality[covered] = Quality.HIDDEN
-    return bands, usable
-
-
-def _complete(frame: Frame, bands: MapBands, grid: Grid) -> MapBands:
-    """Return the map with strips hidden from photo 1 filled from the surface behind."""
-    # Holes outside what both photos see stay unknown.
-    holes = ~np.isfinite(bands.r) & _cover(frame, grid)
-    forward_projection.fill_outwards(bands, holes, grid, frame.pair.image1.nadir)
-    forward_projection.fill_small(bands, holes)
-    bands = bands._replace(r=smoothing.tidy_steps(bands.r))
-    forward_projection.forget_outside(bands)
-    return bands
-
-
-def _cover(frame: Frame, grid: Grid) -> BoolArray:
-    """Return which pixels of the map both photos cover (taken at r = 0)."""
-    both = (frame.seen1 & frame.seen2).astype(np.uint8)
-    column, row = frame.grid.offset_in(grid)
-    scale = frame.grid.gsd / grid.gsd
-    matrix = np.array([[scale, 0, column], [0, scale, row]])
-    return np.asarray(
-        cv2.warpAffine(both, matrix, (grid.width, grid.height), flags=cv2.INTER_NEAREST) > 0
-    )
 
 
 def _resampled(bands: MapBands, grid: Grid, wanted: Grid) -> MapBands:

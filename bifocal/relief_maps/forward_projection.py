@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import cv2
 import numpy as np
@@ -17,6 +17,8 @@ from photocore.arrays import BoolArray, ByteArray, Float32Array, FloatArray, Int
 AGREEMENT = 4e-4
 #: A ramp that stretches the wall by more than this is flow running over a hidden strip.
 STRETCH = 1.3
+#: A pixel that covers less of the wall than this sees the side face of a step.
+SIDE_FACE = 0.5
 #: Steps outwards when a hidden strip is filled; 2**LEAPS steps of LEAP pixels are the most.
 LEAP, LEAPS = 3, 7
 #: Relief hidden or interpolated farther than this from measured one must be surrounded by it. [px]
@@ -32,20 +34,28 @@ class MapBands(NamedTuple):
     sigma: Float32Array
     quality: ByteArray
 
+    def put(self, where: Any, values: MapBands) -> None:
+        """Take over values for the pixels of a mask or of (rows, columns), in place."""
+        self.r[where], self.sigma[where], self.quality[where] = values
 
-def ramps(frame: Frame, relief: Float32Array) -> BoolArray:
-    """Return pixels of photo 1 on ramps that no camera can have seen as a surface.
+    def at(self, where: Any) -> MapBands:
+        """Return the values of the pixels of a mask."""
+        return MapBands(self.r[where], self.sigma[where], self.quality[where])
 
-    With s1 the radius about the nadir of photo 1, ``ds'/ds1 = 1 - r/d1 - (s1/d1) dr/ds1`` is how
-    much wall one pixel covers; on a true surface it is near one.
+
+def stretch(frame: Frame, relief: Float32Array) -> Float32Array:
+    """Return how much of the wall, along the radius, a pixel of photo 1 covers, in pixels.
+
+    With s1 the radius about the nadir of photo 1, ``ds'/ds1 = 1 - r/d1 - (s1/d1) dr/ds1``: near one
+    on a true surface, more on a ramp that no camera can have seen as a surface (`STRETCH`), near
+    zero on the side face of a step, which has no place of its own on the map (`SIDE_FACE`).
     """
     foot = frame.pair.image1.foot
     x, y = offsets(frame.grid.shape, frame.grid.pixel_of(foot.nadir))
     across = cv2.Sobel(relief, cv2.CV_32F, 1, 0, ksize=3, scale=0.125)
     down = cv2.Sobel(relief, cv2.CV_32F, 0, 1, ksize=3, scale=0.125)
     # d s'/d s of s' = s (1 - r / d), Eq. (1).
-    stretch = reduction(relief + across * x + down * y, np.float32(foot.distance))
-    return np.asarray(stretch > STRETCH)
+    return np.asarray(reduction(relief + across * x + down * y, np.float32(foot.distance)))
 
 
 def to_plane(frame: Frame, source: MapBands, usable: BoolArray, grid: Grid) -> MapBands:
@@ -63,21 +73,27 @@ def to_plane(frame: Frame, source: MapBands, usable: BoolArray, grid: Grid) -> M
     """
     foot = frame.pair.image1.foot
     relief = np.where(usable, source.r, np.float32(np.nan))
-    first = _scatter(frame, relief, grid, foot)
+    first = _scatter(frame, relief, source.quality == Quality.MEASURED, grid, foot)
     known = np.isfinite(first)
     around = np.ones((5, 5), dtype=np.uint8)
     upper = cv2.dilate(np.where(known, first, np.float32(-1e3)), around)
     lower = cv2.erode(np.where(known, first, np.float32(1e3)), around)
-    unknown = np.full(grid.shape, np.float32(np.nan))
-    result = MapBands(unknown, unknown.copy(), np.zeros(grid.shape, dtype=np.uint8))
-    for start in (upper, first, lower):
-        start = np.where(np.abs(start) < 999, start, np.float32(np.nan))
-        _gather(frame, source, relief, grid, foot, start, result)
+    result = _look_up(frame, source, relief, foot, _away(frame, foot, grid), first)
+    for start in (upper, lower):
+        row, column = np.nonzero((np.abs(start) < 999) & np.isnan(result.r))
+        away = _away(frame, foot, grid, row, column)
+        found = _look_up(frame, source, relief, foot, away, start[row, column])
+        result.put((row, column), found)
     return result
 
 
-def _scatter(frame: Frame, relief: Float32Array, grid: Grid, foot: Foot) -> Float32Array:
-    """Drop every pixel of photo 1 where it stands on the plane; the highest wins."""
+def _scatter(
+    frame: Frame, relief: Float32Array, validated: BoolArray, grid: Grid, foot: Foot
+) -> Float32Array:
+    """Drop every pixel of photo 1 where it stands on the plane; validated ones and high ones win.
+
+    A spike that nothing validates would otherwise win against the wall that it is a mismatch of.
+    """
     x, y = offsets(frame.grid.shape, frame.grid.pixel_of(foot.nadir))
     share = reduction(relief, np.float32(foot.distance))  # Eq. (1): s' = s - e = s (1 - r / d)
     ratio = frame.grid.gsd / grid.gsd
@@ -87,84 +103,118 @@ def _scatter(frame: Frame, relief: Float32Array, grid: Grid, foot: Foot) -> Floa
         row = y * share * np.float32(ratio) + np.float32(nadir[1] + 0.5)
         inside = (column >= 0) & (column < grid.width) & (row >= 0) & (row < grid.height)
     index = row[inside].astype(np.int32) * np.int64(grid.width) + column[inside].astype(np.int32)
-    return _highest(relief[inside], index, np.full(grid.shape, np.nan, dtype=np.float32))
+    empty = np.full(grid.shape, np.nan, dtype=np.float32)
+    return _highest(relief[inside], index, empty, validated[inside])
 
 
-def _highest(relief: Float32Array, index: IntArray, result: Float32Array) -> Float32Array:
-    """Return an image with values put at flat indices, the highest where several fall."""
+def _highest(
+    relief: Float32Array, index: IntArray, result: Float32Array, first: BoolArray | None = None
+) -> Float32Array:
+    """Return an image with values put at flat indices, the highest where several fall.
+
+    Those of ``first`` win against all others, however high.
+    """
     if relief.size:
         low, high = float(relief.min()), float(relief.max())
-        # A radix sort of 16-bit levels: later writes win, so the highest comes last.
-        level = ((relief - low) * (65535 / max(high - low, 1e-9))).astype(np.uint16)
+        # A radix sort of 15-bit levels and the class: later writes win, so the highest comes last.
+        level = ((relief - low) * (32767 / max(high - low, 1e-9))).astype(np.uint16)
+        if first is not None:
+            level += first.astype(np.uint16) << 15
         order = np.argsort(level, kind="stable")
         result.ravel()[index[order]] = relief[order]
     return result
 
 
-def _gather(
+def _away(
+    frame: Frame, foot: Foot, grid: Grid, row: Any = None, column: Any = None
+) -> Float32Array:
+    """Return how far pixels of the map lie from the nadir, (..., 2), in pixels of photo 1's grid.
+
+    Of all of them, or of those at given rows and columns.
+    """
+    x = ((grid.columns_x - foot.nadir[0]) / frame.grid.gsd).astype(np.float32)
+    y = ((grid.rows_y - foot.nadir[1]) / -frame.grid.gsd).astype(np.float32)
+    if row is not None:
+        return np.stack([x[column], y[row]], axis=-1)
+    return np.stack(np.broadcast_arrays(x[None, :], y[:, None]), axis=-1)
+
+
+def _look_up(
     frame: Frame,
     source: MapBands,
     relief: Float32Array,
-    grid: Grid,
     foot: Foot,
+    away: Float32Array,
     start: Float32Array,
-    result: MapBands,
-) -> None:
-    """Look up, where nothing is known yet, the surface that a first value leads to (in place).
+) -> MapBands:
+    """Return the surface of photo 1 that a first value leads to; unknown where it leads nowhere.
 
     Eq. (1), s = s' d / (d - r), with the r it is meant to find: a fixed point.
     """
-    todo = np.isfinite(start) & ~np.isfinite(result.r)
-    row, column = np.nonzero(todo)
-    if not len(row):
-        return
-    places = np.stack([grid.columns_x[column], grid.rows_y[row]], axis=-1)
-    away = ((places - foot.nadir) / [frame.grid.gsd, -frame.grid.gsd]).astype(np.float32)
     nadir = frame.grid.pixel_of(foot.nadir).astype(np.float32)
-    value = start[row, column]
-    steps = []
+    final, tolerance = start, np.float32(AGREEMENT * foot.distance)
     for _ in range(3):
-        q = nadir + away * magnification(value, foot.distance)[:, None]
-        value = values_at(relief, q, cv2.INTER_NEAREST)
-        steps.append(value)
-    value, final = steps[1:]
-    tolerance = AGREEMENT * foot.distance
+        value = final
+        q = nadir + away * magnification(value, np.float32(foot.distance))[..., None]
+        q[~np.isfinite(q)] = -1e4
+        final = values_at(relief, q, cv2.INTER_NEAREST)
     with np.errstate(invalid="ignore"):
         good = np.abs(final - value) < tolerance
         smooth = values_at(relief, q, cv2.INTER_LINEAR)
         final = np.where(np.abs(smooth - final) < tolerance, smooth, final)
-    row, column, q, final = row[good], column[good], q[good], final[good]
-    result.r[row, column] = final
-    result.sigma[row, column] = values_at(source.sigma, q, cv2.INTER_NEAREST)
-    result.quality[row, column] = values_at(source.quality, q, cv2.INTER_NEAREST)
+    sigma, quality = (values_at(b, q, cv2.INTER_NEAREST) for b in (source.sigma, source.quality))
+    nothing = np.float32(np.nan)
+    return MapBands(
+        np.where(good, final, nothing),
+        np.where(good, sigma, nothing),
+        np.where(good, quality, np.uint8(Quality.UNKNOWN)),
+    )
 
 
-def fill_outwards(bands: MapBands, holes: BoolArray, grid: Grid, nadir: FloatArray) -> BoolArray:
-    """Fill holes from the next known pixel farther out (in place); return which were filled.
+def fill_from_behind(bands: MapBands, holes: BoolArray, grid: Grid, nadir: FloatArray) -> BoolArray:
+    """Fill holes from the lower of the next pixels farther out and farther in (in place).
 
-    Behind a step lies the lower surface, and it goes on outwards: the nearest pixel would smear
-    the step itself over what it hides.
+    Behind a step lies the lower surface: the nearest pixel would smear the step itself over what it
+    hides, and at an inner edge the surface farther out is the upper one. Returns what was filled.
     """
-    height, width = bands.r.shape
     row, column = np.nonzero(holes)
-    if not len(row):
-        return np.zeros_like(holes)
-    centre = grid.pixel_of(nadir)
-    dx, dy = column - centre[0], row - centre[1]
-    length = np.maximum(np.hypot(dx, dy), 1e-9)
-    number = np.full(height * width, -1, dtype=np.int64)
-    number[row * width + column] = np.arange(len(row))
-    to_column = np.clip(np.rint(column + LEAP * dx / length).astype(np.int64), 0, width - 1)
-    to_row = np.clip(np.rint(row + LEAP * dy / length).astype(np.int64), 0, height - 1)
-    target = to_row * width + to_column
-    for _ in range(LEAPS):  # each round doubles the leap of those that are still in a hole
-        hop = number[target]
-        target = np.where(hop >= 0, target[np.maximum(hop, 0)], target)
-    good = np.isfinite(bands.r.ravel()[target]) & (number[target] < 0)
     filled = np.zeros_like(holes)
+    if not len(row):
+        return filled
+    values = bands.r.ravel()
+    number = np.full(bands.r.size, -1, dtype=np.int64)
+    number[row * bands.r.shape[1] + column] = np.arange(len(row))
+    target = np.zeros(len(row), dtype=np.int64)
+    lowest = np.full(len(row), np.inf, dtype=np.float32)
+    for leap in (LEAP, -LEAP):
+        beyond = _beyond(row, column, number, bands.r.shape, grid.pixel_of(nadir), leap)
+        relief = np.where(number[beyond] < 0, values[beyond], np.float32(np.nan))
+        lower = relief < lowest
+        target[lower], lowest[lower] = beyond[lower], relief[lower]
+    good = np.isfinite(lowest)
     filled[row[good], column[good]] = True
     _fill(bands, filled, target[good], 3, Quality.HIDDEN)
     return filled
+
+
+def _beyond(
+    row: IntArray,
+    column: IntArray,
+    number: IntArray,
+    shape: tuple[int, int],
+    centre: FloatArray,
+    leap: int,
+) -> IntArray:
+    """Return flat indices of what lies on the ray from the centre behind the holes it runs into."""
+    dx, dy = column - centre[0], row - centre[1]
+    length = np.maximum(np.hypot(dx, dy), 1e-9)
+    to_column = np.clip(np.rint(column + leap * dx / length).astype(np.int64), 0, shape[1] - 1)
+    to_row = np.clip(np.rint(row + leap * dy / length).astype(np.int64), 0, shape[0] - 1)
+    target = to_row * shape[1] + to_column
+    for _ in range(LEAPS):  # each round doubles the leap of those that are still in a hole
+        hop = number[target]
+        target = np.where(hop >= 0, target[np.maximum(hop, 0)], target)
+    return np.asarray(target)
 
 
 def _fill(
@@ -176,7 +226,9 @@ def _fill(
     bands.quality[holes] = quality
 
 
-def hidden_in_second(frame: Frame, relief: Float32Array, step: Float32Array) -> BoolArray:
+def hidden_in_second(
+    frame: Frame, relief: Float32Array, step: Float32Array, covers: BoolArray | None = None
+) -> BoolArray:
     """Return pixels of photo 1 that a higher surface covers in photo 2.
 
     Parameters
@@ -186,6 +238,8 @@ def hidden_in_second(frame: Frame, relief: Float32Array, step: Float32Array) -> 
         Relief of the pixels of photo 1. [m]
     step : ndarray of float32, broadcastable
         How much higher the covering surface must be. [m]
+    covers : ndarray of bool, optional
+        Pixels that may cover others; by default all.
     """
     columns, rows = zoom_map(frame, relief)
     height, width = relief.shape
@@ -194,11 +248,39 @@ def hidden_in_second(frame: Frame, relief: Float32Array, step: Float32Array) -> 
         inside = (column >= 0) & (column < width) & (row >= 0) & (row < height)
     # What falls outside goes to a cell of its own behind the last one.
     index = np.where(inside, row.astype(np.int64) * width + column, height * width).ravel()
-    top = _highest(relief.ravel(), index, np.full(relief.size + 1, np.float32(-1e3)))
+    top = np.full(relief.size + 1, np.float32(-1e3))
+    if covers is None:
+        _highest(relief.ravel(), index, top)
+    else:
+        _highest(relief[covers], index[covers.ravel()], top)
     cracked = top[:-1].reshape(height, width)
     covering = cv2.morphologyEx(cracked, cv2.MORPH_CLOSE, np.ones((3, 3), np.uint8))
     above = covering.ravel().take(index, mode="clip").reshape(height, width)
     return np.asarray(inside & (above > relief + step))
+
+
+def hidden_on_map(relief: Float32Array, grid: Grid, camera: Foot) -> BoolArray:
+    """Return which pixels of a relief map a camera cannot see, to a pixel.
+
+    On one ray, at one q = N + (P - N) d / (d - r), the highest point is the nearest to the camera:
+    each cell of q keeps it, and a point is hidden if its cell holds one a pixel and more before it.
+    """
+    x = ((grid.columns_x - camera.nadir[0]) / grid.gsd).astype(np.float32)[None, :]
+    y = ((camera.nadir[1] - grid.rows_y) / grid.gsd).astype(np.float32)[:, None]
+    column0, row0 = grid.pixel_of(camera.nadir)
+    factor = magnification(relief, np.float32(camera.distance))  # Eq. (1)
+    with np.errstate(invalid="ignore"):
+        column = x * factor + np.float32(column0 + 0.5)
+        row = y * factor + np.float32(row0 + 0.5)
+        inside = (column >= 0) & (column < grid.width) & (row >= 0) & (row < grid.height)
+        index = np.where(inside, row, 0).astype(np.int64) * grid.width
+        index += np.where(inside, column, 0).astype(np.int64)
+    top = np.full(grid.shape, np.float32(-1e3))
+    _highest(relief[inside], index[inside], top)
+    top = cv2.morphologyEx(top, cv2.MORPH_CLOSE, np.ones((3, 3), np.uint8))
+    pixel = (camera.distance - relief) / np.maximum(np.sqrt(x * x + y * y), 1)
+    with np.errstate(invalid="ignore"):
+        return np.asarray(inside & (top.ravel()[index] > relief + pixel))
 
 
 def fill_small(bands: MapBands, holes: BoolArray) -> None:

@@ -21,6 +21,8 @@ from photocore.errors import GeometryError, InputError
 SAME_LATTICE = 2e-3
 #: Parts of an oblique photo this much coarser than its middle are left out.
 COARSEST_SHARE = 3.0
+#: Side of the raster on which the pixels' shapes are taken. [px]
+STRETCH_SIDE = 64
 #: cv2.remap counts pixels in 16 bits. [px]
 LONGEST_SIDE = 32_000
 
@@ -60,6 +62,36 @@ class Frame:
     def from_centre(self) -> tuple[Float32Array, Float32Array]:
         """Return offsets from the zoom centre, shapes (1, width) and (height, 1). [px]"""
         return offsets(self.grid.shape, self.centre)
+
+
+def _footprints(photo: Photo, places: FloatArray, towards: FloatArray) -> FloatArray:
+    """Return the square of a photo's pixel size on the plane along directions, (n,). [m²]"""
+    per_pixel = photo.metres_per_pixel(photo.pixels_from_plane(places))
+    return np.asarray((np.einsum("nij,ni->nj", per_pixel, towards) ** 2).sum(-1))
+
+
+def radial_stretch(frame: Frame) -> Float32Array:
+    """Return how much coarser the photos are along the radius than across it.
+
+    A photo oblique to the wall has long pixels on the plane, and an error of matching that is the
+    same in all directions of the photo is longer along them; 1 for photos square to the wall.
+    """
+    step = max(1, max(frame.grid.shape) // STRETCH_SIDE)
+    places = np.stack(
+        np.meshgrid(frame.grid.columns_x[step // 2 :: step], frame.grid.rows_y[step // 2 :: step]),
+        axis=-1,
+    )
+    shape = places.shape[:2]
+    away = places.reshape(-1, 2) - frame.pair.zoom_centre
+    along = away / np.maximum(np.linalg.norm(away, axis=1), 1e-9)[:, None]
+    across = along[:, ::-1] * [-1, 1]
+    flat, photos = places.reshape(-1, 2), (frame.pair.image1, frame.pair.image2)
+    squares = [sum(_footprints(photo, flat, way) for photo in photos) for way in (along, across)]
+    with np.errstate(invalid="ignore", divide="ignore"):
+        ratio = np.sqrt(squares[0] / squares[1]).reshape(shape)
+    ratio = np.nan_to_num(ratio, nan=1.0, posinf=1.0).astype(np.float32)
+    size = frame.grid.shape[::-1]
+    return np.asarray(cv2.resize(ratio, size, interpolation=cv2.INTER_LINEAR))
 
 
 def offsets(
@@ -228,7 +260,7 @@ def zoom_map(frame: Frame, relief: Float32Array) -> tuple[Float32Array, Float32A
 
 
 def values_at(band: NDArray[Any], places: NDArray[np.floating], how: int) -> NDArray[Any]:
-    """Return a band or picture at (column, row), shape (n, 2); NaN or 0 outside it.
+    """Return a band or picture at (column, row), shape (n, 2) or (h, w, 2); NaN or 0 outside it.
 
     Parameters
     ----------
@@ -236,6 +268,8 @@ def values_at(band: NDArray[Any], places: NDArray[np.floating], how: int) -> NDA
         OpenCV's interpolation, ``cv2.INTER_NEAREST`` or another.
     """
     outside = np.nan if band.dtype.kind == "f" else 0
+    if places.ndim == 3:
+        return np.asarray(cv2.remap(band, places, None, how, borderValue=outside))
     values = [np.zeros((0, *band.shape[2:]), band.dtype)]
     # cv2.remap counts the places of one call in 16 bits.
     for part in np.array_split(places.astype(np.float32), len(places) // 30000 + 1):

@@ -7,21 +7,30 @@ import numpy as np
 
 from photocore.arrays import Float32Array
 
-#: Half windows, small to large. [px]
+#: Half windows of photo 1, small to large. [px]
 WINDOWS = (8, 16)
+#: Half windows on the map, where relief is final and casts shadows. [px]
+MAP_WINDOWS = (2, 4)
+#: Standard deviations beyond these count alike: weights 1/sigma² of a wider range lose all digits
+#: in float32, and threw the relief of one plain wall to -446 m. [m]
+SIGMA_RANGE = (1e-4, 0.3)
 #: Height from which a step of the map is tidied. [m]
 LEAST_STEP = 0.02
 
 
-def shrink_noise(relief: Float32Array, sigma: Float32Array) -> Float32Array:
+def shrink_noise(
+    relief: Float32Array, sigma: Float32Array, windows: tuple[int, ...] = WINDOWS
+) -> Float32Array:
     """Return relief smoothed where its variance is no more than sigma explains.
 
     Parameters
     ----------
     relief : ndarray of float32, shape (height, width)
-        Measured relief. [m]
+        Measured relief; what is unknown (NaN) stays so and has no say. [m]
     sigma : ndarray of float32, shape (height, width)
         Its standard deviation: large near the nadir and on plain plaster. [m]
+    windows : tuple of int
+        Half sides of the windows, small to large. [px]
 
     Notes
     -----
@@ -29,8 +38,13 @@ def shrink_noise(relief: Float32Array, sigma: Float32Array) -> Float32Array:
     deviation as its regularisation and the weights 1/sigma²: Wiener's shrinkage in each window.
     Smoothing acts on r, not on flow: near the nadir a small flow is a large relief.
     """
-    weight = 1 / np.maximum(sigma, np.float32(1e-6)) ** 2
-    for half in WINDOWS:
+    unknown = ~np.isfinite(relief)
+    if unknown.any():
+        relief = np.where(unknown, np.float32(0), relief)
+        sigma = np.where(unknown, np.float32(0), sigma)
+    weight = (1 / np.clip(sigma, *SIGMA_RANGE) ** 2).astype(np.float32, copy=False)
+    weight[unknown] = np.float32(1e-6)
+    for half in windows:
         side = (2 * half + 1, 2 * half + 1)
         total = cv2.blur(weight, side)
         mean = cv2.blur(weight * relief, side) / total
@@ -41,7 +55,7 @@ def shrink_noise(relief: Float32Array, sigma: Float32Array) -> Float32Array:
         slope = cv2.blur(total * keep, side)
         again = cv2.blur(total, side)
         relief = (slope * relief + level) / again
-    return np.asarray(relief, dtype=np.float32)
+    return np.where(unknown, np.float32(np.nan), relief)
 
 
 def tidy_steps(relief: Float32Array) -> Float32Array:

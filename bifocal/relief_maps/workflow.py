@@ -59,7 +59,7 @@ class ReliefJob:
 
 @all_or_none()
 def relief_of_pair(
-    pair_file: Path, job: ReliefJob, *, progress: Progress = no_progress
+    pair_file: Pair | Path, job: ReliefJob, *, progress: Progress = no_progress
 ) -> tuple[dict[str, Any], tuple[str, ...]]:
     """Make the relief map of a pair file.
 
@@ -76,7 +76,7 @@ def relief_of_pair(
         If a file or an option is unusable, or the photos do not fit; nothing is then written.
     """
     _check_outputs(job)
-    pair = Pair.read(pair_file)
+    pair = Pair.of(pair_file)
     image1, image2 = (read_image(pair.photo_file(number)) for number in (1, 2))
     result = dense_relief(
         pair, image1, image2, gsd=job.gsd, bounds=job.bounds, quality=job.quality,
@@ -86,10 +86,11 @@ def relief_of_pair(
         raise GeometryError(
             "no relief could be measured within the bounds: the photos have no common area there."
         )
+    named = "" if isinstance(pair_file, Pair) else Path(pair_file).name
     tags = {
         "BIFOCAL_D1": f"{pair.image1.distance:.6g}",
         "BIFOCAL_D2": f"{pair.image2.distance:.6g}",
-        "BIFOCAL_PAIR": Path(pair_file).name,
+        "BIFOCAL_PAIR": named or str(pair.extra.get("name", "")),
     }
     write_relief(job.out, result, overwrite=job.overwrite, tags=tags)
     written = [job.out]

@@ -3,18 +3,28 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from bifocal.survey.reference import Georeference, KnownPoints, NamedPoints
-from photocore.arrays import BoolArray, FloatArray
+from bifocal.survey.relief_table import ReliefTable
+from bifocal.survey.weighted_similarity import (
+    WeightedSums,
+    fit_of_sums,
+    fit_space,
+    weighted_sums,
+    weights_of,
+)
+from photocore.arrays import BoolArray, FloatArray, as_floats
 from photocore.errors import GeometryError, InputError
 from photocore.similarity import Similarity, fit_levelled, fit_plane, fit_similarity, round_origin
 
-#: Chance of calling a good set of points bad, shared out over the points.
+#: Chance of calling an upright wall leaning.
 ALPHA = 0.01
+#: Chance of calling a good point bad, shared out over the points: names are blamed last.
+ALPHA_POINT = 0.001
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -42,6 +52,7 @@ def georeference(
     control: KnownPoints | Mapping[str, Any],
     *,
     model: str = "auto",
+    covariance: FloatArray | None = None,
 ) -> Georeference:
     """Find the roto-translation with scale from the wall to the world.
 
@@ -55,7 +66,10 @@ def georeference(
         everywhere for the model ``2D``. [m]
     model : {"auto", "levelled", "3D", "2D"}
         ``auto`` takes 2D without heights, else ``levelled`` (Y upright: the photos were levelled),
-        unless the residuals say that it does not fit and three or more points allow ``3D``.
+        unless a test says that it does not fit and three or more points allow ``3D``.
+    covariance : ndarray, shape (n, 3, 3), optional
+        Of the points' X, Y, Z; default that of the solved ``table``, else all points weigh the
+        same. Points without it take no part. [m²]
 
     Returns
     -------
@@ -72,9 +86,14 @@ def georeference(
 
     Notes
     -----
-    A point is called bad when leaving it out lowers the sum of squares by more than chance allows
-    (F test of the point's own coordinates against the rest, 1 % shared out over the points), worst
-    first, and as long as the rest is still redundant.
+    Each point weighs by its full covariance: next to the nadir, or where the two lenses are nearly
+    alike, relief is far less precise than X and Y, and a point UNCERTAIN in relief still says
+    where the wall stands. The control points count as exact.
+
+    What does not fit is explained by one thing after the other, as long as an F test calls it
+    significant and the rest is redundant: that the wall leans (at 1 %; ``auto`` only, 3D for
+    levelled), or that one point is bad (at 0.1 %, shared out over the points: geometry is blamed
+    before names). Of several explanations the one that chance explains least is taken.
 
     Examples
     --------
@@ -89,81 +108,136 @@ def georeference(
     """
     if model != "auto" and model not in MODELS:
         raise InputError(f"georeference: model {model!r} is none of auto, {', '.join(MODELS)}.")
+    task = _task(points, control, covariance)
+    flat = bool(np.isnan(task.world[:, 2]).all())
+    simplest = ("2D",) if flat else ("levelled", "3D")
+    names = simplest if model == "auto" else (model,)
+    first = MODELS[names[0]]
+    usable = {name: task.usable(MODELS[name]) for name in names}
+    if usable[first.name].sum() < first.needed:
+        hint = f" Not among the measured points: {', '.join(task.missing[:5])}."
+        raise GeometryError(
+            f"Georeference: {int(usable[first.name].sum())} usable control point(s), the model "
+            f"{first.name} needs at least {first.needed} with relief and world coordinates."
+            f"{hint if task.missing else ''}"
+        )
+    fuller = len(names) > 1 and usable["3D"].sum() >= MODELS["3D"].needed
+    try:
+        best = _fit(task, first, usable[first.name])
+    except GeometryError:
+        if not fuller:
+            raise
+        best, fuller = _fit(task, MODELS["3D"], usable["3D"]), False
+    best = _explained(task, best, fuller=fuller)
+    return _as_georeference(task, best, usable[best.model.name])
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Task:
+    """Control points on the wall and in the world, shape (n, 3), with weights or without."""
+
+    ids: tuple[str, ...]
+    wall: FloatArray
+    world: FloatArray
+    covariance: FloatArray | None
+    used: BoolArray
+    missing: tuple[str, ...]
+
+    def usable(self, model: TransformationModel) -> BoolArray:
+        """Return which points have all that the model needs."""
+        known: BoolArray = self.used & ~np.isnan(self.wall).any(axis=1)
+        known &= ~np.isnan(self.world[:, : model.axes]).any(axis=1)
+        if self.covariance is not None:
+            known &= np.isfinite(self.covariance[:, : model.axes, : model.axes]).all(axis=(1, 2))
+        return known
+
+
+def _task(
+    points: NamedPoints | Mapping[str, Any],
+    control: KnownPoints | Mapping[str, Any],
+    covariance: FloatArray | None,
+) -> _Task:
+    """Return what was measured and what is known of the same names."""
+    if isinstance(points, ReliefTable) and covariance is None:
+        covariance = points.covariance
     if isinstance(points, Mapping):
         points = KnownPoints.from_columns(points, "XYZ")
     if isinstance(control, Mapping):
         control = KnownPoints.from_columns(control, "ENH")
-    wall = control.coordinates_in(points)
-    flat = bool(np.isnan(control.xyz[:, 2]).all())
-    simplest = ("2D",) if flat else ("levelled", "3D")
-    names = simplest if model == "auto" else (model,)
-    usable = {
-        name: control.used
-        & ~np.isnan(wall).any(axis=1)
-        & ~np.isnan(control.xyz[:, : MODELS[name].axes]).any(axis=1)
-        for name in names
-    }
-    first = MODELS[names[0]]
-    if usable[names[0]].sum() < first.needed:
-        missing = control.missing_in(points)
-        hint = f" Not among the measured points: {', '.join(missing[:5])}." if missing else ""
-        raise GeometryError(
-            f"Georeference: {int(usable[names[0]].sum())} usable control point(s), the model "
-            f"{first.name} needs at least {first.needed} with relief and world coordinates.{hint}"
-        )
-    fuller = len(names) > 1 and usable["3D"].sum() >= MODELS["3D"].needed
-    try:
-        best = _robust(first, wall, control, usable[first.name])
-    except GeometryError:
-        if not fuller:
-            raise
-        best = _robust(MODELS["3D"], wall, control, usable["3D"])
-    else:
-        best = _fuller_if_better(best, wall, control, usable["3D"]) if fuller else best
-    chosen, transformation, used, squares, redundancy = best
-    flat_world = chosen.axes == 2
-    origin = round_origin(
-        np.where(flat_world, np.nan_to_num(control.xyz) * [1, 1, 0], control.xyz)[used]
-    )
-    origin = np.where(np.isnan(origin), 0.0, origin)
-    near = np.where(flat_world, control.xyz * [1, 1, np.nan], control.xyz) - origin
-    offset = near[used].mean(axis=0)
-    if flat_world:
-        offset[2] = transformation.target_centre[2]
-    return Georeference(
+    if covariance is not None:
+        covariance = as_floats(covariance, "covariance")
+        if covariance.shape != (len(points.ids), 3, 3):
+            raise InputError(
+                f"covariance: shape {covariance.shape}, expected ({len(points.ids)}, 3, 3)."
+            )
+        blank = np.full((1, 3, 3), np.nan)
+        covariance = np.concatenate([covariance, blank])[control.rows_in(points)]
+    return _Task(
         ids=control.ids,
-        world_from_wall=transformation,
-        model=chosen.name,
-        residuals=residuals(transformation, wall, near, offset),
-        solved=wall,
-        used=used,
-        bad=tuple(
-            name
-            for name, was, now in zip(control.ids, usable[chosen.name], used, strict=True)
-            if was and not now
-        ),
-        sigma0=float(np.sqrt(squares / redundancy)) if redundancy > 0 else float("nan"),
-        redundancy=redundancy,
-        origin=origin,
-        offset=offset,
+        wall=control.coordinates_in(points),
+        world=control.xyz,
+        covariance=covariance,
+        used=control.used,
+        missing=control.missing_in(points),
     )
 
 
-_Fit = tuple[TransformationModel, Similarity, BoolArray, float, int]
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Fit:
+    """A transformation with the points it rests on, and how well it fits them."""
+
+    model: TransformationModel
+    used: BoolArray
+    transformation: Similarity
+    origin: FloatArray
+    offset: FloatArray
+    squares: float
+    noise: float
+    redundancy: int
+    sums: WeightedSums | None = None
 
 
-def _fit(model: TransformationModel, wall: FloatArray, world: FloatArray, used: BoolArray) -> _Fit:
-    """Return the fit to the chosen points with its sum of squares and redundancy."""
-    target = world.copy()
+def _fit(task: _Task, model: TransformationModel, used: BoolArray) -> _Fit:
+    """Return the fit to the chosen points with its weighted sum of squares and redundancy."""
+    wall, target = task.wall[used], task.world[used].copy()
     if model.axes == 2:
         target[:, 2] = 0.0
-    transformation = model.fit(wall[used], target[used])
+    found = model.fit(wall, target)
     # About a round origin, so that the sum of squares is not one of rounding errors.
-    origin = round_origin(target[used])
-    offset = (target[used] - origin).mean(axis=0)
-    left = residuals(transformation, wall[used], target[used] - origin, offset)[:, : model.axes]
+    origin = round_origin(target)
+    near = target - origin
+    offset, sums = near.mean(axis=0), None
+    if model.axes == 2:
+        offset[2] = found.target_centre[2]
+    # Rounding noise of large coordinates is no contradiction.
+    noise = (1e-9 * float(np.abs(target).max())) ** 2
     redundancy = model.axes * int(used.sum()) - model.parameters
-    return model, transformation, used, float((left**2).sum()), redundancy
+    if task.covariance is None:
+        left = residuals(found, wall, near, offset)[:, : model.axes]
+        squares = float((left**2).sum())
+    else:
+        weights = weights_of(task.covariance[used], flat=model.axes == 2)
+        about = wall - found.source_centre
+        if model.name == "3D":
+            found, offset = _about(fit_space(about, weights, near, found, origin), found)
+        else:
+            sums = weighted_sums(about, weights, near, found, model=model.name)
+            found, offset = fit_of_sums(sums, found.source_centre, origin, model=model.name)
+        left = residuals(found, wall, near, offset) @ found.rotation / found.scale
+        squares = float(np.einsum("ni,nij,nj->", left, weights, left))
+        noise *= float(np.trace(weights.mean(axis=0))) / model.axes
+    return _Fit(
+        model=model, used=used, transformation=found, origin=origin, offset=offset,
+        squares=squares, noise=noise, redundancy=redundancy, sums=sums,
+    )  # fmt: skip
+
+
+def _about(
+    fitted: tuple[Similarity, FloatArray], start: Similarity
+) -> tuple[Similarity, FloatArray]:
+    """Return a fit made about the wall's centre with that centre."""
+    similarity, offset = fitted
+    return replace(similarity, source_centre=start.source_centre), offset
 
 
 def residuals(
@@ -174,57 +248,78 @@ def residuals(
     return np.asarray(near - (offset + transformation.scale * turned))
 
 
-def _robust(
-    model: TransformationModel, wall: FloatArray, control: KnownPoints, used: BoolArray
-) -> _Fit:
-    """Return the fit without the points that contradict the others."""
-    best = _fit(model, wall, control.xyz, used)
-    size = float(np.abs(control.xyz[used]).max())
-    while True:
-        *_, squares, redundancy = best
-        left = redundancy - model.axes
-        # Rounding noise of large coordinates is no contradiction.
-        if left < 1 or np.sqrt(squares) < 1e-9 * size:
-            return best
-        trials = []
-        for row in np.flatnonzero(best[2]):
-            without = best[2].copy()
+def _explained(task: _Task, best: _Fit, *, fuller: bool) -> _Fit:
+    """Return the fit after what contradicts it: a wall that leans, bad points."""
+    while best.redundancy > 0 and best.squares > best.noise:
+        trials: list[tuple[float, _Fit]] = []
+        if fuller and best.model.name != "3D":
+            trials += [(1 / ALPHA, trial) for trial in _tried(task, MODELS["3D"], best.used)]
+        rows = np.flatnonzero(best.used)
+        for row in rows:
+            without = best.used.copy()
             without[row] = False
-            try:
-                trials.append(_fit(model, wall, control.xyz, without))
-            except GeometryError:
-                continue
-        if not trials:
+            found = _tried(task, best.model, without)
+            trials += [(len(rows) / ALPHA_POINT, trial) for trial in found]
+        # In shares of what is allowed; argmin takes the first of equals, the geometry.
+        chances = [share * _chance(best, trial) for share, trial in trials]
+        if not chances or min(chances) >= 1.0:
             return best
-        lightest = min(trials, key=lambda trial: trial[3])
-        floor = max(lightest[3], (1e-9 * size) ** 2)
-        ratio = (squares - lightest[3]) / model.axes / (floor / left)
-        if ratio < _limit(model.axes, left, ALPHA / len(trials)):
-            return best
-        best = lightest
+        best = trials[int(np.argmin(chances))][1]
+    return best
 
 
-def _fuller_if_better(
-    simple: _Fit, wall: FloatArray, control: KnownPoints, used: BoolArray
-) -> _Fit:
-    """Return the 3D fit if it explains significantly more than the levelled one."""
+def _tried(task: _Task, model: TransformationModel, used: BoolArray) -> list[_Fit]:
+    """Return the fit if there is one that leaves redundancy."""
+    if model.axes * int(used.sum()) - model.parameters < 1:
+        return []
     try:
-        full = _robust(MODELS["3D"], wall, control, used)
+        return [_fit(task, model, used)]
     except GeometryError:
-        return simple
-    if simple[2].sum() < full[2].sum():
-        return full  # the simple model had to throw out points that the fuller one keeps
-    left = full[4]
-    if left < 1:
-        return simple
-    extra = full[0].parameters - simple[0].parameters
-    noise = (1e-9 * float(np.abs(control.xyz[used]).max())) ** 2
-    ratio = (simple[3] - full[3]) / extra / max(full[3] / left, noise)
-    return full if ratio > _limit(extra, left, ALPHA) else simple
+        return []
 
 
-def _limit(observations: int, redundancy: int, chance: float) -> float:
-    """Return the F ratio that honest errors exceed with the given chance."""
-    from scipy.special import fdtri  # a tenth of a second that only control points need
+def _chance(simple: _Fit, full: _Fit) -> float:
+    """Return how probable it is that honest errors alone make the fuller fit so much better."""
+    from scipy.special import fdtrc  # a tenth of a second that only control points need
 
-    return float(fdtri(observations, redundancy, 1 - chance))
+    extra = simple.redundancy - full.redundancy
+    floor = max(full.squares, full.noise) / full.redundancy
+    return float(
+        fdtrc(extra, full.redundancy, max(simple.squares - full.squares, 0.0) / extra / floor)
+    )
+
+
+def _as_georeference(task: _Task, best: _Fit, usable: BoolArray) -> Georeference:
+    """Return the fit with the residuals of all control points."""
+    flat = best.model.axes == 2
+    near = np.where(flat, task.world * [1, 1, np.nan], task.world) - best.origin
+    left = residuals(best.transformation, task.wall, near, best.offset)
+    squares = float((left[best.used][:, : best.model.axes] ** 2).sum())
+    redundant = best.redundancy > 0
+    weighted = redundant and task.covariance is not None
+    return Georeference(
+        ids=task.ids,
+        world_from_wall=best.transformation,
+        model=best.model.name,
+        residuals=left,
+        solved=task.wall,
+        used=best.used,
+        bad=tuple(
+            name
+            for name, was, now in zip(task.ids, usable, best.used, strict=True)
+            if was and not now
+        ),
+        sigma0=float(np.sqrt(squares / best.redundancy)) if redundant else float("nan"),
+        error_ratio=float(np.sqrt(best.squares / best.redundancy)) if weighted else float("nan"),
+        redundancy=best.redundancy,
+        origin=best.origin,
+        offset=best.offset,
+        sums=best.sums,
+        covariance=task.covariance,
+        near=_flattened(task.world - best.origin, flat=flat),
+    )
+
+
+def _flattened(near: FloatArray, *, flat: bool) -> FloatArray:
+    """Return coordinates with zero heights where heights play no part."""
+    return np.where([False, False, flat], 0.0, near)

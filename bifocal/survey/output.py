@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from bifocal.survey.basis import basis
 from bifocal.survey.check_points import check_points
 from bifocal.survey.georeferencing import georeference
 from bifocal.survey.observations import PointObservations
@@ -33,7 +34,10 @@ from photocore.tables.headings import bare
 _OURS = {
     *("readme", "setup", "points", "results", "check", "georeference", "planning", "charts", "log")
 }
-_NUMBERS = ("r", "e1", "e2", "s_c", "X", "Y", "Z", "q", "sigma_r")
+_NUMBERS = ("r", "e1", "e2", "s_c", "X", "Y", "Z", "q", "sigma_X", "sigma_Y", "sigma_r")
+
+#: Columns shown on the screen.
+SHOWN = ("r", "e1", "e2", "X", "Y", "sigma_X", "sigma_Y", "sigma_r")
 
 
 def write_result(
@@ -104,6 +108,11 @@ def _update(path: Path, solution: SolvedSurvey, content: SurveyContent, *, overw
     kept = update_book(
         solution.source, path, solution.survey, own, given=_options(solution), overwrite=overwrite
     )
+    if solution.georeference is not None and _weighs_alike(solution):
+        return (
+            "its formulas weigh all control points alike, since it was made by an older version; "
+            f"a new template weighs them. {_kept_as(kept)}"
+        ).strip()
     return _kept_as(kept)
 
 
@@ -168,6 +177,9 @@ def as_typed(solution: SolvedSurvey, content: SurveyContent) -> SurveyContent:
         )
         if world is not None:
             world = georeference(table, solution.survey.control, model=world.model)
+    if world is not None and _weighs_alike(solution):
+        alike = KnownPoints(ids=table.ids, xyz=table.xyz)
+        world = georeference(alike, solution.survey.control, model=world.model)
     # Relief given beside the points is checked too, but stands not on the sheet Check.
     listed = len(solution.survey.known_rows)
     whole = solution.survey.known
@@ -182,6 +194,12 @@ def as_typed(solution: SolvedSurvey, content: SurveyContent) -> SurveyContent:
         check=check_points(table, known),
         georeference=world,
     )
+
+
+def _weighs_alike(solution: SolvedSurvey) -> bool:
+    """Tell whether the survey's own workbook is an older one, whose formulas have no weights."""
+    book = solution.survey.book
+    return solution.survey.is_ours and book is not None and "g_ok" not in book.names
 
 
 def _uncorrected(
@@ -215,8 +233,25 @@ def result_content(solution: SolvedSurvey, path: Path, language: str | None) -> 
         solution,
         language=language or solution.language,
         pair_file="" if pair_path is None else relative_name(pair_path, path.parent),
+        setup=_moved(solution.setup, solution.source.parent, path.parent),
+        photo_files=_photo_files(solution, path.parent),
         log=[log_row(what, solution.source)],
     )
+
+
+def _moved(setup: SurveySetup | None, old: Path, new: Path) -> SurveySetup | None:
+    """Return the set-up with its photos as seen from another folder."""
+    if setup is None or not (setup.photo1 or setup.photo2):
+        return setup
+    names = [name and relative_name(old / name, new) for name in (setup.photo1, setup.photo2)]
+    return replace(setup, photo1=names[0], photo2=names[1])
+
+
+def _photo_files(solution: SolvedSurvey, folder: Path) -> tuple[str, str]:
+    """Return the photos that the survey's workbook names, as seen from a folder."""
+    setup, old = solution.survey.setup, solution.source.parent
+    first, second = (n and relative_name(old / n, folder) for n in (setup.photo1, setup.photo2))
+    return first, second
 
 
 def _csv_columns(solution: SolvedSurvey) -> dict[str, Any]:
@@ -228,8 +263,11 @@ def _csv_columns(solution: SolvedSurvey) -> dict[str, Any]:
         columns[f"{key} [m]"] = table[key]
     if solution.georeference is not None:
         columns |= {f"{key} [m]": world[:, i] for i, key in enumerate("ENH")}
-    for key in ("r", "e1", "e2", "s_c", "q", "sigma_r"):
+    for key in ("r", "e1", "e2", "s_c", "q", "sigma_X", "sigma_Y", "sigma_r"):
         columns[f"{key} [{units.get(key, 'm')}]"] = table[key]
+    if solution.georeference is not None:
+        sigma = solution.world_sigma
+        columns |= {f"sigma_{key} [m]": sigma[:, i] for i, key in enumerate("ENH")}
     columns["flag"] = list(table.flags)
     if any(solution.points.note):
         columns["note"] = list(solution.points.note)
@@ -247,8 +285,11 @@ def solution_json(solution: SolvedSurvey) -> str:
 def _records(solution: SolvedSurvey) -> list[str]:
     table = solution.table
     columns = [table[key].tolist() for key in _NUMBERS]
-    world = [solution.world[:, i].tolist() for i in range(3)] if solution.georeference else []
-    keys = [*_NUMBERS, *("ENH" if world else "")]
+    world, keys = [], list(_NUMBERS)
+    if solution.georeference is not None:
+        placed = np.hstack([solution.world, solution.world_sigma])
+        world = placed.T.tolist()
+        keys += ["E", "N", "H", "sigma_E", "sigma_N", "sigma_H"]
     numbers = [
         [repr(value) if math.isfinite(value) else "null" for value in values]
         for values in (*columns, *world)
@@ -279,7 +320,15 @@ def _head(solution: SolvedSurvey) -> dict[str, Any]:
         "georeference": _georeference(solution),
         "setup_check": _orientation_check(solution),
         "sigma_px": solution.sigma_px,
-        "units": {"r": "m", "X": "m", "e1": length_unit(solution), "sigma_r": "m"},
+        "rests_on": basis(solution),
+        "units": {
+            "r": "m",
+            "X": "m",
+            "e1": length_unit(solution),
+            "sigma_X": "m",
+            "sigma_Y": "m",
+            "sigma_r": "m",
+        },
         "remarks": list(solution.remarks),
     }
 
@@ -299,6 +348,7 @@ def _georeference(solution: SolvedSurvey) -> dict[str, Any] | None:
         "n": int(geo.used.sum()),
         "left_out": list(geo.bad),
         "sigma0": geo.sigma0,
+        "error_ratio": geo.error_ratio,
         "scale": geo.world_from_wall.scale,
         "rotation": geo.world_from_wall.rotation,
         "wall_centre": geo.world_from_wall.source_centre,
@@ -331,18 +381,18 @@ def verdict_lines(solution: SolvedSurvey) -> list[str]:
 
 
 def point_rows(solution: SolvedSurvey, most: int) -> list[tuple[str, ...]]:
-    """Return the first points as rows of text: id, r, e1, e2, X, Y, sigma_r, flag."""
+    """Return the first points as rows of text: id, the columns of `SHOWN`, flag."""
     table = solution.table
     rows = []
     for i in range(min(most, len(table))):
-        shown = [_shown(table[key][i], 4) for key in ("r", "e1", "e2", "X", "Y", "sigma_r")]
+        shown = [_shown(table[key][i], 4) for key in SHOWN]
         rows.append((table.ids[i], *shown, table.flags[i]))
     return rows
 
 
 def summary(solution: SolvedSurvey) -> list[str]:
-    """Return check points, verdict and georeference in words."""
-    lines = []
+    """Return what the sigmas rest on, check points, verdict and georeference in words."""
+    lines = [basis(solution)]
     for axis, errors in solution.check.axes.items():
         if errors.n:
             lines.append(

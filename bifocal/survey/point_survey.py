@@ -12,10 +12,10 @@ from bifocal.equations import plane_coordinates, relief, relief_displacement
 from bifocal.model.flags import FlagLimits, point_flags
 from bifocal.model.intersection import PlanePicks, intersect
 from bifocal.model.pair import Pair, Photo
-from bifocal.precision import sigma_relief
+from bifocal.precision import point_covariance, sigma_relief
 from bifocal.rays import zoom_centre
 from bifocal.survey.observations import PointObservations
-from bifocal.survey.relief_table import ReliefTable
+from bifocal.survey.relief_table import ReliefTable, entries
 from photocore.arrays import BoolArray, FloatArray
 
 
@@ -100,7 +100,10 @@ def solve_points(
             "Y": first.nadir[1] + y * radii.scale_number / 1000,
             "Z": r,
             "q": radii.q,
+            "sigma_X": np.sqrt(radii.covariance[:, 0, 0]),
+            "sigma_Y": np.sqrt(radii.covariance[:, 1, 1]),
             "sigma_r": sigma_r,
+            **entries(radii.covariance),
         },
         flags=point_flags(
             at_nadir=radii.at_nadir,
@@ -122,7 +125,8 @@ class _Radii:
     """Points as radial distances [mm at the scale of image 1] and directions [deg], shape (n,).
 
     ``s1, s2, theta`` count from the zoom centre, ``own1, own2, own_theta`` from each camera's
-    nadir; ``q`` is the misfit across the radius, ``standardised`` in its sigma.
+    nadir; ``q`` is the misfit across the radius, ``standardised`` in its sigma,
+    ``covariance`` that of X, Y and r from the picks, shape (n, 3, 3) [m²].
     """
 
     scale_number: float
@@ -136,6 +140,7 @@ class _Radii:
     standardised: FloatArray
     at_nadir: BoolArray
     sigma_r: FloatArray
+    covariance: FloatArray
     carried: Mapping[str, FloatArray] = field(default_factory=dict)
 
 
@@ -176,7 +181,11 @@ def _measured_radii(
         standardised=standardised,
         at_nadir=s1 == 0,
         sigma_r=sigma_relief(far, near, d1=d_far, d2=d_near, sigma_1=sigma_far, sigma_2=sigma_near),
-    )
+        covariance=point_covariance(
+            s1, s2, np.radians(theta), d1=first.distance, d2=second.distance, sigma_1=sigma,
+            sigma_2=k12 * sigma, metres=np.nan if scale_number is None else scale_number / 1000,
+        ),
+    )  # fmt: skip
 
 
 def _adjusted_radii(
@@ -208,7 +217,8 @@ def _adjusted_radii(
         )
         k_q = _misfit_spread(x1, x2, picks, to_mm) / solved.sigma_px
         k_r = solved.sigma[:, 2] / solved.sigma_px
-        o_r = np.sqrt(pair.covariance_of_orientation(np.array(solved.xyz))[:, 2, 2])
+        common = pair.covariance_of_orientation(np.array(solved.xyz))
+        o_r = np.sqrt(common[:, 2, 2])
         standardised = q / (solved.sigma_px * k_q)
     moved1, moved2 = x1 - q[:, None] * gain1, x2 - q[:, None] * gain2
     own1, own2 = (
@@ -230,7 +240,11 @@ def _adjusted_radii(
         standardised=standardised,
         at_nadir=radius == 0,
         sigma_r=np.hypot(solved.sigma_px * k_r, o_r),
-        carried=carried | {"k_q": k_q, "k_r": k_r, "o_r": o_r, "misfit_px": solved.misfit},
+        covariance=solved.covariance + common,
+        carried=carried
+        | {"k_q": k_q, "k_r": k_r, "o_r": o_r, "misfit_px": solved.misfit}
+        | entries(solved.covariance / solved.sigma_px**2, "k_")
+        | entries(common, "o_"),
     )
 
 

@@ -9,6 +9,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from bifocal.survey.tolerances import Verdict
+from bifocal.survey.weighted_similarity import WeightedSums
 from photocore.arrays import BoolArray, FloatArray, IntArray, as_floats
 from photocore.errors import InputError
 from photocore.similarity import Similarity
@@ -163,12 +164,20 @@ class Georeference:
     bad : tuple of str
         Points the program left out because they contradict the others.
     sigma0 : float
-        Standard deviation of a coordinate; NaN without redundancy. [m]
+        Standard deviation of a coordinate from the residuals; NaN without redundancy. [m]
+    error_ratio : float
+        Residuals over what the picks' precision lets expect; NaN where that or redundancy lacks.
     redundancy : int
         Observations minus parameters.
     origin, offset : ndarray, shape (3,)
         Whole-metre origin of the world coordinates and where the centre lies from it: with them
         differences of large coordinates lose no digits. [m]
+    sums : WeightedSums or None
+        What the weighted fit is made of, for the workbook; None where all weights are equal.
+    covariance : ndarray, shape (n, 3, 3), or None
+        Of X, Y, Z of the control points, as solved. [m²]
+    near : ndarray, shape (n, 3)
+        E, N, H of the control points about ``origin``; H is 0 for the model 2D. [m]
     """
 
     ids: tuple[str, ...]
@@ -182,3 +191,24 @@ class Georeference:
     redundancy: int
     origin: FloatArray
     offset: FloatArray
+    error_ratio: float = float("nan")
+    sums: WeightedSums | None = None
+    covariance: FloatArray | None = None
+    near: FloatArray = field(default_factory=lambda: np.zeros((0, 3)))
+
+    def sigma(self, covariance: FloatArray | None) -> FloatArray:
+        """Return the standard deviations of E, N, H of points on the wall, shape (n, 3). [m]
+
+        Parameters
+        ----------
+        covariance : ndarray, shape (n, 3, 3), or None
+            Of X, Y, Z. What the transformation itself is worth is not in the result. [m²]
+        """
+        if covariance is None:
+            return np.full((0, 3), np.nan)
+        return np.sqrt(np.diagonal(self.covariance_of(covariance), axis1=1, axis2=2))
+
+    def covariance_of(self, covariance: FloatArray) -> FloatArray:
+        """Return the covariance of E, N, H of points of known X, Y, Z, shape (n, 3, 3). [m²]"""
+        turn = self.world_from_wall.scale * self.world_from_wall.rotation
+        return np.asarray(turn @ covariance @ turn.T)

@@ -9,6 +9,9 @@ import numpy as np
 
 from photocore.arrays import FloatArray
 
+#: Entries of a symmetric matrix of X, Y, Z, and where they stand.
+ENTRIES = {"XX": (0, 0), "XY": (0, 1), "YY": (1, 1), "XZ": (0, 2), "YZ": (1, 2), "ZZ": (2, 2)}
+
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class ReliefTable:
@@ -20,7 +23,9 @@ class ReliefTable:
         Names of the points.
     columns : mapping of str to ndarray, shape (n,)
         The workbook's computed columns by key: ``s1_used s2_used ds e1 e2 s_c q`` [mm],
-        ``theta_used`` [deg], ``den`` [mm/m], ``r X Y Z sigma_r`` [m]. NaN where undefined.
+        ``theta_used`` [deg], ``den`` [mm/m], ``r X Y Z sigma_X sigma_Y sigma_r`` [m]. NaN where
+        undefined. Covariances that follow from the picks: ``cov_XX cov_XY cov_YY cov_XZ cov_YZ``,
+        ``cov_ZZ`` [m²].
     flags : tuple of str, length n
         One of `bifocal.model.flags.FLAGS` per point.
     standardised : ndarray, shape (n,)
@@ -52,3 +57,21 @@ class ReliefTable:
     def xyz(self) -> FloatArray:
         """X, Y and relief, shape (n, 3). [m]"""
         return np.stack([self.columns[key] for key in ("X", "Y", "Z")], axis=-1)
+
+    @property
+    def covariance(self) -> FloatArray | None:
+        """Covariance of X, Y and relief from the picks, shape (n, 3, 3); None if unknown. [m²]"""
+        if "cov_XX" not in self.columns:
+            return None
+        return symmetric(self.columns)
+
+
+def symmetric(columns: Mapping[str, FloatArray], prefix: str = "cov_") -> FloatArray:
+    """Return symmetric matrices of the columns that hold their entries, shape (n, 3, 3)."""
+    order = ("XX", "XY", "XZ", "XY", "YY", "YZ", "XZ", "YZ", "ZZ")
+    return np.stack([columns[prefix + key] for key in order], axis=-1).reshape(-1, 3, 3)
+
+
+def entries(matrices: FloatArray, prefix: str = "cov_") -> dict[str, FloatArray]:
+    """Return the entries of symmetric matrices of shape (n, 3, 3) as columns."""
+    return {prefix + key: matrices[:, i, j] for key, (i, j) in ENTRIES.items()}

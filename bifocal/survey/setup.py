@@ -51,6 +51,8 @@ class SurveySetup:
         Width and height. [mm]
     pair_file : str
         Pair file, as seen from the workbook.
+    photo1, photo2 : str
+        Photo files, as seen from the workbook; empty where none are named.
     matrices, nadirs : tuple of ndarray
         Homographies (3, 3) to the wall, None for an ideal pair, and nadir points (2,) on it. [m]
     adjusted : tuple of ndarray or None
@@ -79,6 +81,8 @@ class SurveySetup:
     k_plane: float = FlagLimits().on_plane
     sensor: Place | None = None
     pair_file: str = ""
+    photo1: str = ""
+    photo2: str = ""
     matrices: tuple[FloatArray, FloatArray] | None = None
     nadirs: tuple[FloatArray, FloatArray] = (np.zeros(2), np.zeros(2))
     adjusted: tuple[FloatArray | None, FloatArray | None] = (None, None)
@@ -163,7 +167,7 @@ class SurveySetup:
         other = {"1": "2", "2": "1"}
         swapped: dict[str, Any] = {
             f"{name}{image}": getattr(self, f"{name}{other[image]}")
-            for name in ("d", "c", "nadir")
+            for name in ("d", "c", "nadir", "photo")
             for image in "12"
         }
         return replace(self, **swapped, adjusted=self.adjusted[::-1])

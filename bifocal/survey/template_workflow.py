@@ -101,12 +101,22 @@ def write_survey(
         language=language,
         pair=pair,
         pair_file=relative_name(pair_path, path.parent) if pair_path is not None else "",
+        photo_files=_photo_files(pair, path.parent) if pair_path is None else ("", ""),
         sigma_px=sigma_px,
         points=points,
         table=solve_points(pair, points, sigma_px=sigma_px),
         log=[log_row(what, pair_path)],
     )
     write_book(path, content, overwrite=overwrite)
+
+
+def _photo_files(pair: Pair, folder: Path) -> tuple[str, str]:
+    """Return the photos of a pair without a file, as seen from the workbook's folder."""
+    first, second = (
+        relative_name(pair.folder / photo.file, folder) if photo.file else ""
+        for photo in (pair.image1, pair.image2)
+    )
+    return first, second
 
 
 def check_book_path(path: Path | str) -> Path:

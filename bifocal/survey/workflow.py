@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 
-from bifocal.model.lens import Lens
 from bifocal.model.pair import Pair, Photo, apply_homography
 from bifocal.survey.check_points import check_points
 from bifocal.survey.georeferencing import georeference
@@ -30,6 +29,7 @@ from bifocal.survey.remarks import (
     point_remarks,
 )
 from bifocal.survey.setup import SCALE_TOLERANCE, SurveySetup
+from bifocal.survey.sources import BOOKS, Source, given_pair, measured, with_setup_of
 from bifocal.survey.tolerances import RULES, ToleranceRule, as_rule
 from bifocal.survey.units import (
     refuse_contradiction,
@@ -39,12 +39,10 @@ from bifocal.survey.units import (
     refuse_wrong_unit,
 )
 from bifocal.survey.workbook.content import SurveyContent
-from bifocal.survey.workbook.reader import ReadOptions, SurveyInput, column_map, read_survey
+from bifocal.survey.workbook.reader import ReadOptions, SurveyInput, column_map
 from photocore.arrays import FloatArray
 from photocore.errors import GeometryError, InputError
 from photocore.tables.numbers import Decimal
-
-Source = Path | str | PointObservations | Mapping[str, Any]
 
 #: From this many points on, the picks' precision is taken from their misfits.
 MINIMUM_FOR_SIGMA = 20
@@ -104,6 +102,13 @@ class SolvedSurvey(SurveyContent):
             return np.full((len(self.table), 3), np.nan)
         return self.georeference.world_from_wall(self.table.xyz)
 
+    @property
+    def world_sigma(self) -> FloatArray:
+        """Standard deviations of E, N, H from the picks, shape (n, 3); NaN as `world`. [m]"""
+        if self.georeference is None:
+            return np.full((len(self.table), 3), np.nan)
+        return self.georeference.sigma(self.table.covariance)
+
 
 def solve(
     source: Source,
@@ -131,12 +136,14 @@ def solve(
 
     Parameters
     ----------
-    source : path, mapping or PointObservations
+    source : path, mapping, PointObservations or tuple of two paths
         A survey workbook or table (``.xlsx .xlsm .ods .csv``), or columns by key: ``id`` and
         ``x1 y1 x2 y2`` [mm or px], or ``s1 s2`` [mm] and ``theta`` [deg], or ``col1 row1 col2
-        row2`` [px]; each of shape (n,), NaN where blank.
+        row2`` [px]; each of shape (n,), NaN where blank. Two paths: the picks of photo 1 and of
+        photo 2 (`bifocal.survey.pick_lists.read_picks`), joined by name.
     pair : Pair or path, optional
-        Pair or pair file, for raw pixels; default the workbook's own set-up.
+        Pair or pair file, for raw pixels, or a survey workbook whose set-up, check and control
+        points are taken; default the workbook's own set-up.
     d1, d2 : float, optional
         Distances of the projection centres to the reference plane, d1 > d2, in place of those of
         `Setup`, as all that follow. [m]
@@ -202,14 +209,16 @@ def solve(
     options = ReadOptions(
         columns=column_map(columns), sheet=sheet, decimal=decimal, visible_only=visible_only
     )
-    survey, path = _measured(source, options)
+    survey, path = measured(source, options, unit)
+    if isinstance(pair, Path | str) and Path(pair).suffix.lower() in BOOKS:
+        survey, pair = with_setup_of(Path(pair), survey), None
     setup = replace(survey.setup, **given, unit=unit or survey.unit or survey.setup.unit)
     survey = replace(survey, setup=setup)
     if not len(survey.points):
         raise InputError(f"{survey.where}: there is no point. Fill in the measured points.")
     if pair is None:
         refuse_far_stations(setup.d1, setup.d2, setup.where, options=given)
-    general, pair_path, pair_remarks = _given_pair(survey, path, pair)
+    general, pair_path, pair_remarks = given_pair(survey, path, pair)
     if general is None:
         solved = _solve_ideal(survey, scale_tolerance, adjust=adjust_setup)
     else:
@@ -264,15 +273,6 @@ def _checked(**numbers: float | None) -> dict[str, Any]:
     return given
 
 
-def _measured(source: Source, options: ReadOptions) -> tuple[SurveyInput, Path]:
-    """Return what was measured, and the file it stands in."""
-    if isinstance(source, Mapping):
-        source = PointObservations.from_columns(source)
-    if isinstance(source, PointObservations):
-        return SurveyInput.of_points(source), Path("points")
-    return read_survey(source, options), Path(source)
-
-
 def _placed(
     survey: SurveyInput, table: ReliefTable, model: str
 ) -> tuple[Georeference | None, list[str]]:
@@ -296,48 +296,6 @@ class _SolvedPoints:
     check: OrientationCheck | None = None
     correction: FloatArray | None = None
     remarks: tuple[str, ...] = ()
-
-
-def _given_pair(
-    survey: SurveyInput, path: Path, pair: Pair | Path | str | None
-) -> tuple[Pair | None, Path | None, list[str]]:
-    """Return the pair asked for, or the one the workbook describes, its file, and remarks."""
-    if isinstance(pair, Pair):
-        return pair, None, list(pair.remarks)
-    if pair is not None:
-        given = Pair.read(pair)
-        return given, Path(pair), [f"{pair}: {remark}" for remark in given.remarks]
-    setup = survey.setup
-    named = path.parent / setup.pair_file if setup.pair_file else None
-    file = named if named is not None and named.is_file() else None
-    described = _described_pair(setup, file, path.parent)
-    if described is None:
-        return None, None, []
-    return described, file, [f"{setup.where}: {remark}" for remark in described.remarks]
-
-
-def _described_pair(setup: SurveySetup, file: Path | None, folder: Path) -> Pair | None:
-    """Return the pair whose homographies `Setup` holds, with the lenses of its pair file."""
-    if setup.matrices is None or setup.d1 is None or setup.d2 is None:
-        return None
-    lenses: list[Lens | None] = [None, None]
-    orientation = None
-    if file is not None:
-        try:
-            given = Pair.read(file)
-            lenses, orientation = [given.image1.lens, given.image2.lens], given.orientation
-        except InputError:
-            lenses = [None, None]
-    photos = [
-        Photo(
-            plane_from_pixel=matrix, nadir=nadir, distance=d, lens=lens, principal_distance=c
-        )
-        for matrix, nadir, d, lens, c in zip(
-            setup.matrices, setup.nadirs, (setup.d1, setup.d2), lenses, (setup.c1, setup.c2),
-            strict=True,
-        )
-    ]  # fmt: skip
-    return Pair(image1=photos[0], image2=photos[1], folder=folder, orientation=orientation)
 
 
 def _solve_pair(

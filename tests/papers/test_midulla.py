@@ -20,9 +20,11 @@ from bifocal import (
 )
 from bifocal.model.flags import FlagLimits
 from bifocal.model.intersection import PlanePicks, intersect
+from bifocal.model.pair import Pair
 from bifocal.precision import (
     base_factor,
     false_relief_of_scale,
+    point_covariance,
     sigma_displacements,
     sigma_relief,
     uncertainty_radius,
@@ -349,3 +351,94 @@ def test_relief_per_zoom_is_the_base_factor_on_the_plane():
     assert rays.relief_per_zoom(0.0, d1=17.5, d2=9.5) == pytest.approx(
         base_factor(d1=17.5, d2=9.5), rel=4 * EPS
     )
+
+
+def test_each_point_may_have_distances_of_its_own():
+    s1, s2 = 35 * 2 / np.array([16.5, 16.5]), np.array([19 * 2 / 8.5, 28 * 2 / 13.0])
+    d2 = np.array([9.5, 14.0])
+    assert relief(s1, s2, d1=17.5, d2=d2) == pytest.approx([1.0, 1.0])
+    e1, e2 = relief_displacements(s1, s2, d1=[17.5, 17.5], d2=d2)
+    assert e1 == pytest.approx(s1 / 17.5)
+    assert e2 == pytest.approx(s2 / d2)
+    with pytest.raises(GeometryError, match="d1 = 9 m is shorter than d2 = 14 m"):
+        relief(s1, s2, d1=[17.5, 9.0], d2=d2)
+    with pytest.raises(InputError, match=r"d2\[1\]: must be above zero \[m\].*got -1"):
+        relief(s1, s2, d1=17.5, d2=[9.5, -1.0])
+
+
+def test_arrays_of_different_length_are_refused_by_name():
+    with pytest.raises(InputError, match=r"s1 \(3,\), s2 \(2,\).* do not fit together"):
+        relief([1, 2, 3], [1, 2], d1=17.5, d2=9.5)
+    with pytest.raises(InputError, match=r"theta \(2,\)"):
+        plane_coordinates([1, 2, 3], 0.0, [1, 2])
+
+
+def test_masked_values_are_unknown():
+    s1 = np.ma.masked_array([35 * 2 / 16.5, 1e30], mask=[False, True])
+    found = relief(s1, [19 * 2 / 8.5] * 2, d1=17.5, d2=9.5)
+    assert found[0] == pytest.approx(1.0)
+    assert np.isnan(found[1])
+
+
+class Column(np.ndarray):
+    """A stand-in for a pandas column, which is no dependency: values with an index."""
+
+    def __new__(cls, values, index):
+        column = np.asarray(values, dtype=float).view(cls)
+        column.index = index
+        return column
+
+
+class Index(tuple):
+    """A stand-in for a pandas index."""
+
+    def equals(self, other):
+        return self == other
+
+
+Column.__module__ = "pandas.core.series"
+
+
+def test_the_index_of_columns_is_kept_and_must_agree():
+    names = Index(("P7", "P9"))
+    s1, s2 = Column([35 * 2 / 16.5] * 2, names), Column([19 * 2 / 8.5] * 2, names)
+    found = relief(s1, s2, d1=17.5, d2=9.5)
+    assert isinstance(found, Column)
+    assert found.index == names
+    e1, _ = relief_displacements(s1, s2, d1=17.5, d2=9.5)
+    assert e1.index == names
+    with pytest.raises(InputError, match="different indices"):
+        relief(s1, Column(s2, Index(("P9", "P7"))), d1=17.5, d2=9.5)
+
+
+def test_points_of_any_shape_intersect():
+    pair = Pair.ideal(d1=17.5, d2=9.5, c1=35, c2=19)
+    xyz = np.random.default_rng(2).uniform([-4, -3, -0.5], [4, 3, 0.8], (2, 3, 3))
+    found = pair.intersect(*pair.project(xyz))
+    assert found.xyz == pytest.approx(xyz)
+    assert found.covariance.shape == (2, 3, 3, 3)
+    assert found.sigma.shape == (2, 3, 3)
+    assert len(found) == len(found.flags) == 6
+    assert pair.intersect(*(p[0, 0] for p in pair.project(xyz))).xyz == pytest.approx(xyz[0, 0])
+
+
+@pytest.mark.parametrize("d2", [9.5, 14.0])
+def test_sigma_of_x_and_y_and_their_covariance_agree_with_monte_carlo(d2):
+    rng = np.random.default_rng(5)
+    c2, m, sigma = d2 / 0.5, 0.5, 0.002
+    x, y, r = 3.1, -1.7, 0.6
+    n = 200_000
+    xy1 = np.array([x, y]) * 35 / (17.5 - r) + rng.normal(0, sigma, (n, 2))
+    xy2 = np.array([x, y]) * c2 / (d2 - r) + rng.normal(0, sigma, (n, 2))
+    s1, s2 = np.hypot(*xy1.T), np.hypot(*xy2.T)
+    found = relief(s1, s2, d1=17.5, d2=d2)
+    # Eq. (7) with the direction of image 1.
+    place = xy1 * ((1 - found / 17.5) * m)[:, None]
+    sample = np.cov(np.column_stack([place, found]).T)
+    theta = np.arctan2(x, y)
+    stated = point_covariance(
+        [35 * np.hypot(x, y) / (17.5 - r)], [c2 * np.hypot(x, y) / (d2 - r)], [theta],
+        d1=17.5, d2=d2, sigma_1=sigma, sigma_2=sigma, metres=m,
+    )[0]  # fmt: skip
+    scale = np.sqrt(np.outer(np.diagonal(stated), np.diagonal(stated)))
+    assert (sample - stated) / scale == pytest.approx(np.zeros((3, 3)), abs=0.02)

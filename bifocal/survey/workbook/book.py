@@ -17,13 +17,15 @@ from bifocal.survey.workbook.content import (
     result_cells,
     setup_cells,
 )
-from bifocal.survey.workbook.reference_sheets import check, georeference, planning
+from bifocal.survey.workbook.georeference_sheet import georeference
+from bifocal.survey.workbook.reference_sheets import check, planning
 from bifocal.survey.workbook.setup_cells import (
     FORMS,
     IDEAL_FORMULAS,
     IDEAL_GROUPS,
     PAIR_FORMULAS,
     PAIR_GROUPS,
+    PHOTOS,
     POSITIVE,
 )
 from bifocal.survey.workbook.sheets import (
@@ -155,7 +157,7 @@ def _setup_cell(
     if name == "input_unit":
         sheet.worksheet[cell].alignment = Alignment(horizontal="right")
         sheet.validate(cell, choices="mm,px")
-    elif name != "pair_file":
+    elif name not in ("pair_file", *PHOTOS):
         sheet.validate(cell, above_zero=name in POSITIVE)
 
 

@@ -53,8 +53,14 @@ def row_formula(table: str, text: str) -> str:
     return "=" + re.sub(r"\[@(\w+)\]", rf"{table}[[#This Row],[\1]]", text)
 
 
-def _f(key: str, formula: str, places: int | None = None, **more: object) -> SurveyColumn:
+def formula_column(
+    key: str, formula: str, places: int | None = None, **more: object
+) -> SurveyColumn:
+    """Return a column that is calculated."""
     return SurveyColumn(key=key, kind="formula", formula=formula, places=places, **more)  # type: ignore[arg-type]
+
+
+_f = formula_column
 
 
 def _of_r(key: str, formula: str) -> SurveyColumn:
@@ -104,6 +110,43 @@ _RELIEF = (
     _f("den", 'IF(OR([@s1_used]="",COUNT(d_1,d_2)<2),"",[@s2_used]/d_2-[@s1_used]/d_1)', 6),
     _f("r", 'IF([@den]="","",IF(AND([@s1_used]>0,[@den]*(d_1-d_2)>0),[@ds]/[@den],NA()))', 4),
 )
+
+#: Entries of the covariance of X, Y, Z.
+COVARIANCES = ("XX", "XY", "YY", "XZ", "YZ", "ZZ")
+
+
+def _of_x(key: str, formula: str, *, folded: bool = True) -> SurveyColumn:
+    """Return a column that is blank where X is blank."""
+    return _f(key, f'IF([@X]="","",{formula})', None if folded else 4, folded=folded)
+
+
+def _sigmas(sigma_r: str, covariances: tuple[SurveyColumn, ...]) -> tuple[SurveyColumn, ...]:
+    """Return the columns of precision, with the covariance of X, Y, Z from the picks."""
+    return (
+        *covariances,
+        _of_x("sigma_X", "SQRT([@cov_XX])", folded=False),
+        _of_x("sigma_Y", "SQRT([@cov_YY])", folded=False),
+        _of_r("sigma_r", sigma_r),
+    )
+
+
+def _ideal_covariances() -> tuple[SurveyColumn, ...]:
+    """Return variances by each photo, along and across the radius; then those of X, Y, Z."""
+    sin, cos = "SIN(RADIANS([@theta_used]))", "COS(RADIANS([@theta_used]))"
+    near, far = "([@s2_used]/d_2)", "([@s1_used]/d_1)"
+    return (
+        _of_x("v_1", "((1-[@r]/d_1)*sigma_s/[@den])^2"),
+        _of_x("v_2", "((1-[@r]/d_2)*k_12*sigma_s/[@den])^2"),
+        _of_x("v_s", f"([@v_1]*{near}^2+[@v_2]*{far}^2)*(m_1/1000)^2"),
+        _of_x("v_t", "((1-[@r]/d_1)*sigma_s*m_1/1000)^2"),
+        _of_x("v_sr", f"-([@v_1]*{near}+[@v_2]*{far})*m_1/1000"),
+        _of_x("cov_XX", f"[@v_s]*{sin}^2+[@v_t]*{cos}^2"),
+        _of_x("cov_XY", f"([@v_s]-[@v_t])*{sin}*{cos}"),
+        _of_x("cov_YY", f"[@v_s]*{cos}^2+[@v_t]*{sin}^2"),
+        _of_x("cov_XZ", f"[@v_sr]*{sin}"),
+        _of_x("cov_YZ", f"[@v_sr]*{cos}"),
+        _of_x("cov_ZZ", "[@v_1]+[@v_2]"),
+    )
 
 
 def ideal_points(
@@ -161,7 +204,9 @@ def ideal_points(
             _f("q", f'IF(COUNT({_XY})=4,IF([@s1_used]>0,{miss},0),"")', 5)
             for _ in range(1 if xy else 0)
         ),
-        _of_r("sigma_r", "sigma_s*SQRT((1-[@r]/d_1)^2+(k_12*(1-[@r]/d_2))^2)/ABS([@den])"),
+        *_sigmas(
+            "sigma_s*SQRT((1-[@r]/d_1)^2+(k_12*(1-[@r]/d_2))^2)/ABS([@den])", _ideal_covariances()
+        ),
         _f("flag", _flag(measured, off), width=13),
     )
 
@@ -227,6 +272,11 @@ def pair_points(*, undistorted: bool) -> tuple[SurveyColumn, ...]:
             SurveyColumn(key=key, kind="value", places=6, folded=True)
             for key in ("g1x", "g1y", "g2x", "g2y", "k_q", "k_r", "o_r")
         ),
+        *(
+            SurveyColumn(key=f"{kind}_{key}", kind="value", folded=True)
+            for kind in "ko"
+            for key in COVARIANCES
+        ),
         _f("s1_used", f'IF([@q]="","",{radius(1, moved)})', 4, folded=True),
         _f("s2_used", f'IF([@q]="","",{radius(2, moved)})', 4, folded=True),
         _f(
@@ -242,7 +292,16 @@ def pair_points(*, undistorted: bool) -> tuple[SurveyColumn, ...]:
         _of_r("X", place("x")),
         _of_r("Y", place("y")),
         _of_r("Z", "[@r]"),
-        _of_r("sigma_r", "IF(ISNUMBER([@r]),SQRT((sigma_px*[@k_r])^2+N([@o_r])^2),NA())"),
+        *_sigmas(
+            "IF(ISNUMBER([@r]),SQRT((sigma_px*[@k_r])^2+N([@o_r])^2),NA())",
+            tuple(
+                _of_x(
+                    f"cov_{key}",
+                    f"IF(ISNUMBER([@r]),sigma_px^2*[@k_{key}]+N([@o_{key}]),NA())",
+                )
+                for key in COVARIANCES
+            ),
+        ),
         _f(
             "flag",
             _flag(_XY, "ABS(N([@q]))>k_off*sigma_px*N([@k_q])").replace(
@@ -267,6 +326,17 @@ def _text_from_points(key: str) -> str:
     return f'IF({_AT}>ROWS(tblPoints[id]),"",IF({cell}="","",{cell}))'
 
 
+def _world_sigma(row: int) -> str:
+    terms = []
+    for key in COVARIANCES:
+        i, j = ("XYZ".index(axis) + 1 for axis in key)
+        double = "2*" if i != j else ""
+        cell = f"INDEX(tblPoints[cov_{key}],{_AT})"
+        terms.append(f"{double}g_{row}{i}*g_{row}{j}*{cell}")
+    known = f"AND(ISNUMBER(g_k),ISNUMBER(INDEX(tblPoints[cov_XX],{_AT})))"
+    return f'IF({known},g_k*SQRT({"+".join(terms)}),"")'
+
+
 def _world(row: int, name: str) -> str:
     turned = "+".join(f"g_{row}{i}*([@{axis}]-g_{axis}0)" for i, axis in enumerate("XYZ", start=1))
     return f'IF(AND(ISNUMBER(g_k),COUNT([@X],[@Y],[@Z])=3),g_{name}0+g_k*({turned}),"")'
@@ -276,13 +346,18 @@ RESULTS: tuple[SurveyColumn, ...] = (
     _f("id", _text_from_points("id"), width=12),
     *(_f(key, _from_points(key), 3, width=9) for key in "XYZ"),
     *(_f(name, _world(row, name), 3, width=13) for row, name in enumerate("ENH", start=1)),
-    _f("sigma_r", _from_points("sigma_r"), 3, width=9),
+    *(
+        _f(key, _from_points(key), 4 if key != "sigma_r" else 3, width=9)
+        for key in ("sigma_X", "sigma_Y", "sigma_r")
+    ),
+    *(_f(f"sigma_{name}", _world_sigma(row), 4, width=9) for row, name in enumerate("ENH", 1)),
     _f("flag", _text_from_points("flag"), width=13),
     _f("note", _text_from_points("note"), width=16),
 )
 
 
-def _look_up(axis: str) -> str:
+def look_up(axis: str) -> str:
+    """Return the formula that finds a column of `Points` by the name of the point."""
     # The second search finds the number 7 among names kept as text.
     at = 'IFERROR(MATCH([@id],tblPoints[id],0),MATCH([@id]&"",tblPoints[id],0))'
     cell = f"INDEX(tblPoints[{axis}],{at})"
@@ -293,7 +368,7 @@ CHECK: tuple[SurveyColumn, ...] = (
     SurveyColumn(key="id", width=12),
     *(SurveyColumn(key=f"{axis}_ref", places=4, width=11) for axis in "XYZ"),
     SurveyColumn(key="use", width=6),
-    *(_f(axis, _look_up(axis), 4) for axis in "XYZ"),
+    *(_f(axis, look_up(axis), 4) for axis in "XYZ"),
     *(
         _f(
             f"d{axis}",
@@ -302,43 +377,6 @@ CHECK: tuple[SurveyColumn, ...] = (
             4,
         )
         for axis in "XYZ"
-    ),
-)
-
-GEOREFERENCE: tuple[SurveyColumn, ...] = (
-    SurveyColumn(key="id", width=12),
-    *(SurveyColumn(key=axis, places=4, width=14) for axis in "ENH"),
-    SurveyColumn(key="use", width=6),
-    SurveyColumn(key="found_bad", kind="value", width=9),
-    *(_f(axis, _look_up(axis), 4) for axis in "XYZ"),
-    _f(
-        "w",
-        'IF(AND(OR([@use]="",[@use]<>0),OR([@found_bad]="",[@found_bad]<>0),'
-        'COUNT([@X],[@Y],[@Z],[@E],[@N])=5,OR(g_used="2D",COUNT([@H])=1)),1,0)',
-        width=7,
-        folded=True,
-        spare=0,
-    ),
-    # From a whole-metre origin: exact, whatever the size of the coordinates.
-    *(
-        _f(f"c{axis}", f"IF({used},[@{axis}]-g_{axis}{origin},0)", 4, folded=True, spare=0)
-        for axes, origin, used in (
-            ("XYZ", "0", "[@w]=1"),
-            ("EN", "r", "[@w]=1"),
-            ("H", "r", 'AND([@w]=1,g_used<>"2D")'),
-        )
-        for axis in axes
-    ),
-    *(
-        _f(
-            f"v{name}",
-            f"IF(AND(ISNUMBER(g_k),COUNT([@X],[@Y],[@Z],[@{name}])=4),"
-            f"([@{name}]-g_{name}r)-(g_{name}t+g_k*("
-            + "+".join(f"g_{row}{i}*([@{axis}]-g_{axis}0)" for i, axis in enumerate("XYZ", 1))
-            + ')),"")',
-            4,
-        )
-        for row, name in enumerate("ENH", start=1)
     ),
 )
 

@@ -12,16 +12,17 @@ from bifocal.model.pair import Pair, Photo
 from bifocal.survey.georeferencing import residuals
 from bifocal.survey.observations import PointObservations
 from bifocal.survey.reference import CheckResult, Georeference, KnownPoints
-from bifocal.survey.relief_table import ReliefTable
+from bifocal.survey.relief_table import ReliefTable, entries
 from bifocal.survey.setup import SurveySetup
 from bifocal.survey.tolerances import RULES, ToleranceRule
+from bifocal.survey.weighted_similarity import weights_of
 from bifocal.survey.workbook.columns import (
     SurveyColumn,
     adjustment_names,
     ideal_points,
     pair_points,
 )
-from bifocal.survey.workbook.setup_cells import MATRICES, NADIRS
+from bifocal.survey.workbook.setup_cells import MATRICES, NADIRS, PHOTOS
 from photocore.arrays import BoolArray, FloatArray
 from photocore.workbook.cells import CellValue
 
@@ -31,6 +32,8 @@ POINT_ROWS, CHECK_ROWS, CONTROL_ROWS, SPARE_ROWS = 300, 25, 12, 10
 STRUCTURED_ROWS = 2000
 #: The charts show the first points only.
 CHART_ROWS = 1000
+#: Columns that are blank where a point has no place on the wall.
+_PLACES = ("X", "Y", "sigma_X", "sigma_Y")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -49,6 +52,8 @@ class SurveyContent:
         Whether points and set-up stand in the order in which an exchanged pair was given.
     pair_file : str
         Its file, as seen from the workbook.
+    photo_files : tuple of str
+        Both photos as seen from the workbook, for a general pair without a file.
     sigma_px : float or None
         Measuring precision of raw pixels. [px]
     points, table : PointObservations, ReliefTable or None
@@ -79,6 +84,7 @@ class SurveyContent:
     pair: Pair | None = None
     as_given: bool = False
     pair_file: str = ""
+    photo_files: tuple[str, str] = ("", "")
     sigma_px: float | None = None
     points: PointObservations | None = None
     table: ReliefTable | None = None
@@ -188,7 +194,7 @@ def point_cells(content: SurveyContent) -> dict[str, list[CellValue]]:
     if not content.is_pair and table.image_scale is None:
         placeless[:] = True
     for key, values in table.columns.items():
-        blank = placeless if key in ("X", "Y") else incomplete
+        blank = placeless if key in _PLACES or key.startswith("cov_") else incomplete
         if key in ("q", "theta_used"):
             blank = np.isnan(values)
         cells[key] = [
@@ -196,11 +202,39 @@ def point_cells(content: SurveyContent) -> dict[str, list[CellValue]]:
             for empty, value in zip(blank.tolist(), values.tolist(), strict=True)
         ]
     cells |= {key: inputs(values) for key, values in table.carried.items()}
+    cells |= _radial_variances(content, placeless) if not content.is_pair else {}
     typed = points.has_pixels | points.is_cartesian | points.is_polar
     cells["flag"] = [
         flag if given else None for flag, given in zip(table.flags, typed, strict=True)
     ]
     return cells
+
+
+def _radial_variances(content: SurveyContent, blank: BoolArray) -> dict[str, list[CellValue]]:
+    """Return the variances that the covariance of a point on an ideal pair is made of."""
+    table, setup = content.table, content.setup
+    assert table is not None
+    assert setup is not None
+    first, second = content.photos
+    m1 = first.scale_number or np.nan
+    k12 = 1.0 if second.scale_number is None else second.scale_number / m1
+    d1, d2, sigma = first.distance, second.distance, setup.precision
+    r, den = table["r"], table["den"]
+    near, far = table["s2_used"] / d2, table["s1_used"] / d1
+    with np.errstate(divide="ignore", invalid="ignore"):
+        v1 = ((1 - r / d1) * sigma / den) ** 2
+        v2 = ((1 - r / d2) * k12 * sigma / den) ** 2
+    found = {
+        "v_1": v1,
+        "v_2": v2,
+        "v_s": (v1 * near**2 + v2 * far**2) * (m1 / 1000) ** 2,
+        "v_t": ((1 - r / d1) * sigma * m1 / 1000) ** 2,
+        "v_sr": -(v1 * near + v2 * far) * m1 / 1000,
+    }
+    return {
+        key: [None if no else v for no, v in zip(blank.tolist(), values.tolist(), strict=True)]
+        for key, values in found.items()
+    }
 
 
 def result_cells(
@@ -210,13 +244,16 @@ def result_cells(
     if content.table is None:
         return {}
     xyz = content.table.xyz
-    world = np.full_like(xyz, np.nan)
+    world, sigma = np.full_like(xyz, np.nan), np.full_like(xyz, np.nan)
     if content.georeference is not None:
         world = content.georeference.world_from_wall(xyz)
+        sigma = content.georeference.sigma(content.table.covariance)
     return {
         "id": cells["id"],
-        **{key: inputs(content.table[key]) for key in ("X", "Y", "Z", "sigma_r")},
+        **{key: inputs(content.table[key]) for key in ("X", "Y", "Z")},
+        **{key: inputs(content.table[key]) for key in ("sigma_X", "sigma_Y", "sigma_r")},
         **{key: inputs(world[:, i]) for i, key in enumerate("ENH")},
+        **{f"sigma_{key}": inputs(sigma[:, i]) for i, key in enumerate("ENH")},
         "flag": cells["flag"],
         "note": cells["note"],
     }
@@ -244,16 +281,38 @@ def control_cells(content: SurveyContent) -> dict[str, list[CellValue]]:
     cells["found_bad"] = [0 if name in geo.bad else None for name in geo.ids]
     used, fit = geo.used, geo.world_from_wall
     centred = geo.solved - fit.source_centre
-    near = control.xyz - geo.origin
-    left = residuals(fit, geo.solved, near, geo.offset)
-    if geo.model == "2D":
-        near[:, 2] = 0.0
+    left = residuals(fit, geo.solved, control.xyz - geo.origin, geo.offset)
+    near = geo.near
     for i, (axis, world) in enumerate(zip("XYZ", "ENH", strict=True)):
         cells[axis] = inputs(geo.solved[:, i])
         cells[f"c{axis}"] = inputs(np.where(used, centred[:, i], 0.0))
         cells[f"c{world}"] = inputs(np.where(used, near[:, i], 0.0))
         cells[f"v{world}"] = inputs(left[:, i])
     cells["w"] = [int(value) for value in used]
+    return cells | _weight_cells(geo)
+
+
+def _weight_cells(geo: Georeference) -> dict[str, list[CellValue]]:
+    """Return covariances of the control points, their weights, and weights times design."""
+    if geo.covariance is None:
+        return {}
+    cells = {key: inputs(values) for key, values in entries(geo.covariance, "q_").items()}
+    size, used = len(geo.ids), geo.used
+    flat = geo.model == "2D"
+    weights = np.zeros((size, 3, 3))
+    weights[used] = weights_of(geo.covariance[used], flat=flat)
+    centred = np.zeros((size, 3))
+    centred[used] = geo.solved[used] - geo.world_from_wall.source_centre
+    east, north, height = np.where(used[:, None], geo.near, 0.0).T
+    zero, turned = np.zeros(size), 1.0 if flat else 0.0
+    design = [
+        (east, turned * north, -north), (north, -turned * east, east), (zero, height, zero)
+    ]  # fmt: skip
+    cells |= {key: inputs(values) for key, values in entries(weights, "p_").items()}
+    columns = {f"u_{{}}{name}": np.stack(d, axis=-1) for name, d in zip("pqm", design, strict=True)}
+    for key, column in {**columns, "h_{}": centred}.items():
+        weighted = np.einsum("nij,nj->ni", weights, column)
+        cells |= {key.format(axis): inputs(weighted[:, i]) for i, axis in enumerate("XYZ")}
     return cells
 
 
@@ -282,6 +341,7 @@ def setup_cells(content: SurveyContent) -> dict[str, CellValue]:
         return cells | _pair_cells(content, first, second)
     if first.scale_number is not None and second.scale_number is not None:
         cells["k_12"] = second.scale_number / first.scale_number
+    cells |= {"photo_1": setup.photo1 or None, "photo_2": setup.photo2 or None}
     cells |= {"pitch": setup.pitch, "input_unit": setup.unit, "sigma_s": setup.precision}
     if setup.unit == "px" and setup.pitch is not None:
         cells |= {"unit_x": setup.pitch, "unit_y": -setup.pitch}
@@ -303,6 +363,7 @@ def _pair_cells(content: SurveyContent, first: Photo, second: Photo) -> dict[str
     sigma = first.precision(content.sigma_px or first.sigma_pixel or second.sigma_pixel)
     cells: dict[str, CellValue] = {
         "pair_file": content.pair_file,
+        **{key: name or None for key, name in zip(PHOTOS, content.photo_files, strict=True)},
         "input_unit": "px",
         "pitch": first.pixel_size,
         "sigma_px": sigma,
@@ -318,6 +379,6 @@ def _pair_cells(content: SurveyContent, first: Photo, second: Photo) -> dict[str
             jacobian = photo.metres_per_pixel(pixels[~np.isnan(pixels).any(axis=1)])
             if len(jacobian):
                 spacing.append(float(np.median(np.sqrt((jacobian**2).sum(axis=(1, 2)) / 2))))
-    # What one pixel is on the wall, typically, in millimetres of the image scale.
-    pixel = (sum(spacing) / len(spacing) if spacing else 0.0) * 1000.0 / scale
-    return cells | {"pixel_mm": pixel, "sigma_s": sigma * pixel}
+    # What one pixel is on the wall, typically: whatever image scale is typed later.
+    pixel = 1000.0 * sum(spacing) / len(spacing) if spacing else 0.0
+    return cells | {"pixel_wall": pixel, "sigma_s": sigma * pixel / scale}

@@ -9,11 +9,14 @@ from bifocal.survey.setup import SIGMA_RADIAL
 
 Groups = tuple[tuple[str, ...], ...]
 
+#: Cells that name the photo files.
+PHOTOS = ("photo_1", "photo_2")
 #: Cells of an ideal pair, group by group; the last group is calculated, the others are typed.
 IDEAL_GROUPS: Groups = (
     (
         *("c_1", "c_2", "d_2", "delta_d", "d_1", "input_unit", "pitch"),
         *("nadir_1_col", "nadir_1_row", "nadir_2_col", "nadir_2_row"),
+        *PHOTOS,
     ),
     ("sigma_s", "sigma_r_max", "k_off", "k_plane"),
     (
@@ -29,9 +32,9 @@ NADIRS: Groups = tuple(tuple(f"n{image}_{axis}" for axis in "xy") for image in "
 PAIR_GROUPS: Groups = (
     (
         *("pair_file", "d_2", "delta_d", "d_1", *NADIRS[0], *NADIRS[1]),
-        *("c_1", "c_2", "pitch", "input_unit"),
+        *("c_1", "c_2", "pitch", "input_unit", *PHOTOS),
     ),
-    ("sigma_px", "sigma_r_max", "k_off", "k_plane", "pixel_mm"),
+    ("sigma_px", "sigma_r_max", "k_off", "k_plane", "pixel_wall"),
     *MATRICES,
     ("m_1", "b_lever", "e_x", "e_y", "sigma_s"),
 )
@@ -41,6 +44,7 @@ FORMS: Mapping[str, str] = {
     **dict.fromkeys(("pitch", "sigma_s", "k_12"), "0.000000"),
     **dict.fromkeys(("m_1", "m_2"), "0.00"),
     "sigma_r_max": "0.0000",
+    **dict.fromkeys(PHOTOS, "@"),
 }
 #: Typed numbers that must be above zero; of the others the sheet only asks that they are numbers.
 POSITIVE = ("c_1", "c_2", "d_1", "d_2", "pitch", "sigma_s", "sigma_px", "sigma_r_max")
@@ -65,7 +69,7 @@ IDEAL_FORMULAS: Mapping[str, str] = {
 }
 PAIR_FORMULAS: Mapping[str, str] = {
     **{key: IDEAL_FORMULAS[key] for key in ("d_1", "sigma_r_max", "b_lever")},
-    "sigma_s": "sigma_px*pixel_mm",
+    "sigma_s": 'IF(COUNT(pixel_wall)=1,sigma_px*pixel_wall/m_1,"")',
     "m_1": "IF(COUNT(c_1)=1,1000*d_1/c_1,1000)",
     "e_x": "(d_1*n2_x-d_2*n1_x)/(d_1-d_2)",
     "e_y": "(d_1*n2_y-d_2*n1_y)/(d_1-d_2)",

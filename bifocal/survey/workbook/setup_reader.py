@@ -12,7 +12,7 @@ from bifocal.model.flags import FlagLimits
 from bifocal.survey.setup import SurveySetup
 from bifocal.survey.workbook.columns import adjustment_names
 from bifocal.survey.workbook.known_reader import LARGEST
-from bifocal.survey.workbook.setup_cells import MATRICES, NADIRS, TYPED_FORMULAS
+from bifocal.survey.workbook.setup_cells import MATRICES, NADIRS, PHOTOS, TYPED_FORMULAS
 from bifocal.survey.workbook.words import headings, term
 from photocore.arrays import FloatArray
 from photocore.errors import CellError
@@ -28,7 +28,7 @@ _NUMBERS = (
     *("sigma_s", "sigma_px", "sigma_r_max", "k_off", "k_plane"),
     *("nadir_1_col", "nadir_1_row", "nadir_2_col", "nadir_2_row", "sensor_w", "sensor_h"),
 )
-_TEXTS = ("input_unit", "pair_file")
+_TEXTS = ("input_unit", "pair_file", *PHOTOS)
 #: d_1 typed and d_2 + delta_d may differ by this much: a tape's millimetre.
 _AGREE = 0.0015
 
@@ -84,6 +84,8 @@ def read_setup(
         sensor=_place(number["sensor_w"], number["sensor_h"]),
         unit=_unit(values, errors),
         pair_file=_text(values, "pair_file"),
+        photo1=_text(values, "photo_1").strip(),
+        photo2=_text(values, "photo_2").strip(),
         matrices=matrices,
         nadirs=nadirs,
         adjusted=_adjusted(book),

@@ -159,3 +159,27 @@ def test_names_with_control_characters_fit_into_a_workbook(tmp_path):
     )
     export_points(tmp_path / "o.xlsx", points)
     assert openpyxl.load_workbook(tmp_path / "o.xlsx")["Results"]["A2"].value == "Ab"
+
+
+def test_error_ellipses_have_the_axes_of_the_covariance(tmp_path):
+    # By hand: variances 25 and 4 mm2 along the directions 30 and 120 degrees from +Y.
+    turn = np.radians(30.0)
+    u, v = np.array([np.sin(turn), np.cos(turn)]), np.array([np.cos(turn), -np.sin(turn)])
+    matrix = 25e-6 * np.outer(u, u) + 4e-6 * np.outer(v, v)
+    points = SurveyPoints(
+        ids=("A",), xyz=np.array([[1.0, 2.0, 0.1]]), sigma_r=np.array([0.02]), flags=("OK",),
+        notes=("",), sigma_xy=np.sqrt(np.diagonal(matrix))[None], cov_xy=matrix[:1, 1],
+    )  # fmt: skip
+    assert points.ellipses()[0] == pytest.approx([0.005, 0.002, 30.0])
+    export_points(tmp_path / "p.dxf", points, ellipses=100)
+    (drawn,) = ezdxf.readfile(tmp_path / "p.dxf").modelspace().query("ELLIPSE")
+    assert drawn.dxf.layer == "BIFOCAL_ELLIPSES_X100"
+    assert tuple(drawn.dxf.major_axis)[:2] == pytest.approx(tuple(0.5 * u))
+    assert drawn.dxf.ratio == pytest.approx(0.4)
+    export_points(tmp_path / "p.geojson", points)
+    said = json.loads((tmp_path / "p.geojson").read_text())["features"][0]["properties"]
+    assert said["sigma_X"] == pytest.approx(matrix[0, 0] ** 0.5)
+    assert (said["ellipse_a"], said["ellipse_b"]) == pytest.approx((0.005, 0.002))
+    assert said["ellipse_azimuth"] == pytest.approx(30.0)
+    export_points(tmp_path / "none.dxf", points, ellipses=0)
+    assert not ezdxf.readfile(tmp_path / "none.dxf").modelspace().query("ELLIPSE")

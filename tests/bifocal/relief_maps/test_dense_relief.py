@@ -234,7 +234,8 @@ def test_relief_that_falls_away_outwards_is_a_ramp_and_that_which_rises_is_none(
     x, y = frame.from_centre()
     limit = forward_projection.STRETCH - 1
     for axis in (x + 0 * y, y + 0 * x):
-        falling = forward_projection.ramps(frame, (-0.01 * axis).astype(np.float32))
+        covered = forward_projection.stretch(frame, (-0.01 * axis).astype(np.float32))
+        falling = covered > forward_projection.STRETCH
         wanted = axis > limit / 2 * 17.5 / 0.01
         clear = np.abs(axis - limit / 2 * 17.5 / 0.01) > 2
         clear[0] = clear[-1] = clear[:, 0] = clear[:, -1] = False
@@ -337,7 +338,7 @@ def test_hidden_strips_take_the_surface_behind():
     holes[:, 560:575] = True
     r[holes] = np.nan
     layer = forward_projection.MapBands(r, np.zeros_like(r), np.ones(grid.shape, dtype=np.uint8))
-    filled = forward_projection.fill_outwards(layer, holes, grid, np.zeros(2))
+    filled = forward_projection.fill_from_behind(layer, holes, grid, np.zeros(2))
     middle = slice(200, 312)
     assert filled[middle, 560:575].all()
     np.testing.assert_array_equal(layer.r[middle, 560:575], 0.0)

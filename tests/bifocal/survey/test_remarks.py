@@ -148,7 +148,7 @@ def test_the_footer_has_room_below_the_printed_table(tmp_path):
 
 @pytest.mark.parametrize(
     ("language", "text"),
-    [("en", "One pixel at image scale, typical"), ("de", "Ein Pixel im Bildmaßstab, typisch")],
+    [("en", "One pixel on the wall, typical"), ("de", "Ein Pixel auf der Wand, typisch")],
 )
 def test_setup_describes_the_pixel_in_one_language(tmp_path, language, text):
     pair = write_pair(tmp_path / "w.pair.json")
@@ -156,4 +156,4 @@ def test_setup_describes_the_pixel_in_one_language(tmp_path, language, text):
     assert run("solve", points, "--pair", pair, "--out", out, "--lang", language).exit_code == 0
     sheet = openpyxl.load_workbook(out)["Setup"]
     words = {row[0].value: row[1].value for row in sheet.iter_rows(min_row=5, max_col=2)}
-    assert words["pixel_mm"] == text
+    assert words["pixel_wall"] == text

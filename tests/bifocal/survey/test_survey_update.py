@@ -162,5 +162,5 @@ def test_limits_typed_in_setup_decide_the_flags(tmp_path):
     out = tmp_path / "out.xlsx"
     assert run("solve", path, "--out", out).exit_code == 0
     flags = openpyxl.load_workbook(out, data_only=True)["Results"]
-    assert flags["I5"].value == "ON-PLANE"
+    assert flags["N5"].value == "ON-PLANE"
     assert SETUP["c_1"] == 35

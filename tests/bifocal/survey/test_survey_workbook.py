@@ -20,8 +20,9 @@ from bifocal.survey.reference import KnownPoints
 from bifocal.survey.setup import SurveySetup
 from bifocal.survey.template_workflow import write_template
 from bifocal.survey.workbook.book import write_book
-from bifocal.survey.workbook.columns import GEOREFERENCE, IDEAL_POINTS, RESULTS, pair_points
+from bifocal.survey.workbook.columns import IDEAL_POINTS, RESULTS, pair_points
 from bifocal.survey.workbook.content import SurveyContent
+from bifocal.survey.workbook.georeference_columns import GEOREFERENCE
 from photocore.errors import InputError
 from tests.recalculate import recalculated
 from tests.workbook_lint import lint
@@ -60,10 +61,12 @@ def test_sheets_names_and_keys_are_those_of_the_contract():
         assert book.defined_names[name].attr_text.startswith("'Setup'!$C$")
     keys = [cell.value for cell in book["Points"][4]]
     assert keys[:11] == "id x1 y1 x2 y2 s1 s2 theta use code note".split()  # noqa: SIM905
-    computed = "ds den r e1 e2 s_c X Y Z q sigma_r flag".split()  # noqa: SIM905
+    computed = "ds den r e1 e2 s_c X Y Z q sigma_X sigma_Y sigma_r flag".split()  # noqa: SIM905
     assert [key for key in keys if key in computed] == computed
     results = [cell.value for cell in book["Results"][4]]
-    assert results == "id X Y Z E N H sigma_r flag note".split()  # noqa: SIM905
+    assert results == (
+        "id X Y Z E N H sigma_X sigma_Y sigma_r sigma_E sigma_N sigma_H flag note".split()  # noqa: SIM905
+    )
 
 
 @pytest.mark.parametrize("language", ["en", "it", "de"])
@@ -308,3 +311,29 @@ def test_rows_are_prepared_as_many_as_wanted(tmp_path):
 def test_unknown_language_is_refused(tmp_path):
     with pytest.raises(InputError, match="fr"):
         write_template(tmp_path / "survey.xlsx", language="fr")
+
+
+def named(book, name):
+    sheet, cell = book.defined_names[name].attr_text.replace("$", "").replace("'", "").split("!")
+    return book[sheet][cell]
+
+
+@pytest.mark.office
+def test_planning_of_a_pair_without_focal_lengths_follows_when_they_are_typed(tmp_path):
+    write_book(tmp_path / "pair.xlsx", pair_content())
+    book = openpyxl.load_workbook(tmp_path / "pair.xlsx")
+    named(book, "sensor_w").value, named(book, "sensor_h").value = 22.7, 15.1
+    book.save(tmp_path / "sensor.xlsx")
+    before = recalculated(tmp_path / "sensor.xlsx", tmp_path)
+    assert named(before, "covered_w").value in (None, "")
+    # The homographies of `pair_content` have 4 mm per pixel, more or less.
+    assert named(before, "gsd_mm").value == pytest.approx(4.0, abs=0.3)
+    named(book, "c_1").value, named(book, "c_2").value = 36.0, 18.0
+    book.save(tmp_path / "typed.xlsx")
+    after = recalculated(tmp_path / "typed.xlsx", tmp_path)
+    assert named(after, "covered_w").value == pytest.approx(22.7 * 18 / 36)
+    radii = [
+        [book["Planning"][f"C{row}"].value for row in range(12, 19)] for book in (before, after)
+    ]
+    assert radii[1] == pytest.approx(radii[0], rel=1e-9)
+    assert radii[0][0] > 0

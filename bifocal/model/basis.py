@@ -1,0 +1,34 @@
+"""What a stated precision rests on, in one line: what was measured, typed, found or assumed."""
+
+from __future__ import annotations
+
+from bifocal.model.pair import Pair
+from bifocal.precision import false_relief_of_scale
+
+
+def rests_on(pair: Pair, *, setup: str, picks: str, more: str = "") -> str:
+    """Return the line that goes with every report of precision.
+
+    Parameters
+    ----------
+    pair : Pair
+        The geometry; its distances say what a slip of 1 % costs.
+    setup : str
+        Where distances and scales come from.
+    picks : str
+        Where the precision of the picks comes from.
+    more : str
+        Anything else, e.g. control points.
+
+    Examples
+    --------
+    >>> pair = Pair.ideal(d1=17.5, d2=9.5, c1=35, c2=19)
+    >>> rests_on(pair, setup="distances as typed", picks="picks of 0.5 px assumed")
+    'Sigmas rest on: picks of 0.5 px assumed; distances as typed, of which 1 % of scale is 0.21 m \
+of relief and in no sigma.'
+    """
+    slip = float(false_relief_of_scale(0.01, d1=pair.d1, d2=pair.d2))
+    share = f"of which 1 % of scale is {slip:.2f} m of relief and in no sigma"
+    if pair.orientation is not None:
+        share = "with the covariance of its orientation"
+    return f"Sigmas rest on: {picks}; {setup}, {share}{'; ' + more if more else ''}."

@@ -1,0 +1,77 @@
+"""From flow to surfaces: relief, sigma and quality of the pixels of photo 1."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from bifocal.model.relief_map import Quality
+from bifocal.relief_maps import edges, evidence, flow, forward_projection, seed, smoothing
+from bifocal.relief_maps.forward_projection import SIDE_FACE, STRETCH, MapBands
+from bifocal.relief_maps.frame import Frame
+from photocore.arrays import BoolArray, Float32Array
+
+#: Error across the radius that counts as noise rather than as an edge, for smoothing. [px]
+NOISE_CLIP = 0.25
+#: How much higher what covers a pixel in photo 2 must be: parallax [px] and share of d2. Supported
+#: relief covers all, any relief only what is not validated.
+COVERS, COVERS_UNVALIDATED = (0.7, 0.0005), (1.5, 0.002)
+
+
+def surfaces(
+    frame: Frame, matched: flow.Measurement, relief_range: tuple[float, float] | None
+) -> tuple[MapBands, BoolArray]:
+    """Return relief, sigma and quality of the pixels of photo 1, and which of them to use.
+
+    Parameters
+    ----------
+    frame : Frame
+    matched : Measurement
+        Flow between the photos.
+    relief_range : tuple of float, optional
+        Least and greatest relief to expect. [m]
+    """
+    d2 = frame.distances[1]
+    low, high = relief_range or seed.usual_range(d2)
+    margin = 0.1 * (high - low)
+    relief = np.clip(np.nan_to_num(matched.r), low - margin, high + margin).astype(np.float32)
+    sigma = flow.sigma_of_relief(frame, relief, matched.sigma_px)
+    valid = evidence.validated(matched.across, matched.loop, sigma, d2)
+    support = evidence.supported(valid)
+    relief = evidence.held_back(relief, support, d2)
+    side_face = forward_projection.stretch(frame, relief) < SIDE_FACE
+    relief = edges.sharpen(frame, relief, float(np.median(matched.sigma_px[::8, ::8])))
+    quiet = np.minimum(matched.sigma_px, np.float32(NOISE_CLIP))
+    relief = smoothing.shrink_noise(relief, flow.sigma_of_relief(frame, relief, quiet))
+    sigma = flow.sigma_of_relief(frame, relief, matched.sigma_px)
+    quality = np.where(valid, Quality.MEASURED, Quality.INTERPOLATED).astype(np.uint8)
+    bands = MapBands(relief, sigma, quality)
+    covered, filled = _uncover(frame, bands, valid, support)
+    steep = forward_projection.stretch(frame, relief) > STRETCH
+    usable = flow.is_inside(frame, relief) & ~(steep & ~filled & ~valid)
+    usable &= ~(side_face & ~valid)
+    bands.quality[covered] = Quality.HIDDEN
+    return bands, usable
+
+
+def _uncover(
+    frame: Frame, bands: MapBands, valid: BoolArray, support: BoolArray
+) -> tuple[BoolArray, BoolArray]:
+    """Give what photo 2 cannot see the surface behind (in place); return it and what changed."""
+
+    def step(covers: tuple[float, float]) -> Float32Array:
+        x, y = frame.from_centre()
+        reach = np.maximum(np.sqrt(x * x + y * y), 1)
+        parallax = covers[0] * frame.pair.base_factor / reach
+        return np.asarray(parallax + covers[1] * frame.distances[1], dtype=np.float32)
+
+    relief, least = bands.r, step(COVERS)
+    covered = forward_projection.hidden_in_second(frame, relief, least, support)
+    perhaps = forward_projection.hidden_in_second(frame, relief, step(COVERS_UNVALIDATED))
+    covered |= perhaps & ~valid
+    before = MapBands(bands.r.copy(), bands.sigma.copy(), bands.quality.copy())
+    nadir = frame.pair.image1.nadir
+    filled = forward_projection.fill_from_behind(bands, covered, frame.grid, nadir)
+    # What is behind lies lower: a fill that rises leans on the wrong surface.
+    rises = filled & (bands.r > before.r + least)
+    bands.put(rises, before.at(rises))
+    return covered, filled & ~rises

@@ -1,0 +1,44 @@
+"""What the sigmas of a solved survey rest on."""
+
+from __future__ import annotations
+
+from bifocal.model.basis import rests_on
+from bifocal.survey.workflow import SolvedSurvey
+
+
+def basis(solution: SolvedSurvey) -> str:
+    """Return in one line what was given, found and assumed."""
+    return rests_on(
+        solution.pair, setup=_setup(solution), picks=_picks(solution), more=_world(solution)
+    )
+
+
+def _setup(solution: SolvedSurvey) -> str:
+    corrected = ", corrected by points of the plane" if solution.adjusted else ""
+    known = "the pair as given"
+    if solution.setup is not None:
+        known = "d_1, d_2, c_1, c_2 and nadir points as typed"
+    return known + corrected
+
+
+def _picks(solution: SolvedSurvey) -> str:
+    if solution.setup is not None:
+        how = "assumed" if solution.setup.sigma_s is None else "given"
+        return f"picks of {solution.setup.precision:.3g} mm {how}"
+    photo = solution.pair.image1
+    how = "assumed"
+    if any("found from the misfits" in remark for remark in solution.remarks):
+        how = "found from the misfits"
+    elif solution.sigma_px is not None or photo.sigma_pixel is not None:
+        how = "given"
+    return f"picks of {photo.precision(solution.sigma_px):.3g} px {how}"
+
+
+def _world(solution: SolvedSurvey) -> str:
+    if solution.georeference is None:
+        return ""
+    count = int(solution.georeference.used.sum())
+    return (
+        f"E, N, H on {count} control points taken as exact; what the transformation is worth is in "
+        "no sigma"
+    )

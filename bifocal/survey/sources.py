@@ -1,0 +1,101 @@
+"""Where a survey comes from: what was measured, and the geometry it was measured with."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from bifocal.model.lens import Lens
+from bifocal.model.pair import Pair, Photo
+from bifocal.survey.observations import PointObservations
+from bifocal.survey.pick_lists import joined, left_over, read_picks
+from bifocal.survey.setup import SurveySetup
+from bifocal.survey.workbook.known_reader import with_measured
+from bifocal.survey.workbook.reader import ReadOptions, SurveyInput, read_survey
+from photocore.errors import InputError
+
+Lists = tuple[Path | str, Path | str]
+Source = Path | str | PointObservations | Mapping[str, Any] | Lists
+#: Files that are workbooks, and so no pair files.
+BOOKS = (".xlsx", ".xlsm", ".ods")
+
+
+def measured(source: Source, options: ReadOptions, unit: str | None) -> tuple[SurveyInput, Path]:
+    """Return what was measured, and the file it stands in."""
+    if isinstance(source, tuple):
+        first, second = (read_picks(path, options.decimal) for path in source)
+        survey = SurveyInput.of_points(joined(first, second, unit))
+        where = f"{first.file.name}, {second.file.name}"
+        survey = replace(
+            survey,
+            setup=replace(survey.setup, where=where),
+            remarks=tuple(left_over(first, second)),
+        )
+        return survey, first.file
+    if isinstance(source, Mapping):
+        source = PointObservations.from_columns(source)
+    if isinstance(source, PointObservations):
+        return SurveyInput.of_points(source), Path("points")
+    return read_survey(source, options), Path(source)
+
+
+def with_setup_of(path: Path, survey: SurveyInput) -> SurveyInput:
+    """Return measured points with the set-up, check and control points of a survey workbook."""
+    book = read_survey(path)
+    setup = book.setup
+    if setup.pair_file:
+        setup = replace(setup, pair_file=str((path.parent / setup.pair_file).resolve()))
+    return replace(
+        book,
+        points=survey.points,
+        setup=setup,
+        unit=survey.unit,
+        known=with_measured(book.known, survey.points),
+        is_ours=False,
+        table=survey.table,
+        remarks=(*survey.remarks, *book.remarks),
+    )
+
+
+def given_pair(
+    survey: SurveyInput, path: Path, pair: Pair | Path | str | None
+) -> tuple[Pair | None, Path | None, list[str]]:
+    """Return the pair asked for, or the one the workbook describes, its file, and remarks."""
+    if isinstance(pair, Pair):
+        return pair, None, list(pair.remarks)
+    if pair is not None:
+        given = Pair.read(pair)
+        return given, Path(pair), [f"{pair}: {remark}" for remark in given.remarks]
+    setup = survey.setup
+    named = path.parent / setup.pair_file if setup.pair_file else None
+    file = named if named is not None and named.is_file() else None
+    described = described_pair(setup, file, path.parent)
+    if described is None:
+        return None, None, []
+    return described, file, [f"{setup.where}: {remark}" for remark in described.remarks]
+
+
+def described_pair(setup: SurveySetup, file: Path | None, folder: Path) -> Pair | None:
+    """Return the pair whose homographies `Setup` holds, with the lenses of its pair file."""
+    if setup.matrices is None or setup.d1 is None or setup.d2 is None:
+        return None
+    lenses: list[Lens | None] = [None, None]
+    orientation = None
+    if file is not None:
+        try:
+            given = Pair.read(file)
+            lenses, orientation = [given.image1.lens, given.image2.lens], given.orientation
+        except InputError:
+            lenses = [None, None]
+    photos = [
+        Photo(
+            plane_from_pixel=matrix, nadir=nadir, distance=d, lens=lens, principal_distance=c
+        )
+        for matrix, nadir, d, lens, c in zip(
+            setup.matrices, setup.nadirs, (setup.d1, setup.d2), lenses, (setup.c1, setup.c2),
+            strict=True,
+        )
+    ]  # fmt: skip
+    return Pair(image1=photos[0], image2=photos[1], folder=folder, orientation=orientation)

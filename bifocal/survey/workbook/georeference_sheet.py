@@ -1,0 +1,318 @@
+"""The sheet `Georeference`: control points, the weighted fit as live formulas, residuals."""
+
+from __future__ import annotations
+
+import math
+import re
+
+import numpy as np
+from openpyxl.styles import Alignment
+
+from bifocal.survey.reference import Georeference
+from bifocal.survey.relief_table import ENTRIES
+from bifocal.survey.weighted_similarity import TURNS
+from bifocal.survey.workbook.content import SurveyContent, control_cells
+from bifocal.survey.workbook.georeference_columns import GEOREFERENCE, entry
+from bifocal.survey.workbook.sheets import LABEL_FONT, BookBuilder, SheetBuilder
+from photocore.arrays import FloatArray
+from photocore.workbook.cells import CellValue
+from photocore.workbook.grid import column_letters
+
+#: Row of the keys of the control points; parameters stand above.
+CONTROL_HEAD = 27
+#: First column and rows of the weighted sums: above the folded columns of the table.
+_LEFT, _TOP, _ROWS = 12, 3, 22
+_UNKNOWNS = ("p", "q", "m")
+
+
+def georeference(builder: BookBuilder, content: SurveyContent) -> None:
+    """Write control points, the closed-form transformation and the residuals."""
+    rows = content.control_rows
+    sheet = builder.sheet("Georeference", "geo_how")
+    _model(sheet, content)
+    _transformation(sheet, content)
+    _centres(sheet, content)
+    _rotation(sheet, content)
+    _sums(sheet, content)
+    _weighted_sums(sheet, content)
+    cells = control_cells(content)
+    sheet.table("tblGeo", GEOREFERENCE, at=(CONTROL_HEAD, 1), rows=rows, cells=cells)
+    sheet.worksheet.column_dimensions["A"].width = 34
+    first, last = CONTROL_HEAD + 1, CONTROL_HEAD + rows
+    sheet.validate(f"B{first}:D{last}", limit=1e8)
+    sheet.validate(f"E{first}:E{last}", choices="1,0")
+    sheet.finish(landscape=True, freeze=f"B{first}")
+
+
+def _model(sheet: SheetBuilder, content: SurveyContent) -> None:
+    """Write which model is asked for, found and used."""
+    geo = content.georeference
+    for row, key in enumerate(("geo_model", "geo_auto", "geo_used"), start=4):
+        sheet.word(f"A{row}", key)
+    sheet.worksheet["A4"].alignment = Alignment(wrap_text=True)
+    sheet.input("B4", content.model, name="g_model")
+    sheet.validate("B4", choices="auto,levelled,3D,2D")
+    sheet.input("B5", None if geo is None else geo.model, name="g_auto")
+    flat = 'IF(COUNT(tblGeo[H])=0,IF(COUNT(tblGeo[E])=0,"levelled","2D"),'
+    used = f'IF(g_model="auto",{flat}IF(g_auto="3D","3D","levelled")),g_model)'
+    shown = "levelled" if content.model == "auto" else content.model
+    value = shown if geo is None else geo.model
+    sheet.formula("B6", used, value, form="General", name="g_used")
+
+
+def _transformation(sheet: SheetBuilder, content: SurveyContent) -> None:
+    """Write number of points, scale, precision and rotation in plan, live."""
+    geo = content.georeference
+    redundant = 'g_n*IF(g_used="2D",2,3)-IF(g_used="2D",4,IF(g_used="3D",7,5))'
+    east, north, height = (f"SUMPRODUCT(tblGeo[w],tblGeo[v{n}],tblGeo[v{n}])" for n in "ENH")
+    values: tuple[CellValue, ...] = (0, None, None, None)
+    if geo is not None:
+        turn = geo.world_from_wall.rotation
+        values = (
+            int(geo.used.sum()),
+            geo.world_from_wall.scale,
+            None if math.isnan(geo.sigma0) else geo.sigma0,
+            math.degrees(math.atan2(turn[1, 0], turn[0, 0])),
+        )
+    lines = (
+        ("geo_n", "g_n", "SUM(tblGeo[w])", "0"),
+        (
+            "geo_scale",
+            "g_k",
+            'IF(g_n<IF(g_used="3D",3,2),"",IF(g_used="3D",IF(COUNT(s3_k)=1,s3_k,""),'
+            f'IF(g_ok=1,1/SQRT(g_p_{TURNS}^2+g_q_{TURNS}^2),"")))',
+            "0.000000000",
+        ),
+        (
+            "geo_sigma0",
+            "g_sigma0",
+            f'IF(g_k="","",IF({redundant}<1,"",SQRT(({east}+{north}'
+            f'+IF(g_used="2D",0,{height}))/({redundant}))))',
+            "0.0000",
+        ),
+        ("geo_alpha", "g_alpha", 'IF(g_k="","",DEGREES(ATAN2(g_11,g_21)))', "0.0000"),
+    )
+    for row, ((key, name, body, form), value) in enumerate(zip(lines, values, strict=True), 7):
+        sheet.word(f"A{row}", key)
+        sheet.formula(f"B{row}", body, value, form=form, name=name)
+
+
+#: Cosines row by row: of the model 2D, of the levelled one.
+_COS, _SIN = f"g_p_{TURNS}*g_k", f"g_q_{TURNS}*g_k"
+_COSINES = {
+    "11": (_COS, _COS), "12": (f"-{_SIN}", "0"), "13": ("0", _SIN),
+    "21": (_SIN, _SIN), "22": (_COS, "0"), "23": ("0", f"-{_COS}"),
+    "31": ("0", "0"), "32": ("0", "1"), "33": ("1", "0"),
+}  # fmt: skip
+
+
+def _rotation(sheet: SheetBuilder, content: SurveyContent) -> None:
+    """Write the rotation: closed forms live, the general one found by the program."""
+    geo = content.georeference
+    sheet.word("A14", "geo_rotation")
+    sheet.word("J14", "geo_solved")
+    is_3d = geo is not None and geo.model == "3D"
+    for key, (plane, levelled) in _COSINES.items():
+        i, j = int(key[0]) - 1, int(key[1]) - 1
+        entry = None if geo is None else float(geo.world_from_wall.rotation[i, j])
+        body = f'IF(g_k="","",IF(g_used="3D",s3_{key},IF(g_used="2D",{plane},{levelled})))'
+        place = f"{'BCD'[j]}{14 + i}"
+        sheet.formula(place, body, entry, form="0.000000000", name=f"g_{key}")
+        solved = entry if is_3d else None
+        sheet.input(f"{'GHI'[j]}{14 + i}", solved, name=f"s3_{key}")
+    sheet.word("J17", "geo_scale")
+    scale = geo.world_from_wall.scale if geo is not None and is_3d else None
+    sheet.input("G17", scale, name="s3_k")
+    constants = _constants(geo) if geo is not None and is_3d else (None, None, None)
+    for letter, axis, value in zip("GHI", "XYZ", constants, strict=True):
+        sheet.input(f"{letter}18", value, name=f"s3_{axis}")
+    sheet.word("J18", "geo_constants")
+
+
+def _centres(sheet: SheetBuilder, content: SurveyContent) -> None:
+    """Write the centres of the control points in both systems, the world's in two parts.
+
+    E0 = Er + Et with Er a whole number: differences of large coordinates stay exact.
+    """
+    geo = content.georeference
+    sheet.word("A12", "geo_centres")
+    zero = np.zeros(3)
+    wall = zero if geo is None else geo.world_from_wall.source_centre
+    origin, offset = (zero, zero) if geo is None else (geo.origin, geo.offset)
+
+    def formula(cell: str, name: str, body: str, value: float) -> None:
+        sheet.formula(cell, body, float(value), form="0.0000", name=name)
+
+    for i, (axis, name) in enumerate(zip("XYZ", "ENH", strict=True)):
+        mean = "IF(g_n=0,0,SUMIF(tblGeo[w],1,tblGeo[{0}])/g_n)"
+        formula(f"{'BCD'[i]}12", f"g_{axis}0", mean.format(axis), wall[i])
+        rounded = f"ROUND({mean.format(name)},0)"
+        turned = "+".join(f"g_{i + 1}{j}*g_x_{other}" for j, other in enumerate("XYZ", 1))
+        rest = f"IF(ISNUMBER(g_k),-g_k*({turned}),0)"
+        if name == "H":
+            rounded = f'IF(g_used="2D",0,{rounded})'
+            rest = f'IF(g_used="2D",IF(ISNUMBER(g_k),g_k*g_Z0,0),{rest})'
+        formula(f"{'BCD'[i]}13", f"g_{name}0", f"g_{name}r+g_{name}t", origin[i] + offset[i])
+        formula(f"{'GHI'[i]}12", f"g_{name}r", rounded, origin[i])
+        formula(f"{'GHI'[i]}13", f"g_{name}t", rest, offset[i])
+
+
+def _sums(sheet: SheetBuilder, content: SurveyContent) -> None:
+    """Write the centred sums the closed forms are made of, with their values."""
+    geo = content.georeference
+    centred = np.zeros((6, 0))
+    if geo is not None:
+        world = content.control.xyz[geo.used] - geo.origin
+        if geo.model == "2D":
+            world[:, 2] = 0.0
+        centred = np.hstack([geo.solved[geo.used] - geo.world_from_wall.source_centre, world]).T
+    column = dict(zip("XYZENH", centred, strict=True))
+    products = {"a2": "XE+YN", "b2": "XN-YE", "aL": "XE-ZN", "bL": "XN+ZE"}
+    bodies, values = {}, {}
+    for name, pairs in products.items():
+        signed = re.findall(r"([+-]?)(\w)(\w)", pairs)
+        bodies[name] = "".join(
+            f"{sign}SUMPRODUCT(tblGeo[c{one}],tblGeo[c{other}])" for sign, one, other in signed
+        )
+        values[name] = sum(
+            float(f"{sign}1") * float((column[one] * column[other]).sum())
+            for sign, one, other in signed
+        )
+    for kind in "2L":
+        bodies[f"l{kind}"] = f"SQRT(g_a{kind}^2+g_b{kind}^2)"
+        values[f"l{kind}"] = math.hypot(values[f"a{kind}"], values[f"b{kind}"])
+    for i, name in enumerate(("a2", "b2", "l2", "aL", "bL", "lL")):
+        row, (left, right) = 19 + i % 5, ("AB", "CD")[i // 5]
+        sheet.text(f"{left}{row}", f"g_{name}", LABEL_FONT)
+        place, form = f"{right}{row}", "0.000000"
+        sheet.formula(place, bodies[name], values[name], form=form, name=f"g_{name}")
+
+
+def _constants(geo: Georeference) -> tuple[float, ...]:
+    """Return the wall's coordinates of the world's origin about the wall's centre. [m]"""
+    turn = geo.world_from_wall
+    return tuple((-(turn.rotation.T @ geo.offset) / turn.scale).tolist())
+
+
+def _weighted_sums(sheet: SheetBuilder, content: SurveyContent) -> None:
+    """Write the normal equations of the weighted fit and the turns that solve them."""
+    values = _weighted_values(content.georeference)
+    lines = {
+        "g_flat": 'IF(g_used="2D",1,0)',
+        "g_ok": 'IF(AND(g_n>=2,g_used<>"3D"),IF(IF(g_flat=1,g_l2,g_lL)>0,1,0),0)',
+        **{name: f'IF(g_ok=1,{body},"")' for name, body in _weighted_lines().items()},
+    }
+    for axis in "XYZ":
+        terms = "+".join(f"g_F_{axis}{u}*{value}" for u, value in _SOLVED.items())
+        lines[f"g_x_{axis}"] = f'IF(g_used="3D",s3_{axis},IF(g_ok=1,g_f_{axis}-({terms}),""))'
+    for i, (name, body) in enumerate(lines.items()):
+        row, left = _TOP + i % _ROWS, _LEFT + 2 * (i // _ROWS)
+        sheet.text(f"{column_letters(left)}{row}", name, LABEL_FONT)
+        place = f"{column_letters(left + 1)}{row}"
+        sheet.formula(place, body, values.get(name), form="0.000000", name=name)
+
+
+#: The unknowns as cells: p, q and, the scale of the heights, m.
+_SOLVED = {"p": f"g_p_{TURNS}", "q": f"g_q_{TURNS}", "m": "(1/g_k)"}
+#: What each unknown is multiplied by on X, Y, Z, as columns of the table with a factor before.
+_DESIGN = {
+    "p": (("", "cE"), ("g_flat*", "cN"), ("-1*", "cN")),
+    "q": (("", "cN"), ("-g_flat*", "cE"), ("", "cE")),
+    "m": (None, ("", "cH"), None),
+}
+
+
+def _product(unknown: str, column: str) -> str:
+    """Return the sum of a column of the design times columns that end in X, Y, Z."""
+    terms = [
+        f"{part[0]}SUMPRODUCT(tblGeo[{part[1]}],tblGeo[{column.format(axis)}])"
+        for axis, part in zip("XYZ", _DESIGN[unknown], strict=True)
+        if part is not None
+    ]
+    return "+".join(terms)
+
+
+def _weighted_lines() -> dict[str, str]:
+    """Return the formulas by name, each from those before it."""
+    pairs = [("p", "p"), ("p", "q"), ("p", "m"), ("q", "q"), ("q", "m"), ("m", "m")]
+    lines = {
+        f"g_s_{key}": f"IF(AND(g_flat=1,{int(key == 'ZZ')}=1),1,SUM(tblGeo[p_{key}]))"
+        for key in ENTRIES
+    }
+    cofactors = {
+        "XX": "g_s_YY*g_s_ZZ-g_s_YZ^2", "XY": "g_s_XZ*g_s_YZ-g_s_XY*g_s_ZZ",
+        "YY": "g_s_XX*g_s_ZZ-g_s_XZ^2", "XZ": "g_s_XY*g_s_YZ-g_s_XZ*g_s_YY",
+        "YZ": "g_s_XY*g_s_XZ-g_s_XX*g_s_YZ", "ZZ": "g_s_XX*g_s_YY-g_s_XY^2",
+    }  # fmt: skip
+    lines["g_det"] = "+".join(f"g_s_X{axis}*({cofactors['X' + axis]})" for axis in "XYZ")
+    lines |= {f"g_i_{key}": f"({body})/g_det" for key, body in cofactors.items()}
+
+    def solved(axis: str, right: str) -> str:
+        return "+".join(f"g_i_{entry(axis, o)}*{right.format(o)}" for o in "XYZ")
+
+    for axis in "XYZ":
+        lines |= {f"g_b_{axis}{u}": f"SUM(tblGeo[u_{axis}{u}])" for u in _UNKNOWNS}
+        lines[f"g_h_{axis}"] = f"SUM(tblGeo[h_{axis}])"
+    for axis in "XYZ":
+        lines |= {f"g_F_{axis}{u}": solved(axis, "g_b_{}" + u) for u in _UNKNOWNS}
+        lines[f"g_f_{axis}"] = solved(axis, "g_h_{}")
+    for one, other in pairs:
+        freed = "+".join(f"g_b_{axis}{one}*g_F_{axis}{other}" for axis in "XYZ")
+        lines[f"g_m_{one}{other}"] = f"{_product(one, 'u_{}' + other)}-({freed})"
+    for one in _UNKNOWNS:
+        freed = "+".join(f"g_b_{axis}{one}*g_f_{axis}" for axis in "XYZ")
+        lines[f"g_y_{one}"] = f"{_product(one, 'h_{}')}-({freed})"
+    for i in range(1, TURNS + 1):
+        lines |= _turn(i)
+    return lines
+
+
+def _turn(i: int) -> dict[str, str]:
+    """Return the formulas of one turn: direction, normal matrix of two unknowns, solution."""
+    before, c, s = f"g_p_{i - 1}", f"g_c_{i}", f"g_s_{i}"
+    length = f"SQRT({before}^2+g_q_{i - 1}^2)"
+    start = ("IF(g_flat=1,g_a2/g_l2,g_aL/g_lL)", "IF(g_flat=1,g_b2/g_l2,g_bL/g_lL)")
+    n11, n12, n22 = (f"g_n{key}_{i}" for key in ("pp", "pq", "qq"))
+    h1, h2 = f"(g_y_p+{c}*g_y_m)", f"(g_y_q+{s}*g_y_m)"
+    det = f"({n11}*{n22}-{n12}^2)"
+    return {
+        c: start[0] if i == 1 else f"{before}/{length}",
+        s: start[1] if i == 1 else f"g_q_{i - 1}/{length}",
+        n11: f"g_m_pp+2*{c}*g_m_pm+{c}^2*g_m_mm",
+        n12: f"g_m_pq+{c}*g_m_qm+{s}*g_m_pm+{c}*{s}*g_m_mm",
+        n22: f"g_m_qq+2*{s}*g_m_qm+{s}^2*g_m_mm",
+        f"g_p_{i}": f"({h1}*{n22}-{h2}*{n12})/{det}",
+        f"g_q_{i}": f"({h2}*{n11}-{h1}*{n12})/{det}",
+    }
+
+
+def _weighted_values(geo: Georeference | None) -> dict[str, CellValue]:
+    """Return what the formulas show."""
+    values: dict[str, CellValue] = {"g_flat": 0, "g_ok": 0}
+    if geo is None:
+        return values
+    values["g_flat"] = int(geo.model == "2D")
+    constants = _constants(geo)
+    if geo.model == "2D" and geo.sums is not None:
+        constants = tuple(geo.sums.constants.tolist())
+    values |= {f"g_x_{axis}": value for axis, value in zip("XYZ", constants, strict=True)}
+    sums = geo.sums
+    if sums is None:
+        return values
+    values["g_ok"] = 1
+    symmetric: dict[str, FloatArray] = {"g_s_": sums.total, "g_i_": sums.inverse}
+    for prefix, matrix in symmetric.items():
+        values |= {f"{prefix}{key}": float(matrix[at]) for key, at in ENTRIES.items()}
+    values["g_det"] = float(sums.determinant)
+    for i, axis in enumerate("XYZ"):
+        values |= {f"g_b_{axis}{u}": float(sums.mixed[i, j]) for j, u in enumerate(_UNKNOWNS)}
+        values |= {f"g_F_{axis}{u}": float(sums.shift[i, j]) for j, u in enumerate(_UNKNOWNS)}
+        values |= {f"g_h_{axis}": float(sums.right[i]), f"g_f_{axis}": float(sums.mean[i])}
+        values[f"g_y_{_UNKNOWNS[i]}"] = float(sums.left[i])
+    for i, one in enumerate(_UNKNOWNS):
+        for j in range(i, 3):
+            values[f"g_m_{one}{_UNKNOWNS[j]}"] = float(sums.reduced[i, j])
+    for i, turn in enumerate(sums.turns, start=1):
+        names = ("g_c_", "g_s_", "g_npp_", "g_npq_", "g_nqq_", "g_p_", "g_q_")
+        values |= {f"{name}{i}": float(v) for name, v in zip(names, turn, strict=True)}
+    return values

@@ -1,0 +1,155 @@
+"""What keeps phantoms, noise and wrongly measured pixels out of a relief map, by hand cases."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from bifocal import Pair, Photo, Quality
+from bifocal.model.grid import Grid
+from bifocal.relief_maps import evidence, forward_projection, levels, smoothing
+from bifocal.relief_maps.forward_projection import MapBands
+from bifocal.relief_maps.frame import Frame, radial_stretch
+from bifocal.relief_maps.map_completion import _spread_inwards, _tidy_outline
+
+METRES = [[0.01, 0, -0.995], [0, -0.01, 0.995], [0, 0, 1]]
+FAR, NEAR = (Photo(plane_from_pixel=METRES, nadir=(0, 0), distance=d) for d in (17.5, 9.5))
+
+
+def frame_of(pair: Pair, side: int = 200) -> Frame:
+    grid = Grid.from_bounds((-1.0, -1.0, 1.0, 1.0), gsd=2.0 / side)
+    grey, seen = np.zeros(grid.shape, np.uint8), np.ones(grid.shape, bool)
+    return Frame(grid=grid, image1=grey, image2=grey, seen1=seen, seen2=seen, pair=pair)
+
+
+def test_a_spike_that_nothing_validates_is_held_back_and_a_validated_one_is_not():
+    relief = np.zeros((192, 192), np.float32)
+    relief[90:100, 90:100] = 2.0
+    valid = np.ones(relief.shape, bool)
+    np.testing.assert_array_equal(evidence.held_back(relief, valid, 9.5), relief)
+    valid[85:105, 85:105] = False
+    held = evidence.held_back(relief, valid, 9.5)
+    # Nothing around it is above 0 m: 0.2 % of 9.5 m are left.
+    np.testing.assert_allclose(held[90:100, 90:100], 0.019, rtol=1e-6)
+    np.testing.assert_array_equal(held[valid], relief[valid])
+
+
+def test_relief_between_two_validated_surfaces_is_left_alone():
+    relief = np.zeros((192, 192), np.float32)
+    relief[:, 96:] = 0.5
+    relief[:, 90:102] = np.linspace(0, 0.5, 12)
+    valid = np.ones(relief.shape, bool)
+    valid[:, 88:104] = False
+    np.testing.assert_array_equal(evidence.held_back(relief, valid, 9.5), relief)
+
+
+def test_where_nothing_far_and_wide_is_validated_relief_stays():
+    relief = np.full((640, 640), 3.0, np.float32)
+    nothing = np.zeros(relief.shape, bool)
+    np.testing.assert_array_equal(evidence.held_back(relief, nothing, 9.5), relief)
+
+
+def test_a_single_validated_pixel_supports_nothing():
+    valid = np.zeros((20, 20), bool)
+    valid[5, 5] = valid[10:14, 10:14] = True
+    support = evidence.supported(valid)
+    assert not support[5, 5]
+    assert support[10:14, 10:14].all()
+
+
+def test_smoothing_survives_any_sigma():
+    rng = np.random.default_rng(4)
+    relief = rng.normal(0.5, 0.01, (128, 128)).astype(np.float32)
+    sigma = np.full(relief.shape, 1e-9, np.float32)
+    sigma[::3] = 1e4
+    smooth = smoothing.shrink_noise(relief, sigma)
+    assert relief.min() - 0.01 < smooth.min() < smooth.max() < relief.max() + 0.01
+
+
+def test_smoothing_leaves_the_unknown_unknown_and_gives_it_no_say():
+    relief = np.full((64, 64), 0.5, np.float32)
+    relief[:, 40:] = np.nan
+    smooth = smoothing.shrink_noise(relief, np.full_like(relief, 0.05), smoothing.MAP_WINDOWS)
+    np.testing.assert_array_equal(np.isnan(smooth), np.isnan(relief))
+    np.testing.assert_allclose(smooth[:, :40], 0.5, atol=1e-5)
+
+
+def test_imprecise_relief_is_drawn_to_the_wall_and_to_the_pilaster_before_it():
+    rng = np.random.default_rng(5)
+    truth = np.zeros((256, 256), np.float32)
+    truth[:, 100:160] = 0.11
+    sigma = np.full_like(truth, 0.01)
+    relief = truth + rng.normal(0, 0.01, truth.shape).astype(np.float32)
+    drawn = levels.drawn_to_levels(relief, sigma, np.ones(truth.shape, bool))
+    before, after = (np.abs(r - truth).mean() for r in (relief, drawn))
+    assert after < 0.7 * before
+    assert np.abs(drawn - relief).max() <= levels.SHARE * 0.01 + 1e-6
+
+
+def test_precise_relief_and_slopes_are_not_drawn_anywhere():
+    slope = np.broadcast_to(np.linspace(0, 1, 512, dtype=np.float32), (512, 512)).copy()
+    everywhere = np.ones(slope.shape, bool)
+    precise = levels.drawn_to_levels(slope, np.full_like(slope, 0.002), everywhere)
+    np.testing.assert_array_equal(precise, slope)
+    vague = levels.drawn_to_levels(slope, np.full_like(slope, 0.01), everywhere)
+    # But for the ends of the count, where there is only one side.
+    assert np.abs(vague - slope)[:, 30:-30].max() < 0.003
+
+
+def test_validated_relief_wins_against_higher_relief_that_is_not():
+    frame = frame_of(Pair(image1=FAR, image2=NEAR))
+    r = np.zeros(frame.grid.shape, np.float32)
+    quality = np.full(r.shape, Quality.MEASURED, np.uint8)
+    # Two metres high pixels of photo 1 at 80 to 90 px land at s (1 - 2 / 17.5): 71 to 80 px.
+    r[95:105, 180:190], quality[95:105, 180:190] = 2.0, Quality.INTERPOLATED
+    bands = MapBands(r, np.full_like(r, 0.001), quality)
+    everywhere = np.ones(r.shape, bool)
+    low = forward_projection.to_plane(frame, bands, everywhere, frame.grid)
+    assert np.nanmax(low.r[95:105, 172:178]) == 0.0
+    quality[:] = Quality.MEASURED
+    high = forward_projection.to_plane(frame, bands, everywhere, frame.grid)
+    assert np.nanmin(high.r[98:102, 173:178]) == 2.0
+
+
+def test_what_stands_before_the_wall_hides_a_strip_as_wide_as_geometry_says():
+    # A slab 0.5 m thick up to 60 px from the nadir hides, from 9.5 m, 60 * 0.5 / 9 = 3.3 px.
+    grid = Grid.from_bounds((-1.0, -1.0, 1.0, 1.0), gsd=0.01)
+    relief = np.zeros(grid.shape, np.float32)
+    relief[60:140, 120:160] = 0.5
+    hidden = forward_projection.hidden_on_map(relief, grid, NEAR.foot)
+    middle = hidden[95:105]
+    assert middle[:, 160:162].all()
+    assert not middle[:, 164:].any()
+    assert not middle[:, :160].any()
+
+
+def test_masks_grow_towards_the_nadir_only():
+    mask = np.zeros((101, 101), bool)
+    mask[50, 80] = True
+    grown = _spread_inwards(mask, np.array([50.0, 50.0]), 3)
+    assert np.flatnonzero(grown[50]).tolist() == [77, 78, 79, 80]
+    assert grown.sum() == 4
+
+
+def test_floating_pieces_go_and_pinholes_are_closed():
+    r = np.zeros((300, 300), np.float32)
+    r[:, 200:] = np.nan
+    r[100:130, 250:280] = 0.0  # 900 px by themselves
+    r[50:54, 50:54] = np.nan
+    bands = MapBands(r, np.full_like(r, 0.01), np.ones(r.shape, np.uint8))
+    _tidy_outline(bands)
+    assert np.isnan(bands.r[:, 205:]).all()
+    assert (bands.quality[:, 205:] == Quality.UNKNOWN).all()
+    assert np.isfinite(bands.r[:, :195]).all()
+
+
+def test_the_pixels_of_an_oblique_photo_are_longer_along_its_slant():
+    square = Pair(image1=FAR, image2=NEAR)
+    np.testing.assert_allclose(radial_stretch(frame_of(square)), 1.0, atol=1e-6)
+    # Photos whose pixels are twice as long in X: to the right of the nadir the radius is X.
+    longer = [[0.02, 0, -1.99], [0, -0.01, 0.995], [0, 0, 1]]
+    far, near = (replace(photo, plane_from_pixel=np.array(longer)) for photo in (FAR, NEAR))
+    stretched = radial_stretch(frame_of(Pair(image1=far, image2=near)))
+    assert abs(stretched[100, 190] - 2.0) < 0.01
+    assert abs(stretched[10, 100] - 0.5) < 0.01
