@@ -74,6 +74,8 @@ def test_a_facade_from_two_photos_to_the_drawing_by_clicks_alone(
         page.click("run-relief")
         page.settled("state.jobs.filter((job) => job.kind === 'relief').length === 2")
         assert page.finished("relief")["state"] == "done"
+        legend = "document.querySelector('[data-testid=relief-legend]')"
+        page.wait(f"() => !{legend}.hidden && {legend}.textContent.endsWith(' m')")
         page.click("run-ortho")
         assert page.finished("ortho")["state"] == "done"
         page.tab.get_by_test_id("deliver-scale").select_option("1:100")
