@@ -10,7 +10,8 @@ from .equations import (
 )
 from .model.intersection import Intersection
 from .model.lens import Lens
-from .model.pair import Pair, Photo
+from .model.pair import Pair
+from .model.photo import Photo
 from .model.relief_map import Quality, ReliefMap
 from .orientation.alignment import Alignment
 from .orientation.control_points import Control, SiteMeasures

@@ -122,7 +122,7 @@ def relief(s1: ArrayLike, s2: ArrayLike, *, d1: ArrayLike, d2: ArrayLike) -> Flo
     -------
     r : ndarray, shape (...)
         Relief, positive towards the cameras. NaN where undefined: at the nadir point, for a
-        negative distance, and where the two rays do not meet before the near camera
+        negative radial distance, and where the two rays do not meet before the near camera
         (s1 / d1 >= s2 / d2). [unit of d1, d2]
 
     Raises

@@ -82,7 +82,7 @@ def pixel_from_plane(camera: Pinhole, plane: FloatArray | None = None) -> FloatA
 
 
 def plane_from_pixel(camera: Pinhole) -> FloatArray:
-    """Return the homography from pixels to the reference plane, largest element 1 in size."""
+    """Return the homography from pixels to the reference plane, last element 1 unless it is 0."""
     matrix = np.linalg.inv(pixel_from_plane(camera))
     return matrix / matrix[2, 2] if abs(matrix[2, 2]) > 1e-12 else matrix
 
@@ -238,7 +238,10 @@ def _mapped_by_camera(camera: Pinhole) -> FloatArray:
 def triangulate(
     first: Pinhole, second: Pinhole, pixels1: FloatArray, pixels2: FloatArray
 ) -> FloatArray:
-    """Return where two rays meet, shape (n, 3): linear, each equation in units of a pixel."""
+    """Return where rays of pixels (n, 2) meet, shape (n, 3); NaN where they do not. [m]
+
+    Linear least squares, each equation in pixels times the depth of the point.
+    """
     design, value = [], []
     for camera, pixels in ((first, pixels1), (second, pixels2)):
         mapped = camera.matrix @ camera.rotation

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import logging
 import re
 import signal
 import sys
@@ -16,6 +17,7 @@ from typing import Any, Protocol
 import click
 
 from photocore.errors import PhotogrammetryError
+from photocore.log import is_quiet, log_options
 from photocore.options import NUMBER
 
 
@@ -28,6 +30,8 @@ def _stop(number: int, frame: object) -> None:  # noqa: ARG001
 UNFORESEEN = 70
 
 _DEBUG = "photocore.debug"
+_LOG = logging.getLogger(__name__)
+_LOG.addHandler(logging.NullHandler())  # errors are printed here, not by logging as well
 
 
 def _debug_option() -> click.Option:
@@ -87,7 +91,7 @@ class LazyGroup(click.Group):
     ) -> None:
         kwargs.setdefault("context_settings", {"help_option_names": ["-h", "--help"]})
         super().__init__(*args, **kwargs)
-        self.params.append(_debug_option())
+        self.params += [_debug_option(), *log_options()]
         self.commands_package, self.summaries = commands_package, dict(summaries)
 
     def list_commands(self, ctx: click.Context) -> list[str]:  # noqa: ARG002
@@ -105,7 +109,7 @@ class LazyGroup(click.Group):
             if parameter.type is click.FLOAT:
                 parameter.type = NUMBER
         if not any("--debug" in parameter.opts for parameter in command.params):
-            command.params.append(_debug_option())
+            command.params += [_debug_option(), *log_options()]
         return command
 
     def resolve_command(
@@ -140,13 +144,12 @@ class LazyGroup(click.Group):
             raise
         except PhotogrammetryError as error:
             _show_details(ctx)
-            click.echo(f"Error: {error}", err=True)
+            _tell_error(f"Error: {error}")
         except KeyboardInterrupt:
-            click.echo("Stopped by the user; nothing was left half-written.", err=True)
+            _tell_error("Stopped by the user; nothing was left half-written.")
         except MemoryError:
-            click.echo(
-                "Error: not enough memory. Use smaller images, a coarser --gsd or --bounds.",
-                err=True,
+            _tell_error(
+                "Error: not enough memory. Use smaller images, a coarser --gsd or --bounds."
             )
         except BrokenPipeError:
             # The reader of our output went away (``| head``): not our failure, nothing to say.
@@ -154,14 +157,20 @@ class LazyGroup(click.Group):
         except OSError as error:
             _show_details(ctx)
             name = f"{error.filename}: " if error.filename else ""
-            click.echo(f"Error: {name}{error.strerror or error}.", err=True)
+            _tell_error(f"Error: {name}{error.strerror or error}.")
         except Exception as error:  # the last resort; the tests let nobody get here
             _show_details(ctx)
             program = self.commands_package.partition(".")[0]
             task = f"{program} {ctx.invoked_subcommand or ''}".rstrip()
-            click.echo(unforeseen_message(task, error), err=True)
+            _tell_error(unforeseen_message(task, error))
             ctx.exit(UNFORESEEN)
         return ctx.exit(1)
+
+
+def _tell_error(message: str) -> None:
+    """Print an error on stderr, and log it."""
+    _LOG.error("%s", message)
+    click.echo(message, err=True)
 
 
 def _show_details(ctx: click.Context) -> None:
@@ -189,8 +198,10 @@ def print_json(value: Any) -> None:
 
 
 def remark(message: str) -> None:
-    """Print a remark on stderr, so that results on stdout stay clean."""
-    click.echo(message, err=True)
+    """Print a remark on stderr, so that results on stdout stay clean, and log it."""
+    _LOG.info("%s", message)
+    if not is_quiet():
+        click.echo(message, err=True)
 
 
 def print_result(
@@ -227,7 +238,7 @@ def no_progress(done: float, total: float, what: str = "") -> None:
 @contextmanager
 def progress_bar(title: str, *, quiet: bool = False) -> Iterator[Progress]:
     """Yield a reporter that draws a bar on stderr, or lines of a long job if it is no terminal."""
-    if quiet:
+    if quiet or is_quiet():
         yield no_progress
         return
     if not sys.stderr.isatty():

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import os
 import re
 import shutil
@@ -27,6 +28,8 @@ _LEFT_OVER = 86_400.0
 _in_use: set[str] = set()
 #: Finished outputs, under their temporary names, that wait for the others of their set.
 _waiting: ContextVar[list[tuple[Path, Path]] | None] = ContextVar("waiting", default=None)
+
+_LOG = logging.getLogger(__name__)
 
 
 def check_writable(path: Path | str, *, overwrite: bool) -> Path:
@@ -179,6 +182,7 @@ def atomic_path(path: Path | str, *, overwrite: bool) -> Iterator[Path]:
         temporary.chmod(_mode_for(real))
         if finished is None:
             temporary.replace(real)
+            _LOG.info("written: %s", path)
         else:
             finished.append((temporary, real))
             waits = True
@@ -255,6 +259,7 @@ def _put_in_place(finished: Sequence[tuple[Path, Path]]) -> None:
             old = _second_name(place) if len(finished) > 1 and place.exists() else None
             done.append((place, old))
             temporary.replace(place)
+            _LOG.info("written: %s", place)
     except OSError:
         for (temporary, _), (place, old) in zip(finished, done, strict=False):
             if not temporary.exists():

@@ -145,8 +145,8 @@ class RasterFile(ExitStack):
             block = self._file.read(1, window=window)
             with np.errstate(invalid="ignore", over="ignore"):  # what float32 cannot hold
                 values = block.astype(dtype)
-            for empty in self._empty:
-                values[block == empty] = np.nan
+                for empty in self._empty:
+                    values[block == empty] = np.nan
             if self.masked:
                 values[self._file.dataset_mask(window=window) == 0] = np.nan
             return values

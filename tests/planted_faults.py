@@ -48,7 +48,7 @@ _GROUPS: tuple[tuple[str, str, tuple[tuple[str, str], ...]], ...] = (
         (
             ("rate = s2 / d2 - s1 / d1", "rate = s2 / d1 - s1 / d2"),
             ("relief_displacement(s2, r, d=d2)", "relief_displacement(s2, r, d=d1)"),
-            ('as_floats(s, "s") - as_floats(e, "e")', 'as_floats(s, "s") + as_floats(e, "e")'),
+            ("s_prime = s - e", "s_prime = s + e"),
         ),
     ),
     (
@@ -77,10 +77,12 @@ _GROUPS: tuple[tuple[str, str, tuple[tuple[str, str], ...]], ...] = (
     (
         "bifocal/model/pair.py",
         "tests/bifocal/model/test_pair.py",
-        (
-            ("[0, -scale, scale * row]", "[0, -scale, -scale * row]"),
-            ("matrix[None, :2, :2] - mapped", "matrix[None, :2, :2] + mapped"),
-        ),
+        (("[0, -scale, scale * row]", "[0, -scale, -scale * row]"),),
+    ),
+    (
+        "bifocal/model/homography.py",
+        "tests/bifocal/model/test_pair.py",
+        (("matrix[None, :2, :2] - mapped", "matrix[None, :2, :2] + mapped"),),
     ),
     (
         "bifocal/model/intersection.py",
@@ -193,7 +195,7 @@ _GROUPS: tuple[tuple[str, str, tuple[tuple[str, str], ...]], ...] = (
     (
         "bifocal/relief_maps/orientation_sigma.py",
         "tests/bifocal/relief_maps/test_dense_relief.py",
-        (("rate1, rate2 = d2", "rate2, rate1 = d2"),),
+        (("(high_ - low_) / 2, (high_ + low_)", "(low_ - high_) / 2, (high_ + low_)"),),
     ),
     (
         "bifocal/relief_maps/evidence.py",

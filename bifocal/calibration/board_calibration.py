@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -293,10 +294,10 @@ def _solve(views: Sequence[BoardView], size: tuple[int, int], wanted: str) -> _L
             best = fits[name]
     tried = tuple((name, each.rms) for name, each in fits.items())
     if wanted == "auto" and _field_of_view(best.lens.camera_matrix, size) > 100:
-        fisheye = _solve_fisheye(views, size)
-        tried = (*tried, ("fisheye", fisheye.rms))
-        if fisheye.rms < 0.8 * best.rms:
-            best = fisheye
+        with suppress(GeometryError):  # then the others stand
+            fisheye = _solve_fisheye(views, size)
+            tried = (*tried, ("fisheye", fisheye.rms))
+            best = fisheye if fisheye.rms < 0.8 * best.rms else best
     return replace(best, tried=tried)
 
 
@@ -312,10 +313,7 @@ def _solve_brown(
         )  # fmt: skip
     except cv2.error as error:
         raise GeometryError(f"the calibration failed: {error.err}") from error
-    if not np.isfinite(matrix).all() or matrix[0, 0] <= 0:
-        raise GeometryError(
-            "the photos do not determine the lens: tilt the board differently from photo to photo."
-        )
+    _refuse_undetermined(matrix)
     order = ("fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2", "k3")
     sigmas = dict(zip(order, np.ravel(deviations).tolist(), strict=False))
     wanted = {n: v for n, v in sigmas.items() if n in names or n in order[:4]}
@@ -337,6 +335,7 @@ def _solve_fisheye(views: Sequence[BoardView], size: tuple[int, int]) -> _LensFi
         )  # fmt: skip
     except cv2.error as error:
         raise GeometryError(f"the fisheye calibration failed: {error.err}") from error
+    _refuse_undetermined(matrix)
     per_view = []
     normal = np.zeros((8, 8))
     for view, turn, shift in zip(views, turns, shifts, strict=True):
@@ -358,6 +357,14 @@ def _solve_fisheye(views: Sequence[BoardView], size: tuple[int, int]) -> _LensFi
     )  # fmt: skip
     deviations = dict(zip(names, sigmas.tolist(), strict=True))
     return _LensFit(name="fisheye", lens=lens, deviations=deviations, per_view=np.array(per_view))
+
+
+def _refuse_undetermined(matrix: FloatArray) -> None:
+    """Refuse the camera matrix of an adjustment that ran away."""
+    if not (np.isfinite(matrix).all() and (np.diag(matrix) > 0).all()):
+        raise GeometryError(
+            "the photos do not determine the lens: tilt the board differently from photo to photo."
+        )
 
 
 def _field_of_view(matrix: FloatArray, size: tuple[int, int]) -> float:

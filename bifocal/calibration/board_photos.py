@@ -52,7 +52,7 @@ def calibrate(
         ``auto`` takes distortion terms in while an F test at 1 % asks for them; or ``k1``,
         ``k1k2``, ``k1k2p``, ``k1k2pk3``, ``fisheye``.
     names : sequence of str, optional
-        What to call the photos; by default ``photo 1`` ...
+        What to call the photos, one for each; by default ``photo 1`` ...
     progress : callable
         Told how far the work is.
 
@@ -101,17 +101,15 @@ def calibrate(
             f"board: {board[0]}x{board[1]} is too small; at least {LEAST_CORNERS} each way are "
             "needed. Count the inner corners of a chessboard, not its squares."
         )
-    photos: Iterator[ByteArray] = (
-        as_grey(image, f"photo {number}") for number, image in enumerate(images, start=1)
-    )
+    photos = _named_photos(images, names)
     if board is None:
         sample = list(islice(photos, _SAMPLE))
-        board, photos = find_board_size(sample), chain(sample, photos)
+        board = find_board_size([grey for _, grey in sample])
+        photos = chain(sample, photos)
     views: list[BoardView] = []
     without: list[str] = []
     sizes: set[tuple[int, int]] = set()
-    for number, grey in enumerate(photos):
-        name = names[number] if names else f"photo {number + 1}"
+    for number, (name, grey) in enumerate(photos):
         progress(number, max(len(names), number + 1), f"searching {name}")
         sizes.add((grey.shape[1], grey.shape[0]))
         if len(sizes) > 1:
@@ -130,3 +128,14 @@ def calibrate(
     progress(1, 1, "adjusting")
     calibration = lens_of_views(views, next(iter(sizes), (0, 0)), model=model)
     return replace(calibration, without_board=tuple(without))
+
+
+def _named_photos(
+    images: Iterable[NDArray[np.generic]], names: Sequence[str]
+) -> Iterator[tuple[str, ByteArray]]:
+    """Yield name and grey values of every photo."""
+    for number, image in enumerate(images, start=1):
+        if names and number > len(names):
+            raise InputError(f"names: {len(names)} names for {number} or more photos.")
+        name = names[number - 1] if names else f"photo {number}"
+        yield name, as_grey(image, name)

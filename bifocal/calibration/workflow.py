@@ -28,13 +28,13 @@ def calibrate_from_boards(
     *,
     overwrite: bool = False,
     progress: Progress = no_progress,
-    **board: Any,
+    **options: Any,
 ) -> Calibration:
-    """Calibrate from board photos and write the lens file; ``board`` as for `calibrate`."""
+    """Calibrate from board photos and write the lens file; ``options`` are those of `calibrate`."""
     check_writable(out, overwrite=overwrite)
     _common_size(images)
     result = calibrate(
-        map(read_grey, images), names=_unique_names(images), progress=progress, **board
+        map(read_grey, images), names=_unique_names(images), progress=progress, **options
     )
     result.lens.write(out, overwrite=overwrite)
     return result

@@ -97,12 +97,12 @@ def command(
     the wall (--distance1, --distance2), the same taken as they are (--as-set-up), or the photos
     alone (--auto) and one distance or length.
     """
-    from bifocal.orientation.align_workflow import align_photos, alignment_as_dict
+    from bifocal.orientation.align_workflow import AlignOptions, align_photos, alignment_as_dict
 
     if picture is None and not no_picture:
         picture = out.with_name(out.name.removesuffix(".json").removesuffix(".pair") + ".pair.png")
     alignment = align_photos(
-        far, near, out, _options(given),
+        far, near, out, AlignOptions.from_given(given),
         picture=None if no_picture else picture, overwrite=overwrite,
     )  # fmt: skip
     print_result(
@@ -111,33 +111,6 @@ def command(
     )  # fmt: skip
     if not as_json:
         remark(f"Pair written to {out}" + (f", picture to {picture}" if not no_picture else ""))
-
-
-def _options(given: dict[str, Any]) -> Any:
-    """Return the workflow's options from the command line's."""
-    from bifocal.orientation.align_workflow import AlignOptions, KnownLens
-    from bifocal.orientation.control_points import SiteMeasures
-
-    lenses = tuple(
-        KnownLens(
-            **{
-                name: given[f"{name}{number}"] or given.get(name)
-                for name in ("lens", "focal", "pixel_size", "sensor_width")
-            }
-        )
-        for number in (1, 2)
-    )
-    site = ("distance1", "distance2", "delta_d", "sigma_control", "sigma_pick", "wall")
-    line = given["horizontal"] or given["vertical"]
-    length = given["length"]
-    return AlignOptions(
-        lenses=(lenses[0], lenses[1]),
-        site=SiteMeasures(sigma=given["sigma_distance"], **{name: given[name] for name in site}),
-        **{name: given[name] for name in ("auto", "as_set_up", "control", "columns", "lengths")},
-        length=(length[:4], length[4]) if length else None,
-        line=(line, given["horizontal"] is None) if line else None,
-        unit=given["unit"] or "",
-    )
 
 
 def _lines(alignment: Alignment) -> Iterator[str]:

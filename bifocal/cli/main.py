@@ -20,7 +20,11 @@ SUMMARIES: dict[str, str] = {
     "relief": "Dense relief map of the wall.",
     "ortho": "Orthophoto to scale, and everything a drawing needs.",
     "mosaic": "One orthophoto from several.",
+    "facade": "Two photos and control points in, drawings and report out, in one line.",
+    "survey": "The same for many pairs: resumable, in parallel, here or on a cluster.",
+    "report": "What was measured and how good it is, as one HTML or PDF file.",
     "export": "Points as DXF, PLY, LAS, CSV, GeoJSON or workbook.",
+    "doctor": "Versions, extras, LibreOffice, memory: what a fault report needs.",
 }
 
 EPILOG = """\b

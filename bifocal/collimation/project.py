@@ -46,11 +46,6 @@ class SurveyFiles:
         """The journal, beside the workbook."""
         return self.folder / f"{self.workbook.stem}{_JOURNAL}"
 
-    @property
-    def own_pair(self) -> Path:
-        """Where the page writes the pair file it makes."""
-        return self.folder / f"{self.stem}{_PAIR}"
-
     def beside(self, ending: str) -> Path:
         """Return the path of a result: the stem with an ending."""
         return self.folder / f"{self.stem}{ending}"

@@ -13,7 +13,6 @@ from bifocal.orientation.matching import (
     OPTIMISM,
     directions_at,
     local_zoom,
-    relief_at,
     seen_at,
 )
 from bifocal.orientation.patches import PatchResult, refine, same_scale
@@ -301,9 +300,3 @@ def _refined(
     free = refine(*images, pixel[None], on_line.pixels2, local, both, iterations=4)
     misfit = float((free.pixels2[0] - on_line.pixels2[0]) @ across)
     return on_line, misfit if np.isfinite(misfit) else 0.0, across
-
-
-def relief_of(pair: Pair, image: int, pixel: FloatArray, other: FloatArray) -> float:
-    """Return the relief of a pick and its homologous point. [m]"""
-    first, second = (pixel, other) if image == 1 else (other, pixel)
-    return float(relief_at(pair, first[None], second[None])[0])

@@ -136,7 +136,7 @@ _GIVEN = ("far.jpg", "near.jpg", "facade.pair.json", "targets.csv", "truth.tif")
 def _survey(
     folder: Path,
 ) -> tuple[tuple[str, ...], FloatArray, FloatArray, FloatArray, tuple[str, ...]]:
-    """Solve the picked targets into the workbook; return ids, true and found relief, sigma."""
+    """Solve the targets into the workbook; return ids, true and found relief, sigma, flags."""
     with (folder / "targets.csv").open(encoding="utf-8", newline="") as file:
         true = np.array([float(row["r measured [m]"]) for row in csv.DictReader(file)])
     solution = solve(folder / "targets.csv", pair=folder / "facade.pair.json", sigma_px=PICK_SIGMA)

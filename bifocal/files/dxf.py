@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from photocore.arrays import FloatArray
+from photocore.provenance import program, today
 
 
 def new_drawing(
@@ -27,13 +30,35 @@ def new_drawing(
     import ezdxf
     from ezdxf import units
 
-    drawing = ezdxf.new("R2010", setup=True)
+    with _reproducible():
+        drawing = ezdxf.new("R2010", setup=True)
     drawing.units = units.M
     drawing.header["$PDMODE"] = point_style
     drawing.header["$PDSIZE"] = point_size
     for layer, colour in layers.items():
         drawing.layers.add(layer, color=colour)
     return drawing, drawing.modelspace()
+
+
+def save_drawing(drawing: Any, path: Path) -> None:
+    """Write a drawing with program and date among its properties, else the same every time."""
+    for name, value in (("Program", program()), ("Date", today())):
+        drawing.header.custom_vars.append(name, value)
+    with _reproducible():
+        drawing.saveas(path)
+
+
+@contextmanager
+def _reproducible() -> Iterator[None]:
+    """Keep times of day and random numbers out of what ezdxf writes."""
+    import ezdxf
+
+    before = ezdxf.options.write_fixed_meta_data_for_testing
+    ezdxf.options.write_fixed_meta_data_for_testing = True
+    try:
+        yield
+    finally:
+        ezdxf.options.write_fixed_meta_data_for_testing = before
 
 
 def add_text(model: Any, text: str, place: tuple[float, ...], height: float, layer: str) -> None:

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from bifocal.files.dxf import add_ellipse, add_text, layer_name, new_drawing
+from bifocal.files.dxf import add_ellipse, add_text, layer_name, new_drawing, save_drawing
 from bifocal.model.points import PointLine, SurveyPoints
 from photocore.arrays import BoolArray, FloatArray, not_negative
 from photocore.cloud import write_cloud
@@ -168,7 +168,7 @@ def _write_dxf(
             drawing.layers.add(layer)
         if len(vertices) > 1:
             model.add_polyline3d(vertices, close=line.closed, dxfattribs={"layer": layer})
-    drawing.saveas(path)
+    save_drawing(drawing, path)
 
 
 def _write_csv(

@@ -209,7 +209,7 @@ def to_eight_bit(image: ImageArray) -> NDArray[np.uint8]:
     """Return an image with 8 bits per channel; 16-bit values are divided by 257."""
     if image.dtype == np.uint8:
         return image.astype(np.uint8, copy=False)
-    return ((image.astype(np.uint32) + 128) // 257).astype(np.uint8)
+    return np.asarray(cv2.convertScaleAbs(image, alpha=1 / 257), dtype=np.uint8)
 
 
 def as_grey(image: NDArray[np.generic], name: str) -> ByteArray:
@@ -220,10 +220,9 @@ def as_grey(image: NDArray[np.generic], name: str) -> ByteArray:
     InputError
         If it is not an image of 8 or 16 bits, or smaller than 16 pixels a side.
     """
-    small = "is too small to match; at least 16 px a side are needed."
+    small = "is too small; at least 16 px a side are needed."
     array = as_photo(image, name, smallest=16, fault=small)
-    if array.dtype == np.uint16:
-        array = (array >> 8).astype(np.uint8)
+    array = to_eight_bit(array)
     # The plain mean of the channels has less noise than the luminance, which is mostly green.
     return array if array.ndim == 2 else cv2.transform(array, np.full((1, 3), 1 / 3))
 

@@ -14,7 +14,6 @@ from photocore.arrays import (
     FloatArray,
     as_floats,
     as_points,
-    is_finite_number,
     not_negative,
     read_only,
 )
@@ -117,8 +116,8 @@ class Lens:
                 if name not in stated:
                     raise InputError(f"the key {name!r} is missing.")
             sigma0 = stated.get("sigma0")
-            if sigma0 is not None and not is_finite_number(sigma0):
-                raise InputError(f"sigma0: expected a number, found {sigma0!r:.40}.")
+            if isinstance(sigma0, list | bool):  # an array of one, or true, would pass for a number
+                raise InputError(f"sigma0: expected one number, found {sigma0!r:.40}.")
             return cls(**stated, extra=data)
 
     def to_dict(self) -> dict[str, Any]:

@@ -12,181 +12,15 @@ from numpy.typing import ArrayLike
 
 from bifocal import rays
 from bifocal.model import orientation_precision
-from bifocal.model.flags import SIGMA_PIXEL, FlagLimits
-from bifocal.model.intersection import Intersection, PlanePicks, intersect
-from bifocal.model.lens import Lens
+from bifocal.model.flags import FlagLimits
+from bifocal.model.intersection import Intersection, intersect
+from bifocal.model.photo import Photo
 from bifocal.precision import base_factor
-from photocore.arrays import (
-    BoolArray,
-    FloatArray,
-    as_points,
-    not_negative,
-    positive,
-    read_only,
-)
+from photocore.arrays import FloatArray, as_points, not_negative, positive
 from photocore.errors import GeometryError, InputError, located
 from photocore.jsonfile import read_object, write_object
 
 FORMAT = "bifocal-pair/1"
-
-
-#: No wall is photographed from further away, nor has coordinates beyond. [m]
-FARTHEST, OUTERMOST = 1e5, 1e8
-#: Numbers of a photo that the pair file may hold, with their units.
-_OPTIONAL = {"sigma_pixel": "px", "principal_distance": "mm", "pixel_size": "mm"}
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Photo:
-    """One photo of a pair: with nadir and distance the homography is the whole pinhole camera.
-
-    Attributes
-    ----------
-    plane_from_pixel : ndarray, shape (3, 3)
-        Homography from (column, row, 1), free of lens distortion, to metres on the plane.
-    nadir : ndarray, shape (2,)
-        Foot of the projection centre on the reference plane. [m]
-    distance : float
-        Distance of the projection centre to the reference plane. [m]
-    file : str
-        Image file, relative to the pair file; empty where no image is needed.
-    lens : Lens or None
-        Distortion of the pixels; None if they are free of it.
-    sigma_pixel : float or None
-        Measuring precision. [px]
-    principal_distance, pixel_size : float or None
-        Of the camera, for lengths in millimetres of the image. [mm]
-    extra : mapping
-        Keys of the pair file this class does not use; kept.
-    """
-
-    plane_from_pixel: FloatArray
-    nadir: FloatArray
-    distance: float
-    file: str = ""
-    lens: Lens | None = None
-    sigma_pixel: float | None = None
-    principal_distance: float | None = None
-    pixel_size: float | None = None
-    extra: Mapping[str, Any] = field(default_factory=dict)
-
-    def __post_init__(self) -> None:
-        set_ = object.__setattr__
-        matrix = read_only(self.plane_from_pixel, "plane_from_pixel", shape=(3, 3))
-        scaled = matrix / (np.abs(matrix).max() or 1.0)
-        # The image is some 1e4 px across: what matters is rank after bringing it to unit size.
-        if abs(np.linalg.det(scaled @ np.diag([1e4, 1e4, 1.0]))) < 1e-12:
-            raise GeometryError(
-                "plane_from_pixel: the homography is singular; it would squeeze the photo onto a "
-                "line. Check the nine numbers, or make the pair again with `bifocal align`."
-            )
-        set_(self, "plane_from_pixel", matrix)
-        set_(self, "nadir", read_only(self.nadir, "nadir", shape=(2,)))
-        set_(self, "distance", positive(self.distance, "distance", unit="m"))
-        for name, most in (("nadir", OUTERMOST), ("distance", FARTHEST)):
-            if np.max(np.abs(getattr(self, name))) > most:
-                raise InputError(
-                    f"{name}: {getattr(self, name)} m is beyond reason (more than {most:g} m); "
-                    "check the number and its unit, metres."
-                )
-        for name, unit in _OPTIONAL.items():
-            value = getattr(self, name)
-            set_(self, name, None if value is None else positive(value, name, unit=unit))
-
-    @property
-    def foot(self) -> rays.Foot:
-        """Nadir and distance."""
-        return rays.Foot(self.nadir, self.distance)
-
-    @property
-    def scale_number(self) -> float | None:
-        """Scale number m = 1000 d / c of the photo; None without a principal distance."""
-        c = self.principal_distance
-        return None if c is None else 1000.0 * self.distance / c
-
-    def plane_from_pixels(self, pixels: ArrayLike) -> FloatArray:
-        """Return where the rays of (raw) pixels meet the reference plane, shape (..., 2). [m]
-
-        NaN where the ray does not meet the plane (at or beyond the horizon).
-        """
-        points = as_points(pixels, "pixels", dimension=2)
-        if self.lens is not None:
-            points = self.lens.undistort(points)
-        return apply_homography(self.plane_from_pixel, points)
-
-    def pixels_from_plane(self, positions: ArrayLike) -> FloatArray:
-        """Return the (raw) pixels that see plane positions, shape (..., 2). [px]"""
-        points = as_points(positions, "positions", dimension=2)
-        ideal = apply_homography(np.linalg.inv(self.plane_from_pixel).astype(np.float64), points)
-        return ideal if self.lens is None else self.lens.distort(ideal)
-
-    def project(self, xyz: ArrayLike) -> FloatArray:
-        """Return the (raw) pixels of points (X, Y, r), shape (..., 2); NaN behind the camera."""
-        points = as_points(xyz, "xyz", dimension=3)
-        return self.pixels_from_plane(rays.plane_position(points, self.foot))
-
-    def precision(self, sigma_px: float | None = None) -> float:
-        """Return the measuring precision: as given, else the photo's own, else 0.5. [px]"""
-        given = self.sigma_pixel if sigma_px is None else sigma_px
-        return positive(SIGMA_PIXEL if given is None else given, "sigma_px", unit="px")
-
-    def picks(self, pixels: FloatArray, sigma_px: float | None = None) -> PlanePicks:
-        """Return picks carried to the plane, of the given precision or else the photo's own."""
-        return PlanePicks(
-            positions=self.plane_from_pixels(pixels),
-            metres_per_pixel=self.metres_per_pixel(pixels),
-            sigma_px=self.precision(sigma_px),
-            foot=self.foot,
-        )
-
-    def metres_per_pixel(self, pixels: FloatArray) -> FloatArray:
-        """Return the derivative of the plane position by the pixel, shape (n, 2, 2). [m/px]"""
-        points = pixels if self.lens is None else self.lens.undistort(pixels)
-        return homography_jacobian(self.plane_from_pixel, points)
-
-    def sees_ahead(self, positions: FloatArray, shape: tuple[int, ...]) -> BoolArray:
-        """Tell which plane positions lie on the photo's side of its horizon.
-
-        Parameters
-        ----------
-        positions : ndarray, shape (..., 2)
-            [m]
-        shape : (height, width, ...)
-            Of the photo. [px]
-        """
-        inverse = np.linalg.inv(self.plane_from_pixel)
-        scale = positions @ inverse[2, :2] + inverse[2, 2]
-        # q = H p / w and p = H^-1 q * w: both scales have the same sign where the photo looks.
-        reference = self.plane_from_pixel[2] @ [shape[1] / 2, shape[0] / 2, 1.0]
-        return np.asarray(scale * reference > 0)
-
-    def gsd(self, size: tuple[int, int]) -> float:
-        """Return the side of a pixel in the middle of a photo of (width, height) px. [m]
-
-        Raises
-        ------
-        GeometryError
-            If its middle does not look at the reference plane.
-        """
-        middle = np.array([[(size[0] - 1) / 2, (size[1] - 1) / 2]])
-        area = abs(float(np.linalg.det(self.metres_per_pixel(middle)[0])))
-        if not (np.isfinite(area) and area > 0):
-            raise GeometryError(
-                "the middle of the photo does not look at the reference plane; check "
-                "plane_from_pixel."
-            )
-        return float(np.sqrt(area))
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return the photo's part of the pair file."""
-        data: dict[str, Any] = {"file": self.file} if self.file else {}
-        data |= {
-            "plane_from_pixel": self.plane_from_pixel,
-            "nadir": self.nadir,
-            "distance": self.distance,
-        }
-        data |= {name: value for name in _OPTIONAL if (value := getattr(self, name)) is not None}
-        return data | dict(self.extra)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -291,12 +125,13 @@ class Pair:
         if (c1 is None) != (c2 is None):
             raise InputError("c1, c2: give both principal distances or none.")
         photos = []
-        for d, c, nadir in ((d1, c1, nadir1), (d2, c2, nadir2)):
-            metres = 1.0 if c is None else positive(d, "d", unit="m") / positive(c, "c", unit="mm")
+        for image, d, c, nadir in ((1, d1, c1, nadir1), (2, d2, c2, nadir2)):
+            positive(d, f"d{image}", unit="m")
+            metres = 1.0 if c is None else d / positive(c, f"c{image}", unit="mm")
             matrix = np.diag([metres, metres, 1.0])
             if pitch is not None:
                 scale = metres * positive(pitch, "pitch", unit="mm")
-                column, row = as_points(nadir, "nadir", dimension=2)
+                column, row = as_points(nadir, f"nadir{image}", dimension=2)
                 matrix = np.array(
                     [[scale, 0, -scale * column], [0, -scale, scale * row], [0, 0, 1]]
                 )
@@ -343,7 +178,7 @@ class Pair:
             raise InputError(
                 '"layers": pairs seen through other media are not supported by this version.'
             )
-        far, near = (_photo_from_dict(data.pop(k, None), k, folder) for k in ("image1", "image2"))
+        far, near = (Photo.from_dict(data.pop(k, None), k, folder) for k in ("image1", "image2"))
         stated = data.pop("orientation", None)
         precision = None if stated is None else orientation_precision.from_dict(stated)
         return cls(image1=far, image2=near, folder=folder, extra=data, orientation=precision)
@@ -468,8 +303,8 @@ class Pair:
         first, second = first.reshape(-1, 2), second.reshape(-1, 2)
         if sigma_r_max is not None:
             positive(sigma_r_max, "sigma_r_max", unit="m")
-        common = {"d1": sigma_d1, "d2": sigma_d2, "scale": sigma_scale, "nadir": sigma_nadir}
-        d1, d2, scale, nadir = (not_negative(v, f"sigma_{k}") for k, v in common.items())
+        shared = {"d1": sigma_d1, "d2": sigma_d2, "scale": sigma_scale, "nadir": sigma_nadir}
+        d1, d2, scale, nadir = (not_negative(v, f"sigma_{k}") for k, v in shared.items())
         return intersect(
             self.image1.picks(first, sigma_px),
             self.image2.picks(second, sigma_px),
@@ -495,53 +330,3 @@ class Pair:
             return np.zeros((len(xyz), 3, 3))
         photos = (self.image1, self.image2)
         return orientation_precision.orientation_covariance(photos, self.orientation, xyz)
-
-
-def apply_homography(matrix: FloatArray, points: FloatArray) -> FloatArray:
-    """Return points mapped by a 3x3 homography, shape (..., 2); NaN at the horizon."""
-    scale = points[..., 0] * matrix[2, 0] + points[..., 1] * matrix[2, 1] + matrix[2, 2]
-    x = points[..., 0] * matrix[0, 0] + points[..., 1] * matrix[0, 1] + matrix[0, 2]
-    y = points[..., 0] * matrix[1, 0] + points[..., 1] * matrix[1, 1] + matrix[1, 2]
-    with np.errstate(divide="ignore", invalid="ignore"):
-        return np.where(
-            (scale == 0)[..., None], np.nan, np.stack([x, y], axis=-1) / scale[..., None]
-        )
-
-
-def homography_jacobian(matrix: FloatArray, points: FloatArray) -> FloatArray:
-    """Return the derivative of a homography at points, shape (n, 2, 2)."""
-    scale = points @ matrix[2, :2] + matrix[2, 2]
-    mapped = apply_homography(matrix, points)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        return (matrix[None, :2, :2] - mapped[:, :, None] * matrix[None, None, 2, :2]) / (
-            scale[:, None, None]
-        )
-
-
-def _photo_from_dict(data: Any, key: str, folder: Path) -> Photo:
-    """Return one photo of a pair file, naming the key that is wrong."""
-    if not isinstance(data, dict):
-        raise InputError(f'"{key}" is missing or not an object.')
-    data = dict(data)
-    missing = [name for name in ("plane_from_pixel", "nadir", "distance") if name not in data]
-    if missing:
-        raise InputError(f'"{key}" lacks {", ".join(missing)}.')
-    file = data.pop("file", "")
-    if not isinstance(file, str):
-        raise InputError(f'"{key}.file" must be text, found {file!r}.')
-    lens = data.get("lens")
-    if lens is not None and not isinstance(lens, str):
-        raise InputError(f'"{key}.lens" must name a lens file, found {lens!r}.')
-    with located(f'"{key}"'):
-        for name in ("distance", *_OPTIONAL):
-            if isinstance(data.get(name), list):  # an array of one would pass for a number
-                raise InputError(f"{name}: expected one number, found {data[name]!r:.40}.")
-        return Photo(
-            file=file,
-            lens=Lens.read(folder / lens) if lens else None,
-            plane_from_pixel=data.pop("plane_from_pixel"),
-            nadir=data.pop("nadir"),
-            distance=data.pop("distance"),
-            **{name: data.pop(name, None) for name in _OPTIONAL},
-            extra=data,
-        )

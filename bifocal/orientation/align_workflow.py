@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -82,6 +83,37 @@ class AlignOptions:
     length: tuple[tuple[float, ...], float] | None = None
     line: tuple[tuple[float, ...], bool] | None = None
     unit: str = ""
+
+    @classmethod
+    def from_given(cls, given: Mapping[str, Any]) -> AlignOptions:
+        """Return the options of a mapping with the names of the command's; absent ones unknown."""
+        lenses = tuple(
+            KnownLens(
+                **{
+                    name: given.get(f"{name}{number}") or given.get(name)
+                    for name in ("lens", "focal", "pixel_size", "sensor_width")
+                }
+            )
+            for number in (1, 2)
+        )
+        site = ("distance1", "distance2", "delta_d", "sigma_control", "sigma_pick", "wall")
+        measures = {name: given[name] for name in site if given.get(name) is not None}
+        if given.get("sigma_distance") is not None:
+            measures["sigma"] = given["sigma_distance"]
+        horizontal, vertical = given.get("horizontal"), given.get("vertical")
+        line, length = horizontal or vertical, given.get("length")
+        return cls(
+            lenses=(lenses[0], lenses[1]),
+            site=SiteMeasures(**measures),
+            auto=bool(given.get("auto")),
+            as_set_up=bool(given.get("as_set_up")),
+            columns=given.get("columns"),
+            control=given.get("control"),
+            lengths=given.get("lengths"),
+            length=(tuple(length[:4]), length[4]) if length else None,
+            line=(tuple(line), horizontal is None) if line else None,
+            unit=given.get("unit") or "",
+        )
 
 
 @all_or_none()

@@ -9,9 +9,11 @@ from typing import Any
 import cv2
 import numpy as np
 
+from bifocal.model.homography import apply_homography
 from bifocal.model.lens import Lens
 from bifocal.model.orientation_precision import CAMERA, NAMES, moved
-from bifocal.model.pair import Pair, Photo, apply_homography
+from bifocal.model.pair import Pair
+from bifocal.model.photo import Photo
 from bifocal.orientation.interior_orientation import Cameras, Interior
 from bifocal.orientation.orientation_report import orientation_in_words
 from bifocal.orientation.orientation_stages import OrientedPair, PhotoInput, Photos

@@ -9,7 +9,7 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-from bifocal.model.pair import apply_homography
+from bifocal.model.homography import apply_homography
 from photocore.arrays import FloatArray
 
 #: A wall bent by more than this, at 3000 px of width, is not that of an honest pair. Six real

@@ -15,7 +15,9 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from bifocal.model.flags import FlagLimits
-from bifocal.model.pair import Pair, Photo, apply_homography
+from bifocal.model.homography import apply_homography
+from bifocal.model.pair import Pair
+from bifocal.model.photo import Photo
 from bifocal.orientation.features import (
     FEATURE_PIXELS,
     Features,

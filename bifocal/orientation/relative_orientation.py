@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from bifocal.model.pair import apply_homography
+from bifocal.model.homography import apply_homography
 from bifocal.orientation.features import (
     Features,
     alike,

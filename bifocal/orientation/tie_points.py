@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from bifocal.model.pair import apply_homography
+from bifocal.model.homography import apply_homography
 from bifocal.orientation.interior_orientation import Cameras, Images, Interiors
 from bifocal.orientation.pair_adjustment import AdjustedPair, wall_equations
 from bifocal.orientation.pair_observations import PairObservations, PairUnknowns

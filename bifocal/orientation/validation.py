@@ -5,7 +5,7 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-from bifocal.model.pair import apply_homography
+from bifocal.model.homography import apply_homography
 from bifocal.orientation.control_points import SiteMeasures
 from bifocal.orientation.features import sharpness
 from bifocal.orientation.interior_orientation import Cameras, Images, Interior, Interiors

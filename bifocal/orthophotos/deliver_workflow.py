@@ -6,7 +6,6 @@ import unicodedata
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from datetime import date
 from pathlib import Path
 
 import numpy as np
@@ -36,6 +35,7 @@ from photocore.arrays import Float32Array, positive
 from photocore.cli import Progress, no_progress
 from photocore.errors import InputError
 from photocore.output import atomic_folder
+from photocore.provenance import program, today
 
 #: Print resolution for which 1:50 makes pixels of 5.00 mm. [dpi]
 DPI = 254.0
@@ -251,5 +251,5 @@ def _notes(pair: Pair, grid: Grid, wish: DeliverTask, task: OrthoTask) -> tuple[
         f"pixel {grid.gsd * 1000:.4g} mm on the wall, {dpi:.4g} dpi on paper",
         f"{image}, camera distances {pair.image1.distance:.3f} m and {pair.image2.distance:.3f} m",
         f"relief: {relief.name if relief else f'plane at {task.plane:g} m'}",
-        f"bifocal, {date.today().isoformat()}",
+        f"{program()}, {today()}",
     )

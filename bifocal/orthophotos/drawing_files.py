@@ -8,7 +8,7 @@ from xml.sax.saxutils import escape
 
 import numpy as np
 
-from bifocal.files.dxf import add_text, new_drawing
+from bifocal.files.dxf import add_text, new_drawing, save_drawing
 from bifocal.model.points import SurveyPoints
 from bifocal.orthophotos.drawing import Drawing, Section, round_step
 from photocore.output import atomic_path
@@ -75,7 +75,7 @@ def write_drawing(path: Path, drawing: Drawing, image_name: str | None, *, overw
         height=1.15 * (ymax - ymin), center=((xmin + xmax) / 2, (ymin + ymax) / 2)
     )
     with atomic_path(path, overwrite=overwrite) as temporary:
-        document.saveas(temporary)
+        save_drawing(document, temporary)
 
 
 def write_section_dxf(path: Path, cut: Section, *, scale: float, overwrite: bool) -> None:
@@ -88,7 +88,7 @@ def write_section_dxf(path: Path, cut: Section, *, scale: float, overwrite: bool
     model.add_line(*ends, dxfattribs={"layer": "BIFOCAL_GRID"})
     add_text(model, f"section {cut.name}", ends[0], 3 * scale / 1000, "BIFOCAL_SECTIONS")
     with atomic_path(path, overwrite=overwrite) as temporary:
-        document.saveas(temporary)
+        save_drawing(document, temporary)
 
 
 def write_section_svg(path: Path, cut: Section, *, scale: float, overwrite: bool) -> None:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from bifocal.model.grid import Grid
 from bifocal.model.image import ImageArray, as_photo
-from bifocal.model.pair import Photo
+from bifocal.model.photo import Photo
 from bifocal.model.surface import Surface
 from bifocal.orthophotos.rectify import ChromaticShift, SourcePhoto
 from bifocal.orthophotos.visibility import hidden_from

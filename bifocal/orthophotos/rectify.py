@@ -10,8 +10,9 @@ import cv2
 import numpy as np
 
 from bifocal.model.grid import Bounds, Grid, bounds_of
+from bifocal.model.homography import apply_homography
 from bifocal.model.image import ImageArray, as_photo
-from bifocal.model.pair import Photo, apply_homography
+from bifocal.model.photo import Photo
 from bifocal.orthophotos.ortho_image import Interpolation
 from bifocal.rays import magnification
 from photocore.arrays import BoolArray, Float32Array, FloatArray

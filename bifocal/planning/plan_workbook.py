@@ -82,7 +82,7 @@ def _stations_sheet(sheet: Any, plan: Plan) -> None:
             cell = sheet.cell(row, column, value)
             cell.number_format = _COLUMNS[column - 1][2]
             cell.alignment = Alignment(wrap_text=True, vertical="top")
-            if row == 5 and station.feasible:
+            if station is plan.best:
                 cell.fill = PatternFill("solid", fgColor="E2F0D9")
     last = 4 + len(plan.stations)
     table = Table(

@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 
 from bifocal import rays
 from bifocal.model.grid import Bounds, Grid, bounds_of, cut
-from bifocal.model.pair import Pair, Photo
+from bifocal.model.pair import Pair
+from bifocal.model.photo import Photo
 from photocore.arrays import BoolArray, ByteArray, Float32Array, FloatArray
 from photocore.errors import GeometryError, InputError
 

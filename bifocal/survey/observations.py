@@ -95,25 +95,36 @@ class PointObservations:
         Raises
         ------
         InputError
-            If a key is unknown, or columns differ in length.
+            If a key is unknown, a column is no list of values, or columns differ in length.
         """
-        n = len(next(iter(columns.values()), ()))
         unknown = [key for key in columns if key not in (*NUMBERS, *TEXTS, "use")]
         if unknown:
             known = ", ".join((*TEXTS, *NUMBERS, "use"))
             raise InputError(f"points: there is no column {unknown[0]!r}; known are {known}.")
-        uneven = [key for key, column in columns.items() if len(column) != n]
+        shapes = {key: np.shape(column) for key, column in columns.items()}
+        flawed = [key for key, shape in shapes.items() if len(shape) != 1]
+        if flawed:
+            raise InputError(
+                f"{flawed[0]}: expected a list of values, one for each point, found shape "
+                f"{shapes[flawed[0]]}."
+            )
+        (n,) = next(iter(shapes.values()), (0,))
+        uneven = [key for key, shape in shapes.items() if shape != (n,)]
         if uneven:
-            raise InputError(f"{uneven[0]}: has {len(columns[uneven[0]])} values, expected {n}.")
-        table = np.stack([as_floats(columns.get(k, np.full(n, np.nan)), k) for k in NUMBERS], -1)
+            raise InputError(f"{uneven[0]}: has {shapes[uneven[0]][0]} values, expected {n}.")
+        blank = np.full(n, np.nan)
+
+        def stacked(*keys: str) -> FloatArray:
+            return np.stack([as_floats(columns.get(key, blank), key) for key in keys], axis=-1)
+
         return cls(
             ids=tuple(map(str, columns.get("id", range(1, n + 1)))),
-            xy1=table[:, 0:2],
-            xy2=table[:, 2:4],
-            polar=table[:, 4:7],
-            pixels1=table[:, 7:9],
-            pixels2=table[:, 9:11],
-            r_measured=table[:, 11],
+            xy1=stacked("x1", "y1"),
+            xy2=stacked("x2", "y2"),
+            polar=stacked("s1", "s2", "theta"),
+            pixels1=stacked("col1", "row1"),
+            pixels2=stacked("col2", "row2"),
+            r_measured=as_floats(columns.get("r_measured", blank), "r_measured"),
             use=columns.get("use", np.ones(n, dtype=bool)),
             code=tuple(columns.get("code", ())),
             note=tuple(columns.get("note", ())),
@@ -142,6 +153,12 @@ class PointObservations:
         angle = np.radians(self.polar[:, 2])
         direction = np.stack([np.sin(angle), np.cos(angle)], axis=-1)
         return self.polar[:, :1] * direction, self.polar[:, 1:2] * direction
+
+    def all_xy(self) -> tuple[FloatArray, FloatArray]:
+        """Return x and y of all points, radial distances turned into them, each (n, 2). [mm]"""
+        cartesian = self.is_cartesian[:, None]
+        first, second = self.polar_xy()
+        return np.where(cartesian, self.xy1, first), np.where(cartesian, self.xy2, second)
 
     @property
     def on_plane(self) -> BoolArray:

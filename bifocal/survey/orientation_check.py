@@ -12,13 +12,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from bifocal.model.pair import Pair, apply_homography
+from bifocal.model.homography import apply_homography
+from bifocal.model.pair import Pair
 from photocore import adjustment
 from photocore.arrays import BoolArray, FloatArray, as_points
 from photocore.errors import GeometryError, InputError
 
 #: The differences that are looked for, tilts only with `MINIMUM_FOR_TILT` points.
 NAMES = ("scale", "rotation", "shift X", "shift Y", "tilt X", "tilt Y")
+#: Residuals of this share of their sigma are rounding: the points fit exactly.
+ROUNDING = 1e-9
 #: Beyond this many sigma a plane point is taken for one that is not on the plane.
 OUTLIER_LIMIT = 4.0
 #: Points that move against the plane by more than this many sigma show the centre of zoom.
@@ -297,7 +300,12 @@ def _fit(
 
     try:
         fit = adjustment.fit(
-            np.zeros(len(names)), equations, np.add, names=names, what="set-up check", rounding=1e-9
+            np.zeros(len(names)),
+            equations,
+            np.add,
+            names=names,
+            what="set-up check",
+            rounding=ROUNDING,
         )
     except GeometryError:
         raise GeometryError(

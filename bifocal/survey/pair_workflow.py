@@ -8,7 +8,8 @@ from pathlib import Path
 import numpy as np
 
 from bifocal.files.images import image_info
-from bifocal.model.pair import Pair, Photo
+from bifocal.model.pair import Pair
+from bifocal.model.photo import Photo
 from bifocal.model.points import SurveyPoints
 from bifocal.survey.setup import SurveySetup
 from bifocal.survey.sources import BOOKS, described_pair

@@ -11,7 +11,8 @@ import numpy as np
 from bifocal.equations import plane_coordinates, relief, relief_displacement
 from bifocal.model.flags import FlagLimits, point_flags
 from bifocal.model.intersection import PlanePicks, intersect
-from bifocal.model.pair import Pair, Photo
+from bifocal.model.pair import Pair
+from bifocal.model.photo import Photo
 from bifocal.precision import point_covariance, sigma_relief
 from bifocal.rays import zoom_centre
 from bifocal.survey.observations import PointObservations

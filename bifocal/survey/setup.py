@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 
 from bifocal.model.flags import SIGMA_PIXEL, FlagLimits
-from bifocal.model.pair import Pair, apply_homography
+from bifocal.model.homography import apply_homography
+from bifocal.model.pair import Pair
 from bifocal.precision import false_relief_of_scale
 from bifocal.survey.observations import PointObservations
 from photocore.arrays import FloatArray, positive
@@ -91,6 +92,10 @@ class SurveySetup:
     remarks: tuple[str, ...] = ()
     text_cells: tuple[str, ...] = ()
 
+    def __post_init__(self) -> None:
+        if self.unit not in UNITS:
+            raise InputError(f"input unit: {self.unit!r} is neither mm nor px.")
+
     @property
     def limits(self) -> FlagLimits:
         """Where the flags begin."""
@@ -123,8 +128,6 @@ class SurveySetup:
                 f"no value for {', '.join(missing)}. Fill in the sheet Setup (d_2 and delta_d, or "
                 "d_1), or give --d1 and --d2 in metres, or a pair file with --pair."
             )
-        if self.unit not in UNITS:
-            raise InputError(f"input unit: {self.unit!r} is neither mm nor px.")
         if self.unit == "px" and self.pitch is None:
             raise InputError("pitch: the size of a pixel [mm/px] is needed to read pixels.")
         if self.unit == "px" and (self.nadir1 is None or self.nadir2 is None):

@@ -8,16 +8,17 @@ from pathlib import Path
 from typing import Any
 
 from bifocal.model.lens import Lens
-from bifocal.model.pair import Pair, Photo
+from bifocal.model.pair import Pair
+from bifocal.model.photo import Photo
 from bifocal.survey.observations import PointObservations
 from bifocal.survey.pick_lists import joined, left_over, read_picks
 from bifocal.survey.setup import SurveySetup
 from bifocal.survey.workbook.known_reader import with_measured
 from bifocal.survey.workbook.reader import ReadOptions, SurveyInput, read_survey
-from photocore.errors import InputError
+from photocore.errors import GeometryError, InputError
 
 Lists = tuple[Path | str, Path | str]
-Source = Path | str | PointObservations | Mapping[str, Any] | Lists
+Source = Path | str | PointObservations | SurveyInput | Mapping[str, Any] | Lists
 #: Files that are workbooks, and so no pair files.
 BOOKS = (".xlsx", ".xlsm", ".ods")
 
@@ -37,7 +38,9 @@ def measured(source: Source, options: ReadOptions, unit: str | None) -> tuple[Su
     if isinstance(source, Mapping):
         source = PointObservations.from_columns(source)
     if isinstance(source, PointObservations):
-        return SurveyInput.of_points(source), Path("points")
+        source = SurveyInput.of_points(source)
+    if isinstance(source, SurveyInput):
+        return source, Path(source.table.file)
     return read_survey(source, options), Path(source)
 
 
@@ -78,17 +81,23 @@ def given_pair(
 
 
 def described_pair(setup: SurveySetup, file: Path | None, folder: Path) -> Pair | None:
-    """Return the pair whose homographies `Setup` holds, with the lenses of its pair file."""
+    """Return the pair whose homographies `Setup` holds, with the lenses of its pair file.
+
+    Where that file is not read a remark says that pixels count as free of lens distortion.
+    """
     if setup.matrices is None or setup.d1 is None or setup.d2 is None:
         return None
     lenses: list[Lens | None] = [None, None]
-    orientation = None
+    orientation, doubt = None, ""
+    if setup.pair_file and file is None:
+        doubt = f"{setup.pair_file} is not found"
     if file is not None:
         try:
             given = Pair.read(file)
             lenses, orientation = [given.image1.lens, given.image2.lens], given.orientation
-        except InputError:
-            lenses = [None, None]
+        except (InputError, GeometryError) as error:
+            doubt = f"{setup.pair_file} cannot be used ({error})"
+    remarks = (f"{doubt}: pixels are taken as free of lens distortion.",) if doubt else ()
     photos = [
         Photo(
             plane_from_pixel=matrix, nadir=nadir, distance=d, lens=lens, principal_distance=c
@@ -98,4 +107,6 @@ def described_pair(setup: SurveySetup, file: Path | None, folder: Path) -> Pair 
             strict=True,
         )
     ]  # fmt: skip
-    return Pair(image1=photos[0], image2=photos[1], folder=folder, orientation=orientation)
+    return Pair(
+        image1=photos[0], image2=photos[1], folder=folder, orientation=orientation, remarks=remarks
+    )

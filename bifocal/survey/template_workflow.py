@@ -2,10 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
-import os
-from datetime import UTC, datetime
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 from bifocal.model.pair import Pair
@@ -16,6 +12,7 @@ from bifocal.survey.workbook.content import POINT_ROWS, SurveyContent
 from bifocal.survey.workbook.words import LANGUAGES
 from photocore.errors import InputError
 from photocore.output import check_ending, relative_name
+from photocore.provenance import file_hash, program, today
 from photocore.workbook.newbook import check_new_workbook
 
 #: Beyond this many points a spreadsheet is no tool any more.
@@ -137,20 +134,5 @@ def log_row(what: str, file: Path | str | None) -> LogRow:
     path = None if file is None else Path(file)
     digest = ""
     if path is not None and path.is_file():
-        digest = hashlib.sha256(path.read_bytes()).hexdigest()
+        digest = file_hash(path)
     return (today(), program(), what, "" if path is None else path.name, digest)
-
-
-def today() -> str:
-    """Return the date in UTC; that of SOURCE_DATE_EPOCH where set, for reproducible files."""
-    stamp = os.environ.get("SOURCE_DATE_EPOCH", "")
-    moment = datetime.fromtimestamp(int(stamp), UTC) if stamp.isdigit() else datetime.now(UTC)
-    return moment.strftime("%Y-%m-%d")
-
-
-def program() -> str:
-    """Return the program's name and version."""
-    try:
-        return f"bifocal {version('bifocal')}"
-    except PackageNotFoundError:
-        return "bifocal"

@@ -142,7 +142,7 @@ def as_rule(rule: str | ToleranceRule) -> ToleranceRule:
     """
     if isinstance(rule, ToleranceRule):
         return rule
-    text = rule
+    text = str(rule)
     for known in RULES:
         if text.strip().casefold() in (known.key, known.name.casefold()):
             return known

@@ -9,7 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from bifocal.model.pair import Pair, Photo, apply_homography
+from bifocal.model.homography import apply_homography
+from bifocal.model.pair import Pair
+from bifocal.model.photo import Photo
 from bifocal.survey.check_points import check_points
 from bifocal.survey.georeferencing import georeference
 from bifocal.survey.observations import PointObservations
@@ -136,7 +138,7 @@ def solve(
 
     Parameters
     ----------
-    source : path, mapping, PointObservations or tuple of two paths
+    source : path, mapping, PointObservations, SurveyInput or tuple of two paths
         A survey workbook or table (``.xlsx .xlsm .ods .csv``), or columns by key: ``id`` and
         ``x1 y1 x2 y2`` [mm or px], or ``s1 s2`` [mm] and ``theta`` [deg], or ``col1 row1 col2
         row2`` [px]; each of shape (n,), NaN where blank. Two paths: the picks of photo 1 and of
@@ -453,7 +455,7 @@ def _solve_ideal(survey: SurveyInput, scale_tolerance: float, *, adjust: bool) -
         remarks.append(exchanged_remark(setup))
         setup, points = setup.exchanged(), points.exchanged()
     measured = setup.in_millimetres(points)
-    xy1, xy2 = _all_xy(measured)
+    xy1, xy2 = measured.all_xy()
     check = _check_plane(pair, points, (xy1, xy2), None, survey, adjust)
     correction: FloatArray | None = None
     if check is not None:
@@ -492,10 +494,3 @@ def _solve_ideal(survey: SurveyInput, scale_tolerance: float, *, adjust: bool) -
         correction=correction,
         remarks=tuple(filter(None, remarks)),
     )
-
-
-def _all_xy(points: PointObservations) -> tuple[FloatArray, FloatArray]:
-    """Return image coordinates of all points, radial distances turned into x and y."""
-    cartesian = points.is_cartesian[:, None]
-    first, second = points.polar_xy()
-    return np.where(cartesian, points.xy1, first), np.where(cartesian, points.xy2, second)

@@ -60,7 +60,7 @@ def bundle_adjust(project: Project, unknowns: Unknowns | None = None) -> Adjustm
     Analytic derivatives throughout. Up to 400 unknowns are solved by orthogonal decomposition;
     beyond, the points are eliminated (Schur complement). Without control points the datum of a
     free network is that of Helmert's inner constraints over the points (small problems) or over
-    the cameras (large ones).
+    the cameras and plates (large ones, and where all points are on plates).
     """
     unknowns = unknowns or Unknowns()
     bundle, remarks = prepare(project, unknowns)

@@ -272,8 +272,9 @@ class Bundle:
 
         Shift, turn and scale of everything that the observations do not feel must not move the
         points on average: Helmert's inner constraints; in a network so large that its points are
-        eliminated, the cameras. Which of the seven motions are not felt is found from the
-        equations themselves, since a glass fixed in the world leaves fewer of them.
+        eliminated, or with all of them on plates, the cameras and plates. Which of the seven
+        motions are not felt is found from the equations themselves, since a glass fixed in the
+        world leaves fewer of them.
         """
         state, stay = self.start, len(self.columns.labels)
         linear = self.equations(state)
@@ -282,9 +283,9 @@ class Bundle:
         motion = self._motions()
         jacobian = hstack([linear.design, linear.eliminated], "csr")
         parts = abs(jacobian) @ abs(motion)
-        _, values, right = np.linalg.svd(jacobian @ motion)
+        _, values, right = np.linalg.svd(jacobian @ motion, full_matrices=False)
         rows = right[values <= _DEFECT * np.linalg.norm(parts)] @ motion.T
-        if linear.unknowns > LARGEST:
+        if linear.unknowns > LARGEST or not self.free.any():
             rows[:, stay:] = 0.0
             rows[:, self.columns.points[self.columns.points >= 0]] = 0.0
         else:
@@ -297,9 +298,8 @@ class Bundle:
     def _motions(self) -> FloatArray:
         """Return how shift, turn and scale of everything move every unknown, (u + 3 p, 7)."""
         state, place, stay = self.start, self.columns, len(self.columns.labels)
-        free = self.free.any(axis=1)
-        middle = state.points[free].mean(axis=0)
-        reach = float(np.abs(state.points[free] - middle).max()) or 1.0
+        middle = state.points.mean(axis=0)
+        reach = float(np.abs(state.points - middle).max()) or 1.0
         motion = np.zeros((stay + self.free.size, 7))
         centres = [camera.centre for camera in state.cameras] + [shift for _, shift in state.poses]
         for at, centre in zip((*place.cameras, *place.plates), centres, strict=True):

@@ -32,9 +32,9 @@ def adjust_project(
     result : Adjustment
     remarks : tuple of str
     """
+    check_all_writable(out, report, overwrite=overwrite)
     check_ending(out, "a project is written as .toml.", ".toml")
     check_ending(report, "a report is written as .html.", ".html")
-    check_all_writable(out, report, overwrite=overwrite)
     project = read_project(source)
     result = bundle_adjust(project, unknowns)
     if out is not None:
@@ -97,7 +97,8 @@ def salinity_of(
     water: dict[str, Any] = {"wavelength_nm": wavelength_nm, "temperature_c": temperature_c}
     water["depth"] = depth
     salinity = float(salinity_from_index(result.value(names[0]), **water))
-    rates = water_index_derivatives(**water, salinity_percent=salinity)
+    # Within the error of the index fresh water may come out slightly below zero.
+    rates = water_index_derivatives(**water, salinity_percent=min(max(salinity, 0.0), 30.0))
     return salinity, result.sigma(names[0]) / abs(float(rates.d_salinity))
 
 

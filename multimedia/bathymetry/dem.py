@@ -117,8 +117,9 @@ class Dem(RasterFile):
     ) -> Iterator[Callable[[Window, FloatArray], None]]:
         """Yield a function (window, array of shape (bands, height, width)) that writes a copy.
 
-        Grid, reference system, no-data value and tags are those of this model. The copy is whole
-        or not there.
+        Grid, reference system, no-data value and tags are those of this model; NaN is the no-data
+        value where there is none or the copy's numbers do not reach it. The copy is whole or not
+        there.
 
         Raises
         ------
@@ -130,7 +131,9 @@ class Dem(RasterFile):
                 f"{self.path.name} holds whole numbers; the corrected model holds float32."
             )
         dtype = np.float64 if self.dtype == np.float64 else np.float32
+        # Programs declare marks that float32 cannot hold, such as -1.8e308.
         nodata = np.nan if self.nodata is None else self.nodata
+        nodata = nodata if abs(nodata) <= float(np.finfo(dtype).max) else np.nan
         with create_geotiff(
             path, width=self.width, height=self.height, bands=len(bands), dtype=dtype,
             transform=self.transform if self.has_position else None, crs=self.crs, nodata=nodata,

@@ -127,7 +127,7 @@ def _corrector(
     job: Job, cloud: Cloud, surface: WaterSurface
 ) -> tuple[Callable[[CloudPiece], CorrectedPoints], list[str]]:
     """Return the function that corrects one piece of a cloud, and what the user should know."""
-    nadir = partial(
+    corrected = partial(
         correct_bathymetry, water_level=surface, index=job.index, precision=job.precision
     )
     if job.beams:
@@ -137,7 +137,7 @@ def _corrector(
         )
         return lambda piece: beams(sensor(piece), piece.xyz), []
     if job.cameras is None:
-        return lambda piece: nadir(piece.xyz), []
+        return lambda piece: corrected(piece.xyz), []
     remarks = []
     cameras = read_camera_positions(job.cameras)
     pairs = read_visibility(job.visibility) if job.visibility else None
@@ -154,7 +154,7 @@ def _corrector(
     def correct(piece: CloudPiece) -> CorrectedPoints:
         _check_camera_unit(piece.xyz, cameras.centres, job)
         visible = _visible(piece, cameras, pairs, job)
-        return nadir(piece.xyz, cameras=cameras.centres, visible=visible)
+        return corrected(piece.xyz, cameras=cameras.centres, visible=visible)
 
     return correct, remarks
 
@@ -349,6 +349,8 @@ def _correct_window(
 def _correct_rays(job: Job) -> Outcome:
     """Refract and intersect a table of measured rays."""
     check_ending(job.target, "intersected rays are written as .csv.", ".csv")
+    if job.nodata is not None:
+        raise InputError(f"{job.source}: --nodata is for the cells of a DEM, these are rays.")
     table = read_rays(job.source)
     surface = read_water_surface(job.water_level)
     points = intersect_refracted_rays(

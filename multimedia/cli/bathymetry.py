@@ -106,6 +106,10 @@ def command(
     if beams and cameras:
         raise click.UsageError("--beams and --cameras exclude each other.")
     precision = Precision(index=sigma_index, level=sigma_level, point=sigma_point)
+    if precision.is_given and (beams or wishes["rays"]):
+        raise click.UsageError(
+            "--sigma-index, --sigma-level and --sigma-point are not for --beams and --rays."
+        )
     job = Job(source=source, target=target, beams=beams, precision=precision, **wishes)
     with progress_bar("Refraction correction", quiet=as_json) as progress:
         outcome = correct_file(job, progress=progress)

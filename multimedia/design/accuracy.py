@@ -23,6 +23,8 @@ from multimedia.refraction.layers import Layers
 from photocore.arrays import BoolArray, FloatArray, as_points, positive
 from photocore.errors import GeometryError, InputError, PhotogrammetryError
 
+#: Rounds of aiming at where a target appears; each leaves a small share of the miss before.
+AIMING_ROUNDS = 7
 #: Steps in which sensitivities are given: what one can be wrong by on a good day. Lengths in mm.
 STEPS: Mapping[str, tuple[float, str]] = {
     "index": (0.001, "0.001"),
@@ -144,6 +146,8 @@ def object_grid(
         Width and height of the object space. [object unit]
     depths : tuple of float
         Least and largest depth below the last face, both above 0. [object unit]
+    count : int
+        Points along X, along Y, and levels.
 
     Examples
     --------
@@ -193,9 +197,9 @@ def ring_of_cameras(
              np.cos(half_angle)]
         )  # fmt: skip
         centre = top + distance * offset
-        # Aim where the target appears: rounds of shifting the aim by the image of the target.
+        # Aim where the target appears: shift the aim by the image of the target.
         aim = target.copy()
-        for _ in range(7):
+        for _ in range(AIMING_ROUNDS):
             camera = Camera.looking_at(
                 centre, aim, principal_distance=principal_distance, name=f"cam{k + 1}"
             )

@@ -50,7 +50,11 @@ def design_ring(
     seed: int = 1,
     unit: str = "m",
 ) -> Design:
-    """Study cameras on a cone above a water surface or a glass; arguments as in the solvers."""
+    """Study cameras on a cone above a water surface or a glass.
+
+    Arguments as in `Layers`, `ring_of_cameras`, `object_grid` and `study_setup`; ``seed`` is that
+    of the noise in the simulated calibrations.
+    """
     if not 0 <= depths[0] < depths[1]:
         raise InputError(
             f"depths: {depths[0]:g} to {depths[1]:g}: give the least and the largest depth under "

@@ -174,6 +174,7 @@ def write_experiment(folder: Path | str, project: Project, *, overwrite: bool = 
 
 
 def _sensor(camera: Camera) -> Sensor:
+    """Return the sensor of a camera, or raise InputError if it has none."""
     if camera.sensor is None:
         raise InputError(f"camera {camera.name}: OpenPTV needs its sensor.")
     return camera.sensor
@@ -193,8 +194,8 @@ def _camera_files(camera: Camera, interface: FlatInterface, base: str) -> dict[s
     shift = sensor.image_from_pixel(np.array([sensor.width, sensor.height]) / 2)
     if np.abs(shift).max() > 1e-9:
         camera = _moved_origin(camera, shift)
-    glass = ori_text(camera, interface.normal * reach)
-    return {f"{base}.ori": glass, f"{base}.addpar": addpar_text(camera)}
+    orientation = ori_text(camera, interface.normal * reach)
+    return {f"{base}.ori": orientation, f"{base}.addpar": addpar_text(camera)}
 
 
 def _moved_origin(camera: Camera, shift: FloatArray) -> Camera:
@@ -375,6 +376,8 @@ def _particles(
     path = stored[0]
     frame = path.suffix.lstrip(".")
     positions, numbers = read_correspondences(path)
+    if not len(positions):
+        return *nothing, (f"{path.name}: holds no particles.",)
     if numbers.shape[1] < len(control.images):
         raise InputError(
             f"{path}: {numbers.shape[1]} target columns for {len(control.images)} cameras."

@@ -66,7 +66,7 @@ def read_control(path: Path) -> ControlParameters:
         If a line is missing or not what it should be; the message names the line.
     """
     lines = [line.strip() for line in read_text(path, _KIND).rstrip().splitlines()]
-    count = int(_number(path, lines, 0, "number of cameras"))
+    count = _count(path, lines, "number of cameras")
     if not 1 <= count <= 64:
         raise InputError(f"{path}, line 1: {count} cameras; expected 1 to 64.")
     names = lines[1 : 1 + 2 * count]
@@ -160,15 +160,13 @@ def read_targets(path: Path, *, field: int = 0) -> DetectedTargets:
         If the count in the first line does not fit the lines that follow.
     """
     first, *rest = read_text(path, _KIND).split() or [""]
-    count = _number(path, [first], 0, "number of targets")
+    count = _count(path, [first], "number of targets")
     if len(rest) != 8 * count:
         raise InputError(
-            f"{path}: its first line announces {count:g} targets of 8 numbers, {len(rest)} numbers "
+            f"{path}: its first line announces {count} targets of 8 numbers, {len(rest)} numbers "
             "follow. The file is cut off, or is no target file."
         )
-    table = _floats(path, rest, "targets").reshape(-1, 8)
-    if not (np.abs(table) <= LARGEST).all():
-        raise InputError(f"{path}: holds a value that is not a finite number.")
+    table = _floats(path, rest, "value {} of the targets").reshape(-1, 8)
     pixels = table[:, 1:3].copy()
     if field in (1, 2):
         # Half frames: the file counts every other line.
@@ -230,26 +228,26 @@ def read_manual(points: Path, pixels: Path) -> tuple[list[str], FloatArray]:
 def read_correspondences(path: Path) -> tuple[FloatArray, IntArray]:
     """Read an rt_is file: positions, shape (n, 3) [mm], and target numbers, shape (n, cameras).
 
-    -1 where a camera did not see the particle.
+    -1 where a camera did not see the particle; a frame without particles has no columns of numbers.
 
     Raises
     ------
     InputError
         If the count in the first line does not fit the lines that follow.
     """
-    first, *rows = [
-        line.split() for line in read_text(path, _KIND).splitlines() if line.strip()
-    ] or [[""]]
-    count = int(_floats(path, first[:1], "number of particles")[0])
+    lines = [line for line in read_text(path, _KIND).splitlines() if line.strip()]
+    count = _count(path, lines, "number of particles")
+    rows = [line.split() for line in lines[1:]]
     widths = {len(row) for row in rows}
     if len(rows) != count or len(widths) > 1 or (widths and min(widths) < 6):
         raise InputError(
             f"{path}: its first line announces {count} particles, {len(rows)} lines follow "
             "(expected number X Y Z and one target number per camera)."
         )
+    if not rows:
+        return np.empty((0, 3)), np.empty((0, 0), dtype=np.int64)
     table = np.array([_floats(path, row, f"line {k}") for k, row in enumerate(rows, 2)])
-    table = table.reshape(count, -1)
-    return table[:, 1:4].copy(), table[:, 4:].astype(np.int64).reshape(count, -1)
+    return table[:, 1:4].copy(), table[:, 4:].astype(np.int64)
 
 
 def ori_text(camera: Camera, glass: FloatArray) -> str:
@@ -323,6 +321,14 @@ def _number(path: Path, lines: list[str], index: int, what: str) -> float:
         raise InputError(f"{path}: ends before line {index + 1} ({what}).")
     words = lines[index].split()[:1] or [""]
     return float(_floats(path, words, f"line {index + 1} ({what})")[0])
+
+
+def _count(path: Path, lines: list[str], what: str) -> int:
+    """Return how many things the first line announces."""
+    number = _number(path, lines, 0, what)
+    if number != int(number):
+        raise InputError(f"{path}, line 1 ({what}): expected a whole number, found {number:g}.")
+    return int(number)
 
 
 def _numbers(path: Path, least: int, what: str) -> FloatArray:

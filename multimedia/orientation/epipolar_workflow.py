@@ -82,7 +82,11 @@ def epipolar_project(
     tolerance : float
         Half width of the band in which candidates are looked for. [mm]
     out, picture : path, optional
-        Table of vertices; picture of the curves over ``photo``.
+        Table of vertices; picture of the curves.
+    photo : path, optional
+        Image of ``other``, under the picture.
+    overwrite : bool
+        Replace existing files.
     """
     check_all_writable(out, picture, overwrite=overwrite)
     project = read_project(path)

@@ -129,16 +129,16 @@ def resect(
     >>> water = Layers(indices=(1.0, 1.337))
     >>> control = [(0, 0, -0.2), (0.1, 0, -0.3), (0, 0.1, -0.1), (0.1, 0.1, -0.2), (0, 0, -0.4)]
     >>> start = Camera.from_angles((0, 0, 1), 0, 0, 0, principal_distance=25.0)
-    >>> found = resect(start, control, project(truth, control, water), water)
-    >>> found.camera.centre.round(9).tolist()
+    >>> resection = resect(start, control, project(truth, control, water), water)
+    >>> resection.camera.centre.round(9).tolist()
     [0.1, 0.2, 0.6]
     """
     names = _checked_names(estimate)
-    control, image, weights, used = _checked_points(
+    control, image, sigmas, used = _checked_points(
         camera, object_points, image_points, sigma, len(names)
     )
     what = f"resection of camera {camera.name}" if camera.name else "resection"
-    problem = _ControlImages(control, image, weights, as_media(layers), names, what)
+    problem = _ControlImages(control, image, sigmas, as_media(layers), names, what)
     start = _best_start(camera, replace(problem, names=EXTERIOR))
     result = fit(
         start, problem.equations, problem.advance, names=names, what=what, rounding=problem.floor
@@ -146,7 +146,7 @@ def resect(
     _refuse_mirrored(result.state, result.sigma0, problem)
     shape = (len(used), 2)
     residuals, normed = np.full(shape, np.nan), np.full(shape, np.nan)
-    residuals[used] = -result.residuals.reshape(-1, 2) * weights
+    residuals[used] = -result.residuals.reshape(-1, 2) * sigmas
     normed[used] = -result.standardised.reshape(-1, 2)
     covariance = result.linear.cofactor * result.sigma0**2
     return Resection(
@@ -167,7 +167,7 @@ class _ControlImages:
 
     control: FloatArray
     image: FloatArray
-    weights: FloatArray
+    sigmas: FloatArray
     interface: OpticalMedia
     names: tuple[str, ...]
     what: str
@@ -182,8 +182,8 @@ class _ControlImages:
             return None
         if not np.isfinite(seen.image).all():
             return None
-        miss = (seen.image - self.image) / self.weights
-        jacobian = seen.by_camera / self.weights[:, :, None]
+        miss = (seen.image - self.image) / self.sigmas
+        jacobian = seen.by_camera / self.sigmas[:, :, None]
         return miss.ravel(), jacobian.reshape(-1, len(self.names))
 
     def is_beyond_doubt(self, cost: float) -> bool:
@@ -270,12 +270,12 @@ def _checked_points(
             f"{max(3, (unknowns + 1) // 2)}. Measure more points or estimate fewer parameters."
         )
     control, image = control[used], image[used]
-    weights = np.ones_like(image)
+    sigmas = np.ones_like(image)
     if sigma is not None:
         given = np.broadcast_to(np.asarray(sigma, dtype=np.float64), (len(used), 2))[used]
         if not (given > 0).all():
             raise InputError(f"{who}sigma: every standard deviation must be above zero.")
-        weights = given / np.sqrt(np.mean(given**2))
+        sigmas = given / np.sqrt(np.mean(given**2))
     refuse_pixels(camera, image)
     spread = np.linalg.svd(control - control.mean(axis=0), compute_uv=False)
     if spread[1] < 1e-6 * spread[0] or spread[0] == 0:
@@ -283,7 +283,7 @@ def _checked_points(
             f"{who}all control points lie on one line; a camera can turn about it freely. Use "
             "points spread over an area, better over a volume."
         )
-    return control, image, weights, used
+    return control, image, sigmas, used
 
 
 def _refuse_mirrored(camera: Camera, sigma0: float, problem: _ControlImages) -> None:

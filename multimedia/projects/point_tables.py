@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from multimedia.media.camera import Camera
+from multimedia.media.camera import Camera, Sensor
 from multimedia.projects.model import SHOWN, ImagePoints, ObjectPoints
 from photocore.arrays import FloatArray
 from photocore.errors import CellError, InputError, WorkbookError
@@ -72,9 +72,9 @@ def read_object_points(path: Path, *, unit: str) -> tuple[ObjectPoints, list[str
     sigma = np.column_stack(
         [table.numbers(k) * _factor(table, k, unit) for k in ("sigma_X", "sigma_Y", "sigma_Z")]
     )
-    if (sigma < 0).any():
-        row = int(np.argwhere(sigma < 0)[0, 0])
-        errors.append(table.error(row, "sigma_X", "a standard deviation cannot be negative."))
+    for row, column in np.argwhere(sigma < 0).tolist():
+        key = f"sigma_{'XYZ'[column]}"
+        errors.append(table.error(row, key, "a standard deviation cannot be negative."))
     if errors:
         raise WorkbookError(errors)
     points = ObjectPoints(ids=_ids(table), xyz=xyz, sigma=sigma, groups=tuple(table.texts("group")))
@@ -134,7 +134,9 @@ def read_image_points(path: Path, cameras: Sequence[Camera]) -> tuple[ImagePoint
     for index in np.flatnonzero(blank).tolist():
         key = keys[int(np.isnan(values[index]).argmax())]
         errors.append(table.error(index, key, "is blank; leave the row out instead."))
-    sigma = _sigmas(table)
+    for key in ("sigma_x", "sigma_y"):
+        for row in np.flatnonzero(table.numbers(key) <= 0).tolist():
+            errors.append(table.error(row, key, "a standard deviation must be above zero."))
     if errors:
         raise WorkbookError(errors)
     if in_mm:
@@ -142,10 +144,10 @@ def read_image_points(path: Path, cameras: Sequence[Camera]) -> tuple[ImagePoint
     else:
         for name in dict.fromkeys(names):
             rows = [row for row, other in enumerate(names) if other == name]
-            values[rows], sigma[rows] = _to_mm(by_name[name], values[rows], sigma[rows])
-    ids = _ids(table)
+            values[rows] = _sensor(by_name[name]).image_from_pixel(values[rows])
     points = ImagePoints(
-        cameras=tuple(names), ids=ids, image=values, sigma=sigma,
+        cameras=tuple(names), ids=_ids(table), image=values,
+        sigma=_sigmas(table, keys, [by_name[name] for name in names]),
         groups=tuple(table.texts("group")),
     )  # fmt: skip
     return points, list(table.remarks)
@@ -253,20 +255,31 @@ def _gathered(table: Table, keys: Sequence[str], unit: str, errors: list[CellErr
     return values * [_factor(table, key, unit) for key in keys]
 
 
-def _sigmas(table: Table) -> FloatArray:
-    """Return sigma_x, sigma_y in their own unit; one column serves both."""
-    second = "sigma_y" if "sigma_y" in table.present else "sigma_x"
-    return np.column_stack([table.numbers("sigma_x"), table.numbers(second)])
+def _sigmas(table: Table, coordinates: Sequence[str], cameras: Sequence[Camera]) -> FloatArray:
+    """Return sigma_x, sigma_y of every row [mm]; one column serves both.
+
+    They are in the unit of their heading, and without one in that of the coordinates.
+    """
+    sigma = np.empty((len(table), 2))
+    for axis, coordinate in enumerate(coordinates):
+        key = f"sigma_{'xy'[axis]}" if "sigma_y" in table.present else "sigma_x"
+        own = "px" if coordinate in ("col", "row") else table.units.get(coordinate, "")
+        unit = table.units.get(key, "") or own
+        factor = METRES.get(unit, METRES["mm"]) / METRES["mm"]
+        sigma[:, axis] = table.numbers(key) * factor
+        if unit == "px" and key in table.present:
+            sigma[:, axis] *= [_sensor(camera).pitch[axis] for camera in cameras]
+    return sigma
 
 
-def _to_mm(camera: Camera, pixels: FloatArray, sigma: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return image coordinates and sigmas of pixels."""
+def _sensor(camera: Camera) -> Sensor:
+    """Return the sensor of a camera whose image points are in pixels; raise if it has none."""
     if camera.sensor is None:
         raise InputError(
             f"camera {camera.name}: image points are given in pixels, but its sensor is not "
             "described; add [camera.sensor] with width, height and pitch."
         )
-    return camera.sensor.image_from_pixel(pixels), sigma * camera.sensor.pitch
+    return camera.sensor
 
 
 def _read_wide(book: object, cameras: Sequence[Camera]) -> tuple[ImagePoints, list[str]] | None:
@@ -295,7 +308,7 @@ def _read_wide(book: object, cameras: Sequence[Camera]) -> tuple[ImagePoints, li
             seen = np.flatnonzero(np.isfinite(values).all(axis=1))
             image = values[seen]
             if first == "col":
-                image, _ = _to_mm(camera, image, np.ones_like(image))
+                image = _sensor(camera).image_from_pixel(image)
             names += [camera.name] * len(seen)
             rows += seen.tolist()
             images.append(image)

@@ -1,6 +1,6 @@
 """Refractive indices of air and of what ports and tanks are made of, as functions of wavelength.
 
-All relative to vacuum except where `AIR` is the unit: water formulas and glass catalogues are
+All relative to vacuum except where air is the unit: water formulas and glass catalogues are
 relative to air, and a set-up that puts air at 1.0 is consistent with them.
 """
 

@@ -42,6 +42,9 @@ BENIGN = 4.0
 #: The cubic first guess may overshoot beyond this; R over its slope at the axis never does.
 NEAR_AXIS = 0.6
 
+#: Steps of the compiled loops, enough for every set-up as long as t² stays below `BENIGN`.
+FEW_STEPS = 12
+
 Height = float | FloatArray
 #: Shifted radius, t, and the index of the layer t belongs to, of one row.
 Row = tuple[FloatArray, FloatArray, Height]
@@ -263,7 +266,7 @@ def shift_blocks(
         for i in range(width):
             x = goal[i] / slope[i]
             t[i] = first_tangent(x, value[i] / slope[i] if x < NEAR_AXIS else 0.0)
-        for _ in range(12):
+        for _ in range(FEW_STEPS):
             for i in range(width):
                 value[i] = slope[i] = straight[i]
             for j in range(k.size):
@@ -282,4 +285,4 @@ def shift_blocks(
         for i in range(width):
             out[low + i] = apparent_radius(t[i], whole[i], k[0], q[0])
             # steep (or not finite), or the layer that t belongs to is absent
-            unsure[low + i] = not (t[i] < 2.0 and straight[i] > 0)
+            unsure[low + i] = not (t[i] * t[i] < BENIGN and straight[i] > 0)

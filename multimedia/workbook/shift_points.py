@@ -104,7 +104,7 @@ class ShiftResult:
     def columns(
         self, points: ShiftPoints, *, every: bool = False
     ) -> dict[str, Sequence[str] | FloatArray]:
-        """Return the columns of tables; X, Y, Z of points given by radius only if ``every``."""
+        """Return the columns of tables; `IN_PLANE` too of points given by radius if ``every``."""
         columns: dict[str, Sequence[str] | FloatArray] = {
             "id": points.ids,
             "X": points.xy[:, 0],

@@ -16,9 +16,11 @@ from scipy.sparse import csr_matrix, hstack
 from photocore.adjustment.dense import DenseEquations
 from photocore.arrays import BoolArray, FloatArray
 
-#: Eigenvalues of the scaled reduced normal matrix below this mark undetermined combinations: the
-#: square root of the precision is lost to squaring.
+#: Eigenvalues of the scaled reduced normal matrix below this share of the largest mark undetermined
+#: combinations. They are squares: singular values below 3e-7, where the dense road sees 1e-11.
 _RANK = 1e-13
+#: No step is taken along eigenvectors whose eigenvalue is no more than rounding.
+_ROUNDING = 1e-15
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -91,7 +93,7 @@ class BlockEquations:
         slope = (self.eliminated.T @ misfit).reshape(-1, 3)
         values, vectors = _scaled_eigen(schur)
         right = vectors.T @ (self.design.T @ misfit - np.einsum("upj,pj->u", solved, slope))
-        step = -vectors @ np.where(values > 1e-15, right / np.maximum(values, 1e-15), 0.0)
+        step = -vectors @ np.where(values > _ROUNDING, right / np.maximum(values, _ROUNDING), 0.0)
         slope += np.einsum("upj,u->pj", self._normal[1], step)
         return np.concatenate([step, -np.einsum("pij,pj->pi", inverse, slope)[self.free]])
 

@@ -6,6 +6,7 @@ Unlike `photocore.tables`, which reads whole tables, a cloud of any size passes 
 from __future__ import annotations
 
 import csv
+import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
@@ -193,7 +194,8 @@ class TextCloud(Cloud):
         if isinstance(values, list):
             return values
         texts = [
-            repr(round(value, DECIMALS)) if value == value else "" for value in values.tolist()
+            repr(round(value, DECIMALS)) if math.isfinite(value) else ""
+            for value in values.tolist()
         ]
         return [text.replace(".", ",") for text in texts] if self._comma else texts
 

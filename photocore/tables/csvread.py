@@ -28,6 +28,8 @@ _SAMPLE = 200
 _SAMPLE_TEXT = 2**18
 #: Few enough records to stay in the processor's cache.
 _CHUNK = 4000
+#: Characters of a usual record.
+_RECORD = 40
 #: Characters from which Arrow, where it is installed, pays its import (60 ms), and its blocks.
 _LARGE, _ARROW_BLOCK = 2**21, 2**22
 
@@ -163,7 +165,8 @@ def _consistency(file: CsvFile, delimiter: str) -> float:
     """Return the share of sample records with the commonest number of fields, 0 for one field."""
     records = islice(file.records(delimiter, sample=True), _SAMPLE)
     counts = [len(record) for record in records if any(record)]
-    commonest = max(set(counts), key=counts.count, default=1)
+    # Of two numbers equally common the larger: block labels stand alone in their lines.
+    commonest = max(set(counts), key=lambda fields: (counts.count(fields), fields), default=1)
     return counts.count(commonest) / len(counts) if commonest > 1 else 0.0
 
 
@@ -278,7 +281,7 @@ def _full_chunks(
         yield from _arrow_chunks(text[start:], delimiter, width)
         return
     while start < len(text):
-        end = text.find("\n", start + 40 * _CHUNK)
+        end = text.find("\n", start + _RECORD * _CHUNK)
         part = text[start : end if end > 0 else None]
         if {line.count(delimiter) for line in part.split("\n")} != {width - 1}:
             yield None

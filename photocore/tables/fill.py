@@ -52,7 +52,8 @@ def fill(
 
         if column.kind == "text":
             table.values[column.key] = convert.texts(values, complain)
-            dated = table.sheet and sum(isinstance(value, CellDate) for value in values)
+            # Only sheets hold dates; a text table may be long.
+            dated = sum(isinstance(value, CellDate) for value in values) if table.sheet else 0
             if dated:
                 table.remarks.append(
                     f"{column.key}: {dated} cells hold dates; type a name like 3-4 as '3-4."

@@ -131,9 +131,14 @@ def data_rows(
 
 
 def block_above(grid: CellGrid, match: Match) -> str:
-    """Return the label of the first block, which stands alone above the headings or the data."""
+    """Return the label of the first block, which stands alone above the headings or the data.
+
+    Of two rows above data without headings the nearer one counts; above headings only the next row
+    is looked at, and a text there is a title.
+    """
     top = min(match.header or match.first, match.first)
-    for row in sorted(row for row in grid.rows if row < top)[-1 if match.header else -2 :]:
+    nearest_first = sorted((row for row in grid.rows if row < top), reverse=True)
+    for row in nearest_first[: 1 if match.header else 2]:
         value = next(iter(grid.rows[row].values()))
         if len(grid.rows[row]) == 1 and not (match.header and isinstance(value, str)):
             return label(value)

@@ -100,6 +100,8 @@ def cell_xml(
     style : str
         Index of its cell format as text, empty for the default.
 
+    Examples
+    --------
     >>> cell_xml("B3", 1.5, "A3*3", style="2")
     '<c r="B3" s="2"><f>A3*3</f><v>1.5</v></c>'
     """

@@ -219,14 +219,21 @@ def check_new_workbook(
 
 
 def is_untouched(path: Path) -> bool:
-    """Tell whether a path is free, empty, or holds a new workbook exactly as it was written."""
-    if not path.exists() or not path.stat().st_size:
+    """Tell whether a path is free, holds no workbook, or a new one exactly as it was written."""
+    if not path.exists():
         return True
+    with path.open("rb") as file:
+        if not file.read(8).startswith(_BOOK_STARTS):
+            return True
     try:
         with zipfile.ZipFile(path) as package:
             return package.comment == _seal(package)
     except (zipfile.BadZipFile, OSError, ValueError, NotImplementedError):
         return False
+
+
+#: How workbooks begin: zip packages, and the compound files of old or encrypted ones.
+_BOOK_STARTS = (b"PK", bytes.fromhex("D0CF11E0"))
 
 
 def _seal(package: zipfile.ZipFile) -> bytes:

@@ -148,6 +148,7 @@ def rewrite_package(
 
     Order, methods and (without one) dates stay.
     """
+    named = source if isinstance(source, Path) else target
     with zipfile.ZipFile(source) as old, target.open("wb") as file:
         with zipfile.ZipFile(file, "w", compresslevel=4) as new:
             new.comment = old.comment
@@ -160,7 +161,7 @@ def rewrite_package(
                 stored = info.compress_type == zipfile.ZIP_STORED
                 copy.compress_type = zipfile.ZIP_STORED if stored else zipfile.ZIP_DEFLATED
                 copy.external_attr, copy.create_system = info.external_attr, info.create_system
-                new.writestr(copy, read_part(target, old, info.filename) if data is None else data)
+                new.writestr(copy, read_part(named, old, info.filename) if data is None else data)
             known = {info.filename for info in listed}
             for name in [name for name in parts if name not in known]:
                 added = zipfile.ZipInfo(name, date or NEW_PART_TIME)

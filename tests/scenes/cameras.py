@@ -6,7 +6,8 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from bifocal.model.pair import Pair, Photo
+from bifocal.model.pair import Pair
+from bifocal.model.photo import Photo
 from photocore.arrays import FloatArray
 
 

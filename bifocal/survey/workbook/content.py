@@ -8,7 +8,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from bifocal.model.flags import FlagLimits
-from bifocal.model.pair import Pair, Photo
+from bifocal.model.pair import Pair
+from bifocal.model.photo import Photo
 from bifocal.survey.georeferencing import residuals
 from bifocal.survey.observations import PointObservations
 from bifocal.survey.reference import CheckResult, Georeference, KnownPoints

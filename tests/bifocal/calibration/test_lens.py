@@ -11,7 +11,7 @@ import pytest
 from click.testing import CliRunner
 from PIL import Image
 
-from bifocal import Lens
+from bifocal import Lens, calibrate
 from bifocal.calibration.board_calibration import (
     BoardView,
     detect_board,
@@ -180,6 +180,8 @@ GOOD = {"camera_matrix": MATRIX.tolist(), "coefficients": [0, 0, 0, 0], "image_s
         ("camera_matrix", [[-900, 0, 5], [0, 900, 5], [0, 0, 1]], "fx and fy above zero"),
         ("model", {}, "is not one of"),
         ("sigma0", "x", "sigma0: expected numbers"),
+        ("sigma0", [0.5], "sigma0: expected one number"),
+        ("sigma0", True, "sigma0: expected one number"),
         ("sigma0", np.nan, "sigma0: must be zero or more"),
     ],
 )
@@ -268,6 +270,20 @@ def test_a_photo_that_does_not_fit_is_left_out_and_named():
 def test_few_photos_are_refused():
     with pytest.raises(InputError, match="at least 3"):
         lens_of_views(board_views(2), (1024, 768))
+
+
+@pytest.mark.parametrize(
+    ("images", "names", "message"),
+    [
+        ([40, 40, 8], ["a.jpg", "b.jpg", "c.jpg"], "c.jpg: 8 x 8 px is too small"),
+        ([40, 40, 50], ["a.jpg", "b.jpg", "c.jpg"], "c.jpg: is of another size"),
+        ([40, 40, 40], ["a.jpg", "b.jpg"], "names: 2 names for 3 or more photos"),
+    ],
+)
+def test_photos_that_cannot_be_used_are_named_as_asked(images, names, message):
+    photos = [np.full((side, side), 99, np.uint8) for side in images]
+    with pytest.raises(InputError, match=message):
+        calibrate(photos, board=(9, 6), names=names)
 
 
 def drawn_board(squares=(10, 7), pixel=60):

@@ -9,7 +9,14 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from bifocal.files.images import image_info, read_image, to_eight_bit, turn_upright, write_image
+from bifocal.files.images import (
+    as_grey,
+    image_info,
+    read_image,
+    to_eight_bit,
+    turn_upright,
+    write_image,
+)
 from photocore.errors import InputError
 
 PICTURE = np.random.default_rng(7).integers(0, 255, (24, 36, 3), dtype=np.uint8)
@@ -45,6 +52,13 @@ def test_sixteen_bit_colour_tiff_keeps_its_bits(tmp_path):
     assert image_info(path).bits == 16
     np.testing.assert_array_equal(read_image(path), deep)
     np.testing.assert_array_equal(to_eight_bit(read_image(path)), PICTURE)
+
+
+def test_sixteen_bits_become_the_nearest_of_eight():
+    deep = np.arange(65536, dtype=np.uint16).reshape(256, 256)
+    nearest = np.rint(deep / 257.0)
+    np.testing.assert_array_equal(to_eight_bit(deep), nearest)
+    np.testing.assert_array_equal(as_grey(deep, "deep"), nearest)
 
 
 def test_alpha_is_dropped_and_grey_stays_grey(tmp_path):

@@ -64,6 +64,19 @@ def test_pixels_of_an_ideal_pair_are_counted_right_and_down_from_its_nadir_point
         np.testing.assert_allclose(photo.plane_from_pixels([pixel]), [[0.37, 0.185]], rtol=1e-12)
 
 
+@pytest.mark.parametrize(
+    ("wrong", "message"),
+    [
+        ({"d2": -9.5}, "^d2: must be above zero"),
+        ({"c1": 0.0}, "^c1: must be above zero"),
+        ({"nadir2": (1.0, 2.0, 3.0), "pitch": 0.0074}, "^nadir2: "),
+    ],
+)
+def test_a_wrong_value_of_an_ideal_pair_is_named(wrong, message):
+    with pytest.raises(InputError, match=message):
+        Pair.ideal(**({"d1": 17.5, "d2": 9.5, "c1": 35.0, "c2": 19.0} | wrong))
+
+
 def test_an_ideal_pair_equals_the_closed_form_to_1e_12():
     pair, xyz = ideal(), scene()
     xyz = xyz[np.hypot(*xyz[:, :2].T) > 0.5]

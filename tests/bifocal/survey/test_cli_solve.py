@@ -138,12 +138,20 @@ def test_result_workbook_holds_numbers_and_formulas(tmp_path):
 
 def test_an_existing_result_is_kept_unless_asked(tmp_path):
     survey, out = fill(tmp_path / "s.xlsx"), tmp_path / "result.xlsx"
-    out.write_bytes(b"mine")
+    assert run("solve", survey, "--out", out).exit_code == 0
+    whole = out.read_bytes()
     result = run("solve", survey, "--out", out)
     assert result.exit_code == 1
     assert "--overwrite" in result.stderr
-    assert out.read_bytes() == b"mine"
+    assert out.read_bytes() == whole
     assert run("solve", survey, "--out", out, "--overwrite").exit_code == 0
+    # What is not ours stays in any case, and no option is named that would not help.
+    out.write_bytes(b"mine")
+    for options in ((), ("--overwrite",)):
+        result = run("solve", survey, "--out", out, *options)
+        assert result.exit_code == 1
+        assert "was not written by this program" in result.stderr
+        assert out.read_bytes() == b"mine"
 
 
 def test_radial_distances_from_a_text_table(tmp_path):
@@ -283,6 +291,11 @@ def test_raw_pixels_with_a_pair_file_and_the_workbook_made_of_them(tmp_path):
     assert run("solve", points, "--pair", pair, "--out", out).exit_code == 0
     again, _ = solved(out)
     assert again["points"] == answer["points"]
+    # Without its pair file nobody knows the lenses: that is said.
+    pair.write_text("{}")
+    assert "wall.pair.json cannot be used" in run("solve", out).stderr
+    pair.unlink()
+    assert "wall.pair.json is not found: pixels are taken as free of" in run("solve", out).stderr
 
 
 def test_millimetres_with_a_pair_file_need_the_principal_distances(tmp_path):

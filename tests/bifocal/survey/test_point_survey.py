@@ -7,7 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bifocal.model.pair import Pair, Photo
+from bifocal.model.pair import Pair
+from bifocal.model.photo import Photo
 from bifocal.survey.observations import PointObservations
 from bifocal.survey.point_survey import solve_points
 from bifocal.survey.setup import SurveySetup

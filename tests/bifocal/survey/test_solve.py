@@ -46,6 +46,11 @@ def test_columns_of_pixels_with_a_pair_give_the_points_back():
     assert picks["col1"][0] == pytest.approx(1536.25 + 35 * 2 / 16.5 / 0.0074)
 
 
+def test_a_unit_that_is_none_is_refused_with_a_pair_too():
+    with pytest.raises(InputError, match="'cm' is neither mm nor px"):
+        solve(columns(XYZ), pair=Pair.ideal(**LENSES), unit="cm")
+
+
 def test_plane_points_correct_the_orientation_from_python_too():
     wall = np.array([[4.0, 2.0, 0.0], [-4.0, 2.0, 0.0], [4.0, -2.0, 0.0], [-4.0, -2.0, 0.0]])
     picks = columns(np.vstack([XYZ, wall]))
@@ -105,6 +110,8 @@ def test_options_that_cannot_be_used_are_named(changes, error, message):
         ({"x1": [1.0, 2.0], "y1": [1.0]}, "y1: has 1 values, expected 2"),
         ({"x1": ["a"], "y1": [1.0], "x2": [1.0], "y2": [1.0]}, "x1: expected numbers"),
         ({}, "there is no point"),
+        ({"x1": 3.0}, r"x1: expected a list of values, one for each point, found shape \(\)"),
+        ({"x1": [1.0], "y1": [[1.0, 2.0]]}, r"y1: expected a list of values.*\(1, 2\)"),
     ],
 )
 def test_columns_that_cannot_be_used_are_named(table, message):

@@ -11,7 +11,8 @@ import openpyxl
 import pytest
 
 from bifocal.model.lens import Lens
-from bifocal.model.pair import Pair, Photo
+from bifocal.model.pair import Pair
+from bifocal.model.photo import Photo
 from bifocal.survey.check_points import check_points
 from bifocal.survey.georeferencing import georeference
 from bifocal.survey.observations import PointObservations

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import tracemalloc
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from scipy.optimize import least_squares
+from scipy.spatial.distance import pdist
 from scipy.spatial.transform import Rotation
 
 from multimedia import Camera, Layers
@@ -357,6 +359,32 @@ def a_plate():
         ids=given.object_points.ids, xyz=flat, sigma=np.zeros_like(flat), groups=("P",) * 25
     )
     return replace(given, object_points=local), world
+
+
+def test_a_free_network_of_plates_alone_holds_its_cameras_and_plates():
+    given, world = a_plate()
+    result = bundle_adjust(given, Unknowns(control="free", plates=("P",)))
+    before = [camera.centre for camera in given.cameras] + [[5.0, -8.0, -120.0]]
+    after = [camera.centre for camera in result.project.cameras]
+    after.append([result.value(f"plate P:{name}") for name in ("X0", "Y0", "Z0")])
+    # The glass lies in the plane Z = 0: only shifts along it and the turn about Z are not felt.
+    moved = np.array(after) - before
+    np.testing.assert_allclose(moved[:, :2].mean(axis=0), 0, atol=1e-7)
+    xyz = result.project.object_points.xyz
+    np.testing.assert_allclose(pdist(xyz), pdist(world), atol=1e-9)
+    assert np.isfinite(result.point_covariance).all()
+
+
+def test_the_datum_of_a_large_network_needs_no_square_of_its_observations():
+    given = with_true_cameras(a_project(points=some_points(300)))
+    bundle, _ = prepare(given, Unknowns(control="free"))
+    tracemalloc.start()
+    try:
+        bundle.datum_rows()
+        most = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    assert most < 2400**2 * 8 / 4  # 300 points in 4 images have 2400 coordinates
 
 
 def test_a_plate_of_known_shape_finds_its_pose():

@@ -50,6 +50,21 @@ def test_adjusting_writes_project_and_report_and_says_the_salinity(project, tmp_
     assert "--overwrite" in again.stderr
 
 
+def test_water_a_little_fresher_than_fresh_has_a_salinity_all_the_same(project):
+    # By Höhle's formula fresh water of 20 °C has 1.3365 at 503.5 nm: 0.07 % are missing at 500 nm.
+    options = ["--media", "index3", "--wavelength", "500", "--temperature", "20", "--json"]
+    result = CliRunner().invoke(
+        main, ["adjust", str(project), "--interior", "c,xh,yh,k1", *options]
+    )
+    assert result.exit_code == 0, result.stderr
+    data = json.loads(result.stdout)
+    n = data["unknowns"]["index3"]["value"]
+    salinity = data["salinity_percent"]
+    assert salinity["value"] == pytest.approx(((n - 1.338) / 4e-5 - 486 + 500 + 20) / 50, abs=1e-6)
+    assert salinity["value"] < 0
+    assert salinity["sigma"] == pytest.approx(data["unknowns"]["index3"]["sigma"] / 2e-3)
+
+
 def test_json_holds_values_sigmas_and_correlations(project):
     result = CliRunner().invoke(
         main, ["adjust", str(project), "--interior", "c", "--media", "index3", "--json"]
@@ -69,7 +84,7 @@ def test_json_holds_values_sigmas_and_correlations(project):
         (["PROJECT", "--prior", "offset"], 1, "label=sigma"),
         (["PROJECT", "--control", "maybe"], 2, "maybe"),
         (["PROJECT", "--fix-camera", "cam9"], 1, "cam9"),
-        (["PROJECT", "--out", "o.toml", "--report", "./o.toml"], 1, "name two files"),
+        (["PROJECT", "--out", "o.toml", "--report", "./o.toml"], 1, "written as .html"),
     ],
 )
 def test_mistakes_are_named(project, arguments, status, message):

@@ -227,6 +227,28 @@ def test_a_group_index_is_for_lidar(tmp_path: Path) -> None:
     assert "--group-index needs --beams" in said
 
 
+@pytest.mark.parametrize("kind", ["--beams", "--rays"])
+def test_precisions_that_nothing_would_use_are_refused(tmp_path: Path, kind: str) -> None:
+    source = tmp_path / "c.csv"
+    write_cloud_csv(source, positions(20))
+    status, _, said = bathymetry(source, tmp_path / "o.csv", kind, "--sigma-level", 0.01)
+    assert status == 2
+    assert "--sigma-level and --sigma-point are not for --beams and --rays" in said
+    if kind == "--rays":
+        message = refused(tmp_path, source, kind, "--nodata", -9999)
+        assert "--nodata is for the cells of a DEM, these are rays" in message
+
+
+def test_a_mark_that_the_numbers_of_a_dem_cannot_reach_becomes_nan(tmp_path: Path) -> None:
+    heights = np.random.default_rng(1).uniform(95, 100, (20, 20)).astype(np.float32)
+    write_dem(tmp_path / "in.tif", heights, nodata=None)
+    status, _, said = bathymetry(tmp_path / "in.tif", tmp_path / "o.tif", "--nodata", -1e300)
+    assert status == 0, said
+    assert np.isfinite(read_band(tmp_path / "o.tif")).all()
+    with rasterio.open(tmp_path / "o.tif") as dem:
+        assert np.isnan(dem.nodata)
+
+
 def test_a_las_header_of_junk_is_refused_at_once(tmp_path: Path) -> None:
     path = tmp_path / "junk.laz"
     for seed in range(8):

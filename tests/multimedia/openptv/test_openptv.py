@@ -345,5 +345,31 @@ def test_an_impossible_number_of_targets_is_named(tmp_path: Path, count: str) ->
     with pytest.raises(InputError, match=r"line 1 \(number of targets\): .* is no finite number"):
         read_targets(path)
     path.write_text("1\n1 2 3 1e300 5 6 7 8\n")
-    with pytest.raises(InputError, match="not a finite number"):
+    with pytest.raises(InputError, match="value 4 of the targets: 1e300 is no finite number"):
         read_targets(path)
+
+
+@pytest.mark.parametrize(
+    ("read", "text"),
+    [
+        (read_targets, "2.5\n" + "1 " * 20),
+        (read_correspondences, "1.5\n1 0 0 0 1 2\n"),
+        (read_correspondences, "nan\n1 0 0 0 1 2\n"),
+        (read_correspondences, ""),
+    ],
+)
+def test_a_first_line_that_counts_nothing_is_named(tmp_path: Path, read, text: str) -> None:
+    path = tmp_path / "stored"
+    path.write_text(text)
+    with pytest.raises(InputError, match="line 1"):
+        read(path)
+
+
+def test_a_stored_frame_without_particles_is_said(tank_project, tmp_path):
+    folder = tmp_path / "exp"
+    write_experiment(folder, tank_project)
+    (folder / "res").mkdir()
+    (folder / "res" / "rt_is.10001").write_text("0\n")
+    experiment = read_experiment(folder)
+    assert particle_points(experiment)[0].ids == ()
+    assert "rt_is.10001: holds no particles." in experiment.project.remarks

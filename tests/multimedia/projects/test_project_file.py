@@ -111,6 +111,7 @@ def full_project() -> Project:
         image_points=ImagePoints(
             cameras=tuple(c.name for c in views for _ in ids), ids=ids * 4,
             image=images(views, points).reshape(-1, 2), groups=("frame 1",) * 48,
+            sigma=np.full((48, 2), (0.003, 0.004)),
         ),
         extra={"plates": {"count": 3}},
     )  # fmt: skip
@@ -137,6 +138,7 @@ def test_what_is_written_is_read_back(tmp_path):
     assert got.object_points.xyz.tolist() == want.object_points.xyz.tolist()
     assert got.object_points.sigma.tolist() == want.object_points.sigma.tolist()
     assert np.abs(got.image_points.image - want.image_points.image).max() < 1e-12
+    assert np.abs(got.image_points.sigma - want.image_points.sigma).max() < EPS
     assert got.image_points.groups == want.image_points.groups
     assert got.extra == {"plates": {"count": 3}}
     assert got.sigma_image == want.sigma_image
@@ -164,6 +166,34 @@ def test_units_in_headings_are_converted(folder):
     (folder / "body.csv").write_text("point,X [m],Y [m],Z [m]\nA,0.0015,0.002,-0.05\n")
     points, _ = read_object_points(folder / "body.csv", unit="mm")
     assert points.xyz[0] == pytest.approx([1.5, 2, -50])
+
+
+@pytest.mark.parametrize(
+    ("heading", "cells", "sigma"),
+    [
+        ("x [mm],y [mm],sigma_x", "1,2,0.003", (0.003, 0.003)),
+        ("x [mm],y [mm],sigma_x [um],sigma_y [um]", "1,2,3,4", (0.003, 0.004)),
+        ("x [um],y [um],sigma_x,sigma_y", "1000,2000,3,4", (0.003, 0.004)),
+        ("x [mm],y [mm],sigma_x [px]", "1,2,0.5", (0.006, 0.006)),
+        ("col,row,sigma_x,sigma_y", "600,500,0.5,0.25", (0.006, 0.003)),
+        ("col,row,sigma_x [mm],sigma_y [um]", "600,500,0.003,4", (0.003, 0.004)),
+    ],
+)
+def test_sigmas_of_image_points_are_in_the_unit_of_their_heading(tmp_path, heading, cells, sigma):
+    path = tmp_path / "image.csv"
+    path.write_text(f"camera,id,{heading}\ncam1,7,{cells}\n")
+    points, _ = read_image_points(path, cameras())
+    np.testing.assert_allclose(points.sigma, [sigma], rtol=4 * EPS)
+
+
+def test_impossible_sigmas_are_named_by_their_cell(tmp_path):
+    path = tmp_path / "points.csv"
+    path.write_text("camera,id,x,y,sigma_x,sigma_y\ncam1,7,1,2,0.003,0\n")
+    with pytest.raises(InputError, match=r"F2 \(sigma_y\): .* above zero"):
+        read_image_points(path, cameras())
+    path.write_text("id,X,Y,Z,sigma_Z\n7,1,2,3,-1\n")
+    with pytest.raises(InputError, match=r"E2 \(sigma_Z\): .* negative"):
+        read_object_points(path, unit="m")
 
 
 def test_wide_tables_of_particles_are_read(folder):

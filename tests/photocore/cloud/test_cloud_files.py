@@ -189,3 +189,14 @@ def test_a_copy_moves_only_what_moved(tmp_path: Path, ending: str) -> None:
         assert lines == ["N;E;note;H;depth", "1,50;2;kept;3,25;0,5", " 4;5;;6;0,0"]
     else:
         assert again.numbers["depth"].tolist() == [0.5, 0.0]
+
+
+def test_numbers_without_end_are_blank_in_a_copied_text(tmp_path: Path) -> None:
+    source, target = tmp_path / "a.csv", tmp_path / "b.csv"
+    source.write_text("X,Y,Z\n1,2,3\n4,5,6\n7,8,9\n")
+    cloud = open_cloud(source)
+    (piece,) = cloud.pieces()
+    depth = np.array([1.5, np.inf, np.nan])
+    with cloud.copy(target, {"depth": ("f8", "")}, overwrite=False) as write:
+        write(piece, piece.xyz, {"depth": depth})
+    assert target.read_text().splitlines() == ["X,Y,Z,depth", "1,2,3,1.5", "4,5,6,", "7,8,9,"]

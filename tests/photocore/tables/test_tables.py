@@ -435,6 +435,27 @@ class TestSampleWorkbooks:
         assert table.numbers("x1").tolist()[3:5] == [15338.0, 7365.0]
         assert table.cell(4, "x1") == "A8"
 
+    @pytest.mark.parametrize("ending", [".xlsx", ".csv"])
+    def test_the_nearest_label_above_data_without_headings_names_the_block(
+        self, book, tmp_path, ending
+    ):
+        rows = [[26], [27], [9, 8], [1, 2, 3, 4], [5, 6, 7, 8]]
+        if ending == ".xlsx":
+            path = book(rows)
+        else:
+            path = tmp_path / "t.csv"
+            padded = [row if len(row) == 1 else [*row, "", ""][:4] for row in rows]
+            path.write_text("".join(",".join(map(str, row)) + "\n" for row in padded))
+        table = read_table(path, self.XY, column_map=parse_column_map("x1=A,y1=B,x2=C,y2=D"))
+        assert table.blocks == ["27"] * 3
+        assert table.numbers("x1").tolist() == [9.0, 1.0, 5.0]
+
+    def test_as_many_labels_as_records_do_not_hide_the_separator(self, tmp_path):
+        path = tmp_path / "t.csv"
+        path.write_text("26\n1,2,3,4\n27\n5,6,7,8\n")
+        table = read_table(path, self.XY, column_map=parse_column_map("x1=A,y1=B,x2=C,y2=D"))
+        assert table.numbers("y2").tolist() == [4.0, 8.0]
+
     def test_headings_above_columns_given_by_letter_are_passed_over(self, data_dir):
         path = data_dir / "spreadsheets/two_row_header_empty_sheets.xlsx"
         table = read_table(path, self.XY, column_map=parse_column_map("id,x1,y1,x2,y2"))

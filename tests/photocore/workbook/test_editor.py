@@ -273,6 +273,24 @@ def test_utf_16_sheets_and_damaged_ones_are_refused(tmp_path):
         splice_sheet(tmp_path, "s", b"<w><sheetData>", SheetChanges())
 
 
+def test_a_damaged_part_is_named_with_the_users_file_not_with_a_temporary_one(tmp_path):
+    path = tmp_path / "book.xlsx"
+    workbook = openpyxl.Workbook()
+    workbook.active["A1"] = 1.5
+    workbook.create_sheet("Other")["A1"] = "kept"
+    workbook.save(path)
+    with zipfile.ZipFile(path) as package:
+        start = package.getinfo(NOTES).header_offset + 30 + len(NOTES)
+    data = bytearray(path.read_bytes())
+    data[start + 5 : start + 25] = bytes(20)
+    path.write_bytes(data)
+    editor = WorkbookEditor(path)
+    editor.set_value("Sheet", 1, 1, 2.5)
+    with pytest.raises(InputError, match=f"^{path}: damaged, the part {NOTES} cannot be unpacked"):
+        editor.save(tmp_path / "out.xlsx")
+    assert not (tmp_path / "out.xlsx").exists()
+
+
 @pytest.mark.office
 def test_libreoffice_opens_the_changed_workbook_and_calculates_the_new_rows(rich, tmp_path):
     out = tmp_path / "out.xlsm"

@@ -1,0 +1,1 @@
+"""Campaigns: whole surveys of many pairs, step by step, resumable, on any number of machines."""

@@ -1,0 +1,370 @@
+"""One pair of a survey: its options, the steps that follow from them, and running them."""
+
+from __future__ import annotations
+
+import os
+import time
+import traceback
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any
+
+import cv2
+
+from bifocal.campaigns.step_store import (
+    Step,
+    StepRecord,
+    is_current,
+    read_record,
+    run_step,
+    step_key,
+)
+from bifocal.files.images import image_info
+from bifocal.model.pair import Pair
+from bifocal.orientation.align_workflow import AlignOptions, align_photos
+from bifocal.orthophotos.deliver_workflow import DeliverTask, deliver, file_name
+from bifocal.orthophotos.ortho_image import OrthoOptions
+from bifocal.orthophotos.ortho_workflow import OrthoTask, make_ortho
+from bifocal.relief_maps.workflow import ReliefJob, relief_of_pair
+from bifocal.reports.control_survey import is_exchanged, solve_control
+from bifocal.reports.workflow import ReportTask, write_report
+from bifocal.survey.output import write_result
+from photocore.cli import Progress, no_progress, unforeseen_message
+from photocore.errors import InputError, PhotogrammetryError
+from photocore.provenance import FileHashes
+
+#: What may be wanted of a pair, in the order of work.
+PRODUCTS = ("relief", "points", "ortho", "drawing", "report")
+#: Files of a pair besides its photos.
+FILES = ("control", "check", "lengths", "lens", "lens1", "lens2")
+#: Share of a pair's time that each step takes, measured on church_2.
+WEIGHTS = {
+    "align": 0.14, "relief": 0.38, "points": 0.01, "ortho": 0.07, "drawing": 0.2, "report": 0.2,
+}  # fmt: skip
+#: Memory of a pair in work: of the program, and for each pixel of its larger photo; a relief map
+#: of 6 MP takes 1.5 GiB. [bytes]
+BASE_MEMORY, MEMORY_PER_PIXEL = 300 << 20, 210
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PairJob:
+    """A pair to be surveyed: plain data that can be sent to another machine.
+
+    Attributes
+    ----------
+    name : str
+        In the survey; its files are called by it.
+    folder : Path
+        Where the folders of its steps lie.
+    far, near : Path
+        Photos.
+    files : mapping of str to Path
+        ``control``, ``check``, ``lengths``, ``lens``, ``lens1``, ``lens2``, where given.
+    options : mapping
+        By the names of `bifocal.campaigns.survey_file.OPTIONS`; absent: default.
+    products : tuple of str
+        Of `PRODUCTS`.
+    overwrite : bool
+        Replace files that were changed after they were made.
+    """
+
+    name: str
+    folder: Path
+    far: Path
+    near: Path
+    files: Mapping[str, Path] = field(default_factory=dict)
+    options: Mapping[str, Any] = field(default_factory=dict)
+    products: tuple[str, ...] = ("relief", "points", "drawing", "report")
+    overwrite: bool = False
+
+    @property
+    def title(self) -> str:
+        """The name as file name."""
+        return file_name(self.name)
+
+    @property
+    def pair_path(self) -> Path:
+        """The pair file that the first step makes."""
+        return self.folder / "align" / f"{self.title}.pair.json"
+
+    @property
+    def relief_path(self) -> Path:
+        """The relief map."""
+        return self.folder / "relief" / f"{self.title}_relief.tif"
+
+    def memory(self) -> int:
+        """Return the memory it needs at most; that of small photos where they cannot be read.
+
+        In bytes.
+        """
+        pixels = 0
+        for path in (self.far, self.near):
+            try:
+                width, height = image_info(path).size
+            except InputError:
+                continue
+            pixels = max(pixels, width * height)
+        return BASE_MEMORY + MEMORY_PER_PIXEL * pixels
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PairOutcome:
+    """What became of a pair.
+
+    Attributes
+    ----------
+    name : str
+    done, kept : tuple of str
+        Steps that ran, and steps whose results were still good.
+    failed_step, message : str
+        Where it stopped and why; empty if it did not.
+    remarks : tuple of str
+        What the user should know, each with its step.
+    seconds : float
+    """
+
+    name: str
+    done: tuple[str, ...] = ()
+    kept: tuple[str, ...] = ()
+    failed_step: str = ""
+    message: str = ""
+    remarks: tuple[str, ...] = ()
+    seconds: float = 0.0
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return it as plain data."""
+        return asdict(self)
+
+
+def steps_of(job: PairJob) -> list[Step]:
+    """Return the steps that make the products of a pair, in order."""
+    wanted = set(job.products)
+    steps = [_align_step(job)]
+    if wanted & {"relief", "ortho", "drawing"}:
+        steps.append(_relief_step(job))
+    if "points" in wanted and {"control", "check"} & set(job.files):
+        steps.append(_points_step(job))
+    if "ortho" in wanted:
+        steps.append(_ortho_step(job))
+    if "drawing" in wanted:
+        steps.append(_drawing_step(job))
+    if "report" in wanted:
+        steps.append(_report_step(job, tuple(step.name for step in steps)))
+    return steps
+
+
+def plan_of(job: PairJob, hashes: FileHashes) -> list[tuple[str, str]]:
+    """Return each step of a pair with ``keep``, ``make``, or why it cannot run."""
+    plan: list[tuple[str, str]] = []
+    earlier: dict[str, StepRecord] = {}
+    stale = False
+    for step in steps_of(job):
+        folder = job.folder / step.name
+        record = read_record(folder)
+        try:
+            key = "" if stale else step_key(step, earlier, hashes)
+            current = not stale and is_current(folder, record, key, hashes)
+        except InputError as error:
+            return [*plan, (step.name, str(error))]
+        if current and record is not None:
+            earlier[step.name] = record
+        else:
+            stale = True
+        plan.append((step.name, "keep" if current else "make"))
+    return plan
+
+
+def run_pair(job: PairJob, progress: Progress = no_progress) -> PairOutcome:
+    """Run the steps of a pair whose results are not there yet; errors become its outcome.
+
+    The number of threads is fixed while it runs: optical flow shares its rows among threads, and
+    its last digits depend on how many there are.
+    """
+    start = time.perf_counter()
+    hashes = FileHashes(job.folder / ".hashes.json")
+    done: list[str] = []
+    kept: list[str] = []
+    remarks: list[str] = []
+    failed, message = "align", ""
+    threads = cv2.getNumThreads()
+    cv2.setNumThreads(1)
+    try:
+        steps = steps_of(job)
+        total = sum(WEIGHTS[step.name] for step in steps)
+        records: dict[str, StepRecord] = {}
+        behind = 0.0
+        for step in steps:
+            failed = step.name
+            part = _part_of(progress, behind / total, WEIGHTS[step.name] / total, step.name)
+            part(0.0, 1.0)
+            key = step_key(step, records, hashes)
+            record = read_record(job.folder / step.name)
+            if record is not None and is_current(job.folder / step.name, record, key, hashes):
+                kept.append(step.name)
+            else:
+                record = run_step(
+                    job.folder, step, key, hashes, progress=part, overwrite=job.overwrite
+                )
+                done.append(step.name)
+            records[step.name] = record
+            remarks += [f"{step.name}: {remark}" for remark in record.remarks]
+            behind += WEIGHTS[step.name]
+        failed = ""
+    except PhotogrammetryError as error:
+        message = str(error)
+    except MemoryError:
+        message = "not enough memory; give it fewer neighbours (--jobs) or a coarser gsd."
+    except OSError as error:
+        message = f"{error.filename or job.folder}: {error.strerror or error}."
+    except Exception as error:  # one pair's fault, whatever it is, must not stop the others
+        if os.environ.get("BIFOCAL_DEBUG"):
+            traceback.print_exc()
+        message = unforeseen_message(f"pair {job.name}, step {failed}", error)
+    finally:
+        cv2.setNumThreads(threads)
+        hashes.save()
+    return PairOutcome(
+        name=job.name, done=tuple(done), kept=tuple(kept), failed_step=failed, message=message,
+        remarks=tuple(remarks), seconds=time.perf_counter() - start,
+    )  # fmt: skip
+
+
+def _part_of(progress: Progress, start: float, share: float, step: str) -> Progress:
+    """Return a reporter for a part of a whole."""
+
+    def report(done: float, total: float, what: str = "") -> None:  # noqa: ARG001
+        progress(start + share * (done / total if total > 0 else 0.0), 1.0, step)
+
+    return report
+
+
+def _some(job: PairJob, *names: str) -> dict[str, Any]:
+    return {name: job.options[name] for name in names if name in job.options}
+
+
+def _align_step(job: PairJob) -> Step:
+    names = [key for key in job.options if key in ALIGN_OPTIONS]
+    files = {k: v for k, v in job.files.items() if k != "check"}
+    options = _some(job, *names)
+
+    def make(place: Path, progress: Progress) -> tuple[str, ...]:  # noqa: ARG001
+        out = place / job.pair_path.name
+        made = align_photos(
+            job.far, job.near, out, AlignOptions.from_given({**options, **files}),
+            picture=out.with_suffix("").with_suffix(".pair.png"),
+        )  # fmt: skip
+        return (*made.remarks, *made.pair.remarks)
+
+    photos = {"far": job.far, "near": job.near}
+    return Step(name="align", files={**photos, **files}, options=options, make=make)
+
+
+#: Options that go to the alignment.
+ALIGN_OPTIONS = (
+    "auto", "distance1", "distance2", "delta_d", "focal1", "focal2", "sensor_width",
+    "sensor_width1", "sensor_width2", "pixel_size", "pixel_size1", "pixel_size2", "wall", "length",
+    "horizontal", "vertical", "unit", "sigma_pick", "sigma_control", "sigma_distance",
+)  # fmt: skip
+
+
+def _photos(job: PairJob) -> dict[str, Path]:
+    return {"far": job.far, "near": job.near}
+
+
+def _relief_step(job: PairJob) -> Step:
+    options = _some(job, "quality", "bounds", "relief_gsd", "relief_range")
+
+    def make(place: Path, progress: Progress) -> tuple[str, ...]:
+        out = place / job.relief_path.name
+        task = ReliefJob(
+            out=out, preview=out.with_suffix(".png"), gsd=options.get("relief_gsd"),
+            bounds=_tuple(options.get("bounds")), quality=options.get("quality", "standard"),
+            relief_range=_tuple(options.get("relief_range")),
+        )  # fmt: skip
+        _, remarks = relief_of_pair(job.pair_path, task, progress=progress)
+        return remarks
+
+    return Step(name="relief", files=_photos(job), after=("align",), options=options, make=make)
+
+
+def _tuple(value: Any) -> Any:
+    return None if value is None else tuple(value)
+
+
+def _tables(job: PairJob) -> dict[str, Path]:
+    return {role: job.files[role] for role in ("control", "check") if role in job.files}
+
+
+def _points_step(job: PairJob) -> Step:
+    options = _some(job, "language", "unit")
+
+    def make(place: Path, progress: Progress) -> tuple[str, ...]:  # noqa: ARG001
+        pair = Pair.read(job.pair_path)
+        tables = {"control": None, **_tables(job)}
+        solution = solve_control(
+            job.pair_path, **tables, exchanged=is_exchanged(pair, job.far),
+            language=options.get("language", "en"), unit=options.get("unit", ""),
+        )  # fmt: skip
+        write_result(place / f"{job.title}_points.xlsx", solution)
+        return solution.remarks
+
+    return Step(name="points", files=_tables(job), after=("align",), options=options, make=make)
+
+
+def _ortho_task(job: PairJob, options: Mapping[str, Any]) -> OrthoTask:
+    return OrthoTask(
+        relief=job.relief_path, image=options.get("image", "1"), gsd=options.get("gsd"),
+        bounds=_tuple(options.get("bounds")), options=OrthoOptions(fill=options.get("fill", False)),
+    )  # fmt: skip
+
+
+def _ortho_step(job: PairJob) -> Step:
+    options = _some(job, "image", "gsd", "bounds", "fill")
+
+    def make(place: Path, progress: Progress) -> tuple[str, ...]:
+        out = place / f"{job.title}_ortho.tif"
+        task = _ortho_task(job, options)
+        return make_ortho(job.pair_path, out, task, progress=progress).remarks
+
+    return Step(
+        name="ortho", files=_photos(job), after=("align", "relief"), options=options, make=make
+    )
+
+
+def _drawing_step(job: PairJob) -> Step:
+    options = _some(job, "scale", "dpi", "paper", "image", "bounds", "fill", "sections", "contours")
+    control = {k: v for k, v in _tables(job).items() if k == "control"}
+
+    def make(place: Path, progress: Progress) -> tuple[str, ...]:
+        wish = DeliverTask(
+            scale=options.get("scale", 50.0), title=job.name, paper=options.get("paper"),
+            sections=tuple(options.get("sections", ())), interval=options.get("contours"),
+            **({"dpi": options["dpi"]} if "dpi" in options else {}),
+        )  # fmt: skip
+        task = _ortho_task(job, options)
+        return deliver(job.pair_path, place, task, wish, progress=progress).ortho.remarks
+
+    return Step(
+        name="drawing", files={**_photos(job), **control}, after=("align", "relief"),
+        options=options, make=make,
+    )  # fmt: skip
+
+
+def _report_step(job: PairJob, earlier: tuple[str, ...]) -> Step:
+    options = {"title": job.name} | _some(job, "language", "unit", "scale")
+    orthos = {"drawing": f"{job.title}.tif", "ortho": f"{job.title}_ortho.tif"}
+
+    def make(place: Path, progress: Progress) -> tuple[str, ...]:
+        ortho = next((job.folder / k / v for k, v in orthos.items() if k in earlier), None)
+        task = ReportTask(
+            title=job.name, language=options.get("language", "en"), unit=options.get("unit", ""),
+            scale=options.get("scale"), far=job.far,
+            relief=job.relief_path if "relief" in earlier else None,
+            ortho=ortho, **_tables(job),
+        )  # fmt: skip
+        outs = (place / f"{job.title}_report.html", place / f"{job.title}_report.pdf")
+        return write_report([job.pair_path], outs, [task], progress=progress)
+
+    files = {**_photos(job), **_tables(job)}
+    return Step(name="report", files=files, after=earlier, options=options, make=make)

@@ -1,0 +1,237 @@
+"""Steps whose results are kept: a folder per step, made anew only when what went in changed.
+
+A step works in a hidden folder beside its own; when all is written, a record of what went in and
+came out (`RECORD`) is added, and the folder takes the place of the old one by a rename. Killed at
+any moment, it leaves either the old folder or the new one.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import shutil
+import tempfile
+import time
+from collections.abc import Callable, Mapping
+from contextlib import suppress
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from photocore.cli import Progress
+from photocore.errors import InputError
+from photocore.jsonfile import to_text
+from photocore.provenance import FileHashes, file_hash, program, today
+
+FORMAT = "bifocal-step/1"
+#: The record of a step, in its folder.
+RECORD = ".made.json"
+_WRITING, _OLD = "-writing-", ".old"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Step:
+    """One piece of work with a folder of its own.
+
+    Attributes
+    ----------
+    name : str
+        Also that of the folder.
+    files : mapping of str to Path
+        The user's files that go in, by role.
+    after : tuple of str
+        Steps whose results go in.
+    options : mapping
+        What else decides the result; plain data.
+    make : callable
+        Writes into the folder it is given; returns remarks.
+    """
+
+    name: str
+    files: Mapping[str, Path]
+    after: tuple[str, ...] = ()
+    options: Mapping[str, Any] = field(default_factory=dict)
+    make: Callable[[Path, Progress], tuple[str, ...]]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StepRecord:
+    """What was made from what.
+
+    Attributes
+    ----------
+    key : str
+        Hash of all that went in.
+    outputs : mapping of str to str
+        Files of the folder and their SHA-256.
+    remarks : tuple of str
+    seconds : float
+        That it took.
+    """
+
+    key: str
+    outputs: Mapping[str, str]
+    remarks: tuple[str, ...] = ()
+    seconds: float = 0.0
+
+
+def step_key(step: Step, earlier: Mapping[str, StepRecord], hashes: FileHashes) -> str:
+    """Return the hash of everything that decides a step's result."""
+    content = {
+        "format": FORMAT,
+        "program": program(),
+        "step": step.name,
+        # By name as well: pair files and drawings speak of the files they were made from.
+        "files": {role: [path.name, hashes(path)] for role, path in step.files.items()},
+        "after": {name: dict(earlier[name].outputs) for name in step.after},
+        "options": dict(step.options),
+    }
+    text = json.dumps(json.loads(to_text(content)), sort_keys=True)
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def read_record(folder: Path) -> StepRecord | None:
+    """Return the record of a step's folder; None where there is none that can be read."""
+    with suppress(OSError, ValueError, KeyError, TypeError):
+        data = json.loads((folder / RECORD).read_text(encoding="utf-8"))
+        if data["format"] == FORMAT:
+            return StepRecord(
+                key=data["key"], outputs=data["outputs"], remarks=tuple(data["remarks"]),
+                seconds=data["seconds"],
+            )  # fmt: skip
+    return None
+
+
+def is_current(folder: Path, record: StepRecord | None, key: str, hashes: FileHashes) -> bool:
+    """Tell whether a folder holds, unchanged, what the step would make."""
+    if record is None or record.key != key:
+        return False
+    return not _changed_files(folder, record, hashes, missing_too=True)
+
+
+def run_step(
+    parent: Path,
+    step: Step,
+    key: str,
+    hashes: FileHashes,
+    *,
+    progress: Progress,
+    overwrite: bool = False,
+) -> StepRecord:
+    """Make a step's folder anew, whole or not at all, and return its record.
+
+    Raises
+    ------
+    InputError
+        If the folder holds files that this program did not write or that were changed since, and
+        ``overwrite`` is false.
+    """
+    folder = parent / step.name
+    old = read_record(folder)
+    if not overwrite:
+        _refuse_changed(folder, old, hashes)
+    start = time.perf_counter()
+    with suppress(FileExistsError):
+        parent.mkdir(parents=True)
+    place = Path(tempfile.mkdtemp(prefix=f".{step.name}{_WRITING}", dir=parent))
+    place.chmod(0o777 & ~_umask())
+    try:
+        remarks = step.make(place, progress)
+        outputs = {name.as_posix(): file_hash(place / name) for name in _files(place)}
+        record = StepRecord(
+            key=key, outputs=outputs, remarks=tuple(remarks),
+            seconds=time.perf_counter() - start,
+        )  # fmt: skip
+        _write_record(place, step, record, hashes)
+        _publish(place, folder, old)
+    finally:
+        shutil.rmtree(place, ignore_errors=True)
+    return record
+
+
+def clean(parent: Path) -> None:
+    """Remove what a killed run left half-written, and put back what it was about to replace."""
+    for left in parent.glob(f".*{_OLD}"):
+        folder = parent / left.name[1 : -len(_OLD)]
+        if folder.exists():
+            shutil.rmtree(left, ignore_errors=True)
+        else:
+            left.rename(folder)
+    for left in parent.glob(f".*{_WRITING}*"):
+        shutil.rmtree(left, ignore_errors=True)
+
+
+def _umask() -> int:
+    mask = os.umask(0)
+    os.umask(mask)
+    return mask
+
+
+def _files(folder: Path) -> list[Path]:
+    """Return the files of a folder, relative, without the record, in order."""
+    found = (path.relative_to(folder) for path in folder.rglob("*") if path.is_file())
+    return sorted(path for path in found if path.name != RECORD)
+
+
+def _changed_files(
+    folder: Path, record: StepRecord, hashes: FileHashes, *, missing_too: bool
+) -> list[str]:
+    changed = []
+    for name, digest in record.outputs.items():
+        path = folder / name
+        if not path.is_file():
+            if missing_too:
+                changed.append(name)
+        elif hashes(path) != digest:
+            changed.append(name)
+    return changed
+
+
+def _refuse_changed(folder: Path, record: StepRecord | None, hashes: FileHashes) -> None:
+    """Refuse to replace what is the user's: files not of our making, or changed since."""
+    if record is None:
+        if folder.is_dir() and any(folder.iterdir()):
+            raise InputError(
+                f"{folder}: holds files that this survey did not make; move them away, choose "
+                "another --out, or add --overwrite."
+            )
+        return
+    changed = _changed_files(folder, record, hashes, missing_too=False)
+    if changed:
+        raise InputError(
+            f"{folder / changed[0]}: was changed after it was made, and would now be made anew. "
+            "Move it away to keep it, or add --overwrite to lose the change."
+        )
+
+
+def _write_record(place: Path, step: Step, record: StepRecord, hashes: FileHashes) -> None:
+    data = {
+        "format": FORMAT,
+        "step": step.name,
+        "program": program(),
+        "date": today(),
+        "key": record.key,
+        "inputs": {role: [path.name, hashes(path)] for role, path in step.files.items()},
+        "after": list(step.after),
+        "options": dict(step.options),
+        "outputs": dict(record.outputs),
+        "remarks": list(record.remarks),
+        "seconds": round(record.seconds, 3),
+    }
+    (place / RECORD).write_text(to_text(data, indent=1) + "\n", encoding="utf-8")
+
+
+def _publish(place: Path, folder: Path, old: StepRecord | None) -> None:
+    """Put a finished folder in place of the old one; files the user added move over."""
+    aside = folder.with_name(f".{folder.name}{_OLD}")
+    if folder.exists():
+        known = set(old.outputs) if old else set()
+        for name in _files(folder):
+            if name.as_posix() not in known and not (place / name).exists():
+                (place / name).parent.mkdir(parents=True, exist_ok=True)
+                shutil.copy2(folder / name, place / name)
+        shutil.rmtree(aside, ignore_errors=True)
+        folder.rename(aside)
+    place.rename(folder)
+    shutil.rmtree(aside, ignore_errors=True)

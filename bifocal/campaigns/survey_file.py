@@ -1,0 +1,214 @@
+"""The survey file: pairs, lens files, control, products and scales in one readable TOML file."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from difflib import get_close_matches
+from pathlib import Path
+from typing import Any
+
+from bifocal.campaigns.pair_job import FILES, PRODUCTS, PairJob
+from bifocal.orthophotos.deliver_workflow import file_name
+from photocore.errors import InputError
+from photocore.textfile import read_text
+
+FORMAT = "bifocal-survey/1"
+
+
+def _number(value: Any) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float) or not 0 < value < 1e9:
+        raise ValueError("a number above zero")
+    return float(value)
+
+
+def _numbers(count: int) -> Callable[[Any], tuple[float, ...]]:
+    def check(value: Any) -> tuple[float, ...]:
+        good = isinstance(value, list) and len(value) == count
+        if not good or not all(
+            isinstance(v, int | float) and not isinstance(v, bool) and abs(v) < 1e9 for v in value
+        ):
+            raise ValueError(f"a list of {count} numbers")
+        return tuple(float(v) for v in value)
+
+    return check
+
+
+def _scale(value: Any) -> float:
+    if isinstance(value, str):
+        try:
+            value = float(value.removeprefix("1:"))
+        except ValueError:
+            value = None
+    try:
+        return _number(value)
+    except ValueError:
+        raise ValueError('a scale, "1:50" or 50') from None
+
+
+def _choice(*words: str) -> Callable[[Any], str]:
+    def check(value: Any) -> str:
+        if str(value) not in words:
+            raise ValueError(f"one of {', '.join(words)}")
+        return str(value)
+
+    return check
+
+
+def _truth(value: Any) -> bool:
+    if not isinstance(value, bool):
+        raise ValueError("true or false")
+    return value
+
+
+def _words(value: Any) -> tuple[str, ...]:
+    if not isinstance(value, list) or not all(isinstance(word, str) for word in value):
+        raise ValueError("a list of texts")
+    return tuple(value)
+
+
+#: Every option of a pair, and what reads it; lengths in metres, picks in pixels.
+OPTIONS: Mapping[str, Callable[[Any], Any]] = {
+    "scale": _scale,
+    "dpi": _number,
+    "paper": _choice("A4", "A3", "A2", "A1", "A0"),
+    "language": _choice("en", "it", "de"),
+    "image": _choice("1", "2", "both"),
+    "quality": _choice("fast", "standard", "best"),
+    "bounds": _numbers(4),
+    "relief_range": _numbers(2),
+    "relief_gsd": _number,
+    "gsd": _number,
+    "fill": _truth,
+    "sections": _words,
+    "contours": _number,
+    "auto": _truth,
+    "unit": _choice("m", "cm", "mm"),
+    "wall": _numbers(2),
+    "length": _numbers(5),
+    "horizontal": _numbers(4),
+    "vertical": _numbers(4),
+} | dict.fromkeys(
+    (
+        "distance1", "distance2", "delta_d", "focal1", "focal2", "sensor_width", "sensor_width1",
+        "sensor_width2", "pixel_size", "pixel_size1", "pixel_size2", "sigma_pick", "sigma_control",
+        "sigma_distance",
+    ),
+    _number,
+)  # fmt: skip
+
+
+def read_survey_file(
+    path: Path, *, out: Path | None = None, overwrite: bool = False
+) -> list[PairJob]:
+    """Return the pairs of a survey file, everything in it checked.
+
+    Parameters
+    ----------
+    path : Path
+        TOML; files in it are relative to it. What stands above the first ``[[pair]]`` holds for
+        every pair that does not say otherwise.
+    out : Path, optional
+        Folder of the results; default ``out`` of the file, else ``results`` beside it.
+    overwrite : bool
+        Of every job.
+
+    Raises
+    ------
+    InputError
+        Naming everything that is wrong at once.
+    """
+    data = _parsed(path)
+    faults: list[str] = []
+    pairs = data.pop("pair", None)
+    for key in ("format", "name"):
+        data.pop(key, None)
+    folder = out or path.parent / str(data.pop("out", "results"))
+    data.pop("out", None)
+    if not isinstance(pairs, list) or not pairs:
+        raise InputError(f"{path}: has no [[pair]]; add one with name, far and near.")
+    common = _entries(data, path.parent, "above the pairs", faults)
+    jobs = []
+    for number, entry in enumerate(pairs, start=1):
+        where = f"pair {entry.get('name', number)}" if isinstance(entry, dict) else f"pair {number}"
+        if not isinstance(entry, dict):
+            faults.append(f"{where}: is no table; write [[pair]].")
+            continue
+        job = _job(entry, number, common, (path.parent, folder), where, faults)
+        if job is not None:
+            jobs.append(replace(job, overwrite=overwrite))
+    folders = [job.folder.name.casefold() for job in jobs]
+    for job in jobs:
+        if folders.count(job.folder.name.casefold()) > 1:
+            faults.append(f"pair {job.name}: another pair has the same name; give each its own.")
+    if faults:
+        raise InputError("\n".join(f"{path}: {fault}" for fault in dict.fromkeys(faults)))
+    return jobs
+
+
+def _parsed(path: Path) -> dict[str, Any]:
+    text = read_text(path, "survey file", form=" (TOML)")
+    try:
+        data = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise InputError(f"{path}: is not valid TOML: {error}.") from None
+    if data.get("format", FORMAT) != FORMAT:
+        raise InputError(
+            f"{path}: format {data['format']!r} is not known; this program reads {FORMAT}."
+        )
+    return data
+
+
+def _entries(
+    data: Mapping[str, Any], base: Path, where: str, faults: list[str]
+) -> dict[str, dict[str, Any]]:
+    """Return files, options and products of a table, noting what is wrong."""
+    found: dict[str, dict[str, Any]] = {"files": {}, "options": {}, "products": {}}
+    for key, value in data.items():
+        if key in FILES:
+            if isinstance(value, str) and value:
+                found["files"][key] = base / value
+            elif value != "":
+                faults.append(f"{where}: {key} = {value!r}: expected the name of a file.")
+        elif key == "products":
+            if not isinstance(value, list) or set(map(str, value)) - set(PRODUCTS):
+                faults.append(f"{where}: products: expected some of {', '.join(PRODUCTS)}.")
+            else:
+                found["products"][key] = tuple(name for name in PRODUCTS if name in value)
+        elif key in OPTIONS:
+            try:
+                found["options"][key] = OPTIONS[key](value)
+            except ValueError as error:
+                faults.append(f"{where}: {key} = {value!r}: expected {error}.")
+        else:
+            near = get_close_matches(key, [*OPTIONS, *FILES, "products"], n=1)
+            hint = f" Did you mean {near[0]}?" if near else ""
+            faults.append(f"{where}: there is no key {key!r}.{hint}")
+    return found
+
+
+def _job(
+    entry: Mapping[str, Any],
+    number: int,
+    common: Mapping[str, dict[str, Any]],
+    folders: tuple[Path, Path],
+    where: str,
+    faults: list[str],
+) -> PairJob | None:
+    base, out = folders
+    rest = {key: value for key, value in entry.items() if key not in ("name", "far", "near")}
+    own = _entries(rest, base, where, faults)
+    photos = [entry.get(key) for key in ("far", "near")]
+    if not all(isinstance(photo, str) and photo for photo in photos):
+        faults.append(f"{where}: far and near must name its two photos.")
+        return None
+    name = str(entry.get("name") or f"pair {number}")
+    far, near = (base / str(photo) for photo in photos)
+    products = own["products"].get("products") or common["products"].get("products")
+    return PairJob(
+        name=name, folder=out / file_name(name), far=far, near=near,
+        files={**common["files"], **own["files"]},
+        options={**common["options"], **own["options"]},
+        **({"products": products} if products else {}),
+    )  # fmt: skip

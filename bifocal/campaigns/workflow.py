@@ -1,0 +1,335 @@
+"""A survey file or two photos in; every product of every pair out."""
+
+from __future__ import annotations
+
+import os
+import socket
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from bifocal.campaigns.pair_job import FILES, PRODUCTS, PairJob, PairOutcome, plan_of
+from bifocal.campaigns.photo_pairing import pair_photos, write_survey_file
+from bifocal.campaigns.step_store import clean
+from bifocal.campaigns.worker_pool import Listener, run_here
+from photocore.cli import Progress, no_progress
+from photocore.errors import InputError
+from photocore.output import check_writable
+from photocore.provenance import FileHashes
+
+#: File that says which process works in a folder.
+LOCK = ".survey.lock"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Machines:
+    """Where pairs are computed.
+
+    Attributes
+    ----------
+    jobs : int, optional
+        Pairs at once on this machine; default its cores.
+    memory : float, optional
+        For all of them; default most of what is free. [GiB]
+    scheduler : str
+        Address of a Dask scheduler; empty: this machine.
+    """
+
+    jobs: int | None = None
+    memory: float | None = None
+    scheduler: str = ""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SurveyResult:
+    """What became of a survey.
+
+    Attributes
+    ----------
+    outcomes : tuple of PairOutcome
+        In the order of the survey.
+    seconds : float
+    """
+
+    outcomes: tuple[PairOutcome, ...]
+    seconds: float
+
+    @property
+    def failed(self) -> tuple[PairOutcome, ...]:
+        """Pairs that did not come to their end."""
+        return tuple(outcome for outcome in self.outcomes if outcome.failed_step)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return it as plain data."""
+        pairs = [outcome.to_dict() for outcome in self.outcomes]
+        return {"pairs": pairs, "failed": len(self.failed), "seconds": self.seconds}
+
+    def lines(self) -> list[str]:
+        """Return what was made, and what failed and how to mend it, for people."""
+        made = sum(bool(outcome.done) and not outcome.failed_step for outcome in self.outcomes)
+        kept = len(self.outcomes) - made - len(self.failed)
+        lines = [
+            f"{len(self.outcomes)} pairs: {made} made, {kept} kept as they were, "
+            f"{len(self.failed)} failed; {_duration(self.seconds)}."
+        ]
+        for outcome in self.failed:
+            lines += ["", f"{outcome.name}, failed at {outcome.failed_step}:"]
+            lines.append(f"  {outcome.message}")
+        return lines
+
+
+def _duration(seconds: float) -> str:
+    """Return a time in words.
+
+    Examples
+    --------
+    >>> _duration(42), _duration(150), _duration(7300)
+    ('42 s', '2 min', '2 h 2 min')
+    """
+    minutes = int(seconds // 60)
+    if minutes < 2:
+        return f"{seconds:.0f} s"
+    return f"{minutes} min" if minutes < 120 else f"{minutes // 60} h {minutes % 60} min"
+
+
+def begin_survey(
+    out: Path, folder: Path, *, overwrite: bool = False, progress: Progress = no_progress
+) -> tuple[int, int]:
+    """Write a survey file from a folder of photos; return how many pairs, and photos in none.
+
+    Raises
+    ------
+    InputError
+        If no photos make a pair, or the file cannot be written.
+    """
+    check_writable(out, overwrite=overwrite)
+    pairs, left = pair_photos(folder, progress=progress)
+    write_survey_file(out, folder, pairs, left, overwrite=overwrite)
+    return len(pairs), len(left)
+
+
+def plan_survey(jobs: Sequence[PairJob]) -> list[tuple[str, str, str]]:
+    """Return (pair, step, ``keep``, ``make`` or what stands against it), doing nothing."""
+    rows = []
+    for job in jobs:
+        hashes = FileHashes(job.folder / ".hashes.json")
+        rows += [(job.name, step, what) for step, what in plan_of(job, hashes)]
+    return rows
+
+
+def run_survey(
+    jobs: Sequence[PairJob],
+    *,
+    machines: Machines = Machines(),
+    progress: Progress = no_progress,
+    tell: Callable[[str], None] | None = None,
+) -> SurveyResult:
+    """Make the products of every pair; what is there already and still good is kept.
+
+    One pair's failure stops no other; stopped at any moment, it goes on from there when called
+    again. ``tell`` is given a line for every pair that ends.
+
+    Raises
+    ------
+    InputError
+        If another process works on the same folders, or the cluster cannot be used.
+    """
+    start = time.perf_counter()
+    listener = _Count(jobs, progress, tell)
+    with _locked([job.folder for job in jobs]):
+        for job in jobs:
+            clean(job.folder)
+        waiting = [job for job in jobs if not _kept(job, listener)]
+        try:
+            for _ in _running(waiting, machines, listener):
+                pass
+        finally:
+            for job in waiting:
+                clean(job.folder)
+    outcomes = {outcome.name: outcome for outcome in listener.outcomes}
+    return SurveyResult(
+        outcomes=tuple(outcomes[job.name] for job in jobs), seconds=time.perf_counter() - start
+    )
+
+
+def _running(
+    jobs: Sequence[PairJob], machines: Machines, listener: Listener
+) -> Iterator[PairOutcome]:
+    if not jobs:
+        return iter(())
+    if machines.scheduler:
+        from bifocal.campaigns.dask_cluster import run_on_cluster
+
+        return run_on_cluster(machines.scheduler, jobs, listener)
+    memory = None if machines.memory is None else int(machines.memory * (1 << 30))
+    return run_here(jobs, listener, most=machines.jobs, memory=memory)
+
+
+def _kept(job: PairJob, listener: Listener) -> bool:
+    """Tell the listener of a pair of which nothing has to be made; no process is started for it."""
+    hashes = FileHashes(job.folder / ".hashes.json")
+    plan = plan_of(job, hashes)
+    hashes.save()
+    if any(what != "keep" for _, what in plan):
+        return False
+    listener.ended(PairOutcome(name=job.name, kept=tuple(step for step, _ in plan)))
+    return True
+
+
+class _Count(Listener):
+    """Adds up how far all pairs are, tells of each that ends, and keeps what became of them."""
+
+    def __init__(
+        self, jobs: Sequence[PairJob], progress: Progress, tell: Callable[[str], None] | None
+    ) -> None:
+        self.shares: dict[str, float] = dict.fromkeys((job.name for job in jobs), 0.0)
+        self.progress, self.tell = progress, tell
+        self.outcomes: list[PairOutcome] = []
+        self.start, self.kept = time.perf_counter(), 0
+
+    def moved(self, name: str, share: float, step: str) -> None:
+        """Add up."""
+        self.shares[name] = share
+        self.progress(sum(self.shares.values()), len(self.shares), f"{name}: {step}")
+
+    def ended(self, outcome: PairOutcome) -> None:
+        """Keep it, and tell of it with the time that is left."""
+        self.shares[outcome.name] = 1.0
+        self.outcomes.append(outcome)
+        self.progress(sum(self.shares.values()), len(self.shares), outcome.name)
+        self.kept += not outcome.done and not outcome.failed_step
+        if self.tell is None or not (outcome.done or outcome.failed_step):
+            return
+        what = f"FAILED at {outcome.failed_step}" if outcome.failed_step else "made"
+        total = len(self.shares) - self.kept
+        behind = sum(self.shares.values()) - self.kept
+        left = (time.perf_counter() - self.start) * (total - behind) / max(behind, 1e-3)
+        rest = f"; about {_duration(left)} left" if behind < total else ""
+        self.tell(
+            f"[{len(self.outcomes)}/{len(self.shares)}] {outcome.name}: {what} in "
+            f"{_duration(outcome.seconds)}{rest}"
+        )
+
+
+@contextmanager
+def _locked(folders: Sequence[Path]) -> Iterator[None]:
+    """Keep other processes out of folders; a lock whose process is gone counts for nothing."""
+    mine = f"{socket.gethostname()} {os.getpid()}"
+    taken: list[Path] = []
+    try:
+        for folder in folders:
+            try:
+                folder.mkdir(parents=True, exist_ok=True)
+                path = folder / LOCK
+                if path.exists() and _is_alive(path):
+                    raise InputError(
+                        f"{folder}: another run works on it ({path.read_text('utf-8').strip()}). "
+                        f"Wait for it; if there is none, delete {path}."
+                    )
+                path.write_text(mine, encoding="utf-8")
+            except OSError as error:
+                raise InputError(
+                    f"{folder}: cannot be written to ({error.strerror or error})."
+                ) from error
+            taken.append(path)
+        yield
+    finally:
+        for path in taken:
+            with suppress(OSError):
+                path.unlink()
+
+
+def _is_alive(lock: Path) -> bool:
+    """Tell whether the process that wrote a lock may still run."""
+    try:
+        host, number = lock.read_text(encoding="utf-8").split()
+        if host != socket.gethostname():
+            return True  # who knows
+        # Windows has no way to ask without harm: there a lock of this machine counts for nothing.
+        if int(number) == os.getpid() or os.name == "nt":
+            return False
+        os.kill(int(number), 0)
+    except (ValueError, ProcessLookupError):
+        return False
+    except OSError:
+        return True
+    return True
+
+
+def facade_job(
+    far: Path,
+    near: Path,
+    out: Path,
+    *,
+    name: str = "",
+    given: Mapping[str, Any] | None = None,
+    products: tuple[str, ...] | None = None,
+    overwrite: bool = False,
+) -> PairJob:
+    """Return the survey of one pair: everything a façade drawing needs, into one folder.
+
+    Parameters
+    ----------
+    far, near : Path
+        Photos.
+    out : Path
+        Folder; each step gets one in it.
+    name : str
+        Title; default that of the folder.
+    given : mapping
+        Files and options by the names of the survey file; None and False count as not given.
+    products : tuple of str, optional
+        Of `PRODUCTS`.
+    overwrite : bool
+        Replace files changed since they were made.
+
+    Raises
+    ------
+    InputError
+        If the folder is a file, a product is unknown, or nothing says how to set the pair up.
+    """
+    if out.exists() and not out.is_dir():
+        raise InputError(f"{out}: is a file; name a folder with --out.")
+    unknown = [product for product in products or () if product not in PRODUCTS]
+    if unknown:
+        raise InputError(f"--products: {unknown[0]!r} is none of {', '.join(PRODUCTS)}.")
+    said = {key: value for key, value in (given or {}).items() if value not in (None, False)}
+    return PairJob(
+        name=name or out.resolve().name,
+        folder=out,
+        far=far,
+        near=near,
+        files={role: path for role, path in said.items() if role in FILES},
+        options={key: value for key, value in said.items() if key not in FILES},
+        **({"products": tuple(p for p in PRODUCTS if p in products)} if products else {}),
+        overwrite=overwrite,
+    )
+
+
+def facade(
+    job: PairJob, *, machines: Machines = Machines(), progress: Progress = no_progress
+) -> PairOutcome:
+    """Survey one pair; see `run_survey`.
+
+    Raises
+    ------
+    InputError
+        Where a step fails: with what it said. What was made before stays and counts.
+    """
+    outcome = run_survey([job], machines=machines, progress=progress).outcomes[0]
+    if outcome.failed_step:
+        raise InputError(outcome.message)
+    return outcome
+
+
+def facade_lines(job: PairJob, outcome: PairOutcome) -> list[str]:
+    """Return what was made where, for people."""
+    lines = []
+    for step in (*outcome.kept, *outcome.done):
+        names = sorted(path.name for path in (job.folder / step).iterdir() if path.name[0] != ".")
+        kept = " (kept)" if step in outcome.kept else ""
+        lines.append(f"{job.folder / step}{kept}: {', '.join(names)}")
+    return lines

@@ -1,0 +1,82 @@
+"""``bifocal facade``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import click
+
+from photocore.cli import print_result, progress_bar
+from photocore.options import (
+    FILE,
+    Length,
+    Names,
+    Scale,
+    as_json,
+    bounds,
+    choice,
+    number,
+    overwrite,
+)  # fmt: skip
+
+EXAMPLE = """\b
+Examples:
+  bifocal facade far.jpg near.jpg --control points.csv --scale 1:50 --out wall
+  bifocal facade far.jpg near.jpg --control points.csv --check check.csv --scale 1:20 --out wall
+  bifocal facade far.jpg near.jpg --auto --distance1 17.5 --scale 1:100 --language de --out wall
+"""
+
+
+@click.command(epilog=EXAMPLE)
+@click.argument("far", type=FILE)
+@click.argument("near", type=FILE)
+@click.option("--out", type=FILE, required=True, metavar="DIR", help="Folder of the results.")
+@click.option("--control", type=FILE, help="Table of control points: id, X, Y, r [m] and pixels.")
+@click.option(
+    "--check", type=FILE,
+    help="Table of independent check points, like --control: the accuracy is judged by them.",
+)  # fmt: skip
+@click.option("--scale", type=Scale(), default="1:50", show_default=True, help="Of the drawing.")
+@click.option("--name", default="", help="Title.  [default: the folder's name]")
+@choice("--language", "en|it|de", "Of report and workbook.", default="en")
+@click.option("--lens", type=FILE, help="Lens file of both photos.")
+@click.option("--lens1", type=FILE, help="Lens file of the far photo.")
+@click.option("--lens2", type=FILE, help="Lens file of the near photo.")
+@click.option("--lengths", type=FILE, help="Table of taped lengths: from, to, length [m].")
+@click.option("--auto", is_flag=True, help="Without control points: from the photos alone.")
+@number("--distance1", "M", "Far camera to the wall [m].")
+@number("--distance2", "M", "Near camera to the wall [m].")
+@number("--focal1", "MM", "Focal length, far photo [mm].  [default: EXIF]")
+@number("--focal2", "MM", "Focal length, near photo [mm].  [default: EXIF]")
+@number("--sensor-width", "MM", "Longer side of the sensor, both photos [mm].")
+@choice("--unit", "m|cm|mm", "Unit of the coordinates.  [default: the headings', else m]")
+@choice("--quality", "fast|standard|best", "Of the relief map.  [default: standard]")
+@bounds("Part of the wall [m].  [default: all that is known]")
+@click.option("--relief-gsd", type=Length(above=0), help="Pixel of the relief map [m].")
+@choice("--paper", "A4|A3|A2|A1|A0", "Sheet of paper.  [default: the smallest that fits]")
+@click.option(
+    "--products", type=Names(), metavar="NAME,NAME,...",
+    help="Of relief, points, ortho, drawing, report.  [default: all but ortho, which the drawing "
+    "has]",
+)  # fmt: skip
+@overwrite
+@as_json
+def command(
+    far: Path, near: Path, out: Path, name: str, products: tuple[str, ...] | None, overwrite: bool,
+    as_json: bool, **given: Any,
+) -> None:  # fmt: skip
+    """Make everything a façade needs from two photos and one table of control points.
+
+    The pair is set up, the relief measured, the points solved, orthophoto and drawings made to
+    scale, and a report written; each step into a folder of its own within DIR. Run it again, and
+    only what changed is made anew; stopped, it goes on where it was.
+    """
+    from bifocal.campaigns.workflow import facade, facade_job, facade_lines
+
+    job = facade_job(far, near, out, name=name, given=given, products=products, overwrite=overwrite)
+    with progress_bar("facade", quiet=as_json) as progress:
+        outcome = facade(job, progress=progress)
+    print_result(
+        outcome.to_dict(), facade_lines(job, outcome), as_json=as_json, remarks=outcome.remarks
+    )

@@ -1,0 +1,76 @@
+"""``bifocal survey``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from photocore.cli import print_json, print_result, progress_bar, remark, tell_written, text_table
+from photocore.options import FILE, Number, as_json, number, overwrite
+
+EXAMPLE = """\b
+Examples:
+  bifocal survey --init photos street.toml
+  bifocal survey street.toml --dry-run
+  bifocal survey street.toml --jobs 4 --memory 12
+  bifocal survey street.toml --scheduler tcp://192.168.0.10:8786
+"""
+
+
+@click.command(epilog=EXAMPLE)
+@click.argument("survey", type=FILE)
+@click.option(
+    "--init", "folder", type=FILE, metavar="DIR", help="Write SURVEY from a folder of photos."
+)
+@click.option("--dry-run", is_flag=True, help="Show what would be made and what is kept.")
+@click.option(
+    "--out", type=FILE, metavar="DIR", help="Folder of the results.  [default: the file's]"
+)
+@number("--jobs", "N", "Pairs at once.  [default: cores]", type=Number(least=1, whole=True))
+@number("--memory", "GIB", "For all pairs at work.  [default: 80 % of what is free]")
+@click.option(
+    "--scheduler", default="", metavar="tcp://...",
+    help="Address of a Dask scheduler whose workers see the same folders.",
+)  # fmt: skip
+@overwrite
+@as_json
+@click.pass_context
+def command(
+    ctx: click.Context, survey: Path, folder: Path | None, dry_run: bool, out: Path | None,
+    jobs: int | None, memory: float | None, scheduler: str, overwrite: bool, as_json: bool,
+) -> None:  # fmt: skip
+    """Survey many pairs: alignment, relief, points, drawings and report of each.
+
+    SURVEY is a TOML file that names the pairs, their control and what is wanted of them. Only
+    what changed is made anew; stopped or killed at any moment, it goes on where it was. A pair
+    that fails stops no other; a table at the end says what failed and how to mend it.
+    """
+    from bifocal.campaigns.survey_file import read_survey_file
+    from bifocal.campaigns.workflow import Machines, begin_survey, plan_survey, run_survey
+
+    if folder is not None:
+        with progress_bar("photos", quiet=as_json) as progress:
+            found, left = begin_survey(survey, folder, overwrite=overwrite, progress=progress)
+        tell_written(survey)
+        print_result(
+            {"pairs": found, "left": left}, [f"{found} pairs; {left} photos in none."],
+            as_json=as_json,
+        )  # fmt: skip
+        return
+    pairs = read_survey_file(survey, out=out, overwrite=overwrite)
+    if dry_run:
+        plan = plan_survey(pairs)
+        if as_json:
+            print_json(
+                {"plan": [dict(zip(("pair", "step", "what"), row, strict=True)) for row in plan]}
+            )
+        else:
+            click.echo(text_table(["pair", "step", "what"], plan))
+        return
+    machines = Machines(jobs=jobs, memory=memory, scheduler=scheduler)
+    with progress_bar("survey", quiet=as_json) as progress:
+        result = run_survey(pairs, machines=machines, progress=progress, tell=remark)
+    print_result(result.to_dict(), result.lines(), as_json=as_json)
+    if result.failed:
+        ctx.exit(1)

@@ -1,0 +1,1 @@
+"""Reports: what was measured, with which geometry, and how good it is."""

@@ -1,0 +1,117 @@
+"""The first thing a report says: how accurate the survey is, and which drawings it is good for."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from bifocal.reports.content import PairContent
+from bifocal.reports.document import Banner, Block, Paragraph, TextTable
+from bifocal.reports.words import Words
+from bifocal.survey.reference import CheckResult
+from bifocal.survey.tolerances import SCALES, Verdict
+
+#: Points shown in a table; the workbook has them all.
+MOST_POINTS = 60
+
+
+def accuracy_blocks(content: PairContent, say: Words) -> Iterator[Block]:
+    """Yield the verdict, its table per drawing scale, and the compared points."""
+    solution = content.solution
+    check = None if solution is None else solution.check
+    if check is None or not np.isfinite(check.accuracy):
+        yield Banner(text=say("verdict_none"))
+        return
+    yield _banner(content, check, say)
+    yield _verdict_table(check.verdicts, say)
+    yield _point_table(content, check, say)
+    hidden = int(np.isfinite(check.errors).any(axis=1).sum()) - MOST_POINTS
+    if hidden > 0:
+        yield Paragraph(text=say("more_points", n=hidden), small=True)
+    errors = content.map_errors()
+    if len(errors):
+        rmse, median = float(np.sqrt(np.mean(errors**2))), float(np.median(np.abs(errors)))
+        yield Paragraph(
+            text=say("map_check", n=len(errors), rmse=millimetres(rmse), median=millimetres(median))
+        )
+
+
+def millimetres(length: float | None) -> str:
+    """Return a length in millimetres with three digits.
+
+    Examples
+    --------
+    >>> millimetres(0.00345), millimetres(0.0123), millimetres(None)
+    ('3.45 mm', '12.3 mm', '-')
+    """
+    if length is None or not np.isfinite(length):
+        return "-"
+    value = 1000 * length
+    digits = max(0, 2 - int(np.floor(np.log10(max(abs(value), 0.01)))))
+    return f"{value:.{min(digits, 3)}f} mm"
+
+
+def _banner(content: PairContent, check: CheckResult, say: Words) -> Banner:
+    count = int(np.isfinite(check.errors).any(axis=1).sum())
+    key = "verdict_check" if content.has_check else "verdict_control"
+    main = [verdict for verdict in check.verdicts if verdict.rule == check.verdicts[0].rule]
+    held = [verdict.scale for verdict in main if verdict.holds]
+    details = [say("good_for", scale=min(held)) if held else say("good_for_none")]
+    scale, good = content.task.scale, bool(held)
+    if scale:
+        limit = main[0].rule.tolerance(round(scale))
+        good = limit is not None and check.accuracy <= limit
+        details.append(say("wanted_yes" if good else "wanted_no", scale=f"{scale:g}"))
+    return Banner(
+        text=say(key, accuracy=millimetres(check.accuracy), n=count), details=tuple(details),
+        good=good,
+    )  # fmt: skip
+
+
+def _verdict_table(verdicts: tuple[Verdict, ...], say: Words) -> TextTable:
+    rules = list(dict.fromkeys(verdict.rule.key for verdict in verdicts))
+    names = {verdict.rule.key: verdict.rule.name for verdict in verdicts}
+    found = {(verdict.scale, verdict.rule.key): verdict for verdict in verdicts}
+    rows = []
+    for scale in SCALES:
+        cells = []
+        for rule in rules:
+            verdict = found.get((scale, rule))
+            word = "" if verdict is None else say("holds" if verdict.holds else "fails")
+            cells.append("-" if verdict is None else f"{verdict.tolerance * 1000:.3g} mm: {word}")
+        rows.append([f"1:{scale}", *cells])
+    return TextTable(
+        headings=[say("scale"), *(names[rule] for rule in rules)], rows=rows,
+        caption=say("rule_table"),
+    )  # fmt: skip
+
+
+def _point_table(content: PairContent, check: CheckResult, say: Words) -> TextTable:
+    solution = content.solution
+    assert solution is not None
+    table, control = solution.table, content.control_ids
+    place = {name: row for row, name in enumerate(table.ids)}
+    headings = [
+        say("point"), say("kind"), "X [m]", "Y [m]", "r [m]", "dX [mm]", "dY [mm]", "dr [mm]",
+        "σr [mm]", say("flag"),
+    ]  # fmt: skip
+    rows = []
+    compared = np.isfinite(check.errors).any(axis=1)
+    for index in np.flatnonzero(compared)[:MOST_POINTS].tolist():
+        name = check.ids[index]
+        row = place[name]
+        rows.append([
+            name, say("kind_control" if name in control else "kind_check"),
+            *(_number(v, 3) for v in check.solved[index]),
+            *(_number(1000 * v, 1) for v in check.errors[index]),
+            _number(1000 * table["sigma_r"][row], 1), table.flags[row],
+        ])  # fmt: skip
+    for key, name in (("rmse", "rmse"), ("mean", "mean"), ("max_abs", "max")):
+        values = [1000 * getattr(check.axes[axis], key) for axis in "XYZ"]
+        rows.append([say(name), "", "", "", "", *(_number(v, 1) for v in values), "", ""])
+    return TextTable(headings=headings, rows=rows, caption=say("check_table"))
+
+
+def _number(value: float, digits: int) -> str:
+    return f"{value:.{digits}f}" if np.isfinite(value) else "-"

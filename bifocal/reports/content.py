@@ -1,0 +1,229 @@
+"""What a report tells of one pair, gathered from its files."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+
+from bifocal.files.geotiff import RasterReader, read_relief
+from bifocal.files.images import read_image, to_eight_bit
+from bifocal.files.strips import ROWS, colour_strips
+from bifocal.model.grid import Bounds
+from bifocal.model.pair import Pair, Photo
+from bifocal.model.relief_map import Quality, ReliefMap
+from bifocal.reports.control_survey import is_exchanged, solve_control
+from bifocal.survey.workflow import SolvedSurvey, solve
+from photocore.arrays import BoolArray, ByteArray, FloatArray
+from photocore.errors import InputError
+
+#: Longer side of pictures in a report. [px]
+SIDE = 1000
+_WORKBOOKS = {".xlsx", ".xlsm", ".ods", ".csv"}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ReportTask:
+    """What a report of one pair is made from besides its pair file or workbook.
+
+    Attributes
+    ----------
+    title : str
+        Empty: the name of the file.
+    language : str
+    scale : float, optional
+        1:scale that was asked for.
+    control, check : Path, optional
+        Tables of control points and of independent check points.
+    unit : str
+        Of their coordinates; empty: as the headings say.
+    far : Path, optional
+        Photo that the tables call the far one.
+    relief, ortho : Path, optional
+        Relief map and orthophoto.
+    """
+
+    title: str = ""
+    language: str = "en"
+    scale: float | None = None
+    control: Path | None = None
+    check: Path | None = None
+    unit: str = ""
+    far: Path | None = None
+    relief: Path | None = None
+    ortho: Path | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class SeenPhoto:
+    """A photo made small: its pixels, the full size [px], and pixels per pixel of the picture."""
+
+    photo: Photo
+    picture: ByteArray
+    size: tuple[int, int]
+    reduction: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class PairContent:
+    """What is known of a pair.
+
+    Attributes
+    ----------
+    task : ReportTask
+    pair : Pair
+    source : Path
+        Pair file or workbook.
+    setup : mapping
+        Diagnostics that `align` left in the pair file; empty without.
+    solution : SolvedSurvey or None
+        Points measured, and what they were compared with.
+    photos : tuple of SeenPhoto
+        Far and near one; empty where there are no files.
+    relief : ReliefMap or None
+    ortho : (picture, bounds) or None
+    ortho_gsd : float
+        Pixel of the orthophoto. [m]
+    """
+
+    task: ReportTask
+    pair: Pair
+    source: Path
+    setup: Mapping[str, Any]
+    solution: SolvedSurvey | None
+    photos: tuple[SeenPhoto, ...]
+    relief: ReliefMap | None
+    ortho: tuple[ByteArray, Bounds] | None
+    ortho_gsd: float
+
+    @property
+    def title(self) -> str:
+        """Title of its part of the report."""
+        return self.task.title or str(self.pair.extra.get("name") or self.source.name.split(".")[0])
+
+    @property
+    def control_ids(self) -> frozenset[str]:
+        """Points that the orientation rests on."""
+        return frozenset(row["id"] for row in self.setup.get("control", ()) if row.get("used"))
+
+    @property
+    def has_check(self) -> bool:
+        """Whether the points compared took no part in the orientation."""
+        if self.solution is None:
+            return False
+        compared = np.asarray(np.isfinite(self.solution.check.errors).any(axis=1))
+        ids = (
+            name for name, is_one in zip(self.solution.check.ids, compared, strict=True) if is_one
+        )
+        return not self.control_ids.intersection(ids)
+
+    def map_errors(self) -> FloatArray:
+        """Return map minus known relief at measured pixels of the compared points. [m]"""
+        if self.relief is None or self.solution is None:
+            return np.zeros(0)
+        known = self.solution.known
+        xyz = known.xyz[known.used]
+        xyz = xyz[np.asarray(np.isfinite(xyz).all(axis=1))]
+        inside = self._measured(xyz[:, :2])
+        errors: FloatArray = (self.relief.sample(xyz[:, :2]) - xyz[:, 2])[inside]
+        return errors[np.isfinite(errors)]
+
+    def _measured(self, positions: FloatArray) -> BoolArray:
+        """Tell which positions lie on measured pixels of the relief map."""
+        assert self.relief is not None
+        pixels = np.rint(self.relief.grid.pixel_of(positions)).astype(int)
+        height, width = self.relief.shape
+        inside = np.asarray(((pixels >= 0) & (pixels < [width, height])).all(axis=1))
+        column, row = np.where(inside[:, None], pixels, 0).T
+        return np.asarray(inside & (self.relief.quality[row, column] == Quality.MEASURED))
+
+
+def read_content(source: Path, task: ReportTask) -> PairContent:
+    """Return what a pair file or a solved workbook and the task's files tell.
+
+    Raises
+    ------
+    InputError
+        If a file is missing or is not what it should be.
+    """
+    solution: SolvedSurvey | None = None
+    if source.suffix.lower() in _WORKBOOKS:
+        if task.control or task.check:
+            raise InputError(
+                f"{source}: brings its own check points (sheet Check); --control and --check go "
+                "with a pair file."
+            )
+        solution = solve(source)
+        pair = solution.pair
+        setup: Any = pair.extra.get("setup")
+        if solution.pair_path is not None:
+            setup = Pair.read(solution.pair_path).extra.get("setup")
+            pair = _with_photos(pair, solution.pair_path)
+    else:
+        pair = Pair.read(source)
+        setup = pair.extra.get("setup")
+        if task.control or task.check:
+            exchanged = task.far is not None and is_exchanged(pair, task.far)
+            solution = solve_control(
+                source, control=task.control, check=task.check, exchanged=exchanged,
+                language=task.language, unit=task.unit,
+            )  # fmt: skip
+    ortho, gsd = (None, 0.0) if task.ortho is None else _thumbnail(task.ortho)
+    return PairContent(
+        task=task,
+        pair=pair,
+        source=source,
+        setup=setup if isinstance(setup, dict) else {},
+        solution=solution,
+        photos=_photos(pair),
+        relief=None if task.relief is None else read_relief(task.relief),
+        ortho=ortho,
+        ortho_gsd=gsd,
+    )
+
+
+def _with_photos(pair: Pair, path: Path) -> Pair:
+    """Return a workbook's pair with the photo files its pair file names."""
+    named = Pair.read(path)
+    images: dict[str, Any] = {
+        f"image{number}": replace(pair.photo(number), file=named.photo(number).file)
+        for number in (1, 2)
+    }
+    return replace(pair, folder=named.folder, **images)
+
+
+def _photos(pair: Pair) -> tuple[SeenPhoto, ...]:
+    """Return both photos made small; none where a file is not named or not there."""
+    photos = []
+    for number in (1, 2):
+        photo = pair.photo(number)
+        if not photo.file or not pair.photo_file(number).is_file():
+            return ()
+        image = to_eight_bit(read_image(pair.photo_file(number)))
+        height, width = image.shape[:2]
+        reduction = max(1.0, max(width, height) / SIDE)
+        size = (round(width / reduction), round(height / reduction))
+        picture = np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_AREA), np.uint8)
+        photos.append(
+            SeenPhoto(photo=photo, picture=picture, size=(width, height), reduction=reduction)
+        )
+    return tuple(photos)
+
+
+def _thumbnail(path: Path) -> tuple[tuple[ByteArray, Bounds], float]:
+    """Return an orthophoto made small, empty pixels white, and its pixel. [m]"""
+    with RasterReader(path) as reader:
+        grid = reader.grid
+        step = 1
+        while max(grid.width, grid.height) / step > 1.5 * SIDE and step < ROWS:
+            step *= 2
+        strips = []
+        for colours, valid in colour_strips(reader):
+            shown = np.where(valid[..., None] > 0, colours, np.uint8(255))
+            size = (max(1, shown.shape[1] // step), max(1, shown.shape[0] // step))
+            strips.append(np.asarray(cv2.resize(shown, size, interpolation=cv2.INTER_AREA)))
+        return (np.concatenate(strips), grid.bounds), grid.gsd

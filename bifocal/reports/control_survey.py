@@ -1,0 +1,91 @@
+"""Control and check points of a pair measured like any others: how far off they come out."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from bifocal.model.pair import Pair
+from bifocal.orientation.control_points import Control, read_control
+from bifocal.survey.observations import PointObservations
+from bifocal.survey.reference import KnownPoints
+from bifocal.survey.workbook.reader import SurveyInput
+from bifocal.survey.workflow import SolvedSurvey, solve
+from photocore.errors import InputError
+
+#: Code of points that the orientation rests on, and of independent ones.
+CONTROL, CHECK = "CONTROL", "CHECK"
+
+
+def solve_control(
+    pair_path: Path,
+    *,
+    control: Path | None,
+    check: Path | None = None,
+    exchanged: bool = False,
+    language: str = "en",
+    unit: str = "",
+) -> SolvedSurvey:
+    """Solve the points of control and check tables from their pixels, and compare.
+
+    Parameters
+    ----------
+    pair_path : Path
+        Pair file.
+    control, check : Path, optional
+        Tables: id, X, Y, r and pixels in both photos. Those of ``check`` took no part in the
+        orientation: where there are any, they alone are compared.
+    exchanged : bool
+        Whether the tables name the photos the other way round than the pair file.
+    language : str
+        Of the workbook that may be made of it.
+    unit : str
+        Unit of the coordinates; empty: as the headings say, else metres.
+
+    Raises
+    ------
+    InputError
+        If a table is unusable, a name is in both, or none has a point seen in both photos.
+    """
+    tables = [(path, code) for path, code in ((control, CONTROL), (check, CHECK)) if path]
+    parts = [_read(path, exchanged, unit) for path, _ in tables]
+    codes = [
+        code for part, (_, code) in zip(parts, tables, strict=True) for _ in range(len(part.ids))
+    ]
+    ids = [name for part in parts for name in part.ids]
+    twice = sorted({name for name in ids if ids.count(name) > 1}) if check else []
+    if twice:
+        raise InputError(f"{check}: {', '.join(twice[:5])} is in {control} too; give other names.")
+    pixels1 = np.concatenate([part.pixels1 for part in parts] or [np.zeros((0, 2))])
+    pixels2 = np.concatenate([part.pixels2 for part in parts] or [np.zeros((0, 2))])
+    xyz = np.concatenate([part.xyz for part in parts] or [np.zeros((0, 3))])
+    seen = np.isfinite(np.hstack([pixels1, pixels2])).all(axis=1)
+    if not seen.any():
+        raise InputError(
+            f"{control or check}: no point was picked in both photos; nothing to measure."
+        )
+    points = PointObservations(
+        ids=tuple(name for name, is_seen in zip(ids, seen, strict=True) if is_seen),
+        pixels1=pixels1[seen],
+        pixels2=pixels2[seen],
+        code=tuple(code for code, is_seen in zip(codes, seen, strict=True) if is_seen),
+    )
+    compared = np.array([code == CHECK for code in points.code], dtype=bool)
+    if not compared.any():
+        compared[:] = True
+    known = KnownPoints(ids=points.ids, xyz=xyz[seen], use=compared)
+    survey = replace(SurveyInput.of_points(points), known=known, language=language)
+    return solve(survey, pair=pair_path)
+
+
+def is_exchanged(pair: Pair, far: Path) -> bool:
+    """Tell whether the photo given as far became the near one of a pair file."""
+    return pair.photo_file(2).resolve() == far.resolve()
+
+
+def _read(path: Path, exchanged: bool, unit: str) -> Control:
+    # The standard deviations are those of the orientation; here they play no part.
+    control = read_control(path, sigma=0.003, sigma_plane=0.005, unit=unit)
+    return control.exchanged() if exchanged else control

@@ -1,0 +1,314 @@
+"""The figures of a report: drawn into whatever they are given, readable in black and white."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from bifocal.model.grid import Bounds
+from bifocal.model.pair import Photo
+from bifocal.model.relief_map import Quality, ReliefMap
+from bifocal.reports.content import SIDE, PairContent, SeenPhoto
+from bifocal.reports.words import Words
+from photocore.arrays import FloatArray
+
+#: Place of the axes in a figure, with and without room for a colour bar; of the bar.
+_WIDE, _BESIDE, _BAR = (0.08, 0.1, 0.9, 0.87), (0.08, 0.1, 0.78, 0.87), (0.885, 0.16, 0.022, 0.72)
+#: Grey of what is unknown.
+_UNKNOWN = "0.8"
+
+
+def ratio_of(bounds: Bounds) -> float:
+    """Return the height over the width of a figure that shows bounds, within reason."""
+    x_min, y_min, x_max, y_max = bounds
+    return float(np.clip(0.87 * (y_max - y_min) / (x_max - x_min) + 0.1, 0.3, 1.15))
+
+
+def draw_ortho(figure: Any, content: PairContent) -> None:
+    """Draw the orthophoto with the compared points."""
+    assert content.ortho is not None
+    picture, bounds = content.ortho
+    axes = _plane_axes(figure, bounds, _WIDE)
+    axes.imshow(picture, extent=_extent(bounds), interpolation="antialiased")
+    if content.solution is not None:
+        x, y = _inside(content.solution.table.xyz[:, :2], bounds).T
+        axes.plot(x, y, "+", color="black", ms=8, mew=2.2)
+        axes.plot(x, y, "+", color="yellow", ms=7, mew=0.9)
+    _scale_bar(axes, bounds)
+
+
+def draw_plan(figure: Any, content: PairContent, say: Words) -> None:
+    """Draw wall and cameras from above, to scale."""
+    axes = figure.add_axes(_WIDE)
+    pair = content.pair
+    ends = []
+    for number, (photo, style) in enumerate(
+        ((pair.image1, "-"), (pair.image2, (0, (5, 2)))), start=1
+    ):
+        x, d = float(photo.nadir[0]), photo.distance
+        left, right = _footprint(content, number)
+        for end in (left, right):
+            axes.plot([x, end], [d, 0], color="black", lw=0.9, ls=style)
+        ends += [left, right, x]
+        name = say("far") if number == 1 else say("near")
+        axes.plot([x], [d], marker="^", color="black", ms=9)
+        axes.annotate(
+            f"{name}\nd{number} = {d:.3f} m", (x, d), (10, -4), textcoords="offset points",
+            fontsize=8, va="center",
+        )  # fmt: skip
+    first = (float(pair.image1.nadir[0]), pair.image1.distance)
+    zoom = float(pair.zoom_centre[0])
+    low, high = min(ends), max(ends)
+    if low - (high - low) <= zoom <= high + (high - low):
+        axes.plot([first[0], zoom], [first[1], 0], color="0.4", lw=0.8, ls=":")
+    axes.plot([low, high], [0, 0], color="black", lw=4, solid_capstyle="butt")
+    axes.annotate(say("wall"), (high, 0), (4, 4), textcoords="offset points", fontsize=8)
+    axes.set_aspect("equal")
+    margin = 0.08 * (high - low)
+    axes.set_xlim(low - margin, high + 2 * margin)
+    axes.set_ylim(-0.05 * first[1], 1.1 * first[1])
+    axes.set_xlabel("X [m]", fontsize=8)
+    axes.set_ylabel(say("distance_axis"), fontsize=8)
+    axes.tick_params(labelsize=8)
+
+
+def plan_ratio(content: PairContent) -> float:
+    """Return the height over the width of the plan of the stations."""
+    ends = [*_footprint(content, 1), *_footprint(content, 2)]
+    width = 1.24 * (max(ends) - min(ends))
+    return float(np.clip(0.9 * 1.15 * content.pair.image1.distance / width + 0.1, 0.35, 1.1))
+
+
+def _footprint(content: PairContent, number: int) -> tuple[float, float]:
+    """Return X at which the middle row of a photo begins and ends on the wall, kept finite. [m]"""
+    photo = content.pair.photo(number)
+    reach = 3 * photo.distance
+    if not content.photos:
+        return float(photo.nadir[0]) - reach / 6, float(photo.nadir[0]) + reach / 6
+    width, height = content.photos[number - 1].size
+    row = np.column_stack([np.linspace(0, width - 1, 9), np.full(9, (height - 1) / 2)])
+    x = photo.plane_from_pixels(row)[:, 0]
+    ahead = photo.sees_ahead(photo.plane_from_pixels(row), (height, width))
+    x = np.clip(x[np.isfinite(x) & ahead], photo.nadir[0] - reach, photo.nadir[0] + reach)
+    return (float(x.min()), float(x.max())) if len(x) else (-1.0, 1.0)
+
+
+def draw_photo(figure: Any, content: PairContent, seen: SeenPhoto, number: int) -> None:
+    """Draw a photo with its points: where they were picked."""
+    axes = figure.add_axes((0.01, 0.01, 0.98, 0.98))
+    shape = seen.picture.shape
+    axes.imshow(seen.picture, cmap="gray" if seen.picture.ndim == 2 else None)
+    axes.set_axis_off()
+    solution = content.solution
+    if solution is None:
+        return
+    pixels = solution.points.pixels1 if number == 1 else solution.points.pixels2
+    missing = np.asarray(np.isnan(pixels).any(axis=1))
+    if missing.any():
+        pixels = np.where(missing[:, None], seen.photo.project(solution.table.xyz), pixels)
+    places = (pixels + 0.5) / seen.reduction - 0.5
+    control = content.control_ids
+    for name, (x, y) in zip(solution.table.ids, places.tolist(), strict=True):
+        if not (0 <= x < shape[1] and 0 <= y < shape[0]):
+            continue
+        marker = "o" if name in control else "^"
+        for colour, width in (("black", 2.4), ("yellow", 1.1)):
+            axes.plot([x], [y], marker, mfc="none", mec=colour, mew=width, ms=8)
+        if len(solution.table) <= 60:
+            _label(axes, name, (x, y), at_right=x > 0.93 * shape[1])
+
+
+def _label(axes: Any, text: str, at: tuple[float, float], *, at_right: bool) -> None:
+    """Write a name beside a point; to the left of one at the right edge."""
+    from matplotlib.patheffects import withStroke
+
+    axes.annotate(
+        text, at, (-5 if at_right else 5, 5), textcoords="offset points", fontsize=7,
+        ha="right" if at_right else "left", color="yellow",
+        path_effects=[withStroke(linewidth=1.6, foreground="black")],
+    )  # fmt: skip
+
+
+def draw_relief(figure: Any, content: PairContent, say: Words) -> None:
+    """Draw the relief in diverging colours about the wall, interpolated parts lightly hatched."""
+    relief = content.relief
+    assert relief is not None
+    part = _reduced(relief)
+    reach = max(float(np.nanpercentile(np.abs(part.r), 98)), 1e-3)
+    axes = _plane_axes(figure, relief.bounds, _BESIDE)
+    axes.set_facecolor(_UNKNOWN)
+    image = axes.imshow(
+        part.r, extent=_extent(relief.bounds), cmap="RdBu_r", vmin=-reach, vmax=reach,
+        interpolation="nearest",
+    )  # fmt: skip
+    guessed = (part.quality > Quality.MEASURED) & np.isfinite(part.r)
+    if guessed.any() and not guessed.all():
+        # Dots let the colours through; a filled contour keeps them vector.
+        axes.contourf(
+            guessed.astype(float), levels=[0.5, 1.5], hatches=["...."], colors="none",
+            extent=_extent(relief.bounds), origin="upper", alpha=0.0,
+        )  # fmt: skip
+    bar = figure.colorbar(image, cax=figure.add_axes(_BAR), extend="both")
+    bar.set_label(say("relief_axis"), fontsize=8)
+    bar.ax.tick_params(labelsize=7)
+    bar.ax.axhline(0, color="black", lw=1)
+    _scale_bar(axes, relief.bounds)
+
+
+def draw_sigma(figure: Any, content: PairContent, say: Words, limit: float) -> None:
+    """Draw the standard deviation of the relief and the border of the area of uncertainty."""
+    from matplotlib.colors import LogNorm
+
+    relief = content.relief
+    assert relief is not None
+    part = _reduced(relief)
+    sigma = 1000.0 * np.where(part.quality == Quality.MEASURED, part.sigma, np.nan)
+    good = np.isfinite(sigma) & (sigma > 0)
+    axes = _plane_axes(figure, relief.bounds, _BESIDE)
+    axes.set_facecolor(_UNKNOWN)
+    if good.any():
+        low, high = np.percentile(sigma[good], [2, 98])
+        image = axes.imshow(
+            sigma, extent=_extent(relief.bounds), cmap="cividis",
+            norm=LogNorm(max(low, 0.01), max(high, 1.5 * low, 0.02)), interpolation="nearest",
+        )  # fmt: skip
+        bar = figure.colorbar(image, cax=figure.add_axes(_BAR), extend="both")
+        bar.set_label(say("sigma_axis"), fontsize=8)
+        bar.ax.tick_params(labelsize=7, which="both")
+        if (sigma[good] > 1000 * limit).any() and (sigma[good] < 1000 * limit).any():
+            axes.contour(
+                np.where(good, sigma, np.nan), levels=[1000 * limit], colors="red", linewidths=1.2,
+                extent=_extent(relief.bounds), origin="upper",
+            )  # fmt: skip
+    x, y = content.pair.zoom_centre
+    x_min, y_min, x_max, y_max = relief.bounds
+    if x_min <= x <= x_max and y_min <= y <= y_max:
+        axes.plot([x], [y], "x", color="red", ms=10, mew=2)
+    _scale_bar(axes, relief.bounds)
+
+
+def draw_errors(figure: Any, content: PairContent, say: Words) -> None:
+    """Draw errors in X and Y as arrows, those of r as colour."""
+    assert content.solution is not None
+    check = content.solution.check
+    known = np.isfinite(check.errors).any(axis=1) & np.isfinite(check.solved[:, :2]).all(axis=1)
+    places, errors = check.solved[known], np.nan_to_num(check.errors[known])
+    bounds = error_bounds(content)
+    axes = _plane_axes(figure, bounds, _BESIDE)
+    if content.ortho is not None:
+        picture, extent = content.ortho
+        axes.imshow(picture, extent=_extent(extent), alpha=0.35, interpolation="antialiased")
+        axes.set_xlim(bounds[0], bounds[2])
+        axes.set_ylim(bounds[1], bounds[3])
+    zoom = error_zoom(content)
+    reach = max(float(np.abs(errors[:, 2]).max(initial=0.0)), 1e-4) * 1000
+    dots = axes.scatter(
+        places[:, 0], places[:, 1], c=errors[:, 2] * 1000, cmap="RdBu_r", vmin=-reach, vmax=reach,
+        s=34, edgecolors="black", linewidths=0.8, zorder=3,
+    )  # fmt: skip
+    axes.quiver(
+        places[:, 0], places[:, 1], errors[:, 0] * zoom, errors[:, 1] * zoom, angles="xy",
+        scale_units="xy", scale=1, width=0.004, color="black", zorder=4,
+    )  # fmt: skip
+    bar = figure.colorbar(dots, cax=figure.add_axes(_BAR))
+    bar.set_label(say("error_of"), fontsize=8)
+    bar.ax.tick_params(labelsize=7)
+    _scale_bar(axes, bounds)
+
+
+def error_zoom(content: PairContent) -> float:
+    """Return by how much errors are enlarged: a round number that shows the usual ones."""
+    assert content.solution is not None
+    errors = content.solution.check.errors[:, :2]
+    usual = float(np.nanpercentile(np.abs(errors), 90)) if np.isfinite(errors).any() else 0.001
+    x_min, _, x_max, _ = error_bounds(content)
+    return float(10 ** np.floor(np.log10(0.08 * (x_max - x_min) / max(usual, 1e-6))))
+
+
+def error_bounds(content: PairContent) -> Bounds:
+    """Return the part of the wall that holds the compared points and some margin. [m]"""
+    if content.ortho is not None:
+        return content.ortho[1]
+    assert content.solution is not None
+    places = content.solution.check.solved[:, :2]
+    places = places[np.isfinite(places).all(axis=1)]
+    low, high = places.min(axis=0), places.max(axis=0)
+    margin = 0.12 * max(float((high - low).max()), 0.1)
+    return (
+        float(low[0] - margin), float(low[1] - margin),
+        float(high[0] + margin), float(high[1] + margin),
+    )  # fmt: skip
+
+
+def draw_histogram(figure: Any, content: PairContent, say: Words) -> None:
+    """Draw how the errors of each axis are spread."""
+    assert content.solution is not None
+    errors = 1000 * content.solution.check.errors
+    reach = max(float(np.nanmax(np.abs(errors))), 0.1)
+    edges = np.linspace(-reach, reach, 16)
+    for index, (name, hatch) in enumerate((("X", "///"), ("Y", "..."), ("r", ""))):
+        axes = figure.add_axes((0.08 + 0.315 * index, 0.24, 0.27, 0.66))
+        values = errors[:, index]
+        axes.hist(values[np.isfinite(values)], edges, color="0.75", edgecolor="black", hatch=hatch)
+        axes.axvline(0, color="black", lw=0.8)
+        axes.set_xlabel(f"{name} [mm]", fontsize=8)
+        axes.tick_params(labelsize=7)
+        axes.yaxis.get_major_locator().set_params(integer=True)
+        if index == 0:
+            axes.set_ylabel(say("count_axis"), fontsize=8)
+
+
+def _reduced(relief: ReliefMap) -> ReliefMap:
+    """Return a map of at most `SIDE` pixels a side, every so many of its pixels."""
+    step = max(1, -(-max(relief.shape) // SIDE))
+    cut = np.s_[::step, ::step]
+    matrix = relief.plane_from_pixel @ np.diag([step, step, 1.0])
+    return ReliefMap(
+        r=relief.r[cut], sigma=relief.sigma[cut], quality=relief.quality[cut],
+        plane_from_pixel=matrix,
+    )  # fmt: skip
+
+
+def _plane_axes(figure: Any, bounds: Bounds, place: tuple[float, float, float, float]) -> Any:
+    axes = figure.add_axes(place)
+    x_min, y_min, x_max, y_max = bounds
+    axes.set_aspect("equal")
+    axes.set_xlim(x_min, x_max)
+    axes.set_ylim(y_min, y_max)
+    axes.set_xlabel("X [m]", fontsize=8)
+    axes.set_ylabel("Y [m]", fontsize=8)
+    axes.tick_params(labelsize=8)
+    return axes
+
+
+def _extent(bounds: Bounds) -> tuple[float, float, float, float]:
+    x_min, y_min, x_max, y_max = bounds
+    return x_min, x_max, y_min, y_max
+
+
+def _inside(positions: FloatArray, bounds: Bounds) -> FloatArray:
+    x_min, y_min, x_max, y_max = bounds
+    x, y = positions.T
+    return positions[(x >= x_min) & (x <= x_max) & (y >= y_min) & (y <= y_max)]
+
+
+def _scale_bar(axes: Any, bounds: Bounds) -> None:
+    """Draw a bar of a round length in the lower left corner."""
+    x_min, y_min, x_max, y_max = bounds
+    length = 10 ** np.floor(np.log10(0.3 * (x_max - x_min)))
+    x, y = x_min + 0.03 * (x_max - x_min), y_min + 0.035 * (y_max - y_min)
+    for colour, width in (("white", 6.0), ("black", 3.0)):
+        axes.plot([x, x + length], [y, y], color=colour, lw=width, solid_capstyle="butt", zorder=5)
+    axes.annotate(
+        f"{length:g} m", (x + length / 2, y), (0, 4), textcoords="offset points", ha="center",
+        fontsize=8, zorder=6, bbox={"boxstyle": "round,pad=0.1", "fc": "white", "ec": "none"},
+    )  # fmt: skip
+
+
+def tilt_of(photo: Photo, seen: SeenPhoto) -> float:
+    """Return the angle between the wall's normal and the ray of a photo's middle. [deg]"""
+    width, height = seen.size
+    middle = photo.plane_from_pixels(np.array([(width - 1) / 2, (height - 1) / 2]))
+    away = float(np.hypot(*(middle - photo.nadir)))
+    return float(np.rad2deg(np.arctan2(away, photo.distance)))

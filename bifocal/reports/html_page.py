@@ -1,0 +1,122 @@
+"""A report as one HTML file that needs nothing else: figures are SVG inside it."""
+
+from __future__ import annotations
+
+import base64
+import html
+import io
+import re
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from bifocal.reports.document import Banner, Block, Document, Heading, Paragraph, Picture, TextTable
+from photocore.cli import Progress, no_progress
+from photocore.output import atomic_path
+
+#: Width of figures [inch], resolution of what is drawn as pixels, quality of photos in them.
+WIDTH, DPI, JPEG = 7.4, 110, 82
+_STYLE = """
+body{font:15px/1.45 system-ui,sans-serif;color:#111;background:#fff;max-width:60rem;
+margin:2rem auto;padding:0 1rem}
+h1{font-size:1.7rem;margin:2rem 0 .2rem}h2{font-size:1.2rem;margin:2rem 0 .5rem;border-bottom:2px
+solid #111}h3{font-size:1rem}
+table{border-collapse:collapse;margin:.6rem 0;font-size:.86rem;font-variant-numeric:tabular-nums}
+caption{text-align:left;font-weight:600;padding:.3rem 0}
+th,td{padding:.15rem .6rem;border-bottom:1px solid #bbb;text-align:right;overflow-wrap:anywhere}
+th{border-bottom:2px solid #111}th:first-child,td:first-child{text-align:left}
+figure{margin:1rem 0}
+figure img{width:100%;height:auto}
+figcaption,.small{font-size:.85rem;color:#333}
+pre{background:#f2f2f2;padding:.4rem .6rem;overflow-x:auto;font-size:.8rem}
+.banner{border:3px solid #111;border-left-width:14px;padding:.6rem 1rem;margin:.6rem 0}
+.banner p{margin:.2rem 0}.banner p:first-child{font-size:1.25rem;font-weight:700}
+.good{border-color:#1a6e2e}.bad{border-color:#b00020}
+@media print{body{margin:0;max-width:none;font-size:11px}figure,table,.banner{break-inside:avoid}}
+"""
+
+
+def write_html(
+    path: Path, document: Document, *, overwrite: bool = False, progress: Progress = no_progress
+) -> None:
+    """Write a report as one HTML file."""
+    parts: list[str] = []
+    for index, block in enumerate(document.blocks):
+        progress(index, len(document.blocks), "report")
+        parts += _block(block)
+    title, subject = html.escape(document.title), html.escape(document.subject)
+    text = (
+        f'<!DOCTYPE html>\n<html lang="{document.language}">\n<head>\n<meta charset="utf-8">\n'
+        '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
+        f'<meta name="generator" content="{subject}">\n<title>{title}</title>\n'
+        f"<style>{_STYLE}</style>\n</head>\n<body>\n" + "\n".join(parts) + "\n</body>\n</html>\n"
+    )
+    with atomic_path(path, overwrite=overwrite) as temporary:
+        temporary.write_text(text, encoding="utf-8")
+
+
+def _block(block: Block) -> Iterator[str]:
+    if isinstance(block, Heading):
+        yield f"<h{block.level}>{html.escape(block.text)}</h{block.level}>"
+    elif isinstance(block, Banner):
+        kind = {True: " good", False: " bad", None: ""}[block.good]
+        lines = "".join(f"<p>{html.escape(text)}</p>" for text in (block.text, *block.details))
+        yield f'<div class="banner{kind}">{lines}</div>'
+    elif isinstance(block, Paragraph):
+        kind = ' class="small"' if block.small else ""
+        yield f"<p{kind}>{html.escape(block.text)}</p>"
+        if block.lines:
+            yield f"<pre>{html.escape(chr(10).join(block.lines))}</pre>"
+    elif isinstance(block, TextTable):
+        yield from _table(block)
+    else:
+        yield from _picture(block)
+
+
+def _table(block: TextTable) -> Iterator[str]:
+    caption = f"<caption>{html.escape(block.caption)}</caption>" if block.caption else ""
+    head = "".join(f'<th scope="col">{html.escape(text)}</th>' for text in block.headings)
+    yield f"<table>{caption}<thead><tr>{head}</tr></thead><tbody>"
+    for row in block.rows:
+        yield "<tr>" + "".join(f"<td>{html.escape(cell)}</td>" for cell in row) + "</tr>"
+    yield "</tbody></table>"
+
+
+def _picture(block: Picture) -> Iterator[str]:
+    data = base64.b64encode(_svg(block).encode("utf-8")).decode("ascii")
+    caption = html.escape(block.caption)
+    yield (
+        f'<figure><img alt="{html.escape(block.caption, quote=True)}" '
+        f'src="data:image/svg+xml;base64,{data}"><figcaption>{caption}</figcaption></figure>'
+    )
+
+
+def _svg(block: Picture) -> str:
+    """Return a figure as SVG, the same bytes for the same content."""
+    import matplotlib as mpl
+    from matplotlib.backends.backend_svg import FigureCanvasSVG
+    from matplotlib.figure import Figure
+
+    with mpl.rc_context({"svg.hashsalt": "bifocal"}):
+        figure = Figure(figsize=(WIDTH, WIDTH * block.ratio), dpi=DPI)
+        FigureCanvasSVG(figure)
+        block.draw(figure)
+        buffer = io.StringIO()
+        figure.savefig(buffer, format="svg", metadata={"Date": None})
+    return re.sub(r'"data:image/png;base64,([^"]+)"', _smaller, buffer.getvalue())
+
+
+def _smaller(found: re.Match[str]) -> str:
+    """Return a picture inside a figure as JPEG where that loses nothing that is transparent."""
+    from PIL import Image
+
+    data = base64.b64decode(found[1])
+    with Image.open(io.BytesIO(data)) as image:
+        picture: Any = image.convert("RGBA")
+    if picture.getextrema()[3][0] < 255 or len(data) < 50_000:
+        return found[0]
+    out = io.BytesIO()
+    picture.convert("RGB").save(out, "JPEG", quality=JPEG)
+    if out.tell() >= len(data):
+        return found[0]
+    return f'"data:image/jpeg;base64,{base64.b64encode(out.getvalue()).decode("ascii")}"'

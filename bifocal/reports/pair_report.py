@@ -1,0 +1,230 @@
+"""From what is known of pairs to the blocks of a report, in the order a reader needs them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from bifocal.model.relief_map import Quality
+from bifocal.precision import base_factor
+from bifocal.reports import figures
+from bifocal.reports.accuracy import accuracy_blocks, millimetres
+from bifocal.reports.content import PairContent
+from bifocal.reports.document import Block, Document, Heading, Paragraph, Picture, TextTable
+from bifocal.reports.words import Words, words_in
+from bifocal.reports.worked_point import method_blocks
+from bifocal.survey.tolerances import RULES
+from photocore.provenance import file_hash, program, today
+
+#: Relief less precise than this is drawn as the area of uncertainty where no scale was asked for;
+#: else what a line of 0.18 mm covers at that scale. [m]
+_UNCERTAIN = 0.01
+
+
+def report_document(contents: Sequence[PairContent], language: str) -> Document:
+    """Return the report of one or several pairs."""
+    say = words_in(language)
+    title = contents[0].title if len(contents) == 1 else say("report")
+    made = say("made", program=program(), date=today())
+    blocks: list[Block] = [Heading(text=title, level=1), Paragraph(text=made, small=True)]
+    for content in contents:
+        if len(contents) > 1:
+            blocks.append(Heading(text=content.title, level=1))
+        blocks += pair_blocks(content, say)
+    return Document(title=title, language=language, subject=made, blocks=tuple(blocks))
+
+
+def pair_blocks(content: PairContent, say: Words) -> Iterator[Block]:
+    """Yield the part of one pair: accuracy first."""
+    yield Heading(text=say("accuracy"))
+    yield from accuracy_blocks(content, say)
+    if content.ortho is not None:
+        yield Heading(text=say("overview"))
+        yield Picture(
+            draw=partial(figures.draw_ortho, content=content),
+            ratio=figures.ratio_of(content.ortho[1]),
+            caption=say("overview_caption", gsd=millimetres(content.ortho_gsd)),
+        )
+    yield from _geometry(content, say)
+    yield from _photos(content, say)
+    yield from _relief(content, say)
+    yield from _residuals(content, say)
+    yield from _foundations(content, say)
+    yield from method_blocks(content, say)
+    yield from _provenance(content, say)
+
+
+def _geometry(content: PairContent, say: Words) -> Iterator[Block]:
+    yield Heading(text=say("geometry"))
+    photos = (content.pair.image1, content.pair.image2)
+    deviations = content.setup.get("standard_deviations", {})
+
+    def with_sigma(value: float, key: str, unit: str, digits: int) -> str:
+        sigma = deviations.get(key)
+        spread = f" ± {sigma:.{digits}f}" if isinstance(sigma, int | float) else ""
+        return f"{value:.{digits}f}{spread} {unit}"
+
+    rows = [[say("file"), *(Path(photo.file).name or "-" for photo in photos)]]
+    rows.append([
+        say("distance"),
+        *(with_sigma(p.distance, f"distance{k}", "m", 3) for k, p in _both(photos)),
+    ])  # fmt: skip
+    rows.append([
+        say("nadir"), *(f"{p.nadir[0]:.3f}, {p.nadir[1]:.3f} m" for p in photos),
+    ])  # fmt: skip
+    focal = content.setup.get("focal_px")
+    if focal:
+        rows.append([
+            say("focal_found"),
+            *(_focal(float(focal[k - 1]), p.pixel_size, deviations.get(f"focal{k}"))
+              for k, p in _both(photos)),
+        ])  # fmt: skip
+        rows.append([say("focal_given"), *map(str, content.setup.get("interior", ("-", "-")))])
+    if content.photos:
+        rows.append([
+            say("gsd"), *(millimetres(seen.photo.gsd(seen.size)) for seen in content.photos),
+        ])  # fmt: skip
+        rows.append([
+            say("tilt"),
+            *(f"{figures.tilt_of(seen.photo, seen):.2f}°" for seen in content.photos),
+        ])  # fmt: skip
+    base = base_factor(d1=content.pair.d1, d2=content.pair.d2)
+    rows.append([say("base"), f"{base:.2f} m", ""])
+    yield TextTable(headings=[say("quantity"), say("far"), say("near")], rows=rows)
+    if content.task.language == "en":
+        for sentence in content.setup.get("words", ()):
+            yield Paragraph(text=str(sentence), small=True)
+    yield Picture(
+        draw=partial(figures.draw_plan, content=content, say=say),
+        ratio=figures.plan_ratio(content),
+        caption=say("plan_caption"),
+    )
+
+
+def _both(photos: Sequence[Any]) -> Iterator[tuple[int, Any]]:
+    return iter(enumerate(photos, start=1))
+
+
+def _focal(pixels: float, pitch: float | None, sigma: float | None) -> str:
+    spread = f" ± {sigma:.1f}" if isinstance(sigma, int | float) else ""
+    length = f" ({pixels * pitch:.2f} mm)" if pitch else ""
+    return f"{pixels:.1f}{spread} px{length}"
+
+
+def _photos(content: PairContent, say: Words) -> Iterator[Block]:
+    if content.photos:
+        yield Heading(text=say("photos"))
+    for number, seen in enumerate(content.photos, start=1):
+        yield Picture(
+            draw=partial(figures.draw_photo, content=content, seen=seen, number=number),
+            ratio=min(1.2, seen.picture.shape[0] / seen.picture.shape[1]),
+            caption=say(
+                "photo_caption",
+                photo=say("far" if number == 1 else "near"),
+                file=Path(seen.photo.file).name,
+            ),
+        )
+
+
+def _relief(content: PairContent, say: Words) -> Iterator[Block]:
+    if content.relief is None:
+        return
+    relief = content.relief
+    shares = {q: f"{float((relief.quality == q).mean()):.0%}" for q in Quality}
+    yield Heading(text=say("relief_map"))
+    ratio = figures.ratio_of(relief.bounds)
+    yield Picture(
+        draw=partial(figures.draw_relief, content=content, say=say), ratio=ratio,
+        caption=say(
+            "relief_caption", measured=shares[Quality.MEASURED],
+            guessed=shares[Quality.INTERPOLATED], hidden=shares[Quality.HIDDEN],
+        ),
+    )  # fmt: skip
+    scale = content.task.scale
+    limit = (RULES[0].tolerance(round(scale)) if scale else None) or _UNCERTAIN
+    yield Picture(
+        draw=partial(figures.draw_sigma, content=content, say=say, limit=limit), ratio=ratio,
+        caption=say("sigma_caption", limit=millimetres(limit)),
+    )  # fmt: skip
+
+
+def _residuals(content: PairContent, say: Words) -> Iterator[Block]:
+    control = content.setup.get("control", ())
+    compared = content.solution is not None and np.isfinite(content.solution.check.errors).any()
+    if control or compared:
+        yield Heading(text=say("residuals"))
+    if compared:
+        yield Picture(
+            draw=partial(figures.draw_errors, content=content, say=say),
+            ratio=figures.ratio_of(figures.error_bounds(content)),
+            caption=say("vector_caption", zoom=f"{figures.error_zoom(content):g}"),
+        )
+        yield Picture(
+            draw=partial(figures.draw_histogram, content=content, say=say), ratio=0.3,
+            caption=say("histogram_caption"),
+        )  # fmt: skip
+    if control:
+        headings = [say("point"), "Δcol1", "Δrow1", "Δcol2", "Δrow2", "test", say("used")]
+        yield TextTable(
+            headings=headings, rows=[_control_row(row, say) for row in control],
+            caption=say("control_table"),
+        )  # fmt: skip
+
+
+def _control_row(row: Mapping[str, Any], say: Words) -> list[str]:
+    residuals = [f"{v:.2f}" if isinstance(v, int | float) else "-" for v in row["residual_px"]]
+    test = row.get("test")
+    shown = f"{test:.1f}" if isinstance(test, int | float) else "-"
+    return [str(row["id"]), *residuals, shown, say("holds" if row.get("used") else "fails")]
+
+
+def _foundations(content: PairContent, say: Words) -> Iterator[Block]:
+    yield Heading(text=say("rests"))
+    setup = content.setup
+    if not setup:
+        yield Paragraph(text=say("rest_unknown"))
+    else:
+        ties = setup.get("common_points", {})
+        sigma = ties.get("sigma_px")
+        yield Paragraph(
+            text=say(
+                "rest_measured", control=len(content.control_ids), ties=ties.get("count", 0),
+                sigma="-" if sigma is None else f"{sigma:.2f} px",
+            )
+        )  # fmt: skip
+        found = setup.get("standard_deviations", {})
+
+        def share(key: str) -> str:
+            value = found.get(key)
+            return "-" if value is None else f"{100 * value:.2g} %"
+
+        yield Paragraph(
+            text=say(
+                "rest_sigma", d1=millimetres(found.get("distance1")),
+                d2=millimetres(found.get("distance2")), scale=share("scale"),
+                relief=share("relief_scale"),
+            )
+        )  # fmt: skip
+        assumed = [str(text) for text in setup.get("assumed", ())]
+        for text in assumed:
+            yield Paragraph(text=say("rest_assumed", what=text))
+        if not assumed:
+            yield Paragraph(text=say("rest_nothing"))
+    remarks = (*content.pair.remarks, *(content.solution.remarks if content.solution else ()))
+    if remarks:
+        yield Heading(text=say("remarks"), level=3)
+        for remark in dict.fromkeys(remarks):
+            yield Paragraph(text=remark, small=True)
+
+
+def _provenance(content: PairContent, say: Words) -> Iterator[Block]:
+    yield Heading(text=say("provenance"))
+    task, pair = content.task, content.pair
+    files = [content.source, *(pair.photo_file(k) for k in (1, 2) if pair.photo(k).file)]
+    files += [path for path in (task.control, task.check, task.relief, task.ortho) if path]
+    rows = [[path.name, file_hash(path)] for path in files if path.is_file()]
+    yield TextTable(headings=[say("file"), "SHA-256"], rows=rows)

@@ -1,0 +1,102 @@
+"""The method with one point's numbers, so that a pocket calculator can check the program."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from bifocal.reports.accuracy import millimetres
+from bifocal.reports.content import PairContent
+from bifocal.reports.document import Block, Heading, Paragraph
+from bifocal.reports.words import Words
+from photocore.arrays import FloatArray
+
+
+def method_blocks(content: PairContent, say: Words) -> Iterator[Block]:
+    """Yield the method page; nothing where no point was measured in both photos."""
+    solution = content.solution
+    if solution is None or solution.setup is not None:
+        return
+    points, table = solution.points, solution.table
+    good = np.isfinite(np.hstack([points.pixels1, points.pixels2, table.xyz])).all(axis=1)
+    if not good.any():
+        return
+    # A point well off the wall and well measured shows the most.
+    worth = np.abs(table["Z"]) / np.maximum(table["sigma_r"], 1e-6)
+    row = int(np.argmax(np.where(good, worth, -1.0)))
+    yield Heading(text=say("method"))
+    yield Paragraph(text=say("method_intro", id=table.ids[row]))
+    pair = content.pair
+    q, v, s = np.zeros((2, 2)), np.zeros((2, 2)), np.zeros(2)
+    pixel_lines, plane_lines, slope_lines = [], [], []
+    picks = (points.pixels1[row], points.pixels2[row])
+    for k, (photo, raw) in enumerate(zip((pair.image1, pair.image2), picks, strict=True)):
+        ideal = raw if photo.lens is None else photo.lens.undistort(raw)
+        matrix = photo.plane_from_pixel / photo.plane_from_pixel[2, 2]
+        x, y, w = matrix @ [*ideal, 1.0]
+        q[k] = x / w, y / w
+        v[k] = (q[k] - photo.nadir) / photo.distance
+        sigma_px = photo.precision(solution.sigma_px)
+        scale = np.sqrt(abs(np.linalg.det(photo.metres_per_pixel(raw[None])[0])))
+        s[k] = sigma_px * scale
+        pixel_lines.append(f"({ideal[0]:.3f}, {ideal[1]:.3f})_{k + 1}")
+        plane_lines += _matrix_lines(f"H{k + 1}", matrix)
+        plane_lines.append(
+            f"     x, y, w = {x:.7g}, {y:.7g}, {w:.7g}    q{k + 1} = ({q[k][0]:.5f}, "
+            f"{q[k][1]:.5f}) m"
+        )
+        slope_lines.append(
+            f"N{k + 1} = ({photo.nadir[0]:.4f}, {photo.nadir[1]:.4f}) m, d{k + 1} = "
+            f"{photo.distance:.4f} m    v{k + 1} = ({v[k][0]:.7f}, {v[k][1]:.7f})"
+        )
+    yield Paragraph(text=say("step_pixels"), lines=("   ".join(pixel_lines),))
+    yield Paragraph(text=say("step_plane"), lines=tuple(plane_lines))
+    yield Paragraph(text=say("step_slope"), lines=tuple(slope_lines))
+    yield from _solved(content, row, (q, v, s), say)
+
+
+def _solved(
+    content: PairContent, row: int, rays: tuple[FloatArray, FloatArray, FloatArray], say: Words
+) -> Iterator[Block]:
+    """Yield relief, place and precision from the rays, and what the program says."""
+    assert content.solution is not None
+    q, v, s = rays
+    table, pair = content.solution.table, content.pair
+    shift, slope = q[0] - q[1], v[0] - v[1]
+    square = float(slope @ slope)
+    r = float(shift @ slope) / square
+    yield Paragraph(
+        text=say("step_relief"),
+        lines=(
+            f"q1 - q2 = ({shift[0]:.5f}, {shift[1]:.5f}) m    v1 - v2 = ({slope[0]:.7f}, "
+            f"{slope[1]:.7f})",
+            f"r = {float(shift @ slope):.7e} / {square:.7e} = {r:.4f} m",
+        ),
+    )
+    place = (q - v * r).mean(axis=0)
+    yield Paragraph(text=say("step_xy"), lines=(f"X = {place[0]:.4f} m    Y = {place[1]:.4f} m",))
+    parts = (1 - r / np.array([pair.d1, pair.d2])) * s
+    yield Paragraph(
+        text=say("step_sigma"),
+        lines=(
+            f"s1 = {1000 * s[0]:.3f} mm    s2 = {1000 * s[1]:.3f} mm    |v1 - v2| = "
+            f"{np.sqrt(square):.6f}    sigma_r = "
+            f"{1000 * np.hypot(*parts) / np.sqrt(square):.2f} mm",
+        ),
+    )
+    x, y, relief = table.xyz[row]
+    yield Paragraph(
+        text=say(
+            "step_program", r=f"{relief:.4f} m", x=f"{x:.4f} m", y=f"{y:.4f} m",
+            sigma=millimetres(float(table["sigma_r"][row])),
+        )
+    )  # fmt: skip
+    yield Paragraph(text=say("method_source"), small=True)
+
+
+def _matrix_lines(name: str, matrix: FloatArray) -> list[str]:
+    return [
+        f"{name if i == 0 else '':3}| " + "  ".join(f"{value: .9e}" for value in line) + " |"
+        for i, line in enumerate(matrix)
+    ]

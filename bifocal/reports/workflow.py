@@ -1,0 +1,111 @@
+"""Pair files, workbooks or a survey's folder in, a report out."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from bifocal.reports.content import ReportTask, read_content
+from bifocal.reports.html_page import write_html
+from bifocal.reports.pair_report import report_document
+from bifocal.reports.pdf_pages import write_pdf
+from photocore.cli import Progress, no_progress
+from photocore.errors import InputError
+from photocore.output import check_writable
+
+__all__ = ["ReportTask", "report_of", "write_report"]
+_WRITERS = {".html": write_html, ".htm": write_html, ".pdf": write_pdf}
+
+
+def write_report(
+    sources: Sequence[Path],
+    outs: Sequence[Path],
+    tasks: Sequence[ReportTask],
+    *,
+    overwrite: bool = False,
+    progress: Progress = no_progress,
+) -> tuple[str, ...]:
+    """Write the report of pairs, once for each file to write, and return remarks.
+
+    Parameters
+    ----------
+    sources : sequence of Path
+        Pair files or solved workbooks.
+    outs : sequence of Path
+        ``.html`` or ``.pdf``.
+    tasks : sequence of ReportTask
+        One for each source; the first one's language is the report's.
+
+    Raises
+    ------
+    InputError
+        If a file is unusable or an ending is another.
+    """
+    for out in outs:
+        check_writable(out, overwrite=overwrite)
+        if out.suffix.lower() not in _WRITERS:
+            raise InputError(f"{out}: a report is written as .html or .pdf.")
+    contents = [read_content(source, task) for source, task in zip(sources, tasks, strict=True)]
+    document = report_document(contents, tasks[0].language)
+    for number, out in enumerate(outs):
+
+        def part(done: float, total: float, what: str = "", number: int = number) -> None:
+            progress(number + done / max(total, 1), len(outs), what)
+
+        _WRITERS[out.suffix.lower()](out, document, overwrite=overwrite, progress=part)
+    remarks = [remark for content in contents for remark in content.pair.remarks]
+    return tuple(dict.fromkeys(remarks))
+
+
+def report_of(
+    source: Path,
+    out: Path,
+    task: ReportTask,
+    *,
+    overwrite: bool = False,
+    progress: Progress = no_progress,
+) -> tuple[str, ...]:
+    """Write the report of a workbook, a pair file or a survey's folder; see `write_report`."""
+    sources, tasks = [source], [task]
+    if source.is_dir():
+        if task.control or task.check or task.relief or task.ortho:
+            raise InputError(
+                f"{source}: the folder says what belongs to its pairs; leave out --control, "
+                "--check, --relief and --ortho."
+            )
+        sources, tasks = find_pairs(source, task)
+    return write_report(sources, [out], tasks, overwrite=overwrite, progress=progress)
+
+
+def find_pairs(folder: Path, task: ReportTask) -> tuple[list[Path], list[ReportTask]]:
+    """Return the pairs of a façade's or a survey's folder, with what was made of each.
+
+    A pair is told by the workbook of its points, which names the pair file, or by the pair file.
+
+    Raises
+    ------
+    InputError
+        If there is none.
+    """
+    sources = sorted(folder.glob("align/*.pair.json")) or sorted(folder.glob("*/align/*.pair.json"))
+    if not sources:
+        raise InputError(
+            f"{folder}: holds no pair made by `bifocal facade` or `bifocal survey` (align/*.pair."
+            "json). Name a pair file or a solved workbook."
+        )
+    tasks, found = [], []
+    for source in sources:
+        home, name = source.parent.parent, source.name.removesuffix(".pair.json")
+        orthos = (home / "drawing" / f"{name}.tif", home / "ortho" / f"{name}_ortho.tif")
+        relief = home / "relief" / f"{name}_relief.tif"
+        workbook = home / "points" / f"{name}_points.xlsx"
+        given: dict[str, Any] = {
+            "title": task.title if len(sources) == 1 and task.title else name,
+            "relief": relief if relief.is_file() else None,
+            "ortho": next((path for path in orthos if path.is_file()), None),
+        }
+        found.append(workbook if workbook.is_file() else source)
+        tasks.append(replace(task, **given))
+    return found, tasks

@@ -1,0 +1,97 @@
+"""What -q, -v and --log do: remarks on the terminal or not, and a log of a command's work.
+
+The library speaks to `logging` (loggers ``bifocal``, ``multimedia``, ``photocore``) and configures
+none of it; only a command does, for its own time.
+"""
+
+from __future__ import annotations
+
+import logging
+import sys
+from pathlib import Path
+
+import click
+
+from photocore.provenance import command_line, program
+
+PACKAGES = ("bifocal", "multimedia", "photocore")
+#: First words of every log, by which a file is known to be one.
+HEAD = "# log of "
+_QUIET = "photocore.quiet"
+_FORMAT = "%(asctime)s %(levelname)-7s %(name)s: %(message)s"
+
+
+def is_quiet() -> bool:
+    """Tell whether the command that runs was asked to be quiet."""
+    context = click.get_current_context(silent=True)
+    return context is not None and bool(context.meta.get(_QUIET))
+
+
+def log_options() -> list[click.Option]:
+    """Return the options that every command and both programs have."""
+    return [
+        click.Option(
+            ["-q", "--quiet"], is_flag=True, is_eager=True, expose_value=False, callback=_be_quiet,
+            help="No remarks and no progress; errors are still told.",
+        ),
+        click.Option(
+            ["-v", "--verbose"], is_flag=True, is_eager=True, expose_value=False,
+            callback=_be_verbose, help="Tell what is read and written.",
+        ),
+        click.Option(
+            ["--log"], type=click.Path(path_type=Path), is_eager=True, expose_value=False,
+            callback=_keep_log, metavar="FILE", help="Add what happens to a log file.",
+        ),
+    ]  # fmt: skip
+
+
+def _be_quiet(ctx: click.Context, param: click.Parameter, value: bool) -> None:  # noqa: ARG001
+    ctx.meta[_QUIET] = ctx.meta.get(_QUIET, False) or value
+
+
+def _be_verbose(ctx: click.Context, param: click.Parameter, value: bool) -> None:  # noqa: ARG001
+    if value:
+        handler = logging.StreamHandler(sys.stderr)
+        handler.setFormatter(logging.Formatter("%(message)s"))
+        # Remarks stand on the terminal already.
+        handler.addFilter(lambda record: record.name != "photocore.cli")
+        _attach(ctx, handler)
+
+
+def _keep_log(ctx: click.Context, param: click.Parameter, value: Path | None) -> None:
+    if value is None:
+        return
+    try:
+        if value.exists() and value.stat().st_size:
+            with value.open("rb") as file:
+                if file.read(len(HEAD)) != HEAD.encode():
+                    raise click.BadParameter(
+                        f"{value} exists already and is no log of this program; name another "
+                        "file.", ctx, param,
+                    )  # fmt: skip
+        with value.open("a", encoding="utf-8") as file:
+            file.write(f"{HEAD}{program()}: {command_line()}\n")
+        handler = logging.FileHandler(value, encoding="utf-8")
+    except OSError as error:
+        raise click.BadParameter(
+            f"{value} cannot be written ({error.strerror or error}).", ctx, param
+        ) from None
+    handler.setFormatter(logging.Formatter(_FORMAT))
+    _attach(ctx, handler)
+
+
+def _attach(ctx: click.Context, handler: logging.Handler) -> None:
+    """Let a handler hear the packages until the whole command has ended."""
+    handler.setLevel(logging.INFO)
+    loggers = [logging.getLogger(name) for name in PACKAGES]
+    for logger in loggers:
+        logger.addHandler(handler)
+        logger.setLevel(logging.INFO)
+
+    def detach() -> None:
+        for logger in loggers:
+            logger.removeHandler(handler)
+            logger.setLevel(logging.NOTSET)
+        handler.close()
+
+    ctx.find_root().call_on_close(detach)

@@ -1,0 +1,90 @@
+"""A survey killed at random moments, or on a cluster that loses a worker, gives the same files."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from bifocal.campaigns.survey_file import read_survey_file
+from bifocal.campaigns.workflow import Machines, run_survey
+from tests.bifocal.campaigns.sample_tables import write_survey
+
+pytestmark = pytest.mark.acceptance
+
+
+def digests(folder: Path) -> dict[str, str]:
+    """Return the hashes of all products; records bear times and are none."""
+    return {
+        path.relative_to(folder).as_posix(): hashlib.sha256(path.read_bytes()).hexdigest()
+        for path in sorted(folder.rglob("*"))
+        if path.is_file() and not path.name.startswith(".")
+    }
+
+
+@pytest.fixture(scope="module")
+def survey(tmp_path_factory) -> Path:
+    return write_survey(tmp_path_factory.mktemp("street") / "survey")
+
+
+@pytest.fixture(scope="module")
+def undisturbed(survey) -> dict[str, str]:
+    out = survey.parent / "undisturbed"
+    result = run_survey(read_survey_file(survey, out=out), machines=Machines(jobs=1))
+    assert [outcome.name for outcome in result.failed] == ["cut off", "no control"]
+    assert "broken.png: the image is damaged" in result.failed[0].message
+    assert "--control" in result.failed[1].message
+    return digests(out)
+
+
+def run(survey: Path, out: Path) -> subprocess.Popen:
+    words = [sys.executable, "-m", "bifocal", "survey", str(survey), "--out", str(out)]
+    return subprocess.Popen(
+        [*words, "--jobs", "2"], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+    )
+
+
+def test_killed_again_and_again_it_ends_with_the_same_files(survey, undisturbed):
+    out = survey.parent / "killed"
+    rng = np.random.default_rng(16)
+    for number, pause in enumerate(rng.uniform(3, 14, 5)):
+        process = run(survey, out)
+        time.sleep(pause)
+        # Twice as Ctrl-C does it, else as the system does without memory.
+        process.send_signal(signal.SIGINT if number % 2 else signal.SIGKILL)
+        process.wait(60)
+    result = run_survey(read_survey_file(survey, out=out), machines=Machines(jobs=2))
+    assert len(result.failed) == 2
+    assert digests(out) == undisturbed
+    assert not [p for p in out.rglob(".*-writing-*")]
+    again = run_survey(read_survey_file(survey, out=out))
+    assert not any(outcome.done for outcome in again.outcomes)
+
+
+def test_a_cluster_that_loses_a_worker_gives_the_same_files(survey, undisturbed):
+    distributed = pytest.importorskip("distributed")
+    out = survey.parent / "cluster"
+    with distributed.LocalCluster(
+        n_workers=2, threads_per_worker=1, dashboard_address=None, resources={"memory": 4e9}
+    ) as cluster:
+        jobs = read_survey_file(survey, out=out)
+        victim = next(iter(cluster.workers.values())).pid
+        killed = []
+
+        def kill(done: float, total: float, what: str = "") -> None:  # noqa: ARG001
+            if not killed and done > 0:
+                killed.append(victim)
+                os.kill(victim, signal.SIGKILL)
+
+        machines = Machines(scheduler=cluster.scheduler_address)
+        result = run_survey(jobs, machines=machines, progress=kill)
+    assert killed
+    assert len(result.failed) == 2
+    assert digests(out) == undisturbed

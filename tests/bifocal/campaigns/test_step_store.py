@@ -1,0 +1,126 @@
+"""Steps are made once, anew when what went in changed, and never over what is the user's."""
+
+from __future__ import annotations
+
+import json
+import os
+from pathlib import Path
+
+import pytest
+
+from bifocal.campaigns import step_store
+from bifocal.campaigns.step_store import RECORD, Step, clean, is_current, read_record, run_step
+from photocore.cli import no_progress
+from photocore.errors import InputError
+from photocore.provenance import FileHashes
+
+
+class Kitchen:
+    """A step that copies its input, counts its runs, and may be told to break."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder, self.runs, self.fault = folder, 0, None
+        self.source = folder / "source.txt"
+        self.source.write_text("one")
+
+    def step(self, **options: object) -> Step:
+        def make(place: Path, progress: object) -> tuple[str, ...]:  # noqa: ARG001
+            self.runs += 1
+            (place / "out.txt").write_text(f"{self.source.read_text()} {options}")
+            if self.fault:
+                raise self.fault
+            return ("done",)
+
+        return Step(name="cook", files={"source": self.source}, options=options, make=make)
+
+    def run(self, *, overwrite: bool = False, **options: object) -> bool:
+        """Return whether it was made anew."""
+        hashes = FileHashes(self.folder / ".hashes.json")
+        step, before = self.step(**options), self.runs
+        key = step_store.step_key(step, {}, hashes)
+        home = self.folder / "out"
+        if not is_current(home / "cook", read_record(home / "cook"), key, hashes):
+            run_step(home, step, key, hashes, progress=no_progress, overwrite=overwrite)
+        hashes.save()
+        return self.runs > before
+
+
+@pytest.fixture
+def kitchen(tmp_path):
+    return Kitchen(tmp_path)
+
+
+def test_a_step_runs_again_only_when_content_or_options_change(kitchen):
+    assert kitchen.run()
+    assert not kitchen.run()
+    os.utime(kitchen.source, (1e9, 1e9))  # another time, the same content
+    assert not kitchen.run()
+    kitchen.source.write_text("two")
+    assert kitchen.run()
+    assert kitchen.run(scale=50)
+    assert not kitchen.run(scale=50)
+    (kitchen.folder / "out/cook/out.txt").unlink()
+    assert kitchen.run(scale=50)
+
+
+def test_a_file_the_user_changed_is_not_replaced_unless_told_to(kitchen):
+    kitchen.run()
+    result = kitchen.folder / "out/cook/out.txt"
+    result.write_text("mine, and longer")
+    with pytest.raises(InputError, match=r"out\.txt: was changed after it was made.*--overwrite"):
+        kitchen.run()
+    assert result.read_text() == "mine, and longer"
+    assert kitchen.run(overwrite=True)
+
+
+def test_files_the_user_added_move_along(kitchen):
+    kitchen.run()
+    (kitchen.folder / "out/cook/notes.txt").write_text("mine")
+    kitchen.source.write_text("two")
+    assert kitchen.run()
+    assert (kitchen.folder / "out/cook/notes.txt").read_text() == "mine"
+
+
+def test_a_folder_of_somebody_else_is_left_alone(kitchen):
+    (kitchen.folder / "out/cook").mkdir(parents=True)
+    (kitchen.folder / "out/cook/thesis.txt").write_text("mine")
+    with pytest.raises(InputError, match="files that this survey did not make"):
+        kitchen.run()
+    assert [p.name for p in (kitchen.folder / "out/cook").iterdir()] == ["thesis.txt"]
+
+
+@pytest.mark.parametrize("fault", [InputError("no"), KeyboardInterrupt(), MemoryError()])
+def test_whatever_breaks_a_step_leaves_the_old_result(kitchen, fault):
+    kitchen.run()
+    kitchen.source.write_text("two")
+    kitchen.fault = fault
+    with pytest.raises(type(fault)):
+        kitchen.run()
+    assert (kitchen.folder / "out/cook/out.txt").read_text().startswith("one")
+    assert [p.name for p in (kitchen.folder / "out").iterdir()] == ["cook"]
+
+
+@pytest.mark.parametrize("moment", ["writing", "old aside", "both there"])
+def test_a_killed_run_is_cleaned_up_at_whatever_moment(kitchen, moment):
+    kitchen.run()
+    home = kitchen.folder / "out"
+    (home / ".cook-writing-x1").mkdir()
+    (home / ".cook-writing-x1/half.txt").write_text("ha")
+    if moment == "old aside":
+        (home / "cook").rename(home / ".cook.old")
+    if moment == "both there":
+        (home / ".cook.old").mkdir()
+    clean(home)
+    assert [p.name for p in home.iterdir()] == ["cook"]
+    assert not kitchen.run()
+
+
+def test_the_record_says_what_was_made_from_what(kitchen):
+    kitchen.run(scale=50)
+    record = json.loads((kitchen.folder / "out/cook" / RECORD).read_text())
+    assert record["options"] == {"scale": 50}
+    # sha256 of "one": `printf one | sha256sum`.
+    digest = "7692c3ad3540bb803c020b3aee66cd8887123234ea0c6e7143c0add73ff431ed"
+    assert record["inputs"] == {"source": ["source.txt", digest]}
+    assert list(record["outputs"]) == ["out.txt"]
+    assert record["program"].startswith("bifocal ")

@@ -1,0 +1,104 @@
+"""The survey file says everything that is wrong with it at once."""
+
+from __future__ import annotations
+
+import shutil
+
+import pytest
+from click.testing import CliRunner
+
+from bifocal.campaigns.survey_file import read_survey_file
+from bifocal.cli.main import main
+from photocore.errors import InputError
+from tests.bifocal.campaigns.sample_tables import FAR, NEAR
+
+GOOD = """
+format = "bifocal-survey/1"
+scale = "1:50"
+lens = "lens.json"
+products = ["report", "relief"]
+
+[[pair]]
+name = "Nord, Hof"
+far = "photos/a.jpg"
+near = "photos/b.jpg"
+control = "a.csv"
+scale = 20
+
+[[pair]]
+far = "c.jpg"
+near = "d.jpg"
+bounds = [-4, 0, 4, 7.5]
+"""
+
+
+def test_common_entries_hold_for_every_pair_that_does_not_say_otherwise(tmp_path):
+    (tmp_path / "street.toml").write_text(GOOD)
+    first, second = read_survey_file(tmp_path / "street.toml")
+    assert (first.name, first.options["scale"]) == ("Nord, Hof", 20.0)
+    assert (second.name, second.options["scale"]) == ("pair 2", 50.0)
+    assert first.folder == tmp_path / "results" / "Nord_Hof"
+    assert first.far == tmp_path / "photos/a.jpg"
+    assert dict(first.files) == {"lens": tmp_path / "lens.json", "control": tmp_path / "a.csv"}
+    assert second.options["bounds"] == (-4.0, 0.0, 4.0, 7.5)
+    assert first.products == ("relief", "report")  # in the order of work
+
+
+@pytest.mark.parametrize(
+    ("wrong", "said"),
+    [
+        ("scal = 50", r"no key 'scal'. Did you mean scale\?"),
+        ('scale = "fifty"', 'expected a scale, "1:50" or 50'),
+        ("distance1 = -3", "distance1 = -3: expected a number above zero"),
+        ("distance1 = true", "expected a number above zero"),
+        ("bounds = [1, 2]", "expected a list of 4 numbers"),
+        ('quality = "superb"', "expected one of fast, standard, best"),
+        ('products = ["poster"]', "expected some of relief, points"),
+        ("control = 7", "expected the name of a file"),
+    ],
+)
+def test_a_wrong_entry_is_named_with_its_pair(tmp_path, wrong, said):
+    (tmp_path / "s.toml").write_text(f'[[pair]]\nname = "A"\nfar = "a"\nnear = "b"\n{wrong}\n')
+    with pytest.raises(InputError, match=f"pair A: .*{said}"):
+        read_survey_file(tmp_path / "s.toml")
+
+
+def test_all_faults_are_told_at_once(tmp_path):
+    (tmp_path / "s.toml").write_text(
+        'dpi = "x"\n[[pair]]\nname = "A"\nfar = "a"\n[[pair]]\nfar = "a"\nnear = "b"\ngsd = 0\n'
+        '[[pair]]\nname="B!"\nfar="a"\nnear="b"\n[[pair]]\nname="b"\nfar="a"\nnear="b"\n'
+    )
+    with pytest.raises(InputError) as caught:
+        read_survey_file(tmp_path / "s.toml")
+    text = str(caught.value)
+    for part in ("above the pairs: dpi", "pair A: far and near", "pair 2: gsd", "the same name"):
+        assert part in text
+
+
+@pytest.mark.parametrize("text", ["[[pair", 'format = "bifocal-survey/9"', "scale = 50"])
+def test_what_is_no_survey_is_refused_by_the_command(tmp_path, text):
+    (tmp_path / "s.toml").write_text(text)
+    result = CliRunner().invoke(main, ["survey", str(tmp_path / "s.toml")])
+    assert result.exit_code == 1
+    assert str(tmp_path / "s.toml") in result.stderr
+
+
+def test_photos_of_a_folder_are_paired_by_what_they_show(tmp_path, capsys):  # noqa: ARG001
+    from PIL import Image
+
+    photos = tmp_path / "photos"
+    photos.mkdir()
+    shutil.copy(FAR, photos / "b far.jpg")
+    shutil.copy(NEAR, photos / "c near.jpg")
+    Image.open(FAR).rotate(90, expand=True).crop((0, 0, 200, 200)).save(photos / "a other.jpg")
+    (photos / "c near.csv").write_text("id\n")
+    out = tmp_path / "street.toml"
+    result = CliRunner().invoke(main, ["survey", "--init", str(photos), str(out)])
+    assert result.exit_code == 0, result.stderr
+    (job,) = read_survey_file(out)
+    assert {job.far.name, job.near.name} == {"b far.jpg", "c near.jpg"}
+    assert job.files["control"] == tmp_path / "photos/c near.csv"
+    assert "a other.jpg" in out.read_text()
+    again = CliRunner().invoke(main, ["survey", "--init", str(photos), str(out)])
+    assert again.exit_code == 1
+    assert "--overwrite" in again.stderr

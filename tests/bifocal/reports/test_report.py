@@ -1,0 +1,170 @@
+"""The report: accuracy first, numbers a pocket calculator confirms, one file that stands alone."""
+
+from __future__ import annotations
+
+import math
+import re
+from html.parser import HTMLParser
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+
+from bifocal.cli.main import main
+from bifocal.demo import SAMPLE
+from bifocal.reports.words import LANGUAGES, _content, words_in
+from tests.bifocal.campaigns.sample_tables import write_tables
+
+PAIR = SAMPLE / "facade.pair.json"
+_VOID = {"meta", "img", "link", "br", "hr"}
+
+
+class Page(HTMLParser):
+    """Checks that elements are closed in order, and gathers what a reader sees."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.open: list[str] = []
+        self.words: list[str] = []
+        self.sources: list[str] = []
+        self.feed(text)
+        self.close()
+        assert not self.open
+
+    def handle_starttag(self, tag, attrs):
+        names = [name for name, _ in attrs]
+        assert len(names) == len(set(names))
+        if tag not in _VOID:
+            self.open.append(tag)
+        if tag == "img":
+            assert dict(attrs)["alt"]
+        self.sources += [value for name, value in attrs if name in ("src", "href")]
+
+    def handle_endtag(self, tag):
+        assert self.open.pop() == tag
+
+    def handle_data(self, data):
+        if self.open and self.open[-1] != "style":
+            self.words.append(data)
+
+    @property
+    def text(self) -> str:
+        return "\n".join(self.words)
+
+
+@pytest.fixture(scope="module")
+def tables(tmp_path_factory) -> tuple[Path, Path]:
+    return write_tables(tmp_path_factory.mktemp("tables"))
+
+
+def report(out: Path, *options: object) -> str:
+    result = CliRunner().invoke(main, ["report", str(PAIR), "--out", str(out), *map(str, options)])
+    assert result.exit_code == 0, result.stderr
+    return out.read_text(encoding="utf-8") if out.suffix == ".html" else ""
+
+
+@pytest.fixture(scope="module")
+def page(tables, tmp_path_factory) -> str:
+    control, check = tables
+    out = tmp_path_factory.mktemp("report") / "report.html"
+    return report(out, "--control", control, "--check", check, "--scale", "1:50")
+
+
+def test_the_page_is_whole_and_needs_no_network(page):
+    parsed = Page(page)
+    assert parsed.sources
+    assert all(source.startswith("data:") for source in parsed.sources)
+    assert "http:" not in page
+    assert "https:" not in page
+    assert len(page) < 15e6
+    # No two figures share an id: each is an image of its own.
+    assert len(re.findall(r' id="', page)) == 0
+
+
+def test_accuracy_stands_first_with_a_verdict_per_scale(page):
+    text = Page(page).text
+    first = text.index("independent check points")
+    assert first < 250
+    assert "16 independent check points" in text
+    # RMSE of the worst axis, from the table of the page itself.
+    rows = re.findall(r"<td>(T\d\d)</td>(.*?)</tr>", page)
+    errors = [re.findall(r"<td>(-?\d+\.\d)</td>", rest) for _, rest in rows]
+    compared = [line for line in errors if len(line) >= 4][:16]
+    assert len(compared) == 16
+    worst = max(
+        math.sqrt(sum(float(line[axis]) ** 2 for line in compared) / 16) for axis in range(3)
+    )
+    said = float(re.search(r"(\d+\.\d*) mm at 16", text)[1])
+    assert said == pytest.approx(worst, abs=0.06)
+    # 0.18 mm at 1:100 is 18 mm on the wall, at 1:20 3.6 mm.
+    limits = {scale: 0.18 * scale for scale in (10, 20, 50, 100, 200, 500)}
+    for scale, limit in limits.items():
+        word = "yes" if worst <= limit else "NO"
+        assert re.search(rf"<td>1:{scale}</td><td>{limit:.3g} mm: {word}</td>", page), scale
+    asked = "is held" if worst <= limits[50] else "is NOT held"
+    assert f"The scale asked for, 1:50, {asked}" in text
+
+
+def numbers(text: str) -> list[float]:
+    return [float(value) for value in re.findall(r"-?\d+\.?\d*(?:e[+-]?\d+)?", text)]
+
+
+def test_the_worked_point_comes_out_by_pocket_calculator(page):
+    text = Page(page).text
+    lines = dict.fromkeys("12")
+    for k in lines:
+        q = re.search(rf"q{k} = \((.*?), (.*?)\) m", text)
+        line = re.search(rf"N{k} = \((.*?), (.*?)\) m, d{k} = (.*?) m ", text)
+        q, (*nadir, d) = [float(v) for v in q.groups()], [float(v) for v in line.groups()]
+        lines[k] = (q, [(a - b) / d for a, b in zip(q, nadir, strict=True)])
+    (q1, v1), (q2, v2) = lines["1"], lines["2"]
+    shift = [a - b for a, b in zip(q1, q2, strict=True)]
+    slope = [a - b for a, b in zip(v1, v2, strict=True)]
+    r = sum(a * b for a, b in zip(shift, slope, strict=True)) / sum(a * a for a in slope)
+    printed = float(re.search(r" = (-?\d+\.\d{4}) m\n", text[text.index("r = ") :])[1])
+    assert printed == pytest.approx(r, abs=4e-4)  # q is printed to 0.01 mm
+    program = float(re.search(r"finds r = (-?\d\.\d+) m", text)[1])
+    sigma = float(re.search(r"sigma_r = (\d+\.\d+) mm", text)[1]) / 1000
+    assert abs(program - r) < sigma
+
+
+def test_without_check_points_the_figure_is_called_optimistic(tables, tmp_path):
+    text = Page(report(tmp_path / "r.html", "--control", tables[0], "--language", "de")).text
+    # The pair file of the sample rests on no control: what is compared is then independent.
+    assert "12 unabhängigen Kontrollpunkten" in text
+    text = Page(report(tmp_path / "bare.html", "--language", "it")).text
+    assert "l'accuratezza non è provata" in text
+
+
+def test_the_pdf_has_the_same_pages_and_names_its_program(tables, tmp_path):
+    control, check = tables
+    out = tmp_path / "report.pdf"
+    report(out, "--control", control, "--check", check)
+    data = out.read_bytes()
+    assert data.startswith(b"%PDF")
+    assert b"bifocal 0." in data
+    assert 3 <= data.count(b"/Type /Page ") <= 12
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (["--out", "r.docx"], "written as .html or .pdf"),
+        (["--out", "r.html", "--control", "absent.csv"], "absent.csv"),
+        (["--out", "r.html", "--relief", str(SAMPLE / "far.jpg")], "far.jpg"),
+    ],
+)
+def test_what_cannot_be_reported_is_refused(tmp_path, monkeypatch, options, said):
+    monkeypatch.chdir(tmp_path)
+    result = CliRunner().invoke(main, ["report", str(PAIR), *options])
+    assert result.exit_code == 1
+    assert said in result.stderr
+    assert not list(tmp_path.iterdir())
+
+
+def test_every_text_is_there_in_three_languages_with_the_same_blanks():
+    for key, texts in _content().items():
+        assert set(texts) == set(LANGUAGES), key
+        blanks = {tuple(sorted(re.findall(r"\{\w+\}", text))) for text in texts.values()}
+        assert len(blanks) == 1, key
+    assert words_in("it")("good_for", scale=50) == "Adatto a disegni in scala 1:50 e minori."
