@@ -165,6 +165,11 @@ class Driver:
             self.tab.keyboard.press(key)
 
     @property
+    def pane(self) -> Any:
+        """The first pane of the stage that is shown."""
+        return self.tab.locator(".pane:visible").first
+
+    @property
     def state(self) -> dict[str, Any]:
         return dict(self.tab.evaluate("() => bifocal.state()"))
 
@@ -208,10 +213,10 @@ class Driver:
             self.command("point.delete", name=point["name"])
         self.settled("state.points.length === 0")
         self.click("mode-points")
-        self.tab.locator(".pane").first.focus()
+        self.pane.focus()
         self.keys("Escape", "Escape", "n", "v", "0")
         self.tab.get_by_test_id("layer-opacity").fill("50")
-        self.tab.locator(".pane").first.focus()
+        self.pane.focus()
 
     def pick_control(self, points: dict[str, tuple[float, float, float]]) -> None:
         """Hand control points over as Excel does, then pick and snap each in both photos."""
@@ -244,7 +249,7 @@ class Driver:
 
     def frames(self) -> list[float]:
         """Return how long the frames take while the photos are dragged and zoomed. [ms]"""
-        box = self.tab.locator(".pane").first.bounding_box()
+        box = self.pane.bounding_box()
         x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
         self.tab.mouse.move(x, y)
         self.tab.evaluate(WATCH)

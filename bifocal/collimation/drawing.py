@@ -4,19 +4,19 @@ from __future__ import annotations
 
 import tempfile
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from bifocal.collimation.live_results import LiveResults
+from bifocal.collimation.records import SurveyState
 from bifocal.files.exports import export_points
 from bifocal.model.points import PointLine, SurveyPoints
 from photocore.errors import InputError
 
-if TYPE_CHECKING:
-    from bifocal.collimation.session import Session
 
-
-def drawn_points(session: Session) -> tuple[SurveyPoints, tuple[PointLine, ...]]:
+def drawn_points(
+    state: SurveyState, results: LiveResults | None
+) -> tuple[SurveyPoints, tuple[PointLine, ...]]:
     """Return the solved points and the lines of a survey.
 
     Raises
@@ -24,13 +24,11 @@ def drawn_points(session: Session) -> tuple[SurveyPoints, tuple[PointLine, ...]]
     InputError
         If no point is picked in both photos yet.
     """
-    with session.lock:
-        results, points = session.results, session.state.sorted_points()
-        lines = tuple(
-            PointLine(line.name, line.layer, line.points, line.closed)
-            for line in session.state.lines.values()
-        )
-        rows = [] if results is None else [(p, results.row(p)) for p in points if p.use]
+    lines = tuple(
+        PointLine(line.name, line.layer, line.points, line.closed) for line in state.lines.values()
+    )
+    points = [point for point in state.sorted_points() if point.use]
+    rows = [] if results is None else [(point, results.row(point)) for point in points]
     solved = [(point, row) for point, row in rows if row is not None]
     if not solved:
         raise InputError("there is nothing to draw yet: pick a point in both photos.")
@@ -48,15 +46,15 @@ def drawn_points(session: Session) -> tuple[SurveyPoints, tuple[PointLine, ...]]
     ), lines
 
 
-def write_points_drawing(session: Session, path: Path) -> None:
+def write_points_drawing(state: SurveyState, results: LiveResults | None, path: Path) -> None:
     """Write the drawing over what may stand there."""
-    points, lines = drawn_points(session)
+    points, lines = drawn_points(state, results)
     export_points(path, points, lines=lines, overwrite=True)
 
 
-def points_drawing(session: Session) -> bytes:
+def points_drawing(state: SurveyState, results: LiveResults | None) -> bytes:
     """Return the drawing as the content of a DXF file."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "points.dxf"
-        write_points_drawing(session, path)
+        write_points_drawing(state, results, path)
         return path.read_bytes()

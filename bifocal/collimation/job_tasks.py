@@ -4,25 +4,38 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import asdict
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from bifocal.collimation.commands import number_of, positive_of
 from bifocal.collimation.drawing import write_points_drawing
+from bifocal.collimation.jobs import PageJob
 from bifocal.collimation.live_orientation import control_of, lenses_of, site_of
+from bifocal.collimation.session import Session
 from bifocal.orientation.control_points import Control
 from photocore.errors import InputError
 from photocore.jsonfile import plain
 from photocore.output import free_path
 from photocore.tables import write_csv
 
-if TYPE_CHECKING:
-    from bifocal.collimation.session import Session
-
 KINDS = ("align", "match", "relief", "ortho", "deliver")
 Options = Mapping[str, Any]
+
+
+def start_job(session: Session, kind: str, options: Options) -> PageJob:
+    """Start a job of a survey.
+
+    Raises
+    ------
+    InputError
+        If another one runs, the survey is not far enough for it, or an option is impossible.
+    """
+    return session.jobs.start(
+        kind, partial(task_of, session, kind, options), partial(finish, session)
+    )
 
 
 def task_of(session: Session, kind: str, options: Options) -> dict[str, Any]:
@@ -196,8 +209,10 @@ def finish(session: Session, task: Mapping[str, Any], result: Mapping[str, Any])
         folder = Path(task["out"])
         names = [f"{folder.name}/{name}" for name in result["files"]]
         if any(point.is_complete for point in session.state.points.values()):
-            write_points_drawing(session, folder / f"{session.products.stem}_points.dxf")
-            names.append(f"{folder.name}/{session.products.stem}_points.dxf")
+            drawing = folder / f"{session.products.stem}_points.dxf"
+            with session.lock:
+                write_points_drawing(session.state, session.results, drawing)
+            names.append(f"{folder.name}/{drawing.name}")
     session.note_made(kind, names)
     session.show_products()
     return " ".join(str(remark) for remark in result.get("remarks", ()))

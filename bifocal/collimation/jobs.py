@@ -6,23 +6,22 @@ import json
 import subprocess
 import sys
 import threading
-from collections.abc import Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from bifocal.collimation.job_tasks import finish, task_of
 from photocore.errors import InputError, PhotogrammetryError
 
-if TYPE_CHECKING:
-    from bifocal.collimation.session import Session
-
+#: Plain data, as it goes to the worker and comes back.
+Task = dict[str, Any]
 #: Jobs that are remembered; older ones are forgotten once they have ended.
 MOST_JOBS = 20
 
 
 @dataclass(slots=True)
-class Job:
+class PageJob:
     """A job.
 
     Attributes
@@ -61,40 +60,59 @@ class JobRunner:
 
     Parameters
     ----------
-    session : Session
+    lock : RLock
+        Of the survey that the jobs work for.
+    tell : callable
+        Called with each event of a job.
+    changed : callable
+        Called where the survey's state is another.
     """
 
-    def __init__(self, session: Session) -> None:
-        self.session = session
-        self.jobs: dict[str, Job] = {}
+    def __init__(
+        self,
+        lock: threading.RLock,
+        tell: Callable[[dict[str, Any]], None],
+        changed: Callable[[], None],
+    ) -> None:
+        self._lock, self._tell_all, self._changed = lock, tell, changed
+        self.jobs: dict[str, PageJob] = {}
         self._count = 0
         self._threads: list[threading.Thread] = []
 
-    def start(self, kind: str, options: Mapping[str, Any]) -> Job:
+    def start(
+        self, kind: str, task_of: Callable[[], Task], finish: Callable[[Task, Task], str]
+    ) -> PageJob:
         """Start a job.
+
+        Parameters
+        ----------
+        kind : str
+        task_of : callable
+            Returns what the worker is told; asked once no other job runs.
+        finish : callable
+            Takes task and result over; returns what the user should know.
 
         Raises
         ------
         InputError
             If another one runs, or it cannot be done as the survey stands.
         """
-        session = self.session
-        with session.lock:
+        with self._lock:
             running = [job for job in self.jobs.values() if job.state == "running"]
             if running:
                 raise InputError(
                     f"the job {running[0].kind} is still running; wait for it or cancel it."
                 )
-            task = task_of(session, kind, options)
+            task = task_of()
             self._count += 1
-            job = Job(str(self._count), kind)
+            job = PageJob(str(self._count), kind)
             self.jobs[job.number] = job
             for number in list(self.jobs)[:-MOST_JOBS]:
                 del self.jobs[number]
-            thread = threading.Thread(target=self._run, args=(job, task), daemon=True)
+            thread = threading.Thread(target=self._run, args=(job, task, finish), daemon=True)
             self._threads = [t for t in self._threads if t.is_alive()] + [thread]
         thread.start()
-        self.session.changed()
+        self._changed()
         return job
 
     def cancel(self, number: str) -> None:
@@ -108,7 +126,7 @@ class JobRunner:
         job = self.jobs.get(number)
         if job is None:
             raise InputError("there is no such job.")
-        with self.session.lock:
+        with self._lock:
             if job.state == "running":
                 job.state = "cancelled"
                 if job.process is not None:
@@ -122,7 +140,7 @@ class JobRunner:
         for thread in self._threads:
             thread.join(timeout=10)
 
-    def _run(self, job: Job, task: dict[str, Any]) -> None:
+    def _run(self, job: PageJob, task: Task, finish: Callable[[Task, Task], str]) -> None:
         command = [sys.executable, "-m", "bifocal.collimation.job_process"]
         try:
             process = subprocess.Popen(
@@ -133,7 +151,7 @@ class JobRunner:
             self._end(job, "failed", f"the job could not be started ({error.strerror}).")
             return
         with process:
-            with self.session.lock:
+            with self._lock:
                 job.process = process
                 if job.state == "cancelled":
                     process.terminate()
@@ -142,13 +160,11 @@ class JobRunner:
         if job.state == "cancelled":
             self._tell(job)
         elif "result" in answer:
-            self._finish(job, task, answer["result"])
+            self._finish(job, partial(finish, task, answer["result"]))
         else:
             self._end(job, "failed", answer.get("error", "the job ended without a result."))
 
-    def _follow(
-        self, job: Job, process: subprocess.Popen[str], task: dict[str, Any]
-    ) -> dict[str, Any]:
+    def _follow(self, job: PageJob, process: subprocess.Popen[str], task: Task) -> dict[str, Any]:
         """Return the last line of a worker, telling its progress meanwhile."""
         assert process.stdin is not None
         assert process.stdout is not None
@@ -169,19 +185,19 @@ class JobRunner:
             answer = told
         return answer
 
-    def _finish(self, job: Job, task: dict[str, Any], result: dict[str, Any]) -> None:
+    def _finish(self, job: PageJob, finish: Callable[[], str]) -> None:
         try:
-            remarks = finish(self.session, task, result)
+            remarks = finish()
         except (PhotogrammetryError, OSError) as error:
             self._end(job, "failed", str(error))
             return
         job.progress = 1.0
         self._end(job, "done", remarks)
 
-    def _end(self, job: Job, state: str, message: str) -> None:
+    def _end(self, job: PageJob, state: str, message: str) -> None:
         job.state, job.message = state, message
-        self.session.changed()
+        self._changed()
         self._tell(job)
 
-    def _tell(self, job: Job) -> None:
-        self.session.tell({"job": job.as_dict()})
+    def _tell(self, job: PageJob) -> None:
+        self._tell_all({"job": job.as_dict()})

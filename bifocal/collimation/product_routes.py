@@ -12,6 +12,7 @@ from starlette.routing import Route
 
 from bifocal.collimation.commands import number_of
 from bifocal.collimation.drawing import points_drawing
+from bifocal.collimation.job_tasks import start_job
 from bifocal.collimation.requests import answer, in_thread, json_body, session_of
 from bifocal.collimation.session import Session
 from bifocal.collimation.state_view import state_of
@@ -45,7 +46,7 @@ async def _start(request: Request) -> Response:
     options = body.get("options", body)
     if not isinstance(options, dict):
         raise InputError("options: expected an object.")
-    job = await in_thread(session_of(request).jobs.start, str(body.get("kind")), options)
+    job = await in_thread(start_job, session_of(request), str(body.get("kind")), options)
     return answer({"id": job.number})
 
 
@@ -60,7 +61,12 @@ async def _download(request: Request) -> Response:
         data = await in_thread(session.products.zipped, session.files.workbook)
         return _attached(data, "application/zip", f"{session.files.stem}.zip")
     if name == "points.dxf":
-        data = await in_thread(points_drawing, session)
+
+        def drawing() -> bytes:
+            with session.lock:
+                return points_drawing(session.state, session.results)
+
+        data = await in_thread(drawing)
         return _attached(data, "image/vnd.dxf", f"{session.files.stem}_points.dxf")
     path = session.products.downloads(session.files.workbook).get(name)
     if path is None:

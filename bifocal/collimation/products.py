@@ -38,6 +38,7 @@ class Products:
         self.folder, self.stem = files.folder, files.stem
         self.made: dict[str, str] = {}
         self._relief: tuple[tuple[str, int], ReliefMap] | None = None
+        self._facts: dict[str, tuple[tuple[str, int], dict[str, Any]]] = {}
 
     def note(self, kind: str, names: Sequence[str]) -> None:
         """Remember that files were made."""
@@ -84,20 +85,20 @@ class Products:
         return buffer.getvalue()
 
     def facts(self, kind: str) -> dict[str, Any] | None:
-        """Return size and place of the relief or the orthophoto; None where there is none."""
+        """Return size and place of the relief or the orthophoto; None where there is none.
+
+        Of the relief also the ``range`` that its colours span. [m]
+        """
         path = self.current(kind)
         if path is None:
             return None
-        with RasterReader(path) as file:
-            grid = file.grid
-        return {
-            "ready": True,
-            "name": path.name,
-            "rows": grid.height,
-            "cols": grid.width,
-            "bounds": grid.bounds,
-            "gsd": grid.gsd,
-        }
+        version = _version(path)
+        if kind not in self._facts or self._facts[kind][0] != version:
+            facts = _grid_facts(path)
+            if kind == "relief":
+                facts["range"] = relief_limits(self.relief())
+            self._facts[kind] = version, facts
+        return self._facts[kind][1]
 
     def relief(self) -> ReliefMap:
         """Return the relief map.
@@ -110,9 +111,9 @@ class Products:
         path = self.current("relief")
         if path is None:
             raise InputError("there is no relief yet; run it first.")
-        facts = (path.name, path.stat().st_mtime_ns)
-        if self._relief is None or self._relief[0] != facts:
-            self._relief = facts, read_relief(path)
+        version = _version(path)
+        if self._relief is None or self._relief[0] != version:
+            self._relief = version, read_relief(path)
         return self._relief[1]
 
     def overlay(self) -> bytes:
@@ -149,6 +150,25 @@ class Products:
             "r": [_plain(value) for value in relief.sample(places).tolist()],
             "sigma": [_plain(value) for value in _nearest(relief, places).tolist()],
         }
+
+
+def _version(path: Path) -> tuple[str, int]:
+    """Return what tells whether a file is still the same."""
+    return path.name, path.stat().st_mtime_ns
+
+
+def _grid_facts(path: Path) -> dict[str, Any]:
+    """Return name, size and place of a raster."""
+    with RasterReader(path) as file:
+        grid = file.grid
+    return {
+        "ready": True,
+        "name": path.name,
+        "rows": grid.height,
+        "cols": grid.width,
+        "bounds": grid.bounds,
+        "gsd": grid.gsd,
+    }
 
 
 def relief_limits(relief: ReliefMap) -> tuple[float, float]:

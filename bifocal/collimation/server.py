@@ -5,7 +5,6 @@ from __future__ import annotations
 import asyncio
 import json
 from collections.abc import AsyncIterator
-from pathlib import Path
 from typing import Any
 
 from starlette.applications import Starlette
@@ -13,9 +12,9 @@ from starlette.exceptions import HTTPException
 from starlette.middleware import Middleware
 from starlette.requests import Request
 from starlette.responses import Response, StreamingResponse
-from starlette.routing import Mount, Route
-from starlette.staticfiles import StaticFiles
+from starlette.routing import Route
 
+from bifocal.collimation.assets import KEEP, Assets
 from bifocal.collimation.measuring_routes import ROUTES as MEASURING
 from bifocal.collimation.product_routes import ROUTES as PRODUCTS
 from bifocal.collimation.requests import answer, in_thread, json_body, session_of
@@ -24,10 +23,6 @@ from bifocal.collimation.session import Session
 from bifocal.collimation.state_view import state_of
 from photocore.errors import PhotogrammetryError
 
-#: The page itself.
-WEB = Path(__file__).parent / "web"
-#: Pictures are named with their version, so a browser need not ask again.
-_KEEP = "private, max-age=31536000, immutable"
 #: Seconds after which an idle stream of events says that it is alive.
 _ALIVE = 15.0
 
@@ -50,8 +45,8 @@ def application(session: Session, token: str) -> Starlette:
         Route("/tiles/{space}/{image:int}/{level:int}/{column:int}_{row:int}.jpg", _tile),
         *MEASURING,
         *PRODUCTS,
-        Mount("/web", StaticFiles(directory=WEB)),
-        Mount("/", StaticFiles(directory=WEB)),
+        Route("/web/{name:path}", _asset),
+        Route("/{name:path}", _asset),
     ]
     app = Starlette(
         routes=routes,
@@ -60,7 +55,7 @@ def application(session: Session, token: str) -> Starlette:
             PhotogrammetryError: _refused, HTTPException: _plain_error, TooLarge: _too_large,
         },
     )  # fmt: skip
-    app.state.session, app.state.token = session, token
+    app.state.session, app.state.token, app.state.assets = session, token, Assets()
     return app
 
 
@@ -78,13 +73,19 @@ async def _too_large(request: Request, error: Exception) -> Response:  # noqa: A
 
 
 async def _page(request: Request) -> Response:
-    text = (WEB / "index.html").read_bytes()
+    session = session_of(request)
+    text = request.app.state.assets.page(session.state.language or session.language)
     response = Response(text, media_type="text/html", headers={"cache-control": "no-store"})
     if "token" in request.query_params:
         response.set_cookie(
             COOKIE, request.app.state.token, httponly=True, samesite="strict", path="/"
         )
     return response
+
+
+async def _asset(request: Request) -> Response:
+    assets: Assets = request.app.state.assets
+    return assets.answer(request)
 
 
 async def _state(request: Request) -> Response:
@@ -149,7 +150,7 @@ async def _tile(request: Request) -> Response:
     tag = f'"{version}"'
     # A tile asked for without its version may be another one after the next orientation.
     named = request.query_params.get("v") == version
-    headers = {"etag": tag, "cache-control": _KEEP if named else "private, no-cache"}
+    headers = {"etag": tag, "cache-control": KEEP if named else "private, no-cache"}
     if request.headers.get("if-none-match") == tag:
         return Response(status_code=304, headers=headers)
     return Response(data, media_type="image/jpeg", headers=headers)

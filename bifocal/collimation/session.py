@@ -68,7 +68,7 @@ class Session:
             self.pictures = Pictures(files.folder / f".{files.stem}.tiles", photos, pair)
             self.results = None if pair is None else LiveResults(pair)
             self.products = Products(files)
-            self.jobs = JobRunner(self)
+            self.jobs = JobRunner(self.lock, self.tell, self.changed)
             self.sync = WorkbookSync(self)
             self._replay_all()
             self._remember_files()

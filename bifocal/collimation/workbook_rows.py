@@ -31,6 +31,9 @@ from photocore.workbook.grid import TableArea, split_cell
 
 #: Rows added at once where the prepared ones are used up.
 MORE_ROWS = 50
+#: What is typed of a point, and of a check point.
+_POINT = ("id", "col1", "row1", "col2", "row2", "use", "code", "note")
+_REFERENCE = ("id", "use", "X_ref", "Y_ref", "Z_ref")
 #: Cells of the sheet Setup that hold the orientation.
 _TYPED = {
     "pair_file", "d_1", "d_2", "c_1", "c_2", "pitch",
@@ -243,7 +246,7 @@ def _edit(
     _set_up(editor, read, pair, pair_file)
     wanted = {point.name: _point_cells(point) for point in points}
     stands = dict(zip(read.survey.table.texts("id"), read.survey.table.rows, strict=True))
-    _table(editor, area, wanted, stands, follower="tblResults")
+    _table(editor, area, _POINT, wanted, stands, follower="tblResults")
     check = editor.table("tblCheck")
     if check is not None:
         ids = read.survey.known.ids[: len(read.survey.known_rows)]
@@ -253,7 +256,7 @@ def _edit(
         }
         # Check points that no picked point is called after are the user's own.
         own = {name: row for name, row in listed.items() if name in wanted or name in read.rows}
-        _table(editor, check, references, own)
+        _table(editor, check, _REFERENCE, references, own)
 
 
 def _point_cells(point: PickedPoint) -> dict[str, CellValue]:
@@ -278,15 +281,19 @@ def _reference_cells(point: PickedPoint) -> dict[str, CellValue]:
 def _table(
     editor: WorkbookEditor,
     area: TableArea,
+    typed: Sequence[str],
     wanted: Mapping[str, Mapping[str, CellValue]],
     stands: Mapping[str, int],
     *,
     follower: str = "",
 ) -> None:
-    """Put rows into a table: changed ones where they stand, new ones into its blank rows."""
+    """Put rows into a table: changed ones where they stand, new ones into its blank rows.
+
+    Of rows not wanted any more all that is ``typed`` is blanked: also where none is left.
+    """
     headings = area.headings()
     cells = editor.grid(area.sheet).rows
-    keys = [key for key in next(iter(wanted.values()), {"id": None}) if key in headings]
+    keys = [key for key in typed if key in headings]
     first, last = area.area[0] + 1, area.area[2]
     places = {name: row for name, row in stands.items() if name in wanted}
     taken, freed = set(places.values()), set(stands.values()) - set(places.values())

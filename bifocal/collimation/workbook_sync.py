@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
+from typing import Protocol
 
+from bifocal.collimation.project import SurveyFiles
+from bifocal.collimation.records import SurveyState
 from bifocal.collimation.workbook_process import FROM as LARGE
 from bifocal.collimation.workbook_process import change_in_process
 from bifocal.collimation.workbook_rows import (
@@ -17,15 +19,38 @@ from bifocal.collimation.workbook_rows import (
     row_of,
     write_new,
 )
+from bifocal.model.flags import FlagLimits
 from bifocal.model.pair import Pair
 from photocore.errors import InputError, PhotogrammetryError
 from photocore.output import check_not_open
 
-if TYPE_CHECKING:
-    from bifocal.collimation.session import Session
-
 #: Quiet seconds after a pick before the workbook is written, and between looks at the file.
 QUIET, LOOK = 0.7, 2.0
+
+
+class Survey(Protocol):
+    """What is kept in step with a workbook: of the session no more than this."""
+
+    lock: threading.RLock
+    files: SurveyFiles
+    state: SurveyState
+    language: str
+
+    @property
+    def accepted_pair(self) -> Pair | None:
+        """The orientation that the workbook is written for; None before one is accepted."""
+
+    def set_precision(self, sigma_px: float | None, limits: FlagLimits) -> None:
+        """Let the results follow the precision and limits of the workbook."""
+
+    def take_rows(self, rows: Mapping[str, PointRow], gone: Sequence[str]) -> None:
+        """Take over points that were changed in the workbook by others."""
+
+    def note_saved(self, digest: str, revision: int) -> None:
+        """Remember that the workbook holds the survey as of a revision."""
+
+    def changed(self) -> None:
+        """Tell that the state is another."""
 
 
 class WorkbookSync:
@@ -33,7 +58,7 @@ class WorkbookSync:
 
     Parameters
     ----------
-    session : Session
+    survey : Survey
 
     Attributes
     ----------
@@ -45,8 +70,8 @@ class WorkbookSync:
         Of the file as the page wrote it last, and as it was read last.
     """
 
-    def __init__(self, session: Session) -> None:
-        self.session = session
+    def __init__(self, survey: Survey) -> None:
+        self.survey = survey
         self.waiting: str | None = None
         self.synced: dict[str, PointRow] = {}
         self.digest = ""
@@ -95,23 +120,23 @@ class WorkbookSync:
             except (PhotogrammetryError, OSError) as error:
                 self.waiting = str(error)
             if self.waiting != before:
-                self.session.changed()
+                self.survey.changed()
 
     def _merge(self) -> None:
         """Take over rows that others changed, unless the page changed the same ones since."""
-        session, path = self.session, self.session.files.workbook
+        survey, path = self.survey, self.survey.files.workbook
         digest = digest_of(path)
         if not digest or digest == self.seen:
             return
         read = read_rows(path)
-        with session.lock:
+        with survey.lock:
             rows, gone = self._foreign(read.rows)
             self.read, self.seen = read, digest
-            session.set_precision(read.sigma_px, read.limits)
+            survey.set_precision(read.sigma_px, read.limits)
             if rows or gone:
-                session.take_rows(rows, gone)
+                survey.take_rows(rows, gone)
                 self.take(rows, gone)
-            session.changed()
+            survey.changed()
 
     def take(self, rows: Mapping[str, PointRow], gone: Sequence[str]) -> None:
         """Count rows that others changed as in step."""
@@ -121,7 +146,7 @@ class WorkbookSync:
 
     def _foreign(self, rows: Mapping[str, PointRow]) -> tuple[dict[str, PointRow], list[str]]:
         """Return rows that others changed, and names that others took out."""
-        points = self.session.state.points
+        points = self.survey.state.points
         now = {name: row_of(point) for name, point in points.items()}
 
         def page_changed(name: str) -> bool:
@@ -141,12 +166,12 @@ class WorkbookSync:
 
     def _write(self) -> None:
         """Write the page's points where they are others than the workbook's."""
-        session, path = self.session, self.session.files.workbook
-        with session.lock:
-            points = session.state.sorted_points()
-            pair, pair_path = session.accepted_pair, session.files.pair
-            revision = session.state.revision
-            language = session.state.language or session.language
+        survey, path = self.survey, self.survey.files.workbook
+        with survey.lock:
+            points = survey.state.sorted_points()
+            pair, pair_path = survey.accepted_pair, survey.files.pair
+            revision = survey.state.revision
+            language = survey.state.language or survey.language
         wanted = {point.name: row_of(point) for point in points}
         if pair is None or pair_path is None:
             return
@@ -171,7 +196,7 @@ class WorkbookSync:
         self.synced = wanted
         self.digest = self.seen = digest_of(path)
         self.read = read
-        session.note_saved(self.digest, revision)
+        survey.note_saved(self.digest, revision)
 
     def _oriented_anew(self, pair: Pair) -> bool:
         """Whether the workbook's homographies, nadirs or distances are not the pair's."""

@@ -5,7 +5,6 @@ from __future__ import annotations
 import base64
 import io
 import zipfile
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +15,6 @@ from tests.browser import (
     SAMPLE,
     TARGETS,
     Driver,
-    launched,
     sample_survey,
     served,
     tab_of,
@@ -24,12 +22,6 @@ from tests.browser import (
 )
 
 CHECKED = {"T17": (-1.62, 1.6, 0.08332), "T18": (1.62, 1.6, 0.08282)}
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Any]:
-    with launched() as found:
-        yield found
 
 
 DROP = """(files) => {
@@ -82,6 +74,8 @@ def test_a_facade_from_two_photos_to_the_drawing_by_clicks_alone(
         page.click("run-relief")
         page.settled("state.jobs.filter((job) => job.kind === 'relief').length === 2")
         assert page.finished("relief")["state"] == "done"
+        legend = "document.querySelector('[data-testid=relief-legend]')"
+        page.wait(f"() => !{legend}.hidden && {legend}.textContent.endsWith(' m')")
         page.click("run-ortho")
         assert page.finished("ortho")["state"] == "done"
         page.tab.get_by_test_id("deliver-scale").select_option("1:100")

@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from bifocal.collimation.server import WEB
+from bifocal.collimation.assets import WEB
 from bifocal.model.lens import Lens
-from tests.browser import Driver, Served, launched, sample_survey, tab_of
+from tests.browser import Driver, Served, tab_of
 
 STAGES = ("photos", "orientation", "points", "products")
 #: WCAG 2.2, success criterion 1.4.3.
@@ -44,18 +44,6 @@ def test_what_is_not_ours_is_versioned_and_licensed() -> None:
     for folder in (WEB / "vendor").iterdir():
         assert re.fullmatch(r"[a-z]+-\d+\.\d+\.\d+", folder.name)
         assert any(path.name.startswith("LICENSE") for path in folder.iterdir())
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Any]:
-    with launched() as found:
-        yield found
-
-
-@pytest.fixture(scope="module")
-def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
-    with sample_survey(tmp_path_factory.mktemp("survey")) as started:
-        yield started
 
 
 @pytest.fixture(scope="module")

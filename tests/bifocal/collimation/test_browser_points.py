@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from tests.browser import TARGETS, Driver, launched, sample_survey, tab_of, true_pixel
+from tests.browser import TARGETS, Driver, Served, tab_of, true_pixel
 
 #: On the rim of a shadow; not among the control points for that.
 SHADED = (2.10, 2.25, 0.0)
@@ -18,9 +18,8 @@ TENTHS = 0.05
 
 
 @pytest.fixture(scope="module")
-def tab(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Driver]:
-    folder = tmp_path_factory.mktemp("survey")
-    with launched() as browser, sample_survey(folder) as server, tab_of(browser, server) as driver:
+def tab(browser: Any, server: Served) -> Iterator[Driver]:
+    with tab_of(browser, server) as driver:
         yield driver
 
 
@@ -139,7 +138,7 @@ def test_a_point_is_picked_by_keys_alone(page: Driver) -> None:
     page.keys("n", "k")
     goal = true_pixel(1, TARGETS["T08"])
     x, y = page.screen(1, goal)
-    box = page.tab.locator(".pane").first.bounding_box()
+    box = page.pane.bounding_box()
     dx, dy = x - box["x"] - box["width"] / 2, y - box["y"] - box["height"] / 2
     for gap, ahead, back in ((dx, "ArrowRight", "ArrowLeft"), (dy, "ArrowDown", "ArrowUp")):
         key, steps = (ahead if gap > 0 else back), round(abs(gap))
@@ -195,7 +194,7 @@ def test_the_list_is_sorted_by_a_column_and_flies_to_a_point(page: Driver) -> No
         "P02", "P01",
     ]  # fmt: skip
     assert page.tab.evaluate("() => bifocal.flyTo('P01')") is True
-    box = page.tab.locator(".pane").first.bounding_box()
+    box = page.pane.bounding_box()
     x, y = page.screen(1, true_pixel(1, TARGETS["T08"]))
     middle = (box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
     assert distance((x, y), middle) < 3
@@ -224,7 +223,7 @@ def seen(page: Driver) -> Any:
     """Return what the pane shows within its frame, as grey values."""
     page.wait("() => !document.querySelector('.toast').classList.contains('on')")
     page.tab.wait_for_timeout(350)
-    shot = page.tab.locator(".pane").first.screenshot()
+    shot = page.pane.screenshot()
     return np.asarray(Image.open(io.BytesIO(shot)).convert("L"), dtype=float)[6:-6, 6:-6]
 
 

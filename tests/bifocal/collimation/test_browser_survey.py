@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -12,21 +11,9 @@ import pytest
 from click.testing import CliRunner
 
 from bifocal.cli.solve import command
-from tests.browser import Driver, Served, launched, sample_survey, tab_of
+from tests.browser import Driver, Served, sample_survey, tab_of
 
 PICKS = [((300.0, 330.0), (293.0, 325.0)), ((1190.0, 700.0), (1196.0, 703.0))]
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Any]:
-    with launched() as found:
-        yield found
-
-
-@pytest.fixture(scope="module")
-def shared(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
-    with sample_survey(tmp_path_factory.mktemp("survey")) as started:
-        yield started
 
 
 def pick_both(page: Driver, count: int, first: Any, second: Any) -> dict[str, Any]:
@@ -45,15 +32,16 @@ def relief_of(book: Path) -> dict[str, float]:
     return {point["id"]: point["r"] for point in json.loads(run.stdout)["points"]}
 
 
-def test_noisy_picks_give_the_relief_that_solve_gives(browser: Any, shared: Served) -> None:
+def test_noisy_picks_give_the_relief_that_solve_gives(browser: Any, server: Served) -> None:
     """Clicks with 0.3 px of noise: the page's numbers against the workbook's, solved anew."""
     rng = np.random.default_rng(14)
-    with tab_of(browser, shared) as page:
+    with tab_of(browser, server) as page:
+        page.empty()
         for count, (first, second) in enumerate(PICKS, start=1):
             noise = rng.normal(0, 0.3, (2, 2))
             pick_both(page, count, np.add(first, noise[0]), np.add(second, noise[1]))
         shown = {point["name"]: point["result"]["r"] for point in page.state["points"]}
-        book = shared.folder / page.state["workbook"]
+        book = server.folder / page.state["workbook"]
         # The workbook is written a moment after the journal.
         for _ in range(100):
             solved = relief_of(book)
@@ -64,9 +52,9 @@ def test_noisy_picks_give_the_relief_that_solve_gives(browser: Any, shared: Serv
 
 
 def test_what_was_picked_is_there_after_a_reload_and_can_be_undone(
-    browser: Any, shared: Served
+    browser: Any, server: Served
 ) -> None:
-    with tab_of(browser, shared) as page:
+    with tab_of(browser, server) as page:
         page.empty()
         before = pick_both(page, 1, *PICKS[0])["points"]
         page.tab.reload()
@@ -81,8 +69,8 @@ def test_what_was_picked_is_there_after_a_reload_and_can_be_undone(
         assert page.settled("state.points[0]?.result")["points"] == before
 
 
-def test_two_tabs_see_each_other_and_lose_nothing(browser: Any, shared: Served) -> None:
-    with tab_of(browser, shared) as one, tab_of(browser, shared) as other:
+def test_two_tabs_see_each_other_and_lose_nothing(browser: Any, server: Served) -> None:
+    with tab_of(browser, server) as one, tab_of(browser, server) as other:
         one.empty()
         first = pick_both(one, 1, *PICKS[0])["points"][0]
         other.settled("state.points[0]?.result")
@@ -103,6 +91,7 @@ def test_two_tabs_see_each_other_and_lose_nothing(browser: Any, shared: Served) 
         assert np.subtract(first["picks"]["2"], moved) == pytest.approx((0.1, 0.1), abs=1e-9)
 
 
+@pytest.mark.acceptance
 def test_a_killed_server_loses_nothing_and_the_page_goes_on(browser: Any, tmp_path: Path) -> None:
     with sample_survey(tmp_path) as server, tab_of(browser, server) as page:
         before = pick_both(page, 1, *PICKS[0])["points"][0]["picks"]["2"]

@@ -20,6 +20,9 @@ from bifocal.files.images import read_image
 from photocore.errors import InputError
 from tests.bifocal.collimation.page_truth import SPOILT, true_pixels
 from tests.page_session import client_of, opened, sample_folder
+from tests.scenes import bifocal_cameras, demo_scene
+from tests.scenes.make_sample import PIXEL, SIZE
+from tests.scenes.tracing import Tracer
 
 
 @pytest.fixture(scope="module")
@@ -45,6 +48,27 @@ def test_the_homologous_point_is_found_along_its_line(sample, image: int) -> Non
     assert np.median(errors) < 0.06
     assert np.mean(kept) > 0.9
     assert max(error for error, good in zip(errors, kept, strict=True) if good) < 0.3
+
+
+#: Picks of the far photo beside steps, whose window shows the other surface too.
+BESIDE_STEPS = [
+    (1226.5, 771.4), (1230.8, 370.6), (366.3, 374.3), (1249.2, 493.3), (291.1, 771.7),
+    (1011.7, 61.7), (1128.2, 369.7), (659.3, 664.4), (849.7, 58.9), (125.9, 507.6),
+]  # fmt: skip
+
+
+def test_what_half_the_window_denies_is_not_taken_unasked(sample) -> None:
+    pair, photos = sample
+    own = np.array(BESIDE_STEPS)
+    cameras, tracer = bifocal_cameras(size=SIZE, pixel=PIXEL), Tracer(demo_scene())
+    rays = cameras.far.rays(own)
+    along, _ = tracer.cast(cameras.far.centre, rays, own, tracer.bounds(cameras.far))
+    seen = cameras.near.view_of(cameras.far.centre + along[:, None] * rays)
+    found = [suggest(pair, photos, 1, pixel) for pixel in own]
+    away = [np.linalg.norm(one.pixel - true) for one, true in zip(found, seen, strict=True)]
+    assert min(away) > 2.0  # correlation alone is sure of a wrong place
+    assert min(one.score for one in found) > 0.7
+    assert not any(one.kept for one in found)
 
 
 def test_the_line_runs_through_the_point_and_the_zoom_centre(sample) -> None:

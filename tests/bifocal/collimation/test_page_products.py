@@ -177,6 +177,7 @@ def _wait(client, number: str) -> dict:
     raise AssertionError("the job did not end")
 
 
+@pytest.mark.acceptance
 def test_an_orthophoto_is_made_shown_and_replaced(tmp_path) -> None:
     folder = sample_folder(tmp_path)
     (folder / "facade.ortho.tif").write_bytes(b"somebody else's")
@@ -239,6 +240,8 @@ def test_relief_is_read_on_the_page(tmp_path) -> None:
         assert client.get("/uncertainty.png").content[:4] == b"\x89PNG"
         facts = client.get("/api/state").json()["products"]["relief"]
         np.testing.assert_allclose(facts["bounds"], [-2.05, -1.05, 2.05, 1.05], atol=1e-9)
+        known = relief.r[np.isfinite(relief.r)]
+        np.testing.assert_allclose(facts["range"], np.quantile(known, [0.005, 0.995]), atol=1e-6)
 
 
 def test_points_and_lines_become_a_drawing_in_space(tmp_path) -> None:

@@ -12,6 +12,7 @@ import pytest
 from PIL import Image
 from starlette.testclient import TestClient
 
+from bifocal.collimation.assets import WEB
 from bifocal.collimation.server import application
 from tests.page_session import BASE, TOKEN, client_of, entries, opened, sample_folder
 
@@ -104,6 +105,20 @@ def test_no_path_leads_out(session, path: str, dots: str) -> None:
     assert answer.status_code in (404, 405, 422), answer.text
     assert b"\xff\xd8\xff" not in answer.content
     assert b"import" not in answer.content
+
+
+def test_the_page_names_all_its_modules_and_they_are_known_by_their_content(session) -> None:
+    client = client_of(session)
+    page = client.get("/").text
+    modules = [path.relative_to(WEB).as_posix() for path in (WEB / "js").glob("*.js")]
+    for name in (*modules, "js/words/en.js"):
+        assert f'href="{name}"' in page
+        answer = client.get(f"/{name}")
+        assert answer.headers["content-type"].startswith("text/javascript")
+        assert answer.content == (WEB / name).read_bytes()
+        same = client.get(f"/{name}", headers={"if-none-match": answer.headers["etag"]})
+        assert (same.status_code, same.content) == (304, b"")
+    assert "js/words/it.js" not in page
 
 
 def test_the_photos_themselves_are_not_served(session) -> None:

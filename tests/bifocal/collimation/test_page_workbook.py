@@ -9,7 +9,7 @@ import bifocal
 from bifocal import Pair
 from bifocal.demo import SAMPLE
 from tests.bifocal.collimation.page_truth import noisy_picks
-from tests.page_session import opened, pick, pick_both, sample_folder, sample_picks
+from tests.page_session import client_of, opened, pick, pick_both, sample_folder, sample_picks
 from tests.workbook_lint import lint
 
 BOOK = "facade.xlsx"
@@ -73,6 +73,55 @@ def test_changes_go_into_the_workbook_in_place(tmp_path) -> None:
     assert openpyxl.load_workbook(folder / BOOK)["My notes"]["B2"].value == "do not lose me"
     # What somebody else saved is kept once, before the page's first change of it.
     assert [path.name for path in folder.glob("*.bak*")] == [f"{BOOK}.bak"]
+    assert not lint(folder / BOOK)
+
+
+def typed_rows(path, sheet: str, columns: int) -> list[tuple]:
+    """Return what is typed in the first rows of a table, as another program reads it."""
+    rows = openpyxl.load_workbook(path)[sheet].iter_rows(values_only=True)
+    body = [row[:columns] for row in rows]
+    first = next(k for k, row in enumerate(body) if row[0] == "id") + 1
+    return body[first : first + 4]
+
+
+@pytest.mark.parametrize("between", [True, False])
+def test_rows_of_deleted_points_are_blanked_whole_and_used_again(tmp_path, between: bool) -> None:
+    folder, picks = sample_folder(tmp_path), sample_picks()
+    with opened(folder) as session:
+        client = client_of(session)
+
+        def ask(op: str, **fields: object) -> str | None:
+            answer = client.post("/api/command", json={"op": op, **fields})
+            assert answer.status_code == 200, answer.text
+            return answer.json()["result"]["name"]
+
+        def pick_new(target: str) -> str:
+            name = None
+            for image, (column, row) in enumerate(picks[target], start=1):
+                name = ask("point.pick", name=name, image=image, column=column, row=row)
+            return str(name)
+
+        assert [pick_new("T01"), pick_new("T02")] == ["P01", "P02"]
+        ask("point.type", name="P02", type="wall")
+        ask("point.reference", name="P01", X=-4.1, Y=-2.1, r=0.0)
+        session.sync.step()
+        assert typed_rows(folder / BOOK, "Points", 2)[1] == ("P02", picks["T02"][0][0])
+        for name in ("P01", "P02"):
+            ask("point.delete", name=name)
+        if between:  # the workbook is written while it holds no point at all
+            session.sync.step()
+            assert session.sync.waiting is None
+            assert typed_rows(folder / BOOK, "Points", 8) == [(None,) * 8] * 4
+            assert not session.state.points
+        assert [pick_new("T16"), pick_new("T20")] == ["P01", "P02"]
+        session.sync.step()
+        assert session.sync.waiting is None
+        assert_solved_alike(session, folder / BOOK)
+        expected = [(*picks[name][0], *picks[name][1]) for name in ("T16", "T20")]
+        points = typed_rows(folder / BOOK, "Points", 8)
+        assert [row[1:5] for row in points] == [*expected, (None,) * 4, (None,) * 4]
+        assert [row[6] for row in points] == [None] * 4
+        assert typed_rows(folder / BOOK, "Check", 5) == [(None,) * 5] * 4
     assert not lint(folder / BOOK)
 
 

@@ -3,6 +3,7 @@
  * that others changed it. A command is kept until the server has answered it: what was typed while
  * the server was away is sent, in order, when it is back, and its id keeps it from counting twice.
  */
+import { ahead } from "./ahead.js";
 
 const WAITS = [200, 400, 800, 1500];
 const SHELF = "bifocal-unsent";
@@ -46,7 +47,9 @@ export class Connection extends EventTarget {
 
   /** Fetch the first state, take up what was left unsent, listen for news. */
   async start() {
-    await this.#retry(() => this.refresh());
+    const first = await ahead;
+    if (first) this.#adopt(first);
+    else await this.#retry(() => this.refresh());
     for (const { id, op, args } of JSON.parse(sessionStorage.getItem(SHELF) ?? "[]")) {
       this.#enqueue({ id, op, args, key: null }).catch((error) => this.#tell("refused", error));
     }

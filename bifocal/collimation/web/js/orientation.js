@@ -156,6 +156,8 @@ export class OrientationStage {
     }
     this.#tellKnown(state);
     this.acceptAlign.disabled = !state.pair || state.pair.accepted !== false;
+    // The next step stands out.
+    this.acceptAlign.classList.toggle("primary", !this.acceptAlign.disabled);
     this.#refresh();
   }
 

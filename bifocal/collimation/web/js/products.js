@@ -13,12 +13,19 @@ const SHEETS = ["A4", "A3", "A2", "A1", "A0"];
 const GRADES = ["fast", "standard", "best"];
 const ASK_MS = 80;
 
+/** Bytes of a file, in the unit that leaves digits to read. */
+const size = (bytes) => (bytes < 1e5 ? `${(bytes / 1e3).toFixed(1)} kB` : `${(bytes / 1e6).toFixed(1)} MB`);
+
 export class ProductsStage {
   constructor(app) {
     this.app = app;
     this.swipe = 1;
     this.photos = h("div", { class: "viewer" });
     this.value = h("p", { class: "value", role: "status", testid: "relief-value" });
+    this.low = h("span", {});
+    this.high = h("span", {});
+    this.legend = h("div", { class: "legend", role: "img", hidden: true, testid: "relief-legend" },
+      this.low, h("span", { class: "colours" }), this.high);
     this.profile = new Profile(app, () => this.pane?.paint(), () => {
       this.pane?.mounted();
       this.pane?.fit();
@@ -124,7 +131,7 @@ export class ProductsStage {
     this.pane.addEventListener("pick", ({ detail }) => {
       this.profile.click(this.wall.toPlane(this.pane.unplace(detail.pixel)));
     });
-    this.photos.replaceChildren(this.pane.element);
+    this.photos.replaceChildren(this.pane.element, this.legend);
     this.pane.mounted();
   }
 
@@ -172,16 +179,27 @@ export class ProductsStage {
   update(state) {
     this.prepare(state).catch((error) => this.app.refuse(error));
     const { relief, ortho, files } = state.products;
-    const size = (product) => (product.cols ? `${product.cols} × ${product.rows} px` : "");
-    setText(this.reliefState, relief ? t("relief.ready", { size: size(relief) }) : t("relief.hint"));
-    setText(this.orthoState, ortho ? t("ortho.ready", { size: size(ortho) }) : t("ortho.hint"));
+    const pixels = (product) => (product.cols ? `${product.cols} × ${product.rows} px` : "");
+    this.#name(relief?.range);
+    setText(this.reliefState, relief ? t("relief.ready", { size: pixels(relief) }) : t("relief.hint"));
+    setText(this.orthoState, ortho ? t("ortho.ready", { size: pixels(ortho) }) : t("ortho.hint"));
     this.runRelief.disabled = !state.pair;
     this.runOrtho.disabled = !state.pair;
     this.deliver.disabled = !ortho;
     this.download.hidden = !files.length;
     keyedRows(this.files, files, { key: ({ name }) => name, signature: JSON.stringify,
       build: ({ name, bytes }) => h("li", {}, h("a", { href: `/download/${encodeURIComponent(name)}`, download: "" }, name),
-        h("span", { class: "hint" }, ` ${(bytes / 1e6).toFixed(2)} MB`)) });
+        h("span", { class: "hint" }, ` ${size(bytes)}`)) });
+  }
+
+  /** Say what the colours of the relief mean. */
+  #name(range) {
+    this.legend.hidden = !range;
+    if (!range) return;
+    const [low, high] = range.map((value) => number(value, 2));
+    setText(this.low, low);
+    setText(this.high, `${high} m`);
+    this.legend.setAttribute("aria-label", t("relief.legend", { low, high }));
   }
 
   get activePane() {

@@ -176,6 +176,7 @@ export default {
   "products.ortho-swipe": "Zum Foto wischen",
   "relief.title": "Reliefkarte",
   "relief.run": "Relief rechnen",
+  "relief.legend": "Farben des Reliefs: von {low} m bis {high} m zu den Kameras hin",
   "relief.hint": "Wie weit jedes Pixel der Wand vorsteht oder zurückliegt.",
   "relief.ready": "Fertig. {size}",
   "ortho.title": "Orthofoto",

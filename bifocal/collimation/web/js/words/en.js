@@ -176,6 +176,7 @@ export default {
   "products.ortho-swipe": "Swipe to the photo",
   "relief.title": "Relief map",
   "relief.run": "Run relief",
+  "relief.legend": "Colours of the relief: from {low} m to {high} m towards the cameras",
   "relief.hint": "How far every pixel of the wall stands out or lies back.",
   "relief.ready": "Ready. {size}",
   "ortho.title": "Orthophoto",

@@ -176,6 +176,7 @@ export default {
   "products.ortho-swipe": "Tendina verso la foto",
   "relief.title": "Mappa del rilievo",
   "relief.run": "Calcola rilievo",
+  "relief.legend": "Colori del rilievo: da {low} m a {high} m verso le camere",
   "relief.hint": "Quanto ogni pixel del muro sporge o rientra.",
   "relief.ready": "Pronta. {size}",
   "ortho.title": "Ortofoto",
