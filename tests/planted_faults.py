@@ -364,8 +364,8 @@ _GROUPS: tuple[tuple[str, str, tuple[tuple[str, str], ...]], ...] = (
         "tests/multimedia/orientation/test_resection.py",
         (
             (
-                "= -result.residuals.reshape(-1, 2) * weights",
-                "= result.residuals.reshape(-1, 2) * weights",
+                "= -result.residuals.reshape(-1, 2) * sigmas",
+                "= result.residuals.reshape(-1, 2) * sigmas",
             ),
         ),
     ),

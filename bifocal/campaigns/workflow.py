@@ -87,7 +87,7 @@ def _duration(seconds: float) -> str:
     Examples
     --------
     >>> _duration(42), _duration(150), _duration(7300)
-    ('42 s', '2 min', '2 h 2 min')
+    ('42 s', '2 min', '2 h 1 min')
     """
     minutes = int(seconds // 60)
     if minutes < 2:

@@ -16,7 +16,7 @@ from photocore.cloud import write_cloud
 from photocore.errors import InputError
 from photocore.output import atomic_path
 from photocore.tables import write_csv
-from photocore.workbook.newbook import new_workbook, without_control
+from photocore.workbook.newbook import new_workbook, save_book, without_control
 
 #: Point lists as surveyors name them: P point, N north, E east, Z height, D description.
 ORDERS = ("PNEZD", "PENZD")
@@ -247,4 +247,4 @@ def _write_xlsx(path: Path, points: SurveyPoints, coordinates: FloatArray) -> No
             texts.append(cell)
         cells = [float(value) if np.isfinite(value) else None for value in numbers]
         sheet.append([texts[0], *cells, texts[1], texts[2]])
-    book.save(path)
+    save_book(book, path)

@@ -222,7 +222,9 @@ def as_grey(image: NDArray[np.generic], name: str) -> ByteArray:
     """
     small = "is too small; at least 16 px a side are needed."
     array = as_photo(image, name, smallest=16, fault=small)
-    array = to_eight_bit(array)
+    if array.dtype == np.uint16:
+        # Cut, not rounded: grey values of 8 bits come back exact whether 256 or 257 widened them.
+        array = (array >> 8).astype(np.uint8)
     # The plain mean of the channels has less noise than the luminance, which is mostly green.
     return array if array.ndim == 2 else cv2.transform(array, np.full((1, 3), 1 / 3))
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from photocore.workbook.newbook import new_workbook
+from photocore.workbook.newbook import new_workbook, save_book
 
 if TYPE_CHECKING:
     from bifocal.planning.camera_plan import Plan
@@ -44,7 +44,7 @@ def write_plan(path: Path | str, plan: Plan, *, overwrite: bool = False) -> None
     _stations_sheet(book.active, plan)
     _grid_sheet(book.create_sheet("Sigma r"), plan)
     with new_workbook(path, overwrite=overwrite) as temporary:
-        book.save(temporary)
+        save_book(book, temporary)
 
 
 def _stations_sheet(sheet: Any, plan: Plan) -> None:

@@ -9,7 +9,7 @@ import numpy as np
 
 from multimedia.projects.point_tables import fill_sheet
 from photocore.output import atomic_path
-from photocore.workbook.newbook import new_workbook
+from photocore.workbook.newbook import new_workbook, save_book
 
 if TYPE_CHECKING:
     from multimedia.design.studies import Design
@@ -64,7 +64,7 @@ def write_design_workbook(path: Path | str, design: Design, *, overwrite: bool =
         for cell in item[1]:
             item.column_dimensions[cell.column_letter].width = 18
     with new_workbook(path, overwrite=overwrite) as temporary:
-        book.save(temporary)
+        save_book(book, temporary)
 
 
 def write_design_plot(path: Path | str, design: Design, *, overwrite: bool = False) -> None:

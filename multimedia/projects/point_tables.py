@@ -197,12 +197,12 @@ def write_columns(
         raise InputError(f"{path}: tables are written as .csv or .xlsx; give one of these endings.")
     from openpyxl import Workbook
 
-    from photocore.workbook.newbook import new_workbook
+    from photocore.workbook.newbook import new_workbook, save_book
 
     book = Workbook()
     fill_sheet(book.active, list(columns), zip(*columns.values(), strict=True))
     with new_workbook(path, overwrite=overwrite) as temporary:
-        book.save(temporary)
+        save_book(book, temporary)
 
 
 def fill_sheet(sheet: Any, headings: Sequence[str], rows: Iterable[Sequence[object]]) -> None:

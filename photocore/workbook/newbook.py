@@ -12,6 +12,7 @@ wrote once more: prototype rows are multiplied, and every formula cell gets its 
 from __future__ import annotations
 
 import hashlib
+import io
 import math
 import re
 import zipfile
@@ -19,7 +20,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import BinaryIO
+from typing import TYPE_CHECKING, BinaryIO
 
 from photocore.errors import InputError
 from photocore.output import atomic_path, check_writable, free_path
@@ -29,6 +30,9 @@ from photocore.workbook.grid import split_cell
 from photocore.workbook.package import read_part, rewrite_package
 from photocore.workbook.splice import SheetChanges, splice_sheet
 from photocore.workbook.xlsx import read_directory
+
+if TYPE_CHECKING:
+    from openpyxl import Workbook
 
 #: Date of every part, so that equal input makes equal files; ZIP knows nothing before 1980.
 PART_TIME = (1980, 1, 1, 0, 0, 0)
@@ -176,6 +180,13 @@ def new_workbook(path: Path | str, *, overwrite: bool) -> Iterator[Path]:
         yield temporary
         with zipfile.ZipFile(temporary, "a") as package:
             package.comment = _seal(package)
+
+
+def save_book(book: Workbook, path: Path) -> None:
+    """Write a workbook of openpyxl, whose own writer tells of a full disk a second time."""
+    package = io.BytesIO()
+    book.save(package)
+    path.write_bytes(package.getvalue())
 
 
 def check_new_workbook(

@@ -8,6 +8,7 @@ path, ``closed`` or ``pipe`` without a reader), ``stdin`` (``closed``), ``home``
 
 from __future__ import annotations
 
+import codecs
 import io
 import json
 import os
@@ -30,6 +31,9 @@ import photocore
 from tests.attack.site import PROGRAMS
 
 NOBODY = 65534
+# Nobody may not read every Python installation: what is loaded late must be there before.
+for name in ("utf-8-sig", "utf-16", "latin-1", "cp1252", "idna"):
+    codecs.lookup(name)
 
 
 def work(job: dict[str, Any], place: Path, said: int) -> None:

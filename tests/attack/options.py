@@ -30,7 +30,7 @@ WORDS: list[tuple[str, str]] = [
     ("bifocal template o.xlsx --rows -5", "rows"),
     ("bifocal template o.xlsx --rows 9999999", "rows"),
     ("bifocal template o.xlsx --rows many", "--rows"),
-    ("bifocal plan", "--focal"),
+    ("bifocal plan", "--pixels"),
     (CANON, "size of the wall.*scale.*GSD.*sigma"),
     (f"{CANON} --scale 0", "--scale"),
     (f"{CANON} --scale 1:0", "--scale"),

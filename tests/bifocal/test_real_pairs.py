@@ -139,7 +139,8 @@ def test_an_exactly_bifocal_pair_is_recognised(data_dir, tmp_path) -> None:
         np.sqrt(np.linalg.det(photo.metres_per_pixel(middle)[0]) * -1)
         for photo in (pair.image1, pair.image2)
     ]
-    assert scales[0] / scales[1] == pytest.approx(1.0, abs=0.0002)
+    # The principal points are free by a few pixels, which costs a little where they are exact.
+    assert scales[0] / scales[1] == pytest.approx(1.0, abs=0.0003)
     for photo in (pair.image1, pair.image2):
         assert np.linalg.norm(photo.pixels_from_plane(photo.nadir) - middle) < 10
     _, found = match_photos(out, tmp_path / "points.csv", MatchSettings())

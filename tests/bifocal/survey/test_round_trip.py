@@ -270,4 +270,6 @@ def test_the_corpus_opens_in_libreoffice_with_the_same_results(tmp_path):
         solution = put_in(path)
         values = set(recalculated(path, tmp_path)["Feld"].values())
         for r in solution.table["r"].tolist():
-            assert any(v == pytest.approx(r, rel=1e-12) for v in values if isinstance(v, float))
+            assert any(
+                v == pytest.approx(r, rel=1e-12) for v in values if isinstance(v, int | float)
+            )

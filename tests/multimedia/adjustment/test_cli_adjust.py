@@ -84,7 +84,7 @@ def test_json_holds_values_sigmas_and_correlations(project):
         (["PROJECT", "--prior", "offset"], 1, "label=sigma"),
         (["PROJECT", "--control", "maybe"], 2, "maybe"),
         (["PROJECT", "--fix-camera", "cam9"], 1, "cam9"),
-        (["PROJECT", "--out", "o.toml", "--report", "./o.toml"], 1, "written as .html"),
+        (["PROJECT", "--out", "o.toml", "--report", "./o.toml"], 1, "name two files"),
     ],
 )
 def test_mistakes_are_named(project, arguments, status, message):
