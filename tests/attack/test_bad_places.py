@@ -144,8 +144,8 @@ def test_json_is_json_whatever_letters_stdout_lacks(run: Run, site: Path) -> Non
         assert "caff" in said["stdout"]
 
 
-#: What an interrupt makes a command say depends on the moment: in a library's own code it may end as
-#: that library's error, while options are read as click's "Aborted!". Files are held in any case.
+#: What an interrupt makes a command say depends on the moment: in a library's own code it may end
+#: as that library's error, while options are read as click's "Aborted!". Files are held anyway.
 WORDS_OF_INTERRUPTS = "BIFOCAL_INTERRUPTS" in os.environ
 
 
