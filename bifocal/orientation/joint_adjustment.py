@@ -163,7 +163,7 @@ def adjust_jointly(observations: JointObservations, start: JointUnknowns) -> Joi
     start, tests = _coarse(seen, start)
     blunders += [_of_ray(seen, k, tests[k]) for k in np.flatnonzero(tests >= FAR_OFF).tolist()]
     seen = _with_enough_rays(with_rays(seen, tests < FAR_OFF))
-    for _ in range(ROUNDS):
+    for left in range(ROUNDS, -1, -1):
         system = _System(seen, start)
         fit = adjustment.fit(
             start, system.equations, system.advance, names=system.unknown_names,
@@ -172,7 +172,7 @@ def adjust_jointly(observations: JointObservations, start: JointUnknowns) -> Joi
         start = fit.state
         sigma0 = _sigma0(fit, system)
         keep, known, found = _gross(seen, system, fit, sigma0)
-        if not found:
+        if not found or not left:
             break
         blunders += found
         seen = _with_enough_rays(with_rays(replace(seen, known=known), keep))
@@ -351,7 +351,8 @@ def _gross(
     tests = standardised(fit.residuals, fit.linear.redundancy_numbers, sigma0)
     tests = np.abs(np.nan_to_num(tests))
     rays = tests[: 2 * len(seen.camera)].reshape(-1, 2).max(axis=1, initial=0.0)
-    coordinates = tests[2 * len(seen.camera) :][: len(system.fixed)]
+    # Rays are more precise than they were believed to be; of control that says nothing.
+    coordinates = tests[2 * len(seen.camera) :][: len(system.fixed)] * min(sigma0, 1.0)
     worst = np.zeros(len(seen.ids))
     np.maximum.at(worst, seen.point, rays)
     np.maximum.at(worst, system.fixed[:, 0], coordinates)
