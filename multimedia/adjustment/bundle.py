@@ -245,10 +245,11 @@ def _adjustment(
     shares = result.linear.redundancy_numbers[own].reshape(-1, 2)
     # The image rows, back in the order of the project's own table.
     rows, count = seen.source, len(project.image_points.ids)
-    residuals, normed, numbers, weight = (np.full((count, 2), np.nan) for _ in range(4))
+    residuals, normed, numbers, weight, sigma = (np.full((count, 2), np.nan) for _ in range(5))
     residuals[rows] = -misses * seen.sigma / np.sqrt(weights)
     normed[rows] = -result.standardised[own].reshape(-1, 2)
     numbers[rows], weight[rows] = shares, weights
+    sigma[rows] = seen.sigma * result.sigma0 / np.sqrt(weights)
     points, covariance = _points(bundle, result)
     values, change = _values(bundle, state)
     sigma0_of = {}
@@ -261,9 +262,9 @@ def _adjustment(
         names=bundle.columns.labels, values=values,
         covariance=change @ result.linear.cofactor @ change.T * result.sigma0**2,
         point_covariance=covariance, residuals=residuals, standardised=normed,
-        redundancy_numbers=numbers, weights=weight, sigma0=result.sigma0 * unit,
-        redundancy=result.redundancy, iterations=result.iterations, sigma0_of=sigma0_of,
-        remarks=remarks,
+        redundancy_numbers=numbers, weights=weight, sigma_image=sigma,
+        sigma0=result.sigma0 * unit, sigma0_of=sigma0_of, redundancy=result.redundancy,
+        iterations=result.iterations, remarks=remarks,
     )  # fmt: skip
 
 

@@ -71,6 +71,11 @@ def place_columns(
         for name in project.camera_names
     ]
     media = _media_columns(project, unknowns.media, labels)
+    alike = {f"plate {plate}" for plate in unknowns.plates} & set(project.camera_names)
+    if alike:
+        raise InputError(
+            f"plates: camera {min(alike)!r} is named like a plate's unknowns; rename the camera."
+        )
     plates = tuple(places(f"plate {plate}", EXTERIOR) for plate in unknowns.plates)
     points = np.full((len(ids), 3), -1, dtype=np.int64)
     row_of = {name: row for row, name in enumerate(ids)}

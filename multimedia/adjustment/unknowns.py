@@ -121,8 +121,10 @@ class Adjustment:
         Share of an error that shows in its own residual.
     weights : ndarray, shape (n, 2)
         Robust weights, 1 for plain least squares.
+    sigma_image : ndarray, shape (n, 2)
+        A-posteriori standard deviation of each image coordinate, with its own weight. [mm]
     sigma0 : float
-        A-posteriori standard deviation of an image coordinate. [mm]
+        The same of an image coordinate of mean weight. [mm]
     redundancy : int
     iterations : int
     sigma0_of : mapping of str to float
@@ -140,6 +142,7 @@ class Adjustment:
     standardised: FloatArray
     redundancy_numbers: FloatArray
     weights: FloatArray
+    sigma_image: FloatArray
     sigma0: float
     redundancy: int
     iterations: int
@@ -173,9 +176,10 @@ class Adjustment:
     def smallest_detectable(self) -> FloatArray:
         """Error of an image coordinate found with 80 % power at 0.1 % risk, shape (n, 2). [mm]
 
-        Baarda's internal reliability: 4.13 sigma / sqrt(redundancy number).
+        Baarda's internal reliability: 4.13 sigma / sqrt(redundancy number), with each
+        coordinate's own sigma; NaN where nothing controls it.
         """
-        return standardised(4.13 * self.sigma0, self.redundancy_numbers)
+        return standardised(4.13 * self.sigma_image, self.redundancy_numbers)
 
     def suspects(self, limit: float = OUTLIER_LIMIT) -> list[str]:
         """Return a sentence for each image point that looks like a gross error, worst first."""

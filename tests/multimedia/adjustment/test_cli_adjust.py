@@ -43,6 +43,7 @@ def test_adjusting_writes_project_and_report_and_says_the_salinity(project, tmp_
     media = next(iter(read_project(out).media.values()))
     assert media.layers.indices[2] == pytest.approx(1.3365, abs=2e-4)
     text = report.read_text()
+    assert "a gross error is found from" in text
     assert text.count("<svg") == 4
     assert "http" not in text
     again = CliRunner().invoke(main, arguments)
