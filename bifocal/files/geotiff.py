@@ -18,7 +18,6 @@ from bifocal.model.grid import Grid
 from bifocal.model.relief_map import Quality, ReliefMap
 from photocore.errors import InputError
 from photocore.output import all_or_none, atomic_path, check_all_writable
-from photocore.provenance import program, today
 from photocore.raster import BLOCK, RasterFile, RasterWriter, corner_transform, create_geotiff
 
 #: Name of the local system every raster is in.
@@ -103,7 +102,7 @@ def create_raster(
     world = path.with_suffix(".tfw")
     check_all_writable(path, world if world_file else None, overwrite=overwrite)
     _check_space(path, grid, bands * np.dtype(dtype).itemsize)
-    known = {"TIFFTAG_SOFTWARE": program(), "BIFOCAL_DATE": today(), **(tags or {})}
+    known = dict(tags or {})
     if dpi is not None:
         known |= {f"TIFFTAG_{axis}RESOLUTION": f"{dpi:.10g}" for axis in "XY"}
         known["TIFFTAG_RESOLUTIONUNIT"] = "2"
