@@ -188,7 +188,7 @@ _GROUPS: tuple[tuple[str, str, tuple[tuple[str, str], ...]], ...] = (
         (("level = mean - slope * self.mean", "level = mean + slope * self.mean"),),
     ),
     (
-        "bifocal/relief_maps/smoothing.py",
+        "photocore/shrinkage.py",
         "tests/bifocal/relief_maps/test_dense_relief.py",
         (("np.maximum(spread - 1 / total, 0)", "np.maximum(spread + 1 / total, 0)"),),
     ),
