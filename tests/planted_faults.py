@@ -81,7 +81,7 @@ _GROUPS: tuple[tuple[str, str, tuple[tuple[str, str], ...]], ...] = (
     ),
     (
         "bifocal/model/homography.py",
-        "tests/bifocal/model/test_pair.py",
+        "tests/bifocal/model/test_homography.py",
         (("matrix[None, :2, :2] - mapped", "matrix[None, :2, :2] + mapped"),),
     ),
     (

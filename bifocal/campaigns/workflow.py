@@ -17,6 +17,7 @@ from bifocal.campaigns.step_store import clean
 from bifocal.campaigns.worker_pool import Listener, run_here
 from photocore.cli import Progress, no_progress
 from photocore.errors import InputError
+from photocore.interrupts import raising
 from photocore.output import check_writable
 from photocore.provenance import FileHashes
 
@@ -139,7 +140,7 @@ def run_survey(
     """
     start = time.perf_counter()
     listener = _Count(jobs, progress, tell)
-    with _locked([job.folder for job in jobs]):
+    with raising(), _locked([job.folder for job in jobs]):
         for job in jobs:
             clean(job.folder)
         waiting = [job for job in jobs if not _kept(job, listener)]
