@@ -334,7 +334,8 @@ def test_cameras_culled_by_angle_are_those_of_a_table_of_all_pairs(monkeypatch):
         np.testing.assert_allclose(other.xyz, table.xyz, rtol=0, atol=1e-10)
         # The step of the numerical derivative follows the block.
         np.testing.assert_allclose(other.covariance, table.covariance, rtol=1e-6, atol=1e-12)
-    assert set(table.status.tolist()) == {1, 2, 3}
+    wanted = {mm.BathymetryStatus.NADIR, mm.BathymetryStatus.RAYS, mm.BathymetryStatus.FAILED}
+    assert set(table.status.tolist()) == wanted
 
 
 def test_an_angle_that_is_none_is_refused():
