@@ -16,6 +16,7 @@ from bifocal.model.flags import FlagLimits
 from bifocal.model.intersection import Intersection, intersect
 from bifocal.model.photo import Photo
 from bifocal.precision import base_factor
+from multimedia import Layers
 from photocore.arrays import FloatArray, as_points, not_negative, positive
 from photocore.errors import GeometryError, InputError, located
 from photocore.jsonfile import read_object, write_object
@@ -54,6 +55,11 @@ class Pair:
     orientation: FloatArray | None = None
 
     def __post_init__(self) -> None:
+        if self.image1.layers != self.image2.layers:
+            raise InputError(
+                "layers: both photos of a pair look through the same media; state `layers` once, "
+                "for the pair."
+            )
         if self.orientation is not None:
             object.__setattr__(self, "orientation", orientation_precision.checked(self.orientation))
         d1, d2 = self.image1.distance, self.image2.distance
@@ -72,6 +78,22 @@ class Pair:
                 object.__setattr__(self, "orientation", turned)
             note = f"image1 was the near camera ({d1:g} m < {d2:g} m); the two were exchanged."
             object.__setattr__(self, "remarks", (*self.remarks, note))
+        if doubts := self._doubts_about_media():
+            object.__setattr__(self, "remarks", (*self.remarks, *doubts))
+
+    def _doubts_about_media(self) -> tuple[str, ...]:
+        """Return what looks like a slip in what lies between cameras and object."""
+        photos = (self.image1, self.image2)
+        if self.layers is None:
+            if all(photo.z0 is None for photo in photos):
+                return ()
+            return ("z0 is given but no layers: nothing is refracted, the pair is taken in air.",)
+        z0 = [photo.z0 or 0.0 for photo in photos]
+        beyond = [
+            photo.distance - z - self.layers.thickness for photo, z in zip(photos, z0, strict=True)
+        ]
+        found = self.layers.remarks_about(z0=z0, zp=beyond)
+        return tuple(f"layers: {doubt}" for doubt in found)
 
     @classmethod
     def ideal(
@@ -174,11 +196,12 @@ class Pair:
         stated = data.pop("format", None)
         if stated != FORMAT:
             raise InputError(f'"format" must be "{FORMAT}", found {stated!r}.')
-        if data.get("layers"):
-            raise InputError(
-                '"layers": pairs seen through other media are not supported by this version.'
-            )
-        far, near = (Photo.from_dict(data.pop(k, None), k, folder) for k in ("image1", "image2"))
+        media = data.pop("layers", None)
+        layers = None if media is None else Layers.from_dict(media, where='"layers"')
+        far, near = (
+            Photo.from_dict(data.pop(key, None), key, folder, layers)
+            for key in ("image1", "image2")
+        )
         stated = data.pop("orientation", None)
         precision = None if stated is None else orientation_precision.from_dict(stated)
         return cls(image1=far, image2=near, folder=folder, extra=data, orientation=precision)
@@ -189,6 +212,7 @@ class Pair:
             "format": FORMAT,
             "image1": self.image1.to_dict(),
             "image2": self.image2.to_dict(),
+            **({} if self.layers is None else {"layers": self.layers.as_dict()}),
             **self.extra,
         }
         if self.orientation is not None:
@@ -203,6 +227,30 @@ class Pair:
     def zoom_centre(self) -> FloatArray:
         """The point e about which image 2 is a zoom of image 1, shape (2,). [m]"""
         return rays.zoom_centre(self.image1.foot, self.image2.foot)
+
+    @property
+    def layers(self) -> Layers | None:
+        """The media between cameras and object; None in air."""
+        return self.image1.layers
+
+    def refuse_media(self, what: str) -> None:
+        """Raise where the pair looks through media and the work asked for knows only air.
+
+        Parameters
+        ----------
+        what : str
+            The work.
+
+        Raises
+        ------
+        InputError
+            Naming it.
+        """
+        if self.layers is not None:
+            raise InputError(
+                f"{what} is not made for pairs seen through other media (`layers`): its result "
+                "would be wrong by what refraction does. `intersect` and `project` know them."
+            )
 
     @property
     def d1(self) -> float:

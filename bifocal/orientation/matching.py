@@ -113,6 +113,7 @@ def match_pair(pair: Pair, images: Images, settings: MatchSettings | None = None
     GeometryError
         If hardly anything matches: photos and pair file do not belong together.
     """
+    pair.refuse_media("the search for homologous points")
     settings = settings or MatchSettings()
     near = pair.image2.distance
     reliefs = settings.relief_range or (-0.5 * near, 0.4 * near)

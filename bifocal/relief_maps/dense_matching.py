@@ -141,6 +141,7 @@ def dense_relief(
     >>> result.shape, round(result.gsd, 6)
     ((67, 100), 0.06)
     """
+    pair.refuse_media("a dense relief map")
     grey1, grey2 = as_grey(image1, "image1"), as_grey(image2, "image2")
     if quality not in QUALITIES:
         raise InputError(f"quality: expected {', '.join(QUALITIES)}, got {quality!r}.")

@@ -70,6 +70,7 @@ def solve_points(
     >>> table.xyz.round(9).tolist(), table.flags
     ([[2.0, 0.0, 1.0]], ('OK',))
     """
+    pair.refuse_media("the table of points")
     first, second = pair.as_given if as_given else (pair.image1, pair.image2)
     limits = limits or FlagLimits()
     if points.has_pixels.any():
