@@ -93,6 +93,8 @@ class Pair:
             photo.distance - z - self.layers.thickness for photo, z in zip(photos, z0, strict=True)
         ]
         found = self.layers.remarks_about(z0=z0, zp=beyond)
+        if self.orientation is not None:
+            found += ("the covariance of the cameras, `orientation`, is in no sigma.",)
         return tuple(f"layers: {doubt}" for doubt in found)
 
     @classmethod
@@ -374,7 +376,7 @@ class Pair:
         ndarray, shape (n, 3, 3)
             Zero where the pair does not state it. Common to all points: neighbours share it.
         """
-        if self.orientation is None:
+        if self.orientation is None or self.layers is not None:
             return np.zeros((len(xyz), 3, 3))
         photos = (self.image1, self.image2)
         return orientation_precision.orientation_covariance(photos, self.orientation, xyz)

@@ -363,6 +363,8 @@ def _check_plane(
 ) -> OrientationCheck | None:
     """Return what points of the reference plane tell; None where there are fewer than two."""
     rows = points.on_plane
+    if needed or rows.sum() > 1:
+        pair.refuse_media("the check of the set-up by points of the plane (code PLANE)")
     if rows.sum() < 2:
         if needed:
             raise InputError(
@@ -415,7 +417,7 @@ def _pixels_of_mm(photo: Photo, key: str, xy: FloatArray, where: str) -> FloatAr
             "(col1 row1 col2 row2)."
         )
     refuse_pixels(xy, c, where)
-    return photo.pixels_from_plane(photo.nadir + xy * photo.distance / c)
+    return photo.pixels_from_apparent(photo.nadir + xy * photo.distance / c)
 
 
 def _sigma_from_misfits(
