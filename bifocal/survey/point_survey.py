@@ -84,17 +84,18 @@ def solve_points(
     else:
         radii = _measured_radii(first, second, points, sigma_px)
     s1, s2, d1, d2 = radii.s1, radii.s2, first.distance, second.distance
-    if radii.bent is None:
+    if radii.bent is not None:
+        ds, den, r = radii.bent.ds, radii.bent.den, radii.bent.relief
+        foot1, foot2 = radii.bent.places
+        e1: FloatArray = np.asarray(radii.own1 - _length(foot1))
+        e2: FloatArray = np.asarray(radii.own2 - _length(foot2))
+    else:
         ds, den = s2 - s1, s2 / d2 - s1 / d1
         (d_far, far), (d_near, near) = _far_first((d1, s1), (d2, s2))
         r = relief(far, near, d1=d_far, d2=d_near)  # Eq. (6)
         e1, e2 = (  # Eqs. (1) and (3)
             relief_displacement(own, r, d=d) for own, d in ((radii.own1, d1), (radii.own2, d2))
         )
-    else:
-        ds, den, r = radii.bent.ds, radii.bent.den, radii.bent.relief
-        foot1, foot2 = radii.bent.places
-        e1, e2 = radii.own1 - _length(foot1), radii.own2 - _length(foot2)
     x, y = plane_coordinates(radii.own1, e1, np.radians(radii.own_theta))  # Eq. (7)
     if radii.bent is not None:
         x, y = radii.bent.places[0].T  # a port that leans bends rays also across the radius
