@@ -18,13 +18,16 @@ References
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from multimedia import Layers, radial_shift_ratio
 from photocore.arrays import BoolArray, FloatArray
 
+#: Rays in the table of distances.
+_TABLE = 4096
 #: A point on the last interface is behind it, whatever the last digit says. Relative.
 _ROUNDING = 1e-14
 
@@ -189,23 +192,84 @@ class MediaPath:
         Maas 2015, Eqs. (1) and (2): the radial shift, in the frame of the interfaces.
         """
         below = self.distance - relief
-        along = offset
-        if self.turn is not None:
-            point = np.concatenate([offset, -below[..., None]], axis=-1) @ self.turn.T
-            along, below = point[..., :2], -point[..., 2]
-        behind = np.maximum(below - self.depth, 0.0)
-        behind = np.where(self.holds(offset, relief), behind, np.nan)
-        ratio = radial_shift_ratio(
-            np.hypot(along[..., 0], along[..., 1]), z0=self.z0, zp=behind, layers=self.layers
-        )
+        if self.turn is None:
+            radius = np.hypot(offset[..., 0], offset[..., 1])
+            return np.asarray(offset * (self.steepness(radius, below) * self.distance)[..., None])
+        point = np.concatenate([offset, -below[..., None]], axis=-1) @ self.turn.T
+        along, below = point[..., :2], -point[..., 2]
         with np.errstate(invalid="ignore", divide="ignore"):
-            tangent = along * (ratio / below)[..., None]
-            if self.turn is None:
-                return tangent * self.distance
+            radius = np.hypot(along[..., 0], along[..., 1])
+            tangent = along * self.steepness(radius, below)[..., None]
             way = self._turned_back(tangent, -1.0)
             return np.where(
                 way[..., 2:] < 0, way[..., :2] * (-self.distance / way[..., 2:]), np.nan
             )
+
+    def steepness(self, radius: FloatArray, below: FloatArray) -> FloatArray:
+        """Return tan beta_1 per metre of radius, of rays to points so far below the camera. [1/m]
+
+        NaN for points before the last interface. Radii count from the foot of the camera's normal.
+        """
+        behind = below - self.depth
+        behind = np.where(behind >= -_ROUNDING * self.distance, np.maximum(behind, 0.0), np.nan)
+        ratio = radial_shift_ratio(radius, z0=self.z0, zp=behind, layers=self.layers)
+        with np.errstate(invalid="ignore", divide="ignore"):
+            return np.asarray(ratio / below)
+
+    @property
+    def near_axis(self) -> float:
+        """Distance of a straight camera whose rays run alike near the axis. [m]
+
+        It is the limit of `distance_at` on the axis.
+        """
+        first, *others = self.layers.indices
+        heights = [self.z0, *self.layers.thicknesses, self.distance - self.depth]
+        reduced = zip(heights, self.layers.indices, strict=True)
+        return float(sum(height * first / index for height, index in reduced) * others[-1] / first)
+
+    def distance_at(self, radius: NDArray[Any], relief: Any = None) -> NDArray[Any]:
+        """Return at what distance a straight camera over the same nadir sees as these rays do.
+
+        Parameters
+        ----------
+        radius : ndarray, shape (...)
+            Of places of the reference plane, from the nadir; with ``relief`` of points. [m]
+        relief : ndarray, shape (...), optional
+            Of the points. [m]
+
+        Returns
+        -------
+        ndarray, shape (...)
+            A / |S|: with it for d, ``A = P d / (d - r)`` holds along the ray as it does in air. In
+            the precision of ``radius``; right to 1e-7 of it. [m]
+
+        Notes
+        -----
+        Interpolated in a table over the radius A, which grows with the angle of the ray; that of a
+        point is found by fixed point, since the distance hardly changes with the radius.
+        """
+        reach = float(np.fmax.reduce(np.abs(radius), axis=None, initial=1e-9))
+        top = 0.0 if relief is None else float(np.fmax.reduce(relief, axis=None, initial=0.0))
+        reach *= 1.5 * max(1.0, self.near_axis / max(self.near_axis - top, 0.1 * self.near_axis))
+        steepest = 1.0
+        for _ in range(12):
+            tangents = np.linspace(0.0, steepest * self.distance, _TABLE)
+            rays = self.trace(np.stack([tangents, np.zeros(_TABLE)], axis=-1))
+            places, slopes = rays.position[:, 0], -rays.slope[:, 0]
+            if not places[-1] < reach:
+                break
+            steepest *= 2.0
+        known = np.isfinite(places) & np.isfinite(slopes)
+        known[0] = False
+        places, distances = places[known], places[known] / slopes[known]
+        found = np.interp(radius, places, distances).astype(radius.dtype)
+        if relief is None:
+            return found
+        for _ in range(4):
+            with np.errstate(invalid="ignore", divide="ignore"):
+                seen = radius * (found / np.maximum(found - relief, 0.05 * found))
+            found = np.interp(seen, places, distances).astype(radius.dtype)
+        return found
 
     def _turned_back(self, along: FloatArray, down: float) -> FloatArray:
         """Return vectors of the interfaces' frame in the plane frame, shape (..., 3)."""

@@ -219,6 +219,29 @@ def apparent_of_plane(positions: FloatArray, camera: Foot) -> FloatArray:
     return camera.nadir + camera.media.apparent(away, np.zeros(away.shape[:-1]))
 
 
+def distance_at(camera: Foot, radius: Any, relief: Any = None) -> Any:
+    """Return the distance of the straight camera that sees places at radii as this one does.
+
+    In air the camera's own; see `bifocal.media.MediaPath.distance_at`.
+    """
+    if camera.media is None:
+        return camera.distance
+    return camera.media.distance_at(radius, relief)
+
+
+def apparent_magnification(radius: FloatArray, relief: FloatArray, camera: Foot) -> FloatArray:
+    """Return (q - N) / (P - N) of points at radii from the nadir: `magnification` in air."""
+    if camera.media is None:
+        return magnification(relief, camera.distance)
+    steepness = camera.media.steepness(radius, camera.distance - relief)
+    return np.asarray(steepness * camera.distance)
+
+
+def near_axis(camera: Foot) -> float:
+    """Return the distance of the straight camera that sees as this one does near its axis. [m]"""
+    return camera.distance if camera.media is None else camera.media.near_axis
+
+
 def is_before(xyz: FloatArray, camera: Foot) -> BoolArray:
     """Return which points lie before the camera, in its last medium; False for NaN."""
     if camera.media is None:

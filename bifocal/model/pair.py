@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -235,6 +235,11 @@ class Pair:
         """The media between cameras and object; None in air."""
         return self.image1.layers
 
+    def in_air(self) -> Pair:
+        """Return the pair with its media left out: what neglecting refraction makes of it."""
+        photos = [replace(photo, layers=None, z0=None) for photo in (self.image1, self.image2)]
+        return replace(self, image1=photos[0], image2=photos[1], remarks=())
+
     def refuse_media(self, what: str) -> None:
         """Raise where the pair looks through media and the work asked for knows only air.
 
@@ -254,6 +259,25 @@ class Pair:
                 "would be wrong by what refraction does. `intersect` and `project` know them."
             )
 
+    def refuse_leaning_media(self, what: str) -> None:
+        """Raise where interfaces are not parallel to the reference plane and must be.
+
+        Parameters
+        ----------
+        what : str
+            The work asked for.
+
+        Raises
+        ------
+        InputError
+            Naming it.
+        """
+        if any(photo.media and photo.media.turn is not None for photo in self.as_given):
+            raise InputError(
+                f"{what} is made through media parallel to the reference plane only, not through "
+                "ports that lean (`interface_normal`); single points are solved through them."
+            )
+
     @property
     def d1(self) -> float:
         """Distance of the far camera to the reference plane. [m]"""
@@ -266,8 +290,25 @@ class Pair:
 
     @property
     def base_factor(self) -> float:
-        """B = d1 d2 / (d1 - d2): metres of relief per unit of relative radial shift. [m]"""
-        return base_factor(d1=self.d1, d2=self.d2)
+        """B = d1 d2 / (d1 - d2): metres of relief per unit of relative radial shift. [m]
+
+        Through media near the axis, with the distances of straight cameras that see alike.
+        """
+        d1, d2 = self.straight_distances
+        return base_factor(d1=d1, d2=d2)
+
+    @property
+    def straight_distances(self) -> tuple[float, float]:
+        """Distances of straight cameras that see as these near the axis; in air d1, d2. [m]"""
+        return rays.near_axis(self.image1.foot), rays.near_axis(self.image2.foot)
+
+    @property
+    def highest_relief(self) -> float:
+        """Relief at which the last interface lies, before the lower one; in air d2. [m]"""
+        if self.layers is None:
+            return self.d2
+        photos = (self.image1, self.image2)
+        return min(photo.distance - photo.media.depth for photo in photos if photo.media)
 
     def photo(self, number: int) -> Photo:
         """Return image 1 or 2."""

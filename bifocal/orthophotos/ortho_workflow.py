@@ -108,7 +108,7 @@ def make_ortho(
     check_writable(out, overwrite=overwrite)
     check_ending(out, "an orthophoto is written as GeoTIFF; name it .tif.", ".tif", ".tiff")
     pair = Pair.of(pair_path)
-    pair.refuse_media("an orthophoto")
+    pair.refuse_leaning_media("an orthophoto")
     with open_surface(task, pair) as (surface, _, remarks):
         numbers = {"1": (1,), "2": (2,), "both": (1, 2)}[task.image]
         images = {number: read_image(pair.photo_file(number)) for number in numbers}

@@ -265,10 +265,25 @@ def test_mixed_units_are_told_of():
 
 def test_what_knows_only_air_says_so():
     pair, photos = Pair.from_dict(content("port")), [np.zeros((60, 80), np.uint8)] * 2
+    with pytest.raises(InputError, match="seen through other media"):
+        bifocal.match(pair, *photos)
+    leaning = Pair.from_dict(content("leaning port"))
     for work in (
-        lambda: bifocal.dense_relief(pair, *photos),
-        lambda: bifocal.orthophoto(pair, photos[0]),
-        lambda: bifocal.match(pair, *photos),
+        lambda: bifocal.dense_relief(leaning, *photos),
+        lambda: bifocal.orthophoto(leaning, photos[0]),
     ):
-        with pytest.raises(InputError, match="seen through other media"):
+        with pytest.raises(InputError, match="ports that lean"):
             work()
+
+
+@pytest.mark.parametrize("name", ["port", "tank", "surface"])
+def test_a_straight_camera_at_the_distance_sees_as_the_bent_rays_do(name):
+    """A = P d / (d - r) with d = A / |S|, against the rays shot to the points."""
+    path = Pair.from_dict(content(name)).image1.media
+    radius, relief = np.array([1e-3, 0.3, 0.9, 1.4]), np.array([0.2, -0.4, 0.35, 0.1])
+    found = path.distance_at(radius, relief)
+    seen = path.apparent(np.stack([radius, 0 * radius], axis=-1), relief)
+    at_plane = path.trace(seen).position[:, 0]
+    np.testing.assert_allclose(radius * found / (found - relief), at_plane, rtol=1e-6)
+    np.testing.assert_allclose(path.distance_at(at_plane), found, rtol=1e-6)
+    assert path.distance_at(np.array([1e-6]))[0] == pytest.approx(path.near_axis, rel=1e-5)

@@ -89,3 +89,14 @@ def test_plane_points_do_not_check_a_set_up_through_media():
     picks = measured("tank") | {"code": ["PLANE"] * len(POINTS)}
     with pytest.raises(InputError, match="PLANE"):
         solve(picks, pair=Pair.from_dict(content("tank")))
+
+
+def test_what_neglecting_refraction_costs_is_said():
+    """The points as a pair in air makes them, from the same pixels."""
+    data, picks = content("tank"), measured("tank")
+    dry = {key: value for key, value in data.items() if key != "layers"}
+    off = solve(picks, pair=Pair.from_dict(dry)).table.xyz - POINTS
+    said = solve(picks, pair=Pair.from_dict(data)).remarks[-1]
+    assert f"up to {np.abs(off[:, 2]).max():.3f} m" in said
+    assert f"places by up to {np.hypot(*off[:, :2].T).max():.3f} m" in said
+    assert np.abs(off[:, 2]).max() > 0.05
