@@ -11,7 +11,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from bifocal import dense_relief, orthophoto
+from bifocal import dense_relief, match, orthophoto
 from tests.scenes import RICH, Rendering, Scene, bifocal_cameras, render
 from tests.scenes.shapes import box
 from tests.scenes.wet import pair_through_media, under_water
@@ -108,3 +108,15 @@ def test_hidden_pixels_are_found_as_in_air(name):
     assert hidden.sum() > 100
     assert (found & hidden).sum() > 0.55 * hidden.sum()
     assert (found & taken.visible1).sum() < 0.005 * found.size
+
+
+@pytest.mark.parametrize("name", ["port", "surface"])
+def test_homologous_points_are_found_along_bent_lines(name):
+    taken, pair, _ = shot(name)
+    found = match(pair, taken.image1, taken.image2)
+    assert len(found.ids) > 150
+    points = pair.intersect(found.pixels1, found.pixels2, sigma_px=0.1)
+    true = taken.truth.sample(points.xyz[:, :2])
+    off = np.abs(points.xyz[:, 2] - true)
+    assert np.nanmedian(off) < 0.015
+    assert np.median(np.abs(points.misfit)) < 0.1
