@@ -9,6 +9,8 @@ from click.testing import CliRunner
 from bifocal import solve
 from bifocal.cli.main import main
 from bifocal.model.pair import Pair
+from bifocal.survey.output import write_result
+from bifocal.survey.workbook.content import SurveyContent
 from photocore.errors import InputError
 from tests.bifocal.model.test_pair_through_media import PAIRS, POINTS, content
 from tests.scenes.refracted import pixels_of
@@ -100,3 +102,12 @@ def test_what_neglecting_refraction_costs_is_said():
     assert f"up to {np.abs(off[:, 2]).max():.3f} m" in said
     assert f"places by up to {np.hypot(*off[:, :2].T).max():.3f} m" in said
     assert np.abs(off[:, 2]).max() > 0.05
+
+
+def test_no_workbook_is_written_with_formulas_of_air(tmp_path):
+    solution = solve(measured("tank"), pair=Pair.from_dict(content("tank")))
+    with pytest.raises(InputError, match=r"--out solved\.csv"):
+        write_result(tmp_path / "solved.xlsx", solution)
+    with pytest.raises(InputError, match=r"write a text table: \.csv"):
+        SurveyContent(pair=solution.pair)
+    assert not list(tmp_path.iterdir())
