@@ -101,10 +101,6 @@ class SurveyContent:
     log: Sequence[tuple[str, str, str, str, str]] = ()
     rows: int = POINT_ROWS
 
-    def __post_init__(self) -> None:
-        if self.pair is not None:
-            self.pair.refuse_media("a survey workbook (write a text table: .csv)")
-
     @property
     def is_pair(self) -> bool:
         """Whether the points are raw pixels of a general pair."""

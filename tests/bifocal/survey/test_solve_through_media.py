@@ -10,7 +10,7 @@ from bifocal import solve
 from bifocal.cli.main import main
 from bifocal.model.pair import Pair
 from bifocal.survey.output import write_result
-from bifocal.survey.workbook.content import SurveyContent
+from bifocal.survey.template_workflow import write_survey
 from photocore.errors import InputError
 from tests.bifocal.model.test_pair_through_media import PAIRS, POINTS, content
 from tests.scenes.refracted import pixels_of
@@ -109,5 +109,5 @@ def test_no_workbook_is_written_with_formulas_of_air(tmp_path):
     with pytest.raises(InputError, match=r"--out solved\.csv"):
         write_result(tmp_path / "solved.xlsx", solution)
     with pytest.raises(InputError, match=r"write a text table: \.csv"):
-        SurveyContent(pair=solution.pair)
+        write_survey(tmp_path / "points.xlsx", solution.points, pair=solution.pair)
     assert not list(tmp_path.iterdir())
