@@ -6,10 +6,9 @@ import json
 import logging
 import re
 import shlex
-import signal
 import sys
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from importlib import import_module
 from io import TextIOWrapper
 from pathlib import Path
@@ -18,15 +17,10 @@ from typing import Any, Protocol
 import click
 
 from photocore.errors import PhotogrammetryError
+from photocore.interrupts import STOPPED
 from photocore.log import COMMAND_LINE, DATE, is_quiet, log_options
 from photocore.options import NUMBER
 from photocore.provenance import recording
-
-
-def _stop(number: int, frame: object) -> None:  # noqa: ARG001
-    """End on a polite kill as on Ctrl-C, so that nothing half-written stays."""
-    raise KeyboardInterrupt
-
 
 #: Exit status of a fault of the program: EX_SOFTWARE of sysexits.h, which Windows' os lacks.
 UNFORESEEN = 70
@@ -142,8 +136,6 @@ class LazyGroup(click.Group):
 
         1: the input, the disk or the user ended it. 70: a fault of the program.
         """
-        with suppress(ValueError):  # not in the main thread: somebody else handles signals there
-            signal.signal(signal.SIGTERM, _stop)
         if isinstance(sys.stdout, TextIOWrapper):  # a name the terminal lacks letters for
             sys.stdout.reconfigure(errors="backslashreplace")
         try:
@@ -155,7 +147,7 @@ class LazyGroup(click.Group):
             _show_details(ctx)
             _tell_error(f"Error: {error}")
         except KeyboardInterrupt:
-            _tell_error("Stopped by the user; nothing was left half-written.")
+            _tell_error(STOPPED)
         except MemoryError:
             _tell_error(
                 "Error: not enough memory. Use smaller images, a coarser --gsd or --bounds."

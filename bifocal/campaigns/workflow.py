@@ -18,6 +18,7 @@ from bifocal.campaigns.whole_wall import JOINT, MOSAIC, joint_step, mosaic_step,
 from bifocal.campaigns.worker_pool import Listener, run_here
 from photocore.cli import Progress, no_progress
 from photocore.errors import InputError
+from photocore.interrupts import raising
 from photocore.output import check_writable
 from photocore.provenance import FileHashes, recording, today
 
@@ -154,7 +155,7 @@ def run_survey(
     jobs = [replace(job, date=job.date or today()) for job in jobs]
     together: list[PairOutcome] = []
     outcomes: dict[str, PairOutcome] = {}
-    with _locked([job.folder for job in jobs]):
+    with raising(), _locked([job.folder for job in jobs]):
         for job in jobs:
             clean(job.folder)
         ready = list(jobs)

@@ -66,11 +66,19 @@ def _reproducible() -> Iterator[None]:
         ezdxf.options.write_fixed_meta_data_for_testing = before
 
 
-def add_text(model: Any, text: str, place: tuple[float, ...], height: float, layer: str) -> None:
-    """Write a text of one line; ``place`` is its lower left corner. [m]"""
-    model.add_text(
-        text.replace("\n", " "), height=height, dxfattribs={"layer": layer, "insert": place}
-    )
+def add_text(model: Any, text: str, place: tuple[float, ...], height: float, layer: str) -> Any:
+    """Write a text of one line and return it; ``place`` is its lower left corner. [m]"""
+    style = {"layer": layer, "insert": place}
+    return model.add_text(text.replace("\n", " "), height=height, dxfattribs=style)
+
+
+def turned(text: Any, angle: float, *, middle: bool) -> None:
+    """Turn a text about its place, counter-clockwise [deg], and centre it there if asked."""
+    from ezdxf.enums import TextEntityAlignment
+
+    text.dxf.rotation = angle
+    if middle:
+        text.set_placement(text.dxf.insert, align=TextEntityAlignment.CENTER)
 
 
 def add_ellipse(model: Any, place: tuple[float, ...], ellipse: FloatArray, layer: str) -> None:
