@@ -175,5 +175,5 @@ def test_gdals_own_file_systems_are_written_and_read() -> None:
         assert file.read(0, 0, 1, 1) == 1
     with pytest.raises(InputError, match="GDAL can read"):
         RasterFile("/vsimem/bucket/none.tif")
-    with pytest.raises(InputError, match="cannot be reached|could not be written"):
+    with pytest.raises(InputError, match=r"cannot be reached|could not be written"):
         write_plain("/vsicurl/https://localhost:1/a.tif", values)
