@@ -195,3 +195,24 @@ def test_other_photos_than_the_workbooks_are_refused(survey) -> None:
         opened(photos / "other.jpg", photos / "near.jpg", workbook=survey),
     ):
         pass
+
+
+def test_the_command_alone_says_that_the_page_is_there() -> None:
+    assert "bifocal pick    " in CliRunner().invoke(main, []).output
+
+
+def test_what_the_lenses_say_of_far_and_near_is_asked(tmp_path) -> None:
+    folder = sample_folder(tmp_path)
+    with opened(folder / "near.jpg", folder / "far.jpg") as session:
+        client = client_of(session)
+
+        def questions() -> str:
+            return " ".join(client.get("/api/state").json()["photos"][0]["missing"])
+
+        session.command({"op": "setup.set", "d1": 17.5, "d2": 9.5})
+        for image, focal in ((1, 19), (2, 35)):
+            lens = {"focal_mm": focal, "sensor_width_mm": 22.7}
+            session.command({"op": "photo.set", "image": image, **lens})
+        assert "exchange far and near?" in questions()
+        session.command({"op": "photos.exchange"})
+        assert "exchange" not in questions()
