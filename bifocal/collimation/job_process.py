@@ -25,6 +25,7 @@ from bifocal.relief_maps.workflow import ReliefJob, relief_of_pair
 from bifocal.survey.pair_workflow import read_pair
 from photocore.cli import Progress
 from photocore.errors import PhotogrammetryError
+from photocore.interrupts import end_on_signals
 from photocore.jsonfile import plain
 
 Task = Mapping[str, Any]
@@ -34,6 +35,7 @@ _OFTEN = 0.2
 
 def main() -> int:
     """Carry out the task that stdin holds; return 0, or 1 where it was refused."""
+    end_on_signals()
     task = json.loads(sys.stdin.read())
     out = sys.stdout
     sys.stdout = sys.stderr  # nothing but our lines on the pipe
