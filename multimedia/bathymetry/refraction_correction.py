@@ -21,7 +21,7 @@ from multimedia.bathymetry.corrected_points import (
     as_water_surface,
     checked_water_index,
 )
-from multimedia.bathymetry.sight import Sight
+from multimedia.bathymetry.visible_points import VisiblePoints
 from multimedia.media.collinearity import Medium, shifts
 from multimedia.media.ray_tracing import aim_rays
 from multimedia.media.surface_sequence import SurfaceSequence
@@ -114,13 +114,13 @@ def correct_bathymetry(
     flat = xyz.reshape(-1, 3)
     surface, n_water = as_water_surface(water_level), checked_water_index(index)
     centres = _checked_cameras(cameras, surface)
-    sight = Sight.checked(visible, centres, max_angle, shape)
+    seen = VisiblePoints.checked(visible, centres, max_angle, shape)
     precision = precision or Precision()
     count = len(flat)
     result = (
         np.empty((count, 3)), np.empty(count), np.empty(count, np.int64), np.empty((count, 3, 3))
     )  # fmt: skip
-    for part, row, camera in sight.blocks(flat, BLOCK_RAYS):
+    for part, row, camera in seen.blocks(flat, BLOCK_RAYS):
         pairs = (row, camera)
         corrected = _correct_block(flat[part], surface, n_water, centres, pairs, precision)
         for whole, piece in zip(result, corrected, strict=True):

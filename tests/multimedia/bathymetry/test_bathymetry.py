@@ -7,7 +7,7 @@ import pytest
 from scipy.sparse import csr_array
 
 import multimedia as mm
-from multimedia.bathymetry import refraction_correction, sight
+from multimedia.bathymetry import refraction_correction, visible_points
 from photocore.errors import GeometryError, InputError
 
 N = 1.34
@@ -324,7 +324,7 @@ def test_cameras_culled_by_angle_are_those_of_a_table_of_all_pairs(monkeypatch):
     whole = {"water_level": 102.5, "index": N, "cameras": cameras}
     whole["precision"] = mm.Precision(index=0.001, level=0.02, point=0.01)
     table = mm.correct_bathymetry(points, visible=seen, **whole)
-    monkeypatch.setattr(sight, "POINTS", 64)
+    monkeypatch.setattr(visible_points, "POINTS", 64)
     monkeypatch.setattr(refraction_correction, "BLOCK_RAYS", 90)
     sparse = mm.correct_bathymetry(points, visible=csr_array(seen), **whole)
     angle = mm.correct_bathymetry(points, max_angle=0.6, **whole)

@@ -18,7 +18,7 @@ from photocore.errors import InputError
 POINTS, PAIRS = 4096, 2_000_000
 
 
-class Sight(NamedTuple):
+class VisiblePoints(NamedTuple):
     """Which camera saw which point: by table, by angle, or all; never points times cameras."""
 
     centres: FloatArray  # (m, 3)
@@ -32,7 +32,7 @@ class Sight(NamedTuple):
         centres: FloatArray,
         max_angle: float | None,
         shape: tuple[int, ...],
-    ) -> Sight:
+    ) -> VisiblePoints:
         """Return what was seen of points of a shape.
 
         Raises
