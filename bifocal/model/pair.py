@@ -174,9 +174,10 @@ class Pair:
         stated = data.pop("format", None)
         if stated != FORMAT:
             raise InputError(f'"format" must be "{FORMAT}", found {stated!r}.')
-        if data.get("layers"):
+        if "layers" in data:
             raise InputError(
-                '"layers": pairs seen through other media are not supported by this version.'
+                '"layers": pairs seen through other media are not supported by this version. Where '
+                "there is only air, remove the key."
             )
         far, near = (Photo.from_dict(data.pop(k, None), k, folder) for k in ("image1", "image2"))
         stated = data.pop("orientation", None)

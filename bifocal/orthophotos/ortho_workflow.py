@@ -25,7 +25,7 @@ from bifocal.orthophotos.triangles import TriangleSurface
 from photocore.arrays import ByteArray
 from photocore.cli import Progress, no_progress
 from photocore.errors import InputError, located
-from photocore.output import check_ending, check_writable
+from photocore.output import check_ending, check_not_input, check_writable
 
 #: A pixel this many times finer or coarser than the photo's own is asked back about.
 FINEST, COARSEST = 1 / 16, 40.0
@@ -105,8 +105,9 @@ def make_ortho(
     InputError
         If an input is missing or does not fit, the size is not plausible, or writing fails.
     """
-    check_writable(out, overwrite=overwrite)
     check_ending(out, "an orthophoto is written as GeoTIFF; name it .tif.", ".tif", ".tiff")
+    check_not_input(out, task.relief)
+    check_writable(out, overwrite=overwrite)
     pair = Pair.of(pair_path)
     with open_surface(task, pair) as (surface, _, remarks):
         numbers = {"1": (1,), "2": (2,), "both": (1, 2)}[task.image]
