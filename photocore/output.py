@@ -19,6 +19,7 @@ from pathlib import Path
 
 from photocore import interrupts
 from photocore.errors import InputError
+from photocore.provenance import note_output
 from photocore.textfile import check_name
 
 #: Temporary names tell the machine and the process, so that what a killed run left is known.
@@ -192,6 +193,7 @@ def atomic_path(path: Path | str, *, overwrite: bool) -> Iterator[Path]:
         As `check_writable`, and when the disk is full or the rename is refused.
     """
     path = check_writable(path, overwrite=overwrite)
+    note_output(path)
     real, finished = path.resolve(), _waiting.get()
     if finished is not None and any(real == place for _, place in finished):
         raise InputError(f"{path}: is named for two outputs; name two files.")

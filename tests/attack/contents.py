@@ -81,7 +81,7 @@ _PAIR: list[tuple[tuple[object, ...], object, str]] = [
     *((("image1", "sigma_pixel"), value, "sigma_pixel") for value in
       ("x", -1, 0, [], True, 1e300)),
     *((("layers",), value, "layers|indices|thick") for value in
-      (3, [], 0, False, "", {}, None, {"indices": [1]}, {"indices": [1, "n"], "thicknesses": []},
+      (3, [], 0, False, "", {}, {"indices": [1]}, {"indices": [1, "n"], "thicknesses": []},
        {"indices": [1, 1.5, 1.3], "thicknesses": []}, {"indices": [1, -1], "thicknesses": []})),
     (("image1", "lens"), 3, "lens"), (("image1", "lens"), "nowhere.json", "nowhere.json"),
     (("image1", "file"), 3, "file"),
