@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
 
 from multimedia.workbook.shift_points import ShiftPoints, ShiftResult, ShiftSetup
-from multimedia.workbook.shift_workbook import table_values
+from multimedia.workbook.shift_workbook import CHART_DATA, table_values
 from photocore.errors import InputError
 from photocore.tables import Table, open_tables
 from photocore.workbook.cells import CellValue
 from photocore.workbook.editor import WorkbookEditor
-from photocore.workbook.grid import SheetFile
+from photocore.workbook.grid import SheetFile, TableArea, split_area
 from photocore.workbook.result_columns import (
     OwnTable,
     ResultColumn,
@@ -87,7 +87,28 @@ def update_template(
         for position, row in enumerate(rows):
             if key in values and key not in ("id", "X", "Y", "Z", "R", "ZP"):
                 editor.set_result(area.sheet, table.rows[row], column, values[key][position])
+    _store_chart(editor, area, [table.rows[row] for row in rows], values)
     return editor.save(out, overwrite=overwrite)
+
+
+def _store_chart(
+    editor: WorkbookEditor,
+    area: TableArea,
+    rows: Sequence[int],
+    values: Mapping[str, Sequence[CellValue]],
+) -> None:
+    """Store the numbers of the chart of our workbooks, which stand beside the table."""
+    sheet, _, cells = editor.book.names.get(CHART_DATA, "").rpartition("!")
+    if sheet.strip("'") != area.sheet:
+        return
+    top, left, bottom, _ = split_area(cells.replace("$", ""))
+    for position, row in enumerate(rows):
+        place = top + row - area.area[0] - 1
+        if place <= bottom:
+            for column, key in enumerate(("R_u", "dR"), start=left):
+                value = values[key][position]
+                shown = value if isinstance(value, int | float) else float("nan")
+                editor.set_result(area.sheet, place, column, shown)
 
 
 def add_columns(
