@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import replace
 from pathlib import Path
 
@@ -38,6 +39,8 @@ from photocore.workbook.newbook import check_new_workbook
 
 #: More rows make a workbook that is slow to open; text tables have no limit.
 MOST_ROWS = 20_000
+#: Columns that the user fills in, besides the name.
+INPUTS = ("X", "Y", "Z", "R", "ZP")
 #: The chart shows the first points only.
 _CHART_ROWS = 1000
 #: Name of the chart's numbers: R_u and dR of the points.
@@ -123,13 +126,10 @@ def _shift_sheet(
     book: BookBuilder, setup: ShiftSetup, points: ShiftPoints | None, *, count: int, steps: int
 ) -> None:
     """Write camera and media, and below them the table of points."""
-    sheet = book.sheet("Multimedia", "shift_how")
-    columns = _columns(len(setup.layers.indices), steps)
-    keys = [column.key for column in columns]
-    _media(sheet, setup, live=points is None)
-    below = 5 + len(setup.layers.indices)
-    _write_lengths(sheet, setup, first=below)
-    head, last = below + len(_lengths(setup)) + 2, get_column_letter(len(columns))
+    sheet = media_cells(book, setup, live=points is None)
+    columns = shift_columns(len(setup.layers.indices), steps)
+    keys, last = [column.key for column in columns], get_column_letter(len(columns))
+    head = 7 + len(setup.layers.indices) + len(_lengths(setup))
     values = table_values(setup, points, count, steps)
     sheet.table("tblMM", columns, at=(head, 1), rows=count, cells=values)
     flags = f"{last}{head + 1}:{last}{head + count}"
@@ -140,31 +140,70 @@ def _shift_sheet(
     sheet.worksheet.print_area = f"A1:{last}{head + printed}"
 
 
-def _media(sheet: SheetBuilder, setup: ShiftSetup, *, live: bool) -> None:
-    """Write the indices of the media, the last one as a formula if ``live``."""
-    for letter, key in zip("ABCD", ("name", "value"), strict=False):
-        sheet.word(f"{letter}4", key, HEAD_FONT)
-    for letter, name in zip("CD", "kq", strict=True):
-        sheet.text(f"{letter}4", name, HEAD_FONT)
-    for letter in "ABCD":
-        sheet.worksheet[f"{letter}4"].fill = HEAD_FILL
+def media_cells(
+    book: BookBuilder,
+    setup: ShiftSetup,
+    *,
+    live: bool = False,
+    links: Mapping[str, str] | None = None,
+) -> SheetBuilder:
+    """Write the sheet of camera and media, without points.
+
+    Parameters
+    ----------
+    book : BookBuilder
+        Takes the sheet.
+    setup : ShiftSetup
+        Camera and media.
+    live : bool
+        Whether the last index is that of the sheet RefractiveIndex.
+    links : mapping, optional
+        By name, the cells of the user's own that hold a value; formulas here refer to them. None
+        in a workbook that is all ours.
+    """
+    named, links = links is None, dict(links or {})
+    sheet = book.sheet("Multimedia", "shift_how" if named else "media_how")
     indices = setup.layers.indices
     count, least = len(indices), min(indices)
+    if live:
+        links[f"n_{count}"] = "n_w"
+    for letter, text in zip("ABCD", (book.word("name"), book.word("value"), "k", "q"), strict=True):
+        sheet.text(f"{letter}4", text, HEAD_FONT)
+        sheet.worksheet[f"{letter}4"].fill = HEAD_FILL
     for i, index in enumerate(indices, start=1):
         row, name = 4 + i, f"n_{i}"
-        sheet.text(f"A{row}", name)
-        if i == count and live:
-            sheet.formula(f"B{row}", "n_w", index, name=name, editable=True)
-        else:
-            sheet.input(f"B{row}", index, name=name)
-        prompt = sheet.book.word("index_prompt")
+        _value(sheet, row, name, index, links)
+        prompt = book.word("index_prompt")
         sheet.validate(f"B{row}", title=name, prompt=prompt, limits=(1, HIGHEST_INDEX))
-        k, text = least / index, f"MIN($B$5:$B${4 + count})/n_{i}"
+        # In a workbook of the user's own the names may be taken.
+        own, ratio = (name, f"k_{i}") if named else (f"$B${row}", f"$C${row}")
+        k, text = least / index, f"MIN($B$5:$B${4 + count})/{own}"
         sheet.formula(f"C{row}", text, k, form="0.000000", name=f"k_{i}")
-        sheet.formula(f"D{row}", f"1-k_{i}^2", 1 - k * k, form="0.000000", name=f"q_{i}")
+        sheet.formula(f"D{row}", f"1-{ratio}^2", 1 - k * k, form="0.000000", name=f"q_{i}")
         place = "camera" if i == 1 else "object" if i == count else "layer"
-        words = sheet.book.word(f"index_{place}").format(n=i - 1)
+        words = book.word(f"index_{place}").format(n=i - 1)
         sheet.text(f"E{row}", words, LABEL_FONT)
+    _write_lengths(sheet, setup, links)
+    return sheet
+
+
+def _value(
+    sheet: SheetBuilder, row: int, name: str, value: float, links: Mapping[str, str]
+) -> None:
+    """Write a named value, typed or as a reference to where it stands."""
+    sheet.text(f"A{row}", name)
+    if name in links:
+        sheet.formula(f"B{row}", links[name], value, name=name, editable=True)
+    else:
+        sheet.input(f"B{row}", value, name=name)
+
+
+def media_places(layers: int) -> dict[str, tuple[int, int]]:
+    """Return row and column of each value on the sheet of `media_cells`, by name."""
+    places = {f"{kind}_{i}": (4 + i, c) for c, kind in enumerate("nkq", start=2)
+              for i in range(1, layers + 1)}  # fmt: skip
+    lengths = [*(f"t_{i}" for i in range(1, layers - 1)), "z_0", "X_0", "Y_0"]
+    return places | {name: (5 + layers + i, 2) for i, name in enumerate(lengths)}
 
 
 def _lengths(setup: ShiftSetup) -> dict[str, float]:
@@ -173,13 +212,13 @@ def _lengths(setup: ShiftSetup) -> dict[str, float]:
     return {**layers, "z_0": setup.z0, "X_0": setup.nadir[0], "Y_0": setup.nadir[1]}
 
 
-def _write_lengths(sheet: SheetBuilder, setup: ShiftSetup, *, first: int) -> None:
+def _write_lengths(sheet: SheetBuilder, setup: ShiftSetup, links: Mapping[str, str]) -> None:
     """Write thicknesses and the camera's position below the indices."""
+    first = 5 + len(setup.layers.indices)
     for row, (name, value) in enumerate(_lengths(setup).items(), start=first):
         key = "thickness" if name.startswith("t_") else name
         words = sheet.book.word(key).format(n=name[2:])
-        sheet.text(f"A{row}", name)
-        sheet.input(f"B{row}", value, name=name)
+        _value(sheet, row, name, value, links)
         sheet.text(f"E{row}", words, LABEL_FONT)
         if name[0] in "tz":
             prompt = f"{words}. {sheet.book.word('length_prompt')}"
@@ -220,60 +259,94 @@ def _chart(
     sheet.worksheet.add_chart(chart, f"{get_column_letter(len(keys) + 2)}{head - 1}")
 
 
-def _columns(layers: int, steps: int) -> list[LiveColumn]:
-    """Return every column of the table."""
-    heights = ["z_0", *(f"t_{i}" for i in range(1, layers - 1)), "[@ZP_u]"]
-    k = [f"{h}*k_{i}" for i, h in enumerate(heights, start=1)]
+def shift_columns(
+    layers: int,
+    steps: int,
+    *,
+    value: Callable[[str], str] = str,
+    given: Collection[str] = INPUTS,
+) -> list[LiveColumn]:
+    """Return every column of the table.
+
+    Parameters
+    ----------
+    layers : int
+        Media, the camera's and the object's with them.
+    steps : int
+        Newton columns.
+    value : callable
+        Returns what a formula calls a value of the set-up, ``k_1`` for instance.
+    given : collection of str
+        The input columns there are.
+    """
+    lengths = map(value, ("z_0", *(f"t_{i}" for i in range(1, layers - 1))))
+    heights = [*lengths, "[@ZP_u]"]
+    k = [f"{h}*{value(f'k_{i}')}" for i, h in enumerate(heights, start=1)]
+    q = [value(f"q_{i}") for i in range(1, layers + 1)]
 
     def f(u: str) -> str:
-        return "+".join(f"{part}/SQRT(1+q_{i}*{u}^2)" for i, part in enumerate(k, start=1))
+        return "+".join(f"{a}/SQRT(1+{b}*{u}^2)" for a, b in zip(k, q, strict=True))
 
     def slope(u: str) -> str:
-        return "+".join(f"{part}/(1+q_{i}*{u}^2)^1.5" for i, part in enumerate(k, start=1))
-
-    def live(key: str, formula: str, form: str = "0.00000", *, folded: bool = False) -> LiveColumn:
-        return LiveColumn(
-            key=key, kind="formula", formula=formula, form=form, width=12, folded=folded
-        )
+        return "+".join(f"{a}/(1+{b}*{u}^2)^1.5" for a, b in zip(k, q, strict=True))
 
     end = f"[@u{steps}]"
-    given = "AND(COUNT([@R_u],[@ZP_u])=2,N([@ZP_u])>=0)"
-    in_plane = 'SQRT(([@X]-X_0)^2+([@Y]-Y_0)^2),""'
-    of_xy = f"IF(COUNT([@X],[@Y])=2,{in_plane})"
+    whole_row = "AND(COUNT([@R_u],[@ZP_u])=2,N([@ZP_u])>=0)"
+    radius, depth = _used(given, value)
     columns = [
         LiveColumn(key="id", width=11),
         *(LiveColumn(key=key, form="General", width=11, limits=(-1e9, 1e9)) for key in "XYZ"),
         *(LiveColumn(key=key, form="General", width=11, limits=(0, 1e9)) for key in ("R", "ZP")),
-        live("R_u", f"IF(COUNT([@R])=1,[@R],{of_xy})", folded=True),
-        live("ZP_u", 'IF(COUNT([@ZP])=1,[@ZP],IF(COUNT([@Z])=1,-[@Z],""))', folded=True),
-        live("u0", f'IF({given},[@R_u]/({"+".join(k)}),"")', "0.000000", folded=True),
+        _live("R_u", radius, folded=True),
+        _live("ZP_u", depth, folded=True),
+        _live("u0", f'IF({whole_row},[@R_u]/({"+".join(k)}),"")', "0.000000", folded=True),
     ]
     for step in range(steps):
         u = f"[@u{step}]"
         text = f'IF({u}="","",{u}+([@R_u]-{u}*({f(u)}))/({slope(u)}))'
-        columns.append(live(f"u{step + 1}", text, "0.000000", folded=True))
-    whole = "+".join(heights)
+        columns.append(_live(f"u{step + 1}", text, "0.000000", folded=True))
+    through = f"{value('k_1')}*{end}/SQRT(1+{q[0]}*{end}^2)"
     columns += [
-        live("Rbar", f'IF({end}="","",({whole})*k_1*{end}/SQRT(1+q_1*{end}^2))'),
-        live("dR", f'IF({end}="","",[@Rbar]-[@R_u])'),
+        _live("Rbar", f'IF({end}="","",({"+".join(heights)})*{through})'),
+        _live("dR", f'IF({end}="","",[@Rbar]-[@R_u])'),
     ]
-    for axis in "XY":
-        moved = f"{axis}_0+([@{axis}]-{axis}_0)*IF([@R_u]=0,1,[@Rbar]/[@R_u])"
+    for axis in "XY" if {"X", "Y"} <= set(given) else "":
+        centre = value(f"{axis}_0")
+        moved = f"{centre}+([@{axis}]-{centre})*IF([@R_u]=0,1,[@Rbar]/[@R_u])"
         text = f'IF(OR({end}="",COUNT([@X],[@Y])<2),"",{moved})'
-        columns.append(live(f"{axis}bar", text))
+        columns.append(_live(f"{axis}bar", text))
     solved = f'IF(ABS([@resid])<={TOLERANCE:.0E}*[@R_u],"OK","CHECK")'
     columns += [
-        live("resid", f'IF({end}="","",{end}*({f(end)})-[@R_u])', "0.0E+00"),
-        live("flag", f'IF(COUNT([@R_u],[@ZP_u])<2,"",IF([@ZP_u]<0,"DRY",{solved}))', "General"),
+        _live("resid", f'IF({end}="","",{end}*({f(end)})-[@R_u])', "0.0E+00"),
+        _live("flag", f'IF(COUNT([@R_u],[@ZP_u])<2,"",IF([@ZP_u]<0,"DRY",{solved}))', "General"),
     ]
     return columns
+
+
+def _live(key: str, formula: str, form: str = "0.00000", *, folded: bool = False) -> LiveColumn:
+    return LiveColumn(key=key, kind="formula", formula=formula, form=form, width=12, folded=folded)
+
+
+def _used(given: Collection[str], value: Callable[[str], str]) -> tuple[str, str]:
+    """Return the formulas of the radius and depth used, from the input columns there are."""
+    radius, depth = '""', '""'
+    if {"X", "Y"} <= set(given):
+        off = f"([@X]-{value('X_0')})^2+([@Y]-{value('Y_0')})^2"
+        radius = f'IF(COUNT([@X],[@Y])=2,SQRT({off}),"")'
+    if "R" in given:
+        radius = f"IF(COUNT([@R])=1,[@R],{radius})"
+    if "Z" in given:
+        depth = 'IF(COUNT([@Z])=1,-[@Z],"")'
+    if "ZP" in given:
+        depth = f"IF(COUNT([@ZP])=1,[@ZP],{depth})"
+    return radius, depth
 
 
 def table_values(
     setup: ShiftSetup, points: ShiftPoints | None, count: int, steps: int
 ) -> dict[str, list[CellValue]]:
     """Return what every column shows, blank rows included."""
-    keys = [column.key for column in _columns(len(setup.layers.indices), steps)]
+    keys = [column.key for column in shift_columns(len(setup.layers.indices), steps)]
     values: dict[str, list[CellValue]] = {key: [None] * count for key in keys[:6]}
     values |= {key: [""] * count for key in keys[6:]}
     if points is None:

@@ -15,8 +15,6 @@ from bifocal.survey.workbook.reader import SurveyInput
 from bifocal.survey.workbook.setup_cells import TYPED_FORMULAS
 from bifocal.survey.workbook.setup_update import (
     add_missing_sheets,
-    place_of,
-    type_value,
     write_corrections,
     write_options,
 )
@@ -28,6 +26,7 @@ from photocore.workbook.editor import WorkbookEditor
 from photocore.workbook.grid import TableArea
 from photocore.workbook.live_book import BookBuilder
 from photocore.workbook.live_columns import TEXT_KEYS, row_formula
+from photocore.workbook.named_cells import place_of, type_value
 from photocore.workbook.newbook import RowBlock
 from photocore.workbook.print_area import move_print_area
 
