@@ -28,7 +28,7 @@ LANGUAGES = ("en", "it", "de")
 def books(tmp_path_factory):
     """Return workbooks by name: the templates, a survey, a pair."""
     folder = tmp_path_factory.mktemp("books")
-    write_book(folder / "ideal.xlsx", ideal_content(20))
+    write_book(folder / "ideal.xlsx", ideal_content(26))
     write_book(folder / "pair.xlsx", pair_content(20))
     paths = {f"survey-{code}": TEMPLATES / f"survey-{code}.xlsx" for code in LANGUAGES}
     paths |= {name: folder / f"{name}.xlsx" for name in ("ideal", "pair")}
@@ -49,17 +49,17 @@ def test_nothing_is_under_8_pt_on_paper(name, books):
 
 @pytest.mark.parametrize("name", NAMES)
 def test_all_sheets_have_one_face_and_one_scale_of_sizes(name, books):
-    fonts = {cell.font for sheet in books[name][1] for row in sheet.iter_rows() for cell in row}
-    assert {font.name for font in fonts} == {"Arial"}
-    assert {font.sz for font in fonts} == {9, 10, 14}
+    cells = [cell for sheet in books[name][1] for row in sheet.iter_rows() for cell in row]
+    assert {cell.font.name for cell in cells} == {"Arial"}
+    assert {cell.font.sz for cell in cells} == {9, 10, 14}
 
 
 def test_results_are_one_page_for_a_client(books):
     sheet = books["ideal"][1]["Results"]
-    assert sheet.print_area == "'Results'!$A$1:$O$24"
+    assert sheet.print_area == "'Results'!$A$1:$O$30"
     assert sheet.print_title_rows == "$3:$4"
     assert sheet.page_setup.orientation == "landscape"
-    rows = [sheet.row_dimensions[r].height or 13.5 for r in range(1, 25)]
+    rows = [sheet.row_dimensions[r].height or 13.5 for r in range(1, 31)]
     paper = 595.3 - 72 * (sheet.page_margins.top + sheet.page_margins.bottom)
     assert sum(rows) * scale_of(sheet) < paper
     values = openpyxl.load_workbook(books["ideal"][0], data_only=True)["Results"]
@@ -71,7 +71,7 @@ def test_results_are_one_page_for_a_client(books):
 
 def test_the_title_block_says_what_is_typed_on_setup(tmp_path):
     block = {"project": "Palazzo Nuovo", "surveyor": "Ada", "survey_date": "3 May 2026"}
-    content = ideal_content(8, title_block=block)
+    content = ideal_content(26, title_block=block)
     write_book(tmp_path / "r.xlsx", content)
     values = openpyxl.load_workbook(tmp_path / "r.xlsx", data_only=True)["Results"]
     assert values["A2"].value.startswith("Project: Palazzo Nuovo\nClient: \n")
@@ -225,11 +225,25 @@ def parts(path):
         return {name: package.read(name) for name in package.namelist()}
 
 
-def test_the_sketch_is_small_and_stays_when_the_workbook_is_solved_in_place(tmp_path):
+@pytest.fixture
+def solved(tmp_path):
+    """Return a survey workbook of 12 points made from a text table."""
+    lines = ["id,x1,y1,x2,y2"]
+    for i in range(12):
+        x, y, r = 0.7 * (i % 8) - 2.4, 0.9 * (i % 5) - 1.7, 0.2 * (i % 3)
+        far, near = 35 / (17.5 - r), 19 / (9.5 - r)
+        lines.append(f"P{i},{far * x},{far * y},{near * x},{near * y}")
+    (tmp_path / "points.csv").write_text("\n".join(lines), encoding="utf-8")
     path = tmp_path / "s.xlsx"
-    content = ideal_content(8)
-    write_book(path, content)
-    before = parts(path)
+    lenses = ["--d1", "17.5", "--d2", "9.5", "--c1", "35", "--c2", "19"]
+    arguments = ["solve", str(tmp_path / "points.csv"), "--out", str(path), *lenses]
+    result = CliRunner().invoke(main, arguments)
+    assert result.exit_code == 0, result.stderr
+    return path
+
+
+def test_the_sketch_is_small_and_stays_when_the_workbook_is_solved_in_place(solved):
+    before = parts(solved)
     name = next(part for part in before if "sketch" in part)
     text = before[name].decode()
     assert len(text) < 40_000
@@ -240,18 +254,17 @@ def test_the_sketch_is_small_and_stays_when_the_workbook_is_solved_in_place(tmp_
     assert {"0072B2", "D55E00", "009E73"} <= colours  # Okabe and Ito
     rels = before["xl/worksheets/_rels/sheet1.xml.rels"].decode()
     assert f'Target="/{name}"' in rels
-    arguments = ["solve", str(path), "--out", str(path), "--overwrite", "--d1", "17.6"]
-    result = CliRunner().invoke(main, arguments)
-    assert result.exit_code == 0, result.stderr
-    after = parts(path)
+    solve(solved, "--d1", "17.6")
+    after = parts(solved)
     for part in (name, "xl/worksheets/sheet1.xml", "xl/worksheets/_rels/sheet1.xml.rels"):
         assert after[part] == before[part]
 
 
 @pytest.fixture
 def filled(tmp_path):
-    """Return a template with 40 typed points."""
-    book = openpyxl.load_workbook(TEMPLATES / "survey-en.xlsx")
+    """Return a template of 30 rows with 40 typed points."""
+    write_template(tmp_path / "form.xlsx", rows=30)
+    book = openpyxl.load_workbook(tmp_path / "form.xlsx")
     for name, value in (("c_1", 35), ("c_2", 19), ("d_2", 9.5), ("delta_d", 8)):
         named(book, name).value = value
     for i in range(40):
@@ -301,19 +314,16 @@ def test_every_sheet_says_how_far_it_reaches(name, books):
         assert light[sheet.title].max_column == sheet.max_column, sheet.title
 
 
-def test_rows_added_in_place_widen_what_the_sheet_says(tmp_path):
-    path = tmp_path / "long.xlsx"
-    write_book(path, ideal_content(12))
-    book = openpyxl.load_workbook(path)
+def test_rows_added_in_place_widen_what_the_sheet_says(solved):
+    book = openpyxl.load_workbook(solved)
     sheet = book["Points"]
-    for row in range(17, 60):
-        for column in range(1, 6):
-            sheet.cell(row, column).value = (
-                f"Q{row}" if column == 1 else sheet.cell(5, column).value
-            )
-    book.save(path)
-    solve(path)
-    light = openpyxl.load_workbook(path, read_only=True, data_only=True)
+    for row in range(17, 45):
+        sheet.cell(row, 1).value = f"Q{row}"
+        for column in range(2, 6):
+            sheet.cell(row, column).value = sheet.cell(5, column).value
+    book.save(solved)
+    solve(solved)
+    light = openpyxl.load_workbook(solved, read_only=True, data_only=True)
     for title in ("Points", "Results"):
-        assert light[title].max_row >= 59
-        assert light[title].cell(59, 1).value == "Q59"
+        assert light[title].max_row >= 44
+        assert light[title].cell(44, 1).value == "Q44"
