@@ -213,10 +213,10 @@ def _title_block(sheet: SheetBuilder, content: SurveyContent, results: Cells) ->
     worst = None if content.check is None else content.check.accuracy
     shown = "" if worst is None or worst != worst else f"{round(worst, 3):g} m"
     points, rmse = book.word("points_solved"), book.word("worst_of_checks")
-    survey += [
+    people += [
         (f'"{points}: "&COUNT(tblResults[X])', f"{points}: {solved}"),
     ]
-    people += [
+    survey += [
         (
             f'"{rmse}: "&IF(ISNUMBER(check_worst),ROUND(check_worst,3)&" m","")',
             f"{rmse}: {shown}",
