@@ -85,6 +85,30 @@ def check_all_writable(*paths: Path | None, overwrite: bool) -> None:
             raise InputError(f"{path}: is named for two outputs; name two files.")
 
 
+def check_not_input(path: Path | None, *inputs: Path | str | None) -> None:
+    """Refuse an output that is one of the files a command reads; ask this before `check_writable`.
+
+    Otherwise the advice to add --overwrite would cost the input, or end in a second refusal.
+
+    Parameters
+    ----------
+    path : Path or None
+        The output; None stands for no file.
+    *inputs : path or None
+        What is read.
+
+    Raises
+    ------
+    InputError
+        Naming it.
+    """
+    if path is None or not path.exists():
+        return
+    for given in inputs:
+        if given is not None and Path(given).exists() and path.samefile(given):
+            raise InputError(f"{path}: is one of the files that are read; name another output.")
+
+
 def check_ending(path: Path | None, rule: str, *endings: str) -> None:
     """Refuse a file with another ending than these, given in small letters; None is no file.
 
