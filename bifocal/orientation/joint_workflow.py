@@ -30,7 +30,7 @@ from bifocal.orientation.joint_ties import (
 from photocore.arrays import BoolArray, FloatArray
 from photocore.camera import Pinhole, plane_from_pixel
 from photocore.cli import Progress, no_progress
-from photocore.errors import InputError
+from photocore.errors import InputError, located
 from photocore.output import atomic_folder, relative_name
 from photocore.tables import write_csv
 
@@ -168,6 +168,9 @@ def adjust_pairs(
     if twice:
         raise InputError(f"{twice[0]}: two pair files have this name; rename one.")
     pairs = [Pair.read(path) for path in paths]
+    for path, pair in zip(paths, pairs, strict=True):
+        with located(path):
+            pair.refuse_media("the joint adjustment")
     tables = _tables(paths, pairs, task)
     result = joint_adjustment(pairs, names, tables, task, progress=progress)
     columns = list(result.points[0]) if result.points else ["id"]
