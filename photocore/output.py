@@ -45,6 +45,8 @@ def check_writable(path: Path | str, *, overwrite: bool) -> Path:
     """
     path = Path(path)
     check_name(path)
+    if str(path).startswith("/vsi"):  # one of GDAL's file systems: only rasters go there
+        return path
     if path.is_dir():
         raise InputError(f"{path}: is a folder; name a file to write.")
     if path.is_symlink() and not path.exists():
