@@ -6,6 +6,7 @@ import re
 import unicodedata
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import lru_cache
 
 from photocore.tables.model import Column
 from photocore.tables.numbers import UNITS, unit_symbol
@@ -65,6 +66,7 @@ class Match:
         return [c.key for c in columns if c.required and c.key not in self.columns]
 
 
+@lru_cache(maxsize=10_000)
 def bare(text: str) -> str:
     """Return a heading without unit, case, blanks and punctuation.
 

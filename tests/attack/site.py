@@ -145,9 +145,10 @@ def _rasters_and_clouds(folder: Path, rng: np.random.Generator) -> None:
     with rasterio.open(folder / "relief.tif", "w", count=3, dtype="float32", **form) as file:
         layers = (0.2 * smooth, 0.01 + 0 * smooth, 1 + 0 * smooth)
         file.write(np.stack(layers).astype("f4"))
+    wall = rng.integers(1, 250, (4, HEIGHT, WIDTH), dtype=np.uint8)  # seen by both
     for name in ("ortho1.tif", "ortho2.tif"):
         with rasterio.open(folder / name, "w", count=4, dtype="uint8", **form) as file:
-            file.write(rng.integers(1, 255, (4, HEIGHT, WIDTH), dtype=np.uint8))
+            file.write(wall + rng.integers(0, 5, wall.shape, dtype=np.uint8))
             file.colorinterp = [rasterio.enums.ColorInterp[c]
                                 for c in ("red", "green", "blue", "alpha")]  # fmt: skip
     with rasterio.open(folder / "dem.tif", "w", count=1, dtype="float32", **form) as file:

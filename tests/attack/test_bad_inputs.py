@@ -55,12 +55,16 @@ def site(whole_site: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> P
 def state(folder: Path) -> dict[str, object]:
     """Return what lies in a folder: kind, target, size, time and mode of each."""
     found: dict[str, object] = {}
-    for path in folder.rglob("*"):
-        told = path.lstat()
-        link = path.readlink() if path.is_symlink() else None
-        found[str(path.relative_to(folder))] = (
-            told.st_mode, link, None if path.is_dir() else (told.st_size, told.st_mtime_ns),
-        )  # fmt: skip
+    with os.scandir(folder) as entries:
+        for entry in entries:
+            told = entry.stat(follow_symlinks=False)
+            link = Path(entry.path).readlink() if entry.is_symlink() else None
+            is_folder = entry.is_dir(follow_symlinks=False)
+            size = None if is_folder else (told.st_size, told.st_mtime_ns)
+            found[entry.name] = (told.st_mode, link, size)
+            if is_folder:
+                below = state(Path(entry.path))
+                found |= {f"{entry.name}/{name}": told for name, told in below.items()}
     return found
 
 
