@@ -75,7 +75,7 @@ class Fit(Generic[State]):
 
 
 def correlations(covariance: FloatArray) -> FloatArray:
-    """Return the correlation matrix of a covariance matrix.
+    """Return the correlation matrix of a covariance matrix; NaN beside a variance of zero.
 
     Examples
     --------
@@ -83,7 +83,8 @@ def correlations(covariance: FloatArray) -> FloatArray:
     [[1.0, 0.5], [0.5, 1.0]]
     """
     sigma = np.sqrt(np.diag(covariance))
-    return covariance / np.outer(sigma, sigma)
+    with np.errstate(invalid="ignore"):
+        return covariance / np.outer(sigma, sigma)
 
 
 def minimise(
