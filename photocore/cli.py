@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import logging
 import re
+import shlex
 import sys
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -17,8 +18,9 @@ import click
 
 from photocore.errors import PhotogrammetryError
 from photocore.interrupts import STOPPED
-from photocore.log import is_quiet, log_options
+from photocore.log import COMMAND_LINE, DATE, is_quiet, log_options
 from photocore.options import NUMBER
+from photocore.provenance import recording
 
 #: Exit status of a fault of the program: EX_SOFTWARE of sysexits.h, which Windows' os lacks.
 UNFORESEEN = 70
@@ -123,6 +125,12 @@ class LazyGroup(click.Group):
         with formatter.section("Commands"):
             formatter.write_dl(list(self.summaries.items()))
 
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        """Keep the words of the command line, for what is written about it."""
+        program = self.commands_package.partition(".")[0]
+        ctx.meta[COMMAND_LINE] = shlex.join([program, *args])
+        return super().parse_args(ctx, args)
+
     def invoke(self, ctx: click.Context) -> Any:
         """Run a command; the one place where errors become messages and an exit status.
 
@@ -131,7 +139,8 @@ class LazyGroup(click.Group):
         if isinstance(sys.stdout, TextIOWrapper):  # a name the terminal lacks letters for
             sys.stdout.reconfigure(errors="backslashreplace")
         try:
-            return super().invoke(ctx)
+            with recording(ctx.meta[COMMAND_LINE], day=ctx.meta.get(DATE)):
+                return super().invoke(ctx)
         except (click.ClickException, click.exceptions.Exit, click.Abort):
             raise
         except PhotogrammetryError as error:

@@ -55,6 +55,11 @@ class Step:
     options: Mapping[str, Any] = field(default_factory=dict)
     make: Callable[[Path, Progress], tuple[str, ...]]
 
+    def described(self) -> str:
+        """Return the step with its options in one line."""
+        said = to_text({key: self.options[key] for key in sorted(self.options)})
+        return f"bifocal survey, step {self.name}, options {said}"
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StepRecord:
