@@ -180,7 +180,7 @@ def adjust_pairs(
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class NamedPoints:
+class NamedPositions:
     """Picked points of all pairs: names, coordinates, rays; ``check`` are compared only."""
 
     ids: tuple[str, ...]
@@ -193,7 +193,7 @@ class NamedPoints:
 def joint_adjustment(
     pairs: Sequence[Pair],
     names: Sequence[str],
-    named: NamedPoints,
+    named: NamedPositions,
     task: JointTask,
     *,
     progress: Progress = no_progress,
@@ -228,7 +228,7 @@ def joint_adjustment(
     )  # fmt: skip
 
 
-def _tables(paths: Sequence[Path], pairs: Sequence[Pair], task: JointTask) -> NamedPoints:
+def _tables(paths: Sequence[Path], pairs: Sequence[Pair], task: JointTask) -> NamedPositions:
     """Return the points of all tables, joined by name."""
     xyz: dict[str, tuple[FloatArray, FloatArray]] = {}
     check: set[str] = set()
@@ -252,7 +252,7 @@ def _tables(paths: Sequence[Path], pairs: Sequence[Pair], task: JointTask) -> Na
     ids = tuple(dict.fromkeys(name for _, name, _ in rays))
     number = {name: k for k, name in enumerate(ids)}
     blank = (np.full(3, np.nan), np.full(3, 1.0))
-    return NamedPoints(
+    return NamedPositions(
         ids=ids,
         xyz=np.array([xyz.get(name, blank)[0] for name in ids]).reshape(-1, 3),
         sigma=np.array([xyz.get(name, blank)[1] for name in ids]).reshape(-1, 3),
@@ -332,7 +332,7 @@ def _ideal(photos: Sequence[Photo], shared: SharedPoints) -> FloatArray:
 def _observations(
     pairs: Sequence[Pair],
     names: Sequence[str],
-    named: NamedPoints,
+    named: NamedPositions,
     shared: SharedPoints,
     ideal: FloatArray,
     features: Sequence[Features],
@@ -383,7 +383,7 @@ def _adjusted_photo(photo: Photo, camera: Pinhole) -> Photo:
     )  # fmt: skip
 
 
-def _points(named: NamedPoints, adjusted: JointAdjustment) -> tuple[dict[str, Any], ...]:
+def _points(named: NamedPositions, adjusted: JointAdjustment) -> tuple[dict[str, Any], ...]:
     """Return the named points with their precision and what they are compared with."""
     rays = np.bincount(adjusted.observations.point, minlength=len(named.ids))
     out = []

@@ -17,6 +17,7 @@ from multimedia.adjustment.bundle_equations import (
 )
 from multimedia.adjustment.interior_choice import choose_interior
 from multimedia.adjustment.plausibility import (
+    EXACT,
     refuse_impossible_media,
     remarks_on_unknowns,
     with_model_error,
@@ -35,8 +36,6 @@ from photocore.similarity import fit_similarity
 ROBUST_ROUNDS = 8
 #: Rounds and relative change in which the weight of the image coordinates settles.
 BALANCE_ROUNDS, BALANCED = 5, 0.05
-#: Image coordinates better than this are exact, as rendered ones are. [mm]
-_EXACT = 1e-7
 
 
 def bundle_adjust(project: Project, unknowns: Unknowns | None = None) -> Adjustment:
@@ -113,7 +112,7 @@ def _balanced(bundle: Bundle, fitted: Fit[BundleState]) -> tuple[Bundle, Fit[Bun
         own = slice(0, seen.image.size)
         free = float(fitted.linear.redundancy_numbers[own].sum())
         worth = float(np.sqrt((fitted.residuals[own] ** 2).sum() / free)) if free > 1e-6 else 1.0
-        if abs(worth - 1) < BALANCED or worth * seen.sigma.min() < _EXACT:
+        if abs(worth - 1) < BALANCED or worth * seen.sigma.min() < EXACT:
             break
         bundle = replace(bundle, observations=replace(seen, sigma=seen.sigma * worth))
         fitted = bundle.fit(fitted.state)

@@ -26,6 +26,8 @@ RISK_PARAMETER, RISK_WHITE = 0.01, 0.001
 #: Points of one image that may share what the model lacks; the largest effect counts.
 NEIGHBOURS = (4, 8, 16)
 _FEWEST_CELLS = 6
+#: Image coordinates better than this are exact, as computed ones are: only rounding is left. [mm]
+EXACT = 1e-7
 _SHOWN = 6
 #: Interior parameters without which a camera is a pinhole: tested against zero (scale against 1).
 _TESTED = {name: 1.0 if name == "scale" else 0.0 for name in INTERIOR[3:]}
@@ -107,6 +109,8 @@ def with_model_error(result: Adjustment, order: tuple[IntArray, ...]) -> Adjustm
     order : tuple of ndarray of int
         Rows of the image points of each camera.
     """
+    if not result.sigma0 > EXACT:
+        return result
     place = result.project.image_points.image
     scaled = result.residuals / result.sigma_image
     effect = 1.0

@@ -167,8 +167,10 @@ def _setup(
     return ShiftSetup(layers=media, z0=own.z0, nadir=own.nadir)
 
 
-def write_template(path: Path | str, *, rows: int, steps: int, overwrite: bool) -> None:
-    """Write the workbook with a tank as an example set-up and an empty table.
+def write_template(
+    path: Path | str, *, rows: int, steps: int, language: str = "en", overwrite: bool
+) -> None:
+    """Write the workbook with a tank as an example set-up and an empty table, in a language.
 
     Raises
     ------
@@ -176,4 +178,6 @@ def write_template(path: Path | str, *, rows: int, steps: int, overwrite: bool) 
         If the file cannot be written, or rows or steps are out of range.
     """
     setup = ShiftSetup(layers=Layers(indices=(1.0, 1.5, 1.337), thicknesses=(10.0,)), z0=500.0)
-    write_shift_workbook(path, setup, rows=rows, steps=steps, overwrite=overwrite)
+    write_shift_workbook(
+        path, setup, rows=rows, steps=steps, language=language, overwrite=overwrite
+    )

@@ -2,7 +2,8 @@
 
 from photocore.tables.csvwrite import FLAVOURS, write_csv
 from photocore.tables.model import Column, NamedValues, Table, parse_column_map
-from photocore.tables.read import open_tables, read_named_values, read_table
+from photocore.tables.named_values import read_named_values
+from photocore.tables.read import open_tables, read_table
 
 __all__ = [
     "FLAVOURS",

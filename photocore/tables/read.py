@@ -7,10 +7,7 @@ from dataclasses import dataclass, replace
 from itertools import chain
 from pathlib import Path
 
-import numpy as np
-
 from photocore.errors import CellError, InputError, WorkbookError
-from photocore.tables import convert
 from photocore.tables.csvread import (
     CsvFile,
     find_in_text,
@@ -25,11 +22,9 @@ from photocore.tables.headings import (
     bare,
     describe,
     find_columns,
-    unit_of,
-    unknown_unit,
 )
-from photocore.tables.model import Column, NamedValues, Table
-from photocore.tables.numbers import Decimal, converted, take_apart
+from photocore.tables.model import Column, Table
+from photocore.tables.numbers import Decimal
 from photocore.tables.rows import DataRows, block_above, data_rows
 from photocore.textfile import check_name
 from photocore.workbook.grid import CellGrid, SheetFile, TableArea, Value, cell_name
@@ -37,8 +32,6 @@ from photocore.workbook.package import check_header
 
 Source = Path | str | SheetFile | CsvFile
 
-#: Rows of a sheet in which labels of single values are looked for.
-_LABELLED = 400
 #: Rows with content that are read beyond the limit: titles, notes, headings above the table.
 _MARGIN = 1000
 
@@ -369,144 +362,3 @@ def _refuse_merged(table: Table, grid: CellGrid, errors: list[CellError]) -> Non
 
 def _quoted(titles: object) -> str:
     return ", ".join(f'"{title}"' for title in titles)  # type: ignore[attr-defined]
-
-
-def read_named_values(
-    source: Source,
-    names: Sequence[Column],
-    *,
-    sheet: str | None = None,
-    decimal: Decimal | None = None,
-    errors: list[CellError] | None = None,
-) -> NamedValues:
-    """Read single values: by defined name, else the value to the right of a label.
-
-    Parameters
-    ----------
-    source : path or open file
-        A file, or what `open_tables` returned.
-    names : sequence of Column
-        What is asked for; keys and aliases are labels, keys also defined names.
-    sheet : str, optional
-        Sheet to prefer when looking for labels, e.g. ``"Setup"``.
-    decimal, errors
-        As for `read_table`.
-
-    Raises
-    ------
-    WorkbookError
-        Naming every bad cell, unless ``errors`` is given.
-    InputError
-        If the file cannot be read, or a required value is absent or blank.
-    """
-    book = source if isinstance(source, SheetFile | CsvFile) else open_tables(source)
-    if isinstance(book, CsvFile):
-        book = book.as_sheets()
-    complaints = errors if errors is not None else []
-    titles = sorted(book.titles, key=lambda title: bare(title) != bare(sheet or ""))
-    result = NamedValues(file=book.label, values={}, places={})
-    for name in names:
-        place, label = _by_defined_name(book, name), ""
-        if place is None:
-            place, label = _by_label(book, titles, name)
-        value: Value | None = None
-        if place:
-            title, row, column = place
-            result.places[name.key] = (title, cell_name(row, column))
-            value = book.grid(title).rows.get(row, {}).get(column)
-
-        def complain(_: int, message: str, key: str = name.key) -> None:
-            complaints.append(result.error(key, message))
-
-        result.values[name.key] = _single(name, value, label, decimal, complain)
-        if place and name.kind == "number" and isinstance(value, str) and result.has(name.key):
-            result.text_cells.append(f"{place[0]}!{result.cell(name.key)}")
-    if errors is None and complaints:
-        raise WorkbookError(complaints)
-    faulty = {error.column for error in complaints}
-    missing = [n.key for n in names if n.required and not result.has(n.key) and n.key not in faulty]
-    if missing:
-        where = f"{book.label} › {sheet}" if sheet else book.label
-        raise InputError(f"{where}: no value for {', '.join(missing)}; fill it in.")
-    return result
-
-
-def _single(
-    name: Column,
-    value: Value | None,
-    label: str,
-    decimal: Decimal | None,
-    complain: convert.Complain,
-) -> float | str:
-    """Return a value, complaining where its label says another unit than it is asked for in."""
-    if name.kind == "text":
-        return convert.texts([value], complain)[0]
-    if name.kind == "flag":
-        return float(convert.flags([value], complain)[0])
-    said = unit_of(label)
-    numbers, _, _ = convert.numbers(
-        name, [value], unit=said, decimal=decimal, elsewhere=set(), complain=complain
-    )
-    number = float(np.asarray(numbers)[0])
-    unit = said or unknown_unit(label)
-    if np.isfinite(number) and name.unit and unit not in ("", name.unit):
-        # Not converted: options of the command line are written into the same cell.
-        metric = converted(number, said, name.unit)
-        advice = "" if metric is None else f" Write {metric:.15g}, and [{name.unit}]."
-        complain(0, f'the label "{label.strip()}" says [{unit}], expected [{name.unit}].{advice}')
-        return np.nan
-    return number
-
-
-def _by_defined_name(book: SheetFile, name: Column) -> tuple[str, int, int] | None:
-    place = book.names.get(name.key.casefold())
-    return place if place and place[0] in book.titles else None
-
-
-def _by_label(
-    book: SheetFile, titles: Sequence[str], name: Column
-) -> tuple[tuple[str, int, int] | None, str]:
-    """Return the cell of a value whose label stands to its left, and the label."""
-    labels = {bare(name.key), *map(bare, name.aliases)}
-    for title in titles:
-        grid = book.grid(title)
-        texts = _labels(grid)
-        places = [texts[label] for label in labels if label in texts]
-        if places:
-            row, column = min(places)
-            value = _right_of(grid.rows[row], column, _value_column(grid)[1], name)
-            return (title, row, value), str(grid.rows[row][column])
-    return None, ""
-
-
-def _labels(grid: CellGrid) -> dict[str, tuple[int, int]]:
-    """Return the place of each text near the top of a sheet, the first one of its kind."""
-    if grid.labels is None:
-        headings = _value_column(grid)[0]
-        grid.labels = {}
-        for row in sorted(grid.rows)[:_LABELLED]:
-            for column, text in sorted(grid.rows[row].items()):
-                if isinstance(text, str) and row != headings:
-                    grid.labels.setdefault(bare(text), (row, column))
-    return grid.labels
-
-
-def _value_column(grid: CellGrid) -> tuple[int, int]:
-    """Return row and column of the heading "value", zeros where there is none."""
-    for row in sorted(grid.rows)[:20]:
-        for column, text in grid.rows[row].items():
-            if isinstance(text, str) and bare(text) in ("value", "valore", "wert"):
-                return row, column
-    return 0, 0
-
-
-def _right_of(cells: Mapping[int, Value], column: int, values: int, name: Column) -> int:
-    """Return the column of a value: the one headed so, else the first that fits the kind."""
-    if values > column:
-        return values
-    right = [c for c in sorted(cells) if c > column]
-    if name.kind != "text":
-        fitting = [c for c in right if not isinstance(cells[c], str)]
-        fitting += [c for c in right if take_apart(str(cells[c])) is not None]
-        return next(iter(fitting), right[-1] if len(right) == 1 else column + 1)
-    return next(iter(right), column + 1)

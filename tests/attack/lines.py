@@ -31,6 +31,7 @@ INPUTS: list[tuple[str, ...]] = [
     ("bifocal solve {} --json " + SOLVE, "survey.csv", "half"),
     ("bifocal solve picks.csv --json --pair {}", "wall.pair.json"),
     ("bifocal relief {} --out o.tif", "wall.pair.json"),
+    ("bifocal adjust {} wall.pair.json --out d", "wall.pair.json"),
     ("bifocal ortho {} --plane --out o.tif", "wall.pair.json"),
     ("bifocal ortho wall.pair.json --out o.tif --relief {}", "relief.tif"),
     ("bifocal ortho wall.pair.json --out o.tif --points {}", "result.csv", "half"),

@@ -11,7 +11,7 @@ import numpy as np
 
 from bifocal.survey.reference import Georeference
 from bifocal.survey.workbook.book import build
-from bifocal.survey.workbook.columns import SurveyColumn, ideal_points, pair_points
+from bifocal.survey.workbook.columns import ideal_points, pair_points
 from bifocal.survey.workbook.content import SurveyContent, point_cells, result_cells
 from bifocal.survey.workbook.reader import TO_DEGREES, TO_MM, SurveyInput
 from bifocal.survey.workbook.setup_update import (
@@ -27,6 +27,7 @@ from photocore.workbook.cells import CellValue
 from photocore.workbook.editor import WorkbookEditor
 from photocore.workbook.graft import quoted_title
 from photocore.workbook.grid import column_letters, split_cell
+from photocore.workbook.live_columns import LiveColumn
 from photocore.workbook.named_cells import make_numbers, place_of
 from photocore.workbook.result_columns import (
     OwnTable,
@@ -171,7 +172,7 @@ def _columns(table: OwnTable, content: SurveyContent) -> list[ResultColumn]:
     return results
 
 
-def _column(column: SurveyColumn, values: Sequence[CellValue]) -> ResultColumn:
+def _column(column: LiveColumn, values: Sequence[CellValue]) -> ResultColumn:
     known = term("columns", column.key)
     unit = "" if known is None else known.unit
     return ResultColumn(

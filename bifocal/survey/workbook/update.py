@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from bifocal.survey.workbook.book import build
+from bifocal.survey.workbook.book import build, unprinted_formula
 from bifocal.survey.workbook.charts import HEAD, LEFT
-from bifocal.survey.workbook.columns import TEXT_KEYS, row_formula
 from bifocal.survey.workbook.content import SurveyContent
 from bifocal.survey.workbook.reader import SurveyInput
 from bifocal.survey.workbook.setup_cells import TYPED_FORMULAS
@@ -18,7 +18,6 @@ from bifocal.survey.workbook.setup_update import (
     write_corrections,
     write_options,
 )
-from bifocal.survey.workbook.sheets import BookBuilder
 from bifocal.survey.workbook.translate import translate
 from bifocal.survey.workbook.words import word
 from photocore.errors import InputError
@@ -26,8 +25,11 @@ from photocore.output import free_path
 from photocore.workbook.cells import CellValue, NewColumn, escape
 from photocore.workbook.editor import WorkbookEditor
 from photocore.workbook.grid import TableArea
+from photocore.workbook.live_book import BookBuilder
+from photocore.workbook.live_columns import TEXT_KEYS, row_formula
 from photocore.workbook.named_cells import place_of, type_value
 from photocore.workbook.newbook import RowBlock
+from photocore.workbook.print_area import move_print_area
 
 
 def check_kind(source: Path, survey: SurveyInput, *, is_pair: bool) -> None:
@@ -105,6 +107,7 @@ def update_book(
     length = max([_length(points), *(row + 1 for row in rows)])
     _table(editor, built, "tblPoints", rows, length, anew=_corrected(content))
     _table(editor, built, "tblResults", rows, length)
+    _print_points(editor, max(rows, default=0) + 1, content.language)
     for name, sheet_rows in (("tblCheck", survey.known_rows), ("tblGeo", survey.control_rows)):
         own = editor.table(name)
         if own is not None:
@@ -115,6 +118,21 @@ def update_book(
     _charts(editor, built, rows)
     _log(editor, content)
     return editor.save(target, overwrite=overwrite)
+
+
+def _print_points(editor: WorkbookEditor, count: int, language: str) -> None:
+    """Print as many rows of `Points` and `Results` as hold points, unless the user chose others."""
+    for name in ("Points", "Results"):
+        place, area = place_of(editor, f"unprinted_{name}"), editor.table(f"tbl{name}")
+        if place is None or area is None:
+            continue
+        sheet, row, column = place
+        stands = editor.models(sheet, row).get(column)
+        found = re.search(r">(\d+),", stands.formula if stands else "")
+        head = area.area[0]
+        if found and move_print_area(editor, area.sheet, head + int(found[1]), head + count):
+            formula = unprinted_formula(word("unprinted", language), count)
+            editor.put(*place, "", formula=formula, style=stands.style if stands else "")
 
 
 def _corrected(content: SurveyContent) -> Sequence[str]:
