@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from bifocal.orientation import validation
-from bifocal.orientation.bend import MOST_BENT, wall_bend
+from bifocal.orientation.bend import MOST_BENT, STRONGLY_BENT, bend_in_words, wall_bend
 from bifocal.orientation.control_points import Control, SiteMeasures
 from bifocal.orientation.features import find_features
 from bifocal.orientation.interior_orientation import Cameras, Interiors, with_one_lens
@@ -107,8 +107,12 @@ def orient_pair(photos: Photos, *, control: Control, site: SiteMeasures) -> Orie
     start = PairUnknowns(cameras=cameras)
     if ties is not None:
         start = replace(start, radial=np.array([[ties.radial, 0.0]] * 2))
-    pair = oriented_in_stages(observations, start, photos, site, with_control=enough)
-    bend = _bend(pair)
+    try:
+        pair = oriented_in_stages(observations, start, photos, site, with_control=enough)
+    except GeometryError as error:
+        # Photos through glass or water may fit no cameras at all: then that is the reason.
+        raise _reason(error, observations, start) from error
+    bend = _bend(pair.observations, pair.adjusted)
     pair = replace(pair, bend=bend)
     # A model that does not fit leaves honest points with large misfits.
     pair = pair if bend > MOST_BENT else without_gross(pair)
@@ -125,14 +129,27 @@ def orient_pair(photos: Photos, *, control: Control, site: SiteMeasures) -> Orie
     return replace(pair, remarks=told, assumed=assumed)
 
 
-def _bend(pair: OrientedPair) -> float:
+def _bend(observations: PairObservations, state: PairUnknowns) -> float:
     """Return how far the wall is from a plane between the photos. [px at 3000 px of width]"""
-    observations = pair.observations
     used = observations.tie_used
     if used.sum() < 30:
         return float("nan")
-    seen1, seen2 = observations.straight_ties(pair.adjusted.radial)
+    seen1, seen2 = observations.straight_ties(state.radial)
     return wall_bend(seen1[used], seen2[used], observations.interiors[0].image_size)
+
+
+def _reason(
+    error: GeometryError, observations: PairObservations, state: PairUnknowns
+) -> GeometryError:
+    """Return why no cameras were found: that the wall is bent where it strongly is, or the error.
+
+    Features as first found are good to a pixel; only a bend beyond `STRONGLY_BENT` counts.
+    """
+    bend = _bend(observations, state)
+    if not bend > STRONGLY_BENT:
+        return error
+    known = any(i.is_calibrated or i.sigma_radial > 0 for i in observations.interiors)
+    return GeometryError(bend_in_words(bend, with_lens=known))
 
 
 def _contradiction(cameras: Cameras, ties: Ties) -> float:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from bifocal.orientation.alignment import standard_deviations
 from bifocal.orientation.bend import bend_in_words
 from bifocal.orientation.control_points import Control, SiteMeasures
 from bifocal.orientation.orientation_stages import OrientedPair
@@ -12,6 +13,9 @@ from bifocal.orientation.pair_observations import PairObservations
 #: Common points that fit their lines no better than this, at 3000 px of width, do not fit. Clean
 #: pairs reach 0.19, a phone pair with its lens estimated 0.4. [px]
 WORST_FIT = 0.6
+#: Relief whose size is known no better than this calls for a tape: nine points with 0.45 m of
+#: relief and no lens give 2 to 4 %, a tape of 2 cm 0.4 %.
+WORST_SCALE = 0.01
 #: Beyond this many standard deviations an adjusted value contradicts what was given.
 CONTRADICTS = 3.0
 
@@ -75,8 +79,15 @@ def control_remarks(control: Control, pair: OrientedPair) -> list[str]:
 
 
 def distance_remarks(pair: OrientedPair) -> list[str]:
-    """Return which distances are poorly determined."""
+    """Return which distances are poorly determined, and what that does to relief."""
     remarks = []
+    share = standard_deviations(pair.adjusted)["relief_scale"]
+    if not pair.observations.measured and share > WORST_SCALE:
+        remarks.append(
+            f"Without a taped distance the size of relief is known only to {100 * share:.1f} % "
+            f"({1000 * share:.0f} mm of a metre): tape one distance from a camera to the wall "
+            "(--distance1 or --distance2)."
+        )
     for number, camera in enumerate(pair.adjusted.cameras, start=1):
         distance, sigma = float(camera.centre[2]), pair.adjusted.sigma("Z", number)
         if sigma > 0.03 * distance:

@@ -17,7 +17,7 @@ from bifocal.orientation.control_points import SiteMeasures
 from bifocal.orientation.interior_orientation import SIGMA_RADIAL, Cameras, Images, Interior
 from bifocal.orientation.pair_adjustment import AdjustedPair, adjust, evaluated
 from bifocal.orientation.pair_observations import PairObservations, PairUnknowns, at
-from bifocal.orientation.reference_plane import Face, choose_wall, rivals_in_words
+from bifocal.orientation.reference_plane import STEEPEST, Face, choose_wall, rivals_in_words
 from bifocal.orientation.tie_points import (
     refine_ties,
     robust_sigma,
@@ -27,6 +27,11 @@ from bifocal.orientation.tie_points import (
     with_support,
     with_wall,
     without_gross_ties,
+)
+from bifocal.orientation.wall_planes import (
+    likely_wall,
+    planes_of_any_direction,
+    steep_rivals_in_words,
 )
 from photocore.arrays import ByteArray, FloatArray
 from photocore.camera import plane_transfer
@@ -153,6 +158,7 @@ def oriented_in_stages(
         if images[0] is not None and images[1] is not None:
             pair = _refined(pair, (images[0], images[1]), photos)
             if not with_control:
+                pair = _facing_the_wall(pair, site)
                 pair = _on_the_wall(pair, (images[0], images[1]), site)
         if with_control:
             pair = _with_named_wall(pair)
@@ -267,6 +273,34 @@ def _corner(pair: OrientedPair) -> float:
     return max(out)
 
 
+def _facing_the_wall(pair: OrientedPair, site: SiteMeasures) -> OrientedPair:
+    """Return the pair in the frame of the likely wall, where that has quite another direction."""
+    ties, adjusted = pair.observations, pair.adjusted
+    xyz = tie_positions(ties, adjusted)
+    used = ties.tie_used & np.isfinite(xyz).all(axis=1)
+    centres = adjusted.cameras[0].centre, adjusted.cameras[1].centre
+    cell = np.floor(ties.tie1[used] / (0.03 * max(ties.interiors[0].image_size)))
+    _, place, count = np.unique(cell, axis=0, return_inverse=True, return_counts=True)
+    seen = ties.interiors[0].raw(ties.tie1[used])
+    planes = planes_of_any_direction(xyz[used], 1.0 / count[place.ravel()], centres)
+    wall = likely_wall(planes, seen, centres, site, sigma_ratio=_sigma_ratio(pair))
+    if wall is None:
+        return pair
+    question = steep_rivals_in_words(planes, wall, seen, site)
+    pair = pair.told(question) if question else pair
+    if wall.slope <= STEEPEST:
+        return pair
+    cameras = _onto_plane(
+        adjusted.cameras, np.array([wall.offset, *-wall.normal[:2]]) / wall.normal[2]
+    )
+    far, near = cameras
+    known = ties.measured.get("distance1")
+    scale = 1.0 if known is None else known[0] / float(far.centre[2])
+    cameras = far._replace(centre=scale * far.centre), near._replace(centre=scale * near.centre)
+    start = evaluated(ties, replace(adjusted, cameras=cameras))
+    return replace(pair, observations=with_wall(ties, start, FREE)).readjusted(start).settled()
+
+
 def _on_the_wall(pair: OrientedPair, images: Images, site: SiteMeasures) -> OrientedPair:
     """Return the pair in the frame of the face that is the wall, with points from its whole area.
 
@@ -358,10 +392,10 @@ def _with_named_wall(pair: OrientedPair) -> OrientedPair:
 
 def _onto_plane(cameras: Cameras, plane: FloatArray) -> Cameras:
     """Return cameras in the frame of the plane z = a + b X + c Y, X and Y all but kept."""
-    normal = np.array([-plane[1], -plane[2], 1.0])
-    normal /= np.linalg.norm(normal)
+    slope = float(np.hypot(plane[1], plane[2]))
     # The rotation that takes the normal to the new Z axis, about their common perpendicular.
-    turn = rotation_from_vector([normal[1], -normal[0], 0.0])
+    angle = np.arctan(slope) / slope if slope > 0 else 0.0
+    turn = rotation_from_vector([-angle * plane[2], angle * plane[1], 0.0])
     origin = np.array([0.0, 0.0, plane[0]])
     return cameras[0].moved(turn, origin), cameras[1].moved(turn, origin)
 

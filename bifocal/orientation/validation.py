@@ -118,6 +118,12 @@ def check_distortion(radial: FloatArray, interior: Interior) -> None:
     bend = float(square * (radial[0] + square * radial[1]))
     # r / (1 + bend), so that a bend of -1 and below folds the photo over.
     moved = abs(bend / (1 + bend)) if bend > -0.9 else np.inf
+    if moved > MOST_DISTORTION and interior.is_assumed:
+        raise GeometryError(
+            "the focal lengths are not known (no EXIF data), and the photos do not tell them. Give "
+            "--focal1 and --focal2 with --sensor-width, e.g. --focal1 35 --focal2 19 "
+            "--sensor-width 22.7, or --lens."
+        )
     if moved > MOST_DISTORTION:
         raise GeometryError(
             f"the common points fit only if the lens distorted the photo's corners by "

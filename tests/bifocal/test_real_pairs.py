@@ -10,10 +10,17 @@ from scipy.spatial import cKDTree
 
 from benchmarks.bench_orientation import RealPair
 from bifocal import Pair
-from bifocal.orientation.align_workflow import AlignOptions, KnownLens, align_photos
+from bifocal.files.images import image_info, read_grey
+from bifocal.orientation.align_workflow import (
+    AlignOptions,
+    KnownLens,
+    align_photos,
+    interior_of_photo,
+)
 from bifocal.orientation.control_points import SiteMeasures
 from bifocal.orientation.match_workflow import match_photos
 from bifocal.orientation.matching import MatchSettings, match_pair, precision
+from bifocal.orientation.photo_alignment import align
 
 pytestmark = pytest.mark.acceptance
 #: Limits of the median error of relief. [m]
@@ -160,3 +167,23 @@ def test_phone_photos_with_distortion_run(data_dir, tmp_path) -> None:
     options = AlignOptions(auto=True, site=SiteMeasures(distance1=27.02))
     made = align_photos(folder / "far.jpg", folder / "near.jpg", out, options)
     assert 14 < made.pair.image2.distance < 20.5
+
+
+def test_both_distances_choose_the_wall_of_a_phone_pair(data_dir) -> None:
+    # The reference itself rests on three photos, its wall is rough to 9 cm.
+    folder = data_dir / "facade_pairs" / "berlin_1"
+    geometry = json.loads((folder / "geometry.json").read_text())
+    table = np.genfromtxt(folder / "points.csv", delimiter=",", names=True)
+    far = np.column_stack([table["x_far_px"], table["y_far_px"]])
+    near = np.column_stack([table["x_near_px"], table["y_near_px"]])
+    photos = [read_grey(folder / f"{name}.jpg") for name in ("far", "near")]
+    interiors = tuple(
+        interior_of_photo(image_info(folder / f"{name}.jpg"), KnownLens(), number)
+        for number, name in enumerate(("far", "near"), start=1)
+    )
+    distances = [geometry[key]["height_over_plane_m"] for key in ("far", "near")]
+    site = SiteMeasures(distance1=distances[0], distance2=distances[1])
+    pair = align(*photos, interiors=(interiors[0], interiors[1]), site=site).pair
+    error = pair.intersect(far, near).xyz[:, 2] - table["relief"]
+    outside = np.hypot(table["X"], table["Y"]) > 4
+    assert np.nanmedian(np.abs(error[outside])) < 0.2

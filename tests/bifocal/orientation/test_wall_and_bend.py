@@ -1,13 +1,23 @@
 """Ties without support, the wall's own face, and walls bent by lens or refraction."""
 
+import cv2
 import numpy as np
 import pytest
 
+from bifocal.orientation.absolute_orientation import orient_pair
 from bifocal.orientation.bend import MOST_BENT, bend_in_words, wall_bend
+from bifocal.orientation.control_points import Control, SiteMeasures
 from bifocal.orientation.features import Features, match_features
+from bifocal.orientation.interior_orientation import Interior
+from bifocal.orientation.orientation_stages import PhotoInput
 from bifocal.orientation.reference_plane import narrow_face
 from bifocal.orientation.relative_orientation import supported
+from photocore.camera import Pinhole
 from photocore.distortion import RadialDivision
+from photocore.errors import GeometryError
+from tests.bifocal.orientation.layered_wall import SIZE as WALL_SIZE
+from tests.bifocal.orientation.layered_wall import camera as wall_camera
+from tests.bifocal.orientation.layered_wall import take
 from tests.scenes import SetupErrors, bifocal_cameras
 
 SIZE = (3072, 2048)
@@ -113,3 +123,38 @@ def test_one_detail_in_two_orientations_is_no_rival_of_itself() -> None:
     rows1, rows2 = match_features(features(pixels, codes), twice)
     assert len(rows1) == 40
     np.testing.assert_array_equal(rows2 // 2, rows1)
+
+
+def through_water(photo: np.ndarray, cam: Pinhole, depth: float) -> np.ndarray:
+    """Return a square photo of the wall as seen through a level of water before it. [m]
+
+    By hand: a ray leaves at angle a in air and goes on at b in water, sin a = 1.334 sin b; it meets
+    the wall at (d - depth) tan a + depth tan b instead of d tan a.
+    """
+    middle, focal, d = cam.matrix[:2, 2], cam.matrix[0, 0], cam.centre[2]
+    column, row = np.meshgrid(np.arange(photo.shape[1]), np.arange(photo.shape[0]))
+    away = np.stack([column - middle[0], row - middle[1]], axis=-1) / focal
+    air = np.linalg.norm(away, axis=-1, keepdims=True)
+    sine = np.sin(np.arctan(air)) / 1.334
+    reach = ((d - depth) * air + depth * np.tan(np.arcsin(sine))) / d
+    at = (middle + focal * away * reach / np.maximum(air, 1e-12)).astype(np.float32)
+    return cv2.remap(photo, at[..., 0], at[..., 1], cv2.INTER_CUBIC)
+
+
+def test_photos_through_water_are_said_not_to_fit() -> None:
+    cameras = wall_camera(16.0), wall_camera(9.0, offset=(0.05, -0.04))
+    views = take(*cameras)
+    photos = [
+        PhotoInput(
+            grey=through_water(image, cam, 2.0),
+            interior=Interior.from_focal(
+                cam.matrix[0, 0], image_size=WALL_SIZE, sigma=0.005, source="test"
+            ),
+            name=name,
+        )
+        for image, cam, name in zip(
+            (views.far, views.near), cameras, ("a.jpg", "b.jpg"), strict=True
+        )
+    ]
+    with pytest.raises(GeometryError, match=r"THE MODEL DOES NOT FIT.*refraction"):
+        orient_pair((photos[0], photos[1]), control=Control(), site=SiteMeasures(distance1=16.0))

@@ -1,0 +1,184 @@
+"""Planes of any direction among a pair's ties: which of them is the wall, where the first is not.
+
+The dominant homography of two photos may be that of a roof, of another façade or of nothing at all
+(a strong distortion bends the wall); the wall's faces are then looked for in the model itself.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from bifocal.orientation.control_points import SiteMeasures
+from bifocal.orientation.reference_plane import FAIR, FITS, RIVAL, STEEPEST
+from photocore.arrays import BoolArray, FloatArray
+
+#: Half the thickness of a plane, as a share of the far distance: real façades are rough.
+THICK = 0.005
+#: A plane of another direction is taken for the wall if it holds so many times as much as the
+#: fullest one of nearly the present direction.
+FULLER = 1.5
+#: Planes looked for, triples tried for each.
+MOST_PLANES, TRIPLES = 5, 2000
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class WallPlane:
+    """A plane ``normal . X = offset`` on which ties gather.
+
+    Attributes
+    ----------
+    normal : ndarray, shape (3,)
+        Unit vector towards the cameras.
+    offset : float
+        [m]
+    share : float
+        Of the photo's cells that hold ties, the part on the plane.
+    members : ndarray of bool, shape (n,)
+    """
+
+    normal: FloatArray
+    offset: float
+    share: float
+    members: BoolArray
+
+    @property
+    def slope(self) -> float:
+        """Slope against Z = 0. [m/m]"""
+        return float(np.hypot(*self.normal[:2]) / max(self.normal[2], 1e-9))
+
+    def distance(self, centre: FloatArray) -> float:
+        """Return how far a camera stands before it. [m]"""
+        return float(self.normal @ centre - self.offset)
+
+
+def planes_of_any_direction(
+    xyz: FloatArray, weight: FloatArray, centres: tuple[FloatArray, FloatArray]
+) -> list[WallPlane]:
+    """Return the planes before both cameras on which points gather, one after the other.
+
+    Parameters
+    ----------
+    xyz : ndarray, shape (n, 3)
+        [m]
+    weight : ndarray, shape (n,)
+        What each point stands for: ties crowd where there is texture.
+    centres : pair of ndarray, shape (3,)
+        Projection centres. [m]
+    """
+    band = THICK * float(centres[0][2])
+    generator = np.random.default_rng(7)
+    free, found = np.ones(len(xyz), dtype=bool), []
+    for _ in range(MOST_PLANES):
+        left = np.flatnonzero(free)
+        if len(left) < 20:
+            break
+        corners = xyz[generator.choice(left, (TRIPLES, 3))]
+        normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        size = np.linalg.norm(normals, axis=1)
+        normals = normals[size > 0] / size[size > 0, None]
+        normals *= np.where(normals[:, 2:] < 0, -1.0, 1.0)
+        offsets = (normals * corners[size > 0, 0]).sum(axis=1)
+        before = np.stack([normals @ centre - offsets for centre in centres])
+        some = generator.choice(left, min(len(left), 1500), replace=False)
+        away = np.abs(xyz[some] @ normals.T - offsets)
+        scores = weight[some] @ np.maximum(1.0 - away / band, 0.0)
+        scores[(before < 0.05 * centres[0][2]).any(axis=0)] = 0.0
+        best = int(scores.argmax())
+        normal, offset = _refined(xyz[left], weight[left], normals[best], offsets[best], band)
+        height = np.abs(xyz @ normal - offset)
+        members = free & (height < band)
+        share = float(weight[members].sum() / weight.sum())
+        if share < 0.02:
+            break
+        found.append(WallPlane(normal, offset, share, members))
+        free &= height >= 2 * band
+    return found
+
+
+def _refined(
+    xyz: FloatArray, weight: FloatArray, normal: FloatArray, offset: float, band: float
+) -> tuple[FloatArray, float]:
+    """Return the plane of the points within the band of a first one."""
+    for _ in range(5):
+        near = np.abs(xyz @ normal - offset) < band
+        if near.sum() < 10:
+            break
+        middle = np.average(xyz[near], axis=0, weights=weight[near])
+        rows = (xyz[near] - middle) * np.sqrt(weight[near])[:, None]
+        normal = np.linalg.svd(rows, full_matrices=False)[2][2]
+        normal = normal if normal[2] > 0 else -normal
+        offset = float(normal @ middle)
+    return normal, offset
+
+
+def likely_wall(
+    planes: Sequence[WallPlane],
+    pixels: FloatArray,
+    centres: tuple[FloatArray, FloatArray],
+    site: SiteMeasures,
+    *,
+    sigma_ratio: float,
+) -> WallPlane | None:
+    """Return the plane to be taken for the wall; None where there is no plane at all.
+
+    The spot the user named decides; else, of the planes whose distances stand in the ratio of the
+    measured ones within two sigma, the fullest; but one of nearly the present direction, Z = 0,
+    unless another holds clearly more.
+
+    Parameters
+    ----------
+    planes : sequence of WallPlane
+    pixels : ndarray, shape (n, 2)
+        The points in the far photo. [px]
+    centres : pair of ndarray, shape (3,)
+        [m]
+    site : SiteMeasures
+    sigma_ratio : float
+        Standard deviation of ln(d1 / d2), found without both measured distances.
+    """
+    if not planes:
+        return None
+    d1, d2 = site.distances
+    fair = [p for p in planes if p.share >= FAIR * planes[0].share]
+    if site.wall is not None:
+        nearest = np.argsort(np.linalg.norm(pixels - np.array(site.wall), axis=1))[:15]
+        chosen = max(planes, key=lambda p: int(p.members[nearest].sum()))
+        return chosen if chosen.members[nearest].sum() >= 5 else None
+    if d1 and d2 and np.isfinite(sigma_ratio):
+        sigma = float(np.hypot(sigma_ratio, np.hypot(site.sigma / d1, site.sigma / d2)))
+        ratios = [np.log(p.distance(centres[0]) / p.distance(centres[1])) for p in fair]
+        tests = np.abs(np.array(ratios) - np.log(d1 / d2)) / sigma
+        fair = [p for p, test in zip(fair, tests, strict=True) if test < FITS] or fair
+    best = max(fair, key=lambda p: p.share)
+    present = [p for p in fair if p.slope <= STEEPEST and FULLER * p.share >= best.share]
+    return max(present, key=lambda p: p.share) if present else best
+
+
+def steep_rivals_in_words(
+    planes: Sequence[WallPlane], chosen: WallPlane, pixels: FloatArray, site: SiteMeasures
+) -> str:
+    """Return the question which of several planes is meant; empty where none competes."""
+    d1, d2 = site.distances
+    others = [
+        p
+        for p in planes
+        if p is not chosen
+        and p.share >= RIVAL * chosen.share
+        and float(p.normal @ chosen.normal) < np.cos(np.arctan(STEEPEST))
+    ]
+    if not others or site.wall is not None or (d1 and d2):
+        return ""
+    named = []
+    for plane in others:
+        turn = np.rad2deg(np.arccos(np.clip(plane.normal @ chosen.normal, -1.0, 1.0)))
+        column, row = np.median(pixels[plane.members], axis=0)
+        share = 100 * plane.share
+        named.append(f"turned by {turn:.0f}°, {share:.0f} % (--wall {column:.0f},{row:.0f})")
+    return (
+        f"WHICH PLANE IS THE WALL? Taken is the fullest, {100 * chosen.share:.0f} % of the area "
+        f"with common points; planes of other directions compete: {'; '.join(named)}. Name a spot "
+        "of the wall in the far photo (--wall COL,ROW), or give both distances: their ratio tells."
+    )
