@@ -19,8 +19,14 @@ from bifocal.model.relief_map import Quality, ReliefMap
 from photocore.arrays import Float32Array
 from photocore.errors import InputError
 from photocore.output import all_or_none, atomic_path, check_all_writable
-from photocore.provenance import program, today
-from photocore.raster import BLOCK, RasterFile, RasterWriter, corner_transform, create_geotiff
+from photocore.raster import (
+    BLOCK,
+    RasterFile,
+    RasterWriter,
+    corner_transform,
+    create_geotiff,
+)
+from photocore.raster_places import is_virtual
 
 #: Name of the local system every raster is in.
 LOCAL_CRS = (
@@ -115,8 +121,9 @@ def create_raster(
     path = Path(path)
     world = path.with_suffix(".tfw")
     check_all_writable(path, world if world_file else None, overwrite=overwrite)
-    _check_space(path, grid, bands * np.dtype(dtype).itemsize)
-    known = {"TIFFTAG_SOFTWARE": program(), "BIFOCAL_DATE": today(), **(tags or {})}
+    if not is_virtual(path):
+        _check_space(path, grid, bands * np.dtype(dtype).itemsize)
+    known = dict(tags or {})
     if dpi is not None:
         known |= {f"TIFFTAG_{axis}RESOLUTION": f"{dpi:.10g}" for axis in "XY"}
         known["TIFFTAG_RESOLUTIONUNIT"] = "2"

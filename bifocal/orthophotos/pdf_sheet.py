@@ -21,6 +21,7 @@ from bifocal.orthophotos.contour_lines import LABEL_SIZE, contour_labels
 from bifocal.orthophotos.drawing import STRIP, Drawing, PrintSheet
 from bifocal.orthophotos.sheet_margins import SheetMargins
 from photocore.output import atomic_path
+from photocore.provenance import Provenance, provenance
 
 #: PDF's own unit in millimetres: 72 to the inch.
 _UNITS_PER_MM = 72 / 25.4
@@ -123,11 +124,20 @@ class _Pdf:
         root = self.object(
             f"<< /Type /Catalog /Pages {pages} 0 R /ViewerPreferences << /PrintScaling /None >> >>"
         )
+        info = self.object(_properties(provenance()))
         start = self.file.tell()
         rows = "".join(f"{place:010d} 00000 n \n" for place in self.places[1:])
         table = f"xref\n0 {len(self.places)}\n0000000000 65535 f \n{rows}"
-        trailer = f"trailer\n<< /Size {len(self.places)} /Root {root} 0 R >>\n"
+        trailer = f"trailer\n<< /Size {len(self.places)} /Root {root} 0 R /Info {info} 0 R >>\n"
         self.file.write(f"{table}{trailer}startxref\n{start}\n%%EOF\n".encode("ascii"))
+
+
+def _properties(made: Provenance) -> str:
+    """Return the entries that viewers show as properties of the file."""
+    known = {"Creator": made.program, "Producer": "bifocal", "Subject": "; ".join(made.lines())}
+    texts = {key: f"\ufeff{text}".encode("utf-16-be").hex() for key, text in known.items()}
+    entries = " ".join(f"/{key} <{text}>" for key, text in texts.items())
+    return f"<< {entries} /CreationDate (D:{made.date.replace('-', '')}000000Z) >>"
 
 
 class _PdfCanvas:

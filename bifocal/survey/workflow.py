@@ -29,6 +29,7 @@ from bifocal.survey.remarks import (
     georeference_remarks,
     opposite_signs_remark,
     point_remarks,
+    refraction_remarks,
 )
 from bifocal.survey.setup import SCALE_TOLERANCE, SurveySetup
 from bifocal.survey.sources import BOOKS, Source, given_pair, measured, with_setup_of
@@ -321,7 +322,7 @@ def _solve_pair(
         pair=pair,
         sigma_px=sigma,
         check=check,
-        remarks=(*remarks, *(check.remarks if check else ())),
+        remarks=(*remarks, *(check.remarks if check else ()), *refraction_remarks(pair, points)),
     )
 
 
@@ -415,7 +416,7 @@ def _pixels_of_mm(photo: Photo, key: str, xy: FloatArray, where: str) -> FloatAr
             "(col1 row1 col2 row2)."
         )
     refuse_pixels(xy, c, where)
-    return photo.pixels_from_plane(photo.nadir + xy * photo.distance / c)
+    return photo.pixels_from_apparent(photo.nadir + xy * photo.distance / c)
 
 
 def _sigma_from_misfits(

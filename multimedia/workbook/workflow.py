@@ -12,7 +12,7 @@ from multimedia.workbook.shift_points import ShiftPoints, ShiftResult, ShiftSetu
 from multimedia.workbook.shift_update import add_columns, is_template, update_template
 from multimedia.workbook.shift_workbook import write_shift_workbook
 from photocore.errors import InputError
-from photocore.output import check_ending
+from photocore.output import check_ending, check_not_input
 from photocore.tables import write_csv
 from photocore.workbook.newbook import check_new_workbook
 
@@ -91,9 +91,11 @@ def shift_file(
         If a cell, an option or a file is at fault.
     """
     out = None if out is None else Path(out)
-    if out is not None:
-        check_new_workbook(out, overwrite=overwrite, source=None if new else path)
     check_ending(out, "results are written as .xlsx or .csv.", ".xlsx", ".xlsm", ".csv")
+    if out is not None:
+        if new or out.suffix.lower() == ".csv":
+            check_not_input(out, path)
+        check_new_workbook(out, overwrite=overwrite, source=None if new else path)
     replaced = {f"n_{i}": n for i, n in enumerate(indices or (), start=1)}
     replaced |= {f"t_{i}": t for i, t in enumerate(thicknesses or (), start=1)}
     if z0 is not None:
@@ -113,7 +115,7 @@ def shift_file(
             path, out, table, rows, setup, given.setup, points, overwrite=overwrite
         )
     elif out is not None:
-        kept = add_columns(path, out, table, rows, points, result, overwrite=overwrite)
+        kept = add_columns(path, out, given, rows, setup, points, overwrite=overwrite)
     remarks = [*given.table.remarks]
     if kept is not None:
         remarks.append(f"{out}: the workbook as it was is kept as {kept}.")

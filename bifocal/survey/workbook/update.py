@@ -15,8 +15,6 @@ from bifocal.survey.workbook.reader import SurveyInput
 from bifocal.survey.workbook.setup_cells import TYPED_FORMULAS
 from bifocal.survey.workbook.setup_update import (
     add_missing_sheets,
-    place_of,
-    type_value,
     write_corrections,
     write_options,
 )
@@ -24,10 +22,30 @@ from bifocal.survey.workbook.sheets import BookBuilder
 from bifocal.survey.workbook.translate import translate
 from bifocal.survey.workbook.words import word
 from photocore.errors import InputError
+from photocore.output import free_path
 from photocore.workbook.cells import CellValue, NewColumn, escape
 from photocore.workbook.editor import WorkbookEditor
 from photocore.workbook.grid import TableArea
+from photocore.workbook.named_cells import place_of, type_value
 from photocore.workbook.newbook import RowBlock
+
+
+def check_kind(source: Path, survey: SurveyInput, *, is_pair: bool) -> None:
+    """Refuse to change a survey workbook for coordinates into one for raw pixels, or the reverse.
+
+    Raises
+    ------
+    InputError
+        Naming the way out.
+    """
+    if is_pair != ("col1" in survey.table.present):
+        other = free_path(source.parent, f"{source.stem}-result", source.suffix).name
+        raise InputError(
+            f"{source}: its formulas are made for another kind of measurement "
+            f"({'coordinates in mm or px' if is_pair else 'raw pixels of a pair'}) and are not "
+            f"changed into others in place. Write to a new workbook, e.g. --out {other}; this one "
+            "stays as it is."
+        )
 
 
 def update_book(
@@ -72,12 +90,9 @@ def update_book(
     """
     editor, built = WorkbookEditor(source, survey.book), build(content)
     points = editor.table("tblPoints")
-    if points is None or content.is_pair != ("col1" in survey.table.present):
-        raise InputError(
-            f"{source}: its formulas are made for another kind of measurement "
-            f"({'coordinates in mm or px' if content.is_pair else 'raw pixels of a pair'}). "
-            "Solve its points from a table of their own (.csv)."
-        )
+    if points is None:
+        raise InputError(f"{source}: has lost its table tblPoints; write to a new workbook.")
+    check_kind(source, survey, is_pair=content.is_pair)
     other_words = content.language != survey.language
     if other_words:
         translate(editor, content, survey.language)
