@@ -7,7 +7,8 @@ import numpy as np
 
 from photocore.arrays import Float32Array
 
-#: Half windows, small to large. [px]
+#: Half windows, small to large; 20 for 18 is better off edges still (loggia 301: 0.87 mm; 16: 0.89)
+#: and worse beside them. [px]
 WINDOWS = (8, 18)
 #: Standard deviations beyond these count alike: weights 1/sigma² of a wider range lose all digits
 #: in float32, and threw the relief of one plain wall to -446 m. [m]
