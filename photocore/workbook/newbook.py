@@ -184,7 +184,11 @@ def _stated_properties(core: bytes) -> bytes:
     core = re.sub(
         rb"<dc:description>.*?</dc:description>|<dc:description\s*/>", b"", core, flags=re.S
     )
-    said = escape(without_control("\n".join(provenance().lines())))
+    made = provenance()
+    if not made.command:
+        # An empty form written from Python says the same whatever the day.
+        return core
+    said = escape(without_control("\n".join(made.lines())))
     told = f"<dc:description>{said}</dc:description>".encode()
     # The order of the elements is free; the last one closes the part.
     return core.replace(b"</cp:coreProperties>", told + b"</cp:coreProperties>")

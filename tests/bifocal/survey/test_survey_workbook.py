@@ -46,7 +46,7 @@ def parts(path):
 def test_committed_template_is_what_the_program_writes(language, tmp_path):
     write_template(tmp_path / "new.xlsx", language=language)
     committed = ROOT / "templates" / f"survey-{language}.xlsx"
-    assert parts(tmp_path / "new.xlsx") == parts(committed), "rebuild it with `bifocal template`"
+    assert parts(tmp_path / "new.xlsx") == parts(committed), "rebuild it with `write_template`"
 
 
 def test_same_content_makes_the_same_bytes(tmp_path):
