@@ -330,3 +330,22 @@ class Pair:
             return np.zeros((len(xyz), 3, 3))
         photos = (self.image1, self.image2)
         return orientation_precision.orientation_covariance(photos, self.orientation, xyz)
+
+    def effect_of_orientation(self, xyz: FloatArray) -> FloatArray | None:
+        """Return what independent errors of the pair's own orientation, of sigma 1, move points by.
+
+        Parameters
+        ----------
+        xyz : ndarray, shape (n, 3)
+            Points. [m]
+
+        Returns
+        -------
+        ndarray, shape (n, 3, k), or None
+            Errors in X, Y, r [m], the same k errors for all points; None where the pair does not
+            state its covariance.
+        """
+        if self.orientation is None:
+            return None
+        photos = (self.image1, self.image2)
+        return orientation_precision.orientation_effect(photos, self.orientation, xyz)

@@ -104,13 +104,6 @@ class SolvedSurvey(SurveyContent):
             return np.full((len(self.table), 3), np.nan)
         return self.georeference.world_from_wall(self.table.xyz)
 
-    @property
-    def world_sigma(self) -> FloatArray:
-        """Standard deviations of E, N, H from the picks, shape (n, 3); NaN as `world`. [m]"""
-        if self.georeference is None:
-            return np.full((len(self.table), 3), np.nan)
-        return self.georeference.sigma(self.table.covariance)
-
 
 def solve(
     source: Source,

@@ -129,6 +129,38 @@ class SurveyContent:
         )
 
     @property
+    def world_covariance(self) -> FloatArray | None:
+        """Covariance of E, N, H, shape (n, 3, 3); None where it is not known. [m²]"""
+        geo, table = self.georeference, self.table
+        if geo is None or table is None or table.covariance is None:
+            return None
+        own = table.own_covariance
+        if geo.precision is None or own is None:
+            return geo.covariance_of(table.xyz, table.covariance)
+        effect = table.effect_of_orientation(table.xyz)
+        return geo.covariance_of(table.xyz, own, ids=table.ids, effect=effect)
+
+    @property
+    def world_sigma(self) -> FloatArray:
+        """Standard deviations of E, N, H, shape (n, 3); NaN without control points. [m]"""
+        if self.world_covariance is None:
+            return np.full((0 if self.table is None else len(self.table), 3), np.nan)
+        variances = np.diagonal(self.world_covariance, axis1=1, axis2=2)
+        # Where points without redundancy are placed exactly, rounding is left.
+        return np.asarray(np.sqrt(np.maximum(variances, 0.0)))
+
+    @property
+    def common_sigma(self) -> FloatArray:
+        """What the orientation still adds to E, N, H once placed, shape (n, 3); NaN if blank. [m]"""
+        geo, table = self.georeference, self.table
+        assert table is not None
+        effect = table.effect_of_orientation(table.xyz)
+        if geo is None or effect is None or geo.precision is None:
+            return np.full((len(table), 3), np.nan)
+        near = geo.world_from_wall(table.xyz) - geo.origin
+        return np.asarray(np.sqrt(np.diagonal(geo.common(near, effect), axis1=1, axis2=2)))
+
+    @property
     def point_rows(self) -> int:
         """Rows of `Points`: an empty form, or the points and a few spare rows."""
         return self.rows if self.points is None else len(self.points) + SPARE_ROWS
@@ -203,7 +235,10 @@ def point_cells(content: SurveyContent) -> dict[str, list[CellValue]]:
             for empty, value in zip(blank.tolist(), values.tolist(), strict=True)
         ]
     cells |= {key: inputs(values) for key, values in table.carried.items()}
-    cells |= _radial_variances(content, placeless) if not content.is_pair else {}
+    if content.is_pair:
+        cells |= {f"o_{axis}": inputs(content.common_sigma[:, i]) for i, axis in enumerate("ENH")}
+    else:
+        cells |= _radial_variances(content, placeless)
     typed = points.has_pixels | points.is_cartesian | points.is_polar
     cells["flag"] = [
         flag if given else None for flag, given in zip(table.flags, typed, strict=True)
@@ -245,10 +280,9 @@ def result_cells(
     if content.table is None:
         return {}
     xyz = content.table.xyz
-    world, sigma = np.full_like(xyz, np.nan), np.full_like(xyz, np.nan)
+    world, sigma = np.full_like(xyz, np.nan), content.world_sigma
     if content.georeference is not None:
         world = content.georeference.world_from_wall(xyz)
-        sigma = content.georeference.sigma(content.table.covariance)
     return {
         "id": cells["id"],
         **{key: inputs(content.table[key]) for key in ("X", "Y", "Z")},
