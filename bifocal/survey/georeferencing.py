@@ -222,12 +222,10 @@ def _fit(
         squares = float((left**2).sum())
     else:
         weights = weights_of(measured.covariance[used], flat=model.axes == 2)
-        about = wall - found.source_centre
-        if model.name == "3D":
-            sums = space_sums(about, weights, near)
+        sums = _sums(model, wall, weights, near, found)
+        if isinstance(sums, SpaceSums):
             found, offset = fit_of_space(sums, found.source_centre, origin)
         else:
-            sums = weighted_sums(about, weights, near, found, model=model.name)
             found, offset = fit_of_sums(sums, found.source_centre, origin, model=model.name)
         left = residuals(found, wall, near, offset) @ found.rotation / found.scale
         squares = float(np.einsum("ni,nij,nj->", left, weights, left))
@@ -236,6 +234,20 @@ def _fit(
         model=model, used=used, transformation=found, origin=origin, offset=offset,
         squares=squares, noise=noise, redundancy=redundancy, sums=sums,
     )  # fmt: skip
+
+
+def _sums(
+    model: TransformationModel,
+    wall: FloatArray,
+    weights: FloatArray,
+    near: FloatArray,
+    start: Similarity,
+) -> WeightedSums | SpaceSums:
+    """Return what a weighted fit is made of."""
+    about = wall - start.source_centre
+    if model.name == "3D":
+        return space_sums(about, weights, near)
+    return weighted_sums(about, weights, near, start, model=model.name)
 
 
 def residuals(
@@ -329,22 +341,23 @@ def _as_georeference(
 
 def _precision(
     measured: _MeasuredControl, best: _FittedTransformation, near: FloatArray, sigma0: float
-) -> tuple[TransformationPrecision, float]:
+) -> tuple[TransformationPrecision | None, float]:
     """Return what the fit is worth, and the weighted sum of squares to be expected."""
-    used, fit, flat = best.used, best.transformation, best.model.axes == 2
+    used, fit, sums = best.used, best.transformation, best.sums
     effect = None if measured.effect is None else measured.effect[used]
-    if measured.covariance is None:
-        # All points alike: as good as the residuals say, which say nothing without redundancy.
-        alike = np.eye(3) * (np.nan if sigma0 == 0 else (sigma0 / fit.scale) ** 2)
-        weights = weights_of(np.tile(alike, (int(used.sum()), 1, 1)), flat=flat)
-    else:
-        weights = weights_of(measured.covariance[used], flat=flat)
-    precision = precision_of(best.model.name, fit, weights, near[used], effect)
     expected = float(best.redundancy)
+    if sums is None:
+        # All points alike: as good as the residuals say, which say nothing without redundancy.
+        if not sigma0 > 0:
+            return None, expected
+        alike = np.tile(np.eye(3) * (sigma0 / fit.scale) ** 2, (int(used.sum()), 1, 1))
+        weights = weights_of(alike, flat=best.model.axes == 2)
+        sums = _sums(best.model, measured.wall[used], weights, near[used], fit)
+    precision = precision_of(best.model.name, fit, sums, near[used], effect)
     if effect is not None:
         moved = precision.moved_by_orientation(near[used])
         unexplained = effect - np.einsum("ba,nbk->nak", fit.rotation, moved) / fit.scale
-        expected += float(np.einsum("nak,nab,nbk->", unexplained, weights, unexplained))
+        expected += float(np.einsum("nak,nab,nbk->", unexplained, sums.weights, unexplained))
     return precision, expected
 
 

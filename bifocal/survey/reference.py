@@ -229,7 +229,7 @@ class Georeference:
         exact. H of the model 2D is relief at the scale of the plan.
         """
         turn = self.world_from_wall.scale * self.world_from_wall.rotation
-        near = self.offset + (xyz - self.world_from_wall.source_centre) @ turn.T
+        near = self.near_of(xyz)
         if self.precision is None:
             return np.asarray(turn @ covariance @ turn.T)
         added = self.precision.of_points(near)
@@ -242,6 +242,11 @@ class Georeference:
         if effect is not None:
             out += self.common(near, effect)
         return np.asarray(out)
+
+    def near_of(self, xyz: FloatArray) -> FloatArray:
+        """Return E, N, H of points on the wall from `origin`, shape (n, 3): no digit is lost. [m]"""
+        turn = self.world_from_wall.scale * self.world_from_wall.rotation
+        return np.asarray(self.offset + (xyz - self.world_from_wall.source_centre) @ turn.T)
 
     def common(self, near: FloatArray, effect: FloatArray) -> FloatArray:
         """Return what errors common to all points still add once placed, shape (n, 3, 3). [m²]

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bifocal.survey.weighted_similarity import inverse_symmetric
+from bifocal.survey.space_similarity import SpaceSums
+from bifocal.survey.weighted_similarity import WeightedSums
 from photocore.arrays import FloatArray
 from photocore.rotation import skew
 from photocore.similarity import Similarity
@@ -76,7 +77,7 @@ def _design(near: FloatArray) -> FloatArray:
 def precision_of(
     model: str,
     fit: Similarity,
-    weights: FloatArray,
+    sums: WeightedSums | SpaceSums,
     near: FloatArray,
     effect: FloatArray | None = None,
 ) -> TransformationPrecision:
@@ -88,8 +89,8 @@ def precision_of(
         ``2D``, ``levelled`` or ``3D``.
     fit : Similarity
         World from wall.
-    weights : ndarray, shape (n, 3, 3)
-        Inverse covariances of the wall's coordinates; zero at Z for the model 2D. [1/m²]
+    sums : WeightedSums or SpaceSums
+        What it was found from.
     near : ndarray, shape (n, 3)
         E, N, H of the control points about the origin. [m]
     effect : ndarray, shape (n, 3, k), optional
@@ -97,38 +98,51 @@ def precision_of(
 
     Notes
     -----
-    The inverse of the normal equations at the solution, shifts eliminated first. The errors of the
-    photos' orientation are common to all points: what they do to the fit is carried separately,
-    because most of it is taken up by the fit itself.
+    The inverse of the normal equations at the solution, shifts eliminated first, from the same sums
+    as the workbook's formulas: next to the nadir X, Y and relief share nearly all their error, and
+    another order of summation would differ in the ninth digit. The errors of the photos'
+    orientation are common to all points: what they do to the fit is carried separately, because
+    most of it is taken up by the fit itself.
     """
-    active = list(_UNKNOWNS[model])
-    turned = near @ fit.rotation / fit.scale
-    slopes = np.concatenate([-skew(turned), turned[:, :, None]], axis=-1)[:, :, active]
-    total = weights.sum(axis=0)
-    if model == "2D":
-        total[2, 2] = 1.0
-    inverse = inverse_symmetric(total[None])[0]
+    if isinstance(sums, SpaceSums):
+        spread, lever = sums.turns[-1].inverse, sums.shift @ sums.turns[-1].design
+    else:
+        spread, lever = _of_direction(sums)
+    inverse = sums.inverse.copy()
     if model == "2D":
         inverse[2, 2] = 0.0
-    mixed = (weights @ slopes).sum(axis=0)
-    lever = inverse @ mixed
-    normal = np.einsum("nai,nab,nbj->ij", slopes, weights, slopes) - mixed.T @ lever
-    spread = np.linalg.inv(normal)
-    into = np.zeros((4, len(active)))
-    axes = np.block([[fit.rotation, np.zeros((3, 1))], [np.zeros((1, 3)), np.ones((1, 1))]])
-    into[active] = np.eye(len(active))
-    into = axes @ into
+    axes = np.eye(4)
+    axes[:3, :3] = fit.rotation
+    into = axes[:, list(_UNKNOWNS[model])]
     to_world = fit.scale * fit.rotation
     gain = np.zeros((7, 0))
     if effect is not None:
-        pulled = np.einsum("nab,nbk->ak", weights, effect)
-        moved = np.einsum("nai,nab,nbk->ik", slopes, weights, effect)
+        turned = near @ fit.rotation / fit.scale
+        slopes = _design(turned)[:, :, 3:][:, :, list(_UNKNOWNS[model])]
+        pulled = np.einsum("nab,nbk->ak", sums.weights, effect)
+        moved = np.einsum("nai,nab,nbk->ik", slopes, sums.weights, effect)
         unknowns = spread @ (moved - lever.T @ pulled)
-        shifts = inverse @ pulled - lever @ unknowns
-        gain = np.vstack([to_world @ shifts, into @ unknowns])
+        gain = np.vstack([to_world @ (inverse @ pulled - lever @ unknowns), into @ unknowns])
     return TransformationPrecision(
         own=to_world @ inverse @ to_world.T,
         lever=to_world @ lever @ into.T,
         spread=into @ spread @ into.T,
         gain=gain,
     )
+
+
+def _of_direction(sums: WeightedSums) -> tuple[FloatArray, FloatArray]:
+    """Return covariance and lever of the turn in plan and the logarithm of the scale.
+
+    A small turn w and stretch k change ``p = m cos, q = m sin`` by ``w q + k p`` and
+    ``-w p + k q``.
+    """
+    pp, pq, qq, p, q = sums.turns[-1, 2:]
+    below = (pp * qq - pq**2) * (p**2 + q**2) ** 2
+    turn = (q**2 * qq + 2 * p * q * pq + p**2 * pp) / below
+    both = (p * q * qq - (q**2 - p**2) * pq - p * q * pp) / below
+    stretch = (p**2 * qq - 2 * p * q * pq + q**2 * pp) / below
+    lever = np.stack(
+        [sums.shift[:, 0] * q - sums.shift[:, 1] * p, sums.mean - sums.constants], axis=-1
+    )
+    return np.array([[turn, both], [both, stretch]]), lever

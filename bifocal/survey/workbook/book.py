@@ -9,7 +9,7 @@ from pathlib import Path
 from openpyxl.styles import Alignment
 
 from bifocal.survey.workbook.charts import charts
-from bifocal.survey.workbook.columns import LOG, RESULTS, SurveyColumn, adjustment_names
+from bifocal.survey.workbook.columns import LOG, SurveyColumn, adjustment_names
 from bifocal.survey.workbook.content import (
     STRUCTURED_ROWS,
     SurveyContent,
@@ -19,6 +19,7 @@ from bifocal.survey.workbook.content import (
 )
 from bifocal.survey.workbook.georeference_sheet import georeference
 from bifocal.survey.workbook.reference_sheets import check, planning
+from bifocal.survey.workbook.results_columns import results_columns
 from bifocal.survey.workbook.setup_cells import (
     FORMS,
     IDEAL_FORMULAS,
@@ -179,8 +180,9 @@ def _points(builder: BookBuilder, content: SurveyContent, cells: Cells) -> None:
 
 
 def _results(builder: BookBuilder, content: SurveyContent, cells: Cells) -> None:
+    columns = results_columns(is_pair=content.is_pair)
     results = result_cells(content, cells)
-    _long_sheet(builder, "Results", "results_how", RESULTS, content.point_rows, results)
+    _long_sheet(builder, "Results", "results_how", columns, content.point_rows, results)
 
 
 def _long_sheet(

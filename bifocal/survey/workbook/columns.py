@@ -120,6 +120,21 @@ def _of_x(key: str, formula: str, *, folded: bool = True) -> SurveyColumn:
     return _f(key, f'IF([@X]="","",{formula})', None if folded else 4, folded=folded)
 
 
+#: E, N, H from a whole-metre origin: columns that refer to the sheet `Georeference`.
+NEAR = ("n_E", "n_N", "n_H")
+
+
+def _near() -> tuple[SurveyColumn, ...]:
+    """Return the columns of `NEAR`: differences of large coordinates would lose their digits."""
+    columns = []
+    for row, key in enumerate(NEAR, start=1):
+        turned = "+".join(f"g_{row}{i}*([@{axis}]-g_{axis}0)" for i, axis in enumerate("XYZ", 1))
+        body = f"g_{key[-1]}t+g_k*({turned})"
+        known = "AND(ISNUMBER(g_k),COUNT([@X],[@Y],[@Z])=3)"
+        columns.append(_f(key, f'IF({known},{body},"")', folded=True))
+    return tuple(columns)
+
+
 def _sigmas(sigma_r: str, covariances: tuple[SurveyColumn, ...]) -> tuple[SurveyColumn, ...]:
     """Return the columns of precision, with the covariance of X, Y, Z from the picks."""
     return (
@@ -127,6 +142,7 @@ def _sigmas(sigma_r: str, covariances: tuple[SurveyColumn, ...]) -> tuple[Survey
         _of_x("sigma_X", "SQRT([@cov_XX])", folded=False),
         _of_x("sigma_Y", "SQRT([@cov_YY])", folded=False),
         _of_r("sigma_r", sigma_r),
+        *_near(),
     )
 
 
@@ -283,6 +299,7 @@ def pair_points(*, undistorted: bool) -> tuple[SurveyColumn, ...]:
             for kind in "ko"
             for key in COVARIANCES
         ),
+        *(SurveyColumn(key=f"o_{name}", kind="value", folded=True) for name in "ENH"),
         _f("s1_used", f'IF([@q]="","",{radius(1, moved)})', 4, folded=True),
         _f("s2_used", f'IF([@q]="","",{radius(2, moved)})', 4, folded=True),
         _f(
@@ -318,56 +335,12 @@ def pair_points(*, undistorted: bool) -> tuple[SurveyColumn, ...]:
     )
 
 
-_AT = "ROW()-ROW(tblResults[[#Headers],[id]])"
-
-
-def _from_points(key: str) -> str:
-    cell = f"INDEX(tblPoints[{key}],{_AT})"
-    return f'IF(ISNUMBER({cell}),{cell},"")'
-
-
-def _text_from_points(key: str) -> str:
-    cell = f"INDEX(tblPoints[{key}],{_AT})"
-    # Fewer rows in Points, where some were deleted, leave the rest of Results blank.
-    return f'IF({_AT}>ROWS(tblPoints[id]),"",IF({cell}="","",{cell}))'
-
-
-def _world_sigma(row: int) -> str:
-    terms = []
-    for key in COVARIANCES:
-        i, j = ("XYZ".index(axis) + 1 for axis in key)
-        double = "2*" if i != j else ""
-        cell = f"INDEX(tblPoints[cov_{key}],{_AT})"
-        terms.append(f"{double}g_{row}{i}*g_{row}{j}*{cell}")
-    known = f"AND(ISNUMBER(g_k),ISNUMBER(INDEX(tblPoints[cov_XX],{_AT})))"
-    return f'IF({known},g_k*SQRT({"+".join(terms)}),"")'
-
-
-def _world(row: int, name: str) -> str:
-    turned = "+".join(f"g_{row}{i}*([@{axis}]-g_{axis}0)" for i, axis in enumerate("XYZ", start=1))
-    return f'IF(AND(ISNUMBER(g_k),COUNT([@X],[@Y],[@Z])=3),g_{name}0+g_k*({turned}),"")'
-
-
-RESULTS: tuple[SurveyColumn, ...] = (
-    _f("id", _text_from_points("id"), width=12),
-    *(_f(key, _from_points(key), 3, width=9) for key in "XYZ"),
-    *(_f(name, _world(row, name), 3, width=13) for row, name in enumerate("ENH", start=1)),
-    *(
-        _f(key, _from_points(key), 4 if key != "sigma_r" else 3, width=9)
-        for key in ("sigma_X", "sigma_Y", "sigma_r")
-    ),
-    *(_f(f"sigma_{name}", _world_sigma(row), 4, width=9) for row, name in enumerate("ENH", 1)),
-    _f("flag", _text_from_points("flag"), width=13),
-    _f("note", _text_from_points("note"), width=16),
-)
-
-
-def look_up(axis: str) -> str:
+def look_up(axis: str, factor: str = "") -> str:
     """Return the formula that finds a column of `Points` by the name of the point."""
     # The second search finds the number 7 among names kept as text.
     at = 'IFERROR(MATCH([@id],tblPoints[id],0),MATCH([@id]&"",tblPoints[id],0))'
     cell = f"INDEX(tblPoints[{axis}],{at})"
-    return f'IF([@id]="","",IFERROR(IF(ISNUMBER({cell}),{cell},""),""))'
+    return f'IF([@id]="","",IFERROR(IF(ISNUMBER({cell}),{factor}{cell},""),""))'
 
 
 CHECK: tuple[SurveyColumn, ...] = (

@@ -18,6 +18,7 @@ from bifocal.survey.setup import SurveySetup
 from bifocal.survey.tolerances import RULES, ToleranceRule
 from bifocal.survey.weighted_similarity import weights_of
 from bifocal.survey.workbook.columns import (
+    NEAR,
     SurveyColumn,
     adjustment_names,
     ideal_points,
@@ -129,6 +130,14 @@ class SurveyContent:
         )
 
     @property
+    def near(self) -> FloatArray:
+        """E, N, H about a whole-metre origin, shape (n, 3); NaN without control points. [m]"""
+        geo, table = self.georeference, self.table
+        if geo is None or table is None:
+            return np.full((0 if table is None else len(table), 3), np.nan)
+        return geo.near_of(table.xyz)
+
+    @property
     def world_covariance(self) -> FloatArray | None:
         """Covariance of E, N, H, shape (n, 3, 3); None where it is not known. [m²]"""
         geo, table = self.georeference, self.table
@@ -157,8 +166,7 @@ class SurveyContent:
         effect = table.effect_of_orientation(table.xyz)
         if geo is None or effect is None or geo.precision is None:
             return np.full((len(table), 3), np.nan)
-        near = geo.world_from_wall(table.xyz) - geo.origin
-        return np.asarray(np.sqrt(np.diagonal(geo.common(near, effect), axis1=1, axis2=2)))
+        return np.asarray(np.sqrt(np.diagonal(geo.common(self.near, effect), axis1=1, axis2=2)))
 
     @property
     def point_rows(self) -> int:
@@ -235,6 +243,7 @@ def point_cells(content: SurveyContent) -> dict[str, list[CellValue]]:
             for empty, value in zip(blank.tolist(), values.tolist(), strict=True)
         ]
     cells |= {key: inputs(values) for key, values in table.carried.items()}
+    cells |= {key: inputs(content.near[:, i]) for i, key in enumerate(NEAR)}
     if content.is_pair:
         cells |= {f"o_{axis}": inputs(content.common_sigma[:, i]) for i, axis in enumerate("ENH")}
     else:

@@ -10,10 +10,13 @@ from openpyxl.styles import Alignment
 
 from bifocal.survey.reference import Georeference
 from bifocal.survey.relief_table import ENTRIES
-from bifocal.survey.weighted_similarity import TURNS
+from bifocal.survey.space_similarity import SpaceSums
+from bifocal.survey.weighted_similarity import TURNS, WeightedSums, determinant
 from bifocal.survey.workbook.content import SurveyContent, control_cells
-from bifocal.survey.workbook.georeference_columns import GEOREFERENCE, entry
+from bifocal.survey.workbook.georeference_columns import entry, georeference_columns
+from bifocal.survey.workbook.precision_lines import precision_lines, precision_values
 from bifocal.survey.workbook.sheets import LABEL_FONT, BookBuilder, SheetBuilder
+from bifocal.survey.workbook.space_block import SpaceBlock
 from photocore.arrays import FloatArray
 from photocore.workbook.cells import CellValue
 from photocore.workbook.grid import column_letters
@@ -34,9 +37,14 @@ def georeference(builder: BookBuilder, content: SurveyContent) -> None:
     _centres(sheet, content)
     _rotation(sheet, content)
     _sums(sheet, content)
-    _weighted_sums(sheet, content)
+    sums = content.georeference.sums if content.georeference is not None else None
+    space = SpaceBlock(sheet, sums if isinstance(sums, SpaceSums) else None)
+    _solved_in_space(sheet, content, space)
+    _weighted_sums(sheet, content, space)
     cells = control_cells(content)
-    sheet.table("tblGeo", GEOREFERENCE, at=(CONTROL_HEAD, 1), rows=rows, cells=cells)
+    columns = georeference_columns(is_pair=content.is_pair)
+    sheet.table("tblGeo", columns, at=(CONTROL_HEAD, 1), rows=rows, cells=cells)
+    space.finish()
     sheet.worksheet.column_dimensions["A"].width = 34
     first, last = CONTROL_HEAD + 1, CONTROL_HEAD + rows
     sheet.validate(f"B{first}:D{last}", limit=1e8)
@@ -107,26 +115,38 @@ _COSINES = {
 
 
 def _rotation(sheet: SheetBuilder, content: SurveyContent) -> None:
-    """Write the rotation: closed forms live, the general one found by the program."""
+    """Write the rotation from the closed forms, or from the turns of the model 3D."""
     geo = content.georeference
     sheet.word("A14", "geo_rotation")
-    sheet.word("J14", "geo_solved")
-    is_3d = geo is not None and geo.model == "3D"
     for key, (plane, levelled) in _COSINES.items():
         i, j = int(key[0]) - 1, int(key[1]) - 1
         entry = None if geo is None else float(geo.world_from_wall.rotation[i, j])
         body = f'IF(g_k="","",IF(g_used="3D",s3_{key},IF(g_used="2D",{plane},{levelled})))'
         place = f"{'BCD'[j]}{14 + i}"
         sheet.formula(place, body, entry, form="0.000000000", name=f"g_{key}")
-        solved = entry if is_3d else None
-        sheet.input(f"{'GHI'[j]}{14 + i}", solved, name=f"s3_{key}")
+
+
+def _solved_in_space(sheet: SheetBuilder, content: SurveyContent, space: SpaceBlock) -> None:
+    """Write rotation, scale and constants of the model 3D from the last turn."""
+    geo = content.georeference
+    is_3d = geo is not None and geo.model == "3D"
+    sheet.word("J14", "geo_solved")
     sheet.word("J17", "geo_scale")
-    scale = geo.world_from_wall.scale if geo is not None and is_3d else None
-    sheet.input("G17", scale, name="s3_k")
-    constants = _constants(geo) if geo is not None and is_3d else (None, None, None)
-    for letter, axis, value in zip("GHI", "XYZ", constants, strict=True):
-        sheet.input(f"{letter}18", value, name=f"s3_{axis}")
     sheet.word("J18", "geo_constants")
+
+    def formula(cell: str, name: str, body: str, value: float | None, form: str) -> None:
+        sheet.formula(cell, f'IF(g_space=1,{body},"")', value, form=form, name=name)
+
+    scale = geo.world_from_wall.scale if geo is not None and is_3d else None
+    formula("G17", "s3_k", f"1/SQRT(SUMSQ({space.entries.range})/3)", scale, "0.000000000")
+    for i, j in np.ndindex(3, 3):
+        value = float(geo.world_from_wall.rotation[i, j]) if geo is not None and is_3d else None
+        body = f"s3_k*{space.entries.fixed(3 * j + i, 0)}"
+        formula(f"{'GHI'[j]}{14 + i}", f"s3_{i + 1}{j + 1}", body, value, "0.000000000")
+    constants = _constants(geo) if geo is not None and is_3d else (None, None, None)
+    for n, (axis, found) in enumerate(zip("XYZ", constants, strict=True)):
+        body = f"g_f_{axis}-SUMPRODUCT({space.shift.column(n)},{space.entries.range})"
+        formula(f"{'GHI'[n]}18", f"s3_{axis}", body, found, "0.000000")
 
 
 def _centres(sheet: SheetBuilder, content: SurveyContent) -> None:
@@ -194,17 +214,22 @@ def _constants(geo: Georeference) -> tuple[float, ...]:
     return tuple((-(turn.rotation.T @ geo.offset) / turn.scale).tolist())
 
 
-def _weighted_sums(sheet: SheetBuilder, content: SurveyContent) -> None:
-    """Write the normal equations of the weighted fit and the turns that solve them."""
-    values = _weighted_values(content.georeference)
+def _weighted_sums(sheet: SheetBuilder, content: SurveyContent, space: SpaceBlock) -> None:
+    """Write the normal equations of the weighted fit, the turns that solve them, and its worth."""
+    values = _weighted_values(content.georeference) | precision_values(content.georeference)
+    of_all, of_level = _common_lines(), _weighted_lines()
     lines = {
         "g_flat": 'IF(g_used="2D",1,0)',
         "g_ok": 'IF(AND(g_n>=2,g_used<>"3D"),IF(IF(g_flat=1,g_l2,g_lL)>0,1,0),0)',
-        **{name: f'IF(g_ok=1,{body},"")' for name, body in _weighted_lines().items()},
+        "g_space": 'IF(AND(g_n>=3,g_used="3D"),1,0)',
+        **{name: f'IF(g_ok+g_space=1,{body},"")' for name, body in of_all.items()},
+        **{name: f'IF(g_ok=1,{body},"")' for name, body in of_level.items()},
     }
     for axis in "XYZ":
         terms = "+".join(f"g_F_{axis}{u}*{value}" for u, value in _SOLVED.items())
         lines[f"g_x_{axis}"] = f'IF(g_used="3D",s3_{axis},IF(g_ok=1,g_f_{axis}-({terms}),""))'
+    for name, body in precision_lines(space).items():
+        lines[name] = f'IF(ISNUMBER(g_k),{body},"")'
     for i, (name, body) in enumerate(lines.items()):
         row, left = _TOP + i % _ROWS, _LEFT + 2 * (i // _ROWS)
         sheet.text(f"{column_letters(left)}{row}", name, LABEL_FONT)
@@ -232,9 +257,13 @@ def _product(unknown: str, column: str) -> str:
     return "+".join(terms)
 
 
-def _weighted_lines() -> dict[str, str]:
-    """Return the formulas by name, each from those before it."""
-    pairs = [("p", "p"), ("p", "q"), ("p", "m"), ("q", "q"), ("q", "m"), ("m", "m")]
+def _solved(axis: str, right: str) -> str:
+    """Return a row of the inverse of the sum of the weights times a vector."""
+    return "+".join(f"g_i_{entry(axis, o)}*{right.format(o)}" for o in "XYZ")
+
+
+def _common_lines() -> dict[str, str]:
+    """Return the formulas by name that all models share, each from those before it."""
     lines = {
         f"g_s_{key}": f"IF(AND(g_flat=1,{int(key == 'ZZ')}=1),1,SUM(tblGeo[p_{key}]))"
         for key in ENTRIES
@@ -246,16 +275,19 @@ def _weighted_lines() -> dict[str, str]:
     }  # fmt: skip
     lines["g_det"] = "+".join(f"g_s_X{axis}*({cofactors['X' + axis]})" for axis in "XYZ")
     lines |= {f"g_i_{key}": f"({body})/g_det" for key, body in cofactors.items()}
+    lines |= {f"g_h_{axis}": f"SUM(tblGeo[h_{axis}])" for axis in "XYZ"}
+    lines |= {f"g_f_{axis}": _solved(axis, "g_h_{}") for axis in "XYZ"}
+    return lines
 
-    def solved(axis: str, right: str) -> str:
-        return "+".join(f"g_i_{entry(axis, o)}*{right.format(o)}" for o in "XYZ")
 
+def _weighted_lines() -> dict[str, str]:
+    """Return the formulas by name of the models 2D and levelled, each from those before it."""
+    pairs = [("p", "p"), ("p", "q"), ("p", "m"), ("q", "q"), ("q", "m"), ("m", "m")]
+    lines = {}
     for axis in "XYZ":
         lines |= {f"g_b_{axis}{u}": f"SUM(tblGeo[u_{axis}{u}])" for u in _UNKNOWNS}
-        lines[f"g_h_{axis}"] = f"SUM(tblGeo[h_{axis}])"
     for axis in "XYZ":
-        lines |= {f"g_F_{axis}{u}": solved(axis, "g_b_{}" + u) for u in _UNKNOWNS}
-        lines[f"g_f_{axis}"] = solved(axis, "g_h_{}")
+        lines |= {f"g_F_{axis}{u}": _solved(axis, "g_b_{}" + u) for u in _UNKNOWNS}
     for one, other in pairs:
         freed = "+".join(f"g_b_{axis}{one}*g_F_{axis}{other}" for axis in "XYZ")
         lines[f"g_m_{one}{other}"] = f"{_product(one, 'u_{}' + other)}-({freed})"
@@ -288,7 +320,7 @@ def _turn(i: int) -> dict[str, str]:
 
 def _weighted_values(geo: Georeference | None) -> dict[str, CellValue]:
     """Return what the formulas show."""
-    values: dict[str, CellValue] = {"g_flat": 0, "g_ok": 0}
+    values: dict[str, CellValue] = {"g_flat": 0, "g_ok": 0, "g_space": 0}
     if geo is None:
         return values
     values["g_flat"] = int(geo.model == "2D")
@@ -299,15 +331,22 @@ def _weighted_values(geo: Georeference | None) -> dict[str, CellValue]:
     sums = geo.sums
     if sums is None:
         return values
-    values["g_ok"] = 1
+    values["g_space" if geo.model == "3D" else "g_ok"] = 1
     symmetric: dict[str, FloatArray] = {"g_s_": sums.total, "g_i_": sums.inverse}
     for prefix, matrix in symmetric.items():
         values |= {f"{prefix}{key}": float(matrix[at]) for key, at in ENTRIES.items()}
-    values["g_det"] = float(sums.determinant)
+    values["g_det"] = determinant(sums.total)
+    for i, axis in enumerate("XYZ"):
+        values |= {f"g_h_{axis}": float(sums.right[i]), f"g_f_{axis}": float(sums.mean[i])}
+    return values | _level_values(sums) if isinstance(sums, WeightedSums) else values
+
+
+def _level_values(sums: WeightedSums) -> dict[str, CellValue]:
+    """Return what the formulas of the models 2D and levelled show."""
+    values: dict[str, CellValue] = {}
     for i, axis in enumerate("XYZ"):
         values |= {f"g_b_{axis}{u}": float(sums.mixed[i, j]) for j, u in enumerate(_UNKNOWNS)}
         values |= {f"g_F_{axis}{u}": float(sums.shift[i, j]) for j, u in enumerate(_UNKNOWNS)}
-        values |= {f"g_h_{axis}": float(sums.right[i]), f"g_f_{axis}": float(sums.mean[i])}
         values[f"g_y_{_UNKNOWNS[i]}"] = float(sums.left[i])
     for i, one in enumerate(_UNKNOWNS):
         for j in range(i, 3):

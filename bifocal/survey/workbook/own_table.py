@@ -11,7 +11,7 @@ import numpy as np
 
 from bifocal.survey.reference import Georeference
 from bifocal.survey.workbook.book import build
-from bifocal.survey.workbook.columns import SurveyColumn, ideal_points, pair_points
+from bifocal.survey.workbook.columns import NEAR, SurveyColumn, ideal_points, pair_points
 from bifocal.survey.workbook.content import SurveyContent, point_cells, result_cells
 from bifocal.survey.workbook.reader import TO_DEGREES, TO_MM, SurveyInput
 from bifocal.survey.workbook.setup_update import (
@@ -168,7 +168,7 @@ def _columns(table: OwnTable, content: SurveyContent) -> list[ResultColumn]:
         )
     results = []
     for column in described:
-        if column.key in ("id", "use", "code", "note"):
+        if column.key in ("id", "use", "code", "note", *NEAR):
             continue
         if column.kind == "input" and column.key in table.columns:
             continue

@@ -121,8 +121,13 @@ class SheetBuilder:
         if form:
             target.number_format = form
         if name:
-            place = f"'{self.worksheet.title}'!{absolute_coordinate(cell)}"
-            self.book.book.defined_names[name] = DefinedName(name, attr_text=place)
+            self.name_area(name, cell)
+
+    def name_area(self, name: str, first: str, last: str = "") -> None:
+        """Give a cell, or an area from its first to its last cell, a name."""
+        cells = ":".join(absolute_coordinate(cell) for cell in (first, last) if cell)
+        place = f"'{self.worksheet.title}'!{cells}"
+        self.book.book.defined_names[name] = DefinedName(name, attr_text=place)
 
     def table(
         self,

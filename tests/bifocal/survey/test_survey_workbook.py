@@ -21,9 +21,10 @@ from bifocal.survey.reference import KnownPoints
 from bifocal.survey.setup import SurveySetup
 from bifocal.survey.template_workflow import write_template
 from bifocal.survey.workbook.book import write_book
-from bifocal.survey.workbook.columns import IDEAL_POINTS, RESULTS, pair_points
+from bifocal.survey.workbook.columns import IDEAL_POINTS, pair_points
 from bifocal.survey.workbook.content import SurveyContent
-from bifocal.survey.workbook.georeference_columns import GEOREFERENCE
+from bifocal.survey.workbook.georeference_columns import georeference_columns
+from bifocal.survey.workbook.results_columns import results_columns
 from photocore.errors import InputError
 from tests.recalculate import recalculated
 from tests.workbook_lint import lint
@@ -96,7 +97,9 @@ def test_only_functions_of_excel_2007_are_used():
     )
     allowed = set(text.split())
     used = set()
-    columns = (*IDEAL_POINTS, *pair_points(undistorted=True), *RESULTS, *GEOREFERENCE)
+    columns = [*IDEAL_POINTS, *pair_points(undistorted=True)]
+    for is_pair in (False, True):
+        columns += [*results_columns(is_pair=is_pair), *georeference_columns(is_pair=is_pair)]
     for column in columns:
         used |= set(re.findall(r"([A-Z][A-Z0-9.]*)\(", column.formula))
     assert used <= allowed
