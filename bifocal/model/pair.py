@@ -19,6 +19,7 @@ from bifocal.precision import base_factor
 from photocore.arrays import FloatArray, as_points, not_negative, positive
 from photocore.errors import GeometryError, InputError, located
 from photocore.jsonfile import read_object, write_object
+from photocore.series import check_index
 
 FORMAT = "bifocal-pair/1"
 
@@ -292,6 +293,7 @@ class Pair:
         here) is common to all points: it is in every point's covariance, but not independent from
         point to point.
         """
+        check_index("intersect", pixels1, pixels2)
         first = as_points(pixels1, "pixels1", dimension=2)
         second = as_points(pixels2, "pixels2", dimension=2)
         if first.shape != second.shape:

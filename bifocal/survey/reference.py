@@ -14,6 +14,7 @@ from bifocal.survey.transformation_precision import TransformationPrecision
 from bifocal.survey.weighted_similarity import WeightedSums
 from photocore.arrays import BoolArray, FloatArray, IntArray, as_floats
 from photocore.errors import InputError
+from photocore.series import check_index
 from photocore.similarity import Similarity
 
 
@@ -59,6 +60,7 @@ class KnownPoints:
     @classmethod
     def from_columns(cls, columns: Mapping[str, Any], axes: str) -> KnownPoints:
         """Return the points of columns by key: ``id`` and one of shape (n,) for each axis. [m]"""
+        check_index("points", *columns.values())
         names = tuple(map(str, columns.get("id", ())))
         blank = np.full(len(names), np.nan)
         xyz = [as_floats(columns.get(axis, blank), axis) for axis in axes]
@@ -244,7 +246,7 @@ class Georeference:
         return np.asarray(out)
 
     def near_of(self, xyz: FloatArray) -> FloatArray:
-        """Return E, N, H of points on the wall from `origin`, shape (n, 3): no digit is lost. [m]"""
+        """Return E, N, H of points on the wall from `origin`, shape (n, 3). [m]"""
         turn = self.world_from_wall.scale * self.world_from_wall.rotation
         return np.asarray(self.offset + (xyz - self.world_from_wall.source_centre) @ turn.T)
 

@@ -104,6 +104,8 @@ def precision_of(
     orientation are common to all points: what they do to the fit is carried separately, because
     most of it is taken up by the fit itself.
     """
+    spread: FloatArray
+    lever: FloatArray
     if isinstance(sums, SpaceSums):
         spread, lever = sums.turns[-1].inverse, sums.shift @ sums.turns[-1].design
     else:
@@ -111,7 +113,7 @@ def precision_of(
     inverse = sums.inverse.copy()
     if model == "2D":
         inverse[2, 2] = 0.0
-    axes = np.eye(4)
+    axes: FloatArray = np.eye(4)
     axes[:3, :3] = fit.rotation
     into = axes[:, list(_UNKNOWNS[model])]
     to_world = fit.scale * fit.rotation

@@ -42,7 +42,7 @@ from bifocal.survey.units import (
 )
 from bifocal.survey.workbook.content import SurveyContent
 from bifocal.survey.workbook.reader import ReadOptions, SurveyInput, column_map
-from photocore.arrays import FloatArray
+from photocore.arrays import FloatArray, as_floats
 from photocore.errors import GeometryError, InputError
 from photocore.tables.numbers import Decimal
 
@@ -261,8 +261,10 @@ def _checked(**numbers: float | None) -> dict[str, Any]:
     """Return the options that are given, refusing what is not above zero."""
     given = {name: value for name, value in numbers.items() if value is not None}
     for name, value in given.items():
+        option = f"--{name.replace('_', '-')}"
+        if as_floats(value, option).ndim:
+            raise InputError(f"{option}: expected one number for the whole survey.")
         if not value > 0:
-            option = f"--{name.replace('_', '-')}"
             raise InputError(f"{option}: must be a number above zero, got {value:g}.")
     return given
 

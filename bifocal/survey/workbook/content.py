@@ -160,7 +160,7 @@ class SurveyContent:
 
     @property
     def common_sigma(self) -> FloatArray:
-        """What the orientation still adds to E, N, H once placed, shape (n, 3); NaN if blank. [m]"""
+        """What the orientation still adds to E, N, H once placed, shape (n, 3). [m]"""
         geo, table = self.georeference, self.table
         assert table is not None
         effect = table.effect_of_orientation(table.xyz)

@@ -283,7 +283,7 @@ def _common_lines() -> dict[str, str]:
 def _weighted_lines() -> dict[str, str]:
     """Return the formulas by name of the models 2D and levelled, each from those before it."""
     pairs = [("p", "p"), ("p", "q"), ("p", "m"), ("q", "q"), ("q", "m"), ("m", "m")]
-    lines = {}
+    lines: dict[str, str] = {}
     for axis in "XYZ":
         lines |= {f"g_b_{axis}{u}": f"SUM(tblGeo[u_{axis}{u}])" for u in _UNKNOWNS}
     for axis in "XYZ":

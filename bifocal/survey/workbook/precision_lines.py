@@ -134,6 +134,11 @@ def added_variance(name: str, cells: Mapping[str, str]) -> str:
 
 #: The mixed terms of each.
 _PAIRS_OF = {
-    name: [(a, b) for a, b in _PAIRS if a != b and a in moved and b in moved]
+    name: [
+        (one, other)
+        for i, one in enumerate(_SMALL)
+        for other in _SMALL[i + 1 :]
+        if one in moved and other in moved
+    ]
     for name, moved in _MOVED.items()
 }

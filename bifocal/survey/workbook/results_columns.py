@@ -75,9 +75,7 @@ def results_columns(*, is_pair: bool) -> tuple[SurveyColumn, ...]:
             for key in ("sigma_X", "sigma_Y", "sigma_r")
         ),
         *(
-            formula_column(
-                f"sigma_{name}", _world_sigma(row, name, is_pair=is_pair), 4, width=9
-            )
+            formula_column(f"sigma_{name}", _world_sigma(row, name, is_pair=is_pair), 4, width=9)
             for row, name in enumerate("ENH", start=1)
         ),
         formula_column("flag", _text_from_points("flag"), width=13),

@@ -197,7 +197,9 @@ class SpaceBlock:
             value,
         )  # fmt: skip
 
-    def _turn(self, number: int, entries: CellMatrix, reduced: CellMatrix, left: Matrix) -> CellMatrix:
+    def _turn(
+        self, number: int, entries: CellMatrix, reduced: CellMatrix, left: CellMatrix
+    ) -> CellMatrix:
         """Write one turn and return B after it."""
         turn = None if self.sums is None else self.sums.turns[number]
         after = None
@@ -267,7 +269,9 @@ class SpaceBlock:
         for number in range(LEFT, last + 1):
             width = self.sheet.worksheet.column_dimensions[column_letters(number)]
             width.outlineLevel, width.hidden = 1, True
-        self.sheet.name_area(BLOCK, f"{column_letters(LEFT)}{UPPER}", f"{column_letters(last)}{LOWER + 8}")
+        self.sheet.name_area(
+            BLOCK, f"{column_letters(LEFT)}{UPPER}", f"{column_letters(last)}{LOWER + 8}"
+        )
 
 
 def _axis_rows(j: int) -> Iterator[tuple[int, int, int]]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -119,7 +119,11 @@ def store_named_cells(editor: WorkbookEditor, built: BookBuilder, content: Surve
     typed = {"g_auto"}
     if is_older(editor.book.names):
         # The model 3D was no formula: what the program found was typed.
-        typed |= {"s3_k", *(f"s3_{i}{j}" for i in "123" for j in "123"), *(f"s3_{i}" for i in "XYZ")}
+        typed |= {
+            "s3_k",
+            *(f"s3_{i}{j}" for i in "123" for j in "123"),
+            *(f"s3_{i}" for i in "XYZ"),
+        }
     for name, defined in built.book.defined_names.items():
         sheet, _, cell = defined.attr_text.partition("!")
         sheet, cell = sheet.strip("'"), cell.replace("$", "")
@@ -139,7 +143,7 @@ def store_named_cells(editor: WorkbookEditor, built: BookBuilder, content: Surve
             _make_number(editor, place, value)
 
 
-def is_older(names: Mapping[str, str]) -> bool:
+def is_older(names: Collection[str]) -> bool:
     """Tell by its names whether a workbook's sheet `Georeference` has no live model 3D yet.
 
     Its formulas of sigma_E, sigma_N, sigma_H then leave out what the transformation is worth.
