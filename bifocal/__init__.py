@@ -34,6 +34,8 @@ The page
     pick                      orient, pick and draw in the browser, as the command `bifocal pick`
     page_server, PageServer   the same without a browser, for programs that drive it
 
+    recording                 what the outputs written within it say made them
+
 Files in, files out: the command `bifocal`. Errors are ValueErrors with one message that says what
 is wrong, where, and how to mend it.
 """

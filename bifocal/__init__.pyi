@@ -8,6 +8,7 @@ from .equations import (
     relief_displacements,
     relief_from_displacement,
 )
+from .files.provenance import recording
 from .model.intersection import Intersection
 from .model.lens import Lens
 from .model.pair import Pair
@@ -61,6 +62,7 @@ __all__ = [
     "page_server",
     "pick",
     "plane_coordinates",
+    "recording",
     "relief",
     "relief_displacement",
     "relief_displacements",

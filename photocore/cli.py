@@ -5,10 +5,10 @@ from __future__ import annotations
 import json
 import logging
 import re
-import signal
+import shlex
 import sys
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from importlib import import_module
 from io import TextIOWrapper
 from pathlib import Path
@@ -17,14 +17,10 @@ from typing import Any, Protocol
 import click
 
 from photocore.errors import PhotogrammetryError
-from photocore.log import is_quiet, log_options
+from photocore.interrupts import STOPPED
+from photocore.log import COMMAND_LINE, DATE, is_quiet, log_options
 from photocore.options import NUMBER
-
-
-def _stop(number: int, frame: object) -> None:  # noqa: ARG001
-    """End on a polite kill as on Ctrl-C, so that nothing half-written stays."""
-    raise KeyboardInterrupt
-
+from photocore.provenance import recording
 
 #: Exit status of a fault of the program: EX_SOFTWARE of sysexits.h, which Windows' os lacks.
 UNFORESEEN = 70
@@ -129,24 +125,29 @@ class LazyGroup(click.Group):
         with formatter.section("Commands"):
             formatter.write_dl(list(self.summaries.items()))
 
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        """Keep the words of the command line, for what is written about it."""
+        program = self.commands_package.partition(".")[0]
+        ctx.meta[COMMAND_LINE] = shlex.join([program, *args])
+        return super().parse_args(ctx, args)
+
     def invoke(self, ctx: click.Context) -> Any:
         """Run a command; the one place where errors become messages and an exit status.
 
         1: the input, the disk or the user ended it. 70: a fault of the program.
         """
-        with suppress(ValueError):  # not in the main thread: somebody else handles signals there
-            signal.signal(signal.SIGTERM, _stop)
         if isinstance(sys.stdout, TextIOWrapper):  # a name the terminal lacks letters for
             sys.stdout.reconfigure(errors="backslashreplace")
         try:
-            return super().invoke(ctx)
+            with recording(ctx.meta[COMMAND_LINE], day=ctx.meta.get(DATE)):
+                return super().invoke(ctx)
         except (click.ClickException, click.exceptions.Exit, click.Abort):
             raise
         except PhotogrammetryError as error:
             _show_details(ctx)
             _tell_error(f"Error: {error}")
         except KeyboardInterrupt:
-            _tell_error("Stopped by the user; nothing was left half-written.")
+            _tell_error(STOPPED)
         except MemoryError:
             _tell_error(
                 "Error: not enough memory. Use smaller images, a coarser --gsd or --bounds."

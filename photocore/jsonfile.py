@@ -11,6 +11,7 @@ import numpy as np
 
 from photocore.errors import InputError
 from photocore.output import atomic_path
+from photocore.provenance import is_recorded, provenance
 from photocore.textfile import read_text
 
 
@@ -46,8 +47,16 @@ def read_object(path: Path | str, *, what: str) -> dict[str, Any]:
     return value
 
 
-def write_object(path: Path | str, value: dict[str, Any], *, overwrite: bool = False) -> None:
-    """Write an object as indented JSON, whole or not at all; NaN and infinity become null."""
+def write_object(
+    path: Path | str, value: dict[str, Any], *, overwrite: bool = False, as_is: bool = False
+) -> None:
+    """Write an object as indented JSON, whole or not at all; NaN and infinity become null.
+
+    While something is recorded (`photocore.provenance.recording`), it gets a key ``provenance`` in
+    place of the one it has, unless it is written as it is.
+    """
+    if is_recorded() and not as_is:
+        value = {**value, "provenance": provenance().to_dict()}
     with atomic_path(path, overwrite=overwrite) as temporary:
         temporary.write_text(to_text(value, indent=2) + "\n", encoding="utf-8")
 

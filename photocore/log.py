@@ -12,11 +12,14 @@ from pathlib import Path
 
 import click
 
-from photocore.provenance import command_line, program
+from photocore.errors import InputError
+from photocore.provenance import checked_date, program, set_day
 
 PACKAGES = ("bifocal", "multimedia", "photocore")
 #: First words of every log, by which a file is known to be one.
 HEAD = "# log of "
+#: Where a command finds its own line, and the date it was told.
+COMMAND_LINE, DATE = "photocore.command_line", "photocore.date"
 _QUIET = "photocore.quiet"
 _FORMAT = "%(asctime)s %(levelname)-7s %(name)s: %(message)s"
 
@@ -41,6 +44,10 @@ def log_options() -> list[click.Option]:
         click.Option(
             ["--log"], type=click.Path(path_type=Path), is_eager=True, expose_value=False,
             callback=_keep_log, metavar="FILE", help="Add what happens to a log file.",
+        ),
+        click.Option(
+            ["--date"], is_eager=True, expose_value=False, callback=_bear_date,
+            metavar="YYYY-MM-DD", help="Date that outputs bear.  [default: today]",
         ),
     ]  # fmt: skip
 
@@ -70,7 +77,7 @@ def _keep_log(ctx: click.Context, param: click.Parameter, value: Path | None) ->
                         "file.", ctx, param,
                     )  # fmt: skip
         with value.open("a", encoding="utf-8") as file:
-            file.write(f"{HEAD}{program()}: {command_line()}\n")
+            file.write(f"{HEAD}{program()}: {ctx.meta[COMMAND_LINE]}\n")
         handler = logging.FileHandler(value, encoding="utf-8")
     except OSError as error:
         raise click.BadParameter(
@@ -78,6 +85,15 @@ def _keep_log(ctx: click.Context, param: click.Parameter, value: Path | None) ->
         ) from None
     handler.setFormatter(logging.Formatter(_FORMAT))
     _attach(ctx, handler)
+
+
+def _bear_date(ctx: click.Context, param: click.Parameter, value: str | None) -> None:
+    if value is not None:
+        try:
+            ctx.meta[DATE] = checked_date(value)
+        except InputError as error:
+            raise click.BadParameter(str(error), ctx, param) from None
+        set_day(ctx.meta[DATE])  # given behind the command; before it, the program reads it there
 
 
 def _attach(ctx: click.Context, handler: logging.Handler) -> None:

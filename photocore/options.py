@@ -6,19 +6,85 @@ finite or not possible, as wrong usage that names the option.
 
 from __future__ import annotations
 
+import io
+import shlex
+import sys
 from collections.abc import Callable
+from contextlib import redirect_stdout
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any, TypeVar
 
 import click
 
 from photocore.errors import LARGEST
+from photocore.log import COMMAND_LINE
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 FILE = click.Path(path_type=Path)
 
 overwrite = click.option("--overwrite", is_flag=True, help="Replace existing files.")
 as_json = click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
+
+
+class TableFile(click.Path):
+    """A file that holds a table; ``-`` stands for stdin or stdout.
+
+    What comes from stdin (a text table, or a workbook) is kept as a file while the command runs.
+    What goes to stdout is written as ``.csv`` first, and printed only when it is whole; the
+    results that the command prints otherwise are then left out.
+
+    Parameters
+    ----------
+    output : bool
+        Written instead of read.
+    """
+
+    name = "file"
+
+    def __init__(self, *, output: bool = False) -> None:
+        super().__init__(path_type=Path)
+        self.output = output
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """Return the path, that of a temporary file where ``-`` is given."""
+        if ctx is None or ctx.resilient_parsing or str(value) != "-":
+            return super().convert(value, param, ctx)
+        key = f"photocore.{'stdout' if self.output else 'stdin'}"
+        if key in ctx.meta:
+            self.fail("- can stand for one table only.", param, ctx)
+        ctx.meta[key] = True
+        # The whole command's context is closed also where the rest of the line is wrong.
+        ctx = ctx.find_root()
+        folder = Path(ctx.with_resource(TemporaryDirectory(prefix="bifocal-")))
+        if not self.output:
+            return _from_stdin(folder)
+        if {"--json"} & set(shlex.split(ctx.meta.get(COMMAND_LINE, ""))):
+            self.fail("both it and --json go to stdout; choose one of them.", param, ctx)
+        path, stdout = folder / "stdout.csv", sys.stdout
+
+        def show() -> None:
+            if path.is_file():
+                stdout.flush()
+                getattr(stdout, "buffer", stdout).write(path.read_bytes())
+                stdout.flush()
+
+        # Closed in the opposite order: stdout is itself again, then comes the table.
+        ctx.call_on_close(show)
+        ctx.with_resource(redirect_stdout(io.StringIO()))
+        return path
+
+
+def _from_stdin(folder: Path) -> Path:
+    """Return a file with what stands on stdin, of the ending that its first bytes ask for."""
+    data = getattr(sys.stdin, "buffer", sys.stdin).read()
+    path = folder / ("stdin.xlsx" if data[:2] == b"PK" else "stdin.csv")
+    path.write_bytes(data)
+    return path
+
+
+#: A table that is read, and one that is written.
+TABLE, NEW_TABLE = TableFile(), TableFile(output=True)
 
 
 class Number(click.ParamType):  # type: ignore[type-arg,unused-ignore]

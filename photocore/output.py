@@ -17,15 +17,15 @@ from hashlib import sha256
 from itertools import count
 from pathlib import Path
 
+from photocore import interrupts
 from photocore.errors import InputError
+from photocore.provenance import note_output
 from photocore.textfile import check_name
 
 #: Temporary names tell the machine and the process, so that what a killed run left is known.
 _NODE = sha256(socket.gethostname().encode()).hexdigest()[:6]
 #: Where processes of others cannot be asked, a temporary file of this age is left over. [s]
 _LEFT_OVER = 86_400.0
-#: Temporary files and folders in use by this process.
-_in_use: set[str] = set()
 #: Finished outputs, under their temporary names, that wait for the others of their set.
 _waiting: ContextVar[list[tuple[Path, Path]] | None] = ContextVar("waiting", default=None)
 
@@ -169,6 +169,7 @@ def atomic_path(path: Path | str, *, overwrite: bool) -> Iterator[Path]:
         As `check_writable`, and when the disk is full or the rename is refused.
     """
     path = check_writable(path, overwrite=overwrite)
+    note_output(path)
     real, finished = path.resolve(), _waiting.get()
     if finished is not None and any(real == place for _, place in finished):
         raise InputError(f"{path}: is named for two outputs; name two files.")
@@ -214,8 +215,9 @@ def atomic_folder(path: Path | str, *, overwrite: bool) -> Iterator[Path]:
     try:
         _make_folder(path, made_folders)
         _remove_left_over(path, ".writing", "")
-        temporary = Path(tempfile.mkdtemp(prefix=_prefix(".writing"), dir=path))
-        _in_use.add(temporary.name)
+        with interrupts.held():
+            temporary = Path(tempfile.mkdtemp(prefix=_prefix(".writing"), dir=path))
+            interrupts.temporary.add(temporary)
         yield temporary
         files = [item.relative_to(temporary) for item in temporary.rglob("*") if item.is_file()]
         taken = [str(name) for name in files if os.path.lexists(path / name)]
@@ -234,20 +236,25 @@ def atomic_folder(path: Path | str, *, overwrite: bool) -> Iterator[Path]:
     finally:
         if temporary is not None:
             shutil.rmtree(temporary, ignore_errors=True)
-            _in_use.discard(temporary.name)
-        for folder in () if done else reversed(made_folders):
-            with suppress(OSError):
-                folder.rmdir()
+            interrupts.temporary.discard(temporary)
+        for folder in reversed(made_folders):
+            interrupts.made_folders.remove(folder)
+            if not done:
+                with suppress(OSError):
+                    folder.rmdir()
 
 
 def _make_folder(path: Path, made: list[Path]) -> None:
     """Make a folder and those above it that are missing; note which."""
     missing = [folder for folder in (path, *path.parents) if not folder.exists()]
     for folder in reversed(missing):
-        folder.mkdir(exist_ok=True)
-        made.append(folder)
+        with interrupts.held():
+            folder.mkdir(exist_ok=True)
+            made.append(folder)
+            interrupts.made_folders.append(folder)
 
 
+@interrupts.held()
 def _put_in_place(finished: Sequence[tuple[Path, Path]]) -> None:
     """Rename all files to their places; where one fails, put the old state of all back.
 
@@ -298,15 +305,17 @@ def _temporary_file(place: Path) -> Path:
     # Names have an end; Python's random letters and the process number take some of it.
     stem = f".{place.stem[:60]}"
     _remove_left_over(place.parent, stem, place.suffix)
-    handle, name = tempfile.mkstemp(prefix=_prefix(stem), suffix=place.suffix, dir=place.parent)
-    os.close(handle)
-    _in_use.add(Path(name).name)
-    return Path(name)
+    with interrupts.held():
+        handle, name = tempfile.mkstemp(prefix=_prefix(stem), suffix=place.suffix, dir=place.parent)
+        os.close(handle)
+        temporary = Path(name)
+        interrupts.temporary.add(temporary)
+    return temporary
 
 
 def _forget(temporary: Path) -> None:
     temporary.unlink(missing_ok=True)
-    _in_use.discard(temporary.name)
+    interrupts.temporary.discard(temporary)
 
 
 def _remove_left_over(folder: Path, stem: str, ending: str) -> None:
@@ -314,10 +323,11 @@ def _remove_left_over(folder: Path, stem: str, ending: str) -> None:
     pattern = re.compile(
         rf"{re.escape(stem)}-(?P<node>[0-9a-f]{{6}})-(?P<process>\d+)-\w{{8}}{re.escape(ending)}.*"
     )
+    in_use = {path.name for path in interrupts.temporary}
     for entry in os.scandir(folder):
         match = pattern.fullmatch(entry.name)
         with suppress(OSError):
-            if match and entry.name not in _in_use and _is_left_over(match, entry.stat()):
+            if match and entry.name not in in_use and _is_left_over(match, entry.stat()):
                 if entry.is_dir(follow_symlinks=False):
                     shutil.rmtree(entry.path, ignore_errors=True)
                 else:

@@ -1,17 +1,24 @@
-"""Where a file comes from: program and version, date, hashes of what went in."""
+"""Where a file comes from: program and version, date, command, hashes of what went in.
+
+While a `recording` runs, readers `note` the files they open; every output that is written then
+carries the `Provenance` so far. A command records its line, a step of a survey its options, and
+from Python ``with bifocal.recording("what I do"):`` does the same.
+"""
 
 from __future__ import annotations
 
 import hashlib
 import json
 import os
-import sys
 import time
-from collections.abc import Iterable
-from contextlib import suppress
-from datetime import UTC, datetime
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from contextvars import ContextVar
+from dataclasses import dataclass, field
+from datetime import UTC, date, datetime
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
+from typing import Any
 
 from photocore.errors import InputError
 
@@ -20,8 +27,153 @@ _CHUNK = 1 << 20
 RACY_SECONDS = 2.0
 
 
+@dataclass(slots=True)
+class _Recording:
+    """What runs, the date it bears, and the files it has read, by their place."""
+
+    command: str
+    day: str
+    files: dict[Path, str] = field(default_factory=dict)
+    outputs: set[Path] = field(default_factory=set)
+
+
+_recording: ContextVar[_Recording | None] = ContextVar("recording", default=None)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Provenance:
+    """Where an output comes from.
+
+    Attributes
+    ----------
+    program : str
+        Name and version.
+    date : str
+        Year-month-day, UTC.
+    command : str
+        Command line, or options; empty where nobody said.
+    inputs : tuple of (str, str)
+        Names of the files read and their SHA-256.
+    """
+
+    program: str
+    date: str
+    command: str = ""
+    inputs: tuple[tuple[str, str], ...] = ()
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return it as plain data, without what is empty."""
+        inputs = [{"file": name, "sha256": digest} for name, digest in self.inputs]
+        more = {"command": self.command, "inputs": inputs}
+        known = {key: value for key, value in more.items() if value}
+        return {"program": self.program, "date": self.date, **known}
+
+    def lines(self) -> list[str]:
+        """Return it as lines of text."""
+        command = [self.command] if self.command else []
+        return [
+            f"{self.program}, {self.date}",
+            *command,
+            *(f"{name} SHA-256 {digest}" for name, digest in self.inputs),
+        ]
+
+
+@contextmanager
+def recording(command: str, *, day: str | None = None) -> Iterator[None]:
+    """Let the outputs written within say what made them, and from which files.
+
+    Parameters
+    ----------
+    command : str
+        Command line, or what is done with which options.
+    day : str, optional
+        Date that outputs bear, year-month-day; default that of the recording around this one,
+        else today.
+
+    Raises
+    ------
+    InputError
+        If ``day`` is no date.
+
+    Examples
+    --------
+    >>> with recording("my script, gsd 5 mm", day="2026-11-22"):
+    ...     provenance().command, provenance().date
+    ('my script, gsd 5 mm', '2026-11-22')
+    """
+    token = _recording.set(_Recording(command, today() if day is None else checked_date(day)))
+    try:
+        yield
+    finally:
+        _recording.reset(token)
+
+
+def is_recorded() -> bool:
+    """Tell whether a recording runs."""
+    return _recording.get() is not None
+
+
+def set_day(day: str) -> None:
+    """Let the outputs of what is recorded from here on bear this date."""
+    running = _recording.get()
+    if running is not None:
+        running.day = day
+
+
+def note(path: Path | str) -> None:
+    """Remember, while something is recorded, that a file was read; our own outputs do not count."""
+    running, place = _recording.get(), Path(path).absolute()
+    if running is not None and place not in running.outputs and place.name[:1] != ".":
+        running.files.setdefault(place, "")
+
+
+def note_output(path: Path | str) -> None:
+    """Remember that a file was written: read again, it is nothing that went in."""
+    running, place = _recording.get(), Path(path).absolute()
+    if running is not None and place not in running.files:
+        running.outputs.add(place)
+
+
+def provenance() -> Provenance:
+    """Return what an output written now should carry; files that are gone by now are left out."""
+    running = _recording.get()
+    if running is None:
+        return Provenance(program=program(), date=today())
+    for path, digest in list(running.files.items()):
+        if not digest:
+            # Hashed once: a file that the command itself replaces counts as it was read.
+            try:
+                running.files[path] = file_hash(path)
+            except InputError:
+                del running.files[path]
+    inputs = sorted({(path.name, digest) for path, digest in running.files.items()})
+    return Provenance(
+        program=program(), date=running.day, command=running.command, inputs=tuple(inputs)
+    )
+
+
+def checked_date(text: str) -> str:
+    """Return a date as year-month-day.
+
+    Raises
+    ------
+    InputError
+        If it is none.
+    """
+    try:
+        return date.fromisoformat(text.strip()).isoformat()
+    except ValueError:
+        raise InputError(f"{text!r} is no date; write year-month-day, e.g. 2026-11-22.") from None
+
+
 def today() -> str:
-    """Return the date in UTC; that of SOURCE_DATE_EPOCH where set, for reproducible files."""
+    """Return the date in UTC that outputs bear.
+
+    That of the recording, else that of SOURCE_DATE_EPOCH, for reproducible files.
+    """
+    running = _recording.get()
+    if running is not None:
+        return running.day
     stamp = os.environ.get("SOURCE_DATE_EPOCH", "")
     moment = datetime.fromtimestamp(int(stamp), UTC) if stamp.isdigit() else datetime.now(UTC)
     return moment.strftime("%Y-%m-%d")
@@ -33,11 +185,6 @@ def program() -> str:
         return f"bifocal {version('bifocal')}"
     except PackageNotFoundError:
         return "bifocal"
-
-
-def command_line() -> str:
-    """Return the command line that runs, the program by its name only."""
-    return " ".join([Path(sys.argv[0]).name, *sys.argv[1:]])
 
 
 def file_hash(path: Path | str) -> str:
@@ -102,8 +249,3 @@ class FileHashes:
             temporary.write_text(json.dumps(self._known), encoding="utf-8")
             temporary.replace(self.memory)
         self._changed = False
-
-
-def inputs_by_name(paths: Iterable[Path]) -> dict[str, str]:
-    """Return file names with their SHA-256."""
-    return {path.name: file_hash(path) for path in paths}

@@ -6,6 +6,7 @@ is full: every raster is checked whole before it takes the old one's place.
 
 from __future__ import annotations
 
+import json
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
@@ -19,6 +20,7 @@ from numpy.typing import DTypeLike, NDArray
 from photocore.arrays import FloatArray
 from photocore.errors import InputError
 from photocore.output import atomic_path
+from photocore.provenance import note, provenance
 from photocore.textfile import check_name
 
 #: Side of a tile of the file; GDAL's and most viewers' sweet spot. [px]
@@ -97,6 +99,7 @@ class RasterFile(ExitStack):
         except RasterioError:
             self.close()
             raise InputError(f"{self.path}: is not a raster file GDAL can read.") from None
+        note(self.path)
         self.width, self.height, self.bands = int(file.width), int(file.height), int(file.count)
         self.dtype = np.dtype(file.dtypes[0])
         self.names = tuple(name or "" for name in file.descriptions)
@@ -283,7 +286,7 @@ def create_geotiff(
         try:
             with written_whole(temporary, width=width, height=height, bands=bands):
                 with _opened(temporary, "w", **options) as file:
-                    file.update_tags(**(tags or {}))
+                    file.update_tags(**_provenance_tags(), **(tags or {}))
                     for number, name in enumerate(names, start=1):
                         file.set_band_description(number, name)
                     yield RasterWriter(file)
@@ -294,6 +297,17 @@ def create_geotiff(
         finally:
             for extra in (".ovr", ".msk", ".aux.xml"):
                 temporary.with_name(temporary.name + extra).unlink(missing_ok=True)
+
+
+def _provenance_tags() -> dict[str, str]:
+    """Return program, date, command and inputs as metadata of a raster."""
+    made = provenance()
+    tags = {"TIFFTAG_SOFTWARE": made.program, "BIFOCAL_DATE": made.date}
+    if made.command:
+        tags["BIFOCAL_COMMAND"] = made.command
+    if made.inputs:
+        tags["BIFOCAL_SOURCES"] = json.dumps(made.to_dict()["inputs"], ensure_ascii=False)
+    return tags
 
 
 def _add_overviews(path: Path, side: int, *, categories: bool) -> None:

@@ -8,6 +8,7 @@ from errno import ENAMETOOLONG
 from pathlib import Path
 
 from photocore.errors import InputError
+from photocore.provenance import note
 
 
 def check_name(path: Path) -> None:
@@ -58,6 +59,7 @@ def readable(path: Path, what: str, *, missing: str = "file") -> Iterator[None]:
             raise InputError(f"{path}: is a folder, expected a {what}.")
         if path.exists() and not path.is_file():  # reading it may wait for ever
             raise InputError(f"{path}: is a pipe or a device; save what it gives as a file first.")
+        note(path)
         yield
     except FileNotFoundError:
         raise InputError(f"{path}: no such {missing}.") from None

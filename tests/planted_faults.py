@@ -81,7 +81,7 @@ _GROUPS: tuple[tuple[str, str, tuple[tuple[str, str], ...]], ...] = (
     ),
     (
         "bifocal/model/homography.py",
-        "tests/bifocal/model/test_pair.py",
+        "tests/bifocal/model/test_homography.py",
         (("matrix[None, :2, :2] - mapped", "matrix[None, :2, :2] + mapped"),),
     ),
     (
@@ -188,7 +188,7 @@ _GROUPS: tuple[tuple[str, str, tuple[tuple[str, str], ...]], ...] = (
         (("level = mean - slope * self.mean", "level = mean + slope * self.mean"),),
     ),
     (
-        "bifocal/relief_maps/smoothing.py",
+        "photocore/shrinkage.py",
         "tests/bifocal/relief_maps/test_dense_relief.py",
         (("np.maximum(spread - 1 / total, 0)", "np.maximum(spread + 1 / total, 0)"),),
     ),

@@ -32,10 +32,12 @@ from bifocal.reports.workflow import ReportTask, write_report
 from bifocal.survey.output import write_result
 from photocore.cli import Progress, no_progress, unforeseen_message
 from photocore.errors import InputError, PhotogrammetryError
-from photocore.provenance import FileHashes
+from photocore.provenance import FileHashes, recording
 
 #: What may be wanted of a pair, in the order of work.
 PRODUCTS = ("relief", "points", "ortho", "drawing", "report")
+#: What is made where nothing else is said: the drawing has the orthophoto.
+MOST_PRODUCTS = ("relief", "points", "drawing", "report")
 #: Files of a pair besides its photos.
 FILES = ("control", "check", "lengths", "lens", "lens1", "lens2")
 #: Share of a pair's time that each step takes, measured on church_2.
@@ -67,6 +69,8 @@ class PairJob:
         Of `PRODUCTS`.
     overwrite : bool
         Replace files that were changed after they were made.
+    date : str
+        That its files bear, wherever and whenever they are made; empty: the day they are made.
     """
 
     name: str
@@ -75,8 +79,9 @@ class PairJob:
     near: Path
     files: Mapping[str, Path] = field(default_factory=dict)
     options: Mapping[str, Any] = field(default_factory=dict)
-    products: tuple[str, ...] = ("relief", "points", "drawing", "report")
+    products: tuple[str, ...] = MOST_PRODUCTS
     overwrite: bool = False
+    date: str = ""
 
     @property
     def title(self) -> str:
@@ -203,9 +208,10 @@ def run_pair(job: PairJob, progress: Progress = no_progress) -> PairOutcome:
             if record is not None and is_current(job.folder / step.name, record, key, hashes):
                 kept.append(step.name)
             else:
-                record = run_step(
-                    job.folder, step, key, hashes, progress=part, overwrite=job.overwrite
-                )
+                with recording(step.described(), day=job.date or None):
+                    record = run_step(
+                        job.folder, step, key, hashes, progress=part, overwrite=job.overwrite
+                    )
                 done.append(step.name)
             records[step.name] = record
             remarks += [f"{step.name}: {remark}" for remark in record.remarks]

@@ -19,6 +19,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from photocore import interrupts
 from photocore.cli import Progress
 from photocore.errors import InputError
 from photocore.jsonfile import to_text
@@ -53,6 +54,11 @@ class Step:
     after: tuple[str, ...] = ()
     options: Mapping[str, Any] = field(default_factory=dict)
     make: Callable[[Path, Progress], tuple[str, ...]]
+
+    def described(self) -> str:
+        """Return the step with its options in one line."""
+        said = to_text({key: self.options[key] for key in sorted(self.options)})
+        return f"bifocal survey, step {self.name}, options {said}"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -134,7 +140,9 @@ def run_step(
     start = time.perf_counter()
     with suppress(FileExistsError):
         parent.mkdir(parents=True)
-    place = Path(tempfile.mkdtemp(prefix=f".{step.name}{_WRITING}", dir=parent))
+    with interrupts.held():
+        place = Path(tempfile.mkdtemp(prefix=f".{step.name}{_WRITING}", dir=parent))
+        interrupts.temporary.add(place)
     place.chmod(0o777 & ~_umask())
     try:
         remarks = step.make(place, progress)
@@ -147,6 +155,7 @@ def run_step(
         _publish(place, folder, old)
     finally:
         shutil.rmtree(place, ignore_errors=True)
+        interrupts.temporary.discard(place)
     return record
 
 
@@ -222,6 +231,7 @@ def _write_record(place: Path, step: Step, record: StepRecord, hashes: FileHashe
     (place / RECORD).write_text(to_text(data, indent=1) + "\n", encoding="utf-8")
 
 
+@interrupts.held()
 def _publish(place: Path, folder: Path, old: StepRecord | None) -> None:
     """Put a finished folder in place of the old one; files the user added move over."""
     aside = folder.with_name(f".{folder.name}{_OLD}")

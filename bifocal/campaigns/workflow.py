@@ -7,18 +7,19 @@ import socket
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from bifocal.campaigns.pair_job import FILES, PRODUCTS, PairJob, PairOutcome, plan_of
+from bifocal.campaigns.pair_job import FILES, MOST_PRODUCTS, PRODUCTS, PairJob, PairOutcome, plan_of
 from bifocal.campaigns.photo_pairing import pair_photos, write_survey_file
 from bifocal.campaigns.step_store import clean
 from bifocal.campaigns.worker_pool import Listener, run_here
 from photocore.cli import Progress, no_progress
 from photocore.errors import InputError
+from photocore.interrupts import raising
 from photocore.output import check_writable
-from photocore.provenance import FileHashes
+from photocore.provenance import FileHashes, today
 
 #: File that says which process works in a folder.
 LOCK = ".survey.lock"
@@ -139,7 +140,8 @@ def run_survey(
     """
     start = time.perf_counter()
     listener = _Count(jobs, progress, tell)
-    with _locked([job.folder for job in jobs]):
+    jobs = [replace(job, date=job.date or today()) for job in jobs]
+    with raising(), _locked([job.folder for job in jobs]):
         for job in jobs:
             clean(job.folder)
         waiting = [job for job in jobs if not _kept(job, listener)]
@@ -304,7 +306,7 @@ def facade_job(
         near=near,
         files={role: path for role, path in said.items() if role in FILES},
         options={key: value for key, value in said.items() if key not in FILES},
-        **({"products": tuple(p for p in PRODUCTS if p in products)} if products else {}),
+        products=tuple(p for p in PRODUCTS if p in products) if products else MOST_PRODUCTS,
         overwrite=overwrite,
     )
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from photocore.cli import print_result, remark
-from photocore.options import FILE, FOCAL, Numbers, as_json, choice, number, overwrite
+from photocore.options import FILE, FOCAL, TABLE, Numbers, as_json, choice, number, overwrite
 
 if TYPE_CHECKING:
     from bifocal.orientation.alignment import Alignment
@@ -33,7 +33,7 @@ points.csv, one line per control point; r blank = on the wall; pixels in both ph
 @click.argument("far", type=FILE)
 @click.argument("near", type=FILE)
 @click.option("--out", type=FILE, required=True, help="Pair file to write (*.pair.json).")
-@click.option("--control", type=FILE, help="Table of control points: id, X, Y, r [m] and pixels.")
+@click.option("--control", type=TABLE, help="Table of control points: id, X, Y, r [m] and pixels.")
 @click.option(
     "--columns", metavar="MAP",
     help='Which column of --control is which: "id=A,X=East" or "id,X,Y,r,col1,row1,col2,row2" for '

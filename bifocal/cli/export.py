@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from photocore.cli import remark
-from photocore.options import FILE, NOT_NEGATIVE, choice, number, overwrite
+from photocore.options import NEW_TABLE, NOT_NEGATIVE, TABLE, choice, number, overwrite
 
 EXAMPLE = """\b
 Examples:
@@ -18,10 +18,11 @@ Examples:
 
 
 @click.command(epilog=EXAMPLE)
-@click.argument("result", type=FILE)
+@click.argument("result", type=TABLE)
 @click.option(
-    "--out", type=FILE, required=True,
-    help="File to write; its ending chooses the format: .dxf .ply .las .laz .csv .geojson .xlsx",
+    "--out", type=NEW_TABLE, required=True,
+    help="File to write; its ending chooses the format: .dxf .ply .las .laz .csv .geojson .xlsx; "
+    "- is a .csv on stdout",
 )  # fmt: skip
 @click.option("--world", is_flag=True, help="E, N, H instead of the wall's X, Y, relief [m].")
 @choice(

@@ -9,7 +9,7 @@ from typing import Any
 import click
 
 from photocore.cli import print_result, remark
-from photocore.options import FILE, NUMBER, as_json, choice, number, overwrite
+from photocore.options import FILE, NEW_TABLE, NUMBER, as_json, choice, number, overwrite
 
 EXAMPLE = """\b
 Examples:
@@ -26,7 +26,10 @@ Then:
 @click.command(epilog=EXAMPLE)
 @click.argument("pair", type=FILE)
 @click.option(
-    "--out", type=FILE, required=True, help="Survey workbook (.xlsx) or table (.csv) to write."
+    "--out",
+    type=NEW_TABLE,
+    required=True,
+    help="Survey workbook (.xlsx) or table (.csv) to write; - is a table on stdout.",
 )
 @click.option(
     "--count", type=click.IntRange(1, 100_000), default=4000, show_default=True,

@@ -130,13 +130,13 @@ def command(
     last band says where each pixel comes from (0 nothing, 1 and 2 the photos, 3 both, 4 filled,
     5 a photo on interpolated relief, 6 a photo on the plane).
     """
-    from bifocal.orthophotos.deliver_workflow import DeliverTask, deliver
+    from bifocal.orthophotos.deliver_workflow import DeliverTask, default_title, deliver
     from bifocal.orthophotos.ortho_image import OrthoOptions
     from bifocal.orthophotos.ortho_workflow import OrthoTask, make_ortho
     from bifocal.survey.pair_workflow import is_workbook, points_of, read_pair
 
-    if (out is None) == (folder is None):
-        raise click.UsageError("Give either --out FILE or --deliver DIR.")
+    if out is None and folder is None:
+        raise click.UsageError("Give --out FILE, --deliver DIR or both.")
     if folder is not None and scale is None:
         raise click.UsageError("--deliver needs the scale of the drawing, e.g. --scale 1:50.")
     if sum(choice is not None for choice in (relief, points, plane)) > 1:
@@ -165,10 +165,12 @@ def command(
     with progress_bar("orthophoto", quiet=as_json) as progress:
         if folder is not None and scale is not None:
             wish = DeliverTask(
-                scale=scale, dpi=dpi, title=title, paper=paper, marked=mark, control=control,
-                sections=sections, interval=contours,
+                scale=scale, dpi=dpi, title=title or default_title(source, pair), paper=paper,
+                marked=mark, control=control, sections=sections, interval=contours,
             )  # fmt: skip
-            done = deliver(source, folder, task, wish, overwrite=overwrite, progress=progress)
+            done = deliver(
+                source, folder, task, wish, out=out, overwrite=overwrite, progress=progress
+            )
             result = done.ortho
             files = {"folder": str(folder), "files": list(done.files), "sheet": done.sheet}
         else:

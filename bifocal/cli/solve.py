@@ -8,7 +8,7 @@ from typing import Any
 import click
 
 from photocore.cli import print_json, remark, text_table
-from photocore.options import FILE, FOCAL, as_json, choice, number, overwrite
+from photocore.options import FILE, FOCAL, NEW_TABLE, TABLE, as_json, choice, number, overwrite
 
 EXAMPLE = """\b
 Examples:
@@ -23,10 +23,10 @@ SHOWN = 40
 
 
 @click.command(epilog=EXAMPLE)
-@click.argument("survey", type=FILE, metavar="SURVEY...", nargs=-1, required=True)
+@click.argument("survey", type=TABLE, metavar="SURVEY...", nargs=-1, required=True)
 @click.option(
-    "--out", type=FILE, metavar="FILE",
-    help="Result: a workbook (.xlsx, .xlsm) or a text table (.csv).  [default: none]",
+    "--out", type=NEW_TABLE, metavar="FILE",
+    help="Result: a workbook (.xlsx, .xlsm), a text table (.csv), or - (stdout).  [default: none]",
 )  # fmt: skip
 @click.option(
     "--pair", type=FILE, metavar="PAIR.pair.json",
@@ -87,6 +87,7 @@ def command(
 
     SURVEY is a survey workbook, or any table (.xlsx, .xlsm, .ods, .csv) with the headings id and
     x1 y1 x2 y2, or s1 s2 theta, or col1 row1 col2 row2 (raw pixels, with --pair).
+    - is a table on stdin.
     Or give two lists of picks, of photo 1 and of photo 2 (.csv, .xlsx, .dxf), joined by the names
     of the points, with --pair: a pair file, or a survey workbook for its set-up.
     """

@@ -22,8 +22,10 @@ from bifocal.orientation.matching import MatchSettings
 from bifocal.orthophotos.deliver_workflow import DPI, DeliverTask, deliver
 from bifocal.orthophotos.ortho_workflow import OrthoTask, make_ortho
 from bifocal.relief_maps.workflow import ReliefJob, relief_of_pair
+from bifocal.survey.pair_workflow import read_pair
 from photocore.cli import Progress
 from photocore.errors import PhotogrammetryError
+from photocore.interrupts import end_on_signals
 from photocore.jsonfile import plain
 
 Task = Mapping[str, Any]
@@ -33,6 +35,7 @@ _OFTEN = 0.2
 
 def main() -> int:
     """Carry out the task that stdin holds; return 0, or 1 where it was refused."""
+    end_on_signals()
     task = json.loads(sys.stdin.read())
     out = sys.stdout
     sys.stdout = sys.stderr  # nothing but our lines on the pipe
@@ -81,7 +84,7 @@ def _align(task: Task, progress: Progress) -> dict[str, Any]:
 def _match(task: Task, progress: Progress) -> dict[str, Any]:
     progress(0.0, 1.0)
     settings = MatchSettings(count=task["count"], features=task["features"])
-    _, matches = match_pair_file(Path(task["pair"]), settings)
+    _, matches = match_pair_file(read_pair(task["pair"]), settings)
     return {
         "points": [
             {
@@ -106,7 +109,7 @@ def _relief(task: Task, progress: Progress) -> dict[str, Any]:
         quality=task["quality"],
         overwrite=task["overwrite"],
     )
-    summary, remarks = relief_of_pair(Path(task["pair"]), job, progress=progress)
+    summary, remarks = relief_of_pair(read_pair(task["pair"]), job, progress=progress)
     return {"summary": summary, "remarks": remarks}
 
 
@@ -126,7 +129,7 @@ def _ortho_task(task: Task) -> OrthoTask:
 
 def _ortho(task: Task, progress: Progress) -> dict[str, Any]:
     result = make_ortho(
-        Path(task["pair"]), Path(task["out"]), _ortho_task(task), overwrite=task["overwrite"],
+        read_pair(task["pair"]), Path(task["out"]), _ortho_task(task), overwrite=task["overwrite"],
         progress=progress,
     )  # fmt: skip
     return {"remarks": result.remarks}
@@ -142,7 +145,7 @@ def _deliver(task: Task, progress: Progress) -> dict[str, Any]:
         sections=task["sections"],
     )
     made = deliver(
-        Path(task["pair"]), Path(task["out"]), _ortho_task(task), wish,
+        read_pair(task["pair"]), Path(task["out"]), _ortho_task(task), wish,
         overwrite=task["overwrite"], progress=progress,
     )  # fmt: skip
     return {"files": made.files, "sheet": made.sheet, "remarks": made.ortho.remarks}

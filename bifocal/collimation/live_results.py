@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -13,11 +13,13 @@ from bifocal.model.flags import FlagLimits
 from bifocal.model.pair import Pair
 from bifocal.survey.observations import PointObservations
 from bifocal.survey.point_survey import solve_points
+from bifocal.survey.relief_table import ReliefTable
+from bifocal.survey.setup import SurveySetup
 from photocore.arrays import FloatArray
 from photocore.jsonfile import plain
 
 _KEYS = {"s1": "s1_used", "s2": "s2_used", "delta_s": "ds"} | {
-    key: key for key in ("e1", "e2", "r", "X", "Y", "Z", "sigma_r")
+    key: key for key in ("e1", "e2", "r", "X", "Y", "Z", "sigma_X", "sigma_Y", "sigma_r")
 }
 
 
@@ -47,13 +49,16 @@ class LiveResults:
         Precision of a pick; default the pair's own, else 0.5. [px]
     limits : FlagLimits
         Where the flags begin.
+    setup : SurveySetup or None
+        The ideal set-up of a workbook that is the pair itself; it is solved by radial distances.
     """
 
     pair: Pair
     sigma_px: float | None = None
     limits: FlagLimits = field(default_factory=FlagLimits)
-    _rows: dict[Picks, dict[str, Any]] = field(default_factory=dict)
-    _places: dict[Picks, tuple[FloatArray, FloatArray]] = field(default_factory=dict)
+    setup: SurveySetup | None = None
+    _rows: dict[Picks, dict[str, Any]] = field(default_factory=dict, init=False)
+    _places: dict[Picks, tuple[FloatArray, FloatArray]] = field(default_factory=dict, init=False)
 
     def solve(self, points: Iterable[PickedPoint]) -> None:
         """Solve all points whose picks are new, at once."""
@@ -61,23 +66,27 @@ class LiveResults:
                    .values())  # fmt: skip
         if not new:
             return
-        seen = observations(new)
-        table = solve_points(self.pair, seen, sigma_px=self.sigma_px, limits=self.limits)
-        places = self.pair.intersect(seen.pixels1, seen.pixels2, sigma_px=self.sigma_px)
+        table = self._solved(observations(new))
+        covariance = table.covariance
         for row, point in enumerate(new):
-            sigma = places.sigma[row]
             misfit = table.carried.get("misfit_px")
             self._rows[point.picks] = plain(
                 {key: float(table[column][row]) for key, column in _KEYS.items()}
                 | {
-                    "sigma_X": float(sigma[0]),
-                    "sigma_Y": float(sigma[1]),
                     "flag": table.flags[row],
                     "misfit_px": None if misfit is None else float(misfit[row]),
                     "uncertain_area": table.flags[row] in ("UNCERTAIN", "NADIR"),
                 }
             )
-            self._places[point.picks] = places.xyz[row], places.covariance[row]
+            if covariance is not None:
+                self._places[point.picks] = table.xyz[row], covariance[row]
+
+    def _solved(self, seen: PointObservations) -> ReliefTable:
+        if self.setup is None:
+            return solve_points(self.pair, seen, sigma_px=self.sigma_px, limits=self.limits)
+        typed = replace(seen, xy1=seen.pixels1, xy2=seen.pixels2)
+        measured = self.setup.in_millimetres(typed)
+        return solve_points(self.setup.pair(), measured, limits=self.limits)
 
     def row(self, point: PickedPoint) -> Mapping[str, Any] | None:
         """Return a point's results: lengths on the photos in mm, on the wall in m."""

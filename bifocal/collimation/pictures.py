@@ -124,6 +124,7 @@ class Pictures:
                 "sigma_px": found.sigma_px,
                 "misfit_px": found.misfit_px,
                 "kept": found.kept,
+                "others": [{"column": place[0], "row": place[1]} for place in found.others],
                 "line": self.line(image, pixel),
             }
         )

@@ -190,7 +190,7 @@ def accept_pair(proposed: Path, target: Path) -> None:
             name = f"{stem}.lens{number}.json"
             (proposed.parent / photo["lens"]).replace(target.parent / name)
             photo["lens"] = name
-    write_object(target, data, overwrite=True)
+    write_object(target, data, overwrite=True, as_is=True)
     Pair.read(target)
     proposed.unlink()
 

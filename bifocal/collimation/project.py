@@ -9,8 +9,9 @@ from pathlib import Path
 from typing import Any
 
 from bifocal.files.images import image_info
+from bifocal.survey.pair_workflow import is_survey, read_pair
 from bifocal.survey.workbook.reader import read_survey
-from photocore.errors import InputError
+from photocore.errors import InputError, PhotogrammetryError
 
 #: Endings of photos looked for in a folder.
 PHOTOS = frozenset({".jpg", ".jpeg", ".png", ".tif", ".tiff"})
@@ -30,7 +31,8 @@ class SurveyFiles:
     workbook, journal : Path
         The workbook may not exist yet.
     pair : Path or None
-        Pair file; None before the photos are oriented.
+        Pair file, or the workbook itself where its set-up names the photos; None before the photos
+        are oriented.
     photos : tuple of Path
         Far and near photo; empty before they are given.
     """
@@ -45,6 +47,11 @@ class SurveyFiles:
     def journal(self) -> Path:
         """The journal, beside the workbook."""
         return self.folder / f"{self.workbook.stem}{_JOURNAL}"
+
+    @property
+    def pair_is_workbook(self) -> bool:
+        """Whether the workbook's own set-up is the pair."""
+        return self.pair is not None and self.pair.resolve() == self.workbook.resolve()
 
     def beside(self, ending: str) -> Path:
         """Return the path of a result: the stem with an ending."""
@@ -105,9 +112,17 @@ def _of_photos(photos: tuple[Path, Path], workbook: Path | None) -> SurveyFiles:
     if photos[0].samefile(photos[1]):
         raise InputError(f"{photos[0]}: is given twice; give the far and the near photo.")
     book = _workbook(workbook or photos[0].parent / "survey.xlsx")
-    return _remembered(
-        SurveyFiles(folder=book.parent, stem=book.stem, workbook=book, photos=photos)
-    )
+    files = SurveyFiles(folder=book.parent, stem=book.stem, workbook=book, photos=photos)
+    if workbook is not None and _names_photos(book) and last_opened(files.journal) is None:
+        pair = read_pair(book)
+        own = [pair.photo_file(1), pair.photo_file(2)]
+        if not all(a.samefile(b) for a, b in zip(own, photos, strict=True)):
+            raise InputError(
+                f"{book}: its photos (photo_1, photo_2) are {own[0].name} and {own[1].name}, not "
+                f"{photos[0].name} and {photos[1].name}; give the workbook alone, or another one."
+            )
+        return replace(files, pair=book)
+    return _remembered(files)
 
 
 def _of_workbook(workbook: Path) -> SurveyFiles:
@@ -115,12 +130,17 @@ def _of_workbook(workbook: Path) -> SurveyFiles:
     files = _remembered(SurveyFiles(folder=book.parent, stem=book.stem, workbook=book))
     if files.pair is not None or files.photos:
         return files
+    if not book.is_file():
+        raise InputError(f"{workbook}: no such file.")
+    if is_survey(book):
+        return replace(files, pair=book)
     named = read_survey(book).setup.pair_file
     if not named:
         raise InputError(
-            f"{workbook}: names no pair file in its sheet Setup (pair_file), so the page cannot "
-            f"tell its photos. Start it with the pair: bifocal pick PAIR.pair.json --workbook "
-            f"{workbook.name}"
+            f"{workbook}: names neither photos (photo_1, photo_2, beside d_1 and d_2) nor a pair "
+            "file (pair_file) in its sheet Setup, so the page cannot tell its photos. Type the "
+            "names of the photos there, or start the page with the pair: bifocal pick "
+            f"PAIR.pair.json --workbook {workbook.name}"
         )
     pair = book.parent / named
     if not pair.is_file():
@@ -145,10 +165,26 @@ def _of_folder(folder: Path, workbook: Path | None) -> SurveyFiles:
         return _remembered(SurveyFiles(folder=folder, stem=stem, workbook=book))
     if pairs:
         return _of_pair(pairs[0], workbook)
+    books = [path for path in names if _names_photos(path)] if workbook is None else []
+    if len(books) > 1:
+        shown = ", ".join(path.name for path in books[:5])
+        raise InputError(f"{folder}: holds {len(books)} survey workbooks ({shown}); name one.")
+    if books:
+        return _of_workbook(books[0])
     if len(photos) == 2:
         return _of_photos((photos[0], photos[1]), workbook)
     book = _workbook(workbook or folder / "survey.xlsx")
     return SurveyFiles(folder=book.parent, stem=book.stem, workbook=book)
+
+
+def _names_photos(path: Path) -> bool:
+    """Whether a file is a workbook whose set-up names its photos."""
+    if path.suffix.lower() not in (".xlsx", ".xlsm") or path.name.startswith("~$"):
+        return False
+    try:
+        return path.is_file() and is_survey(path)
+    except PhotogrammetryError:  # somebody's workbook that is no survey
+        return False
 
 
 def _workbook(path: Path) -> Path:

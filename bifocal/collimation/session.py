@@ -22,6 +22,7 @@ from bifocal.collimation.products import Products, accept_pair
 from bifocal.collimation.project import SurveyFiles
 from bifocal.collimation.records import Change, PickedPoint, SurveyState
 from bifocal.collimation.workbook_rows import PointRow, row_of
+from bifocal.collimation.workbook_setup import ideal_setup, pair_of
 from bifocal.collimation.workbook_sync import WorkbookSync
 from bifocal.model.flags import FlagLimits
 from bifocal.model.pair import Pair
@@ -63,10 +64,10 @@ class Session:
         self.state = SurveyState()
         self.journal = Journal(files.journal)
         try:
-            pair = Pair.read(files.pair) if files.pair is not None else None
+            pair = pair_of(files)
             photos = files.photos if pair is None else (pair.photo_file(1), pair.photo_file(2))
             self.pictures = Pictures(files.folder / f".{files.stem}.tiles", photos, pair)
-            self.results = None if pair is None else LiveResults(pair)
+            self.results = None if pair is None else self._results(pair)
             self.products = Products(files)
             self.jobs = JobRunner(self.lock, self.tell, self.changed)
             self.sync = WorkbookSync(self)
@@ -128,7 +129,7 @@ class Session:
         if path is not None:
             pair = Pair.read(path)
             self.pictures.show_pair(pair)
-            self.results = LiveResults(pair)
+            self.results = self._results(pair)
 
     @property
     def proposed_path(self) -> Path | None:
@@ -142,6 +143,30 @@ class Session:
     def accepted_pair(self) -> Pair | None:
         """The orientation that the workbook is written for; None before one is accepted."""
         return None if self.proposed_path is not None else self.pictures.pair
+
+    def _results(self, pair: Pair) -> LiveResults:
+        """Return results of points with a pair, as `bifocal solve` will find them."""
+        return LiveResults(pair, setup=ideal_setup(self.files, pair))
+
+    def follow_workbook(self) -> None:
+        """Take over the orientation of a workbook that is the pair itself, where it changed.
+
+        Raises
+        ------
+        InputError, GeometryError
+            If its set-up cannot be used any more.
+        """
+        if not self.files.pair_is_workbook or self.proposal is not None:
+            return
+        pair = pair_of(self.files)
+        known = self.pictures.pair
+        if pair is None or (known is not None and _typed(pair) == _typed(known)):
+            return
+        photos = [pair.photo_file(1), pair.photo_file(2)]
+        if photos != [info.path for info in self.pictures.infos]:
+            self.pictures.show_photos(photos)
+        self.pictures.show_pair(pair)
+        self.results = self._results(pair)
 
     def _accept(self) -> None:
         """Make the proposed orientation the survey's own pair file."""
@@ -157,7 +182,7 @@ class Session:
         self._remember_files()
         pair = Pair.read(target)
         self.pictures.show_pair(pair)
-        self.results = LiveResults(pair)
+        self.results = self._results(pair)
         if self.sync.read is not None:
             self.set_precision(self.sync.read.sigma_px, self.sync.read.limits)
 
@@ -330,7 +355,7 @@ class Session:
         """Let the results follow the precision and limits of the workbook."""
         known = self.results
         if known is not None and (known.sigma_px, known.limits) != (sigma_px, limits):
-            self.results = LiveResults(known.pair, sigma_px, limits)
+            self.results = replace(known, sigma_px=sigma_px, limits=limits)
 
     def _write(self, record: Mapping[str, Any]) -> None:
         stamp = datetime.now(UTC).isoformat(timespec="milliseconds")
@@ -403,6 +428,17 @@ class Session:
                 raise InputError(f"point {name} is not picked in both photos yet.")
             places.append(place)
         return measure(places)
+
+
+def _typed(pair: Pair) -> list[object]:
+    """Return what a workbook says of its pair, for comparison."""
+    return [
+        [
+            *(photo.file, photo.plane_from_pixel.tolist(), list(photo.nadir)),
+            *(photo.distance, photo.principal_distance, photo.sigma_pixel),
+        ]
+        for photo in (pair.image1, pair.image2)
+    ]
 
 
 def _rows_of(record: Mapping[str, Any]) -> tuple[dict[str, PointRow], list[str]]:

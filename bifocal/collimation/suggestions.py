@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import cv2
 import numpy as np
@@ -37,6 +38,8 @@ KEPT = 0.5
 BETTER_BESIDE = 0.05
 #: Nearby: beyond the match's own peak, within reach of a step. [px]
 PEAK, BESIDE = 2.0, 30.0
+#: Places nearer to each other are one. [px]
+APART = 3.0
 #: A place far off the wall has to correlate better: by this much per near distance.
 OFF_WALL = 0.2
 #: Best precision of a match; neighbouring samples are not independent. [px]
@@ -61,6 +64,10 @@ class Suggestion:
         How far off the line it fits best. [px]
     kept : bool
         Whether it is good enough to be taken.
+    others : tuple of ndarray, shape (2,)
+        Where it is not: other places on the line that part of the window takes for as good. On the
+        sample pair, and on the church never tuned on, one of them is right for 2 of 3 suggestions
+        that are wrong and not kept. [px]
     """
 
     pixel: FloatArray
@@ -69,6 +76,7 @@ class Suggestion:
     sigma_px: float
     misfit_px: float
     kept: bool
+    others: tuple[FloatArray, ...] = ()
 
 
 def radial_line(
@@ -157,44 +165,109 @@ def suggest(
     low, high = relief_range or (FARTHEST * pair.d2, NEAREST * pair.d2)
     reliefs = _reliefs(pair, image, pixel, (low, high), other.shape)
     there = seen_in_other(pair, image, pixel, reliefs)
-    here = np.broadcast_to(pixel, there.shape)
-    local = _zooms(pair, image, here, there, reliefs)
-    scale = float(np.median(np.sqrt(np.abs(np.linalg.det(local)))))
-    reach = (HALF + 3) * max(1.0, 1.0 / scale) + 4
-    first, corner1 = _crop(own, pixel[None], reach)
-    second, corner2 = _crop(other, there, reach * max(1.0, scale) * 1.5)
-    smooth = same_scale(first, second, local)
-    correlation, *halves = _correlation(smooth, pixel - corner1, there - corner2, local)
+    search = _Search.along(pair, (own, other), image, pixel, reliefs, there)
+    correlation, *halves = search.correlation()
     if not np.isfinite(correlation).any():
         raise InputError("too near to the rim of a photo for a suggestion; pick it by hand.")
     judged = correlation - OFF_WALL * np.abs(reliefs) / pair.d2
     best = int(np.nanargmax(judged))
-    apart = np.linalg.norm(there - there[best], axis=1) > HALF * max(1.0, scale) / 2
+    apart = np.linalg.norm(there - there[best], axis=1) > search.radius / 2
     second_best = float(np.nanmax(np.where(apart, judged, -1.0))) if apart.any() else -1.0
-    row = slice(best, best + 1)
-    along = _directions(pair, image, here[row], reliefs[row])
-    result, misfit, across = _refined(
-        smooth, pixel - corner1, there[row] - corner2, local[row], along
-    )
-    moved = result.pixels2[0] + corner2
-    score = float(result.zncc[0])
-    sigma = float(np.hypot(OPTIMISM * result.sigma[0], _BEST))
+    match = search.match(best)
     clear = float(np.clip((judged[best] - second_best) / CLEAR, 0.0, 1.0))
-    agreement = float(np.clip((score - 0.5) / 0.5, 0.0, 1.0))
-    fits = bool(result.converged[0]) and abs(misfit) < 2.0 and sigma < 0.5
-    quality = agreement * (0.3 + 0.7 * clear) * (1.0 if fits else 0.3)
+    agreement = float(np.clip((match.score - 0.5) / 0.5, 0.0, 1.0))
+    quality = agreement * (0.3 + 0.7 * clear) * (1.0 if match.fits else 0.3)
+    away = np.linalg.norm(there - match.pixel, axis=1)
+    kept = match.fits and match.score > LEAST_AGREEMENT and quality >= KEPT
+    kept = kept and _one_surface(halves, away)
     return Suggestion(
-        # As `bifocal match` does: the misfit stays in the point, for the survey to judge.
-        pixel=moved + (across * misfit if fits else 0.0),
-        score=score,
+        pixel=match.pixel,
+        score=match.score,
         quality=quality,
-        sigma_px=sigma,
-        misfit_px=misfit,
-        kept=fits
-        and score > LEAST_AGREEMENT
-        and quality >= KEPT
-        and _one_surface(halves, np.linalg.norm(there - moved, axis=1)),
+        sigma_px=match.sigma_px,
+        misfit_px=match.misfit_px,
+        kept=kept,
+        others=() if kept else _others(search, [judged, *halves], match.pixel),
     )
+
+
+class _Match(NamedTuple):
+    """A place on the line after least squares."""
+
+    pixel: FloatArray
+    score: float
+    sigma_px: float
+    misfit_px: float
+    fits: bool
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Search:
+    """Places on the line of a pick, and both photos around them, equally sharp."""
+
+    pair: Pair
+    image: int
+    pixel: FloatArray
+    reliefs: FloatArray
+    there: FloatArray
+    local: FloatArray
+    smooth: tuple[Float32Array, Float32Array]
+    corners: tuple[FloatArray, FloatArray]
+    radius: float
+
+    @classmethod
+    def along(
+        cls, pair: Pair, images: tuple[ByteArray, ByteArray], image: int, pixel: FloatArray,
+        reliefs: FloatArray, there: FloatArray,
+    ) -> _Search:  # fmt: skip
+        """Return the search among places of these reliefs."""
+        local = _zooms(pair, image, np.broadcast_to(pixel, there.shape), there, reliefs)
+        scale = float(np.median(np.sqrt(np.abs(np.linalg.det(local)))))
+        reach = (HALF + 3) * max(1.0, 1.0 / scale) + 4
+        first, corner1 = _crop(images[0], pixel[None], reach)
+        second, corner2 = _crop(images[1], there, reach * max(1.0, scale) * 1.5)
+        return cls(
+            pair=pair, image=image, pixel=pixel, reliefs=reliefs, there=there, local=local,
+            smooth=same_scale(first, second, local), corners=(corner1, corner2),
+            radius=HALF * max(1.0, scale),
+        )  # fmt: skip
+
+    def correlation(self) -> FloatArray:
+        """Return the correlations of `_correlation`, shape (5, n)."""
+        corner1, corner2 = self.corners
+        return _correlation(self.smooth, self.pixel - corner1, self.there - corner2, self.local)
+
+    def match(self, index: int) -> _Match:
+        """Return the place of an index, moved to where it fits best."""
+        row, (corner1, corner2) = slice(index, index + 1), self.corners
+        along = _directions(self.pair, self.image, self.pixel[None], self.reliefs[row])
+        result, misfit, across = _refined(
+            self.smooth, self.pixel - corner1, self.there[row] - corner2, self.local[row], along
+        )
+        sigma = float(np.hypot(OPTIMISM * result.sigma[0], _BEST))
+        fits = bool(result.converged[0]) and abs(misfit) < 2.0 and sigma < 0.5
+        # As `bifocal match` does: the misfit stays in the point, for the survey to judge.
+        pixel = result.pixels2[0] + corner2 + (across * misfit if fits else 0.0)
+        return _Match(pixel, float(result.zncc[0]), sigma, misfit, fits)
+
+
+def _others(search: _Search, curves: list[FloatArray], pixel: FloatArray) -> tuple[FloatArray, ...]:
+    """Return other places that whole or half windows take for as good as the match, best first."""
+    offers, taken = list[tuple[float, FloatArray]](), [pixel]
+    for curve in curves:
+        away = np.linalg.norm(search.there - pixel, axis=1)
+        near = np.max(curve, where=(away < PEAK) & np.isfinite(curve), initial=-1.0)
+        free = (away > APART) & np.isfinite(curve)
+        if not free.any():
+            continue
+        index = int(np.argmax(np.where(free, curve, -1.0)))
+        if curve[index] < max(near - BETTER_BESIDE, LEAST_AGREEMENT):
+            continue
+        match = search.match(index)
+        if match.fits and min(np.linalg.norm(match.pixel - one) for one in taken) > APART:
+            taken.append(match.pixel)
+            offers.append((match.score, match.pixel))
+    return tuple(place for _, place in sorted(offers, key=lambda offer: -offer[0]))
 
 
 def _one_surface(halves: list[FloatArray], away: FloatArray) -> bool:

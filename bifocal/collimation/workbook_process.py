@@ -12,7 +12,7 @@ from typing import Any
 
 from bifocal.collimation.records import PickedPoint
 from bifocal.collimation.workbook_rows import change_rows, read_rows
-from bifocal.model.pair import Pair
+from bifocal.survey.pair_workflow import read_pair
 from photocore.errors import InputError, PhotogrammetryError
 
 #: From so many points on a process of its own pays.
@@ -57,7 +57,7 @@ def main() -> int:
     try:
         points = [_point(entry) for entry in task["points"]]
         change_rows(
-            path, read_rows(path), points, Pair.read(pair_path), pair_path, keep=task["keep"]
+            path, read_rows(path), points, read_pair(pair_path), pair_path, keep=task["keep"]
         )
     except (PhotogrammetryError, OSError) as error:
         sys.stdout.write(json.dumps({"error": str(error)}))

@@ -14,9 +14,11 @@ import numpy as np
 
 from bifocal.collimation.live_results import observations
 from bifocal.collimation.records import Known, PickedPoint, Picks, Pixel
+from bifocal.collimation.workbook_setup import typed_setup
 from bifocal.model.flags import FlagLimits
 from bifocal.model.pair import Pair
 from bifocal.survey.output import as_typed, result_content
+from bifocal.survey.pair_workflow import is_survey
 from bifocal.survey.template_workflow import write_survey
 from bifocal.survey.workbook.content import SurveyContent, name_cell, setup_cells
 from bifocal.survey.workbook.reader import SurveyInput, read_survey
@@ -32,7 +34,9 @@ from photocore.workbook.grid import TableArea, split_cell
 #: Rows added at once where the prepared ones are used up.
 MORE_ROWS = 50
 #: What is typed of a point, and of a check point.
-_POINT = ("id", "col1", "row1", "col2", "row2", "use", "code", "note")
+_POINT = ("id", "use", "code", "note")
+#: Where its picks stand, (column, row) of both photos: for a pair file, and for an ideal set-up.
+_RAW, _IDEAL = ("col1", "row1", "col2", "row2"), ("x1", "y1", "x2", "y2")
 _REFERENCE = ("id", "use", "X_ref", "Y_ref", "Z_ref")
 #: Cells of the sheet Setup that hold the orientation.
 _TYPED = {
@@ -95,11 +99,14 @@ def read_rows(path: Path) -> ReadBook:
     """
     survey = read_survey(path)
     points = survey.points
-    if len(points) and not points.has_pixels.any() and "col1" not in survey.table.present:
+    in_pixels = "px" in (survey.unit or survey.setup.unit)
+    if points.is_cartesian.any() and not (in_pixels and is_survey(path)):
         raise InputError(
             f"{path.name}: its points are image coordinates of an ideal pair, the page picks raw "
             "pixels; give another workbook with --workbook."
         )
+    pixels1 = np.where(points.is_cartesian[:, None], points.xy1, points.pixels1)
+    pixels2 = np.where(points.is_cartesian[:, None], points.xy2, points.pixels2)
     # Relief measured beside the points is the user's own column; the page keeps the sheet Check.
     listed = len(survey.known_rows)
     known = {
@@ -108,10 +115,12 @@ def read_rows(path: Path) -> ReadBook:
     }
     rows = {}
     for index, name in enumerate(points.ids):
-        if not name:
+        # Points given by radial distances alone are the user's own: nothing of them was picked.
+        picks = (_pixel(pixels1[index]), _pixel(pixels2[index]))
+        if not name or (points.is_polar[index] and picks == (None, None)):
             continue
         rows[name] = PointRow(
-            (_pixel(points.pixels1[index]), _pixel(points.pixels2[index])),
+            picks,
             points.code[index],
             points.note[index],
             bool(points.use[index]),
@@ -178,7 +187,8 @@ def change_rows(
     before = digest_of(path)
     with _beside(path) as typed, _beside(path) as solved:
         editor = WorkbookEditor(path)
-        _edit(editor, read, points, pair, relative_name(pair_path, path.parent))
+        own = pair_path.resolve() == path.resolve()
+        _edit(editor, read, points, pair, None if own else relative_name(pair_path, path.parent))
         editor.save(typed, overwrite=True)
         ready = solved if _solved(typed, solved) else typed
         check_not_open(path)
@@ -228,10 +238,12 @@ def _edit(
     read: ReadBook,
     points: Sequence[PickedPoint],
     pair: Pair,
-    pair_file: str,
+    pair_file: str | None,
 ) -> None:
+    """Type points and orientation; ``pair_file`` None: the workbook's set-up is the pair."""
     area = editor.table("tblPoints")
-    if area is None or "col1" not in area.headings():
+    places = _IDEAL if pair_file is None and read.survey.setup.matrices is None else _RAW
+    if area is None or places[0] not in area.headings():
         raise InputError(
             f"{editor.path.name}: is no survey workbook for raw pixels; give another one with "
             "--workbook."
@@ -243,10 +255,14 @@ def _edit(
             f"{'with' if has_lens else 'without'} lens distortion, the orientation is "
             "not; give another workbook with --workbook."
         )
-    _set_up(editor, read, pair, pair_file)
-    wanted = {point.name: _point_cells(point) for point in points}
-    stands = dict(zip(read.survey.table.texts("id"), read.survey.table.rows, strict=True))
-    _table(editor, area, _POINT, wanted, stands, follower="tblResults")
+    if pair_file is not None:
+        _set_up(editor, read, pair, pair_file)
+    elif places is _IDEAL:
+        _type_names(editor, typed_setup(read.survey.setup, pair))
+    wanted = {point.name: _point_cells(point, places) for point in points}
+    lines = zip(read.survey.table.texts("id"), read.survey.table.rows, strict=True)
+    stands = {name: row for name, row in lines if name in read.rows or name in wanted}
+    _table(editor, area, (*_POINT, *places), wanted, stands, follower="tblResults")
     check = editor.table("tblCheck")
     if check is not None:
         ids = read.survey.known.ids[: len(read.survey.known_rows)]
@@ -259,10 +275,10 @@ def _edit(
         _table(editor, check, _REFERENCE, references, own)
 
 
-def _point_cells(point: PickedPoint) -> dict[str, CellValue]:
-    row, cells = row_of(point), dict[str, CellValue]()
-    for image, pick in enumerate(row.picks, start=1):
-        cells[f"col{image}"], cells[f"row{image}"] = pick or (None, None)
+def _point_cells(point: PickedPoint, places: Sequence[str]) -> dict[str, CellValue]:
+    row = row_of(point)
+    values = [value for pick in row.picks for value in pick or (None, None)]
+    cells: dict[str, CellValue] = dict(zip(places, values, strict=True))
     return {
         "id": name_cell(point.name),
         **cells,
@@ -336,10 +352,11 @@ def _set(
 def _set_up(editor: WorkbookEditor, read: ReadBook, pair: Pair, pair_file: str) -> None:
     """Type the orientation into the sheet Setup, where it is another one."""
     content = SurveyContent(pair=pair, pair_file=pair_file, sigma_px=read.sigma_px)
-    cells = {
-        name: value for name, value in setup_cells(content).items()
-        if name in _TYPED
-    }  # fmt: skip
+    _type_names(editor, {n: value for n, value in setup_cells(content).items() if n in _TYPED})
+
+
+def _type_names(editor: WorkbookEditor, cells: Mapping[str, CellValue]) -> None:
+    """Type values into named cells, where others stand."""
     names = {key.casefold(): place for key, place in editor.book.names.items()}
     for name, value in cells.items():
         place = names.get(name.casefold(), "")

@@ -46,6 +46,9 @@ class Survey(Protocol):
     def take_rows(self, rows: Mapping[str, PointRow], gone: Sequence[str]) -> None:
         """Take over points that were changed in the workbook by others."""
 
+    def follow_workbook(self) -> None:
+        """Take over the orientation of a workbook that is the pair itself, where it changed."""
+
     def note_saved(self, digest: str, revision: int) -> None:
         """Remember that the workbook holds the survey as of a revision."""
 
@@ -131,6 +134,7 @@ class WorkbookSync:
         read = read_rows(path)
         with survey.lock:
             rows, gone = self._foreign(read.rows)
+            survey.follow_workbook()
             self.read, self.seen = read, digest
             survey.set_precision(read.sigma_px, read.limits)
             if rows or gone:
@@ -185,6 +189,8 @@ class WorkbookSync:
                 change_rows(path, self.read, points, pair, pair_path, keep=keep)
             else:
                 change_in_process(path, points, pair_path, keep=keep)
+        elif survey.files.pair_is_workbook:
+            raise InputError(f"{path.name}: is not there any more; it holds the set-up.")
         else:
             if not any(point.is_complete for point in points):
                 return

@@ -19,6 +19,7 @@ from bifocal.collimation.project import find_files
 from bifocal.collimation.server import application
 from bifocal.collimation.session import Session
 from photocore.errors import InputError, PhotogrammetryError
+from photocore.interrupts import raising
 
 HOST = "127.0.0.1"
 #: After the first paint, from kept tiles, the photos are read for suggestion and snap. [s]
@@ -82,7 +83,7 @@ def page_server(
     warm = threading.Timer(WARM_UP, _warm_up, [session])
     warm.daemon = True
     try:
-        with _listening(port, access.port) as listening:
+        with raising(), _listening(port, access.port) as listening:
             number = listening.getsockname()[1]
             config = uvicorn.Config(
                 application(session, access.token), log_level="critical", access_log=False,

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from photocore.arrays import FloatArray
-from photocore.provenance import program, today
+from photocore.provenance import provenance
 
 
 def new_drawing(
@@ -41,9 +41,14 @@ def new_drawing(
 
 
 def save_drawing(drawing: Any, path: Path) -> None:
-    """Write a drawing with program and date among its properties, else the same every time."""
-    for name, value in (("Program", program()), ("Date", today())):
-        drawing.header.custom_vars.append(name, value)
+    """Write a drawing with its provenance among its properties, else the same every time."""
+    made = provenance()
+    known = [("Program", made.program), ("Date", made.date), ("Command", made.command)]
+    known += [(f"Input {name}", f"SHA-256 {digest}") for name, digest in made.inputs]
+    for name, value in known:
+        if value:
+            # A line of a DXF ends at a line break, and has no more than 255 characters in R2010.
+            drawing.header.custom_vars.append(name[:255], " ".join(value.split())[:255])
     with _reproducible():
         drawing.saveas(path)
 
@@ -61,11 +66,19 @@ def _reproducible() -> Iterator[None]:
         ezdxf.options.write_fixed_meta_data_for_testing = before
 
 
-def add_text(model: Any, text: str, place: tuple[float, ...], height: float, layer: str) -> None:
-    """Write a text of one line; ``place`` is its lower left corner. [m]"""
-    model.add_text(
-        text.replace("\n", " "), height=height, dxfattribs={"layer": layer, "insert": place}
-    )
+def add_text(model: Any, text: str, place: tuple[float, ...], height: float, layer: str) -> Any:
+    """Write a text of one line and return it; ``place`` is its lower left corner. [m]"""
+    style = {"layer": layer, "insert": place}
+    return model.add_text(text.replace("\n", " "), height=height, dxfattribs=style)
+
+
+def turned(text: Any, angle: float, *, middle: bool) -> None:
+    """Turn a text about its place, counter-clockwise [deg], and centre it there if asked."""
+    from ezdxf.enums import TextEntityAlignment
+
+    text.dxf.rotation = angle
+    if middle:
+        text.set_placement(text.dxf.insert, align=TextEntityAlignment.CENTER)
 
 
 def add_ellipse(model: Any, place: tuple[float, ...], ellipse: FloatArray, layer: str) -> None:

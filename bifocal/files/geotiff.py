@@ -16,9 +16,9 @@ from numpy.typing import DTypeLike
 
 from bifocal.model.grid import Grid
 from bifocal.model.relief_map import Quality, ReliefMap
+from photocore.arrays import Float32Array
 from photocore.errors import InputError
 from photocore.output import all_or_none, atomic_path, check_all_writable
-from photocore.provenance import program, today
 from photocore.raster import BLOCK, RasterFile, RasterWriter, corner_transform, create_geotiff
 
 #: Name of the local system every raster is in.
@@ -60,6 +60,18 @@ class RasterReader(RasterFile):
         except InputError as error:
             self.close()
             raise InputError(f"{self.path}: {error}") from None
+
+    def nearest(self, grid: Grid, *, bands: Sequence[int]) -> Float32Array:
+        """Return bands at a grid's pixels, each from the nearest pixel, shape (h, w, bands).
+
+        0 beyond the raster's edges.
+        """
+        import cv2
+
+        window, columns, rows = grid.resampling(self.grid, 1)
+        patch = np.asarray(self.read(*window, bands=list(bands)), np.float32)
+        found = cv2.remap(patch, columns, rows, cv2.INTER_NEAREST)
+        return np.asarray(found.reshape(*grid.shape, len(bands)), np.float32)
 
 
 @contextmanager
@@ -103,7 +115,7 @@ def create_raster(
     world = path.with_suffix(".tfw")
     check_all_writable(path, world if world_file else None, overwrite=overwrite)
     _check_space(path, grid, bands * np.dtype(dtype).itemsize)
-    known = {"TIFFTAG_SOFTWARE": program(), "BIFOCAL_DATE": today(), **(tags or {})}
+    known = dict(tags or {})
     if dpi is not None:
         known |= {f"TIFFTAG_{axis}RESOLUTION": f"{dpi:.10g}" for axis in "XY"}
         known["TIFFTAG_RESOLUTIONUNIT"] = "2"
@@ -209,12 +221,18 @@ def _check_space(path: Path, grid: Grid, bytes_per_pixel: int) -> None:
     free = shutil.disk_usage(path.parent).free
     if needed > free:
         raise InputError(
-            f"{path}: {grid.width} x {grid.height} px need more than {_size(needed)} and "
-            f"{_size(free)} are free. Choose another disk, a coarser --gsd or --bounds."
+            f"{path}: {grid.width} x {grid.height} px need more than {bytes_in_words(needed)} and "
+            f"{bytes_in_words(free)} are free. Choose another disk, a coarser --gsd or --bounds."
         )
 
 
-def _size(count: float) -> str:
-    """Return a number of bytes in words."""
+def bytes_in_words(count: float) -> str:
+    """Return a number of bytes in words.
+
+    Examples
+    --------
+    >>> bytes_in_words(18), bytes_in_words(6_300_000)
+    ('18 bytes', '6.3 MB')
+    """
     power = min(int(np.log10(float(max(count, 1)))) // 3, 3)
     return f"{count / 1000**power:.4g} {('bytes', 'kB', 'MB', 'GB')[power]}"

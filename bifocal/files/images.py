@@ -21,6 +21,7 @@ from bifocal.model.image import as_photo
 from photocore.arrays import ByteArray
 from photocore.errors import InputError
 from photocore.output import atomic_path, check_ending
+from photocore.provenance import note
 from photocore.raster import RasterFile
 from photocore.textfile import check_name
 
@@ -99,6 +100,7 @@ def image_info(path: Path | str) -> ImageInfo:
     """
     path = Path(path)
     _refuse_early(path)
+    note(path)
     if path.suffix.lower() in {".tif", ".tiff"}:
         return _tiff_info(path)
     from PIL import Image, UnidentifiedImageError

@@ -171,9 +171,9 @@ def pair_equations(observations: PairObservations, state: PairUnknowns) -> Equat
 
 def wall_equations(observations: PairObservations, state: PairUnknowns) -> Equations:
     """Return what the wall's ties tell of the reference plane: height and slopes, in sigma."""
-    wall = observations.wall
-    values, by = _transfer(observations, state, wall)
-    rows = observations.wall_rows[:, wall]
+    asked = observations.wall_rows.any(axis=0) & observations.tie_used
+    values, by = _transfer(observations, state, asked)
+    rows = observations.wall_rows[:, asked]
     return rows @ values, rows @ by
 
 

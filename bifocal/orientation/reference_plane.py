@@ -31,6 +31,8 @@ FAIR, FITS = 0.25, 2.0
 ONE_SCALE = 0.02
 #: Faces nearer than this many bands are one face, unevenly built.
 APART = 3.0
+#: Shallow relief scatters by at least so many times the wall's own roughness.
+WIDER = 2.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -226,13 +228,18 @@ class NarrowFace:
         z = a + b X + c Y. [m, -, -]
     roughness : float
         Standard deviation of the face's own unevenness. [m]
-    members : ndarray of bool, shape (n,)
-        Points that are more likely of the face than of anything else.
+    chance : ndarray, shape (n,)
+        Each point's probability of being of the face.
     """
 
     plane: FloatArray
     roughness: float
-    members: BoolArray
+    chance: FloatArray
+
+    @property
+    def members(self) -> BoolArray:
+        """Points that are more likely of the face than of anything else."""
+        return self.chance > 0.5
 
 
 def narrow_face(xyz: FloatArray, sigma: FloatArray, *, band: float) -> NarrowFace:
@@ -250,15 +257,19 @@ def narrow_face(xyz: FloatArray, sigma: FloatArray, *, band: float) -> NarrowFac
     Notes
     -----
     Planes through three points compete by their truncated cost at four of each point's own sigma;
-    the best is refined by expectation-maximisation of a normal core of unknown roughness in a
-    uniform rest. A band of fixed width would average plinths and joints into the wall: 6.2 mm of
-    relief on a rendered façade, against 0.35 mm.
+    the best is refined by expectation-maximisation of a normal core of unknown roughness, of
+    shallow relief around it (none, one or two wider normals, in front of it or behind, as many as
+    the points call for by Schwarz's criterion) and of a uniform rest. A band of fixed width would
+    average plinths and joints into the wall: 6.2 mm of relief on a rendered façade, against
+    0.35 mm. A core without shallow relief swallows it: on a church whose ashlar is even to 4 mm,
+    with joints 15 mm behind and mouldings 50 mm in front, it came out 18 mm thick, 5 mm in front
+    and leaning by 0.2 degrees.
     """
     reach = np.maximum(band, 4 * sigma)
     near = np.abs(xyz[:, 2]) < reach
     lifted = np.column_stack([np.ones(len(xyz)), xyz[:, :2]])
     if near.sum() < 20:
-        return NarrowFace(np.zeros(3), 0.0, np.zeros(len(xyz), dtype=bool))
+        return NarrowFace(np.zeros(3), 0.0, np.zeros(len(xyz)))
     some, height, spread, reach = lifted[near], xyz[near, 2], sigma[near], reach[near]
     generator = np.random.default_rng(7)
     precise = np.argsort(spread)[: max(len(spread) // 2, 20)]
@@ -274,11 +285,14 @@ def narrow_face(xyz: FloatArray, sigma: FloatArray, *, band: float) -> NarrowFac
     for least in (0.01, 0.05):  # an even wall, a rough one: the likelier is it
         wide = 4 * np.maximum(spread[tested], least * band)
         start = planes[int(np.minimum((away / wide) ** 2, 1.0).sum(axis=1).argmin())]
-        cores.append(_core(some, height, spread, reach, start, least * band))
+        cores += [
+            _core(some, height, spread, reach, start, least * band, shallow=shallow)
+            for shallow in (0, 1, 2)
+        ]
     _, plane, roughness, chance = max(cores, key=lambda core: core[0])
-    members = np.zeros(len(xyz), dtype=bool)
-    members[np.flatnonzero(near)[chance > 0.5]] = True
-    return NarrowFace(plane, roughness, members)
+    everywhere = np.zeros(len(xyz))
+    everywhere[near] = chance
+    return NarrowFace(plane, roughness, everywhere)
 
 
 def _core(
@@ -288,24 +302,51 @@ def _core(
     reach: FloatArray,
     plane: FloatArray,
     roughness: float,
+    *,
+    shallow: int,
 ) -> tuple[float, FloatArray, float, FloatArray]:
-    """Return log-likelihood, plane, roughness and chances of a normal core in a uniform rest."""
-    share, least = 0.5, 0.2 * roughness
-    for _ in range(30):
+    """Return log-likelihood, plane, roughness and chances of a wall's own face.
+
+    Parameters
+    ----------
+    lifted : ndarray, shape (n, 3)
+        (1, X, Y). [-, m, m]
+    height, spread, reach : ndarray, shape (n,)
+        Heights, their standard deviations, and how far from Z = 0 a point was asked. [m]
+    plane : ndarray, shape (3,)
+        Start.
+    roughness : float
+        Start; a fifth of it is the least. [m]
+    shallow : int
+        How many wider normals of free offset stand for shallow relief. The three unknowns of each
+        cost 1.5 ln(n) of the likelihood (Schwarz's criterion).
+    """
+    least = 0.2 * roughness
+    shares = np.full(shallow + 2, 1 / (shallow + 2))
+    widths, offsets = roughness * 4.0 ** np.arange(shallow + 1), np.zeros(shallow + 1)
+    level = 1 / (2 * reach)[None]
+    for _ in range(50):
+        variance = widths[:, None] ** 2 + spread**2
+        away = height - lifted @ plane - offsets[:, None]
+        normal = np.exp(-0.5 * away**2 / variance) / np.sqrt(2 * np.pi * variance)
+        parts = shares[:, None] * np.concatenate([normal, level])
+        density = parts.sum(axis=0)
+        chance = parts / density
+        weight = chance[:-1] / variance
+        core = lifted * weight[0][:, None]
+        plane = np.linalg.solve(core.T @ lifted, core.T @ height)
         away = height - lifted @ plane
-        variance = roughness**2 + spread**2
-        core = share * np.exp(-0.5 * away**2 / variance) / np.sqrt(2 * np.pi * variance)
-        density = core + (1 - share) / (2 * reach)
-        chance = core / density
-        weight = chance / variance
-        plane = np.linalg.solve((lifted * weight[:, None]).T @ lifted, lifted.T @ (weight * height))
-        away = height - lifted @ plane
-        share = float(np.clip(chance.mean(), 0.02, 0.98))
-        # The core's variance beyond the points' own, each weighted by how much it tells of it.
-        tell = chance / variance**2
-        extra = (tell * (away**2 - spread**2)).sum() / max(tell.sum(), 1e-300)
-        roughness = float(np.sqrt(max(extra, least**2)))
-    return float(np.log(density).sum()), plane, roughness, chance
+        offsets[1:] = (weight[1:] @ away) / np.maximum(weight[1:].sum(axis=1), 1e-300)
+        shares = np.maximum(chance.mean(axis=1), [0.02, *[0.0] * shallow, 0.02])
+        shares /= shares.sum()
+        # A normal's variance beyond the points' own, each weighted by how much it tells of it.
+        tell = weight / variance
+        square = (away - offsets[:, None]) ** 2 - spread**2
+        extra = (tell * square).sum(axis=1) / np.maximum(tell.sum(axis=1), 1e-300)
+        widths[0] = np.sqrt(max(extra[0], least**2))
+        widths[1:] = np.sqrt(np.maximum(extra[1:], (WIDER * widths[0]) ** 2))
+    likelihood = float(np.log(density).sum()) - 1.5 * shallow * float(np.log(len(height)))
+    return likelihood, plane, float(widths[0]), chance[0]
 
 
 def is_one_scale(interiors: Interiors, site: SiteMeasures) -> bool:

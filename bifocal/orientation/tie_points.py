@@ -154,21 +154,24 @@ def with_wall(
     if known:
         rough = WALL_BAND * float(state.cameras[0].centre[2])
         on_wall = observations.wall & np.isfinite(xyz).all(axis=1) & np.isfinite(metres)
-        face = replace(face, roughness=rough, members=on_wall)
-    on = np.flatnonzero(face.members)
-    if len(on) < FEWEST_ON_WALL:
+        face = replace(face, roughness=rough, chance=on_wall.astype(float))
+    if face.members.sum() < FEWEST_ON_WALL:
         return replace(
             observations,
             wall=np.zeros_like(face.members),
             wall_rows=np.zeros((3, len(face.members))),
         )
-    middle = xyz[on, :2].mean(axis=0)
+    # All that may be of the wall, by its chance: members alone would be cut off unevenly where
+    # there is more shallow relief on one side.
+    on = np.flatnonzero(face.chance > 0)
+    middle = np.average(xyz[on, :2], axis=0, weights=face.chance[on])
     lifted = np.column_stack([np.ones(len(on)), xyz[on, :2]])
-    weight = 1.0 / (sigma[on] ** 2 + face.roughness**2)
+    weight = face.chance[on] / (sigma[on] ** 2 + face.roughness**2)
     inverse = np.linalg.inv((lifted * weight[:, None]).T @ lifted)
-    cell = np.floor(observations.tie1[on] / (0.1 * max(observations.interiors[0].image_size)))
+    seen = observations.tie1[face.members]
+    cell = np.floor(seen / (0.1 * max(observations.interiors[0].image_size)))
     independent = max(len(np.unique(cell, axis=0)) / 4.0, 3.0)
-    covariance = inverse * max(len(on) / independent, 1.0)
+    covariance = inverse * max(face.chance.sum() / independent, 1.0)
     # The height is that of the wall's middle; slopes act about it.
     slack = np.zeros((3, 3))
     slack[0, 0] = tolerance[0] ** 2
@@ -189,9 +192,9 @@ def _wall_of(
     known = observations.tie_used & np.isfinite(xyz).all(axis=1) & np.isfinite(metres)
     sigma = np.hypot(np.sqrt(2.0) * observations.sigma_tie * np.abs(metres), 1e-6)
     face = narrow_face(xyz[known], sigma[known], band=WALL_BAND * float(state.cameras[0].centre[2]))
-    members = np.zeros(len(xyz), dtype=bool)
-    members[known] = face.members
-    return xyz, metres, sigma, replace(face, members=members)
+    chance = np.zeros(len(xyz))
+    chance[known] = face.chance
+    return xyz, metres, sigma, replace(face, chance=chance)
 
 
 def wall_roughness(observations: PairObservations, state: PairUnknowns) -> float:

@@ -2,15 +2,22 @@
 
 from __future__ import annotations
 
+import shutil
 import unicodedata
 from collections.abc import Sequence
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
-from bifocal.files.geotiff import RasterReader, create_raster, dpi_at_scale, gsd_at_scale
+from bifocal.files.geotiff import (
+    RELIEF_BANDS,
+    RasterReader,
+    create_raster,
+    dpi_at_scale,
+    gsd_at_scale,
+)
 from bifocal.files.strips import write_png
 from bifocal.model.grid import Grid
 from bifocal.model.pair import Pair
@@ -18,9 +25,11 @@ from bifocal.model.points import SurveyPoints
 from bifocal.model.relief_map import Quality
 from bifocal.model.surface import FlatSurface, MapSurface, Surface
 from bifocal.orthophotos.compose import TILE
-from bifocal.orthophotos.drawing import Drawing, Legend, PrintSheet, round_step
-from bifocal.orthophotos.drawing_files import write_drawing, write_section_dxf, write_section_svg
+from bifocal.orthophotos.contour_lines import contour_grid, contours
+from bifocal.orthophotos.drawing import Contour, Drawing, Legend, PrintSheet, round_step
+from bifocal.orthophotos.drawing_files import write_drawing
 from bifocal.orthophotos.ortho_workflow import (
+    ORTHO_ENDING,
     OrthoTask,
     make_ortho,
     open_surface,
@@ -28,19 +37,20 @@ from bifocal.orthophotos.ortho_workflow import (
     survey_points_of,
 )
 from bifocal.orthophotos.pdf_sheet import write_sheet
-from bifocal.orthophotos.sections import contours, section
-from bifocal.orthophotos.shading import shaded, tints
+from bifocal.orthophotos.section_files import write_section_dxf, write_section_svg
+from bifocal.orthophotos.sections import section, section_letter
+from bifocal.orthophotos.shading import colour_limits, shaded, tints, unmeasured
 from bifocal.orthophotos.tiles import RasterResult
 from photocore.arrays import Float32Array, positive
 from photocore.cli import Progress, no_progress
 from photocore.errors import InputError
-from photocore.output import atomic_folder
+from photocore.output import atomic_folder, atomic_path, check_ending
 from photocore.provenance import program, today
 
 #: Print resolution for which 1:50 makes pixels of 5.00 mm. [dpi]
 DPI = 254.0
-#: Relief detail worth drawing, on paper. [mm]
-_CONTOUR_DETAIL = 0.4
+#: Names shorter than this say nothing as a title: the folder's is taken.
+_SHORT = 3
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -54,7 +64,7 @@ class DeliverTask:
     dpi : float
         Pixels per inch of paper.
     title : str
-        Empty: the name of the pair.
+        Empty: `default_title`.
     paper : str, optional
         ``A4`` to ``A0``; None: the smallest that holds the picture.
     marked, control : Path, optional
@@ -84,16 +94,35 @@ class Delivery:
     sheet: str
 
 
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Relief:
+    """A relief as it is drawn: all of it, what was measured, and its file where it has one."""
+
+    surface: Surface
+    measured: Surface
+    reader: RasterReader | None
+    interval: float
+    limits: tuple[float, float]
+    beyond: tuple[bool, bool]
+    lines: tuple[Contour, ...]
+
+
 def deliver(
     pair_path: Pair | Path,
     folder: Path,
     task: OrthoTask,
     wish: DeliverTask,
     *,
+    out: Path | None = None,
     overwrite: bool = False,
     progress: Progress = no_progress,
 ) -> Delivery:
     """Write orthophoto, relief, drawings, sections and print sheets into a folder.
+
+    Parameters
+    ----------
+    out : Path, optional
+        Where the orthophoto is wanted besides.
 
     Raises
     ------
@@ -104,46 +133,83 @@ def deliver(
     gsd = task.gsd or gsd_at_scale(positive(wish.dpi, "dpi"), scale)
     task = replace(task, gsd=gsd, scale=scale, overviews=True)
     pair = Pair.of(pair_path)
-    title = wish.title or str(pair.extra.get("name") or _name_of(pair_path))
+    title = wish.title or default_title(pair_path)
     name = file_name(title)
     points, remarks = _points(wish.marked or task.points)
     control, notes_on_control = _points(wish.control)
     remarks += notes_on_control
-    with open_surface(task, pair) as (surface, reader, _):
+    with ExitStack() as stack:
+        surface, reader, _ = stack.enter_context(open_surface(task, pair))
         # Everything that can be refused is, before the work.
         grid = planned_grid(pair, surface, task)
-        notes = _notes(pair, grid, wish, task)
         drawing = Drawing(
-            title=title, grid=grid, scale=scale, points=points, control=control, notes=notes
-        )
+            title=title, grid=grid, scale=scale, points=points, control=control,
+            notes=_notes(pair, grid, wish, task),
+        )  # fmt: skip
         sheet = PrintSheet.fitting(drawing, wish.paper)
-        cuts = tuple(section(surface, grid, cut, step=gsd) for cut in wish.sections)
-        drawing = replace(drawing, sections=cuts)
-        with atomic_folder(folder, overwrite=overwrite) as place:
-            result = make_ortho(
-                pair_path, place / f"{name}.tif", task, world_file=True, progress=progress
+        measured = _measured(reader) or surface
+        cuts = tuple(
+            section(surface, grid, cut, step=gsd, measured=measured, letter=section_letter(number))
+            for number, cut in enumerate(wish.sections)
+        )
+        if cuts:
+            named = f"sections {'; '.join(cut.title for cut in cuts)}"
+            drawing = replace(drawing, sections=cuts, notes=(*drawing.notes, named))
+        if out is not None:
+            check_ending(out, ORTHO_ENDING, ".tif", ".tiff")
+            copy = stack.enter_context(atomic_path(out, overwrite=overwrite))
+        place = stack.enter_context(atomic_folder(folder, overwrite=overwrite))
+        result = make_ortho(
+            pair_path, place / f"{name}.tif", task, world_file=True, progress=progress
+        )
+        relief = None
+        if not isinstance(surface, FlatSurface):
+            relief = _prepared((surface, measured), reader, drawing, wish)
+        nameless = _pictures(place, name, drawing, sheet, relief.lines if relief else ())
+        if nameless:
+            remarks += (
+                f"{nameless} marked points stand on the sheet without name, since names would "
+                "lie over each other; the drawing (.dxf) has them all.",
             )
-            nameless = _pictures(place, name, drawing, sheet)
-            if nameless:
+        if relief:
+            share = _draw_relief(place, f"{name}_relief", relief, drawing, sheet)
+            if share:
                 remarks += (
-                    f"{nameless} marked points stand on the sheet without name, since names would "
-                    "lie over each other; the drawing (.dxf) has them all.",
+                    f"relief sheet: {share:.1%} of it was not measured but interpolated or "
+                    "hidden; paler, hatched, and without contour lines.",
                 )
-            if not isinstance(surface, FlatSurface):
-                surfaces = (surface, _measured(reader) or surface)
-                share = _relief(place, f"{name}_relief", surfaces, drawing, sheet, wish)
-                if share:
-                    remarks += (
-                        f"relief sheet: {share:.1%} of it was not measured but interpolated or "
-                        "hidden; hatched in grey and without contour lines.",
-                    )
-            for number, cut in enumerate(cuts, start=1):
-                for writer, ending in ((write_section_dxf, "dxf"), (write_section_svg, "svg")):
-                    target = place / f"{name}_section{number}.{ending}"
-                    writer(target, cut, scale=scale, overwrite=False)
-            files = tuple(sorted(item.name for item in place.iterdir()))
-    result = replace(result, path=folder / f"{name}.tif", remarks=(*result.remarks, *remarks))
+        for number, cut in enumerate(cuts, start=1):
+            for writer, ending in ((write_section_dxf, "dxf"), (write_section_svg, "svg")):
+                target = place / f"{name}_section{number}.{ending}"
+                writer(target, cut, scale=scale, overwrite=False)
+        if out is not None:
+            shutil.copyfile(place / f"{name}.tif", copy)
+        files = tuple(sorted(item.name for item in place.iterdir()))
+    path = out or folder / f"{name}.tif"
+    result = replace(result, path=path, remarks=(*result.remarks, *remarks))
     return Delivery(ortho=result, files=files, sheet=sheet.name)
+
+
+def default_title(source: Pair | Path, path: Path | None = None) -> str:
+    """Return the name of a pair; of a nameless one that of its file, or of the file's folder.
+
+    The folder's where there is no file, or one called ``w`` or the like.
+
+    Parameters
+    ----------
+    source : Pair or Path
+    path : Path, optional
+        Where a pair was read from.
+    """
+    path = source if isinstance(source, Path) else path
+    pair = Pair.of(source)
+    if pair.extra.get("name"):
+        return str(pair.extra["name"])
+    stem = path.name.split(".")[0] if path else ""
+    if len(stem) >= _SHORT:
+        return stem
+    folder = (path.parent if path else pair.folder).resolve().name
+    return folder if len(folder) >= _SHORT else "wall"
 
 
 def file_name(title: str) -> str:
@@ -159,58 +225,109 @@ def file_name(title: str) -> str:
     return "_".join(words) or "ortho"
 
 
-def _pictures(place: Path, name: str, drawing: Drawing, sheet: PrintSheet) -> int:
-    """Write PNG, drawing and print sheet of a raster; return how many points bear no name."""
+def _pictures(
+    place: Path, name: str, drawing: Drawing, sheet: PrintSheet, lines: tuple[Contour, ...]
+) -> int:
+    """Write PNG, drawing and print sheet of a raster; return how many points bear no name.
+
+    The drawing has the contour lines whatever the sheet shows: CAD switches their layer off.
+    """
     dpi = dpi_at_scale(drawing.grid.gsd, drawing.scale)
     with RasterReader(place / f"{name}.tif") as reader:
         write_png(place / f"{name}.png", reader, dpi=dpi, overwrite=False)
-        write_drawing(place / f"{name}.dxf", drawing, f"{name}.png", overwrite=False)
+        everything = replace(drawing, contours=lines)
+        write_drawing(place / f"{name}.dxf", everything, sheet, f"{name}.png", overwrite=False)
         return write_sheet(place / f"{name}.pdf", drawing, sheet, reader, overwrite=False)
 
 
-def _relief(
-    place: Path, name: str, surfaces: tuple[Surface, Surface], drawing: Drawing, sheet: PrintSheet,
+def _prepared(
+    surfaces: tuple[Surface, Surface], reader: RasterReader | None, drawing: Drawing,
     wish: DeliverTask,
-) -> float:  # fmt: skip
+) -> _Relief:  # fmt: skip
+    """Return a relief with its colours and contour lines."""
+    surface, measured = surfaces
+    coarse = contour_grid(drawing.grid, drawing.scale)
+    shown = measured.window(coarse)
+    if not np.isfinite(shown).any():  # nothing measured in here
+        shown = surface.window(coarse)
+    limits, beyond = colour_limits(shown)
+    interval = wish.interval or round_step(max((limits[1] - limits[0]) / 12, 0.001))
+    lines = contours(
+        surface, drawing.grid, interval=interval, scale=drawing.scale,
+        sigma=_band(reader, 2), guessed=unmeasured(surface, measured, coarse, scale=drawing.scale),
+    )  # fmt: skip
+    return _Relief(
+        surface=surface, measured=measured, reader=reader, interval=interval, limits=limits,
+        beyond=beyond, lines=lines,
+    )  # fmt: skip
+
+
+def _draw_relief(
+    place: Path, name: str, relief: _Relief, drawing: Drawing, sheet: PrintSheet
+) -> float:
     """Write the relief as numbers, and shaded with contour lines as picture, drawing and sheet.
 
     Returns the share of the picture whose relief is known but was not measured.
     """
-    grid = drawing.grid
-    surface, measured = surfaces
-    low, high = measured.extremes(grid.bounds)
-    if np.isnan(low):  # nothing measured in here
-        low, high = surface.extremes(grid.bounds)
-    interval = wish.interval or round_step(max((high - low) / 12, 0.001))
-    lines = contours(
-        measured, grid, interval=interval, detail=_CONTOUR_DETAIL / 1000 * drawing.scale
-    )
-    with create_raster(
-        place / f"{name}_values.tif", grid, bands=1, dtype=np.float32, nodata=float("nan"),
-        names=["relief [m]"], overviews=True, world_file=True,
-    ) as writer:  # fmt: skip
-        for column, row, part in grid.tiles(TILE):
-            writer.write(surface.window(part), column=column, row=row)
+    grid, measured, (low, high) = drawing.grid, relief.measured, relief.limits
+    _write_values(place / f"{name}_values.tif", relief, grid)
     guessed = 0
     with create_raster(
         place / f"{name}.tif", grid, bands=3, dtype=np.uint8, colour=True, world_file=True,
         dpi=dpi_at_scale(grid.gsd, drawing.scale), overviews=True,
     ) as writer:  # fmt: skip
         for column, row, part in grid.tiles(TILE):
-            picture, known = shaded(surface, part, limits=(low, high), measured=measured)
+            picture, known = shaded(
+                relief.surface, part, limits=(low, high), measured=measured, scale=drawing.scale
+            )
             guessed += int(np.count_nonzero((known > 0) & np.isnan(measured.window(part))))
             writer.write(picture, column=column, row=row, mask=known > 0)
-    notes = (f"relief {low:+.2f} to {high:+.2f} m, contour lines every {interval:g} m",)
+    words = f"relief {low:+.2f} to {high:+.2f} m, contour lines every {relief.interval:g} m"
     share = guessed / (grid.width * grid.height)
-    colours = np.rint(tints(np.linspace(low, high, 36), (low, high))).astype(int).tolist()
+    scale = np.concatenate([np.linspace(low, 0, 18), np.linspace(0, high, 18)])
+    colours = np.rint(tints(scale, (low, high))).astype(int).tolist()
     legend = Legend(
-        limits=(low, high), colours=tuple((r, g, b) for r, g, b in colours), guessed=share
-    )
+        limits=(low, high), beyond=relief.beyond, colours=tuple((r, g, b) for r, g, b in colours),
+        guessed=share,
+    )  # fmt: skip
     drawing = replace(
-        drawing, subtitle="Relief", contours=lines, notes=(*notes, *drawing.notes), legend=legend
-    )
-    _pictures(place, name, drawing, sheet)
+        drawing, subtitle="Relief", contours=relief.lines, notes=(words, *drawing.notes),
+        legend=legend,
+    )  # fmt: skip
+    _pictures(place, name, drawing, sheet, relief.lines)
     return share
+
+
+def _write_values(path: Path, relief: _Relief, grid: Grid) -> None:
+    """Write relief in metres, and beside it sigma and quality where the map knows them."""
+    reader = relief.reader
+    bands = 1 if reader is None else min(reader.bands, len(RELIEF_BANDS))
+    with create_raster(
+        path, grid, bands=bands, dtype=np.float32, nodata=float("nan"),
+        names=RELIEF_BANDS[:bands], overviews=True, world_file=True,
+    ) as writer:  # fmt: skip
+        for column, row, part in grid.tiles(TILE):
+            r = relief.surface.window(part)
+            layers = [r]
+            if reader is not None and bands > 1:
+                beside = reader.nearest(part, bands=list(range(2, bands + 1)))
+                fill = np.where(np.arange(bands - 1) == 0, np.nan, Quality.UNKNOWN)
+                beside = np.where(np.isnan(r)[..., None], fill.astype(np.float32), beside)
+                layers += list(np.moveaxis(beside, -1, 0))
+            writer.write(np.stack(layers, axis=-1), column=column, row=row)
+
+
+def _band(reader: RasterReader | None, number: int) -> Surface | None:
+    """Return another band of a relief map, 2 for sigma; None where it has none that says much."""
+    if reader is None or reader.bands < number:
+        return None
+
+    def fetch(*window: int) -> Float32Array:
+        return np.asarray(reader.read(*window, bands=[number])[:, :, 0], np.float32)
+
+    with suppress(InputError):
+        return MapSurface(reader.grid, fetch)
+    return None
 
 
 def _measured(reader: RasterReader | None) -> Surface | None:
@@ -226,10 +343,6 @@ def _measured(reader: RasterReader | None) -> Surface | None:
     with suppress(InputError):
         return MapSurface(reader.grid, fetch)
     return None
-
-
-def _name_of(source: Pair | Path) -> str:
-    return "wall" if isinstance(source, Pair) else source.name.split(".")[0]
 
 
 def _points(source: Path | SurveyPoints | None) -> tuple[SurveyPoints | None, tuple[str, ...]]:

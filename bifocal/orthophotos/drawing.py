@@ -5,12 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from itertools import pairwise
 
 import numpy as np
 
 from bifocal.model.grid import Grid
 from bifocal.model.points import SurveyPoints
-from photocore.arrays import FloatArray
+from photocore.arrays import BoolArray, FloatArray
 from photocore.errors import InputError
 
 #: Paper sizes, width x height upright. [mm]
@@ -35,6 +36,8 @@ class Section:
 
     Attributes
     ----------
+    letter : str
+        Both its ends bear it: section A-A.
     name : str
         What was asked for: ``x=1.5``, ``y=2`` or the corners of a polyline.
     axis : str
@@ -45,22 +48,69 @@ class Section:
         Y of an upright cut, X of a level one, else the distance along the line. [m]
     relief : ndarray, shape (n,)
         NaN where unknown. [m]
+    measured : ndarray of bool, shape (n,)
+        False where the relief was interpolated or taken from behind a step.
     """
 
+    letter: str = "A"
     name: str
     axis: str
     path: FloatArray
     place: FloatArray
     relief: FloatArray
+    measured: BoolArray
 
-    def pieces(self) -> list[FloatArray]:
-        """Return the known pieces as drawn: shape (n, 2), relief to the right or upwards. [m]"""
-        known = np.isfinite(self.relief)
-        edges = np.flatnonzero(np.diff(np.concatenate([[0], known.astype(np.int8), [0]])))
+    @property
+    def title(self) -> str:
+        """What it is called: ``A-A  x=1.5``."""
+        return f"{self.letter}-{self.letter}  {self.name}"
+
+    def looking(self) -> FloatArray:
+        """Return the direction one looks in, on the plane, shape (2,): see `pieces`."""
+        if self.axis == "x":
+            return np.array([1.0, 0.0])
+        along = self.path[-1] - self.path[0]
+        if not along.any():
+            along = self.path[1] - self.path[0]
+        return np.array([-along[1], along[0]]) / np.hypot(*along)
+
+    def pieces(self) -> list[tuple[bool, FloatArray]]:
+        """Return the known pieces as drawn, measured or not, relief to the right or upwards.
+
+        Each is an array of shape (n, 2); one that was not measured goes on to its neighbours. [m]
+        """
+        kind = np.where(np.isfinite(self.relief), np.where(self.measured, 1, 2), 0)
+        bounds = [0, *(np.flatnonzero(np.diff(kind)) + 1).tolist(), len(kind)]
         upright = self.axis == "x"
         columns = (self.relief, self.place) if upright else (self.place, self.relief)
         line = np.stack(columns, axis=-1)
-        return [line[a:b] for a, b in edges.reshape(-1, 2).tolist() if b - a > 1]
+        pieces = []
+        for a, b in pairwise(bounds):
+            if kind[a] == 2:
+                a -= int(a > 0 and kind[a - 1] == 1)
+                b += int(b < len(kind) and kind[b] == 1)
+            if kind[b - 1] and b - a > 1:
+                pieces.append((not (kind[a:b] == 2).any(), line[a:b]))
+        return pieces
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Contour:
+    """A contour line.
+
+    Attributes
+    ----------
+    level : float
+        Its relief. [m]
+    line : ndarray, shape (n, 2)
+        On the plane. [m]
+    index : bool
+        Every fifth level: drawn thicker, and labelled.
+    """
+
+    level: float
+    line: FloatArray
+    index: bool
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -70,13 +120,16 @@ class Legend:
     Attributes
     ----------
     limits : tuple of float
-        Relief of the first and the last colour. [m]
+        Relief of the first and the last colour; the wall, 0 m, has the one in the middle. [m]
+    beyond : tuple of bool
+        Whether there is relief below the first, above the last.
     colours : tuple of (red, green, blue), 0 to 255
     guessed : float
         Share of the picture whose relief was not measured; hatched.
     """
 
     limits: tuple[float, float]
+    beyond: tuple[bool, bool] = (False, False)
     colours: tuple[tuple[int, int, int], ...]
     guessed: float = 0.0
 
@@ -93,8 +146,7 @@ class Drawing:
     scale : float
         1:scale.
     points, control : SurveyPoints, optional
-    contours : tuple of (float, ndarray of shape (n, 2))
-        Level and line. [m]
+    contours : tuple of Contour
     sections : tuple of Section
     notes : tuple of str
         Lines for the title block.
@@ -108,7 +160,7 @@ class Drawing:
     scale: float
     points: SurveyPoints | None = None
     control: SurveyPoints | None = None
-    contours: tuple[tuple[float, FloatArray], ...] = ()
+    contours: tuple[Contour, ...] = ()
     sections: tuple[Section, ...] = ()
     notes: tuple[str, ...] = field(default=())
     legend: Legend | None = None

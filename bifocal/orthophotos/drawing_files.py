@@ -1,16 +1,18 @@
-"""Drawings for CAD: the orthophoto in its place with all that belongs to it, and sections."""
+"""Drawings for CAD: the orthophoto in its place with all that belongs to it, and its sheet."""
 
 from __future__ import annotations
 
 from pathlib import Path
 from typing import Any
-from xml.sax.saxutils import escape
 
 import numpy as np
 
-from bifocal.files.dxf import add_text, new_drawing, save_drawing
+from bifocal.files.dxf import add_text, new_drawing, save_drawing, turned
 from bifocal.model.points import SurveyPoints
-from bifocal.orthophotos.drawing import Drawing, Section, round_step
+from bifocal.orthophotos.contour_lines import LABEL_SIZE, contour_labels
+from bifocal.orthophotos.drawing import Drawing, PrintSheet, Section
+from bifocal.orthophotos.dxf_canvas import DxfCanvas
+from bifocal.orthophotos.sheet_margins import SheetMargins
 from photocore.output import atomic_path
 
 #: Layers and their colours (AutoCAD colour index).
@@ -22,21 +24,29 @@ LAYERS = {
     "BIFOCAL_GRID": 8,
     "BIFOCAL_SCALEBAR": 7,
     "BIFOCAL_CONTOURS": 30,
+    "BIFOCAL_CONTOURS_INDEX": 30,
     "BIFOCAL_CONTOUR_TEXT": 30,
     "BIFOCAL_SECTION_LINES": 5,
-    "BIFOCAL_SECTIONS": 5,
+    "BIFOCAL_FRAME": 7,
+    "BIFOCAL_LEGEND": 7,
+    "BIFOCAL_VIEWPORT": 8,
 }
 
 
-def write_drawing(path: Path, drawing: Drawing, image_name: str | None, *, overwrite: bool) -> None:
-    """Write an R2010 drawing in metres with the image attached at its place.
+def write_drawing(
+    path: Path, drawing: Drawing, sheet: PrintSheet, image_name: str | None, *, overwrite: bool
+) -> None:
+    """Write an R2010 drawing in metres with the image attached at its place, and its sheet.
 
     Parameters
     ----------
+    sheet : PrintSheet
+        Laid out in paper space, in millimetres, with a viewport at 1:scale.
     image_name : str, optional
         File of the picture beside the drawing.
     """
-    document, model = _new(drawing.scale)
+    # Points are crosses in circles of 3 mm on paper.
+    document, model = new_drawing(LAYERS, point_style=34, point_size=3 * drawing.scale / 1000)
     grid = drawing.grid
     xmin, ymin, xmax, ymax = grid.bounds
     if image_name is not None:
@@ -48,7 +58,8 @@ def write_drawing(path: Path, drawing: Drawing, image_name: str | None, *, overw
             definition,
             insert=(xmin, ymin),
             size_in_units=(grid.width * grid.gsd, grid.height * grid.gsd),
-            dxfattribs={"layer": "BIFOCAL_IMAGE"},
+            # Shown, also where turned; transparent where the picture is empty.
+            dxfattribs={"layer": "BIFOCAL_IMAGE", "flags": 1 | 2 | 8},
         )
     paper = drawing.scale / 1000.0  # metres on the wall per millimetre on paper
     style, arm = {"layer": "BIFOCAL_GRID"}, 2 * paper
@@ -60,85 +71,61 @@ def write_drawing(path: Path, drawing: Drawing, image_name: str | None, *, overw
     _scale_bar(model, drawing, paper)
     _points(model, drawing.points, "BIFOCAL_POINTS", 2.0 * paper)
     _points(model, drawing.control, "BIFOCAL_CONTROL", 2.0 * paper)
-    for level, line in drawing.contours:
-        model.add_lwpolyline(
-            line.tolist(), dxfattribs={"layer": "BIFOCAL_CONTOURS", "elevation": level}
-        )
-        if len(line) > 60:
-            place = tuple(line[len(line) // 2].tolist())
-            add_text(model, f"{level:+.2f}", place, 1.4 * paper, "BIFOCAL_CONTOUR_TEXT")
+    _contours(model, drawing, paper)
     for cut in drawing.sections:
-        model.add_lwpolyline(cut.path.tolist(), dxfattribs={"layer": "BIFOCAL_SECTION_LINES"})
-        place = tuple(cut.path[0].tolist())
-        add_text(model, cut.name, place, 2.5 * paper, "BIFOCAL_SECTION_LINES")
+        dashed = {"linetype": "DASHDOT", "ltscale": 5 * paper}
+        model.add_lwpolyline(
+            cut.path.tolist(), dxfattribs={"layer": "BIFOCAL_SECTION_LINES", **dashed}
+        )
+        _section_names(model, cut, paper)
     document.set_modelspace_vport(
         height=1.15 * (ymax - ymin), center=((xmin + xmax) / 2, (ymin + ymax) / 2)
     )
+    _lay_out(document, drawing, sheet)
     with atomic_path(path, overwrite=overwrite) as temporary:
         save_drawing(document, temporary)
 
 
-def write_section_dxf(path: Path, cut: Section, *, scale: float, overwrite: bool) -> None:
-    """Write one section, 1:1 in metres: relief to the right (upright cut) or upwards."""
-    document, model = _new(scale)
-    for piece in cut.pieces():
-        model.add_lwpolyline(piece.tolist(), dxfattribs={"layer": "BIFOCAL_SECTIONS"})
-    start, end = float(cut.place.min()), float(cut.place.max())
-    ends = ((0.0, start), (0.0, end)) if cut.axis == "x" else ((start, 0.0), (end, 0.0))
-    model.add_line(*ends, dxfattribs={"layer": "BIFOCAL_GRID"})
-    add_text(model, f"section {cut.name}", ends[0], 3 * scale / 1000, "BIFOCAL_SECTIONS")
-    with atomic_path(path, overwrite=overwrite) as temporary:
-        save_drawing(document, temporary)
+def _contours(model: Any, drawing: Drawing, paper: float) -> None:
+    for contour in drawing.contours:
+        layer = "BIFOCAL_CONTOURS_INDEX" if contour.index else "BIFOCAL_CONTOURS"
+        style: dict[str, Any] = {"layer": layer, "elevation": contour.level}
+        style["lineweight"] = 25 if contour.index else 9
+        model.add_lwpolyline(contour.line.tolist(), dxfattribs=style)
+    for label in contour_labels(drawing.contours, drawing.scale):
+        entity = add_text(
+            model, label.words, label.place, LABEL_SIZE * paper, "BIFOCAL_CONTOUR_TEXT"
+        )
+        turned(entity, label.angle, middle=True)
 
 
-def write_section_svg(path: Path, cut: Section, *, scale: float, overwrite: bool) -> None:
-    """Write one section as SVG that prints at 1:scale, with its reference line and a scale bar."""
-    factor = 1000.0 / scale
-    pieces = [piece * factor for piece in cut.pieces()]
-    every = np.concatenate(pieces)
-    low, high = np.minimum(every.min(axis=0), 0), np.maximum(every.max(axis=0), 0)
-    margin, foot = 10.0, 16.0
-    bar = round_step(0.05 * scale)
-    width = max(high[0] - low[0], bar * factor) + 2 * margin
-    height = high[1] - low[1] + 2 * margin + foot
+def _section_names(model: Any, cut: Section, paper: float) -> None:
+    """Write a section's letter beyond both its ends, off its line."""
+    for end, before in ((cut.path[0], cut.path[1]), (cut.path[-1], cut.path[-2])):
+        outwards = (end - before) / np.hypot(*(end - before))
+        x, y = (end + 3 * paper * outwards).tolist()
+        place = (x, y - 1.25 * paper)
+        entity = add_text(model, cut.letter, place, 2.5 * paper, "BIFOCAL_SECTION_LINES")
+        turned(entity, 0.0, middle=True)
 
-    def place(x: float, y: float) -> str:
-        return f"{x - low[0] + margin:.3f},{high[1] - y + margin:.3f}"
 
-    lines = "\n".join(
-        f'<polyline points="{" ".join(place(x, y) for x, y in piece.tolist())}"/>'
-        for piece in pieces
+def _lay_out(document: Any, drawing: Drawing, sheet: PrintSheet) -> None:
+    """Draw the sheet in paper space: its margins, and the model through a viewport at 1:scale."""
+    name = sheet.name
+    document.layouts.rename("Layout1", name)
+    layout = document.paperspace(name)
+    layout.page_setup(size=(sheet.width, sheet.height), margins=(0, 0, 0, 0), units="mm")
+    (x, y), (wide, high) = sheet.origin(drawing), drawing.paper_size
+    xmin, ymin, xmax, ymax = drawing.grid.bounds
+    layout.add_viewport(
+        center=(x + wide / 2, y + high / 2),
+        size=(wide, high),
+        view_center_point=((xmin + xmax) / 2, (ymin + ymax) / 2),
+        view_height=ymax - ymin,
+        dxfattribs={"layer": "BIFOCAL_VIEWPORT"},
     )
-    along = np.array([0.0, 1.0] if cut.axis == "x" else [1.0, 0.0])  # the reference line
-    ends = (function(every @ along) * along for function in (np.min, np.max))
-    zero = " ".join(place(*end.tolist()) for end in ends)
-    y = height - 6
-    tenth = bar * factor / 5
-    boxes = "".join(
-        f'<rect x="{margin + i * tenth:.3f}" y="{y - 2:.3f}" width="{tenth:.3f}" height="2" '
-        f'fill="{"#000" if i % 2 == 0 else "#fff"}" stroke="#000" stroke-width="0.15"/>'
-        for i in range(5)
-    )
-    text = (
-        f'<svg xmlns="http://www.w3.org/2000/svg" width="{width:.3f}mm" height="{height:.3f}mm" '
-        f'viewBox="0 0 {width:.3f} {height:.3f}">\n'
-        f'<rect width="100%" height="100%" fill="#fff"/>\n'
-        f'<polyline points="{zero}" fill="none" stroke="#888" stroke-width="0.15" '
-        f'stroke-dasharray="2 1"/>\n'
-        f'<g fill="none" stroke="#000" stroke-width="0.25">\n{lines}\n</g>\n'
-        f"{boxes}\n"
-        f'<g font-family="Helvetica, Arial, sans-serif" font-size="2.6">'
-        f'<text x="{margin}" y="{y - 3.2:.3f}">section {escape(cut.name)}, 1:{scale:g}</text>'
-        f'<text x="{margin}" y="{y + 3.2:.3f}">0</text>'
-        f'<text x="{margin + 5 * tenth:.3f}" y="{y + 3.2:.3f}">{bar:g} m</text></g>\n</svg>\n'
-    )
-    with atomic_path(path, overwrite=overwrite) as temporary:
-        temporary.write_text(text, encoding="utf-8")
-
-
-def _new(scale: float) -> tuple[Any, Any]:
-    """Return a drawing whose points are crosses in circles of 3 mm on paper."""
-    return new_drawing(LAYERS, point_style=34, point_size=3 * scale / 1000)
+    document.layers.get("BIFOCAL_VIEWPORT").dxf.plot = 0
+    SheetMargins(DxfCanvas(layout), drawing, sheet).draw()
 
 
 def _points(model: Any, points: SurveyPoints | None, layer: str, height: float) -> None:

@@ -9,7 +9,13 @@ from pathlib import Path
 
 import numpy as np
 
-from bifocal.files.geotiff import RasterReader, check_relief, create_raster, dpi_at_scale
+from bifocal.files.geotiff import (
+    RasterReader,
+    bytes_in_words,
+    check_relief,
+    create_raster,
+    dpi_at_scale,
+)
 from bifocal.files.images import ImageArray, image_info, read_image
 from bifocal.files.point_tables import read_survey_points
 from bifocal.model.grid import Bounds, Grid
@@ -27,6 +33,8 @@ from photocore.cli import Progress, no_progress
 from photocore.errors import InputError, located
 from photocore.output import check_ending, check_writable
 
+#: What an orthophoto must be named.
+ORTHO_ENDING = "an orthophoto is written as GeoTIFF; name it .tif."
 #: A pixel this many times finer or coarser than the photo's own is asked back about.
 FINEST, COARSEST = 1 / 16, 40.0
 #: So is one this much finer that makes so many pixels that it takes minutes.
@@ -106,7 +114,7 @@ def make_ortho(
         If an input is missing or does not fit, the size is not plausible, or writing fails.
     """
     check_writable(out, overwrite=overwrite)
-    check_ending(out, "an orthophoto is written as GeoTIFF; name it .tif.", ".tif", ".tiff")
+    check_ending(out, ORTHO_ENDING, ".tif", ".tiff")
     pair = Pair.of(pair_path)
     with open_surface(task, pair) as (surface, _, remarks):
         numbers = {"1": (1,), "2": (2,), "both": (1, 2)}[task.image]
@@ -250,7 +258,7 @@ def _grid(pair: Pair, first: int, size: tuple[int, int], surface: Surface, task:
     if strange and not task.any_size:
         raise InputError(
             f"a pixel of {grid.gsd * 1000:g} mm makes an orthophoto of {grid.width:,} x "
-            f"{grid.height:,} px ({pixels * 3 / 1e9:,.3g} GB), while a pixel of the photo covers "
+            f"{grid.height:,} px ({bytes_in_words(3 * pixels)}), while a pixel of the photo covers "
             f"{own * 1000:.2g} mm. If that is what you want, add --any-size; otherwise give --gsd "
             f"in metres or with its unit (0.005 or 5mm), or smaller --bounds."
         )

@@ -1,4 +1,4 @@
-"""Contour lines and sections of a relief."""
+"""Sections of a relief."""
 
 from __future__ import annotations
 
@@ -9,65 +9,18 @@ import numpy as np
 
 from bifocal.model.grid import Grid
 from bifocal.model.surface import Surface
-from bifocal.orthophotos.drawing import Section, multiples
+from bifocal.orthophotos.drawing import Section
 from photocore.arrays import FloatArray
 from photocore.errors import InputError
 
-#: More contour levels than this are a mistake of unit.
-_MOST_LEVELS = 2000
-#: Side of the largest raster contours are drawn from. [px]
-_LARGEST = 4000
 #: Points of a section that are looked up together.
 _TOGETHER = 64
 
 
-def contours(
-    surface: Surface, grid: Grid, *, interval: float, detail: float
-) -> tuple[tuple[float, FloatArray], ...]:
-    """Return contour lines of a relief.
-
-    Parameters
-    ----------
-    surface : Surface
-    grid : Grid
-        Where.
-    interval : float
-        Between levels. [m]
-    detail : float
-        Finest detail that is wanted. [m]
-
-    Returns
-    -------
-    lines : tuple of (level, ndarray of shape (n, 2))
-        In metres on the plane.
-    """
-    from contourpy import contour_generator
-
-    largest = max(grid.shape) * grid.gsd / _LARGEST
-    coarse = Grid.from_bounds(grid.bounds, gsd=max(grid.gsd, detail, largest))
-    relief = surface.window(coarse).astype(np.float64)
-    if min(relief.shape) < 2 or not np.isfinite(relief).any():
-        return ()
-    low, high = float(np.nanmin(relief)), float(np.nanmax(relief))
-    if (high - low) / interval > _MOST_LEVELS:
-        raise InputError(
-            f"contours every {interval:g} m make {(high - low) / interval:.0f} levels; choose a "
-            "larger interval."
-        )
-    levels = multiples(low, high, interval)
-    generator = contour_generator(
-        coarse.columns_x, coarse.rows_y, np.ma.masked_invalid(relief), name="serial"
-    )
-    lines = []
-    for level in levels.tolist():
-        for line in generator.lines(level):
-            # Rings of a few pixels are noise of the relief, not form of the wall.
-            if len(line) >= 8:
-                lines.append((level, np.asarray(line, dtype=np.float64)))
-    return tuple(lines)
-
-
-def section(surface: Surface, grid: Grid, name: str, *, step: float) -> Section:
+def section(
+    surface: Surface, grid: Grid, name: str, *, step: float, measured: Surface | None = None,
+    letter: str = "A",
+) -> Section:  # fmt: skip
     """Return a section of a relief.
 
     Parameters
@@ -76,6 +29,10 @@ def section(surface: Surface, grid: Grid, name: str, *, step: float) -> Section:
         ``x=1.5`` upright cut, ``y=2`` level cut, or the corners ``x,y x,y ...`` of a line. [m]
     step : float
         Between points along it. [m]
+    measured : Surface, optional
+        The part of the surface that was measured; None: all of it.
+    letter : str
+        What both its ends bear.
 
     Raises
     ------
@@ -96,7 +53,16 @@ def section(surface: Surface, grid: Grid, name: str, *, step: float) -> Section:
     relief = sample(surface, points, gsd=grid.gsd)
     if not np.isfinite(relief).any():
         raise InputError(f"section {name}: no relief is known along it; check its coordinates.")
-    return Section(name=name, axis=axis, path=path, place=place, relief=relief)
+    known = relief if measured is None else sample(measured, points, gsd=grid.gsd)
+    return Section(
+        letter=letter, name=name, axis=axis, path=path, place=place, relief=relief,
+        measured=np.isfinite(known),
+    )  # fmt: skip
+
+
+def section_letter(number: int) -> str:
+    """Return the letter of a section, counted from 0: A to Z, then A1, B1 ..."""
+    return chr(ord("A") + number % 26) + (str(number // 26) if number >= 26 else "")
 
 
 def sample(surface: Surface, points: FloatArray, *, gsd: float) -> FloatArray:

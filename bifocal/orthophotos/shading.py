@@ -2,28 +2,69 @@
 
 from __future__ import annotations
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from bifocal.model.grid import Grid
 from bifocal.model.surface import Surface
-from photocore.arrays import ByteArray, Float32Array
+from photocore.arrays import BoolArray, ByteArray, Float32Array
 
-#: Tints from far to near: dark blue, green-grey, sand, nearly white.
+#: Tints from the farthest to the nearest: blue behind the wall, the wall itself nearly white, sand
+#: and brown before it.
 _TINTS = np.array(
-    [[38, 54, 96], [64, 110, 132], [140, 158, 132], [214, 190, 140], [246, 236, 214]], np.float32
+    [[32, 62, 120], [118, 162, 196], [236, 234, 228], [222, 172, 104], [140, 74, 34]], np.float32
 )
 #: Direction to the light: upper left, 45 degrees high.
 _LIGHT = np.array([-0.5, 0.5, 0.7071])
 
 
+#: Of relief that was not measured: how pale its colours become, and how dark its lines are.
+_PALE, _LINES = 0.45, 0.55
+#: Distance and width of the lines, and what is narrower than this bears none. On paper. [mm]
+_PERIOD, _STROKE, _NARROW = 1.5, 0.2, 1.0
+
+
 def tints(relief: NDArray[np.floating], limits: tuple[float, float]) -> Float32Array:
-    """Return the unlit colours of a relief, shape (..., 3), 0 to 255; NaN counts as 0 m."""
-    span = max(limits[1] - limits[0], 1e-6)
-    share = np.clip((np.nan_to_num(relief) - limits[0]) / span, 0, 1) * (len(_TINTS) - 1)
-    low = np.minimum(share.astype(np.int64), len(_TINTS) - 2)
-    step = (share - low)[..., None].astype(np.float32)
-    return _TINTS[low] + (_TINTS[low + 1] - _TINTS[low]) * step
+    """Return the unlit colours of a relief, shape (..., 3), 0 to 255; NaN counts as 0 m.
+
+    The first and the last colour belong to the limits, the one in the middle to 0 m, the wall.
+    """
+    low, high = min(limits[0], -1e-6), max(limits[1], 1e-6)
+    filled = np.nan_to_num(relief)
+    half = (len(_TINTS) - 1) / 2
+    share = half + half * np.clip(np.where(filled < 0, -filled / low, filled / high), -1, 1)
+    first = np.minimum(share.astype(np.int64), len(_TINTS) - 2)
+    step = (share - first)[..., None].astype(np.float32)
+    return _TINTS[first] + (_TINTS[first + 1] - _TINTS[first]) * step
+
+
+def colour_limits(relief: Float32Array) -> tuple[tuple[float, float], tuple[bool, bool]]:
+    """Return the relief of the first and the last colour [m], and whether any lies beyond them.
+
+    A phantom of a few pixels must not take the colours from the wall: a median over 5 x 5 pixels
+    takes small ones out, and of the rest 0.2 % may lie beyond either end. The end that is nearer
+    to the wall is at least a tenth as far as the other, lest noise of the wall be coloured.
+    """
+    unknown = ~np.isfinite(relief)
+    if unknown.all():
+        return (0.0, 0.0), (False, False)
+    quiet = cv2.medianBlur(np.where(unknown, np.float32(0), relief), 5)[~unknown]
+    low, high = (float(value) for value in np.percentile(quiet, (0.2, 99.8)))
+    low, high = min(low, -high / 10, 0.0), max(high, -low / 10, 0.0)
+    extremes = float(relief[~unknown].min()), float(relief[~unknown].max())
+    slack = 0.02 * (high - low)
+    return (low, high), (extremes[0] < low - slack, extremes[1] > high + slack)
+
+
+def unmeasured(surface: Surface, measured: Surface, grid: Grid, *, scale: float) -> BoolArray:
+    """Return where relief is known but was not measured, but for parts too narrow to be drawn."""
+    side = max(3, round(_NARROW / 1000 * scale / grid.gsd) | 1)
+    wide = grid.window(-side, -side, grid.width + 2 * side, grid.height + 2 * side)
+    mask = np.isfinite(surface.window(wide)) & np.isnan(measured.window(wide))
+    disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (side, side))
+    opened = cv2.morphologyEx(mask.astype(np.uint8), cv2.MORPH_OPEN, disc)
+    return np.asarray(opened[side:-side, side:-side] > 0)
 
 
 def shaded(
@@ -32,6 +73,7 @@ def shaded(
     *,
     limits: tuple[float, float],
     measured: Surface | None = None,
+    scale: float = 50.0,
 ) -> tuple[ByteArray, ByteArray]:
     """Return the picture of a window, shape (h, w, 3), and where relief is known, shape (h, w).
 
@@ -40,7 +82,9 @@ def shaded(
     limits : tuple of float
         Relief of the first and the last tint. [m]
     measured : Surface, optional
-        The part of the surface that was measured; the rest is greyed and hatched.
+        The part of the surface that was measured; the rest is paler and hatched.
+    scale : float
+        1:scale of the drawing, for the hatching.
     """
     wide = grid.window(-1, -1, grid.width + 2, grid.height + 2)
     r = surface.window(wide)
@@ -55,11 +99,15 @@ def shaded(
     tint = tints(middle, limits)
     picture = tint * (0.35 + 0.92 * np.clip(light, 0, 1))[..., None]
     if measured is not None:
-        rows, columns = np.nonzero(known & np.isnan(measured.window(grid)))
-        # Counted from the plane's origin, so that the stripes go on from tile to tile.
+        rows, columns = np.nonzero(unmeasured(surface, measured, grid, scale=scale))
+        pixel = 1000 * grid.gsd / scale  # on paper [mm]
+        period = max(4, round(_PERIOD * np.sqrt(2) / pixel))
+        stroke = max(1, round(_STROKE * np.sqrt(2) / pixel))
+        # Counted from the plane's origin, so that the lines go on from tile to tile.
         first = round((grid.x0 - grid.y0) / grid.gsd)
-        stripe = (rows + columns + first) % 10 < 3
-        picture[rows, columns] = np.where(stripe, 110, 205)[:, None]
+        lined = (rows + columns + first) % period < stroke
+        pale = picture[rows, columns] * (1 - _PALE) + 255 * _PALE
+        picture[rows, columns] = np.where(lined[:, None], pale * _LINES, pale)
     picture[~known] = 255
     colours = np.clip(np.rint(picture), 0, 255).astype(np.uint8)
     return colours, np.where(known, np.uint8(255), np.uint8(0))

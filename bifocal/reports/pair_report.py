@@ -18,7 +18,7 @@ from bifocal.reports.document import Block, Document, Heading, Paragraph, Pictur
 from bifocal.reports.words import Words, words_in
 from bifocal.reports.worked_point import method_blocks
 from bifocal.survey.tolerances import RULES
-from photocore.provenance import file_hash, program, today
+from photocore.provenance import file_hash, program, provenance, today
 
 #: Relief less precise than this is drawn as the area of uncertainty where no scale was asked for;
 #: else what a line of 0.18 mm covers at that scale. [m]
@@ -226,5 +226,8 @@ def _provenance(content: PairContent, say: Words) -> Iterator[Block]:
     task, pair = content.task, content.pair
     files = [content.source, *(pair.photo_file(k) for k in (1, 2) if pair.photo(k).file)]
     files += [path for path in (task.control, task.check, task.relief, task.ortho) if path]
-    rows = [[path.name, file_hash(path)] for path in files if path.is_file()]
-    yield TextTable(headings=[say("file"), "SHA-256"], rows=rows)
+    made = provenance()
+    if made.command:
+        yield Paragraph(text=say("made_by"), lines=(made.command,), small=True)
+    rows = {path.name: file_hash(path) for path in files if path.is_file()} | dict(made.inputs)
+    yield TextTable(headings=[say("file"), "SHA-256"], rows=[list(row) for row in rows.items()])

@@ -11,7 +11,7 @@ from typing import Any
 from bifocal.reports.document import Banner, Block, Document, Heading, Paragraph, Picture, TextTable
 from photocore.cli import Progress, no_progress
 from photocore.output import atomic_path
-from photocore.provenance import today
+from photocore.provenance import provenance, today
 
 #: Page and margins. [mm]
 PAGE, MARGIN = (210.0, 297.0), 18.0
@@ -31,7 +31,7 @@ def write_pdf(
     made = datetime.fromisoformat(today()).replace(tzinfo=UTC)
     info = {
         "Title": document.title, "Creator": document.subject, "Producer": "bifocal",
-        "CreationDate": made, "ModDate": made,
+        "CreationDate": made, "ModDate": made, "Subject": "; ".join(provenance().lines()),
     }  # fmt: skip
     with (
         atomic_path(path, overwrite=overwrite) as temporary,

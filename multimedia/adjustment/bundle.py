@@ -15,7 +15,13 @@ from multimedia.adjustment.bundle_equations import (
     ImageObservations,
     Pose,
 )
-from multimedia.adjustment.unknowns import Adjustment, Unknowns
+from multimedia.adjustment.interior_choice import choose_interior
+from multimedia.adjustment.plausibility import (
+    refuse_impossible_media,
+    remarks_on_unknowns,
+    with_model_error,
+)
+from multimedia.adjustment.unknowns import AUTO, Adjustment, Unknowns
 from multimedia.media.camera import EXTERIOR, Camera
 from multimedia.orientation.intersection import intersect
 from multimedia.projects.model import ObjectPoints, Project
@@ -27,6 +33,10 @@ from photocore.similarity import fit_similarity
 
 #: Robust weights settle in a few rounds; more change nothing that matters.
 ROBUST_ROUNDS = 8
+#: Rounds and relative change in which the weight of the image coordinates settles.
+BALANCE_ROUNDS, BALANCED = 5, 0.05
+#: Image coordinates better than this are exact, as rendered ones are. [mm]
+_EXACT = 1e-7
 
 
 def bundle_adjust(project: Project, unknowns: Unknowns | None = None) -> Adjustment:
@@ -63,22 +73,51 @@ def bundle_adjust(project: Project, unknowns: Unknowns | None = None) -> Adjustm
     the cameras and plates (large ones, and where all points are on plates).
     """
     unknowns = unknowns or Unknowns()
+    if unknowns.interior == AUTO:
+        chosen = choose_interior(project, unknowns, bundle_adjust)
+        result = bundle_adjust(project, replace(unknowns, interior=chosen))
+        choice = f"Interior parameters that the data carry: {', '.join(chosen) or 'none'}."
+        return replace(result, remarks=(choice, *result.remarks))
     bundle, remarks = prepare(project, unknowns)
-    if not bundle.columns.labels and not bundle.free.any():
+    columns = bundle.columns
+    if not columns.labels and not bundle.free.any():
         raise InputError("adjust: nothing to estimate; free a camera or add new points.")
-    seen = bundle.observations
-    weights = np.ones_like(seen.image)
-    result = bundle.fit(bundle.start)
+    bundle, fitted = _balanced(bundle, bundle.fit(bundle.start))
+    weights = np.ones_like(bundle.observations.image)
     for _ in range(ROBUST_ROUNDS if unknowns.robust is not None else 0):
         assert unknowns.robust is not None
-        plain = result.residuals[: weights.size].reshape(-1, 2) / np.sqrt(weights)
+        plain = fitted.residuals[: weights.size].reshape(-1, 2) / np.sqrt(weights)
         new = huber_weights(plain, unknowns.robust)
         if np.abs(new - weights).max() < 1e-3:
             break
         weights = new
+        seen = bundle.observations
         weighted = replace(seen, sigma=seen.sigma / np.sqrt(weights))
-        result = replace(bundle, observations=weighted).fit(result.state)
-    return _adjustment(bundle, result, weights, remarks)
+        fitted = replace(bundle, observations=weighted).fit(fitted.state)
+    result = _adjustment(bundle, fitted, weights, remarks)
+    refuse_impossible_media(bundle.project, columns, result, unknowns.priors)
+    seen = bundle.observations
+    result = with_model_error(result, tuple(seen.source[rows] for rows in seen.rows))
+    told = remarks_on_unknowns(bundle.project, columns, result)
+    return replace(result, remarks=(*result.remarks, *told))
+
+
+def _balanced(bundle: Bundle, fitted: Fit[BundleState]) -> tuple[Bundle, Fit[BundleState]]:
+    """Weigh image coordinates by what they are worth where priors stand beside them.
+
+    Their sigmas only matter against one another until a prior is stated in its own unit: an
+    image coordinate called five times too good would then push an index off by five times.
+    """
+    for _ in range(BALANCE_ROUNDS if bundle.columns.priors else 0):
+        seen = bundle.observations
+        own = slice(0, seen.image.size)
+        free = float(fitted.linear.redundancy_numbers[own].sum())
+        worth = float(np.sqrt((fitted.residuals[own] ** 2).sum() / free)) if free > 1e-6 else 1.0
+        if abs(worth - 1) < BALANCED or worth * seen.sigma.min() < _EXACT:
+            break
+        bundle = replace(bundle, observations=replace(seen, sigma=seen.sigma * worth))
+        fitted = bundle.fit(fitted.state)
+    return bundle, fitted
 
 
 def prepare(project: Project, unknowns: Unknowns) -> tuple[Bundle, tuple[str, ...]]:
@@ -245,10 +284,11 @@ def _adjustment(
     shares = result.linear.redundancy_numbers[own].reshape(-1, 2)
     # The image rows, back in the order of the project's own table.
     rows, count = seen.source, len(project.image_points.ids)
-    residuals, normed, numbers, weight = (np.full((count, 2), np.nan) for _ in range(4))
+    residuals, normed, numbers, weight, sigma = (np.full((count, 2), np.nan) for _ in range(5))
     residuals[rows] = -misses * seen.sigma / np.sqrt(weights)
     normed[rows] = -result.standardised[own].reshape(-1, 2)
     numbers[rows], weight[rows] = shares, weights
+    sigma[rows] = seen.sigma * result.sigma0 / np.sqrt(weights)
     points, covariance = _points(bundle, result)
     values, change = _values(bundle, state)
     sigma0_of = {}
@@ -261,9 +301,9 @@ def _adjustment(
         names=bundle.columns.labels, values=values,
         covariance=change @ result.linear.cofactor @ change.T * result.sigma0**2,
         point_covariance=covariance, residuals=residuals, standardised=normed,
-        redundancy_numbers=numbers, weights=weight, sigma0=result.sigma0 * unit,
-        redundancy=result.redundancy, iterations=result.iterations, sigma0_of=sigma0_of,
-        remarks=remarks,
+        redundancy_numbers=numbers, weights=weight, sigma_image=sigma,
+        sigma0=result.sigma0 * unit, sigma0_of=sigma0_of, redundancy=result.redundancy,
+        iterations=result.iterations, remarks=remarks,
     )  # fmt: skip
 
 

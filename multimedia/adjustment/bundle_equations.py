@@ -218,8 +218,7 @@ class Bundle:
                 yield miss, column, 1.0 / sigma, 0, 0.0
             else:
                 yield miss, 0, 0.0, 3 * j + axis, 1.0 / sigma
-        for label, sigma in self.unknowns.priors.items():
-            column = place.labels.index(label)
+        for column, sigma in place.priors.items():
             yield state.drift[column] / sigma, column, 1.0 / sigma, 0, 0.0
         for bar in self.unknowns.scale_bars:
             ends = [self.ids.index(bar.first), self.ids.index(bar.second)]

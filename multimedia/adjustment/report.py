@@ -109,6 +109,8 @@ def _residuals(result: Adjustment) -> str:
             )
         box = f"{-reach:.4f} {-reach:.4f} {2 * reach:.4f} {2 * reach:.4f}"
         rms = float(np.sqrt(np.mean(miss[good] ** 2)) * 1000)
+        hidden = result.smallest_detectable[rows]
+        least = float(np.nanmedian(hidden)) * 1000 if np.isfinite(hidden).any() else float("nan")
         figures.append(
             f"<figure><svg width=340 height=340 viewBox='{box}' role=img "
             f"aria-label='Residual vectors of camera {escape(camera.name)}'>"
@@ -117,7 +119,8 @@ def _residuals(result: Adjustment) -> str:
             f"<g stroke-width={reach / 150:.5f}>{''.join(lines)}</g></svg>"
             f"<figcaption>camera {escape(camera.name)}: {int(good.sum())} points, RMS "
             f"{rms:.2f} um, sigma0 {result.sigma0_of[camera.name] * 1000:.2f} um, "
-            f"vectors {scale:.0f} x</figcaption></figure>"
+            f"vectors {scale:.0f} x; a gross error is found from {least:.1f} um on "
+            "(median, 80 % power)</figcaption></figure>"
         )
     return "<div class=images>" + "".join(figures) + "</div>"
 

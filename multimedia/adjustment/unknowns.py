@@ -15,6 +15,8 @@ from photocore.errors import InputError
 
 #: How control points enter: error-free, with their sigmas, or as a free network.
 CONTROL = ("fixed", "weighted", "free")
+#: Interior parameters chosen by what the data determine and need.
+AUTO = ("auto",)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -50,7 +52,8 @@ class Unknowns:
     fixed_cameras : tuple of str
         Cameras whose exterior orientation is kept.
     interior : tuple of str
-        Of c, xh, yh, k1, k2, k3, p1, p2, scale, shear; for every camera.
+        Of c, xh, yh, k1, k2, k3, p1, p2, scale, shear; for every camera. ``("auto",)``: those
+        that the data determine and need.
     shared_interior : bool or mapping of str to str
         One set for all cameras (the same camera moved), one for each, or camera name to the name
         of a set.
@@ -68,7 +71,10 @@ class Unknowns:
     scale_bars : tuple of ScaleBar
     priors : mapping of str to float
         Label of an unknown to the standard deviation of its start value: a water level read to
-        2 mm is ``{"water:offset": 0.002}``.
+        2 mm is ``{"water:offset": 0.002}``; ``c`` alone means that of every camera. Infinite:
+        nothing is known, any value that physics allows is taken.
+    typical_priors : bool
+        Give indices (0.005) and thicknesses (a tenth) a prior where ``priors`` has none.
     robust : float or None
         Huber's bound in standard deviations; observations beyond it lose weight. None: plain
         least squares.
@@ -82,10 +88,12 @@ class Unknowns:
     plates: tuple[str, ...] = ()
     scale_bars: tuple[ScaleBar, ...] = ()
     priors: Mapping[str, float] = field(default_factory=dict)
+    typical_priors: bool = False
     robust: float | None = None
 
     def __post_init__(self) -> None:
         unknown = [name for name in self.interior if name not in INTERIOR]
+        unknown = [] if self.interior == AUTO else unknown
         if unknown:
             raise InputError(f"interior: {', '.join(unknown)} is not one of {', '.join(INTERIOR)}.")
         if self.control not in CONTROL:
@@ -93,7 +101,8 @@ class Unknowns:
         if self.robust is not None:
             positive(self.robust, "robust")
         for label, sigma in self.priors.items():
-            positive(sigma, f"prior of {label}")
+            if sigma != np.inf:
+                positive(sigma, f"prior of {label}")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -121,8 +130,13 @@ class Adjustment:
         Share of an error that shows in its own residual.
     weights : ndarray, shape (n, 2)
         Robust weights, 1 for plain least squares.
+    sigma_image : ndarray, shape (n, 2)
+        A-posteriori standard deviation of each image coordinate, with its own weight. [mm]
     sigma0 : float
-        A-posteriori standard deviation of an image coordinate. [mm]
+        The same of an image coordinate of mean weight. [mm]
+    model_error : float
+        Factor that all standard deviations of unknowns and points contain because residuals of
+        neighbouring points are alike; 1 where they are not.
     redundancy : int
     iterations : int
     sigma0_of : mapping of str to float
@@ -140,10 +154,12 @@ class Adjustment:
     standardised: FloatArray
     redundancy_numbers: FloatArray
     weights: FloatArray
+    sigma_image: FloatArray
     sigma0: float
     redundancy: int
     iterations: int
     sigma0_of: Mapping[str, float]
+    model_error: float = 1.0
     remarks: tuple[str, ...] = ()
 
     def value(self, name: str) -> float:
@@ -173,9 +189,10 @@ class Adjustment:
     def smallest_detectable(self) -> FloatArray:
         """Error of an image coordinate found with 80 % power at 0.1 % risk, shape (n, 2). [mm]
 
-        Baarda's internal reliability: 4.13 sigma / sqrt(redundancy number).
+        Baarda's internal reliability: 4.13 sigma / sqrt(redundancy number), with each
+        coordinate's own sigma; NaN where nothing controls it.
         """
-        return standardised(4.13 * self.sigma0, self.redundancy_numbers)
+        return standardised(4.13 * self.sigma_image, self.redundancy_numbers)
 
     def suspects(self, limit: float = OUTLIER_LIMIT) -> list[str]:
         """Return a sentence for each image point that looks like a gross error, worst first."""

@@ -79,7 +79,9 @@ def parse_prior(text: str) -> tuple[str, float]:
     try:
         return label.strip(), float(sigma)
     except ValueError:
-        raise InputError(f"--prior {text}: expected label=sigma, e.g. tank:offset=0.002") from None
+        raise InputError(
+            f"--prior {text}: expected label=sigma, e.g. tank:offset=0.002, or label=inf"
+        ) from None
 
 
 def salinity_of(
@@ -109,6 +111,7 @@ def as_dict(result: Adjustment) -> dict[str, Any]:
     return {
         "sigma0_mm": result.sigma0,
         "sigma0_mm_of": dict(result.sigma0_of),
+        "model_error": result.model_error,
         "redundancy": result.redundancy,
         "iterations": result.iterations,
         "unknowns": {

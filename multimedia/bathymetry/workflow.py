@@ -174,9 +174,11 @@ def _visible(
             names = text.replace(";", " ").replace(",", " ").replace("|", " ").split()
             unknown = [name for name in names if name not in place]
             if unknown:
+                # A piece does not know where in the file it begins; coordinates find the point.
+                where = ", ".join(f"{value:.3f}" for value in piece.xyz[number])
                 raise InputError(
-                    f"{job.source}: point {number + 1} names camera {unknown[0]!r}, which is not "
-                    f"in {job.cameras}."
+                    f"{job.source}: the point at {where} names camera {unknown[0]!r}, which is "
+                    f"not in {job.cameras}."
                 )
             seen[number, [place[name] for name in names]] = True
     if job.max_angle is not None:

@@ -17,11 +17,13 @@ EXAMPLE = """\b
 Examples:
   multimedia adjust tank.toml --interior c,xh,yh,k1 --media index3 --out tank2.toml
              --report tank.html
+  multimedia adjust tank.toml --interior auto --media index3 --prior index3=0.0005
   multimedia adjust reef.toml --control free --scale-bar A,B,0.5,0.0001 --out reef2.toml
   multimedia adjust tank.toml --media index3 --wavelength 520 --temperature 20 --depth 0.1
 
 Unknowns of the media: offset, tilt1, tilt2, thickness1..., index1... counted from the camera;
-NAME:index3 for one media of several. Labels for --prior are those of the result.
+NAME:index3 for one media of several. Labels for --prior are those of the result; c alone means that
+of every camera.
 """
 
 
@@ -29,7 +31,8 @@ NAME:index3 for one media of several. Labels for --prior are those of the result
 @click.argument("project", type=FILE)
 @click.option(
     "--interior", default="", type=Names(), metavar="LIST",
-    help="Interior parameters to estimate, of c,xh,yh,k1,k2,k3,p1,p2,scale,shear.  [default: none]",
+    help="Interior parameters to estimate, of c,xh,yh,k1,k2,k3,p1,p2,scale,shear; or auto: those "
+    "that the data carry.  [default: none]",
 )  # fmt: skip
 @click.option(
     "--shared-interior", is_flag=True, help="One set of interior parameters for all cameras."
@@ -56,7 +59,8 @@ NAME:index3 for one media of several. Labels for --prior are those of the result
 )  # fmt: skip
 @click.option(
     "--prior", multiple=True, metavar="LABEL=SIGMA",
-    help="Standard deviation of an unknown's start value [its unit]; repeat it.",
+    help="Standard deviation of an unknown's start value [its unit]; inf: not known at all; repeat "
+    "it.  [default: indices 0.005, thicknesses a tenth, others inf]",
 )  # fmt: skip
 @number(
     "--robust", "K", "Huber weights beyond K standard deviations.  [default: plain least squares]"
@@ -82,7 +86,7 @@ def command(
     unknowns = Unknowns(
         fixed_cameras=fix_camera, plates=plate, **choices,
         scale_bars=tuple(adjust.parse_scale_bar(text) for text in scale_bar),
-        priors=dict(adjust.parse_prior(text) for text in prior),
+        priors=dict(adjust.parse_prior(text) for text in prior), typical_priors=True,
     )  # fmt: skip
     result, notes = adjust.adjust_project(
         project, unknowns, out=out, report=report, overwrite=overwrite

@@ -9,7 +9,7 @@ from typing import Any
 import click
 
 from photocore.cli import print_result, progress_bar
-from photocore.options import FILE, Number, as_json, number, overwrite, sigma
+from photocore.options import FILE, NEW_TABLE, TABLE, Number, as_json, number, overwrite, sigma
 
 EXAMPLE = """\b
 Examples:
@@ -30,7 +30,7 @@ Examples:
 
 
 @click.command(epilog=EXAMPLE)
-@click.argument("source", metavar="IN", type=FILE)
+@click.argument("source", metavar="IN", type=TABLE)
 @click.option(
     "--water-level", required=True, metavar="Z|FILE",
     help="Height of the water [m]; or its surface as a .tif raster, a .ply triangle mesh or the "
@@ -40,7 +40,13 @@ Examples:
     "--index", "N", "Refractive index of the water relative to the air [-], about 1.33 to 1.35.",
     required=True,
 )  # fmt: skip
-@click.option("--out", "target", required=True, type=FILE, help="Corrected file, same kind as IN.")
+@click.option(
+    "--out",
+    "target",
+    required=True,
+    type=NEW_TABLE,
+    help="Corrected file, same kind as IN; - is a .csv on stdout.",
+)
 @click.option(
     "--cameras", type=FILE, metavar="FILE",
     help="Table id,X,Y,Z of projection centres [m], or a project .toml: rigorous correction of X, "

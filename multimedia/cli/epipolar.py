@@ -9,7 +9,16 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from photocore.cli import print_result, tell_written, text_table
-from photocore.options import FILE, THOUSANDTHS, Number, Numbers, as_json, number, overwrite
+from photocore.options import (
+    FILE,
+    NEW_TABLE,
+    THOUSANDTHS,
+    Number,
+    Numbers,
+    as_json,
+    number,
+    overwrite,
+)
 
 if TYPE_CHECKING:
     from multimedia.orientation.epipolar_workflow import EpipolarResult
@@ -49,7 +58,7 @@ Examples:
     "--tolerance", "UM", "Half width of the band in which candidates are looked for [um].",
     type=THOUSANDTHS, default=10.0,
 )  # fmt: skip
-@click.option("--out", type=FILE, help="Vertices as .csv or .xlsx.")
+@click.option("--out", type=NEW_TABLE, help="Vertices as .csv or .xlsx; - is stdout.")
 @click.option("--picture", type=FILE, help="Picture of the curves: .png, .svg or .pdf.")
 @click.option("--photo", type=FILE, help="Image of --to, under the picture.")
 @overwrite

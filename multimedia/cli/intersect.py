@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from photocore.options import FILE, as_json, choice, overwrite
+from photocore.options import FILE, NEW_TABLE, as_json, choice, overwrite
 
 EXAMPLE = """\b
 Examples:
@@ -29,7 +29,7 @@ Examples:
     "Least squares of the image residuals; of the distances to the rays; or the mean of the "
     "midpoints of all pairs of rays, as OpenPTV does.", default="rigorous",
 )  # fmt: skip
-@click.option("--out", type=FILE, help="Also write a .csv or .xlsx table.")
+@click.option("--out", type=NEW_TABLE, help="Also write a .csv or .xlsx table; - is stdout.")
 @overwrite
 @as_json
 def command(project: Path, out: Path | None, as_json: bool, **options: Any) -> None:

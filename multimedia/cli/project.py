@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from photocore.options import FILE, as_json, overwrite
+from photocore.options import FILE, NEW_TABLE, as_json, overwrite
 
 EXAMPLE = """\b
 Examples:
@@ -22,7 +22,7 @@ Examples:
     "--points", type=FILE,
     help="Table of object points: id, X, Y, Z.  [default: the project's own]",
 )  # fmt: skip
-@click.option("--out", type=FILE, help="Also write a .csv or .xlsx table.")
+@click.option("--out", type=NEW_TABLE, help="Also write a .csv or .xlsx table; - is stdout.")
 @overwrite
 @as_json
 def command(project: Path, out: Path | None, as_json: bool, **options: Any) -> None:

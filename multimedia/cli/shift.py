@@ -8,7 +8,16 @@ from typing import Any
 import click
 
 from photocore.cli import print_json, remark
-from photocore.options import FILE, NUMBER, Numbers, as_json, choice, number, overwrite
+from photocore.options import (
+    NEW_TABLE,
+    NUMBER,
+    TABLE,
+    Numbers,
+    as_json,
+    choice,
+    number,
+    overwrite,
+)
 
 EXAMPLE = """\b
 Examples:
@@ -20,8 +29,8 @@ Examples:
 
 
 @click.command(epilog=EXAMPLE)
-@click.argument("source", metavar="IN", type=FILE)
-@click.option("--out", type=FILE, help="Result, .xlsx or .csv.")
+@click.argument("source", metavar="IN", type=TABLE)
+@click.option("--out", type=NEW_TABLE, help="Result, .xlsx or .csv; - is a .csv on stdout.")
 @click.option(
     "--camera", type=Numbers(3), metavar="X,Y,Z",
     help="Camera, in the unit of the points; Z = 0 is the interface on the water side.",
@@ -58,10 +67,10 @@ def command(
 ) -> None:  # fmt: skip
     """Shift points so that straight rays see them where they are seen through the media.
 
-    IN is a table (.xlsx, .xlsm, .ods, .csv) with X, Y, Z (points in water have Z below 0) or R, ZP
-    (distance from the camera's nadir, depth). All lengths in one unit. A workbook comes back with
-    the results put in and everything else as it was; a text table becomes .csv, or a workbook with
-    live formulas.
+    IN is a table (.xlsx, .xlsm, .ods, .csv; - for stdin) with X, Y, Z (points in water have Z
+    below 0) or R, ZP (distance from the camera's nadir, depth). All lengths in one unit. A workbook
+    comes back with the results put in and everything else as it was; a text table becomes .csv, or
+    a workbook with live formulas.
     """
     if out is None and not as_json:
         raise click.UsageError("give --out FILE, --json, or both.")

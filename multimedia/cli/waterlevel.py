@@ -8,7 +8,7 @@ from typing import Any
 import click
 
 from photocore.cli import print_result
-from photocore.options import FILE, as_json, number, overwrite
+from photocore.options import FILE, TABLE, as_json, number, overwrite
 
 EXAMPLE = """\b
 Examples:
@@ -19,7 +19,7 @@ Examples:
 
 
 @click.command(epilog=EXAMPLE)
-@click.argument("source", metavar="POINTS", type=FILE)
+@click.argument("source", metavar="POINTS", type=TABLE)
 @click.option("--tilted", is_flag=True, help="Fit a tilted plane instead of a height. [off]")
 @number(
     "--spread", "M",

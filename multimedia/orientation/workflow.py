@@ -28,6 +28,8 @@ from photocore.errors import InputError
 from photocore.output import all_or_none, check_all_writable, check_ending
 from photocore.workbook.newbook import check_new_workbook
 
+METHODS = ("rigorous", "rays", "pairs")
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PointTable:
@@ -83,7 +85,9 @@ def intersect_project(
     method: str = "rigorous",
     overwrite: bool = False,
 ) -> PointTable:
-    """Intersect the image points of a project, or of another table."""
+    """Intersect the image points of a project, or of another table, by one of ``METHODS``."""
+    if method not in METHODS:
+        raise InputError(f"method: {method!r} is not one of {', '.join(METHODS)}.")
     if out is not None:
         check_new_workbook(out, overwrite=overwrite)
     project = read_project(path)

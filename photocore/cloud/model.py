@@ -14,6 +14,7 @@ import numpy as np
 from photocore.arrays import FloatArray
 from photocore.errors import LARGEST, InputError
 from photocore.output import atomic_path
+from photocore.provenance import note
 
 #: Points per piece: some 100 MB at the most, whatever the attributes.
 PIECE = 200_000
@@ -73,6 +74,7 @@ class Cloud(ABC):
 
     def __init__(self, path: Path) -> None:
         self.path, self.remarks = path, list[str]()
+        note(path)
 
     @abstractmethod
     def pieces(

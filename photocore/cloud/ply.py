@@ -25,6 +25,7 @@ from photocore.cloud.model import (
     checked_positions,
 )
 from photocore.errors import InputError
+from photocore.provenance import provenance
 
 _TYPES = {
     "char": "i1", "uchar": "u1", "short": "i2", "ushort": "u2", "int": "i4", "uint": "u4",
@@ -207,9 +208,15 @@ def write_ply(
     rows = np.empty(len(xyz), dtype)
     for name, values in columns.items():
         rows[name] = values
-    lines = ["ply", "format binary_little_endian 1.0", f"comment {comment}",
+    comments = [f"comment {_ascii(line)}" for line in (comment, *provenance().lines())]
+    lines = ["ply", "format binary_little_endian 1.0", *comments,
              f"element vertex {len(rows)}", *_properties(rows.dtype), "end_header"]  # fmt: skip
     path.write_bytes(_heading(lines) + rows.tobytes())
+
+
+def _ascii(text: str) -> str:
+    """Return one line of a heading, which is ASCII and not endless."""
+    return " ".join(text.encode("ascii", "replace").decode("ascii").split())[:1000]
 
 
 def _properties(dtype: np.dtype[Any]) -> list[str]:

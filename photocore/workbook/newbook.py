@@ -24,6 +24,7 @@ from typing import TYPE_CHECKING, BinaryIO
 
 from photocore.errors import InputError
 from photocore.output import atomic_path, check_writable, free_path
+from photocore.provenance import provenance
 from photocore.workbook.cells import CellValue, NewColumn, NewRows, escape
 from photocore.workbook.formulas import ModelCell, model_cells
 from photocore.workbook.grid import split_cell
@@ -36,6 +37,8 @@ if TYPE_CHECKING:
 
 #: Date of every part, so that equal input makes equal files; ZIP knows nothing before 1980.
 PART_TIME = (1980, 1, 1, 0, 0, 0)
+#: The part with the properties of a workbook.
+_CORE = "docProps/core.xml"
 _ILLEGAL = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\ufffe\uffff]")
 
 
@@ -140,10 +143,21 @@ def _finished_parts(
                     changes.cached.setdefault(row, {})[column] = _result(value)
             data = read_part(target, package, sheet.part)
             parts[sheet.part] = splice_sheet(target, sheet.part, data, changes).joined(strip=False)
-        core = read_part(target, package, "docProps/core.xml")
-        moment = rb"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\dZ"
-        parts["docProps/core.xml"] = re.sub(moment, b"1980-01-01T00:00:00Z", core)
+        parts[_CORE] = _stated_properties(read_part(target, package, _CORE))
     return parts
+
+
+def _stated_properties(core: bytes) -> bytes:
+    """Return a workbook's properties with its provenance as description, and no time of day."""
+    moment = rb"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\dZ"
+    core = re.sub(moment, b"1980-01-01T00:00:00Z", core)
+    core = re.sub(
+        rb"<dc:description>.*?</dc:description>|<dc:description\s*/>", b"", core, flags=re.S
+    )
+    said = escape(without_control("\n".join(provenance().lines())))
+    told = f"<dc:description>{said}</dc:description>".encode()
+    # The order of the elements is free; the last one closes the part.
+    return core.replace(b"</cp:coreProperties>", told + b"</cp:coreProperties>")
 
 
 def _typed(value: CellValue) -> CellValue:
@@ -185,8 +199,11 @@ def new_workbook(path: Path | str, *, overwrite: bool) -> Iterator[Path]:
 def save_book(book: Workbook, path: Path) -> None:
     """Write a workbook of openpyxl, whose own writer tells of a full disk a second time."""
     package = io.BytesIO()
+    book.properties.creator = "bifocal"
     book.save(package)
-    path.write_bytes(package.getvalue())
+    with zipfile.ZipFile(package) as written:
+        parts = {_CORE: _stated_properties(written.read(_CORE))}
+    rewrite_package(package, path, parts, date=PART_TIME)
 
 
 def check_new_workbook(

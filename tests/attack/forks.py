@@ -28,6 +28,7 @@ import cv2
 import bifocal
 import multimedia
 import photocore
+from photocore.interrupts import end_on_signals
 from tests.attack.site import PROGRAMS
 
 NOBODY = 65534
@@ -69,6 +70,8 @@ def work(job: dict[str, Any], place: Path, said: int) -> None:
         os.setgid(NOBODY)
         os.setuid(NOBODY)
     program, *words = shlex.split(job["line"])
+    end_on_signals()
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, [signal.SIGINT])
     try:
         PROGRAMS[program].main(args=words, prog_name=program)
         status = 0
@@ -88,12 +91,15 @@ def run(job: dict[str, Any], place: Path) -> dict[str, Any]:
     out.unlink(missing_ok=True)
     # What it says goes through a pipe: a limit on files would cut it.
     reading, writing = os.pipe()
+    # A signal waits until the child is the program; before, it would hit this harness' code.
+    signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])
     child = os.fork()
     if not child:
         try:
             work(job, place, writing)
         finally:
             os._exit(99)
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, [signal.SIGINT])
     os.close(writing)
     if "signal" in job:
         time.sleep(job["after"])

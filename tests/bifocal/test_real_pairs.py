@@ -128,10 +128,6 @@ def test_deep_relief_is_matched_and_none_of_it_is_off_radial(data_dir) -> None:
     assert wrong.mean() < 0.004
 
 
-@pytest.mark.xfail(
-    strict=True,
-    reason="known loss: with the lens free, an exact pair is set up to 2.7e-4 in scale and 5.6 mm",
-)
 def test_an_exactly_bifocal_pair_is_recognised(data_dir, tmp_path) -> None:
     folder = data_dir / "semireal_church"
     lenses = tuple(KnownLens(focal=focal, sensor_width=22.7) for focal in (36, 18))

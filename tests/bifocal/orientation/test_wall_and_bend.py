@@ -77,6 +77,24 @@ def test_a_walls_roughness_is_told_from_the_precision_of_its_points() -> None:
     assert narrow_face(xyz, sigma, band=0.09).roughness == pytest.approx(0.012, rel=0.1)
 
 
+def test_joints_and_mouldings_do_not_thicken_lift_or_turn_the_wall() -> None:
+    # As on a church: a fifth is ashlar even to 3 mm, the rest joints and mouldings, more of them on
+    # one side.
+    rng = np.random.default_rng(9)
+    xyz = np.column_stack([rng.uniform(-4, 4, (5000, 2)), np.zeros(5000)])
+    kind = rng.uniform(0, 1, 5000) - 0.03 * xyz[:, 0]
+    joint, moulding = (kind > 0.25) & (kind < 0.65), kind > 0.65
+    uneven = np.where(moulding, 0.025, np.where(joint, 0.018, 0.003))
+    xyz[:, 2] = rng.normal(np.where(moulding, 0.035, 0.0), uneven)
+    rest = rng.random(5000) < 0.13
+    xyz[rest, 2] = rng.uniform(-0.09, 0.09, rest.sum())
+    xyz[:, 2] += rng.normal(0, 0.003, 5000)
+    face = narrow_face(xyz, np.full(5000, 0.003), band=0.09)
+    assert abs(face.plane[0]) < 1e-3
+    assert np.abs(face.plane[1:]).max() < 3e-4
+    assert face.roughness == pytest.approx(0.003, abs=0.0015)
+
+
 def test_one_detail_in_two_orientations_is_no_rival_of_itself() -> None:
     rng = np.random.default_rng(7)
     codes = np.abs(rng.normal(size=(40, 128))).astype(np.float32)

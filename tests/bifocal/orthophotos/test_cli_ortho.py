@@ -136,6 +136,88 @@ def test_one_to_fifty_at_254_dpi_is_five_millimetres_in_every_file(wall: Path) -
     assert any(0.02 < level < 0.3 for level in levels)
 
 
+def test_the_drawing_has_a_sheet_with_a_viewport_to_scale_and_the_contours(wall: Path) -> None:
+    done = run(
+        wall, "--relief", "relief.tif", "--deliver", "d", "--scale", "1:50", "--section", "x=0.8",
+        "--contours", "0.02",
+    )  # fmt: skip
+    assert done.exit_code == 0, done.output
+    drawing = ezdxf.readfile(wall / "d" / "Torre_est.dxf")
+    sheet = drawing.paperspace("A4 landscape")
+    assert (sheet.dxf_layout.dxf.paper_width, sheet.dxf_layout.dxf.paper_height) == (297, 210)
+    (window,) = sheet.query('VIEWPORT[layer=="BIFOCAL_VIEWPORT"]')
+    # Millimetres of paper for metres of the model: 1:50.
+    assert window.dxf.height / window.dxf.view_height == pytest.approx(1000 / 50)
+    assert (window.dxf.width, window.dxf.height) == pytest.approx((84, 60))
+    assert tuple(window.dxf.view_center_point)[:2] == pytest.approx((0, 0))
+    words = {text.dxf.text for text in sheet.query("TEXT")}
+    assert {"Torre (est)", "Orthophoto 1:50", "A", "sections A-A  x=0.8"} <= words
+    model = drawing.modelspace()
+    levels = {line.dxf.elevation for line in model.query("LWPOLYLINE[elevation > 0.05]")}
+    assert any(0.05 < level < 0.3 for level in levels)
+    assert len(model.query('LWPOLYLINE[layer=="BIFOCAL_CONTOURS_INDEX"]')) > 0
+    labels = {text.dxf.text for text in model.query('TEXT[layer=="BIFOCAL_CONTOUR_TEXT"]')}
+    assert "+0.10" in labels
+    assert all(round(float(label) / 0.02) % 5 == 0 for label in labels)
+    letters = model.query('TEXT[layer=="BIFOCAL_SECTION_LINES"]')
+    assert sorted(text.dxf.align_point.y > 0 for text in letters) == [False, True]
+    assert min(abs(text.dxf.align_point.y) for text in letters) > 1.5 + 0.05
+
+
+def test_sigma_and_quality_lie_beside_the_delivered_relief(wall: Path) -> None:
+    relief = read_relief(wall / "relief.tif")
+    quality, sigma = relief.quality.copy(), np.full(relief.shape, 0.004, np.float32)
+    quality[:, :84], sigma[:, :84] = 3, 0.02
+    write_relief(wall / "relief.tif", replace(relief, quality=quality, sigma=sigma), overwrite=True)
+    done = run(
+        wall, "--relief", "relief.tif", "--deliver", "d", "--out", "o.tif", "--scale", "1:50",
+        "--bounds", "-3,-1,2,1", "--json",
+    )  # fmt: skip
+    assert done.exit_code == 0, done.output
+    assert json.loads(done.stdout)["file"] == "o.tif"
+    assert (wall / "o.tif").read_bytes() == (wall / "d" / "Torre_est.tif").read_bytes()
+    found = read_relief(wall / "d" / "Torre_est_relief_values.tif")
+    x = found.grid.columns_x
+    assert np.isnan(found.r[:, x < -2.1]).all()
+    assert np.isnan(found.sigma[:, x < -2.1]).all()
+    assert (found.quality[:, x < -2.1] == 0).all()
+    hidden = (x > -2.1) & (x < -2.1 + 84 * GSD)
+    assert (found.quality[:, hidden] == 3).all()
+    assert (found.quality[:, x > -1.25] == 1).all()
+    np.testing.assert_allclose(found.sigma[:, hidden], 0.02)
+
+
+def test_a_nameless_pair_is_called_as_its_folder_where_its_file_has_no_name(wall: Path) -> None:
+    data = json.loads((wall / "wall.pair.json").read_text())
+    del data["name"]
+    folder = wall / "Via Roma 7"
+    folder.mkdir()
+    for name in ("far.png", "near.png"):
+        (wall / name).rename(folder / name)
+    for name, title in (("w", "Via_Roma_7"), ("north", "north")):
+        (folder / f"{name}.pair.json").write_text(json.dumps(data))
+        words = [str(folder / f"{name}.pair.json"), "--plane", "--deliver", str(wall / name)]
+        done = CliRunner().invoke(main, ["ortho", *words, "--scale", "1:50"])
+        assert done.exit_code == 0, done.output
+        assert (wall / name / f"{title}.pdf").exists()
+
+
+def test_a_phantom_does_not_take_the_colours_from_the_wall(wall: Path) -> None:
+    relief = read_relief(wall / "relief.tif")
+    r = np.where(relief.r > 0.1, relief.r, np.float32(0))
+    r[40:44, 40:44] = 1.9
+    write_relief(wall / "relief.tif", replace(relief, r=r), overwrite=True)
+    done = run(wall, "--relief", "relief.tif", "--deliver", "d", "--scale", "1:50")
+    assert done.exit_code == 0, done.output
+    page = page_of(wall / "d" / "Torre_est_relief.pdf")
+    assert "(> +0.30 m)" in page
+    assert "(0.00 wall)" in page
+    with Image.open(wall / "d" / "Torre_est_relief.png") as picture:
+        pixels = np.asarray(picture)[:, :, :3].astype(int)
+    assert np.ptp(pixels[300, 100]) < 12  # the wall is nearly white, whatever lies before it
+    assert pixels[300, 580, 0] > pixels[300, 580, 2] + 60  # what stands before it is brown
+
+
 def test_the_png_is_the_geotiff(wall: Path) -> None:
     run(wall, "--relief", "relief.tif", "--deliver", "d", "--scale", "1:50")
     with Image.open(wall / "d" / "Torre_est.png") as png:
@@ -172,6 +254,10 @@ def test_a_level_section_shows_the_relief_where_it_is(wall: Path) -> None:
     np.testing.assert_allclose(points[inside, 1], 0.3, atol=1e-6)
     outside = points[:, 0] < 0.5
     np.testing.assert_allclose(points[outside, 1], 0.02 * points[outside, 0], atol=2e-4)
+    texts = {text.dxf.text: text.dxf.insert for text in drawing.query("TEXT")}
+    assert {"Section A-A  y=0.5, 1:50", "X [m]", "r [m]", "-2", "2", "+0.2"} <= set(texts)
+    assert max(place[1] for place in texts.values()) < 0.8  # none on the profile
+    assert texts["+0.2"][0] < -2.1
     svg = (wall / "d" / "Torre_est_section1.svg").read_text()
     # 4.2 m at 1:50 is 84 mm, with 10 mm on either side.
     assert 'width="10' in svg
@@ -181,7 +267,8 @@ def test_a_level_section_shows_the_relief_where_it_is(wall: Path) -> None:
     ("arguments", "message"),
     [
         (("--plane", "--gsd", "1"), "--any-size"),
-        (("--plane", "--gsd", "0.00001"), "420,000 x 300,000 px"),
+        (("--plane", "--gsd", "0.00001"), "420,000 x 300,000 px (378 GB)"),
+        (("--plane", "--gsd", "1", "--bounds", "0,0,2,3"), "2 x 3 px (18 bytes)"),
         (("--plane", "--bounds", "0,0,0,1"), "xmin < xmax"),
         (("--plane", "--bounds", "500,500,501,501"), "another wall"),
         (("--relief", "absent.tif"), "no such raster"),
@@ -250,6 +337,7 @@ def test_a_drawing_that_fits_no_paper_is_refused_before_the_work(wall: Path) -> 
 def test_wrong_usage_is_exit_2(wall: Path) -> None:
     assert run(wall).exit_code == 2
     assert run(wall, "--deliver", "d").exit_code == 2
+    assert run(wall, "--deliver", "d", "--out", "o.tif").exit_code == 2
     assert run(wall, "--out", "o.tif", "--plane", "--relief", "relief.tif").exit_code == 2
 
 
@@ -319,17 +407,29 @@ def test_the_relief_sheet_hatches_what_was_not_measured_and_has_a_legend(wall: P
     page = page_of(wall / "d" / "Torre_est_relief.pdf")
     assert "(not measured 20.0%)" in page
     assert "(+0.30 m)" in page
-    assert "(y=0.5)" in page
-    assert "(y=0.5)" in page_of(wall / "d" / "Torre_est.pdf")
+    for sheet in (page, page_of(wall / "d" / "Torre_est.pdf")):
+        assert "(sections A-A  y=0.5)" in sheet
+        # The letters stand beyond both ends of the line: 297 mm less 168 mm, and 20 mm for binding.
+        places = [float(x) for x in re.findall(r"1 0 0 1 (\S+) \S+ Tm \(A\) Tj", sheet)]
+        assert len(places) == 2
+        assert min(places) < (20 + 287 - 168) / 2 - 4
+        assert max(places) > (20 + 287 + 168) / 2 + 4
     assert "not measured" not in page_of(wall / "d" / "Torre_est.pdf")
     # The name begins where it still ends inside the frame, 10 mm from the edge of 297 mm.
     (start,) = set(re.findall(r"1 0 0 1 (\S+) \S+ Tm \(A_VERY_LONG", page))
     assert float(start) + 28 * 0.556 * 2.0 < 297 - 10
     with Image.open(wall / "d" / "Torre_est_relief.png") as picture:
         pixels = np.asarray(picture)[:, :, :3]
-    guessed = pixels[:, : pixels.shape[1] // 5 - 2]
-    assert set(np.unique(guessed)) == {110, 205}
-    assert (np.ptp(pixels[:, pixels.shape[1] // 5 + 2 :], axis=-1) > 0).any()
+    edge = pixels.shape[1] // 5
+    guessed, measured = pixels[2:-2, 2 : edge - 8], pixels[2:-2, edge + 8 :]
+    # A sixth or so is lined; the rest is paler than its colour, dark blue, but blue.
+    light = guessed.astype(int).sum(axis=-1)
+    lined = light < 0.75 * np.median(light)
+    assert 0.08 < lined.mean() < 0.25
+    pale = guessed[~lined].astype(int)
+    assert pale.min() > 0.45 * 255 - 1
+    assert (pale[:, 2] > pale[:, 0] + 20).mean() > 0.9
+    assert (np.ptp(measured.astype(int), axis=-1) > 0).any()
     model = ezdxf.readfile(wall / "d" / "Torre_est_relief.dxf").modelspace()
     lines = model.query('LWPOLYLINE[layer=="BIFOCAL_CONTOURS"]')
     assert len(lines) > 0

@@ -43,6 +43,7 @@ def test_adjusting_writes_project_and_report_and_says_the_salinity(project, tmp_
     media = next(iter(read_project(out).media.values()))
     assert media.layers.indices[2] == pytest.approx(1.3365, abs=2e-4)
     text = report.read_text()
+    assert "a gross error is found from" in text
     assert text.count("<svg") == 4
     assert "http" not in text
     again = CliRunner().invoke(main, arguments)
@@ -106,6 +107,25 @@ def test_the_real_cavity_is_adjusted_to_the_known_sigma0(data_dir, tmp_path):
     sigma0 = json.loads(done.stdout)["sigma0_mm_of"]
     for camera, limit in (("cam1", 5.67), ("cam2", 3.54), ("cam3", 4.54), ("cam4", 3.54)):
         assert sigma0[camera] * 1000 <= limit
+
+
+def test_the_real_cavity_does_not_carry_an_index_and_says_so(data_dir, tmp_path):
+    out = tmp_path / "cavity.toml"
+    folder = str(data_dir / "openptv_cavity")
+    CliRunner().invoke(main, ["openptv", folder, "--swap-indices", "--out", str(out)])
+    CliRunner().invoke(main, ["resect", str(out), "--out", str(out), "--overwrite"])
+    arguments = ["adjust", str(out), "--interior", "c,xh,yh,k1,p1,p2,scale", "--media", "index3"]
+    done = CliRunner().invoke(main, arguments)
+    assert done.exit_code == 0, done.stderr
+    assert "index3: the data hardly carry it; it rests on what was given, 1.33" in done.stderr
+    (line,) = [line for line in done.stdout.splitlines() if line.startswith("index3")]
+    assert 1.325 < float(line.split()[1]) < 1.335
+    assert float(line.split()[2]) >= 0.0045
+    thick = ["adjust", str(out), "--media", "index3,thickness1", "--prior", "thickness1=inf"]
+    done = CliRunner().invoke(main, [*thick, "--prior", "index3=inf"])
+    assert done.exit_code == 1
+    assert "thickness1 comes out as" in done.stderr
+    assert "--prior thickness1=0.6" in done.stderr
 
 
 def test_the_files_of_an_adjustment_appear_together_or_not_at_all(

@@ -151,6 +151,11 @@ def test_tables_that_do_not_fit_each_other_are_named(tmp_path: Path) -> None:
         tmp_path, tmp_path / "in.csv", *cameras, "--visibility", tmp_path / "seen.csv"
     )
     assert "camera 'c9' is not in" in message
+    (tmp_path / "by.csv").write_text(
+        "id,X,Y,Z,cameras\nP1,1,2,90,c1 c2\nP2,5,6,91,c1 c9\n", encoding="utf-8"
+    )
+    message = refused(tmp_path, tmp_path / "by.csv", *cameras)
+    assert "the point at 5.000, 6.000, 91.000 names camera 'c9', which is not in" in message
     (tmp_path / "twice.csv").write_text("id,X,Y,Z\nc1,0,0,150\nc1,1,1,150\n", encoding="utf-8")
     message = refused(tmp_path, tmp_path / "in.csv", "--cameras", tmp_path / "twice.csv")
     assert "stands in" in message

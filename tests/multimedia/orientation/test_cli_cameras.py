@@ -13,8 +13,10 @@ from click.testing import CliRunner
 
 from multimedia.cli.main import SUMMARIES, main
 from multimedia.media.flat_interface import FlatInterface
+from multimedia.orientation.workflow import intersect_project
 from multimedia.projects.model import ImagePoints, ObjectPoints, Project
 from multimedia.projects.project_file import read_project, write_project
+from photocore.errors import InputError
 from tests.multimedia.tank import LAYERS, cameras, control, images
 
 COMMANDS = ("project", "intersect", "resect", "epipolar", "openptv")
@@ -191,6 +193,8 @@ def test_bad_input_is_one_message_and_status_1(tank, words, message):
 def test_wrong_usage_is_status_2(tank):
     run("epipolar", tank, "--camera", "cam1", "--to", "cam2", "--at", "middle", status=2)
     run("intersect", tank, "--method", "guess", status=2)
+    with pytest.raises(InputError, match="method: 'guess' is not one of rigorous, rays, pairs"):
+        intersect_project(Path(tank), points=None, out=None, method="guess")
 
 
 def test_as_many_parameters_as_coordinates_leave_no_precision_and_that_is_said(tank):

@@ -1,0 +1,74 @@
+"""A workbook that is the pair itself: its ideal set-up, in pixels of its photos."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from bifocal.collimation.project import SurveyFiles
+from bifocal.model.pair import Pair
+from bifocal.survey.pair_workflow import read_pair
+from bifocal.survey.setup import SurveySetup
+from bifocal.survey.workbook.reader import read_survey
+from photocore.errors import InputError
+from photocore.workbook.cells import CellValue
+
+
+def pair_of(files: SurveyFiles) -> Pair | None:
+    """Return the pair of a survey's files; None before its photos are oriented.
+
+    Raises
+    ------
+    InputError, GeometryError
+        If the pair file, or the set-up of the workbook, cannot be used.
+    """
+    if files.pair is None:
+        return None
+    pair = read_pair(files.pair)
+    if files.pair_is_workbook and pair.exchanged:
+        raise InputError(
+            f"{files.pair}: d_1 is less than d_2; photo_1 and d_1 belong to the far photo: "
+            "exchange the values of both photos in its sheet Setup."
+        )
+    return pair
+
+
+def ideal_setup(files: SurveyFiles, pair: Pair) -> SurveySetup | None:
+    """Return the ideal set-up that `bifocal solve` will use; None where a pair file is used.
+
+    What is blank in the workbook is as the page assumes it: see `typed_setup`.
+    """
+    if not files.pair_is_workbook:
+        return None
+    setup = read_survey(files.workbook).setup
+    return None if setup.matrices is not None else completed(setup, pair)
+
+
+def completed(setup: SurveySetup, pair: Pair) -> SurveySetup:
+    """Return an ideal set-up in pixels, with pitch and nadirs of its pair where it has none."""
+    photos = (pair.image1, pair.image2)
+    first, second = (tuple(p.pixels_from_plane(p.nadir).tolist()) for p in photos)
+    metres, c, d = pair.image1.plane_from_pixel[0, 0], setup.c1 or 1.0, pair.d1
+    return replace(
+        setup,
+        unit="px",
+        pitch=setup.pitch or float(metres * c / d),
+        nadir1=setup.nadir1 or first,
+        nadir2=setup.nadir2 or second,
+    )
+
+
+def typed_setup(setup: SurveySetup, pair: Pair) -> dict[str, CellValue]:
+    """Return what the page types into an ideal set-up, by the names of its cells.
+
+    Picks are pixels; pitch and nadir points that were blank are typed as the page assumes them, so
+    that the formulas give what the page shows.
+    """
+    whole = completed(setup, pair)
+    cells: dict[str, CellValue] = {"input_unit": whole.unit}
+    if setup.pitch is None:
+        cells["pitch"] = whole.pitch
+    known = ((setup.nadir1, whole.nadir1), (setup.nadir2, whole.nadir2))
+    for number, (typed, nadir) in enumerate(known, start=1):
+        if typed is None and nadir is not None:
+            cells |= {f"nadir_{number}_col": nadir[0], f"nadir_{number}_row": nadir[1]}
+    return cells

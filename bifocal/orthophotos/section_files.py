@@ -1,0 +1,169 @@
+"""A section as a drawing of its own: profile, axes with values, the wall's plane, its name."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from pathlib import Path
+from xml.sax.saxutils import escape
+
+import numpy as np
+
+from bifocal.files.dxf import new_drawing, save_drawing
+from bifocal.orthophotos.canvas import (
+    BLUE,
+    GREY,
+    Canvas,
+    Pen,
+    Place,
+    box,
+    scale_bar,
+    text_width,
+)
+from bifocal.orthophotos.drawing import Section, multiples, round_step
+from bifocal.orthophotos.dxf_canvas import DxfCanvas
+from photocore.arrays import FloatArray
+from photocore.output import atomic_path
+
+#: Layers and their colours (AutoCAD colour index).
+LAYERS = {
+    "BIFOCAL_SECTIONS": 5,
+    "BIFOCAL_SECTIONS_GUESSED": 8,
+    "BIFOCAL_AXES": 8,
+    "BIFOCAL_SECTION_NAME": 7,
+    "BIFOCAL_SCALEBAR": 7,
+}
+_PROFILE = Pen(layer="BIFOCAL_SECTIONS", width=0.25)
+_GUESSED = Pen(layer="BIFOCAL_SECTIONS_GUESSED", width=0.18, colour=GREY, dashes=(1.5, 1.0))
+_AXIS = Pen(layer="BIFOCAL_AXES", width=0.13)
+_WALL = Pen(layer="BIFOCAL_AXES", width=0.13, colour=BLUE, dashes=(4.0, 1.5))
+_NAME = Pen(layer="BIFOCAL_SECTION_NAME")
+_BAR = Pen(layer="BIFOCAL_SCALEBAR")
+#: Between values of the axes: along the wall, and of the relief, to the right and upwards; about.
+#: On paper. [mm]
+_ALONG, _ACROSS = 20.0, (10.0, 5.0)
+#: White around the profile, for the values, and below it, for name and scale bar. [mm]
+MARGIN, FOOT = 10.0, 19.0
+
+
+def write_section_dxf(path: Path, cut: Section, *, scale: float, overwrite: bool) -> None:
+    """Write one section, 1:1 in metres: relief to the right (upright cut) or upwards."""
+    document, model = new_drawing(LAYERS, point_style=3, point_size=3 * scale / 1000)
+    draw_section(DxfCanvas(model, scale / 1000), cut, scale)
+    with atomic_path(path, overwrite=overwrite) as temporary:
+        save_drawing(document, temporary)
+
+
+def write_section_svg(path: Path, cut: Section, *, scale: float, overwrite: bool) -> None:
+    """Write one section as SVG that prints at 1:scale."""
+    left, bottom, right, top = _extent(cut, scale)
+    canvas = _SvgCanvas(left - MARGIN, top + MARGIN)
+    draw_section(canvas, cut, scale)
+    bar = round_step(0.05 * scale) * 1000 / scale
+    width = max(right - left, bar, text_width(_words(cut, scale), 3.2)) + 2 * MARGIN
+    height = top - bottom + 2 * MARGIN + FOOT
+    text = (
+        f'<svg xmlns="http://www.w3.org/2000/svg" width="{width:.3f}mm" height="{height:.3f}mm" '
+        f'viewBox="0 0 {width:.3f} {height:.3f}" font-family="Helvetica, Arial, sans-serif">\n'
+        f'<rect width="{width:.3f}" height="{height:.3f}" fill="#fff"/>\n'
+        + "\n".join(canvas.parts)
+        + "\n</svg>\n"
+    )
+    with atomic_path(path, overwrite=overwrite) as temporary:
+        temporary.write_text(text, encoding="utf-8")
+
+
+def draw_section(canvas: Canvas, cut: Section, scale: float) -> None:
+    """Draw a section in millimetres on paper; (0, 0) is the place 0 on the wall's plane."""
+    left, bottom, right, top = _extent(cut, scale)
+    factor = 1000.0 / scale
+    upright = cut.axis == "x"
+    along, across = ((bottom, top), (left, right)) if upright else ((left, right), (bottom, top))
+    box(canvas, (left, bottom), right - left, top - bottom, _AXIS)
+    relief_step = _ACROSS[0 if upright else 1]
+    for low, high, paper, vertical in (
+        (*along, _ALONG, upright), (*across, relief_step, not upright)
+    ):  # fmt: skip
+        step = round_step(paper / factor)
+        digits = max(0, -math.floor(math.log10(step) + 1e-9))
+        for value in multiples(low / factor, high / factor, step).tolist():
+            at = value * factor
+            words = f"{value:.{digits}f}" if paper == _ALONG else f"{value:+.{digits}f}"
+            if vertical:
+                canvas.line([(left - 1.2, at), (left, at)], _AXIS)
+                place = (left - 1.8 - text_width(words, 2.0), at - 0.7)
+                canvas.text(place, words, _AXIS, size=2.0)
+            else:
+                canvas.line([(at, bottom - 1.2), (at, bottom)], _AXIS)
+                canvas.text((at, bottom - 3.6), words, _AXIS, size=2.0, middle=True)
+    ends = [(0.0, bottom), (0.0, top)] if upright else [(left, 0.0), (right, 0.0)]
+    canvas.line(ends, _WALL)
+    for measured, piece in cut.pieces():
+        places = [(x, y) for x, y in (piece * factor).tolist()]
+        canvas.line(places, _PROFILE if measured else _GUESSED)
+    names = ("r [m]", "Y [m]") if upright else ("X [m]" if cut.axis == "y" else "s [m]", "r [m]")
+    canvas.text((right - text_width(names[0], 2.2), bottom - 6.8), names[0], _AXIS, size=2.2)
+    canvas.text((left - MARGIN + 1, top + 2.5), names[1], _AXIS, size=2.2)
+    canvas.text((left, bottom - 11.5), _words(cut, scale), _NAME, size=3.2, bold=True)
+    length = round_step(0.05 * scale)
+    scale_bar(canvas, (left, bottom - 20.0), length, factor, _BAR)
+
+
+def _words(cut: Section, scale: float) -> str:
+    return f"Section {cut.title}, 1:{scale:g}"
+
+
+def _extent(cut: Section, scale: float) -> tuple[float, float, float, float]:
+    """Return left, bottom, right and top of the axes: what is known, with the wall's plane. [mm]"""
+    known = np.isfinite(cut.relief)
+    factor = 1000.0 / scale
+
+    def rounded(values: FloatArray) -> tuple[float, float]:
+        """Return a range that holds the values and 0, to half a division more."""
+        step = round_step(_ACROSS[0 if cut.axis == "x" else 1] / factor) / 2
+        low, high = min(values.min(), 0.0), max(values.max(), 0.0)
+        return (math.floor(low / step - 1e-6) * step * factor,
+                math.ceil(high / step + 1e-6) * step * factor)  # fmt: skip
+
+    across = rounded(cut.relief[known])
+    along = cut.place[known].min() * factor, cut.place[known].max() * factor
+    (left, right), (bottom, top) = (across, along) if cut.axis == "x" else (along, across)
+    return float(left), float(bottom), float(right), float(top)
+
+
+class _SvgCanvas:
+    """Elements of an SVG picture, whose Y runs downwards. [mm]"""
+
+    def __init__(self, left: float, top: float) -> None:
+        self.left, self.top = left, top
+        self.parts: list[str] = []
+
+    def line(self, points: Sequence[Place], pen: Pen) -> None:
+        dashes = f' stroke-dasharray="{" ".join(f"{v:g}" for v in pen.dashes)}"'
+        self.parts.append(
+            f'<polyline points="{self._places(points)}" fill="none" stroke="{_hex(pen)}" '
+            f'stroke-width="{pen.width:g}"{dashes if pen.dashes else ""}/>'
+        )
+
+    def area(self, corners: Sequence[Place], pen: Pen) -> None:
+        self.parts.append(f'<polygon points="{self._places(corners)}" fill="{_hex(pen)}"/>')
+
+    def text(
+        self, place: Place, words: str, pen: Pen, *, size: float = 2.5, bold: bool = False,
+        middle: bool = False, angle: float = 0.0,
+    ) -> None:  # fmt: skip
+        x, y = place[0] - self.left, self.top - place[1]
+        how = ' text-anchor="middle"' if middle else ""
+        how += ' font-weight="bold"' if bold else ""
+        how += f' transform="rotate({-angle:g} {x:.3f} {y:.3f})"' if angle else ""
+        self.parts.append(
+            f'<text x="{x:.3f}" y="{y:.3f}" font-size="{size:g}" fill="{_hex(pen)}"{how}>'
+            f"{escape(words)}</text>"
+        )
+
+    def _places(self, points: Sequence[Place]) -> str:
+        return " ".join(f"{x - self.left:.3f},{self.top - y:.3f}" for x, y in points)
+
+
+def _hex(pen: Pen) -> str:
+    return "#{:02x}{:02x}{:02x}".format(*pen.colour)

@@ -1,0 +1,237 @@
+"""What may be believed of an adjustment: impossible media, unknowns alike, residuals not white."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+from scipy.stats import chi2, norm
+
+from multimedia.adjustment.bundle_columns import BundleColumns, typical_sigma
+from multimedia.adjustment.unknowns import Adjustment
+from multimedia.media.camera import EXTERIOR, INTERIOR
+from multimedia.projects.model import Project
+from photocore.arrays import FloatArray, IntArray
+from photocore.errors import GeometryError
+
+#: A medium adjusted by more than this many of its prior sigmas is another one, or nonsense.
+FARTHEST = 5.0
+#: Media unknowns whose sigma keeps this share of the prior's are not carried by the data.
+UNCARRIED = 0.9
+#: Correlations from which two unknowns can hardly be told apart.
+ALIKE = 0.95
+#: Risk of calling a parameter significant, or residuals not white, that are so by chance.
+RISK_PARAMETER, RISK_WHITE = 0.01, 0.001
+#: Points of one image that may share what the model lacks; the largest effect counts.
+NEIGHBOURS = (4, 8, 16)
+_FEWEST_CELLS = 6
+_SHOWN = 6
+#: Interior parameters without which a camera is a pinhole: tested against zero (scale against 1).
+_TESTED = {name: 1.0 if name == "scale" else 0.0 for name in INTERIOR[3:]}
+_REMEDIES = (
+    (("thickness",), "measure the glass and give its sigma, e.g. --prior thickness1=0.1"),
+    (("index",), "measure points at more depths in the water or a distance there (--scale-bar)"),
+    (("offset", "tilt"), "measure where the interface lies and give its sigma as a --prior"),
+    (("p1", "p2"), "leave p1, p2 out, or turn the camera by 90 degrees between photos"),
+    (("k1", "k2", "k3"), "leave the higher one out, or use points out to the corners"),
+    (("xh", "yh"), "take photos turned by 90 degrees about the axis, or keep xh, yh"),
+    (("c", "scale", "shear"), "use control points at more depths or oblique photos, or keep c"),
+)
+
+
+def refuse_impossible_media(
+    project: Project, columns: BundleColumns, result: Adjustment, given: Mapping[str, float]
+) -> None:
+    """Refuse indices and thicknesses that the medium named cannot have.
+
+    Parameters
+    ----------
+    project : Project
+        With the start values.
+    columns : BundleColumns
+    result : Adjustment
+    given : mapping of str to float
+        Prior standard deviations by label; infinite: anything that physics allows.
+
+    Raises
+    ------
+    GeometryError
+        Naming the unknown, its value and what it cannot be told apart from.
+    """
+    for label, name, start in material_unknowns(project, columns):
+        sigma = given.get(label, typical_sigma(name, start))
+        value, own = result.value(label), result.sigma(label)
+        least, most = (1.0, 3.0) if name.startswith("index") else (1e-6 * start, np.inf)
+        reach = FARTHEST * sigma
+        if max(least, start - reach) < value < min(most, start + reach):
+            continue
+        row = result.names.index(label)
+        others = np.abs(result.correlations[row])
+        others[row] = 0.0
+        twin = int(np.argmax(others))
+        alike = (
+            f"; it goes with {result.names[twin]} (correlation {others[twin]:.2f})"
+            if others[twin] > ALIKE / 2
+            else ""
+        )
+        raise GeometryError(
+            f"adjust: {label} comes out as {value:.4g} +- {own:.2g}, {start:g} was given: the data "
+            f"cannot carry it{alike}. Give what is known as a standard deviation (--prior "
+            f"{label}={typical_sigma(name, start):.3g}), measure points at more depths, or take "
+            f"{name} out of --media. If it really is another medium, change its start value in the "
+            "project."
+        )
+
+
+def material_unknowns(project: Project, columns: BundleColumns) -> Iterator[tuple[str, str, float]]:
+    """Yield label, parameter and start value of every unknown index and thickness, once."""
+    told = set()
+    for owner, places in columns.media.items():
+        for name, column in places.items():
+            if name.startswith(("index", "thickness")) and column not in told:
+                told.add(column)
+                yield columns.labels[column], name, float(project.media[owner].value(name))
+
+
+def with_model_error(result: Adjustment, order: tuple[IntArray, ...]) -> Adjustment:
+    """Return the adjustment with sigmas that include what the model lacks.
+
+    Residuals of neighbouring points are independent if the model is complete. Where their sums
+    scatter more than that, every parameter rests on fewer independent observations than were
+    counted: covariances are multiplied by the ratio (the design effect of cluster sampling).
+
+    Parameters
+    ----------
+    result : Adjustment
+    order : tuple of ndarray of int
+        Rows of the image points of each camera.
+    """
+    place = result.project.image_points.image
+    scaled = result.residuals / result.sigma_image
+    effect = 1.0
+    for size in NEIGHBOURS:
+        sums, free, count = 0.0, 0.0, 0
+        for rows in order:
+            for cell in _cells(place[rows], size):
+                mine = rows[cell]
+                sums += float((scaled[mine].sum(axis=0) ** 2).sum())
+                free += float(result.redundancy_numbers[mine].sum())
+                count += 2
+        if count < 2 * _FEWEST_CELLS or free <= 0:
+            break
+        ratio = sums / free
+        if ratio > chi2.isf(RISK_WHITE / len(NEIGHBOURS), count) / count:
+            effect = max(effect, ratio)
+    if effect == 1.0:
+        return result
+    points = result.project.object_points
+    factor = float(np.sqrt(effect))
+    return replace(
+        result,
+        project=replace(result.project, object_points=replace(points, sigma=points.sigma * factor)),
+        covariance=result.covariance * effect,
+        point_covariance=result.point_covariance * effect,
+        model_error=factor,
+        remarks=(
+            *result.remarks,
+            f"Residuals of neighbouring points are alike: the model lacks something (lens terms, a "
+            f"tilt, an index, gross errors). All sigmas were made {factor:.1f} times larger, the "
+            "least that this costs.",
+        ),
+    )
+
+
+def _cells(place: FloatArray, size: int) -> Iterator[IntArray]:
+    """Yield the rows of neighbouring places, at most ``size`` together, halving the wider side."""
+    waiting = [np.arange(len(place))]
+    while waiting:
+        rows = waiting.pop()
+        if len(rows) <= size:
+            yield rows
+            continue
+        wider = int(np.argmax(np.ptp(place[rows], axis=0)))
+        rows = rows[np.argsort(place[rows, wider], kind="stable")]
+        waiting += [rows[: len(rows) // 2], rows[len(rows) // 2 :]]
+
+
+def remarks_on_unknowns(
+    project: Project, columns: BundleColumns, result: Adjustment
+) -> tuple[str, ...]:
+    """Return what the user should know of the unknowns: alike, insignificant, or not carried."""
+    return (
+        *_uncarried(project, columns, result),
+        *_alike(result),
+        *_insignificant(result),
+    )
+
+
+def _uncarried(project: Project, columns: BundleColumns, result: Adjustment) -> Iterator[str]:
+    """Yield the indices and thicknesses that rest on their priors alone."""
+    for label, _, start in material_unknowns(project, columns):
+        prior = columns.priors.get(columns.labels.index(label))
+        if prior is not None and result.sigma(label) > UNCARRIED * prior * result.model_error:
+            yield (
+                f"{label}: the data hardly carry it; it rests on what was given, {start:g} "
+                f"+- {prior:.2g}."
+            )
+
+
+def _alike(result: Adjustment) -> Iterator[str]:
+    """Yield the pairs that cannot be told apart, one sentence for each kind of pair."""
+    matrix = np.nan_to_num(result.correlations)
+    first, second = np.nonzero(np.triu(np.abs(matrix) > ALIKE, 1))
+    kinds: dict[tuple[str, str], list[tuple[float, str, str]]] = {}
+    for i, j in zip(first.tolist(), second.tolist(), strict=True):
+        names = result.names[i], result.names[j]
+        kind = names[0].rpartition(":")[2], names[1].rpartition(":")[2]
+        # Centre and turns of one camera are alike in every narrow view; that harms no point.
+        if not {*kind} <= {*EXTERIOR, "X", "Y", "Z"}:
+            kinds.setdefault(kind, []).append((abs(float(matrix[i, j])), *names))
+    ranked = sorted(kinds.items(), key=lambda item: -max(item[1])[0])
+    for kind, pairs in ranked[:_SHOWN]:
+        strength, one, other = max(pairs)
+        more = f" (and {len(pairs) - 1} more such pairs)" if len(pairs) > 1 else ""
+        yield (
+            f"{one} and {other} can hardly be told apart: correlation {strength:.3f}{more}; "
+            f"{_remedy(kind)}."
+        )
+    if len(ranked) > _SHOWN:
+        yield f"{len(ranked) - _SHOWN} more kinds of pairs are alike; the report shows them."
+
+
+def _remedy(kind: tuple[str, str]) -> str:
+    """Return what would tell two unknowns apart."""
+    for starts, remedy in _REMEDIES:
+        if any(name.startswith(start) for name in kind for start in starts if len(start) > 1) or (
+            "c" in kind and "c" in starts
+        ):
+            return remedy
+    return "leave one out, or give one a --prior"
+
+
+def _insignificant(result: Adjustment) -> Iterator[str]:
+    """Yield the lens parameters that the geometry does not carry."""
+    for name, neutral in _TESTED.items():
+        labels = [label for label in result.names if label.rpartition(":")[2] == name]
+        if labels and significance(result, labels, neutral) > RISK_PARAMETER:
+            whose = ", ".join(label.rpartition(":")[0] for label in labels[:_SHOWN])
+            yield (
+                f"{name} is not significant at 1 % ({whose}): leave it out of --interior, or say "
+                "--interior auto."
+            )
+
+
+def significance(
+    result: Adjustment, labels: Sequence[str], neutral: float | Sequence[float] = 0.0
+) -> float:
+    """Return the chance that parameters which are really neutral come out this far off.
+
+    The test is that of the quadratic form of all of them with their covariance (chi-square).
+    """
+    rows = [result.names.index(label) for label in labels]
+    off = result.values[rows] - np.asarray(neutral)
+    covariance = result.covariance[np.ix_(rows, rows)]
+    if len(rows) == 1:
+        return float(2 * norm.sf(abs(off[0]) / np.sqrt(covariance[0, 0])))
+    return float(chi2.sf(off @ np.linalg.solve(covariance, off), len(rows)))

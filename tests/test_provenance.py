@@ -1,0 +1,143 @@
+"""Every kind of output says which program made it, when, by which command and from which files."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import zipfile
+from pathlib import Path
+
+import numpy as np
+import pytest
+import rasterio
+from click.testing import CliRunner
+
+import bifocal
+from bifocal.cli.main import main
+from bifocal.demo import SAMPLE
+from multimedia.cli.main import main as multimedia
+from photocore.provenance import note, provenance, recording
+
+PAIR = SAMPLE / "facade.pair.json"
+DAY = "2019-03-04"
+
+
+def digest(path: Path) -> str:
+    return hashlib.sha256(path.read_bytes()).hexdigest()
+
+
+def run(*words: object, group=main) -> None:
+    result = CliRunner().invoke(group, [*map(str, words), "--date", DAY])
+    assert result.exit_code == 0, result.stderr
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory) -> Path:
+    """A folder with one output of each kind, from the sample's targets."""
+    out = tmp_path_factory.mktemp("made")
+    targets = SAMPLE / "targets.csv"
+    run("solve", targets, "--pair", PAIR, "--out", out / "r.xlsx")
+    for ending in ("dxf", "ply", "xlsx"):
+        run("export", out / "r.xlsx", "--out", out / f"points.{ending}")
+    run("ortho", PAIR, "--plane", "--scale", "1:100", "--dpi", "60",
+        "--bounds=-1,-1,1,1", "--deliver", out / "sheet")  # fmt: skip
+    run("report", PAIR, "--control", targets, "--out", out / "report.html")
+    run("report", PAIR, "--control", targets, "--out", out / "report.pdf")
+    run("align", SAMPLE / "far.jpg", SAMPLE / "near.jpg", "--as-set-up", "--no-picture",
+        "--distance1", 17.5, "--distance2", 9.5,
+        "--focal1", 35, "--focal2", 19, "--sensor-width", 22.7,
+        "--out", out / "p.pair.json")  # fmt: skip
+    return out
+
+
+def told(path: Path) -> str:
+    """Return everything a file says about itself, as text."""
+    if path.suffix == ".tif":
+        with rasterio.open(path) as file:
+            return json.dumps(file.tags())
+    if path.suffix == ".xlsx":
+        with zipfile.ZipFile(path) as package:
+            return package.read("docProps/core.xml").decode()
+    data = path.read_bytes()
+    if path.suffix == ".pdf":
+        texts = [data.decode("latin-1")]
+        for part in data.split(b"<feff")[1:]:
+            texts.append(bytes.fromhex(part.split(b">")[0].decode()).decode("utf-16-be"))
+        return "\n".join(texts)
+    return data.decode("utf-8", "replace")
+
+
+INPUTS = {
+    "r.xlsx": ("targets.csv", "facade.pair.json"),
+    "points.dxf": ("r.xlsx",),
+    "points.ply": ("r.xlsx",),
+    "points.xlsx": ("r.xlsx",),
+    "p.pair.json": ("far.jpg", "near.jpg"),
+    "report.html": ("targets.csv", "facade.pair.json", "far.jpg"),
+    "report.pdf": ("targets.csv", "facade.pair.json", "far.jpg"),
+    "sheet/*.tif": ("facade.pair.json", "far.jpg"),
+    "sheet/*.pdf": ("facade.pair.json", "far.jpg"),
+    "sheet/*.dxf": ("facade.pair.json", "far.jpg"),
+}
+COMMANDS = {"r": "solve", "points": "export", "p": "align", "report": "report", "sheet": "ortho"}
+
+
+@pytest.mark.parametrize("name", INPUTS)
+def test_an_output_says_program_date_command_and_inputs_with_their_hashes(made, name):
+    (path,) = list(made.glob(name))[:1]
+    text = told(path)
+    assert f"bifocal {bifocal.__version__}" in text
+    assert DAY in text
+    assert f"bifocal {COMMANDS[name.split('/')[0].split('.')[0]]} " in text
+    for source in INPUTS[name]:
+        place = made / source if (made / source).exists() else SAMPLE / source
+        assert source in text
+        assert digest(place) in text, source
+
+
+def test_a_map_of_the_other_program_says_so_too(tmp_path):
+    with rasterio.open(
+        tmp_path / "dem.tif", "w", driver="GTiff", width=4, height=4, count=1, dtype="float32",
+        transform=rasterio.Affine(1, 0, 0, 0, -1, 4),
+    ) as file:  # fmt: skip
+        file.write(np.full((1, 4, 4), -1.5, np.float32))
+    cameras = tmp_path / "cameras.csv"
+    cameras.write_text("id,X,Y,Z\n1,0,0,50\n2,4,4,50\n")
+    run("bathymetry", tmp_path / "dem.tif", "--water-level", 0, "--index", 1.34, "--cameras",
+        cameras, "--out", tmp_path / "out.tif", group=multimedia)  # fmt: skip
+    text = told(tmp_path / "out.tif")
+    assert "multimedia bathymetry" in text
+    assert digest(tmp_path / "dem.tif") in text
+    assert digest(cameras) in text
+
+
+def test_what_is_read_counts_once_as_it_was_and_own_outputs_do_not(tmp_path):
+    source = tmp_path / "a.txt"
+    source.write_text("before")
+    before = digest(source)
+    with recording("script", day="2020-02-29"):
+        note(source)
+        note(tmp_path / "gone")
+        assert provenance().inputs == (("a.txt", before),)
+        source.write_text("after")
+        assert provenance().to_dict() == {
+            "program": f"bifocal {bifocal.__version__}", "date": "2020-02-29",
+            "command": "script", "inputs": [{"file": "a.txt", "sha256": before}],
+        }  # fmt: skip
+        bifocal.Pair.read(PAIR).write(tmp_path / "mine.pair.json")
+        bifocal.Pair.read(tmp_path / "mine.pair.json").write(tmp_path / "next.pair.json")
+    said = json.loads((tmp_path / "next.pair.json").read_text())["provenance"]
+    assert [item["file"] for item in said["inputs"]] == ["a.txt", "facade.pair.json"]
+    assert provenance().command == ""
+
+
+@pytest.mark.parametrize("place", ["before", "behind"])
+def test_a_date_that_is_none_is_refused_and_a_date_holds_wherever_it_is_given(tmp_path, place):
+    words = ["template", str(tmp_path / f"{place}.xlsx")]
+    for day, status in (("yesterday", 2), (DAY, 0)):
+        given = ["--date", day]
+        line = [*given, *words] if place == "before" else [*words, *given]
+        result = CliRunner().invoke(main, line)
+        assert result.exit_code == status, result.stderr
+    assert "year-month-day" in CliRunner().invoke(main, ["--date", "1.2.2020", "doctor"]).stderr
+    assert DAY in told(tmp_path / f"{place}.xlsx")
