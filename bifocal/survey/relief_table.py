@@ -34,9 +34,9 @@ class ReliefTable:
     carried : mapping of str to ndarray, shape (n,)
         For points measured in raw pixels of a general pair: positions carried to the plane
         ``x1 y1 x2 y2`` [mm at image scale, from the zoom centre], least-squares gains
-        ``g1x g1y g2x g2y`` [mm per mm of q], ``k_q`` [mm/px], ``k_r`` [m/px], ``o_r`` [m] (what
-        the orientation adds to sigma_r), and ``misfit_px``, the miss across the radius in pixels
-        of image 2.
+        ``g1x g1y g2x g2y`` [mm per mm of q], ``k_q`` [mm/px], ``k_w`` (the same on the wall) and
+        ``k_r`` [m/px], ``o_r`` [m] (what the orientation adds to sigma_r), and ``misfit_px``, the
+        miss across the radius in pixels of image 2.
     image_scale : float or None
         Scale number of image 1; None where no principal distance is known.
     sigma_px : float or None

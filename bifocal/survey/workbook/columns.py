@@ -292,7 +292,7 @@ def pair_points(*, undistorted: bool) -> tuple[SurveyColumn, ...]:
         ),
         *(
             SurveyColumn(key=key, kind="value", places=6, folded=True)
-            for key in ("g1x", "g1y", "g2x", "g2y", "k_q", "k_r", "o_r")
+            for key in ("g1x", "g1y", "g2x", "g2y", "k_q", "k_w", "k_r", "o_r")
         ),
         *(
             SurveyColumn(key=f"{kind}_{key}", kind="value", folded=True)
@@ -327,7 +327,8 @@ def pair_points(*, undistorted: bool) -> tuple[SurveyColumn, ...]:
         ),
         _f(
             "flag",
-            _flag(_XY, "ABS(N([@q]))>k_off*sigma_px*N([@k_q])").replace(
+            # On the wall: q follows an image scale typed later, k_q does not.
+            _flag(_XY, "ABS(N([@q]))*m_1/1000>k_off*sigma_px*N([@k_w])").replace(
                 "[@s1_used]=0", "[@x1]^2+[@y1]^2=0"
             ),
             width=13,

@@ -378,3 +378,16 @@ def test_planning_of_a_pair_without_focal_lengths_follows_when_they_are_typed(tm
     ]
     assert radii[1] == pytest.approx(radii[0], rel=1e-9)
     assert radii[0][0] > 0
+    # Nothing about the points has changed, although they are now counted at another image scale.
+    keys = [cell.value for cell in before["Points"][4]]
+    for key in ("flag", "r", "sigma_r", "X"):
+        shown = [
+            [book["Points"].cell(row, keys.index(key) + 1).value for row in range(5, 65)]
+            for book in (before, after)
+        ]
+        if key == "flag":
+            assert shown[1] == shown[0]
+            assert {"OK", "OFF-RADIAL"} <= set(shown[0])
+        else:
+            number = [[v for v in column if isinstance(v, float)] for column in shown]
+            assert number[1] == pytest.approx(number[0], rel=1e-9)
