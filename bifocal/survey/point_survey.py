@@ -247,7 +247,13 @@ def _adjusted_radii(
         covariance=solved.covariance + common,
         sigma_px=float(solved.sigma_px),
         carried=carried
-        | {"k_q": k_q, "k_w": k_q * scale_number / 1000, "k_r": k_r, "o_r": o_r, "misfit_px": solved.misfit}
+        | {
+            "k_q": k_q,
+            "k_w": k_q * scale_number / 1000,
+            "k_r": k_r,
+            "o_r": o_r,
+            "misfit_px": solved.misfit,
+        }
         | entries(solved.covariance / solved.sigma_px**2, "k_")
         | entries(common, "o_"),
     )
