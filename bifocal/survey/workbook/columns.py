@@ -12,6 +12,11 @@ from collections.abc import Collection
 from dataclasses import dataclass
 
 from bifocal.model.flags import FlagLimits
+from bifocal.survey.workbook.placed_formulas import (
+    IS_CONTROL,
+    added_covariance,
+    turned_covariance,
+)
 
 #: Columns of names and words, not of numbers.
 TEXT_KEYS = ("id", "code", "note")
@@ -121,28 +126,43 @@ def _of_x(key: str, formula: str, *, folded: bool = True) -> SurveyColumn:
 
 
 #: E, N, H from a whole-metre origin: columns that refer to the sheet `Georeference`.
-NEAR = ("n_E", "n_N", "n_H")
+NEAR = ("n_E", "n_N", "n_H", "cov_EN")
 
 
-def _near() -> tuple[SurveyColumn, ...]:
-    """Return the columns of `NEAR`: differences of large coordinates would lose their digits."""
+def _near(*, is_pair: bool) -> tuple[SurveyColumn, ...]:
+    """Return the columns of `NEAR`: differences of large coordinates would lose their digits.
+
+    With them the covariance of E and N, for error ellipses.
+    """
     columns = []
-    for row, key in enumerate(NEAR, start=1):
+    for row, key in enumerate(NEAR[:3], start=1):
         turned = "+".join(f"g_{row}{i}*([@{axis}]-g_{axis}0)" for i, axis in enumerate("XYZ", 1))
         body = f"g_{key[-1]}t+g_k*({turned})"
         known = "AND(ISNUMBER(g_k),COUNT([@X],[@Y],[@Z])=3)"
         columns.append(_f(key, f'IF({known},{body},"")', folded=True))
+    added = added_covariance("E", "N", {name: f"[@n_{name}]" for name in "ENH"})
+    own = f"g_k^2*({turned_covariance('E', 'N', '[@cov_{}]')})"
+    common = ""
+    if is_pair:
+        own = f"(g_k*sigma_px)^2*({turned_covariance('E', 'N', '[@k_{}]')})"
+        whole = turned_covariance("E", "N", "[@o_{}]")
+        common = f"+IF(ISNUMBER([@o_EN]),[@o_EN],g_k^2*({whole}))"
+    both = f"{own}+IF({IS_CONTROL},-1,1)*({added}){common}"
+    known = "AND(ISNUMBER([@n_E]),ISNUMBER([@cov_XX]))"
+    columns.append(_f(NEAR[3], f'IF({known},{both},"")', folded=True))
     return tuple(columns)
 
 
-def _sigmas(sigma_r: str, covariances: tuple[SurveyColumn, ...]) -> tuple[SurveyColumn, ...]:
+def _sigmas(
+    sigma_r: str, covariances: tuple[SurveyColumn, ...], *, is_pair: bool
+) -> tuple[SurveyColumn, ...]:
     """Return the columns of precision, with the covariance of X, Y, Z from the picks."""
     return (
         *covariances,
         _of_x("sigma_X", "SQRT([@cov_XX])", folded=False),
         _of_x("sigma_Y", "SQRT([@cov_YY])", folded=False),
         _of_r("sigma_r", sigma_r),
-        *_near(),
+        *_near(is_pair=is_pair),
     )
 
 
@@ -221,7 +241,9 @@ def ideal_points(
             for _ in range(1 if xy else 0)
         ),
         *_sigmas(
-            "sigma_s*SQRT((1-[@r]/d_1)^2+(k_12*(1-[@r]/d_2))^2)/ABS([@den])", _ideal_covariances()
+            "sigma_s*SQRT((1-[@r]/d_1)^2+(k_12*(1-[@r]/d_2))^2)/ABS([@den])",
+            _ideal_covariances(),
+            is_pair=False,
         ),
         _f("flag", _flag(measured, off), width=13),
     )
@@ -299,7 +321,10 @@ def pair_points(*, undistorted: bool) -> tuple[SurveyColumn, ...]:
             for kind in "ko"
             for key in COVARIANCES
         ),
-        *(SurveyColumn(key=f"o_{name}", kind="value", folded=True) for name in "ENH"),
+        *(
+            SurveyColumn(key=f"o_{name}", kind="value", folded=True)
+            for name in ("E", "N", "H", "EN")
+        ),
         _f("s1_used", f'IF([@q]="","",{radius(1, moved)})', 4, folded=True),
         _f("s2_used", f'IF([@q]="","",{radius(2, moved)})', 4, folded=True),
         _f(
@@ -324,6 +349,7 @@ def pair_points(*, undistorted: bool) -> tuple[SurveyColumn, ...]:
                 )
                 for key in COVARIANCES
             ),
+            is_pair=True,
         ),
         _f(
             "flag",

@@ -159,14 +159,14 @@ class SurveyContent:
         return np.asarray(np.sqrt(np.maximum(variances, 0.0)))
 
     @property
-    def common_sigma(self) -> FloatArray:
-        """What the orientation still adds to E, N, H once placed, shape (n, 3). [m]"""
+    def common_covariance(self) -> FloatArray:
+        """What the orientation still adds to E, N, H once placed, shape (n, 3, 3). [m²]"""
         geo, table = self.georeference, self.table
         assert table is not None
         effect = table.effect_of_orientation(table.xyz)
         if geo is None or effect is None or geo.precision is None:
-            return np.full((len(table), 3), np.nan)
-        return np.asarray(np.sqrt(np.diagonal(geo.common(self.near, effect), axis1=1, axis2=2)))
+            return np.full((len(table), 3, 3), np.nan)
+        return geo.common(self.near, effect)
 
     @property
     def point_rows(self) -> int:
@@ -243,9 +243,13 @@ def point_cells(content: SurveyContent) -> dict[str, list[CellValue]]:
             for empty, value in zip(blank.tolist(), values.tolist(), strict=True)
         ]
     cells |= {key: inputs(values) for key, values in table.carried.items()}
-    cells |= {key: inputs(content.near[:, i]) for i, key in enumerate(NEAR)}
+    cells |= {key: inputs(content.near[:, i]) for i, key in enumerate(NEAR[:3])}
+    placed = content.world_covariance
+    cells[NEAR[3]] = [None] * len(table) if placed is None else inputs(placed[:, 0, 1])
     if content.is_pair:
-        cells |= {f"o_{axis}": inputs(content.common_sigma[:, i]) for i, axis in enumerate("ENH")}
+        common = content.common_covariance
+        cells |= {f"o_{axis}": inputs(np.sqrt(common[:, i, i])) for i, axis in enumerate("ENH")}
+        cells["o_EN"] = inputs(common[:, 0, 1])
     else:
         cells |= _radial_variances(content, placeless)
     typed = points.has_pixels | points.is_cartesian | points.is_polar

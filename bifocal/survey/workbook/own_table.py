@@ -15,7 +15,8 @@ from bifocal.survey.relief_table import ENTRIES
 from bifocal.survey.workbook.book import build
 from bifocal.survey.workbook.columns import NEAR, SurveyColumn, ideal_points, pair_points
 from bifocal.survey.workbook.content import SurveyContent, point_cells, result_cells
-from bifocal.survey.workbook.precision_lines import added_variance, precision_values
+from bifocal.survey.workbook.placed_formulas import added_covariance
+from bifocal.survey.workbook.precision_lines import precision_values
 from bifocal.survey.workbook.reader import TO_DEGREES, TO_MM, SurveyInput
 from bifocal.survey.workbook.setup_update import (
     add_sheets,
@@ -171,7 +172,7 @@ def _columns(table: OwnTable, content: SurveyContent) -> list[ResultColumn]:
         )
     results = []
     for column in described:
-        if column.key in ("id", "use", "code", "note", *NEAR):
+        if column.key in ("id", "use", "code", "note", *NEAR, "o_EN"):
             continue
         if column.kind == "input" and column.key in table.columns:
             continue
@@ -254,7 +255,7 @@ def _world_sigmas(
             for key, (a, b) in ENTRIES.items()
         )
         added = re.sub(
-            r"g_[zuw]_[A-Z]+", lambda m: f"({numbers[m[0]]!r})", added_variance(name, near)
+            r"g_[zuw]_[A-Z]+", lambda m: f"({numbers[m[0]]!r})", added_covariance(name, name, near)
         )
         sign = "1" if geo.model == "2D" and name == "H" else "[@shared]"
         common = f"+N([@o_{name}])^2" if content.is_pair else ""

@@ -2,29 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 import numpy as np
 
 from bifocal.survey.reference import Georeference
 from bifocal.survey.weighted_similarity import TURNS
 from bifocal.survey.workbook.georeference_columns import entry
+from bifocal.survey.workbook.placed_formulas import SMALL, ordered
 from bifocal.survey.workbook.space_block import SpaceBlock
 from photocore.workbook.cells import CellValue
 
-#: Turns about E, N, H and the logarithm of the scale, K.
-_SMALL = "ENHK"
-_PAIRS = tuple(one + other for i, one in enumerate(_SMALL) for other in _SMALL[i:])
-#: What a small change of each moves E, N, H by: sign and coordinate from the origin.
-_MOVED = {
-    "E": {"N": (1, "H"), "H": (-1, "N"), "K": (1, "E")},
-    "N": {"E": (-1, "H"), "H": (1, "E"), "K": (1, "N")},
-    "H": {"E": (1, "N"), "N": (-1, "E"), "K": (1, "H")},
-}
-
-
-def _ordered(one: str, other: str) -> str:
-    return one + other if _SMALL.index(one) <= _SMALL.index(other) else other + one
+_PAIRS = tuple(one + other for i, one in enumerate(SMALL) for other in SMALL[i:])
 
 
 def precision_lines(space: SpaceBlock) -> dict[str, str]:
@@ -44,12 +31,12 @@ def precision_lines(space: SpaceBlock) -> dict[str, str]:
         general = f"SUMPRODUCT({shift},{last.column(3)})"
         lines[f"g_t_{axis}K"] = f"IF(g_space=1,{general},g_f_{axis}-g_x_{axis})"
     for i, name in enumerate("ENH", start=1):
-        for small in _SMALL:
+        for small in SMALL:
             turned = "+".join(f"g_{i}{j}*g_t_{axis}{small}" for j, axis in enumerate("XYZ", 1))
             lines[f"g_v_{name}{small}"] = f"g_k*({turned})"
     for name in "ENH":
-        for small in _SMALL:
-            terms = (f"g_v_{name}{other}*g_w_{_ordered(other, small)}" for other in _SMALL)
+        for small in SMALL:
+            terms = (f"g_v_{name}{other}*g_w_{ordered(other, small)}" for other in SMALL)
             lines[f"g_u_{name}{small}"] = "+".join(terms)
     for i, name in enumerate("ENH", start=1):
         own = "+".join(
@@ -58,15 +45,22 @@ def precision_lines(space: SpaceBlock) -> dict[str, str]:
             for k, other in enumerate("XYZ", start=1)
         )
         own = f"IF(g_flat=1,0,g_k^2*({own}))" if name == "H" else f"g_k^2*({own})"
-        carried = "+".join(f"g_v_{name}{small}*g_u_{name}{small}" for small in _SMALL)
+        carried = "+".join(f"g_v_{name}{small}*g_u_{name}{small}" for small in SMALL)
         lines[f"g_z_{name}"] = f"{own}+{carried}"
+    own = "+".join(
+        f"g_1{j}*g_2{k}*g_i_{entry(one, other)}"
+        for j, one in enumerate("XYZ", start=1)
+        for k, other in enumerate("XYZ", start=1)
+    )
+    carried = "+".join(f"g_v_E{small}*g_u_N{small}" for small in SMALL)
+    lines["g_z_EN"] = f"g_k^2*({own})+{carried}"
     return lines
 
 
 def _spread(key: str, space: SpaceBlock) -> str:
     """Return the formula of an entry of the covariance of turns and stretch."""
     found = space.inverse
-    rows = [[f"g_{_SMALL.index(small) + 1}{j}" for j in "123"] for small in key if small != "K"]
+    rows = [[f"g_{SMALL.index(small) + 1}{j}" for j in "123"] for small in key if small != "K"]
     if key == "KK":
         general = found.fixed(3, 3)
     elif key.endswith("K"):
@@ -95,50 +89,14 @@ def precision_values(geo: Georeference | None) -> dict[str, CellValue]:
     carried = found.lever @ found.spread
     variances = np.diag(found.covariance)
     on_wall = fit.rotation.T @ found.lever / fit.scale
-    values = {}
-    for i, one in enumerate(_SMALL):
+    values = {"g_z_EN": float(found.covariance[0, 1])}
+    for i, one in enumerate(SMALL):
         for j in range(i, 4):
-            values[f"g_w_{one}{_SMALL[j]}"] = float(found.spread[i, j])
+            values[f"g_w_{one}{SMALL[j]}"] = float(found.spread[i, j])
     for i, (axis, name) in enumerate(zip("XYZ", "ENH", strict=True)):
-        for j, small in enumerate(_SMALL):
+        for j, small in enumerate(SMALL):
             values[f"g_t_{axis}{small}"] = float(on_wall[i, j])
             values[f"g_v_{name}{small}"] = float(found.lever[i, j])
             values[f"g_u_{name}{small}"] = float(carried[i, j])
         values[f"g_z_{name}"] = float(variances[i])
     return dict(values)
-
-
-def added_variance(name: str, cells: Mapping[str, str]) -> str:
-    """Return what the transformation adds to the variance of E, N or H of a point, as a formula.
-
-    Parameters
-    ----------
-    name : str
-        ``E``, ``N`` or ``H``.
-    cells : mapping
-        Where the point's E, N, H from the whole-metre origin stand.
-    """
-    moved = {small: (sign, cells[axis]) for small, (sign, axis) in _MOVED[name].items()}
-    single = "".join(
-        f"{'+' if sign > 0 else '-'}g_u_{name}{small}*{cell}"
-        for small, (sign, cell) in moved.items()
-    )
-    squares = "+".join(f"g_w_{small}{small}*{cell}^2" for small, (_, cell) in moved.items())
-    mixed = "".join(
-        f"{'+' if moved[one][0] * moved[other][0] > 0 else '-'}"
-        f"g_w_{one}{other}*{moved[one][1]}*{moved[other][1]}"
-        for one, other in _PAIRS_OF[name]
-    )
-    return f"g_z_{name}+2*(0{mixed}-(0{single}))+{squares}"
-
-
-#: The mixed terms of each.
-_PAIRS_OF = {
-    name: [
-        (one, other)
-        for i, one in enumerate(_SMALL)
-        for other in _SMALL[i + 1 :]
-        if one in moved and other in moved
-    ]
-    for name, moved in _MOVED.items()
-}

@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
-from bifocal.survey.workbook.columns import COVARIANCES, SurveyColumn, formula_column
-from bifocal.survey.workbook.precision_lines import added_variance
+from bifocal.survey.workbook.columns import SurveyColumn, formula_column
+from bifocal.survey.workbook.placed_formulas import (
+    IS_CONTROL,
+    added_covariance,
+    turned_covariance,
+)
 
 _AT = "ROW()-ROW(tblResults[[#Headers],[id]])"
 
@@ -26,30 +30,17 @@ def _world(row: int, name: str) -> str:
     return f'IF(AND(ISNUMBER(g_k),COUNT([@X],[@Y],[@Z])=3),g_{name}0+g_k*({turned}),"")'
 
 
-def _turned(row: int, prefix: str) -> str:
-    """Return the variance along a world axis that a covariance on the wall gives, for scale 1."""
-    terms = []
-    for key in COVARIANCES:
-        i, j = ("XYZ".index(axis) + 1 for axis in key)
-        double = "2*" if i != j else ""
-        terms.append(f"{double}g_{row}{i}*g_{row}{j}*{_cell(prefix + key)}")
-    return "+".join(terms)
-
-
-def _world_sigma(row: int, name: str, *, is_pair: bool) -> str:
+def _world_sigma(name: str, *, is_pair: bool) -> str:
     """Return the formula of sigma_E, sigma_N or sigma_H: the picks and the transformation."""
-    own = f"g_k^2*({_turned(row, 'cov_')})"
+    own = f"g_k^2*({turned_covariance(name, name, _cell('cov_{}'))})"
     if is_pair:
-        own = f"(g_k*sigma_px)^2*({_turned(row, 'k_')})"
+        own = f"(g_k*sigma_px)^2*({turned_covariance(name, name, _cell('k_{}'))})"
     near = {axis: _cell(f"n_{axis}") for axis in "ENH"}
-    # A control point shares its error with the transformation that rests on it.
-    shared = 'SUMPRODUCT((tblGeo[id]&""=[@id]&"")*tblGeo[w])>0'
-    if name == "H":
-        shared = f"AND(g_flat=0,{shared})"
-    variance = f"{own}+IF({shared},-1,1)*({added_variance(name, near)})"
+    shared = f"AND(g_flat=0,{IS_CONTROL})" if name == "H" else IS_CONTROL
+    variance = f"{own}+IF({shared},-1,1)*({added_covariance(name, name, near)})"
     if is_pair:
-        common = _cell(f"o_{name}")
-        variance += f"+IF(ISNUMBER({common}),{common}^2,g_k^2*({_turned(row, 'o_')}))"
+        common, whole = _cell(f"o_{name}"), turned_covariance(name, name, _cell("o_{}"))
+        variance += f"+IF(ISNUMBER({common}),{common}^2,g_k^2*({whole}))"
     known = f"AND(ISNUMBER({near['E']}),ISNUMBER({_cell('cov_XX')}))"
     return f'IF({known},SQRT(MAX(0,{variance})),"")'
 
@@ -75,8 +66,8 @@ def results_columns(*, is_pair: bool) -> tuple[SurveyColumn, ...]:
             for key in ("sigma_X", "sigma_Y", "sigma_r")
         ),
         *(
-            formula_column(f"sigma_{name}", _world_sigma(row, name, is_pair=is_pair), 4, width=9)
-            for row, name in enumerate("ENH", start=1)
+            formula_column(f"sigma_{name}", _world_sigma(name, is_pair=is_pair), 4, width=9)
+            for name in "ENH"
         ),
         formula_column("flag", _text_from_points("flag"), width=13),
         formula_column("note", _text_from_points("note"), width=16),
