@@ -1,12 +1,15 @@
 """The page with a pair of 24 MP: first paint, suggestion, frames a second, a thousand points.
 
-``python -m benchmarks.bench_page`` (wants Chromium). The photos are those of the sample, enlarged.
+``python -m benchmarks.bench_page`` (wants Chromium), ``... bench_page 100`` for photos of 100 MP,
+which also tells the server's memory. The photos are those of the sample, enlarged.
 Baseline in the same run: the browser's own frame rate on an empty page.
 """
 
 from __future__ import annotations
 
 import json
+import os
+import sys
 import tempfile
 import time
 from pathlib import Path
@@ -17,7 +20,10 @@ import numpy as np
 
 from tests.browser import SAMPLE, WATCH, Driver, Served, launched, served, tab_of
 
-WIDTH, HEIGHT, POINTS = 6000, 4000, 1000
+#: Megapixels of a photo, three to two.
+MEGAPIXELS = float(sys.argv[1]) if len(sys.argv) > 1 else 24.0
+HEIGHT = round((MEGAPIXELS * 1e6 / 1.5) ** 0.5)
+WIDTH, POINTS = round(1.5 * HEIGHT), 1000
 
 
 def enlarged(folder: Path) -> None:
@@ -33,6 +39,18 @@ def enlarged(folder: Path) -> None:
         scale[:2, 2] = (factors - 1) / 2
         data[key]["plane_from_pixel"] = (np.array(data[key]["plane_from_pixel"]) @ scale).tolist()
     (folder / "facade.pair.json").write_text(json.dumps(data))
+
+
+def memory(server: Served) -> str:
+    """Say the largest memory the server had, and its processor time."""
+    assert server.process is not None
+    place = Path(f"/proc/{server.process.pid}")
+    if not place.is_dir():
+        return "not known on this system"
+    peak = next(line for line in (place / "status").read_text().splitlines() if "VmHWM" in line)
+    fields = (place / "stat").read_text().rsplit(")", 1)[1].split()
+    seconds = (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+    return f"{int(peak.split()[1]) / 1e6:.2f} GB at most, {seconds:.1f} s of CPU so far"
 
 
 def spread(times: Any) -> str:
@@ -71,6 +89,7 @@ def main() -> None:
         with served(Path(folder), "facade.pair.json") as server:
             print(f"first paint, not yet tiled     {first_paint(browser, server):.2f} s")
             time.sleep(8)
+            print(f"server, tiled                  {memory(server)}")
             times = [first_paint(browser, server) for _ in range(5)]
             middle, worst = np.median(times), max(times)
             print(f"first paint, tiled             {middle:.2f} s, at worst {worst:.2f} s")
@@ -94,6 +113,7 @@ def main() -> None:
                 page.keys("1", *["ArrowRight"] * 10)
                 page.settled("true")
                 print(f"ten nudges, saved              {time.perf_counter() - started:.2f} s")
+            print(f"server, at the end             {memory(server)}")
             blank = browser.new_page()
             blank.evaluate(WATCH)
             blank.wait_for_timeout(1500)

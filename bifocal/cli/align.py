@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
+from click.core import ParameterSource
 
 from photocore.cli import print_result, remark
 from photocore.options import FILE, FOCAL, TABLE, Numbers, as_json, choice, number, overwrite
@@ -22,6 +23,7 @@ Examples:
   bifocal align far.jpg near.jpg --as-set-up --distance1 17.5 --distance2 9.5 --focal1 35
                --focal2 19 --sensor-width 22.7 --out wall.pair.json
   bifocal align far.jpg near.jpg --auto --distance1 17.5 --out wall.pair.json
+  bifocal align survey.xlsx --out wall.pair.json
 \b
 points.csv, one line per control point; r blank = on the wall; pixels in both photos:
   id,X [m],Y [m],r [m],col1 [px],row1 [px],col2 [px],row2 [px]
@@ -31,7 +33,7 @@ points.csv, one line per control point; r blank = on the wall; pixels in both ph
 
 @click.command(epilog=EXAMPLE)
 @click.argument("far", type=FILE)
-@click.argument("near", type=FILE)
+@click.argument("near", type=FILE, required=False)
 @click.option("--out", type=FILE, required=True, help="Pair file to write (*.pair.json).")
 @click.option("--control", type=TABLE, help="Table of control points: id, X, Y, r [m] and pixels.")
 @click.option(
@@ -87,16 +89,24 @@ points.csv, one line per control point; r blank = on the wall; pixels in both ph
 @overwrite
 @as_json
 def command(
-    far: Path, near: Path, out: Path, picture: Path | None, no_picture: bool, overwrite: bool,
-    as_json: bool, **given: Any,
+    far: Path, near: Path | None, out: Path, picture: Path | None, no_picture: bool,
+    overwrite: bool, as_json: bool, **given: Any,
 ) -> None:  # fmt: skip
     """Set up a pair: where both cameras stood, how they looked, at which scale.
 
     FAR is the photo taken from afar with the long lens, NEAR the other one. Four ways: control
     points measured on the wall (--control), distances measured on site with the cameras square to
     the wall (--distance1, --distance2), the same taken as they are (--as-set-up), or the photos
-    alone (--auto) and one distance or length.
+    alone (--auto) and one distance or length. FAR alone may be a survey workbook that states
+    distances, focal lengths and nadirs: they are taken as they are.
     """
+    from bifocal.survey.pair_workflow import is_workbook
+
+    if is_workbook(far):
+        _align_workbook(far, near, out, given["sigma_distance"], overwrite, as_json)
+        return
+    if near is None:
+        raise click.UsageError("Give two photos, FAR and NEAR, or a survey workbook as FAR.")
     from bifocal.orientation.align_workflow import AlignOptions, align_photos, alignment_as_dict
 
     if picture is None and not no_picture:
@@ -111,6 +121,47 @@ def command(
     )  # fmt: skip
     if not as_json:
         remark(f"Pair written to {out}" + (f", picture to {picture}" if not no_picture else ""))
+
+
+#: Options that a workbook leaves room for.
+WITH_WORKBOOK = ("far", "out", "as_set_up", "sigma_distance", "overwrite", "as_json")
+
+
+def _align_workbook(
+    book: Path, near: Path | None, out: Path, sigma: float, overwrite: bool, as_json: bool
+) -> None:
+    """Write the pair of a workbook's set-up as it is typed."""
+    from bifocal.survey.pair_workflow import write_pair
+
+    context = click.get_current_context()
+    given = [
+        parameter.opts[0] if parameter.name != "near" else str(near)
+        for parameter in context.command.params
+        if parameter.name not in WITH_WORKBOOK
+        and context.get_parameter_source(parameter.name or "") is ParameterSource.COMMANDLINE
+    ]
+    if given:
+        raise click.UsageError(
+            f"{given[0]}: {book.name} states the set-up, which is taken as it is typed. Leave "
+            f"{given[0]} out, or give both photos to register them."
+        )
+    pair = write_pair(book, out, sigma_distance=sigma, overwrite=overwrite)
+    data = {
+        "way": "as set up",
+        "distance1": pair.d1,
+        "distance2": pair.d2,
+        "nadir1": pair.image1.nadir,
+        "nadir2": pair.image2.nadir,
+        "zoom_centre": pair.zoom_centre,
+        "sigma_distance": sigma,
+    }
+    lines = (
+        f"Set up exactly as {book.name} says, nothing registered: far camera {pair.d1:g} m, near "
+        f"camera {pair.d2:g} m from the wall, both within {1000 * sigma:.0f} mm.",
+    )
+    print_result(data, lines, as_json=as_json, remarks=pair.remarks)
+    if not as_json:
+        remark(f"Pair written to {out}")
 
 
 def _lines(alignment: Alignment) -> Iterator[str]:

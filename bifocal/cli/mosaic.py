@@ -32,7 +32,7 @@ The last band of the result says which input every pixel comes from: 1, 2, ... i
     help="Relief map: seams keep away from its edges; repeat it.",
 )  # fmt: skip
 @click.option("--priority", is_flag=True, help="Earlier files cover later ones; no seam is sought.")
-@switch("gain", "Make the exposure equal.")
+@switch("gain", "Make the exposure equal to the first file's.")
 @switch("blend", "Blend over the seams; relief maps are never mixed.")
 @switch("overviews", "Reduced copies in the file, for fast display.")
 @overwrite
@@ -41,7 +41,7 @@ def command(rasters: tuple[Path, ...], out: Path, as_json: bool, **options: Any)
     """Join orthophotos, or relief maps, of one wall.
 
     Seams run where the rasters agree, away from edges of the relief and from hidden places;
-    exposure is made equal and colours fade into each other. Sizes are not limited.
+    exposure becomes that of the first file and colours fade into each other. Sizes are not limited.
     """
     from bifocal.orthophotos.mosaic_workflow import make_mosaic
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from dataclasses import asdict
 from functools import partial
@@ -200,7 +201,7 @@ def finish(session: Session, task: Mapping[str, Any], result: Mapping[str, Any])
     kind = task["kind"]
     if kind == "align":
         session.propose(Path(task["out"]), result)
-        return " ".join(result.get("remarks", ()))
+        return _told(result)
     if kind == "match":
         session.command({"op": "points.add", "points": result["points"]})
         return ""
@@ -215,4 +216,19 @@ def finish(session: Session, task: Mapping[str, Any], result: Mapping[str, Any])
             names.append(f"{folder.name}/{drawing.name}")
     session.note_made(kind, names)
     session.show_products()
-    return " ".join(str(remark) for remark in result.get("remarks", ()))
+    return _told(result)
+
+
+#: The advice to use an option of the command line, which the page does not have.
+_OPTION = re.compile(r"[:;,]?\s*--[a-z][^;.]*(?=[;.]|$)")
+
+
+def _told(result: Mapping[str, Any]) -> str:
+    """Return the remarks of a job without advice for the command line.
+
+    Examples
+    --------
+    >>> _told({"remarks": ["35% of it is empty: --fill closes holes; --complete marks it."]})
+    '35% of it is empty.'
+    """
+    return " ".join(_OPTION.sub("", str(remark)).strip() for remark in result.get("remarks", ()))

@@ -16,7 +16,7 @@ from bifocal.collimation.job_tasks import start_job
 from bifocal.collimation.requests import answer, in_thread, json_body, session_of
 from bifocal.collimation.session import Session
 from bifocal.collimation.state_view import state_of
-from bifocal.collimation.uncertainty import uncertainty_picture
+from bifocal.collimation.uncertainty import precision_contours, uncertainty_picture
 from bifocal.collimation.uploads import take_photos
 from photocore.arrays import FloatArray, as_points
 from photocore.errors import InputError
@@ -117,6 +117,17 @@ async def _uncertainty(request: Request) -> Response:
     return Response(data, media_type="image/png", headers=_FRESH)
 
 
+async def _contours(request: Request) -> Response:
+    session = session_of(request)
+    session.pictures.needed_pair()
+
+    def lines(session: Session) -> list[dict[str, Any]]:
+        assert session.results is not None
+        return precision_contours(session.pictures, session.results)
+
+    return answer(await in_thread(lines, session))
+
+
 ROUTES = [
     Route("/api/photos", _photos, methods=["POST"]),
     Route("/api/jobs", _start, methods=["POST"]),
@@ -126,4 +137,5 @@ ROUTES = [
     Route("/relief/value", _value),
     Route("/relief/profile", _profile, methods=["POST"]),
     Route("/uncertainty.png", _uncertainty),
+    Route("/uncertainty.json", _contours),
 ]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import cv2
 import numpy as np
 
@@ -13,8 +15,9 @@ from photocore.arrays import FloatArray
 COMPUTED, SHOWN = 256, 1024
 #: Contour lines of sigma of r. [mm]
 LEVELS = (1, 2, 5, 10, 20, 50, 100, 200, 500)
-_SHADE, _LINE = (60, 60, 220, 110), (250, 250, 250, 255)  # BGRA
-_DARK = (30, 30, 30, 255)
+_SHADE = (60, 60, 220, 110)  # BGRA
+#: Shorter lines are specks. [points of the computed grid]
+_SHORTEST = 6
 
 
 def relief_sigma(pictures: Pictures, results: LiveResults) -> FloatArray:
@@ -42,7 +45,7 @@ def relief_sigma(pictures: Pictures, results: LiveResults) -> FloatArray:
 
 
 def uncertainty_picture(pictures: Pictures, results: LiveResults) -> bytes:
-    """Return the shaded area of uncertainty and the precision contours over the wall, PNG."""
+    """Return the shaded area of uncertainty over the wall, PNG."""
     sigma = relief_sigma(pictures, results)
     limit = results.limits.relief_limit(pictures.needed_pair().d2)
     height, width = sigma.shape
@@ -54,26 +57,20 @@ def uncertainty_picture(pictures: Pictures, results: LiveResults) -> bytes:
     shown = cv2.resize(known.astype(np.uint8), size, interpolation=cv2.INTER_NEAREST) > 0
     picture = np.zeros((size[1], size[0], 4), np.uint8)
     picture[(smooth > np.log(limit)) & shown] = _SHADE
-    for level in LEVELS:
-        _draw_level(picture, smooth, shown, level)
     return cv2.imencode(".png", picture)[1].tobytes()
 
 
-def _draw_level(picture: FloatArray, smooth: FloatArray, shown: FloatArray, level: int) -> None:
-    """Draw one contour line with its number."""
+def precision_contours(pictures: Pictures, results: LiveResults) -> list[dict[str, Any]]:
+    """Return lines of equal sigma of r: ``sigma_mm`` and ``line``, pixels of the wall, (n, 2)."""
     from contourpy import contour_generator
 
-    values = np.where(shown, smooth, np.nan)
-    lines = contour_generator(z=np.ma.masked_invalid(values)).lines(np.log(level / 1000))
-    for line in lines:
-        points = np.round(np.asarray(line)).astype(np.int32)
-        if len(points) < 12:
-            continue
-        for colour, thickness in ((_DARK, 3), (_LINE, 1)):
-            cv2.polylines(picture, [points], False, colour, thickness, cv2.LINE_AA)
-        column, row = points[len(points) // 3].tolist()
-        for colour, thickness in ((_DARK, 3), (_LINE, 1)):
-            cv2.putText(
-                picture, f"{level} mm", (column + 4, row - 4), cv2.FONT_HERSHEY_SIMPLEX, 0.5,
-                colour, thickness, cv2.LINE_AA,
-            )  # fmt: skip
+    sigma, grid = relief_sigma(pictures, results), pictures.grid
+    assert grid is not None
+    step = np.array([grid.width, grid.height]) / sigma.shape[::-1]
+    contours = contour_generator(z=np.ma.masked_invalid(np.log(sigma)))
+    return [
+        {"sigma_mm": level, "line": ((np.asarray(line) + 0.5) * step - 0.5).round(1).tolist()}
+        for level in LEVELS
+        for line in contours.lines(np.log(level / 1000))
+        if len(line) >= _SHORTEST
+    ]

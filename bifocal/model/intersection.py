@@ -20,7 +20,8 @@ class PlanePicks:
     Attributes
     ----------
     positions : ndarray, shape (n, 2)
-        Where the rays meet the plane; NaN where there is no pick. [m]
+        Where the rays meet the plane, through media where they would if they went straight on;
+        NaN where there is no pick. [m]
     metres_per_pixel : ndarray, shape (n, 2, 2)
         Derivative of the position by the pixel. [m/px]
     sigma_px : float
@@ -59,7 +60,8 @@ class Intersection:
     e1, e2 : ndarray, shape (n,)
         Relief displacements on the reference plane, outwards positive. [m]
     adjusted1, adjusted2 : ndarray, shape (n, 2)
-        Adjusted positions of both picks on the reference plane, on one radial line. [m]
+        Adjusted positions of both picks on the reference plane, on one radial line; through media
+        the apparent ones, whose rays meet. [m]
     flags : tuple of str, length n
         One of `bifocal.model.flags.FLAGS` per point.
     sigma_px : float
@@ -127,11 +129,17 @@ def intersect(
     q1, q2 = far.positions, near.positions
     centre = rays.zoom_centre(far.foot, near.foot)
     cov1, cov2 = far.covariance, near.covariance
-    a1, a2, standardised = rays.adjust_onto_epipolar_line(q1, q2, cov1, cov2, centre)
+    meeting = rays.meeting_of(far.foot, near.foot, centre)
+    a1, a2, standardised = rays.adjust_onto_epipolar_line(
+        q1, q2, cov1, cov2, centre, meeting=meeting
+    )
     relief = rays.relief_of_rays(a1, a2, far.foot, near.foot)
-    # A point at or behind the near camera cannot be in the photo: the rays diverge there.
-    relief = np.where(relief < near.foot.distance, relief, np.nan)
     xyz = rays.point_on_ray(a1, relief, far.foot)
+    # A point at or behind the near camera cannot be in the photo: the rays diverge there. Nor can
+    # one on the camera's side of the glass.
+    before = rays.is_before(xyz, near.foot) & rays.is_before(xyz, far.foot)
+    xyz[~before] = np.nan
+    relief = xyz[:, 2]
     covariance = _covariance(xyz, a2, cov1, cov2, far.foot, near.foot, sigma_orientation)
     if of_orientation is not None:
         covariance = covariance + of_orientation(xyz)
@@ -141,10 +149,10 @@ def intersect(
         xyz=xyz,
         covariance=covariance,
         residuals=np.concatenate(residuals, axis=1),
-        misfit=_misfit(q1, q2, near.metres_per_pixel, centre),
+        misfit=_misfit(near.metres_per_pixel, *meeting(q1 - centre, q2 - centre)),
         standardised=standardised,
-        e1=_outward(a1 - xyz[:, :2], xyz[:, :2] - far.foot.nadir),
-        e2=_outward(a2 - xyz[:, :2], xyz[:, :2] - near.foot.nadir),
+        e1=_displacement(a1, xyz, far.foot),
+        e2=_displacement(a2, xyz, near.foot),
         adjusted1=a1,
         adjusted2=a2,
         flags=point_flags(
@@ -195,14 +203,11 @@ def _covariance(
     sigma_d1, sigma_d2, sigma_scale, sigma_nadir = sigma_orientation
     if not any(sigma_orientation):
         return covariance
-    relief = xyz[:, 2]
     effects = []
     for camera, product, sigma_d in ((far, weighted[0], sigma_d1), (near, weighted[1], sigma_d2)):
-        # Derivatives of q = N + (P - N) d / (d - r) with respect to d and to N.
-        depth = camera.distance - relief
-        by_distance = -(xyz[:, :2] - camera.nadir) * (relief / depth**2)[:, None]
+        by_distance, by_nadir = rays.orientation_rows(xyz, camera)
         effects.append(product @ (by_distance * sigma_d)[:, :, None])
-        effects.append(product * (-relief / depth * sigma_nadir)[:, None, None])
+        effects.append(product @ (by_nadir * sigma_nadir))
     # A scale error of image 2 stretches the measured positions about its nadir.
     effects.append(weighted[1] @ ((a2 - near.nadir) * sigma_scale)[:, :, None])
     effect = covariance @ np.concatenate(effects, axis=2)
@@ -215,14 +220,21 @@ def _pixels(metres: FloatArray, shift: FloatArray) -> FloatArray:
     return shift_px
 
 
-def _misfit(q1: FloatArray, q2: FloatArray, metres2: FloatArray, centre: FloatArray) -> FloatArray:
-    """Return the signed distance of pick 2 from the radial line through pick 1. [px]"""
-    v1, v2 = q1 - centre, q2 - centre
-    radius = np.hypot(v1[:, 0], v1[:, 1])
+def _misfit(
+    metres2: FloatArray, value: FloatArray, _: FloatArray, gradient: FloatArray
+) -> FloatArray:
+    """Return the signed distance of pick 2 from the line on which pick 1 puts it. [px]"""
+    radius = np.hypot(gradient[:, 0], gradient[:, 1])
     with np.errstate(divide="ignore", invalid="ignore"):
-        across = (v1[:, 0] * v2[:, 1] - v1[:, 1] * v2[:, 0]) / radius
-        normal = np.stack([-v1[:, 1], v1[:, 0]], axis=-1) / radius[:, None]
+        across = value / radius
+        normal = gradient / radius[:, None]
     return np.copysign(np.linalg.norm(_pixels(metres2, normal * across[:, None]), axis=1), across)
+
+
+def _displacement(q: FloatArray, xyz: FloatArray, camera: rays.Foot) -> FloatArray:
+    """Return how far relief moves points outwards, from where they stand on the plane. [m]"""
+    seen = rays.object_rays(q, camera).position
+    return _outward(seen - xyz[:, :2], xyz[:, :2] - camera.nadir)
 
 
 def _outward(shift: FloatArray, direction: FloatArray) -> FloatArray:

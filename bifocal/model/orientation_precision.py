@@ -132,6 +132,35 @@ def _by_orientation(photos: tuple[PlanePhoto, PlanePhoto], xyz: FloatArray) -> F
     return out
 
 
+def of_distances(d1: float, d2: float, sigma: float) -> FloatArray:
+    """Return the covariance of distances known to their sigma, at scales that are exact.
+
+    Parameters
+    ----------
+    d1, d2 : float
+        Distances of both cameras. [m]
+    sigma : float
+        Standard deviation of either. [m]
+
+    Returns
+    -------
+    ndarray, shape (24, 24)
+        Of `NAMES`.
+
+    Notes
+    -----
+    The scales on the wall are what a bifocal set-up is made for: an error of a distance alone turns
+    into one of the principal distance beside it, ``d(ln f) = dZ / Z``.
+    """
+    covariance = np.zeros((len(NAMES), len(NAMES)))
+    for number, distance in ((1, d1), (2, d2)):
+        row = np.zeros(len(NAMES))
+        row[NAMES.index(f"Z {number}")] = 1.0
+        row[NAMES.index(f"focal length {number}")] = 1.0 / distance
+        covariance += sigma**2 * np.outer(row, row)
+    return covariance
+
+
 def exchanged(covariance: FloatArray) -> FloatArray:
     """Return the covariance with both cameras exchanged."""
     order = np.roll(np.arange(len(NAMES)), len(CAMERA))

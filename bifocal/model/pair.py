@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +16,7 @@ from bifocal.model.flags import FlagLimits
 from bifocal.model.intersection import Intersection, intersect
 from bifocal.model.photo import Photo
 from bifocal.precision import base_factor
+from multimedia import Layers
 from photocore.arrays import FloatArray, as_points, not_negative, positive
 from photocore.errors import GeometryError, InputError, located
 from photocore.jsonfile import read_object, write_object
@@ -55,6 +56,11 @@ class Pair:
     orientation: FloatArray | None = None
 
     def __post_init__(self) -> None:
+        if self.image1.layers != self.image2.layers:
+            raise InputError(
+                "layers: both photos of a pair look through the same media; state `layers` once, "
+                "for the pair."
+            )
         if self.orientation is not None:
             object.__setattr__(self, "orientation", orientation_precision.checked(self.orientation))
         d1, d2 = self.image1.distance, self.image2.distance
@@ -73,6 +79,24 @@ class Pair:
                 object.__setattr__(self, "orientation", turned)
             note = f"image1 was the near camera ({d1:g} m < {d2:g} m); the two were exchanged."
             object.__setattr__(self, "remarks", (*self.remarks, note))
+        if doubts := self._doubts_about_media():
+            object.__setattr__(self, "remarks", (*self.remarks, *doubts))
+
+    def _doubts_about_media(self) -> tuple[str, ...]:
+        """Return what looks like a slip in what lies between cameras and object."""
+        photos = (self.image1, self.image2)
+        if self.layers is None:
+            if all(photo.z0 is None for photo in photos):
+                return ()
+            return ("z0 is given but no layers: nothing is refracted, the pair is taken in air.",)
+        z0 = [photo.z0 or 0.0 for photo in photos]
+        beyond = [
+            photo.distance - z - self.layers.thickness for photo, z in zip(photos, z0, strict=True)
+        ]
+        found = self.layers.remarks_about(z0=z0, zp=beyond)
+        if self.orientation is not None:
+            found += ("the covariance of the cameras, `orientation`, is in no sigma.",)
+        return tuple(f"layers: {doubt}" for doubt in found)
 
     @classmethod
     def ideal(
@@ -175,11 +199,12 @@ class Pair:
         stated = data.pop("format", None)
         if stated != FORMAT:
             raise InputError(f'"format" must be "{FORMAT}", found {stated!r}.')
-        if data.get("layers"):
-            raise InputError(
-                '"layers": pairs seen through other media are not supported by this version.'
-            )
-        far, near = (Photo.from_dict(data.pop(k, None), k, folder) for k in ("image1", "image2"))
+        media = data.pop("layers", None)
+        layers = None if media is None else Layers.from_dict(media, where='"layers"')
+        far, near = (
+            Photo.from_dict(data.pop(key, None), key, folder, layers)
+            for key in ("image1", "image2")
+        )
         stated = data.pop("orientation", None)
         precision = None if stated is None else orientation_precision.from_dict(stated)
         return cls(image1=far, image2=near, folder=folder, extra=data, orientation=precision)
@@ -190,6 +215,7 @@ class Pair:
             "format": FORMAT,
             "image1": self.image1.to_dict(),
             "image2": self.image2.to_dict(),
+            **({} if self.layers is None else {"layers": self.layers.as_dict()}),
             **self.extra,
         }
         if self.orientation is not None:
@@ -206,6 +232,54 @@ class Pair:
         return rays.zoom_centre(self.image1.foot, self.image2.foot)
 
     @property
+    def layers(self) -> Layers | None:
+        """The media between cameras and object; None in air."""
+        return self.image1.layers
+
+    def in_air(self) -> Pair:
+        """Return the pair with its media left out: what neglecting refraction makes of it."""
+        photos = [replace(photo, layers=None, z0=None) for photo in (self.image1, self.image2)]
+        return replace(self, image1=photos[0], image2=photos[1], remarks=())
+
+    def refuse_media(self, what: str) -> None:
+        """Raise where the pair looks through media and the work asked for knows only air.
+
+        Parameters
+        ----------
+        what : str
+            The work.
+
+        Raises
+        ------
+        InputError
+            Naming it.
+        """
+        if self.layers is not None:
+            raise InputError(
+                f"{what} is not made for pairs seen through other media (`layers`): its result "
+                "would be wrong by what refraction does. `intersect` and `project` know them."
+            )
+
+    def refuse_leaning_media(self, what: str) -> None:
+        """Raise where interfaces are not parallel to the reference plane and must be.
+
+        Parameters
+        ----------
+        what : str
+            The work asked for.
+
+        Raises
+        ------
+        InputError
+            Naming it.
+        """
+        if any(photo.media and photo.media.turn is not None for photo in self.as_given):
+            raise InputError(
+                f"{what} is made through media parallel to the reference plane only, not through "
+                "ports that lean (`interface_normal`); single points are solved through them."
+            )
+
+    @property
     def d1(self) -> float:
         """Distance of the far camera to the reference plane. [m]"""
         return self.image1.distance
@@ -217,8 +291,25 @@ class Pair:
 
     @property
     def base_factor(self) -> float:
-        """B = d1 d2 / (d1 - d2): metres of relief per unit of relative radial shift. [m]"""
-        return base_factor(d1=self.d1, d2=self.d2)
+        """B = d1 d2 / (d1 - d2): metres of relief per unit of relative radial shift. [m]
+
+        Through media near the axis, with the distances of straight cameras that see alike.
+        """
+        d1, d2 = self.straight_distances
+        return base_factor(d1=d1, d2=d2)
+
+    @property
+    def straight_distances(self) -> tuple[float, float]:
+        """Distances of straight cameras that see as these near the axis; in air d1, d2. [m]"""
+        return rays.near_axis(self.image1.foot), rays.near_axis(self.image2.foot)
+
+    @property
+    def highest_relief(self) -> float:
+        """Relief at which the last interface lies, before the lower one; in air d2. [m]"""
+        if self.layers is None:
+            return self.d2
+        photos = (self.image1, self.image2)
+        return min(photo.distance - photo.media.depth for photo in photos if photo.media)
 
     def photo(self, number: int) -> Photo:
         """Return image 1 or 2."""
@@ -328,7 +419,7 @@ class Pair:
         ndarray, shape (n, 3, 3)
             Zero where the pair does not state it. Common to all points: neighbours share it.
         """
-        if self.orientation is None:
+        if self.orientation is None or self.layers is not None:
             return np.zeros((len(xyz), 3, 3))
         photos = (self.image1, self.image2)
         return orientation_precision.orientation_covariance(photos, self.orientation, xyz)

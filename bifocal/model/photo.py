@@ -11,17 +11,32 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from bifocal import rays
+from bifocal.media import MediaPath, interface_axes
 from bifocal.model.flags import SIGMA_PIXEL
 from bifocal.model.homography import apply_homography, homography_jacobian
 from bifocal.model.intersection import PlanePicks
 from bifocal.model.lens import Lens
-from photocore.arrays import BoolArray, FloatArray, as_points, positive, read_only
+from bifocal.model.orientation_precision import pinhole
+from multimedia import Layers
+from photocore.arrays import (
+    BoolArray,
+    FloatArray,
+    as_points,
+    not_negative,
+    positive,
+    read_only,
+)
+from photocore.distortion import inverse_2x2
 from photocore.errors import GeometryError, InputError, located
 
 #: No wall is photographed from further away, nor has coordinates beyond. [m]
 FARTHEST, OUTERMOST = 1e5, 1e8
 #: Numbers of a photo that the pair file may hold, with their units.
 _OPTIONAL = {"sigma_pixel": "px", "principal_distance": "mm", "pixel_size": "mm"}
+#: The normal of a port that is square to the camera's optical axis.
+AXIS = "axis"
+#: What else it holds where the pair file has `layers`.
+_MEDIA = ("z0", "interface_normal")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -44,6 +59,14 @@ class Photo:
         Measuring precision. [px]
     principal_distance, pixel_size : float or None
         Of the camera, for lengths in millimetres of the image. [mm]
+    layers : Layers or None
+        Media between camera and object, the same for both photos of a pair; None in air.
+    z0 : float or None
+        Centre to the first interface, along its normal. [m]
+    interface_normal : ndarray, shape (3,), or None
+        Normal of the interfaces, (X, Y, r), towards the camera; None where they are parallel to
+        the reference plane. In the pair file ``"axis"`` stands for a port square to the camera's
+        optical axis.
     extra : mapping
         Keys of the pair file this class does not use; kept.
     """
@@ -56,7 +79,12 @@ class Photo:
     sigma_pixel: float | None = None
     principal_distance: float | None = None
     pixel_size: float | None = None
+    layers: Layers | None = None
+    z0: float | None = None
+    interface_normal: FloatArray | None = None
     extra: Mapping[str, Any] = field(default_factory=dict)
+    #: What the rays cross on their way; follows from the above.
+    media: MediaPath | None = field(default=None, init=False)
 
     def __post_init__(self) -> None:
         set_ = object.__setattr__
@@ -80,11 +108,42 @@ class Photo:
         for name, unit in _OPTIONAL.items():
             value = getattr(self, name)
             set_(self, name, None if value is None else positive(value, name, unit=unit))
+        if self.interface_normal is not None:
+            set_(self, "interface_normal", _checked_normal(self.interface_normal))
+        if self.z0 is not None:
+            set_(self, "z0", not_negative(self.z0, "z0"))
+        if self.layers is not None:
+            set_(self, "media", self._media_path(self.layers))
+
+    def _media_path(self, layers: Layers) -> MediaPath:
+        """Return what the rays cross, refusing interfaces that cannot lie where they are said to.
+
+        Raises
+        ------
+        InputError, GeometryError
+            If z0 is missing, or the object's medium would begin behind the reference plane.
+        """
+        if self.z0 is None:
+            raise InputError(
+                "z0 is missing: photos taken through layers need the distance from the camera "
+                "centre to the first interface, in metres."
+            )
+        normal = self.interface_normal
+        turn = None if normal is None else interface_axes(normal / np.linalg.norm(normal))
+        path = MediaPath(layers=layers, z0=self.z0, distance=self.distance, turn=turn)
+        if not path.holds(np.zeros(2), np.zeros(())):
+            raise GeometryError(
+                f"z0: the last interface would lie {path.depth:g} m from the camera, behind the "
+                f"reference plane at {self.distance:g} m. z0 is measured from the camera centre to "
+                "the first interface, distance to the reference plane; both, and the thicknesses, "
+                "are in metres."
+            )
+        return path
 
     @property
     def foot(self) -> rays.Foot:
-        """Nadir and distance."""
-        return rays.Foot(self.nadir, self.distance)
+        """Nadir, distance and what the rays cross."""
+        return rays.Foot(self.nadir, self.distance, self.media)
 
     @property
     def scale_number(self) -> float | None:
@@ -95,7 +154,15 @@ class Photo:
     def plane_from_pixels(self, pixels: ArrayLike) -> FloatArray:
         """Return where the rays of (raw) pixels meet the reference plane, shape (..., 2). [m]
 
-        NaN where the ray does not meet the plane (at or beyond the horizon).
+        Bent by the media on their way. NaN where the ray does not meet the plane (at or beyond the
+        horizon, or totally reflected).
+        """
+        return rays.object_rays(self.apparent_from_pixels(pixels), self.foot).position
+
+    def apparent_from_pixels(self, pixels: ArrayLike) -> FloatArray:
+        """Return where the rays of (raw) pixels would meet the plane if they went straight on.
+
+        Without media `plane_from_pixels`, shape (..., 2). [m]
         """
         points = as_points(pixels, "pixels", dimension=2)
         if self.lens is not None:
@@ -105,13 +172,35 @@ class Photo:
     def pixels_from_plane(self, positions: ArrayLike) -> FloatArray:
         """Return the (raw) pixels that see plane positions, shape (..., 2). [px]"""
         points = as_points(positions, "positions", dimension=2)
-        ideal = apply_homography(np.linalg.inv(self.plane_from_pixel).astype(np.float64), points)
+        return self.pixels_from_apparent(rays.apparent_of_plane(points, self.foot))
+
+    def pixels_from_apparent(self, positions: FloatArray) -> FloatArray:
+        """Return the (raw) pixels whose rays, going straight on, meet the plane at positions."""
+        inverse = np.linalg.inv(self.plane_from_pixel).astype(np.float64)
+        ideal = apply_homography(inverse, positions)
         return ideal if self.lens is None else self.lens.distort(ideal)
 
     def project(self, xyz: ArrayLike) -> FloatArray:
-        """Return the (raw) pixels of points (X, Y, r), shape (..., 2); NaN behind the camera."""
+        """Return the (raw) pixels of points (X, Y, r), shape (..., 2).
+
+        NaN for what the camera cannot see: behind it, or on its side of the last interface.
+        """
         points = as_points(xyz, "xyz", dimension=3)
-        return self.pixels_from_plane(rays.plane_position(points, self.foot))
+        return self.pixels_from_apparent(rays.plane_position(points, self.foot))
+
+    def pixels_by_point(self, xyz: ArrayLike) -> FloatArray:
+        """Return the derivatives of the ideal pixels by (X, Y, r), shape (..., 2, 3). [px/m]
+
+        Ideal pixels are those free of lens distortion; equal to `project` without a lens.
+        """
+        points = as_points(xyz, "xyz", dimension=3)
+        flat = points.reshape(-1, 3)
+        ideal = apply_homography(
+            np.linalg.inv(self.plane_from_pixel), rays.plane_position(flat, self.foot)
+        )
+        metres = homography_jacobian(self.plane_from_pixel, ideal)
+        rows = inverse_2x2(metres) @ rays.design_rows(flat, self.foot)
+        return np.asarray(rows.reshape(*points.shape[:-1], 2, 3))
 
     def precision(self, sigma_px: float | None = None) -> float:
         """Return the measuring precision: as given, else the photo's own, else 0.5. [px]"""
@@ -121,14 +210,22 @@ class Photo:
     def picks(self, pixels: FloatArray, sigma_px: float | None = None) -> PlanePicks:
         """Return picks carried to the plane, of the given precision or else the photo's own."""
         return PlanePicks(
-            positions=self.plane_from_pixels(pixels),
-            metres_per_pixel=self.metres_per_pixel(pixels),
+            positions=self.apparent_from_pixels(pixels),
+            metres_per_pixel=self.apparent_by_pixel(pixels),
             sigma_px=self.precision(sigma_px),
             foot=self.foot,
         )
 
     def metres_per_pixel(self, pixels: FloatArray) -> FloatArray:
         """Return the derivative of the plane position by the pixel, shape (n, 2, 2). [m/px]"""
+        apparent = self.apparent_by_pixel(pixels)
+        if self.media is None:
+            return apparent
+        away = self.apparent_from_pixels(pixels) - self.nadir
+        return np.asarray(self.media.trace_with_jacobian(away)[1] @ apparent)
+
+    def apparent_by_pixel(self, pixels: FloatArray) -> FloatArray:
+        """Return the derivative of the apparent position by the pixel, shape (n, 2, 2). [m/px]"""
         points = pixels if self.lens is None else self.lens.undistort(pixels)
         return homography_jacobian(self.plane_from_pixel, points)
 
@@ -143,6 +240,7 @@ class Photo:
             Of the photo. [px]
         """
         inverse = np.linalg.inv(self.plane_from_pixel)
+        positions = rays.apparent_of_plane(positions, self.foot)
         scale = positions @ inverse[2, :2] + inverse[2, 2]
         # q = H p / w and p = H^-1 q * w: both scales have the same sign where the photo looks.
         reference = self.plane_from_pixel[2] @ [shape[1] / 2, shape[0] / 2, 1.0]
@@ -166,7 +264,7 @@ class Photo:
         return float(np.sqrt(area))
 
     @classmethod
-    def from_dict(cls, data: Any, key: str, folder: Path) -> Photo:
+    def from_dict(cls, data: Any, key: str, folder: Path, layers: Layers | None = None) -> Photo:
         """Return a photo from its part of the pair file.
 
         Parameters
@@ -177,6 +275,8 @@ class Photo:
             ``"image1"`` or ``"image2"``, for messages.
         folder : Path
             Where the pair file lies; its lens file is looked for from there.
+        layers : Layers, optional
+            The media that the pair file states for both photos.
 
         Raises
         ------
@@ -196,16 +296,19 @@ class Photo:
         if lens is not None and not isinstance(lens, str):
             raise InputError(f'"{key}.lens" must name a lens file, found {lens!r}.')
         with located(f'"{key}"'):
-            for name in ("distance", *_OPTIONAL):
+            for name in ("distance", "z0", *_OPTIONAL):
                 if isinstance(data.get(name), list):  # an array of one would pass for a number
                     raise InputError(f"{name}: expected one number, found {data[name]!r:.40}.")
+            if data.get("interface_normal") == AXIS:
+                data["interface_normal"] = _towards_camera(data)
             return cls(
                 file=file,
                 lens=Lens.read(folder / lens) if lens else None,
                 plane_from_pixel=data.pop("plane_from_pixel"),
                 nadir=data.pop("nadir"),
                 distance=data.pop("distance"),
-                **{name: data.pop(name, None) for name in _OPTIONAL},
+                **{name: data.pop(name, None) for name in (*_OPTIONAL, *_MEDIA)},
+                layers=layers,
                 extra=data,
             )
 
@@ -217,5 +320,31 @@ class Photo:
             "nadir": self.nadir,
             "distance": self.distance,
         }
-        data |= {name: value for name in _OPTIONAL if (value := getattr(self, name)) is not None}
+        for name in (*_OPTIONAL, *_MEDIA):
+            if (value := getattr(self, name)) is not None:
+                data[name] = value
         return data | dict(self.extra)
+
+
+def _towards_camera(data: Mapping[str, Any]) -> FloatArray:
+    """Return the direction from the object back along the optical axis of a photo as stated."""
+    stated = {name: data[name] for name in ("plane_from_pixel", "nadir", "distance")}
+    forwards = pinhole(Photo(**stated)).rotation[2]
+    return np.asarray(-forwards * np.sign(-forwards[2]))
+
+
+def _checked_normal(value: FloatArray) -> FloatArray:
+    """Return the normal of the interfaces, read-only.
+
+    Raises
+    ------
+    GeometryError
+        If it does not point from the object to the cameras.
+    """
+    normal = read_only(value, "interface_normal", shape=(3,))
+    if not normal[2] > 0.1 * float(np.linalg.norm(normal)):
+        raise GeometryError(
+            f"interface_normal: {normal.tolist()} does not point from the object to the camera; "
+            "it is (X, Y, r) in the plane frame, (0, 0, 1) for glass parallel to the plane."
+        )
+    return normal

@@ -37,7 +37,7 @@ class Alignment:
     ----------
     pair : Pair
     way : str
-        ``control``, ``site`` or ``auto``.
+        ``control``, ``site``, ``auto`` or ``as set up``.
     deviations : mapping of str to float
         Standard deviations: ``distance1`` ... [m], ``focal1`` ... [px], ``scale`` (relative).
     control_ids : tuple of str
@@ -91,7 +91,7 @@ def make_alignment(
     photos : pair of PhotoInput
         Far one first, as in ``oriented``.
     way : str
-        ``control``, ``site`` or ``auto``.
+        ``control``, ``site``, ``auto`` or ``as set up``.
     direction : (pixels (2, 2), is_vertical), optional
         Two points of photo 1 on a level or upright line of the wall, where the frame is free.
     """

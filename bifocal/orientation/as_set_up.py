@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from bifocal.model.orientation_precision import NAMES
+from bifocal.model.orientation_precision import of_distances
 from bifocal.orientation.control_points import SiteMeasures
 from bifocal.orientation.orientation_stages import OrientedPair, Photos
 from bifocal.orientation.pair_adjustment import AdjustedPair
-from bifocal.orientation.pair_observations import PairObservations, at
-from photocore.arrays import FloatArray
+from bifocal.orientation.pair_observations import PairObservations
 from photocore.camera import Pinhole
 from photocore.errors import InputError
 
@@ -55,7 +54,7 @@ def pair_as_set_up(photos: Photos, site: SiteMeasures) -> OrientedPair:
     nothing = np.zeros((0, 4))
     adjusted = AdjustedPair(
         cameras=(first, second),
-        covariance=_stated(site, d1, d2),
+        covariance=of_distances(d1, d2, site.sigma),
         sigma0=1.0,
         control_residuals=nothing,
         control_test=np.zeros(0),
@@ -71,17 +70,3 @@ def pair_as_set_up(photos: Photos, site: SiteMeasures) -> OrientedPair:
             f"photos at the typed scales; distances within {1000 * site.sigma:.0f} mm",
         ),
     )
-
-
-def _stated(site: SiteMeasures, d1: float, d2: float) -> FloatArray:
-    """Return the covariance of distances known to their sigma, at scales that are exact.
-
-    The scales on the wall are what the set-up is made for: an error of a distance alone turns into
-    one of the principal distance beside it.
-    """
-    covariance = np.zeros((len(NAMES), len(NAMES)))
-    for number, distance in ((1, d1), (2, d2)):
-        row = np.zeros(len(NAMES))
-        row[at("Z", number)], row[at("focal length", number)] = 1.0, 1.0 / distance
-        covariance += site.sigma**2 * np.outer(row, row)
-    return covariance

@@ -30,7 +30,7 @@ from bifocal.orientation.interior_orientation import Images
 from bifocal.orientation.patches import PatchResult, refine, same_scale
 from bifocal.orientation.targets import SurveyTargets, find_targets
 from bifocal.orientation.tie_points import robust_sigma
-from bifocal.rays import relief_of_rays, zoom_factor
+from bifocal.rays import point_on_ray, relief_of_rays, zoom_factor
 from photocore.arrays import BoolArray, FloatArray, IntArray
 from photocore.errors import GeometryError
 
@@ -45,6 +45,9 @@ FEATURE_ACROSS, SIGMA_FEATURE = 0.7, 0.35
 #: Neighbours asked for support, how many must agree, and to what share of d1 in relief. On two
 #: castles 13 and 35 % of what stood out by 0.8 m was covered before, 91 and 82 % with it.
 NEIGHBOURS, SUPPORTERS, RELIEF_ALIKE = 8, 2, 0.005
+
+#: Relief looked for ends this near to the last interface; in air, to the near camera. [share]
+HIGHEST_SHARE = 0.999
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -115,7 +118,8 @@ def match_pair(pair: Pair, images: Images, settings: MatchSettings | None = None
     """
     settings = settings or MatchSettings()
     near = pair.image2.distance
-    reliefs = settings.relief_range or (-0.5 * near, 0.4 * near)
+    low, high = settings.relief_range or (-0.5 * near, 0.4 * near)
+    reliefs = (low, min(high, HIGHEST_SHARE * pair.highest_relief))
     parts = []
     if settings.targets:
         parts.append(_target_matches(pair, images, reliefs))
@@ -301,6 +305,10 @@ def pair_targets(
 
 def seen_at(pair: Pair, pixels1: FloatArray, relief: FloatArray | float) -> FloatArray:
     """Return where photo 2 sees the points of photo 1 if they have a given relief. [px]"""
+    if pair.layers is not None:
+        positions = pair.image1.apparent_from_pixels(pixels1)
+        heights = np.broadcast_to(np.asarray(relief, dtype=np.float64), positions.shape[:-1])
+        return pair.image2.project(point_on_ray(positions, heights, pair.image1.foot))
     centre = pair.zoom_centre
     factor = zoom_factor(
         np.asarray(relief, dtype=np.float64), d1=pair.image1.distance, d2=pair.image2.distance
@@ -313,8 +321,8 @@ def seen_at(pair: Pair, pixels1: FloatArray, relief: FloatArray | float) -> Floa
 def relief_at(pair: Pair, pixels1: FloatArray, pixels2: FloatArray) -> FloatArray:
     """Return the relief of point pairs (not adjusted across the line). [m]"""
     return relief_of_rays(
-        pair.image1.plane_from_pixels(pixels1),
-        pair.image2.plane_from_pixels(pixels2),
+        pair.image1.apparent_from_pixels(pixels1),
+        pair.image2.apparent_from_pixels(pixels2),
         pair.image1.foot,
         pair.image2.foot,
     )
@@ -357,6 +365,10 @@ def local_zoom(pair: Pair, pixels1: FloatArray, relief: FloatArray) -> FloatArra
     factor = zoom_factor(relief, d1=pair.image1.distance, d2=pair.image2.distance)
     metres1 = _raw_metres(pair.image1, pixels1)
     metres2 = _raw_metres(pair.image2, seen_at(pair, pixels1, relief))
+    if pair.layers is not None:
+        metres1 = _metres_at(pair.image1, pixels1, relief)
+        metres2 = _metres_at(pair.image2, seen_at(pair, pixels1, relief), relief)
+        factor = np.where(np.isfinite(metres2).all(axis=(1, 2)), 1.0, np.nan)
     bad = ~(np.abs(np.linalg.det(np.nan_to_num(metres2))) > 0) | ~np.isfinite(factor)
     metres2[bad] = np.eye(2)
     return np.nan_to_num(np.linalg.inv(metres2) @ metres1 * factor[:, None, None])
@@ -367,6 +379,18 @@ def _raw_metres(photo: Photo, pixels: FloatArray) -> FloatArray:
     metres = photo.metres_per_pixel(pixels)
     if photo.lens is None:
         return np.array(metres)
+    return metres @ np.linalg.inv(photo.lens.distorted_by_ideal(_ideal(photo, pixels)))
+
+
+def _metres_at(photo: Photo, pixels: FloatArray, relief: FloatArray) -> FloatArray:
+    """Return the derivative of points at a relief by the raw pixel, through media. [m/px]"""
+    assert photo.media is not None
+    _, place, slope = photo.media.trace_with_jacobian(
+        photo.apparent_from_pixels(pixels) - photo.nadir
+    )
+    metres = (place + relief[:, None, None] * slope) @ photo.apparent_by_pixel(pixels)
+    if photo.lens is None:
+        return np.asarray(metres)
     return metres @ np.linalg.inv(photo.lens.distorted_by_ideal(_ideal(photo, pixels)))
 
 
@@ -389,7 +413,8 @@ def refine_along_lines(
         [px]
     """
     relief = np.nan_to_num(relief_at(pair, pixels1, pixels2))
-    relief = np.clip(relief, -3 * pair.image2.distance, 0.9 * pair.image2.distance)
+    highest = min(0.9 * pair.image2.distance, HIGHEST_SHARE * pair.highest_relief)
+    relief = np.clip(relief, -3 * pair.image2.distance, highest)
     # On the line, at the relief nearest to the approximate match.
     start = seen_at(pair, pixels1, relief)
     local = local_zoom(pair, pixels1, relief)

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from bifocal.files.images import as_grey
 from bifocal.orientation.absolute_orientation import orient_pair
 from bifocal.orientation.alignment import Alignment, make_alignment
+from bifocal.orientation.as_set_up import pair_as_set_up
 from bifocal.orientation.control_points import Control, SiteMeasures
 from bifocal.orientation.interior_orientation import Interior
 from bifocal.orientation.orientation_stages import PhotoInput
@@ -25,6 +26,7 @@ def align(
     control: Control | None = None,
     site: SiteMeasures | None = None,
     line: tuple[Literal["level", "upright"], ArrayLike] | None = None,
+    as_set_up: bool = False,
 ) -> Alignment:
     r"""Orient a pair of photos: where both cameras stood, how they looked, at which scale.
 
@@ -44,6 +46,10 @@ def align(
     line : ("level" or "upright", array_like of shape (2, 2)), optional
         Two pixels of the far photo on such a line of the wall, for the direction of X and Y where
         no control points give it. [px]
+    as_set_up : bool
+        Whether distances and principal distances are taken exactly as they are given: cameras
+        square to the wall, nadirs in the principal points, nothing registered. The distances'
+        ``site.sigma`` goes into the pair; ``interiors`` must tell both principal distances.
 
     Returns
     -------
@@ -55,7 +61,8 @@ def align(
     Raises
     ------
     InputError
-        If an image or a line is unusable, or a photo and its interior are both missing.
+        If an image or a line is unusable, a photo and its interior are both missing, or a set-up
+        to be taken as it is lacks a distance or a principal distance.
     GeometryError
         If photos and measurements do not make a pair; the message says why and what to do.
 
@@ -89,8 +96,12 @@ def align(
         raise InputError(f"line: expected level or upright and two pixels, got {line[0]!r}.")
     site = site or SiteMeasures()
     photos = (_photo(image1, interiors[0], "image1"), _photo(image2, interiors[1], "image2"))
-    oriented = orient_pair(photos, control=control or Control(), site=site)
     direction = line and (as_points(line[1], "line", dimension=2), line[0] == "upright")
+    if as_set_up:
+        if control is not None or line is not None:
+            raise InputError("as_set_up registers nothing: leave out control and line.")
+        return make_alignment(pair_as_set_up(photos, site), photos, way="as set up")
+    oriented = orient_pair(photos, control=control or Control(), site=site)
     way = "control" if control is not None else "site" if site.parallel else "auto"
     ordered = (photos[1], photos[0]) if oriented.exchanged else photos
     return make_alignment(oriented, ordered, way=way, direction=direction)

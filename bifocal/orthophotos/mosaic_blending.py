@@ -17,8 +17,9 @@ from bifocal.orthophotos.pull_push import fill_holes
 from photocore.arrays import BoolArray, Float32Array, FloatArray, IntArray
 from photocore.errors import InputError
 
-#: Side of the raster on which seams and exposure are worked out. [px]
-COARSE = 1600
+#: Sides of the rasters on which seams and exposure are worked out: a part of the mosaic's own, so
+#: that the work grows with it, but no less and no more than these. [px]
+COARSE_SHARE, COARSE_LEAST, COARSE = 1 / 3, 400, 1600
 #: Levels of the blending pyramid; colours fade over about 2^(levels + 1) px, detail over two.
 LEVELS = 5
 #: Surroundings of a window that its blending needs; a multiple of 2^LEVELS. [px]
@@ -28,6 +29,10 @@ _SHY = 6.0
 #: Relief that changes by more than this per metre is an edge to a seam.
 _EDGE_SLOPE = 0.5
 _LEAST_OVERLAP = 50
+#: An overlap that tells whether layers show one wall; the least that varies on it (share of the
+#: range of colours, or metres); and the least correlation of what varies. Neighbouring orthophotos
+#: of the churches and the rendered façades have 0.5 and more, different ones -0.1 to 0.1.
+_TELLING, _CONTRAST, _ALIKE = 5000, 0.02, 0.1
 
 
 #: A layer's values, shape (h, w, bands), and which of them are valid, shape (h, w).
@@ -121,6 +126,34 @@ def _refuse_unrelated(boxes: Sequence[Bounds]) -> None:
         )
 
 
+def _refuse_strangers(images: Sequence[Float32Array], valid: Sequence[BoolArray]) -> None:
+    """Refuse layers that overlap widely, show something each, and not the same."""
+    fine = [_detail(image, seen) for image, seen in zip(images, valid, strict=True)]
+    for i, j in combinations(range(len(images)), 2):
+        both = valid[i] & valid[j]
+        if np.count_nonzero(both) < _TELLING:
+            continue
+        a, b = fine[i][both], fine[j][both]
+        spread = float(a.std()), float(b.std())
+        if min(spread) < _CONTRAST:
+            continue
+        likeness = float(np.mean((a - a.mean()) * (b - b.mean()))) / (spread[0] * spread[1])
+        if likeness < _ALIKE:
+            raise InputError(
+                f"rasters {i + 1} and {j + 1} overlap but have nothing in common (correlation "
+                f"{likeness:+.2f}): their X and Y are not of one frame. Orient their pairs by "
+                "control points in one system, then make them again."
+            )
+
+
+def _detail(image: Float32Array, seen: BoolArray) -> Float32Array:
+    """Return the first band less its surroundings, from which light and tilt are gone."""
+    band = np.where(seen, np.nan_to_num(image[:, :, 0]), np.float32(0))
+    side = (max(band.shape) // 12 | 1,) * 2
+    share = cv2.blur(seen.astype(np.float32), side)
+    return np.asarray(band - cv2.blur(band, side) / np.maximum(share, 1e-6), np.float32)
+
+
 def plan_mosaic(
     layers: Sequence[Layer],
     grid: Grid,
@@ -136,19 +169,26 @@ def plan_mosaic(
     priority : bool
         Earlier layers cover later ones; otherwise seams are sought.
     gain : bool
-        Make the colours equal.
+        Make the colours equal to the first layer's.
     relief : callable, optional
         Gives the relief of the wall on a grid: seams keep away from its edges. [m]
 
+    Raises
+    ------
+    InputError
+        If two layers overlap and show different things.
+
     Notes
     -----
+    The first layer keeps its exposure, and so does the first of any others that do not touch it.
     Each layer owns what it sees from deep within; between owners the seam is a watershed (after
     Soille, "Morphological image compositing", 2006) that runs where the layers agree, away from
     edges of the relief and from holes, which lie right behind such edges.
     """
-    factor = max(1.0, max(grid.shape) / COARSE)
-    coarse = Grid.from_bounds(grid.bounds, gsd=grid.gsd * factor)
+    side = min(max(COARSE_SHARE * max(grid.shape), COARSE_LEAST), COARSE)
+    coarse = Grid.from_bounds(grid.bounds, gsd=grid.gsd * max(1.0, max(grid.shape) / side))
     images, valid = zip(*(_onto(layer, coarse) for layer in layers), strict=True)
+    _refuse_strangers(images, valid)
     depth = np.stack([_depth(seen) for seen in valid])
     gains, differences = _gains(images, valid, wanted=gain)
     if priority:
@@ -204,11 +244,18 @@ def window_of(layer: Layer, grid: Grid) -> Seen:
     image, seen = layer.read(*window)
     values = image.dtype.kind == "f"
     if not values and not seen.all():
-        image, _ = fill_holes(image, seen, ~seen)  # no black from the holes into the rim
+        image = np.where(seen[:, :, None], image, _around(image, seen))
     flag = cv2.INTER_NEAREST if values else cv2.INTER_CUBIC
     moved = cv2.remap(image, columns, rows, flag, borderMode=cv2.BORDER_REPLICATE)
     inside = cv2.remap(seen.astype(np.uint8), columns, rows, cv2.INTER_NEAREST)
     return moved.reshape(*grid.shape, -1), inside > 0
+
+
+def _around(image: NDArray[Any], seen: BoolArray) -> NDArray[Any]:
+    """Return the mean colour of what is seen within 3 px: cubic weights reach 2 px into holes."""
+    share = cv2.blur(seen.astype(np.float32), (7, 7))[:, :, None]
+    sums = np.atleast_3d(cv2.blur(np.where(seen[:, :, None], image, 0).astype(np.float32), (7, 7)))
+    return (sums.reshape(image.shape) / np.maximum(share, 1e-6)).astype(image.dtype)
 
 
 def _onto(layer: Layer, coarse: Grid) -> tuple[Float32Array, BoolArray]:
@@ -241,9 +288,13 @@ def _depth(seen: BoolArray) -> Float32Array:
 def _gains(
     images: Sequence[Float32Array], valid: Sequence[BoolArray], *, wanted: bool
 ) -> tuple[FloatArray, dict[tuple[int, int], float]]:
-    """Return the factors that make common parts equal, by least squares over all overlaps."""
+    """Return the factors that make common parts equal, by least squares over all overlaps.
+
+    The first layer, and the first of each further group of layers, keeps its colours.
+    """
     count, bands = len(images), images[0].shape[2]
     normal = np.eye(count) * 1e-3
+    group = np.arange(count)
     right = np.zeros((count, bands))
     differences = {}
     for i, j in combinations(range(count), 2):
@@ -257,11 +308,14 @@ def _gains(
             continue
         ratio = np.median(np.log(a[usable]) - np.log(b[usable]), axis=0)
         weight = math.sqrt(np.count_nonzero(usable))
+        group[group == group[j]] = group[i]
         normal[np.ix_([i, j], [i, j])] += weight * np.array([[1, -1], [-1, 1]])
         right[i] -= weight * ratio
         right[j] += weight * ratio
     if not wanted:
         return np.ones((count, bands)), differences
+    first = np.unique(group, return_index=True)[1]
+    normal[first, first] += 1e9
     return np.exp(np.linalg.solve(normal, right)), differences
 
 

@@ -29,7 +29,7 @@ class MosaicOptions:
     priority : bool
         Earlier rasters cover later ones; otherwise seams run where the rasters agree.
     gain : bool
-        Make the exposures equal (colours only).
+        Make the exposures equal to the first raster's (colours only).
     blend : bool
         Fade colours over the seams; relief values are never mixed.
     """
@@ -124,7 +124,8 @@ def mosaic(
     Raises
     ------
     InputError
-        If there are fewer than two rasters, they differ in kind, or nothing lies in the bounds.
+        If there are fewer than two rasters, they differ in kind, show different things on their
+        overlap, or nothing lies in the bounds.
 
     Examples
     --------
@@ -138,7 +139,7 @@ def mosaic(
     ...         hidden=np.zeros(grid.shape, bool), plane_from_pixel=grid.plane_from_pixel)
     >>> whole = mosaic([half(0.0, 120), half(1.0, 80)])
     >>> whole.image.shape, np.unique(whole.image).tolist()
-    ((50, 150, 3), [98])
+    ((50, 150, 3), [120])
     """
     options = options or MosaicOptions()
     layers = [_ArrayLayer(raster) for raster in rasters]

@@ -88,14 +88,15 @@ def make_mosaic(
     priority : bool
         Earlier files cover later ones instead of seams being sought.
     gain : bool
-        Make the exposure of the inputs equal.
+        Make the exposure of the inputs equal to the first one's.
     blend : bool
         Blend over the seams (colours only; relief values are never mixed).
 
     Raises
     ------
     InputError
-        If inputs are missing, differ in kind, or the output cannot be written.
+        If inputs are missing, differ in kind, show different things on their overlap, or the
+        output cannot be written.
     """
     check_writable(out, overwrite=overwrite)
     if out.exists() and any(path.exists() and path.samefile(out) for path in inputs):

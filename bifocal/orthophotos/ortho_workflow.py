@@ -116,6 +116,7 @@ def make_ortho(
     check_writable(out, overwrite=overwrite)
     check_ending(out, ORTHO_ENDING, ".tif", ".tiff")
     pair = Pair.of(pair_path)
+    pair.refuse_leaning_media("an orthophoto")
     with open_surface(task, pair) as (surface, _, remarks):
         numbers = {"1": (1,), "2": (2,), "both": (1, 2)}[task.image]
         images = {number: read_image(pair.photo_file(number)) for number in numbers}

@@ -10,11 +10,10 @@ import cv2
 import numpy as np
 
 from bifocal.model.grid import Bounds, Grid, bounds_of
-from bifocal.model.homography import apply_homography
 from bifocal.model.image import ImageArray, as_photo
 from bifocal.model.photo import Photo
 from bifocal.orthophotos.ortho_image import Interpolation
-from bifocal.rays import magnification
+from bifocal.rays import apparent_magnification
 from photocore.arrays import BoolArray, Float32Array, FloatArray
 from photocore.errors import GeometryError, InputError
 
@@ -171,7 +170,7 @@ def footprint(photo: Photo, size: tuple[int, int]) -> Bounds:
     ideal = rim if photo.lens is None else photo.lens.undistort(rim)
     # The denominator of the homography changes sign where the photo meets the horizon.
     depth = ideal @ photo.plane_from_pixel[2, :2] + photo.plane_from_pixel[2, 2]
-    plane = apply_homography(photo.plane_from_pixel, ideal)
+    plane = photo.plane_from_pixels(rim)
     if not np.isfinite(plane).all() or depth.min() * depth.max() <= 0:
         raise GeometryError(
             "the photo looks past the horizon of the reference plane, so it covers no finite "
@@ -200,7 +199,9 @@ def _project(
     matrix = np.linalg.inv(photo.plane_from_pixel)
     nx, ny = photo.nadir
     x, y = grid.columns_x - nx, grid.rows_y - ny
-    k = magnification(relief.astype(np.float64), photo.distance)  # Eq. (1)
+    relief = relief.astype(np.float64)
+    radius = np.zeros(()) if photo.media is None else np.hypot(x[None, :], y[:, None])
+    k = apparent_magnification(radius, relief, photo.foot)  # Eq. (1), through media Maas Eq. (2)
     constant = matrix @ np.array([nx, ny, 1.0])
     reach = max(np.abs(x).max(), np.abs(y).max())
     tilt = np.abs(matrix[2, :2]).max() * reach * max(1.0, float(np.fmax.reduce(k, axis=None)))

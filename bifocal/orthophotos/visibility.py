@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import cv2
 import numpy as np
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from bifocal.model.grid import Bounds, Grid
 from bifocal.model.surface import EVERYWHERE, Surface
-from bifocal.rays import Foot, magnification
+from bifocal.rays import Foot, distance_at, magnification, near_axis
 from photocore.arrays import BoolArray, Float32Array
 
 #: A pixel of the buffer is a candidate when another on its ray lies this much farther in. [px]
@@ -30,6 +30,8 @@ _BESIDE = (1.25, 1.75)
 _AROUND = (-2.0, -1.5, -1.0, -0.5, 0.0, 0.5, 1.0, 1.5, 2.0)
 #: Windows with surroundings of more pixels are halved, down to this side. [px]
 _LARGEST, _SMALLEST = 2_000_000, 200
+#: Through media neighbours on a flat part lie up to this much farther apart than on the axis.
+_BENT = 1.3
 #: No more than this many points are inserted between two neighbours.
 _MOST_STEPS = 400
 
@@ -75,7 +77,9 @@ def hidden_from(surface: Surface, grid: Grid, camera: Foot, relief: Float32Array
         relief_wide = relief
     # The same cells for every window, so that windows fit together.
     _, high = surface.extremes(EVERYWHERE)
-    largest = float(magnification(high, camera.distance))
+    largest = float(magnification(high, near_axis(camera)))
+    if camera.media is not None:
+        largest *= _BENT
     return _hidden(relief_wide, wide, camera, (column, row), grid.shape, largest)
 
 
@@ -90,17 +94,21 @@ def _reach(surface: Surface, grid: Grid, camera: Foot) -> tuple[Grid, int, int] 
     if math.isnan(low):
         return None
     left, bottom, right, top = bounds
+    farthest = max(
+        math.hypot(x - camera.nadir[0], y - camera.nadir[1])
+        for x in (left, right)
+        for y in (bottom, top)
+    )
+    least = near_axis(camera)
+    if camera.media is not None:
+        least = min(least, float(distance_at(camera, np.array([farthest]))[0]))
     share = 1.0
     # The first pass takes everything up to the nadir, the next only what the relief there needs.
     for _ in range(3):
         box = _towards(bounds, camera, share)
         _, high = surface.extremes(box)
-        share = max(0.0, (high - low) / (camera.distance - low))
-    reach = share * max(
-        math.hypot(x - camera.nadir[0], y - camera.nadir[1])
-        for x in (left, right)
-        for y in (bottom, top)
-    )
+        share = max(0.0, (high - low) / (least - low))
+    reach = share * farthest
     if reach < grid.gsd:
         return None
     box = _towards(bounds, camera, share)
@@ -130,8 +138,12 @@ class _Surroundings(NamedTuple):
     x: Float32Array  # of every column, from the nadir [px]
     y: Float32Array  # of every row, upwards [px]
     rho: Float32Array  # distance from the nadir [px]
-    distance: np.float32  # of the camera [px]
+    distance: Any  # of the camera; through media of straight ones that see alike, (h, w) [px]
     core: tuple[slice, slice]  # the window itself
+
+    def distance_in(self, where: Any) -> Any:
+        """Return the distance for some of the pixels."""
+        return self.distance if np.ndim(self.distance) == 0 else self.distance[where]
 
 
 def _hidden(
@@ -147,12 +159,16 @@ def _hidden(
     gsd = grid.gsd
     x = ((grid.columns_x - camera.nadir[0]) / gsd).astype(np.float32)
     y = ((grid.rows_y - camera.nadir[1]) / gsd).astype(np.float32)
+    rho = np.sqrt(x * x + (y * y)[:, None])
+    distance: Any = np.float32(camera.distance / gsd)
+    if camera.media is not None:
+        distance = distance_at(camera, rho * np.float32(gsd), relief) * np.float32(1 / gsd)
     around = _Surroundings(
         relief=relief * np.float32(1 / gsd),
         x=x,
         y=y,
-        rho=np.sqrt(x * x + (y * y)[:, None]),
-        distance=np.float32(camera.distance / gsd),
+        rho=rho,
+        distance=distance,
         core=np.s_[row : row + shape[0], column : column + shape[1]],
     )
     buffer = _Buffer.of_surroundings(around, largest)
@@ -237,7 +253,8 @@ def _sharpen(around: _Surroundings, buffer: _Buffer) -> BoolArray:
     unsure = (cv2.dilate(flags, square) > 0) & ~sure
     known = np.where(np.isnan(around.relief), np.float32(-1e9), around.relief)
     rise = cv2.dilate(known, square)[core] - around.relief[core]
-    unsure |= rise * rho > np.float32(_LEAST_SHADOW) * (around.distance - around.relief[core])
+    depth = around.distance_in(core) - around.relief[core]
+    unsure |= rise * rho > np.float32(_LEAST_SHADOW) * depth
     row, column = np.nonzero(unsure & ~sure)
     if not len(row):
         return hidden
@@ -257,7 +274,7 @@ def _above_ray(
     """Return which pixels' rays to the camera run into relief beside them or at the occluder."""
     rows, columns = around.relief.shape
     r, rho = around.relief[row, column], around.rho[row, column]
-    slope = (around.distance - r) / rho
+    slope = (around.distance_in((row, column)) - r) / rho
     to_x, to_y = -around.x[column] / rho, around.y[row] / rho
     hidden = np.zeros(len(row), bool)
     to_occluder = np.where(np.isfinite(occluder), rho - occluder, np.float32(0))

@@ -12,7 +12,7 @@ from bifocal.files.images import as_grey
 from bifocal.model.grid import Bounds, Grid, bounds_of
 from bifocal.model.pair import Pair
 from bifocal.model.relief_map import Quality, ReliefMap
-from bifocal.rays import plane_position
+from bifocal.rays import object_rays, plane_position
 from bifocal.relief_maps import flow, forward_projection, seed
 from bifocal.relief_maps.exposure import match_exposure
 from bifocal.relief_maps.forward_projection import MapBands
@@ -141,11 +141,15 @@ def dense_relief(
     >>> result.shape, round(result.gsd, 6)
     ((67, 100), 0.06)
     """
+    pair.refuse_leaning_media("a dense relief map")
     grey1, grey2 = as_grey(image1, "image1"), as_grey(image2, "image2")
     if quality not in QUALITIES:
         raise InputError(f"quality: expected {', '.join(QUALITIES)}, got {quality!r}.")
     if relief_range is not None:
         _check_range(relief_range, pair.image2.distance)
+    if pair.layers is not None:  # nothing stands out of the water, or through the glass
+        low, high = relief_range or seed.usual_range(pair.image2.distance)
+        relief_range = (low, min(high, 0.999 * pair.highest_relief))
     wanted, target, work = _grids(pair, (grey1, grey2), gsd, bounds, quality, relief_range)
     frame = make_frame(pair, grey1, grey2, work)
     progress(0.1, 1.0, "First relief")
@@ -250,7 +254,7 @@ def _seen_box(pair: Pair, box: Bounds, low: float, high: float) -> Bounds:
     corners = (box[:2], box[2:])
     reliefs = (low, 0.0, min(high, 0.6 * foot.distance))
     xyz = np.array([[x, y, r] for r in reliefs for x, y in corners])
-    return bounds_of(plane_position(xyz, foot))
+    return bounds_of(object_rays(plane_position(xyz, foot), foot).position)
 
 
 def _resampled(bands: MapBands, grid: Grid, wanted: Grid) -> MapBands:

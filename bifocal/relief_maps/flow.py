@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 
 from bifocal import rays
-from bifocal.relief_maps.frame import Frame, offsets, radial_stretch, zoom_map
+from bifocal.relief_maps.frame import Frame, nadir_pixels, offsets, radial_stretch, zoom_map
 from photocore.arrays import BoolArray, ByteArray, Float32Array
 
 #: Weight of smoothness; 30 is as good before noise is taken out, 20 keeps more detail for it.
@@ -133,6 +133,8 @@ def _noise(frame: Frame) -> float:
 
 def split(frame: Frame, flow: Float32Array) -> tuple[Float32Array, Float32Array]:
     """Return relief [m] and the flow across the radius [px] of a flow from photo 1."""
+    if frame.pair.layers is not None:
+        return _split_bent(frame, flow)
     x, y = frame.from_centre()
     square = x * x + y * y
     np.maximum(square, np.float32(1e-3), out=square)
@@ -143,12 +145,41 @@ def split(frame: Frame, flow: Float32Array) -> tuple[Float32Array, Float32Array]
     return relief, across.astype(np.float32)
 
 
+def _rates(
+    frame: Frame, column: Float32Array, row: Float32Array
+) -> tuple[Float32Array, Float32Array, Float32Array]:
+    """Return how rays of photo 2 at (column, row) and those of photo 1 part with relief. [px/m]
+
+    Along columns and rows; and the distance of photo 2 for its rays. [m]
+    """
+    (far_x, far_y), (near_x, near_y) = nadir_pixels(frame)
+    x1, y1 = offsets(frame.grid.shape, (far_x, far_y))
+    x2, y2 = column - near_x, row - near_y
+    d1, d2 = frame.distance_at(1, x1, y1), frame.distance_at(2, x2, y2)
+    return x2 / d2 - x1 / d1, y2 / d2 - y1 / d1, d2
+
+
+def _split_bent(frame: Frame, flow: Float32Array) -> tuple[Float32Array, Float32Array]:
+    """Return `split` for rays through media: linear in r, as `rays.relief_of_rays`."""
+    x, y = offsets(frame.grid.shape)
+    rate_x, rate_y, _ = _rates(frame, x + flow[..., 0], y + flow[..., 1])
+    square = np.maximum(rate_x * rate_x + rate_y * rate_y, np.float32(1e-6))
+    relief = (flow[..., 0] * rate_x + flow[..., 1] * rate_y) / square
+    across = (flow[..., 1] * rate_x - flow[..., 0] * rate_y) / np.sqrt(square)
+    relief[~(relief < frame.pair.highest_relief)] = np.nan
+    return relief.astype(np.float32), across.astype(np.float32)
+
+
 def sigma_of_relief(frame: Frame, relief: Float32Array, sigma_px: Float32Array) -> Float32Array:
     """Return the standard deviation of r from a matching precision in pixels. [m]
 
     ``sigma_r = sigma_m B / s'`` at r = 0 with B = d1 d2 / (d1 - d2): `precision.sigma_relief`
     with all error in image 2.
     """
+    if frame.pair.layers is not None:
+        rate_x, rate_y, near = _rates(frame, *zoom_map(frame, relief))
+        away = np.maximum(np.hypot(rate_x, rate_y), np.float32(0.5 / frame.pair.base_factor))
+        return np.asarray(np.abs(rays.reduction(relief, near)) * sigma_px / away, dtype=np.float32)
     x, y = frame.from_centre()
     reach = np.maximum(np.sqrt(x * x + y * y), np.float32(0.5))
     d1, d2 = frame.distances

@@ -9,7 +9,7 @@ import numpy as np
 
 from bifocal.model.grid import Grid
 from bifocal.model.relief_map import Quality
-from bifocal.rays import Foot, magnification, reduction
+from bifocal.rays import Foot, distance_at, magnification, reduction
 from bifocal.relief_maps.frame import Frame, offsets, values_at, zoom_map
 from photocore.arrays import BoolArray, ByteArray, Float32Array, FloatArray, IntArray
 
@@ -55,7 +55,8 @@ def stretch(frame: Frame, relief: Float32Array) -> Float32Array:
     across = cv2.Sobel(relief, cv2.CV_32F, 1, 0, ksize=3, scale=0.125)
     down = cv2.Sobel(relief, cv2.CV_32F, 0, 1, ksize=3, scale=0.125)
     # d s'/d s of s' = s (1 - r / d), Eq. (1).
-    return np.asarray(reduction(relief + across * x + down * y, np.float32(foot.distance)))
+    distance = frame.distance_at(1, x, y)
+    return np.asarray(reduction(relief + across * x + down * y, distance))
 
 
 def to_plane(frame: Frame, source: MapBands, usable: BoolArray, grid: Grid) -> MapBands:
@@ -95,7 +96,7 @@ def _scatter(
     A spike that nothing validates would otherwise win against the wall that it is a mismatch of.
     """
     x, y = offsets(frame.grid.shape, frame.grid.pixel_of(foot.nadir))
-    share = reduction(relief, np.float32(foot.distance))  # Eq. (1): s' = s - e = s (1 - r / d)
+    share = reduction(relief, frame.distance_at(1, x, y))  # Eq. (1): s' = s - e = s (1 - r / d)
     ratio = frame.grid.gsd / grid.gsd
     nadir = grid.pixel_of(foot.nadir)
     with np.errstate(invalid="ignore"):
@@ -155,7 +156,8 @@ def _look_up(
     final, tolerance = start, np.float32(AGREEMENT * foot.distance)
     for _ in range(3):
         value = final
-        q = nadir + away * magnification(value, np.float32(foot.distance))[..., None]
+        distance = frame.distance_at(1, away[..., 0], away[..., 1], value)
+        q = nadir + away * magnification(value, distance)[..., None]
         q[~np.isfinite(q)] = -1e4
         final = values_at(relief, q, cv2.INTER_NEAREST)
     with np.errstate(invalid="ignore"):
@@ -268,7 +270,10 @@ def hidden_on_map(relief: Float32Array, grid: Grid, camera: Foot) -> BoolArray:
     x = ((grid.columns_x - camera.nadir[0]) / grid.gsd).astype(np.float32)[None, :]
     y = ((camera.nadir[1] - grid.rows_y) / grid.gsd).astype(np.float32)[:, None]
     column0, row0 = grid.pixel_of(camera.nadir)
-    factor = magnification(relief, np.float32(camera.distance))  # Eq. (1)
+    distance = np.float32(camera.distance)
+    if camera.media is not None:
+        distance = distance_at(camera, np.sqrt(x * x + y * y) * np.float32(grid.gsd), relief)
+    factor = magnification(relief, distance)  # Eq. (1)
     with np.errstate(invalid="ignore"):
         column = x * factor + np.float32(column0 + 0.5)
         row = y * factor + np.float32(row0 + 0.5)
@@ -278,7 +283,7 @@ def hidden_on_map(relief: Float32Array, grid: Grid, camera: Foot) -> BoolArray:
     top = np.full(grid.shape, np.float32(-1e3))
     _highest(relief[inside], index[inside], top)
     top = cv2.morphologyEx(top, cv2.MORPH_CLOSE, np.ones((3, 3), np.uint8))
-    pixel = (camera.distance - relief) / np.maximum(np.sqrt(x * x + y * y), 1)
+    pixel = (distance - relief) / np.maximum(np.sqrt(x * x + y * y), 1)
     with np.errstate(invalid="ignore"):
         return np.asarray(inside & (top.ravel()[index] > relief + pixel))
 

@@ -57,8 +57,16 @@ class Frame:
 
     @property
     def distances(self) -> tuple[float, float]:
-        """d1, d2. [m]"""
-        return self.pair.image1.distance, self.pair.image2.distance
+        """d1, d2; through media those of straight cameras that see alike near the axis. [m]"""
+        return self.pair.straight_distances
+
+    def distance_at(self, number: int, x: Any, y: Any, relief: Any = None) -> Any:
+        """Return a camera's distance at offsets [px] from its nadir; see `rays.distance_at`. [m]"""
+        foot = self.pair.photo(number).foot
+        if foot.media is None:
+            return np.float32(foot.distance)
+        radius = np.sqrt(x * x + y * y) * np.float32(self.grid.gsd)
+        return rays.distance_at(foot, radius, relief)
 
     def from_centre(self) -> tuple[Float32Array, Float32Array]:
         """Return offsets from the zoom centre, shapes (1, width) and (height, 1). [px]"""
@@ -128,7 +136,8 @@ def common_bounds(pair: Pair, shapes: tuple[tuple[int, ...], tuple[int, ...]]) -
 
 def zoomed_box(pair: Pair, shape2: tuple[int, ...], box: Bounds, relief: float) -> Bounds:
     """Return a box grown to where photo 2 shows what stands out by a relief, as far as it does."""
-    factor = rays.zoom_factor(relief, d1=pair.image1.distance, d2=pair.image2.distance)
+    d1, d2 = pair.straight_distances
+    factor = rays.zoom_factor(relief, d1=d1, d2=d2)
     corners = np.reshape(box, (2, 2))
     grown = pair.zoom_centre + (corners - pair.zoom_centre) * factor
     footprint = _footprint(pair.image2, shape2)
@@ -176,7 +185,8 @@ def working_grid(pair: Pair, shape1: tuple[int, ...], box: Bounds, gsd: float) -
     matrix = photo.plane_from_pixel / photo.plane_from_pixel[2, 2]
     ideal = np.array([[gsd, 0, matrix[0, 2]], [0, -gsd, matrix[1, 2]], [0, 0, 1.0]])
     span = max(shape1[:2])
-    if photo.lens is None and np.abs((matrix - ideal)[:, :2]).max() * span < SAME_LATTICE * gsd:
+    straight = photo.lens is None and photo.media is None
+    if straight and np.abs((matrix - ideal)[:, :2]).max() * span < SAME_LATTICE * gsd:
         column, row = np.rint(np.linalg.inv(matrix)[:2] @ np.array([grid.x0, grid.y0, 1.0]))
         x0, y0 = matrix[:2] @ np.array([column, row, 1.0])
         grid = Grid(x0=float(x0), y0=float(y0), gsd=gsd, width=grid.width, height=grid.height)
@@ -207,7 +217,8 @@ def _on_grid(photo: Photo, image: ByteArray, grid: Grid) -> tuple[ByteArray, Boo
     matrix = np.linalg.inv(photo.plane_from_pixel) @ grid.plane_from_pixel
     matrix = matrix / matrix[2, 2]
     height, width = image.shape
-    shift = _whole_shift(matrix, grid) if photo.lens is None else None
+    straight = photo.lens is None and photo.media is None
+    shift = _whole_shift(matrix, grid) if straight else None
     if shift is not None:
         window = (*shift, grid.width, grid.height)
         return cut(image, window), cut(np.ones(image.shape, bool), window)
@@ -253,11 +264,35 @@ def zoom_map(frame: Frame, relief: Float32Array) -> tuple[Float32Array, Float32A
 
     Eq. (6) read the other way round, about the zoom centre: q2 - e = k(r) (q1 - e).
     """
+    if frame.pair.layers is not None:
+        return shown_at(frame, *offsets(frame.grid.shape), relief)
     d1, d2 = frame.distances
     factor = rays.zoom_factor(relief, d1=d1, d2=d2).astype(np.float32)
     x, y = frame.from_centre()
     column, row = (np.float32(value) for value in frame.centre)
     return factor * x + column, factor * y + row
+
+
+def shown_at(
+    frame: Frame, column: Float32Array, row: Float32Array, relief: Any
+) -> tuple[Float32Array, Float32Array]:
+    """Return where photo 2 shows pixels of photo 1 seen through media at given relief. [px]
+
+    Down the ray of photo 1 to the point by Eq. (1), up that of photo 2.
+    """
+    (far_x, far_y), (near_x, near_y) = nadir_pixels(frame)
+    x, y = column - far_x, row - far_y
+    share = rays.reduction(relief, frame.distance_at(1, x, y))
+    x, y = x * share + (far_x - near_x), y * share + (far_y - near_y)
+    factor = rays.magnification(relief, frame.distance_at(2, x, y, relief))
+    moved = (x * factor + near_x, y * factor + near_y)
+    return np.asarray(moved[0], np.float32), np.asarray(moved[1], np.float32)
+
+
+def nadir_pixels(frame: Frame) -> list[Float32Array]:
+    """Return both nadirs in pixels of the grid, (column, row) each."""
+    photos = (frame.pair.image1, frame.pair.image2)
+    return [frame.grid.pixel_of(photo.nadir).astype(np.float32) for photo in photos]
 
 
 def values_at(band: NDArray[Any], places: NDArray[np.floating], how: int) -> NDArray[Any]:

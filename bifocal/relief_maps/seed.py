@@ -11,7 +11,7 @@ import cv2
 import numpy as np
 
 from bifocal import rays
-from bifocal.relief_maps.frame import Frame, offsets
+from bifocal.relief_maps.frame import Frame, offsets, shown_at
 from photocore.arrays import BoolArray, ByteArray, Float32Array
 
 #: Width or height at which the sweep works; more brings little, costs squarely. [px]
@@ -106,6 +106,8 @@ def _cost_volume(
     content = inside.astype(np.float32)
     for i, zoom in enumerate(rays.zoom_factor(relief, d1=d1, d2=d2).astype(np.float32)):
         maps = (zoom * x + np.float32(centre[0]), zoom * y + np.float32(centre[1]))
+        if frame.pair.layers is not None:
+            maps = _coarse_map(frame, (height, width), float(relief[i]))
         moved = cv2.remap(near, *maps, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
         there = cv2.remap(content, *maps, cv2.INTER_LINEAR, borderValue=0.0)
         score = np.zeros_like(far)
@@ -116,6 +118,18 @@ def _cost_volume(
             score += 0.5 * shared / np.sqrt((variance + NOISE**2) * (variance2 + NOISE**2))
         cost[..., i] = np.where(there > 0.99, np.clip(1 - score, 0, 1), OUTSIDE)
     return cost
+
+
+def _coarse_map(
+    frame: Frame, shape: tuple[int, int], relief: float
+) -> tuple[Float32Array, Float32Array]:
+    """Return where photo 2 shows coarse pixels of photo 1 through media, in coarse pixels."""
+    factor = np.float32(frame.grid.width // shape[1])
+    x, y = offsets(shape)
+    column, row = ((axis + np.float32(0.5)) * factor - np.float32(0.5) for axis in (x, y))
+    moved = shown_at(frame, column, row, np.float32(relief))
+    column, row = ((axis + np.float32(0.5)) / factor - np.float32(0.5) for axis in moved)
+    return column, row
 
 
 def _moments(image: Float32Array, n: int) -> tuple[Float32Array, Float32Array]:

@@ -149,6 +149,7 @@ def check_orientation(
     of the points' largest radius; tilt p: ``p s' B`` at that radius. Rotation moves points across
     the radius and makes no relief.
     """
+    pair.refuse_media("the check of the set-up by points of the plane (code PLANE)")
     first = as_points(pixels1, "pixels1", dimension=2)
     second = as_points(pixels2, "pixels2", dimension=2)
     labels = list(names) if names is not None else [str(i + 1) for i in range(len(first))]

@@ -88,6 +88,11 @@ def write_result(
         return ""
     if ending not in (".xlsx", ".xlsm"):
         raise InputError(f"{path}: results are written as .xlsx, .xlsm or .csv.")
+    if solution.pair.layers is not None:
+        raise InputError(
+            f"{path}: no workbook is written for a pair seen through media, whose formulas it does "
+            f"not have yet. Write a text table: --out {path.with_suffix('.csv').name}"
+        )
     if len(solution.table) > MOST_ROWS:
         raise InputError(
             f"{path}: {len(solution.table)} points are too many for a workbook (limit {MOST_ROWS})."

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from bifocal.files.images import image_info
+from bifocal.model.orientation_precision import of_distances
 from bifocal.model.pair import Pair
 from bifocal.model.photo import Photo
 from bifocal.model.points import SurveyPoints
@@ -15,8 +16,12 @@ from bifocal.survey.setup import SurveySetup
 from bifocal.survey.sources import BOOKS, described_pair
 from bifocal.survey.workbook.reader import read_survey
 from bifocal.survey.workflow import SolvedSurvey, solve
-from photocore.arrays import FloatArray
+from photocore.arrays import FloatArray, not_negative
 from photocore.errors import InputError, located
+from photocore.output import all_or_none, check_all_writable, check_ending, relative_name
+
+#: Standard deviation of a distance by tape: it ends at the lens, the ray in its entrance pupil. [m]
+SIGMA_DISTANCE = 0.02
 
 
 def is_workbook(path: Path | str) -> bool:
@@ -51,6 +56,49 @@ def read_pair(path: Path | str) -> Pair:
     with located(setup.where):
         pair = _general(setup, path) if setup.matrices is not None else _ideal(setup, path.parent)
     return replace(pair, extra={"name": path.stem, **pair.extra})
+
+
+@all_or_none()
+def write_pair(
+    book: Path, out: Path, *, sigma_distance: float = SIGMA_DISTANCE, overwrite: bool = False
+) -> Pair:
+    """Write the pair file of a survey workbook's set-up, exactly as it is typed, and return it.
+
+    Parameters
+    ----------
+    book : path
+        Survey workbook that names its photos, as for `read_pair`.
+    out : path
+        ``.json``; photos are named as seen from its folder.
+    sigma_distance : float
+        Standard deviation of d_1 and d_2, carried to every point; the scales of the photos count
+        as exact. [m]
+    overwrite : bool
+
+    Raises
+    ------
+    InputError, GeometryError
+        If the set-up lacks something, or is that of a pair file already.
+    """
+    check_ending(out, f"a pair file ends in .json; write --out {out.stem}.pair.json.", ".json")
+    check_all_writable(out, overwrite=overwrite)
+    not_negative(sigma_distance, "sigma_distance", unit="m")
+    setup = read_survey(book).setup
+    if setup.matrices is not None:
+        raise InputError(
+            f"{setup.where}: the set-up is that of a pair file ({setup.pair_file or 'not named'}): "
+            "use that one, or the workbook itself."
+        )
+    pair = read_pair(book)
+    first, second = (
+        replace(photo, file=relative_name(pair.folder / (photo.file or ""), out.parent))
+        for photo in (pair.image1, pair.image2)
+    )
+    stated = of_distances(pair.d1, pair.d2, sigma_distance)
+    typed = {"setup": {"way": "as set up", "source": book.name, "assumed": list(pair.remarks)}}
+    written = Pair(image1=first, image2=second, orientation=stated, extra=typed)
+    written.write(out, overwrite=overwrite)
+    return replace(written, folder=out.parent, remarks=pair.remarks)
 
 
 def _general(setup: SurveySetup, path: Path) -> Pair:

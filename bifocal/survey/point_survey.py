@@ -4,20 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from bifocal.equations import plane_coordinates, relief, relief_displacement
+from bifocal.media import ObjectRays
 from bifocal.model.flags import FlagLimits, point_flags
 from bifocal.model.intersection import PlanePicks, intersect
 from bifocal.model.pair import Pair
 from bifocal.model.photo import Photo
 from bifocal.precision import point_covariance, sigma_relief
-from bifocal.rays import zoom_centre
+from bifocal.rays import in_line, meeting_of, object_rays, zoom_centre
 from bifocal.survey.observations import PointObservations
 from bifocal.survey.relief_table import ReliefTable, entries
 from photocore.arrays import BoolArray, FloatArray
+from photocore.errors import InputError
 
 
 def solve_points(
@@ -60,6 +62,11 @@ def solve_points(
     least squares, so that the result equals `Pair.intersect`; ``e1``, ``e2`` and ``s_c`` count
     from each camera's own nadir.
 
+    Through media (raw pixels only) the columns hold what refraction leaves: ``s1_used`` and
+    ``s2_used`` are radii of where the bent rays meet the reference plane, ``den`` is how much their
+    slopes differ, ``ds`` their distance along that difference, and ``r = ds / den`` is as closed as
+    Eq. (6) (`bifocal.media`).
+
     Examples
     --------
     A point 1 m before the wall and 2 m right of the nadir, 35 mm / 17.5 m and 19 mm / 9.5 m:
@@ -77,13 +84,21 @@ def solve_points(
     else:
         radii = _measured_radii(first, second, points, sigma_px)
     s1, s2, d1, d2 = radii.s1, radii.s2, first.distance, second.distance
-    den = s2 / d2 - s1 / d1
-    (d_far, far), (d_near, near) = _far_first((d1, s1), (d2, s2))
-    r = relief(far, near, d1=d_far, d2=d_near)  # Eq. (6)
-    e1, e2 = (  # Eqs. (1) and (3)
-        relief_displacement(own, r, d=d) for own, d in ((radii.own1, d1), (radii.own2, d2))
-    )
+    if radii.bent is not None:
+        ds, den, r = radii.bent.ds, radii.bent.den, radii.bent.relief
+        foot1, foot2 = radii.bent.places
+        e1: FloatArray = np.asarray(radii.own1 - _length(foot1))
+        e2: FloatArray = np.asarray(radii.own2 - _length(foot2))
+    else:
+        ds, den = s2 - s1, s2 / d2 - s1 / d1
+        (d_far, far), (d_near, near) = _far_first((d1, s1), (d2, s2))
+        r = relief(far, near, d1=d_far, d2=d_near)  # Eq. (6)
+        e1, e2 = (  # Eqs. (1) and (3)
+            relief_displacement(own, r, d=d) for own, d in ((radii.own1, d1), (radii.own2, d2))
+        )
     x, y = plane_coordinates(radii.own1, e1, np.radians(radii.own_theta))  # Eq. (7)
+    if radii.bent is not None:
+        x, y = radii.bent.places[0].T  # a port that leans bends rays also across the radius
     sigma_r = np.where(np.isnan(r), np.nan, radii.sigma_r)
     return ReliefTable(
         ids=points.ids,
@@ -91,7 +106,7 @@ def solve_points(
             "s1_used": s1,
             "s2_used": s2,
             "theta_used": radii.theta,
-            "ds": s2 - s1,
+            "ds": ds,
             "den": den,
             "r": r,
             "e1": e1,
@@ -123,6 +138,15 @@ def solve_points(
     )
 
 
+class _BentRays(NamedTuple):
+    """What Eq. (6) becomes through media, shape (n,): lengths [mm at the scale of image 1]."""
+
+    ds: FloatArray
+    den: FloatArray  # [mm/m]
+    relief: FloatArray  # [m]
+    places: tuple[FloatArray, FloatArray]  # of the points, from each camera's nadir, (n, 2)
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class _Radii:
     """Points as radial distances [mm at the scale of image 1] and directions [deg], shape (n,).
@@ -146,12 +170,17 @@ class _Radii:
     covariance: FloatArray
     sigma_px: float | None = None
     carried: Mapping[str, FloatArray] = field(default_factory=dict)
+    bent: _BentRays | None = None
 
 
 def _measured_radii(
     first: Photo, second: Photo, points: PointObservations, sigma: float | None
 ) -> _Radii:
     """Return radial distances as measured on the photos of an ideal pair."""
+    if first.media is not None:
+        raise InputError(
+            "points seen through media are solved from pixels: give the pair with --pair."
+        )
     scale_number = first.scale_number
     k12 = 1.0
     if scale_number is not None and second.scale_number is not None:
@@ -210,16 +239,19 @@ def _adjusted_radii(
     centre = zoom_centre(first.foot, second.foot)
     scale_number = first.scale_number or 1000.0
     to_mm = 1000.0 / scale_number
-    x1, x2 = ((pick.positions - centre) * to_mm for pick in picks)
+    feet = [pick.foot for pick in picks]
+    places = [object_rays(pick.positions, pick.foot) for pick in picks]
+    fitted = [object_rays(solved.adjusted1, feet[0]), object_rays(solved.adjusted2, feet[1])]
+    x1, x2 = ((ray.position - centre) * to_mm for ray in places)
     radius = np.hypot(x1[:, 0], x1[:, 1])
     with np.errstate(divide="ignore", invalid="ignore"):
-        q = np.where(radius > 0, (x1[:, 0] * x2[:, 1] - x1[:, 1] * x2[:, 0]) / radius, 0.0)
+        q, spread = _miss(x1, x2, picks, centre, to_mm)
         q = np.where(np.isnan(x1[:, 0]) | np.isnan(x2[:, 0]), np.nan, q)
         gain1, gain2 = (
-            np.where((q != 0)[:, None], (x - (adjusted - centre) * to_mm) / q[:, None], 0.0)
-            for x, adjusted in ((x1, solved.adjusted1), (x2, solved.adjusted2))
+            np.where((q != 0)[:, None], (x - (ray.position - centre) * to_mm) / q[:, None], 0.0)
+            for x, ray in zip((x1, x2), fitted, strict=True)
         )
-        k_q = _misfit_spread(x1, x2, picks, to_mm) / solved.sigma_px
+        k_q = spread / solved.sigma_px
         k_r = solved.sigma[:, 2] / solved.sigma_px
         common = pair.covariance_of_orientation(np.array(solved.xyz))
         o_r = np.sqrt(common[:, 2, 2])
@@ -231,6 +263,10 @@ def _adjusted_radii(
     )
     names = ("x1", "y1", "x2", "y2", "g1x", "g1y", "g2x", "g2y")
     carried = dict(zip(names, np.hstack([x1, x2, gain1, gain2]).T, strict=True))
+    bent = None
+    if pair.layers is not None:
+        bent = _bent_rays(fitted, (moved1, moved2), (own1, own2), to_mm, solved.xyz[:, 2])
+        carried |= _carried_slopes(places, fitted, q, to_mm)
     s1 = _length(moved1)
     return _Radii(
         scale_number=scale_number,
@@ -256,7 +292,45 @@ def _adjusted_radii(
         }
         | entries(solved.covariance / solved.sigma_px**2, "k_")
         | entries(common, "o_"),
+        bent=bent,
     )
+
+
+def _bent_rays(
+    rays: list[ObjectRays],
+    feet: tuple[FloatArray, FloatArray],
+    own: tuple[FloatArray, FloatArray],
+    to_mm: float,
+    solved: FloatArray,
+) -> _BentRays:
+    """Return what Eq. (6) becomes for rays through media; NaN where the relief solved is.
+
+    ``feet`` and ``own`` are where they meet the plane, from one point and from each nadir. [mm]
+    """
+    gap = feet[1] - feet[0]
+    rate = (rays[0].slope - rays[1].slope) * to_mm
+    den = _length(rate)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ds = np.where(den > 0, (gap * rate).sum(axis=1) / den, 0.0)
+        relief = np.where(~np.isnan(solved) & (den > 0), ds / den, np.nan)
+    places = [
+        foot + ray.slope * (to_mm * relief)[:, None] for foot, ray in zip(own, rays, strict=True)
+    ]
+    return _BentRays(ds, den, relief, (places[0], places[1]))
+
+
+def _carried_slopes(
+    places: list[ObjectRays], fitted: list[ObjectRays], q: FloatArray, to_mm: float
+) -> dict[str, FloatArray]:
+    """Return slopes [mm/m, outwards] of the picks' rays and how they move with their misfit."""
+    columns = {}
+    for image, (place, moved) in enumerate(zip(places, fitted, strict=True), start=1):
+        with np.errstate(divide="ignore", invalid="ignore"):
+            gain = np.where((q != 0)[:, None], (moved.slope - place.slope) / q[:, None], 0.0)
+        for axis, k in (("x", 0), ("y", 1)):
+            columns[f"t{image}{axis}"] = -place.slope[:, k] * to_mm
+            columns[f"u{image}{axis}"] = gain[:, k] * to_mm
+    return columns
 
 
 def _far_first(*photos: tuple[Any, ...]) -> list[tuple[Any, ...]]:
@@ -268,14 +342,32 @@ def _length(vectors: FloatArray) -> FloatArray:
     return np.asarray(np.sqrt((vectors**2).sum(axis=1)))
 
 
-def _misfit_spread(
-    x1: FloatArray, x2: FloatArray, picks: tuple[PlanePicks, PlanePicks], to_mm: float
-) -> FloatArray:
-    """Return the standard deviation of q. [mm]"""
-    g1 = np.stack([x2[:, 1], -x2[:, 0]], axis=-1)
-    g2 = np.stack([-x1[:, 1], x1[:, 0]], axis=-1)
+def _miss(
+    x1: FloatArray,
+    x2: FloatArray,
+    picks: tuple[PlanePicks, PlanePicks],
+    centre: FloatArray,
+    to_mm: float,
+) -> tuple[FloatArray, FloatArray]:
+    """Return the misfit q across the radius and its standard deviation. [mm]
+
+    Through media it is the distance at which both rays pass each other, seen along relief.
+    """
+    if picks[0].foot.media is None:
+        value, g1, g2 = in_line(x1, x2)
+        radius = np.hypot(x1[:, 0], x1[:, 1])
+        q, unit = np.where(radius > 0, value / radius, 0.0), to_mm / _length(x1)
+    else:
+        feet = [pick.foot for pick in picks]
+        value, g1, g2 = meeting_of(feet[0], feet[1], centre)(
+            *(pick.positions - centre for pick in picks)
+        )
+        rays = [object_rays(pick.positions, pick.foot) for pick in picks]
+        rate = _length(rays[0].slope - rays[1].slope)
+        unit = to_mm / rate
+        q = np.where(rate > 0, value * unit, 0.0)
     variance = sum(
         np.einsum("ni,nij,nj->n", g, pick.covariance, g)
         for g, pick in zip((g1, g2), picks, strict=True)
     )
-    return np.asarray(np.sqrt(variance) * to_mm / _length(x1))
+    return q, np.asarray(np.sqrt(variance) * unit)

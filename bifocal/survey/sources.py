@@ -94,22 +94,28 @@ def described_pair(setup: SurveySetup, file: Path | None, folder: Path) -> Pair 
         return None
     lenses: list[Lens | None] = [None, None]
     orientation, doubt = None, ""
+    media: list[dict[str, Any]] = [{}, {}]
     if setup.pair_file and file is None:
         doubt = f"{setup.pair_file} is not found"
     if file is not None:
         try:
             given = Pair.read(file)
             lenses, orientation = [given.image1.lens, given.image2.lens], given.orientation
+            media = [
+                {name: getattr(photo, name) for name in ("layers", "z0", "interface_normal")}
+                for photo in (given.image1, given.image2)
+            ]
         except (InputError, GeometryError) as error:
             doubt = f"{setup.pair_file} cannot be used ({error})"
     remarks = (f"{doubt}: pixels are taken as free of lens distortion.",) if doubt else ()
     photos = [
         Photo(
-            plane_from_pixel=matrix, nadir=nadir, distance=d, lens=lens, principal_distance=c
+            plane_from_pixel=matrix, nadir=nadir, distance=d, lens=lens, principal_distance=c,
+            **through,
         )
-        for matrix, nadir, d, lens, c in zip(
+        for matrix, nadir, d, lens, c, through in zip(
             setup.matrices, setup.nadirs, (setup.d1, setup.d2), lenses, (setup.c1, setup.c2),
-            strict=True,
+            media, strict=True,
         )
     ]  # fmt: skip
     return Pair(

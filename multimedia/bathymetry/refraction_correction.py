@@ -7,11 +7,11 @@ follows rigorously, without them its depth is stretched by the refractive index.
 
 from __future__ import annotations
 
-import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.sparse import csr_array
 
 from multimedia.bathymetry.corrected_points import (
     BathymetryStatus,
@@ -21,6 +21,7 @@ from multimedia.bathymetry.corrected_points import (
     as_water_surface,
     checked_water_index,
 )
+from multimedia.bathymetry.visible_points import VisiblePoints
 from multimedia.media.collinearity import Medium, shifts
 from multimedia.media.ray_tracing import aim_rays
 from multimedia.media.surface_sequence import SurfaceSequence
@@ -50,7 +51,8 @@ def correct_bathymetry(
     water_level: float | WaterSurface,
     index: float,
     cameras: ArrayLike | None = None,
-    visible: ArrayLike | None = None,
+    visible: ArrayLike | csr_array | None = None,
+    max_angle: float | None = None,
     precision: Precision | None = None,
 ) -> CorrectedPoints:
     r"""Correct apparent points under water for the refraction at the water surface.
@@ -67,9 +69,11 @@ def correct_bathymetry(
     cameras : array_like, shape (m, 3), optional
         Projection centres, above the water. Without them every point is treated as if seen from
         straight above. [m]
-    visible : array_like of bool, shape (..., m), optional
+    visible : array_like of bool, shape (..., m), or sparse array, shape (n, m), optional
         Which camera saw which point; all of them by default. A point seen by fewer than two
         cameras (or by rays that hardly differ) gets the nadir correction and says so.
+    max_angle : float, optional
+        Cameras see nothing farther than this from the vertical below them. [rad]
     precision : Precision, optional
         Standard deviations of index, level and points, carried through to the result.
 
@@ -110,16 +114,15 @@ def correct_bathymetry(
     flat = xyz.reshape(-1, 3)
     surface, n_water = as_water_surface(water_level), checked_water_index(index)
     centres = _checked_cameras(cameras, surface)
-    seen = _checked_visibility(visible, shape, len(centres))
+    seen = VisiblePoints.checked(visible, centres, max_angle, shape)
     precision = precision or Precision()
     count = len(flat)
     result = (
         np.empty((count, 3)), np.empty(count), np.empty(count, np.int64), np.empty((count, 3, 3))
     )  # fmt: skip
-    block = max(BLOCK_RAYS // max(len(centres), 1), 1)
-    for first in range(0, count, block):
-        part = slice(first, first + block)
-        corrected = _correct_block(flat[part], surface, n_water, centres, seen[part], precision)
+    for part, row, camera in seen.blocks(flat, BLOCK_RAYS):
+        pairs = (row, camera)
+        corrected = _correct_block(flat[part], surface, n_water, centres, pairs, precision)
         for whole, piece in zip(result, corrected, strict=True):
             whole[part] = piece
     return CorrectedPoints(
@@ -135,10 +138,13 @@ def _correct_block(
     surface: WaterSurface,
     index: float,
     centres: FloatArray,
-    seen: BoolArray,
+    pairs: tuple[IntArray, IntArray],
     precision: Precision,
 ) -> tuple[FloatArray, FloatArray, IntArray, FloatArray]:
-    """Return position, depth, status and covariance of one block of points."""
+    """Return position, depth, status and covariance of one block of points.
+
+    ``pairs`` are rows and cameras of what was seen, sorted by row.
+    """
     level = surface.height_at(apparent[:, :2])
     below = level - apparent[:, 2]
     status = np.where(below > 0, BathymetryStatus.NADIR, BathymetryStatus.DRY).astype(np.int64)
@@ -153,9 +159,9 @@ def _correct_block(
         + (below[wet] * precision.index) ** 2
         + ((1 - index) * precision.level) ** 2
     )
-    rows = wet[seen[wet].sum(-1) >= 2]
+    rows = wet[np.bincount(pairs[0], minlength=len(xyz))[wet] >= 2]
     if rows.size:
-        task = _Task.near(apparent[rows], centres, seen[rows], surface, index)
+        task = _Task.near(apparent, rows, centres, pairs, surface, index)
         points, ok, weak = _solve(task, xyz[rows])
         xyz[rows[~weak]] = np.where(ok[~weak, None], points[~weak], np.nan)
         status[rows[~weak]] = np.where(ok[~weak], BathymetryStatus.RAYS, BathymetryStatus.FAILED)
@@ -172,7 +178,9 @@ class _Task(NamedTuple):
 
     apparent: FloatArray  # (n, 3)
     centres: FloatArray  # (m, 3)
-    weights: FloatArray  # (n, m); 0 where not seen
+    row: IntArray  # (k,), point of each pair that was seen, ascending
+    camera: IntArray  # (k,)
+    weight: FloatArray  # (k,)
     surface: WaterSurface
     n_water: float
     origin: FloatArray  # (3,), to be added again
@@ -181,28 +189,47 @@ class _Task(NamedTuple):
     def near(
         cls,
         apparent: FloatArray,
+        rows: IntArray,
         centres: FloatArray,
-        seen: BoolArray,
+        pairs: tuple[IntArray, IntArray],
         surface: WaterSurface,
         index: float,
     ) -> _Task:
-        """Move the scene to the origin: map coordinates would cost six digits."""
-        origin = np.round(apparent.mean(0))
-        local, at = apparent - origin, centres - origin
-        square = ((local[:, None] - at) ** 2).sum(-1)
-        return cls(
-            local, at, np.where(seen, 1 / square, 0.0), surface.shifted(-origin), index, origin
-        )
+        """Move some points of a block to the origin: map coordinates would cost six digits."""
+        origin = np.round(apparent[rows].mean(0))
+        row, camera = _of_rows(pairs, rows, len(apparent))
+        local, at = apparent[rows] - origin, centres - origin
+        weight = 1 / ((local[row] - at[camera]) ** 2).sum(-1)
+        return cls(local, at, row, camera, weight, surface.shifted(-origin), index, origin)
 
     def take(self, rows: IntArray) -> _Task:
-        """Return the task for some of the points."""
-        return self._replace(apparent=self.apparent[rows], weights=self.weights[rows])
+        """Return the task for some of the points, ascending."""
+        if len(rows) == len(self.apparent):
+            return self
+        row, camera, weight = _of_rows(
+            (self.row, self.camera, self.weight), rows, len(self.apparent)
+        )
+        return self._replace(apparent=self.apparent[rows], row=row, camera=camera, weight=weight)
+
+    @property
+    def starts(self) -> IntArray:
+        """First pair of each point: sums over runs; every point has a camera."""
+        return np.searchsorted(self.row, np.arange(len(self.apparent)))
+
+
+def _of_rows(pairs: tuple[Any, ...], rows: IntArray, count: int) -> tuple[Any, ...]:
+    """Return the pairs of some of ``count`` rows, numbered anew; the first entry is the row."""
+    number = np.full(count, -1)
+    number[rows] = np.arange(len(rows))
+    row = number[pairs[0]]
+    kept = row >= 0
+    return (row[kept], *(part[kept] for part in pairs[1:]))
 
 
 def _solve(task: _Task, start: FloatArray) -> tuple[FloatArray, BoolArray, BoolArray]:
     """Return true positions, which were found, and which have rays too parallel to be fixed."""
     point = start - task.origin
-    scale = np.linalg.norm(task.apparent[:, None] - task.centres, axis=-1).max(-1)
+    scale = np.sqrt(1 / np.minimum.reduceat(task.weight, task.starts))
     ok = np.zeros(len(point), dtype=bool)
     weak = ok.copy()
     rows = np.arange(len(point))
@@ -240,9 +267,8 @@ def _kept_in_water(surface: WaterSurface, point: FloatArray, step: FloatArray) -
 
 def _balance(task: _Task, point: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return sum w (I - u u')(A - C), the normal matrix, and minus the derivative by the point."""
-    row, camera = np.nonzero(task.weights)
-    heading, derivative = _pointing(task, point, row, camera)
-    weight = task.weights[row, camera]
+    row, camera, weight = task.row, task.camera, task.weight
+    heading, derivative = _pointing(task, point)
     toward = task.apparent[row] - task.centres[camera]
     along = (heading * toward).sum(-1)
     aside = toward - along[:, None] * heading
@@ -250,8 +276,7 @@ def _balance(task: _Task, point: FloatArray) -> tuple[FloatArray, FloatArray, Fl
     # d(u u') r = (u . r) du + u (r . du)
     change = along[:, None, None] * derivative
     change += heading[:, :, None] * (toward[:, None, :] @ derivative)
-    # Pairs come sorted by point, and every point has a camera: sums over runs.
-    starts = np.searchsorted(row, np.arange(len(point)))
+    starts = task.starts
     return (
         np.add.reduceat(weight[:, None] * aside, starts),
         np.add.reduceat(weight[:, None, None] * outer, starts),
@@ -259,10 +284,9 @@ def _balance(task: _Task, point: FloatArray) -> tuple[FloatArray, FloatArray, Fl
     )
 
 
-def _pointing(
-    task: _Task, point: FloatArray, row: IntArray, camera: IntArray
-) -> tuple[FloatArray, FloatArray]:
+def _pointing(task: _Task, point: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return directions in air of the rays of pairs, (k, 3), and their derivatives (k, 3, 3)."""
+    row, camera = task.row, task.camera
     if not isinstance(task.surface, Plane):
         water = SurfaceSequence(surfaces=(task.surface,), indices=(1.0, task.n_water))
         path = aim_rays(task.centres[camera], point[row], water, jacobian=True)
@@ -311,14 +335,13 @@ def _propagate(task: _Task, points: FloatArray, precision: Precision) -> FloatAr
 
 def _weight_change(task: _Task, point: FloatArray) -> FloatArray:
     """Return how the balance changes because the weights 1 / |A - C|^2 follow the point A."""
-    row, camera = np.nonzero(task.weights)
-    heading, _ = _pointing(task, point, row, camera)
+    row, camera = task.row, task.camera
+    heading, _ = _pointing(task, point)
     toward = task.apparent[row] - task.centres[camera]
     aside = toward - (heading * toward).sum(-1)[:, None] * heading
     # d(1 / r^2) = -2 r . dr / r^4
-    change = -2 * (task.weights[row, camera] ** 2)[:, None, None] * aside[:, :, None]
-    starts = np.searchsorted(row, np.arange(len(point)))
-    return np.add.reduceat(change * toward[:, None, :], starts)
+    change = -2 * (task.weight**2)[:, None, None] * aside[:, :, None]
+    return np.add.reduceat(change * toward[:, None, :], task.starts)
 
 
 def _checked_cameras(cameras: ArrayLike | None, surface: WaterSurface) -> FloatArray:
@@ -339,15 +362,3 @@ def _checked_cameras(cameras: ArrayLike | None, surface: WaterSurface) -> FloatA
             "the unit (m, not mm)."
         )
     return centres
-
-
-def _checked_visibility(visible: ArrayLike | None, shape: tuple[int, ...], count: int) -> BoolArray:
-    """Return which camera saw which point, shape (n, m)."""
-    if visible is None:
-        return np.broadcast_to(np.True_, (math.prod(shape), count))
-    seen = np.asarray(visible, dtype=bool)
-    if seen.shape != (*shape, count):
-        raise InputError(
-            f"visible: expected shape {(*shape, count)} (points, cameras), found {seen.shape}."
-        )
-    return seen.reshape(-1, count)

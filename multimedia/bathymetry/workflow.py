@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping
 from functools import partial
 
 import numpy as np
+from scipy.sparse import csr_array
 
 from multimedia.bathymetry.corrected_points import (
     CorrectedPoints,
@@ -27,7 +28,7 @@ from multimedia.bathymetry.survey_tables import (
 )
 from multimedia.bathymetry.water_surfaces import read_water_surface
 from multimedia.media.surfaces import Plane
-from photocore.arrays import BoolArray, FloatArray
+from photocore.arrays import FloatArray
 from photocore.cli import Progress, no_progress
 from photocore.cloud import open_cloud
 from photocore.cloud.model import Cloud, CloudPiece
@@ -154,22 +155,22 @@ def _corrector(
     def correct(piece: CloudPiece) -> CorrectedPoints:
         _check_camera_unit(piece.xyz, cameras.centres, job)
         visible = _visible(piece, cameras, pairs, job)
-        return corrected(piece.xyz, cameras=cameras.centres, visible=visible)
+        return corrected(
+            piece.xyz, cameras=cameras.centres, visible=visible, max_angle=job.max_angle
+        )
 
     return correct, remarks
 
 
 def _visible(
     piece: CloudPiece, cameras: CameraPositions, pairs: Mapping[str, set[str]] | None, job: Job
-) -> BoolArray:
-    """Return which camera saw which point: by table, by column, by angle, or all."""
-    seen = np.ones((len(piece.xyz), len(cameras.ids)), dtype=bool)
+) -> csr_array | None:
+    """Return which camera saw which point, by table or by column; None: nothing says so."""
+    place = {name: k for k, name in enumerate(cameras.ids)}
+    seen: list[list[int]] = []
     if pairs is not None:
-        sets = [pairs.get(name, set()) for name in piece.texts["id"]]
-        seen = np.array([[camera in names for camera in cameras.ids] for names in sets])
+        seen = [[place[name] for name in pairs.get(point, ())] for point in piece.texts["id"]]
     elif "cameras" in piece.texts:
-        place = {name: k for k, name in enumerate(cameras.ids)}
-        seen[:] = False
         for number, text in enumerate(piece.texts["cameras"]):
             names = text.replace(";", " ").replace(",", " ").replace("|", " ").split()
             unknown = [name for name in names if name not in place]
@@ -180,18 +181,13 @@ def _visible(
                     f"{job.source}: the point at {where} names camera {unknown[0]!r}, which is "
                     f"not in {job.cameras}."
                 )
-            seen[number, [place[name] for name in names]] = True
-    if job.max_angle is not None:
-        seen &= _within_angle(piece.xyz, cameras.centres, job.max_angle)
-    return seen
-
-
-def _within_angle(points: FloatArray, centres: FloatArray, angle: float) -> BoolArray:
-    """Return whether each camera sees each point within an angle from the vertical, (n, m)."""
-    offset = centres - points[..., None, :]
-    aside = np.hypot(offset[..., 0], offset[..., 1])
-    inside: BoolArray = aside <= np.tan(angle) * offset[..., 2]
-    return inside
+            seen.append([place[name] for name in dict.fromkeys(names)])
+    else:
+        return None
+    ends = np.cumsum([0, *map(len, seen)])
+    camera = np.fromiter((number for row in seen for number in row), np.int64, ends[-1])
+    shape = (len(piece.xyz), len(cameras.ids))
+    return csr_array((np.ones(len(camera), dtype=bool), camera, ends), shape=shape)
 
 
 def _check_camera_unit(points: FloatArray, centres: FloatArray, job: Job) -> None:
@@ -304,15 +300,12 @@ def _correct_window(
         given = np.concatenate([dem.positions(wide), dem.heights(wide)[..., None]], axis=-1)
         known = np.isfinite(given[..., 2])
         points = given[known]
-        visible = None
-        if centres is not None and job.max_angle is not None:
-            visible = _within_angle(points, centres, job.max_angle)
         result = correct_bathymetry(
             points,
             water_level=surface,
             index=job.index,
             cameras=centres,
-            visible=visible,
+            max_angle=None if centres is None else job.max_angle,
             precision=job.precision,
         )
         move = np.full((*known.shape, 2), np.nan)

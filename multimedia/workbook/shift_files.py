@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -41,10 +41,13 @@ class ShiftInput:
         The table, with the way back to its cells.
     setup : ShiftSetup or None
         Camera and media, where the file is a workbook that names them.
+    places : mapping
+        Sheet and cell of each of their values that the workbook has, by the cell's name.
     """
 
     table: Table
     setup: ShiftSetup | None
+    places: Mapping[str, tuple[str, str]] = field(default_factory=dict)
 
 
 def read_shift_input(
@@ -109,7 +112,7 @@ def read_shift_input(
     }
     indices = [n for i in range(1, MOST_LAYERS + 1) if not np.isnan(n := numbers[f"n_{i}"])]
     if len(indices) < 2 or np.isnan(numbers["z_0"]):
-        return ShiftInput(table=table, setup=None)
+        return ShiftInput(table=table, setup=None, places=values.places)
     with located(f"{values.file} › Multimedia"):
         layers = Layers(
             indices=tuple(indices),
@@ -120,7 +123,7 @@ def read_shift_input(
             z0=numbers["z_0"],
             nadir=(float(np.nan_to_num(numbers["X_0"])), float(np.nan_to_num(numbers["Y_0"]))),
         )
-    return ShiftInput(table=table, setup=setup)
+    return ShiftInput(table=table, setup=setup, places=values.places)
 
 
 def _refuse_survey(book: SheetFile | CsvFile) -> None:

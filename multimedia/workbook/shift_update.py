@@ -2,18 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import io
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-import numpy as np
-
-from multimedia.workbook.shift_points import ShiftPoints, ShiftResult, ShiftSetup
-from multimedia.workbook.shift_workbook import table_values
+from multimedia.refraction.unrolled import STEPS
+from multimedia.workbook.live_book import LiveBook
+from multimedia.workbook.shift_files import ShiftInput
+from multimedia.workbook.shift_points import ShiftPoints, ShiftSetup
+from multimedia.workbook.shift_workbook import (
+    media_cells,
+    media_places,
+    number_format,
+    shift_columns,
+    table_values,
+)
 from photocore.errors import InputError
-from photocore.tables import Table, open_tables
-from photocore.workbook.cells import CellValue
+from photocore.tables import Table
 from photocore.workbook.editor import WorkbookEditor
-from photocore.workbook.grid import SheetFile
+from photocore.workbook.graft import quoted_title
+from photocore.workbook.grid import column_letters, split_cell
+from photocore.workbook.named_cells import make_numbers, place_of
+from photocore.workbook.newbook import finished_parts
 from photocore.workbook.result_columns import (
     OwnTable,
     ResultColumn,
@@ -21,10 +31,12 @@ from photocore.workbook.result_columns import (
     put_result_columns,
 )
 
-#: Columns added to a table that has none of them yet.
+#: Results that come first, and are taken over where a table has them already.
 ADDED = ("Rbar", "dR", "Xbar", "Ybar", "flag")
 #: Name of the headings of the results in a workbook of the user's own.
 MARK = "multimedia_results"
+#: Name of the first value on the sheet of camera and media that such a workbook gets.
+MEDIA = "multimedia_media"
 
 
 def is_template(path: Path | str) -> bool:
@@ -71,11 +83,7 @@ def update_template(
         If the number of media differs or the file cannot be written.
     """
     editor = WorkbookEditor(Path(path))
-    if len(setup.layers.indices) != len(own.layers.indices):
-        raise InputError(
-            f"{path}: its formulas are for {len(own.layers.indices)} media, the options give "
-            f"{len(setup.layers.indices)}; add --new for a new workbook."
-        )
+    _check_count(editor, len(own.layers.indices), setup)
     _store_setup(editor, setup, own)
     area = editor.table("tblMM")
     if area is None:
@@ -93,24 +101,25 @@ def update_template(
 def add_columns(
     path: Path | str,
     out: Path,
-    table: Table,
+    given: ShiftInput,
     rows: Sequence[int],
+    setup: ShiftSetup,
     points: ShiftPoints,
-    result: ShiftResult,
     *,
     overwrite: bool,
 ) -> Path | None:
-    """Write the shifted points beside the user's table, in columns of their own.
+    """Put live formulas of the shift beside the user's table, and a sheet with camera and media.
 
-    Columns called Rbar, dR, Xbar, Ybar or flag are filled; those that are missing are added to
-    the right of everything on the sheet, see `photocore.workbook.result_columns`.
+    The columns Rbar, dR, Xbar, Ybar and flag come first, those that they are calculated from after
+    them, to the right of everything on the sheet; see `photocore.workbook.result_columns`. On
+    the sheet of the media, values that stand in cells of the user's own refer to these.
 
     Parameters
     ----------
-    path, out, table, rows, points, overwrite
+    path, out, rows, setup, points, overwrite
         As in `update_template`.
-    result : ShiftResult
-        The shifted points.
+    given : ShiftInput
+        What was read from the workbook.
 
     Returns
     -------
@@ -120,9 +129,14 @@ def add_columns(
     Raises
     ------
     InputError
-        If the file cannot be written.
+        If the sheet of the media is for another number of them, or the file cannot be written.
     """
-    editor = WorkbookEditor(Path(path))
+    editor, table = WorkbookEditor(Path(path)), given.table
+    media = _media_sheet(editor, given, setup)
+    make_numbers(editor, table, lambda _: 1.0)
+    count = len(setup.layers.indices)
+    places = media_places(count)
+
     grid = editor.grid(table.sheet).rows
     own = OwnTable(
         sheet=table.sheet,
@@ -130,40 +144,111 @@ def add_columns(
         rows=[table.rows[row] for row in rows],
         columns=table.columns,
     )
+    formulas = shift_columns(
+        count,
+        STEPS,
+        at=lambda key: f"[@{key}]",
+        value=lambda name: _reference(media, *places[name]),
+        given=table.columns.keys(),
+    )
+    values = table_values(setup, points, len(points.ids), STEPS)
     columns = [
-        ResultColumn(key=key, heading=key, values=[_shown(value) for value in values])
-        for key, values in result.columns(points).items()
-        if key in ADDED
-    ]
+        ResultColumn(
+            key=key, heading=key, values=values[key], formula=formula,
+            number_format="" if key == "flag" else number_format(key),
+        )
+        for key, _, formula in formulas
+        if formula
+    ]  # fmt: skip
+    columns.sort(key=lambda column: column.key not in ADDED)
     put_result_columns(editor, own, columns, mark=MARK, adopted=ADDED)
     return editor.save(out, overwrite=overwrite)
 
 
-def _shown(value: str | np.float64) -> CellValue:
-    """Return a result as a cell, blank where there is none."""
-    if isinstance(value, str):
-        return value
-    return None if np.isnan(value) else float(value)
+def _media_sheet(editor: WorkbookEditor, given: ShiftInput, setup: ShiftSetup) -> str:
+    """Return the title of the sheet of camera and media, made or brought up to date."""
+    place = place_of(editor, MEDIA)
+    values = _named(setup)
+    if place is not None:
+        title = place[0]
+        count = sum(
+            str(cells.get(1)).startswith("n_") for cells in editor.grid(title).rows.values()
+        )
+        _check_count(editor, count, setup)
+        places = {name: (title, *at) for name, at in media_places(count).items()}
+        for name, value in values.items():
+            typed = place_of(editor, name) or places[name]
+            if _stands(editor, typed) != value:
+                editor.put(*typed, value)
+            if typed != places[name]:
+                editor.set_result(*places[name], value)
+        _store_ratios(editor, setup, places)
+        return title
+    links = {}
+    for name, (sheet, cell) in given.places.items():
+        own = (sheet, *split_cell(cell))
+        stands = _stands(editor, own)
+        if name not in values or (stands != values[name] and place_of(editor, name) != own):
+            continue
+        if stands != values[name]:
+            editor.put(*own, values[name])
+        links[name] = _reference(*own)
+    book = LiveBook()
+    media_cells(book, setup, links=links)
+    package = io.BytesIO()
+    book.book.save(package)
+    title = editor.free_title("Media")
+    editor.add_sheets(finished_parts(package, results=book.results), {"Multimedia": title})
+    editor.define(MEDIA, _reference(title, 5, 2))
+    return title
+
+
+def _stands(editor: WorkbookEditor, place: tuple[str, int, int]) -> object:
+    sheet, row, column = place
+    return editor.grid(sheet).rows.get(row, {}).get(column)
+
+
+def _reference(sheet: str, row: int, column: int) -> str:
+    """Return what a formula calls a cell."""
+    return f"{quoted_title(sheet)}!${column_letters(column)}${row}"
+
+
+def _named(setup: ShiftSetup) -> dict[str, float]:
+    """Return a set-up by the names of its cells."""
+    values = {f"n_{i}": n for i, n in enumerate(setup.layers.indices, start=1)}
+    values |= {f"t_{i}": t for i, t in enumerate(setup.layers.thicknesses, start=1)}
+    return values | {"z_0": setup.z0, "X_0": setup.nadir[0], "Y_0": setup.nadir[1]}
+
+
+def _check_count(editor: WorkbookEditor, count: int, setup: ShiftSetup) -> None:
+    if len(setup.layers.indices) != count:
+        raise InputError(
+            f"{editor.path}: its formulas are for {count} media, the options give "
+            f"{len(setup.layers.indices)}; add --new for a new workbook."
+        )
 
 
 def _store_setup(editor: WorkbookEditor, setup: ShiftSetup, own: ShiftSetup) -> None:
     """Type changed set-up values into their named cells, and store what follows from them."""
-
-    def named(given: ShiftSetup) -> dict[str, float]:
-        values = {f"n_{i}": n for i, n in enumerate(given.layers.indices, start=1)}
-        values |= {f"t_{i}": t for i, t in enumerate(given.layers.thicknesses, start=1)}
-        return values | {"z_0": given.z0, "X_0": given.nadir[0], "Y_0": given.nadir[1]}
-
-    book = open_tables(editor.path)
-    places = book.names if isinstance(book, SheetFile) else {}
-    before = named(own)
-    changed = {name: value for name, value in named(setup).items() if value != before[name]}
-    for name, value in changed.items():
-        if name.casefold() not in places:
+    before = _named(own)
+    for name, value in _named(setup).items():
+        place = place_of(editor, name)
+        if value == before[name]:
+            continue
+        if place is None:
             raise InputError(
                 f"{editor.path.name}: has no cell named {name}; add --new for a new workbook."
             )
-        editor.put(*places[name.casefold()], value)
+        editor.put(*place, value)
+    ratios = [f"{kind}_{i}" for kind in "kq" for i in range(1, len(setup.layers.indices) + 1)]
+    places = {name: place for name in ratios if (place := place_of(editor, name)) is not None}
+    _store_ratios(editor, setup, places)
+
+
+def _store_ratios(
+    editor: WorkbookEditor, setup: ShiftSetup, places: Mapping[str, tuple[str, int, int]]
+) -> None:
+    """Store the results of k = n_min / n and q = 1 - k^2 where they have cells."""
     lowest = min(setup.layers.indices)
     for i, index in enumerate(setup.layers.indices, start=1):
         k = lowest / index

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import replace
 from pathlib import Path
 
@@ -24,6 +25,9 @@ from photocore.workbook.newbook import check_new_workbook
 
 #: More rows make a workbook that is slow to open; text tables have no limit.
 MOST_ROWS = 20_000
+
+#: Columns that the user fills in, besides the name.
+INPUTS = ("X", "Y", "Z", "R", "ZP")
 
 _FLAGS = {"OK": ("E2F0D9", "1E5B12"), "CHECK": ("E4DFEC", "3F2A63"), "DRY": ("FCE4D6", "9C3D00")}
 
@@ -116,7 +120,7 @@ def write_shift_workbook(
     if points is None:
         indices = (*setup.layers.indices[:-1], index)
         setup = replace(setup, layers=replace(setup.layers, indices=indices))
-    setup_rows = _media(book, setup, live=points is None)
+    setup_rows = media_cells(book, setup, live=points is None)
     _points(book, setup, points, first=setup_rows + 3, count=count, steps=steps)
     book.book.move_sheet("RefractiveIndex", 1)
     book.book.active = 1
@@ -125,12 +129,34 @@ def write_shift_workbook(
     book.save(path, overwrite=overwrite)
 
 
-def _media(book: LiveBook, setup: ShiftSetup, *, live: bool) -> int:
-    """Write camera and media, the last index as a formula if ``live``; return the last row used."""
+def media_cells(
+    book: LiveBook,
+    setup: ShiftSetup,
+    *,
+    live: bool = False,
+    links: Mapping[str, str] | None = None,
+) -> int:
+    """Write the sheet of camera and media, without points; return the last row used.
+
+    Parameters
+    ----------
+    book : LiveBook
+        Takes the sheet.
+    setup : ShiftSetup
+        Camera and media.
+    live : bool
+        Whether the last index is that of the sheet RefractiveIndex.
+    links : mapping, optional
+        By name, the cells of the user's own that hold a value; formulas here refer to them. None
+        in a workbook that is all ours.
+    """
+    named, links = links is None, dict(links or {})
     sheet = book.sheet(
         "Multimedia",
         "Radial shift through plane-parallel media",
-        "Yellow: fill in. Blue: calculated. All lengths in one unit. See Readme.",
+        "Yellow: fill in. Blue: calculated. All lengths in one unit."
+        + (" See Readme." if named else ""),
+        first=not named,
     )
     layers, count = setup.layers, len(setup.layers.indices)
     headings(sheet, 4, ("name", "value", "k", "q"))
@@ -138,15 +164,19 @@ def _media(book: LiveBook, setup: ShiftSetup, *, live: bool) -> int:
         row = 4 + i
         sheet.cell(row, 1, f"n_{i}")
         if i == count and live:
-            book.formula(sheet, row, 2, "n_w", index)
+            links[f"n_{i}"] = "n_w"
+        if f"n_{i}" in links:
+            book.formula(sheet, row, 2, links[f"n_{i}"], index)
             sheet.cell(row, 2).fill = INPUT_FILL
         else:
             book.typed(sheet, row, 2, index)
         words = "Refractive index, at least 1; the camera's first."
         allow_between(sheet, f"B{row}", (1, HIGHEST_INDEX), words)
         k = min(layers.indices) / index
-        book.formula(sheet, row, 3, f"MIN($B$5:$B${4 + count})/n_{i}", k)
-        book.formula(sheet, row, 4, f"1-k_{i}^2", 1 - k * k)
+        # In a workbook of the user's own the names may be taken.
+        own, ratio = (f"n_{i}", f"k_{i}") if named else (f"$B${row}", f"$C${row}")
+        book.formula(sheet, row, 3, f"MIN($B$5:$B${4 + count})/{own}", k)
+        book.formula(sheet, row, 4, f"1-{ratio}^2", 1 - k * k)
         sheet.cell(row, 3).number_format = sheet.cell(row, 4).number_format = "0.000000"
         for column, name in enumerate("nkq", start=2):
             book.name(f"{name}_{i}", sheet, row, column)
@@ -157,7 +187,11 @@ def _media(book: LiveBook, setup: ShiftSetup, *, live: bool) -> int:
     typed += [("z_0", setup.z0), ("X_0", setup.nadir[0]), ("Y_0", setup.nadir[1])]
     for name, value in typed:
         sheet.cell(row, 1, name)
-        book.typed(sheet, row, 2, value)
+        if name in links:
+            book.formula(sheet, row, 2, links[name], value)
+            sheet.cell(row, 2).fill = INPUT_FILL
+        else:
+            book.typed(sheet, row, 2, value)
         book.name(name, sheet, row, 2)
         words = _WORDS.get(name, f"thickness of layer {name[2:]}")
         sheet.cell(row, 5, words).font = NOTE
@@ -178,7 +212,7 @@ def _points(
 ) -> None:
     """Write the table of points; its keys stand in row ``first``."""
     sheet = book.book["Multimedia"]
-    columns = _columns(len(setup.layers.indices), steps)
+    columns = shift_columns(len(setup.layers.indices), steps)
     values = table_values(setup, points, count, steps)
     for number, (key, label, text) in enumerate(columns, start=1):
         above, head = sheet.cell(first - 1, number, label), sheet.cell(first, number, key)
@@ -192,7 +226,7 @@ def _points(
                 book.formula(sheet, row, number, text, value)
             else:
                 book.typed(sheet, row, number, value)
-            sheet.cell(row, number).number_format = _number_format(key)
+            sheet.cell(row, number).number_format = number_format(key)
     sheet.row_dimensions[first - 1].height = 42
     last = get_column_letter(len(columns))
     keyed = ((key, text) for key, _, text in columns)
@@ -207,23 +241,63 @@ def _points(
     sheet.print_title_rows = f"{first - 1}:{first}"
 
 
-def _columns(layers: int, steps: int) -> list[tuple[str, str, str]]:
-    """Return key, label and formula of every column; inputs have no formula."""
+def _in_table(key: str) -> str:
+    return f"tblMM[[#This Row],[{key}]]"
 
-    def at(key: str) -> str:
-        return f"tblMM[[#This Row],[{key}]]"
 
-    heights = ["z_0", *(f"t_{i}" for i in range(1, layers - 1)), at("ZP_u")]
-    k = [f"{h}*k_{i}" for i, h in enumerate(heights, start=1)]
+def media_places(layers: int) -> dict[str, tuple[int, int]]:
+    """Return row and column of each value on the sheet of `media_cells`, by name."""
+    places = {f"{kind}_{i}": (4 + i, c) for c, kind in enumerate("nkq", start=2)
+              for i in range(1, layers + 1)}  # fmt: skip
+    lengths = [*(f"t_{i}" for i in range(1, layers - 1)), "z_0", "X_0", "Y_0"]
+    return places | {name: (5 + layers + i, 2) for i, name in enumerate(lengths)}
+
+
+def shift_columns(
+    layers: int,
+    steps: int,
+    *,
+    at: Callable[[str], str] = _in_table,
+    value: Callable[[str], str] = str,
+    given: Collection[str] = INPUTS,
+) -> list[tuple[str, str, str]]:
+    """Return key, label and formula of every column; inputs have no formula.
+
+    Parameters
+    ----------
+    layers : int
+        Media, the camera's and the object's with them.
+    steps : int
+        Newton columns.
+    at : callable
+        Returns what a formula calls the cell of a column in its own row.
+    value : callable
+        Returns what a formula calls a value of the set-up, ``k_1`` for instance.
+    given : collection of str
+        The input columns there are.
+    """
+    heights = [*map(value, ("z_0", *(f"t_{i}" for i in range(1, layers - 1)))), at("ZP_u")]
+    k = [f"{h}*{value(f'k_{i}')}" for i, h in enumerate(heights, start=1)]
+    q = [value(f"q_{i}") for i in range(1, layers + 1)]
 
     def f(u: str) -> str:
-        return "+".join(f"{part}/SQRT(1+q_{i}*{u}^2)" for i, part in enumerate(k, start=1))
+        return "+".join(f"{a}/SQRT(1+{b}*{u}^2)" for a, b in zip(k, q, strict=True))
 
     def slope(u: str) -> str:
-        return "+".join(f"{part}/(1+q_{i}*{u}^2)^1.5" for i, part in enumerate(k, start=1))
+        return "+".join(f"{a}/(1+{b}*{u}^2)^1.5" for a, b in zip(k, q, strict=True))
 
     r, end = at("R_u"), at(f"u{steps}")
-    given = f"AND(COUNT({r},{at('ZP_u')})=2,N({at('ZP_u')})>=0)"
+    whole_row = f"AND(COUNT({r},{at('ZP_u')})=2,N({at('ZP_u')})>=0)"
+    radius, depth = '""', '""'
+    if {"X", "Y"} <= set(given):
+        off = f"({at('X')}-{value('X_0')})^2+({at('Y')}-{value('Y_0')})^2"
+        radius = f'IF(COUNT({at("X")},{at("Y")})=2,SQRT({off}),"")'
+    if "R" in given:
+        radius = f"IF(COUNT({at('R')})=1,{at('R')},{radius})"
+    if "Z" in given:
+        depth = f'IF(COUNT({at("Z")})=1,-{at("Z")},"")'
+    if "ZP" in given:
+        depth = f"IF(COUNT({at('ZP')})=1,{at('ZP')},{depth})"
     columns = [
         ("id", "Point", ""),
         ("X", "X", ""),
@@ -231,27 +305,26 @@ def _columns(layers: int, steps: int) -> list[tuple[str, str, str]]:
         ("Z", "Z (water: < 0)", ""),
         ("R", "or: distance from nadir", ""),
         ("ZP", "and: depth", ""),
-        ("R_u", "R used",
-         f"IF(COUNT({at('R')})=1,{at('R')},IF(COUNT({at('X')},{at('Y')})=2,"
-         f'SQRT(({at("X")}-X_0)^2+({at("Y")}-Y_0)^2),""))'),
-        ("ZP_u", "depth used",
-         f'IF(COUNT({at("ZP")})=1,{at("ZP")},IF(COUNT({at("Z")})=1,-{at("Z")},""))'),
-        ("u0", "tan b, start", f'IF({given},{r}/({"+".join(k)}),"")'),
-    ]  # fmt: skip
+        ("R_u", "R used", radius),
+        ("ZP_u", "depth used", depth),
+        ("u0", "tan b, start", f'IF({whole_row},{r}/({"+".join(k)}),"")'),
+    ]
     for step in range(steps):
         u = at(f"u{step}")
         text = f'IF({u}="","",{u}+({r}-{u}*({f(u)}))/({slope(u)}))'
         columns.append((f"u{step + 1}", f"tan b, step {step + 1}", text))
     whole = "+".join(heights)
     columns += [
-        ("Rbar", "shifted R", f'IF({end}="","",({whole})*k_1*{end}/SQRT(1+q_1*{end}^2))'),
+        ("Rbar", "shifted R",
+         f'IF({end}="","",({whole})*{value("k_1")}*{end}/SQRT(1+{q[0]}*{end}^2))'),
         ("dR", "shift Rbar - R", f'IF({end}="","",{at("Rbar")}-{r})'),
-    ]
-    for axis in "XY":
+    ]  # fmt: skip
+    for axis in "XY" if {"X", "Y"} <= set(given) else "":
+        centre = value(f"{axis}_0")
         columns.append(
             (f"{axis}bar", f"shifted {axis}",
              f'IF(OR({end}="",COUNT({at("X")},{at("Y")})<2),"",'
-             f"{axis}_0+({at(axis)}-{axis}_0)*IF({r}=0,1,{at('Rbar')}/{r}))")
+             f"{centre}+({at(axis)}-{centre})*IF({r}=0,1,{at('Rbar')}/{r}))")
         )  # fmt: skip
     columns += [
         ("resid", "F(u) - R", f'IF({end}="","",{end}*({f(end)})-{r})'),
@@ -266,7 +339,7 @@ def table_values(
     setup: ShiftSetup, points: ShiftPoints | None, count: int, steps: int
 ) -> dict[str, list[CellValue]]:
     """Return what every column shows, blank rows included."""
-    keys = [key for key, _, _ in _columns(len(setup.layers.indices), steps)]
+    keys = [key for key, _, _ in shift_columns(len(setup.layers.indices), steps)]
     values: dict[str, list[CellValue]] = {key: [None] * count for key in keys[:6]}
     values |= {key: [""] * count for key in keys[6:]}
     if points is None:
@@ -296,7 +369,7 @@ def table_values(
     return values
 
 
-def _number_format(key: str) -> str:
+def number_format(key: str) -> str:
     """Return how a column is shown; every digit is kept."""
     if key == "id":
         return "@"

@@ -113,7 +113,7 @@ def shift_file(
             path, out, table, rows, setup, given.setup, points, overwrite=overwrite
         )
     elif out is not None:
-        kept = add_columns(path, out, table, rows, points, result, overwrite=overwrite)
+        kept = add_columns(path, out, given, rows, setup, points, overwrite=overwrite)
     remarks = [*given.table.remarks]
     if kept is not None:
         remarks.append(f"{out}: the workbook as it was is kept as {kept}.")

@@ -6,9 +6,9 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from photocore.errors import CellError, InputError
+from photocore.errors import CellError, InputError, WorkbookError
 from photocore.tables import convert
-from photocore.tables.headings import Match
+from photocore.tables.headings import Match, unknown_unit
 from photocore.tables.model import Column, Table
 from photocore.tables.numbers import Decimal, unit_symbol
 from photocore.workbook.grid import CellDate, CellGrid, Value, cell_name, column_letters
@@ -100,6 +100,31 @@ def refuse_doubles(label: str, title: str, match: Match) -> None:
             f'{where}: the heading "{match.headings[key]}" stands in {cells}; which one is {key}? '
             f'Say it by letter: --columns "{key}={column_letters(numbers[0])}".'
         )
+
+
+def refuse_unknown_units(label: str, title: str, match: Match, columns: Sequence[Column]) -> None:
+    """Refuse headings of numbers that say a unit nobody here knows.
+
+    Raises
+    ------
+    WorkbookError
+        Naming the cells and the units there are.
+    """
+    errors = []
+    for column in columns:
+        heading = match.headings.get(column.key, "")
+        unit = "" if column.key in match.units else unknown_unit(heading)
+        if unit and column.kind in ("number", "integer"):
+            message = (
+                f'the heading "{heading}" says the unit "{unit}", which is not known. Known are '
+                "um, mm, cm, dm, m, km, px, deg, gon, rad; convert the column. A note belongs in "
+                "round brackets."
+            )
+            cell = cell_name(match.header, match.columns[column.key])
+            error = CellError(message, file=label, sheet=title, cell=cell, column=column.key)
+            errors.append(error)
+    if errors:
+        raise WorkbookError(errors)
 
 
 def take_unit_row(grid: CellGrid, match: Match) -> None:

@@ -8,11 +8,20 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from photocore.tables.model import Column
-from photocore.tables.numbers import unit_symbol
+from photocore.tables.numbers import UNITS, unit_symbol
 from photocore.workbook.grid import CellGrid, Value, cell_name, column_letters, column_number
 
 _UNIT = re.compile(r"\s*[\[(]\s*([^\])]*)\s*[\])]\s*$")
 _LOOSE_UNIT = re.compile(r"[\s_,]+(mm|cm|m|px|pixel|deg|°|gon|rad)$", re.IGNORECASE)
+#: Ends a unit: square metres and the like.
+_POWER = re.compile(r"(?:[²³]|\^?[23])$")
+#: Units people measure in that no command takes.
+_FOREIGN = frozenset(
+    ("ft", "feet", "foot", "in", "inch", "inches", "yd", "yard", "yards", "mi", "mile", "miles",
+     "furlong", "furlongs", "mil", "mils", "arcsec", "arcmin", "mgon", "mrad")
+)  # fmt: skip
+#: What may stand in square brackets besides lengths, angles and pixels.
+_NO_LENGTHS = frozenset(("1", "–", "s", "‰"))
 _DROPPED = re.compile(r"[\s_.\-:/'\"`´]+")
 _PHOTO = re.compile(r"(?:image|photo|picture|foto|bild|immagine|aufnahme)\s*([12])$")
 #: Rows of a sheet that are searched for headings.
@@ -74,6 +83,27 @@ def unit_of(text: str) -> str:
     """
     unit = _UNIT.search(text) or _LOOSE_UNIT.search(text)
     return unit_symbol(unit[1]) if unit else ""
+
+
+def unknown_unit(text: str) -> str:
+    """Return the unit a heading says where it is none that is known, else an empty text.
+
+    What stands in square brackets is a unit; in round ones it may be any word, so only units that
+    people use elsewhere count there.
+
+    >>> unknown_unit("s1 [furlong]"), unknown_unit("E (ft)"), unknown_unit("cov [m²]")
+    ('furlong', 'ft', '')
+    >>> unknown_unit("X (east)"), unknown_unit("scale [1]")
+    ('', '')
+    """
+    said = _UNIT.search(text)
+    if said is None:
+        return ""
+    word = said[1].strip(" .")
+    base = _POWER.sub("", word).casefold()
+    if said[0].lstrip().startswith("("):
+        return word if base in _FOREIGN else ""
+    return "" if not word or base in UNITS or base in _NO_LENGTHS else word
 
 
 def find_columns(

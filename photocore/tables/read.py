@@ -19,10 +19,17 @@ from photocore.tables.csvread import (
     too_wide,
     unguarded,
 )
-from photocore.tables.fill import fill, refuse_doubles, take_unit_row
-from photocore.tables.headings import Match, bare, describe, find_columns
+from photocore.tables.fill import fill, refuse_doubles, refuse_unknown_units, take_unit_row
+from photocore.tables.headings import (
+    Match,
+    bare,
+    describe,
+    find_columns,
+    unit_of,
+    unknown_unit,
+)
 from photocore.tables.model import Column, NamedValues, Table
-from photocore.tables.numbers import Decimal, take_apart
+from photocore.tables.numbers import Decimal, converted, take_apart
 from photocore.tables.rows import DataRows, block_above, data_rows
 from photocore.textfile import check_name
 from photocore.workbook.grid import CellGrid, SheetFile, TableArea, Value, cell_name
@@ -137,6 +144,7 @@ def read_table(
                 f"heading; the headings are {describe(place.grid, place.match)}."
             )
     refuse_doubles(book.label, place.grid.title, place.match)
+    refuse_unknown_units(book.label, place.grid.title, place.match, columns)
     take_unit_row(place.grid, place.match)
     if isinstance(book, CsvFile):
         table = _read_text(book, place, columns, decimal, complaints)
@@ -398,7 +406,9 @@ def read_named_values(
     titles = sorted(book.titles, key=lambda title: bare(title) != bare(sheet or ""))
     result = NamedValues(file=book.label, values={}, places={})
     for name in names:
-        place = _by_defined_name(book, name) or _by_label(book, titles, name)
+        place, label = _by_defined_name(book, name), ""
+        if place is None:
+            place, label = _by_label(book, titles, name)
         value: Value | None = None
         if place:
             title, row, column = place
@@ -408,7 +418,7 @@ def read_named_values(
         def complain(_: int, message: str, key: str = name.key) -> None:
             complaints.append(result.error(key, message))
 
-        result.values[name.key] = _single(name, value, decimal, complain)
+        result.values[name.key] = _single(name, value, label, decimal, complain)
         if place and name.kind == "number" and isinstance(value, str) and result.has(name.key):
             result.text_cells.append(f"{place[0]}!{result.cell(name.key)}")
     if errors is None and complaints:
@@ -422,16 +432,30 @@ def read_named_values(
 
 
 def _single(
-    name: Column, value: Value | None, decimal: Decimal | None, complain: convert.Complain
+    name: Column,
+    value: Value | None,
+    label: str,
+    decimal: Decimal | None,
+    complain: convert.Complain,
 ) -> float | str:
+    """Return a value, complaining where its label says another unit than it is asked for in."""
     if name.kind == "text":
         return convert.texts([value], complain)[0]
     if name.kind == "flag":
         return float(convert.flags([value], complain)[0])
+    said = unit_of(label)
     numbers, _, _ = convert.numbers(
-        name, [value], unit="", decimal=decimal, elsewhere=set(), complain=complain
+        name, [value], unit=said, decimal=decimal, elsewhere=set(), complain=complain
     )
-    return float(np.asarray(numbers)[0])
+    number = float(np.asarray(numbers)[0])
+    unit = said or unknown_unit(label)
+    if np.isfinite(number) and name.unit and unit not in ("", name.unit):
+        # Not converted: options of the command line are written into the same cell.
+        metric = converted(number, said, name.unit)
+        advice = "" if metric is None else f" Write {metric:.15g}, and [{name.unit}]."
+        complain(0, f'the label "{label.strip()}" says [{unit}], expected [{name.unit}].{advice}')
+        return np.nan
+    return number
 
 
 def _by_defined_name(book: SheetFile, name: Column) -> tuple[str, int, int] | None:
@@ -439,8 +463,10 @@ def _by_defined_name(book: SheetFile, name: Column) -> tuple[str, int, int] | No
     return place if place and place[0] in book.titles else None
 
 
-def _by_label(book: SheetFile, titles: Sequence[str], name: Column) -> tuple[str, int, int] | None:
-    """Return the cell of a value whose label stands to its left."""
+def _by_label(
+    book: SheetFile, titles: Sequence[str], name: Column
+) -> tuple[tuple[str, int, int] | None, str]:
+    """Return the cell of a value whose label stands to its left, and the label."""
     labels = {bare(name.key), *map(bare, name.aliases)}
     for title in titles:
         grid = book.grid(title)
@@ -448,8 +474,9 @@ def _by_label(book: SheetFile, titles: Sequence[str], name: Column) -> tuple[str
         places = [texts[label] for label in labels if label in texts]
         if places:
             row, column = min(places)
-            return title, row, _right_of(grid.rows[row], column, _value_column(grid)[1], name)
-    return None
+            value = _right_of(grid.rows[row], column, _value_column(grid)[1], name)
+            return (title, row, value), str(grid.rows[row][column])
+    return None, ""
 
 
 def _labels(grid: CellGrid) -> dict[str, tuple[int, int]]:

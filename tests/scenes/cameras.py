@@ -37,6 +37,20 @@ class SceneCamera:
         flat = np.concatenate([pixels, np.ones((*pixels.shape[:-1], 1))], axis=-1)
         return flat @ np.linalg.inv(self.matrix).T @ self.rotation
 
+    @property
+    def bulge(self) -> float:
+        """How far the outline of a body bends out of its corners' box. [px]"""
+        return 0.0
+
+    def emitted(self, pixels: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return where rays of pixels begin and their directions, each of shape (n, 3)."""
+        rays = self.rays(pixels)
+        return np.broadcast_to(self.centre, rays.shape), rays
+
+    def aimed(self, points: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return where the rays to points begin and the way from there to them."""
+        return np.broadcast_to(self.centre, points.shape), points - self.centre
+
     def view_of(self, points: FloatArray) -> FloatArray:
         """Return the pixels of points, shape (..., 2)."""
         seen = (points - self.centre) @ self.rotation.T @ self.matrix.T

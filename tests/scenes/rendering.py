@@ -156,9 +156,9 @@ def photograph(tracer: Tracer, painter: Painter, camera: SceneCamera) -> FloatAr
     inner = np.stack(np.meshgrid(steps, steps), axis=-1).reshape(1, -1, 2)
 
     def shoot(pixels: FloatArray) -> tuple[FloatArray, Faces, BoolArray]:
-        rays = camera.rays(pixels)
-        distance, face = tracer.cast(camera.centre, rays, pixels, bounds)
-        points = camera.centre + rays * distance[:, None]
+        origins, rays = camera.emitted(pixels)
+        distance, face = tracer.cast(origins, rays, pixels, bounds)
+        points = origins + rays * distance[:, None]
         return points, face, tracer.lit(points, shadows, sun)
 
     for top in range(0, height, _TILE):

@@ -83,7 +83,8 @@ class Tracer:
         for i, body in enumerate(bodies):
             grid = np.meshgrid(*body.box.T, indexing="ij")
             seen = view.view_of(np.stack([axis.ravel() for axis in grid], axis=-1))
-            rectangles[i] = *seen.min(0), *seen.max(0)
+            bulge = getattr(view, "bulge", 0.0)
+            rectangles[i] = *(seen.min(0) - bulge), *(seen.max(0) + bulge)
         return rectangles
 
     def cast(

@@ -65,10 +65,10 @@ def sees(
     tracer: Tracer, camera: SceneCamera, points: FloatArray, bounds: FloatArray | None = None
 ) -> BoolArray:
     """Return which points lie in the photo with nothing before them, shape (n,)."""
-    rays = points - camera.centre
+    origins, rays = camera.aimed(points)
     pixels = camera.view_of(points)
     distance, _ = tracer.cast(
-        camera.centre, rays, pixels, tracer.bounds(camera) if bounds is None else bounds
+        origins, rays, pixels, tracer.bounds(camera) if bounds is None else bounds
     )
     limit = np.array(camera.size)
     inside = ((pixels >= -0.5) & (pixels < limit - 0.5)).all(1)

@@ -20,8 +20,6 @@ from bifocal.survey.workbook.precision_lines import precision_values
 from bifocal.survey.workbook.reader import TO_DEGREES, TO_MM, SurveyInput
 from bifocal.survey.workbook.setup_update import (
     add_sheets,
-    place_of,
-    type_value,
     write_corrections,
     write_options,
 )
@@ -33,6 +31,7 @@ from photocore.workbook.cells import CellValue
 from photocore.workbook.editor import WorkbookEditor
 from photocore.workbook.graft import quoted_title
 from photocore.workbook.grid import column_letters, split_cell
+from photocore.workbook.named_cells import make_numbers, place_of
 from photocore.workbook.result_columns import (
     OwnTable,
     ResultColumn,
@@ -98,7 +97,7 @@ def add_results(
     write_options(editor, content, given)
     write_corrections(editor, content)
     table = survey.table
-    _make_numbers(editor, table)
+    make_numbers(editor, table, lambda key: _typed_factor(table, key))
     grid = editor.grid(table.sheet).rows
     own = OwnTable(
         sheet=table.sheet,
@@ -135,17 +134,10 @@ def _factors(table: Table) -> dict[str, float]:
     }
 
 
-def _make_numbers(editor: WorkbookEditor, table: Table) -> None:
-    """Turn numbers typed as text into numbers, units typed with them taken into account."""
-    text_cells = set(table.text_cells)
-    for key, column in table.columns.items():
-        factor = 1.0
-        if key in table.typed_units:
-            factor = (TO_DEGREES if key == "theta" else TO_MM).get(table.units[key], 1.0)
-        for i, row in enumerate(table.rows):
-            if f"{table.sheet}!{table.cell(i, key)}" in text_cells:
-                value = float(table.numbers(key)[i]) * factor
-                type_value(editor, (table.sheet, row, column), value)
+def _typed_factor(table: Table, key: str) -> float:
+    """Return what brings the cells of a column that say their unit themselves to mm or degrees."""
+    scale = TO_DEGREES if key == "theta" else TO_MM
+    return scale.get(table.units[key], 1.0) if key in table.typed_units else 1.0
 
 
 def _inputs(columns: Mapping[str, int], content: SurveyContent) -> dict[str, int]:

@@ -15,7 +15,8 @@ from photocore.errors import InputError
 from photocore.workbook.cells import CellValue
 from photocore.workbook.editor import WorkbookEditor
 from photocore.workbook.graft import quoted_title
-from photocore.workbook.grid import cell_name, split_cell
+from photocore.workbook.grid import cell_name
+from photocore.workbook.named_cells import place_of
 from photocore.workbook.newbook import finished_parts
 
 #: The cell of each option; those of the distances depend on each other.
@@ -31,23 +32,6 @@ _TABLES = {
     "Planning": "tblPlan",
     "Log": "tblLog",
 }
-
-
-def place_of(editor: WorkbookEditor, name: str) -> tuple[str, int, int] | None:
-    """Return sheet, row and column of a named cell."""
-    place = next((v for k, v in editor.book.names.items() if k.casefold() == name.casefold()), "")
-    sheet, _, cell = place.rpartition("!")
-    sheet = sheet.strip("'").replace("''", "'")
-    if sheet not in editor.titles or ":" in cell or not cell:
-        return None
-    return (sheet, *split_cell(cell))
-
-
-def type_value(editor: WorkbookEditor, place: tuple[str, int, int], value: CellValue) -> None:
-    """Type a value unless it stands there already."""
-    sheet, row, column = place
-    if editor.grid(sheet).rows.get(row, {}).get(column) != value:
-        editor.set_value(sheet, row, column, value)
 
 
 def add_missing_sheets(editor: WorkbookEditor, built: BookBuilder) -> list[str]:

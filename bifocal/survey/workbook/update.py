@@ -15,8 +15,6 @@ from bifocal.survey.workbook.reader import SurveyInput
 from bifocal.survey.workbook.setup_cells import TYPED_FORMULAS
 from bifocal.survey.workbook.setup_update import (
     add_missing_sheets,
-    place_of,
-    type_value,
     write_corrections,
     write_options,
 )
@@ -28,6 +26,7 @@ from photocore.errors import InputError
 from photocore.workbook.cells import CellValue, NewColumn, escape
 from photocore.workbook.editor import WorkbookEditor
 from photocore.workbook.grid import TableArea, split_area, split_cell
+from photocore.workbook.named_cells import place_of, type_value
 from photocore.workbook.newbook import RowBlock
 
 

@@ -80,7 +80,9 @@ def test_a_facade_from_two_photos_to_the_drawing_by_clicks_alone(
         assert page.finished("ortho")["state"] == "done"
         page.tab.get_by_test_id("deliver-scale").select_option("1:100")
         page.click("deliver")
-        assert page.finished("deliver")["state"] == "done"
+        told = page.finished("deliver")
+        assert told["state"] == "done"
+        assert "--" not in told["message"]  # the page has no options of the command line
         with page.tab.expect_download() as got:
             page.click("download")
         archive = Path(got.value.path()).read_bytes()

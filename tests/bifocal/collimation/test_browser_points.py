@@ -120,6 +120,21 @@ def test_a_point_is_picked_suggested_and_accepted_by_clicks(page: Driver) -> Non
     )
 
 
+def test_a_doubtful_suggestion_offers_the_other_place_too(page: Driver) -> None:
+    """Above the pediment, beside a step: the second place is the true one (ray caster)."""
+    page.zoom_to(1, (383.0, 320.0), 3.0)
+    page.keys("n")
+    page.pick(1, (383.0, 320.0))
+    page.suggested()
+    quality = page.tab.get_by_test_id("quality")
+    assert quality.get_attribute("data-level") != "good"
+    assert "S shows the next" in str(quality.text_content())
+    page.keys("s", "a")
+    picks = page.settled("state.points[0].picks[2]")["points"][0]["picks"]
+    # Its partner moves as the click fell: half a screen pixel.
+    assert distance(np.subtract(picks["2"], picks["1"]), (-6.2, -3.09)) < 0.5
+
+
 def test_a_pick_off_the_line_is_taken_and_its_misfit_shown(page: Driver) -> None:
     page.pick(1, true_pixel(1, SHADED))
     page.settled("state.points.length === 1")
@@ -187,18 +202,37 @@ def test_the_list_is_sorted_by_a_column_and_flies_to_a_point(page: Driver) -> No
         page.suggested()
         page.keys("a")
         page.settled("state.points.at(-1)?.result")
+    page.keys("n")
+    page.pick(1, true_pixel(1, TARGETS["T15"]))
+    page.settled("state.points.length === 3")
     table = page.tab.get_by_test_id("point-list")
-    table.get_by_role("button", name="Name").click()
-    table.get_by_role("button", name="Name").click()
-    assert [one.split("\t")[0][:3] for one in table.locator("tbody tr").all_inner_texts()] == [
-        "P02", "P01",
-    ]  # fmt: skip
+
+    def order() -> list[str]:
+        return [one.split("\t")[0][:3] for one in table.locator("tbody tr").all_inner_texts()]
+
+    for expected in (["P01", "P02", "P03"], ["P03", "P02", "P01"]):
+        table.get_by_role("button", name="Name").click()
+        assert order() == expected
+    known = {point["name"]: point["result"] for point in page.state["points"]}
+    assert known["P03"] is None
+    risen = sorted(("P01", "P02"), key=lambda name: known[name]["r"])
+    for expected in (risen, risen[::-1]):
+        table.locator("thead button").nth(2).click()  # r
+        assert order() == [*expected, "P03"]  # what is not measured yet comes last
     assert page.tab.evaluate("() => bifocal.flyTo('P01')") is True
     box = page.pane.bounding_box()
     x, y = page.screen(1, true_pixel(1, TARGETS["T08"]))
     middle = (box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
     assert distance((x, y), middle) < 3
     assert page.tab.evaluate("() => bifocal.flyTo('nobody')") is False
+    page.click("fit")
+    corners = [page.screen(1, pixel) for pixel in ((0, 0), (1535, 1023))]
+    assert corners[0][0] > box["x"]
+    assert corners[1][1] < box["y"] + box["height"]
+    page.click("uncertainty")
+    asked = "performance.getEntriesByType('resource').map(({ name }) => name)"
+    page.wait(f"() => {asked}.some((name) => name.endsWith('/uncertainty.json'))")
+    page.click("uncertainty")
 
 
 def test_both_photos_side_by_side_move_together(page: Driver) -> None:

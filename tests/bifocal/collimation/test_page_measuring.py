@@ -57,13 +57,33 @@ BESIDE_STEPS = [
 ]  # fmt: skip
 
 
-def test_what_half_the_window_denies_is_not_taken_unasked(sample) -> None:
-    pair, photos = sample
-    own = np.array(BESIDE_STEPS)
+#: Picks whose window takes two places for as good, the wrong one first; another draw.
+DOUBTFUL = [(383.0, 320.0), (221.0, 377.0), (424.0, 647.0), (1039.0, 848.0)]
+
+
+def partners(own) -> np.ndarray:
+    """Return where the near camera sees picks of the far photo, by the ray caster."""
     cameras, tracer = bifocal_cameras(size=SIZE, pixel=PIXEL), Tracer(demo_scene())
     rays = cameras.far.rays(own)
     along, _ = tracer.cast(cameras.far.centre, rays, own, tracer.bounds(cameras.far))
-    seen = cameras.near.view_of(cameras.far.centre + along[:, None] * rays)
+    return np.asarray(cameras.near.view_of(cameras.far.centre + along[:, None] * rays))
+
+
+def test_where_a_suggestion_is_in_doubt_the_other_places_are_offered(sample) -> None:
+    pair, photos = sample
+    for own, seen in zip(np.array(DOUBTFUL), partners(np.array(DOUBTFUL)), strict=True):
+        found = suggest(pair, photos, 1, own)
+        assert not found.kept
+        assert np.linalg.norm(found.pixel - seen) > 2.0
+        assert min(np.linalg.norm(place - seen) for place in found.others) < 0.7
+    # One that is sure of itself offers nothing else.
+    assert suggest(pair, photos, 1, true_pixels()["T08"][0]).others == ()
+
+
+def test_what_half_the_window_denies_is_not_taken_unasked(sample) -> None:
+    pair, photos = sample
+    own = np.array(BESIDE_STEPS)
+    seen = partners(own)
     found = [suggest(pair, photos, 1, pixel) for pixel in own]
     away = [np.linalg.norm(one.pixel - true) for one, true in zip(found, seen, strict=True)]
     assert min(away) > 2.0  # correlation alone is sure of a wrong place

@@ -23,6 +23,7 @@ from tests.page_session import (
     client_of,
     entries,
     opened,
+    pick,
     pick_both,
     sample_folder,
     sample_picks,
@@ -310,3 +311,20 @@ def test_what_is_no_survey_says_so(tmp_path, names, said) -> None:
     (folder / "other.pair.json").touch()
     with pytest.raises(InputError, match="2 pair files"):
         find_files([folder])
+
+
+def test_precision_contours_lie_where_picks_are_that_precise(tmp_path) -> None:
+    with opened(sample_folder(tmp_path)) as session:
+        client = client_of(session)
+        lines = client.get("/uncertainty.json").json()
+        assert {line["sigma_mm"] for line in lines} >= {20, 50, 100}
+        for number, sigma in enumerate((20, 50, 100)):
+            line = next(one["line"] for one in lines if one["sigma_mm"] == sigma)
+            place = line[len(line) // 4]
+            for image in (1, 2):
+                ask = {"image": image, "pixels": [place], "from": "wall"}
+                column, row = client.post("/api/convert", json=ask).json()["pixels"][0]
+                pick(session, f"Q{number}", image, (column, row))
+            point = session.state.points[f"Q{number}"]
+            # Between the nodes of the grid the line is straight.
+            assert session.results.row(point)["sigma_r"] == pytest.approx(sigma / 1000, rel=0.03)

@@ -59,6 +59,27 @@ def test_control_points_alone_give_both_cameras_in_either_order(exchanged: bool)
     assert any("exchanged" in text for text in alignment.remarks) == exchanged
 
 
+def test_a_set_up_is_taken_as_it_is() -> None:
+    site = bifocal.SiteMeasures(distance1=17.5, distance2=9.5, sigma=0.01)
+    alignment = bifocal.align(
+        noise(), None, interiors=(lens(17.5), lens(9.5)), site=site, as_set_up=True
+    )
+    pair = alignment.pair
+    assert alignment.way == "as set up"
+    np.testing.assert_allclose(
+        np.concatenate(pair.project(WALL)), np.concatenate(PAIR.project(WALL)), atol=1e-9
+    )
+    assert alignment.deviations["distance1"] == pytest.approx(0.01)
+    assert any("exactly as typed" in text for text in alignment.setup["assumed"])
+    with pytest.raises(InputError, match="leave out control"):
+        bifocal.align(
+            None, None, interiors=(lens(17.5), lens(9.5)), site=site, control=control(),
+            as_set_up=True,
+        )  # fmt: skip
+    with pytest.raises(InputError, match="focal length of image2"):
+        bifocal.align(noise(), noise(), interiors=(lens(17.5), None), site=site, as_set_up=True)
+
+
 def test_photos_square_to_a_wall_at_known_distances() -> None:
     far = noise()
     # The near lens is 1.1 times as long as equal scale would ask for.

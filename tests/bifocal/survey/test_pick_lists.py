@@ -11,6 +11,7 @@ import pytest
 from click.testing import CliRunner
 
 from bifocal.cli.main import main
+from bifocal.model.pair import Pair
 from bifocal.survey.pair_workflow import read_pair
 from bifocal.survey.pick_lists import read_picks
 from bifocal.survey.workflow import solve
@@ -143,6 +144,36 @@ def test_a_workbook_is_the_pair_it_states(tmp_path):
     assumed = read_pair(book)
     assert assumed.project(XYZ) == (pytest.approx(FAR), pytest.approx(NEAR))
     assert "assumed: the nadir point of photo 1" in assumed.remarks[0]
+
+
+def test_align_takes_the_set_up_of_a_workbook_as_it_is_typed(tmp_path):
+    from PIL import Image
+
+    book, out = set_up(tmp_path), tmp_path / "pairs" / "wall.pair.json"
+    out.parent.mkdir()
+    for name in ("far.tif", "near.tif"):
+        Image.new("L", SIZE).save(tmp_path / "photos" / name)
+    words = ["align", str(book), "--out", str(out), "--sigma-distance", "0.01"]
+    run = CliRunner().invoke(main, words)
+    assert run.exit_code == 0, run.output
+    assert "far camera 17.5 m, near camera 9.5 m" in run.stdout
+    pair = Pair.read(out)
+    assert pair.project(XYZ) == (pytest.approx(FAR), pytest.approx(NEAR))
+    assert pair.photo_file(1).resolve() == (tmp_path / "photos" / "far.tif").resolve()
+    assert pair.image1.precision() == pytest.approx(0.29)
+    # By hand, of 1 m of relief: dr/dd1 = d2 / (d1 (d1 - d2)) r (1 - r/d2), and so for d2.
+    added = pair.covariance_of_orientation(np.array([[2.0, 1.0, 1.0]]))[0, 2, 2]
+    by = np.array([9.5 / 17.5 * (1 - 1 / 9.5), 17.5 / 9.5 * (1 - 1 / 17.5)]) / 8.0
+    assert np.sqrt(added) == pytest.approx(0.01 * np.hypot(*by), rel=0.01)
+    again = CliRunner().invoke(main, words)
+    assert again.exit_code == 1
+    assert "--overwrite" in again.stderr
+    other = CliRunner().invoke(main, [*words, "--overwrite", "--distance1", "17.4"])
+    assert other.exit_code == 2
+    assert "--distance1" in other.stderr
+    alone = CliRunner().invoke(main, ["align", "far.tif", "--out", str(out)])
+    assert alone.exit_code == 2
+    assert "FAR and NEAR" in alone.stderr
 
 
 def test_a_workbook_without_photos_says_which_cells(tmp_path):

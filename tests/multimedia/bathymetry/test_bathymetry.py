@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.sparse import csr_array
 
 import multimedia as mm
+from multimedia.bathymetry import refraction_correction, visible_points
 from photocore.errors import GeometryError, InputError
 
 N = 1.34
@@ -304,3 +306,42 @@ def test_impossible_corrections_are_refused(options, kind, message) -> None:
 def test_negative_precision_is_refused() -> None:
     with pytest.raises(InputError, match="sigma of the level"):
         mm.Precision(level=-1.0)
+
+
+def many_cameras():
+    """Return apparent points over a wide lake, one without position, and 96 cameras."""
+    rng = np.random.default_rng(4)
+    points = np.column_stack([rng.uniform(0, 400, (700, 2)), 102.5 - rng.uniform(0.2, 8, 700)])
+    points[5] = np.nan
+    grid = np.stack(np.meshgrid(np.linspace(0, 400, 12), np.linspace(0, 400, 8)), -1)
+    return points, np.column_stack([grid.reshape(-1, 2), np.full(96, 150.0)])
+
+
+def test_cameras_culled_by_angle_are_those_of_a_table_of_all_pairs(monkeypatch):
+    points, cameras = many_cameras()
+    offset = cameras - points[:, None]
+    seen = np.hypot(offset[..., 0], offset[..., 1]) <= np.tan(0.6) * offset[..., 2]
+    whole = {"water_level": 102.5, "index": N, "cameras": cameras}
+    whole["precision"] = mm.Precision(index=0.001, level=0.02, point=0.01)
+    table = mm.correct_bathymetry(points, visible=seen, **whole)
+    monkeypatch.setattr(visible_points, "POINTS", 64)
+    monkeypatch.setattr(refraction_correction, "BLOCK_RAYS", 90)
+    sparse = mm.correct_bathymetry(points, visible=csr_array(seen), **whole)
+    angle = mm.correct_bathymetry(points, max_angle=0.6, **whole)
+    both = mm.correct_bathymetry(points, visible=np.ones_like(seen), max_angle=0.6, **whole)
+    for other in (sparse, angle, both):
+        np.testing.assert_array_equal(other.status, table.status)
+        np.testing.assert_allclose(other.xyz, table.xyz, rtol=0, atol=1e-10)
+        # The step of the numerical derivative follows the block.
+        np.testing.assert_allclose(other.covariance, table.covariance, rtol=1e-6, atol=1e-12)
+    wanted = {mm.BathymetryStatus.NADIR, mm.BathymetryStatus.RAYS, mm.BathymetryStatus.FAILED}
+    assert set(table.status.tolist()) == wanted
+
+
+def test_an_angle_that_is_none_is_refused():
+    points, cameras = many_cameras()
+    for angle in (0.0, 1.6, np.nan):
+        with pytest.raises(InputError, match="max_angle"):
+            mm.correct_bathymetry(
+                points, water_level=102.5, index=N, cameras=cameras, max_angle=angle
+            )

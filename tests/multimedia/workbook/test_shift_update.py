@@ -10,6 +10,7 @@ import openpyxl
 import pytest
 from click.testing import CliRunner, Result
 from openpyxl.chart import ScatterChart
+from openpyxl.workbook.defined_name import DefinedName
 
 from multimedia import Layers, radial_shift
 from multimedia.cli.main import main
@@ -43,35 +44,123 @@ def own(tmp_path: Path) -> Path:
     return path
 
 
-def test_columns_are_added_and_everything_else_stays(own: Path, tmp_path: Path) -> None:
+def test_live_columns_are_added_and_everything_else_stays(own: Path, tmp_path: Path) -> None:
     out = tmp_path / "out.xlsx"
     result = run(own, *MEDIA, "--out", out)
     assert result.exit_code == 0, result.stderr
-    sheet = openpyxl.load_workbook(out)["Messung"]
-    assert [c.value for c in sheet[3]][:12] == [
+    assert [c.value for c in openpyxl.load_workbook(out)["Messung"][3]] == [
         "Punkt", "X [m]", "Y [m]", "Z [m]", "Bemerkung", None, None,
         "Rbar", "dR", "Xbar", "Ybar", "flag",
+        "R_u", "ZP_u", "u0", "u1", "u2", "u3", "u4", "u5", "u6", "resid",
     ]  # fmt: skip
+    shown, formulas = office.stored(out), office.formulas_of(out)
+    assert {f"{c}{row}" for c in "HIJKLMNOPQRSTUV" for row in (4, 5)} <= formulas["Messung"].keys()
+    cells = shown["Messung"]
     exact = float(radial_shift(0.5, z0=0.5, zp=0.2, layers=LAYERS))
-    assert sheet["H4"].value == pytest.approx(exact, rel=4 * EPS)
-    assert sheet["J4"].value == pytest.approx(0.3 * exact / 0.5, rel=16 * EPS)
-    assert sheet["L4"].value == "OK"
-    assert sheet["G4"].value == "=B4*2"
+    assert cells["H4"] == pytest.approx(exact, rel=4 * EPS)
+    assert cells["J4"] == pytest.approx(0.3 * exact / 0.5, rel=16 * EPS)
+    assert cells["L4"] == "OK"
+    assert formulas["Messung"]["G4"] == "=B4*2"
+    assert shown["Media"]["B9"] == 0.5
     with zipfile.ZipFile(own) as before, zipfile.ZipFile(out) as after:
         changed = {n for n in before.namelist() if before.read(n) != after.read(n)}
-        assert before.namelist() == after.namelist()
-    assert changed <= {"xl/worksheets/sheet1.xml", "xl/workbook.xml"}
+        new = set(after.namelist()) - set(before.namelist())
+    assert changed <= {
+        "xl/worksheets/sheet1.xml", "xl/workbook.xml", "xl/styles.xml", "[Content_Types].xml",
+        "xl/_rels/workbook.xml.rels",
+    }  # fmt: skip
+    assert len(new) == 1, new
+
+
+@pytest.mark.office
+@pytest.mark.parametrize(
+    "kind",
+    [
+        "labels",
+        "texts",
+        pytest.param("names", marks=pytest.mark.acceptance),
+        pytest.param("radius", marks=pytest.mark.acceptance),
+    ],
+)
+def test_the_formulas_beside_an_own_table_calculate_the_same(
+    own: Path, tmp_path: Path, kind: str
+) -> None:
+    book = openpyxl.load_workbook(own)
+    sheet, notes = book["Messung"], book["Notizen"]
+    media = ("--indices", "1,1.5,1.34", "--thicknesses", "0.01", "--z0", "0.5")
+    if kind in ("labels", "names"):
+        values = {"n_1": 1.0, "n_2": 1.5, "n_3": 1.34, "t_1": 0.01, "z_0": 0.5, "k_1": 7.0}
+        for row, (name, value) in enumerate(values.items(), start=3):
+            notes.append([name if kind == "labels" else None, value])
+            if kind == "names":
+                place = f"'Notizen'!$B${row - 1}"
+                book.defined_names[name] = DefinedName(name, attr_text=place)
+        media = ()
+    elif kind == "radius":
+        rows = [("R [m]", "Tiefe"), (0.5, 0.2), (0.1, 0.1)]
+        for row, (radius, depth) in enumerate(rows, start=3):
+            sheet.cell(row, 2, radius)
+            sheet.cell(row, 3, depth)
+            sheet.cell(row, 4).value = None
+    elif kind == "texts":
+        sheet["B4"], sheet["D5"] = "0,3", "-0.1 m"
+        sheet["D3"] = "Z"
+        sheet["D4"] = "-0.2 m"
+    book.save(own)
+    out = tmp_path / "out.xlsx"
+    result = run(own, *media, "--out", out)
+    assert result.exit_code == 0, result.stderr
+    stored, anew = office.stored(out), office.recalculated(out, tmp_path / "lo")
+    assert anew["Messung"].pop("G4", None) is not None  # openpyxl stores no result
+    for title in ("Messung", "Media"):
+        assert stored[title].keys() == anew[title].keys()
+        for cell, value in stored[title].items():
+            if isinstance(value, int | float):
+                assert anew[title][cell] == pytest.approx(value, rel=64 * EPS, abs=64 * EPS), cell
+            else:
+                assert anew[title][cell] == value
+    exact = [
+        float(radial_shift(r, z0=0.5, zp=zp, layers=LAYERS)) for r, zp in ((0.5, 0.2), (0.1, 0.1))
+    ]
+    assert [anew["Messung"]["H4"], anew["Messung"]["H5"]] == pytest.approx(exact, rel=64 * EPS)
+    if kind != "labels":
+        return
+    # The set-up is live where the user typed it.
+    book = openpyxl.load_workbook(out)
+    row = next(cell.row for cell in book[notes.title]["B"] if cell.value == 0.5)
+    book[notes.title].cell(row, 2).value = 0.75
+    book.save(out)
+    moved = office.recalculated(out, tmp_path / "lo")["Messung"]
+    exact = [
+        float(radial_shift(r, z0=0.75, zp=z, layers=LAYERS)) for r, z in ((0.5, 0.2), (0.1, 0.1))
+    ]
+    assert [moved["H4"], moved["H5"]] == pytest.approx(exact, rel=64 * EPS)
 
 
 def test_a_second_run_fills_the_same_columns_and_keeps_a_backup(own: Path) -> None:
     assert run(own, *MEDIA, "--out", own, "--overwrite").exit_code == 0
-    once = openpyxl.load_workbook(own)["Messung"].max_column
+    once = openpyxl.load_workbook(own)
     assert run(own, *MEDIA[:-1], "0,0,0.61", "--out", own, "--overwrite").exit_code == 0
-    sheet = openpyxl.load_workbook(own)["Messung"]
-    assert sheet.max_column == once
+    twice = openpyxl.load_workbook(own)
+    assert twice["Messung"].max_column == once["Messung"].max_column
+    assert twice.sheetnames == once.sheetnames
     exact = float(radial_shift(0.5, z0=0.6, zp=0.2, layers=LAYERS))
-    assert sheet["H4"].value == pytest.approx(exact, rel=4 * EPS)
+    shown = office.stored(own)
+    assert shown["Messung"]["H4"] == pytest.approx(exact, rel=4 * EPS)
+    assert shown["Media"]["B9"] == 0.6
     assert own.with_name("becken.xlsx.bak").exists()
+    # The media are in the workbook now.
+    result = run(own, "--json")
+    assert json.loads(result.stdout)["points"][0]["Rbar"] == pytest.approx(exact, rel=4 * EPS)
+
+
+def test_other_media_than_the_formulas_are_for_are_refused_there_too(own: Path) -> None:
+    assert run(own, *MEDIA, "--out", own, "--overwrite").exit_code == 0
+    before = own.read_bytes()
+    result = run(own, "--indices", "1,1.34", "--z0", "1", "--out", own, "--overwrite")
+    assert result.exit_code == 1
+    assert "its formulas are for 3 media, the options give 2; add --new" in result.stderr
+    assert own.read_bytes() == before
 
 
 def test_the_backup_is_named_and_never_replaced(own: Path) -> None:

@@ -1,6 +1,7 @@
 """Tables as people bring them, in every file format."""
 
 import datetime
+import re
 import zipfile
 
 import numpy as np
@@ -69,6 +70,51 @@ def test_headings_are_found_in_any_case_language_and_with_units(book, heading):
 def test_units_in_headings_are_reported(book):
     table = read_table(book(polar_rows(("id", "s1 [px]", "s2 (mm)", "theta"))), POLAR)
     assert table.units == {"s1": "px", "s2": "mm"}
+
+
+@pytest.mark.parametrize("ending", ["xlsx", "csv"])
+@pytest.mark.parametrize("heading", ["s1 [furlong]", "s1 [parsec²]", "s1 (ft)", "S 1 (Inch)"])
+def test_a_unit_nobody_knows_is_refused_with_the_known_ones(book, tmp_path, heading, ending):
+    rows = [("Point", heading, "s2 [mm]", "theta"), *SAMPLES]
+    path = book([], rows)
+    if ending == "csv":
+        path = tmp_path / "survey.csv"
+        path.write_text("\n".join(",".join(map(str, row)) for row in rows), encoding="utf-8")
+    with pytest.raises(WorkbookError) as caught:
+        read_table(path, POLAR)
+    unit = heading.strip(")]").partition("[")[2] or heading.strip(")]").partition("(")[2]
+    place = "Sheet2!B1" if ending == "xlsx" else "B1"
+    assert str(caught.value).startswith(f"survey.{ending} › {place} (s1): ")
+    assert f'"{unit}", which is not known. Known are um, mm, cm, dm, m, km, px' in str(caught.value)
+
+
+@pytest.mark.parametrize("heading", ["s1 (far photo)", "s1 [-]", "s1 []", "s1 [mm]", "s1 [1]"])
+def test_notes_in_round_brackets_and_known_units_are_no_fault(book, heading):
+    table = read_table(book([("Point", heading, "s2", "theta"), *SAMPLES]), POLAR)
+    assert table.numbers("s1").tolist() == [12.5, 14.75]
+
+
+@pytest.mark.parametrize(
+    ("label", "message"),
+    [
+        ("d1 [cm]", 'the label "d1 [cm]" says [cm], expected [m]. Write 17.5, and [m].'),
+        ("d1 [furlong]", 'the label "d1 [furlong]" says [furlong], expected [m].'),
+        ("d1 (ft)", 'the label "d1 (ft)" says [ft], expected [m].'),
+        ("d1 [px]", 'the label "d1 [px]" says [px], expected [m].'),
+    ],
+)
+def test_a_label_with_another_unit_than_its_value_is_wanted_in_is_refused(book, label, message):
+    wanted = [Column("d1", unit="m"), Column("d2", unit="m")]
+    path = book([(label, 1750), ("d2 (near)", 9.5)])
+    with pytest.raises(WorkbookError, match=re.escape(message)) as caught:
+        read_named_values(path, wanted)
+    assert str(caught.value).startswith("survey.xlsx › Sheet1!B1 (d1): ")
+
+
+def test_a_label_with_the_unit_wanted_is_read(book):
+    path = book([("d1 [m]", 17.5), ("d2", 9.5)])
+    values = read_named_values(path, [Column("d1", unit="m"), Column("d2", unit="m")])
+    assert values.number("d1") == 17.5
 
 
 def test_a_row_of_units_below_the_headings_is_taken_as_units(book):

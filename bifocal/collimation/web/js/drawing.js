@@ -1,8 +1,18 @@
 /** What is drawn above the photos. Each image has a colour and a shape of its own. */
 
 export const INK = { 1: "#63c7ff", 2: "#ffb454" };
+const sprites = new Map();
 const DARK = "rgba(0, 0, 0, 0.75)";
 const LABELS_FROM = 60;
+
+/** What is drawn grows with the page's letters, as on a screen of 4K. */
+let unit = 1;
+const measureUnit = () => {
+  unit = parseFloat(getComputedStyle(document.documentElement).fontSize) / 14;
+  sprites.clear();
+};
+window.addEventListener("resize", measureUnit);
+measureUnit();
 
 function stroke(context, style, width, path) {
   context.beginPath();
@@ -18,7 +28,7 @@ function stroke(context, style, width, path) {
 
 /** A cross that leaves its centre free: round for photo 1, square for photo 2. */
 export function marker(context, image, [x, y], { selected = false, proposed = false } = {}) {
-  const size = selected ? 11 : 7;
+  const size = (selected ? 11 : 7) * unit;
   if (proposed) context.setLineDash([3, 3]);
   stroke(context, INK[image], selected ? 2 : 1.5, (path) => {
     if (image === 1) path.arc(x, y, size, 0, 2 * Math.PI);
@@ -32,7 +42,6 @@ export function marker(context, image, [x, y], { selected = false, proposed = fa
 }
 
 const SPRITE = 18;
-const sprites = new Map();
 
 /** A small marker, drawn once for each image and screen. */
 function sprite(image) {
@@ -41,9 +50,9 @@ function sprite(image) {
   let canvas = sprites.get(key);
   if (!canvas) {
     canvas = document.createElement("canvas");
-    canvas.width = canvas.height = Math.ceil(SPRITE * ratio);
+    canvas.width = canvas.height = Math.ceil(SPRITE * unit * ratio);
     const context = canvas.getContext("2d");
-    context.scale(ratio, ratio);
+    context.scale(ratio * unit, ratio * unit);
     const middle = SPRITE / 2;
     stroke(context, INK[image], 1.3, (path) => {
       if (image === 1) path.arc(middle, middle, 5, 0, 2 * Math.PI);
@@ -58,7 +67,8 @@ function sprite(image) {
 export function markers(context, image, places) {
   const canvas = sprite(image);
   for (const [x, y] of places) {
-    context.drawImage(canvas, x - SPRITE / 2, y - SPRITE / 2, SPRITE, SPRITE);
+    const side = SPRITE * unit;
+    context.drawImage(canvas, x - side / 2, y - side / 2, side, side);
   }
 }
 
@@ -73,13 +83,20 @@ export function polyline(context, style, places, { width = 2, dash = [], closed 
 }
 
 export function label(context, text, [x, y], style = "#ffffff") {
-  context.font = "500 12px system-ui, sans-serif";
+  context.font = `500 ${12 * unit}px system-ui, sans-serif`;
   context.lineJoin = "round";
   context.lineWidth = 3;
   context.strokeStyle = DARK;
   context.strokeText(text, x, y);
   context.fillStyle = style;
   context.fillText(text, x, y);
+}
+
+/** A line of equal precision, thin at every zoom, its number where it is seen. */
+export function contour(context, pane, places, text) {
+  polyline(context, "#f4f4f4", places, { width: 1 });
+  const seen = places.filter((place) => inside(pane, place));
+  if (seen.length) label(context, text, seen[Math.floor(seen.length / 3)].map((value) => value + 4));
 }
 
 /** Full cross through the keyboard's cursor. */
@@ -134,7 +151,7 @@ export function picks(context, pane, { items, images, pick, selected }) {
       });
     }
     const [x, y] = places.find(Boolean);
-    if (!crowded || chosen) label(context, item.name, [x + (chosen ? 15 : 9), y - 8]);
+    if (!crowded || chosen) label(context, item.name, [x + (chosen ? 15 : 9) * unit, y - 8 * unit]);
   }
 }
 

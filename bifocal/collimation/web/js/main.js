@@ -177,10 +177,12 @@ class App {
   jobBox(kind) {
     const bar = h("progress", { max: "1", "aria-label": t(`job.${kind}`) });
     const words = h("p", { class: "hint", role: "status" });
+    const told = h("p", { class: "hint" });
+    const fold = h("details", { hidden: true }, h("summary", {}, t("job.remarks")), told);
     const cancel = button(t("job.cancel"), () => {
       this.connection.remove(`/api/jobs/${cancel.dataset.job}`).catch((error) => this.refuse(error));
     }, { class: "quiet", testid: `cancel-${kind}` });
-    const box = h("div", { class: "job", hidden: true, testid: `job-${kind}` }, h("div", { class: "row" }, bar, cancel), words);
+    const box = h("div", { class: "job", hidden: true, testid: `job-${kind}` }, h("div", { class: "row" }, bar, cancel), words, fold);
     this.boxes.push((state) => {
       const job = state.jobs.filter((one) => one.kind === kind).at(-1);
       box.hidden = !job;
@@ -192,7 +194,10 @@ class App {
       box.dataset.state = job.state;
       const percent = Math.round(100 * (job.progress ?? 0));
       const doing = running ? `${percent} %` : t(`job.state.${job.state}`);
-      setText(words, [doing, job.message].filter(Boolean).join(" · "));
+      const long = job.state === "done" && Boolean(job.message);
+      fold.hidden = !long;
+      setText(told, long ? job.message : "");
+      setText(words, [doing, long ? "" : job.message].filter(Boolean).join(" · "));
     });
     return box;
   }

@@ -34,7 +34,7 @@ export class OrientationStage {
     this.target = h("p", { class: "target", role: "status" });
     this.element = h("main", { class: "stage work", id: "stage-orientation" }, this.photos,
       h("aside", { class: "panel" }, this.#targetBox(), this.loupe.element, this.#controlTable(),
-        this.#tapeTable(), this.#result()));
+        this.#tapeTable(), this.#tellResult(), this.#result()));
   }
 
   #targetBox() {
@@ -57,7 +57,7 @@ export class OrientationStage {
   #tapeTable() {
     const heads = ["tape.from", "tape.to", "tape.length", "tape.sigma"];
     const inputs = heads.map((key, index) => h("input", { type: "text", "aria-label": t(key),
-      placeholder: t(key), inputmode: index > 1 ? "decimal" : "text", testid: `tape-${index}` }));
+      placeholder: t(key).replace(/ ?\[.*/, ""), inputmode: index > 1 ? "decimal" : "text", testid: `tape-${index}` }));
     const add = () => {
       const [from, to, ...numbers] = inputs.map(({ value }) => value.trim());
       const [length, sigma] = numbers.map((text) => (text ? Number(text.replace(",", ".")) : null));
@@ -73,10 +73,17 @@ export class OrientationStage {
         inputs, h("button", { type: "submit", class: "quiet", testid: "tape-add" }, t("tape.add"))));
   }
 
+  #tellResult() {
+    this.remarkCount = h("summary", {});
+    this.fold = h("details", { testid: "align-remarks" }, this.remarkCount, this.remarks);
+    this.tell = h("section", { class: "card" }, h("h2", {}, t("known.title")), this.known, this.fold);
+    return this.tell;
+  }
+
+  /** What is to be done next stays in sight, however long the table. */
   #result() {
-    return h("section", { class: "card" }, h("h2", {}, t("align.title")), this.advice,
-      this.known, h("div", { class: "row" }, this.align, this.acceptAlign), this.app.jobBox("align"),
-      this.remarks);
+    return h("section", { class: "card next" }, h("h2", {}, t("align.title")), this.advice,
+      h("div", { class: "row" }, this.align, this.acceptAlign), this.app.jobBox("align"));
   }
 
   #pasted(event) {
@@ -154,7 +161,11 @@ export class OrientationStage {
       keyedRows(list, lines, { key: (text) => text, signature: (text) => text,
         build: (text) => h("li", {}, text) });
     }
+    const remarks = state.pair?.remarks?.length ?? 0;
+    this.fold.hidden = !remarks;
+    setText(this.remarkCount, t("known.remarks", { count: remarks }));
     this.#tellKnown(state);
+    this.tell.hidden = !remarks && !this.known.children.length;
     this.acceptAlign.disabled = !state.pair || state.pair.accepted !== false;
     // The next step stands out.
     this.acceptAlign.classList.toggle("primary", !this.acceptAlign.disabled);

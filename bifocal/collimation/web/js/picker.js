@@ -169,8 +169,16 @@ export class Picker extends EventTarget {
     this.changed();
   }
 
-  /** Ask for the homologous point of the one in hand. */
+  /** Ask for the homologous point of the one in hand; where it is in doubt, for the next place. */
   suggest() {
+    const { proposal } = this;
+    if (proposal?.others?.length && proposal.name === this.selected) {
+      const [{ column, row }, ...rest] = proposal.others;
+      const left = { column: proposal.column, row: proposal.row };
+      this.proposal = { ...proposal, column, row, others: [...rest, left] };
+      this.say("say.other");
+      return this.changed();
+    }
     return this.#next(() => this.#suggest());
   }
 

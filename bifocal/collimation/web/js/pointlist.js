@@ -8,15 +8,17 @@ const COLUMNS = [
   ["type", (item) => item.type],
   ["r", (item) => item.result?.r ?? null],
   ["sigma_r", (item) => item.result?.sigma_r ?? null],
-  ["misfit_px", (item) => item.result?.misfit_px ?? null],
+  ["misfit_px", (item) => (item.result ? Math.abs(item.result.misfit_px ?? 0) : null)],
   ["flag", (item) => (item.result ? item.result.flag || "OK" : "…")],
 ];
 const DIGITS = { r: 3, sigma_r: 3, misfit_px: 1 };
 const worded = new Intl.Collator(undefined, { numeric: true });
 
-function compare(a, b) {
+/** What has no value yet comes last either way. */
+function compare(a, b, down) {
   if (a === null || b === null) return (a === null) - (b === null);
-  return typeof a === "number" ? Math.abs(a) - Math.abs(b) : worded.compare(a, b);
+  const order = typeof a === "number" ? a - b : worded.compare(a, b);
+  return down ? -order : order;
 }
 
 export class PointList {
@@ -51,8 +53,7 @@ export class PointList {
     const points = this.app.points();
     const column = COLUMNS.find(([key]) => key === this.sort.column);
     if (!column) return points;
-    const sorted = [...points].sort((a, b) => compare(column[1](a), column[1](b)));
-    return this.sort.down ? sorted.reverse() : sorted;
+    return [...points].sort((a, b) => compare(column[1](a), column[1](b), this.sort.down));
   }
 
   update() {

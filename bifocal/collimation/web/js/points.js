@@ -40,7 +40,9 @@ export class PointsStage {
     this.quality = h("p", { class: "quality", testid: "quality" });
     this.areaButton = button(t("pick.area"), () => this.toggleArea(), { class: "quiet",
       testid: "uncertainty", "aria-pressed": "false" });
-    this.layers.element.append(this.areaButton);
+    this.fitButton = button(h("span", { class: "whole", "aria-hidden": "true" }), () => this.activePane?.fit(), { class: "icon", testid: "fit",
+      "aria-label": t("key.fit"), title: `${t("key.fit")} (0)` });
+    this.layers.element.append(this.areaButton, this.fitButton);
     const hand = h("section", { class: "hand" }, this.target, h("div", { class: "row" },
       this.buttons.pick, this.buttons.suggest, this.buttons.accept, this.buttons.snap, this.buttons.fresh),
     this.quality);
@@ -133,7 +135,14 @@ export class PointsStage {
     this.area = this.area ? null : pictureLayer(this.view, "layer-area", `/uncertainty.png?v=${Date.now()}`,
       [-0.5, -0.5, width - 0.5, height - 0.5]);
     this.areaButton.setAttribute("aria-pressed", String(Boolean(this.area)));
+    this.contours = [];
     this.#arrange();
+    if (this.area) {
+      this.app.connection.get("/uncertainty.json").then((lines) => {
+        if (this.area) this.contours = lines;
+        this.#paint();
+      }).catch((error) => this.app.refuse(error));
+    }
   }
 
   remove() {
@@ -161,6 +170,9 @@ export class PointsStage {
     const { pair } = app.state;
     if (!pair) return;
     if (pair.zoom_centre) drawing.centre(context, pane.place(pair.zoom_centre.wall), t("draw.centre"));
+    for (const { sigma_mm: sigma, line } of this.contours ?? []) {
+      drawing.contour(context, pane, line.map((pixel) => pane.place(pixel)), `${sigma} mm`);
+    }
     this.#drawLines(context, pane);
     const { guide, proposal, cursor } = picker;
     if (guide && pane.images.includes(guide.image)) {
@@ -170,6 +182,11 @@ export class PointsStage {
     drawing.picks(context, pane, { items: app.points(), images: pane.images,
       pick: (item, image) => picker.pick(item, image), selected: picker.selected });
     if (proposal && pane.images.includes(proposal.image)) {
+      for (const { column, row } of proposal.others ?? []) {
+        const place = pane.screen(proposal.image, [column, row]);
+        drawing.marker(context, proposal.image, place, { proposed: true });
+        drawing.label(context, "?", [place[0] + 11, place[1] + 4], drawing.INK[proposal.image]);
+      }
       const place = pane.screen(proposal.image, [proposal.column, proposal.row]);
       drawing.marker(context, proposal.image, place, { selected: true, proposed: true });
       drawing.label(context, `? ${Math.round(100 * proposal.quality)} %`, [place[0] + 16, place[1] + 18],
@@ -208,15 +225,17 @@ export class PointsStage {
 
   #refresh() {
     const { target, picking, proposal, selected } = this.picker;
-    const words = { name: target.name ?? t("point.newName"), image: target.image };
-    setText(this.target, picking ? t("pick.next", words) : t("pick.off"));
+    const next = { name: target.name ?? t("point.newName"), image: target.image };
+    setText(this.target, picking ? t("pick.next", next) : t("pick.off"));
     this.target.dataset.image = target.image;
     this.buttons.pick.setAttribute("aria-pressed", String(picking));
     for (const key of ["suggest", "snap"]) this.buttons[key].disabled = !selected;
     this.buttons.accept.disabled = !proposal && !this.picker.lacking;
     const level = !proposal ? "" : proposal.kept ? "good" : proposal.quality > 0.5 ? "fair" : "poor";
-    setText(this.quality, proposal ? t(`quality.${level}`, { percent: Math.round(100 * proposal.quality),
-      sigma: proposal.sigma_px?.toFixed(2) ?? "?" }) : "");
+    const words = proposal ? t(`quality.${level}`, { percent: Math.round(100 * proposal.quality),
+      sigma: proposal.sigma_px?.toFixed(2) ?? "?" }) : "";
+    const others = proposal?.others?.length ?? 0;
+    setText(this.quality, others ? `${words} ${t("quality.others", { count: others })}` : words);
     this.quality.dataset.level = level;
     this.readout.update();
     this.list.mark();

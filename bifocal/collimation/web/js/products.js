@@ -80,7 +80,7 @@ export class ProductsStage {
     this.sheet = choice({ label: t("deliver.sheet"), options: { auto: t("deliver.auto"), ...same(SHEETS) },
       save: () => {}, testid: "deliver-sheet" });
     this.deliver = button(t("deliver.run"), () => this.app.job("deliver", { scale: this.scale.value,
-      sheet: this.sheet.value === "auto" ? null : this.sheet.value }), { class: "primary", testid: "deliver" });
+      image: this.source.value, sheet: this.sheet.value === "auto" ? null : this.sheet.value }), { class: "primary", testid: "deliver" });
     this.files = h("ul", { class: "files" });
     this.download = h("a", { class: "button", href: "/download/all.zip", download: "", testid: "download" },
       t("deliver.download"));
@@ -186,6 +186,7 @@ export class ProductsStage {
     this.runRelief.disabled = !state.pair;
     this.runOrtho.disabled = !state.pair;
     this.deliver.disabled = !ortho;
+    this.deliver.title = ortho ? "" : t("status.products.ortho");
     this.download.hidden = !files.length;
     keyedRows(this.files, files, { key: ({ name }) => name, signature: JSON.stringify,
       build: ({ name, bytes }) => h("li", {}, h("a", { href: `/download/${encodeURIComponent(name)}`, download: "" }, name),

@@ -1,0 +1,309 @@
+r"""Straight rays bent on their way: a camera of a pair that looks through plane-parallel media.
+
+The one module of `bifocal` that knows `multimedia`. It carries a camera's ray from its own medium
+into the object's and back. On the measured side the ray is known, so nothing is iterated: with
+:math:`\tau_i = \tan\beta_i` along the interfaces, Snell's law (Maas 2015, Eq. 3) gives
+
+.. math:: \tau_i = k_i \tau_1, \qquad k_i = n_1 / \sqrt{n_i^2 + (n_i^2 - n_1^2) \tau_1^2},
+
+and the ray in the object's medium is the straight line ``(X, Y) = A + r S`` over relief r, with
+:math:`A = N + \tau_1 (z_0 + \sum t_i k_i + H k_m)`, :math:`S = -\tau_1 k_m` and H the way from the
+last interface to the reference plane. Without media A = q and S = -(q - N) / d.
+
+References
+----------
+.. [1] Maas, "On the accuracy potential in underwater/multimedia photogrammetry", Sensors 2015.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from multimedia import Layers, radial_shift_ratio
+from photocore.arrays import BoolArray, FloatArray
+
+#: Rays in the table of distances.
+_TABLE = 4096
+#: A point on the last interface is behind it, whatever the last digit says. Relative.
+_ROUNDING = 1e-14
+
+
+class ObjectRays(NamedTuple):
+    """Rays in the object's medium, as lines over relief.
+
+    Attributes
+    ----------
+    position : ndarray, shape (..., 2)
+        Where they meet the reference plane, from the nadir. [m]
+    slope : ndarray, shape (..., 2)
+        Change of (X, Y) per metre of relief.
+    """
+
+    position: FloatArray
+    slope: FloatArray
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class MediaPath:
+    """What lies between one camera and the reference plane.
+
+    Attributes
+    ----------
+    layers : Layers
+        The media.
+    z0 : float
+        Camera centre to the first interface, along its normal. [m]
+    distance : float
+        Camera centre to the reference plane. [m]
+    turn : ndarray, shape (3, 3), or None
+        Axes of the interfaces in the plane frame, one a row, their normal towards the camera the
+        last; None where they are parallel to the reference plane.
+    """
+
+    layers: Layers
+    z0: float
+    distance: float
+    turn: FloatArray | None = None
+
+    def __post_init__(self) -> None:
+        if self.turn is not None:
+            self.turn.setflags(write=False)
+
+    @property
+    def depth(self) -> float:
+        """Camera centre to the last interface, along its normal. [m]"""
+        return self.z0 + self.layers.thickness
+
+    def holds(self, offset: FloatArray, relief: FloatArray) -> BoolArray:
+        """Return which points, (X, Y) from the nadir and r, lie behind the last interface."""
+        below = self.distance - relief
+        if self.turn is not None:
+            below = below * self.turn[2, 2] - offset @ self.turn[2, :2]
+        return np.asarray(below - self.depth >= -_ROUNDING * self.distance)
+
+    def trace(self, away: FloatArray) -> ObjectRays:
+        """Return the rays of apparent positions (from the nadir, on the reference plane).
+
+        Parameters
+        ----------
+        away : ndarray, shape (..., 2)
+            Where the straight ray of the first medium meets the reference plane. [m]
+
+        Returns
+        -------
+        ObjectRays
+            NaN beyond total reflection, and where a ray does not come down to the plane.
+        """
+        return self._traced(away)[0]
+
+    def trace_with_jacobian(self, away: FloatArray) -> tuple[ObjectRays, FloatArray, FloatArray]:
+        """Return `trace` and the derivatives of position and slope by ``away``, (..., 2, 2)."""
+        rays, tangent, (arm, by_arm), (bend, by_bend) = self._traced(away)
+        outer = tangent[..., :, None] * tangent[..., None, :]
+        unit = np.eye(2)
+        of_arm = arm[..., None, None] * unit + (2 * by_arm)[..., None, None] * outer
+        of_slope = bend[..., None, None] * unit + (2 * by_bend)[..., None, None] * outer
+        if self.turn is None:
+            return rays, of_arm / self.distance, of_slope / -self.distance
+        by_away = self._tangent_by_away(away, tangent)
+        start, way = of_arm @ by_away, of_slope @ by_away
+        turn = self.turn
+        along = self._along(tangent * bend[..., None])
+        # E = C + Q^T (e, -depth), w = Q^T (t, -1); slope = w_xy / w_z, A = E_xy - E_z slope.
+        by_way = turn[:2].T @ way  # (..., 3, 2)
+        by_start = turn[:2].T @ start
+        down = along[..., 2, None, None]
+        by_slope = (by_way[..., :2, :] - rays.slope[..., :, None] * by_way[..., 2:, :]) / down
+        height = (self._turned_back(tangent * arm[..., None], -self.depth)[..., 2]) + self.distance
+        by_position = (
+            by_start[..., :2, :]
+            - rays.slope[..., :, None] * by_start[..., 2:, :]
+            - height[..., None, None] * by_slope
+        )
+        return rays, by_position, by_slope
+
+    def moved_by_distance(
+        self, away: FloatArray, relief: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return how rays at a relief move with ``away`` (n, 2, 2) and with the distance (n, 2).
+
+        The apparent positions and z0 are kept: a camera farther off looks along steeper rays.
+        """
+        rays, place, slope = self.trace_with_jacobian(away)
+        by_away = place + relief[:, None, None] * slope
+        # The ray depends on away / d; the way behind the last interface grows by what d does.
+        turned = -(by_away @ away[..., None])[..., 0] / self.distance
+        return by_away, turned - rays.slope
+
+    def _traced(
+        self, away: FloatArray
+    ) -> tuple[
+        ObjectRays, FloatArray, tuple[FloatArray, FloatArray], tuple[FloatArray, FloatArray]
+    ]:
+        """Return rays, tan beta_1 along the interfaces, arm and k_m with derivatives by its square.
+
+        The arm carries the tangent to the reference plane, or with tilted interfaces to the last
+        of them.
+        """
+        tangent = away / self.distance if self.turn is None else self._tangent(away)
+        square = (tangent * tangent).sum(-1)
+        first = self.layers.indices[0]
+        heights = [*self.layers.thicknesses, self.distance - self.depth]
+        if self.turn is not None:
+            heights[-1] = 0.0
+        arm, by_arm = np.full_like(square, self.z0), np.zeros_like(square)
+        bend, by_bend = np.ones_like(square), np.zeros_like(square)
+        with np.errstate(invalid="ignore", divide="ignore"):
+            for index, height in zip(self.layers.indices[1:], heights, strict=True):
+                excess = (index - first) * (index + first)
+                cosine = 1.0 / np.sqrt(index**2 + excess * square)
+                bend = first * cosine  # Maas Eq. (3)
+                by_bend = -0.5 * excess * bend * cosine * cosine
+                arm = arm + height * bend
+                by_arm = by_arm + height * by_bend
+        if self.turn is None:
+            rays = ObjectRays(tangent * arm[..., None], tangent * -bend[..., None])
+        else:
+            rays = self._lines(tangent * arm[..., None], tangent * bend[..., None])
+        return rays, tangent, (arm, by_arm), (bend, by_bend)
+
+    def apparent(self, offset: FloatArray, relief: FloatArray) -> FloatArray:
+        """Return where straight rays in the first medium would show points, from the nadir.
+
+        Parameters
+        ----------
+        offset : ndarray, shape (..., 2)
+            (X, Y) of the points from the nadir. [m]
+        relief : ndarray, shape (...)
+            [m]
+
+        Returns
+        -------
+        ndarray, shape (..., 2)
+            Apparent position on the reference plane; NaN for points that are not behind the last
+            interface, and where no ray leads. [m]
+
+        Notes
+        -----
+        Maas 2015, Eqs. (1) and (2): the radial shift, in the frame of the interfaces.
+        """
+        below = self.distance - relief
+        if self.turn is None:
+            radius = np.hypot(offset[..., 0], offset[..., 1])
+            return np.asarray(offset * (self.steepness(radius, below) * self.distance)[..., None])
+        point = np.concatenate([offset, -below[..., None]], axis=-1) @ self.turn.T
+        along, below = point[..., :2], -point[..., 2]
+        with np.errstate(invalid="ignore", divide="ignore"):
+            radius = np.hypot(along[..., 0], along[..., 1])
+            tangent = along * self.steepness(radius, below)[..., None]
+            way = self._turned_back(tangent, -1.0)
+            return np.where(
+                way[..., 2:] < 0, way[..., :2] * (-self.distance / way[..., 2:]), np.nan
+            )
+
+    def steepness(self, radius: FloatArray, below: FloatArray) -> FloatArray:
+        """Return tan beta_1 per metre of radius, of rays to points so far below the camera. [1/m]
+
+        NaN for points before the last interface. Radii count from the foot of the camera's normal.
+        """
+        behind = below - self.depth
+        behind = np.where(behind >= -_ROUNDING * self.distance, np.maximum(behind, 0.0), np.nan)
+        ratio = radial_shift_ratio(radius, z0=self.z0, zp=behind, layers=self.layers)
+        with np.errstate(invalid="ignore", divide="ignore"):
+            return np.asarray(ratio / below)
+
+    @property
+    def near_axis(self) -> float:
+        """Distance of a straight camera whose rays run alike near the axis. [m]
+
+        It is the limit of `distance_at` on the axis.
+        """
+        first, *others = self.layers.indices
+        heights = [self.z0, *self.layers.thicknesses, self.distance - self.depth]
+        reduced = zip(heights, self.layers.indices, strict=True)
+        return float(sum(height * first / index for height, index in reduced) * others[-1] / first)
+
+    def distance_at(self, radius: NDArray[Any], relief: Any = None) -> NDArray[Any]:
+        """Return at what distance a straight camera over the same nadir sees as these rays do.
+
+        Parameters
+        ----------
+        radius : ndarray, shape (...)
+            Of places of the reference plane, from the nadir; with ``relief`` of points. [m]
+        relief : ndarray, shape (...), optional
+            Of the points. [m]
+
+        Returns
+        -------
+        ndarray, shape (...)
+            A / |S|: with it for d, ``A = P d / (d - r)`` holds along the ray as it does in air. In
+            the precision of ``radius``; right to 1e-7 of it. [m]
+
+        Notes
+        -----
+        Interpolated in a table over the radius A, which grows with the angle of the ray; that of a
+        point is found by fixed point, since the distance hardly changes with the radius.
+        """
+        reach = float(np.fmax.reduce(np.abs(radius), axis=None, initial=1e-9))
+        top = 0.0 if relief is None else float(np.fmax.reduce(relief, axis=None, initial=0.0))
+        reach *= 1.5 * max(1.0, self.near_axis / max(self.near_axis - top, 0.1 * self.near_axis))
+        steepest = 1.0
+        for _ in range(12):
+            tangents = np.linspace(0.0, steepest * self.distance, _TABLE)
+            rays = self.trace(np.stack([tangents, np.zeros(_TABLE)], axis=-1))
+            places, slopes = rays.position[:, 0], -rays.slope[:, 0]
+            if not places[-1] < reach:
+                break
+            steepest *= 2.0
+        known = np.isfinite(places) & np.isfinite(slopes)
+        known[0] = False
+        places, distances = places[known], places[known] / slopes[known]
+        found = np.interp(radius, places, distances).astype(radius.dtype)
+        if relief is None:
+            return found
+        for _ in range(4):
+            with np.errstate(invalid="ignore", divide="ignore"):
+                seen = radius * (found / np.maximum(found - relief, 0.05 * found))
+            found = np.interp(seen, places, distances).astype(radius.dtype)
+        return found
+
+    def _turned_back(self, along: FloatArray, down: float) -> FloatArray:
+        """Return vectors of the interfaces' frame in the plane frame, shape (..., 3)."""
+        assert self.turn is not None
+        return np.asarray(along @ self.turn[:2] + down * self.turn[2])
+
+    def _along(self, tangent: FloatArray) -> FloatArray:
+        """Return directions of the plane frame from tangents along the interfaces."""
+        return self._turned_back(tangent, -1.0)
+
+    def _tangent(self, away: FloatArray) -> FloatArray:
+        """Return tan beta_1 along tilted interfaces; NaN for rays that do not run towards them."""
+        assert self.turn is not None
+        way = away @ self.turn[:, :2].T - self.distance * self.turn[:, 2]
+        with np.errstate(invalid="ignore", divide="ignore"):
+            return np.where(way[..., 2:] < 0, way[..., :2] / -way[..., 2:], np.nan)
+
+    def _tangent_by_away(self, away: FloatArray, tangent: FloatArray) -> FloatArray:
+        """Return the derivative of `_tangent`, shape (..., 2, 2)."""
+        assert self.turn is not None
+        down = away @ self.turn[2, :2] - self.distance * self.turn[2, 2]
+        change = self.turn[:2, :2] + tangent[..., :, None] * self.turn[2, :2]
+        return np.asarray(change / -down[..., None, None])
+
+    def _lines(self, start: FloatArray, tangent: FloatArray) -> ObjectRays:
+        """Return rays that leave tilted interfaces as lines over relief."""
+        place, way = self._turned_back(start, -self.depth), self._along(tangent)
+        with np.errstate(invalid="ignore", divide="ignore"):
+            slope = np.where(way[..., 2:] < 0, way[..., :2] / way[..., 2:], np.nan)
+        return ObjectRays(place[..., :2] - (place[..., 2:] + self.distance) * slope, slope)
+
+
+def interface_axes(normal: FloatArray) -> FloatArray:
+    """Return the axes of interfaces of a unit normal, one a row, the normal last, shape (3, 3)."""
+    across = np.cross(normal, [1.0, 0.0, 0.0])
+    across /= np.linalg.norm(across)
+    return np.stack([np.cross(across, normal), across, normal])

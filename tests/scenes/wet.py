@@ -1,0 +1,124 @@
+"""Cameras that look at a scene through plane-parallel media: refracted rays, independently cast.
+
+Vector Snell where rays leave the photo, bisection of the refraction invariant where a point is
+looked for: nothing here comes from the package.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from bifocal.model.pair import Pair
+from multimedia import Layers
+from photocore.arrays import FloatArray
+from tests.scenes.cameras import CameraPair, SceneCamera
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class WetCamera(SceneCamera):
+    """A camera before media parallel to the wall.
+
+    Attributes
+    ----------
+    indices, thicknesses : tuple of float
+    z0 : float
+        Centre to the first interface. [m]
+    """
+
+    indices: tuple[float, ...]
+    thicknesses: tuple[float, ...]
+    z0: float
+
+    @property
+    def heights(self) -> list[float]:
+        """Of the media before the last. [m]"""
+        return [self.z0, *self.thicknesses]
+
+    def emitted(self, pixels: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return where rays leave the last interface, and how, each of shape (n, 3)."""
+        rays = SceneCamera.rays(self, pixels)
+        rays = rays / np.linalg.norm(rays, axis=-1, keepdims=True)
+        places = np.broadcast_to(self.centre, rays.shape).copy()
+        after_each = zip(self.heights, self.indices, self.indices[1:], strict=False)
+        for height, before, after in after_each:
+            places = places + rays * (height / -rays[:, 2:])
+            along = rays[:, :2] * (before / after)
+            rays = np.column_stack([along, -np.sqrt(1 - (along**2).sum(axis=1))])
+        return places, rays
+
+    def _invariant(self, points: FloatArray) -> FloatArray:
+        """Return n sin(beta) of the rays to points, by bisection, shape (n,)."""
+        radius = np.hypot(*(points[:, :2] - self.centre[:2]).T)
+        heights = [*self.heights, self.centre[2] - points[:, 2] - sum(self.heights)]
+        low, high = np.zeros(len(points)), np.full(len(points), min(self.indices) * (1 - 1e-12))
+        for _ in range(54):
+            middle = (low + high) / 2
+            reach = sum(
+                h * middle / np.sqrt(n * n - middle**2)
+                for h, n in zip(heights, self.indices, strict=True)
+            )
+            short = reach < radius
+            low, high = np.where(short, middle, low), np.where(short, high, middle)
+        return (low + high) / 2
+
+    def view_of(self, points: FloatArray) -> FloatArray:
+        """Return the pixels of points, shape (n, 2)."""
+        away = points[:, :2] - self.centre[:2]
+        radius = np.maximum(np.hypot(*away.T), 1e-300)
+        sine = self._invariant(points) / self.indices[0]
+        way = np.column_stack([away * (sine / radius)[:, None], -np.sqrt(1 - sine**2)])
+        return SceneCamera.view_of(self, self.centre + way)
+
+    def aimed(self, points: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return where the rays to points leave the last interface, and the way from there."""
+        away = points[:, :2] - self.centre[:2]
+        radius = np.maximum(np.hypot(*away.T), 1e-300)
+        invariant = self._invariant(points)
+        reach = sum(
+            h * invariant / np.sqrt(n * n - invariant**2)
+            for h, n in zip(self.heights, self.indices[:-1], strict=True)
+        )
+        places = self.centre - np.array([0, 0, sum(self.heights)])
+        places = places + np.column_stack([away * (reach / radius)[:, None], np.zeros(len(away))])
+        return places, points - places
+
+    @property
+    def bulge(self) -> float:
+        """How far the outline of a body may bend out of its corners' box. [px]"""
+        return 0.04 * max(self.size)
+
+
+def under_water(
+    cameras: CameraPair,
+    *,
+    indices: tuple[float, ...],
+    thicknesses: tuple[float, ...] = (),
+    z0: tuple[float, float],
+) -> CameraPair:
+    """Return cameras of a pair square to the wall behind media, at the same scale near the axis."""
+    wet = []
+    for camera, first in zip((cameras.far, cameras.near), z0, strict=True):
+        distance = float(camera.centre[2])
+        heights = [first, *thicknesses, distance - first - sum(thicknesses)]
+        apparent = sum(h * indices[0] / n for h, n in zip(heights, indices, strict=True))
+        matrix = camera.matrix.copy()
+        matrix[[0, 1], [0, 1]] *= apparent / distance
+        wet.append(
+            WetCamera(
+                matrix=matrix, rotation=camera.rotation, centre=camera.centre, size=camera.size,
+                indices=indices, thicknesses=thicknesses, z0=first,
+            )
+        )  # fmt: skip
+    return CameraPair(far=wet[0], near=wet[1], nominal_far=cameras.far, nominal_near=cameras.near)
+
+
+def pair_through_media(cameras: CameraPair) -> Pair:
+    """Return the exact pair of cameras made by `under_water`."""
+    photos = []
+    for camera in (cameras.far, cameras.near):
+        assert isinstance(camera, WetCamera)
+        layers = Layers(indices=camera.indices, thicknesses=camera.thicknesses)
+        photos.append(replace(camera.photo(), layers=layers, z0=camera.z0))
+    return Pair(image1=photos[0], image2=photos[1])
