@@ -27,6 +27,19 @@ overwrite = click.option("--overwrite", is_flag=True, help="Replace existing fil
 as_json = click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 
 
+def _enter_cog(ctx: click.Context, param: click.Parameter, value: bool) -> None:  # noqa: ARG001
+    if value:
+        from photocore.raster_places import cloud_optimised
+
+        ctx.with_resource(cloud_optimised())
+
+
+cog = click.option(
+    "--cog", is_flag=True, expose_value=False, callback=_enter_cog,
+    help="Write rasters as cloud-optimised GeoTIFF.",
+)  # fmt: skip
+
+
 class TableFile(click.Path):
     """A file that holds a table; ``-`` stands for stdin or stdout.
 
@@ -66,7 +79,7 @@ class TableFile(click.Path):
         def show() -> None:
             if path.is_file():
                 stdout.flush()
-                getattr(stdout, "buffer", stdout).write(path.read_bytes())
+                stdout.buffer.write(path.read_bytes())
                 stdout.flush()
 
         # Closed in the opposite order: stdout is itself again, then comes the table.
@@ -77,7 +90,7 @@ class TableFile(click.Path):
 
 def _from_stdin(folder: Path) -> Path:
     """Return a file with what stands on stdin, of the ending that its first bytes ask for."""
-    data = getattr(sys.stdin, "buffer", sys.stdin).read()
+    data = sys.stdin.buffer.read()
     path = folder / ("stdin.xlsx" if data[:2] == b"PK" else "stdin.csv")
     path.write_bytes(data)
     return path

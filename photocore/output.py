@@ -45,6 +45,8 @@ def check_writable(path: Path | str, *, overwrite: bool) -> Path:
     """
     path = Path(path)
     check_name(path)
+    if str(path).startswith("/vsi"):  # one of GDAL's file systems: only rasters go there
+        return path
     if path.is_dir():
         raise InputError(f"{path}: is a folder; name a file to write.")
     if path.is_symlink() and not path.exists():
@@ -81,6 +83,30 @@ def check_all_writable(*paths: Path | None, overwrite: bool) -> None:
         check_writable(path, overwrite=overwrite)
         if path.resolve() in [other.resolve() for other in given[:number]]:
             raise InputError(f"{path}: is named for two outputs; name two files.")
+
+
+def check_not_input(path: Path | None, *inputs: Path | str | None) -> None:
+    """Refuse an output that is one of the files a command reads; ask this before `check_writable`.
+
+    Otherwise the advice to add --overwrite would cost the input, or end in a second refusal.
+
+    Parameters
+    ----------
+    path : Path or None
+        The output; None stands for no file.
+    *inputs : path or None
+        What is read.
+
+    Raises
+    ------
+    InputError
+        Naming it.
+    """
+    if path is None or not path.exists():
+        return
+    for given in inputs:
+        if given is not None and Path(given).exists() and path.samefile(given):
+            raise InputError(f"{path}: is one of the files that are read; name another output.")
 
 
 def check_ending(path: Path | None, rule: str, *endings: str) -> None:

@@ -19,8 +19,14 @@ from numpy.typing import DTypeLike, NDArray
 
 from photocore.arrays import FloatArray
 from photocore.errors import InputError
-from photocore.output import atomic_path
 from photocore.provenance import note, provenance
+from photocore.raster_places import (
+    copy_optimised,
+    gdal_name,
+    is_cloud_optimised,
+    is_virtual,
+    raster_place,
+)
 from photocore.textfile import check_name
 
 #: Side of a tile of the file; GDAL's and most viewers' sweet spot. [px]
@@ -91,7 +97,7 @@ class RasterFile(ExitStack):
         check_name(self.path)
         if self.path.is_dir():
             raise InputError(f"{self.path}: is a folder; name the raster file in it.")
-        if not self.path.is_file():
+        if not is_virtual(self.path) and not self.path.is_file():
             raise InputError(f"{self.path}: no such raster file.")
         self.enter_context(rasterio.Env(GDAL_CACHEMAX=CACHE_MB))
         try:
@@ -203,7 +209,7 @@ def _opened(path: Path, mode: str = "r", **options: Any) -> Any:
 
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", NotGeoreferencedWarning)
-        return rasterio.open(path, mode, **options)
+        return rasterio.open(gdal_name(path), mode, **options)
 
 
 class RasterWriter:
@@ -282,19 +288,25 @@ def create_geotiff(
     gdal = rasterio.Env(
         GDAL_CACHEMAX=CACHE_MB, GDAL_TIFF_INTERNAL_MASK=True, GDAL_PAM_ENABLED=False
     )
-    with atomic_path(path, overwrite=overwrite) as temporary, gdal:
+    cog = is_cloud_optimised()
+    with raster_place(Path(path), overwrite=overwrite) as temporary, gdal:
+        # A cloud-optimised file is a copy: what comes first in it is known last.
+        plain = temporary.with_name(f"{temporary.name}.plain.tif") if cog else temporary
         try:
             with written_whole(temporary, width=width, height=height, bands=bands):
-                with _opened(temporary, "w", **options) as file:
+                with _opened(plain, "w", **options) as file:
                     file.update_tags(**_provenance_tags(), **(tags or {}))
                     for number, name in enumerate(names, start=1):
                         file.set_band_description(number, name)
                     yield RasterWriter(file)
-                if overviews:
-                    _add_overviews(
-                        temporary, max(width, height), categories=not colour and kind.kind == "u"
-                    )
+                categories = not colour and kind.kind == "u"
+                if cog:
+                    copy_optimised(plain, temporary, options, block=BLOCK, categories=categories)
+                elif overviews:
+                    _add_overviews(temporary, max(width, height), categories=categories)
         finally:
+            if cog:
+                plain.unlink(missing_ok=True)
             for extra in (".ovr", ".msk", ".aux.xml"):
                 temporary.with_name(temporary.name + extra).unlink(missing_ok=True)
 

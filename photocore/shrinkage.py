@@ -8,7 +8,7 @@ import numpy as np
 from photocore.arrays import Float32Array
 
 #: Half windows, small to large. [px]
-WINDOWS = (8, 16)
+WINDOWS = (8, 18)
 #: Standard deviations beyond these count alike: weights 1/sigma² of a wider range lose all digits
 #: in float32, and threw the relief of one plain wall to -446 m. [m]
 SIGMA_RANGE = (1e-4, 0.3)

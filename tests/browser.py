@@ -134,8 +134,9 @@ class Driver:
 
     def __init__(self, browser: Any, server: Served, **context: Any) -> None:
         size = {"width": 1280, "height": 720}
+        calm = {"viewport": size, "reduced_motion": "reduce"}  # no frames for transitions
         self.server = server
-        self.context = browser.new_context(**({"viewport": size} | context))
+        self.context = browser.new_context(**(calm | context))
         self.requests: list[str] = []
         self.faults: list[str] = []
         self.open(self.context.new_page(), server)

@@ -88,12 +88,31 @@ _GROUPS: tuple[tuple[str, str, tuple[tuple[str, str], ...]], ...] = (
         "bifocal/model/intersection.py",
         "tests/bifocal/model/test_pair.py",
         (
-            ("(relief / depth**2)", "(relief / depth)"),
             (
-                "e2=_outward(a2 - xyz[:, :2], xyz[:, :2] - near.foot.nadir)",
-                "e2=_outward(a2 - xyz[:, :2], xyz[:, :2] - far.foot.nadir)",
+                "e2=_displacement(a2, xyz, near.foot)",
+                "e2=_displacement(a2, xyz, far.foot)",
             ),
         ),
+    ),
+    (
+        "bifocal/rays.py",
+        "tests/bifocal/model/test_pair.py",
+        (("(xyz[:, 2] / depth**2)", "(xyz[:, 2] / depth)"),),
+    ),
+    (
+        "bifocal/media.py",
+        "tests/bifocal/model/test_pair_through_media.py",
+        (
+            ("bend = first * cosine  # Maas Eq. (3)", "bend = index * cosine  # Maas Eq. (3)"),
+            ("by_bend = -0.5 * excess", "by_bend = 0.5 * excess"),
+            ("return by_away, turned - rays.slope", "return by_away, turned + rays.slope"),
+            ("* others[-1] / first)", "* others[0] / first)"),
+        ),
+    ),
+    (
+        "bifocal/planning/planned_media.py",
+        "tests/bifocal/planning/test_plan_through_media.py",
+        (("(rest - self.port) * last / first", "(rest - self.port) * first / last"),),
     ),
     (
         "bifocal/model/flags.py",

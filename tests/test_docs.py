@@ -66,7 +66,8 @@ def options_used():
         if page.name == "cli.md":
             continue
         text = page.read_text(encoding="utf-8").replace("\\\n", " ")
-        for line in re.findall(r"^[ \t]*(?:\$ )?((?:bifocal|multimedia) [a-z].*)$", text, re.M):
+        lines = re.findall(r"^[ \t]*(?:\$ )?((?:bifocal|multimedia) [a-z].*)$", text, re.M)
+        for line in (part.strip() for whole in lines for part in whole.split(" | ")):
             words = shlex.split(line, comments=True, posix=False)
             program, name = words[0], words[1]
             if name in GROUPS[program].summaries:

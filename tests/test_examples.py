@@ -33,6 +33,10 @@ PRINTED = {
         r"RMS error X, Y, Z (\S+), (\S+), (\S+) um\nexpected +(\S+), (\S+), (\S+) um",
         [(4, 7), (4, 7), (11, 20), (4, 7), (4, 7), (11, 20)],
     ),
+    "pair_through_water": (
+        r"RMS error X, Y, r (\S+), (\S+), (\S+) mm\nexpected +(\S+), (\S+), (\S+) mm\n.* (\S+) mm",
+        [(0.5, 1.5), (0.3, 1.2), (2.0, 5.0), (0.5, 1.5), (0.3, 1.2), (2.0, 5.0), (150, 400)],
+    ),
     "pair_from_geometry": (r"points\.csv \((\d+) points\)", [(1866, 1866)]),
 }
 

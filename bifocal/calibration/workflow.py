@@ -18,7 +18,7 @@ from bifocal.model.lens import Lens
 from photocore.arrays import FloatArray
 from photocore.cli import Progress, no_progress
 from photocore.errors import InputError, located
-from photocore.output import all_or_none, check_all_writable, check_writable
+from photocore.output import all_or_none, check_all_writable, check_not_input, check_writable
 from photocore.tables import Column, read_table
 
 
@@ -31,6 +31,7 @@ def calibrate_from_boards(
     **options: Any,
 ) -> Calibration:
     """Calibrate from board photos and write the lens file; ``options`` are those of `calibrate`."""
+    check_not_input(out, *images)
     check_writable(out, overwrite=overwrite)
     _common_size(images)
     result = calibrate(
@@ -67,6 +68,7 @@ def calibrate_from_edges(
     result : PlumbLine
     remarks : tuple of str
     """
+    check_not_input(out, lines, *images)
     check_writable(out, overwrite=overwrite)
     size = _common_size(images)
     remarks: list[str] = []
@@ -96,6 +98,7 @@ def write_database_lens(
     image: Path, out: Path, *, overwrite: bool = False, **names: Any
 ) -> tuple[Lens, tuple[str, ...]]:
     """Write the lens file of the lens database for a photo; see `lens_from_database`."""
+    check_not_input(out, image)
     check_writable(out, overwrite=overwrite)
     known = lens_from_database(image, **names)
     known.lens.write(out, overwrite=overwrite)

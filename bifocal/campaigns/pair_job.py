@@ -33,6 +33,7 @@ from bifocal.survey.output import write_result
 from photocore.cli import Progress, no_progress, unforeseen_message
 from photocore.errors import InputError, PhotogrammetryError
 from photocore.provenance import FileHashes, recording
+from photocore.raster_places import cloud_optimised
 
 #: What may be wanted of a pair, in the order of work.
 PRODUCTS = ("relief", "points", "ortho", "drawing", "report")
@@ -71,6 +72,8 @@ class PairJob:
         Replace files that were changed after they were made.
     date : str
         That its files bear, wherever and whenever they are made; empty: the day they are made.
+    joint : Path or None
+        Folder with the pair files of all pairs adjusted in one frame; None: this pair's own.
     """
 
     name: str
@@ -82,6 +85,7 @@ class PairJob:
     products: tuple[str, ...] = MOST_PRODUCTS
     overwrite: bool = False
     date: str = ""
+    joint: Path | None = None
 
     @property
     def title(self) -> str:
@@ -90,8 +94,18 @@ class PairJob:
 
     @property
     def pair_path(self) -> Path:
+        """The pair file that relief and drawings are made with."""
+        return self.own_pair_path if self.joint is None else self.joint / self.own_pair_path.name
+
+    @property
+    def own_pair_path(self) -> Path:
         """The pair file that the first step makes."""
         return self.folder / "align" / f"{self.title}.pair.json"
+
+    @property
+    def drawing_path(self) -> Path:
+        """The orthophoto of the drawing."""
+        return self.folder / "drawing" / f"{self.title}.tif"
 
     @property
     def relief_path(self) -> Path:
@@ -208,7 +222,8 @@ def run_pair(job: PairJob, progress: Progress = no_progress) -> PairOutcome:
             if record is not None and is_current(job.folder / step.name, record, key, hashes):
                 kept.append(step.name)
             else:
-                with recording(step.described(), day=job.date or None):
+                rasters = cloud_optimised(bool(job.options.get("cog")))
+                with recording(step.described(), day=job.date or None), rasters:
                     record = run_step(
                         job.folder, step, key, hashes, progress=part, overwrite=job.overwrite
                     )
@@ -255,7 +270,7 @@ def _align_step(job: PairJob) -> Step:
     options = _some(job, *names)
 
     def make(place: Path, progress: Progress) -> tuple[str, ...]:  # noqa: ARG001
-        out = place / job.pair_path.name
+        out = place / job.own_pair_path.name
         made = align_photos(
             job.far, job.near, out, AlignOptions.from_given({**options, **files}),
             picture=out.with_suffix("").with_suffix(".pair.png"),
@@ -275,11 +290,13 @@ ALIGN_OPTIONS = (
 
 
 def _photos(job: PairJob) -> dict[str, Path]:
-    return {"far": job.far, "near": job.near}
+    """Return what a step after the alignment looks at: the photos, the pair file of all pairs."""
+    joint = {} if job.joint is None else {"pair": job.pair_path}
+    return {"far": job.far, "near": job.near, **joint}
 
 
 def _relief_step(job: PairJob) -> Step:
-    options = _some(job, "quality", "bounds", "relief_gsd", "relief_range")
+    options = _some(job, "quality", "bounds", "relief_gsd", "relief_range", "cog")
 
     def make(place: Path, progress: Progress) -> tuple[str, ...]:
         out = place / job.relief_path.name
@@ -315,7 +332,10 @@ def _points_step(job: PairJob) -> Step:
         write_result(place / f"{job.title}_points.xlsx", solution)
         return solution.remarks
 
-    return Step(name="points", files=_tables(job), after=("align",), options=options, make=make)
+    joint = {} if job.joint is None else {"pair": job.pair_path}
+    return Step(
+        name="points", files={**_tables(job), **joint}, after=("align",), options=options, make=make
+    )
 
 
 def _ortho_task(job: PairJob, options: Mapping[str, Any]) -> OrthoTask:
@@ -326,7 +346,7 @@ def _ortho_task(job: PairJob, options: Mapping[str, Any]) -> OrthoTask:
 
 
 def _ortho_step(job: PairJob) -> Step:
-    options = _some(job, "image", "gsd", "bounds", "fill")
+    options = _some(job, "image", "gsd", "bounds", "fill", "cog")
 
     def make(place: Path, progress: Progress) -> tuple[str, ...]:
         out = place / f"{job.title}_ortho.tif"
@@ -339,7 +359,8 @@ def _ortho_step(job: PairJob) -> Step:
 
 
 def _drawing_step(job: PairJob) -> Step:
-    options = _some(job, "scale", "dpi", "paper", "image", "bounds", "fill", "sections", "contours")
+    names = ("scale", "dpi", "paper", "image", "bounds", "fill", "sections", "contours", "cog")
+    options = _some(job, *names)
     control = {k: v for k, v in _tables(job).items() if k == "control"}
 
     def make(place: Path, progress: Progress) -> tuple[str, ...]:

@@ -81,6 +81,7 @@ OPTIONS: Mapping[str, Callable[[Any], Any]] = {
     "relief_gsd": _number,
     "gsd": _number,
     "fill": _truth,
+    "cog": _truth,
     "sections": _words,
     "contours": _number,
     "auto": _truth,
@@ -97,6 +98,15 @@ OPTIONS: Mapping[str, Callable[[Any], Any]] = {
     ),
     _number,
 )  # fmt: skip
+
+
+#: What is made of all pairs together, each in a folder of its own: keys above the pairs.
+WHOLE = ("joint", "mosaic")
+
+
+def wants_mosaic(path: Path) -> bool:
+    """Return whether a survey file asks for the mosaic of all its pairs."""
+    return _parsed(path).get("mosaic") is True
 
 
 def read_survey_file(
@@ -126,6 +136,12 @@ def read_survey_file(
         data.pop(key, None)
     folder = out or path.parent / str(data.pop("out", "results"))
     data.pop("out", None)
+    whole = {key: data.pop(key, False) for key in WHOLE}
+    faults += [
+        f"above the pairs: {key} = {value!r}: expected true or false."
+        for key, value in whole.items()
+        if not isinstance(value, bool)
+    ]
     if not isinstance(pairs, list) or not pairs:
         raise InputError(f"{path}: has no [[pair]]; add one with name, far and near.")
     common = _entries(data, path.parent, "above the pairs", faults)
@@ -137,8 +153,14 @@ def read_survey_file(
             continue
         job = _job(entry, number, common, (path.parent, folder), where, faults)
         if job is not None:
-            jobs.append(replace(job, overwrite=overwrite))
+            joint = folder / "joint" if whole["joint"] else None
+            jobs.append(replace(job, overwrite=overwrite, joint=joint))
     folders = [job.folder.name.casefold() for job in jobs]
+    faults += [
+        f"pair {job.name}: joint and mosaic are folders of the whole survey; give it another name."
+        for job in jobs
+        if job.folder.name.casefold() in WHOLE
+    ]
     for job in jobs:
         if folders.count(job.folder.name.casefold()) > 1:
             faults.append(f"pair {job.name}: another pair has the same name; give each its own.")

@@ -13,13 +13,14 @@ from typing import Any
 
 from bifocal.campaigns.pair_job import FILES, MOST_PRODUCTS, PRODUCTS, PairJob, PairOutcome, plan_of
 from bifocal.campaigns.photo_pairing import pair_photos, write_survey_file
-from bifocal.campaigns.step_store import clean
+from bifocal.campaigns.step_store import Step, clean
+from bifocal.campaigns.whole_wall import JOINT, MOSAIC, joint_step, mosaic_step, run_whole
 from bifocal.campaigns.worker_pool import Listener, run_here
 from photocore.cli import Progress, no_progress
 from photocore.errors import InputError
 from photocore.interrupts import raising
 from photocore.output import check_writable
-from photocore.provenance import FileHashes, today
+from photocore.provenance import FileHashes, recording, today
 
 #: File that says which process works in a folder.
 LOCK = ".survey.lock"
@@ -53,29 +54,39 @@ class SurveyResult:
     outcomes : tuple of PairOutcome
         In the order of the survey.
     seconds : float
+    together : tuple of PairOutcome
+        Of what is made of all pairs: ``joint``, ``mosaic``, where asked for.
     """
 
     outcomes: tuple[PairOutcome, ...]
     seconds: float
+    together: tuple[PairOutcome, ...] = ()
 
     @property
     def failed(self) -> tuple[PairOutcome, ...]:
         """Pairs that did not come to their end."""
-        return tuple(outcome for outcome in self.outcomes if outcome.failed_step)
+        everything = (*self.outcomes, *self.together)
+        return tuple(outcome for outcome in everything if outcome.failed_step)
 
     def to_dict(self) -> dict[str, Any]:
         """Return it as plain data."""
         pairs = [outcome.to_dict() for outcome in self.outcomes]
-        return {"pairs": pairs, "failed": len(self.failed), "seconds": self.seconds}
+        whole = {outcome.name: outcome.to_dict() for outcome in self.together}
+        return {"pairs": pairs, **whole, "failed": len(self.failed), "seconds": self.seconds}
 
     def lines(self) -> list[str]:
         """Return what was made, and what failed and how to mend it, for people."""
         made = sum(bool(outcome.done) and not outcome.failed_step for outcome in self.outcomes)
-        kept = len(self.outcomes) - made - len(self.failed)
+        failed = sum(bool(outcome.failed_step) for outcome in self.outcomes)
+        kept = len(self.outcomes) - made - failed
         lines = [
             f"{len(self.outcomes)} pairs: {made} made, {kept} kept as they were, "
-            f"{len(self.failed)} failed; {_duration(self.seconds)}."
+            f"{failed} failed; {_duration(self.seconds)}."
         ]
+        for outcome in self.together:
+            if not outcome.failed_step:
+                lines.append(f"{outcome.name}: {'kept' if outcome.kept else 'made'}")
+                lines += [f"  {text}" for text in outcome.remarks]
         for outcome in self.failed:
             lines += ["", f"{outcome.name}, failed at {outcome.failed_step}:"]
             lines.append(f"  {outcome.message}")
@@ -125,13 +136,15 @@ def run_survey(
     jobs: Sequence[PairJob],
     *,
     machines: Machines = Machines(),
+    mosaic: bool = False,
     progress: Progress = no_progress,
     tell: Callable[[str], None] | None = None,
 ) -> SurveyResult:
     """Make the products of every pair; what is there already and still good is kept.
 
     One pair's failure stops no other; stopped at any moment, it goes on from there when called
-    again. ``tell`` is given a line for every pair that ends.
+    again. ``tell`` is given a line for every pair that ends. Where the jobs ask for one frame,
+    all pairs are aligned first and adjusted together; ``mosaic`` joins their drawings at the end.
 
     Raises
     ------
@@ -139,22 +152,81 @@ def run_survey(
         If another process works on the same folders, or the cluster cannot be used.
     """
     start = time.perf_counter()
-    listener = _Count(jobs, progress, tell)
     jobs = [replace(job, date=job.date or today()) for job in jobs]
+    together: list[PairOutcome] = []
+    outcomes: dict[str, PairOutcome] = {}
     with raising(), _locked([job.folder for job in jobs]):
         for job in jobs:
             clean(job.folder)
-        waiting = [job for job in jobs if not _kept(job, listener)]
-        try:
-            for _ in _running(waiting, machines, listener):
-                pass
-        finally:
-            for job in waiting:
-                clean(job.folder)
-    outcomes = {outcome.name: outcome for outcome in listener.outcomes}
+        ready = list(jobs)
+        if any(job.joint is not None for job in jobs):
+            outcomes = _aligned(jobs, machines, progress)
+            ready = [job for job in jobs if not outcomes[job.name].failed_step]
+            together.append(_one_frame(ready, progress, tell))
+            if together[-1].failed_step:
+                ready = []
+        outcomes |= _made(ready, machines, _Count(ready, progress, tell))
+        if mosaic:
+            drawn = [job for job in ready if not outcomes[job.name].failed_step]
+            together.append(_mosaic(drawn, jobs[0], progress, tell))
     return SurveyResult(
-        outcomes=tuple(outcomes[job.name] for job in jobs), seconds=time.perf_counter() - start
-    )
+        outcomes=tuple(outcomes[job.name] for job in jobs), together=tuple(together),
+        seconds=time.perf_counter() - start,
+    )  # fmt: skip
+
+
+def _made(jobs: Sequence[PairJob], machines: Machines, listener: _Count) -> dict[str, PairOutcome]:
+    """Return what became of each pair."""
+    waiting = [job for job in jobs if not _kept(job, listener)]
+    try:
+        for _ in _running(waiting, machines, listener):
+            pass
+    finally:
+        for job in waiting:
+            clean(job.folder)
+    return {outcome.name: outcome for outcome in listener.outcomes}
+
+
+def _aligned(
+    jobs: Sequence[PairJob], machines: Machines, progress: Progress
+) -> dict[str, PairOutcome]:
+    """Set every pair up by itself, nothing else."""
+    alone = [replace(job, products=(), joint=None) for job in jobs]
+    return _made(alone, machines, _Count(alone, progress, None))
+
+
+def _one_frame(
+    jobs: Sequence[PairJob], progress: Progress, tell: Callable[[str], None] | None
+) -> PairOutcome:
+    """Adjust the pairs that are set up in one frame."""
+    if len(jobs) < 2:
+        return PairOutcome(
+            name=JOINT, failed_step=JOINT,
+            message="fewer than two pairs could be set up: there is nothing to adjust together.",
+        )  # fmt: skip
+    return _whole(joint_step(jobs), jobs[0], progress, tell)
+
+
+def _mosaic(
+    jobs: Sequence[PairJob], first: PairJob, progress: Progress,
+    tell: Callable[[str], None] | None,
+) -> PairOutcome:  # fmt: skip
+    try:
+        step = mosaic_step(jobs)
+    except InputError as error:
+        return PairOutcome(name=MOSAIC, failed_step=MOSAIC, message=str(error))
+    return _whole(step, first, progress, tell)
+
+
+def _whole(
+    step: Step, job: PairJob, progress: Progress, tell: Callable[[str], None] | None
+) -> PairOutcome:
+    with recording(step.name, day=job.date):
+        outcome = run_whole(job.folder.parent, step, overwrite=job.overwrite, progress=progress)
+    if tell is not None and not outcome.kept:
+        what = f"FAILED: {outcome.message}" if outcome.failed_step else "made"
+        tell(f"{step.name}: {what}; {_duration(outcome.seconds)}")
+    return outcome
 
 
 def _running(

@@ -60,6 +60,7 @@ Examples:
     help="Of relief, points, ortho, drawing, report.  [default: all but ortho, which the drawing "
     "has]",
 )  # fmt: skip
+@click.option("--cog", is_flag=True, help="Write rasters as cloud-optimised GeoTIFF.")
 @overwrite
 @as_json
 def command(

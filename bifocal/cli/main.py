@@ -19,6 +19,7 @@ SUMMARIES: dict[str, str] = {
     "solve": "Relief, coordinates and precision of measured points.",
     "relief": "Dense relief map of the wall.",
     "ortho": "Orthophoto to scale, and everything a drawing needs.",
+    "adjust": "All pairs of one facade in one frame, by one adjustment.",
     "mosaic": "One orthophoto from several.",
     "facade": "Two photos and control points in, drawings and report out, in one line.",
     "survey": "The same for many pairs: resumable, in parallel, here or on a cluster.",

@@ -8,7 +8,7 @@ from typing import Any
 import click
 
 from photocore.cli import print_result, progress_bar
-from photocore.options import FILE, Length, as_json, bounds, overwrite, switch
+from photocore.options import FILE, Length, as_json, bounds, cog, overwrite, switch
 
 EXAMPLE = """\b
 Examples:
@@ -35,6 +35,7 @@ The last band of the result says which input every pixel comes from: 1, 2, ... i
 @switch("gain", "Make the exposure equal to the first file's.")
 @switch("blend", "Blend over the seams; relief maps are never mixed.")
 @switch("overviews", "Reduced copies in the file, for fast display.")
+@cog
 @overwrite
 @as_json
 def command(rasters: tuple[Path, ...], out: Path, as_json: bool, **options: Any) -> None:

@@ -16,6 +16,7 @@ from photocore.options import (
     as_json,
     bounds,
     choice,
+    cog,
     number,
     overwrite,
     switch,
@@ -112,6 +113,7 @@ Examples:
 )  # fmt: skip
 @click.option("--tfw", is_flag=True, help="Also write the world file beside it.")
 @click.option("--any-size", is_flag=True, help="Do not ask back about an unusual size.")
+@cog
 @overwrite
 @as_json
 def command(

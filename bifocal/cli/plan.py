@@ -9,7 +9,18 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from photocore.cli import print_result, remark, text_table
-from photocore.options import FILE, POSITIVE, THOUSANDTHS, Scale, Size, as_json, number, overwrite
+from photocore.options import (
+    FILE,
+    NOT_NEGATIVE,
+    POSITIVE,
+    THOUSANDTHS,
+    Numbers,
+    Scale,
+    Size,
+    as_json,
+    number,
+    overwrite,
+)
 
 if TYPE_CHECKING:
     from bifocal.planning.camera_plan import Plan
@@ -19,6 +30,8 @@ Examples:
   bifocal plan --focal 35 --focal 28 --focal 19 --sensor 22.7x15.1 --pixels 3072x2048 --scale 1:500
   bifocal plan --focal 35 --focal 18 --sensor 23.5x15.6 --pixels 6000x4000 --object 12x8
                --free-space 20 --out plan.xlsx
+  bifocal plan --focal 35 --focal 19 --sensor 22.7x15.1 --pixels 3072x2048 --scale 1:100
+               --indices 1,1.49,1.337 --thicknesses 0.01 --depth 0.9
   bifocal plan --equivalent 77 --equivalent 24 --pixels 4000x3000 --object 6x4
 """
 
@@ -51,12 +64,27 @@ Examples:
     "[default: 3 x that of the best pair]", type=THOUSANDTHS,
 )  # fmt: skip
 @number("--free-space", "M", "Room in front of the wall [m].")
+@click.option(
+    "--indices", type=Numbers(), metavar="N,N,...",
+    help="Refractive indices from the camera to the object, where the photos look through media.",
+)  # fmt: skip
+@click.option(
+    "--thicknesses", type=Numbers(), metavar="T,...",
+    help="Thicknesses of the media between the first and the last [m].",
+)  # fmt: skip
+@number(
+    "--port", "M", "Camera centre to the first interface, where that moves with the camera [m].",
+    type=NOT_NEGATIVE,
+)  # fmt: skip
+@number("--depth", "M", "Object behind the glass or surface that stays with it [m].")
 @click.option("--out", type=FILE, help="Also write the plan as .xlsx.")
 @overwrite
 @as_json
 def command(
     focal_lengths: tuple[float, ...], equivalents: tuple[float, ...],
     sensor: tuple[float, float] | None, pixels: tuple[int, int],
+    indices: tuple[float, ...] | None, thicknesses: tuple[float, ...] | None,
+    port: float | None, depth: float | None,
     out: Path | None, as_json: bool, **wishes: Any,
 ) -> None:  # fmt: skip
     """Compare pairs of lenses: where to stand, what a photo covers, how precise it gets.
@@ -65,7 +93,7 @@ def command(
     the wall, or a sigma of the relief.
     """
     from bifocal.planning.camera_plan import CameraSensor
-    from bifocal.planning.workflow import make_plan, plan_as_dict
+    from bifocal.planning.workflow import make_plan, plan_as_dict, planned_media
 
     if equivalents and (focal_lengths or sensor):
         raise click.UsageError("Give --equivalent, or --focal with --sensor, not both.")
@@ -75,6 +103,10 @@ def command(
         raise click.UsageError("Give --focal with --sensor, or --equivalent for a phone.")
     else:
         camera = CameraSensor(width=sensor[0], height=sensor[1], columns=pixels[0], rows=pixels[1])
+    if indices is None and (thicknesses or port is not None or depth is not None):
+        raise click.UsageError("--thicknesses, --port and --depth go with --indices.")
+    if indices is not None:
+        wishes["media"] = planned_media(indices, thicknesses or (), port=port, depth=depth)
     plan = make_plan(equivalents or focal_lengths, camera, out=out, **wishes)
     print_result(plan_as_dict(plan), _lines(plan), as_json=as_json)
     if out is not None:
@@ -100,6 +132,11 @@ def _lines(plan: Plan) -> Iterator[str]:
     )  # fmt: skip
     yield text_table(headings, rows)
     for station in plan.stations:
+        if station.z0_1 is not None:
+            yield (
+                f"{station.c1:g}/{station.c2:g} mm: first interface {station.z0_1:.3f} and "
+                f"{station.z0_2:.3f} m before the cameras."
+            )
         if station.note:
             yield f"{station.c1:g}/{station.c2:g} mm: {station.note}"
     yield plan.basis

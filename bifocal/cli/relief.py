@@ -9,7 +9,7 @@ from typing import Any
 import click
 
 from photocore.cli import print_result, progress_bar
-from photocore.options import FILE, Numbers, as_json, bounds, choice, number, overwrite
+from photocore.options import FILE, Numbers, as_json, bounds, choice, cog, number, overwrite
 
 EXAMPLE = """\b
 Examples:
@@ -43,6 +43,7 @@ photos, 2 interpolated, 3 hidden from a camera, 0 unknown).
 )  # fmt: skip
 @click.option("--preview", type=FILE, help="Also a shaded picture (.png).")
 @click.option("--cloud", type=FILE, help="Also a coloured point cloud (.ply, .las, .laz).")
+@cog
 @overwrite
 @as_json
 def command(pair_file: Path, as_json: bool, **wishes: Any) -> None:

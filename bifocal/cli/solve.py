@@ -91,15 +91,28 @@ def command(
     Or give two lists of picks, of photo 1 and of photo 2 (.csv, .xlsx, .dxf), joined by the names
     of the points, with --pair: a pair file, or a survey workbook for its set-up.
     """
-    from bifocal.survey.output import length_unit, point_rows, solution_json, summary, write_result
+    from bifocal.survey.output import (
+        check_target,
+        length_unit,
+        point_rows,
+        solution_json,
+        summary,
+        write_result,
+    )
     from bifocal.survey.workflow import solve
+    from photocore.output import check_not_input
     from photocore.workbook.newbook import check_new_workbook
 
     if out is not None:
-        check_new_workbook(out, overwrite=overwrite, source=survey[0])
+        if out.suffix.lower() == ".csv":
+            check_not_input(out, *survey)
+        if not (out.exists() and survey[0].exists() and out.samefile(survey[0])):
+            check_new_workbook(out, overwrite=overwrite)
     if len(survey) > 2:
         raise click.UsageError("Give one survey, or two lists of picks: photo 1 and photo 2.")
     solution = solve(survey[0] if len(survey) == 1 else (survey[0], survey[1]), **options)
+    if out is not None:
+        check_target(out, solution, overwrite=overwrite)
     for text in solution.remarks:
         remark(text)
     if out is not None:

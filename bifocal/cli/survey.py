@@ -46,7 +46,7 @@ def command(
     what changed is made anew; stopped or killed at any moment, it goes on where it was. A pair
     that fails stops no other; a table at the end says what failed and how to mend it.
     """
-    from bifocal.campaigns.survey_file import read_survey_file
+    from bifocal.campaigns.survey_file import read_survey_file, wants_mosaic
     from bifocal.campaigns.workflow import Machines, begin_survey, plan_survey, run_survey
 
     if folder is not None:
@@ -70,7 +70,9 @@ def command(
         return
     machines = Machines(jobs=jobs, memory=memory, scheduler=scheduler)
     with progress_bar("survey", quiet=as_json) as progress:
-        result = run_survey(pairs, machines=machines, progress=progress, tell=remark)
+        result = run_survey(
+            pairs, machines=machines, mosaic=wants_mosaic(survey), progress=progress, tell=remark
+        )
     print_result(result.to_dict(), result.lines(), as_json=as_json)
     if result.failed:
         ctx.exit(1)

@@ -76,7 +76,8 @@ def _length_unit(session: Session) -> str:
 
 
 def _photos(session: Session) -> list[dict[str, Any]]:
-    shown, language = [], session.state.language or session.language
+    shown: list[dict[str, Any]] = []
+    language = session.state.language or session.language
     for number, info in enumerate(session.pictures.infos, start=1):
         typed = session.state.lenses.get(number, {})
         shown.append(
@@ -91,7 +92,25 @@ def _photos(session: Session) -> list[dict[str, Any]]:
                 "missing": _missing(info, typed, language),
             }
         )
+    if session.files.pair is None and len(shown) == 2 and _exchanged(session, shown):
+        question = say("ask", "exchange", language, name=shown[0]["name"])
+        shown[0]["missing"] = [*shown[0]["missing"], question]
     return shown
+
+
+def _exchanged(session: Session, shown: list[dict[str, Any]]) -> bool:
+    """Whether lenses or distances say that the far photo is the near one."""
+    sensors = [photo["sensor_width_mm"] for photo in shown]
+    scales = sensors if all(sensors) else [1.0, 1.0]
+    lenses = [
+        None if photo["focal_mm"] is None else photo["focal_mm"] / scale
+        for photo, scale in zip(shown, scales, strict=True)
+    ]
+    distances = [session.state.setup.get(key) for key in ("d1", "d2")]
+    return any(
+        first is not None and second is not None and first < second
+        for first, second in (lenses, distances)
+    )
 
 
 def _missing(info: ImageInfo, typed: Mapping[str, float | None], language: str) -> list[str]:

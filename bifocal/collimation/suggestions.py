@@ -193,7 +193,7 @@ def suggest(
     )
 
 
-class _Match(NamedTuple):
+class _LineMatch(NamedTuple):
     """A place on the line after least squares."""
 
     pixel: FloatArray
@@ -239,7 +239,7 @@ class _Search:
         corner1, corner2 = self.corners
         return _correlation(self.smooth, self.pixel - corner1, self.there - corner2, self.local)
 
-    def match(self, index: int) -> _Match:
+    def match(self, index: int) -> _LineMatch:
         """Return the place of an index, moved to where it fits best."""
         row, (corner1, corner2) = slice(index, index + 1), self.corners
         along = _directions(self.pair, self.image, self.pixel[None], self.reliefs[row])
@@ -250,7 +250,7 @@ class _Search:
         fits = bool(result.converged[0]) and abs(misfit) < 2.0 and sigma < 0.5
         # As `bifocal match` does: the misfit stays in the point, for the survey to judge.
         pixel = result.pixels2[0] + corner2 + (across * misfit if fits else 0.0)
-        return _Match(pixel, float(result.zncc[0]), sigma, misfit, fits)
+        return _LineMatch(pixel, float(result.zncc[0]), sigma, misfit, fits)
 
 
 def _others(search: _Search, curves: list[FloatArray], pixel: FloatArray) -> tuple[FloatArray, ...]:

@@ -19,7 +19,14 @@ from bifocal.model.relief_map import Quality, ReliefMap
 from photocore.arrays import Float32Array
 from photocore.errors import InputError
 from photocore.output import all_or_none, atomic_path, check_all_writable
-from photocore.raster import BLOCK, RasterFile, RasterWriter, corner_transform, create_geotiff
+from photocore.raster import (
+    BLOCK,
+    RasterFile,
+    RasterWriter,
+    corner_transform,
+    create_geotiff,
+)
+from photocore.raster_places import is_virtual
 
 #: Name of the local system every raster is in.
 LOCAL_CRS = (
@@ -114,7 +121,8 @@ def create_raster(
     path = Path(path)
     world = path.with_suffix(".tfw")
     check_all_writable(path, world if world_file else None, overwrite=overwrite)
-    _check_space(path, grid, bands * np.dtype(dtype).itemsize)
+    if not is_virtual(path):
+        _check_space(path, grid, bands * np.dtype(dtype).itemsize)
     known = dict(tags or {})
     if dpi is not None:
         known |= {f"TIFFTAG_{axis}RESOLUTION": f"{dpi:.10g}" for axis in "XY"}

@@ -27,7 +27,8 @@ def rests_on(pair: Pair, *, setup: str, picks: str, more: str = "") -> str:
     'Sigmas rest on: picks of 0.5 px assumed; distances as typed, of which 1 % of scale is 0.21 m \
 of relief and in no sigma.'
     """
-    slip = float(false_relief_of_scale(0.01, d1=pair.d1, d2=pair.d2))
+    d1, d2 = pair.straight_distances
+    slip = float(false_relief_of_scale(0.01, d1=d1, d2=d2))
     share = f"of which 1 % of scale is {slip:.2f} m of relief and in no sigma"
     if pair.orientation is not None:
         share = "with the covariance of its orientation"

@@ -256,8 +256,9 @@ class Pair:
         """
         if self.layers is not None:
             raise InputError(
-                f"{what} is not made for pairs seen through other media (`layers`): its result "
-                "would be wrong by what refraction does. `intersect` and `project` know them."
+                f"{what} is not made for pairs seen through other media (`layers`): it would be "
+                "wrong by what refraction does. `solve` (to .csv), `match`, `relief` and `ortho` "
+                "know them."
             )
 
     def refuse_leaning_media(self, what: str) -> None:

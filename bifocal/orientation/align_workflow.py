@@ -21,7 +21,13 @@ from bifocal.orientation.interior_orientation import Interior, lens_of_photo
 from bifocal.orientation.orientation_stages import PhotoInput
 from photocore.arrays import FloatArray
 from photocore.errors import InputError
-from photocore.output import all_or_none, check_all_writable, check_ending, relative_name
+from photocore.output import (
+    all_or_none,
+    check_all_writable,
+    check_ending,
+    check_not_input,
+    relative_name,
+)
 
 #: A wall point given without r lies on the plane to this. [m]
 SIGMA_ON_WALL = 0.005
@@ -141,6 +147,7 @@ def align_photos(
     check_ending(picture, "a picture is written as .png, .jpg or .tif.", *WRITTEN)
     way, options = _way(options)
     _check_metres(options)
+    check_not_input(picture, far, near)
     check_all_writable(out, picture, overwrite=overwrite)
     infos = image_info(far), image_info(near)
     first, second = (

@@ -26,7 +26,7 @@ from bifocal.orthophotos.tiles import RasterResult, write_tiles
 from photocore.arrays import Float32Array, IntArray
 from photocore.cli import Progress, no_progress
 from photocore.errors import InputError
-from photocore.output import check_writable
+from photocore.output import check_not_input, check_writable
 
 #: A relief map that differs from its neighbour by more is pointed out. [m]
 _RELIEF_STEP = 0.005
@@ -98,9 +98,8 @@ def make_mosaic(
         If inputs are missing, differ in kind, show different things on their overlap, or the
         output cannot be written.
     """
+    check_not_input(out, *inputs)
     check_writable(out, overwrite=overwrite)
-    if out.exists() and any(path.exists() and path.samefile(out) for path in inputs):
-        raise InputError(f"{out}: is one of the inputs; name another file for --out.")
     if len(inputs) < 2:
         raise InputError("a mosaic needs two rasters or more.")
     if len(inputs) > _MOST_INPUTS:

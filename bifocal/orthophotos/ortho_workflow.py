@@ -31,7 +31,7 @@ from bifocal.orthophotos.triangles import TriangleSurface
 from photocore.arrays import ByteArray
 from photocore.cli import Progress, no_progress
 from photocore.errors import InputError, located
-from photocore.output import check_ending, check_writable
+from photocore.output import check_ending, check_not_input, check_writable
 
 #: What an orthophoto must be named.
 ORTHO_ENDING = "an orthophoto is written as GeoTIFF; name it .tif."
@@ -113,8 +113,9 @@ def make_ortho(
     InputError
         If an input is missing or does not fit, the size is not plausible, or writing fails.
     """
-    check_writable(out, overwrite=overwrite)
     check_ending(out, ORTHO_ENDING, ".tif", ".tiff")
+    check_not_input(out, task.relief)
+    check_writable(out, overwrite=overwrite)
     pair = Pair.of(pair_path)
     pair.refuse_leaning_media("an orthophoto")
     with open_surface(task, pair) as (surface, _, remarks):

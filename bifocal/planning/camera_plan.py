@@ -8,6 +8,7 @@ import numpy as np
 
 from bifocal.model.basis import rests_on
 from bifocal.model.pair import Pair
+from bifocal.planning.planned_media import PlannedMedia, sigma_at
 from bifocal.precision import sigma_relief
 from photocore.arrays import FloatArray, positive
 from photocore.errors import InputError
@@ -90,6 +91,10 @@ class Station:
         Whether both stations fit into the free space.
     note : str
         Why not, or what to mind.
+    z0_1, z0_2 : float or None
+        Camera centres to the first interface; None in air. [m]
+    straight : tuple of float
+        Distances of straight cameras that see alike near the axis; in air d1, d2. [m]
     """
 
     c1: float
@@ -108,6 +113,9 @@ class Station:
     uncertain_share: float
     feasible: bool
     note: str
+    z0_1: float | None = None
+    z0_2: float | None = None
+    straight: tuple[float, float] = (0.0, 0.0)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -123,12 +131,15 @@ class Plan:
         Picking precision the figures rest on. [px]
     sigma_r_max : float
         Bound of the area of uncertainty. [m]
+    media : PlannedMedia or None
+        What the photos look through.
     """
 
     sensor: CameraSensor
     stations: tuple[Station, ...]
     sigma_px: float
     sigma_r_max: float
+    media: PlannedMedia | None = None
 
     @property
     def best(self) -> Station:
@@ -138,7 +149,7 @@ class Plan:
     @property
     def basis(self) -> str:
         """What the sigmas rest on, in one line."""
-        pair = Pair.ideal(d1=self.best.d1, d2=self.best.d2)
+        pair = Pair.ideal(d1=self.best.straight[0], d2=self.best.straight[1])
         return rests_on(
             pair, setup="stations and focal lengths exactly as planned",
             picks=f"picks of {self.sigma_px:g} px assumed in both photos",
@@ -161,6 +172,10 @@ class Plan:
         x = np.linspace(-half_w, half_w, columns)
         y = np.linspace(half_h, -half_h, rows)
         radius = np.hypot(*np.meshgrid(x, y))
+        if self.media is not None:
+            d, c = (station.d1, station.d2), (station.c1, station.c2)
+            pair = self.media.pair(d, c, pitch=self.sensor.pitch, sigma_px=self.sigma_px)
+            return x, y, sigma_at(pair, np.where(radius < 1e-9, 0.0, radius))
         sigma = self.sigma_px * station.gsd
         grid = sigma_relief(
             radius, radius, d1=station.d1, d2=station.d2, sigma_1=sigma, sigma_2=sigma

@@ -7,7 +7,11 @@ from dataclasses import replace
 from itertools import combinations
 from math import ceil, hypot, sqrt
 
+import numpy as np
+
+from bifocal.model.pair import Pair
 from bifocal.planning.camera_plan import CameraSensor, Plan, Station
+from bifocal.planning.planned_media import PlannedMedia, sigma_at
 from bifocal.precision import base_factor, sigma_relief, uncertainty_radius
 from photocore.arrays import positive
 from photocore.errors import GeometryError, InputError
@@ -31,6 +35,7 @@ def plan_stations(
     sigma_px: float = 0.5,
     sigma_r_max: float | None = None,
     free_space: float | None = None,
+    media: PlannedMedia | None = None,
 ) -> Plan:
     """Return stations, scale and precision for every pair of the given lenses.
 
@@ -54,6 +59,8 @@ def plan_stations(
         best pair. [m]
     free_space : float, optional
         Room in front of the wall. [m]
+    media : PlannedMedia, optional
+        What both photos look through; scales are then those near the axis.
 
     Returns
     -------
@@ -91,6 +98,8 @@ def plan_stations(
         raise InputError(f"give only one of {' and '.join(given)}: each of them sets the scale.")
     if not given and object_size is None:
         raise InputError("give the size of the wall, a photo scale, a GSD or a wanted sigma of r.")
+    if media is not None and sigma_r is not None:
+        raise InputError("through media give a scale, a GSD or the size of the wall, not a sigma.")
     for name, value in (*wishes.items(), ("free_space", free_space)):
         if value is not None:
             positive(value, name)
@@ -113,7 +122,7 @@ def plan_stations(
     if not pairs:
         raise InputError("the focal lengths differ by less than 5 %: too little to see relief.")
     drafts = [
-        _station(c1, c2, scale_of(c1, c2), sensor, object_size, sigma_px, free_space)
+        _station(c1, c2, scale_of(c1, c2), sensor, object_size, sigma_px, free_space, media)
         for c1, c2 in pairs
     ]
     nearest = min(station.d2 for station in drafts)
@@ -129,22 +138,39 @@ def plan_stations(
     drafts.sort(key=lambda s: (not s.feasible, float(f"{s.sigma_r_rms:.9g}"), -s.gsd, s.d1))
     limit = sigma_r_max or 3 * drafts[0].sigma_r_rms
     stations = tuple(_with_uncertainty(s, sigma_px, limit) for s in drafts)
-    return Plan(sensor=sensor, stations=stations, sigma_px=sigma_px, sigma_r_max=limit)
+    return Plan(sensor=sensor, stations=stations, sigma_px=sigma_px, sigma_r_max=limit, media=media)
 
 
 def _station(
     c1: float, c2: float, scale_number: float, sensor: CameraSensor,
     object_size: tuple[float, float] | None, sigma_px: float, free_space: float | None,
+    media: PlannedMedia | None,
 ) -> Station:  # fmt: skip
     """Return the stations of one pair of lenses, the uncertainty still open."""
-    d1, d2 = scale_number * c1 / 1000, scale_number * c2 / 1000
+    d1, d2 = straight = (scale_number * c1 / 1000, scale_number * c2 / 1000)
     gsd = sensor.pitch * scale_number / 1000
     footprint = (sensor.columns * gsd, sensor.rows * gsd)
+    z0: tuple[float | None, float | None] = (None, None)
+    pair = None
+    if media is not None:
+        (d1, far), (d2, near) = (
+            media.placed(d, c) for d, c in zip((d1, d2), (c1, c2), strict=True)
+        )
+        z0 = (far, near)
+        pair = media.pair((d1, d2), (c1, c2), pitch=sensor.pitch, sigma_px=sigma_px)
+        straight = pair.straight_distances
+        footprint = _seen_by_both(pair, sensor)
     half_diagonal = hypot(*footprint) / 2
     # Mean square radius of a rectangle about its centre is diagonal² / 12.
     rms = hypot(*footprint) / sqrt(12)
     sigma = sigma_px * gsd
     in_both = {"d1": d1, "d2": d2, "sigma_1": sigma, "sigma_2": sigma}
+
+    def sigma_of(radius: float) -> float:
+        if pair is not None:
+            return float(sigma_at(pair, np.array([radius]))[0])
+        return float(sigma_relief(radius, radius, **in_both))
+
     feasible = free_space is None or d1 <= free_space
     note = ""
     if not feasible:
@@ -157,11 +183,21 @@ def _station(
     return Station(
         c1=c1, c2=c2, d1=d1, d2=d2, delta_d=d1 - d2, scale_number=scale_number, gsd=gsd,
         footprint=footprint, photos=_photos(object_size, footprint),
-        sigma_r_rms=float(sigma_relief(rms, rms, **in_both)),
-        sigma_r_corner=float(sigma_relief(half_diagonal, half_diagonal, **in_both)),
-        sigma_ortho=sqrt(2) * sigma * base_factor(d1=d1, d2=d2) / d1,  # e1 = s1 r / d1, Eq. (1)
+        sigma_r_rms=sigma_of(rms),
+        sigma_r_corner=sigma_of(half_diagonal),
+        # e1 = s1 r / d1, Eq. (1)
+        sigma_ortho=sqrt(2) * sigma * base_factor(d1=straight[0], d2=straight[1]) / straight[0],
         uncertain_radius=0.0, uncertain_share=0.0, feasible=feasible, note=note,
+        z0_1=z0[0], z0_2=z0[1], straight=straight,
     )  # fmt: skip
+
+
+def _seen_by_both(pair: Pair, sensor: CameraSensor) -> tuple[float, float]:
+    """Return width and height of the wall in the middle of both photos through media. [m]"""
+    rim = np.array([[sensor.columns / 2, 0.0], [0.0, sensor.rows / 2]])
+    reach = [np.abs(photo.plane_from_pixels(rim)) for photo in (pair.image1, pair.image2)]
+    width, height = np.minimum(*reach)[[0, 1], [0, 1]]
+    return 2 * float(width), 2 * float(height)
 
 
 def _photos(
@@ -182,7 +218,10 @@ def _with_uncertainty(station: Station, sigma_px: float, limit: float) -> Statio
     """Return the station with the area of uncertainty for the given sigma of r."""
     radius = float(
         uncertainty_radius(
-            limit, d1=station.d1, d2=station.d2, sigma_m=sqrt(2) * sigma_px * station.gsd
+            limit,
+            d1=station.straight[0],
+            d2=station.straight[1],
+            sigma_m=sqrt(2) * sigma_px * station.gsd,
         )
     )
     half_diagonal = hypot(*station.footprint) / 2

@@ -13,7 +13,7 @@ from bifocal.model.grid import Bounds, Grid, bounds_of
 from bifocal.model.pair import Pair
 from bifocal.model.relief_map import Quality, ReliefMap
 from bifocal.rays import object_rays, plane_position
-from bifocal.relief_maps import flow, forward_projection, seed
+from bifocal.relief_maps import coarse_level, flow, forward_projection, seed
 from bifocal.relief_maps.exposure import match_exposure
 from bifocal.relief_maps.forward_projection import MapBands
 from bifocal.relief_maps.frame import (
@@ -159,8 +159,11 @@ def dense_relief(
     small = quality != "fast" and work.width * work.height < SMALL
     matched = flow.measure(frame, coarse, stride=flow.FINE_STRIDE if small else flow.STRIDE)
     registration = check_registration(frame, matched)
+    backing = None
+    if quality != "fast" and (matched.plain or coarse_level.is_unsure(matched)):
+        matched, backing = coarse_level.backed(frame, matched, coarse)
     progress(0.7, 1.0, "Edges")
-    source, usable = surfaces(frame, matched, relief_range)
+    source, usable = surfaces(frame, matched, relief_range, backing)
     progress(0.85, 1.0, "Relief map")
     bands = forward_projection.to_plane(frame, source, usable, target)
     bands = complete(frame, bands, target, plain=matched.plain)

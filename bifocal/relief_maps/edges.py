@@ -34,8 +34,12 @@ CONTRAST, CONTRAST_WINDOW = 8.0, 15
 FAVOUR = 0.05
 
 
-def sharpen(frame: Frame, relief: Float32Array, sigma_px: float = 0.0) -> Float32Array:
+def sharpen(
+    frame: Frame, relief: Float32Array, sigma_px: float = 0.0
+) -> tuple[Float32Array, Float32Array]:
     """Return the relief of photo 1 with ramps at steps replaced by one of the two surfaces.
+
+    And how badly the photos fit each other at the relief that was measured. [grey levels]
 
     Parameters
     ----------
@@ -54,16 +58,15 @@ def sharpen(frame: Frame, relief: Float32Array, sigma_px: float = 0.0) -> Float3
     result = relief.copy()
     far, near = _features(frame.image1), _features(frame.image2)
     guide = _Guide(far[..., 0])
-    costs = []
-    for candidate, favour in ((relief, FAVOUR), (upper, 0.0), (lower, 0.0)):
-        costs.append(guide.smooth(_mismatch(frame, far, near, candidate)) - favour)
-    own, high, low = costs
+    misfits = [_mismatch(frame, far, near, candidate) for candidate in (relief, upper, lower)]
+    own, high, low = (guide.smooth(misfit) for misfit in misfits)
+    own -= FAVOUR
     margin = _margin(frame, median) * np.clip(parallax / np.float32(WIDE_STEP), 0, 1)
     up = band & (high + margin <= low) & (high + margin < own)
     down = band & (low - margin < own) & (low < high + margin)
     result[up] = upper[up]
     result[down] = lower[down]
-    return result
+    return result, misfits[0]
 
 
 def _margin(frame: Frame, median: Float32Array) -> Float32Array:

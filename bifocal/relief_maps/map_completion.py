@@ -20,7 +20,7 @@ NOISE, NOISE_UNMEASURED = 0.05, 2.0
 #: out too fat, and 87 % of the wrongly measured pixels lay within two pixels of the rim. Façade 61:
 #: wrong / measured % 15.5 / 94.9 without, 9.4 / 94.3 with 3, 8.1 / 93.7 with 5; three pixels on all
 #: sides 4.2 / 92.0. [px]
-GUARD = 3
+GUARD = 1
 #: Share of a step within 5 x 5 px that is added to sigma: which side a pixel is on is uncertain.
 SIGMA_OF_STEP = 0.25
 #: The outline of what is known is that of most pixels in a window of this side. [px]

@@ -2,24 +2,29 @@
 
 from __future__ import annotations
 
+import cv2
 import numpy as np
 
 from bifocal.model.relief_map import Quality
 from bifocal.relief_maps import edges, evidence, flow, forward_projection, seed, smoothing
 from bifocal.relief_maps.forward_projection import SIDE_FACE, STRETCH, MapBands
-from bifocal.relief_maps.frame import Frame
+from bifocal.relief_maps.frame import Frame, offsets
 from photocore.arrays import BoolArray, Float32Array
 
 #: Error across the radius that counts as noise rather than as an edge, for smoothing. [px]
 NOISE_CLIP = 0.25
+#: Slope outwards, as a share of that of camera 2's rays, times the square of the misfit of the
+#: photos from which a pixel counts as not measured.
+FALLS_AWAY = 6.0
 #: How much higher what covers a pixel in photo 2 must be: parallax [px] and share of d2. Supported
 #: relief covers all, any relief only what is not validated.
 COVERS, COVERS_UNVALIDATED = (0.7, 0.0005), (1.5, 0.002)
 
 
 def surfaces(
-    frame: Frame, matched: flow.Measurement, relief_range: tuple[float, float] | None
-) -> tuple[MapBands, BoolArray]:
+    frame: Frame, matched: flow.Measurement, relief_range: tuple[float, float] | None,
+    backing: BoolArray | None = None,
+) -> tuple[MapBands, BoolArray]:  # fmt: skip
     """Return relief, sigma and quality of the pixels of photo 1, and which of them to use.
 
     Parameters
@@ -29,6 +34,8 @@ def surfaces(
         Flow between the photos.
     relief_range : tuple of float, optional
         Least and greatest relief to expect. [m]
+    backing : ndarray of bool, optional
+        Pixels whose relief another level validates: to be believed, if not called measured.
     """
     d2 = frame.distances[1]
     low, high = relief_range or seed.usual_range(d2)
@@ -36,13 +43,15 @@ def surfaces(
     relief = np.clip(np.nan_to_num(matched.r), low - margin, high + margin).astype(np.float32)
     sigma = flow.sigma_of_relief(frame, relief, matched.sigma_px)
     valid = evidence.validated(matched.across, matched.loop, sigma, d2)
-    support = evidence.supported(valid)
+    support = evidence.supported(valid if backing is None else valid | backing)
     relief = evidence.held_back(relief, support, d2)
     side_face = forward_projection.stretch(frame, relief) < SIDE_FACE
-    relief = edges.sharpen(frame, relief, float(np.median(matched.sigma_px[::8, ::8])))
+    typical = float(np.median(matched.sigma_px[::8, ::8]))
+    relief, misfit = edges.sharpen(frame, relief, typical)
     quiet = np.minimum(matched.sigma_px, np.float32(NOISE_CLIP))
     relief = smoothing.shrink_noise(relief, flow.sigma_of_relief(frame, relief, quiet))
     sigma = flow.sigma_of_relief(frame, relief, matched.sigma_px)
+    valid &= ~_falls_away(frame, relief, misfit)
     quality = np.where(valid, Quality.MEASURED, Quality.INTERPOLATED).astype(np.uint8)
     bands = MapBands(relief, sigma, quality)
     covered, filled = _uncover(frame, bands, valid, support)
@@ -51,6 +60,23 @@ def surfaces(
     usable &= ~(side_face & ~valid)
     bands.quality[covered] = Quality.HIDDEN
     return bands, usable
+
+
+def _falls_away(frame: Frame, relief: Float32Array, misfit: Float32Array) -> BoolArray:
+    """Return where relief falls outwards and the photos do not fit: camera 2 may see nothing there.
+
+    Half of the wrongly measured pixels lie in strips of two to four pixels that the map does not
+    know to be hidden: flow runs over the step as a slope. It is taken as a share of the slope of
+    camera 2's rays, the steepest that camera 2 can see.
+    """
+    foot = frame.pair.image2.foot
+    x, y = offsets(frame.grid.shape, frame.grid.pixel_of(foot.nadir))
+    quiet = cv2.GaussianBlur(relief, (0, 0), 1.5)
+    across = cv2.Sobel(quiet, cv2.CV_32F, 1, 0, ksize=3, scale=0.125)
+    down = cv2.Sobel(quiet, cv2.CV_32F, 0, 1, ksize=3, scale=0.125)
+    falls = -(across * x + down * y) / (np.float32(foot.distance) - relief)
+    misfit = cv2.blur(misfit, (3, 3))
+    return np.asarray(falls * misfit * misfit > FALLS_AWAY)
 
 
 def _uncover(

@@ -147,8 +147,8 @@ def coloured_cloud(
 
 def _check_outputs(job: ReliefJob) -> None:
     """Refuse, before any work, outputs that could not be written."""
-    check_all_writable(job.out, job.preview, job.cloud, overwrite=job.overwrite)
     check_ending(job.out, "the relief map is written as .tif.", ".tif", ".tiff")
     check_ending(job.preview, "the preview is written as .png.", ".png")
     rule = "point clouds are written as .ply, .las or .laz."
     check_ending(job.cloud, rule, ".ply", ".las", ".laz")
+    check_all_writable(job.out, job.preview, job.cloud, overwrite=job.overwrite)

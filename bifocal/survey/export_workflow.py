@@ -8,6 +8,7 @@ from bifocal.files.exports import export_points
 from bifocal.files.point_tables import read_survey_points
 from bifocal.survey.pair_workflow import is_survey, is_workbook, points_of
 from photocore.errors import InputError, located
+from photocore.output import check_not_input
 from photocore.workbook.newbook import check_new_workbook
 
 
@@ -16,8 +17,7 @@ def export(
     flavour: str = "plain", ellipses: float = 10.0, overwrite: bool = False,
 ) -> tuple[str, ...]:  # fmt: skip
     """Write the points of a result in the format the ending of ``out`` names; return remarks."""
-    if out.exists() and source.exists() and out.samefile(source):
-        raise InputError(f"{out}: is the survey itself; name another file to export to.")
+    check_not_input(out, source)
     check_new_workbook(out, overwrite=overwrite)
     try:
         points, remarks = read_survey_points(source)

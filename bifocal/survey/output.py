@@ -22,13 +22,14 @@ from bifocal.survey.tolerances import RULES, sentence
 from bifocal.survey.workbook.book import write_book
 from bifocal.survey.workbook.content import SurveyContent
 from bifocal.survey.workbook.own_table import add_results
-from bifocal.survey.workbook.update import is_older, update_book
+from bifocal.survey.workbook.update import check_kind, is_older, update_book
 from bifocal.survey.workflow import SolvedSurvey
 from photocore.errors import InputError
 from photocore.jsonfile import to_text
-from photocore.output import relative_name
+from photocore.output import check_not_input, relative_name
 from photocore.tables import write_csv
 from photocore.tables.headings import bare
+from photocore.workbook.newbook import check_new_workbook
 
 #: Sheets of a survey workbook, as `bare` writes them.
 _OURS = {
@@ -82,8 +83,7 @@ def write_result(
     path = Path(path)
     ending = path.suffix.lower()
     if ending == ".csv":
-        if _is_same_file(path, solution.source):
-            raise InputError(f"{path}: is the survey itself; name another file to write to.")
+        check_not_input(path, solution.source)
         write_csv(path, _csv_columns(solution), overwrite=overwrite)
         return ""
     if ending not in (".xlsx", ".xlsm"):
@@ -99,12 +99,31 @@ def write_result(
             f" Write a text table instead: --out {path.with_suffix('.csv').name}"
         )
     content = result_content(solution, path, language)
-    if solution.survey.is_ours and solution.source.suffix.lower() in (".xlsx", ".xlsm"):
+    in_place, is_book = _is_same_file(path, solution.source), _is_survey_book(solution)
+    same_kind = content.is_pair == ("col1" in solution.survey.table.present)
+    if is_book and (in_place or same_kind):
         return _update(path, solution, content, overwrite=overwrite)
-    if ending == ".xlsm" or _is_same_file(path, solution.source):
+    if not solution.survey.is_ours and (ending == ".xlsm" or in_place):
         return _add_columns(path, solution, content, overwrite=overwrite)
     write_book(path, content, overwrite=overwrite)
     return _left_behind(solution)
+
+
+def check_target(path: Path, solution: SolvedSurvey, *, overwrite: bool) -> None:
+    """Refuse an output that cannot be written; first for a reason that no option mends.
+
+    Raises
+    ------
+    InputError
+        As `write_result`.
+    """
+    if _is_survey_book(solution) and _is_same_file(path, solution.source):
+        check_kind(solution.source, solution.survey, is_pair=solution.is_pair)
+    check_new_workbook(path, overwrite=overwrite, source=solution.source)
+
+
+def _is_survey_book(solution: SolvedSurvey) -> bool:
+    return solution.survey.is_ours and solution.source.suffix.lower() in (".xlsx", ".xlsm")
 
 
 def _update(path: Path, solution: SolvedSurvey, content: SurveyContent, *, overwrite: bool) -> str:
@@ -159,7 +178,7 @@ def _left_behind(solution: SolvedSurvey) -> str:
         return ""
     others = [title for title in survey.titles if bare(title) not in _OURS or not survey.is_ours]
     said = f"a new workbook; {source.name} stays as it is"
-    if source.suffix.lower() in (".xlsx", ".xlsm"):
+    if source.suffix.lower() in (".xlsx", ".xlsm") and not survey.is_ours:
         return f"{said} (--out {source} --overwrite puts the results into its own table)."
     if not others:
         return f"{said}."

@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 
+from bifocal.model.pair import Pair
 from bifocal.survey.observations import PointObservations
 from bifocal.survey.reference import Georeference, KnownPoints
 from bifocal.survey.relief_table import ReliefTable
@@ -121,3 +122,30 @@ def point_remarks(
     if len(off) > 10:
         remarks.append(f"... and {len(off) - 10} more OFF-RADIAL points.")
     return remarks
+
+
+def refraction_remarks(pair: Pair, points: PointObservations) -> list[str]:
+    """Return what it would cost to take a pair through media for one in air; empty in air.
+
+    Parameters
+    ----------
+    pair : Pair
+        As solved.
+    points : PointObservations
+        With ``pixels1`` and ``pixels2``; only points in use are counted. [px]
+    """
+    if pair.layers is None:
+        return []
+    bent, straight = (
+        one.intersect(points.pixels1, points.pixels2).xyz for one in (pair, pair.in_air())
+    )
+    off = np.abs(straight - bent)[points.use]
+    off = off[np.isfinite(off).all(axis=1)]
+    if not len(off):
+        return []
+    aside = float(np.hypot(off[:, 0], off[:, 1]).max())
+    return [
+        f"refraction in {len(pair.layers.indices)} media is taken into account; neglected it would "
+        f"falsify relief by up to {off[:, 2].max():.3f} m (median {np.median(off[:, 2]):.3f} m) "
+        f"and places by up to {aside:.3f} m."
+    ]

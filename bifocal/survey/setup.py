@@ -54,6 +54,8 @@ class SurveySetup:
         Pair file, as seen from the workbook.
     photo1, photo2 : str
         Photo files, as seen from the workbook; empty where none are named.
+    title_block : mapping
+        Project, client, surveyor and date as they head the printed results, by name of their cell.
     matrices, nadirs : tuple of ndarray
         Homographies (3, 3) to the wall, None for an ideal pair, and nadir points (2,) on it. [m]
     adjusted : tuple of ndarray or None
@@ -84,6 +86,7 @@ class SurveySetup:
     pair_file: str = ""
     photo1: str = ""
     photo2: str = ""
+    title_block: Mapping[str, str] = field(default_factory=dict)
     matrices: tuple[FloatArray, FloatArray] | None = None
     nadirs: tuple[FloatArray, FloatArray] = (np.zeros(2), np.zeros(2))
     adjusted: tuple[FloatArray | None, FloatArray | None] = (None, None)

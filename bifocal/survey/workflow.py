@@ -28,6 +28,7 @@ from bifocal.survey.remarks import (
     georeference_remarks,
     opposite_signs_remark,
     point_remarks,
+    refraction_remarks,
 )
 from bifocal.survey.setup import SCALE_TOLERANCE, SurveySetup
 from bifocal.survey.sources import BOOKS, Source, given_pair, measured, with_setup_of
@@ -315,27 +316,8 @@ def _solve_pair(
         pair=pair,
         sigma_px=sigma,
         check=check,
-        remarks=(*remarks, *(check.remarks if check else ()), *_refraction_remark(pair, points)),
+        remarks=(*remarks, *(check.remarks if check else ()), *refraction_remarks(pair, points)),
     )
-
-
-def _refraction_remark(pair: Pair, points: PointObservations) -> list[str]:
-    """Return what it would cost to take a pair through media for one in air; empty in air."""
-    if pair.layers is None:
-        return []
-    bent, straight = (
-        one.intersect(points.pixels1, points.pixels2).xyz for one in (pair, pair.in_air())
-    )
-    off = np.abs(straight - bent)[points.use]
-    off = off[np.isfinite(off).all(axis=1)]
-    if not len(off):
-        return []
-    aside = float(np.hypot(off[:, 0], off[:, 1]).max())
-    return [
-        f"refraction at {len(pair.layers.indices) - 1} interfaces is taken into account; neglected "
-        f"it would falsify relief by up to {off[:, 2].max():.3f} m (median "
-        f"{np.median(off[:, 2]):.3f} m) and places by up to {aside:.3f} m."
-    ]
 
 
 def _with_centre(

@@ -56,8 +56,8 @@ def fit_water_level(
     InputError, GeometryError
         If the file cannot be read or shows no water surface.
     """
-    check_all_writable(target, overwrite=overwrite)
     check_ending(target, "a water level is written as .json.", ".json")
+    check_all_writable(target, overwrite=overwrite)
     cloud = open_cloud(source)
     points = np.concatenate([piece.xyz for piece in cloud.pieces()])
     fitted = FittedLevel(

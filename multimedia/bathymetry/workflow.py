@@ -33,7 +33,7 @@ from photocore.cli import Progress, no_progress
 from photocore.cloud import open_cloud
 from photocore.cloud.model import Cloud, CloudPiece
 from photocore.errors import GeometryError, InputError, located
-from photocore.output import check_ending, check_writable
+from photocore.output import check_ending, check_not_input, check_writable
 from photocore.raster import Window
 from photocore.tables import write_csv
 
@@ -61,6 +61,7 @@ def correct_file(job: Job, *, progress: Progress = no_progress) -> Outcome:
     InputError, GeometryError
         If anything is wrong with the data; the target is then not written.
     """
+    check_not_input(job.target, job.source)
     check_writable(job.target, overwrite=job.overwrite)
     checked_water_index(job.index)
     lowest, highest = WATER
@@ -69,8 +70,6 @@ def correct_file(job: Job, *, progress: Progress = no_progress) -> Outcome:
             f"--index: {job.index:g} is no water's; relative to the air water has {lowest:g} to "
             f"{highest:g} (`multimedia index` computes it)."
         )
-    if job.source.exists() and job.target.exists() and job.source.samefile(job.target):
-        raise InputError(f"{job.target}: is the input itself; name another file for --out.")
     if job.rays:
         return _correct_rays(job)
     if job.source.suffix.lower() in (".tif", ".tiff"):

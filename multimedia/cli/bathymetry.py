@@ -9,7 +9,7 @@ from typing import Any
 import click
 
 from photocore.cli import print_result, progress_bar
-from photocore.options import FILE, NEW_TABLE, TABLE, Number, as_json, number, overwrite, sigma
+from photocore.options import FILE, NEW_TABLE, TABLE, Number, as_json, cog, number, overwrite, sigma
 
 EXAMPLE = """\b
 Examples:
@@ -85,6 +85,7 @@ Examples:
     help="Height that marks empty cells of a DEM [m]. [default: as the file says]",
 )  # fmt: skip
 @click.option("--allow-dry", is_flag=True, help="Accept data without a point under water. [off]")
+@cog
 @overwrite
 @as_json
 def command(

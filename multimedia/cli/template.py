@@ -13,6 +13,7 @@ EXAMPLE = """\b
 Examples:
   multimedia template tank.xlsx
   multimedia template oblique.xlsx --newton 10 --rows 200
+  multimedia template vasca.xlsx --lang it
 """
 
 
@@ -25,13 +26,17 @@ Examples:
     "--newton", type=int, default=6, show_default=True,
     help="Newton steps: 6 reach 1e-9 up to 75 degrees in the thinnest medium, 10 up to 85.",
 )  # fmt: skip
+@click.option(
+    "--lang", type=click.Choice(["en", "it", "de"]), default="en", show_default=True,
+    help="Language of labels and help.",
+)  # fmt: skip
 @overwrite
-def command(out: Path, rows: int, newton: int, overwrite: bool) -> None:
+def command(out: Path, rows: int, newton: int, lang: str, overwrite: bool) -> None:
     """Write a workbook that shifts points and gives the refractive index of water by itself.
 
     No macros, no circular references: Excel, LibreOffice and others calculate it.
     """
     from multimedia.workbook.workflow import write_template
 
-    write_template(out, rows=rows, steps=newton, overwrite=overwrite)
+    write_template(out, rows=rows, steps=newton, language=lang, overwrite=overwrite)
     remark(f"Workbook written to {out}")

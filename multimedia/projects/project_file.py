@@ -128,6 +128,10 @@ def project_data(project: Project) -> dict[str, Any]:
     return data
 
 
+#: Keys of media; at the top of a file, where unknown keys are kept, they would have no effect.
+_OF_MEDIA = frozenset(("layers", "indices", "thicknesses", "surfaces", "medium"))
+
+
 def _toml(path: Path) -> dict[str, Any]:
     check_name(path)
     if path.is_dir():
@@ -154,6 +158,11 @@ def _project(data: dict[str, Any], folder: Path) -> Project:
     unit = str(data.pop("unit", "m"))
     if unit not in METRES:
         raise InputError(f"unit: {unit!r} is no unit of length; choose {', '.join(METRES)}.")
+    for key in _OF_MEDIA & data.keys():
+        raise InputError(
+            f"{key}: media belong in a section of their own, e.g. [media.tank] with indices and "
+            'thicknesses, which each camera names: media = "tank".'
+        )
     described = data.pop("media", {})
     if not isinstance(described, dict):
         raise InputError("media: expected sections such as [media.tank].")

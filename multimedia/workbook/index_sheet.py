@@ -1,10 +1,11 @@
-"""The sheet RefractiveIndex: the index of water as live formulas."""
+"""The sheet RefractiveIndex: the index of water as live formulas, and a chart over the light."""
 
 from __future__ import annotations
 
 from typing import Any
 
-from openpyxl.worksheet.worksheet import Worksheet
+import numpy as np
+from openpyxl.chart import Reference
 
 from multimedia.refraction.water import (
     QUAN_FRY,
@@ -12,70 +13,91 @@ from multimedia.refraction.water import (
     water_index_derivatives,
     water_refractive_index,
 )
-from multimedia.workbook.live_book import LiveBook, allow_between, headings
+from photocore.workbook.live_book import BookBuilder, SheetBuilder
+from photocore.workbook.live_charts import scatter
+from photocore.workbook.look import HEAD_FONT
 
-#: Name, value, description, unit and limits of the cells to fill in.
+#: Name, value, unit and limits of the cells to fill in.
 _GIVEN = (
-    ("wavelength_nm", 550.0, "Wavelength; blue 460, green 550, red 620", "nm", (180, 1200)),
-    ("temperature_c", 20.0, "Water temperature; the formulas hold from 0 to 30", "°C", (-5, 100)),
-    ("salinity_percent", 0.0, "Salinity; sea water 3.5 (per cent)", "%", (0, 30)),
-    ("depth_m", 0.0, "Water depth", "m", (0, 11000)),
+    ("wavelength_nm", 550.0, "nm", (180, 1200)),
+    ("temperature_c", 20.0, "°C", (-5, 100)),
+    ("salinity_percent", 0.0, "%", (0, 30)),
+    ("depth_m", 0.0, "m", (0, 11000)),
 )
 #: An index to find the salinity of.
 _MEASURED = 1.3416
+#: The light of the chart. [nm]
+_LIGHT = range(400, 701, 25)
+_CHART_HEAD = 21
 
 
-def write_index_sheet(book: LiveBook) -> float:
+def write_index_sheet(book: BookBuilder) -> float:
     """Write the sheet of the refractive index; return the index it shows."""
-    sheet = book.sheet(
-        "RefractiveIndex",
-        "Refractive index of water",
-        "Fill in the yellow cells; salinity in per cent (sea water 3.5).",
-    )
-    for letter, width in zip("ABCD", (18, 66, 14, 10), strict=True):
-        sheet.column_dimensions[letter].width = width
-    headings(sheet, 4, ("name", "description", "value", "unit"))
-    for row, (name, value, words, unit, limits) in enumerate(_GIVEN, start=5):
-        _describe(sheet, row, name, words, unit)
-        book.typed(sheet, row, 3, value)
-        book.name(name, sheet, row, 3)
-        allow_between(sheet, f"C{row}", limits, words)
+    sheet = book.sheet("RefractiveIndex", "index_how")
+    sheet.headings(4, ("name", "description", "value", "unit"), (18, 56, 14, 14))
+    for row, (name, value, unit, limits) in enumerate(_GIVEN, start=5):
+        sheet.describe(row, (name, book.word(name)), unit)
+        sheet.input(f"C{row}", value, name=name)
+        sheet.validate(f"C{row}", title=name, prompt=book.word(name), limits=limits)
     water: dict[str, Any] = {name.removesuffix("_m"): value for name, value, *_ in _GIVEN}
     slopes = water_index_derivatives(**water)
     n_w = float(slopes.refractive_index)
     results = (
-        ("n_w", "Refractive index (Höhle 1971; Maas 2015, Eq. 4)",
-         "1.338+4E-5*(486+0.003*depth_m+50*salinity_percent-wavelength_nm-temperature_c)", n_w, ""),
-        ("n_w_quan_fry", "Refractive index (Quan and Fry 1995), for comparison", _QUAN_FRY_FORMULA,
+        ("n_w", "n_hoehle", _HOEHLE_FORMULA, n_w, ""),
+        ("n_w_quan_fry", "n_quan_fry", _QUAN_FRY_FORMULA,
          float(water_refractive_index(**water, formula=QUAN_FRY)), ""),
-        ("dn_dT", "Change of n_w per degree", "-4E-5", float(slopes.d_temperature), "1/°C"),
-        ("dn_dS", "Change of n_w per per cent of salt", "4E-5*50", float(slopes.d_salinity), "1/%"),
+        ("dn_dT", "dn_dT", "-4E-5", float(slopes.d_temperature), "1/°C"),
+        ("dn_dS", "dn_dS", "4E-5*50", float(slopes.d_salinity), "1/%"),
     )  # fmt: skip
-    headings(sheet, 10, ("result", "description", "value", "unit"))
+    sheet.headings(10, ("result", "description", "value", "unit"))
     for row, (name, words, text, value, unit) in enumerate(results, start=11):
-        _describe(sheet, row, name, words, unit)
-        book.formula(sheet, row, 3, text, value)
-        sheet.cell(row, 3).number_format = "0.000000"
-    book.name("n_w", sheet, 11, 3)
-    headings(sheet, 16, ("inverse", "description", "value", "unit"))
-    _describe(sheet, 17, "n_measured", "A measured index, e.g. from an adjustment")
-    book.typed(sheet, 17, 3, _MEASURED)
-    book.name("n_measured", sheet, 17, 3)
-    _describe(sheet, 18, "salinity", "Salinity of that water (Höhle)", "%")
-    del water["salinity_percent"]
+        sheet.describe(row, (name, book.word(words)), unit)
+        sheet.formula(f"C{row}", text, value, form="0.000000", name=name if name == "n_w" else "")
+    sheet.headings(16, ("inverse", "description", "value", "unit"))
+    sheet.describe(17, ("n_measured", book.word("n_measured")))
+    sheet.input("C17", _MEASURED, name="n_measured")
+    prompt = book.word("n_measured")
+    sheet.validate("C17", title="n_measured", prompt=prompt, limits=(1.2, 1.6))
+    sheet.describe(18, ("salinity", book.word("salinity")), "%")
+    warm = {key: value for key, value in water.items() if key != "salinity_percent"}
     text = "((n_measured-1.338)/4E-5-486-0.003*depth_m+wavelength_nm+temperature_c)/50"
-    book.formula(sheet, 18, 3, text, float(salinity_from_index(_MEASURED, **water)))
-    sheet.cell(18, 3).number_format = "0.000"
-    sheet.freeze_panes = "A5"
+    sheet.formula("C18", text, float(salinity_from_index(_MEASURED, **warm)), form="0.000")
+    _over_light(sheet, water)
+    sheet.finish(freeze="A5")
     return n_w
 
 
-def _describe(sheet: Worksheet, row: int, name: str, words: str, unit: str | None = None) -> None:
-    """Write what stands beside a value."""
-    for column, text in ((1, name), (2, words), (4, unit)):
-        sheet.cell(row, column, text)
+def _over_light(sheet: SheetBuilder, water: dict[str, Any]) -> None:
+    """Write the index by both formulas over the wavelength, and draw it."""
+    sheet.word(f"A{_CHART_HEAD - 1}", "over_light", HEAD_FONT)
+    for letter, key in zip("ACD", ("nm", "Höhle", "Quan, Fry"), strict=True):
+        sheet.text(f"{letter}{_CHART_HEAD}", key, HEAD_FONT)
+    others = {key: value for key, value in water.items() if key != "wavelength_nm"}
+    light = np.array(_LIGHT, dtype=float)
+    hoehle = water_refractive_index(wavelength_nm=light, **others)
+    quan_fry = water_refractive_index(wavelength_nm=light, **others, formula=QUAN_FRY)
+    for i, wavelength in enumerate(_LIGHT):
+        row = _CHART_HEAD + 1 + i
+        sheet.worksheet[f"A{row}"] = wavelength
+        for letter, text, found in (
+            ("C", _HOEHLE_FORMULA, hoehle), ("D", _QUAN_FRY_FORMULA, quan_fry),
+        ):  # fmt: skip
+            own = text.replace("wavelength_nm", f"$A{row}")
+            sheet.formula(f"{letter}{row}", own, float(found[i]), form="0.000000")
+    last = _CHART_HEAD + len(_LIGHT)
+    data = [
+        Reference(sheet.worksheet, min_col=column, min_row=_CHART_HEAD + 1, max_row=last)
+        for column in (1, 3, 4)
+    ]
+    title = sheet.book.word("chart_index")
+    chart = scatter(title, "nm", "n", data[0], {"Höhle": data[1], "Quan, Fry": data[2]})
+    chart.x_axis.number_format, chart.y_axis.number_format = "0", "0.000"
+    chart.x_axis.scaling.min, chart.x_axis.scaling.max = 400, 700
+    chart.height, chart.width = 6.5, 10.5
+    sheet.worksheet.add_chart(chart, f"B{_CHART_HEAD}")
 
 
+_HOEHLE_FORMULA = "1.338+4E-5*(486+0.003*depth_m+50*salinity_percent-wavelength_nm-temperature_c)"
 #: Quan and Fry's Eq. (3) in the names of the sheet; their salinity is per mille.
 _QUAN_FRY_FORMULA = (
     "1.31405+(0.0001779-0.00000105*temperature_c+0.000000016*temperature_c^2)*10*salinity_percent"

@@ -7,21 +7,23 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from multimedia.refraction.unrolled import STEPS
-from multimedia.workbook.live_book import LiveBook
 from multimedia.workbook.shift_files import ShiftInput
 from multimedia.workbook.shift_points import ShiftPoints, ShiftSetup
 from multimedia.workbook.shift_workbook import (
+    CHART_DATA,
     media_cells,
     media_places,
-    number_format,
     shift_columns,
     table_values,
 )
+from multimedia.workbook.words import WORDS
 from photocore.errors import InputError
 from photocore.tables import Table
+from photocore.workbook.cells import CellValue
 from photocore.workbook.editor import WorkbookEditor
 from photocore.workbook.graft import quoted_title
-from photocore.workbook.grid import column_letters, split_cell
+from photocore.workbook.grid import TableArea, column_letters, split_area, split_cell
+from photocore.workbook.live_book import BookBuilder
 from photocore.workbook.named_cells import make_numbers, place_of
 from photocore.workbook.newbook import finished_parts
 from photocore.workbook.result_columns import (
@@ -95,7 +97,28 @@ def update_template(
         for position, row in enumerate(rows):
             if key in values and key not in ("id", "X", "Y", "Z", "R", "ZP"):
                 editor.set_result(area.sheet, table.rows[row], column, values[key][position])
+    _store_chart(editor, area, [table.rows[row] for row in rows], values)
     return editor.save(out, overwrite=overwrite)
+
+
+def _store_chart(
+    editor: WorkbookEditor,
+    area: TableArea,
+    rows: Sequence[int],
+    values: Mapping[str, Sequence[CellValue]],
+) -> None:
+    """Store the numbers of the chart of our workbooks, which stand beside the table."""
+    sheet, _, cells = editor.book.names.get(CHART_DATA, "").rpartition("!")
+    if sheet.strip("'") != area.sheet:
+        return
+    top, left, bottom, _ = split_area(cells.replace("$", ""))
+    for position, row in enumerate(rows):
+        place = top + row - area.area[0] - 1
+        if place <= bottom:
+            for column, key in enumerate(("R_u", "dR"), start=left):
+                value = values[key][position]
+                shown = value if isinstance(value, int | float) else float("nan")
+                editor.set_result(area.sheet, place, column, shown)
 
 
 def add_columns(
@@ -147,18 +170,17 @@ def add_columns(
     formulas = shift_columns(
         count,
         STEPS,
-        at=lambda key: f"[@{key}]",
         value=lambda name: _reference(media, *places[name]),
         given=table.columns.keys(),
     )
     values = table_values(setup, points, len(points.ids), STEPS)
     columns = [
         ResultColumn(
-            key=key, heading=key, values=values[key], formula=formula,
-            number_format="" if key == "flag" else number_format(key),
+            key=column.key, heading=column.key, values=values[column.key], formula=column.formula,
+            number_format="" if column.key == "flag" else column.number_format,
         )
-        for key, _, formula in formulas
-        if formula
+        for column in formulas
+        if column.formula
     ]  # fmt: skip
     columns.sort(key=lambda column: column.key not in ADDED)
     put_result_columns(editor, own, columns, mark=MARK, adopted=ADDED)
@@ -193,8 +215,9 @@ def _media_sheet(editor: WorkbookEditor, given: ShiftInput, setup: ShiftSetup) -
         if stands != values[name]:
             editor.put(*own, values[name])
         links[name] = _reference(*own)
-    book = LiveBook()
-    media_cells(book, setup, links=links)
+    book = BookBuilder(language="en", words=WORDS)
+    media = media_cells(book, setup, links=links)
+    media.finish(landscape=True, guarded=False)
     package = io.BytesIO()
     book.book.save(package)
     title = editor.free_title("Media")

@@ -8,61 +8,46 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import ArrayLike
-from openpyxl.styles import Alignment, Font
+from openpyxl.chart import Reference
+from openpyxl.styles import Font
 from openpyxl.utils import get_column_letter
 
 from multimedia.refraction.layers import HIGHEST_INDEX
 from multimedia.refraction.unrolled import STEPS, TOLERANCE, unrolled_shift
 from multimedia.workbook.index_sheet import write_index_sheet
-from multimedia.workbook.live_book import BOLD, NOTE, SMALL, LiveBook, allow_between, headings
 from multimedia.workbook.shift_points import IN_PLANE, ShiftPoints, ShiftResult, ShiftSetup
+from multimedia.workbook.shift_sketch import shift_sketch
+from multimedia.workbook.words import WORDS
 from photocore.arrays import BoolArray
 from photocore.errors import InputError
 from photocore.output import check_ending
 from photocore.workbook.cells import CellValue
-from photocore.workbook.look import HEAD_FILL, INPUT_FILL, add_table, colour_words
+from photocore.workbook.live_book import BookBuilder, SheetBuilder
+from photocore.workbook.live_charts import scatter
+from photocore.workbook.live_columns import LiveColumn
+from photocore.workbook.look import (
+    DOUBT,
+    FACE,
+    GOOD,
+    HEAD_FILL,
+    HEAD_FONT,
+    LABEL,
+    LABEL_FONT,
+    colour_words,
+)
 from photocore.workbook.newbook import check_new_workbook
 
 #: More rows make a workbook that is slow to open; text tables have no limit.
 MOST_ROWS = 20_000
-
 #: Columns that the user fills in, besides the name.
 INPUTS = ("X", "Y", "Z", "R", "ZP")
-
-_FLAGS = {"OK": ("E2F0D9", "1E5B12"), "CHECK": ("E4DFEC", "3F2A63"), "DRY": ("FCE4D6", "9C3D00")}
-
-_WORDS = {
-    "z_0": "distance from the camera's centre to the first interface",
-    "X_0": "X of the camera",
-    "Y_0": "Y of the camera",
-}
-
-_README = (
-    "#What this is",
-    "Photogrammetry through water: where a straight ray would see a point that is seen through "
-    "air, glass and water (radial shift), and the refractive index of water. No macros.",
-    "#How to use it",
-    "Fill in the yellow cells; everything blue is calculated. All lengths in one unit, any.",
-    "RefractiveIndex: light and water; n_w feeds the last index on the sheet Multimedia.",
-    "Multimedia: the media from the camera to the object (n_1 air, n_2 glass, n_3 water; t_1 "
-    "thickness of the glass), z_0 from the camera's centre to the first interface, X_0 Y_0 of the "
-    "camera. Then the points: X, Y, Z (Z = 0 at the water side of the interface, negative in "
-    "water), or R and ZP (distance from the camera's nadir, depth). Put Xbar, Ybar and Z into the "
-    "collinearity equations instead of X, Y, Z.",
-    "New rows: drag the corner of the table down. Without glass set t_1 to 0.",
-    "#What is calculated",
-    "R = z_0 tan(b1) + t_1 tan(b2) + ZP tan(b3), Rbar = (z_0 + t_1 + ZP) tan(b1), "
-    "n_1 sin(b1) = n_2 sin(b2) = n_3 sin(b3): Maas, Sensors 15(8), 2015, Eqs. (1) to (3).",
-    "u is tan(b) in the medium of the smallest index; k = n_min / n, q = 1 - k^2. u0 is the start, "
-    "u1 u2 ... are Newton steps for R = F(u) = u * sum(h k / sqrt(1 + q u^2)). F is increasing and "
-    "bends downwards, so the steps cannot diverge.",
-    "resid = F(u) - R after the last step. flag: OK when |resid| is under 1e-9 of R; CHECK when "
-    "not (very oblique rays: write the workbook with more steps, multimedia template --newton 10; "
-    "or no ray exists); DRY when the point is above the water.",
-    "Precision: 1e-9 of Rbar up to 75 degrees in the thinnest medium with six steps.",
-    "n_w = 1.338 + 4e-5 (486 + 0.003 d + 50 S - wavelength - T): Höhle 1971; Maas 2015, Eq. (4). "
-    "Salinity S in per cent: sea water 3.5.",
-)
+#: The chart shows the first points only.
+_CHART_ROWS = 1000
+#: Name of the chart's numbers: R_u and dR of the points.
+CHART_DATA = "chart_shift"
+#: Columns that the chart takes beside the table.
+_CHART_COLUMNS = 11
+_FLAGS = {"OK": GOOD, "CHECK": DOUBT, "DRY": ("FCE4D6", "9C3D00")}
 
 
 def write_shift_workbook(
@@ -72,6 +57,7 @@ def write_shift_workbook(
     *,
     rows: int = 50,
     steps: int = STEPS,
+    language: str = "en",
     overwrite: bool = False,
 ) -> None:
     """Write the workbook, whole or not at all.
@@ -89,6 +75,8 @@ def write_shift_workbook(
         Least number of prepared rows.
     steps : int
         Newton columns.
+    language : {"en", "it", "de"}
+        Of labels and help; keys and flags are the same in all.
     overwrite : bool
         Replace an existing file.
 
@@ -107,40 +95,63 @@ def write_shift_workbook(
             f"{path}: {count} rows; a workbook may have 1 to {MOST_ROWS}. Write a .csv file."
         )
     check_new_workbook(path, overwrite=overwrite, other="" if points is None else "-result")
-    book = LiveBook()
-    readme = book.sheet("Readme", "Photogrammetry through water", "", first=True)
-    readme.column_dimensions["A"].width = 110
-    for row, line in enumerate(_README, start=3):
-        cell = readme.cell(row, 1, line.lstrip("#"))
-        cell.alignment = Alignment(wrap_text=True, vertical="top")
-        cell.font = BOLD if line.startswith("#") else Font()
-        # openpyxl cannot ask for automatic heights; LibreOffice and Excel wrap at about 115 signs.
-        readme.row_dimensions[row].height = 15 * (1 + len(line) // 115)
+    book = BookBuilder(language=language, words=WORDS)
+    book.book.properties.creator = book.book.properties.title = "multimedia"
+    _readme(book)
     index = write_index_sheet(book)
     if points is None:
         indices = (*setup.layers.indices[:-1], index)
         setup = replace(setup, layers=replace(setup.layers, indices=indices))
-    setup_rows = media_cells(book, setup, live=points is None)
-    _points(book, setup, points, first=setup_rows + 3, count=count, steps=steps)
+    _shift_sheet(book, setup, points, count=count, steps=steps)
     book.book.move_sheet("RefractiveIndex", 1)
-    book.book.active = 1
-    for sheet in book.book.worksheets:
-        sheet.sheet_view.tabSelected = sheet.title == "Multimedia"
+    book.open_at("Multimedia")
     book.save(path, overwrite=overwrite)
 
 
+def _readme(book: BookBuilder) -> None:
+    sheet = book.sheet("Readme")
+    for letter, width in zip("ABC", (80, 2, 50), strict=True):
+        sheet.worksheet.column_dimensions[letter].width = width
+    lines = [line for line in WORDS.readme(book.language) if line]
+    for row, line in enumerate(lines, start=3):
+        sheet.text(f"A{row}", line.lstrip("#"), HEAD_FONT if line.startswith("#") else None)
+    book.drawings["Readme"] = shift_sketch(book.word("sketch")).part("C3")
+    sheet.finish(landscape=True, guarded=False)
+    # Nothing stands in the cells below the sketch: without this they would not be printed.
+    sheet.worksheet.print_area = f"A1:C{len(lines) + 3}"
+    sheet.worksheet.page_setup.fitToHeight = 1
+
+
+def _shift_sheet(
+    book: BookBuilder, setup: ShiftSetup, points: ShiftPoints | None, *, count: int, steps: int
+) -> None:
+    """Write camera and media, and below them the table of points."""
+    sheet = media_cells(book, setup, live=points is None)
+    columns = shift_columns(len(setup.layers.indices), steps)
+    keys, last = [column.key for column in columns], get_column_letter(len(columns))
+    head = 7 + len(setup.layers.indices) + len(_lengths(setup))
+    values = table_values(setup, points, count, steps)
+    sheet.table("tblMM", columns, at=(head, 1), rows=count, cells=values)
+    flags = f"{last}{head + 1}:{last}{head + count}"
+    colour_words(sheet.worksheet, flags, _FLAGS, bold=_FLAGS.keys() - {"OK"}, stop=True)
+    _chart(sheet, keys, values, head=head, count=min(count, _CHART_ROWS))
+    printed = count if points is None else max(len(points.ids), 1)
+    sheet.finish(landscape=True, freeze=f"B{head + 1}", repeat=f"{head - 1}:{head}")
+    sheet.worksheet.print_area = f"A1:{last}{head + printed}"
+
+
 def media_cells(
-    book: LiveBook,
+    book: BookBuilder,
     setup: ShiftSetup,
     *,
     live: bool = False,
     links: Mapping[str, str] | None = None,
-) -> int:
-    """Write the sheet of camera and media, without points; return the last row used.
+) -> SheetBuilder:
+    """Write the sheet of camera and media, without points.
 
     Parameters
     ----------
-    book : LiveBook
+    book : BookBuilder
         Takes the sheet.
     setup : ShiftSetup
         Camera and media.
@@ -151,98 +162,40 @@ def media_cells(
         in a workbook that is all ours.
     """
     named, links = links is None, dict(links or {})
-    sheet = book.sheet(
-        "Multimedia",
-        "Radial shift through plane-parallel media",
-        "Yellow: fill in. Blue: calculated. All lengths in one unit."
-        + (" See Readme." if named else ""),
-        first=not named,
-    )
-    layers, count = setup.layers, len(setup.layers.indices)
-    headings(sheet, 4, ("name", "value", "k", "q"))
-    for i, index in enumerate(layers.indices, start=1):
-        row = 4 + i
-        sheet.cell(row, 1, f"n_{i}")
-        if i == count and live:
-            links[f"n_{i}"] = "n_w"
-        if f"n_{i}" in links:
-            book.formula(sheet, row, 2, links[f"n_{i}"], index)
-            sheet.cell(row, 2).fill = INPUT_FILL
-        else:
-            book.typed(sheet, row, 2, index)
-        words = "Refractive index, at least 1; the camera's first."
-        allow_between(sheet, f"B{row}", (1, HIGHEST_INDEX), words)
-        k = min(layers.indices) / index
+    sheet = book.sheet("Multimedia", "shift_how" if named else "media_how")
+    indices = setup.layers.indices
+    count, least = len(indices), min(indices)
+    if live:
+        links[f"n_{count}"] = "n_w"
+    for letter, text in zip("ABCD", (book.word("name"), book.word("value"), "k", "q"), strict=True):
+        sheet.text(f"{letter}4", text, HEAD_FONT)
+        sheet.worksheet[f"{letter}4"].fill = HEAD_FILL
+    for i, index in enumerate(indices, start=1):
+        row, name = 4 + i, f"n_{i}"
+        _value(sheet, row, name, index, links)
+        prompt = book.word("index_prompt")
+        sheet.validate(f"B{row}", title=name, prompt=prompt, limits=(1, HIGHEST_INDEX))
         # In a workbook of the user's own the names may be taken.
-        own, ratio = (f"n_{i}", f"k_{i}") if named else (f"$B${row}", f"$C${row}")
-        book.formula(sheet, row, 3, f"MIN($B$5:$B${4 + count})/{own}", k)
-        book.formula(sheet, row, 4, f"1-{ratio}^2", 1 - k * k)
-        sheet.cell(row, 3).number_format = sheet.cell(row, 4).number_format = "0.000000"
-        for column, name in enumerate("nkq", start=2):
-            book.name(f"{name}_{i}", sheet, row, column)
-        place = "the camera" if i == 1 else "the object" if i == count else f"layer {i - 1}"
-        sheet.cell(row, 5, f"refractive index of the medium of {place}").font = NOTE
-    row = 5 + count
-    typed: list[tuple[str, float]] = [(f"t_{i}", t) for i, t in enumerate(layers.thicknesses, 1)]
-    typed += [("z_0", setup.z0), ("X_0", setup.nadir[0]), ("Y_0", setup.nadir[1])]
-    for name, value in typed:
-        sheet.cell(row, 1, name)
-        if name in links:
-            book.formula(sheet, row, 2, links[name], value)
-            sheet.cell(row, 2).fill = INPUT_FILL
-        else:
-            book.typed(sheet, row, 2, value)
-        book.name(name, sheet, row, 2)
-        words = _WORDS.get(name, f"thickness of layer {name[2:]}")
-        sheet.cell(row, 5, words).font = NOTE
-        if name[0] in "tz":
-            allow_between(sheet, f"B{row}", (0, 1e9), "A length, zero or more.")
-        row += 1
-    return row - 1
+        own, ratio = (name, f"k_{i}") if named else (f"$B${row}", f"$C${row}")
+        k, text = least / index, f"MIN($B$5:$B${4 + count})/{own}"
+        sheet.formula(f"C{row}", text, k, form="0.000000", name=f"k_{i}")
+        sheet.formula(f"D{row}", f"1-{ratio}^2", 1 - k * k, form="0.000000", name=f"q_{i}")
+        place = "camera" if i == 1 else "object" if i == count else "layer"
+        words = book.word(f"index_{place}").format(n=i - 1)
+        sheet.text(f"E{row}", words, LABEL_FONT)
+    _write_lengths(sheet, setup, links)
+    return sheet
 
 
-def _points(
-    book: LiveBook,
-    setup: ShiftSetup,
-    points: ShiftPoints | None,
-    *,
-    first: int,
-    count: int,
-    steps: int,
+def _value(
+    sheet: SheetBuilder, row: int, name: str, value: float, links: Mapping[str, str]
 ) -> None:
-    """Write the table of points; its keys stand in row ``first``."""
-    sheet = book.book["Multimedia"]
-    columns = shift_columns(len(setup.layers.indices), steps)
-    values = table_values(setup, points, count, steps)
-    for number, (key, label, text) in enumerate(columns, start=1):
-        above, head = sheet.cell(first - 1, number, label), sheet.cell(first, number, key)
-        above.font, head.font, head.fill = SMALL, BOLD, HEAD_FILL
-        above.alignment = Alignment(wrap_text=True, horizontal="center", vertical="bottom")
-        head.alignment = Alignment(horizontal="center")
-        sheet.column_dimensions[get_column_letter(number)].width = 13 if number > 1 else 11
-        for i in range(count):
-            row, value = first + 1 + i, values[key][i]
-            if text:
-                book.formula(sheet, row, number, text, value)
-            else:
-                book.typed(sheet, row, number, value)
-            sheet.cell(row, number).number_format = number_format(key)
-    sheet.row_dimensions[first - 1].height = 42
-    last = get_column_letter(len(columns))
-    keyed = ((key, text) for key, _, text in columns)
-    add_table(sheet, "tblMM", f"A{first}:{last}{first + count}", keyed)
-    flags = f"{last}{first + 1}:{last}{first + count}"
-    colour_words(sheet, flags, _FLAGS, bold=_FLAGS.keys() - {"OK"}, stop=True)
-    letters = {key: get_column_letter(i) for i, (key, _, _) in enumerate(columns, start=1)}
-    for key in ("R", "ZP"):
-        place = f"{letters[key]}{first + 1}:{letters[key]}{first + count}"
-        allow_between(sheet, place, (0, 1e9), "A length, zero or more; in water ZP is positive.")
-    sheet.freeze_panes = f"B{first + 1}"
-    sheet.print_title_rows = f"{first - 1}:{first}"
-
-
-def _in_table(key: str) -> str:
-    return f"tblMM[[#This Row],[{key}]]"
+    """Write a named value, typed or as a reference to where it stands."""
+    sheet.text(f"A{row}", name)
+    if name in links:
+        sheet.formula(f"B{row}", links[name], value, name=name, editable=True)
+    else:
+        sheet.input(f"B{row}", value, name=name)
 
 
 def media_places(layers: int) -> dict[str, tuple[int, int]]:
@@ -253,15 +206,67 @@ def media_places(layers: int) -> dict[str, tuple[int, int]]:
     return places | {name: (5 + layers + i, 2) for i, name in enumerate(lengths)}
 
 
+def _lengths(setup: ShiftSetup) -> dict[str, float]:
+    """Return the lengths to be typed, by name."""
+    layers = {f"t_{i}": t for i, t in enumerate(setup.layers.thicknesses, start=1)}
+    return {**layers, "z_0": setup.z0, "X_0": setup.nadir[0], "Y_0": setup.nadir[1]}
+
+
+def _write_lengths(sheet: SheetBuilder, setup: ShiftSetup, links: Mapping[str, str]) -> None:
+    """Write thicknesses and the camera's position below the indices."""
+    first = 5 + len(setup.layers.indices)
+    for row, (name, value) in enumerate(_lengths(setup).items(), start=first):
+        key = "thickness" if name.startswith("t_") else name
+        words = sheet.book.word(key).format(n=name[2:])
+        _value(sheet, row, name, value, links)
+        sheet.text(f"E{row}", words, LABEL_FONT)
+        if name[0] in "tz":
+            prompt = f"{words}. {sheet.book.word('length_prompt')}"
+            sheet.validate(f"B{row}", title=name, prompt=prompt, limits=(0, 1e9))
+        else:
+            sheet.validate(f"B{row}", title=name, prompt=words, limits=(-1e9, 1e9))
+
+
+def _chart(
+    sheet: SheetBuilder,
+    keys: list[str],
+    values: dict[str, list[CellValue]],
+    *,
+    head: int,
+    count: int,
+) -> None:
+    """Draw the shift over the distance from the nadir, right of the table; numbers behind."""
+    left, first = len(keys) + _CHART_COLUMNS, head + 1
+    letters = [get_column_letter(left + i) for i in range(2)]
+    sheet.word(f"{letters[0]}{head - 2}", "chart_data", LABEL_FONT)
+    for letter, key in zip(letters, ("R_u", "dR"), strict=True):
+        sheet.text(f"{letter}{head - 1}", key, LABEL_FONT)
+        for i in range(count):
+            # Texts would break a scatter chart, so blanks are #N/A.
+            cell, shown = f"INDEX(tblMM[{key}],{i + 1})", values[key][i]
+            value = shown if isinstance(shown, int | float) else float("nan")
+            grey = Font(name=FACE, size=LABEL, color="7F7F7F")
+            text = f"IF(ISNUMBER({cell}),{cell},NA())"
+            sheet.formula(f"{letter}{first + i}", text, value, form="0.000", font=grey)
+    x, y = (
+        Reference(sheet.worksheet, min_col=left + i, min_row=first, max_row=first + count - 1)
+        for i in range(2)
+    )
+    place = f"'Multimedia'!${letters[0]}${first}:${letters[1]}${first + count - 1}"
+    sheet.book.define(CHART_DATA, place)
+    chart = scatter(sheet.book.word("chart_shift"), "R", "Rbar - R", x, {"dR": y})
+    chart.height, chart.width = 7.5, 13
+    sheet.worksheet.add_chart(chart, f"{get_column_letter(len(keys) + 2)}{head - 1}")
+
+
 def shift_columns(
     layers: int,
     steps: int,
     *,
-    at: Callable[[str], str] = _in_table,
     value: Callable[[str], str] = str,
     given: Collection[str] = INPUTS,
-) -> list[tuple[str, str, str]]:
-    """Return key, label and formula of every column; inputs have no formula.
+) -> list[LiveColumn]:
+    """Return every column of the table.
 
     Parameters
     ----------
@@ -269,14 +274,13 @@ def shift_columns(
         Media, the camera's and the object's with them.
     steps : int
         Newton columns.
-    at : callable
-        Returns what a formula calls the cell of a column in its own row.
     value : callable
         Returns what a formula calls a value of the set-up, ``k_1`` for instance.
     given : collection of str
         The input columns there are.
     """
-    heights = [*map(value, ("z_0", *(f"t_{i}" for i in range(1, layers - 1)))), at("ZP_u")]
+    lengths = map(value, ("z_0", *(f"t_{i}" for i in range(1, layers - 1))))
+    heights = [*lengths, "[@ZP_u]"]
     k = [f"{h}*{value(f'k_{i}')}" for i, h in enumerate(heights, start=1)]
     q = [value(f"q_{i}") for i in range(1, layers + 1)]
 
@@ -286,60 +290,63 @@ def shift_columns(
     def slope(u: str) -> str:
         return "+".join(f"{a}/(1+{b}*{u}^2)^1.5" for a, b in zip(k, q, strict=True))
 
-    r, end = at("R_u"), at(f"u{steps}")
-    whole_row = f"AND(COUNT({r},{at('ZP_u')})=2,N({at('ZP_u')})>=0)"
-    radius, depth = '""', '""'
-    if {"X", "Y"} <= set(given):
-        off = f"({at('X')}-{value('X_0')})^2+({at('Y')}-{value('Y_0')})^2"
-        radius = f'IF(COUNT({at("X")},{at("Y")})=2,SQRT({off}),"")'
-    if "R" in given:
-        radius = f"IF(COUNT({at('R')})=1,{at('R')},{radius})"
-    if "Z" in given:
-        depth = f'IF(COUNT({at("Z")})=1,-{at("Z")},"")'
-    if "ZP" in given:
-        depth = f"IF(COUNT({at('ZP')})=1,{at('ZP')},{depth})"
+    end = f"[@u{steps}]"
+    whole_row = "AND(COUNT([@R_u],[@ZP_u])=2,N([@ZP_u])>=0)"
+    radius, depth = _used(given, value)
     columns = [
-        ("id", "Point", ""),
-        ("X", "X", ""),
-        ("Y", "Y", ""),
-        ("Z", "Z (water: < 0)", ""),
-        ("R", "or: distance from nadir", ""),
-        ("ZP", "and: depth", ""),
-        ("R_u", "R used", radius),
-        ("ZP_u", "depth used", depth),
-        ("u0", "tan b, start", f'IF({whole_row},{r}/({"+".join(k)}),"")'),
+        LiveColumn(key="id", width=11),
+        *(LiveColumn(key=key, form="General", width=11, limits=(-1e9, 1e9)) for key in "XYZ"),
+        *(LiveColumn(key=key, form="General", width=11, limits=(0, 1e9)) for key in ("R", "ZP")),
+        _live("R_u", radius, folded=True),
+        _live("ZP_u", depth, folded=True),
+        _live("u0", f'IF({whole_row},[@R_u]/({"+".join(k)}),"")', "0.000000", folded=True),
     ]
     for step in range(steps):
-        u = at(f"u{step}")
-        text = f'IF({u}="","",{u}+({r}-{u}*({f(u)}))/({slope(u)}))'
-        columns.append((f"u{step + 1}", f"tan b, step {step + 1}", text))
-    whole = "+".join(heights)
+        u = f"[@u{step}]"
+        text = f'IF({u}="","",{u}+([@R_u]-{u}*({f(u)}))/({slope(u)}))'
+        columns.append(_live(f"u{step + 1}", text, "0.000000", folded=True))
+    through = f"{value('k_1')}*{end}/SQRT(1+{q[0]}*{end}^2)"
     columns += [
-        ("Rbar", "shifted R",
-         f'IF({end}="","",({whole})*{value("k_1")}*{end}/SQRT(1+{q[0]}*{end}^2))'),
-        ("dR", "shift Rbar - R", f'IF({end}="","",{at("Rbar")}-{r})'),
-    ]  # fmt: skip
+        _live("Rbar", f'IF({end}="","",({"+".join(heights)})*{through})'),
+        _live("dR", f'IF({end}="","",[@Rbar]-[@R_u])'),
+    ]
     for axis in "XY" if {"X", "Y"} <= set(given) else "":
         centre = value(f"{axis}_0")
-        columns.append(
-            (f"{axis}bar", f"shifted {axis}",
-             f'IF(OR({end}="",COUNT({at("X")},{at("Y")})<2),"",'
-             f"{centre}+({at(axis)}-{centre})*IF({r}=0,1,{at('Rbar')}/{r}))")
-        )  # fmt: skip
+        moved = f"{centre}+([@{axis}]-{centre})*IF([@R_u]=0,1,[@Rbar]/[@R_u])"
+        text = f'IF(OR({end}="",COUNT([@X],[@Y])<2),"",{moved})'
+        columns.append(_live(f"{axis}bar", text))
+    solved = f'IF(ABS([@resid])<={TOLERANCE:.0E}*[@R_u],"OK","CHECK")'
     columns += [
-        ("resid", "F(u) - R", f'IF({end}="","",{end}*({f(end)})-{r})'),
-        ("flag", "OK, CHECK or DRY",
-         f'IF(COUNT({r},{at("ZP_u")})<2,"",IF({at("ZP_u")}<0,"DRY",'
-         f'IF(ABS({at("resid")})<={TOLERANCE:.0E}*{r},"OK","CHECK")))'),
-    ]  # fmt: skip
+        _live("resid", f'IF({end}="","",{end}*({f(end)})-[@R_u])', "0.0E+00"),
+        _live("flag", f'IF(COUNT([@R_u],[@ZP_u])<2,"",IF([@ZP_u]<0,"DRY",{solved}))', "General"),
+    ]
     return columns
+
+
+def _live(key: str, formula: str, form: str = "0.00000", *, folded: bool = False) -> LiveColumn:
+    return LiveColumn(key=key, kind="formula", formula=formula, form=form, width=12, folded=folded)
+
+
+def _used(given: Collection[str], value: Callable[[str], str]) -> tuple[str, str]:
+    """Return the formulas of the radius and depth used, from the input columns there are."""
+    radius, depth = '""', '""'
+    if {"X", "Y"} <= set(given):
+        off = f"([@X]-{value('X_0')})^2+([@Y]-{value('Y_0')})^2"
+        radius = f'IF(COUNT([@X],[@Y])=2,SQRT({off}),"")'
+    if "R" in given:
+        radius = f"IF(COUNT([@R])=1,[@R],{radius})"
+    if "Z" in given:
+        depth = 'IF(COUNT([@Z])=1,-[@Z],"")'
+    if "ZP" in given:
+        depth = f"IF(COUNT([@ZP])=1,[@ZP],{depth})"
+    return radius, depth
 
 
 def table_values(
     setup: ShiftSetup, points: ShiftPoints | None, count: int, steps: int
 ) -> dict[str, list[CellValue]]:
     """Return what every column shows, blank rows included."""
-    keys = [key for key, _, _ in shift_columns(len(setup.layers.indices), steps)]
+    keys = [column.key for column in shift_columns(len(setup.layers.indices), steps)]
     values: dict[str, list[CellValue]] = {key: [None] * count for key in keys[:6]}
     values |= {key: [""] * count for key in keys[6:]}
     if points is None:
@@ -367,14 +374,3 @@ def table_values(
         for i in np.flatnonzero(shown).tolist():
             values[key][i] = column[i] if key in ("id", "flag") else float(column[i])
     return values
-
-
-def number_format(key: str) -> str:
-    """Return how a column is shown; every digit is kept."""
-    if key == "id":
-        return "@"
-    if key == "resid":
-        return "0.0E+00"
-    if key in ("X", "Y", "Z", "R", "ZP", "flag"):
-        return "General"
-    return "0.000000" if key[0] == "u" else "0.00000"

@@ -12,7 +12,7 @@ from multimedia.workbook.shift_points import ShiftPoints, ShiftResult, ShiftSetu
 from multimedia.workbook.shift_update import add_columns, is_template, update_template
 from multimedia.workbook.shift_workbook import write_shift_workbook
 from photocore.errors import InputError
-from photocore.output import check_ending
+from photocore.output import check_ending, check_not_input
 from photocore.tables import write_csv
 from photocore.workbook.newbook import check_new_workbook
 
@@ -91,9 +91,11 @@ def shift_file(
         If a cell, an option or a file is at fault.
     """
     out = None if out is None else Path(out)
-    if out is not None:
-        check_new_workbook(out, overwrite=overwrite, source=None if new else path)
     check_ending(out, "results are written as .xlsx or .csv.", ".xlsx", ".xlsm", ".csv")
+    if out is not None:
+        if new or out.suffix.lower() == ".csv":
+            check_not_input(out, path)
+        check_new_workbook(out, overwrite=overwrite, source=None if new else path)
     replaced = {f"n_{i}": n for i, n in enumerate(indices or (), start=1)}
     replaced |= {f"t_{i}": t for i, t in enumerate(thicknesses or (), start=1)}
     if z0 is not None:
@@ -165,8 +167,10 @@ def _setup(
     return ShiftSetup(layers=media, z0=own.z0, nadir=own.nadir)
 
 
-def write_template(path: Path | str, *, rows: int, steps: int, overwrite: bool) -> None:
-    """Write the workbook with a tank as an example set-up and an empty table.
+def write_template(
+    path: Path | str, *, rows: int, steps: int, language: str = "en", overwrite: bool
+) -> None:
+    """Write the workbook with a tank as an example set-up and an empty table, in a language.
 
     Raises
     ------
@@ -174,4 +178,6 @@ def write_template(path: Path | str, *, rows: int, steps: int, overwrite: bool) 
         If the file cannot be written, or rows or steps are out of range.
     """
     setup = ShiftSetup(layers=Layers(indices=(1.0, 1.5, 1.337), thicknesses=(10.0,)), z0=500.0)
-    write_shift_workbook(path, setup, rows=rows, steps=steps, overwrite=overwrite)
+    write_shift_workbook(
+        path, setup, rows=rows, steps=steps, language=language, overwrite=overwrite
+    )

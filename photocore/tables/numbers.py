@@ -29,6 +29,8 @@ _NUMBER = re.compile(
     r"\s*(?P<unit>[^\d\s.,'+-][^\d.,]*|)"
 )
 _PLAIN = re.compile(r"[+-]?[0-9]+([.,][0-9]*)?")
+#: The exponent as Fortran writes it.
+_FORTRAN = re.compile(r"(?<=[\d.,])[dD](?=[+-]?\d+\s*$)")
 #: Thousands: groups of three digits with one kind of separator between them.
 _GROUPED = re.compile(r"[+-]?[1-9]\d{0,2}([.,' \u2019])\d{3}(\1\d{3})*(?=$|[eE])")
 
@@ -82,12 +84,14 @@ def take_apart(text: str) -> NumberText | None:
 
     >>> take_apart("−1 250,5 mm")
     NumberText(digits='-1250,5', unit='mm', evidence='comma')
+    >>> take_apart("43.00d0").value("point")
+    43.0
     >>> take_apart("n/a") is None
     True
     """
     if plain := _PLAIN.fullmatch(text):
         return NumberText(text, "", _evidence(text) if plain[1] else "none")
-    clean = text.translate(_SPACES).translate(_MINUS).strip()
+    clean = _FORTRAN.sub("e", text.translate(_SPACES).translate(_MINUS).strip())
     match = _NUMBER.fullmatch(clean)
     if match is None:
         return None

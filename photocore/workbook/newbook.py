@@ -37,6 +37,10 @@ if TYPE_CHECKING:
 
 #: Date of every part, so that equal input makes equal files; ZIP knows nothing before 1980.
 PART_TIME = (1980, 1, 1, 0, 0, 0)
+_TYPES = "[Content_Types].xml"
+_RELATIONS = "http://schemas.openxmlformats.org/officeDocument/2006/relationships"
+_PACKAGE = "http://schemas.openxmlformats.org/package/2006/relationships"
+_DRAWING = "application/vnd.openxmlformats-officedocument.drawing+xml"
 #: The part with the properties of a workbook.
 _CORE = "docProps/core.xml"
 _ILLEGAL = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\ufffe\uffff]")
@@ -88,6 +92,7 @@ def finish_book(
     *,
     results: Mapping[str, Mapping[str, CellValue]],
     blocks: Mapping[str, RowBlock] | None = None,
+    drawings: Mapping[str, bytes] | None = None,
 ) -> None:
     """Copy a package written by openpyxl, multiplying rows and filling in results.
 
@@ -102,8 +107,11 @@ def finish_book(
         is #N/A), or to the number there in full precision.
     blocks : mapping, optional
         Sheet name to the rows that repeat its prototype row.
+    drawings : mapping, optional
+        Sheet name to the drawing on it, of a sheet that has neither tables nor charts.
     """
     parts = _finished_parts(source, target, results=results, blocks=blocks)
+    _add_drawings(source, target, parts, drawings or {})
     rewrite_package(source, target, parts, date=PART_TIME)
 
 
@@ -145,6 +153,28 @@ def _finished_parts(
             parts[sheet.part] = splice_sheet(target, sheet.part, data, changes).joined(strip=False)
         parts[_CORE] = _stated_properties(read_part(target, package, _CORE))
     return parts
+
+
+def _add_drawings(
+    source: BinaryIO, target: Path, parts: dict[str, bytes], drawings: Mapping[str, bytes]
+) -> None:
+    """Add drawings to sheets that openpyxl cannot draw on."""
+    with zipfile.ZipFile(source) as package:
+        sheets = {sheet.title: sheet.part for sheet in read_directory(target, package).sheets}
+        types = read_part(target, package, _TYPES)
+    for title, drawing in drawings.items():
+        folder, _, file = sheets[title].rpartition("/")
+        name = f"xl/drawings/sketch-{file}"
+        parts[name] = drawing
+        link = f'<drawing xmlns:r="{_RELATIONS}" r:id="rId1"/></worksheet>'
+        parts[sheets[title]] = parts[sheets[title]].replace(b"</worksheet>", link.encode())
+        entry = f'<Relationship Id="rId1" Type="{_RELATIONS}/drawing" Target="/{name}"/>'
+        whole = f'<Relationships xmlns="{_PACKAGE}">{entry}</Relationships>'
+        parts[f"{folder}/_rels/{file}.rels"] = whole.encode()
+        kind = f'<Override PartName="/{name}" ContentType="{_DRAWING}"/></Types>'
+        types = types.replace(b"</Types>", kind.encode())
+    if drawings:
+        parts[_TYPES] = types
 
 
 def _stated_properties(core: bytes) -> bytes:

@@ -81,7 +81,7 @@ _PAIR: list[tuple[tuple[object, ...], object, str]] = [
     *((("image1", "sigma_pixel"), value, "sigma_pixel") for value in
       ("x", -1, 0, [], True, 1e300)),
     *((("layers",), value, "layers|indices|thick") for value in
-      (3, {"indices": [1]}, {"indices": [1, "n"], "thicknesses": []},
+      (3, [], 0, False, "", {}, {"indices": [1]}, {"indices": [1, "n"], "thicknesses": []},
        {"indices": [1, 1.5, 1.3], "thicknesses": []}, {"indices": [1, -1], "thicknesses": []})),
     (("image1", "lens"), 3, "lens"), (("image1", "lens"), "nowhere.json", "nowhere.json"),
     (("image1", "file"), 3, "file"),
@@ -128,6 +128,8 @@ _TANK: list[tuple[str, str, str]] = [
     ('media = "tank"', 'media = "glass"', "glass"), ('media = "tank"', "media = 3", "media"),
     ('name = "cam1"', 'name = "cam2"', "cam2"), ('name = "cam1"', "name = 1", "cam1"),
 
+    *(('unit = "mm"', f'unit = "mm"\n{more}', "layers|indices|section") for more in
+      ("layers = []", "layers = 3", "indices = [1.0, 1.3]", "thicknesses = []")),
     ("[media.tank]", "[media]", "tank|media"),
     ("[[camera]]", "[camera]", "camera|tank.toml"),
     ("k1 = 2e-05", 'k1 = "x"', "k1"), ("k1 = 2e-05", "k1 = nan", "k1"),

@@ -21,7 +21,7 @@ from click.testing import CliRunner
 
 from photocore import output
 from tests.attack.contents import CONTENTS
-from tests.attack.lines import INPUTS, OUTPUTS
+from tests.attack.lines import ALIGN, INPUTS, OUTPUTS, SOLVE, WATER
 from tests.attack.options import WORDS
 from tests.attack.site import PROGRAMS, make_site
 
@@ -218,3 +218,31 @@ def test_no_impossible_content_is_taken(
     (site / name).unlink(missing_ok=True)
     (site / name).write_bytes(data if isinstance(data, bytes) else str(data).encode())
     refused(line, culprit, folder=site)
+
+
+#: Lines whose output is one of the files they read; `resect` and `adjust` may renew their project.
+IN_PLACE = [
+    (f"multimedia bathymetry dem.tif {WATER} --out {{}}", "dem.tif"),
+    (f"multimedia bathymetry cloud.las {WATER} --out {{}}", "cloud.las"),
+    (f"bifocal solve survey.csv {SOLVE} --out {{}}", "survey.csv"),
+    ("bifocal solve survey.xlsx --pair wall.pair.json --out {}", "survey.xlsx"),
+    ("bifocal export survey.xlsx --out {}", "survey.xlsx"),
+    ("bifocal export result.csv --out {}", "result.csv"),
+    ("bifocal mosaic ortho1.tif ortho2.tif --out {}", "ortho2.tif"),
+    ("bifocal calibrate far.jpg --lines lines.csv --out {}", "lines.csv"),
+    ("bifocal calibrate far.jpg --database --out {}", "far.jpg"),
+    ("bifocal ortho wall.pair.json --relief relief.tif --out {}", "relief.tif"),
+    ("multimedia waterlevel cloud.csv --out {}", "cloud.csv"),
+    ("multimedia shift shift.csv --z0 1 --indices 1,1.337 --out {}", "shift.csv"),
+    (f"{ALIGN} --control control.csv --picture {{}}", "far.jpg"),
+]
+
+
+@pytest.mark.parametrize(("line", "name"), IN_PLACE, ids=[line for line, _ in IN_PLACE])
+def test_an_input_is_no_output_and_no_option_is_named_that_would_not_help(
+    site: Path, line: str, name: str
+) -> None:
+    line = line.format(name)
+    first = refused(line, re.escape(name), folder=site)
+    assert "--overwrite" not in first
+    assert refused(f"{line} --overwrite", re.escape(name), folder=site) == first

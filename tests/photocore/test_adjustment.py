@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.sparse import csr_matrix
 
-from photocore.adjustment import DenseEquations, fit, minimise
+from photocore.adjustment import BlockEquations, DenseEquations, fit, minimise
+from photocore.adjustment.sparse import SparseEquations
 from photocore.errors import ConvergenceError, GeometryError
 
 X = np.arange(6.0)
@@ -80,3 +82,48 @@ def test_an_adjustment_that_does_not_settle_says_so():
 
     with pytest.raises(ConvergenceError, match="does not settle"):
         fit(np.zeros(1), runaway, move, names=("a",), what="decay", most=5)
+
+
+def chain(rng: np.random.Generator, photos: int = 40, points: int = 150) -> dict:
+    """Equations of photos in a row, each point seen by four neighbours; one coordinate held."""
+    design, eliminated = [], []
+    for k in range(points):
+        first = rng.integers(0, photos - 3)
+        for photo in range(first, first + 4):
+            for _ in range(2):
+                design.append(np.zeros(6 * photos))
+                design[-1][6 * photo : 6 * photo + 6] = rng.normal(size=6)
+                eliminated.append(np.zeros(3 * points))
+                eliminated[-1][3 * k : 3 * k + 3] = rng.normal(size=3)
+    for column in range(6 * photos):
+        design.append(np.eye(6 * photos)[column] * 0.3)
+        eliminated.append(np.zeros(3 * points))
+    free = np.ones((points, 3), dtype=bool)
+    free[7, 1] = False
+    blanked = np.array(eliminated) * free.ravel()
+    return {
+        "residuals": rng.normal(size=len(design)), "design": csr_matrix(np.array(design)),
+        "eliminated": csr_matrix(blanked), "free": free,
+    }  # fmt: skip
+
+
+def test_three_ways_to_solve_the_same_equations_agree():
+    given = chain(np.random.default_rng(1))
+    sparse, block = SparseEquations(**given), BlockEquations(**given)
+    dense = block.stacked()
+    assert sparse.undetermined([str(k) for k in range(240)]) == []
+    assert sparse.step(0.0) == pytest.approx(dense.step(0.0), abs=1e-11)
+    assert sparse.step(1e-3) == pytest.approx(block.step(1e-3), abs=1e-11)
+    assert sparse.scale == pytest.approx(block.scale, rel=1e-12)
+    assert sparse.cofactor.diagonal() == pytest.approx(np.diag(dense.cofactor), rel=1e-10)
+    assert sparse.block_cofactor == pytest.approx(dense.block_cofactor, abs=1e-10)
+    assert sparse.redundancy_numbers == pytest.approx(dense.redundancy_numbers, abs=1e-10)
+
+
+def test_an_open_unknown_of_a_row_of_photos_is_named():
+    given = chain(np.random.default_rng(2))
+    design = given["design"].toarray()
+    design[:, 100] = design[:, 101]
+    sparse = SparseEquations(**{**given, "design": csr_matrix(design)})
+    named = sparse.undetermined([str(k) for k in range(240)])
+    assert named == ["100", "101"] or len(named) == 20

@@ -18,6 +18,7 @@ from photocore.raster import (
     create_geotiff,
     written_whole,
 )
+from photocore.raster_places import cloud_optimised
 
 WIDTH, HEIGHT = 700, 300
 pytestmark = pytest.mark.filterwarnings("ignore::rasterio.errors.NotGeoreferencedWarning")
@@ -128,3 +129,51 @@ def test_a_damaged_raster_is_refused_where_it_cannot_be_read(tmp_path: Path) -> 
 
 def test_a_window_is_widened_on_every_side() -> None:
     assert Window(10, 20, 30, 40).widened(2) == (8, 18, 34, 44)
+
+
+def write_plain(path: Path | str, values: np.ndarray, *, overwrite: bool = False) -> None:
+    with create_geotiff(
+        path, width=values.shape[1], height=values.shape[0], bands=1, dtype=values.dtype,
+        names=["grey"], tags={"A": "b"}, overwrite=overwrite,
+        transform=corner_transform(np.array([[2.0, 0.0, 11.0], [0.0, -2.0, 49.0]])),
+    ) as writer:  # fmt: skip
+        writer.write(values, mask=values > 10)
+
+
+@pytest.mark.parametrize("kind", [np.uint8, np.float32])
+def test_a_cloud_optimised_raster_holds_what_a_plain_one_does(tmp_path: Path, kind) -> None:
+    values = np.random.default_rng(1).integers(0, 255, (900, 1300)).astype(kind)
+    write_plain(tmp_path / "plain.tif", values)
+    with cloud_optimised():
+        write_plain(tmp_path / "cog.tif", values)
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["cog.tif", "plain.tif"]
+    layouts = []
+    for name in ("plain", "cog"):
+        with rasterio.open(tmp_path / f"{name}.tif") as file:
+            layouts.append(file.tags(ns="IMAGE_STRUCTURE").get("LAYOUT"))
+            assert file.tags()["A"] == "b"
+            assert file.tags()["TIFFTAG_SOFTWARE"].startswith("bifocal")
+            assert file.descriptions == ("grey",)
+            assert tuple(file.transform)[:6] == (2, 0, 10, 0, -2, 50)
+            assert np.array_equal(file.read(1), values)
+            assert np.array_equal(file.dataset_mask() > 0, values > 10)
+            overviews = file.overviews(1)
+    assert layouts == [None, "COG"]
+    assert overviews == [2, 4]
+
+
+def test_gdals_own_file_systems_are_written_and_read() -> None:
+    values = np.arange(600 * 700, dtype=np.float32).reshape(600, 700)
+    place = "/vsimem/bucket/a.tif"
+    write_plain(place, values)
+    with RasterFile(place) as file:
+        assert np.array_equal(file.read_floats(5, 6, 7, 8), values[6:14, 5:12])
+    with pytest.raises(InputError, match="exists already; add --overwrite"):
+        write_plain(place, values)
+    write_plain(place, values + 1, overwrite=True)
+    with RasterFile(place) as file:
+        assert file.read(0, 0, 1, 1) == 1
+    with pytest.raises(InputError, match="GDAL can read"):
+        RasterFile("/vsimem/bucket/none.tif")
+    with pytest.raises(InputError, match=r"cannot be reached|could not be written"):
+        write_plain("/vsicurl/https://localhost:1/a.tif", values)

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import io
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 from openpyxl.styles import Alignment
 
+from bifocal.survey.workbook.cameras_sketch import cameras_sketch
 from bifocal.survey.workbook.charts import charts
-from bifocal.survey.workbook.columns import LOG, SurveyColumn, adjustment_names
+from bifocal.survey.workbook.columns import LOG
 from bifocal.survey.workbook.content import (
     STRUCTURED_ROWS,
     SurveyContent,
@@ -20,31 +20,43 @@ from bifocal.survey.workbook.content import (
 from bifocal.survey.workbook.georeference_sheet import georeference
 from bifocal.survey.workbook.reference_sheets import check, planning
 from bifocal.survey.workbook.results_columns import results_columns
-from bifocal.survey.workbook.setup_cells import (
-    FORMS,
-    IDEAL_FORMULAS,
-    IDEAL_GROUPS,
-    PAIR_FORMULAS,
-    PAIR_GROUPS,
-    PHOTOS,
-    POSITIVE,
-)
-from bifocal.survey.workbook.sheets import (
-    FLAG_COLOURS,
-    HEAD_FONT,
-    LABEL_FONT,
-    BookBuilder,
-    Cells,
-    SheetBuilder,
-)
-from bifocal.survey.workbook.words import readme, term, word
+from bifocal.survey.workbook.setup_sheet import setup_sheet
+from bifocal.survey.workbook.words import WORDS, readme
 from photocore.workbook.cells import CellValue
 from photocore.workbook.grid import column_letters
-from photocore.workbook.look import colour_words
-from photocore.workbook.newbook import finish_book, new_workbook
+from photocore.workbook.live_book import BookBuilder, Cells, SheetBuilder
+from photocore.workbook.live_columns import LiveColumn
+from photocore.workbook.look import (
+    BODY_FONT,
+    DOUBT,
+    GOOD,
+    HEAD_FONT,
+    WARN_FONT,
+    WRONG,
+    colour_words,
+    strike_out,
+)
 
 #: Row of the keys in `Points` and `Results`.
 HEAD = 4
+#: Rows of an empty form that are printed: one page of `Results`.
+FORM_ROWS = 28
+#: Fill and text of each flag; the word itself always stands in the cell too.
+FLAG_COLOURS = {
+    "OK": GOOD,
+    "ON-PLANE": ("DDEBF7", "1F4E79"),
+    "WEAK": ("FFF2CC", "7F6000"),
+    "UNCERTAIN": ("FCE4D6", "9C3D00"),
+    "NADIR": ("EDEDED", "3B3B3B"),
+    "OFF-RADIAL": WRONG,
+    "CHECK": DOUBT,
+}
+#: Scale of the sheet `Points` on paper: labels stay above 8 pt. [%]
+_SCALE = 92
+#: Name of the column `use` of `Points`, for rules of other sheets, which may not name a table.
+USED = "points_use"
+#: Where the sketch of the cameras stands on the sheet `Readme`.
+_SKETCH = "C3"
 
 
 def write_book(path: Path | str, content: SurveyContent, *, overwrite: bool = False) -> None:
@@ -59,20 +71,16 @@ def write_book(path: Path | str, content: SurveyContent, *, overwrite: bool = Fa
     overwrite : bool
         Replace an existing file.
     """
-    with new_workbook(path, overwrite=overwrite) as temporary:
-        builder = build(content)
-        package = io.BytesIO()
-        builder.book.save(package)
-        finish_book(package, temporary, blocks=builder.blocks, results=builder.results)
+    build(content).save(path, overwrite=overwrite)
 
 
 def build(content: SurveyContent) -> BookBuilder:
     """Return all sheets of the workbook, tables with one prototype row each."""
-    builder = BookBuilder(language=content.language)
+    builder = BookBuilder(language=content.language, words=WORDS)
     builder.book.properties.creator = "bifocal"
     builder.book.properties.title = "bifocal survey"
     _readme(builder)
-    _setup(builder, content)
+    setup_sheet(builder, content)
     cells = point_cells(content)
     _points(builder, content, cells)
     _results(builder, content, cells)
@@ -81,131 +89,151 @@ def build(content: SurveyContent) -> BookBuilder:
     planning(builder, content)
     charts(builder, content, cells)
     _log(builder, content)
-    builder.book.active = builder.book.sheetnames.index("Points" if content.points else "Readme")
-    for sheet in builder.book.worksheets:
-        sheet.sheet_view.tabSelected = sheet.title == builder.book.active.title
-    builder.book.calculation.fullCalcOnLoad = True
+    builder.open_at("Points" if content.points else "Readme")
     return builder
 
 
 def _readme(builder: BookBuilder) -> None:
     sheet = builder.sheet("Readme")
-    sheet.worksheet.column_dimensions["A"].width = 110
+    sheet.worksheet.column_dimensions["A"].width = 80
+    sheet.worksheet.column_dimensions["B"].width = 2
     for row, line in enumerate(readme(builder.language), start=3):
         heading = line.startswith("#")
         sheet.text(f"A{row}", line.lstrip("#"), HEAD_FONT if heading else None)
-    sheet.finish(guarded=False)
-
-
-def _setup(builder: BookBuilder, content: SurveyContent) -> None:
-    sheet = builder.sheet("Setup", "type")
-    for letter, key, width in (
-        ("A", "name", 14),
-        ("B", "description", 72),
-        ("C", "value", 16),
-        ("D", "unit", 10),
-    ):
-        sheet.word(f"{letter}4", key, HEAD_FONT)
-        sheet.worksheet.column_dimensions[letter].width = width
-    cells = setup_cells(content)
-    groups = PAIR_GROUPS if content.is_pair else IDEAL_GROUPS
-    row = 5
-    for group in groups:
-        for name in group:
-            _setup_cell(sheet, row, name, cells, content, typed=group is not groups[-1])
-            row += 1
-        row += 1
-    for image in (1, 2):
-        names = [name for name in adjustment_names(image) if name in cells]
-        for name in names:
-            sheet.text(f"A{row}", name)
-            sheet.text(f"B{row}", word("correction", builder.language).format(n=image))
-            sheet.input(f"C{row}", cells[name], name=name)
-            row += 1
-    sheet.finish(freeze="A5")
-
-
-def _setup_cell(
-    sheet: SheetBuilder,
-    row: int,
-    name: str,
-    cells: Mapping[str, CellValue],
-    content: SurveyContent,
-    *,
-    typed: bool,
-) -> None:
-    """Write one named value with its description and unit."""
-    known = term("setup", name)
-    matrix = f"H{name[1]}({name[3:4]},{name[4:5]})"
-    sheet.text(f"A{row}", name)
-    sheet.text(f"B{row}", known.in_language(sheet.book.language) if known else matrix)
-    sheet.text(f"D{row}", known.unit if known else "", LABEL_FONT)
-    sheet.worksheet[f"D{row}"].alignment = Alignment(indent=1)
-    cell, form, value = f"C{row}", FORMS.get(name, "General"), cells.get(name)
-    if name in content.links:
-        sheet.formula(cell, content.links[name], value, form=form, name=name, editable=True)
-        return
-    formulas = PAIR_FORMULAS if content.is_pair else IDEAL_FORMULAS
-    is_default = {
-        "d_1": content.pair is None,
-        "sigma_s": content.setup is None or content.setup.sigma_s is None,
-        "sigma_r_max": content.limits.sigma_r_max is None,
-    }
-    if not typed or (name in formulas and is_default.get(name, False)):
-        sheet.formula(cell, formulas[name], value, form=form, name=name, editable=typed)
-        return
-    sheet.input(cell, value, form=form, name=name)
-    if name == "input_unit":
-        sheet.worksheet[cell].alignment = Alignment(horizontal="right")
-        sheet.validate(cell, choices="mm,px")
-    elif name not in ("pair_file", *PHOTOS):
-        sheet.validate(cell, above_zero=name in POSITIVE)
+    sketch = cameras_sketch(builder.word("nadir"), builder.word("sketch"))
+    builder.drawings["Readme"] = sketch.part(_SKETCH)
+    # Nothing stands in the cells below the sketch: without this they would not be printed.
+    sheet.worksheet.print_area = "A1:C34"
+    sheet.worksheet.column_dimensions["C"].width = 50
+    sheet.finish(landscape=True, guarded=False)
+    sheet.worksheet.page_setup.fitToHeight = 1
 
 
 def _points(builder: BookBuilder, content: SurveyContent, cells: Cells) -> None:
+    """Write what was measured and, beside it, all results as formulas."""
     columns = content.point_columns
     note = "points_pair" if content.is_pair else "points_how"
-    sheet = _long_sheet(builder, "Points", note, columns, content.point_rows, cells)
-
-    def area(first: str, last: str) -> str:
-        keys = [column.key for column in columns]
-        left, right = (column_letters(keys.index(key) + 1) for key in (first, last))
-        return f"{left}{HEAD + 1}:{right}{HEAD + content.point_rows}"
-
-    sheet.validate(area("use", "use"), choices="1,0")
-    sheet.validate(area("col1", "row2") if content.is_pair else area("x1", "s2"))
-    if not content.is_pair:
-        sheet.validate(area("theta", "theta"), limit=360)
+    sheet = _long_sheet(builder, "Points", note, columns, content, cells)
+    keys = [column.key for column in columns]
+    first_result = keys.index("note") + 2
     sheet.worksheet.sheet_properties.outlinePr.summaryRight = True
+    # Each page begins with the names: the title would be cut off there, so it heads the page.
+    sheet.worksheet.oddHeader.left.text = builder.word("Points")
+    sheet.finish(
+        landscape=True,
+        freeze=f"B{HEAD + 1}",
+        repeat=f"{HEAD - 1}:{HEAD}",
+        scale=_SCALE,
+        breaks=(len(columns), (first_result,)),
+    )
 
 
 def _results(builder: BookBuilder, content: SurveyContent, cells: Cells) -> None:
-    columns = results_columns(is_pair=content.is_pair)
-    results = result_cells(content, cells)
-    _long_sheet(builder, "Results", "results_how", columns, content.point_rows, results)
+    """Write what a client is handed: names, coordinates, precision, below a title block."""
+    results, columns = result_cells(content, cells), results_columns(is_pair=content.is_pair)
+    sheet = _long_sheet(builder, "Results", "", columns, content, results)
+    _title_block(sheet, content, results)
+    sheet.finish(landscape=True, freeze=f"B{HEAD + 1}", repeat=f"{HEAD - 1}:{HEAD}")
 
 
 def _long_sheet(
     builder: BookBuilder,
     name: str,
     note: str,
-    columns: Sequence[SurveyColumn],
-    rows: int,
+    columns: Sequence[LiveColumn],
+    content: SurveyContent,
     cells: Cells,
 ) -> SheetBuilder:
     """Write a sheet that is one table with a row per point, its flags coloured."""
-    sheet = builder.sheet(name, note)
+    sheet, rows = builder.sheet(name, note), content.point_rows
     short = rows > STRUCTURED_ROWS
     sheet.table(
         f"tbl{name}", columns, at=(HEAD, 1), rows=rows, cells=cells, repeat=True, short=short
     )
-    flag = column_letters([column.key for column in columns].index("flag") + 1)
+    keys = [column.key for column in columns]
+    flag, last = column_letters(keys.index("flag") + 1), HEAD + rows
+    if "use" in keys:
+        used = column_letters(keys.index("use") + 1)
+        builder.define(USED, f"'{name}'!${used}${HEAD + 1}:${used}${last}")
+        unused = f"AND(ISNUMBER(${used}{HEAD + 1}),${used}{HEAD + 1}=0)"
+    else:
+        at = f"INDEX({USED},ROW()-{HEAD})"
+        unused = f"AND(ISNUMBER({at}),{at}=0)"
+    # A point that is not used is no good point, whatever its flag.
+    whole = f"A{HEAD + 1}:{column_letters(len(columns))}{last}"
+    strike_out(sheet.worksheet, whole, unused)
     bold = ("OFF-RADIAL", "NADIR", "CHECK")
-    flags = f"{flag}{HEAD + 1}:{flag}{HEAD + rows}"
+    flags = f"{flag}{HEAD + 1}:{flag}{last}"
     colour_words(sheet.worksheet, flags, FLAG_COLOURS, bold=bold, stop=True)
-    repeat = f"{HEAD - 1}:{HEAD}"
-    sheet.finish(landscape=name == "Points", freeze=f"B{HEAD + 1}", repeat=repeat)
+    _printed(sheet, print_area(name, len(columns), printed_rows(content)), content)
     return sheet
+
+
+def printed_rows(content: SurveyContent) -> int:
+    """Return how many points are printed: all there are, or one page of an empty form."""
+    if content.points is None:
+        return min(FORM_ROWS, content.point_rows)
+    return max(len(content.points), 1)
+
+
+def print_area(sheet: str, columns: int, rows: int) -> str:
+    """Return the cells of `Points` or `Results` that are printed."""
+    return f"A{1 if sheet == 'Results' else HEAD - 1}:{column_letters(columns)}{HEAD + rows}"
+
+
+def unprinted_formula(words: str, rows: int) -> str:
+    """Return the formula of the warning that points stand below the printed rows."""
+    return f'IF(COUNTA(tblPoints[id])>{rows},"{words}","")'
+
+
+def _printed(sheet: SheetBuilder, area: str, content: SurveyContent) -> None:
+    """Print only the rows that hold points, and say so where points stand below them."""
+    name = sheet.worksheet.title
+    sheet.worksheet.print_area = area
+    formula = unprinted_formula(sheet.book.word("unprinted"), printed_rows(content))
+    sheet.formula("E1", formula, None, name=f"unprinted_{name}", font=WARN_FONT)
+
+
+_BLOCK_PLACE = Alignment(wrap_text=True, vertical="top")
+#: The title block: cell, the cells it spans, its name.
+_BLOCKS = (
+    ("A2", "D2", "title_project"), ("E2", "I2", "title_survey"), ("J2", "O2", "title_units"),
+)  # fmt: skip
+
+
+def _title_block(sheet: SheetBuilder, content: SurveyContent, results: Cells) -> None:
+    """Write whose survey it is, by whom, when, in which units, and how good."""
+    book, setup = sheet.book, setup_cells(content)
+
+    def line(word: str, name: str) -> tuple[str, str]:
+        return f'"{book.word(word)}: "&{name}', f"{book.word(word)}: {setup.get(name) or ''}"
+
+    people = [line("project", "project"), line("client", "client")]
+    survey = [line("surveyor", "surveyor"), line("survey_date", "survey_date")]
+    solved = sum(isinstance(x, float) and x == x for x in results.get("X", ()))
+    worst = None if content.check is None else content.check.accuracy
+    shown = "" if worst is None or worst != worst else f"{round(worst, 3):g} m"
+    points, rmse = book.word("points_solved"), book.word("worst_of_checks")
+    people += [
+        (f'"{points}: "&COUNT(tblResults[X])', f"{points}: {solved}"),
+    ]
+    survey += [
+        (
+            f'"{rmse}: "&IF(ISNUMBER(check_worst),ROUND(check_worst,3)&" m","")',
+            f"{rmse}: {shown}",
+        )
+    ]
+    for (left, right, name), lines in zip(_BLOCKS, (people, survey), strict=False):
+        text = "&CHAR(10)&".join(formula for formula, _ in lines)
+        value: CellValue = "\n".join(shown for _, shown in lines)
+        sheet.formula(left, text, value, name=name, font=BODY_FONT)
+        sheet.worksheet.merge_cells(f"{left}:{right}")
+        sheet.worksheet[left].alignment = _BLOCK_PLACE
+    left, right, _ = _BLOCKS[-1]
+    sheet.word(left, "result_units")
+    sheet.worksheet.merge_cells(f"{left}:{right}")
+    sheet.worksheet[left].alignment = _BLOCK_PLACE
+    sheet.worksheet.row_dimensions[2].height = 42
 
 
 def _log(builder: BookBuilder, content: SurveyContent) -> None:

@@ -8,10 +8,12 @@ from openpyxl.styles import Font
 
 from bifocal.survey.workbook.content import CHART_ROWS, SurveyContent
 from bifocal.survey.workbook.reference_sheets import CHECK_HEAD
-from bifocal.survey.workbook.sheets import LABEL_FONT, BookBuilder, Cells
 from bifocal.survey.workbook.words import word
 from photocore.workbook.cells import CellValue
 from photocore.workbook.grid import column_letters
+from photocore.workbook.live_book import BookBuilder, Cells
+from photocore.workbook.live_charts import COLOURS, scatter, titled
+from photocore.workbook.look import FACE, LABEL, LABEL_FONT
 from photocore.workbook.newbook import RowBlock
 
 #: Row of the headings of the chart data; text would break a scatter chart, so blanks are #N/A.
@@ -37,7 +39,7 @@ def charts(builder: BookBuilder, content: SurveyContent, cells: Cells) -> None:
         sheet.formula(
             f"{letter}{HEAD + 1}", f"IF(ISNUMBER({value}),{value},NA())", None, form="0.000"
         )
-        sheet.worksheet[f"{letter}{HEAD + 1}"].font = Font(name="Calibri", color="A6A6A6", size=8)
+        sheet.worksheet[f"{letter}{HEAD + 1}"].font = Font(name=FACE, color="7F7F7F", size=LABEL)
         listed: list[CellValue] = [
             value if isinstance(value, int | float) else float("nan")
             for value in cells.get(key, [])[:rows]
@@ -49,33 +51,17 @@ def charts(builder: BookBuilder, content: SurveyContent, cells: Cells) -> None:
         Reference(sheet.worksheet, min_col=LEFT + 1 + i, min_row=HEAD + 1, max_row=last)
         for i in range(len(_KEYS))
     ]
-    plan = _scatter(word("chart_plan", language), "X [m]", "Y [m]", data[0], data[1])
+    plan = scatter(word("chart_plan", language), "X [m]", "Y [m]", data[0], {"Y": data[1]})
     _equal_scales(plan, cells)
     sheet.worksheet.add_chart(plan, "A3")
-    sigma = _scatter(word("chart_sigma", language), "s' [mm]", "sigma_r [m]", data[2], data[3])
-    sigma.height, sigma.width = 8, 16
-    sheet.worksheet.add_chart(sigma, "A30")
+    title, series = word("chart_sigma", language), {"sigma_r": data[3]}
+    sigma = scatter(title, "s' [mm]", "sigma_r [m]", data[2], series)
+    sigma.height, sigma.width = 7, 16
+    sheet.worksheet.add_chart(sigma, "A32")
     _errors(builder, content)
     sheet.finish()
-    sheet.worksheet.print_area = "A1:J66"
+    sheet.worksheet.print_area = "A1:J65"
     sheet.worksheet.page_setup.fitToHeight = 1
-
-
-def _scatter(title: str, x_title: str, y_title: str, x: Reference, y: Reference) -> ScatterChart:
-    """Return a chart of dots: markers set one by one, or LibreOffice shows none."""
-    chart = ScatterChart()
-    chart.style, chart.scatterStyle, chart.legend = 13, "lineMarker", None
-    chart.title, chart.x_axis.title, chart.y_axis.title = title, x_title, y_title
-    series = Series(y, x, title=title)
-    series.marker.symbol, series.marker.size = "circle", 5
-    series.marker.graphicalProperties = GraphicalProperties(solidFill="1F3FA8")
-    series.marker.graphicalProperties.line.solidFill = "1F3FA8"
-    series.graphicalProperties.line.noFill = True
-    chart.series.append(series)
-    for axis in (chart.x_axis, chart.y_axis):
-        axis.delete, axis.tickLblPos, axis.crosses = False, "low", "min"
-        axis.number_format = "0.00"
-    return chart
 
 
 def _equal_scales(chart: ScatterChart, cells: Cells) -> None:
@@ -104,18 +90,17 @@ def _errors(builder: BookBuilder, content: SurveyContent) -> None:
     """Draw a bar for the relief error of each check point."""
     sheet, language = builder.book["Check"], builder.language
     chart = BarChart()
-    chart.type, chart.style, chart.title, chart.legend = (
-        "col", 10, word("chart_error", language), None
-    )  # fmt: skip
+    chart.type, chart.style, chart.legend = "col", 10, None
+    chart.title = titled(word("chart_error", language))
     rows = max(len(content.known), 8)
     errors = Reference(sheet, min_col=11, min_row=CHECK_HEAD + 1, max_row=CHECK_HEAD + rows)
     names = Reference(sheet, min_col=1, min_row=CHECK_HEAD + 1, max_row=CHECK_HEAD + rows)
     series = Series(errors, title="dZ")
-    series.graphicalProperties = GraphicalProperties(solidFill="C55A11")
+    series.graphicalProperties = GraphicalProperties(solidFill=COLOURS[1])
     chart.series.append(series)
     chart.set_categories(names)
     chart.x_axis.delete = chart.y_axis.delete = False
-    chart.x_axis.tickLblPos, chart.y_axis.title = "low", "dZ [m]"
+    chart.x_axis.tickLblPos, chart.y_axis.title = "low", titled("dZ [m]", 1000)
     chart.y_axis.number_format = "0.000"
-    chart.height, chart.width = 8, 16
-    builder.book["Charts"].add_chart(chart, "A48")
+    chart.height, chart.width = 7, 16
+    builder.book["Charts"].add_chart(chart, "A49")

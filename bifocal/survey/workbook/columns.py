@@ -1,15 +1,11 @@
 """Tables of the survey workbook: keys, kinds, number formats and live formulas.
 
-Formulas are written with ``[@key]`` for the cell of the same row; `row_formula` turns that into the
-file's structured references. Only functions of Excel 2007 are used, no text formats, no locale.
 Names never look like cells, so `d_1` and not the paper's `d1`.
 """
 
 from __future__ import annotations
 
-import re
 from collections.abc import Collection
-from dataclasses import dataclass
 
 from bifocal.model.flags import FlagLimits
 from bifocal.survey.workbook.placed_formulas import (
@@ -17,60 +13,14 @@ from bifocal.survey.workbook.placed_formulas import (
     added_covariance,
     turned_covariance,
 )
-
-#: Columns of names and words, not of numbers.
-TEXT_KEYS = ("id", "code", "note")
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class SurveyColumn:
-    """One column of a table.
-
-    Attributes
-    ----------
-    key : str
-        Heading; stable, ASCII, never translated.
-    kind : str
-        ``input`` (typed by the user), ``formula``, or ``value`` (written by the program).
-    formula : str
-        With ``[@key]`` for the same row.
-    places : int or None
-        Decimals shown; None for text and whole numbers.
-    width : float
-        In characters.
-    folded : bool
-        Whether the column is grouped and folded away: a step on the way, not a result.
-    spare : int or None
-        What the formula shows in rows that hold no point; None where it shows nothing.
-    """
-
-    key: str
-    kind: str = "input"
-    formula: str = ""
-    places: int | None = None
-    width: float = 10.0
-    folded: bool = False
-    spare: int | None = None
-
-
-def row_formula(table: str, text: str) -> str:
-    """Return a formula with ``[@key]`` written as the file format wants it."""
-    return "=" + re.sub(r"\[@(\w+)\]", rf"{table}[[#This Row],[\1]]", text)
-
-
-def formula_column(
-    key: str, formula: str, places: int | None = None, **more: object
-) -> SurveyColumn:
-    """Return a column that is calculated."""
-    return SurveyColumn(key=key, kind="formula", formula=formula, places=places, **more)  # type: ignore[arg-type]
-
+from photocore.workbook.live_columns import LiveColumn, formula_column
 
 _f = formula_column
 
 
-def _of_r(key: str, formula: str) -> SurveyColumn:
+def _of_r(key: str, formula: str, **more: object) -> LiveColumn:
     """Return a column that is blank where relief is blank."""
-    return _f(key, f'IF([@r]="","",{formula})', 4)
+    return _f(key, f'IF([@r]="","",{formula})', 4, **more)
 
 
 _XY = "[@x1],[@y1],[@x2],[@y2]"
@@ -120,7 +70,7 @@ _RELIEF = (
 COVARIANCES = ("XX", "XY", "YY", "XZ", "YZ", "ZZ")
 
 
-def _of_x(key: str, formula: str, *, folded: bool = True) -> SurveyColumn:
+def _of_x(key: str, formula: str, *, folded: bool = True) -> LiveColumn:
     """Return a column that is blank where X is blank."""
     return _f(key, f'IF([@X]="","",{formula})', None if folded else 4, folded=folded)
 
@@ -129,7 +79,7 @@ def _of_x(key: str, formula: str, *, folded: bool = True) -> SurveyColumn:
 NEAR = ("n_E", "n_N", "n_H", "cov_EN")
 
 
-def _near(*, is_pair: bool) -> tuple[SurveyColumn, ...]:
+def _near(*, is_pair: bool) -> tuple[LiveColumn, ...]:
     """Return the columns of `NEAR`: differences of large coordinates would lose their digits.
 
     With them the covariance of E and N, for error ellipses.
@@ -154,8 +104,8 @@ def _near(*, is_pair: bool) -> tuple[SurveyColumn, ...]:
 
 
 def _sigmas(
-    sigma_r: str, covariances: tuple[SurveyColumn, ...], *, is_pair: bool
-) -> tuple[SurveyColumn, ...]:
+    sigma_r: str, covariances: tuple[LiveColumn, ...], *, is_pair: bool
+) -> tuple[LiveColumn, ...]:
     """Return the columns of precision, with the covariance of X, Y, Z from the picks."""
     return (
         *covariances,
@@ -166,7 +116,7 @@ def _sigmas(
     )
 
 
-def _ideal_covariances() -> tuple[SurveyColumn, ...]:
+def _ideal_covariances() -> tuple[LiveColumn, ...]:
     """Return variances by each photo, along and across the radius; then those of X, Y, Z."""
     sin, cos = "SIN(RADIANS([@theta_used]))", "COS(RADIANS([@theta_used]))"
     near, far = "([@s2_used]/d_2)", "([@s1_used]/d_1)"
@@ -191,7 +141,7 @@ def ideal_points(
     polar: bool = True,
     theta: bool = True,
     adjusted: Collection[int] = (),
-) -> tuple[SurveyColumn, ...]:
+) -> tuple[LiveColumn, ...]:
     """Return the `Points` table of an ideal pair.
 
     Parameters
@@ -220,19 +170,23 @@ def ideal_points(
     miss = f"(({x1})*({y2})-({y1})*({x2}))*k_12/[@s1_used]"
     off = "ABS(N([@q]))>k_off*sigma_s*SQRT(1+([@s2_used]/[@s1_used])^2)" if xy else "FALSE"
     return (
-        SurveyColumn(key="id", width=12),
-        *(SurveyColumn(key=key, places=4) for key in ("x1", "y1", "x2", "y2") if xy),
-        *(SurveyColumn(key=key, places=4) for key in ("s1", "s2") if polar),
-        *(SurveyColumn(key=key, places=4, width=11) for key in ("theta",) if theta),
-        SurveyColumn(key="use", width=6),
-        SurveyColumn(key="code", width=10),
-        SurveyColumn(key="note", width=18),
+        LiveColumn(key="id", width=12),
+        *(LiveColumn(key=key, places=4, width=10.5) for key in ("x1", "y1", "x2", "y2") if xy),
+        *(LiveColumn(key=key, places=4, width=11.5) for key in ("s1", "s2") if polar),
+        *(
+            LiveColumn(key=key, places=4, width=11, limits=(-360, 360))
+            for key in ("theta",)
+            if theta
+        ),
+        LiveColumn(key="use", width=9, choices="1,0"),
+        LiveColumn(key="code", width=10),
+        LiveColumn(key="note", width=18),
         _f("s1_used", _radius(x1, y1, "[@s1]", "", **kinds), 4, folded=True),
         _f("s2_used", _radius(x2, y2, "[@s2]", "*k_12", **kinds), 4, folded=True),
         _f("theta_used", f'IF([@s1_used]="","",{of_theta})', 4, folded=True),
         *_RELIEF,
-        _of_r("e1", "[@s1_used]*[@r]/d_1"),
-        _of_r("e2", "[@s2_used]*[@r]/d_2"),
+        _of_r("e1", "[@s1_used]*[@r]/d_1", width=11.5),
+        _of_r("e2", "[@s2_used]*[@r]/d_2", width=11.5),
         _of_r("s_c", "[@s1_used]-[@e1]"),
         *place,
         _of_r("Z", "[@r]"),
@@ -252,7 +206,7 @@ def ideal_points(
 IDEAL_POINTS = ideal_points()
 
 
-def _carried_to_the_plane(prefix: str) -> list[SurveyColumn]:
+def _carried_to_the_plane(prefix: str) -> list[LiveColumn]:
     """Return x1, y1, x2, y2: both pixels on the reference plane, from e, at the scale of photo 1.
 
     Parameters
@@ -272,7 +226,7 @@ def _carried_to_the_plane(prefix: str) -> list[SurveyColumn]:
     return columns
 
 
-def pair_points(*, undistorted: bool) -> tuple[SurveyColumn, ...]:
+def pair_points(*, undistorted: bool) -> tuple[LiveColumn, ...]:
     """Return the `Points` table of a general pair measured in raw pixels.
 
     Parameters
@@ -295,13 +249,13 @@ def pair_points(*, undistorted: bool) -> tuple[SurveyColumn, ...]:
         return f"e_{axis}+({moved[f'{axis}1']}-{own[f'{axis}1']}*[@r]/d_1)*m_1/1000"
 
     return (
-        SurveyColumn(key="id", width=12),
-        *(SurveyColumn(key=key, places=3) for key in ("col1", "row1", "col2", "row2")),
-        SurveyColumn(key="use", width=6),
-        SurveyColumn(key="code", width=10),
-        SurveyColumn(key="note", width=18),
+        LiveColumn(key="id", width=12),
+        *(LiveColumn(key=key, places=3, width=10.5) for key in ("col1", "row1", "col2", "row2")),
+        LiveColumn(key="use", width=9, choices="1,0"),
+        LiveColumn(key="code", width=10),
+        LiveColumn(key="note", width=18),
         *(
-            SurveyColumn(key=f"u{key}", kind="value", places=3, folded=True)
+            LiveColumn(key=f"u{key}", kind="value", places=3, folded=True)
             for key in ("col1", "row1", "col2", "row2")
             if undistorted
         ),
@@ -313,18 +267,15 @@ def pair_points(*, undistorted: bool) -> tuple[SurveyColumn, ...]:
             5,
         ),
         *(
-            SurveyColumn(key=key, kind="value", places=6, folded=True)
+            LiveColumn(key=key, kind="value", places=6, folded=True)
             for key in ("g1x", "g1y", "g2x", "g2y", "k_q", "k_w", "k_r", "o_r")
         ),
         *(
-            SurveyColumn(key=f"{kind}_{key}", kind="value", folded=True)
+            LiveColumn(key=f"{kind}_{key}", kind="value", folded=True)
             for kind in "ko"
             for key in COVARIANCES
         ),
-        *(
-            SurveyColumn(key=f"o_{name}", kind="value", folded=True)
-            for name in ("E", "N", "H", "EN")
-        ),
+        *(LiveColumn(key=f"o_{name}", kind="value", folded=True) for name in ("E", "N", "H", "EN")),
         _f("s1_used", f'IF([@q]="","",{radius(1, moved)})', 4, folded=True),
         _f("s2_used", f'IF([@q]="","",{radius(2, moved)})', 4, folded=True),
         _f(
@@ -334,8 +285,8 @@ def pair_points(*, undistorted: bool) -> tuple[SurveyColumn, ...]:
             folded=True,
         ),
         *_RELIEF,
-        _of_r("e1", f"{radius(1, own)}*[@r]/d_1"),
-        _of_r("e2", f"{radius(2, own)}*[@r]/d_2"),
+        _of_r("e1", f"{radius(1, own)}*[@r]/d_1", width=11.5),
+        _of_r("e2", f"{radius(2, own)}*[@r]/d_2", width=11.5),
         _of_r("s_c", f"{radius(1, own)}-[@e1]"),
         _of_r("X", place("x")),
         _of_r("Y", place("y")),
@@ -370,17 +321,18 @@ def look_up(axis: str, factor: str = "") -> str:
     return f'IF([@id]="","",IFERROR(IF(ISNUMBER({cell}),{factor}{cell},""),""))'
 
 
-CHECK: tuple[SurveyColumn, ...] = (
-    SurveyColumn(key="id", width=12),
-    *(SurveyColumn(key=f"{axis}_ref", places=4, width=11) for axis in "XYZ"),
-    SurveyColumn(key="use", width=6),
-    *(_f(axis, look_up(axis), 4) for axis in "XYZ"),
+CHECK: tuple[LiveColumn, ...] = (
+    LiveColumn(key="id", width=12),
+    *(LiveColumn(key=f"{axis}_ref", places=4) for axis in "XYZ"),
+    LiveColumn(key="use", width=9, choices="1,0"),
+    *(_f(axis, look_up(axis), 4, width=8.5) for axis in "XYZ"),
     *(
         _f(
             f"d{axis}",
             f'IF(AND(COUNT([@{axis}],[@{axis}_ref])=2,OR([@use]="",[@use]<>0)),'
             f'[@{axis}]-[@{axis}_ref],"")',
             4,
+            width=8.5,
         )
         for axis in "XYZ"
     ),
@@ -388,8 +340,8 @@ CHECK: tuple[SurveyColumn, ...] = (
 
 #: Relief whose area of uncertainty the sheet `Planning` shows. [cm]
 PLANNED_RELIEF = (1, 2, 5, 10, 20, 50, 100)
-UNCERTAINTY: tuple[SurveyColumn, ...] = (
-    SurveyColumn(key="relief_cm", width=13),
+UNCERTAINTY: tuple[LiveColumn, ...] = (
+    LiveColumn(key="relief_cm", width=13),
     _f(
         "radius_mm",
         f'IF(COUNT(d_1,d_2)<2,"",{FlagLimits().on_plane:g}*SQRT(2)*sigma_s*(d_1-[@relief_cm]/100)*'
@@ -407,8 +359,8 @@ UNCERTAINTY: tuple[SurveyColumn, ...] = (
     ),
 )
 FRAME_SHARES = (10, 20, 30, 40, 50, 60, 70, 80, 90, 100)
-OVER_FRAME: tuple[SurveyColumn, ...] = (
-    SurveyColumn(key="share", width=13),
+OVER_FRAME: tuple[LiveColumn, ...] = (
+    LiveColumn(key="share", width=13),
     _f(
         "s_mm",
         'IF(COUNT(sensor_w,sensor_h)<2,"",[@share]/200*SQRT(sensor_w^2+sensor_h^2))',
@@ -424,22 +376,22 @@ OVER_FRAME: tuple[SurveyColumn, ...] = (
 )
 
 
-def verdict_columns(holds: str, fails: str) -> tuple[SurveyColumn, ...]:
+def verdict_columns(holds: str, fails: str) -> tuple[LiveColumn, ...]:
     """Return the table of verdicts with its two words in the workbook's language."""
     return (
-        SurveyColumn(key="rule", width=16),
-        SurveyColumn(key="scale", width=9),
-        SurveyColumn(key="tolerance", places=1, width=11),
+        LiveColumn(key="rule", width=13),
+        LiveColumn(key="scale", width=9, form='"1:"0'),
+        LiveColumn(key="tolerance", places=1),
         _f(
             "verdict",
             'IF(OR(check_worst="",[@tolerance]=""),"",'
             f'IF(check_worst<=[@tolerance]/1000,"{holds}","{fails}"))',
-            width=11,
+            width=9,
         ),
     )
 
 
-LOG: tuple[SurveyColumn, ...] = tuple(
-    SurveyColumn(key=key, kind="value", width=width)
-    for key, width in (("time", 12), ("program", 16), ("what", 40), ("file", 30), ("sha256", 68))
+LOG: tuple[LiveColumn, ...] = tuple(
+    LiveColumn(key=key, kind="value", width=width)
+    for key, width in (("time", 11), ("program", 14), ("what", 32), ("file", 24), ("sha256", 66))
 )

@@ -19,14 +19,14 @@ from bifocal.survey.tolerances import RULES, ToleranceRule
 from bifocal.survey.weighted_similarity import weights_of
 from bifocal.survey.workbook.columns import (
     NEAR,
-    SurveyColumn,
     adjustment_names,
     ideal_points,
     pair_points,
 )
-from bifocal.survey.workbook.setup_cells import MATRICES, NADIRS, PHOTOS
+from bifocal.survey.workbook.setup_cells import MATRICES, NADIRS, PHOTOS, setup_checks
 from photocore.arrays import BoolArray, FloatArray
 from photocore.workbook.cells import CellValue
+from photocore.workbook.live_columns import LiveColumn
 
 #: Rows of the tables of an empty template.
 POINT_ROWS, CHECK_ROWS, CONTROL_ROWS, SPARE_ROWS = 300, 25, 12, 10
@@ -120,7 +120,7 @@ class SurveyContent:
         return any(photo.lens is not None for photo in self.photos)
 
     @property
-    def point_columns(self) -> tuple[SurveyColumn, ...]:
+    def point_columns(self) -> tuple[LiveColumn, ...]:
         """The columns of `Points`."""
         if self.is_pair:
             return pair_points(undistorted=self.undistorted)
@@ -366,6 +366,11 @@ def _weight_cells(geo: Georeference) -> dict[str, list[CellValue]]:
 
 def setup_cells(content: SurveyContent) -> dict[str, CellValue]:
     """Return the value of every named cell of `Setup`; what is absent is blank."""
+    cells = _setup_cells(content)
+    return cells | setup_checks(cells, is_pair=content.is_pair)
+
+
+def _setup_cells(content: SurveyContent) -> dict[str, CellValue]:
     limits, setup = content.limits, content.setup
     cells: dict[str, CellValue] = {
         "input_unit": "mm", "k_off": limits.off_radial, "k_plane": limits.on_plane,
@@ -390,6 +395,7 @@ def setup_cells(content: SurveyContent) -> dict[str, CellValue]:
     if first.scale_number is not None and second.scale_number is not None:
         cells["k_12"] = second.scale_number / first.scale_number
     cells |= {"photo_1": setup.photo1 or None, "photo_2": setup.photo2 or None}
+    cells |= setup.title_block
     cells |= {"pitch": setup.pitch, "input_unit": setup.unit, "sigma_s": setup.precision}
     if setup.unit == "px" and setup.pitch is not None:
         cells |= {"unit_x": setup.pitch, "unit_y": -setup.pitch}

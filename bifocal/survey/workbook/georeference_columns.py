@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from bifocal.survey.workbook.columns import COVARIANCES, SurveyColumn, formula_column, look_up
+from bifocal.survey.workbook.columns import COVARIANCES, look_up
+from photocore.workbook.live_columns import LiveColumn, formula_column
 
 #: Entries of the weights and, after them, what each of the unknowns p, q, m is multiplied by on
 #: X, Y, Z; g_flat is 1 for the model 2D, where weights at Z are 0.
@@ -27,11 +28,11 @@ def entry(one: str, other: str) -> str:
     return min(one, other) + max(one, other)
 
 
-def _folded(key: str, formula: str) -> SurveyColumn:
+def _folded(key: str, formula: str) -> LiveColumn:
     return formula_column(key, formula, folded=True, spare=0)
 
 
-def _weight(key: str) -> SurveyColumn:
+def _weight(key: str) -> LiveColumn:
     det = "+".join(f"[@q_X{axis}]*({_COFACTORS[entry('X', axis)]})" for axis in "XYZ")
     flat = f"({_FLAT[key]})/([@q_XX]*[@q_YY]-[@q_XY]^2)" if key in _FLAT else "0"
     body = f'IF(g_used="2D",{flat},({_COFACTORS[key]})/({det}))'
@@ -48,7 +49,7 @@ def _weighted(axis: str, parts: tuple[str, str, str]) -> str:
     return "+".join(terms)
 
 
-WEIGHTS: tuple[SurveyColumn, ...] = (
+WEIGHTS: tuple[LiveColumn, ...] = (
     *(_weight(key) for key in COVARIANCES),
     *(
         _folded(f"u_{axis}{unknown}", _weighted(axis, parts))
@@ -58,15 +59,15 @@ WEIGHTS: tuple[SurveyColumn, ...] = (
     *(_folded(f"h_{axis}", _weighted(axis, ("[@cX]", "[@cY]", "[@cZ]"))) for axis in "XYZ"),
 )
 
-_NAMED: tuple[SurveyColumn, ...] = (
-    SurveyColumn(key="id", width=12),
-    *(SurveyColumn(key=axis, places=4, width=14) for axis in "ENH"),
-    SurveyColumn(key="use", width=6),
-    SurveyColumn(key="found_bad", kind="value", width=9),
+_NAMED: tuple[LiveColumn, ...] = (
+    LiveColumn(key="id", width=12),
+    *(LiveColumn(key=axis, places=4, width=13, limits=(-1e8, 1e8)) for axis in "ENH"),
+    LiveColumn(key="use", width=9, choices="1,0"),
+    LiveColumn(key="found_bad", kind="value", width=10),
     *(formula_column(axis, look_up(axis), 4) for axis in "XYZ"),
 )
 
-_WEIGHED: tuple[SurveyColumn, ...] = (
+_WEIGHED: tuple[LiveColumn, ...] = (
     formula_column(
         "w",
         'IF(AND(OR([@use]="",[@use]<>0),OR([@found_bad]="",[@found_bad]<>0),'
@@ -104,7 +105,7 @@ _WEIGHED: tuple[SurveyColumn, ...] = (
 )
 
 
-def georeference_columns(*, is_pair: bool) -> tuple[SurveyColumn, ...]:
+def georeference_columns(*, is_pair: bool) -> tuple[LiveColumn, ...]:
     """Return the table of control points.
 
     Parameters

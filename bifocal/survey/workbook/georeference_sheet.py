@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Iterator, Sequence
 
 import numpy as np
-from openpyxl.styles import Alignment
 
 from bifocal.survey.reference import Georeference
 from bifocal.survey.relief_table import ENTRIES
@@ -15,16 +15,19 @@ from bifocal.survey.weighted_similarity import TURNS, WeightedSums, determinant
 from bifocal.survey.workbook.content import SurveyContent, control_cells
 from bifocal.survey.workbook.georeference_columns import entry, georeference_columns
 from bifocal.survey.workbook.precision_lines import precision_lines, precision_values
-from bifocal.survey.workbook.sheets import LABEL_FONT, BookBuilder, SheetBuilder
 from bifocal.survey.workbook.space_block import SpaceBlock
 from photocore.arrays import FloatArray
 from photocore.workbook.cells import CellValue
 from photocore.workbook.grid import column_letters
+from photocore.workbook.live_book import BookBuilder, SheetBuilder
+from photocore.workbook.look import LABEL_FONT
 
-#: Row of the keys of the control points; parameters stand above.
-CONTROL_HEAD = 27
-#: First column and rows of the weighted sums: above the folded columns of the table.
-_LEFT, _TOP, _ROWS = 12, 3, 22
+#: Row of the keys of the control points; model and parameters stand above.
+CONTROL_HEAD = 12
+#: First column and rows of the steps of the fit: above the folded columns of the table.
+_LEFT, _TOP, _ROWS = 10, 3, 8
+#: Where the residuals stand, and how far right of them the steps go on.
+_RESIDUALS, _BESIDE = 40, 4
 _UNKNOWNS = ("p", "q", "m")
 
 
@@ -36,20 +39,33 @@ def georeference(builder: BookBuilder, content: SurveyContent) -> None:
     _transformation(sheet, content)
     _centres(sheet, content)
     _rotation(sheet, content)
-    _sums(sheet, content)
     sums = content.georeference.sums if content.georeference is not None else None
     space = SpaceBlock(sheet, sums if isinstance(sums, SpaceSums) else None)
-    _solved_in_space(sheet, content, space)
-    _weighted_sums(sheet, content, space)
+    steps = [*_origin_steps(content), *_solved_steps(content, space), *_sums(content)]
+    _write_steps(sheet, [*steps, *_weighted_steps(content, space)])
     cells = control_cells(content)
     columns = georeference_columns(is_pair=content.is_pair)
     sheet.table("tblGeo", columns, at=(CONTROL_HEAD, 1), rows=rows, cells=cells)
     space.finish()
-    sheet.worksheet.column_dimensions["A"].width = 34
-    first, last = CONTROL_HEAD + 1, CONTROL_HEAD + rows
-    sheet.validate(f"B{first}:D{last}", limit=1e8)
-    sheet.validate(f"E{first}:E{last}", choices="1,0")
-    sheet.finish(landscape=True, freeze=f"B{first}")
+    for letter, width in (("A", 30), ("G", 13), ("H", 13), ("I", 13)):
+        sheet.worksheet.column_dimensions[letter].width = width
+    repeat = f"{CONTROL_HEAD - 1}:{CONTROL_HEAD}"
+    sheet.finish(landscape=True, freeze=f"B{CONTROL_HEAD + 1}", repeat=repeat)
+
+
+#: Name, formula and value of a step of the fit.
+_Step = tuple[str, str, CellValue]
+
+
+def _write_steps(sheet: SheetBuilder, steps: Sequence[_Step]) -> None:
+    """Write the steps of the fit, each beside its name, above the folded columns."""
+    for i, (name, body, value) in enumerate(steps):
+        row, left = _TOP + i % _ROWS, _LEFT + 2 * (i // _ROWS)
+        # Not above the residuals, which are not folded away.
+        left += _BESIDE if left >= _RESIDUALS else 0
+        sheet.text(f"{column_letters(left)}{row}", name, LABEL_FONT)
+        place = f"{column_letters(left + 1)}{row}"
+        sheet.formula(place, body, value, form="0.000000", name=name)
 
 
 def _model(sheet: SheetBuilder, content: SurveyContent) -> None:
@@ -57,10 +73,10 @@ def _model(sheet: SheetBuilder, content: SurveyContent) -> None:
     geo = content.georeference
     for row, key in enumerate(("geo_model", "geo_auto", "geo_used"), start=4):
         sheet.word(f"A{row}", key)
-    sheet.worksheet["A4"].alignment = Alignment(wrap_text=True)
     sheet.input("B4", content.model, name="g_model")
-    sheet.validate("B4", choices="auto,levelled,3D,2D")
-    sheet.input("B5", None if geo is None else geo.model, name="g_auto")
+    prompt, choices = sheet.book.word("geo_models"), "auto,levelled,3D,2D"
+    sheet.validate("B4", title="g_model", prompt=prompt, choices=choices)
+    sheet.input("B5", None if geo is None else geo.model, name="g_auto", editable=False)
     flat = 'IF(COUNT(tblGeo[H])=0,IF(COUNT(tblGeo[E])=0,"levelled","2D"),'
     used = f'IF(g_model="auto",{flat}IF(g_auto="3D","3D","levelled")),g_model)'
     shown = "levelled" if content.model == "auto" else content.model
@@ -117,68 +133,76 @@ _COSINES = {
 def _rotation(sheet: SheetBuilder, content: SurveyContent) -> None:
     """Write the rotation from the closed forms, or from the turns of the model 3D."""
     geo = content.georeference
-    sheet.word("A14", "geo_rotation")
+    sheet.word("D7", "geo_rotation")
     for key, (plane, levelled) in _COSINES.items():
         i, j = int(key[0]) - 1, int(key[1]) - 1
         entry = None if geo is None else float(geo.world_from_wall.rotation[i, j])
         body = f'IF(g_k="","",IF(g_used="3D",s3_{key},IF(g_used="2D",{plane},{levelled})))'
-        place = f"{'BCD'[j]}{14 + i}"
-        sheet.formula(place, body, entry, form="0.000000000", name=f"g_{key}")
+        sheet.formula(f"{'GHI'[j]}{7 + i}", body, entry, form="0.000000000", name=f"g_{key}")
 
 
-def _solved_in_space(sheet: SheetBuilder, content: SurveyContent, space: SpaceBlock) -> None:
-    """Write rotation, scale and constants of the model 3D from the last turn."""
+def _solved_steps(content: SurveyContent, space: SpaceBlock) -> Iterator[_Step]:
+    """Yield rotation, scale and constants of the model 3D from its last turn."""
     geo = content.georeference
-    is_3d = geo is not None and geo.model == "3D"
-    sheet.word("J14", "geo_solved")
-    sheet.word("J17", "geo_scale")
-    sheet.word("J18", "geo_constants")
-
-    def formula(cell: str, name: str, body: str, value: float | None, form: str) -> None:
-        sheet.formula(cell, f'IF(g_space=1,{body},"")', value, form=form, name=name)
-
-    scale = geo.world_from_wall.scale if geo is not None and is_3d else None
-    formula("G17", "s3_k", f"1/SQRT(SUMSQ({space.entries.range})/3)", scale, "0.000000000")
+    found = geo if geo is not None and geo.model == "3D" else None
+    scale = None if found is None else found.world_from_wall.scale
+    yield "s3_k", _in_space(f"1/SQRT(SUMSQ({space.entries.range})/3)"), scale
     for i, j in np.ndindex(3, 3):
-        value = float(geo.world_from_wall.rotation[i, j]) if geo is not None and is_3d else None
+        value = None if found is None else float(found.world_from_wall.rotation[i, j])
         body = f"s3_k*{space.entries.fixed(3 * j + i, 0)}"
-        formula(f"{'GHI'[j]}{14 + i}", f"s3_{i + 1}{j + 1}", body, value, "0.000000000")
-    constants = _constants(geo) if geo is not None and is_3d else (None, None, None)
-    for n, (axis, found) in enumerate(zip("XYZ", constants, strict=True)):
+        yield f"s3_{i + 1}{j + 1}", _in_space(body), value
+    constants = (None, None, None) if found is None else _constants(found)
+    for n, (axis, constant) in enumerate(zip("XYZ", constants, strict=True)):
         body = f"g_f_{axis}-SUMPRODUCT({space.shift.column(n)},{space.entries.range})"
-        formula(f"{'GHI'[n]}18", f"s3_{axis}", body, found, "0.000000")
+        yield f"s3_{axis}", _in_space(body), constant
+
+
+def _in_space(body: str) -> str:
+    return f'IF(g_space=1,{body},"")'
+
+
+def _origins(geo: Georeference | None) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return the centre on the wall, and the world's in two parts, whole metres and the rest."""
+    zero = np.zeros(3)
+    if geo is None:
+        return zero, zero, zero
+    return geo.world_from_wall.source_centre, geo.origin, geo.offset
+
+
+_MEAN = "IF(g_n=0,0,SUMIF(tblGeo[w],1,tblGeo[{0}])/g_n)"
 
 
 def _centres(sheet: SheetBuilder, content: SurveyContent) -> None:
-    """Write the centres of the control points in both systems, the world's in two parts.
-
-    E0 = Er + Et with Er a whole number: differences of large coordinates stay exact.
-    """
-    geo = content.georeference
-    sheet.word("A12", "geo_centres")
-    zero = np.zeros(3)
-    wall = zero if geo is None else geo.world_from_wall.source_centre
-    origin, offset = (zero, zero) if geo is None else (geo.origin, geo.offset)
-
-    def formula(cell: str, name: str, body: str, value: float) -> None:
-        sheet.formula(cell, body, float(value), form="0.0000", name=name)
-
+    """Write the centres of the control points in both systems."""
+    wall, origin, offset = _origins(content.georeference)
+    sheet.word("D4", "geo_wall")
+    sheet.word("D5", "geo_world")
     for i, (axis, name) in enumerate(zip("XYZ", "ENH", strict=True)):
-        mean = "IF(g_n=0,0,SUMIF(tblGeo[w],1,tblGeo[{0}])/g_n)"
-        formula(f"{'BCD'[i]}12", f"g_{axis}0", mean.format(axis), wall[i])
-        rounded = f"ROUND({mean.format(name)},0)"
+        body, letter = _MEAN.format(axis), "GHI"[i]
+        sheet.formula(f"{letter}4", body, float(wall[i]), form="0.0000", name=f"g_{axis}0")
+        body, value = f"g_{name}r+g_{name}t", float(origin[i] + offset[i])
+        sheet.formula(f"{letter}5", body, value, form="0.0000", name=f"g_{name}0")
+
+
+def _origin_steps(content: SurveyContent) -> Iterator[_Step]:
+    """Yield the world's centre in two parts, E0 = Er + Et.
+
+    Er is a whole number: differences of large coordinates stay exact.
+    """
+    _, origin, offset = _origins(content.georeference)
+    for i, name in enumerate("ENH"):
+        rounded = f"ROUND({_MEAN.format(name)},0)"
         turned = "+".join(f"g_{i + 1}{j}*g_x_{other}" for j, other in enumerate("XYZ", 1))
         rest = f"IF(ISNUMBER(g_k),-g_k*({turned}),0)"
         if name == "H":
             rounded = f'IF(g_used="2D",0,{rounded})'
             rest = f'IF(g_used="2D",IF(ISNUMBER(g_k),g_k*g_Z0,0),{rest})'
-        formula(f"{'BCD'[i]}13", f"g_{name}0", f"g_{name}r+g_{name}t", origin[i] + offset[i])
-        formula(f"{'GHI'[i]}12", f"g_{name}r", rounded, origin[i])
-        formula(f"{'GHI'[i]}13", f"g_{name}t", rest, offset[i])
+        yield f"g_{name}r", rounded, float(origin[i])
+        yield f"g_{name}t", rest, float(offset[i])
 
 
-def _sums(sheet: SheetBuilder, content: SurveyContent) -> None:
-    """Write the centred sums the closed forms are made of, with their values."""
+def _sums(content: SurveyContent) -> Iterator[_Step]:
+    """Yield the centred sums the closed forms are made of, with their values."""
     geo = content.georeference
     centred = np.zeros((6, 0))
     if geo is not None:
@@ -201,11 +225,8 @@ def _sums(sheet: SheetBuilder, content: SurveyContent) -> None:
     for kind in "2L":
         bodies[f"l{kind}"] = f"SQRT(g_a{kind}^2+g_b{kind}^2)"
         values[f"l{kind}"] = math.hypot(values[f"a{kind}"], values[f"b{kind}"])
-    for i, name in enumerate(("a2", "b2", "l2", "aL", "bL", "lL")):
-        row, (left, right) = 19 + i % 5, ("AB", "CD")[i // 5]
-        sheet.text(f"{left}{row}", f"g_{name}", LABEL_FONT)
-        place, form = f"{right}{row}", "0.000000"
-        sheet.formula(place, bodies[name], values[name], form=form, name=f"g_{name}")
+    for name in ("a2", "b2", "l2", "aL", "bL", "lL"):
+        yield f"g_{name}", bodies[name], values[name]
 
 
 def _constants(geo: Georeference) -> tuple[float, ...]:
@@ -214,8 +235,8 @@ def _constants(geo: Georeference) -> tuple[float, ...]:
     return tuple((-(turn.rotation.T @ geo.offset) / turn.scale).tolist())
 
 
-def _weighted_sums(sheet: SheetBuilder, content: SurveyContent, space: SpaceBlock) -> None:
-    """Write the normal equations of the weighted fit, the turns that solve them, and its worth."""
+def _weighted_steps(content: SurveyContent, space: SpaceBlock) -> Iterator[_Step]:
+    """Yield the normal equations of the weighted fit, the turns that solve them, and its worth."""
     values = _weighted_values(content.georeference) | precision_values(content.georeference)
     of_all, of_level = _common_lines(), _weighted_lines()
     lines = {
@@ -230,11 +251,8 @@ def _weighted_sums(sheet: SheetBuilder, content: SurveyContent, space: SpaceBloc
         lines[f"g_x_{axis}"] = f'IF(g_used="3D",s3_{axis},IF(g_ok=1,g_f_{axis}-({terms}),""))'
     for name, body in precision_lines(space).items():
         lines[name] = f'IF(ISNUMBER(g_k),{body},"")'
-    for i, (name, body) in enumerate(lines.items()):
-        row, left = _TOP + i % _ROWS, _LEFT + 2 * (i // _ROWS)
-        sheet.text(f"{column_letters(left)}{row}", name, LABEL_FONT)
-        place = f"{column_letters(left + 1)}{row}"
-        sheet.formula(place, body, values.get(name), form="0.000000", name=name)
+    for name, body in lines.items():
+        yield name, body, values.get(name)
 
 
 #: The unknowns as cells: p, q and, the scale of the heights, m.

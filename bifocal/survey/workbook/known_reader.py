@@ -9,7 +9,6 @@ import numpy as np
 
 from bifocal.survey.observations import PointObservations
 from bifocal.survey.reference import KnownPoints
-from bifocal.survey.workbook.columns import TEXT_KEYS
 from bifocal.survey.workbook.words import headings
 from photocore.errors import CellError
 from photocore.tables import Column, Table, read_table
@@ -18,6 +17,7 @@ from photocore.tables.headings import bare
 from photocore.tables.model import Kind
 from photocore.tables.numbers import Decimal
 from photocore.workbook.grid import SheetFile
+from photocore.workbook.live_columns import TEXT_KEYS
 
 #: No coordinate of a photo or a map is larger.
 LARGEST = 1e9

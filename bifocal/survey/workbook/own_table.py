@@ -13,7 +13,7 @@ import numpy as np
 from bifocal.survey.reference import Georeference
 from bifocal.survey.relief_table import ENTRIES
 from bifocal.survey.workbook.book import build
-from bifocal.survey.workbook.columns import NEAR, SurveyColumn, ideal_points, pair_points
+from bifocal.survey.workbook.columns import NEAR, ideal_points, pair_points
 from bifocal.survey.workbook.content import SurveyContent, point_cells, result_cells
 from bifocal.survey.workbook.placed_formulas import added_covariance
 from bifocal.survey.workbook.precision_lines import precision_values
@@ -31,6 +31,7 @@ from photocore.workbook.cells import CellValue
 from photocore.workbook.editor import WorkbookEditor
 from photocore.workbook.graft import quoted_title
 from photocore.workbook.grid import column_letters, split_cell
+from photocore.workbook.live_columns import LiveColumn
 from photocore.workbook.named_cells import make_numbers, place_of
 from photocore.workbook.result_columns import (
     OwnTable,
@@ -176,7 +177,7 @@ def _columns(table: OwnTable, content: SurveyContent) -> list[ResultColumn]:
     return results
 
 
-def _column(column: SurveyColumn, values: Sequence[CellValue]) -> ResultColumn:
+def _column(column: LiveColumn, values: Sequence[CellValue]) -> ResultColumn:
     known = term("columns", column.key)
     unit = "" if known is None else known.unit
     return ResultColumn(

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 
+from openpyxl.styles import Alignment
+
 from bifocal.model.flags import FlagLimits
 from bifocal.survey.tolerances import judge
 from bifocal.survey.workbook.columns import (
@@ -15,11 +17,11 @@ from bifocal.survey.workbook.columns import (
     verdict_columns,
 )
 from bifocal.survey.workbook.content import SurveyContent, check_cells, setup_cells
-from bifocal.survey.workbook.sheets import HEAD_FONT, BookBuilder, Cells, SheetBuilder
 from bifocal.survey.workbook.words import word
 from photocore.workbook.cells import CellValue
 from photocore.workbook.grid import column_letters
-from photocore.workbook.look import colour_words
+from photocore.workbook.live_book import BookBuilder, Cells, SheetBuilder
+from photocore.workbook.look import GOOD, HEAD_FONT, WRONG, colour_words
 
 #: Row of the keys of the check table; statistics stand above.
 CHECK_HEAD = 12
@@ -34,6 +36,7 @@ def check(builder: BookBuilder, content: SurveyContent) -> None:
     sheet = builder.sheet("Check", "check_how")
     for letter, axis in zip("BCD", "XYZ", strict=True):
         sheet.text(f"{letter}4", f"d{axis}", HEAD_FONT)
+        sheet.worksheet[f"{letter}4"].alignment = Alignment(horizontal="right")
     for row, (key, (body, attribute)) in enumerate(_STATISTICS.items(), start=5):
         sheet.word(f"A{row}", key)
         for letter, axis in zip("BCD", "XYZ", strict=True):
@@ -52,12 +55,12 @@ def check(builder: BookBuilder, content: SurveyContent) -> None:
     )
     cells = check_cells(content)
     sheet.table("tblCheck", CHECK, at=(CHECK_HEAD, 1), rows=rows, cells=cells)
-    sheet.worksheet.column_dimensions["A"].width = 28
+    sheet.worksheet.column_dimensions["A"].width = 22
+    for letter in ("L", "M"):
+        sheet.worksheet.column_dimensions[letter].width = 1.5
     _verdict(sheet, content, accuracy)
-    first, last = CHECK_HEAD + 1, CHECK_HEAD + rows
-    sheet.validate(f"B{first}:D{last}")
-    sheet.validate(f"E{first}:E{last}", choices="1,0")
-    sheet.finish(landscape=True, freeze=f"B{first}")
+    repeat = f"{CHECK_HEAD - 1}:{CHECK_HEAD}"
+    sheet.finish(landscape=True, freeze=f"B{CHECK_HEAD + 1}", repeat=repeat)
 
 
 #: Statistics of errors: formula of their column and the cell of their number, attribute.
@@ -91,7 +94,7 @@ def _verdict(sheet: SheetBuilder, content: SurveyContent, accuracy: float) -> No
     )
     first, last = CHECK_HEAD + 1, CHECK_HEAD + len(verdicts)
     letter = column_letters(VERDICT_LEFT + 3)
-    colours = {holds: ("E2F0D9", "1E5B12"), fails: ("F8CBCB", "8B0000")}
+    colours = {holds: GOOD, fails: WRONG}
     colour_words(sheet.worksheet, f"{letter}{first}:{letter}{last}", colours)
 
 
@@ -106,7 +109,7 @@ def planning(builder: BookBuilder, content: SurveyContent) -> None:
     for row, (name, size) in enumerate(zip(_SENSOR, sizes, strict=True), start=4):
         sheet.word(f"A{row}", name)
         sheet.input(f"B{row}", size, form="0.00", name=name)
-        sheet.validate(f"B{row}", above_zero=True)
+        sheet.validate(f"B{row}", title=name, prompt=word(name, builder.language), above_zero=True)
     # By the principal distance: without it the image scale of a general pair is only nominal.
     c1, d1 = (float(cells.get(name) or math.nan) for name in ("c_1", "d_1"))
     for letter, name, size in zip("BC", _SENSOR, sizes, strict=True):

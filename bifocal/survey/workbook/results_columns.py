@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from bifocal.survey.workbook.columns import SurveyColumn, formula_column
 from bifocal.survey.workbook.placed_formulas import (
     IS_CONTROL,
     added_covariance,
     turned_covariance,
 )
+from photocore.workbook.live_columns import LiveColumn, formula_column
 
 _AT = "ROW()-ROW(tblResults[[#Headers],[id]])"
 
@@ -45,7 +45,7 @@ def _world_sigma(name: str, *, is_pair: bool) -> str:
     return f'IF({known},SQRT(MAX(0,{variance})),"")'
 
 
-def results_columns(*, is_pair: bool) -> tuple[SurveyColumn, ...]:
+def results_columns(*, is_pair: bool) -> tuple[LiveColumn, ...]:
     """Return the columns of `Results`.
 
     Parameters

@@ -2,24 +2,34 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 from bifocal.model.flags import SIGMA_PIXEL, UNCERTAIN_SHARE
-from bifocal.survey.setup import SIGMA_RADIAL
+from bifocal.survey.setup import SCALE_TOLERANCE, SIGMA_RADIAL
+from photocore.workbook.cells import CellValue
 
 Groups = tuple[tuple[str, ...], ...]
 
 #: Cells that name the photo files.
 PHOTOS = ("photo_1", "photo_2")
+#: Nadir points of an ideal pair measured in pixels.
+IDEAL_NADIRS = ("nadir_1_col", "nadir_1_row", "nadir_2_col", "nadir_2_row")
+#: Cells for the head of the printed results.
+TITLE_BLOCK = ("project", "client", "surveyor", "survey_date")
+#: Cells that hold texts.
+TEXTS = ("pair_file", *PHOTOS, *TITLE_BLOCK)
+_CHECKS = ("setup_missing", "check_order", "check_scale")
 #: Cells of an ideal pair, group by group; the last group is calculated, the others are typed.
 IDEAL_GROUPS: Groups = (
     (
         *("c_1", "c_2", "d_2", "delta_d", "d_1", "input_unit", "pitch"),
-        *("nadir_1_col", "nadir_1_row", "nadir_2_col", "nadir_2_row"),
+        *IDEAL_NADIRS,
         *PHOTOS,
     ),
     ("sigma_s", "sigma_r_max", "k_off", "k_plane"),
+    TITLE_BLOCK,
     (
+        *_CHECKS,
         *("m_1", "m_2", "k_12", "b_lever", "unit_x", "unit_y"),
         *("off_x1", "off_y1", "off_x2", "off_y2"),
     ),
@@ -35,8 +45,9 @@ PAIR_GROUPS: Groups = (
         *("c_1", "c_2", "pitch", "input_unit", *PHOTOS),
     ),
     ("sigma_px", "sigma_r_max", "k_off", "k_plane", "pixel_wall"),
+    TITLE_BLOCK,
     *MATRICES,
-    ("m_1", "b_lever", "e_x", "e_y", "sigma_s"),
+    (*_CHECKS[:2], "m_1", "b_lever", "e_x", "e_y", "sigma_s"),
 )
 #: Number formats.
 FORMS: Mapping[str, str] = {
@@ -44,7 +55,7 @@ FORMS: Mapping[str, str] = {
     **dict.fromkeys(("pitch", "sigma_s", "k_12"), "0.000000"),
     **dict.fromkeys(("m_1", "m_2"), "0.00"),
     "sigma_r_max": "0.0000",
-    **dict.fromkeys(PHOTOS, "@"),
+    **dict.fromkeys((*PHOTOS, *TITLE_BLOCK), "@"),
 }
 #: Typed numbers that must be above zero; of the others the sheet only asks that they are numbers.
 POSITIVE = ("c_1", "c_2", "d_1", "d_2", "pitch", "sigma_s", "sigma_px", "sigma_r_max")
@@ -54,8 +65,88 @@ TYPED_FORMULAS: Mapping[str, str] = {
     "sigma_s": f"IF(COUNT(pitch)=1,{SIGMA_PIXEL:g}*pitch,{SIGMA_RADIAL:g})",
     "sigma_r_max": f'IF(COUNT(d_1,d_2)=2,{UNCERTAIN_SHARE:g}*MIN(d_1,d_2),"")',
 }
+#: What a set-up needs: what to type, the cells that then hold numbers, for which input unit.
+_NEEDED = (
+    ("d_2", ("d_2",), ""),
+    ("delta_d", ("d_1",), ""),
+    ("c_1", ("c_1",), ""),
+    ("c_2", ("c_2",), ""),
+    ("pitch", ("pitch",), "px"),
+    ("nadir_1_col ... nadir_2_row", IDEAL_NADIRS, "px"),
+)
+_IDEAL_NEEDED, _PAIR_NEEDED = _NEEDED, _NEEDED[:2]
+
+
+def _missing_formula(needed: Sequence[tuple[str, tuple[str, ...], str]]) -> str:
+    """Return the formula that names the cells still to be filled in."""
+    parts = []
+    for name, cells, unit in needed:
+        blank = f"COUNT({','.join(cells)})<{len(cells)}"
+        test = f'AND(input_unit="{unit}",{blank})' if unit else blank
+        parts.append(f'IF({test},", {name}","")')
+    return f"MID({'&'.join(parts)},3,200)"
+
+
+def setup_checks(cells: Mapping[str, CellValue], *, is_pair: bool) -> dict[str, CellValue]:
+    """Return what the checks of the set-up show: what is missing, d_1 > d_2, the scales."""
+
+    def known(*names: str) -> bool:
+        return all(isinstance(cells.get(name), int | float) for name in names)
+
+    needed = _PAIR_NEEDED if is_pair else _IDEAL_NEEDED
+    missing = [
+        name
+        for name, wanted, unit in needed
+        if not known(*wanted) and unit in ("", cells["input_unit"])
+    ]
+    order: CellValue = None
+    if known("d_1", "d_2"):
+        order = _verdict(float(cells["d_1"] or 0) > float(cells["d_2"] or 0))
+    scale: CellValue = None
+    if known("m_1", "m_2"):
+        scale = _verdict(abs(float(cells["k_12"] or 0) - 1) <= SCALE_TOLERANCE)
+    checks = (", ".join(missing) or None, order, scale)
+    return dict(zip(_CHECKS, checks, strict=True))
+
+
+def _verdict(good: bool) -> str:
+    return "OK" if good else "CHECK"
+
+
+def state_formula(words: Mapping[str, str], *, is_pair: bool) -> str:
+    """Return the formula of the line that says what `Setup` still lacks.
+
+    Parameters
+    ----------
+    words : mapping
+        `STATES` to sentences.
+    """
+    rest = f'"{words["state_ready"]}"'
+    checks = _CHECKS[1:2] if is_pair else _CHECKS[1:]
+    for check in reversed(checks):
+        rest = f'IF({check}="CHECK","{words[check.replace("check", "state")]}",{rest})'
+    return f'IF(setup_missing<>"","{words["state_missing"]} "&setup_missing,{rest})'
+
+
+def state(cells: Mapping[str, CellValue], words: Mapping[str, str]) -> str:
+    """Return what that line says."""
+    if cells["setup_missing"]:
+        return f"{words['state_missing']} {cells['setup_missing']}"
+    wrong = [check for check in _CHECKS[1:] if cells.get(check) == "CHECK"]
+    return words[wrong[0].replace("check", "state") if wrong else "state_ready"]
+
+
+#: Keys of the sentences about the set-up.
+STATES = ("state_ready", "state_missing", "state_order", "state_scale")
+
+_CHECK_FORMULAS: Mapping[str, str] = {
+    "check_order": 'IF(COUNT(d_1,d_2)<2,"",IF(d_1>d_2,"OK","CHECK"))',
+    "check_scale": (f'IF(COUNT(m_1,m_2)<2,"",IF(ABS(k_12-1)<={SCALE_TOLERANCE:g},"OK","CHECK"))'),
+}
 IDEAL_FORMULAS: Mapping[str, str] = {
     **TYPED_FORMULAS,
+    **_CHECK_FORMULAS,
+    "setup_missing": _missing_formula(_IDEAL_NEEDED),
     "m_1": 'IF(COUNT(c_1,d_1)=2,1000*d_1/c_1,"")',
     "m_2": 'IF(COUNT(c_2,d_2)=2,1000*d_2/c_2,"")',
     "k_12": "IF(COUNT(m_1,m_2)=2,m_2/m_1,1)",
@@ -68,7 +159,8 @@ IDEAL_FORMULAS: Mapping[str, str] = {
     "off_y2": 'IF(input_unit="px",nadir_2_row,0)',
 }
 PAIR_FORMULAS: Mapping[str, str] = {
-    **{key: IDEAL_FORMULAS[key] for key in ("d_1", "sigma_r_max", "b_lever")},
+    **{key: IDEAL_FORMULAS[key] for key in ("d_1", "sigma_r_max", "b_lever", "check_order")},
+    "setup_missing": _missing_formula(_PAIR_NEEDED),
     "sigma_s": 'IF(COUNT(pixel_wall)=1,sigma_px*pixel_wall/m_1,"")',
     "m_1": "IF(COUNT(c_1)=1,1000*d_1/c_1,1000)",
     "e_x": "(d_1*n2_x-d_2*n1_x)/(d_1-d_2)",

@@ -12,7 +12,13 @@ from bifocal.model.flags import FlagLimits
 from bifocal.survey.setup import SurveySetup
 from bifocal.survey.workbook.columns import adjustment_names
 from bifocal.survey.workbook.known_reader import LARGEST
-from bifocal.survey.workbook.setup_cells import MATRICES, NADIRS, PHOTOS, TYPED_FORMULAS
+from bifocal.survey.workbook.setup_cells import (
+    MATRICES,
+    NADIRS,
+    PHOTOS,
+    TITLE_BLOCK,
+    TYPED_FORMULAS,
+)
 from bifocal.survey.workbook.words import headings, term
 from photocore.arrays import FloatArray
 from photocore.errors import CellError
@@ -56,7 +62,8 @@ def read_setup(
     columns = [c for c in _columns() if not (c.key == "sigma_s" and is_general(book))]
     if "d_1" in book.names and "d_2" in book.names:
         # Our own workbook: every value has its name, labels need not be searched for.
-        columns = [c for c in columns if c.key.casefold() in book.names]
+        titles = [Column(key, kind="text") for key in TITLE_BLOCK]
+        columns = [c for c in (*columns, *titles) if c.key.casefold() in book.names]
     values = read_named_values(book, columns, sheet="Setup", decimal=decimal, errors=complaints)
     where = f"{book.label} › Setup" if "Setup" in book.titles else book.label
     formulas = _formulas(path, values)
@@ -86,6 +93,7 @@ def read_setup(
         pair_file=_text(values, "pair_file"),
         photo1=_text(values, "photo_1").strip(),
         photo2=_text(values, "photo_2").strip(),
+        title_block={key: text for key in TITLE_BLOCK if (text := _text(values, key))},
         matrices=matrices,
         nadirs=nadirs,
         adjusted=_adjusted(book),

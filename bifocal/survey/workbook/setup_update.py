@@ -8,14 +8,14 @@ from typing import Any
 
 from bifocal.survey.workbook.columns import adjustment_names
 from bifocal.survey.workbook.content import SurveyContent, setup_cells
-from bifocal.survey.workbook.setup_cells import PAIR_GROUPS, TYPED_FORMULAS
-from bifocal.survey.workbook.sheets import BookBuilder
+from bifocal.survey.workbook.setup_cells import PAIR_GROUPS, TITLE_BLOCK, TYPED_FORMULAS
 from bifocal.survey.workbook.words import word
 from photocore.errors import InputError
 from photocore.workbook.cells import CellValue
 from photocore.workbook.editor import WorkbookEditor
 from photocore.workbook.graft import quoted_title
 from photocore.workbook.grid import cell_name
+from photocore.workbook.live_book import BookBuilder
 from photocore.workbook.named_cells import place_of
 from photocore.workbook.newbook import finished_parts
 
@@ -68,7 +68,7 @@ def write_options(editor: WorkbookEditor, content: SurveyContent, given: Mapping
             wanted.add("sigma_px")
         if "pair" in given or "adjust_setup" in given:
             typed = {name for group in PAIR_GROUPS[:-1] for name in group}
-            wanted |= typed - {"delta_d", "sigma_r_max", "k_off", "k_plane"}
+            wanted |= typed - {"delta_d", "sigma_r_max", "k_off", "k_plane", *TITLE_BLOCK}
     elif content.setup is not None:
         wanted |= {"input_unit"} | ({"c_2"} if "adjust_setup" in given else set())
     if {"d1", "d2", "pair"} & given.keys():

@@ -14,12 +14,15 @@ import numpy as np
 
 from bifocal.survey.space_similarity import SPACE_TURNS, SQUARINGS, SpaceSums
 from bifocal.survey.workbook.georeference_columns import entry
-from bifocal.survey.workbook.sheets import LABEL_FONT, SheetBuilder
 from photocore.arrays import FloatArray
 from photocore.workbook.grid import column_letters
+from photocore.workbook.live_book import SheetBuilder
+from photocore.workbook.look import LABEL_FONT
 
-#: First column, right of the table of control points, and the rows where the two bands begin.
-LEFT, UPPER, LOWER = 46, 4, 15
+#: First column, right of the table of control points; first row, that nine stand above its keys.
+LEFT, TOP = 60, 3
+#: First column right of the table: all that stands there is folded away.
+FOLDED = 44
 #: Name of the whole block, by which its results are stored in a workbook that exists.
 BLOCK = "g_space_block"
 _KEYS = tuple((axis, world) for axis in "XYZ" for world in "ENH")
@@ -68,22 +71,21 @@ class SpaceBlock:
     def __init__(self, sheet: SheetBuilder, sums: SpaceSums | None) -> None:
         self.sheet = sheet
         self.sums = sums
-        self.next = {UPPER: LEFT, LOWER: LEFT}
+        self.next = LEFT
         self._write()
 
     def _put(
         self,
-        band: int,
         label: str,
         shape: tuple[int, int],
         body: Callable[[int, int], str],
         values: FloatArray | None,
     ) -> CellMatrix:
-        """Write a matrix of formulas in a band and return where it stands."""
-        left = self.next[band]
-        self.next[band] = left + shape[1]
-        matrix = CellMatrix(band, left, *shape)
-        self.sheet.text(f"{column_letters(left)}{band - 1}", label, LABEL_FONT)
+        """Write a matrix of formulas and return where it stands."""
+        left = self.next
+        self.next = left + shape[1]
+        matrix = CellMatrix(TOP, left, *shape)
+        self.sheet.text(f"{column_letters(left)}{TOP - 1}", label, LABEL_FONT)
         shown = None if values is None else np.asarray(values, dtype=np.float64).reshape(shape)
         for i in range(shape[0]):
             for j in range(shape[1]):
@@ -105,19 +107,19 @@ class SpaceBlock:
             return f"tblGeo[c{_KEYS[i][j]}]"
 
         mixed = put(
-            UPPER, "L", (9, 3),
+            "L", (9, 3),
             lambda i, j: f"SUMPRODUCT(tblGeo[p_{entry(_KEYS[i][0], 'XYZ'[j])}],{column(i, 1)})",
             mixed_value("mixed"),
         )  # fmt: skip
         self.shift = put(
-            UPPER, "F", (9, 3),
+            "F", (9, 3),
             lambda i, j: "+".join(
                 f"g_i_{entry('XYZ'[j], other)}*{mixed.fixed(i, n)}" for n, other in enumerate("XYZ")
             ),
             mixed_value("shift"),
         )  # fmt: skip
         reduced = put(
-            UPPER, "H", (9, 9),
+            "H", (9, 9),
             lambda i, j: (
                 f"SUMPRODUCT(tblGeo[p_{entry(_KEYS[i][0], _KEYS[j][0])}],{column(i, 1)},"
                 f"{column(j, 1)})-SUMPRODUCT({mixed.row(i)},{self.shift.row(j)})"
@@ -125,7 +127,7 @@ class SpaceBlock:
             value("reduced"),
         )  # fmt: skip
         left = put(
-            UPPER, "g", (9, 1),
+            "g", (9, 1),
             lambda i, _: f"SUMPRODUCT(tblGeo[h_{_KEYS[i][0]}],{column(i, 1)})-("
             + "+".join(f"{mixed.fixed(i, n)}*g_f_{axis}" for n, axis in enumerate("XYZ"))
             + ")",
@@ -140,7 +142,7 @@ class SpaceBlock:
         """Write the unweighted rotation by Horn's matrix, and B of it."""
         sums, put = self.sums, self._put
         crossed = put(
-            UPPER, "S", (9, 1), lambda i, _: f"SUMPRODUCT(tblGeo[c{_KEYS[i][0]}],"
+            "S", (9, 1), lambda i, _: f"SUMPRODUCT(tblGeo[c{_KEYS[i][0]}],"
             f"tblGeo[c{_KEYS[i][1]}])", None if sums is None else sums.crossed,
         )  # fmt: skip
         cell = dict(zip(("".join(key) for key in _KEYS), crossed.cells(), strict=True))
@@ -153,7 +155,7 @@ class SpaceBlock:
             (f"{xy}-{yx}", f"{zx}+{xz}", f"{yz}+{zy}", f"{zz}-{xx}-{yy}+{bound}"),
         )
         shown = [None] * (SQUARINGS + 1) if sums is None else list(sums.powers)
-        power = put(LOWER, "Q", (4, 4), lambda i, j: horn[i][j], shown[0])
+        power = put("Q", (4, 4), lambda i, j: horn[i][j], shown[0])
         for number in range(1, SQUARINGS + 1):
             power = self._squared(power, shown[number])
         diagonal = [power.fixed(i, i) for i in range(4)]
@@ -162,7 +164,7 @@ class SpaceBlock:
         if sums is not None:
             chosen = sums.powers[-1][:, int(np.argmax(np.diag(sums.powers[-1])))]
         column = put(
-            LOWER, "q", (4, 1),
+            "q", (4, 1),
             lambda i, _: "".join(
                 f"IF({diagonal[n]}={longest},{power.fixed(i, n)}," for n in range(3)
             ) + power.fixed(i, 3) + ")))",
@@ -177,22 +179,22 @@ class SpaceBlock:
             f"2*({b}*{d}+{a}*{c})", f"2*({c}*{d}-{a}*{b})", f"({a}^2-{b}^2-{c}^2+{d}^2)",
         )  # fmt: skip
         start = put(
-            UPPER, "R'", (9, 1), lambda i, _: f"{turned[i]}/{length}",
+            "R'", (9, 1), lambda i, _: f"{turned[i]}/{length}",
             None if sums is None else sums.start,
         )  # fmt: skip
         squares = "+".join(f"SUMSQ(tblGeo[c{axis}])" for axis in "XYZ")
         scale = put(
-            LOWER, "m", (1, 1), lambda *_: f"({squares})/SUMPRODUCT({start.range},{crossed.range})",
+            "m", (1, 1), lambda *_: f"({squares})/SUMPRODUCT({start.range},{crossed.range})",
             None if sums is None else np.array([sums.squares / (sums.start @ sums.crossed)]),
         )  # fmt: skip
         return put(
-            UPPER, "B0", (9, 1), lambda i, _: f"{scale.fixed(0, 0)}*{start.fixed(i, 0)}",
+            "B0", (9, 1), lambda i, _: f"{scale.fixed(0, 0)}*{start.fixed(i, 0)}",
             None if sums is None else sums.turns[0].entries,
         )  # fmt: skip
 
     def _squared(self, power: CellMatrix, value: FloatArray | None) -> CellMatrix:
         return self._put(
-            LOWER, "Q^2", (4, 4),
+            "Q^2", (4, 4),
             lambda i, j: f"SUMPRODUCT({power.column(i)},{power.column(j)})/SUMSQ({power.range})",
             value,
         )  # fmt: skip
@@ -218,29 +220,29 @@ class SpaceBlock:
                     return f"{'-' if sign < 0 else ''}{b[3 * other + world]}"
             return "0"
 
-        self.design = put(UPPER, "D", (9, 4), design, None if turn is None else turn.design)
+        self.design = put("D", (9, 4), design, None if turn is None else turn.design)
         product = put(
-            UPPER, "HD", (9, 4),
+            "HD", (9, 4),
             lambda i, j: f"SUMPRODUCT({reduced.column(i)},{self.design.column(j)})",
             None if turn is None else turn.product,
         )  # fmt: skip
         normal = put(
-            LOWER, "N", (4, 4),
+            "N", (4, 4),
             lambda i, j: f"SUMPRODUCT({self.design.column(i)},{product.column(j)})",
             None if turn is None else turn.normal,
         )  # fmt: skip
         self.inverse = put(
-            LOWER, "1/N", (4, 4), lambda i, j: f"INDEX(MINVERSE({normal.range}),{i + 1},{j + 1})",
+            "1/N", (4, 4), lambda i, j: f"INDEX(MINVERSE({normal.range}),{i + 1},{j + 1})",
             None if turn is None else turn.inverse,
         )  # fmt: skip
         right = put(
-            LOWER, "n", (4, 1),
+            "n", (4, 1),
             lambda i, _: f"SUMPRODUCT({self.design.column(i)},{left.range})"
             f"-SUMPRODUCT({self.design.column(i)},{product.column(3)})",
             None if turn is None else turn.right,
         )  # fmt: skip
         step = put(
-            LOWER, "step", (4, 1),
+            "step", (4, 1),
             lambda i, _: f"SUMPRODUCT({self.inverse.column(i)},{right.range})",
             None if turn is None else turn.step,
         )  # fmt: skip
@@ -252,26 +254,25 @@ class SpaceBlock:
             return f"{a[one]}*{cells[3 * first + world]}-{a[other]}*{cells[3 * second + world]}"
 
         halfway = put(
-            UPPER, "U", (9, 1), lambda i, _: f"{b[i]}+{crossed(i, b)}",
+            "U", (9, 1), lambda i, _: f"{b[i]}+{crossed(i, b)}",
             None if turn is None else turn.halfway,
         )  # fmt: skip
         u, turns = halfway.cells(), ",".join(step.cells()[:3])
         stretch = f"EXP({step.fixed(3, 0)})"
         return put(
-            UPPER, f"B{number + 1}", (9, 1),
+            f"B{number + 1}", (9, 1),
             lambda i, _: f"{stretch}*({b[i]}+2/(1+SUMSQ({turns})/4)*({crossed(i, u)}))",
             after,
         )  # fmt: skip
 
     def finish(self) -> None:
         """Fold the block away and name it as a whole."""
-        last = max(self.next.values()) - 1
-        for number in range(LEFT, last + 1):
+        last = self.next - 1
+        for number in range(FOLDED, last + 1):
             width = self.sheet.worksheet.column_dimensions[column_letters(number)]
             width.outlineLevel, width.hidden = 1, True
-        self.sheet.name_area(
-            BLOCK, f"{column_letters(LEFT)}{UPPER}", f"{column_letters(last)}{LOWER + 8}"
-        )
+        cells = f"${column_letters(LEFT)}${TOP}:${column_letters(last)}${TOP + 8}"
+        self.sheet.book.define(BLOCK, f"'{self.sheet.worksheet.title}'!{cells}")
 
 
 def _axis_rows(j: int) -> Iterator[tuple[int, int, int]]:

@@ -4,13 +4,17 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from openpyxl import Workbook
+
 from bifocal.survey.workbook.book import build
 from bifocal.survey.workbook.content import SurveyContent
 from bifocal.survey.workbook.words import word
 from photocore.workbook.editor import WorkbookEditor
+from photocore.workbook.live_book import BookBuilder
+from photocore.workbook.named_cells import place_of
 
 #: Words in charts, footers and rules: they stand in no cell.
-_ELSEWHERE = ("chart_plan", "chart_sigma", "chart_error", "page", "holds", "fails")
+_ELSEWHERE = ("chart_plan", "chart_sigma", "chart_error", "page", "holds", "fails", "Points")
 
 
 def translate(editor: WorkbookEditor, content: SurveyContent, language: str) -> None:
@@ -25,7 +29,10 @@ def translate(editor: WorkbookEditor, content: SurveyContent, language: str) -> 
     language : str
         The language it is in.
     """
-    new, old = build(content).book, build(replace(content, language=language)).book
+    built, old = build(content), build(replace(content, language=language)).book
+    new = built.book
+    for name, defined in new.defined_names.items():
+        _reword(editor, built, old, name, defined.attr_text)
     for sheet in new.worksheets:
         if sheet.title not in editor.titles:
             continue
@@ -49,3 +56,17 @@ def translate(editor: WorkbookEditor, content: SurveyContent, language: str) -> 
             texts = [word(key, spoken) for spoken in (language, content.language)]
             quoted = {"page": "R{} &P", "holds": '="{}"', "fails": '="{}"'}.get(key, "{}")
             editor.replace_text(sheet.title, *(quoted.format(text) for text in texts))
+
+
+def _reword(
+    editor: WorkbookEditor, built: BookBuilder, old: Workbook, name: str, place: str
+) -> None:
+    """Write a named formula anew where words of the language stand in it."""
+    sheet, _, cell = place.replace("$", "").partition("!")
+    sheet, own = sheet.strip("'"), place_of(editor, name)
+    if ":" in cell or own is None or old[sheet][cell].data_type != "f":
+        return
+    formula = built.book[sheet][cell].value
+    if formula != old[sheet][cell].value:
+        value = built.results[sheet].get(cell)
+        editor.put(*own, "" if value is None else value, formula=formula[1:])

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable, Collection, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from bifocal.survey.workbook.book import build
+from bifocal.survey.workbook.book import build, unprinted_formula
 from bifocal.survey.workbook.charts import HEAD, LEFT
-from bifocal.survey.workbook.columns import TEXT_KEYS, row_formula
 from bifocal.survey.workbook.content import SurveyContent
 from bifocal.survey.workbook.reader import SurveyInput
 from bifocal.survey.workbook.setup_cells import TYPED_FORMULAS
@@ -18,16 +18,37 @@ from bifocal.survey.workbook.setup_update import (
     write_corrections,
     write_options,
 )
-from bifocal.survey.workbook.sheets import BookBuilder
 from bifocal.survey.workbook.space_block import BLOCK
 from bifocal.survey.workbook.translate import translate
 from bifocal.survey.workbook.words import word
 from photocore.errors import InputError
+from photocore.output import free_path
 from photocore.workbook.cells import CellValue, NewColumn, escape
 from photocore.workbook.editor import WorkbookEditor
 from photocore.workbook.grid import TableArea, split_area, split_cell
+from photocore.workbook.live_book import BookBuilder
+from photocore.workbook.live_columns import TEXT_KEYS, row_formula
 from photocore.workbook.named_cells import place_of, type_value
 from photocore.workbook.newbook import RowBlock
+from photocore.workbook.print_area import move_print_area
+
+
+def check_kind(source: Path, survey: SurveyInput, *, is_pair: bool) -> None:
+    """Refuse to change a survey workbook for coordinates into one for raw pixels, or the reverse.
+
+    Raises
+    ------
+    InputError
+        Naming the way out.
+    """
+    if is_pair != ("col1" in survey.table.present):
+        other = free_path(source.parent, f"{source.stem}-result", source.suffix).name
+        raise InputError(
+            f"{source}: its formulas are made for another kind of measurement "
+            f"({'coordinates in mm or px' if is_pair else 'raw pixels of a pair'}) and are not "
+            f"changed into others in place. Write to a new workbook, e.g. --out {other}; this one "
+            "stays as it is."
+        )
 
 
 def update_book(
@@ -72,12 +93,9 @@ def update_book(
     """
     editor, built = WorkbookEditor(source, survey.book), build(content)
     points = editor.table("tblPoints")
-    if points is None or content.is_pair != ("col1" in survey.table.present):
-        raise InputError(
-            f"{source}: its formulas are made for another kind of measurement "
-            f"({'coordinates in mm or px' if content.is_pair else 'raw pixels of a pair'}). "
-            "Solve its points from a table of their own (.csv)."
-        )
+    if points is None:
+        raise InputError(f"{source}: has lost its table tblPoints; write to a new workbook.")
+    check_kind(source, survey, is_pair=content.is_pair)
     other_words = content.language != survey.language
     if other_words:
         translate(editor, content, survey.language)
@@ -90,6 +108,7 @@ def update_book(
     length = max([_length(points), *(row + 1 for row in rows)])
     _table(editor, built, "tblPoints", rows, length, anew=_corrected(content))
     _table(editor, built, "tblResults", rows, length)
+    _print_points(editor, max(rows, default=0) + 1, content.language)
     for name, sheet_rows in (("tblCheck", survey.known_rows), ("tblGeo", survey.control_rows)):
         own = editor.table(name)
         if own is not None:
@@ -100,6 +119,21 @@ def update_book(
     _charts(editor, built, rows)
     _log(editor, content)
     return editor.save(target, overwrite=overwrite)
+
+
+def _print_points(editor: WorkbookEditor, count: int, language: str) -> None:
+    """Print as many rows of `Points` and `Results` as hold points, unless the user chose others."""
+    for name in ("Points", "Results"):
+        place, area = place_of(editor, f"unprinted_{name}"), editor.table(f"tbl{name}")
+        if place is None or area is None:
+            continue
+        sheet, row, column = place
+        stands = editor.models(sheet, row).get(column)
+        found = re.search(r">(\d+),", stands.formula if stands else "")
+        head = area.area[0]
+        if found and move_print_area(editor, area.sheet, head + int(found[1]), head + count):
+            formula = unprinted_formula(word("unprinted", language), count)
+            editor.put(*place, "", formula=formula, style=stands.style if stands else "")
 
 
 def _corrected(content: SurveyContent) -> Sequence[str]:

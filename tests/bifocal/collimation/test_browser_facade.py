@@ -76,6 +76,13 @@ def test_a_facade_from_two_photos_to_the_drawing_by_clicks_alone(
         assert page.finished("relief")["state"] == "done"
         legend = "document.querySelector('[data-testid=relief-legend]')"
         page.wait(f"() => !{legend}.hidden && {legend}.textContent.endsWith(' m')")
+        page.tab.mouse.move(*page.screen(1, true_pixel(1, CHECKED["T17"])))
+        value = "document.querySelector('[data-testid=relief-value]')"
+        page.wait(f"() => {value}.textContent.includes('r 0.0')")
+        page.click("profile")
+        for x in (-3.0, 3.0):
+            page.tab.mouse.click(*page.screen(1, true_pixel(1, (x, 1.6, 0.0))))
+        page.tab.locator(".profile .curve").wait_for()
         page.click("run-ortho")
         assert page.finished("ortho")["state"] == "done"
         page.tab.get_by_test_id("deliver-scale").select_option("1:100")

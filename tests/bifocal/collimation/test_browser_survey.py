@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +15,19 @@ from bifocal.cli.solve import command
 from tests.browser import Driver, Served, sample_survey, tab_of
 
 PICKS = [((300.0, 330.0), (293.0, 325.0)), ((1190.0, 700.0), (1196.0, 703.0))]
+
+
+@pytest.fixture(scope="module")
+def tab(browser: Any, server: Served) -> Iterator[Driver]:
+    with tab_of(browser, server) as driver:
+        yield driver
+
+
+@pytest.fixture
+def page(tab: Driver) -> Driver:
+    """Return the page with no points."""
+    tab.empty()
+    return tab
 
 
 def pick_both(page: Driver, count: int, first: Any, second: Any) -> dict[str, Any]:
@@ -32,59 +46,55 @@ def relief_of(book: Path) -> dict[str, float]:
     return {point["id"]: point["r"] for point in json.loads(run.stdout)["points"]}
 
 
-def test_noisy_picks_give_the_relief_that_solve_gives(browser: Any, server: Served) -> None:
+def test_noisy_picks_give_the_relief_that_solve_gives(page: Driver) -> None:
     """Clicks with 0.3 px of noise: the page's numbers against the workbook's, solved anew."""
     rng = np.random.default_rng(14)
-    with tab_of(browser, server) as page:
-        page.empty()
-        for count, (first, second) in enumerate(PICKS, start=1):
-            noise = rng.normal(0, 0.3, (2, 2))
-            pick_both(page, count, np.add(first, noise[0]), np.add(second, noise[1]))
-        shown = {point["name"]: point["result"]["r"] for point in page.state["points"]}
-        book = server.folder / page.state["workbook"]
-        # The workbook is written a moment after the journal.
-        for _ in range(100):
-            solved = relief_of(book)
-            if solved.keys() == shown.keys():
-                break
-            page.tab.wait_for_timeout(300)
+    for count, (first, second) in enumerate(PICKS, start=1):
+        noise = rng.normal(0, 0.3, (2, 2))
+        pick_both(page, count, np.add(first, noise[0]), np.add(second, noise[1]))
+    shown = {point["name"]: point["result"]["r"] for point in page.state["points"]}
+    book = page.server.folder / page.state["workbook"]
+    # The workbook is written a moment after the journal.
+    for _ in range(100):
+        solved = relief_of(book)
+        if solved.keys() == shown.keys():
+            break
+        page.tab.wait_for_timeout(600)
     assert solved == pytest.approx(shown, abs=1e-9, rel=1e-9)
 
 
-def test_what_was_picked_is_there_after_a_reload_and_can_be_undone(
-    browser: Any, server: Served
+def test_what_was_picked_is_there_after_a_reload_and_can_be_undone(page: Driver) -> None:
+    before = pick_both(page, 1, *PICKS[0])["points"]
+    page.tab.reload()
+    page.wait("() => window.bifocal")
+    assert page.state["points"] == before
+    page.click("undo")
+    page.settled("state.points[0].picks[2] === null")
+    page.click("undo")
+    page.settled("state.points.length === 0")
+    page.click("redo")
+    page.click("redo")
+    assert page.settled("state.points[0]?.result")["points"] == before
+
+
+def test_two_tabs_see_each_other_and_lose_nothing(
+    page: Driver, browser: Any, server: Served
 ) -> None:
-    with tab_of(browser, server) as page:
-        page.empty()
-        before = pick_both(page, 1, *PICKS[0])["points"]
-        page.tab.reload()
-        page.wait("() => window.bifocal")
-        assert page.state["points"] == before
-        page.click("undo")
-        page.settled("state.points[0].picks[2] === null")
-        page.click("undo")
-        page.settled("state.points.length === 0")
-        page.click("redo")
-        page.click("redo")
-        assert page.settled("state.points[0]?.result")["points"] == before
-
-
-def test_two_tabs_see_each_other_and_lose_nothing(browser: Any, server: Served) -> None:
-    with tab_of(browser, server) as one, tab_of(browser, server) as other:
-        one.empty()
+    one = page
+    with tab_of(browser, server) as other:
         first = pick_both(one, 1, *PICKS[0])["points"][0]
         other.settled("state.points[0]?.result")
         pick_both(other, 2, *PICKS[1])
         state = one.settled("state.points[1]?.result")
         assert state["points"][0] == first
         # Both move the same pick: the last one wins in both tabs.
-        for page, key in ((one, "ArrowUp"), (other, "ArrowLeft")):
-            page.tab.evaluate("() => bifocal.flyTo('P01')")
-            page.keys("2", key)
-            page.settled("true")
-            revision = page.state["revision"]
-            for tab in (one, other):
-                tab.settled("state.revision >= argument", revision)
+        for tab, key in ((one, "ArrowUp"), (other, "ArrowLeft")):
+            tab.tab.evaluate("() => bifocal.flyTo('P01')")
+            tab.keys("2", key)
+            tab.settled("true")
+            revision = tab.state["revision"]
+            for each in (one, other):
+                each.settled("state.revision >= argument", revision)
         moved = other.state["points"][0]["picks"]["2"]
         one.settled("state.points[0].picks[2][0] === argument", moved[0])
         assert one.state["points"] == other.state["points"]

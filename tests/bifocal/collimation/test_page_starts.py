@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import shutil
 
 import openpyxl
@@ -187,6 +188,17 @@ def test_a_set_up_that_is_no_pair_is_refused_in_words(survey, cells, words) -> N
     assert after == before
 
 
+def test_a_pair_through_water_is_refused_before_anything_is_drawn_wrongly(tmp_path) -> None:
+    folder = sample_folder(tmp_path)
+    path = folder / "facade.pair.json"
+    data = json.loads(path.read_text())
+    data["layers"] = {"indices": [1.0, 1.5, 1.337], "thicknesses": [0.01]}
+    data["image1"]["z0"] = data["image2"]["z0"] = 0.05
+    path.write_text(json.dumps(data))
+    with pytest.raises(ValueError, match="bifocal pick"), opened(path):
+        pass
+
+
 def test_other_photos_than_the_workbooks_are_refused(survey) -> None:
     photos = survey.parent / "photos"
     shutil.copyfile(photos / "far.jpg", photos / "other.jpg")
@@ -195,3 +207,24 @@ def test_other_photos_than_the_workbooks_are_refused(survey) -> None:
         opened(photos / "other.jpg", photos / "near.jpg", workbook=survey),
     ):
         pass
+
+
+def test_the_command_alone_says_that_the_page_is_there() -> None:
+    assert "bifocal pick    " in CliRunner().invoke(main, []).output
+
+
+def test_what_the_lenses_say_of_far_and_near_is_asked(tmp_path) -> None:
+    folder = sample_folder(tmp_path)
+    with opened(folder / "near.jpg", folder / "far.jpg") as session:
+        client = client_of(session)
+
+        def questions() -> str:
+            return " ".join(client.get("/api/state").json()["photos"][0]["missing"])
+
+        session.command({"op": "setup.set", "d1": 17.5, "d2": 9.5})
+        for image, focal in ((1, 19), (2, 35)):
+            lens = {"focal_mm": focal, "sensor_width_mm": 22.7}
+            session.command({"op": "photo.set", "image": image, **lens})
+        assert "exchange far and near?" in questions()
+        session.command({"op": "photos.exchange"})
+        assert "exchange" not in questions()

@@ -4,11 +4,20 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import cv2
 import numpy as np
 
 from bifocal import Pair, Photo, Quality
 from bifocal.model.grid import Grid
-from bifocal.relief_maps import evidence, forward_projection, levels, smoothing
+from bifocal.relief_maps import (
+    coarse_level,
+    evidence,
+    flow,
+    forward_projection,
+    levels,
+    smoothing,
+    surfaces,
+)
 from bifocal.relief_maps.forward_projection import MapBands
 from bifocal.relief_maps.frame import Frame, radial_stretch
 from bifocal.relief_maps.map_completion import _spread_inwards, _tidy_outline
@@ -153,3 +162,58 @@ def test_the_pixels_of_an_oblique_photo_are_longer_along_its_slant():
     stretched = radial_stretch(frame_of(Pair(image1=far, image2=near)))
     assert abs(stretched[100, 190] - 2.0) < 0.01
     assert abs(stretched[10, 100] - 0.5) < 0.01
+
+
+def test_what_falls_away_from_camera_2_where_the_photos_do_not_fit_is_not_measured():
+    frame = frame_of(Pair(image1=FAR, image2=NEAR))
+    x = np.arange(200) - 99.5
+    # A pilaster 0.5 m before the wall, 40 to 60 px from the nadir, whose flanks flow runs over.
+    profile = np.interp(x, [32, 40, 60, 68], [0.0, 0.5, 0.5, 0.0])
+    relief = np.broadcast_to(profile, (200, 200)).astype(np.float32)
+    # At 64 px a ray of camera 2 sinks by 9.25 m / 64 px = 145 mm a pixel, the outer flank by 62.5.
+    doubtful = surfaces._falls_away(frame, relief, np.full(relief.shape, 4.5, np.float32))
+    row = doubtful[99]
+    assert row[np.abs(x - 64) < 2].all()
+    assert not row[x < 58].any()
+    assert not row[x > 71].any()
+    assert not surfaces._falls_away(frame, relief, np.full(relief.shape, 2.0, np.float32)).any()
+
+
+def test_half_the_resolution_lies_where_the_whole_one_does():
+    frame = frame_of(Pair(image1=FAR, image2=NEAR), side=201)
+    half = coarse_level.halved(frame)
+    assert half.grid.shape == (100, 100)
+    # Its first pixel covers the first four of the whole one; the odd last row is dropped.
+    place = frame.grid.pixel_of(np.array([half.grid.x0, half.grid.y0]))
+    np.testing.assert_allclose(place, [0.5, 0.5], atol=1e-9)
+    slope = np.broadcast_to(frame.grid.columns_x, frame.grid.shape).astype(np.float32)
+    large = coarse_level._enlarged(
+        np.broadcast_to(half.grid.columns_x, half.grid.shape).astype(np.float32), frame
+    )
+    np.testing.assert_allclose(large[:, 1:199], slope[:, 1:199], atol=1e-6)
+
+
+def test_plaster_that_is_lost_in_noise_is_known_better_at_half_the_resolution():
+    rng = np.random.default_rng(9)
+    side = 320
+    frame = frame_of(Pair(image1=FAR, image2=NEAR), side=side)
+    shades = cv2.GaussianBlur(rng.normal(0, 1, (side, side)), (0, 0), 5.0)
+    shades *= 5 / shades.std()
+    # A wall at 0.3 m: photo 2 is photo 1 enlarged by (9.5 / 9.2) / (17.5 / 17.2).
+    k, middle = (9.5 / 9.2) / (17.5 / 17.2), (side - 1) / 2
+    zoom = np.array([[k, 0, middle * (1 - k)], [0, k, middle * (1 - k)]])
+    second = cv2.warpAffine(shades, zoom, (side, side), borderMode=cv2.BORDER_REPLICATE)
+    photos = [
+        np.clip(128 + image + rng.normal(0, 5, image.shape), 0, 255).astype(np.uint8)
+        for image in (shades, second)
+    ]
+    frame = replace(frame, image1=photos[0], image2=photos[1])
+    first = np.full((10, 10), 0.25, np.float32)
+    fine = flow.measure(frame, first)
+    assert coarse_level.is_unsure(fine)
+    both, known = coarse_level.backed(frame, fine, first)
+    assert known.mean() > 0.1
+    before, after = (np.abs(found.r[known] - 0.3).mean() for found in (fine, both))
+    assert after < 0.85 * before
+    valid = ~known & (np.abs(both.r - fine.r) < coarse_level.GROSS)
+    np.testing.assert_array_equal(both.r[valid], fine.r[valid])

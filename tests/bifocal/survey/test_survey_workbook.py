@@ -202,12 +202,12 @@ def pair_content(rows=60, principal_distance=None, lens=None, placed=False):
 
 def of_turns(sheet, cell, cached):
     """Return relative and absolute tolerance: turns that solve the model 3D are worth 1e-9."""
-    if sheet.title != "Georeference" or cell.column < 46 or cell.row > 23:
+    if sheet.title != "Georeference" or cell.column < 60 or cell.row > 11:
         return 1e-12, 1e-12
     # Columns headed n: a difference of two sums that grow equal turn by turn.
-    if not 15 <= cell.row <= 18 or sheet.cell(14, cell.column).value != "n":
+    if not 3 <= cell.row <= 6 or sheet.cell(2, cell.column).value != "n":
         return 1e-9, 1e-12
-    normal = [cached[sheet.title].cell(15 + i, cell.column - 8 + i).value for i in range(4)]
+    normal = [cached[sheet.title].cell(3 + i, cell.column - 8 + i).value for i in range(4)]
     return 1e-9, 1e-9 * max((value for value in normal if value), default=0.0)
 
 

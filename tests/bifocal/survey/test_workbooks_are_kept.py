@@ -352,7 +352,7 @@ def test_a_text_table_is_not_replaced_by_its_own_results(tmp_path):
     path = write_csv(tmp_path / "p.csv", TABLE)
     result = run("solve", path, "--out", path, "--overwrite", *DISTANCES)
     assert result.exit_code == 1
-    assert "is the survey itself" in result.stderr
+    assert "p.csv: is one of the files that are read" in result.stderr
     assert path.read_text() == TABLE
 
 
@@ -463,3 +463,32 @@ def test_a_backup_of_somebody_else_is_not_replaced(tmp_path):
     assert run("solve", path, "--out", path, "--overwrite").exit_code == 0
     assert (tmp_path / "s.xlsx.bak").read_text() == "mine"
     assert (tmp_path / "s.xlsx.bak2").read_bytes() == before
+
+
+def test_a_coordinate_survey_becomes_one_for_pixels_in_a_new_workbook_only(tmp_path):
+    pair = write_pair(
+        tmp_path / "wall.pair.json", image1_principal_distance=35, image2_principal_distance=19
+    )
+    table = write_csv(tmp_path / "p.csv", TABLE)
+    path = tmp_path / "survey.xlsx"
+    assert run("solve", table, "--out", path, *DISTANCES).exit_code == 0
+    with_own_chart(path)
+    before = path.read_bytes()
+    for more in ((), ("--overwrite",)):
+        result = run("solve", path, "--pair", pair, "--out", path, *more)
+        assert result.exit_code == 1
+        assert result.stderr.count("\n") == 1
+        assert "--out survey-result.xlsx; this one stays as it is" in result.stderr
+        assert path.read_bytes() == before
+    out = tmp_path / "survey-result.xlsx"
+    result = run("solve", path, "--pair", pair, "--out", out)
+    assert result.exit_code == 0, result.stderr
+    assert "a new workbook; survey.xlsx stays as it is, and what else it holds" in result.stderr
+    assert "My chart" in result.stderr
+    assert path.read_bytes() == before
+    again = run("solve", out, "--json")
+    assert again.exit_code == 0, again.stderr
+    assert json.loads(again.stdout)["points"]
+    # The way out of the other direction is the same.
+    result = run("solve", out, "--out", out, "--overwrite")
+    assert result.exit_code == 0, result.stderr

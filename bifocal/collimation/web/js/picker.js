@@ -3,6 +3,8 @@
  * the next click means, the point in hand, nudge, snap, the proposed partner.
  */
 const NEAR = 14;
+const REACH = 8;
+const FARTHEST = 16;
 
 const other = (image) => 3 - image;
 
@@ -238,8 +240,14 @@ export class Picker extends EventTarget {
     this.nudge((step * (b[0] - a[0])) / length, (step * (b[1] - a[1])) / length);
   }
 
+  /** How far off a click may have fallen: farther where the photo is shown small. [photo pixels] */
+  get #reach() {
+    const zoom = Math.min(...this.panes().map((pane) => pane.zoom), 1);
+    return Math.min(Math.max(REACH, (REACH / 2) / zoom), FARTHEST);
+  }
+
   /** Centre the pick in hand on the corner or target that lies there. */
-  snap(radius = 8) {
+  snap(radius = this.#reach) {
     return this.#next(async () => {
       const { item, image } = this;
       const from = item && this.pick(item, image);

@@ -1,0 +1,63 @@
+"""``bifocal adjust``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import click
+
+from photocore.cli import print_result, progress_bar, tell_written
+from photocore.options import FILE, as_json, choice, number, overwrite
+
+EXAMPLE = """\b
+Examples:
+  bifocal adjust left.pair.json right.pair.json --control left.csv --control right.csv --out joint
+  bifocal adjust a.pair.json b.pair.json c.pair.json --control a.csv --control none
+                 --control c.csv --out joint
+"""
+
+
+@click.command(epilog=EXAMPLE)
+@click.argument("pairs", type=FILE, nargs=-1, required=True, metavar="PAIR.pair.json...")
+@click.option(
+    "--out", type=FILE, required=True, metavar="DIR", help="Folder of the adjusted pairs."
+)
+@click.option(
+    "--control", type=FILE, multiple=True,
+    help="Table of control points of a pair, as for `bifocal align`, or none; repeat it, one for "
+    "each PAIR. Points of one name are one point.",
+)  # fmt: skip
+@click.option(
+    "--check", type=FILE, multiple=True,
+    help="The same for independent check points: they are compared, and hold nothing.",
+)  # fmt: skip
+@choice("--unit", "m|cm|mm", "Unit of the coordinates.  [default: the headings', else m]")
+@number("--sigma-control", "M", "Precision of a control coordinate [m].", default=0.003)
+@number("--sigma-pick", "PX", "Precision of a pick [px].", default=0.5)
+@number("--sigma-tie", "PX", "Precision of a point found automatically [px].", default=0.5)
+@overwrite
+@as_json
+def command(
+    pairs: tuple[Path, ...], out: Path, control: tuple[Path, ...], check: tuple[Path, ...],
+    unit: str | None, overwrite: bool, as_json: bool, **sigmas: Any,
+) -> None:  # fmt: skip
+    """Adjust all pairs of one facade in one frame.
+
+    Points that the photos share are found by themselves; with the control points of all pairs
+    they give one least-squares adjustment of all cameras. DIR gets a pair file of the same name
+    for each PAIR, and points.csv with coordinates, precision and misfits. What contradicts the
+    rest takes no part and is named. Fewer than three control points: the first pair is held.
+    """
+    from bifocal.orientation.joint_workflow import JointTask, adjust_pairs
+
+    task = JointTask(control=_tables(control), check=_tables(check), unit=unit or "", **sigmas)
+    with progress_bar("adjust", quiet=as_json) as progress:
+        result = adjust_pairs(pairs, out, task, overwrite=overwrite, progress=progress)
+    print_result(result.to_dict(), result.lines(), as_json=as_json)
+    tell_written(*(out / path.name for path in pairs), out / "points.csv")
+
+
+def _tables(paths: tuple[Path, ...]) -> tuple[Path | None, ...]:
+    """Return tables, None for ``none``."""
+    return tuple(None if str(path).lower() == "none" else path for path in paths)

@@ -1,0 +1,73 @@
+"""Words of workbooks in English, Italian and German, read from a package's `words.toml`."""
+
+from __future__ import annotations
+
+import tomllib
+from functools import cached_property
+from importlib.resources import files
+from typing import Any, NamedTuple
+
+LANGUAGES = ("en", "it", "de")
+
+
+class Wording(NamedTuple):
+    """One expression in every language, with the unit of what it names."""
+
+    en: str
+    it: str
+    de: str
+    unit: str = ""
+
+    def in_language(self, language: str) -> str:
+        """Return the expression in a language."""
+        return self[LANGUAGES.index(language)]
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The expression in all languages."""
+        return self[: len(LANGUAGES)]
+
+
+class WordBook:
+    """The words of one kind of workbook.
+
+    Parameters
+    ----------
+    package : str
+        Where its `words.toml` lies, with the sections ``words``, ``columns``, ``prompts`` and
+        ``readme``, and others of its own.
+    """
+
+    def __init__(self, package: str) -> None:
+        self.package = package
+
+    @cached_property
+    def content(self) -> dict[str, dict[str, Any]]:
+        """The file."""
+        text = files(self.package).joinpath("words.toml").read_text(encoding="utf-8")
+        return tomllib.loads(text)
+
+    def term(self, section: str, key: str) -> Wording | None:
+        """Return an entry of a section; None if absent."""
+        entry = self.content[section].get(key)
+        return None if entry is None else Wording(**entry)
+
+    def word(self, key: str, language: str) -> str:
+        """Return a word in a language."""
+        return Wording(**self.content["words"][key]).in_language(language)
+
+    def label(self, key: str, language: str) -> str:
+        """Return a column's label with its unit; numbered columns may share one entry."""
+        columns, stem = self.content["columns"], key.rstrip("0123456789")
+        column = Wording(**columns[key if key in columns else stem])
+        name = column.in_language(language).format(n=key[len(stem) :])
+        return f"{name} [{column.unit}]" if column.unit else name
+
+    def prompt(self, key: str, language: str) -> str:
+        """Return what a cell says when it is chosen: its own prompt, or its column's label."""
+        known = self.term("prompts", key)
+        return known.in_language(language) if known else self.label(key, language)
+
+    def readme(self, language: str) -> list[str]:
+        """Return the paragraphs of the sheet `Readme`; "#" marks a heading."""
+        return str(self.content["readme"][language]).splitlines()

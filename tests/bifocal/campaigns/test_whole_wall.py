@@ -1,0 +1,60 @@
+"""A survey whose pairs are adjusted in one frame and joined into one orthophoto."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+import rasterio
+from click.testing import CliRunner
+
+from bifocal.campaigns.survey_file import read_survey_file
+from bifocal.cli.main import main
+from photocore.errors import InputError
+from tests.bifocal.orientation.street import write_street
+
+
+def survey(folder: Path, *above: str) -> Path:
+    # 17.5 m at 8.5 mm a pixel and 35 mm: 720 px are 12.24 mm.
+    lines = ['scale = "1:100"', 'quality = "fast"', "sensor_width = 12.24", "focal1 = 35",
+             "focal2 = 19", 'products = ["relief", "drawing"]', *above]  # fmt: skip
+    for name in "abc":
+        lines += ["[[pair]]", f'name = "{name}"', f'far = "{name}_far.png"']
+        lines += [f'near = "{name}_near.png"', f'control = "{name}_all.csv"']
+    path = folder / "street.toml"
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    return path
+
+
+@pytest.mark.acceptance
+def test_a_street_comes_into_one_frame_and_one_picture_and_stays(tmp_path):
+    write_street(tmp_path)
+    for name in "abc":
+        parts = [(tmp_path / f"{name}_{r}.csv").read_text() for r in ("control", "check")]
+        rest = "".join(parts[1].splitlines(keepends=True)[1:])
+        (tmp_path / f"{name}_all.csv").write_text(parts[0] + rest)
+    path = survey(tmp_path, "joint = true", "mosaic = true")
+    first = CliRunner().invoke(main, ["survey", str(path), "--json"])
+    assert first.exit_code == 0, first.stderr
+    said = json.loads(first.stdout)
+    assert (said["joint"]["done"], said["mosaic"]["done"]) == (["joint"], ["mosaic"])
+    assert sorted(p.name for p in (tmp_path / "results/joint").glob("*.pair.json")) == [
+        "a.pair.json", "b.pair.json", "c.pair.json",
+    ]  # fmt: skip
+    with rasterio.open(tmp_path / "results/mosaic/mosaic.tif") as file:
+        assert file.tags(ns="IMAGE_STRUCTURE")["LAYOUT"] == "COG"
+        assert {1, 2, 3} <= set(file.read(4).ravel().tolist())
+        assert (file.dataset_mask() > 0).mean() > 0.9
+    again = CliRunner().invoke(main, ["survey", str(path), "--json"])
+    said = json.loads(again.stdout)
+    assert not any(pair["done"] for pair in [*said["pairs"], said["joint"], said["mosaic"]])
+
+
+def test_what_is_wrong_above_the_pairs_is_said(tmp_path):
+    path = survey(tmp_path, 'joint = "yes"')
+    with pytest.raises(InputError, match="joint = 'yes': expected true or false"):
+        read_survey_file(path)
+    path.write_text(path.read_text().replace('name = "b"', 'name = "mosaic"').replace('"yes"', "1"))
+    with pytest.raises(InputError, match="folders of the whole survey"):
+        read_survey_file(path)
