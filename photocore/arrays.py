@@ -29,8 +29,9 @@ def as_floats(value: ArrayLike, name: str) -> FloatArray:
     """
     try:
         array = np.asarray(value)
-        # numpy would take the text "17.5", and true for 1; no file of ours means it.
-        if array.dtype.kind in "USb":
+        # numpy would take the text "17.5", true for 1, a date for its days, and drop what is
+        # imaginary; no file of ours means it.
+        if array.dtype.kind in "USbcmM":
             raise TypeError
         if isinstance(value, np.ma.MaskedArray):
             plain = np.asarray(value.data, dtype=np.float64)

@@ -31,11 +31,7 @@ def keeps_index(function: Callable[P, R]) -> Callable[P, R]:
         if not columns:
             return function(*args, **kwargs)
         first = columns[0]
-        if any(not first.index.equals(other.index) for other in columns[1:]):
-            raise InputError(
-                f"{function.__name__}: the columns have different indices; bring them into one "
-                "order (reindex), or give plain arrays."
-            )
+        check_index(function.__name__, *columns)
         plain = [np.asarray(a) if _is_column(a) else a for a in args]
         named = {k: np.asarray(v) if _is_column(v) else v for k, v in kwargs.items()}
         result: Any = function(*plain, **named)  # type: ignore[arg-type]
@@ -46,11 +42,32 @@ def keeps_index(function: Callable[P, R]) -> Callable[P, R]:
     return wrapped
 
 
+def check_index(name: str, *values: Any) -> None:
+    """Refuse columns of data frames, or whole frames, that count their rows differently.
+
+    Raises
+    ------
+    InputError
+        If two of them have different indices, which arrays would silently take for the same rows.
+    """
+    frames = [value for value in values if _is_of_pandas(value)]
+    if any(not frames[0].index.equals(other.index) for other in frames[1:]):
+        raise InputError(
+            f"{name}: the columns have different indices; bring them into one "
+            "order (reindex), or give plain arrays."
+        )
+
+
+def _is_of_pandas(value: Any) -> bool:
+    # pandas 3 calls the module of its classes "pandas" alone.
+    return type(value).__module__.partition(".")[0] == "pandas" and hasattr(value, "index")
+
+
 def _is_column(value: Any) -> bool:
     """Tell a pandas column by its class; nothing is imported for it."""
-    if not type(value).__module__.startswith("pandas."):
+    if not _is_of_pandas(value):
         return False
-    if getattr(value, "ndim", 0) != 1 or not hasattr(value, "index"):
+    if getattr(value, "ndim", 0) != 1:
         raise InputError("expected columns or arrays, found a whole data frame; give one column.")
     return True
 

@@ -166,6 +166,8 @@ def _align_workbook(
 
 def _lines(alignment: Alignment) -> Iterator[str]:
     """Yield the set-up for people."""
+    from bifocal.orientation.align_workflow import basis
+
     yield from alignment.words
     ties = alignment.setup["common_points"]
     if ties["count"]:
@@ -180,6 +182,7 @@ def _lines(alignment: Alignment) -> Iterator[str]:
             values = "  ".join(f"{value:7.2f}" for value in alignment.control_residuals[index])
             mark = "" if alignment.control_used[index] else "   LEFT OUT"
             yield f"  {name:>12}  {values}  {alignment.control_test[index]:6.1f}{mark}"
+    yield basis(alignment)
     for text in alignment.setup["assumed"]:
         yield f"Assumed: {text}."
 

@@ -75,5 +75,6 @@ def _lines(summary: dict[str, Any]) -> Iterator[str]:
     )
     if summary["sigma_median"] is not None:
         yield f"Sigma     {1000 * summary['sigma_median']:.1f} mm (median of the measured)"
+        yield summary["rests_on"]
     for path in summary["written"]:
         yield f"Written   {path}"

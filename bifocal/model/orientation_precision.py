@@ -77,11 +77,41 @@ def orientation_covariance(
     -------
     ndarray, shape (n, 3, 3)
         NaN where a point is.
+    """
+    jacobian = _by_orientation(photos, xyz)
+    return np.asarray(jacobian @ covariance @ jacobian.transpose(0, 2, 1))
+
+
+def orientation_effect(
+    photos: tuple[PlanePhoto, PlanePhoto], covariance: FloatArray, xyz: FloatArray
+) -> FloatArray:
+    """Return what independent errors of the orientation, of sigma 1, move each point by. [m]
+
+    Parameters
+    ----------
+    photos, covariance, xyz
+        As for `orientation_covariance`, which is the result times its transpose, point by point.
+
+    Returns
+    -------
+    ndarray, shape (n, 3, 24)
+        NaN where a point is.
+    """
+    scale = np.sqrt(np.diag(covariance))
+    safe = np.where(scale > 0, scale, 1.0)
+    # As a correlation: radians, metres and pixels differ by many powers of ten.
+    values, vectors = np.linalg.eigh(covariance / np.outer(safe, safe))
+    factor = safe[:, None] * vectors * np.sqrt(np.maximum(values, 0.0))
+    return np.asarray(_by_orientation(photos, xyz) @ factor)
+
+
+def _by_orientation(photos: tuple[PlanePhoto, PlanePhoto], xyz: FloatArray) -> FloatArray:
+    """Return the derivative of points at fixed pixels by the orientation, shape (n, 3, 24).
 
     Notes
     -----
     The four pixels p of a point P in cameras c stay: ``A dP = -dp/dc dc`` by least squares with
-    ``A = dp/dP``, so ``J = -(AᵀA)⁻¹Aᵀ dp/dc`` and the covariance is ``J C Jᵀ``.
+    ``A = dp/dP``, so ``J = -(AᵀA)⁻¹Aᵀ dp/dc``.
     """
     by_point, by_camera = [], np.zeros((len(xyz), 4, len(NAMES)))
     for number, photo in enumerate(photos):
@@ -97,9 +127,8 @@ def orientation_covariance(
         by_camera[:, rows, first + len(PARAMETERS) + 1] = away * square**2
     design = np.concatenate(by_point, axis=1)
     known = np.isfinite(design).all(axis=(1, 2))
-    out = np.full((len(xyz), 3, 3), np.nan)
-    jacobian = -np.linalg.pinv(design[known]) @ by_camera[known]
-    out[known] = jacobian @ covariance @ jacobian.transpose(0, 2, 1)
+    out = np.full((len(xyz), 3, len(NAMES)), np.nan)
+    out[known] = -np.linalg.pinv(design[known]) @ by_camera[known]
     return out
 
 

@@ -20,6 +20,7 @@ from multimedia import Layers
 from photocore.arrays import FloatArray, as_points, not_negative, positive
 from photocore.errors import GeometryError, InputError, located
 from photocore.jsonfile import read_object, write_object
+from photocore.series import check_index
 
 FORMAT = "bifocal-pair/1"
 
@@ -384,6 +385,7 @@ class Pair:
         here) is common to all points: it is in every point's covariance, but not independent from
         point to point.
         """
+        check_index("intersect", pixels1, pixels2)
         first = as_points(pixels1, "pixels1", dimension=2)
         second = as_points(pixels2, "pixels2", dimension=2)
         if first.shape != second.shape:
@@ -422,3 +424,22 @@ class Pair:
             return np.zeros((len(xyz), 3, 3))
         photos = (self.image1, self.image2)
         return orientation_precision.orientation_covariance(photos, self.orientation, xyz)
+
+    def effect_of_orientation(self, xyz: FloatArray) -> FloatArray | None:
+        """Return what independent errors of the pair's own orientation, of sigma 1, move points by.
+
+        Parameters
+        ----------
+        xyz : ndarray, shape (n, 3)
+            Points. [m]
+
+        Returns
+        -------
+        ndarray, shape (n, 3, k), or None
+            Errors in X, Y, r [m], the same k errors for all points; None where the pair does not
+            state its covariance.
+        """
+        if self.orientation is None:
+            return None
+        photos = (self.image1, self.image2)
+        return orientation_precision.orientation_effect(photos, self.orientation, xyz)

@@ -95,8 +95,10 @@ class SurveyPoints:
         middle, spread = (xx + yy) / 2, np.hypot((xx - yy) / 2, mixed)
         # Where a circle's direction is anybody's, north is as good as any.
         direction = np.degrees(np.arctan2(2 * mixed, yy - xx)) / 2 % 180
-        short = np.sqrt(np.maximum(middle - spread, 0.0))
-        return np.stack([np.sqrt(middle + spread), short, direction], axis=-1)
+        long = np.sqrt(middle + spread)
+        # Errors along one line leave a short axis of rounding, which must not make it vanish.
+        short = np.sqrt(np.maximum(middle - spread, (1e-5 * long) ** 2))
+        return np.stack([long, short, direction], axis=-1)
 
     def take(self, keep: BoolArray) -> SurveyPoints:
         """Return the points where ``keep`` is true."""

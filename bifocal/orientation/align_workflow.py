@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from bifocal.files.images import WRITTEN, ImageInfo, image_info, read_grey
+from bifocal.model.basis import rests_on
 from bifocal.model.lens import Lens
 from bifocal.orientation.absolute_orientation import orient_pair
 from bifocal.orientation.alignment import Alignment, make_alignment, with_files
@@ -196,9 +197,32 @@ def alignment_as_dict(alignment: Alignment) -> dict[str, Any]:
             for key in ("standard_deviations", "focal_px", "common_points", "assumed", "sigma0")
         },
         "control": alignment.setup.get("control", []),
+        "rests_on": basis(alignment),
         "words": alignment.words,
         "remarks": alignment.remarks,
     }
+
+
+#: What gives the scale of relief, by the way into the pair file.
+_SCALES = {
+    "control": "control points taken as exact",
+    "site": "distances as taped",
+    "as set up": "distances, focal lengths and nadir points as typed",
+    "auto": "one measure taped",
+}
+
+
+def basis(alignment: Alignment) -> str:
+    """Return in one line what the precision of an alignment rests on."""
+    ties = alignment.setup["common_points"]
+    picks = "no common points"
+    if ties["count"]:
+        picks = f"{ties['count']} common points of {ties['sigma_px']:.2f} px, measured"
+    assumed = "; ".join(alignment.setup["assumed"])
+    return rests_on(
+        alignment.pair, setup=_SCALES[alignment.way], picks=picks,
+        more=f"assumed: {assumed}" if assumed else "",
+    )  # fmt: skip
 
 
 def _way(options: AlignOptions) -> tuple[str, AlignOptions]:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from bifocal.files.geotiff import write_relief
 from bifocal.files.images import ImageArray, read_image, to_eight_bit
+from bifocal.model.basis import rests_on
 from bifocal.model.pair import Pair
 from bifocal.model.relief_map import ReliefMap
 from bifocal.relief_maps import dense_relief
@@ -104,7 +105,10 @@ def relief_of_pair(
             descriptions={"sigma": "sigma of relief, m"}, overwrite=job.overwrite,
         )  # fmt: skip
         written.append(job.cloud)
-    summary = result.summary() | {"written": [str(path) for path in written]}
+    basis = rests_on(
+        pair, setup="the pair as given", picks="the photos' own misfit across the radius, measured"
+    )
+    summary = result.summary() | {"rests_on": basis, "written": [str(path) for path in written]}
     return summary, (*pair.remarks, *result.registration.remarks)
 
 

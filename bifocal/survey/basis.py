@@ -38,7 +38,4 @@ def _world(solution: SolvedSurvey) -> str:
     if solution.georeference is None:
         return ""
     count = int(solution.georeference.used.sum())
-    return (
-        f"E, N, H on {count} control points taken as exact; what the transformation is worth is in "
-        "no sigma"
-    )
+    return f"E, N, H on {count} control points taken as exact, with the transformation's own error"

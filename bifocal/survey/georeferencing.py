@@ -3,20 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from bifocal.survey.reference import Georeference, KnownPoints, NamedPoints
 from bifocal.survey.relief_table import ReliefTable
-from bifocal.survey.weighted_similarity import (
-    WeightedSums,
-    fit_of_sums,
-    fit_space,
-    weighted_sums,
-    weights_of,
-)
+from bifocal.survey.space_similarity import SpaceSums, fit_of_space, space_sums
+from bifocal.survey.transformation_precision import TransformationPrecision, precision_of
+from bifocal.survey.weighted_similarity import WeightedSums, fit_of_sums, weighted_sums, weights_of
 from photocore.arrays import BoolArray, FloatArray, as_floats
 from photocore.errors import GeometryError, InputError
 from photocore.similarity import Similarity, fit_levelled, fit_plane, fit_similarity, round_origin
@@ -68,8 +64,8 @@ def georeference(
         ``auto`` takes 2D without heights, else ``levelled`` (Y upright: the photos were levelled),
         unless a test says that it does not fit and three or more points allow ``3D``.
     covariance : ndarray, shape (n, 3, 3), optional
-        Of the points' X, Y, Z; default that of the solved ``table``, else all points weigh the
-        same. Points without it take no part. [m²]
+        Of the points' X, Y, Z, independent from point to point; default that of the picks of the
+        solved ``table``, else all points weigh the same. Points without it take no part. [m²]
 
     Returns
     -------
@@ -88,7 +84,9 @@ def georeference(
     -----
     Each point weighs by its full covariance: next to the nadir, or where the two lenses are nearly
     alike, relief is far less precise than X and Y, and a point UNCERTAIN in relief still says
-    where the wall stands. The control points count as exact.
+    where the wall stands. The control points count as exact. What the photos' orientation itself
+    is worth moves all points together and most of it is taken up by the fit: it weighs nothing, but
+    is in the precision of every point placed.
 
     What does not fit is explained by one thing after the other, as long as an F test calls it
     significant and the rest is redundant: that the wall leans (at 1 %; ``auto`` only, 3D for
@@ -140,6 +138,7 @@ class _MeasuredControl:
     wall: FloatArray
     world: FloatArray
     covariance: FloatArray | None
+    effect: FloatArray | None
     used: BoolArray
     missing: tuple[str, ...]
 
@@ -158,8 +157,9 @@ def _measured_control(
     covariance: FloatArray | None,
 ) -> _MeasuredControl:
     """Return what was measured and what is known of the same names."""
-    if isinstance(points, ReliefTable) and covariance is None:
-        covariance = points.covariance
+    solved = points if isinstance(points, ReliefTable) and covariance is None else None
+    if solved is not None:
+        covariance = solved.own_covariance
     if isinstance(points, Mapping):
         points = KnownPoints.from_columns(points, "XYZ")
     if isinstance(control, Mapping):
@@ -172,11 +172,13 @@ def _measured_control(
             )
         blank = np.full((1, 3, 3), np.nan)
         covariance = np.concatenate([covariance, blank])[control.rows_in(points)]
+    wall = control.coordinates_in(points)
     return _MeasuredControl(
         ids=control.ids,
-        wall=control.coordinates_in(points),
+        wall=wall,
         world=control.xyz,
         covariance=covariance,
+        effect=None if solved is None else solved.effect_of_orientation(wall),
         used=control.used,
         missing=control.missing_in(points),
     )
@@ -194,7 +196,7 @@ class _FittedTransformation:
     squares: float
     noise: float
     redundancy: int
-    sums: WeightedSums | None = None
+    sums: WeightedSums | SpaceSums | None = None
 
 
 def _fit(
@@ -208,7 +210,8 @@ def _fit(
     # About a round origin, so that the sum of squares is not one of rounding errors.
     origin = round_origin(target)
     near = target - origin
-    offset, sums = near.mean(axis=0), None
+    offset = near.mean(axis=0)
+    sums: WeightedSums | SpaceSums | None = None
     if model.axes == 2:
         offset[2] = found.target_centre[2]
     # Rounding noise of large coordinates is no contradiction.
@@ -219,11 +222,10 @@ def _fit(
         squares = float((left**2).sum())
     else:
         weights = weights_of(measured.covariance[used], flat=model.axes == 2)
-        about = wall - found.source_centre
-        if model.name == "3D":
-            found, offset = _about(fit_space(about, weights, near, found, origin), found)
+        sums = _sums(model, wall, weights, near, found)
+        if isinstance(sums, SpaceSums):
+            found, offset = fit_of_space(sums, found.source_centre, origin)
         else:
-            sums = weighted_sums(about, weights, near, found, model=model.name)
             found, offset = fit_of_sums(sums, found.source_centre, origin, model=model.name)
         left = residuals(found, wall, near, offset) @ found.rotation / found.scale
         squares = float(np.einsum("ni,nij,nj->", left, weights, left))
@@ -234,12 +236,18 @@ def _fit(
     )  # fmt: skip
 
 
-def _about(
-    fitted: tuple[Similarity, FloatArray], start: Similarity
-) -> tuple[Similarity, FloatArray]:
-    """Return a fit made about the wall's centre with that centre."""
-    similarity, offset = fitted
-    return replace(similarity, source_centre=start.source_centre), offset
+def _sums(
+    model: TransformationModel,
+    wall: FloatArray,
+    weights: FloatArray,
+    near: FloatArray,
+    start: Similarity,
+) -> WeightedSums | SpaceSums:
+    """Return what a weighted fit is made of."""
+    about = wall - start.source_centre
+    if model.name == "3D":
+        return space_sums(about, weights, near)
+    return weighted_sums(about, weights, near, start, model=model.name)
 
 
 def residuals(
@@ -303,8 +311,10 @@ def _as_georeference(
     near = np.where(flat, measured.world * [1, 1, np.nan], measured.world) - best.origin
     left = residuals(best.transformation, measured.wall, near, best.offset)
     squares = float((left[best.used][:, : best.model.axes] ** 2).sum())
-    redundant = best.redundancy > 0
-    weighted = redundant and measured.covariance is not None
+    sigma0 = float(np.sqrt(squares / best.redundancy)) if best.redundancy > 0 else float("nan")
+    flattened = _flattened(measured.world - best.origin, flat=flat)
+    precision, expected = _precision(measured, best, flattened, sigma0)
+    weighted = best.redundancy > 0 and measured.covariance is not None
     return Georeference(
         ids=measured.ids,
         world_from_wall=best.transformation,
@@ -317,15 +327,38 @@ def _as_georeference(
             for name, was, now in zip(measured.ids, usable, best.used, strict=True)
             if was and not now
         ),
-        sigma0=float(np.sqrt(squares / best.redundancy)) if redundant else float("nan"),
-        error_ratio=float(np.sqrt(best.squares / best.redundancy)) if weighted else float("nan"),
+        sigma0=sigma0,
+        error_ratio=float(np.sqrt(best.squares / expected)) if weighted else float("nan"),
         redundancy=best.redundancy,
         origin=best.origin,
         offset=best.offset,
         sums=best.sums,
         covariance=measured.covariance,
-        near=_flattened(measured.world - best.origin, flat=flat),
+        near=flattened,
+        precision=precision,
     )
+
+
+def _precision(
+    measured: _MeasuredControl, best: _FittedTransformation, near: FloatArray, sigma0: float
+) -> tuple[TransformationPrecision | None, float]:
+    """Return what the fit is worth, and the weighted sum of squares to be expected."""
+    used, fit, sums = best.used, best.transformation, best.sums
+    effect = None if measured.effect is None else measured.effect[used]
+    expected = float(best.redundancy)
+    if sums is None:
+        # All points alike: as good as the residuals say, which say nothing without redundancy.
+        if not sigma0 > 0:
+            return None, expected
+        alike = np.tile(np.eye(3) * (sigma0 / fit.scale) ** 2, (int(used.sum()), 1, 1))
+        weights = weights_of(alike, flat=best.model.axes == 2)
+        sums = _sums(best.model, measured.wall[used], weights, near[used], fit)
+    precision = precision_of(best.model.name, fit, sums, near[used], effect)
+    if effect is not None:
+        moved = precision.moved_by_orientation(near[used])
+        unexplained = effect - np.einsum("ba,nbk->nak", fit.rotation, moved) / fit.scale
+        expected += float(np.einsum("nak,nab,nbk->", unexplained, sums.weights, unexplained))
+    return precision, expected
 
 
 def _flattened(near: FloatArray, *, flat: bool) -> FloatArray:

@@ -10,6 +10,7 @@ import numpy as np
 
 from photocore.arrays import BoolArray, FloatArray, as_floats
 from photocore.errors import InputError
+from photocore.series import check_index
 
 #: Columns of numbers and of texts, by key.
 NUMBERS = (
@@ -112,6 +113,7 @@ class PointObservations:
         uneven = [key for key, shape in shapes.items() if shape != (n,)]
         if uneven:
             raise InputError(f"{uneven[0]}: has {shapes[uneven[0]][0]} values, expected {n}.")
+        check_index("points", *columns.values())
         blank = np.full(n, np.nan)
 
         def stacked(*keys: str) -> FloatArray:

@@ -22,7 +22,7 @@ from bifocal.survey.tolerances import RULES, sentence
 from bifocal.survey.workbook.book import write_book
 from bifocal.survey.workbook.content import SurveyContent
 from bifocal.survey.workbook.own_table import add_results
-from bifocal.survey.workbook.update import check_kind, update_book
+from bifocal.survey.workbook.update import check_kind, is_older, update_book
 from bifocal.survey.workflow import SolvedSurvey
 from photocore.errors import InputError
 from photocore.jsonfile import to_text
@@ -132,10 +132,15 @@ def _update(path: Path, solution: SolvedSurvey, content: SurveyContent, *, overw
     kept = update_book(
         solution.source, path, solution.survey, own, given=_options(solution), overwrite=overwrite
     )
-    if solution.georeference is not None and _weighs_alike(solution):
+    if solution.georeference is not None and _is_older(solution):
+        how = (
+            "weigh all control points alike"
+            if _weighs_alike(solution)
+            else "leave what the transformation is worth out of sigma_E, sigma_N, sigma_H"
+        )
         return (
-            "its formulas weigh all control points alike, since it was made by an older version; "
-            f"a new template weighs them. {_kept_as(kept)}"
+            f"its formulas {how}, since it was made by an older version; a new template does "
+            f"better. {_kept_as(kept)}"
         ).strip()
     return _kept_as(kept)
 
@@ -201,9 +206,13 @@ def as_typed(solution: SolvedSurvey, content: SurveyContent) -> SurveyContent:
         )
         if world is not None:
             world = georeference(table, solution.survey.control, model=world.model)
-    if world is not None and _weighs_alike(solution):
+    if world is not None and _is_older(solution):
         alike = KnownPoints(ids=table.ids, xyz=table.xyz)
-        world = georeference(alike, solution.survey.control, model=world.model)
+        covariance = None if _weighs_alike(solution) else table.covariance
+        world = georeference(
+            alike, solution.survey.control, model=world.model, covariance=covariance
+        )
+        world = replace(world, precision=None)
     # Relief given beside the points is checked too, but stands not on the sheet Check.
     listed = len(solution.survey.known_rows)
     whole = solution.survey.known
@@ -218,6 +227,12 @@ def as_typed(solution: SolvedSurvey, content: SurveyContent) -> SurveyContent:
         check=check_points(table, known),
         georeference=world,
     )
+
+
+def _is_older(solution: SolvedSurvey) -> bool:
+    """Tell whether the survey's own workbook has no formulas for what the transformation costs."""
+    book = solution.survey.book
+    return solution.survey.is_ours and book is not None and is_older(book.names)
 
 
 def _weighs_alike(solution: SolvedSurvey) -> bool:

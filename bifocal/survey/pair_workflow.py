@@ -202,7 +202,8 @@ def survey_points(solution: SolvedSurvey) -> SurveyPoints:
     if covariance is not None:
         mixed = covariance[:, 0, 1]
         if world is not None:
-            mixed_world = world.covariance_of(covariance)[:, 0, 1]
+            placed = solution.world_covariance
+            mixed_world = None if placed is None else placed[:, 0, 1]
     points = SurveyPoints(
         ids=table.ids,
         xyz=table.xyz,

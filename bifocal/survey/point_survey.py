@@ -133,6 +133,8 @@ def solve_points(
         standardised=radii.standardised,
         carried=radii.carried,
         image_scale=first.scale_number,
+        sigma_px=radii.sigma_px,
+        pair=None if pair.orientation is None else pair,
     )
 
 
@@ -166,6 +168,7 @@ class _Radii:
     at_nadir: BoolArray
     sigma_r: FloatArray
     covariance: FloatArray
+    sigma_px: float | None = None
     carried: Mapping[str, FloatArray] = field(default_factory=dict)
     bent: _BentRays | None = None
 
@@ -278,8 +281,15 @@ def _adjusted_radii(
         at_nadir=radius == 0,
         sigma_r=np.hypot(solved.sigma_px * k_r, o_r),
         covariance=solved.covariance + common,
+        sigma_px=float(solved.sigma_px),
         carried=carried
-        | {"k_q": k_q, "k_r": k_r, "o_r": o_r, "misfit_px": solved.misfit}
+        | {
+            "k_q": k_q,
+            "k_w": k_q * scale_number / 1000,
+            "k_r": k_r,
+            "o_r": o_r,
+            "misfit_px": solved.misfit,
+        }
         | entries(solved.covariance / solved.sigma_px**2, "k_")
         | entries(common, "o_"),
         bent=bent,

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Protocol
 
 import numpy as np
 
+from bifocal.survey.space_similarity import SpaceSums
 from bifocal.survey.tolerances import Verdict
+from bifocal.survey.transformation_precision import TransformationPrecision
 from bifocal.survey.weighted_similarity import WeightedSums
 from photocore.arrays import BoolArray, FloatArray, IntArray, as_floats
 from photocore.errors import InputError
+from photocore.series import check_index
 from photocore.similarity import Similarity
 
 
@@ -57,6 +60,7 @@ class KnownPoints:
     @classmethod
     def from_columns(cls, columns: Mapping[str, Any], axes: str) -> KnownPoints:
         """Return the points of columns by key: ``id`` and one of shape (n,) for each axis. [m]"""
+        check_index("points", *columns.values())
         names = tuple(map(str, columns.get("id", ())))
         blank = np.full(len(names), np.nan)
         xyz = [as_floats(columns.get(axis, blank), axis) for axis in axes]
@@ -172,12 +176,14 @@ class Georeference:
     origin, offset : ndarray, shape (3,)
         Whole-metre origin of the world coordinates and where the centre lies from it: with them
         differences of large coordinates lose no digits. [m]
-    sums : WeightedSums or None
+    sums : WeightedSums, SpaceSums or None
         What the weighted fit is made of, for the workbook; None where all weights are equal.
     covariance : ndarray, shape (n, 3, 3), or None
         Of X, Y, Z of the control points, as solved. [m²]
     near : ndarray, shape (n, 3)
         E, N, H of the control points about ``origin``; H is 0 for the model 2D. [m]
+    precision : TransformationPrecision or None
+        What the transformation is worth.
     """
 
     ids: tuple[str, ...]
@@ -192,23 +198,69 @@ class Georeference:
     origin: FloatArray
     offset: FloatArray
     error_ratio: float = float("nan")
-    sums: WeightedSums | None = None
+    sums: WeightedSums | SpaceSums | None = None
     covariance: FloatArray | None = None
     near: FloatArray = field(default_factory=lambda: np.zeros((0, 3)))
+    precision: TransformationPrecision | None = None
 
-    def sigma(self, covariance: FloatArray | None) -> FloatArray:
-        """Return the standard deviations of E, N, H of points on the wall, shape (n, 3). [m]
+    def covariance_of(
+        self,
+        xyz: FloatArray,
+        covariance: FloatArray,
+        *,
+        ids: Sequence[str] = (),
+        effect: FloatArray | None = None,
+    ) -> FloatArray:
+        """Return the covariance of E, N, H of points on the wall, shape (n, 3, 3). [m²]
 
         Parameters
         ----------
-        covariance : ndarray, shape (n, 3, 3), or None
-            Of X, Y, Z. What the transformation itself is worth is not in the result. [m²]
-        """
-        if covariance is None:
-            return np.full((0, 3), np.nan)
-        return np.sqrt(np.diagonal(self.covariance_of(covariance), axis1=1, axis2=2))
+        xyz : ndarray, shape (n, 3)
+            Points on the wall. [m]
+        covariance : ndarray, shape (n, 3, 3)
+            Of X, Y, Z, independent from point to point: of the picks. [m²]
+        ids : sequence of str, length n, optional
+            Their names: a point that the transformation rests on shares its error with it.
+        effect : ndarray, shape (n, 3, k), optional
+            What independent errors common to all points move them by. [m]
 
-    def covariance_of(self, covariance: FloatArray) -> FloatArray:
-        """Return the covariance of E, N, H of points of known X, Y, Z, shape (n, 3, 3). [m²]"""
+        Notes
+        -----
+        With A the derivative of a placed point by the transformation and K its covariance, the
+        result is ``C + A K A'``, for control points ``C - A K A'``. The control points count as
+        exact. H of the model 2D is relief at the scale of the plan.
+        """
         turn = self.world_from_wall.scale * self.world_from_wall.rotation
-        return np.asarray(turn @ covariance @ turn.T)
+        near = self.near_of(xyz)
+        if self.precision is None:
+            return np.asarray(turn @ covariance @ turn.T)
+        added = self.precision.of_points(near)
+        rests_on = {name for name, used in zip(self.ids, self.used, strict=True) if used}
+        own = np.array([name in rests_on for name in ids], dtype=bool)
+        if own.any():
+            flat = self.model == "2D"
+            added[own] *= np.where(np.outer([0, 0, flat], [0, 0, flat]), 1.0, -1.0)
+        out = turn @ covariance @ turn.T + added
+        if effect is not None:
+            out += self.common(near, effect)
+        return np.asarray(out)
+
+    def near_of(self, xyz: FloatArray) -> FloatArray:
+        """Return E, N, H of points on the wall from `origin`, shape (n, 3). [m]"""
+        turn = self.world_from_wall.scale * self.world_from_wall.rotation
+        return np.asarray(self.offset + (xyz - self.world_from_wall.source_centre) @ turn.T)
+
+    def common(self, near: FloatArray, effect: FloatArray) -> FloatArray:
+        """Return what errors common to all points still add once placed, shape (n, 3, 3). [m²]
+
+        Parameters
+        ----------
+        near : ndarray, shape (n, 3)
+            E, N, H about `origin`. [m]
+        effect : ndarray, shape (n, 3, k)
+            What they move the points by on the wall. [m]
+        """
+        assert self.precision is not None
+        turn = self.world_from_wall.scale * self.world_from_wall.rotation
+        moved = turn @ effect - self.precision.moved_by_orientation(near)
+        return np.asarray(moved @ moved.transpose(0, 2, 1))

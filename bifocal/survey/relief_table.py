@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from bifocal.model.pair import Pair
 from photocore.arrays import FloatArray
 
 #: Entries of a symmetric matrix of X, Y, Z, and where they stand.
@@ -33,11 +34,15 @@ class ReliefTable:
     carried : mapping of str to ndarray, shape (n,)
         For points measured in raw pixels of a general pair: positions carried to the plane
         ``x1 y1 x2 y2`` [mm at image scale, from the zoom centre], least-squares gains
-        ``g1x g1y g2x g2y`` [mm per mm of q], ``k_q`` [mm/px], ``k_r`` [m/px], ``o_r`` [m] (what
-        the orientation adds to sigma_r), and ``misfit_px``, the miss across the radius in pixels
-        of image 2.
+        ``g1x g1y g2x g2y`` [mm per mm of q], ``k_q`` [mm/px], ``k_w`` (the same on the wall) and
+        ``k_r`` [m/px], ``o_r`` [m] (what the orientation adds to sigma_r), and ``misfit_px``, the
+        miss across the radius in pixels of image 2.
     image_scale : float or None
         Scale number of image 1; None where no principal distance is known.
+    sigma_px : float or None
+        Precision of a pick, where the covariances are kept for one pixel (``k_XX`` ...). [px]
+    pair : Pair or None
+        The geometry, where its own precision is in the covariances.
     """
 
     ids: tuple[str, ...]
@@ -46,6 +51,8 @@ class ReliefTable:
     standardised: FloatArray
     carried: Mapping[str, FloatArray]
     image_scale: float | None
+    sigma_px: float | None = None
+    pair: Pair | None = None
 
     def __len__(self) -> int:
         return len(self.ids)
@@ -60,10 +67,24 @@ class ReliefTable:
 
     @property
     def covariance(self) -> FloatArray | None:
-        """Covariance of X, Y and relief from the picks, shape (n, 3, 3); None if unknown. [m²]"""
+        """Covariance of X, Y and relief, shape (n, 3, 3); None if unknown. [m²]"""
         if "cov_XX" not in self.columns:
             return None
         return symmetric(self.columns)
+
+    @property
+    def own_covariance(self) -> FloatArray | None:
+        """Its part that is each point's own, from the picks, shape (n, 3, 3). [m²]"""
+        if self.sigma_px is None or "k_XX" not in self.carried:
+            return self.covariance
+        return np.asarray(self.sigma_px**2 * symmetric(self.carried, "k_"))
+
+    def effect_of_orientation(self, xyz: FloatArray) -> FloatArray | None:
+        """Return what errors common to all points move them by, shape (n, 3, k) [m]; None if none.
+
+        See `bifocal.model.pair.Pair.effect_of_orientation`.
+        """
+        return None if self.pair is None else self.pair.effect_of_orientation(xyz)
 
 
 def symmetric(columns: Mapping[str, FloatArray], prefix: str = "cov_") -> FloatArray:

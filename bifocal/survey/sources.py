@@ -41,6 +41,11 @@ def measured(source: Source, options: ReadOptions, unit: str | None) -> tuple[Su
         source = SurveyInput.of_points(source)
     if isinstance(source, SurveyInput):
         return source, Path(source.table.file)
+    if not isinstance(source, Path | str):
+        raise InputError(
+            f"solve: expected a file, or columns by key, found {type(source).__name__}. Of a data "
+            "frame give the columns: dict(frame) with pandas, frame.to_dict() with polars."
+        )
     return read_survey(source, options), Path(source)
 
 

@@ -1,12 +1,14 @@
-"""Millimetres taken for pixels, or pixels for millimetres, found out from the numbers."""
+"""Pixels of millimetres; millimetres taken for pixels, or pixels for them, told by the numbers."""
 
 from __future__ import annotations
 
 from collections.abc import Collection
+from dataclasses import replace
 
 import numpy as np
 
 from bifocal.model.pair import Pair
+from bifocal.model.photo import Photo
 from bifocal.survey.observations import PointObservations
 from bifocal.survey.relief_table import ReliefTable
 from bifocal.survey.setup import SurveySetup
@@ -179,3 +181,47 @@ def refuse_contradiction(points: PointObservations, table: ReliefTable, where: s
         "together: columns of equal heading (say with --columns which is which), coordinates not "
         "counted from the nadir points, photos turned against each other, or names mixed up."
     )
+
+
+def as_pixels(pair: Pair, points: PointObservations, where: str, unit: str) -> PointObservations:
+    """Return the points with raw pixels for every kind of input."""
+    missing = ~points.has_pixels
+    rows = points.is_cartesian & missing
+    xy1, xy2 = points.xy1, points.xy2
+    if not rows.any():
+        rows, unit = missing & points.is_polar, "mm"
+        if not rows.any():
+            return points
+        if np.isnan(points.polar[rows & points.use, 2]).any():
+            raise InputError(
+                f"{where}: theta is needed beside s1 and s2 to use them with a pair file."
+            )
+        if not np.allclose(pair.image1.nadir, pair.image2.nadir, atol=1e-9):
+            raise GeometryError(
+                f"{where}: the cameras of this pair have different nadir points, so s1 and"
+                " s2 do not share one direction theta; measure x1 y1 x2 y2 or pixels."
+            )
+        xy1, xy2 = points.polar_xy()
+    if unit != "px":
+        xy1, xy2 = (
+            _pixels_of_mm(photo, key, xy, where)
+            for key, photo, xy in (("image1", pair.image1, xy1), ("image2", pair.image2, xy2))
+        )
+    return replace(
+        points,
+        pixels1=np.where(rows[:, None], xy1, points.pixels1),
+        pixels2=np.where(rows[:, None], xy2, points.pixels2),
+    )
+
+
+def _pixels_of_mm(photo: Photo, key: str, xy: FloatArray, where: str) -> FloatArray:
+    """Return pixels of image coordinates in mm from the nadir, y up."""
+    c = photo.principal_distance
+    if c is None:
+        raise InputError(
+            f"{where}: coordinates in mm need the principal distance of each photo; "
+            f'add "principal_distance" [mm] to {key} in the pair file, or give pixels '
+            "(col1 row1 col2 row2)."
+        )
+    refuse_pixels(xy, c, where)
+    return photo.pixels_from_apparent(photo.nadir + xy * photo.distance / c)

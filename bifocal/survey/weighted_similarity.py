@@ -14,7 +14,6 @@ import numpy as np
 
 from photocore.arrays import FloatArray
 from photocore.errors import GeometryError
-from photocore.rotation import rotation_from_vector
 from photocore.similarity import Similarity
 
 #: Turns of the direction, each some 1e-3 as far as the one before: six reach rounding.
@@ -65,12 +64,6 @@ class WeightedSums:
     turns: FloatArray
 
     @property
-    def determinant(self) -> float:
-        """Of the sum of the weights."""
-        (a, b, c), (_, d, e), (_, _, f) = self.total
-        return float(a * (d * f - e * e) + b * (c * e - b * f) + c * (b * e - c * d))
-
-    @property
     def unknowns(self) -> FloatArray:
         """p, q and the scale m of the last turn, shape (3,)."""
         p, q = self.turns[-1, 5:]
@@ -90,6 +83,12 @@ def inverse_symmetric(matrices: FloatArray) -> FloatArray:
     yy, yz, zz = a * f - c * c, b * c - a * e, a * d - b * b
     rows = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]) / (a * xx + b * xy + c * xz)
     return np.moveaxis(rows, (0, 1), (-2, -1))
+
+
+def determinant(matrix: FloatArray) -> float:
+    """Return the determinant of a symmetric 3x3 matrix by cofactors, as `inverse_symmetric`."""
+    (a, b, c), (_, d, e), (_, _, f) = matrix
+    return float(a * (d * f - e * e) + b * (c * e - b * f) + c * (b * e - c * d))
 
 
 def weights_of(covariance: FloatArray, *, flat: bool) -> FloatArray:
@@ -181,39 +180,5 @@ def fit_of_sums(
         offset[2] = scale * centre[2]
     similarity = Similarity(
         scale=float(scale), rotation=rotation, source_centre=centre, target_centre=origin + offset
-    )
-    return similarity, offset
-
-
-def fit_space(
-    wall: FloatArray, weights: FloatArray, near: FloatArray, start: Similarity, origin: FloatArray
-) -> tuple[Similarity, FloatArray]:
-    """Return the weighted fit of seven parameters; arguments as in `weighted_sums`.
-
-    Gauss-Newton on shift, rotation vector and logarithm of the scale in the wall's frame.
-    """
-    turn, scale = start.rotation.T, 1.0 / start.scale
-    constants = wall.mean(axis=0) - scale * turn @ near.mean(axis=0)
-    for _ in range(20):
-        moved = scale * near @ turn.T
-        design = np.zeros((len(wall), 3, 7))
-        design[:, :, :3] = np.eye(3)
-        x, y, z = moved.T
-        zero = np.zeros(len(wall))
-        # d(R w) = omega x (R w)
-        skew = np.array([[zero, z, -y], [-z, zero, x], [y, -x, zero]])
-        design[:, :, 3:6] = np.moveaxis(skew, -1, 0)
-        design[:, :, 6] = moved
-        left = wall - constants - moved
-        normal = np.einsum("nki,nkl,nlj->ij", design, weights, design)
-        step = np.linalg.solve(normal, np.einsum("nki,nkl,nl->i", design, weights, left))
-        constants = constants + step[:3]
-        turn = rotation_from_vector(step[3:6]) @ turn
-        scale *= float(np.exp(step[6]))
-        if np.abs(step).max() < 1e-13 * (1.0 + np.abs(near).max()):
-            break
-    offset = -(turn.T @ constants) / scale
-    similarity = Similarity(
-        scale=1.0 / scale, rotation=turn.T, source_centre=np.zeros(3), target_centre=origin + offset
     )
     return similarity, offset

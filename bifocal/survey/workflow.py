@@ -11,7 +11,6 @@ import numpy as np
 
 from bifocal.model.homography import apply_homography
 from bifocal.model.pair import Pair
-from bifocal.model.photo import Photo
 from bifocal.survey.check_points import check_points
 from bifocal.survey.georeferencing import georeference
 from bifocal.survey.observations import PointObservations
@@ -35,16 +34,16 @@ from bifocal.survey.setup import SCALE_TOLERANCE, SurveySetup
 from bifocal.survey.sources import BOOKS, Source, given_pair, measured, with_setup_of
 from bifocal.survey.tolerances import RULES, ToleranceRule, as_rule
 from bifocal.survey.units import (
+    as_pixels,
     refuse_contradiction,
     refuse_far_stations,
     refuse_millimetres,
-    refuse_pixels,
     refuse_wrong_unit,
 )
 from bifocal.survey.workbook.content import SurveyContent
 from bifocal.survey.workbook.reader import ReadOptions, SurveyInput, column_map
-from photocore.arrays import FloatArray
-from photocore.errors import GeometryError, InputError
+from photocore.arrays import FloatArray, as_floats
+from photocore.errors import InputError
 from photocore.tables.numbers import Decimal
 
 #: From this many points on, the picks' precision is taken from their misfits.
@@ -104,13 +103,6 @@ class SolvedSurvey(SurveyContent):
         if self.georeference is None:
             return np.full((len(self.table), 3), np.nan)
         return self.georeference.world_from_wall(self.table.xyz)
-
-    @property
-    def world_sigma(self) -> FloatArray:
-        """Standard deviations of E, N, H from the picks, shape (n, 3); NaN as `world`. [m]"""
-        if self.georeference is None:
-            return np.full((len(self.table), 3), np.nan)
-        return self.georeference.sigma(self.table.covariance)
 
 
 def solve(
@@ -269,8 +261,10 @@ def _checked(**numbers: float | None) -> dict[str, Any]:
     """Return the options that are given, refusing what is not above zero."""
     given = {name: value for name, value in numbers.items() if value is not None}
     for name, value in given.items():
+        option = f"--{name.replace('_', '-')}"
+        if as_floats(value, option).ndim:
+            raise InputError(f"{option}: expected one number for the whole survey.")
         if not value > 0:
-            option = f"--{name.replace('_', '-')}"
             raise InputError(f"{option}: must be a number above zero, got {value:g}.")
     return given
 
@@ -306,7 +300,7 @@ def _solve_pair(
     """Solve raw pixels with a pair; coordinates in millimetres are carried to pixels first."""
     points = survey.points.exchanged() if pair.exchanged else survey.points
     setup = survey.setup
-    points = _as_pixels(pair, points, survey.where, setup.unit)
+    points = as_pixels(pair, points, survey.where, setup.unit)
     refuse_millimetres(pair, points, survey.where)
     sigma = sigma_px or setup.sigma_px
     remarks: tuple[str, ...] = ()
@@ -373,50 +367,6 @@ def _check_plane(
         return None
     names = [name for name, on in zip(points.ids, rows, strict=True) if on]
     return check_orientation(pair, pixels[0][rows], pixels[1][rows], names=names, sigma_px=sigma)
-
-
-def _as_pixels(pair: Pair, points: PointObservations, where: str, unit: str) -> PointObservations:
-    """Return the points with raw pixels for every kind of input."""
-    missing = ~points.has_pixels
-    rows = points.is_cartesian & missing
-    xy1, xy2 = points.xy1, points.xy2
-    if not rows.any():
-        rows, unit = missing & points.is_polar, "mm"
-        if not rows.any():
-            return points
-        if np.isnan(points.polar[rows & points.use, 2]).any():
-            raise InputError(
-                f"{where}: theta is needed beside s1 and s2 to use them with a pair file."
-            )
-        if not np.allclose(pair.image1.nadir, pair.image2.nadir, atol=1e-9):
-            raise GeometryError(
-                f"{where}: the cameras of this pair have different nadir points, so s1 and"
-                " s2 do not share one direction theta; measure x1 y1 x2 y2 or pixels."
-            )
-        xy1, xy2 = points.polar_xy()
-    if unit != "px":
-        xy1, xy2 = (
-            _pixels_of_mm(photo, key, xy, where)
-            for key, photo, xy in (("image1", pair.image1, xy1), ("image2", pair.image2, xy2))
-        )
-    return replace(
-        points,
-        pixels1=np.where(rows[:, None], xy1, points.pixels1),
-        pixels2=np.where(rows[:, None], xy2, points.pixels2),
-    )
-
-
-def _pixels_of_mm(photo: Photo, key: str, xy: FloatArray, where: str) -> FloatArray:
-    """Return pixels of image coordinates in mm from the nadir, y up."""
-    c = photo.principal_distance
-    if c is None:
-        raise InputError(
-            f"{where}: coordinates in mm need the principal distance of each photo; "
-            f'add "principal_distance" [mm] to {key} in the pair file, or give pixels '
-            "(col1 row1 col2 row2)."
-        )
-    refuse_pixels(xy, c, where)
-    return photo.pixels_from_apparent(photo.nadir + xy * photo.distance / c)
 
 
 def _sigma_from_misfits(

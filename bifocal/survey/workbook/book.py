@@ -9,7 +9,7 @@ from openpyxl.styles import Alignment
 
 from bifocal.survey.workbook.cameras_sketch import cameras_sketch
 from bifocal.survey.workbook.charts import charts
-from bifocal.survey.workbook.columns import LOG, RESULTS
+from bifocal.survey.workbook.columns import LOG
 from bifocal.survey.workbook.content import (
     STRUCTURED_ROWS,
     SurveyContent,
@@ -19,6 +19,7 @@ from bifocal.survey.workbook.content import (
 )
 from bifocal.survey.workbook.georeference_sheet import georeference
 from bifocal.survey.workbook.reference_sheets import check, planning
+from bifocal.survey.workbook.results_columns import results_columns
 from bifocal.survey.workbook.setup_sheet import setup_sheet
 from bifocal.survey.workbook.words import WORDS, readme
 from photocore.workbook.cells import CellValue
@@ -129,8 +130,8 @@ def _points(builder: BookBuilder, content: SurveyContent, cells: Cells) -> None:
 
 def _results(builder: BookBuilder, content: SurveyContent, cells: Cells) -> None:
     """Write what a client is handed: names, coordinates, precision, below a title block."""
-    results = result_cells(content, cells)
-    sheet = _long_sheet(builder, "Results", "", RESULTS, content, results)
+    results, columns = result_cells(content, cells), results_columns(is_pair=content.is_pair)
+    sheet = _long_sheet(builder, "Results", "", columns, content, results)
     _title_block(sheet, content, results)
     sheet.finish(landscape=True, freeze=f"B{HEAD + 1}", repeat=f"{HEAD - 1}:{HEAD}")
 

@@ -8,6 +8,11 @@ from __future__ import annotations
 from collections.abc import Collection
 
 from bifocal.model.flags import FlagLimits
+from bifocal.survey.workbook.placed_formulas import (
+    IS_CONTROL,
+    added_covariance,
+    turned_covariance,
+)
 from photocore.workbook.live_columns import LiveColumn, formula_column
 
 _f = formula_column
@@ -70,13 +75,44 @@ def _of_x(key: str, formula: str, *, folded: bool = True) -> LiveColumn:
     return _f(key, f'IF([@X]="","",{formula})', None if folded else 4, folded=folded)
 
 
-def _sigmas(sigma_r: str, covariances: tuple[LiveColumn, ...]) -> tuple[LiveColumn, ...]:
+#: E, N, H from a whole-metre origin: columns that refer to the sheet `Georeference`.
+NEAR = ("n_E", "n_N", "n_H", "cov_EN")
+
+
+def _near(*, is_pair: bool) -> tuple[LiveColumn, ...]:
+    """Return the columns of `NEAR`: differences of large coordinates would lose their digits.
+
+    With them the covariance of E and N, for error ellipses.
+    """
+    columns = []
+    for row, key in enumerate(NEAR[:3], start=1):
+        turned = "+".join(f"g_{row}{i}*([@{axis}]-g_{axis}0)" for i, axis in enumerate("XYZ", 1))
+        body = f"g_{key[-1]}t+g_k*({turned})"
+        known = "AND(ISNUMBER(g_k),COUNT([@X],[@Y],[@Z])=3)"
+        columns.append(_f(key, f'IF({known},{body},"")', folded=True))
+    added = added_covariance("E", "N", {name: f"[@n_{name}]" for name in "ENH"})
+    own = f"g_k^2*({turned_covariance('E', 'N', '[@cov_{}]')})"
+    common = ""
+    if is_pair:
+        own = f"(g_k*sigma_px)^2*({turned_covariance('E', 'N', '[@k_{}]')})"
+        whole = turned_covariance("E", "N", "[@o_{}]")
+        common = f"+IF(ISNUMBER([@o_EN]),[@o_EN],g_k^2*({whole}))"
+    both = f"{own}+IF({IS_CONTROL},-1,1)*({added}){common}"
+    known = "AND(ISNUMBER([@n_E]),ISNUMBER([@cov_XX]))"
+    columns.append(_f(NEAR[3], f'IF({known},{both},"")', folded=True))
+    return tuple(columns)
+
+
+def _sigmas(
+    sigma_r: str, covariances: tuple[LiveColumn, ...], *, is_pair: bool
+) -> tuple[LiveColumn, ...]:
     """Return the columns of precision, with the covariance of X, Y, Z from the picks."""
     return (
         *covariances,
         _of_x("sigma_X", "SQRT([@cov_XX])", folded=False),
         _of_x("sigma_Y", "SQRT([@cov_YY])", folded=False),
         _of_r("sigma_r", sigma_r),
+        *_near(is_pair=is_pair),
     )
 
 
@@ -159,7 +195,9 @@ def ideal_points(
             for _ in range(1 if xy else 0)
         ),
         *_sigmas(
-            "sigma_s*SQRT((1-[@r]/d_1)^2+(k_12*(1-[@r]/d_2))^2)/ABS([@den])", _ideal_covariances()
+            "sigma_s*SQRT((1-[@r]/d_1)^2+(k_12*(1-[@r]/d_2))^2)/ABS([@den])",
+            _ideal_covariances(),
+            is_pair=False,
         ),
         _f("flag", _flag(measured, off), width=13),
     )
@@ -230,13 +268,14 @@ def pair_points(*, undistorted: bool) -> tuple[LiveColumn, ...]:
         ),
         *(
             LiveColumn(key=key, kind="value", places=6, folded=True)
-            for key in ("g1x", "g1y", "g2x", "g2y", "k_q", "k_r", "o_r")
+            for key in ("g1x", "g1y", "g2x", "g2y", "k_q", "k_w", "k_r", "o_r")
         ),
         *(
             LiveColumn(key=f"{kind}_{key}", kind="value", folded=True)
             for kind in "ko"
             for key in COVARIANCES
         ),
+        *(LiveColumn(key=f"o_{name}", kind="value", folded=True) for name in ("E", "N", "H", "EN")),
         _f("s1_used", f'IF([@q]="","",{radius(1, moved)})', 4, folded=True),
         _f("s2_used", f'IF([@q]="","",{radius(2, moved)})', 4, folded=True),
         _f(
@@ -261,10 +300,12 @@ def pair_points(*, undistorted: bool) -> tuple[LiveColumn, ...]:
                 )
                 for key in COVARIANCES
             ),
+            is_pair=True,
         ),
         _f(
             "flag",
-            _flag(_XY, "ABS(N([@q]))>k_off*sigma_px*N([@k_q])").replace(
+            # On the wall: q follows an image scale typed later, k_q does not.
+            _flag(_XY, "ABS(N([@q]))*m_1/1000>k_off*sigma_px*N([@k_w])").replace(
                 "[@s1_used]=0", "[@x1]^2+[@y1]^2=0"
             ),
             width=13,
@@ -272,59 +313,12 @@ def pair_points(*, undistorted: bool) -> tuple[LiveColumn, ...]:
     )
 
 
-_AT = "ROW()-ROW(tblResults[[#Headers],[id]])"
-
-
-def _from_points(key: str) -> str:
-    cell = f"INDEX(tblPoints[{key}],{_AT})"
-    return f'IF(ISNUMBER({cell}),{cell},"")'
-
-
-def _text_from_points(key: str) -> str:
-    cell = f"INDEX(tblPoints[{key}],{_AT})"
-    # Fewer rows in Points, where some were deleted, leave the rest of Results blank.
-    return f'IF({_AT}>ROWS(tblPoints[id]),"",IF({cell}="","",{cell}))'
-
-
-def _world_sigma(row: int) -> str:
-    terms = []
-    for key in COVARIANCES:
-        i, j = ("XYZ".index(axis) + 1 for axis in key)
-        double = "2*" if i != j else ""
-        cell = f"INDEX(tblPoints[cov_{key}],{_AT})"
-        terms.append(f"{double}g_{row}{i}*g_{row}{j}*{cell}")
-    known = f"AND(ISNUMBER(g_k),ISNUMBER(INDEX(tblPoints[cov_XX],{_AT})))"
-    return f'IF({known},g_k*SQRT({"+".join(terms)}),"")'
-
-
-def _world(row: int, name: str) -> str:
-    turned = "+".join(f"g_{row}{i}*([@{axis}]-g_{axis}0)" for i, axis in enumerate("XYZ", start=1))
-    return f'IF(AND(ISNUMBER(g_k),COUNT([@X],[@Y],[@Z])=3),g_{name}0+g_k*({turned}),"")'
-
-
-RESULTS: tuple[LiveColumn, ...] = (
-    _f("id", _text_from_points("id")),
-    *(_f(key, _from_points(key), 3, width=9) for key in "XYZ"),
-    *(
-        _f(name, _world(row, name), 3, width=10 if name == "H" else 12.5)
-        for row, name in enumerate("ENH", start=1)
-    ),
-    *(
-        _f(key, _from_points(key), 4 if key != "sigma_r" else 3, width=9)
-        for key in ("sigma_X", "sigma_Y", "sigma_r")
-    ),
-    *(_f(f"sigma_{name}", _world_sigma(row), 4, width=9) for row, name in enumerate("ENH", 1)),
-    _f("flag", _text_from_points("flag"), width=13),
-    _f("note", _text_from_points("note"), width=16),
-)
-
-
-def look_up(axis: str) -> str:
+def look_up(axis: str, factor: str = "") -> str:
     """Return the formula that finds a column of `Points` by the name of the point."""
     # The second search finds the number 7 among names kept as text.
     at = 'IFERROR(MATCH([@id],tblPoints[id],0),MATCH([@id]&"",tblPoints[id],0))'
     cell = f"INDEX(tblPoints[{axis}],{at})"
-    return f'IF([@id]="","",IFERROR(IF(ISNUMBER({cell}),{cell},""),""))'
+    return f'IF([@id]="","",IFERROR(IF(ISNUMBER({cell}),{factor}{cell},""),""))'
 
 
 CHECK: tuple[LiveColumn, ...] = (

@@ -18,6 +18,7 @@ from bifocal.survey.setup import SurveySetup
 from bifocal.survey.tolerances import RULES, ToleranceRule
 from bifocal.survey.weighted_similarity import weights_of
 from bifocal.survey.workbook.columns import (
+    NEAR,
     adjustment_names,
     ideal_points,
     pair_points,
@@ -129,6 +130,45 @@ class SurveyContent:
         )
 
     @property
+    def near(self) -> FloatArray:
+        """E, N, H about a whole-metre origin, shape (n, 3); NaN without control points. [m]"""
+        geo, table = self.georeference, self.table
+        if geo is None or table is None:
+            return np.full((0 if table is None else len(table), 3), np.nan)
+        return geo.near_of(table.xyz)
+
+    @property
+    def world_covariance(self) -> FloatArray | None:
+        """Covariance of E, N, H, shape (n, 3, 3); None where it is not known. [m²]"""
+        geo, table = self.georeference, self.table
+        if geo is None or table is None or table.covariance is None:
+            return None
+        own = table.own_covariance
+        if geo.precision is None or own is None:
+            return geo.covariance_of(table.xyz, table.covariance)
+        effect = table.effect_of_orientation(table.xyz)
+        return geo.covariance_of(table.xyz, own, ids=table.ids, effect=effect)
+
+    @property
+    def world_sigma(self) -> FloatArray:
+        """Standard deviations of E, N, H, shape (n, 3); NaN without control points. [m]"""
+        if self.world_covariance is None:
+            return np.full((0 if self.table is None else len(self.table), 3), np.nan)
+        variances = np.diagonal(self.world_covariance, axis1=1, axis2=2)
+        # Where points without redundancy are placed exactly, rounding is left.
+        return np.asarray(np.sqrt(np.maximum(variances, 0.0)))
+
+    @property
+    def common_covariance(self) -> FloatArray:
+        """What the orientation still adds to E, N, H once placed, shape (n, 3, 3). [m²]"""
+        geo, table = self.georeference, self.table
+        assert table is not None
+        effect = table.effect_of_orientation(table.xyz)
+        if geo is None or effect is None or geo.precision is None:
+            return np.full((len(table), 3, 3), np.nan)
+        return geo.common(self.near, effect)
+
+    @property
     def point_rows(self) -> int:
         """Rows of `Points`: an empty form, or the points and a few spare rows."""
         return self.rows if self.points is None else len(self.points) + SPARE_ROWS
@@ -203,7 +243,15 @@ def point_cells(content: SurveyContent) -> dict[str, list[CellValue]]:
             for empty, value in zip(blank.tolist(), values.tolist(), strict=True)
         ]
     cells |= {key: inputs(values) for key, values in table.carried.items()}
-    cells |= _radial_variances(content, placeless) if not content.is_pair else {}
+    cells |= {key: inputs(content.near[:, i]) for i, key in enumerate(NEAR[:3])}
+    placed = content.world_covariance
+    cells[NEAR[3]] = [None] * len(table) if placed is None else inputs(placed[:, 0, 1])
+    if content.is_pair:
+        common = content.common_covariance
+        cells |= {f"o_{axis}": inputs(np.sqrt(common[:, i, i])) for i, axis in enumerate("ENH")}
+        cells["o_EN"] = inputs(common[:, 0, 1])
+    else:
+        cells |= _radial_variances(content, placeless)
     typed = points.has_pixels | points.is_cartesian | points.is_polar
     cells["flag"] = [
         flag if given else None for flag, given in zip(table.flags, typed, strict=True)
@@ -245,10 +293,9 @@ def result_cells(
     if content.table is None:
         return {}
     xyz = content.table.xyz
-    world, sigma = np.full_like(xyz, np.nan), np.full_like(xyz, np.nan)
+    world, sigma = np.full_like(xyz, np.nan), content.world_sigma
     if content.georeference is not None:
         world = content.georeference.world_from_wall(xyz)
-        sigma = content.georeference.sigma(content.table.covariance)
     return {
         "id": cells["id"],
         **{key: inputs(content.table[key]) for key in ("X", "Y", "Z")},

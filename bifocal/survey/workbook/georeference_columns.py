@@ -59,13 +59,15 @@ WEIGHTS: tuple[LiveColumn, ...] = (
     *(_folded(f"h_{axis}", _weighted(axis, ("[@cX]", "[@cY]", "[@cZ]"))) for axis in "XYZ"),
 )
 
-GEOREFERENCE: tuple[LiveColumn, ...] = (
+_NAMED: tuple[LiveColumn, ...] = (
     LiveColumn(key="id", width=12),
     *(LiveColumn(key=axis, places=4, width=13, limits=(-1e8, 1e8)) for axis in "ENH"),
     LiveColumn(key="use", width=9, choices="1,0"),
     LiveColumn(key="found_bad", kind="value", width=10),
     *(formula_column(axis, look_up(axis), 4) for axis in "XYZ"),
-    *(formula_column(f"q_{key}", look_up(f"cov_{key}"), folded=True) for key in COVARIANCES),
+)
+
+_WEIGHED: tuple[LiveColumn, ...] = (
     formula_column(
         "w",
         'IF(AND(OR([@use]="",[@use]<>0),OR([@found_bad]="",[@found_bad]<>0),'
@@ -101,3 +103,19 @@ GEOREFERENCE: tuple[LiveColumn, ...] = (
         for row, name in enumerate("ENH", start=1)
     ),
 )
+
+
+def georeference_columns(*, is_pair: bool) -> tuple[LiveColumn, ...]:
+    """Return the table of control points.
+
+    Parameters
+    ----------
+    is_pair : bool
+        Whether `Points` keeps the covariances of the picks for one pixel, apart from what the
+        photos' orientation is worth, which weighs nothing here.
+    """
+    kept, factor = ("k_", "sigma_px^2*") if is_pair else ("cov_", "")
+    covariances = (
+        formula_column(f"q_{key}", look_up(kept + key, factor), folded=True) for key in COVARIANCES
+    )
+    return (*_NAMED, *covariances, *_WEIGHED)

@@ -10,9 +10,12 @@ import numpy as np
 
 from bifocal.survey.reference import Georeference
 from bifocal.survey.relief_table import ENTRIES
-from bifocal.survey.weighted_similarity import TURNS
+from bifocal.survey.space_similarity import SpaceSums
+from bifocal.survey.weighted_similarity import TURNS, WeightedSums, determinant
 from bifocal.survey.workbook.content import SurveyContent, control_cells
-from bifocal.survey.workbook.georeference_columns import GEOREFERENCE, entry
+from bifocal.survey.workbook.georeference_columns import entry, georeference_columns
+from bifocal.survey.workbook.precision_lines import precision_lines, precision_values
+from bifocal.survey.workbook.space_block import SpaceBlock
 from photocore.arrays import FloatArray
 from photocore.workbook.cells import CellValue
 from photocore.workbook.grid import column_letters
@@ -23,6 +26,8 @@ from photocore.workbook.look import LABEL_FONT
 CONTROL_HEAD = 12
 #: First column and rows of the steps of the fit: above the folded columns of the table.
 _LEFT, _TOP, _ROWS = 10, 3, 8
+#: Where the residuals stand, and how far right of them the steps go on.
+_RESIDUALS, _BESIDE = 40, 4
 _UNKNOWNS = ("p", "q", "m")
 
 
@@ -34,17 +39,21 @@ def georeference(builder: BookBuilder, content: SurveyContent) -> None:
     _transformation(sheet, content)
     _centres(sheet, content)
     _rotation(sheet, content)
-    steps = [*_origin_steps(content), *_solved_steps(content), *_sums(content)]
-    _write_steps(sheet, [*steps, *_weighted_steps(content)])
+    sums = content.georeference.sums if content.georeference is not None else None
+    space = SpaceBlock(sheet, sums if isinstance(sums, SpaceSums) else None)
+    steps = [*_origin_steps(content), *_solved_steps(content, space), *_sums(content)]
+    _write_steps(sheet, [*steps, *_weighted_steps(content, space)])
     cells = control_cells(content)
-    sheet.table("tblGeo", GEOREFERENCE, at=(CONTROL_HEAD, 1), rows=rows, cells=cells)
+    columns = georeference_columns(is_pair=content.is_pair)
+    sheet.table("tblGeo", columns, at=(CONTROL_HEAD, 1), rows=rows, cells=cells)
+    space.finish()
     for letter, width in (("A", 30), ("G", 13), ("H", 13), ("I", 13)):
         sheet.worksheet.column_dimensions[letter].width = width
     repeat = f"{CONTROL_HEAD - 1}:{CONTROL_HEAD}"
     sheet.finish(landscape=True, freeze=f"B{CONTROL_HEAD + 1}", repeat=repeat)
 
 
-#: Name, formula (empty for a number that the program types in) and value of a step of the fit.
+#: Name, formula and value of a step of the fit.
 _Step = tuple[str, str, CellValue]
 
 
@@ -52,12 +61,11 @@ def _write_steps(sheet: SheetBuilder, steps: Sequence[_Step]) -> None:
     """Write the steps of the fit, each beside its name, above the folded columns."""
     for i, (name, body, value) in enumerate(steps):
         row, left = _TOP + i % _ROWS, _LEFT + 2 * (i // _ROWS)
+        # Not above the residuals, which are not folded away.
+        left += _BESIDE if left >= _RESIDUALS else 0
         sheet.text(f"{column_letters(left)}{row}", name, LABEL_FONT)
         place = f"{column_letters(left + 1)}{row}"
-        if body:
-            sheet.formula(place, body, value, form="0.000000", name=name)
-        else:
-            sheet.input(place, value, form="0.000000", name=name, editable=False)
+        sheet.formula(place, body, value, form="0.000000", name=name)
 
 
 def _model(sheet: SheetBuilder, content: SurveyContent) -> None:
@@ -123,7 +131,7 @@ _COSINES = {
 
 
 def _rotation(sheet: SheetBuilder, content: SurveyContent) -> None:
-    """Write the rotation: closed forms live, the general one found by the program."""
+    """Write the rotation from the closed forms, or from the turns of the model 3D."""
     geo = content.georeference
     sheet.word("D7", "geo_rotation")
     for key, (plane, levelled) in _COSINES.items():
@@ -133,18 +141,24 @@ def _rotation(sheet: SheetBuilder, content: SurveyContent) -> None:
         sheet.formula(f"{'GHI'[j]}{7 + i}", body, entry, form="0.000000000", name=f"g_{key}")
 
 
-def _solved_steps(content: SurveyContent) -> Iterator[_Step]:
-    """Yield what the program finds for the model 3D, which no closed form gives, and types in."""
+def _solved_steps(content: SurveyContent, space: SpaceBlock) -> Iterator[_Step]:
+    """Yield rotation, scale and constants of the model 3D from its last turn."""
     geo = content.georeference
-    is_3d = geo is not None and geo.model == "3D"
-    for i in range(3):
-        for j in range(3):
-            entry = float(geo.world_from_wall.rotation[i, j]) if geo is not None and is_3d else None
-            yield f"s3_{i + 1}{j + 1}", "", entry
-    yield "s3_k", "", geo.world_from_wall.scale if geo is not None and is_3d else None
-    constants = _constants(geo) if geo is not None and is_3d else (None, None, None)
-    for axis, value in zip("XYZ", constants, strict=True):
-        yield f"s3_{axis}", "", value
+    found = geo if geo is not None and geo.model == "3D" else None
+    scale = None if found is None else found.world_from_wall.scale
+    yield "s3_k", _in_space(f"1/SQRT(SUMSQ({space.entries.range})/3)"), scale
+    for i, j in np.ndindex(3, 3):
+        value = None if found is None else float(found.world_from_wall.rotation[i, j])
+        body = f"s3_k*{space.entries.fixed(3 * j + i, 0)}"
+        yield f"s3_{i + 1}{j + 1}", _in_space(body), value
+    constants = (None, None, None) if found is None else _constants(found)
+    for n, (axis, constant) in enumerate(zip("XYZ", constants, strict=True)):
+        body = f"g_f_{axis}-SUMPRODUCT({space.shift.column(n)},{space.entries.range})"
+        yield f"s3_{axis}", _in_space(body), constant
+
+
+def _in_space(body: str) -> str:
+    return f'IF(g_space=1,{body},"")'
 
 
 def _origins(geo: Georeference | None) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -221,17 +235,22 @@ def _constants(geo: Georeference) -> tuple[float, ...]:
     return tuple((-(turn.rotation.T @ geo.offset) / turn.scale).tolist())
 
 
-def _weighted_steps(content: SurveyContent) -> Iterator[_Step]:
-    """Yield the normal equations of the weighted fit and the turns that solve them."""
-    values = _weighted_values(content.georeference)
+def _weighted_steps(content: SurveyContent, space: SpaceBlock) -> Iterator[_Step]:
+    """Yield the normal equations of the weighted fit, the turns that solve them, and its worth."""
+    values = _weighted_values(content.georeference) | precision_values(content.georeference)
+    of_all, of_level = _common_lines(), _weighted_lines()
     lines = {
         "g_flat": 'IF(g_used="2D",1,0)',
         "g_ok": 'IF(AND(g_n>=2,g_used<>"3D"),IF(IF(g_flat=1,g_l2,g_lL)>0,1,0),0)',
-        **{name: f'IF(g_ok=1,{body},"")' for name, body in _weighted_lines().items()},
+        "g_space": 'IF(AND(g_n>=3,g_used="3D"),1,0)',
+        **{name: f'IF(g_ok+g_space=1,{body},"")' for name, body in of_all.items()},
+        **{name: f'IF(g_ok=1,{body},"")' for name, body in of_level.items()},
     }
     for axis in "XYZ":
         terms = "+".join(f"g_F_{axis}{u}*{value}" for u, value in _SOLVED.items())
         lines[f"g_x_{axis}"] = f'IF(g_used="3D",s3_{axis},IF(g_ok=1,g_f_{axis}-({terms}),""))'
+    for name, body in precision_lines(space).items():
+        lines[name] = f'IF(ISNUMBER(g_k),{body},"")'
     for name, body in lines.items():
         yield name, body, values.get(name)
 
@@ -256,9 +275,13 @@ def _product(unknown: str, column: str) -> str:
     return "+".join(terms)
 
 
-def _weighted_lines() -> dict[str, str]:
-    """Return the formulas by name, each from those before it."""
-    pairs = [("p", "p"), ("p", "q"), ("p", "m"), ("q", "q"), ("q", "m"), ("m", "m")]
+def _solved(axis: str, right: str) -> str:
+    """Return a row of the inverse of the sum of the weights times a vector."""
+    return "+".join(f"g_i_{entry(axis, o)}*{right.format(o)}" for o in "XYZ")
+
+
+def _common_lines() -> dict[str, str]:
+    """Return the formulas by name that all models share, each from those before it."""
     lines = {
         f"g_s_{key}": f"IF(AND(g_flat=1,{int(key == 'ZZ')}=1),1,SUM(tblGeo[p_{key}]))"
         for key in ENTRIES
@@ -270,16 +293,19 @@ def _weighted_lines() -> dict[str, str]:
     }  # fmt: skip
     lines["g_det"] = "+".join(f"g_s_X{axis}*({cofactors['X' + axis]})" for axis in "XYZ")
     lines |= {f"g_i_{key}": f"({body})/g_det" for key, body in cofactors.items()}
+    lines |= {f"g_h_{axis}": f"SUM(tblGeo[h_{axis}])" for axis in "XYZ"}
+    lines |= {f"g_f_{axis}": _solved(axis, "g_h_{}") for axis in "XYZ"}
+    return lines
 
-    def solved(axis: str, right: str) -> str:
-        return "+".join(f"g_i_{entry(axis, o)}*{right.format(o)}" for o in "XYZ")
 
+def _weighted_lines() -> dict[str, str]:
+    """Return the formulas by name of the models 2D and levelled, each from those before it."""
+    pairs = [("p", "p"), ("p", "q"), ("p", "m"), ("q", "q"), ("q", "m"), ("m", "m")]
+    lines: dict[str, str] = {}
     for axis in "XYZ":
         lines |= {f"g_b_{axis}{u}": f"SUM(tblGeo[u_{axis}{u}])" for u in _UNKNOWNS}
-        lines[f"g_h_{axis}"] = f"SUM(tblGeo[h_{axis}])"
     for axis in "XYZ":
-        lines |= {f"g_F_{axis}{u}": solved(axis, "g_b_{}" + u) for u in _UNKNOWNS}
-        lines[f"g_f_{axis}"] = solved(axis, "g_h_{}")
+        lines |= {f"g_F_{axis}{u}": _solved(axis, "g_b_{}" + u) for u in _UNKNOWNS}
     for one, other in pairs:
         freed = "+".join(f"g_b_{axis}{one}*g_F_{axis}{other}" for axis in "XYZ")
         lines[f"g_m_{one}{other}"] = f"{_product(one, 'u_{}' + other)}-({freed})"
@@ -312,7 +338,7 @@ def _turn(i: int) -> dict[str, str]:
 
 def _weighted_values(geo: Georeference | None) -> dict[str, CellValue]:
     """Return what the formulas show."""
-    values: dict[str, CellValue] = {"g_flat": 0, "g_ok": 0}
+    values: dict[str, CellValue] = {"g_flat": 0, "g_ok": 0, "g_space": 0}
     if geo is None:
         return values
     values["g_flat"] = int(geo.model == "2D")
@@ -323,15 +349,22 @@ def _weighted_values(geo: Georeference | None) -> dict[str, CellValue]:
     sums = geo.sums
     if sums is None:
         return values
-    values["g_ok"] = 1
+    values["g_space" if geo.model == "3D" else "g_ok"] = 1
     symmetric: dict[str, FloatArray] = {"g_s_": sums.total, "g_i_": sums.inverse}
     for prefix, matrix in symmetric.items():
         values |= {f"{prefix}{key}": float(matrix[at]) for key, at in ENTRIES.items()}
-    values["g_det"] = float(sums.determinant)
+    values["g_det"] = determinant(sums.total)
+    for i, axis in enumerate("XYZ"):
+        values |= {f"g_h_{axis}": float(sums.right[i]), f"g_f_{axis}": float(sums.mean[i])}
+    return values | _level_values(sums) if isinstance(sums, WeightedSums) else values
+
+
+def _level_values(sums: WeightedSums) -> dict[str, CellValue]:
+    """Return what the formulas of the models 2D and levelled show."""
+    values: dict[str, CellValue] = {}
     for i, axis in enumerate("XYZ"):
         values |= {f"g_b_{axis}{u}": float(sums.mixed[i, j]) for j, u in enumerate(_UNKNOWNS)}
         values |= {f"g_F_{axis}{u}": float(sums.shift[i, j]) for j, u in enumerate(_UNKNOWNS)}
-        values |= {f"g_h_{axis}": float(sums.right[i]), f"g_f_{axis}": float(sums.mean[i])}
         values[f"g_y_{_UNKNOWNS[i]}"] = float(sums.left[i])
     for i, one in enumerate(_UNKNOWNS):
         for j in range(i, 3):

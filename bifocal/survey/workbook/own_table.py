@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -10,9 +11,12 @@ from typing import Any
 import numpy as np
 
 from bifocal.survey.reference import Georeference
+from bifocal.survey.relief_table import ENTRIES
 from bifocal.survey.workbook.book import build
-from bifocal.survey.workbook.columns import ideal_points, pair_points
+from bifocal.survey.workbook.columns import NEAR, ideal_points, pair_points
 from bifocal.survey.workbook.content import SurveyContent, point_cells, result_cells
+from bifocal.survey.workbook.placed_formulas import added_covariance
+from bifocal.survey.workbook.precision_lines import precision_values
 from bifocal.survey.workbook.reader import TO_DEGREES, TO_MM, SurveyInput
 from bifocal.survey.workbook.setup_update import (
     add_sheets,
@@ -161,7 +165,7 @@ def _columns(table: OwnTable, content: SurveyContent) -> list[ResultColumn]:
         )
     results = []
     for column in described:
-        if column.key in ("id", "use", "code", "note"):
+        if column.key in ("id", "use", "code", "note", *NEAR, "o_EN"):
             continue
         if column.kind == "input" and column.key in table.columns:
             continue
@@ -169,6 +173,7 @@ def _columns(table: OwnTable, content: SurveyContent) -> list[ResultColumn]:
     if content.georeference is not None:
         world = result_cells(content, cells)
         results += _world(content.georeference, world)
+        results += _world_sigmas(content, cells, world)
     return results
 
 
@@ -202,6 +207,59 @@ def _world(geo: Georeference, cells: Mapping[str, Sequence[CellValue]]) -> list[
                 values=cells[name],
                 formula=f'IF(COUNT([@X],[@Y],[@Z])=3,{float(origin[i])!r}+{fit.scale!r}*({turned}),"")',
                 number_format="0.000",
+            )
+        )
+    return columns
+
+
+def _world_sigmas(
+    content: SurveyContent,
+    cells: Mapping[str, Sequence[CellValue]],
+    world: Mapping[str, Sequence[CellValue]],
+) -> list[ResultColumn]:
+    """Return sigma_E, sigma_N, sigma_H and what their formulas need, numbers as in `_world`."""
+    geo, table = content.georeference, content.table
+    if geo is None or table is None or geo.precision is None or table.covariance is None:
+        return []
+    fit, numbers = geo.world_from_wall, precision_values(geo)
+    used = {name for name, is_used in zip(geo.ids, geo.used, strict=True) if is_used}
+    shared: list[CellValue] = [-1 if name in used else 1 for name in table.ids]
+    columns = [ResultColumn(key="shared", heading="shared", values=shared)]
+    kept, factor = ("k_", "sigma_px^2*") if content.is_pair else ("cov_", "")
+    near = {name: f"[@n_{name}]" for name in "ENH"}
+    for i, name in enumerate("ENH"):
+        row = (fit.scale * fit.rotation[i]).tolist()
+        turned = "+".join(
+            f"({turn!r})*([@{axis}]-({centre!r}))"
+            for turn, axis, centre in zip(row, "XYZ", fit.source_centre.tolist(), strict=True)
+        )
+        columns.append(
+            ResultColumn(
+                key=f"n_{name}",
+                heading=f"n_{name} [m]",
+                values=cells[f"n_{name}"],
+                formula=f'IF(COUNT([@X],[@Y],[@Z])=3,{float(geo.offset[i])!r}+{turned},"")',
+            )
+        )
+    for i, name in enumerate("ENH"):
+        row = (fit.scale * fit.rotation[i]).tolist()
+        own = "+".join(
+            f"({(1 if a == b else 2) * row[a] * row[b]!r})*[@{kept}{key}]"
+            for key, (a, b) in ENTRIES.items()
+        )
+        added = re.sub(
+            r"g_[zuw]_[A-Z]+", lambda m: f"({numbers[m[0]]!r})", added_covariance(name, name, near)
+        )
+        sign = "1" if geo.model == "2D" and name == "H" else "[@shared]"
+        common = f"+N([@o_{name}])^2" if content.is_pair else ""
+        variance = f"{factor}({own})+{sign}*({added}){common}"
+        columns.append(
+            ResultColumn(
+                key=f"sigma_{name}",
+                heading=f"sigma_{name} [m]",
+                values=world[f"sigma_{name}"],
+                formula=f'IF(COUNT([@n_E],[@cov_XX])=2,SQRT(MAX(0,{variance})),"")',
+                number_format="0.0000",
             )
         )
     return columns

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -18,13 +18,14 @@ from bifocal.survey.workbook.setup_update import (
     write_corrections,
     write_options,
 )
+from bifocal.survey.workbook.space_block import BLOCK
 from bifocal.survey.workbook.translate import translate
 from bifocal.survey.workbook.words import word
 from photocore.errors import InputError
 from photocore.output import free_path
 from photocore.workbook.cells import CellValue, NewColumn, escape
 from photocore.workbook.editor import WorkbookEditor
-from photocore.workbook.grid import TableArea
+from photocore.workbook.grid import TableArea, split_area, split_cell
 from photocore.workbook.live_book import BookBuilder
 from photocore.workbook.live_columns import TEXT_KEYS, row_formula
 from photocore.workbook.named_cells import place_of, type_value
@@ -148,10 +149,20 @@ def _length(area: TableArea) -> int:
 
 def store_named_cells(editor: WorkbookEditor, built: BookBuilder, content: SurveyContent) -> None:
     """Store the results of single formulas, found by their names; type what was found."""
-    typed = {"g_auto", "s3_k", *(f"s3_{i}{j}" for i in "123" for j in "123")}
+    typed = {"g_auto"}
+    if is_older(editor.book.names):
+        # The model 3D was no formula: what the program found was typed.
+        typed |= {
+            "s3_k",
+            *(f"s3_{i}{j}" for i in "123" for j in "123"),
+            *(f"s3_{i}" for i in "XYZ"),
+        }
     for name, defined in built.book.defined_names.items():
         sheet, _, cell = defined.attr_text.partition("!")
         sheet, cell = sheet.strip("'"), cell.replace("$", "")
+        if name == BLOCK:
+            _store_block(editor, built.results[sheet], cell)
+            continue
         place = place_of(editor, name)
         if place is None:
             continue
@@ -163,6 +174,29 @@ def store_named_cells(editor: WorkbookEditor, built: BookBuilder, content: Surve
             editor.set_result(*place, _result(value))
         if built.book[sheet][cell].data_type != "f" and name not in typed:
             _make_number(editor, place, value)
+
+
+def is_older(names: Collection[str]) -> bool:
+    """Tell by its names whether a workbook's sheet `Georeference` has no live model 3D yet.
+
+    Its formulas of sigma_E, sigma_N, sigma_H then leave out what the transformation is worth.
+    """
+    return "g_k" in names and "g_space" not in names
+
+
+def _store_block(editor: WorkbookEditor, results: Mapping[str, CellValue], cells: str) -> None:
+    """Store the results of the formulas of `BLOCK`, wherever it stands now."""
+    sheet, _, area = editor.book.names.get(BLOCK, "").rpartition("!")
+    sheet = sheet.strip("'").replace("''", "'")
+    if sheet not in editor.titles or ":" not in area:
+        return
+    top, left, bottom, right = split_area(cells)
+    down, across, *_ = split_area(area.replace("$", ""))
+    for cell, value in results.items():
+        row, column = split_cell(cell)
+        if top <= row <= bottom and left <= column <= right:
+            at = (row - top + down, column - left + across)
+            editor.set_result(sheet, *at, _result(value))
 
 
 def _make_number(editor: WorkbookEditor, place: tuple[str, int, int], value: CellValue) -> None:

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bifocal import Pair, Photo, solve
+from bifocal import Pair, Photo, georeference, solve
 from bifocal.model.orientation_precision import CAMERA, NAMES, moved, pinhole
 from photocore.camera import PARAMETERS, plane_from_pixel
 from photocore.distortion import RadialDivision
@@ -38,32 +38,59 @@ def test_a_homography_with_nadir_and_distance_is_its_camera() -> None:
         np.testing.assert_array_equal(found.centre, camera.centre)
 
 
+def drawn_points(step, seen) -> np.ndarray:
+    """Return the points that a pair with errors in all its parameters finds from pixels."""
+    photos, ideal = [], []
+    for number, (photo, pixels) in enumerate(zip((PAIR.image1, PAIR.image2), seen, strict=True)):
+        own = step[number * len(CAMERA) : (number + 1) * len(CAMERA)]
+        camera = pinhole(photo)
+        lens = RadialDivision(own[-2], camera.matrix[:2, 2], camera.matrix[0, 0], own[-1])
+        ideal.append(lens.undistort(pixels))
+        camera = camera.stepped(own[: len(PARAMETERS)])
+        photos.append(
+            Photo(
+                plane_from_pixel=plane_from_pixel(camera),
+                nadir=camera.centre[:2],
+                distance=camera.centre[2],
+            )
+        )
+    return Pair(image1=photos[0], image2=photos[1]).intersect(*ideal).xyz
+
+
 def test_the_spread_of_points_over_drawn_orientations_is_the_covariance_stated() -> None:
     stated = replace(PAIR, orientation=covariance()).covariance_of_orientation(XYZ)
+    steps = np.random.default_rng(5).multivariate_normal(np.zeros(24), covariance(), 1500)
     seen = PAIR.project(XYZ)
-    rng, draws = np.random.default_rng(5), []
-    for step in rng.multivariate_normal(np.zeros(24), covariance(), 1500):
-        photos, ideal = [], []
-        for number, (photo, pixels) in enumerate(
-            zip((PAIR.image1, PAIR.image2), seen, strict=True)
-        ):
-            own = step[number * len(CAMERA) : (number + 1) * len(CAMERA)]
-            camera = pinhole(photo)
-            lens = RadialDivision(own[-2], camera.matrix[:2, 2], camera.matrix[0, 0], own[-1])
-            ideal.append(lens.undistort(pixels))
-            camera = camera.stepped(own[: len(PARAMETERS)])
-            photos.append(
-                Photo(
-                    plane_from_pixel=plane_from_pixel(camera),
-                    nadir=camera.centre[:2],
-                    distance=camera.centre[2],
-                )
-            )
-        drawn = Pair(image1=photos[0], image2=photos[1])
-        draws.append(drawn.intersect(*ideal).xyz)
+    draws = [drawn_points(step, seen) for step in steps]
     spread = np.std(draws, axis=0)
     # 1500 draws give a standard deviation to 1.8 %; three of those, and some curvature.
     np.testing.assert_allclose(spread, np.sqrt(np.diagonal(stated, axis1=1, axis2=2)), rtol=0.07)
+
+
+def test_control_points_take_up_most_of_it_and_the_rest_is_in_the_sigmas() -> None:
+    # Small enough for no curvature; 0.3 px of picks is then about as much as what is left.
+    loose = 0.15**2 * covariance()
+    seen, rng = PAIR.project(XYZ), np.random.default_rng(6)
+    names = [str(i) for i in range(len(XYZ))]
+    keys = ("col1", "row1", "col2", "row2")
+    control = {"id": names[:8], **dict(zip("ENH", XYZ[:8].T + 1000.0, strict=True))}
+    picked = {"id": names, **dict(zip(keys, np.hstack(seen).T, strict=True))}
+    pair = replace(PAIR, orientation=loose)
+    survey = solve(picked, pair=pair, sigma_px=0.3)
+    placed = georeference(survey.table, control, model="3D")
+    survey = replace(survey, georeference=placed)
+    own, errors = survey.table.own_covariance, []
+    for step in rng.multivariate_normal(np.zeros(24), loose, 250):
+        xyz = drawn_points(step, [p + rng.normal(0, 0.3, p.shape) for p in seen])
+        columns = {"id": names, **dict(zip("XYZ", xyz.T, strict=True))}
+        fit = georeference(columns, control, model="3D", covariance=own)
+        if not fit.bad:
+            errors.append(fit.world_from_wall(xyz) - XYZ - 1000.0)
+    ratio = np.sqrt((np.array(errors) ** 2).mean(axis=0)) / survey.world_sigma
+    assert np.sqrt((ratio**2).mean()) == pytest.approx(1.0, abs=0.05)
+    # Taken as each point's own, most of what the fit takes up would be stated too.
+    whole = np.sqrt(np.diagonal(survey.table.covariance, axis1=1, axis2=2))
+    assert np.median(survey.world_sigma[:, 2] / whole[:, 2]) < 0.8
 
 
 def test_intersection_and_survey_add_it_to_the_picks() -> None:

@@ -47,6 +47,23 @@ def test_the_workbook_holds_the_stations_and_two_charts_of_precision(tmp_path):
 
 
 @pytest.mark.parametrize(
+    ("equivalents", "wall", "stations", "pixel"),
+    [
+        # A phone. By hand: 4:3 on a diagonal of 43.267 mm is 34.613 mm wide; 77 x 6 / 34.613.
+        ((77, 24), "6x4", (13.35, 4.16), 0.0015),
+        # A drone over a quarry, as docs/planning.md has it: 48 x 60 / 34.613.
+        ((48, 24), "60x40", (83.21, 41.60), 0.015),
+    ],
+)
+def test_equivalents_plan_for_phones_and_drones(equivalents, wall, stations, pixel):
+    lenses = [part for c in equivalents for part in ("--equivalent", str(c))]
+    data = json.loads(run(*lenses, "--pixels", "4000x3000", "--object", wall, "--json").stdout)
+    best = data["stations"][0]
+    assert (best["d1"], best["d2"]) == pytest.approx(stations, abs=0.005)
+    assert best["gsd"] == pytest.approx(pixel, rel=1e-3)
+
+
+@pytest.mark.parametrize(
     ("arguments", "status", "message"),
     [
         (["--focal", "35", *CANON, "--scale", "500"], 1, "two different focal lengths"),

@@ -116,3 +116,42 @@ def test_names_that_were_not_measured_are_said():
 def test_unknown_model_is_refused():
     with pytest.raises(InputError, match="affine"):
         georeference(table(), control(levelled(), range(4)), model="affine")
+
+
+def rotation_of(model):
+    if model == "2D":
+        return Rotation.from_euler("z", 0.7).as_matrix()
+    return TURN if model == "levelled" else Rotation.from_euler("xyz", [0.3, 0.5, 1.2]).as_matrix()
+
+
+@pytest.mark.parametrize("model", ["2D", "levelled", "3D"])
+def test_sigmas_of_placed_points_count_the_picks_and_the_transformation(model):
+    # Covariances as far from round as those of a bifocal pair: radius and relief go together.
+    rng = np.random.default_rng(11)
+    shape = rng.normal(0, 1, (12, 3, 3)) * np.array([0.002, 0.003, 0.01])[:, None]
+    own = shape @ shape.transpose(0, 2, 1) + 1e-6 * np.eye(3)
+    draw = np.linalg.cholesky(own)
+    world = UTM * [1, 1, model != "2D"] + 1.3 * XYZ @ rotation_of(model).T
+    known = control(world if model != "2D" else world * [1, 1, np.nan], range(5))
+    standard = []
+    for _ in range(300):
+        seen = XYZ + np.einsum("nij,nj->ni", draw, rng.normal(0, 1, (12, 3)))
+        columns = {"id": IDS, **dict(zip("XYZ", seen.T, strict=True))}
+        found = georeference(columns, known, model=model, covariance=own)
+        if not found.bad:
+            stated = found.covariance_of(seen, own, ids=IDS)
+            sigma = np.sqrt(np.diagonal(stated, axis1=1, axis2=2))
+            standard.append((found.world_from_wall(seen) - world) / sigma)
+    ratio = np.sqrt((np.array(standard) ** 2).mean(axis=(0, 2)))
+    # 300 draws give one ratio to 2 %; the five control points share their error with the fit.
+    assert np.sqrt((ratio[:5] ** 2).mean()) == pytest.approx(1.0, abs=0.05)
+    assert np.sqrt((ratio[5:] ** 2).mean()) == pytest.approx(1.0, abs=0.05)
+
+
+def test_points_weighing_alike_are_as_good_as_the_residuals_say():
+    found = georeference(table(), control(levelled(0.02), range(12)))
+    # By hand: a shift in E, N, H from twelve points is good to sigma0 / sqrt(12) at their centre.
+    assert found.precision is not None
+    centre = found.precision.of_points(found.near.mean(axis=0)[None])[0]
+    expected = found.sigma0 / np.sqrt(12)
+    assert np.sqrt(np.diagonal(centre)) == pytest.approx([expected] * 3, rel=0.01)

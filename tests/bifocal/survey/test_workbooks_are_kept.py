@@ -270,6 +270,31 @@ def test_results_are_new_live_columns_of_the_users_own_table(tmp_path, name):
 
 
 @pytest.mark.office
+def test_sigmas_in_the_world_are_live_in_the_users_own_table(tmp_path):
+    heads, table, head = FOREIGN["plain"]
+    path = foreign(tmp_path / "own.xlsx", heads=heads, table=table, head=head)
+    book = openpyxl.load_workbook(path)
+    sheet = book.create_sheet("Georeference")
+    sheet.append(("id", "E", "N", "H"))
+    for name, x, y, r in POINTS[:5]:
+        sheet.append((name, 100 + x, 200 - r, 5 + y))
+    book.save(path)
+    answer = json.loads(run("solve", path, *DISTANCES, "--json").stdout)
+    solved_in_place(path, *DISTANCES)
+    assert_recalculated_equals_cached(path, tmp_path)
+    shown = recalculated(path, tmp_path)["Facciata"]
+    place = {cell.value: cell.column for cell in shown[head]}
+    for row, point in enumerate(answer["points"], start=head + 1):
+        for key in ("sigma_E", "sigma_N", "sigma_H"):
+            cell = shown.cell(row, place[f"{key} [m]"])
+            assert cell.value == pytest.approx(point[key], rel=1e-9, abs=1e-9)
+    used = [
+        row for row in range(head + 1, head + 6) if shown.cell(row, place["shared"]).value == -1
+    ]
+    assert len(used) >= 4
+
+
+@pytest.mark.office
 def test_values_of_the_users_own_setup_stay_where_they_are_and_live(tmp_path):
     heads, table, head = FOREIGN["plain"]
     path = foreign(
