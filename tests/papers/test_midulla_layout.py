@@ -66,7 +66,7 @@ def fill(path, c2, d2, folder, *, points=None, control=None):
     for row, (name, first, second) in enumerate(points or (), start=5):
         for column, value in zip("ABCDE", (name, *first, *second), strict=True):
             book["Points"][f"{column}{row}"] = value
-    for row, (name, place) in enumerate(control or (), start=28):
+    for row, (name, place) in enumerate(control or (), start=13):
         for column, value in zip("ABCD", (name, *place), strict=True):
             book["Georeference"][f"{column}{row}"] = value
     book.save(path)
