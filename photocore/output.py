@@ -106,7 +106,10 @@ def check_not_input(path: Path | None, *inputs: Path | str | None) -> None:
         return
     for given in inputs:
         if given is not None and Path(given).exists() and path.samefile(given):
-            raise InputError(f"{path}: is one of the files that are read; name another output.")
+            other = free_path(path.parent, f"{path.stem}-result", path.suffix).name
+            raise InputError(
+                f"{path}: is one of the files that are read; name another output, e.g. {other}."
+            )
 
 
 def check_ending(path: Path | None, rule: str, *endings: str) -> None:

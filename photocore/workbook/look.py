@@ -127,7 +127,7 @@ def prepare_page(
     margins.left = margins.right = _MARGIN
     margins.top, margins.header = 0.6, 0.3
     # The footer stands within the bottom margin: text and what printers cannot reach.
-    margins.bottom, margins.footer = 0.7, 0.3
+    margins.bottom, margins.footer = 0.75, 0.3
 
 
 def break_columns(sheet: Worksheet, last: int, *, scale: int, before: Sequence[int] = ()) -> None:

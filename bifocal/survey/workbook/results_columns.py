@@ -58,7 +58,7 @@ def results_columns(*, is_pair: bool) -> tuple[LiveColumn, ...]:
         formula_column("id", _text_from_points("id"), width=12),
         *(formula_column(key, _from_points(key), 3, width=9) for key in "XYZ"),
         *(
-            formula_column(name, _world(row, name), 3, width=13)
+            formula_column(name, _world(row, name), 3, width=10 if name == "H" else 12.5)
             for row, name in enumerate("ENH", start=1)
         ),
         *(

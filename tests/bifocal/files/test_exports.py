@@ -148,7 +148,9 @@ def test_a_survey_is_never_exported_onto_itself(tmp_path):
     table.write_text("Point,X,Y,Z\nA,1,2,3\n")
     done = CliRunner().invoke(main, ["export", str(table), "--out", str(table), "--overwrite"])
     assert done.exit_code == 1
-    assert "the survey itself" in done.stderr
+    assert "is one of the files that are read; name another output, e.g. result-result.csv" in (
+        done.stderr
+    )
     assert table.read_text().startswith("Point")
 
 

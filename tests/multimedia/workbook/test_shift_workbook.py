@@ -217,6 +217,6 @@ def test_the_committed_template_is_what_the_command_writes(tmp_path: Path) -> No
     fresh = tmp_path / "fresh.xlsx"
     write_template(fresh, rows=50, steps=6, overwrite=False)
     assert office.formulas_of(fresh) == office.formulas_of(committed), (
-        "run: multimedia template templates/multimedia.xlsx --overwrite"
+        "rebuild it with `write_template`"
     )
     assert office.stored(fresh) == office.stored(committed)
