@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import atexit
+import functools
 import os
 import shutil
 import subprocess
+import tempfile
 from pathlib import Path
 
 import openpyxl
@@ -28,6 +31,17 @@ def strip_results(source: Path, target: Path) -> Path:
     return target
 
 
+@functools.cache
+def _profile() -> str:
+    """Return the profile of this process: two conversions at once that share one fail silently.
+
+    Making a profile costs more than most conversions.
+    """
+    folder = tempfile.mkdtemp(prefix="office-profile-")
+    atexit.register(shutil.rmtree, folder, ignore_errors=True)
+    return Path(folder).as_uri()
+
+
 def convert(source: Path, folder: Path, ending: str = "xlsx") -> Path:
     """Convert a file with LibreOffice; skip where it is missing, except in CI."""
     program = shutil.which("soffice") or shutil.which("libreoffice")
@@ -39,9 +53,7 @@ def convert(source: Path, folder: Path, ending: str = "xlsx") -> Path:
     out.mkdir(parents=True, exist_ok=True)
     result = out / f"{source.stem}.{ending}"
     result.unlink(missing_ok=True)
-    # A profile of its own: two conversions that share one fail silently.
-    profile = (folder / "office-profile").resolve().as_uri()
-    command = [program, f"-env:UserInstallation={profile}", "--headless", "--norestore"]
+    command = [program, f"-env:UserInstallation={_profile()}", "--headless", "--norestore"]
     command += ["--convert-to", ending, "--outdir", str(out), str(source)]
     run = subprocess.run(command, capture_output=True, text=True, timeout=300, check=False)
     # The exit status is 0 even when nothing could be loaded: only the file tells.

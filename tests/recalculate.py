@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import os
 import re
-import shutil
-import subprocess
 import zipfile
 from pathlib import Path
 from typing import Any
 
 import openpyxl
-import pytest
+
+from tests.office import convert
 
 
 def strip_cached_values(source: Path, target: Path) -> None:
@@ -30,23 +28,9 @@ def strip_cached_values(source: Path, target: Path) -> None:
 
 def recalculated(path: Path, folder: Path) -> openpyxl.Workbook:
     """Return the workbook as LibreOffice calculates it, values only."""
-    soffice = shutil.which("soffice")
-    if soffice is None:
-        if os.environ.get("CI"):
-            pytest.fail("soffice is missing")
-        pytest.skip("LibreOffice (soffice) is not installed")
-    bare, out = folder / f"bare-{path.stem}.xlsx", folder / "recalculated"
-    out.mkdir(exist_ok=True)
+    bare = folder / f"bare-{path.stem}.xlsx"
     strip_cached_values(path, bare)
-    profile = (folder / "office-profile").as_uri()
-    subprocess.run(
-        [soffice, f"-env:UserInstallation={profile}", "--headless", "--convert-to", "xlsx",
-         "--outdir", str(out), str(bare)],
-        check=True,
-        capture_output=True,
-        timeout=300,
-    )  # fmt: skip
-    return openpyxl.load_workbook(out / bare.name, data_only=True)
+    return openpyxl.load_workbook(convert(bare, folder), data_only=True)
 
 
 def rows_of(book: openpyxl.Workbook, sheet: str, head: int) -> list[dict[str, Any]]:

@@ -136,7 +136,8 @@ def test_a_file_is_not_corrected_twice_nor_overwritten_unasked(tmp_path: Path) -
     assert "exists already" in refused(tmp_path, tmp_path / "in.csv", target="out.csv")
     assert bathymetry(tmp_path / "in.csv", tmp_path / "out.csv", "--overwrite")[0] == 0
     assert "corrected already" in refused(tmp_path, tmp_path / "out.csv", target="twice.csv")
-    assert "input itself" in refused(tmp_path, tmp_path / "in.csv", "--overwrite", target="in.csv")
+    message = refused(tmp_path, tmp_path / "in.csv", "--overwrite", target="in.csv")
+    assert "is one of the files that are read; name another output, e.g. in-result.csv" in message
     write_dem(tmp_path / "in.tif", np.full((20, 20), 101.0))
     assert bathymetry(tmp_path / "in.tif", tmp_path / "out.tif")[0] == 0
     assert "already" in refused(tmp_path, tmp_path / "out.tif", target="twice.tif")
