@@ -171,7 +171,7 @@ def test_what_falls_away_from_camera_2_where_the_photos_do_not_fit_is_not_measur
     profile = np.interp(x, [32, 40, 60, 68], [0.0, 0.5, 0.5, 0.0])
     relief = np.broadcast_to(profile, (200, 200)).astype(np.float32)
     # At 64 px a ray of camera 2 sinks by 9.25 m / 64 px = 145 mm a pixel, the outer flank by 62.5.
-    doubtful = surfaces._falls_away(frame, relief, np.full(relief.shape, 5.5, np.float32))
+    doubtful = surfaces._falls_away(frame, relief, np.full(relief.shape, 8.5, np.float32))
     row = doubtful[99]
     assert row[np.abs(x - 64) < 2].all()
     assert not row[x < 58].any()
