@@ -281,10 +281,14 @@ def test_opacity_swipe_blink_and_contrast_show_what_they_say(page: Driver) -> No
     assert np.abs(swept - far)[:, : middle - 20].mean() < 0.5
     assert np.abs(swept - near)[:, middle + 20 :].mean() < 0.5
     page.keys("b")
-    blinks = [seen(page) for _ in range(5)]
-    apart = [min(np.abs(one - photo).mean() for photo in (far, near)) for one in blinks]
-    assert max(apart) < 0.5
-    assert len({np.abs(one - far).mean() < 0.5 for one in blinks}) == 2
+    shown = set()
+    for _ in range(60):  # a fast machine looks several times between two changes
+        one = seen(page)
+        assert min(np.abs(one - photo).mean() for photo in (far, near)) < 0.5
+        shown.add(bool(np.abs(one - far).mean() < 0.5))
+        if len(shown) == 2:
+            break
+    assert shown == {True, False}
     page.keys("v")
     slider.fill("0")
     page.tab.get_by_test_id("contrast-1").fill("200")
