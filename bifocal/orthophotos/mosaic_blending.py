@@ -30,8 +30,8 @@ _SHY = 6.0
 _EDGE_SLOPE = 0.5
 _LEAST_OVERLAP = 50
 #: An overlap that tells whether layers show one wall; the least that varies on it (share of the
-#: range of colours, or metres); and the least correlation of what varies. Neighbouring orthophotos
-#: of the churches and the rendered façades have 0.5 and more, different ones -0.1 to 0.1.
+#: range of colours, or metres); and the least correlation of what varies, near zero for
+#: pictures of different things.
 _TELLING, _CONTRAST, _ALIKE = 5000, 0.02, 0.1
 
 
