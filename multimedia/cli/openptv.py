@@ -49,6 +49,10 @@ def command(
     Reads ptv.par, .ori, .addpar, _targets, the calibration body and the first rt_is frame; finds
     the control points among the targets of the calibration images, starting from the stored
     orientation; and says what looks wrong, such as interchanged indices of glass and water.
+
+    Where multi_planes.par lists positions of the body, the .crd and .fix files of each position and
+    camera are found by name and content, whatever folder they lie in; what was taken is said, and
+    lists that no camera can have seen, alone or together with the others, are refused.
     """
     from multimedia.openptv.workflow import export_openptv, import_openptv
 

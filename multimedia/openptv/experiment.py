@@ -23,6 +23,8 @@ from multimedia.openptv.openptv_files import (
     read_manual,
     read_targets,
 )
+from multimedia.openptv.plane_files import find_sets, read_stems
+from multimedia.openptv.plane_sets import PlaneCandidates
 from multimedia.projects.model import SHOWN, ImagePoints, ObjectPoints, Project
 from photocore.arrays import FloatArray, IntArray
 from photocore.distortion import Brown, Convention
@@ -34,6 +36,8 @@ from photocore.textfile import check_name
 _PARAMETERS = ("", "parameters", "parametersRun1", "parametersMultiPlane")
 #: A text file with fewer lines of four numbers is no calibration body.
 _FEWEST = 6
+#: Said of a camera.
+NO_TARGETS = "{}: no _targets file of its calibration image was found."
 _BODIES = ("target_on_a_side.txt", "calblock.txt", "calibration_target.txt", "target_file.txt")
 
 
@@ -54,6 +58,8 @@ class Experiment:
         Detections of that frame.
     manual : tuple of (list of str, ndarray)
         Points clicked by hand in each calibration image: ids and pixels; may be empty.
+    planes : tuple of PlaneCandidates
+        Sets of points of a multi-plane calibration, per camera; may be empty.
     """
 
     project: Project
@@ -62,6 +68,7 @@ class Experiment:
     particle_targets: IntArray
     frame_targets: tuple[DetectedTargets | None, ...]
     manual: tuple[tuple[list[str], FloatArray], ...] = ()
+    planes: tuple[PlaneCandidates, ...] = ()
 
 
 def read_experiment(folder: Path | str, *, swap_indices: bool = False) -> Experiment:
@@ -85,7 +92,8 @@ def read_experiment(folder: Path | str, *, swap_indices: bool = False) -> Experi
         raise InputError(f"{folder}: is no folder; give the folder of an OpenPTV experiment.")
     control_path = _control_path(folder)
     control = read_control(control_path)
-    roots = list(dict.fromkeys([control_path.parent, folder]))
+    home = folder.parent if control_path.parent == folder and _is_of_parameters(folder) else folder
+    roots = list(dict.fromkeys([control_path.parent, folder, home]))
     remarks: list[str] = []
     if control_path.parent.name not in _PARAMETERS and control_path.parent != folder:
         remarks.append(f"{folder}: has no ptv.par of its own; read {control_path}.")
@@ -99,13 +107,16 @@ def read_experiment(folder: Path | str, *, swap_indices: bool = False) -> Experi
         _targets(roots, [f"{name}_targets"], control.field) for name in control.calibration_images
     )
     remarks += [
-        f"{camera.name}: no _targets file of its calibration image was found."
+        NO_TARGETS.format(camera.name)
         for camera, detected in zip(cameras, targets, strict=True)
         if detected is None
     ]
     particles, numbers, frame, odd_frame = _particles(roots, control)
     manual, odd_manual = _manual(roots, len(cameras))
-    remarks += [*odd_frame, *odd_manual]
+    listed = _find(roots, "multi_planes.par")
+    stems = read_stems(listed) if listed is not None else []
+    planes, odd_planes = find_sets(home, stems, control.calibration_images, control.sensor)
+    remarks += [*odd_frame, *odd_manual, *odd_planes]
     project = Project(
         cameras=tuple(cameras),
         media=media,
@@ -124,6 +135,7 @@ def read_experiment(folder: Path | str, *, swap_indices: bool = False) -> Experi
         particle_targets=numbers,
         frame_targets=frame,
         manual=manual,
+        planes=planes,
     )
 
 
@@ -238,6 +250,11 @@ def _control_path(folder: Path) -> Path:
         f"{folder}: neither ptv.par nor parameters/ptv.par was found; is this the folder of an "
         "OpenPTV experiment?"
     )
+
+
+def _is_of_parameters(folder: Path) -> bool:
+    """Whether a folder is one of parameters only, the data lying beside it."""
+    return folder.name.lower().startswith("parameters") and not (folder / "cal").is_dir()
 
 
 def _find(roots: Sequence[Path], name: str) -> Path | None:

@@ -19,7 +19,7 @@ from photocore.textfile import read_text
 
 #: A printed matrix has 7 decimals; angles and matrix of one camera differ by a few of the last.
 MATRIX_ROUNDING = 1e-5
-_KIND = "file of OpenPTV"
+KIND = "file of OpenPTV"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -65,7 +65,7 @@ def read_control(path: Path) -> ControlParameters:
     InputError
         If a line is missing or not what it should be; the message names the line.
     """
-    lines = [line.strip() for line in read_text(path, _KIND).rstrip().splitlines()]
+    lines = [line.strip() for line in read_text(path, KIND).rstrip().splitlines()]
     count = _count(path, lines, "number of cameras")
     if not 1 <= count <= 64:
         raise InputError(f"{path}, line 1: {count} cameras; expected 1 to 64.")
@@ -159,14 +159,14 @@ def read_targets(path: Path, *, field: int = 0) -> DetectedTargets:
     InputError
         If the count in the first line does not fit the lines that follow.
     """
-    first, *rest = read_text(path, _KIND).split() or [""]
+    first, *rest = read_text(path, KIND).split() or [""]
     count = _count(path, [first], "number of targets")
     if len(rest) != 8 * count:
         raise InputError(
             f"{path}: its first line announces {count} targets of 8 numbers, {len(rest)} numbers "
             "follow. The file is cut off, or is no target file."
         )
-    table = _floats(path, rest, "value {} of the targets").reshape(-1, 8)
+    table = floats(path, rest, "value {} of the targets").reshape(-1, 8)
     pixels = table[:, 1:3].copy()
     if field in (1, 2):
         # Half frames: the file counts every other line.
@@ -185,7 +185,7 @@ def read_body(path: Path) -> tuple[list[str], FloatArray]:
         If a line has other than four numbers; the message names it.
     """
     ids, points = [], []
-    for number, line in enumerate(read_text(path, _KIND).splitlines(), start=1):
+    for number, line in enumerate(read_text(path, KIND).splitlines(), start=1):
         fields = line.replace(",", " ").split()
         if not fields or fields[0].startswith("#"):
             continue
@@ -194,7 +194,7 @@ def read_body(path: Path) -> tuple[list[str], FloatArray]:
                 f"{path}, line {number}: found {len(fields)} values, expected number X Y Z."
             )
         ids.append(fields[0])
-        points.append(_floats(path, fields[1:], f"line {number}"))
+        points.append(floats(path, fields[1:], f"line {number}"))
     if not ids:
         raise InputError(f"{path}: no points; expected lines of number X Y Z.")
     return ids, np.array(points)
@@ -215,8 +215,8 @@ def read_manual(points: Path, pixels: Path) -> tuple[list[str], FloatArray]:
     InputError
         If the two files do not belong together.
     """
-    ids = read_text(points, _KIND).split()
-    values = _floats(pixels, read_text(pixels, _KIND).split(), "man_ori")
+    ids = read_text(points, KIND).split()
+    values = floats(pixels, read_text(pixels, KIND).split(), "man_ori")
     if values.size != 2 * len(ids):
         raise InputError(
             f"{pixels}: holds {values.size} numbers for the {len(ids)} points of {points.name}; "
@@ -235,7 +235,7 @@ def read_correspondences(path: Path) -> tuple[FloatArray, IntArray]:
     InputError
         If the count in the first line does not fit the lines that follow.
     """
-    lines = [line for line in read_text(path, _KIND).splitlines() if line.strip()]
+    lines = [line for line in read_text(path, KIND).splitlines() if line.strip()]
     count = _count(path, lines, "number of particles")
     rows = [line.split() for line in lines[1:]]
     widths = {len(row) for row in rows}
@@ -246,7 +246,7 @@ def read_correspondences(path: Path) -> tuple[FloatArray, IntArray]:
         )
     if not rows:
         return np.empty((0, 3)), np.empty((0, 0), dtype=np.int64)
-    table = np.array([_floats(path, row, f"line {k}") for k, row in enumerate(rows, 2)])
+    table = np.array([floats(path, row, f"line {k}") for k, row in enumerate(rows, 2)])
     return table[:, 1:4].copy(), table[:, 4:].astype(np.int64)
 
 
@@ -301,7 +301,7 @@ def _rotation(
     return nearest_rotation(matrix), (f"{path.name}: {odd}",)
 
 
-def _floats(path: Path, words: Sequence[str], what: str) -> FloatArray:
+def floats(path: Path, words: Sequence[str], what: str) -> FloatArray:
     """Return words as numbers; refuse the first that is none; {} in ``what`` is its place."""
     values = np.empty(len(words))
     for place, word in enumerate(words):
@@ -320,7 +320,7 @@ def _number(path: Path, lines: list[str], index: int, what: str) -> float:
     if index >= len(lines):
         raise InputError(f"{path}: ends before line {index + 1} ({what}).")
     words = lines[index].split()[:1] or [""]
-    return float(_floats(path, words, f"line {index + 1} ({what})")[0])
+    return float(floats(path, words, f"line {index + 1} ({what})")[0])
 
 
 def _count(path: Path, lines: list[str], what: str) -> int:
@@ -332,7 +332,7 @@ def _count(path: Path, lines: list[str], what: str) -> int:
 
 
 def _numbers(path: Path, least: int, what: str) -> FloatArray:
-    values = _floats(path, read_text(path, _KIND).split(), "value {}")
+    values = floats(path, read_text(path, KIND).split(), "value {}")
     if len(values) < least:
         raise InputError(f"{path}: {len(values)} numbers, expected at least {least}: {what}.")
     return values
