@@ -57,10 +57,13 @@ def command(
     from multimedia.openptv.workflow import export_openptv, import_openptv
 
     if export is not None:
-        written = export_openptv(source, export, overwrite=overwrite)
+        written, inexact = export_openptv(source, export, overwrite=overwrite)
+        for line in inexact:
+            remark(f"Note: {line}")
         remark(f"OpenPTV folder written to {export}")
         if as_json:
-            print_json({"folder": export, "cameras": list(written.camera_names)})
+            names = list(written.camera_names)
+            print_json({"folder": export, "cameras": names, "remarks": list(inexact)})
         return
     target = out if out is not None else Path(f"{source.resolve().name}.toml")
     imported = import_openptv(source, out=target, overwrite=overwrite, **options)

@@ -253,36 +253,21 @@ def read_correspondences(path: Path) -> tuple[FloatArray, IntArray]:
 def ori_text(camera: Camera, glass: FloatArray) -> str:
     """Return the content of an .ori file."""
     x, m = camera.centre, camera.rotation
-    rows = "\n".join("    " + " ".join(f"{v:.15f}" for v in row) for row in m)
+    rows = "\n".join("    " + " ".join(f"{v:.17g}" for v in row) for row in m)
     return (
         f"{x[0]:.15g} {x[1]:.15g} {x[2]:.15g}\n"
         f"    {' '.join(f'{v:.16g}' for v in camera.angles)}\n\n{rows}\n\n"
-        f"    {camera.principal_point[0]:.16g} {camera.principal_point[1]:.16g}\n"
-        f"    {camera.principal_distance:.16g}\n\n"
-        f"    {glass[0]:.15f} {glass[1]:.15f} {glass[2]:.15f}\n"
+        f"    {camera.principal_point[0]:.17g} {camera.principal_point[1]:.17g}\n"
+        f"    {camera.principal_distance:.17g}\n\n"
+        f"    {glass[0]:.17g} {glass[1]:.17g} {glass[2]:.17g}\n"
     )
 
 
-def addpar_text(camera: Camera) -> str:
-    """Return the content of an .addpar file.
-
-    Raises
-    ------
-    InputError
-        If OpenPTV has no parameters for this distortion.
-    """
+def addpar_text(camera: Camera, scale: float) -> str:
+    """Return the content of an .addpar file: distortion of OpenPTV's convention, and ``scx``."""
     d = camera.distortion
-    centred = d.convention is Convention.OPENPTV or (
-        d.convention is Convention.BROWN and not np.any(camera.principal_point)
-    )
-    if not (centred or d.is_identity) or d.scale != 1.0:
-        raise InputError(
-            f"camera {camera.name}: OpenPTV counts distortion from the centre of the sensor and "
-            "has no separate scale of x, so this camera cannot be written exactly. Calibrate with "
-            'distortion convention = "openptv" and without scale.'
-        )
-    terms = (d.k1, d.k2, d.k3, d.p1, d.p2, 1.0, d.shear)
-    return " ".join(f"{v:.16g}" for v in terms) + "\n"
+    terms = (d.k1, d.k2, d.k3, d.p1, d.p2, scale, d.shear)
+    return " ".join(f"{v:.17g}" for v in terms) + "\n"
 
 
 def _rotation(

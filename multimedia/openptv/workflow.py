@@ -105,11 +105,12 @@ def import_openptv(
     )
 
 
-def export_openptv(project: Path, folder: Path, *, overwrite: bool = False) -> Project:
-    """Write a project as an OpenPTV experiment folder."""
+def export_openptv(
+    project: Path, folder: Path, *, overwrite: bool = False
+) -> tuple[Project, tuple[str, ...]]:
+    """Write a project as an OpenPTV experiment folder; return it, and what is not exact there."""
     content = read_project(project)
-    write_experiment(folder, content, overwrite=overwrite)
-    return content
+    return content, write_experiment(folder, content, overwrite=overwrite)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -1,0 +1,278 @@
+"""Cameras and media in OpenPTV's terms, exactly where it has them, otherwise as near as it can.
+
+OpenPTV counts distortion from the centre of the sensor, stretches both axes alike by ``scx`` and
+turns the y axis by ``she``: image = scx (x' - sin(she) y', cos(she) y'). One pixel size serves all
+cameras, so a scale of x against y that they share becomes the shape of the pixel.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from multimedia.media.camera import EXTERIOR, Camera, Sensor
+from multimedia.media.flat_interface import FlatInterface
+from multimedia.media.interfaces import Interfaces
+from multimedia.media.projection import project, project_with_jacobian
+from multimedia.refraction.layers import Layers
+from photocore.adjustment import minimise
+from photocore.arrays import FloatArray
+from photocore.distortion import Brown, Convention
+from photocore.errors import GeometryError, InputError
+
+#: What OpenPTV has and a direction-preserving change of the camera may use.
+_FREE = (*EXTERIOR[3:], "c", "xh", "yh", "k1", "k2", "k3", "p1", "p2", "shear")
+#: Beyond so many pixels a camera is another one. The four cameras of a real tank, calibrated with a
+#: scale each (0.991 to 1.004, sigma 0.001 to 0.03), move by 0.02 to 1.15 px at their points.
+FARTHEST = 1.2
+#: A misfit of rounding is none; from CLOSE on the object points say which camera is nearest. [px]
+NO_MISFIT, CLOSE = 1e-10, 0.05
+#: Points along the sides of the sensor at which cameras are compared.
+_GRID = (25, 21)
+#: OpenPTV's glass vector has no direction where its tip is in the origin: a picometre off it does.
+_SHORTEST = 1e-9
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class OpenptvCamera:
+    """A camera as .ori and .addpar hold it.
+
+    Attributes
+    ----------
+    camera : Camera
+        With OpenPTV's convention, its scale and the origin of its sensor.
+    scale : float
+        ``scx``.
+    misfit : float
+        Farthest that an image point of the given camera moves. [px]
+    at_points : bool
+        Whether that is said of the object points only, the centre having moved too.
+    """
+
+    camera: Camera
+    scale: float
+    misfit: float
+    at_points: bool = False
+
+
+def common_sensor(cameras: Sequence[Camera]) -> Sensor:
+    """Return the one sensor of ptv.par that comes nearest to those of all cameras.
+
+    Raises
+    ------
+    InputError
+        If a camera has none, or one of another size.
+    """
+    sensors = [_sensor(camera) for camera in cameras]
+    first, ratios = sensors[0], []
+    for camera, sensor in zip(cameras, sensors, strict=True):
+        if (sensor.width, sensor.height) != (first.width, first.height):
+            raise InputError(
+                f"camera {camera.name}: its photos of {sensor.width} x {sensor.height} px are not "
+                f"of the size of the others, {first.width} x {first.height}: OpenPTV has one."
+            )
+        lens = camera.distortion
+        # Which height of a pixel makes scale and shear those of OpenPTV.
+        shape = np.sqrt(lens.scale**2 - np.sin(lens.shear) ** 2) / np.cos(lens.shear)
+        if lens.convention is Convention.PHOTOGRAMMETRIC:
+            shape = 1.0 / lens.scale
+        ratios.append(float(sensor.pitch[1] / sensor.pitch[0] * shape))
+    pitch = np.array([first.pitch[0], first.pitch[0] * np.median(ratios)])
+    size = np.array([first.width, first.height])
+    return Sensor(width=first.width, height=first.height, pitch=pitch, origin=size / 2)
+
+
+def in_openptvs_terms(
+    camera: Camera, sensor: Sensor, *, points: FloatArray, media: FlatInterface
+) -> OpenptvCamera:
+    """Return the camera of OpenPTV that sees directions where ``camera`` does.
+
+    Parameters
+    ----------
+    camera : Camera
+        Of any convention.
+    sensor : Sensor
+        From `common_sensor`.
+    points : ndarray, shape (n, 3)
+        Object points; may be none. [object unit]
+    media : FlatInterface
+        What the camera looks through.
+
+    Raises
+    ------
+    InputError
+        If that is impossible to a pixel.
+
+    Notes
+    -----
+    Exact for cameras without distortion, with distortion about the centre of the sensor, and of
+    OpenPTV's own convention. Brown's formula about a principal point off the centre differs by
+    its terms of the fifth order and an affine part; those are met by least squares over the sensor,
+    rotation and interior orientation free, the centre fixed: rays keep their places in all media.
+    A scale of its own (cameras share one pixel shape) no direction can make good; in a calibration
+    it goes with the position of the camera, so then the camera is fitted to what it sees of the
+    object points.
+    """
+    own = _sensor(camera)
+    rows, columns = np.meshgrid(
+        *(np.linspace(0, side - 1, n) for side, n in zip((own.height, own.width), _GRID[::-1],
+          strict=True)), indexing="ij",
+    )  # fmt: skip
+    pixels = np.stack([columns, rows], axis=-1).reshape(-1, 2)
+    ideal = camera.distortion.ideal(own.image_from_pixel(pixels), camera.principal_point)
+    seen = np.isfinite(ideal).all(axis=1)
+    if not seen.any():
+        raise InputError(f"camera {camera.name}: its distortion cannot be undone on the sensor.")
+    vectors = np.column_stack([ideal, np.full(len(ideal), -camera.principal_distance)])[seen]
+    rays = camera.centre + vectors @ camera.rotation.T
+    start, scale = _start(camera, own, sensor)
+    target = sensor.image_from_pixel(pixels[seen]) / scale
+    misfit = _misfit(start, rays, None, target, sensor, scale)
+    if misfit > NO_MISFIT:
+        start = _fitted(start, rays, None, target, _FREE)
+        misfit = _misfit(start, rays, None, target, sensor, scale)
+    at_points = misfit > CLOSE and len(points) >= len(_FREE)
+    if at_points:
+        image = project(camera, points, media)
+        pixels = own.pixel_from_image(image)
+        inside = ((pixels > -0.5) & (pixels < (own.width, own.height))).all(axis=1)
+        target = sensor.image_from_pixel(pixels[inside]) / scale
+        nearer = _fitted(start, points[inside], media, target, EXTERIOR[:3] + _FREE)
+        there = _misfit(nearer, points[inside], media, target, sensor, scale)
+        at_points = there < misfit
+        start, misfit = (nearer, there) if at_points else (start, misfit)
+    if not misfit <= FARTHEST:
+        raise InputError(
+            f"camera {camera.name}: OpenPTV's distortion, common pixel size and scale come no "
+            f"nearer than {misfit:.2g} px to this camera's scale, shear and distortion. Calibrate "
+            'with distortion convention = "openptv" and without scale.'
+        )
+    return OpenptvCamera(camera=start, scale=scale, misfit=misfit, at_points=at_points)
+
+
+def wall_of(camera: Camera, media: FlatInterface | Interfaces | None) -> FlatInterface:
+    """Return the glass that stands in the world and is three media, as OpenPTV wants it.
+
+    Raises
+    ------
+    InputError
+        If OpenPTV cannot hold it.
+    """
+    who = f"camera {camera.name}"
+    if media is None:
+        return _no_glass(camera)
+    if not isinstance(media, FlatInterface) or len(media.layers.indices) > 3:
+        raise InputError(
+            f"{who}: OpenPTV holds three plane-parallel media (air, glass, water) before every "
+            "camera, not curved surfaces nor more layers."
+        )
+    layers = media.layers
+    if len(layers.indices) == 2:
+        layers = Layers(indices=(*layers.indices, layers.indices[1]), thicknesses=(0.0,))
+    if not media.moves_with_camera:
+        return replace(media, layers=layers)
+    return FlatInterface(
+        layers=layers,
+        point=camera.centre + camera.rotation @ media.point,
+        normal=camera.rotation @ media.normal,
+    )
+
+
+def _no_glass(camera: Camera) -> FlatInterface:
+    """Return three media of one index before a camera that looks through none."""
+    # OpenPTV wants the camera beyond the origin, seen along the glass vector.
+    away = float(np.linalg.norm(camera.centre))
+    normal = camera.centre / away if away > 0 else camera.rotation[:, 2]
+    same = Layers(indices=(1.0, 1.0, 1.0), thicknesses=(0.0,))
+    return FlatInterface(layers=same, normal=normal)
+
+
+def glass_vector(camera: Camera, wall: FlatInterface) -> FloatArray:
+    """Return the vector from the origin to the foot on the water side of the glass.
+
+    Raises
+    ------
+    InputError
+        If the origin lies on the camera's side of it: the vector would point the wrong way.
+    """
+    reach = float(wall.point @ wall.normal)
+    if len(set(wall.indices)) == 1:
+        # Nothing is refracted: any glass before the camera will do.
+        return np.asarray(_SHORTEST * wall.normal)
+    if reach < -_SHORTEST:
+        raise InputError(
+            f"camera {camera.name}: the water side of the glass must lie between origin and "
+            "camera for OpenPTV; move the origin of the object frame into the water."
+        )
+    return np.asarray(max(reach, _SHORTEST) * wall.normal)
+
+
+def _start(camera: Camera, own: Sensor, sensor: Sensor) -> tuple[Camera, float]:
+    """Return the camera with the same coefficients in OpenPTV's terms, and scx."""
+    lens = camera.distortion
+    stretch = float(sensor.pitch[0] / own.pitch[0])
+    scale = lens.scale * stretch
+    turn = float(np.arcsin(np.sin(lens.shear) / lens.scale))
+    shift = sensor.image_from_pixel(own.origin) / scale
+    axes = np.array([[1.0, -np.sin(turn)], [0.0, np.cos(turn)]])
+    if lens.convention is Convention.OPENPTV:
+        centre = camera.principal_point + shift
+    else:
+        moved = own.pixel_from_image(camera.principal_point)
+        centre = np.linalg.solve(axes, sensor.image_from_pixel(moved) / scale)
+    sign = 1.0
+    if lens.convention is Convention.PHOTOGRAMMETRIC:
+        sign, scale, centre = -1.0, stretch, sensor.image_from_pixel(
+            own.pixel_from_image(camera.principal_point)
+        ) / stretch  # fmt: skip
+    terms = {name: sign * getattr(lens, name) for name in ("k1", "k2", "k3", "p1", "p2")}
+    brown = Brown(**terms, shear=sign * turn, convention=Convention.OPENPTV)
+    return replace(camera, principal_point=centre, distortion=brown, sensor=sensor), scale
+
+
+def _fitted(
+    start: Camera,
+    points: FloatArray,
+    media: FlatInterface | None,
+    target: FloatArray,
+    names: tuple[str, ...],
+) -> Camera:
+    """Return the camera of OpenPTV's convention that sees the points nearest to the target."""
+
+    def equations(camera: Camera) -> tuple[FloatArray, FloatArray] | None:
+        seen = project_with_jacobian(camera, points, media, camera_names=names)
+        if not np.isfinite(seen.image).all():
+            return None
+        return (seen.image - target).ravel(), seen.by_camera.reshape(-1, len(names))
+
+    def advance(camera: Camera, step: FloatArray) -> Camera | None:
+        try:
+            return camera.stepped(names, step)
+        except (InputError, GeometryError):
+            return None
+
+    what = f"camera {start.name} in OpenPTV's terms"
+    return minimise(start, equations, advance, what=what, most=60).state
+
+
+def _misfit(
+    camera: Camera,
+    points: FloatArray,
+    media: FlatInterface | None,
+    target: FloatArray,
+    sensor: Sensor,
+    scale: float,
+) -> float:
+    """Return the largest distance in the image, infinite where a point is not seen. [px]"""
+    miss = (project(camera, points, media) - target) * scale / sensor.pitch
+    largest = float(np.linalg.norm(miss, axis=1).max())
+    return largest if np.isfinite(largest) else np.inf
+
+
+def _sensor(camera: Camera) -> Sensor:
+    """Return the sensor of a camera, or raise InputError if it has none."""
+    if camera.sensor is None:
+        raise InputError(f"camera {camera.name}: OpenPTV needs its sensor.")
+    return camera.sensor
