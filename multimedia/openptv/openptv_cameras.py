@@ -136,9 +136,9 @@ def in_openptvs_terms(
     at_points = misfit > CLOSE and len(points) >= len(_FREE)
     if at_points:
         image = project(camera, points, media)
-        pixels = own.pixel_from_image(image)
-        inside = ((pixels > -0.5) & (pixels < (own.width, own.height))).all(axis=1)
-        target = sensor.image_from_pixel(pixels[inside]) / scale
+        places = own.pixel_from_image(image)
+        inside = ((places > -0.5) & (places < (own.width, own.height))).all(axis=1)
+        target = sensor.image_from_pixel(places[inside]) / scale
         nearer = _fitted(start, points[inside], media, target, EXTERIOR[:3] + _FREE)
         there = _misfit(nearer, points[inside], media, target, sensor, scale)
         at_points = there < misfit
