@@ -15,12 +15,12 @@ import numpy as np
 from multimedia.media.camera import EXTERIOR, Camera, Sensor
 from multimedia.media.flat_interface import FlatInterface
 from multimedia.media.interfaces import Interfaces
-from multimedia.media.projection import project, project_with_jacobian
+from multimedia.media.lens_conversion import farthest_miss, nearest_camera, sensor_rays
+from multimedia.media.projection import project
 from multimedia.refraction.layers import Layers
-from photocore.adjustment import minimise
 from photocore.arrays import FloatArray
 from photocore.distortion import Brown, Convention
-from photocore.errors import GeometryError, InputError
+from photocore.errors import InputError
 
 #: What OpenPTV has and a direction-preserving change of the camera may use.
 _FREE = (*EXTERIOR[3:], "c", "xh", "yh", "k1", "k2", "k3", "p1", "p2", "shear")
@@ -29,8 +29,6 @@ _FREE = (*EXTERIOR[3:], "c", "xh", "yh", "k1", "k2", "k3", "p1", "p2", "shear")
 FARTHEST = 1.2
 #: A misfit of rounding is none; from CLOSE on the object points say which camera is nearest. [px]
 NO_MISFIT, CLOSE = 1e-10, 0.05
-#: Points along the sides of the sensor at which cameras are compared.
-_GRID = (25, 21)
 #: OpenPTV's glass vector has no direction where its tip is in the origin: a picometre off it does.
 _SHORTEST = 1e-9
 
@@ -116,31 +114,21 @@ def in_openptvs_terms(
     object points.
     """
     own = _sensor(camera)
-    rows, columns = np.meshgrid(
-        *(np.linspace(0, side - 1, n) for side, n in zip((own.height, own.width), _GRID[::-1],
-          strict=True)), indexing="ij",
-    )  # fmt: skip
-    pixels = np.stack([columns, rows], axis=-1).reshape(-1, 2)
-    ideal = camera.distortion.ideal(own.image_from_pixel(pixels), camera.principal_point)
-    seen = np.isfinite(ideal).all(axis=1)
-    if not seen.any():
-        raise InputError(f"camera {camera.name}: its distortion cannot be undone on the sensor.")
-    vectors = np.column_stack([ideal, np.full(len(ideal), -camera.principal_distance)])[seen]
-    rays = camera.centre + vectors @ camera.rotation.T
+    rays, pixels = sensor_rays(camera)
     start, scale = _start(camera, own, sensor)
-    target = sensor.image_from_pixel(pixels[seen]) / scale
-    misfit = _misfit(start, rays, None, target, sensor, scale)
+    target = sensor.image_from_pixel(pixels) / scale
+    misfit = farthest_miss(start, rays, target * scale, scale=scale)
     if misfit > NO_MISFIT:
-        start = _fitted(start, rays, None, target, _FREE)
-        misfit = _misfit(start, rays, None, target, sensor, scale)
+        start = nearest_camera(start, rays, target, _FREE)
+        misfit = farthest_miss(start, rays, target * scale, scale=scale)
     at_points = misfit > CLOSE and len(points) >= len(_FREE)
     if at_points:
         image = project(camera, points, media)
         places = own.pixel_from_image(image)
         inside = ((places > -0.5) & (places < (own.width, own.height))).all(axis=1)
         target = sensor.image_from_pixel(places[inside]) / scale
-        nearer = _fitted(start, points[inside], media, target, EXTERIOR[:3] + _FREE)
-        there = _misfit(nearer, points[inside], media, target, sensor, scale)
+        nearer = nearest_camera(start, points[inside], target, EXTERIOR[:3] + _FREE, media=media)
+        there = farthest_miss(nearer, points[inside], target * scale, scale=scale, media=media)
         at_points = there < misfit
         start, misfit = (nearer, there) if at_points else (start, misfit)
     if not misfit <= FARTHEST:
@@ -230,45 +218,6 @@ def _start(camera: Camera, own: Sensor, sensor: Sensor) -> tuple[Camera, float]:
     terms = {name: sign * getattr(lens, name) for name in ("k1", "k2", "k3", "p1", "p2")}
     brown = Brown(**terms, shear=sign * turn, convention=Convention.OPENPTV)
     return replace(camera, principal_point=centre, distortion=brown, sensor=sensor), scale
-
-
-def _fitted(
-    start: Camera,
-    points: FloatArray,
-    media: FlatInterface | None,
-    target: FloatArray,
-    names: tuple[str, ...],
-) -> Camera:
-    """Return the camera of OpenPTV's convention that sees the points nearest to the target."""
-
-    def equations(camera: Camera) -> tuple[FloatArray, FloatArray] | None:
-        seen = project_with_jacobian(camera, points, media, camera_names=names)
-        if not np.isfinite(seen.image).all():
-            return None
-        return (seen.image - target).ravel(), seen.by_camera.reshape(-1, len(names))
-
-    def advance(camera: Camera, step: FloatArray) -> Camera | None:
-        try:
-            return camera.stepped(names, step)
-        except (InputError, GeometryError):
-            return None
-
-    what = f"camera {start.name} in OpenPTV's terms"
-    return minimise(start, equations, advance, what=what, most=60).state
-
-
-def _misfit(
-    camera: Camera,
-    points: FloatArray,
-    media: FlatInterface | None,
-    target: FloatArray,
-    sensor: Sensor,
-    scale: float,
-) -> float:
-    """Return the largest distance in the image, infinite where a point is not seen. [px]"""
-    miss = (project(camera, points, media) - target) * scale / sensor.pitch
-    largest = float(np.linalg.norm(miss, axis=1).max())
-    return largest if np.isfinite(largest) else np.inf
 
 
 def _sensor(camera: Camera) -> Sensor:
