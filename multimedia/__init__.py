@@ -52,6 +52,7 @@ Planning and simplified models
 Files
     read_project, write_project, Project, ImagePoints, ObjectPoints
     read_experiment, write_experiment     OpenPTV folders
+    convert, Conversion       cameras of COLMAP, Metashape, OpenCV, AquaCal, in and out
 
 Files in, files out: the command `multimedia`. Errors are ValueErrors with one message that says
 what is wrong, where, and how to mend it.

@@ -25,6 +25,7 @@ from .design.dispersion import (
 )
 from .design.simplified_models import Approximation, agrafiotis, lavest, telem
 from .design.studies import CalibrationCosts, Placement, Study
+from .exchange.workflow import Conversion, convert
 from .media.camera import Camera, Sensor
 from .media.flat_interface import FlatInterface
 from .media.height_field import RasterSurface, WaveSurface
@@ -86,6 +87,7 @@ __all__ = [
     "CalibrationCosts",
     "Camera",
     "Candidates",
+    "Conversion",
     "CorrectedPoints",
     "Cylinder",
     "EpipolarCurves",
@@ -94,8 +96,8 @@ __all__ = [
     "FlatInterface",
     "HOEHLE",
     "ImagePoints",
-    "IntersectedPoints",
     "Interfaces",
+    "IntersectedPoints",
     "Layers",
     "Material",
     "MeshSurface",
@@ -136,6 +138,7 @@ __all__ = [
     "calibration_costs",
     "colour_positions",
     "compare_placements",
+    "convert",
     "correct_bathymetry",
     "correct_dispersion",
     "correct_lidar_beams",

@@ -48,9 +48,7 @@ def read_foreign_lens(path: Path | str) -> LensData:
         return _opencv(path)
     text = read_text(path, "lens calibration")
     if "<!DOCTYPE" in text:
-        raise InputError(
-            f"{path}: declares a document type (DOCTYPE), which calibrations never do; remove it."
-        )
+        xml_root(path, text)  # refuses it
     if ending == ".xml":
         return _opencv(path) if "opencv_storage" in text[:500] else _metashape(path, text)
     if ending == ".txt":
@@ -68,48 +66,93 @@ def _colmap(path: Path, text: str) -> LensData:
             f"{path}: expected COLMAP's cameras.txt with one camera, found {len(rows)} lines; "
             "keep the line of this lens only."
         )
-    _, model, *numbers = rows[0]
+    return colmap_lens(rows[0], path)[0]
+
+
+#: COLMAP's models: number of parameters, which are fx fy cx cy, and which are OpenCV's
+#: coefficients, None for 0.
+_COLMAP: dict[str, tuple[int, tuple[int, int, int, int], Sequence[int | None]]] = {
+    "SIMPLE_PINHOLE": (3, (0, 0, 1, 2), ()),
+    "PINHOLE": (4, (0, 1, 2, 3), ()),
+    "SIMPLE_RADIAL": (4, (0, 0, 1, 2), (3, None, None, None)),
+    "RADIAL": (5, (0, 0, 1, 2), (3, 4, None, None)),
+    "OPENCV": (8, (0, 1, 2, 3), (4, 5, 6, 7)),
+    "OPENCV_FISHEYE": (8, (0, 1, 2, 3), (4, 5, 6, 7)),
+    "FULL_OPENCV": (12, (0, 1, 2, 3), (4, 5, 6, 7, 8, 9, 10, 11)),
+}
+
+
+def colmap_lens(words: Sequence[str], path: Path, *, more: bool = False) -> tuple[LensData, int]:
+    """Return the lens of one line of ``cameras.txt``, and how many of its words that took.
+
+    Parameters
+    ----------
+    words : sequence of str
+        CAMERA_ID, MODEL, WIDTH, HEIGHT, PARAMS[].
+    path : path
+        For messages.
+    more : bool
+        Whether anything may follow the parameters.
+    """
+    _, model, *numbers = words
+    known = _COLMAP.get(model)
+    count = known[0] if known and more else len(numbers) - 2
     try:
-        width, height, *p = (float(item) for item in numbers)
+        width, height, *p = (float(item) for item in numbers[: 2 + count])
     except ValueError:
-        raise InputError(f"{path}: {' '.join(rows[0])!r} is not a COLMAP camera line.") from None
-    forms: dict[str, tuple[int, Sequence[int], Sequence[int | None]]] = {
-        # model: (count, indices of fx fy cx cy, indices of the OpenCV coefficients or None for 0)
-        "SIMPLE_PINHOLE": (3, (0, 0, 1, 2), ()),
-        "PINHOLE": (4, (0, 1, 2, 3), ()),
-        "SIMPLE_RADIAL": (4, (0, 0, 1, 2), (3, None, None, None)),
-        "RADIAL": (5, (0, 0, 1, 2), (3, 4, None, None)),
-        "OPENCV": (8, (0, 1, 2, 3), (4, 5, 6, 7)),
-        "OPENCV_FISHEYE": (8, (0, 1, 2, 3), (4, 5, 6, 7)),
-        "FULL_OPENCV": (12, (0, 1, 2, 3), (4, 5, 6, 7, 8, 9, 10, 11)),
-    }
-    if model not in forms or len(p) != forms[model][0]:
+        raise InputError(f"{path}: {' '.join(words)!r} is not a COLMAP camera line.") from None
+    if known is None or len(p) != known[0]:
         raise InputError(f"{path}: COLMAP camera {model} with {len(p)} parameters is not read.")
-    _, (fx, fy, cx, cy), terms = forms[model]
+    _, (fx, fy, cx, cy), terms = known
     if not (p[fx] > 0 and p[fy] > 0):
         raise InputError(f"{path}: the focal lengths must be above zero [px].")
-    return LensData(
+    lens = LensData(
         camera_matrix(p[fx], p[fy] / p[fx], p[cx] - 0.5, p[cy] - 0.5),
         np.array([0.0 if i is None else p[i] for i in terms]),
         "fisheye" if model == "OPENCV_FISHEYE" else "opencv",
         (width, height),
         f"COLMAP {model}, {path.name}",
     )
+    return lens, 4 + count
 
 
 def _metashape(path: Path, text: str) -> LensData:
     """Read a Metashape camera calibration (frame camera)."""
-    try:
-        root = ElementTree.fromstring(text)
-    except ElementTree.ParseError as error:
-        raise InputError(f"{path}: is not valid XML ({error}).") from None
+    root = xml_root(path, text)
     node = root if root.tag == "calibration" else root.find(".//calibration")
     if node is None or node.findtext("projection") not in {"frame", "perspective"}:
         raise InputError(f"{path}: holds no frame calibration of Metashape.")
+    return metashape_lens(node, path)
+
+
+def xml_root(path: Path, text: str) -> ElementTree.Element:
+    """Return the root of an XML file.
+
+    Raises
+    ------
+    InputError
+        If it is not valid, or declares a document type, which could stand for anything.
+    """
+    if "<!DOCTYPE" in text:
+        raise InputError(
+            f"{path}: declares a document type (DOCTYPE), which calibrations never do; remove it."
+        )
+    try:
+        return ElementTree.fromstring(text)
+    except ElementTree.ParseError as error:
+        raise InputError(f"{path}: is not valid XML ({error}).") from None
+
+
+def metashape_lens(node: ElementTree.Element, path: Path) -> LensData:
+    """Return the lens of a ``calibration`` node; its size in elements or in ``resolution``."""
+    resolution = node.find("resolution")
 
     def value(name: str) -> float:
+        text = node.findtext(name)
+        if text is None and resolution is not None:
+            text = resolution.get(name)
         try:
-            return float(node.findtext(name) or 0.0)
+            return float(text or 0.0)
         except ValueError:
             raise InputError(f"{path}: <{name}> is not a number.") from None
 
