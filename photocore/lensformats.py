@@ -6,16 +6,18 @@ half a pixel more.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import re
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 from xml.etree import ElementTree
 
 import numpy as np
 
-from photocore.arrays import FloatArray
+from photocore.arrays import FloatArray, is_finite_number
 from photocore.camera import camera_matrix
-from photocore.errors import InputError
+from photocore.errors import LARGEST, InputError
+from photocore.jsonfile import read_object
 from photocore.textfile import check_name, read_text
 
 
@@ -174,34 +176,108 @@ def metashape_lens(node: ElementTree.Element, path: Path) -> LensData:
 
 def _opencv(path: Path) -> LensData:
     """Read an OpenCV FileStorage calibration."""
-    import cv2
-
-    try:
-        storage = cv2.FileStorage(str(path), cv2.FILE_STORAGE_READ)
-    except (cv2.error, SystemError) as error:
-        raise InputError(f"{path}: is not an OpenCV calibration file.") from error
+    values = opencv_values(path)
 
     def first(*names: str) -> FloatArray | None:
-        for name in names:
-            node = storage.getNode(name)
-            if not node.empty():
-                return np.asarray(node.mat() if node.isMap() else node.real(), dtype=np.float64)
-        return None
+        return next((values[name] for name in names if name in values), None)
 
-    try:
-        matrix = first("camera_matrix", "cameraMatrix", "Camera_Matrix", "K", "M1")
-        terms = first(
-            "distortion_coefficients", "dist_coeffs", "distCoeffs", "Distortion_Coefficients",
-            "D", "D1",
-        )  # fmt: skip
-        width, height = first("image_width", "image_Width"), first("image_height", "image_Height")
-    except (cv2.error, TypeError, ValueError) as error:
-        raise InputError(f"{path}: one of its matrices is damaged; export it again.") from error
-    finally:
-        storage.release()
+    matrix = first("camera_matrix", "cameraMatrix", "Camera_Matrix", "K", "M1")
+    terms = first(
+        "distortion_coefficients", "dist_coeffs", "distCoeffs", "Distortion_Coefficients",
+        "D", "D1",
+    )  # fmt: skip
+    width, height = first("image_width", "image_Width"), first("image_height", "image_Height")
     if matrix is None or matrix.shape != (3, 3) or terms is None:
         raise InputError(f"{path}: lacks camera_matrix (3x3) or distortion_coefficients.")
-    if width is None or height is None:
+    if width is None or height is None or width.size != 1 or height.size != 1:
         raise InputError(f"{path}: lacks image_width and image_height; add both.")
-    size = (float(width), float(height))
+    size = (float(width.item()), float(height.item()))
     return LensData(matrix, np.ravel(terms), "opencv", size, f"OpenCV, {path.name}")
+
+
+#: A number, a list or a matrix at the top of OpenCV's YAML; ROS leaves tag and dt out.
+_YAML = re.compile(
+    r"^(?P<key>\w+):[ \t]*(?:(?P<number>[-+.\w]+)[ \t]*$|\[(?P<list>[^\]\[]*)\]"
+    r"|(?:!!opencv-matrix)?\s*\n[ \t]+rows:\s*(?P<rows>\d{1,6})\s+cols:\s*(?P<cols>\d{1,6})\s+"
+    r"(?:dt:[^\n]*\s+)?data:\s*\[(?P<data>[^\]\[]*)\])",
+    re.MULTILINE,
+)
+
+
+def opencv_values(path: Path) -> dict[str, FloatArray]:
+    """Return the numbers, lists and matrices at the top of an OpenCV file by their names.
+
+    YAML and XML of ``FileStorage``, its JSON, and JSON with lists of numbers. Parsed here: OpenCV's
+    own reader corrupts memory on damaged files.
+
+    Raises
+    ------
+    InputError
+        If the file is no such file, or a matrix is damaged.
+    """
+    ending = path.suffix.lower()
+    if ending == ".json":
+        return _json_values(path)
+    text = read_text(path, "lens calibration")
+    return _xml_values(path, text) if ending == ".xml" else _yaml_values(path, text)
+
+
+def _json_values(path: Path) -> dict[str, FloatArray]:
+    found = {}
+    for key, value in read_object(path, what="OpenCV calibration").items():
+        if isinstance(value, Mapping) and {"rows", "cols", "data"} <= value.keys():
+            found[key] = _table(path, key, value["data"], [value["rows"], value["cols"]])
+        elif isinstance(value, list) or is_finite_number(value):
+            found[key] = _table(path, key, value, None)
+    return found
+
+
+def _xml_values(path: Path, text: str) -> dict[str, FloatArray]:
+    root = xml_root(path, text)
+    if root.tag != "opencv_storage":
+        raise InputError(f"{path}: is not an OpenCV calibration file.")
+    found = {}
+    for node in root:
+        words = (node.findtext("data") or node.text or "").split()
+        if node.find("data") is not None:
+            shape = [node.findtext("rows"), node.findtext("cols")]
+            found[node.tag] = _table(path, node.tag, words, shape)
+        elif words and all(map(_is_number, words)):
+            found[node.tag] = np.array([float(word) for word in words])
+    return found
+
+
+def _yaml_values(path: Path, text: str) -> dict[str, FloatArray]:
+    if not re.search(r"^\w+:", text, re.MULTILINE):
+        raise InputError(f"{path}: is not an OpenCV calibration file.")
+    found = {}
+    for match in _YAML.finditer(text):
+        words = (match["number"] or match["list"] or match["data"] or "").replace(",", " ").split()
+        if match["rows"] is not None:
+            shape = [match["rows"], match["cols"]]
+            found[match["key"]] = _table(path, match["key"], words, shape)
+        elif words and all(map(_is_number, words)):
+            found[match["key"]] = np.array([float(word) for word in words])
+    return found
+
+
+def _is_number(word: str) -> bool:
+    try:
+        return bool(np.isfinite(float(word)))
+    except ValueError:
+        return False
+
+
+def _table(path: Path, key: str, data: Any, shape: Sequence[Any] | None) -> FloatArray:
+    """Return numbers, of a shape if one is stated; refuse what is none."""
+    try:
+        table = np.array(data, dtype=np.float64)
+        if shape is not None:
+            table = table.reshape(tuple(int(side) for side in shape))
+    except (TypeError, ValueError, OverflowError):
+        raise InputError(
+            f"{path}: the matrix {key} is damaged; export the calibration again."
+        ) from None
+    if not (np.abs(table) <= LARGEST).all():
+        raise InputError(f"{path}: {key} holds what is no finite number.")
+    return table

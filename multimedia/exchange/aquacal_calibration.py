@@ -143,7 +143,7 @@ def _surface(project: Project, k: int) -> FlatInterface:
     if not isinstance(media, FlatInterface) or len(media.indices) != 2 or media.moves_with_camera:
         raise InputError(
             f"camera {camera.name}: AquaCal knows one water surface that stands still, air above "
-            "and water below, not what this camera looks through."
+            "and water below, not what this camera looks through; choose COLMAP for glass."
         )
     if abs(abs(media.normal[2]) - 1.0) > _LEVEL:
         raise InputError(

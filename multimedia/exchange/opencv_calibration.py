@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -18,8 +17,7 @@ from multimedia.media.camera import Camera
 from multimedia.projects.model import Project
 from photocore.arrays import FloatArray
 from photocore.errors import InputError
-from photocore.jsonfile import read_object
-from photocore.lensformats import LensData
+from photocore.lensformats import LensData, opencv_values
 from photocore.output import all_or_none, atomic_path, check_all_writable
 from photocore.rotation import checked_rotation, rotation_from_vector
 from photocore.textfile import check_name
@@ -55,8 +53,7 @@ def read_opencv(path: Path, *, pitch: float, unit: str) -> Project:
     cameras: list[Camera] = []
     remarks: list[str] = []
     for file in files:
-        get = _json(file) if file.suffix.lower() == ".json" else _storage(file)
-        found, said = _cameras(file, get, pitch)
+        found, said = _cameras(file, opencv_values(file).get, pitch)
         cameras += found
         remarks += said
     if not cameras:
@@ -152,57 +149,3 @@ def _pose(
 
 def _first(get: _Get, *names: str) -> FloatArray | None:
     return next((value for name in names if (value := get(name)) is not None), None)
-
-
-def _storage(path: Path) -> _Get:
-    """Return the look-up in a FileStorage, whose content is read at once."""
-    import cv2
-
-    text = path.read_text(encoding="utf-8", errors="replace") if path.is_file() else None
-    if text is None:
-        raise InputError(f"{path}: no such file.")
-    try:
-        storage = cv2.FileStorage(str(path), cv2.FILE_STORAGE_READ)
-    except (cv2.error, SystemError) as error:
-        raise InputError(f"{path}: is not an OpenCV calibration file.") from error
-    if not storage.isOpened():
-        raise InputError(f"{path}: is not an OpenCV calibration file.")
-    found: dict[str, FloatArray] = {}
-    try:
-        for key in storage.root().keys():  # noqa: SIM118
-            node = storage.getNode(key)
-            if node.isMap():
-                found[key] = np.asarray(node.mat(), dtype=np.float64)
-            elif node.isSeq():
-                values = [node.at(k).real() for k in range(node.size())]
-                found[key] = np.array(values, dtype=np.float64)
-            elif node.isInt() or node.isReal():
-                found[key] = np.array(node.real(), dtype=np.float64)
-    except (cv2.error, TypeError, ValueError) as error:
-        raise InputError(f"{path}: one of its matrices is damaged; export it again.") from error
-    finally:
-        storage.release()
-    return found.get
-
-
-def _json(path: Path) -> _Get:
-    """Return the look-up in a JSON object: lists of numbers, or OpenCV's own matrices."""
-    data = read_object(path, what="OpenCV calibration")
-
-    def get(key: str) -> FloatArray | None:
-        value: Any = data.get(key)
-        if value is None:
-            return None
-        try:
-            if isinstance(value, Mapping):
-                shape = (int(value["rows"]), int(value["cols"]))
-                table = np.array(value["data"], dtype=np.float64).reshape(shape)
-            else:
-                table = np.array(value, dtype=np.float64)
-        except (KeyError, TypeError, ValueError):
-            raise InputError(f"{path}: {key} must hold numbers, found {value!r:.60}.") from None
-        if not np.isfinite(table).all():
-            raise InputError(f"{path}: {key} holds what is no finite number.")
-        return table
-
-    return get

@@ -283,6 +283,30 @@ def test_metashape_sees_the_same_pixels_and_comes_back(tmp_path):
             assert np.abs(pixels(got, points) - theirs).max() < 1e-8
 
 
+def test_xml_of_opencv_and_yaml_of_ros_are_read_and_nothing_crashes(tmp_path):
+    matrix = np.array([[900.0, 0, 320.5], [0, 905.0, 239.0], [0, 0, 1]])
+    storage = cv2.FileStorage(str(tmp_path / "a.xml"), cv2.FILE_STORAGE_WRITE)
+    for key, value in (("image_width", 640), ("image_height", 480), ("camera_matrix", matrix),
+                       ("distortion_coefficients", np.array([[-0.2, 0.05, 0, 0, 0]]))):  # fmt: skip
+        storage.write(key, value)
+    storage.release()
+    (tmp_path / "b.yaml").write_text(
+        "image_width: 640\nimage_height: 480\ncamera_name: left\ncamera_matrix:\n  rows: 3\n"
+        "  cols: 3\n  data: [900., 0., 320.5, 0., 905.,\n    239., 0., 0., 1.]\n"
+        "distortion_model: plumb_bob\ndistortion_coefficients:\n  rows: 1\n  cols: 5\n"
+        "  data: [-0.2, 0.05, 0., 0., 0.]\n"
+    )
+    one, two = (convert(tmp_path / n, tmp_path / f"{n}.toml").project for n in ("a.xml", "b.yaml"))
+    seen = [pixels(p.cameras[0], POINTS + np.array([0, 0, 2])) for p in (one, two)]
+    assert np.isfinite(seen[0]).all()
+    assert np.array_equal(*seen)
+    assert "has no pose" in one.remarks[0]
+    text = (tmp_path / "a.xml").read_text()
+    (tmp_path / "a.xml").write_text(text.replace("905", "9 05"))
+    with pytest.raises(InputError, match="camera_matrix is damaged"):
+        convert(tmp_path / "a.xml", tmp_path / "c.toml")
+
+
 @pytest.mark.parametrize("ending", [".yml", ".json"])
 def test_opencv_sees_the_same_pixels_and_comes_back(tmp_path, ending):
     content = made(cameras(k3=1e-8)[:1])
@@ -381,7 +405,7 @@ def test_other_conventions_of_distortion_are_met_and_the_rest_said(tmp_path):
         ("a.json", '{"cameras": {"c": {}}, "interface": {"normal": [0, 0, -1], "n_air": 1, '
          '"n_water": 1.33}}', "camera c: intrinsics is missing"),
         ("a.json", '{"K": [[1, 0], [0, 1]]}', "lacks image_width"),
-        ("a.json", '{"K": [["x"]], "image_size": [9, 9]}', "K must hold numbers"),
+        ("a.json", '{"K": [["x"]], "image_size": [9, 9]}', "matrix K is damaged"),
         ("a.xml", "<document><chunk/></document>", "holds no aligned camera"),
         ("a.xml", "<document>", "not valid XML"),
         ("a.yml", "hello", "not an OpenCV calibration"),
