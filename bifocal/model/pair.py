@@ -330,6 +330,11 @@ class Pair:
         return self.folder / file
 
     @property
+    def photo_files(self) -> tuple[Path, ...]:
+        """The image files that are named, of none to both photos."""
+        return tuple(self.photo_file(k) for k in (1, 2) if self.photo(k).file)
+
+    @property
     def as_given(self) -> tuple[Photo, Photo]:
         """The photos in the order they were given, not far before near."""
         return (self.image2, self.image1) if self.exchanged else (self.image1, self.image2)

@@ -236,6 +236,11 @@ IN_PLACE = [
     ("bifocal calibrate far.jpg --lines lines.csv --out {}", "lines.csv"),
     ("bifocal calibrate far.jpg --database --out {}", "far.jpg"),
     ("bifocal ortho wall.pair.json --relief relief.tif --out {}", "relief.tif"),
+    (
+        "bifocal ortho wall.pair.json --relief relief.tif --deliver d --scale 1:100 --out {}",
+        "relief.tif",
+    ),
+    ("bifocal mosaic ortho1.tif ortho2.tif --relief relief.tif --out {}", "relief.tif"),
     ("multimedia waterlevel cloud.csv --out {}", "cloud.csv"),
     ("multimedia shift shift.csv --z0 1 --indices 1,1.337 --out {}", "shift.csv"),
     (f"{ALIGN} --control control.csv --picture {{}}", "far.jpg"),
