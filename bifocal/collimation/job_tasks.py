@@ -219,8 +219,19 @@ def finish(session: Session, task: Mapping[str, Any], result: Mapping[str, Any])
     return _told(result)
 
 
-#: The advice to use an option of the command line, which the page does not have.
-_OPTION = re.compile(r"[:;,]?\s*--[a-z][^;.]*(?=[;.]|$)")
+#: An option of the command line, which the page does not have, with its value.
+_OPTION = r"--[a-z][\w-]*(?: (?:[A-Z]+|\d[\d.]*)(?:,(?:[A-Z]+|\d[\d.]*))*)?"
+#: Advice to use one: in brackets of its own; a clause that begins with it; its last words. What
+#: else is said stays, and so does the name of the option.
+_ADVICE = tuple(
+    (re.compile(pattern), instead)
+    for pattern, instead in (
+        (rf" \({_OPTION}(?:(?:,| or| and) {_OPTION})*\)", ""),
+        (rf"[:;] {_OPTION} [a-z][^;.]*", ""),
+        (rf"(?:, give| and give| with) {_OPTION}|, {_OPTION}(?=\))", ""),
+        (r"--(?=[a-z])", ""),
+    )
+)
 
 
 def _told(result: Mapping[str, Any]) -> str:
@@ -230,5 +241,14 @@ def _told(result: Mapping[str, Any]) -> str:
     --------
     >>> _told({"remarks": ["35% of it is empty: --fill closes holes; --complete marks it."]})
     '35% of it is empty.'
+    >>> _told({"remarks": ["Distortion (calibrate, give --lens), or refraction. Check it."]})
+    'Distortion (calibrate), or refraction. Check it.'
+    >>> _told({"remarks": ["+12 mm, 30 % (--wall 120,130): name a spot with --wall COL,ROW."]})
+    '+12 mm, 30 %: name a spot.'
     """
-    return " ".join(_OPTION.sub("", str(remark)).strip() for remark in result.get("remarks", ()))
+    told = []
+    for remark in map(str, result.get("remarks", ())):
+        for pattern, instead in _ADVICE:
+            remark = pattern.sub(instead, remark)
+        told.append(remark.strip())
+    return " ".join(told)

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from bifocal import Pair, ReliefMap
+from bifocal.collimation import job_process
 from bifocal.collimation.live_orientation import live_orientation
 from bifocal.collimation.project import find_files
 from bifocal.collimation.records import PickedControl, SurveyState
@@ -328,3 +329,19 @@ def test_precision_contours_lie_where_picks_are_that_precise(tmp_path) -> None:
             point = session.state.points[f"Q{number}"]
             # Between the nodes of the grid the line is straight.
             assert session.results.row(point)["sigma_r"] == pytest.approx(sigma / 1000, rel=0.03)
+
+
+def test_a_drawing_without_title_is_called_as_its_pair_file(tmp_path, monkeypatch) -> None:
+    titles = []
+
+    def noted(*given, **_):
+        titles.append(given[3].title)
+        raise InputError("enough")
+
+    monkeypatch.setattr(job_process, "deliver", noted)
+    monkeypatch.setattr(job_process, "_ortho_task", lambda task: task)
+    blank = dict.fromkeys(["scale", "dpi", "title", "paper", "marked", "sections", "overwrite"])
+    task = {**blank, "pair": str(sample_folder(tmp_path) / "facade.pair.json"), "out": "d"}
+    with pytest.raises(InputError, match="enough"):
+        job_process._deliver(task, lambda *_: None)
+    assert titles == ["facade"]
