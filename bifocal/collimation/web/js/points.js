@@ -189,7 +189,8 @@ export class PointsStage {
       }
       const place = pane.screen(proposal.image, [proposal.column, proposal.row]);
       drawing.marker(context, proposal.image, place, { selected: true, proposed: true });
-      drawing.label(context, `? ${Math.round(100 * proposal.quality)} %`, [place[0] + 16, place[1] + 18],
+      const sure = proposal.quality === null ? "" : ` ${Math.round(100 * proposal.quality)} %`;
+      drawing.label(context, `?${sure}`, [place[0] + 16, place[1] + 18],
         drawing.INK[proposal.image]);
     }
     if (cursor?.pane === pane) {
@@ -231,11 +232,13 @@ export class PointsStage {
     this.buttons.pick.setAttribute("aria-pressed", String(picking));
     for (const key of ["suggest", "snap"]) this.buttons[key].disabled = !selected;
     this.buttons.accept.disabled = !proposal && !this.picker.lacking;
-    const level = !proposal ? "" : proposal.kept ? "good" : proposal.quality > 0.5 ? "fair" : "poor";
-    const words = proposal ? t(`quality.${level}`, { percent: Math.round(100 * proposal.quality),
+    // How sure another place is that fits as well, nobody knows.
+    const known = Boolean(proposal) && proposal.quality !== null;
+    const level = !known ? "" : proposal.kept ? "good" : proposal.quality > 0.5 ? "fair" : "poor";
+    const words = known ? t(`quality.${level}`, { percent: Math.round(100 * proposal.quality),
       sigma: proposal.sigma_px?.toFixed(2) ?? "?" }) : "";
     const others = proposal?.others?.length ?? 0;
-    setText(this.quality, others ? `${words} ${t("quality.others", { count: others })}` : words);
+    setText(this.quality, [words, others && t("quality.others", { count: others })].filter(Boolean).join(" "));
     this.quality.dataset.level = level;
     this.readout.update();
     this.list.mark();
