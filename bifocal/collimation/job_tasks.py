@@ -187,6 +187,7 @@ def _write_control(session: Session, control: Control) -> dict[str, Path | None]
             "from": [control.ids[i] for i in starts],
             "to": [control.ids[i] for i in ends],
             "length [m]": np.array(lengths),
+            "sigma [m]": np.array(control.sigma_lengths),
         }
     for key, content in contents.items():
         path = session.products.place(key, f".{key}.csv")

@@ -85,17 +85,15 @@ def control_of(state: SurveyState) -> Control:
     on_wall = np.isfinite(xyz[:, :2]).all(axis=1) & np.isnan(xyz[:, 2])
     xyz[on_wall, 2], sigma[on_wall, 2] = 0.0, SIGMA_ON_WALL
     index = {point.name: number for number, point in enumerate(points)}
+    tapes = [tape for tape in state.tapes.values() if tape.start in index and tape.end in index]
     return Control(
         ids=tuple(index),
         xyz=xyz,
         sigma=sigma,
         pixels1=np.array([p.picks[0] or nowhere for p in points], dtype=float).reshape(-1, 2),
         pixels2=np.array([p.picks[1] or nowhere for p in points], dtype=float).reshape(-1, 2),
-        lengths=tuple(
-            (index[tape.start], index[tape.end], tape.length)
-            for tape in state.tapes.values()
-            if tape.start in index and tape.end in index
-        ),
+        lengths=tuple((index[tape.start], index[tape.end], tape.length) for tape in tapes),
+        sigma_lengths=tuple(tape.sigma or np.nan for tape in tapes),
     )
 
 
