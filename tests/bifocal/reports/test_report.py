@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 import re
 from hashlib import sha256
@@ -16,6 +17,7 @@ from bifocal.cli.main import main
 from bifocal.demo import SAMPLE
 from bifocal.reports.pair_report import _provenance
 from bifocal.reports.words import LANGUAGES, _content, words_in
+from bifocal.reports.workflow import ReportTask, find_pairs
 from tests.bifocal.campaigns.sample_tables import write_tables
 
 PAIR = SAMPLE / "facade.pair.json"
@@ -118,6 +120,18 @@ def test_photos_of_one_name_in_two_folders_have_a_hash_each(tmp_path):
     *_, table = _provenance(content, words_in("en"))
     named = [[path.name, sha256(path.read_bytes()).hexdigest()] for path in files]
     assert table.rows[1:] == named
+
+
+def test_a_pair_in_the_frame_of_all_pairs_is_told_by_that_pair_file(tmp_path):
+    for name, inputs in (("a", {"pair": ["a.pair.json", "1"]}), ("b", {"far": ["far.jpg", "2"]})):
+        for path in (f"{name}/align/{name}.pair.json", f"joint/{name}.pair.json"):
+            (tmp_path / path).parent.mkdir(parents=True, exist_ok=True)
+            (tmp_path / path).touch()
+        (tmp_path / name / "relief").mkdir()
+        (tmp_path / name / "relief" / ".made.json").write_text(json.dumps({"inputs": inputs}))
+    sources, _ = find_pairs(tmp_path, ReportTask())
+    own = tmp_path / "b" / "align" / "b.pair.json"  # made before the frame of all was dropped
+    assert sources == [tmp_path / "joint" / "a.pair.json", own]
 
 
 def numbers(text: str) -> list[float]:
