@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping
 from dataclasses import asdict
 from functools import partial
@@ -16,6 +15,7 @@ from bifocal.collimation.drawing import write_points_drawing
 from bifocal.collimation.jobs import PageJob
 from bifocal.collimation.live_orientation import control_of, lenses_of, site_of
 from bifocal.collimation.session import Session
+from bifocal.collimation.wording import without_options
 from bifocal.orientation.control_points import Control
 from photocore.errors import InputError
 from photocore.jsonfile import plain
@@ -220,36 +220,6 @@ def finish(session: Session, task: Mapping[str, Any], result: Mapping[str, Any])
     return _told(result)
 
 
-#: An option of the command line, which the page does not have, with its value.
-_OPTION = r"--[a-z][\w-]*(?: (?:[A-Z]+|\d[\d.]*)(?:,(?:[A-Z]+|\d[\d.]*))*)?"
-#: Advice to use one: in brackets of its own; a clause that begins with it; its last words. What
-#: else is said stays, and so does the name of the option.
-_ADVICE = tuple(
-    (re.compile(pattern), instead)
-    for pattern, instead in (
-        (rf" \({_OPTION}(?:(?:,| or| and) {_OPTION})*\)", ""),
-        (rf"[:;] {_OPTION} [a-z][^;.]*", ""),
-        (rf"(?:, give| and give| with) {_OPTION}|, {_OPTION}(?=\))", ""),
-        (r"--(?=[a-z])", ""),
-    )
-)
-
-
 def _told(result: Mapping[str, Any]) -> str:
-    """Return the remarks of a job without advice for the command line.
-
-    Examples
-    --------
-    >>> _told({"remarks": ["35% of it is empty: --fill closes holes; --complete marks it."]})
-    '35% of it is empty.'
-    >>> _told({"remarks": ["Distortion (calibrate, give --lens), or refraction. Check it."]})
-    'Distortion (calibrate), or refraction. Check it.'
-    >>> _told({"remarks": ["+12 mm, 30 % (--wall 120,130): name a spot with --wall COL,ROW."]})
-    '+12 mm, 30 %: name a spot.'
-    """
-    told = []
-    for remark in map(str, result.get("remarks", ())):
-        for pattern, instead in _ADVICE:
-            remark = pattern.sub(instead, remark)
-        told.append(remark.strip())
-    return " ".join(told)
+    """Return the remarks of a job without advice for the command line."""
+    return " ".join(without_options(str(remark)) for remark in result.get("remarks", ()))

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from bifocal.collimation.records import PickedControl, SurveyState
-from bifocal.collimation.wording import say
+from bifocal.collimation.wording import say, without_options
 from bifocal.files.images import ImageInfo
 from bifocal.model.orientation_precision import CAMERA, NAMES
 from bifocal.orientation.absolute_orientation import orient_pair
@@ -124,9 +124,8 @@ def live_orientation(state: SurveyState, infos: list[ImageInfo], language: str) 
             site=site_of(state),
         )
     except PhotogrammetryError as error:
-        return LiveOrientation(
-            error=str(error), deviations={}, residuals={}, advice=(*hints, str(error))
-        )
+        told = without_options(str(error))
+        return LiveOrientation(error=told, deviations={}, residuals={}, advice=(*hints, told))
     adjusted = oriented.adjusted
     residuals = adjusted.control_residuals
     if oriented.exchanged:

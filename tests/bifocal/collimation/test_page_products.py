@@ -363,3 +363,12 @@ def test_a_tape_weighs_as_it_is_said_to_be_good(tmp_path) -> None:
     assert read.lengths == control.lengths == ((0, 1, 4.4), (0, 2, 4.4))
     for found in (read, control):
         assert found.sigma_lengths == pytest.approx((0.05, np.nan), nan_ok=True)
+
+
+def test_remarks_on_an_orientation_name_no_option_of_the_command_line(tmp_path) -> None:
+    with opened(sample_folder(tmp_path)) as session:
+        report = {"remarks": ["CHECK THE WALL: +12 mm (--wall 120,130). Give control points."]}
+        session.proposal = {"op": "proposed", "pair": "none.pair.json", "report": report}
+        state = client_of(session).get("/api/state").json()
+        session.proposal = None
+    assert state["pair"]["remarks"] == ["CHECK THE WALL: +12 mm. Give control points."]
