@@ -13,6 +13,7 @@ from bifocal.files.images import read_grey
 from bifocal.model.orientation_precision import NAMES, pinhole
 from bifocal.model.pair import Pair
 from bifocal.model.photo import Photo
+from bifocal.orientation.align_workflow import SIGMA_ON_WALL
 from bifocal.orientation.control_points import Control, read_control
 from bifocal.orientation.features import Features, find_features
 from bifocal.orientation.joint_adjustment import (
@@ -266,7 +267,7 @@ def _tables(paths: Sequence[Path], pairs: Sequence[Pair], task: JointTask) -> Na
             if path is None:
                 continue
             part = read_control(
-                path, sigma=task.sigma_control, sigma_plane=task.sigma_control, unit=task.unit
+                path, sigma=task.sigma_control, sigma_plane=SIGMA_ON_WALL, unit=task.unit
             )
             if pairs[index].exchanged:
                 part = part.exchanged()

@@ -15,7 +15,7 @@ from bifocal.model.pair import Pair
 from bifocal.orientation import joint_adjustment
 from bifocal.orientation.joint_adjustment import adjust_jointly, with_rays
 from bifocal.orientation.joint_ties import SharedPoints, into_one_frame, near_each_other
-from bifocal.orientation.joint_workflow import _adjusted_photo, adjust_pairs
+from bifocal.orientation.joint_workflow import JointTask, _adjusted_photo, _tables, adjust_pairs
 from photocore.errors import GeometryError, InputError
 from photocore.rotation import rotation_from_vector
 from photocore.similarity import Similarity
@@ -217,3 +217,11 @@ def test_a_rendered_street_is_adjusted_by_the_command(tmp_path):
     assert "--overwrite" in again.stderr
     one = CliRunner().invoke(main, ["adjust", str(paths[0]), "--out", str(tmp_path / "x")])
     assert "two pair files" in one.stderr
+
+
+def test_a_control_point_without_relief_is_on_the_wall_as_for_align(tmp_path):
+    (tmp_path / "c.csv").write_text("id,X,Y,r,col1,row1,col2,row2\nA,1,2,,5,6,7,8\n")
+    pair = Pair.ideal(d1=17.5, d2=9.5)
+    named = _tables([tmp_path / "a.json"], [pair], JointTask(control=(tmp_path / "c.csv",)))
+    np.testing.assert_array_equal(named.xyz, [[1.0, 2.0, 0.0]])
+    np.testing.assert_array_equal(named.sigma, [[0.003, 0.003, 0.005]])
