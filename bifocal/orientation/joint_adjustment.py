@@ -28,6 +28,8 @@ ROUNDS = 8
 COARSE, FAR_OFF = 3, 10.0
 #: Rounding error of pixels and metres, as a share of their standard deviations.
 ROUNDING = 1e-9
+#: Redundancy from which rays of one stated precision tell how good they truly are.
+ENOUGH = 20.0
 #: Of fewer points with known coordinates no frame follows.
 FEWEST_KNOWN = 3
 
@@ -379,18 +381,35 @@ def _sigma0(fit: Fit[JointUnknowns], system: _System) -> float:
     )
 
 
+def _units(
+    residuals: FloatArray, redundancy: FloatArray, sigma: FloatArray, sigma0: float
+) -> FloatArray:
+    """Return the unit of each residual, by all rays of its stated precision, shape (n,).
+
+    Features that are better than was believed must not make gross errors of honest picks.
+    """
+    _, group = np.unique(sigma, return_inverse=True)
+    squares = np.bincount(group, weights=residuals**2)
+    free = np.bincount(group, weights=redundancy)
+    own = np.where(free >= ENOUGH, np.sqrt(squares / np.maximum(free, 1.0)), 1.0)
+    return np.maximum(own, sigma0)[group]
+
+
 def _gross(
     seen: JointObservations, system: _System, fit: Fit[JointUnknowns], sigma0: float
 ) -> tuple[BoolArray, FloatArray, list[Blunder]]:
     """Return which rays stay, the coordinates that stay known, and what goes: the worst of each.
 
-    A ray is judged by the larger of its two coordinates.
+    A ray is judged by the larger of its two coordinates, and by the rays of its own precision.
     """
-    tests = standardised(fit.residuals, fit.linear.redundancy_numbers, sigma0)
+    count = 2 * len(seen.camera)
+    tests = standardised(fit.residuals, fit.linear.redundancy_numbers)
     tests = np.abs(np.nan_to_num(tests))
-    rays = tests[: 2 * len(seen.camera)].reshape(-1, 2).max(axis=1, initial=0.0)
-    # Rays are more precise than they were believed to be; of control that says nothing.
-    coordinates = tests[2 * len(seen.camera) :][: len(system.fixed)] * min(sigma0, 1.0)
+    units = _units(fit.residuals[:count], fit.linear.redundancy_numbers[:count],
+                   np.repeat(seen.sigma, 2), sigma0)  # fmt: skip
+    rays = (tests[:count] / units).reshape(-1, 2).max(axis=1, initial=0.0)
+    # That rays are more precise than they were believed to be says nothing of control.
+    coordinates = tests[count:][: len(system.fixed)] / max(sigma0, 1.0)
     worst = np.zeros(len(seen.ids))
     np.maximum.at(worst, seen.point, rays)
     np.maximum.at(worst, system.fixed[:, 0], coordinates)

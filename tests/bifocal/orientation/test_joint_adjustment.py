@@ -80,6 +80,18 @@ def test_what_is_known_of_focal_lengths_counts_once_however_many_rounds_there_ar
     assert np.abs(drift).max() < 2e-3
 
 
+def test_features_better_than_believed_make_no_gross_errors_of_honest_picks():
+    """Features are good to 0.1 px and believed to be 0.5, picks of 0.4 px are stated as such."""
+    case = many_pairs(3, np.random.default_rng(8), control=6, noise=0.1)
+    o, rng = case.observations, np.random.default_rng(9)
+    picks = o.point < 30
+    pixels = o.pixels.copy()
+    pixels[picks] += rng.normal(0, np.sqrt(0.4**2 - 0.1**2), (picks.sum(), 2))
+    got = adjust_jointly(replace(o, pixels=pixels, sigma=np.where(picks, 0.4, 0.5)), case.start)
+    assert got.sigma0 < 0.6
+    assert got.blunders == ()
+
+
 def test_a_control_point_without_a_good_ray_says_nothing_more():
     case = many_pairs(4, np.random.default_rng(6), control=8)
     o = case.observations
