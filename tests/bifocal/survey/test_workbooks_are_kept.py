@@ -109,6 +109,38 @@ def test_options_are_written_into_the_cells_of_the_users_workbook(tmp_path, opti
             assert other[key] == pytest.approx(one[key], rel=1e-9, abs=1e-12)
 
 
+@pytest.mark.parametrize("far_first", [True, False])
+def test_a_centre_of_zoom_that_was_found_goes_into_the_cells_too(tmp_path, far_first):
+    """The near camera stands 6 cm aside: relief spreads from elsewhere than the nadir."""
+    rng = np.random.default_rng(8)
+    xyz = rng.uniform([-5, -3, -0.5], [5, 3, 0.6], (30, 3))
+    xyz[:14, 2] = 0.0
+    photos = (((0.0, 0.0), 17.5, 35), ((0.06, -0.04), 9.5, 19))
+    seen = [
+        (nadir + (xyz[:, :2] - nadir) * (d / (d - xyz[:, 2]))[:, None]) * c / d
+        for nadir, d, c in photos
+    ]
+    lenses = ("--d1", 17.5, "--d2", 9.5, "--c1", 35, "--c2", 19)
+    if not far_first:
+        seen, lenses = seen[::-1], ("--d1", 9.5, "--d2", 17.5, "--c1", 19, "--c2", 35)
+    rows = [
+        f"P{i}," + ",".join(map(repr, row)) + (",PLANE" if i < 14 else ",")
+        for i, row in enumerate(np.hstack(seen).tolist())
+    ]
+    table = write_csv(tmp_path / "p.csv", "\n".join(["id,x1,y1,x2,y2,code", *rows, ""]))
+    path = tmp_path / "s.xlsx"
+    assert run("solve", table, "--out", path, *lenses).exit_code == 0
+    found = json.loads(run("solve", path, "--adjust-setup", "--json").stdout)["points"]
+    away = np.hypot(xyz[:, 0], xyz[:, 1]) > 1.5
+    relief = np.array([point["r"] for point in found], float)
+    np.testing.assert_allclose(relief[away], xyz[away, 2], atol=1e-3)
+    solved_in_place(path, "--adjust-setup")
+    again = json.loads(run("solve", path, "--json").stdout)["points"]
+    for one, other in zip(found, again, strict=True):
+        for key in ("r", "X", "Y", "sigma_r"):
+            assert other[key] == pytest.approx(one[key], rel=1e-9, abs=1e-12)
+
+
 def test_another_language_changes_labels_and_nothing_the_user_wrote(tmp_path):
     path = with_own_chart(fill(tmp_path / "own.xlsx"))
     book = openpyxl.load_workbook(path)
