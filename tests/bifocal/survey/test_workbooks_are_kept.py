@@ -524,3 +524,41 @@ def test_a_coordinate_survey_becomes_one_for_pixels_in_a_new_workbook_only(tmp_p
     # The way out of the other direction is the same.
     result = run("solve", out, "--out", out, "--overwrite")
     assert result.exit_code == 0, result.stderr
+
+
+def test_new_rows_of_an_older_workbook_calculate_as_those_above(tmp_path):
+    """Its tables lack the columns that formulas of today name: Excel would refuse the file."""
+    path = tmp_path / "s.xlsx"
+    assert (
+        run("solve", write_csv(tmp_path / "p.csv", TABLE), "--out", path, *DISTANCES).exit_code == 0
+    )
+    book = openpyxl.load_workbook(path)
+    for name in ("g_space", "g_space_block"):
+        del book.defined_names[name]
+    points, results = book["Points"], book["Results"]
+    column = [cell.value for cell in results[4]].index("sigma_E") + 1
+    last = results.max_row
+    for row in range(5, last + 1):
+        results.cell(row, column).value = "=ROWS(tblPoints[id])"
+    for row in range(last + 1, last + 9):
+        for number in range(1, 6):
+            points.cell(row, number).value = points.cell(5, number).value
+        points.cell(row, 1).value = f"Q{row}"
+    book.save(path)
+    solved_in_place(path)
+    sheet = openpyxl.load_workbook(path)["Results"]
+    assert sheet.cell(last + 8, 1).value.startswith("=")
+    assert {sheet.cell(row, column).value for row in range(5, last + 9)} == {"=ROWS(tblPoints[id])"}
+
+
+def test_the_setup_of_an_older_version_in_the_users_own_workbook_is_enough(tmp_path):
+    heads, table, head = FOREIGN["plain"]
+    path = foreign(tmp_path / "own.xlsx", heads=heads, table=table, head=head)
+    solved_in_place(path, *DISTANCES)
+    book = openpyxl.load_workbook(path)
+    before = book.sheetnames
+    for name in ("project", "client", "setup_state", "setup_missing", "check_scale"):
+        del book.defined_names[name]
+    book.save(path)
+    solved_in_place(path, *DISTANCES)
+    assert openpyxl.load_workbook(path).sheetnames == before
