@@ -15,7 +15,7 @@ from multimedia.adjustment.bundle_equations import (
     ImageObservations,
     Pose,
 )
-from multimedia.adjustment.interior_choice import choose_interior
+from multimedia.adjustment.interior_choice import choose_interior, with_interior
 from multimedia.adjustment.plausibility import (
     EXACT,
     refuse_impossible_media,
@@ -74,7 +74,7 @@ def bundle_adjust(project: Project, unknowns: Unknowns | None = None) -> Adjustm
     unknowns = unknowns or Unknowns()
     if unknowns.interior == AUTO:
         chosen = choose_interior(project, unknowns, bundle_adjust)
-        result = bundle_adjust(project, replace(unknowns, interior=chosen))
+        result = bundle_adjust(project, with_interior(unknowns, chosen))
         choice = f"Interior parameters that the data carry: {', '.join(chosen) or 'none'}."
         return replace(result, remarks=(choice, *result.remarks))
     bundle, remarks = prepare(project, unknowns)
@@ -121,7 +121,7 @@ def _balanced(bundle: Bundle, fitted: Fit[BundleState]) -> tuple[Bundle, Fit[Bun
 
 def prepare(project: Project, unknowns: Unknowns) -> tuple[Bundle, tuple[str, ...]]:
     """Return the equations of a project, and remarks about what was left out."""
-    project = with_common_values(project, unknowns.media)
+    project = with_common_values(project, unknowns)
     ids, rows, remarks = _used_points(project, unknowns)
     place = {name: row for row, name in enumerate(ids)}
     control = project.object_points
