@@ -29,7 +29,15 @@ _LEFT_OVER = 86_400.0
 #: Finished outputs, under their temporary names, that wait for the others of their set.
 _waiting: ContextVar[list[tuple[Path, Path]] | None] = ContextVar("waiting", default=None)
 
+#: How GDAL's names of what is no local file begin: /vsis3/, /vsicurl/, /vsiaz/, /vsimem/ ...
+VIRTUAL = "/vsi"
+
 _LOG = logging.getLogger(__name__)
+
+
+def is_virtual(path: Path | str) -> bool:
+    """Tell whether a path is one of GDAL's own file systems, object storage for example."""
+    return Path(path).as_posix().startswith(VIRTUAL)
 
 
 def check_writable(path: Path | str, *, overwrite: bool) -> Path:
@@ -45,7 +53,7 @@ def check_writable(path: Path | str, *, overwrite: bool) -> Path:
     """
     path = Path(path)
     check_name(path)
-    if str(path).startswith("/vsi"):  # one of GDAL's file systems: only rasters go there
+    if is_virtual(path):  # only rasters go there
         return path
     if path.is_dir():
         raise InputError(f"{path}: is a folder; name a file to write.")
@@ -224,6 +232,19 @@ def atomic_path(path: Path | str, *, overwrite: bool) -> Iterator[Path]:
 
 
 @contextmanager
+def temporary_folder() -> Iterator[Path]:
+    """Yield a folder outside of the user's, for files that only pass; gone at the end, however."""
+    with interrupts.held():
+        folder = Path(tempfile.mkdtemp(prefix="bifocal-"))
+        interrupts.temporary.add(folder)
+    try:
+        yield folder
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)
+        interrupts.temporary.discard(folder)
+
+
+@contextmanager
 def atomic_folder(path: Path | str, *, overwrite: bool) -> Iterator[Path]:
     """Yield a temporary folder; on success all its files move into ``path``, otherwise none.
 
@@ -352,7 +373,7 @@ def _remove_left_over(folder: Path, stem: str, ending: str) -> None:
     pattern = re.compile(
         rf"{re.escape(stem)}-(?P<node>[0-9a-f]{{6}})-(?P<process>\d+)-\w{{8}}{re.escape(ending)}.*"
     )
-    in_use = {path.name for path in interrupts.temporary}
+    in_use = {path.name for path in list(interrupts.temporary)}  # other threads add to it
     for entry in os.scandir(folder):
         match = pattern.fullmatch(entry.name)
         with suppress(OSError):

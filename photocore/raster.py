@@ -19,12 +19,12 @@ from numpy.typing import DTypeLike, NDArray
 
 from photocore.arrays import FloatArray
 from photocore.errors import InputError
+from photocore.output import is_virtual
 from photocore.provenance import note, provenance
 from photocore.raster_places import (
     copy_optimised,
     gdal_name,
     is_cloud_optimised,
-    is_virtual,
     raster_place,
 )
 from photocore.textfile import check_name

@@ -30,10 +30,11 @@ def ended(
 ) -> tuple[int, str, str]:
     """Run a script, send it a signal when it is ready; return status, stdout and stderr."""
     command = [sys.executable, "-c", BEGIN + code]
+    environment = {**os.environ, "TMPDIR": str(folder)}
     ignore = (lambda: signal.signal(signal.SIGINT, signal.SIG_IGN)) if shield else None
     with subprocess.Popen(
         command, cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
-        preexec_fn=ignore,
+        preexec_fn=ignore, env=environment,
     ) as process:  # fmt: skip
         assert process.stdout is not None
         assert process.stdout.readline() == "ready\n"
@@ -55,6 +56,13 @@ with all_or_none():
     for name in ('o.csv', 'p.csv'):
         with atomic_path(name, overwrite=False) as path:
             path.write_text('x')
+    ready()
+""",
+    "beside": """
+from photocore.output import temporary_folder
+with temporary_folder() as folder, atomic_path('o.tif', overwrite=False) as name:
+    name.with_name(name.name + '.plain.tif').write_text('x')
+    (folder / 'passing').write_text('x')
     ready()
 """,
     "exit": "import atexit\natexit.register(ready)",

@@ -27,7 +27,7 @@ def test_a_table_goes_through_solve_and_export_without_a_file(tmp_path):
     run(["solve", TARGETS, "--pair", PAIR, "--out", out])
     piped = run(["solve", "-", "--pair", PAIR, "--out", "-"], stdin=TARGETS.read_bytes())
     assert piped.stdout_bytes == out.read_bytes()
-    assert "28 points written" in piped.stderr
+    assert "stdout: 28 points written" in piped.stderr
     run(["export", out, "--out", tmp_path / "p.csv"])
     exported = run(["export", "-", "--out", "-"], stdin=piped.stdout_bytes)
     assert exported.stdout_bytes == (tmp_path / "p.csv").read_bytes()
