@@ -301,6 +301,8 @@ def create_geotiff(
                     yield RasterWriter(file)
                 categories = not colour and kind.kind == "u"
                 if cog:
+                    # What a full disk swallowed would be copied as empty blocks.
+                    check_whole(plain, width=width, height=height, bands=bands)
                     copy_optimised(plain, temporary, options, block=BLOCK, categories=categories)
                 elif overviews:
                     _add_overviews(temporary, max(width, height), categories=categories)
