@@ -26,6 +26,8 @@ from photocore.textfile import check_name
 _NODE = sha256(socket.gethostname().encode()).hexdigest()[:6]
 #: Where processes of others cannot be asked, a temporary file of this age is left over. [s]
 _LEFT_OVER = 86_400.0
+#: When this process began, or a little before: clocks of files are coarse. [s]
+_BEGUN = time.time() - 1.0
 #: Finished outputs, under their temporary names, that wait for the others of their set.
 _waiting: ContextVar[list[tuple[Path, Path]] | None] = ContextVar("waiting", default=None)
 
@@ -387,7 +389,8 @@ def _remove_left_over(folder: Path, stem: str, ending: str) -> None:
 def _is_left_over(match: re.Match[str], status: os.stat_result) -> bool:
     if match["node"] == _NODE and os.name == "posix":
         process = int(match["process"])
-        return process == os.getpid() or not _is_running(process)
+        # What bears our own number and is older than we are was left by a namesake.
+        return status.st_mtime < _BEGUN if process == os.getpid() else not _is_running(process)
     return time.time() - status.st_mtime > _LEFT_OVER
 
 
