@@ -10,9 +10,10 @@ import io
 import shlex
 import sys
 from collections.abc import Callable
-from contextlib import redirect_stdout
+from contextlib import redirect_stdout, suppress
 from pathlib import Path
 from typing import Any, TypeVar
+from zipfile import BadZipFile, ZipFile
 
 import click
 
@@ -93,9 +94,14 @@ class TableFile(click.Path):
 
 
 def _from_stdin(folder: Path) -> Path:
-    """Return a file with what stands on stdin, of the ending that its first bytes ask for."""
+    """Return a file with what stands on stdin, of the ending that its content asks for."""
     data = sys.stdin.buffer.read()
-    path = folder / ("stdin.xlsx" if data[:2] == b"PK" else "stdin.csv")
+    ending = ".csv"
+    if data[:2] == b"PK":
+        ending = ".xlsx"
+        with suppress(BadZipFile), ZipFile(io.BytesIO(data)) as package:
+            ending = ".ods" if "content.xml" in package.namelist() else ".xlsx"
+    path = folder / f"stdin{ending}"
     path.write_bytes(data)
     return path
 
