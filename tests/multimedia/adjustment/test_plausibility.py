@@ -81,6 +81,17 @@ def test_a_prior_weighs_the_same_however_good_the_image_was_called():
     assert boast.sigma0 == pytest.approx(honest.sigma0, rel=0.05)
 
 
+def test_a_gross_error_beside_robust_weights_leaves_a_prior_its_sigma():
+    flat = with_start(a_project(noise=0.001, points=flat_control()))
+    image = flat.image_points.image.copy()
+    image[10] += 0.5
+    bad = replace(flat, image_points=replace(flat.image_points, image=image))
+    wanted = Unknowns(interior=("c",), media=("index3",), typical_priors=True, robust=2.0)
+    result = bundle_adjust(bad, wanted)
+    assert result.sigma("index3") == pytest.approx(0.005, rel=0.1)
+    assert "point 10 in camera cam0" in result.suspects()[0]
+
+
 def test_a_prior_of_c_is_that_of_every_camera():
     given = a_project(noise=0.001)
     every = bundle_adjust(given, Unknowns(interior=("c",), priors={"c": 1e-4}))
