@@ -79,7 +79,7 @@ def _hear(number: int, frame: object) -> None:  # noqa: ARG001
     if os.getpid() != _state.process:  # a child's clean-up is not its parent's
         signal.signal(number, signal.SIG_DFL)
         os.kill(os.getpid(), number)
-    elif _state.held:
+    elif _state.held or _lock.locked():  # in the middle of counting, the count would stay wrong
         _state.heard = number
     else:
         _answer()

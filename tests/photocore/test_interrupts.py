@@ -105,6 +105,20 @@ print('went on')
     assert ended(code, tmp_path) == (1, "finished\n", STOPPED + "\n")
 
 
+def test_a_signal_while_steps_are_counted_waits_too(tmp_path: Path) -> None:
+    code = """
+try:
+    with interrupts.raising():
+        with interrupts._lock:
+            ready(0.3)
+        with interrupts.held():
+            print('counted')
+except KeyboardInterrupt:
+    print('stopped')
+"""
+    assert ended(code, tmp_path) == (0, "counted\nstopped\n", "")
+
+
 def test_a_body_that_has_something_to_stop_stops_it_and_only_once(tmp_path: Path) -> None:
     code = """
 try:
