@@ -418,7 +418,8 @@ class Pair:
         Returns
         -------
         ndarray, shape (n, 3, 3)
-            Zero where the pair does not state it. Common to all points: neighbours share it.
+            Zero where the pair does not state it, or looks through media. Common to all points:
+            neighbours share it.
         """
         if self.orientation is None or self.layers is not None:
             return np.zeros((len(xyz), 3, 3))
@@ -437,9 +438,9 @@ class Pair:
         -------
         ndarray, shape (n, 3, k), or None
             Errors in X, Y, r [m], the same k errors for all points; None where the pair does not
-            state its covariance.
+            state its covariance, or looks through media.
         """
-        if self.orientation is None:
+        if self.orientation is None or self.layers is not None:
             return None
         photos = (self.image1, self.image2)
         return orientation_precision.orientation_effect(photos, self.orientation, xyz)
