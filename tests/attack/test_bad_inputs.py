@@ -21,7 +21,7 @@ from click.testing import CliRunner
 
 from photocore import output
 from tests.attack.contents import CONTENTS
-from tests.attack.lines import ALIGN, INPUTS, OUTPUTS, SOLVE, WATER
+from tests.attack.lines import ALIGN, CURVE, INPUTS, OUTPUTS, SOLVE, WATER
 from tests.attack.options import WORDS
 from tests.attack.site import PROGRAMS, make_site
 
@@ -244,6 +244,16 @@ IN_PLACE = [
     ("multimedia waterlevel cloud.csv --out {}", "cloud.csv"),
     ("multimedia shift shift.csv --z0 1 --indices 1,1.337 --out {}", "shift.csv"),
     (f"{ALIGN} --control control.csv --picture {{}}", "far.jpg"),
+    (f"multimedia bathymetry cloud.csv {WATER} --cameras eyes.csv --out {{}}", "eyes.csv"),
+    ("multimedia bathymetry dem.tif --index 1.34 --water-level relief.tif --out {}", "relief.tif"),
+    ("multimedia project tank.toml --points shift.csv --out {}", "shift.csv"),
+    ("multimedia project tank.toml --out {}", "tank_object_points.csv"),
+    (
+        "multimedia intersect tank.toml --points tank_image_points.csv --out {}",
+        "tank_image_points.csv",
+    ),
+    ("multimedia resect tank.toml --out o.toml --residuals {}", "tank_image_points.csv"),
+    (f"{CURVE} --out {{}}", "tank_object_points.csv"),
 ]
 
 
