@@ -63,8 +63,9 @@ def labels_of(stems: Sequence[str]) -> list[str]:
 def read_set(crd: Path, fix: Path, *, sensor: Sensor, label: str, source: str) -> PlaneSet:
     """Read a .crd file and the .fix file that goes with it.
 
-    Image coordinates are pixels, or mm from the centre of the sensor as older versions of OpenPTV
-    wrote them: those lie on both sides of zero.
+    ``fix`` may also be a calibration body, ``.txt``: its points are then those of the .crd file,
+    one by one, as OpenPTV takes them. Image coordinates are pixels, or mm from the centre of the
+    sensor as older versions of OpenPTV wrote them: those lie on both sides of zero.
 
     Raises
     ------
@@ -73,7 +74,8 @@ def read_set(crd: Path, fix: Path, *, sensor: Sensor, label: str, source: str) -
     """
     numbers, places = _rows(crd, 3)
     body, xyz = _rows(fix, 4)
-    if len(numbers) == len(body) and ((numbers == body) | (numbers == _NOT_FOUND)).all():
+    whole = fix.suffix.lower() == ".txt" and len(numbers) == len(body)
+    if whole or (len(numbers) == len(body) and ((numbers == body) | (numbers == _NOT_FOUND)).all()):
         order = np.arange(len(body), dtype=np.int64)
     else:
         order = _by_number(crd, fix, numbers, body)
@@ -113,6 +115,7 @@ def find_sets(
         path for path in sorted(folder.rglob("*.crd")) if not path.name.startswith((".", "._"))
     ]
     bodies = [path for path in sorted(folder.rglob("*.fix")) if not path.name.startswith(".")]
+    texts = [path for path in sorted(folder.rglob("*.txt")) if not path.name.startswith(".")]
     labels, odd = labels_of(stems), dict[str, None]()
     cameras = []
     for k, image in enumerate(images):
@@ -122,6 +125,7 @@ def find_sets(
             # Any name with the position and the camera in it will do; OpenPTV's own comes first.
             ours = _named(files, folder, label, number, first=f"{stem}{number}.tif")
             theirs = _named(bodies, folder, label, number, first=f"{stem}{number}.tif")
+            theirs += [path for path in texts if _position(label).search(path.name)]
             positions.append(_pairs(folder, ours, theirs, sensor, label, odd))
         own = Path(image.replace("\\", "/")).name
         taken = [path for path in files if path.name == f"{own}.crd"]
@@ -149,7 +153,8 @@ def _pairs(
             try:
                 sets.append(read_set(crd, fix, sensor=sensor, label=label, source=source))
             except InputError as error:
-                odd[f"left out: {error}"] = None
+                if fix.suffix == ".fix":  # other text may be of anything
+                    odd[f"left out: {error}"] = None
                 continue
             break
         else:
@@ -163,7 +168,7 @@ def _named(
     files: Sequence[Path], folder: Path, label: str, number: int, *, first: str
 ) -> list[Path]:
     """Return the files whose names tell this position and camera, the likeliest first."""
-    position = re.compile(rf"(?<![a-z0-9]){re.escape(label)}(?!\d)", re.IGNORECASE)
+    position = _position(label)
     camera = re.compile(rf"cam(era)?[_\- ]?0*{number}(?!\d)", re.IGNORECASE)
     found = []
     for path in files:
@@ -172,6 +177,11 @@ def _named(
         if exact or (position.search(name) and camera.search(path.name)):
             found.append((not exact, _COPY.search(name) is not None, name.count("/"), name, path))
     return [entry[-1] for entry in sorted(found)]
+
+
+def _position(label: str) -> re.Pattern[str]:
+    """Return what finds a position of the body in a name."""
+    return re.compile(rf"(?<![a-z0-9]){re.escape(label)}(?!\d)", re.IGNORECASE)
 
 
 def _camera_number(image: str, k: int) -> int:

@@ -191,10 +191,18 @@ def test_a_body_file_in_another_folder_serves_where_the_own_is_missing(folder):
     assert "plane1 (cal/plane1_cam1.tif.crd with cal/old/plane1_cam1 copy.tif.fix)" in said
 
 
+def test_the_body_named_like_the_position_serves_where_no_fix_is_left(folder):
+    for path in folder.rglob("plane1_cam1*.fix"):
+        path.unlink()
+    said = " ".join(import_openptv(folder, out=None).project.remarks)
+    assert "plane1 (cal/plane1_cam1.tif.crd with cal/target_plane1.txt)" in said
+
+
 def test_damaged_and_lonely_files_are_named_and_nothing_stops(folder):
     for path in (folder / "cal/old").iterdir():
         path.unlink()
     (folder / "cal/plane1_cam1.tif.fix").unlink()
+    (folder / "cal/target_plane1.txt").unlink()
     (folder / "cal/plane2_cam1.tif.crd").write_text("0.0 1.0\n")
     rewritten(folder / "cal/plane3_cam1.tif.fix", lambda t: t[:-5] + np.array([100, 0, 0, 0]))
     found = import_openptv(folder, out=None)
