@@ -33,6 +33,7 @@ Cameras
     PointStatus               why a point is missing or doubtful
     epipolar_curve, EpipolarCurves    where a ray runs in another image
     epipolar_candidates, Candidates   image points near it
+    correspondences           which targets of several cameras are of one particle
     bundle_adjust, Adjustment cameras, points and media together
     Unknowns, ScaleBar        what it estimates and is told
 Bathymetry

@@ -35,6 +35,7 @@ from .media.projection import project, projection_status
 from .media.ray_paths import RayPaths, RayStatus
 from .media.ray_tracing import aim_rays, trace_rays
 from .media.surfaces import Cylinder, Plane, Sphere
+from .openptv.correspondences import correspondences
 from .openptv.experiment import read_experiment, write_experiment
 from .orientation.epipolar_curves import (
     Candidates,
@@ -142,6 +143,7 @@ __all__ = [
     "correct_bathymetry",
     "correct_dispersion",
     "correct_lidar_beams",
+    "correspondences",
     "critical_angle",
     "epipolar_candidates",
     "epipolar_curve",

@@ -250,6 +250,16 @@ def read_correspondences(path: Path) -> tuple[FloatArray, IntArray]:
     return table[:, 1:4].copy(), table[:, 4:].astype(np.int64)
 
 
+def rt_is_text(xyz: FloatArray, numbers: IntArray) -> str:
+    """Return the content of an rt_is file: number from 1, X, Y, Z [mm], targets of four cameras."""
+    blank = np.full((len(numbers), max(0, 4 - numbers.shape[1])), -1, dtype=np.int64)
+    lines = [str(len(xyz))]
+    for k, (place, row) in enumerate(zip(xyz, np.hstack([numbers, blank]), strict=True), start=1):
+        words = [f"{k:4d}", *(f"{v:9.3f}" for v in place), *(f"{n:4d}" for n in row)]
+        lines.append(" ".join(words))
+    return "\n".join(lines) + "\n"
+
+
 def ori_text(camera: Camera, glass: FloatArray) -> str:
     """Return the content of an .ori file."""
     x, m = camera.centre, camera.rotation
