@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from multimedia.openptv.correspondences import TOLERANCE, correspondences
 from multimedia.openptv.openptv_files import read_targets, rt_is_text
