@@ -102,9 +102,7 @@ def _write(out: Path, found: Particles, *, overwrite: bool) -> None:
             factor = METRES[unit] / METRES["mm"]
             temporary.write_text(rt_is_text(found.xyz * factor, found.numbers), encoding="utf-8")
         return
-    columns: dict[str, FloatArray | IntArray | list[str]] = {
-        "id": [str(k) for k in range(1, len(found.xyz) + 1)]
-    }
+    columns: dict[str, Any] = {"id": [str(k) for k in range(1, len(found.xyz) + 1)]}
     columns |= {f"{axis} [{unit}]": found.xyz[:, k] for k, axis in enumerate("XYZ")}
     columns |= {
         f"{name} target": [str(n) if n >= 0 else "" for n in found.numbers[:, k].tolist()]
