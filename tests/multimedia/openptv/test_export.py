@@ -149,6 +149,7 @@ def test_what_cannot_be_is_refused_with_the_reason(tmp_path):
     assert not (tmp_path / "exp").exists()
 
 
+@pytest.mark.acceptance
 def test_a_real_calibration_with_scale_goes_to_openptv_and_comes_back(data_dir, tmp_path):
     run, project_file = CliRunner().invoke, str(tmp_path / "c.toml")
     folder, done = str(data_dir / "openptv_cavity"), str(tmp_path / "done.toml")

@@ -17,6 +17,7 @@ from multimedia.media.projection import project
 from multimedia.openptv.experiment import write_experiment
 from multimedia.openptv.workflow import import_openptv
 from multimedia.projects.model import Project
+from multimedia.projects.project_file import read_project
 from multimedia.refraction.layers import Layers
 from photocore.distortion import Brown, Convention
 from tests.multimedia.tank import SENSOR
@@ -112,20 +113,17 @@ def test_a_multi_plane_experiment_is_resected_to_its_pixel_noise(folder, tmp_pat
         # 0.3 px of 12 um over 200 points at 430 mm and 35 mm: some 0.02 mm along the axis.
         place = [camera[key] for key in ("X0", "Y0", "Z0")]
         assert place == pytest.approx(truth.centre, abs=0.3)
-
-
-def test_numbers_of_each_camera_count_on_their_own_and_points_are_tied_by_place(folder):
-    found = import_openptv(folder, out=None).project
+    # Numbers of each camera count on their own: points are tied by place.
+    found = read_project(tmp_path / "t.toml")
     table = found.image_points
     for name, xyz in zip(found.object_points.ids, found.object_points.xyz, strict=True):
         assert name == f"X{xyz[0]:g}Y{xyz[1]:g}Z{xyz[2]:g}"
     assert set(found.object_points.groups) == set(DEPTHS)
     for camera in views():
         rows = table.of_camera(camera.name)
-        place = found.object_points.rows([table.ids[row] for row in rows])
-        image = project(camera, found.object_points.xyz[place], WALL)
-        miss = np.abs(table.image[rows] - image)
-        assert miss.max() < 6 * NOISE * 0.012
+        at = found.object_points.rows([table.ids[row] for row in rows])
+        image = project(camera, found.object_points.xyz[at], WALL)
+        assert np.abs(table.image[rows] - image).max() < 6 * NOISE * 0.012
 
 
 @pytest.mark.acceptance
@@ -153,6 +151,7 @@ def test_a_list_in_another_order_is_refused_and_single_wrong_points_too(folder):
     assert any("1 points were refused" in line for line in said)
 
 
+@pytest.mark.acceptance
 def test_one_file_of_all_planes_serves_where_those_of_the_planes_are_missing(folder):
     tables = {
         ending: [np.loadtxt(folder / f"cal/{label}_cam1.tif.{ending}") for label in DEPTHS]
@@ -168,6 +167,7 @@ def test_one_file_of_all_planes_serves_where_those_of_the_planes_are_missing(fol
     assert found.matched[0] > 190
 
 
+@pytest.mark.acceptance
 def test_millimetres_and_points_that_were_not_found_are_understood(folder):
     # As OpenPTV before pyptv: whole numbers, -999 for none, mm from the centre with y up.
     for label in DEPTHS:
@@ -185,12 +185,14 @@ def test_millimetres_and_points_that_were_not_found_are_understood(folder):
     assert found.matched[0] < found.matched[1]
 
 
+@pytest.mark.acceptance
 def test_a_body_file_in_another_folder_serves_where_the_own_is_missing(folder):
     (folder / "cal/plane1_cam1.tif.fix").unlink()
     said = " ".join(import_openptv(folder, out=None).project.remarks)
     assert "plane1 (cal/plane1_cam1.tif.crd with cal/old/plane1_cam1 copy.tif.fix)" in said
 
 
+@pytest.mark.acceptance
 def test_the_body_named_like_the_position_serves_where_no_fix_is_left(folder):
     for path in folder.rglob("plane1_cam1*.fix"):
         path.unlink()
@@ -213,6 +215,7 @@ def test_damaged_and_lonely_files_are_named_and_nothing_stops(folder):
     assert "of different calibrations" in said
 
 
+@pytest.mark.acceptance
 def test_two_planes_that_contradict_each_other_are_both_refused_one_alone_is_said(folder):
     for ending in ("crd", "fix"):
         (folder / f"cal/plane3_cam1.tif.{ending}").unlink()
