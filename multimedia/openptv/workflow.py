@@ -114,7 +114,7 @@ def export_openptv(
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class _Control:
+class _CameraControl:
     """Control points of one camera: ids, image coordinates, where from, and remarks."""
 
     ids: list[str]
@@ -123,7 +123,7 @@ class _Control:
     planes: PlaneMatch | None = None
 
 
-def _control(experiment: Experiment, k: int, least_pixels: int, radius: float) -> _Control:
+def _control(experiment: Experiment, k: int, least_pixels: int, radius: float) -> _CameraControl:
     """Return the control points of a camera: of the planes if listed, else found among targets."""
     listed = any(experiment.planes[k].positions)
     targets = _nothing() if listed else _from_targets(experiment, k, least_pixels, radius)
@@ -137,7 +137,7 @@ def _control(experiment: Experiment, k: int, least_pixels: int, radius: float) -
         targets = _from_targets(experiment, k, least_pixels, radius)
         return replace(targets, remarks=said + targets.remarks)
     ids = [name_of(place) for place in planes.xyz]
-    return _Control(ids=ids, image=planes.image, remarks=said, planes=planes)
+    return _CameraControl(ids=ids, image=planes.image, remarks=said, planes=planes)
 
 
 def name_of(place: FloatArray) -> str:
@@ -152,7 +152,7 @@ def name_of(place: FloatArray) -> str:
     return "".join(f"{axis}{v:.10g}" for axis, v in zip("XYZ", rounded.tolist(), strict=True))
 
 
-def _with_planes(experiment: Experiment, control: Sequence[_Control]) -> ObjectPoints:
+def _with_planes(experiment: Experiment, control: Sequence[_CameraControl]) -> ObjectPoints:
     """Return the points of all planes, and those of the body where a camera was matched to it."""
     body = experiment.project.object_points
     found = [one for one in control if one.planes is not None]
@@ -172,11 +172,13 @@ def _with_planes(experiment: Experiment, control: Sequence[_Control]) -> ObjectP
     )
 
 
-def _nothing(remarks: Sequence[str] = ()) -> _Control:
-    return _Control(ids=[], image=np.empty((0, 2)), remarks=list(remarks))
+def _nothing(remarks: Sequence[str] = ()) -> _CameraControl:
+    return _CameraControl(ids=[], image=np.empty((0, 2)), remarks=list(remarks))
 
 
-def _from_targets(experiment: Experiment, k: int, least_pixels: int, radius: float) -> _Control:
+def _from_targets(
+    experiment: Experiment, k: int, least_pixels: int, radius: float
+) -> _CameraControl:
     """Return the control points found among the targets of one calibration image."""
     project, targets = experiment.project, experiment.targets[k]
     camera, body = project.cameras[k], project.object_points
@@ -213,7 +215,7 @@ def _from_targets(experiment: Experiment, k: int, least_pixels: int, radius: flo
         shown = ", ".join(missing[:10])
         remarks.append(f"{camera.name}: no target for control points {shown}{more}.")
     image = camera.sensor.image_from_pixel(targets.pixels[best[seen]])
-    return _Control(ids=[body.ids[row] for row in seen], image=image, remarks=remarks)
+    return _CameraControl(ids=[body.ids[row] for row in seen], image=image, remarks=remarks)
 
 
 def _by_chance(project: Project, k: int, targets: DetectedTargets, best: IntArray) -> bool:
