@@ -17,11 +17,12 @@ from photocore.errors import InputError
 from photocore.output import atomic_path, check_writable, free_path
 from photocore.workbook import formulas
 from photocore.workbook.cells import CellValue, NewCell, NewColumn, NewRows, RowFormula, escape
+from photocore.workbook.changes import SheetChanges, Spliced
 from photocore.workbook.graft import Graft
 from photocore.workbook.grid import CellGrid, SheetFile, TableArea, cell_name
 from photocore.workbook.newbook import check_new_workbook, new_workbook
 from photocore.workbook.package import check_header, open_package, read_part, rewrite_package
-from photocore.workbook.splice import SheetChanges, Spliced, splice_sheet
+from photocore.workbook.splice import splice_sheet
 from photocore.workbook.styles import StyleSheet
 from photocore.workbook.xlsx import (
     SheetPart,
@@ -427,7 +428,11 @@ class WorkbookEditor:
                 formulas.drop_order(self.path, package, self.book, parts)
             self._graft(package, parts)
             own = {*package.namelist()}
-            original = {n: read_part(self.path, package, n) for n in own & parts.keys()}
+            original = {
+                s.part: spliced[s.title].data for s in self.book.sheets if s.title in spliced
+            }
+            for name in (own & parts.keys()) - original.keys():
+                original[name] = read_part(self.path, package, name)
         return {name: data for name, data in parts.items() if data != original.get(name, b"")}
 
     def _graft(self, package: zipfile.ZipFile, parts: dict[str, bytes | None]) -> None:

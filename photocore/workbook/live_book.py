@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import io
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -367,12 +367,26 @@ def _block(
     if short:
         for i, column in enumerate(columns):
             if column.kind == "formula":
-                formulas[i] = _short_formula(table, column.formula, letters, first - 1)
+                formulas[i] = short_formula(table, column.formula, letters, first - 1)
     return RowBlock(row=first, columns=listed, formulas=formulas)
 
 
-def _short_formula(table: str, text: str, letters: Mapping[str, str], head: int):  # type: ignore[no-untyped-def]
-    """Return a function of the row that writes the formula with A1 references."""
+def short_formula(
+    table: str, text: str, letters: Mapping[str, str], head: int
+) -> Callable[[int], str]:
+    """Return a function of the row that writes a formula with A1 references.
+
+    Parameters
+    ----------
+    table : str
+        Name of the table.
+    text : str
+        The formula, with ``[@key]`` for the cell of the same row.
+    letters : mapping
+        Key to the letters of its column.
+    head : int
+        Row of the keys.
+    """
     text = text.replace(f"ROW()-ROW({table}[[#Headers],[id]])", "\0")
     parts = re.split(r"\[@(\w+)\]", text)
     pieces = [letters[part] if i % 2 else part for i, part in enumerate(parts)]

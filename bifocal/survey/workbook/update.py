@@ -10,7 +10,7 @@ from typing import Any
 
 from bifocal.survey.workbook.book import build, unprinted_formula
 from bifocal.survey.workbook.charts import HEAD, LEFT
-from bifocal.survey.workbook.content import SurveyContent
+from bifocal.survey.workbook.content import STRUCTURED_ROWS, SurveyContent
 from bifocal.survey.workbook.reader import SurveyInput
 from bifocal.survey.workbook.setup_cells import TYPED_FORMULAS
 from bifocal.survey.workbook.setup_update import (
@@ -25,12 +25,15 @@ from photocore.errors import InputError
 from photocore.output import free_path
 from photocore.workbook.cells import CellValue, NewColumn, escape
 from photocore.workbook.editor import WorkbookEditor
-from photocore.workbook.grid import TableArea, split_area, split_cell
-from photocore.workbook.live_book import BookBuilder
+from photocore.workbook.grid import TableArea, column_letters, split_area, split_cell
+from photocore.workbook.live_book import BookBuilder, short_formula
 from photocore.workbook.live_columns import TEXT_KEYS, row_formula
 from photocore.workbook.named_cells import place_of, type_value
 from photocore.workbook.newbook import RowBlock
 from photocore.workbook.print_area import move_print_area
+
+#: The cell of the same row in a formula of `LiveColumn`.
+_SAME_ROW = re.compile(r"\[@(\w+)\]")
 
 
 def check_kind(source: Path, survey: SurveyInput, *, is_pair: bool) -> None:
@@ -237,6 +240,7 @@ def _table(
     headings, first = area.headings(), area.area[0] + 1
     length = max([length, _length(area), *(row + 1 for row in rows)])
     editor.extend(name, area.area[0] + length)
+    letters = {key: column_letters(number) for key, number in headings.items()}
     styles = editor.styles_of(area.sheet, first)
     filled, prepared = [], []
     for column in content.columns:
@@ -267,7 +271,10 @@ def _table(
             for row, value in enumerate(values, start=first):
                 editor.put(area.sheet, row, number, value, formula=text, style=style)
             continue
-        filled.append(NewColumn(number, values, style, _constant(escape(text))))
+        formula = _constant(text)
+        if length > STRUCTURED_ROWS and letters.keys() >= {*re.findall(_SAME_ROW, column.formula)}:
+            formula = short_formula(area.name, column.formula, letters, area.area[0])
+        filled.append(NewColumn(number, values, style, _escaped(formula)))
     editor.fill_rows(area.sheet, first, filled)
     editor.fill_rows(area.sheet, first + _length(area), prepared)
 
@@ -289,6 +296,10 @@ def _complete(
 def _constant(text: str) -> Callable[[int], str]:
     """Return a function of the row that is the same formula in all."""
     return lambda _: text
+
+
+def _escaped(formula: Callable[[int], str]) -> Callable[[int], str]:
+    return lambda row: escape(formula(row))
 
 
 def _fixed_table(editor: WorkbookEditor, built: BookBuilder, name: str, key: str) -> None:
