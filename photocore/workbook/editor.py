@@ -93,8 +93,7 @@ class WorkbookEditor:
 
     def table(self, name: str) -> TableArea | None:
         """Return a named table, None where there is none; upper and lower case are alike."""
-        tables = (t for t in self.tables if t.name.casefold() == name.casefold())
-        return next(tables, None)
+        return next((t for t in self.tables if t.name.casefold() == name.casefold()), None)
 
     def grid(self, title: str) -> CellGrid:
         """Return a sheet's cells as they stand in the file."""
@@ -427,13 +426,10 @@ class WorkbookEditor:
             if any(sheet.formula_lost for sheet in spliced.values()):
                 formulas.drop_order(self.path, package, self.book, parts)
             self._graft(package, parts)
-            own = {*package.namelist()}
-            original = {
-                s.part: spliced[s.title].data for s in self.book.sheets if s.title in spliced
-            }
-            for name in (own & parts.keys()) - original.keys():
-                original[name] = read_part(self.path, package, name)
-        return {name: data for name, data in parts.items() if data != original.get(name, b"")}
+            known = {s.part: spliced[s.title].data for s in self.book.sheets if s.title in spliced}
+            others = {*package.namelist()} & parts.keys() - known.keys()
+            known |= {name: read_part(self.path, package, name) for name in others}
+        return {name: data for name, data in parts.items() if data != known.get(name, b"")}
 
     def _graft(self, package: zipfile.ZipFile, parts: dict[str, bytes | None]) -> None:
         """Add new sheets, names and formats."""
