@@ -32,9 +32,6 @@ from photocore.workbook.named_cells import place_of, type_value
 from photocore.workbook.newbook import RowBlock
 from photocore.workbook.print_area import move_print_area
 
-#: The cell of the same row in a formula of `LiveColumn`.
-_SAME_ROW = re.compile(r"\[@(\w+)\]")
-
 
 def check_kind(source: Path, survey: SurveyInput, *, is_pair: bool) -> None:
     """Refuse to change a survey workbook for coordinates into one for raw pixels, or the reverse.
@@ -243,6 +240,7 @@ def _table(
     letters = {key: column_letters(number) for key, number in headings.items()}
     styles = editor.styles_of(area.sheet, first)
     filled, prepared = [], []
+    repeated: Mapping[int, str] | None = None
     for column in content.columns:
         if column.key not in headings:
             continue
@@ -271,12 +269,40 @@ def _table(
             for row, value in enumerate(values, start=first):
                 editor.put(area.sheet, row, number, value, formula=text, style=style)
             continue
-        formula = _constant(text)
-        if length > STRUCTURED_ROWS and letters.keys() >= {*re.findall(_SAME_ROW, column.formula)}:
-            formula = short_formula(area.name, column.formula, letters, area.area[0])
-        filled.append(NewColumn(number, values, style, _escaped(formula)))
+        formula: Callable[[int], str] | None = _constant(escape(text))
+        if is_older(editor.book.names) or _lacks(editor, text):
+            repeated = _repeated(editor, area) if repeated is None else repeated
+            text = repeated.get(number, "")
+            formula = _constant(escape(text)) if text else None
+        elif length > STRUCTURED_ROWS:
+            formula = _escaped(short_formula(area.name, column.formula, letters, area.area[0]))
+        filled.append(NewColumn(number, values, style, formula))
     editor.fill_rows(area.sheet, first, filled)
     editor.fill_rows(area.sheet, first + _length(area), prepared)
+
+
+def _lacks(editor: WorkbookEditor, formula: str) -> bool:
+    """Tell whether a formula names columns that the workbook's tables do not have."""
+    for name, key in re.findall(r"(tbl\w+)\[(?:\[#[^]]+\],\[)?(\w+)\]", formula):
+        area = editor.table(name)
+        if area is None or key not in area.headings():
+            return True
+    return False
+
+
+def _repeated(editor: WorkbookEditor, area: TableArea) -> dict[int, str]:
+    """Return by column the formulas that stand alike in a table's first row and its last.
+
+    New rows of a workbook made by an older version calculate as the rows above them do.
+    """
+    if _length(area) < 2:
+        return {}
+    top, last = (editor.models(area.sheet, row) for row in (area.area[0] + 1, area.area[2]))
+    return {
+        column: cell.formula
+        for column, cell in top.items()
+        if column in last and last[column].formula == cell.formula
+    }
 
 
 def _complete(
