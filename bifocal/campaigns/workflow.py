@@ -12,7 +12,6 @@ from pathlib import Path
 from typing import Any
 
 from bifocal.campaigns.pair_job import FILES, MOST_PRODUCTS, PRODUCTS, PairJob, PairOutcome, plan_of
-from bifocal.campaigns.photo_pairing import pair_photos, write_survey_file
 from bifocal.campaigns.step_store import Step, clean
 from bifocal.campaigns.whole_wall import JOINT, MOSAIC, joint_step, mosaic_step, run_whole
 from bifocal.campaigns.worker_pool import Listener, run_here
@@ -38,11 +37,14 @@ class Machines:
         For all of them; default most of what is free. [GiB]
     scheduler : str
         Address of a Dask scheduler; empty: this machine.
+    ship : bool
+        Send files to its workers and back even if they see the folders.
     """
 
     jobs: int | None = None
     memory: float | None = None
     scheduler: str = ""
+    ship: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -117,6 +119,8 @@ def begin_survey(
     InputError
         If no photos make a pair, or the file cannot be written.
     """
+    from bifocal.campaigns.photo_pairing import pair_photos, write_survey_file
+
     check_writable(out, overwrite=overwrite)
     pairs, left = pair_photos(folder, progress=progress)
     write_survey_file(out, folder, pairs, left, overwrite=overwrite)
@@ -237,7 +241,7 @@ def _running(
     if machines.scheduler:
         from bifocal.campaigns.dask_cluster import run_on_cluster
 
-        return run_on_cluster(machines.scheduler, jobs, listener)
+        return run_on_cluster(machines.scheduler, jobs, listener, ship=machines.ship)
     memory = None if machines.memory is None else int(machines.memory * (1 << 30))
     return run_here(jobs, listener, most=machines.jobs, memory=memory)
 
