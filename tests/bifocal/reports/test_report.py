@@ -12,7 +12,7 @@ from click.testing import CliRunner
 
 from bifocal.cli.main import main
 from bifocal.demo import SAMPLE
-from bifocal.reports.words import LANGUAGES, _content, words_in
+from photocore.reports.words import LANGUAGES, texts_of, words_of
 from tests.bifocal.campaigns.sample_tables import write_tables
 
 PAIR = SAMPLE / "facade.pair.json"
@@ -162,9 +162,16 @@ def test_what_cannot_be_reported_is_refused(tmp_path, monkeypatch, options, said
     assert not list(tmp_path.iterdir())
 
 
-def test_every_text_is_there_in_three_languages_with_the_same_blanks():
-    for key, texts in _content().items():
+@pytest.mark.parametrize("package", ["bifocal.reports"])
+def test_every_text_is_there_in_three_languages_with_the_same_blanks(package):
+    for key, texts in texts_of(package).items():
         assert set(texts) == set(LANGUAGES), key
         blanks = {tuple(sorted(re.findall(r"\{\w+\}", text))) for text in texts.values()}
         assert len(blanks) == 1, key
-    assert words_in("it")("good_for", scale=50) == "Adatto a disegni in scala 1:50 e minori."
+
+
+def test_a_text_is_given_in_the_language_asked_for():
+    assert (
+        words_of("bifocal.reports", "it")("good_for", scale=50)
+        == "Adatto a disegni in scala 1:50 e minori."
+    )

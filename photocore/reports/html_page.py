@@ -10,9 +10,17 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from bifocal.reports.document import Banner, Block, Document, Heading, Paragraph, Picture, TextTable
 from photocore.cli import Progress, no_progress
 from photocore.output import atomic_path
+from photocore.reports.document import (
+    Banner,
+    Block,
+    Document,
+    Heading,
+    Paragraph,
+    Picture,
+    TextTable,
+)
 
 #: Width of figures [inch], resolution of what is drawn as pixels, quality of photos in them.
 WIDTH, DPI, JPEG = 7.4, 110, 82
