@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import re
-from html.parser import HTMLParser
 from pathlib import Path
 
 import pytest
@@ -14,42 +13,9 @@ from bifocal.cli.main import main
 from bifocal.demo import SAMPLE
 from photocore.reports.words import LANGUAGES, texts_of, words_of
 from tests.bifocal.campaigns.sample_tables import write_tables
+from tests.web_page import Page
 
 PAIR = SAMPLE / "facade.pair.json"
-_VOID = {"meta", "img", "link", "br", "hr"}
-
-
-class Page(HTMLParser):
-    """Checks that elements are closed in order, and gathers what a reader sees."""
-
-    def __init__(self, text: str) -> None:
-        super().__init__()
-        self.open: list[str] = []
-        self.words: list[str] = []
-        self.sources: list[str] = []
-        self.feed(text)
-        self.close()
-        assert not self.open
-
-    def handle_starttag(self, tag, attrs):
-        names = [name for name, _ in attrs]
-        assert len(names) == len(set(names))
-        if tag not in _VOID:
-            self.open.append(tag)
-        if tag == "img":
-            assert dict(attrs)["alt"]
-        self.sources += [value for name, value in attrs if name in ("src", "href")]
-
-    def handle_endtag(self, tag):
-        assert self.open.pop() == tag
-
-    def handle_data(self, data):
-        if self.open and self.open[-1] != "style":
-            self.words.append(data)
-
-    @property
-    def text(self) -> str:
-        return "\n".join(self.words)
 
 
 @pytest.fixture(scope="module")
@@ -162,7 +128,7 @@ def test_what_cannot_be_reported_is_refused(tmp_path, monkeypatch, options, said
     assert not list(tmp_path.iterdir())
 
 
-@pytest.mark.parametrize("package", ["bifocal.reports"])
+@pytest.mark.parametrize("package", ["bifocal.reports", "multimedia.adjustment"])
 def test_every_text_is_there_in_three_languages_with_the_same_blanks(package):
     for key, texts in texts_of(package).items():
         assert set(texts) == set(LANGUAGES), key
