@@ -224,6 +224,26 @@ def atomic_path(path: Path | str, *, overwrite: bool) -> Iterator[Path]:
 
 
 @contextmanager
+def scratch_beside(path: Path | str) -> Iterator[Path]:
+    """Yield a file beside another, removed at the end; relative names in it stay true there.
+
+    Raises
+    ------
+    InputError
+        If the folder takes no file.
+    """
+    path = Path(path)
+    try:
+        temporary = _temporary_file(path.resolve())
+    except OSError as error:
+        raise _not_written(path, error) from error
+    try:
+        yield temporary
+    finally:
+        _forget(temporary)
+
+
+@contextmanager
 def atomic_folder(path: Path | str, *, overwrite: bool) -> Iterator[Path]:
     """Yield a temporary folder; on success all its files move into ``path``, otherwise none.
 

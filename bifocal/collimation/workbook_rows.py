@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import hashlib
-import tempfile
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+import shutil
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -26,7 +25,13 @@ from bifocal.survey.workbook.setup_cells import MATRICES, NADIRS
 from bifocal.survey.workbook.update import update_book
 from bifocal.survey.workflow import solve
 from photocore.errors import InputError, PhotogrammetryError
-from photocore.output import check_not_open, free_path, relative_name
+from photocore.output import (
+    atomic_path,
+    check_not_open,
+    free_path,
+    relative_name,
+    scratch_beside,
+)
 from photocore.workbook.cells import CellValue
 from photocore.workbook.editor import WorkbookEditor
 from photocore.workbook.grid import TableArea, split_cell
@@ -185,38 +190,19 @@ def change_rows(
     """
     check_not_open(path)
     before = digest_of(path)
-    with _beside(path) as typed, _beside(path) as solved:
+    with scratch_beside(path) as typed, atomic_path(path, overwrite=True) as ready:
         editor = WorkbookEditor(path)
         own = pair_path.resolve() == path.resolve()
         _edit(editor, read, points, pair, None if own else relative_name(pair_path, path.parent))
         editor.save(typed, overwrite=True)
-        ready = solved if _solved(typed, solved) else typed
+        if not _solved(typed, ready):
+            shutil.copyfile(typed, ready)
         check_not_open(path)
         if digest_of(path) != before:
             raise InputError(f"{path.name}: was changed by another program just now.")
-        try:
-            if keep:
-                backup = free_path(path.parent, f"{path.name}.bak")
-                backup.write_bytes(path.read_bytes())
-            ready.replace(path)
-        except OSError as error:
-            raise InputError(
-                f"{path.name}: cannot be written ({error.strerror or error}); close it in other "
-                "programs."
-            ) from error
-
-
-@contextmanager
-def _beside(path: Path) -> Iterator[Path]:
-    """Yield a temporary name beside a workbook; the relative names in it stay true there."""
-    with tempfile.NamedTemporaryFile(
-        prefix=f".{path.stem}-", suffix=path.suffix, dir=path.parent, delete=False
-    ) as file:
-        temporary = Path(file.name)
-    try:
-        yield temporary
-    finally:
-        temporary.unlink(missing_ok=True)
+        if keep:
+            backup = free_path(path.parent, f"{path.name}.bak")
+            backup.write_bytes(path.read_bytes())
 
 
 def _solved(typed: Path, target: Path) -> bool:

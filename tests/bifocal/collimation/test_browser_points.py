@@ -46,6 +46,7 @@ def nudged(page: Driver, name: str, image: int, goal: tuple[float, float]) -> An
     return page.point(name)["picks"][str(image)]
 
 
+@pytest.mark.acceptance
 def test_a_pick_is_nudged_to_a_known_centre_at_every_zoom(page: Driver) -> None:
     truth = true_pixel(1, SHADED)
     for index, zoom in enumerate((0.6, 2.0, 8.0), start=1):

@@ -44,6 +44,28 @@ def test_picks_with_noise_give_the_relief_of_solve(tmp_path) -> None:
     assert not lint(folder / BOOK)
 
 
+def test_a_workbook_keeps_its_mode_and_the_link_that_leads_to_it(tmp_path) -> None:
+    folder = sample_folder(tmp_path)
+    name, picks = next(iter(sample_picks().items()))
+    with opened(folder) as session:
+        pick_both(session, name, picks)
+        session.sync.step()
+        book = folder / BOOK
+        made = book.stat().st_mode & 0o777
+        assert made == (folder / "facade.pair.json").stat().st_mode & 0o777
+        book.chmod(0o640)
+        elsewhere = folder / "shared.xlsx"
+        book.rename(elsewhere)
+        book.symlink_to(elsewhere.name)
+        pick_both(session, "second", picks)
+        session.sync.step()
+        assert session.sync.waiting is None
+        assert_solved_alike(session, book)
+    assert book.is_symlink()
+    assert elsewhere.stat().st_mode & 0o777 == 0o640
+    assert not [path.name for path in folder.glob(".facade-*.xlsx")]
+
+
 def test_changes_go_into_the_workbook_in_place(tmp_path) -> None:
     folder = sample_folder(tmp_path)
     picks = sample_picks()

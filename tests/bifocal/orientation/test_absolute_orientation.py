@@ -143,6 +143,7 @@ def test_a_wall_without_relief_is_refused_by_auto_and_taken_with_both_distances(
     assert made.adjusted.cameras[1].centre[2] == pytest.approx(9.0, abs=0.02)
 
 
+@pytest.mark.acceptance
 def test_two_different_walls_are_refused(views) -> None:
     first, second = inputs(views)
     other = PhotoInput(

@@ -31,6 +31,7 @@ def test_results_in_the_users_workbook_equal_its_formulas(tmp_path):
     assert sheet["E5"].value == pytest.approx(1002.0)
 
 
+@pytest.mark.acceptance
 @pytest.mark.office
 def test_numbers_typed_as_text_become_numbers_so_that_formulas_see_them(tmp_path):
     path = survey(tmp_path / "s.xlsx")
@@ -48,6 +49,7 @@ def test_numbers_typed_as_text_become_numbers_so_that_formulas_see_them(tmp_path
     assert "Points!B5, Setup!C7, Check!D13: numbers typed as text" in result.stderr
 
 
+@pytest.mark.acceptance
 @pytest.mark.office
 def test_swapped_images_keep_the_columns_the_user_typed(tmp_path):
     swapped = [(name, x2, y2, x1, y1) for name, x1, y1, x2, y2 in rows(POINTS)]
@@ -59,6 +61,7 @@ def test_swapped_images_keep_the_columns_the_user_typed(tmp_path):
     assert openpyxl.load_workbook(out)["Points"]["B5"].value == swapped[0][1]
 
 
+@pytest.mark.acceptance
 @pytest.mark.office
 def test_a_survey_in_pixels_of_a_pair_is_updated_too(tmp_path):
     from tests.bifocal.survey.test_cli_solve import pixel_rows, write_pair

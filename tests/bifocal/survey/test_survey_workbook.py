@@ -233,14 +233,19 @@ def assert_recalculated_equals_cached(path, folder):
 
 
 @pytest.mark.office
-@pytest.mark.parametrize("model", ["levelled", "3D", "2D"])
+@pytest.mark.parametrize(
+    "model",
+    ["levelled", *(pytest.param(m, marks=pytest.mark.acceptance) for m in ("3D", "2D"))],
+)
 def test_every_formula_recalculated_by_libreoffice_equals_the_library(model, tmp_path):
     write_book(tmp_path / "ideal.xlsx", ideal_content(model=model))
     assert assert_recalculated_equals_cached(tmp_path / "ideal.xlsx", tmp_path) > 1500
 
 
 @pytest.mark.office
-@pytest.mark.parametrize("principal_distance", [None, 35.0])
+@pytest.mark.parametrize(
+    "principal_distance", [None, pytest.param(35.0, marks=pytest.mark.acceptance)]
+)
 def test_formulas_of_a_general_pair_equal_the_library(principal_distance, tmp_path):
     write_book(tmp_path / "pair.xlsx", pair_content(principal_distance=principal_distance))
     assert assert_recalculated_equals_cached(tmp_path / "pair.xlsx", tmp_path) > 2000
@@ -359,6 +364,7 @@ def named(book, name):
     return book[sheet][cell]
 
 
+@pytest.mark.acceptance
 @pytest.mark.office
 def test_planning_of_a_pair_without_focal_lengths_follows_when_they_are_typed(tmp_path):
     write_book(tmp_path / "pair.xlsx", pair_content())

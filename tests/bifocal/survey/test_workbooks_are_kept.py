@@ -75,17 +75,22 @@ def named(path, name):
     return book[sheet.strip("'")][cell.replace("$", "")].value
 
 
+def slow(*values):
+    """A case that runs with the acceptance tests: one like it runs with every test."""
+    return pytest.param(*values, marks=pytest.mark.acceptance)
+
+
 #: LibreOffice takes seconds a workbook: it recalculates those whose formulas change.
 RECALCULATED = ("--d1", "--tolerance-rule", "--adjust-setup")
 OPTIONS = [
     (("--d1", 17.6), {"d_2": 9.5, "delta_d": 8.1}),
-    (("--d2", 9.4), {"d_2": 9.4, "delta_d": 8.1}),
+    slow(("--d2", 9.4), {"d_2": 9.4, "delta_d": 8.1}),
     (("--c1", 35.5, "--sigma-s", 0.01), {"c_1": 35.5, "sigma_s": 0.01}),
-    (("--unit", "mm"), {"input_unit": "mm"}),
-    (("--sigma-r-max", 0.5), {"sigma_r_max": 0.5}),
+    slow(("--unit", "mm"), {"input_unit": "mm"}),
+    slow(("--sigma-r-max", 0.5), {"sigma_r_max": 0.5}),
     (("--lang", "it"), {}),
-    (("--tolerance-rule", "2cm"), {}),
-    (("--adjust-setup",), {}),
+    slow(("--tolerance-rule", "2cm"), {}),
+    slow(("--adjust-setup",), {}),
 ]
 
 
@@ -143,6 +148,7 @@ def test_rows_below_the_prepared_ones_get_formulas(tmp_path):
     assert book["Results"].tables["tblResults"].ref.endswith("34")
 
 
+@pytest.mark.acceptance
 @pytest.mark.office
 def test_a_row_inserted_without_formulas_gets_them(tmp_path):
     path = fill(tmp_path / "own.xlsx")
@@ -185,7 +191,10 @@ def test_deleted_rows_leave_no_errors_in_results(tmp_path):
 
 
 @pytest.mark.office
-@pytest.mark.parametrize("title", ["Setup", "Results", "Check", "Georeference", "Planning", "Log"])
+@pytest.mark.parametrize(
+    "title",
+    ["Setup", "Results", slow("Check"), slow("Georeference"), slow("Planning"), slow("Log")],
+)
 def test_a_sheet_that_is_missing_is_added(tmp_path, title):
     path = with_own_chart(fill(tmp_path / "own.xlsx"))
     book = openpyxl.load_workbook(path)
@@ -237,7 +246,7 @@ FOREIGN = {
 
 
 @pytest.mark.office
-@pytest.mark.parametrize("name", FOREIGN)
+@pytest.mark.parametrize("name", [slow("plain"), "italian", slow("german"), slow("text")])
 def test_results_are_new_live_columns_of_the_users_own_table(tmp_path, name):
     heads, table, head = FOREIGN[name]
     path = foreign(tmp_path / "own.xlsx", heads=heads, table=table, head=head)
@@ -312,6 +321,7 @@ def test_values_of_the_users_own_setup_stay_where_they_are_and_live(tmp_path):
     assert fresh == pytest.approx((s2 - s1) / (s2 / 9.5 - s1 / 17.6), rel=1e-12)
 
 
+@pytest.mark.acceptance
 @pytest.mark.office
 def test_pixels_of_a_pair_in_the_users_own_table(tmp_path):
     pair = write_pair(tmp_path / "w.pair.json")

@@ -76,7 +76,15 @@ def head_row(path: Path) -> int:
 
 
 @pytest.mark.office
-@pytest.mark.parametrize("name", ORDERS)
+@pytest.mark.parametrize(
+    "name",
+    [
+        name
+        if name in ("air glass water", "five media")
+        else pytest.param(name, marks=pytest.mark.acceptance)
+        for name in ORDERS
+    ],
+)
 def test_recalculated_formulas_equal_the_library(name: str, tmp_path: Path) -> None:
     setup = ORDERS[name]
     points = points_for(setup)
