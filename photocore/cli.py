@@ -19,7 +19,7 @@ import click
 from photocore.errors import PhotogrammetryError
 from photocore.interrupts import STOPPED
 from photocore.log import COMMAND_LINE, DATE, is_quiet, log_options
-from photocore.options import NUMBER
+from photocore.options import NUMBER, STREAMS
 from photocore.provenance import recording
 
 #: Exit status of a fault of the program: EX_SOFTWARE of sysexits.h, which Windows' os lacks.
@@ -170,8 +170,19 @@ class LazyGroup(click.Group):
 
 def _tell_error(message: str) -> None:
     """Print an error on stderr, and log it."""
+    message = _named_streams(message)
     _LOG.error("%s", message)
     click.echo(message, err=True)
+
+
+def _named_streams(message: str) -> str:
+    """Return a message that calls stdin and stdout so, not by the files that stand for them."""
+    context = click.get_current_context(silent=True)
+    known = {} if context is None else context.meta
+    for key in STREAMS:
+        if key in known:
+            message = message.replace(str(known[key]), key.rpartition(".")[2])
+    return message
 
 
 def _show_details(ctx: click.Context) -> None:
@@ -200,6 +211,7 @@ def print_json(value: Any) -> None:
 
 def remark(message: str) -> None:
     """Print a remark on stderr, so that results on stdout stay clean, and log it."""
+    message = _named_streams(message)
     _LOG.info("%s", message)
     if not is_quiet():
         click.echo(message, err=True)

@@ -16,7 +16,8 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 STOPPED = "Stopped by the user; nothing was left half-written."
-#: Temporary files and folders in use by this process; removed, with all they hold, if it is ended.
+#: Temporary files and folders in use by this process; removed, with all they hold and what lies
+#: beside them under a longer name, if it is ended.
 temporary: set[Path] = set()
 #: Folders made for outputs that are not there yet; removed, if empty, the last one first.
 made_folders: list[Path] = []
@@ -78,7 +79,7 @@ def _hear(number: int, frame: object) -> None:  # noqa: ARG001
     if os.getpid() != _state.process:  # a child's clean-up is not its parent's
         signal.signal(number, signal.SIG_DFL)
         os.kill(os.getpid(), number)
-    elif _state.held:
+    elif _state.held or _lock.locked():  # in the middle of counting, the count would stay wrong
         _state.heard = number
     else:
         _answer()
@@ -90,7 +91,10 @@ def _answer() -> None:
         _state.raising = False  # a second one does not wait any more
         raise KeyboardInterrupt
     for path in list(temporary):
-        _remove(path)
+        with suppress(OSError):  # what libraries write beside a file bears its name and more
+            for beside in list(path.parent.iterdir()):
+                if beside.name.startswith(path.name):
+                    _remove(beside)
     for path in reversed(made_folders):
         with suppress(OSError):
             path.rmdir()

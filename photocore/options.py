@@ -10,10 +10,10 @@ import io
 import shlex
 import sys
 from collections.abc import Callable
-from contextlib import redirect_stdout
+from contextlib import redirect_stdout, suppress
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any, TypeVar
+from zipfile import BadZipFile, ZipFile
 
 import click
 
@@ -21,6 +21,8 @@ from photocore.errors import LARGEST
 from photocore.log import COMMAND_LINE
 
 Command = TypeVar("Command", bound=Callable[..., Any])
+#: Where a command finds the files that stand for stdin and stdout.
+STREAMS = ("photocore.stdin", "photocore.stdout")
 FILE = click.Path(path_type=Path)
 
 overwrite = click.option("--overwrite", is_flag=True, help="Replace existing files.")
@@ -63,18 +65,21 @@ class TableFile(click.Path):
         """Return the path, that of a temporary file where ``-`` is given."""
         if ctx is None or ctx.resilient_parsing or str(value) != "-":
             return super().convert(value, param, ctx)
-        key = f"photocore.{'stdout' if self.output else 'stdin'}"
+        key = STREAMS[self.output]
         if key in ctx.meta:
             self.fail("- can stand for one table only.", param, ctx)
-        ctx.meta[key] = True
+        from photocore.output import temporary_folder
+
         # The whole command's context is closed also where the rest of the line is wrong.
         ctx = ctx.find_root()
-        folder = Path(ctx.with_resource(TemporaryDirectory(prefix="bifocal-")))
+        folder = ctx.with_resource(temporary_folder())
         if not self.output:
-            return _from_stdin(folder)
-        if {"--json"} & set(shlex.split(ctx.meta.get(COMMAND_LINE, ""))):
+            path = ctx.meta[key] = _from_stdin(folder)
+            return path
+        if "--json" in shlex.split(ctx.meta.get(COMMAND_LINE, "")):
             self.fail("both it and --json go to stdout; choose one of them.", param, ctx)
         path, stdout = folder / "stdout.csv", sys.stdout
+        ctx.meta[key] = path
 
         def show() -> None:
             if path.is_file():
@@ -89,9 +94,14 @@ class TableFile(click.Path):
 
 
 def _from_stdin(folder: Path) -> Path:
-    """Return a file with what stands on stdin, of the ending that its first bytes ask for."""
+    """Return a file with what stands on stdin, of the ending that its content asks for."""
     data = sys.stdin.buffer.read()
-    path = folder / ("stdin.xlsx" if data[:2] == b"PK" else "stdin.csv")
+    ending = ".csv"
+    if data[:2] == b"PK":
+        ending = ".xlsx"
+        with suppress(BadZipFile), ZipFile(io.BytesIO(data)) as package:
+            ending = ".ods" if "content.xml" in package.namelist() else ".xlsx"
+    path = folder / f"stdin{ending}"
     path.write_bytes(data)
     return path
 

@@ -26,10 +26,20 @@ from photocore.textfile import check_name
 _NODE = sha256(socket.gethostname().encode()).hexdigest()[:6]
 #: Where processes of others cannot be asked, a temporary file of this age is left over. [s]
 _LEFT_OVER = 86_400.0
+#: When this process began, or a little before: clocks of files are coarse. [s]
+_BEGUN = time.time() - 1.0
 #: Finished outputs, under their temporary names, that wait for the others of their set.
 _waiting: ContextVar[list[tuple[Path, Path]] | None] = ContextVar("waiting", default=None)
 
+#: How GDAL's names of what is no local file begin: /vsis3/, /vsicurl/, /vsiaz/, /vsimem/ ...
+VIRTUAL = "/vsi"
+
 _LOG = logging.getLogger(__name__)
+
+
+def is_virtual(path: Path | str) -> bool:
+    """Tell whether a path is one of GDAL's own file systems, object storage for example."""
+    return Path(path).as_posix().startswith(VIRTUAL)
 
 
 def check_writable(path: Path | str, *, overwrite: bool) -> Path:
@@ -45,7 +55,7 @@ def check_writable(path: Path | str, *, overwrite: bool) -> Path:
     """
     path = Path(path)
     check_name(path)
-    if str(path).startswith("/vsi"):  # one of GDAL's file systems: only rasters go there
+    if is_virtual(path):  # only rasters go there
         return path
     if path.is_dir():
         raise InputError(f"{path}: is a folder; name a file to write.")
@@ -224,6 +234,19 @@ def atomic_path(path: Path | str, *, overwrite: bool) -> Iterator[Path]:
 
 
 @contextmanager
+def temporary_folder() -> Iterator[Path]:
+    """Yield a folder outside of the user's, for files that only pass; gone at the end, however."""
+    with interrupts.held():
+        folder = Path(tempfile.mkdtemp(prefix="bifocal-"))
+        interrupts.temporary.add(folder)
+    try:
+        yield folder
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)
+        interrupts.temporary.discard(folder)
+
+
+@contextmanager
 def scratch_beside(path: Path | str) -> Iterator[Path]:
     """Yield a file beside another, removed at the end; relative names in it stay true there.
 
@@ -372,7 +395,7 @@ def _remove_left_over(folder: Path, stem: str, ending: str) -> None:
     pattern = re.compile(
         rf"{re.escape(stem)}-(?P<node>[0-9a-f]{{6}})-(?P<process>\d+)-\w{{8}}{re.escape(ending)}.*"
     )
-    in_use = {path.name for path in interrupts.temporary}
+    in_use = {path.name for path in list(interrupts.temporary)}  # other threads add to it
     for entry in os.scandir(folder):
         match = pattern.fullmatch(entry.name)
         with suppress(OSError):
@@ -386,7 +409,8 @@ def _remove_left_over(folder: Path, stem: str, ending: str) -> None:
 def _is_left_over(match: re.Match[str], status: os.stat_result) -> bool:
     if match["node"] == _NODE and os.name == "posix":
         process = int(match["process"])
-        return process == os.getpid() or not _is_running(process)
+        # What bears our own number and is older than we are was left by a namesake.
+        return status.st_mtime < _BEGUN if process == os.getpid() else not _is_running(process)
     return time.time() - status.st_mtime > _LEFT_OVER
 
 

@@ -170,12 +170,22 @@ def today() -> str:
     """Return the date in UTC that outputs bear.
 
     That of the recording, else that of SOURCE_DATE_EPOCH, for reproducible files.
+
+    Raises
+    ------
+    InputError
+        If SOURCE_DATE_EPOCH is no time.
     """
     running = _recording.get()
     if running is not None:
         return running.day
     stamp = os.environ.get("SOURCE_DATE_EPOCH", "")
-    moment = datetime.fromtimestamp(int(stamp), UTC) if stamp.isdigit() else datetime.now(UTC)
+    try:
+        moment = datetime.fromtimestamp(int(stamp), UTC) if stamp else datetime.now(UTC)
+    except (ValueError, OverflowError, OSError):
+        raise InputError(
+            f"SOURCE_DATE_EPOCH: {stamp!r} is no time; set it to seconds since 1970, or unset it."
+        ) from None
     return moment.strftime("%Y-%m-%d")
 
 

@@ -19,12 +19,12 @@ from numpy.typing import DTypeLike, NDArray
 
 from photocore.arrays import FloatArray
 from photocore.errors import InputError
+from photocore.output import is_virtual
 from photocore.provenance import note, provenance
 from photocore.raster_places import (
     copy_optimised,
     gdal_name,
     is_cloud_optimised,
-    is_virtual,
     raster_place,
 )
 from photocore.textfile import check_name
@@ -301,6 +301,8 @@ def create_geotiff(
                     yield RasterWriter(file)
                 categories = not colour and kind.kind == "u"
                 if cog:
+                    # What a full disk swallowed would be copied as empty blocks.
+                    check_whole(plain, width=width, height=height, bands=bands)
                     copy_optimised(plain, temporary, options, block=BLOCK, categories=categories)
                 elif overviews:
                     _add_overviews(temporary, max(width, height), categories=categories)

@@ -12,14 +12,11 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from contextvars import ContextVar
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any
 
 from photocore.errors import InputError
-from photocore.output import atomic_path
+from photocore.output import atomic_path, is_virtual, temporary_folder
 
-#: How GDAL's names of what is no local file begin: /vsis3/, /vsicurl/, /vsiaz/, /vsimem/ ...
-VIRTUAL = "/vsi"
 _cloud_optimised: ContextVar[bool] = ContextVar("cloud_optimised", default=False)
 
 
@@ -46,13 +43,7 @@ def gdal_name(path: Path | str) -> str:
     >>> gdal_name(Path("/vsicurl/https://example.org/a.tif"))
     '/vsicurl/https://example.org/a.tif'
     """
-    name = str(path)
-    return re.sub(r":/+", "://", name, count=1) if name.startswith(VIRTUAL) else name
-
-
-def is_virtual(path: Path | str) -> bool:
-    """Tell whether a path is one of GDAL's own file systems, object storage for example."""
-    return str(path).startswith(VIRTUAL)
+    return re.sub(r":/+", "://", Path(path).as_posix(), count=1) if is_virtual(path) else str(path)
 
 
 @contextmanager
@@ -67,8 +58,8 @@ def raster_place(path: Path, *, overwrite: bool) -> Iterator[Path]:
     from rasterio.errors import RasterioError
 
     check_virtual(path, overwrite=overwrite)
-    with TemporaryDirectory(prefix="bifocal-") as folder:
-        temporary = Path(folder) / path.name
+    with temporary_folder() as folder:
+        temporary = folder / path.name
         yield temporary
         try:
             rasterio.shutil.copyfiles(str(temporary), gdal_name(path))

@@ -131,6 +131,14 @@ def test_what_is_read_counts_once_as_it_was_and_own_outputs_do_not(tmp_path):
     assert provenance().command == ""
 
 
+@pytest.mark.parametrize("stamp", ["99999999999999999", "²", "today"])
+def test_a_time_of_the_environment_that_is_none_is_refused_by_name(monkeypatch, stamp):
+    monkeypatch.setenv("SOURCE_DATE_EPOCH", stamp)
+    result = CliRunner().invoke(multimedia, ["index"])
+    assert result.exit_code == 1
+    assert result.stderr.startswith("Error: SOURCE_DATE_EPOCH: ")
+
+
 @pytest.mark.parametrize("place", ["before", "behind"])
 def test_a_date_that_is_none_is_refused_and_a_date_holds_wherever_it_is_given(tmp_path, place):
     words = ["template", str(tmp_path / f"{place}.xlsx")]

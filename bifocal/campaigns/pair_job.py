@@ -38,6 +38,8 @@ PRODUCTS = ("relief", "points", "ortho", "drawing", "report")
 MOST_PRODUCTS = ("relief", "points", "drawing", "report")
 #: Files of a pair besides its photos.
 FILES = ("control", "check", "lengths", "lens", "lens1", "lens2")
+#: Options that hold for all pairs where these are adjusted in one frame.
+JOINT_OPTIONS = ("sigma_control", "sigma_pick", "unit")
 #: Share of a pair's time that each step takes, measured on church_2.
 WEIGHTS = {
     "align": 0.14, "relief": 0.38, "points": 0.01, "ortho": 0.07, "drawing": 0.2, "report": 0.2,
@@ -231,16 +233,8 @@ def run_pair(job: PairJob, progress: Progress = no_progress) -> PairOutcome:
             remarks += [f"{step.name}: {remark}" for remark in record.remarks]
             behind += WEIGHTS[step.name]
         failed = ""
-    except PhotogrammetryError as error:
-        message = str(error)
-    except MemoryError:
-        message = "not enough memory; give it fewer neighbours (--jobs) or a coarser gsd."
-    except OSError as error:
-        message = f"{error.filename or job.folder}: {error.strerror or error}."
     except Exception as error:  # one pair's fault, whatever it is, must not stop the others
-        if os.environ.get("BIFOCAL_DEBUG"):
-            traceback.print_exc()
-        message = unforeseen_message(f"pair {job.name}, step {failed}", error)
+        message = failure_message(error, f"pair {job.name}, step {failed}", job.folder)
     finally:
         cv2.setNumThreads(threads)
         hashes.save()
@@ -248,6 +242,19 @@ def run_pair(job: PairJob, progress: Progress = no_progress) -> PairOutcome:
         name=job.name, done=tuple(done), kept=tuple(kept), failed_step=failed, message=message,
         remarks=tuple(remarks), seconds=time.perf_counter() - start,
     )  # fmt: skip
+
+
+def failure_message(error: Exception, what: str, folder: Path) -> str:
+    """Return what to say of the error that ended a step, while it is handled."""
+    if isinstance(error, PhotogrammetryError):
+        return str(error)
+    if isinstance(error, MemoryError):
+        return "not enough memory; give it fewer neighbours (--jobs) or a coarser gsd."
+    if isinstance(error, OSError):
+        return f"{error.filename or folder}: {error.strerror or error}."
+    if os.environ.get("BIFOCAL_DEBUG"):
+        traceback.print_exc()
+    return unforeseen_message(what, error)
 
 
 def _part_of(progress: Progress, start: float, share: float, step: str) -> Progress:
@@ -318,7 +325,8 @@ def _tuple(value: Any) -> Any:
     return None if value is None else tuple(value)
 
 
-def _tables(job: PairJob) -> dict[str, Path]:
+def tables_of(job: PairJob) -> dict[str, Path]:
+    """Return the tables of known points of a pair."""
     return {role: job.files[role] for role in ("control", "check") if role in job.files}
 
 
@@ -331,7 +339,7 @@ def _points_step(job: PairJob) -> Step:
         from bifocal.survey.output import write_result
 
         pair = Pair.read(job.pair_path)
-        tables = {"control": None, **_tables(job)}
+        tables = {"control": None, **tables_of(job)}
         solution = solve_control(
             job.pair_path, **tables, exchanged=is_exchanged(pair, job.far),
             language=options.get("language", "en"), unit=options.get("unit", ""),
@@ -341,7 +349,11 @@ def _points_step(job: PairJob) -> Step:
 
     joint = {} if job.joint is None else {"pair": job.pair_path}
     return Step(
-        name="points", files={**_tables(job), **joint}, after=("align",), options=options, make=make
+        name="points",
+        files={**tables_of(job), **joint},
+        after=("align",),
+        options=options,
+        make=make,
     )
 
 
@@ -373,7 +385,7 @@ def _ortho_step(job: PairJob) -> Step:
 def _drawing_step(job: PairJob) -> Step:
     names = ("scale", "dpi", "paper", "image", "bounds", "fill", "sections", "contours", "cog")
     options = _some(job, *names)
-    control = {k: v for k, v in _tables(job).items() if k == "control"}
+    control = {k: v for k, v in tables_of(job).items() if k == "control"}
 
     def make(place: Path, progress: Progress) -> tuple[str, ...]:
         from bifocal.orthophotos.deliver_workflow import DeliverTask, deliver
@@ -404,10 +416,10 @@ def _report_step(job: PairJob, earlier: tuple[str, ...]) -> Step:
             title=job.name, language=options.get("language", "en"), unit=options.get("unit", ""),
             scale=options.get("scale"), far=job.far,
             relief=job.relief_path if "relief" in earlier else None,
-            ortho=ortho, **_tables(job),
+            ortho=ortho, **tables_of(job),
         )  # fmt: skip
         outs = (place / f"{job.title}_report.html", place / f"{job.title}_report.pdf")
         return write_report([job.pair_path], outs, [task], progress=progress)
 
-    files = {**_photos(job), **_tables(job)}
+    files = {**_photos(job), **tables_of(job)}
     return Step(name="report", files=files, after=earlier, options=options, make=make)

@@ -95,12 +95,23 @@ def pair_photos(
 
 def _may_pair(first: ImageInfo, second: ImageInfo) -> bool:
     """Tell whether focal lengths allow a pair; unknown ones do."""
-    a, b = (info.focal_length_35 or info.focal_length for info in (first, second))
+    a, b = _focal_lengths(first, second)
     return not a or not b or max(a, b) >= _LONGER * min(a, b)
 
 
+def _focal_lengths(first: ImageInfo, second: ImageInfo) -> tuple[float | None, float | None]:
+    """Return both focal lengths in one measure: 35 mm equivalents, else those of the lenses. [mm]
+
+    The equivalent of one photo and the true length of the other do not compare.
+    """
+    a, b = first.focal_length_35, second.focal_length_35
+    if a and b:
+        return a, b
+    return (None, None) if a or b else (first.focal_length, second.focal_length)
+
+
 def _ordered(first: ImageInfo, second: ImageInfo, shared: int) -> PhotoPair:
-    a, b = (info.focal_length_35 or info.focal_length for info in (first, second))
+    a, b = _focal_lengths(first, second)
     known = bool(a and b)
     if a and b and b > a:
         first, second = second, first

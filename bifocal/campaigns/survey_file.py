@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
-from bifocal.campaigns.pair_job import FILES, PRODUCTS, PairJob
+from bifocal.campaigns.pair_job import FILES, JOINT_OPTIONS, PRODUCTS, PairJob, tables_of
 from photocore.errors import InputError
 from photocore.textfile import file_name, read_text
 
@@ -155,17 +155,31 @@ def read_survey_file(
             joint = folder / "joint" if whole["joint"] else None
             jobs.append(replace(job, overwrite=overwrite, joint=joint))
     folders = [job.folder.name.casefold() for job in jobs]
-    faults += [
-        f"pair {job.name}: joint and mosaic are folders of the whole survey; give it another name."
-        for job in jobs
-        if job.folder.name.casefold() in WHOLE
-    ]
+    faults += _faults_of_whole(jobs, whole)
     for job in jobs:
         if folders.count(job.folder.name.casefold()) > 1:
             faults.append(f"pair {job.name}: another pair has the same name; give each its own.")
     if faults:
         raise InputError("\n".join(f"{path}: {fault}" for fault in dict.fromkeys(faults)))
     return jobs
+
+
+def _faults_of_whole(jobs: Sequence[PairJob], whole: Mapping[str, Any]) -> list[str]:
+    """Return what stands against making something of all pairs together."""
+    if not any(whole.values()):
+        return []
+    faults = [
+        f"pair {job.name}: joint and mosaic are folders of the whole survey; give it another name."
+        for job in jobs
+        if job.folder.name.casefold() in WHOLE
+    ]
+    for key in JOINT_OPTIONS if whole["joint"] else ():
+        if len({job.options.get(key) for job in jobs if tables_of(job)}) > 1:
+            faults.append(
+                f"{key}: the pairs say different things of their tables, and joint = true "
+                "adjusts all tables as one; write it above the pairs."
+            )
+    return faults
 
 
 def _parsed(path: Path) -> dict[str, Any]:

@@ -7,7 +7,13 @@ from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
 
-from bifocal.campaigns.pair_job import PairJob, PairOutcome
+from bifocal.campaigns.pair_job import (
+    JOINT_OPTIONS,
+    PairJob,
+    PairOutcome,
+    failure_message,
+    tables_of,
+)
 from bifocal.campaigns.step_store import (
     Step,
     clean,
@@ -17,7 +23,7 @@ from bifocal.campaigns.step_store import (
     step_key,
 )
 from photocore.cli import Progress, no_progress
-from photocore.errors import InputError, PhotogrammetryError
+from photocore.errors import InputError
 from photocore.provenance import FileHashes, recording
 from photocore.raster_places import cloud_optimised
 
@@ -30,11 +36,11 @@ def joint_step(jobs: Sequence[PairJob]) -> Step:
     files: dict[str, Path] = {}
     for job in jobs:
         parts = {"pair": job.own_pair_path, "far": job.far, "near": job.near}
-        parts |= {role: job.files[role] for role in ("control", "check") if role in job.files}
+        parts |= tables_of(job)
         files |= {f"{job.title} {role}": path for role, path in parts.items()}
-    # One precision of control and picks for all: that of the first pair.
-    names = {"sigma_control": "sigma_control", "sigma_pick": "sigma_pick", "unit": "unit"}
-    options = {to: jobs[0].options[of] for of, to in names.items() if of in jobs[0].options}
+    # One unit and precision of the tables for all: the survey file holds no two.
+    said = next((job for job in jobs if tables_of(job)), jobs[0]).options
+    options = {name: said[name] for name in JOINT_OPTIONS if name in said}
 
     def make(place: Path, progress: Progress) -> tuple[str, ...]:
         from bifocal.orientation.joint_workflow import JointTask, adjust_pairs
@@ -78,6 +84,17 @@ def mosaic_step(jobs: Sequence[PairJob]) -> Step:
     return Step(name=MOSAIC, files=files, options={"cog": True}, make=make)
 
 
+def plan_of_whole(folder: Path, step: Step) -> str:
+    """Return ``keep`` or ``make`` for a step of all pairs, or what stands against it."""
+    hashes = FileHashes(folder / f".{step.name}-hashes.json")
+    try:
+        key = step_key(step, {}, hashes)
+        current = is_current(folder / step.name, read_record(folder / step.name), key, hashes)
+    except InputError as error:
+        return str(error)
+    return "keep" if current else "make"
+
+
 def run_whole(
     folder: Path, step: Step, *, overwrite: bool, progress: Progress = no_progress
 ) -> PairOutcome:
@@ -97,8 +114,9 @@ def run_whole(
             with recording(step.described()):
                 record = run_step(folder, step, key, hashes, progress=progress, overwrite=overwrite)
         remarks = record.remarks
-    except PhotogrammetryError as error:
-        done, failed, message = (), step.name, str(error)
+    except Exception as error:  # the pairs are made, whatever this fault is
+        done, failed = (), step.name
+        message = failure_message(error, f"step {step.name}", folder)
     finally:
         with suppress(OSError):
             hashes.save()

@@ -11,9 +11,24 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from bifocal.campaigns.pair_job import FILES, MOST_PRODUCTS, PRODUCTS, PairJob, PairOutcome, plan_of
+from bifocal.campaigns.pair_job import (
+    FILES,
+    MOST_PRODUCTS,
+    PRODUCTS,
+    PairJob,
+    PairOutcome,
+    plan_of,
+    steps_of,
+)
 from bifocal.campaigns.step_store import Step, clean
-from bifocal.campaigns.whole_wall import JOINT, MOSAIC, joint_step, mosaic_step, run_whole
+from bifocal.campaigns.whole_wall import (
+    JOINT,
+    MOSAIC,
+    joint_step,
+    mosaic_step,
+    plan_of_whole,
+    run_whole,
+)
 from bifocal.campaigns.worker_pool import Listener, run_here
 from photocore.cli import Progress, no_progress
 from photocore.errors import InputError
@@ -23,6 +38,8 @@ from photocore.provenance import FileHashes, recording, today
 
 #: File that says which process works in a folder.
 LOCK = ".survey.lock"
+#: In place of a pair's name in a plan.
+_ALL = "all pairs"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -127,13 +144,43 @@ def begin_survey(
     return len(pairs), len(left)
 
 
-def plan_survey(jobs: Sequence[PairJob]) -> list[tuple[str, str, str]]:
-    """Return (pair, step, ``keep``, ``make`` or what stands against it), doing nothing."""
+def plan_survey(jobs: Sequence[PairJob], *, mosaic: bool = False) -> list[tuple[str, str, str]]:
+    """Return (pair, step, ``keep``, ``make`` or what stands against it), doing nothing.
+
+    What is made of all pairs, if asked for, comes last.
+    """
+    frame = "" if all(job.joint is None for job in jobs) else _plan_of_frame(jobs)
     rows = []
     for job in jobs:
         hashes = FileHashes(job.folder / ".hashes.json")
-        rows += [(job.name, step, what) for step, what in plan_of(job, hashes)]
+        if frame in ("", "keep"):
+            plan = plan_of(job, hashes)
+        else:  # what follows the common frame is made anew with it
+            plan = plan_of(replace(job, products=(), joint=None), hashes)
+            if plan[-1][1] in ("keep", "make"):
+                plan += [(step.name, "make") for step in steps_of(job)[1:]]
+        rows += [(job.name, step, what) for step, what in plan]
+    if frame:
+        rows.append((_ALL, JOINT, frame))
+    if mosaic:
+        rows.append((_ALL, MOSAIC, _plan_of_mosaic(jobs, rows)))
     return rows
+
+
+def _plan_of_frame(jobs: Sequence[PairJob]) -> str:
+    alone = [replace(job, products=(), joint=None) for job in jobs]
+    if any(what != "keep" for _, _, what in plan_survey(alone)):
+        return "make"
+    return plan_of_whole(jobs[0].folder.parent, joint_step(jobs))
+
+
+def _plan_of_mosaic(jobs: Sequence[PairJob], rows: Sequence[tuple[str, str, str]]) -> str:
+    if any(what != "keep" for _, _, what in rows):
+        return "make"
+    try:
+        return plan_of_whole(jobs[0].folder.parent, mosaic_step(jobs))
+    except InputError as error:
+        return str(error)
 
 
 def run_survey(

@@ -62,7 +62,9 @@ points.csv, one line per control point; r blank = on the wall; pixels in both ph
 @click.option("--lens1", type=FILE, help="Lens file of the far photo.")
 @click.option("--lens2", type=FILE, help="Lens file of the near photo.")
 @click.option(
-    "--lengths", type=FILE, help="Table of lengths between control points: from, to, length [m]."
+    "--lengths",
+    type=FILE,
+    help="Table of lengths between control points: from, to, length, sigma [m].",
 )
 @click.option(
     "--length", type=Numbers(5), metavar="COL,ROW,COL,ROW,M",

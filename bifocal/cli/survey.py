@@ -66,7 +66,7 @@ def command(
         return
     pairs = read_survey_file(survey, out=out, overwrite=overwrite)
     if dry_run:
-        plan = plan_survey(pairs)
+        plan = plan_survey(pairs, mosaic=wants_mosaic(survey))
         if as_json:
             print_json(
                 {"plan": [dict(zip(("pair", "step", "what"), row, strict=True)) for row in plan]}

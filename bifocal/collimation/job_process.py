@@ -19,7 +19,7 @@ from bifocal.orientation.align_workflow import (
 from bifocal.orientation.control_points import SiteMeasures
 from bifocal.orientation.match_workflow import match_pair_file
 from bifocal.orientation.matching import MatchSettings
-from bifocal.orthophotos.deliver_workflow import DPI, DeliverTask, deliver
+from bifocal.orthophotos.deliver_workflow import DPI, DeliverTask, default_title, deliver
 from bifocal.orthophotos.ortho_workflow import OrthoTask, make_ortho
 from bifocal.relief_maps.workflow import ReliefJob, relief_of_pair
 from bifocal.survey.pair_workflow import read_pair
@@ -136,16 +136,18 @@ def _ortho(task: Task, progress: Progress) -> dict[str, Any]:
 
 
 def _deliver(task: Task, progress: Progress) -> dict[str, Any]:
+    path = Path(task["pair"])
+    pair = read_pair(path)
     wish = DeliverTask(
         scale=task["scale"] or 50.0,
         dpi=task["dpi"] or DPI,
-        title=task["title"],
+        title=task["title"] or default_title(pair, path),
         paper=task["paper"],
         marked=_path(task["marked"]),
         sections=task["sections"],
     )
     made = deliver(
-        read_pair(task["pair"]), Path(task["out"]), _ortho_task(task), wish,
+        pair, Path(task["out"]), _ortho_task(task), wish,
         overwrite=task["overwrite"], progress=progress,
     )  # fmt: skip
     return {"files": made.files, "sheet": made.sheet, "remarks": made.ortho.remarks}

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping
 from dataclasses import asdict
 from functools import partial
@@ -16,6 +15,7 @@ from bifocal.collimation.drawing import write_points_drawing
 from bifocal.collimation.jobs import PageJob
 from bifocal.collimation.live_orientation import control_of, lenses_of, site_of
 from bifocal.collimation.session import Session
+from bifocal.collimation.wording import without_options
 from bifocal.orientation.control_points import Control
 from photocore.errors import InputError
 from photocore.jsonfile import plain
@@ -187,6 +187,7 @@ def _write_control(session: Session, control: Control) -> dict[str, Path | None]
             "from": [control.ids[i] for i in starts],
             "to": [control.ids[i] for i in ends],
             "length [m]": np.array(lengths),
+            "sigma [m]": np.array(control.sigma_lengths),
         }
     for key, content in contents.items():
         path = session.products.place(key, f".{key}.csv")
@@ -219,16 +220,6 @@ def finish(session: Session, task: Mapping[str, Any], result: Mapping[str, Any])
     return _told(result)
 
 
-#: The advice to use an option of the command line, which the page does not have.
-_OPTION = re.compile(r"[:;,]?\s*--[a-z][^;.]*(?=[;.]|$)")
-
-
 def _told(result: Mapping[str, Any]) -> str:
-    """Return the remarks of a job without advice for the command line.
-
-    Examples
-    --------
-    >>> _told({"remarks": ["35% of it is empty: --fill closes holes; --complete marks it."]})
-    '35% of it is empty.'
-    """
-    return " ".join(_OPTION.sub("", str(remark)).strip() for remark in result.get("remarks", ()))
+    """Return the remarks of a job without advice for the command line."""
+    return " ".join(without_options(str(remark)) for remark in result.get("remarks", ()))

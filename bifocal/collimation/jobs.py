@@ -12,6 +12,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from bifocal.collimation.wording import without_options
 from photocore.errors import InputError, PhotogrammetryError
 
 #: Plain data, as it goes to the worker and comes back.
@@ -162,7 +163,8 @@ class JobRunner:
         elif "result" in answer:
             self._finish(job, partial(finish, task, answer["result"]))
         else:
-            self._end(job, "failed", answer.get("error", "the job ended without a result."))
+            why = answer.get("error", "the job ended without a result.")
+            self._end(job, "failed", without_options(why))
 
     def _follow(self, job: PageJob, process: subprocess.Popen[str], task: Task) -> dict[str, Any]:
         """Return the last line of a worker, telling its progress meanwhile."""

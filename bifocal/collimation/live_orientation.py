@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from bifocal.collimation.records import PickedControl, SurveyState
-from bifocal.collimation.wording import say
+from bifocal.collimation.wording import say, without_options
 from bifocal.files.images import ImageInfo
 from bifocal.model.orientation_precision import CAMERA, NAMES
 from bifocal.orientation.absolute_orientation import orient_pair
@@ -85,17 +85,15 @@ def control_of(state: SurveyState) -> Control:
     on_wall = np.isfinite(xyz[:, :2]).all(axis=1) & np.isnan(xyz[:, 2])
     xyz[on_wall, 2], sigma[on_wall, 2] = 0.0, SIGMA_ON_WALL
     index = {point.name: number for number, point in enumerate(points)}
+    tapes = [tape for tape in state.tapes.values() if tape.start in index and tape.end in index]
     return Control(
         ids=tuple(index),
         xyz=xyz,
         sigma=sigma,
         pixels1=np.array([p.picks[0] or nowhere for p in points], dtype=float).reshape(-1, 2),
         pixels2=np.array([p.picks[1] or nowhere for p in points], dtype=float).reshape(-1, 2),
-        lengths=tuple(
-            (index[tape.start], index[tape.end], tape.length)
-            for tape in state.tapes.values()
-            if tape.start in index and tape.end in index
-        ),
+        lengths=tuple((index[tape.start], index[tape.end], tape.length) for tape in tapes),
+        sigma_lengths=tuple(tape.sigma or np.nan for tape in tapes),
     )
 
 
@@ -126,9 +124,8 @@ def live_orientation(state: SurveyState, infos: list[ImageInfo], language: str) 
             site=site_of(state),
         )
     except PhotogrammetryError as error:
-        return LiveOrientation(
-            error=str(error), deviations={}, residuals={}, advice=(*hints, str(error))
-        )
+        told = without_options(str(error))
+        return LiveOrientation(error=told, deviations={}, residuals={}, advice=(*hints, told))
     adjusted = oriented.adjusted
     residuals = adjusted.control_residuals
     if oriented.exchanged:

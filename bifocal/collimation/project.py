@@ -116,7 +116,7 @@ def _of_photos(photos: tuple[Path, Path], workbook: Path | None) -> SurveyFiles:
     if workbook is not None and _names_photos(book) and last_opened(files.journal) is None:
         pair = read_pair(book)
         own = [pair.photo_file(1), pair.photo_file(2)]
-        if not all(a.samefile(b) for a, b in zip(own, photos, strict=True)):
+        if not all(a.is_file() and a.samefile(b) for a, b in zip(own, photos, strict=True)):
             raise InputError(
                 f"{book}: its photos (photo_1, photo_2) are {own[0].name} and {own[1].name}, not "
                 f"{photos[0].name} and {photos[1].name}; give the workbook alone, or another one."

@@ -65,8 +65,6 @@ class Session:
         self.journal = Journal(files.journal)
         try:
             pair = pair_of(files)
-            if pair is not None:
-                pair.refuse_media("the page")
             photos = files.photos if pair is None else (pair.photo_file(1), pair.photo_file(2))
             self.pictures = Pictures(files.folder / f".{files.stem}.tiles", photos, pair)
             self.results = None if pair is None else self._results(pair)

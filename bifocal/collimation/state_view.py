@@ -10,7 +10,7 @@ import numpy as np
 from bifocal.collimation.commands import SETUP
 from bifocal.collimation.live_orientation import LiveOrientation
 from bifocal.collimation.session import Session
-from bifocal.collimation.wording import say
+from bifocal.collimation.wording import say, without_options
 from bifocal.files.images import ImageInfo
 from bifocal.model.pair import Pair
 from photocore.jsonfile import plain
@@ -143,6 +143,8 @@ def _pair(session: Session, pair: Pair) -> dict[str, Any]:
             }
         )
     centre = np.asarray(pair.zoom_centre)
+    found = (session.proposal or {}).get("report", {}).get("remarks", ())
+    remarks = (*pair.remarks, *found)
     return plain(
         {
             "name": str(pair.extra.get("name") or session.files.stem),
@@ -158,10 +160,7 @@ def _pair(session: Session, pair: Pair) -> dict[str, Any]:
             "images": images,
             "accepted": session.proposed_path is None,
             "report": session.proposal and session.proposal["report"],
-            "remarks": [
-                *pair.remarks,
-                *((session.proposal or {}).get("report", {}).get("remarks", ())),
-            ],
+            "remarks": [without_options(str(remark)) for remark in remarks],
         }
     )
 

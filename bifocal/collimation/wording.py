@@ -2,10 +2,25 @@
 
 from __future__ import annotations
 
+import re
 import tomllib
 from functools import cache
 from importlib.resources import files
 from typing import Any
+
+#: An option of the command line, which the page does not have, with its value.
+_OPTION = r"--[a-z][\w-]*(?: (?:[A-Z]+|\d[\d.]*)(?:,(?:[A-Z]+|\d[\d.]*))*)?"
+#: Advice to use one: in brackets of its own; a clause that begins with it; its last words. What
+#: else is said stays, and so does the name of the option.
+_ADVICE = tuple(
+    (re.compile(pattern), instead)
+    for pattern, instead in (
+        (rf" \({_OPTION}(?:(?:,| or| and) {_OPTION})*\)", ""),
+        (rf"[:;] {_OPTION} [a-z][^;.]*", ""),
+        (rf"(?:, give| and give| with) {_OPTION}|, {_OPTION}(?=\))", ""),
+        (r"(?<![\w-])--(?=[a-z])", ""),
+    )
+)
 
 
 @cache
@@ -16,3 +31,22 @@ def _content() -> dict[str, dict[str, dict[str, str]]]:
 def say(section: str, key: str, language: str, **fields: Any) -> str:
     """Return a sentence in a language, its fields filled in."""
     return _content()[section][key][language].format(**fields)
+
+
+def without_options(text: str) -> str:
+    """Return a remark of the program without advice for the command line.
+
+    Examples
+    --------
+    >>> without_options("35% of it is empty: --fill closes holes; --complete marks it.")
+    '35% of it is empty.'
+    >>> without_options("Distortion (calibrate, give --lens), or refraction. Check it.")
+    'Distortion (calibrate), or refraction. Check it.'
+    >>> without_options("+12 mm, 30 % (--wall 120,130): name a spot with --wall COL,ROW.")
+    '+12 mm, 30 %: name a spot.'
+    >>> without_options("wall--b.jpg: is blurred.")
+    'wall--b.jpg: is blurred.'
+    """
+    for pattern, instead in _ADVICE:
+        text = pattern.sub(instead, text)
+    return text.strip()

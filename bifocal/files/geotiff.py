@@ -18,7 +18,7 @@ from bifocal.model.grid import Grid
 from bifocal.model.relief_map import Quality, ReliefMap
 from photocore.arrays import Float32Array
 from photocore.errors import InputError
-from photocore.output import all_or_none, atomic_path, check_all_writable
+from photocore.output import all_or_none, atomic_path, check_all_writable, is_virtual
 from photocore.raster import (
     BLOCK,
     RasterFile,
@@ -26,7 +26,6 @@ from photocore.raster import (
     corner_transform,
     create_geotiff,
 )
-from photocore.raster_places import is_virtual
 
 #: Name of the local system every raster is in.
 LOCAL_CRS = (

@@ -208,7 +208,8 @@ def checked(covariance: FloatArray) -> FloatArray:
     size = len(NAMES)
     matrix = read_only(covariance, "orientation", shape=(size, size))
     scale = np.sqrt(np.maximum(np.diag(matrix), 0.0))
-    wrong = np.abs(matrix) > 1.001 * np.outer(scale, scale) + 1e-30
+    largest = np.outer(scale, scale) + 1e-30
+    wrong = (np.abs(matrix) > 1.001 * largest) | (np.abs(matrix - matrix.T) > 1e-6 * largest)
     if not np.isfinite(matrix).all() or (np.diag(matrix) < 0).any() or wrong.any():
         raise InputError('"orientation": the matrix is no covariance (symmetric, not negative).')
     return matrix

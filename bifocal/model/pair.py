@@ -330,6 +330,11 @@ class Pair:
         return self.folder / file
 
     @property
+    def photo_files(self) -> tuple[Path, ...]:
+        """The image files that are named, of none to both photos."""
+        return tuple(self.photo_file(k) for k in (1, 2) if self.photo(k).file)
+
+    @property
     def as_given(self) -> tuple[Photo, Photo]:
         """The photos in the order they were given, not far before near."""
         return (self.image2, self.image1) if self.exchanged else (self.image1, self.image2)
@@ -418,7 +423,8 @@ class Pair:
         Returns
         -------
         ndarray, shape (n, 3, 3)
-            Zero where the pair does not state it. Common to all points: neighbours share it.
+            Zero where the pair does not state it, or looks through media. Common to all points:
+            neighbours share it.
         """
         if self.orientation is None or self.layers is not None:
             return np.zeros((len(xyz), 3, 3))
@@ -437,9 +443,9 @@ class Pair:
         -------
         ndarray, shape (n, 3, k), or None
             Errors in X, Y, r [m], the same k errors for all points; None where the pair does not
-            state its covariance.
+            state its covariance, or looks through media.
         """
-        if self.orientation is None:
+        if self.orientation is None or self.layers is not None:
             return None
         photos = (self.image1, self.image2)
         return orientation_precision.orientation_effect(photos, self.orientation, xyz)

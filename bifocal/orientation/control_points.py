@@ -31,6 +31,7 @@ LENGTHS = (
     Column("to", ("point 2", "nach", "b"), kind="text", required=True),
     Column("length", ("distance", "lunghezza", "distanza", "laenge", "länge", "strecke"),
            required=True, unit="m"),
+    Column("sigma", ("sigma length", "std"), unit="m"),
 )  # fmt: skip
 
 
@@ -49,6 +50,9 @@ class Control:
         Picks in the far and the near photo; NaN where not picked. [px]
     lengths : tuple of (int, int, float)
         Taped distances between two of the points: indices and metres.
+    sigma_lengths : tuple of float
+        Standard deviations of these; where they are left out or NaN, that of the best coordinate,
+        3 mm at most. [m]
     """
 
     ids: tuple[str, ...] = ()
@@ -57,12 +61,15 @@ class Control:
     pixels1: FloatArray = field(default_factory=lambda: np.zeros((0, 2)))
     pixels2: FloatArray = field(default_factory=lambda: np.zeros((0, 2)))
     lengths: tuple[tuple[int, int, float], ...] = ()
+    sigma_lengths: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
         count = len(self.ids)
         shapes = [self.xyz.shape, self.sigma.shape, self.pixels1.shape, self.pixels2.shape]
         if shapes != [(count, 3), (count, 3), (count, 2), (count, 2)]:
             raise InputError(f"control: {count} ids but arrays of shape {shapes}.")
+        if len(self.sigma_lengths) not in (0, len(self.lengths)):
+            raise InputError("control: sigma_lengths and lengths are not equally many.")
 
     def exchanged(self) -> Control:
         """Return the same points with far and near photo exchanged."""
@@ -165,11 +172,12 @@ def read_control(
 
 
 def read_lengths(path: Path | str, control: Control) -> Control:
-    """Read taped lengths (from, to, length) between control points and add them."""
+    """Read taped lengths (from, to, length, sigma) between control points and add them."""
     table = read_table(path, LENGTHS)
     index = {name: number for number, name in enumerate(control.ids)}
-    lengths = _metres(table, "length", "")
+    lengths, sigmas = _metres(table, "length", ""), _metres(table, "sigma", "")
     taped: list[tuple[int, int, float]] = []
+    spread: list[float] = []
     errors: list[CellError] = []
     for row, ends in enumerate(zip(table.texts("from"), table.texts("to"), strict=True)):
         for key, name in zip(("from", "to"), ends, strict=True):
@@ -178,11 +186,15 @@ def read_lengths(path: Path | str, control: Control) -> Control:
                 errors.append(table.error(row, key, message))
         if not lengths[row] > 0:
             errors.append(table.error(row, "length", "expected a length above zero, in metres."))
+        elif sigmas[row] <= 0:
+            errors.append(table.error(row, "sigma", "expected a number above zero, in metres."))
         elif ends[0] in index and ends[1] in index:
             taped.append((index[ends[0]], index[ends[1]], float(lengths[row])))
+            spread.append(float(sigmas[row]))
     if errors:
         raise WorkbookError(errors)
-    return replace(control, lengths=(*control.lengths, *taped))
+    before = control.sigma_lengths or (np.nan,) * len(control.lengths)
+    return replace(control, lengths=(*control.lengths, *taped), sigma_lengths=(*before, *spread))
 
 
 def _metres(table: Table, key: str, unit: str) -> FloatArray:

@@ -28,6 +28,8 @@ ROUNDS = 8
 COARSE, FAR_OFF = 3, 10.0
 #: Rounding error of pixels and metres, as a share of their standard deviations.
 ROUNDING = 1e-9
+#: Redundancy from which rays of one stated precision tell how good they truly are.
+ENOUGH = 20.0
 #: Of fewer points with known coordinates no frame follows.
 FEWEST_KNOWN = 3
 
@@ -115,6 +117,8 @@ class JointAdjustment(JointUnknowns):
     control : ndarray, shape (p, 3)
         Adjusted minus known coordinates, also of what was taken out; NaN elsewhere. [m]
     blunders : tuple of Blunder
+    left_in : tuple of Blunder
+        What the last round would have taken out: empty unless there were more than `ROUNDS`.
     by_camera : ndarray, shape (m, 7, 7)
         Covariance of the `ESTIMATED` of each camera.
     between : ndarray, shape (m // 2, 7, 7)
@@ -129,6 +133,7 @@ class JointAdjustment(JointUnknowns):
     residuals: FloatArray
     control: FloatArray
     blunders: tuple[Blunder, ...]
+    left_in: tuple[Blunder, ...]
     by_camera: FloatArray
     between: FloatArray
 
@@ -160,11 +165,13 @@ def adjust_jointly(observations: JointObservations, start: JointUnknowns) -> Joi
     """
     blunders: list[Blunder] = []
     seen = _with_enough_rays(observations)
-    start, tests = _coarse(seen, start)
+    # What was known before of the focal lengths, however often a round begins anew.
+    focal = np.array([camera.matrix[0, 0] for camera in start.cameras])
+    start, tests = _coarse(seen, start, focal)
     blunders += [_of_ray(seen, k, tests[k]) for k in np.flatnonzero(tests >= FAR_OFF).tolist()]
-    seen = _with_enough_rays(with_rays(seen, tests < FAR_OFF))
+    seen = _without(seen, tests < FAR_OFF, seen.known, blunders)
     for left in range(ROUNDS, -1, -1):
-        system = _System(seen, start)
+        system = _System(seen, start, focal)
         fit = adjustment.fit(
             start, system.equations, system.advance, names=system.unknown_names,
             what="the pairs", rounding=ROUNDING, largest=0,
@@ -175,24 +182,27 @@ def adjust_jointly(observations: JointObservations, start: JointUnknowns) -> Joi
         if not found or not left:
             break
         blunders += found
-        seen = _with_enough_rays(with_rays(replace(seen, known=known), keep))
-    return _adjusted(observations, seen, system, fit, sigma0, tuple(blunders))
+        seen = _without(seen, keep, known, found)
+    return _adjusted(observations, seen, system, fit, sigma0, (tuple(blunders), tuple(found)))
 
 
-def _coarse(seen: JointObservations, start: JointUnknowns) -> tuple[JointUnknowns, FloatArray]:
+def _coarse(
+    seen: JointObservations, start: JointUnknowns, focal: FloatArray
+) -> tuple[JointUnknowns, FloatArray]:
     """Return a state that most rays agree on, and each ray's misfit over the usual one, (n,).
 
     Huber's weights, renewed a few times: a match with the wrong window must not bend the whole.
     """
     for _ in range(COARSE):
-        away = np.linalg.norm(_System(seen, start).rays(start)[0] - seen.pixels, axis=1)
+        away = np.linalg.norm(_System(seen, start, focal).rays(start)[0] - seen.pixels, axis=1)
         away = np.nan_to_num(away, nan=1e6)
         weighted = replace(seen, sigma=seen.sigma / np.sqrt(huber_weights(away, 2.0)))
-        system = _System(weighted, start)
+        system = _System(weighted, start, focal)
         start = adjustment.minimise(
             start, system.equations, system.advance, what="the pairs", most=6, largest=0
         ).state
-    away = np.linalg.norm(_System(seen, start).rays(start)[0] - seen.pixels, axis=1) / seen.sigma
+    away = np.linalg.norm(_System(seen, start, focal).rays(start)[0] - seen.pixels, axis=1)
+    away = away / seen.sigma
     usual = max(float(np.median(away)) / 1.1774, 1.0)  # Rayleigh's median
     return start, np.nan_to_num(away / usual, nan=np.inf)
 
@@ -211,11 +221,41 @@ def with_rays(observations: JointObservations, keep: BoolArray) -> JointObservat
     )
 
 
+def _without(
+    seen: JointObservations, keep: BoolArray, known: FloatArray, found: list[Blunder]
+) -> JointObservations:
+    """Return what is left without gross errors.
+
+    Raises
+    ------
+    GeometryError
+        If too little control is left to hold the frame.
+    """
+    left = _with_enough_rays(with_rays(replace(seen, known=known), keep))
+    if seen.frame_is_known and not left.frame_is_known:
+        control = {seen.ids[k] for k in np.flatnonzero(np.isfinite(seen.known).all(axis=1))}
+        raise GeometryError(
+            "the control points contradict each other or their picks: "
+            f"{', '.join(sorted(control & {b.point for b in found}))}. "
+            "Check their coordinates and names."
+        )
+    return left
+
+
 def _with_enough_rays(observations: JointObservations) -> JointObservations:
-    """Leave out the rays of points that have only one and are not known."""
+    """Leave out the rays of points that have only one and are not known, and what holds nothing.
+
+    That is what is known of points without rays, and of all where they are too few for a frame: in
+    that of the first pair they would contradict what is held.
+    """
     count = np.bincount(observations.point, minlength=len(observations.ids))
-    fixed = np.isfinite(observations.known).all(axis=1)
-    return with_rays(observations, ((count >= 2) | fixed)[observations.point])
+    fixed = np.isfinite(observations.known).all(axis=1) & (count > 0)
+    if fixed.sum() < FEWEST_KNOWN:
+        fixed[:] = False
+    enough = (count >= 2) | fixed
+    held = enough & bool(fixed.any())
+    known = np.where(held[:, None], observations.known, np.nan)
+    return replace(with_rays(observations, enough[observations.point]), known=known)
 
 
 class _System:
@@ -226,7 +266,7 @@ class _System:
     focal length that is not held.
     """
 
-    def __init__(self, seen: JointObservations, start: JointUnknowns) -> None:
+    def __init__(self, seen: JointObservations, start: JointUnknowns, focal: FloatArray) -> None:
         self.seen = seen
         count = len(seen.names)
         free = np.ones((count, len(ESTIMATED)), dtype=bool)
@@ -247,7 +287,7 @@ class _System:
         self.loose = np.flatnonzero(self.used & ~np.isfinite(seen.known[:, 2]))
         self.reach = float(min(camera.centre[2] for camera in start.cameras))
         self.focal = np.flatnonzero(free[:, 0])
-        self.first_focal = np.log([camera.matrix[0, 0] for camera in start.cameras])
+        self.first_focal = np.log(focal)
 
     def advance(self, state: JointUnknowns, step: FloatArray) -> JointUnknowns | None:
         """Return the state after a step."""
@@ -341,18 +381,35 @@ def _sigma0(fit: Fit[JointUnknowns], system: _System) -> float:
     )
 
 
+def _units(
+    residuals: FloatArray, redundancy: FloatArray, sigma: FloatArray, sigma0: float
+) -> FloatArray:
+    """Return the unit of each residual, by all rays of its stated precision, shape (n,).
+
+    Features that are better than was believed must not make gross errors of honest picks.
+    """
+    _, group = np.unique(sigma, return_inverse=True)
+    squares = np.bincount(group, weights=residuals**2)
+    free = np.bincount(group, weights=redundancy)
+    own = np.where(free >= ENOUGH, np.sqrt(squares / np.maximum(free, 1.0)), 1.0)
+    return np.maximum(own, sigma0)[group]
+
+
 def _gross(
     seen: JointObservations, system: _System, fit: Fit[JointUnknowns], sigma0: float
 ) -> tuple[BoolArray, FloatArray, list[Blunder]]:
     """Return which rays stay, the coordinates that stay known, and what goes: the worst of each.
 
-    A ray is judged by the larger of its two coordinates.
+    A ray is judged by the larger of its two coordinates, and by the rays of its own precision.
     """
-    tests = standardised(fit.residuals, fit.linear.redundancy_numbers, sigma0)
+    count = 2 * len(seen.camera)
+    tests = standardised(fit.residuals, fit.linear.redundancy_numbers)
     tests = np.abs(np.nan_to_num(tests))
-    rays = tests[: 2 * len(seen.camera)].reshape(-1, 2).max(axis=1, initial=0.0)
-    # Rays are more precise than they were believed to be; of control that says nothing.
-    coordinates = tests[2 * len(seen.camera) :][: len(system.fixed)] * min(sigma0, 1.0)
+    units = _units(fit.residuals[:count], fit.linear.redundancy_numbers[:count],
+                   np.repeat(seen.sigma, 2), sigma0)  # fmt: skip
+    rays = (tests[:count] / units).reshape(-1, 2).max(axis=1, initial=0.0)
+    # That rays are more precise than they were believed to be says nothing of control.
+    coordinates = tests[count:][: len(system.fixed)] / max(sigma0, 1.0)
     worst = np.zeros(len(seen.ids))
     np.maximum.at(worst, seen.point, rays)
     np.maximum.at(worst, system.fixed[:, 0], coordinates)
@@ -367,12 +424,6 @@ def _gross(
         point = int(system.fixed[k, 0])
         known[point] = np.nan
         found.append(Blunder(point=seen.ids[point], where="control", test=float(coordinates[k])))
-    if seen.frame_is_known and np.isfinite(known).all(axis=1).sum() < FEWEST_KNOWN:
-        raise GeometryError(
-            "the control points contradict each other or their picks: "
-            f"{', '.join(sorted({b.point for b in found if b.where == 'control'}))}. "
-            "Check their coordinates and names."
-        )
     return ~bad, known, found
 
 
@@ -382,9 +433,9 @@ def _adjusted(
     system: _System,
     fit: Fit[JointUnknowns],
     sigma0: float,
-    blunders: tuple[Blunder, ...],
+    blunders: tuple[tuple[Blunder, ...], tuple[Blunder, ...]],
 ) -> JointAdjustment:
-    """Return the result with its precision."""
+    """Return the result with its precision; blunders taken out, and left in."""
     linear = fit.linear
     assert isinstance(linear, SparseEquations)
     factor = max(sigma0, 1.0) ** 2
@@ -410,5 +461,5 @@ def _adjusted(
         cameras=fit.state.cameras, xyz=xyz, observations=seen, covariance=covariance,
         sigma0=sigma0, redundancy=fit.redundancy - len(system.loose), iterations=fit.iterations,
         residuals=system.rays(fit.state)[0] - seen.pixels, control=xyz - given.known,
-        blunders=blunders, by_camera=by_camera, between=between,
+        blunders=blunders[0], left_in=blunders[1], by_camera=by_camera, between=between,
     )  # fmt: skip

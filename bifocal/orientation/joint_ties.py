@@ -174,6 +174,8 @@ def into_one_frame(
     if fixed[root] < 3 and np.isfinite(known + xyz).all(axis=1).sum() >= 3:
         whole = _robust(xyz, known)
         xyz, moved = _moved(xyz, whole), [_moved_camera(camera, whole) for camera in moved]
+    # What no pair sees in both photos stands on the wall, where its rays meet that.
+    xyz = np.where(np.isfinite(xyz), xyz, _on_the_wall(moved, shared, ideal))
     middle = np.nanmedian(xyz, axis=0)
     return JointUnknowns(cameras=tuple(moved), xyz=np.where(np.isfinite(xyz), xyz, middle[None, :]))
 
@@ -186,12 +188,8 @@ def near_each_other(
     Repeated windows are matched a window apart; what is left of the frames' tilts, and the relief
     itself, put rays of one point apart by a few per cent of the distance.
     """
-    places = np.full((len(ideal), 2), np.nan)
-    reach = np.empty(len(ideal))
-    for number, camera in enumerate(cameras):
-        rays = shared.photo == number
-        places[rays] = ray_on_plane(camera, ideal[rays])[:, :2]
-        reach[rays] = NEAR * camera.centre[2]
+    places = _meeting_the_wall(cameras, shared, ideal)[:, :2]
+    reach = NEAR * np.array([camera.centre[2] for camera in cameras])[shared.photo]
     order = np.argsort(shared.point, kind="stable")
     starts = np.searchsorted(shared.point[order], np.arange(shared.count + 1))
     good = np.zeros(len(ideal), dtype=bool)
@@ -203,6 +201,27 @@ def near_each_other(
         away = np.abs(places[rays] - np.median(places[rays], axis=0)).max(axis=1)
         good[rays] = away < reach[rays]
     return good
+
+
+def _meeting_the_wall(
+    cameras: Sequence[Pinhole], shared: SharedPoints, ideal: FloatArray
+) -> FloatArray:
+    """Return where rays meet the reference plane, shape (n, 3); NaN where they do not. [m]"""
+    places = np.full((len(ideal), 3), np.nan)
+    for number, camera in enumerate(cameras):
+        rays = shared.photo == number
+        places[rays] = ray_on_plane(camera, ideal[rays])
+    return places
+
+
+def _on_the_wall(cameras: Sequence[Pinhole], shared: SharedPoints, ideal: FloatArray) -> FloatArray:
+    """Return the mean of the places where each point's rays meet the wall, shape (p, 3). [m]"""
+    places = _meeting_the_wall(cameras, shared, ideal)
+    met = np.isfinite(places).all(axis=1)
+    total = np.zeros((shared.count, 3))
+    np.add.at(total, shared.point[met], places[met])
+    count = np.bincount(shared.point[met], minlength=shared.count)
+    return np.where(count[:, None] > 0, total / np.maximum(count, 1)[:, None], np.nan)
 
 
 def _places_by_pair(

@@ -13,9 +13,11 @@ from bifocal.files.images import read_grey
 from bifocal.model.orientation_precision import NAMES, pinhole
 from bifocal.model.pair import Pair
 from bifocal.model.photo import Photo
+from bifocal.orientation.align_workflow import SIGMA_ON_WALL
 from bifocal.orientation.control_points import Control, read_control
 from bifocal.orientation.features import Features, find_features
 from bifocal.orientation.joint_adjustment import (
+    Blunder,
     JointAdjustment,
     JointObservations,
     adjust_jointly,
@@ -31,7 +33,12 @@ from photocore.arrays import BoolArray, FloatArray
 from photocore.camera import Pinhole, plane_from_pixel
 from photocore.cli import Progress, no_progress
 from photocore.errors import InputError, located
-from photocore.output import atomic_folder, relative_name
+from photocore.output import (
+    atomic_folder,
+    check_all_writable,
+    check_not_input,
+    relative_name,
+)
 from photocore.tables import write_csv
 
 #: Precision of a feature's coordinate. [px of the searched photo]
@@ -122,6 +129,10 @@ class JointResult:
         if ties:
             worst = sorted(ties.items(), key=lambda item: -item[1])[:5]
             lines.append("rays taken out: " + ", ".join(f"{n} in {k}" for k, n in worst))
+        for b in a.left_in[:NAMED]:
+            lines.append(
+                f"gross error LEFT IN: {b.point} in {b.where}, {b.test:.1f} times its sigma"
+            )
         return lines
 
     def to_dict(self) -> dict[str, Any]:
@@ -134,8 +145,13 @@ class JointResult:
             "rays": len(a.residuals),
             "rms_px": np.sqrt((a.residuals**2).mean(axis=0)),
             "points": list(self.points),
-            "blunders": [{"point": b.point, "where": b.where, "test": b.test} for b in a.blunders],
+            "blunders": [_plain(b) for b in a.blunders],
+            "left_in": [_plain(b) for b in a.left_in],
         }
+
+
+def _plain(blunder: Blunder) -> dict[str, Any]:
+    return {"point": blunder.point, "where": blunder.where, "test": blunder.test}
 
 
 def adjust_pairs(
@@ -172,6 +188,11 @@ def adjust_pairs(
         with located(path):
             pair.refuse_media("the joint adjustment")
     tables = _tables(paths, pairs, task)
+    outputs = [out / "points.csv", *(out / path.name for path in paths)]
+    for output in outputs:
+        check_not_input(output, *paths, *task.control, *task.check)
+    if out.is_dir():
+        check_all_writable(*outputs, overwrite=overwrite)
     result = joint_adjustment(pairs, names, tables, task, progress=progress)
     columns = list(result.points[0]) if result.points else ["id"]
     table = {name: [point[name] for point in result.points] for name in columns}
@@ -246,7 +267,7 @@ def _tables(paths: Sequence[Path], pairs: Sequence[Pair], task: JointTask) -> Na
             if path is None:
                 continue
             part = read_control(
-                path, sigma=task.sigma_control, sigma_plane=task.sigma_control, unit=task.unit
+                path, sigma=task.sigma_control, sigma_plane=SIGMA_ON_WALL, unit=task.unit
             )
             if pairs[index].exchanged:
                 part = part.exchanged()
@@ -380,9 +401,11 @@ def _adjusted_pair(pair: Pair, adjusted: JointAdjustment, index: int) -> Pair:
 
 
 def _adjusted_photo(photo: Photo, camera: Pinhole) -> Photo:
+    stretch = float(camera.matrix[0, 0] / pinhole(photo).matrix[0, 0])
+    c = photo.principal_distance
     return replace(
         photo, plane_from_pixel=plane_from_pixel(camera), nadir=camera.centre[:2],
-        distance=float(camera.centre[2]),
+        distance=float(camera.centre[2]), principal_distance=None if c is None else stretch * c,
     )  # fmt: skip
 
 

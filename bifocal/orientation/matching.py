@@ -114,12 +114,18 @@ def match_pair(pair: Pair, images: Images, settings: MatchSettings | None = None
     Raises
     ------
     GeometryError
-        If hardly anything matches: photos and pair file do not belong together.
+        If hardly anything matches: photos and pair file do not belong together; or if both photos
+        can see no relief of the range.
     """
     settings = settings or MatchSettings()
     near = pair.image2.distance
     low, high = settings.relief_range or (-0.5 * near, 0.4 * near)
     reliefs = (low, min(high, HIGHEST_SHARE * pair.highest_relief))
+    if not reliefs[0] < reliefs[1]:
+        raise GeometryError(
+            f"relief from {low:g} m: both photos see relief below {pair.highest_relief:g} m only, "
+            f"and up to {high:g} m is looked for. Choose a lower least relief, or a higher largest."
+        )
     parts = []
     if settings.targets:
         parts.append(_target_matches(pair, images, reliefs))

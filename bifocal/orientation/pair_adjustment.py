@@ -398,18 +398,23 @@ def _lengths(
     observations: PairObservations, state: PairUnknowns, control: _AdjustedControl
 ) -> Equations:
     """Return the taped distances' residuals; the picks' own noise is part of their weight."""
-    used, far = observations.pick_used, state.cameras[0]
-    lengths = [(a, b, c) for a, b, c in observations.control.lengths if used[a] and used[b]]
+    used, far, points = observations.pick_used, state.cameras[0], observations.control
+    spread = points.sigma_lengths or (np.nan,) * len(points.lengths)
+    lengths = [
+        (a, b, c, s)
+        for (a, b, c), s in zip(points.lengths, spread, strict=True)
+        if used[a] and used[b]
+    ]
     if not lengths:
         return np.zeros(0), np.zeros((0, len(NAMES)))
-    first, second, taped = (np.array(column) for column in zip(*lengths, strict=True))
+    first, second, taped, own = (np.array(column) for column in zip(*lengths, strict=True))
     between = control.xyz[first] - control.xyz[second]
     between_by = control.xyz_by_unknowns[first] - control.xyz_by_unknowns[second]
     length = np.linalg.norm(between, axis=1)
     pick = 1.41 * far.centre[2] / far.matrix[0, 0] * observations.sigma_pick
-    sigma = float(np.hypot(observations.control.sigma.min(initial=0.003), pick))
+    sigma = np.hypot(np.where(np.isnan(own), points.sigma.min(initial=0.003), own), pick)
     misfit = (length - taped) / sigma
-    by = np.einsum("ni,nik->nk", between / length[:, None], between_by) / sigma
+    by = np.einsum("ni,nik->nk", between / length[:, None], between_by) / sigma[:, None]
     # A pixel on the wall is distance over principal distance; so is the picks' share of sigma.
     by[:, at("Z", 1)] -= misfit * (pick / sigma) ** 2 / far.centre[2]
     by[:, at("focal length", 1)] += misfit * (pick / sigma) ** 2

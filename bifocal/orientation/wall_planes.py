@@ -178,7 +178,7 @@ def steep_rivals_in_words(
         share = 100 * plane.share
         named.append(f"turned by {turn:.0f}°, {share:.0f} % (--wall {column:.0f},{row:.0f})")
     return (
-        f"WHICH PLANE IS THE WALL? Taken is the fullest, {100 * chosen.share:.0f} % of the area "
-        f"with common points; planes of other directions compete: {'; '.join(named)}. Name a spot "
+        f"WHICH PLANE IS THE WALL? Taken is one with {100 * chosen.share:.0f} % of the area that "
+        f"shows common points; planes of other directions compete: {'; '.join(named)}. Name a spot "
         "of the wall in the far photo (--wall COL,ROW), or give both distances: their ratio tells."
     )

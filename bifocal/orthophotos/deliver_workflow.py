@@ -43,12 +43,20 @@ from bifocal.orthophotos.tiles import RasterResult
 from photocore.arrays import Float32Array, positive
 from photocore.cli import Progress, no_progress
 from photocore.errors import InputError
-from photocore.output import atomic_folder, atomic_path, check_ending
+from photocore.output import (
+    atomic_folder,
+    atomic_path,
+    check_ending,
+    check_not_input,
+    check_writable,
+)
 from photocore.provenance import program, today
 from photocore.textfile import file_name
 
 #: Print resolution for which 1:50 makes pixels of 5.00 mm. [dpi]
 DPI = 254.0
+#: More contour levels than this are made only where their interval is asked for.
+_MOST_AUTOMATIC = 500
 #: Names shorter than this say nothing as a title: the folder's is taken.
 _SHORT = 3
 
@@ -136,6 +144,7 @@ def deliver(
     pair.refuse_media("the set of deliverables")
     title = wish.title or default_title(pair_path)
     name = file_name(title)
+    _check_outputs(out, folder, name, (task.relief, *pair.photo_files), overwrite=overwrite)
     points, remarks = _points(wish.marked or task.points)
     control, notes_on_control = _points(wish.control)
     remarks += notes_on_control
@@ -156,16 +165,15 @@ def deliver(
         if cuts:
             named = f"sections {'; '.join(cut.title for cut in cuts)}"
             drawing = replace(drawing, sections=cuts, notes=(*drawing.notes, named))
+        relief = None
+        if not isinstance(surface, FlatSurface):
+            relief = _prepared((surface, measured), reader, drawing, wish)
         if out is not None:
-            check_ending(out, ORTHO_ENDING, ".tif", ".tiff")
             copy = stack.enter_context(atomic_path(out, overwrite=overwrite))
         place = stack.enter_context(atomic_folder(folder, overwrite=overwrite))
         result = make_ortho(
             pair_path, place / f"{name}.tif", task, world_file=True, progress=progress
         )
-        relief = None
-        if not isinstance(surface, FlatSurface):
-            relief = _prepared((surface, measured), reader, drawing, wish)
         nameless = _pictures(place, name, drawing, sheet, relief.lines if relief else ())
         if nameless:
             remarks += (
@@ -189,6 +197,22 @@ def deliver(
     path = out or folder / f"{name}.tif"
     result = replace(result, path=path, remarks=(*result.remarks, *remarks))
     return Delivery(ortho=result, files=files, sheet=sheet.name)
+
+
+def _check_outputs(
+    out: Path | None, folder: Path, name: str, inputs: Sequence[Path | None], *, overwrite: bool
+) -> None:
+    """Refuse outputs that would take the place of what is read, or of a delivery."""
+    check_ending(out, ORTHO_ENDING, ".tif", ".tiff")
+    rasters = [
+        folder / f"{name}{what}.{ending}"
+        for what in ("", "_relief", "_relief_values")
+        for ending in ("tif", "png")
+    ]
+    for path in (out, *rasters):
+        check_not_input(path, *inputs)
+    if rasters[0].exists():
+        check_writable(rasters[0], overwrite=overwrite)
 
 
 def default_title(source: Pair | Path, path: Path | None = None) -> str:
@@ -235,11 +259,14 @@ def _prepared(
     """Return a relief with its colours and contour lines."""
     surface, measured = surfaces
     coarse = contour_grid(drawing.grid, drawing.scale)
-    shown = measured.window(coarse)
+    shown, whole = measured.window(coarse), surface.window(coarse)
     if not np.isfinite(shown).any():  # nothing measured in here
-        shown = surface.window(coarse)
+        shown = whole
     limits, beyond = colour_limits(shown)
-    interval = wish.interval or round_step(max((limits[1] - limits[0]) / 12, 0.001))
+    # A phantom far off a flat wall must not make more levels than can be drawn.
+    span = float(np.ptp(whole[np.isfinite(whole)])) if np.isfinite(whole).any() else 0.0
+    least = max((limits[1] - limits[0]) / 12, span / _MOST_AUTOMATIC, 0.001)
+    interval = wish.interval or round_step(least)
     lines = contours(
         surface, drawing.grid, interval=interval, scale=drawing.scale,
         sigma=_band(reader, 2), guessed=unmeasured(surface, measured, coarse, scale=drawing.scale),

@@ -98,7 +98,7 @@ def make_mosaic(
         If inputs are missing, differ in kind, show different things on their overlap, or the
         output cannot be written.
     """
-    check_not_input(out, *inputs)
+    check_not_input(out, *inputs, *relief)
     check_writable(out, overwrite=overwrite)
     if len(inputs) < 2:
         raise InputError("a mosaic needs two rasters or more.")

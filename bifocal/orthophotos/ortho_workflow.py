@@ -114,9 +114,9 @@ def make_ortho(
         If an input is missing or does not fit, the size is not plausible, or writing fails.
     """
     check_ending(out, ORTHO_ENDING, ".tif", ".tiff")
-    check_not_input(out, task.relief)
-    check_writable(out, overwrite=overwrite)
     pair = Pair.of(pair_path)
+    check_not_input(out, task.relief, *pair.photo_files)
+    check_writable(out, overwrite=overwrite)
     pair.refuse_leaning_media("an orthophoto")
     with open_surface(task, pair) as (surface, _, remarks):
         numbers = {"1": (1,), "2": (2,), "both": (1, 2)}[task.image]

@@ -98,4 +98,4 @@ def _path(name: str, grid: Grid) -> tuple[str, FloatArray]:
     corners = np.array(numbers).reshape(-1, 2)
     if not np.ptp(corners, axis=0).any():
         raise InputError(f"section {name!r}: its corners are one point; write two or more.")
-    return kind, corners
+    return kind, corners[np.append(True, np.diff(corners, axis=0).any(axis=1))]

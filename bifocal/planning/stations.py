@@ -159,7 +159,7 @@ def _station(
         z0 = (far, near)
         pair = media.pair((d1, d2), (c1, c2), pitch=sensor.pitch, sigma_px=sigma_px)
         straight = pair.straight_distances
-        footprint = _seen_by_both(pair, sensor)
+        footprint = _seen_by_both(pair, sensor, (c1, c2))
     half_diagonal = hypot(*footprint) / 2
     # Mean square radius of a rectangle about its centre is diagonal² / 12.
     rms = hypot(*footprint) / sqrt(12)
@@ -192,10 +192,22 @@ def _station(
     )  # fmt: skip
 
 
-def _seen_by_both(pair: Pair, sensor: CameraSensor) -> tuple[float, float]:
-    """Return width and height of the wall in the middle of both photos through media. [m]"""
+def _seen_by_both(pair: Pair, sensor: CameraSensor, c: tuple[float, float]) -> tuple[float, float]:
+    """Return width and height of the wall in the middle of both photos through media. [m]
+
+    Raises
+    ------
+    GeometryError
+        If the rays at a photo's edge are totally reflected; the lens is named.
+    """
     rim = np.array([[sensor.columns / 2, 0.0], [0.0, sensor.rows / 2]])
     reach = [np.abs(photo.plane_from_pixels(rim)) for photo in (pair.image1, pair.image2)]
+    for length, places in zip(c, reach, strict=True):
+        if not np.isfinite(places).all():
+            raise GeometryError(
+                f"the {length:g} mm lens sees nothing at the edges of its photo: the media reflect "
+                "rays that steep totally. Choose a longer lens."
+            )
     width, height = np.minimum(*reach)[[0, 1], [0, 1]]
     return 2 * float(width), 2 * float(height)
 

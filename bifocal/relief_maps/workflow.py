@@ -22,7 +22,7 @@ from photocore.arrays import FloatArray
 from photocore.cli import Progress, no_progress
 from photocore.cloud import write_cloud
 from photocore.errors import GeometryError
-from photocore.output import all_or_none, check_all_writable, check_ending
+from photocore.output import all_or_none, check_all_writable, check_ending, check_not_input
 
 _ROWS = 256
 
@@ -76,8 +76,8 @@ def relief_of_pair(
     InputError, GeometryError
         If a file or an option is unusable, or the photos do not fit; nothing is then written.
     """
-    _check_outputs(job)
     pair = Pair.of(pair_file)
+    _check_outputs(job, pair)
     image1, image2 = (read_image(pair.photo_file(number)) for number in (1, 2))
     result = dense_relief(
         pair, image1, image2, gsd=job.gsd, bounds=job.bounds, quality=job.quality,
@@ -145,10 +145,12 @@ def coloured_cloud(
     return np.concatenate(positions), attributes
 
 
-def _check_outputs(job: ReliefJob) -> None:
+def _check_outputs(job: ReliefJob, pair: Pair) -> None:
     """Refuse, before any work, outputs that could not be written."""
     check_ending(job.out, "the relief map is written as .tif.", ".tif", ".tiff")
     check_ending(job.preview, "the preview is written as .png.", ".png")
     rule = "point clouds are written as .ply, .las or .laz."
     check_ending(job.cloud, rule, ".ply", ".las", ".laz")
+    for path in (job.out, job.preview):
+        check_not_input(path, *pair.photo_files)
     check_all_writable(job.out, job.preview, job.cloud, overwrite=job.overwrite)

@@ -224,10 +224,12 @@ def _foundations(content: PairContent, say: Words) -> Iterator[Block]:
 def _provenance(content: PairContent, say: Words) -> Iterator[Block]:
     yield Heading(text=say("provenance"))
     task, pair = content.task, content.pair
-    files = [content.source, *(pair.photo_file(k) for k in (1, 2) if pair.photo(k).file)]
+    files = [content.source, *pair.photo_files]
     files += [path for path in (task.control, task.check, task.relief, task.ortho) if path]
     made = provenance()
     if made.command:
         yield Paragraph(text=say("made_by"), lines=(made.command,), small=True)
-    rows = {path.name: file_hash(path) for path in files if path.is_file()} | dict(made.inputs)
-    yield TextTable(headings=[say("file"), "SHA-256"], rows=[list(row) for row in rows.items()])
+    rows = [(path.name, file_hash(path)) for path in files if path.is_file()]
+    # Files of one name in two folders are two files.
+    rows = list(dict.fromkeys([*rows, *made.inputs]))
+    yield TextTable(headings=[say("file"), "SHA-256"], rows=[list(row) for row in rows])

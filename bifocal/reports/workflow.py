@@ -11,6 +11,7 @@ from bifocal.reports.content import ReportTask, read_content
 from bifocal.reports.pair_report import report_document
 from photocore.cli import Progress, no_progress
 from photocore.errors import InputError
+from photocore.jsonfile import read_object
 from photocore.output import check_writable
 from photocore.reports.writing import check_report, write_document
 
@@ -103,6 +104,20 @@ def find_pairs(folder: Path, task: ReportTask) -> tuple[list[Path], list[ReportT
             "relief": relief if relief.is_file() else None,
             "ortho": next((path for path in orthos if path.is_file()), None),
         }
-        found.append(workbook if workbook.is_file() else source)
+        found.append(workbook if workbook.is_file() else _pair_file(source, folder))
         tasks.append(replace(task, **given))
     return found, tasks
+
+
+def _pair_file(own: Path, folder: Path) -> Path:
+    """Return the pair file that a pair's products were made with: its own, or that of all pairs.
+
+    The records of the steps tell; what was adjusted once and is not used any more does not count.
+    """
+    joint = folder / "joint" / own.name
+    if not joint.is_file():
+        return own
+    records = sorted(own.parents[1].glob("*/.made.json"))
+    used = [read_object(path, what="record of a step").get("inputs") for path in records]
+    is_joint = any(isinstance(files, dict) and "pair" in files for files in used)
+    return joint if is_joint else own

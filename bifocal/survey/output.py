@@ -197,7 +197,7 @@ def as_typed(solution: SolvedSurvey, content: SurveyContent) -> SurveyContent:
     """Return the content as the workbook's formulas see it: images in the order they were typed."""
     table, setup, points = solution.table, solution.setup, solution.points
     world, exchanged = solution.georeference, solution.pair.exchanged
-    if solution.correction is not None and setup is not None:
+    if solution.corrections[1] is not None and setup is not None:
         setup, points = _uncorrected(solution, setup)
     if exchanged and setup is not None:
         setup, points = setup.exchanged(), points.exchanged()
@@ -244,7 +244,7 @@ def _weighs_alike(solution: SolvedSurvey) -> bool:
 def _uncorrected(
     solution: SolvedSurvey, setup: SurveySetup
 ) -> tuple[SurveySetup, PointObservations]:
-    """Return set-up and points as typed, the correction of image 2 beside them.
+    """Return set-up and points as typed, the corrections of the images beside them.
 
     Points given by radial distances get coordinates, since only these can be corrected.
     """
@@ -260,8 +260,7 @@ def _uncorrected(
     points = replace(
         points, xy1=np.where(rows, polar[0], points.xy1), xy2=np.where(rows, polar[1], points.xy2)
     )
-    corrections = (typed.adjusted[0], solution.correction)
-    return replace(setup, unit=typed.unit, adjusted=corrections), points
+    return replace(setup, unit=typed.unit, adjusted=solution.corrections), points
 
 
 def result_content(solution: SolvedSurvey, path: Path, language: str | None) -> SurveyContent:

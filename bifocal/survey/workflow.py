@@ -46,6 +46,8 @@ from photocore.arrays import FloatArray, as_floats
 from photocore.errors import InputError
 from photocore.tables.numbers import Decimal
 
+#: Homographies of both images, shape (3, 3), None for none.
+Corrections = tuple[FloatArray | None, FloatArray | None]
 #: From this many points on, the picks' precision is taken from their misfits.
 MINIMUM_FOR_SIGMA = 20
 #: Precision is never taken for better than this. [px]
@@ -76,8 +78,8 @@ class SolvedSurvey(SurveyContent):
         What the points of the reference plane tell.
     adjusted : bool
         Whether the orientation was corrected by it.
-    correction : ndarray, shape (3, 3), or None
-        Homography that corrected the coordinates in mm of image 2, where the pair is ideal.
+    corrections : pair of ndarray, shape (3, 3), or None
+        Homographies that corrected the typed coordinates in mm, where the pair is ideal.
     given : mapping
         The options that took the place of what the workbook says.
     remarks : tuple of str
@@ -93,7 +95,7 @@ class SolvedSurvey(SurveyContent):
     pair_path: Path | None
     orientation_check: OrientationCheck | None
     adjusted: bool
-    correction: FloatArray | None
+    corrections: Corrections
     given: Mapping[str, Any]
     remarks: tuple[str, ...]
 
@@ -250,7 +252,7 @@ def solve(
         limits=setup.limits,
         orientation_check=solved.check,
         adjusted=adjust_setup,
-        correction=solved.correction,
+        corrections=solved.corrections,
         given={name: value for name, value in asked.items() if value is not None},
         rules=judged,
         remarks=tuple(dict.fromkeys(remarks)),
@@ -290,7 +292,7 @@ class _SolvedPoints:
     setup: SurveySetup | None = None
     sigma_px: float | None = None
     check: OrientationCheck | None = None
-    correction: FloatArray | None = None
+    corrections: Corrections = (None, None)
     remarks: tuple[str, ...] = ()
 
 
@@ -407,15 +409,13 @@ def _solve_ideal(survey: SurveyInput, scale_tolerance: float, *, adjust: bool) -
     measured = setup.in_millimetres(points)
     xy1, xy2 = measured.all_xy()
     check = _check_plane(pair, points, (xy1, xy2), None, survey, adjust)
-    correction: FloatArray | None = None
+    corrections: Corrections = (None, None)
     if check is not None:
         remarks += check.remarks
         if adjust:
             scale = pair.image1.plane_from_pixel[0, 0]
             correction = check.matrix @ pair.image2.plane_from_pixel / [[scale], [scale], [1.0]]
             moved = apply_homography(correction, xy2)
-            if setup.adjusted[1] is not None:
-                correction = correction @ setup.adjusted[1]
             only_theta = points.polar * np.array([np.nan, np.nan, 1.0])
             found, said = _with_centre(check.corrected, points, (xy1, xy2), None)
             # An ideal pair counts from its nadir; relief spreads from the centre of zoom.
@@ -423,6 +423,7 @@ def _solve_ideal(survey: SurveyInput, scale_tolerance: float, *, adjust: bool) -
             points = measured = replace(
                 measured, xy1=xy1 - centre, xy2=moved - centre, polar=only_theta
             )
+            corrections = _with_corrections(setup, correction, centre)
             c2 = None if setup.c1 is None else setup.c1 * pair.d2 / pair.d1
             setup = replace(setup, unit="mm", c2=c2, adjusted=(None, None))
             pair = setup.pair()
@@ -441,6 +442,17 @@ def _solve_ideal(survey: SurveyInput, scale_tolerance: float, *, adjust: bool) -
         pair=pair,
         setup=setup,
         check=check,
-        correction=correction,
+        corrections=corrections,
         remarks=tuple(filter(None, remarks)),
     )
+
+
+def _with_corrections(
+    setup: SurveySetup, correction: FloatArray, centre: FloatArray
+) -> Corrections:
+    """Return what corrects typed coordinates in mm: of image 2, then both counted from a centre."""
+    shift = np.array([[1.0, 0.0, -centre[0]], [0.0, 1.0, -centre[1]], [0.0, 0.0, 1.0]])
+    first, second = setup.adjusted
+    if centre.any():
+        first = shift if first is None else shift @ first
+    return first, shift @ (correction if second is None else correction @ second)

@@ -15,7 +15,7 @@ from multimedia.adjustment.bundle_equations import (
     ImageObservations,
     Pose,
 )
-from multimedia.adjustment.interior_choice import choose_interior
+from multimedia.adjustment.interior_choice import choose_interior, with_interior
 from multimedia.adjustment.plausibility import (
     EXACT,
     refuse_impossible_media,
@@ -58,7 +58,8 @@ def bundle_adjust(project: Project, unknowns: Unknowns | None = None) -> Adjustm
     InputError
         If the project lacks measurements, or names in ``unknowns`` do not exist.
     GeometryError
-        If the data leave a combination of unknowns open: the message names them.
+        If the data leave a combination of unknowns open: the message names them. If an index or a
+        thickness comes out as none that the medium can have.
     ConvergenceError
         If the iteration does not settle.
 
@@ -74,15 +75,15 @@ def bundle_adjust(project: Project, unknowns: Unknowns | None = None) -> Adjustm
     unknowns = unknowns or Unknowns()
     if unknowns.interior == AUTO:
         chosen = choose_interior(project, unknowns, bundle_adjust)
-        result = bundle_adjust(project, replace(unknowns, interior=chosen))
+        result = bundle_adjust(project, with_interior(unknowns, chosen))
         choice = f"Interior parameters that the data carry: {', '.join(chosen) or 'none'}."
         return replace(result, remarks=(choice, *result.remarks))
     bundle, remarks = prepare(project, unknowns)
     columns = bundle.columns
     if not columns.labels and not bundle.free.any():
         raise InputError("adjust: nothing to estimate; free a camera or add new points.")
-    bundle, fitted = _balanced(bundle, bundle.fit(bundle.start))
     weights = np.ones_like(bundle.observations.image)
+    bundle, fitted = _balanced(bundle, bundle.fit(bundle.start), weights)
     for _ in range(ROBUST_ROUNDS if unknowns.robust is not None else 0):
         assert unknowns.robust is not None
         plain = fitted.residuals[: weights.size].reshape(-1, 2) / np.sqrt(weights)
@@ -90,9 +91,8 @@ def bundle_adjust(project: Project, unknowns: Unknowns | None = None) -> Adjustm
         if np.abs(new - weights).max() < 1e-3:
             break
         weights = new
-        seen = bundle.observations
-        weighted = replace(seen, sigma=seen.sigma / np.sqrt(weights))
-        fitted = replace(bundle, observations=weighted).fit(fitted.state)
+        fitted = _weighted(bundle, weights).fit(fitted.state)
+        bundle, fitted = _balanced(bundle, fitted, weights)
     result = _adjustment(bundle, fitted, weights, remarks)
     refuse_impossible_media(bundle.project, columns, result, unknowns.priors)
     seen = bundle.observations
@@ -101,11 +101,20 @@ def bundle_adjust(project: Project, unknowns: Unknowns | None = None) -> Adjustm
     return replace(result, remarks=(*result.remarks, *told))
 
 
-def _balanced(bundle: Bundle, fitted: Fit[BundleState]) -> tuple[Bundle, Fit[BundleState]]:
+def _weighted(bundle: Bundle, weights: FloatArray) -> Bundle:
+    """Return the equations with robust weights of the image coordinates, shape (n, 2)."""
+    seen = bundle.observations
+    return replace(bundle, observations=replace(seen, sigma=seen.sigma / np.sqrt(weights)))
+
+
+def _balanced(
+    bundle: Bundle, fitted: Fit[BundleState], weights: FloatArray
+) -> tuple[Bundle, Fit[BundleState]]:
     """Weigh image coordinates by what they are worth where priors stand beside them.
 
     Their sigmas only matter against one another until a prior is stated in its own unit: an
-    image coordinate called five times too good would then push an index off by five times.
+    image coordinate called five times too good would then push an index off by five times. With
+    robust weights they are worth what remains without the gross errors.
     """
     for _ in range(BALANCE_ROUNDS if bundle.columns.priors else 0):
         seen = bundle.observations
@@ -115,13 +124,13 @@ def _balanced(bundle: Bundle, fitted: Fit[BundleState]) -> tuple[Bundle, Fit[Bun
         if abs(worth - 1) < BALANCED or worth * seen.sigma.min() < EXACT:
             break
         bundle = replace(bundle, observations=replace(seen, sigma=seen.sigma * worth))
-        fitted = bundle.fit(fitted.state)
+        fitted = _weighted(bundle, weights).fit(fitted.state)
     return bundle, fitted
 
 
 def prepare(project: Project, unknowns: Unknowns) -> tuple[Bundle, tuple[str, ...]]:
     """Return the equations of a project, and remarks about what was left out."""
-    project = with_common_values(project, unknowns.media)
+    project = with_common_values(project, unknowns)
     ids, rows, remarks = _used_points(project, unknowns)
     place = {name: row for row, name in enumerate(ids)}
     control = project.object_points

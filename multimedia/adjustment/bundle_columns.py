@@ -84,7 +84,7 @@ def place_columns(
         for name in project.camera_names
     ]
     interior = [
-        places(_interior_group(name, unknowns.shared_interior), unknowns.interior)
+        places(interior_group(name, unknowns.shared_interior), unknowns.interior)
         for name in project.camera_names
     ]
     media = _media_columns(project, unknowns.media, labels)
@@ -116,7 +116,8 @@ def _prior_columns(
     """Return the standard deviations of start values by column: those given, then typical ones."""
     missing: list[str] = []
     priors: dict[int, float] = {}
-    for label, sigma in unknowns.priors.items():
+    # What is said of one unknown counts more than what is said of all alike.
+    for label, sigma in sorted(unknowns.priors.items(), key=lambda prior: prior[0] in labels):
         every = [name for name in labels if name.rpartition(":")[2] == label in INTERIOR]
         own = [label] if label in labels else every
         missing += [] if own else [label]
@@ -132,7 +133,7 @@ def _prior_columns(
     return {column: sigma for column, sigma in priors.items() if np.isfinite(sigma)}
 
 
-def _interior_group(camera: str, shared: bool | Mapping[str, str]) -> str:
+def interior_group(camera: str, shared: bool | Mapping[str, str]) -> str:
     """Return the name of a camera's set of interior parameters."""
     if isinstance(shared, bool):
         return "interior" if shared else camera
@@ -170,10 +171,13 @@ def _media_columns(
     return dict(columns)
 
 
-def with_common_values(project: Project, wanted: Sequence[str]) -> Project:
-    """Return the project with one start value for parameters that are common to all media."""
+def with_common_values(project: Project, unknowns: Unknowns) -> Project:
+    """Return the project with one start value, the mean, for what media or cameras have in common.
+
+    Cameras that share a set of interior parameters have those in common that are estimated.
+    """
     media = dict(project.media)
-    for item in (name for name in wanted if name.startswith(_MATERIAL) and ":" not in name):
+    for item in (n for n in unknowns.media if n.startswith(_MATERIAL) and ":" not in n):
         flat = {
             name: interface
             for name, interface in media.items()
@@ -184,4 +188,15 @@ def with_common_values(project: Project, wanted: Sequence[str]) -> Project:
             mean = float(np.mean(values))
             for name, interface in flat.items():
                 media[name] = interface.stepped([item], [mean - interface.value(item)])
-    return replace(project, media=media)
+    cameras = list(project.cameras)
+    groups: dict[str, list[int]] = {}
+    for k, camera in enumerate(cameras):
+        groups.setdefault(interior_group(camera.name, unknowns.shared_interior), []).append(k)
+    for group in groups.values():
+        for item in unknowns.interior:
+            values = [cameras[k].value(item) for k in group]
+            if len(set(values)) > 1:
+                mean = float(np.mean(values))
+                for k in group:
+                    cameras[k] = cameras[k].stepped([item], [mean - cameras[k].value(item)])
+    return replace(project, media=media, cameras=tuple(cameras))

@@ -5,8 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 
+import numpy as np
+
+from multimedia.adjustment.bundle_columns import interior_group
 from multimedia.adjustment.plausibility import significance
 from multimedia.adjustment.unknowns import Adjustment, Unknowns
+from multimedia.media.camera import INTERIOR
 from multimedia.projects.model import Project
 from photocore.errors import ConvergenceError, GeometryError
 
@@ -30,7 +34,7 @@ def choose_interior(
     ----------
     project : Project
     unknowns : Unknowns
-        Its ``interior`` is not looked at.
+        Its ``interior`` is not looked at; priors of interior parameters hold where these are tried.
     adjust : callable
         Adjusts a project.
     """
@@ -38,30 +42,47 @@ def choose_interior(
     for group in GROUPS:
         trial = (*taken, *group)
         try:
-            result = adjust(project, replace(unknowns, interior=trial))
+            result = adjust(project, with_interior(unknowns, trial))
         except (GeometryError, ConvergenceError):
             continue
-        if _needed(project, result, group):
+        if _needed(project, unknowns, result, group):
             taken, last = trial, result
     for group in reversed(GROUPS):
-        if set(group) <= set(taken) and not _needed(project, last, group):
+        if set(group) <= set(taken) and not _needed(project, unknowns, last, group):
             taken = tuple(name for name in taken if name not in group)
-            last = adjust(project, replace(unknowns, interior=taken))
+            last = adjust(project, with_interior(unknowns, taken))
     return taken
 
 
-def _needed(project: Project, result: Adjustment, group: tuple[str, ...]) -> bool:
+def with_interior(unknowns: Unknowns, interior: tuple[str, ...]) -> Unknowns:
+    """Return unknowns with these interior parameters, without the priors of others."""
+    left_out = set(INTERIOR) - set(interior)
+    priors = {
+        label: sigma
+        for label, sigma in unknowns.priors.items()
+        if label.rpartition(":")[2] not in left_out
+    }
+    return replace(unknowns, interior=interior, priors=priors)
+
+
+def _needed(
+    project: Project, unknowns: Unknowns, result: Adjustment, group: tuple[str, ...]
+) -> bool:
     """Return whether a parameter of the group differs from its start values beyond chance."""
     for name in group:
         labels = [label for label in result.names if label.rpartition(":")[2] == name]
-        starts = [_start(project, label) for label in labels]
+        starts = [_start(project, unknowns, label) for label in labels]
         if labels and significance(result, labels, starts) < RISK:
             return True
     return False
 
 
-def _start(project: Project, label: str) -> float:
-    """Return the start value of an interior parameter; that of a shared one is the first's."""
+def _start(project: Project, unknowns: Unknowns, label: str) -> float:
+    """Return the start value of an interior parameter; a set that cameras share has the mean."""
     owner, _, name = label.rpartition(":")
-    number = project.camera_index(owner) if owner in project.camera_names else 0
-    return float(project.cameras[number].value(name))
+    group = [
+        camera.value(name)
+        for camera in project.cameras
+        if interior_group(camera.name, unknowns.shared_interior) == owner
+    ]
+    return float(np.mean(group))

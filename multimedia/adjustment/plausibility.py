@@ -150,7 +150,7 @@ def with_model_error(result: Adjustment, order: tuple[IntArray, ...]) -> Adjustm
 
 def _cells(place: FloatArray, size: int) -> Iterator[IntArray]:
     """Yield the rows of neighbouring places, at most ``size`` together, halving the wider side."""
-    waiting = [np.arange(len(place))]
+    waiting = [np.arange(len(place))] if len(place) else []
     while waiting:
         rows = waiting.pop()
         if len(rows) <= size:

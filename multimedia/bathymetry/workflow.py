@@ -61,7 +61,8 @@ def correct_file(job: Job, *, progress: Progress = no_progress) -> Outcome:
     InputError, GeometryError
         If anything is wrong with the data; the target is then not written.
     """
-    check_not_input(job.target, job.source)
+    tables = (job.cameras, job.visibility, job.trajectory)
+    check_not_input(job.target, job.source, job.water_level, *tables)
     check_writable(job.target, overwrite=job.overwrite)
     checked_water_index(job.index)
     lowest, highest = WATER

@@ -15,10 +15,10 @@ from multimedia.orientation.epipolar_picture import draw_epipolar
 from multimedia.orientation.intersection import intersect_pairs
 from multimedia.projects.model import SHOWN, Project
 from multimedia.projects.point_tables import write_columns
-from multimedia.projects.project_file import read_project
+from multimedia.projects.project_file import project_files, read_project
 from photocore.arrays import FloatArray
 from photocore.errors import GeometryError, InputError
-from photocore.output import all_or_none, check_all_writable
+from photocore.output import all_or_none, check_all_writable, check_not_input
 
 #: The depth range without --z-range: that of the object points, this share of it wider.
 _MARGIN = 0.25
@@ -88,6 +88,8 @@ def epipolar_project(
     overwrite : bool
         Replace existing files.
     """
+    for written in (out, picture):
+        check_not_input(written, *project_files(path), photo)
     check_all_writable(out, picture, overwrite=overwrite)
     project = read_project(path)
     one, two = project.camera_index(camera), project.camera_index(other)

@@ -22,10 +22,10 @@ from multimedia.orientation.point_status import PointStatus
 from multimedia.orientation.resection import Resection, resect
 from multimedia.projects.model import SHOWN, ImagePoints, ObjectPoints, Project
 from multimedia.projects.point_tables import read_image_points, read_object_points, write_columns
-from multimedia.projects.project_file import read_project, write_project
+from multimedia.projects.project_file import project_files, read_project, write_project
 from photocore.arrays import FloatArray, IntArray
 from photocore.errors import InputError
-from photocore.output import all_or_none, check_all_writable, check_ending
+from photocore.output import all_or_none, check_all_writable, check_ending, check_not_input
 from photocore.workbook.newbook import check_new_workbook
 
 METHODS = ("rigorous", "rays", "pairs")
@@ -52,6 +52,7 @@ def project_project(
 ) -> PointTable:
     """Project the object points of a project, or of another table, into all its cameras."""
     if out is not None:
+        check_not_input(out, *project_files(path), points)
         check_new_workbook(out, overwrite=overwrite)
     project = read_project(path)
     objects, remarks = _objects(project, points)
@@ -89,6 +90,7 @@ def intersect_project(
     if method not in METHODS:
         raise InputError(f"method: {method!r} is not one of {', '.join(METHODS)}.")
     if out is not None:
+        check_not_input(out, *project_files(path), points)
         check_new_workbook(out, overwrite=overwrite)
     project = read_project(path)
     images, remarks = _images(project, points)
@@ -181,6 +183,7 @@ def resect_project(
 ) -> Resected:
     """Orient the cameras of a project, each on its own, from its control points."""
     check_ending(out, "a project is written as .toml.", ".toml")
+    check_not_input(residuals, *project_files(path))
     check_all_writable(out, residuals, overwrite=overwrite)
     project = read_project(path)
     unknown = [name for name in cameras if name not in project.camera_names]

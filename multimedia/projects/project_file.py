@@ -71,6 +71,20 @@ def read_project(path: Path | str) -> Project:
         raise InputError(f"{path}: {error}") from None
 
 
+def project_files(path: Path | str) -> tuple[Path, ...]:
+    """Return a project file and the tables that it names, whether they are there or not.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read.
+    """
+    path = Path(path)
+    data = _toml(path)
+    tables = (data.get(key) for key in ("object_points", "image_points"))
+    return (path, *(path.parent / name for name in tables if isinstance(name, str)))
+
+
 def write_project(path: Path | str, project: Project, *, overwrite: bool = False) -> list[Path]:
     """Write a project file and, beside it, the tables it names.
 
@@ -158,7 +172,7 @@ def _project(data: dict[str, Any], folder: Path) -> Project:
     unit = str(data.pop("unit", "m"))
     if unit not in METRES:
         raise InputError(f"unit: {unit!r} is no unit of length; choose {', '.join(METRES)}.")
-    for key in _OF_MEDIA & data.keys():
+    for key in sorted(_OF_MEDIA & data.keys()):
         raise InputError(
             f"{key}: media belong in a section of their own, e.g. [media.tank] with indices and "
             'thicknesses, which each camera names: media = "tank".'

@@ -75,7 +75,7 @@ class Graft:
                 data = _restyled(content[sheet.part], renumbered, conditional)
                 part = self._add_part(sheet.part, {**content, sheet.part: data})
                 self._add_sheet(titles[sheet.title], part)
-                self._local_names(content[other.part], other, sheet, count)
+                self._local_names(content[other.part], other, sheet, count, titles[sheet.title])
                 count += 1
         for name, reference in other.names.items():
             title, _, place = reference.rpartition("!")
@@ -112,7 +112,9 @@ class Graft:
         else:
             self._add_name(f" name={quoteattr(name)}", reference)
 
-    def _local_names(self, data: bytes, other: Workbook, sheet: SheetPart, index: int) -> None:
+    def _local_names(
+        self, data: bytes, other: Workbook, sheet: SheetPart, index: int, title: str
+    ) -> None:
         """Take over the names that belong to a sheet: rows printed on every page, print areas."""
         place = [own.title for own in other.sheets].index(sheet.title)
         for match in re.finditer(rb"<definedName\s([^>]*)>([^<]*)</", data):
@@ -120,7 +122,9 @@ class Graft:
             old, new = f'localSheetId="{place}"', f'localSheetId="{index}"'
             if old in attributes:
                 attributes = attributes.replace(old, new)
-                self._add_name(f" {attributes.strip()}", match[2].decode(), raw=True)
+                before, after = (f"{escape(quoted_title(name))}!" for name in (sheet.title, title))
+                reference = match[2].decode().replace(before, after)
+                self._add_name(f" {attributes.strip()}", reference, raw=True)
 
     def _add_name(self, attributes: str, reference: str, *, raw: bool = False) -> None:
         data = self._book()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import io
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -371,7 +371,9 @@ def _block(
     return RowBlock(row=first, columns=listed, formulas=formulas)
 
 
-def _short_formula(table: str, text: str, letters: Mapping[str, str], head: int):  # type: ignore[no-untyped-def]
+def _short_formula(
+    table: str, text: str, letters: Mapping[str, str], head: int
+) -> Callable[[int], str]:
     """Return a function of the row that writes the formula with A1 references."""
     text = text.replace(f"ROW()-ROW({table}[[#Headers],[id]])", "\0")
     parts = re.split(r"\[@(\w+)\]", text)

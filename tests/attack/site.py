@@ -119,12 +119,15 @@ def _point_tables(folder: Path, rng: np.random.Generator) -> None:
          [rest for _, *rest in bow])  # fmt: skip
     rows = [["id", "x1 [mm]", "y1 [mm]", "x2 [mm]", "y2 [mm]"]]
     rows += [[i, *a, *b] for i, a, b in zip(ids, mm1.tolist(), mm2.tolist(), strict=True)]
-    cells = "".join(f"<table:table-row>{''.join(map(_ods, row))}</table:table-row>" for row in rows)
+    cells = "".join(
+        f"<table:table-row>{''.join(map(ods_cell, row))}</table:table-row>" for row in rows
+    )
     with zipfile.ZipFile(folder / "survey.ods", "w") as package:
         package.writestr("content.xml", ODS.format(rows=cells))
 
 
-def _ods(value: object) -> str:
+def ods_cell(value: object) -> str:
+    """Return one cell of `ODS`."""
     if isinstance(value, str):
         return (f'<table:table-cell office:value-type="string"><text:p>{value}</text:p>'
                 "</table:table-cell>")  # fmt: skip

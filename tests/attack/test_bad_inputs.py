@@ -21,7 +21,7 @@ from click.testing import CliRunner
 
 from photocore import output
 from tests.attack.contents import CONTENTS
-from tests.attack.lines import ALIGN, INPUTS, OUTPUTS, SOLVE, WATER
+from tests.attack.lines import ALIGN, CURVE, INPUTS, OUTPUTS, SOLVE, WATER
 from tests.attack.options import WORDS
 from tests.attack.site import PROGRAMS, make_site
 
@@ -236,9 +236,24 @@ IN_PLACE = [
     ("bifocal calibrate far.jpg --lines lines.csv --out {}", "lines.csv"),
     ("bifocal calibrate far.jpg --database --out {}", "far.jpg"),
     ("bifocal ortho wall.pair.json --relief relief.tif --out {}", "relief.tif"),
+    (
+        "bifocal ortho wall.pair.json --relief relief.tif --deliver d --scale 1:100 --out {}",
+        "relief.tif",
+    ),
+    ("bifocal mosaic ortho1.tif ortho2.tif --relief relief.tif --out {}", "relief.tif"),
     ("multimedia waterlevel cloud.csv --out {}", "cloud.csv"),
     ("multimedia shift shift.csv --z0 1 --indices 1,1.337 --out {}", "shift.csv"),
     (f"{ALIGN} --control control.csv --picture {{}}", "far.jpg"),
+    (f"multimedia bathymetry cloud.csv {WATER} --cameras eyes.csv --out {{}}", "eyes.csv"),
+    ("multimedia bathymetry dem.tif --index 1.34 --water-level relief.tif --out {}", "relief.tif"),
+    ("multimedia project tank.toml --points shift.csv --out {}", "shift.csv"),
+    ("multimedia project tank.toml --out {}", "tank_object_points.csv"),
+    (
+        "multimedia intersect tank.toml --points tank_image_points.csv --out {}",
+        "tank_image_points.csv",
+    ),
+    ("multimedia resect tank.toml --out o.toml --residuals {}", "tank_image_points.csv"),
+    (f"{CURVE} --out {{}}", "tank_object_points.csv"),
 ]
 
 

@@ -19,9 +19,13 @@ import time
 from photocore import interrupts
 from photocore.output import all_or_none, atomic_folder, atomic_path
 interrupts.end_on_signals()
+def wait(seconds):
+    # In many short sleeps: a signal just before a long one would be heard behind it.
+    for _ in range(int(seconds * 50)):
+        time.sleep(0.02)
 def ready(seconds=20):
     print("ready", flush=True)
-    time.sleep(seconds)
+    wait(seconds)
 """
 
 
@@ -30,10 +34,11 @@ def ended(
 ) -> tuple[int, str, str]:
     """Run a script, send it a signal when it is ready; return status, stdout and stderr."""
     command = [sys.executable, "-c", BEGIN + code]
+    environment = {**os.environ, "TMPDIR": str(folder)}
     ignore = (lambda: signal.signal(signal.SIGINT, signal.SIG_IGN)) if shield else None
     with subprocess.Popen(
         command, cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
-        preexec_fn=ignore,
+        preexec_fn=ignore, env=environment,
     ) as process:  # fmt: skip
         assert process.stdout is not None
         assert process.stdout.readline() == "ready\n"
@@ -55,6 +60,13 @@ with all_or_none():
     for name in ('o.csv', 'p.csv'):
         with atomic_path(name, overwrite=False) as path:
             path.write_text('x')
+    ready()
+""",
+    "beside": """
+from photocore.output import temporary_folder
+with temporary_folder() as folder, atomic_path('o.tif', overwrite=False) as name:
+    name.with_name(name.name + '.plain.tif').write_text('x')
+    (folder / 'passing').write_text('x')
     ready()
 """,
     "exit": "import atexit\natexit.register(ready)",
@@ -97,6 +109,20 @@ print('went on')
     assert ended(code, tmp_path) == (1, "finished\n", STOPPED + "\n")
 
 
+def test_a_signal_while_steps_are_counted_waits_too(tmp_path: Path) -> None:
+    code = """
+try:
+    with interrupts.raising():
+        with interrupts._lock:
+            ready(0.3)
+        with interrupts.held():
+            print('counted')
+except KeyboardInterrupt:
+    print('stopped')
+"""
+    assert ended(code, tmp_path) == (0, "counted\nstopped\n", "")
+
+
 def test_a_body_that_has_something_to_stop_stops_it_and_only_once(tmp_path: Path) -> None:
     code = """
 try:
@@ -131,7 +157,7 @@ with atomic_path('o.csv', overwrite=False) as path:
     path.write_text('x')
     child = os.fork()
     if not child:
-        time.sleep(20)
+        wait(20)
     time.sleep(0.1)
     os.kill(child, signal.SIGINT)
     assert os.waitpid(child, 0)[1] == signal.SIGINT

@@ -171,6 +171,13 @@ def test_temporary_files_of_running_processes_stay(tmp_path):
     write(tmp_path / "a.csv", "new")
     assert other.exists()
     assert foreign.exists()
-    os.utime(foreign, (0, 0))
+    # Made by another thread a moment ago, or by an earlier process of the same number.
+    own = tmp_path / f".a-{output._NODE}-{os.getpid()}-abcdefgh.csv"
+    own.touch()
     write(tmp_path / "a.csv", "new")
+    assert own.exists()
+    for path in (own, foreign):
+        os.utime(path, (0, 0))
+    write(tmp_path / "a.csv", "new")
+    assert not own.exists()
     assert not foreign.exists()

@@ -9,6 +9,7 @@ import pytest
 import rasterio
 from rasterio.errors import RasterioIOError
 
+from photocore import raster
 from photocore.errors import InputError
 from photocore.raster import (
     RasterFile,
@@ -160,6 +161,23 @@ def test_a_cloud_optimised_raster_holds_what_a_plain_one_does(tmp_path: Path, ki
             overviews = file.overviews(1)
     assert layouts == [None, "COG"]
     assert overviews == [2, 4]
+
+
+@pytest.mark.parametrize("wanted", [False, True], ids=["plain", "cloud-optimised"])
+def test_blocks_that_the_disk_swallowed_are_missed(tmp_path: Path, monkeypatch, wanted) -> None:
+    opened = raster._opened
+
+    def swallowing(path: Path, mode: str = "r", **options: object) -> object:
+        return opened(path, mode, **options, **({"sparse_ok": True} if mode == "w" else {}))
+
+    monkeypatch.setattr(raster, "_opened", swallowing)
+    with (
+        pytest.raises(InputError, match="is the disk full"),
+        cloud_optimised(wanted),
+        create_geotiff(tmp_path / "a.tif", width=1300, height=900, bands=1, dtype="uint8") as file,
+    ):
+        file.write(np.ones((512, 512), np.uint8))
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_gdals_own_file_systems_are_written_and_read() -> None:

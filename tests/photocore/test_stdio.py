@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import json
+import zipfile
 
 import pytest
 from click.testing import CliRunner
@@ -12,6 +13,7 @@ from click.testing import CliRunner
 from bifocal.cli.main import main
 from bifocal.demo import SAMPLE
 from multimedia.cli.main import main as multimedia
+from tests.attack.site import ODS, ods_cell
 
 TARGETS, PAIR = SAMPLE / "targets.csv", SAMPLE / "facade.pair.json"
 
@@ -27,10 +29,22 @@ def test_a_table_goes_through_solve_and_export_without_a_file(tmp_path):
     run(["solve", TARGETS, "--pair", PAIR, "--out", out])
     piped = run(["solve", "-", "--pair", PAIR, "--out", "-"], stdin=TARGETS.read_bytes())
     assert piped.stdout_bytes == out.read_bytes()
-    assert "28 points written" in piped.stderr
+    assert "stdout: 28 points written" in piped.stderr
     run(["export", out, "--out", tmp_path / "p.csv"])
     exported = run(["export", "-", "--out", "-"], stdin=piped.stdout_bytes)
     assert exported.stdout_bytes == (tmp_path / "p.csv").read_bytes()
+
+
+def test_an_opendocument_table_on_stdin_is_known_by_its_parts(tmp_path):
+    rows = (("id", "s1 [mm]", "s2 [mm]"), ("A", 1.0, 1.1))
+    with zipfile.ZipFile(tmp_path / "t.ods", "w") as package:
+        cells = "".join(f"<table:table-row>{''.join(map(ods_cell, row))}</table:table-row>"
+                        for row in rows)  # fmt: skip
+        package.writestr("content.xml", ODS.format(rows=cells))
+    words = ["solve", "-", "--d1", 17.5, "--d2", 9.5, "--c1", 35, "--c2", 19, "--json"]
+    said = run(words, stdin=(tmp_path / "t.ods").read_bytes())
+    # Eq. (5): (1.1 - 1.0) / (1.1 / 9.5 - 1.0 / 17.5)
+    assert json.loads(said.stdout)["points"][0]["r"] == pytest.approx(1.705128, abs=1e-6)
 
 
 def test_a_workbook_on_stdin_is_known_by_its_first_bytes(tmp_path):

@@ -18,6 +18,7 @@ from bifocal.survey.workbook.content import SurveyContent, point_cells, result_c
 from bifocal.survey.workbook.placed_formulas import added_covariance
 from bifocal.survey.workbook.precision_lines import precision_values
 from bifocal.survey.workbook.reader import TO_DEGREES, TO_MM, SurveyInput
+from bifocal.survey.workbook.setup_cells import SHOWN_ONLY
 from bifocal.survey.workbook.setup_update import (
     add_sheets,
     write_corrections,
@@ -90,7 +91,7 @@ def add_results(
     needed = [
         name
         for name, defined in built.book.defined_names.items()
-        if defined.attr_text.startswith("'Setup'!")
+        if defined.attr_text.startswith("'Setup'!") and name not in SHOWN_ONLY
     ]
     if any(place_of(editor, name) is None for name in needed if not name.startswith("a")):
         add_sheets(editor, built, ["Setup"])

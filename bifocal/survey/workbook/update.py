@@ -239,6 +239,7 @@ def _table(
     editor.extend(name, area.area[0] + length)
     styles = editor.styles_of(area.sheet, first)
     filled, prepared = [], []
+    repeated: Mapping[int, str] | None = None
     for column in content.columns:
         if column.key not in headings:
             continue
@@ -267,9 +268,37 @@ def _table(
             for row, value in enumerate(values, start=first):
                 editor.put(area.sheet, row, number, value, formula=text, style=style)
             continue
-        filled.append(NewColumn(number, values, style, _constant(escape(text))))
+        if is_older(editor.book.names) or _lacks(editor, text):
+            repeated = _repeated(editor, area) if repeated is None else repeated
+            text = repeated.get(number, "")
+        formula = _constant(escape(text)) if text else None
+        filled.append(NewColumn(number, values, style, formula))
     editor.fill_rows(area.sheet, first, filled)
     editor.fill_rows(area.sheet, first + _length(area), prepared)
+
+
+def _lacks(editor: WorkbookEditor, formula: str) -> bool:
+    """Tell whether a formula names columns that the workbook's tables do not have."""
+    for name, key in re.findall(r"(tbl\w+)\[(?:\[#[^]]+\],\[)?(\w+)\]", formula):
+        area = editor.table(name)
+        if area is None or key not in area.headings():
+            return True
+    return False
+
+
+def _repeated(editor: WorkbookEditor, area: TableArea) -> dict[int, str]:
+    """Return by column the formulas that stand alike in a table's first row and its last.
+
+    New rows of a workbook made by an older version calculate as the rows above them do.
+    """
+    if _length(area) < 2:
+        return {}
+    top, last = (editor.models(area.sheet, row) for row in (area.area[0] + 1, area.area[2]))
+    return {
+        column: cell.formula
+        for column, cell in top.items()
+        if column in last and last[column].formula == cell.formula
+    }
 
 
 def _complete(

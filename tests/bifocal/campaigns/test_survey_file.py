@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import shutil
+from dataclasses import replace
+from pathlib import Path
 
 import pytest
 from click.testing import CliRunner
 
+from bifocal.campaigns import photo_pairing
 from bifocal.campaigns.survey_file import read_survey_file
 from bifocal.cli.main import main
+from bifocal.files.images import ImageInfo
 from photocore.errors import InputError
 from tests.bifocal.campaigns.sample_tables import FAR, NEAR
 
@@ -102,3 +106,14 @@ def test_photos_of_a_folder_are_paired_by_what_they_show(tmp_path, capsys):  # n
     again = CliRunner().invoke(main, ["survey", "--init", str(photos), str(out)])
     assert again.exit_code == 1
     assert "--overwrite" in again.stderr
+
+
+def test_an_equivalent_and_a_true_focal_length_do_not_tell_which_photo_is_far():
+    phone = ImageInfo(path=Path("p.jpg"), size=(40, 30), focal_length=4.2, focal_length_35=28.0)
+    camera = ImageInfo(path=Path("c.jpg"), size=(40, 30), focal_length=24.0)  # 36 mm on APS-C
+    found = photo_pairing._ordered(phone, camera, 50)
+    assert (found.far.name, found.certain) == ("p.jpg", False)
+    found = photo_pairing._ordered(phone, replace(camera, focal_length_35=36.0), 50)
+    assert (found.far.name, found.certain) == ("c.jpg", True)
+    zoom = replace(camera, path=Path("z.jpg"), focal_length=70.0)
+    assert photo_pairing._ordered(camera, zoom, 50).far.name == "z.jpg"

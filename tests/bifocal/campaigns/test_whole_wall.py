@@ -3,15 +3,22 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 import rasterio
 from click.testing import CliRunner
 
+from bifocal.campaigns.pair_job import steps_of
+from bifocal.campaigns.step_store import Step, run_step, step_key
 from bifocal.campaigns.survey_file import read_survey_file
+from bifocal.campaigns.whole_wall import joint_step, run_whole
+from bifocal.campaigns.workflow import plan_survey
 from bifocal.cli.main import main
+from photocore.cli import no_progress
 from photocore.errors import InputError
+from photocore.provenance import FileHashes
 from tests.bifocal.orientation.street import write_street
 
 
@@ -58,3 +65,53 @@ def test_what_is_wrong_above_the_pairs_is_said(tmp_path):
     path.write_text(path.read_text().replace('name = "b"', 'name = "mosaic"').replace('"yes"', "1"))
     with pytest.raises(InputError, match="folders of the whole survey"):
         read_survey_file(path)
+    path.write_text(path.read_text().replace("joint = 1", "joint = false"))
+    assert [job.name for job in read_survey_file(path)] == ["a", "mosaic", "c"]
+
+
+def test_tables_in_several_units_are_not_adjusted_as_one(tmp_path):
+    path = survey(tmp_path, "joint = true")
+    write_files(tmp_path)
+    text = path.read_text()
+    assert len(read_survey_file(path)) == 3
+    path.write_text(text + 'unit = "mm"\n')  # of the last pair
+    with pytest.raises(InputError, match="unit: the pairs say different things"):
+        read_survey_file(path)
+    path.write_text(text.replace("[[pair]]", 'unit = "mm"\n[[pair]]', 1))
+    (job, *_) = jobs = read_survey_file(path)
+    assert joint_step([replace(job, files={}, options={}), *jobs[1:]]).options == {"unit": "mm"}
+
+
+def write_files(folder: Path) -> None:
+    for name in "abc":
+        for rest in ("far.png", "near.png", "all.csv"):
+            (folder / f"{name}_{rest}").write_text(name)
+
+
+def test_the_plan_tells_of_the_common_frame_that_is_still_to_be_found(tmp_path):
+    write_files(tmp_path)
+    jobs = read_survey_file(survey(tmp_path, "joint = true"))
+    for job in jobs:
+
+        def make(place, progress, title=job.title):  # noqa: ARG001
+            (place / f"{title}.pair.json").write_text("{}")
+            return ()
+
+        step, hashes = replace(steps_of(job)[0], make=make), FileHashes(tmp_path / "hashes.json")
+        key = step_key(step, {}, hashes)
+        run_step(job.folder, step, key, hashes, progress=no_progress, overwrite=False)
+    each = [("align", "keep"), ("relief", "make"), ("drawing", "make")]
+    assert plan_survey(jobs, mosaic=True) == [
+        *((name, *row) for name in "abc" for row in each),
+        ("all pairs", "joint", "make"), ("all pairs", "mosaic", "make"),
+    ]  # fmt: skip
+
+
+def test_a_full_disk_at_the_end_costs_no_more_than_the_last_step(tmp_path):
+    def make(place, progress):  # noqa: ARG001
+        raise OSError(28, "No space left on device")
+
+    step = Step(name="mosaic", files={}, make=make)
+    outcome = run_whole(tmp_path, step, overwrite=False)
+    assert (outcome.failed_step, outcome.done) == ("mosaic", ())
+    assert outcome.message.endswith("No space left on device.")

@@ -133,7 +133,20 @@ def test_a_doubtful_suggestion_offers_the_other_place_too(page: Driver) -> None:
     quality = page.tab.get_by_test_id("quality")
     assert quality.get_attribute("data-level") != "good"
     assert "S shows the next" in str(quality.text_content())
-    page.keys("s", "a")
+    # Once the pick has moved, S asks anew along its new line.
+    asked = "performance.getEntriesByType('resource').map(({ name }) => name)"
+    asked = f"{asked}.filter((name) => name.endsWith('/api/suggest')).length"
+    count = page.tab.evaluate(asked)
+    for number, key in enumerate(("ArrowRight", "ArrowLeft"), start=1):
+        page.keys("1", key)
+        page.settled("true")
+        page.keys("s")
+        page.wait(f"() => {asked} === {count + number}")
+        page.suggested()
+    page.keys("s")
+    assert page.tab.evaluate(asked) == count + 2
+    assert "%" not in str(quality.text_content())  # how sure the other place is, nobody knows
+    page.keys("a")
     picks = page.settled("state.points[0].picks[2]")["points"][0]["picks"]
     # Its partner moves as the click fell: half a screen pixel.
     assert distance(np.subtract(picks["2"], picks["1"]), (-6.2, -3.09)) < 0.5

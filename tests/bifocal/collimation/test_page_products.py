@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import time
 import zipfile
+from dataclasses import replace
 from io import BytesIO
 
 import ezdxf
@@ -12,12 +13,14 @@ import numpy as np
 import pytest
 
 from bifocal import Pair, ReliefMap
-from bifocal.collimation.live_orientation import live_orientation
+from bifocal.collimation import job_process, job_tasks
+from bifocal.collimation.live_orientation import control_of, live_orientation
 from bifocal.collimation.project import find_files
 from bifocal.collimation.records import PickedControl, SurveyState
 from bifocal.demo import SAMPLE
 from bifocal.files.geotiff import write_relief
 from bifocal.files.images import image_info
+from bifocal.orientation.control_points import read_lengths
 from photocore.errors import InputError
 from tests.page_session import (
     client_of,
@@ -328,3 +331,44 @@ def test_precision_contours_lie_where_picks_are_that_precise(tmp_path) -> None:
             point = session.state.points[f"Q{number}"]
             # Between the nodes of the grid the line is straight.
             assert session.results.row(point)["sigma_r"] == pytest.approx(sigma / 1000, rel=0.03)
+
+
+def test_a_drawing_without_title_is_called_as_its_pair_file(tmp_path, monkeypatch) -> None:
+    titles = []
+
+    def noted(*given, **_):
+        titles.append(given[3].title)
+        raise InputError("enough")
+
+    monkeypatch.setattr(job_process, "deliver", noted)
+    monkeypatch.setattr(job_process, "_ortho_task", lambda task: task)
+    blank = dict.fromkeys(["scale", "dpi", "title", "paper", "marked", "sections", "overwrite"])
+    task = {**blank, "pair": str(sample_folder(tmp_path) / "facade.pair.json"), "out": "d"}
+    with pytest.raises(InputError, match="enough"):
+        job_process._deliver(task, lambda *_: None)
+    assert titles == ["facade"]
+
+
+def test_a_tape_weighs_as_it_is_said_to_be_good(tmp_path) -> None:
+    with opened(sample_folder(tmp_path)) as session:
+        for name, place in (("A", (300.0, 300.0)), ("B", (900.0, 300.0)), ("C", (900.0, 700.0))):
+            picked = {"column": place[0], "row": place[1]}
+            session.command({"op": "control.pick", "name": name, "image": 1, **picked})
+        tape = {"op": "tape.set", "from": "A", "length": 4.4}
+        session.command({**tape, "to": "B", "sigma": 0.05})
+        session.command({**tape, "to": "C"})
+        control = control_of(session.state)
+        tables = job_tasks._write_control(session, control)
+        read = read_lengths(tables["lengths"], replace(control, lengths=(), sigma_lengths=()))
+    assert read.lengths == control.lengths == ((0, 1, 4.4), (0, 2, 4.4))
+    for found in (read, control):
+        assert found.sigma_lengths == pytest.approx((0.05, np.nan), nan_ok=True)
+
+
+def test_remarks_on_an_orientation_name_no_option_of_the_command_line(tmp_path) -> None:
+    with opened(sample_folder(tmp_path)) as session:
+        report = {"remarks": ["CHECK THE WALL: +12 mm (--wall 120,130). Give control points."]}
+        session.proposal = {"op": "proposed", "pair": "none.pair.json", "report": report}
+        state = client_of(session).get("/api/state").json()
+        session.proposal = None
+    assert state["pair"]["remarks"] == ["CHECK THE WALL: +12 mm. Give control points."]

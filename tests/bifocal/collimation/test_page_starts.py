@@ -159,6 +159,15 @@ def test_homographies_in_a_workbook_are_a_pair_too(tmp_path) -> None:
     assert reliefs(folder / "facade.xlsx") == pytest.approx(
         {"T01": first["r"], "again": first["r"]}, rel=1e-9, abs=1e-9
     )
+    # Beside photos it does not name, also where those it names are not there.
+    (folder / "facade.journal.jsonl").unlink()
+    typed(folder / "facade.xlsx", {"photo_1": "gone.jpg"})
+    given = (folder / "far.jpg", folder / "near.jpg")
+    with (
+        pytest.raises(ValueError, match=r"gone\.jpg"),
+        opened(*given, workbook=folder / "facade.xlsx"),
+    ):
+        pass
 
 
 def test_a_survey_is_taken_up_from_its_folder(survey) -> None:

@@ -140,6 +140,10 @@ def test_turning_the_axes_turns_the_covariance() -> None:
         ({"parameters": ["Z 1"], "covariance": [[1]]}, "24 parameters"),
         ({"parameters": list(NAMES), "covariance": [[1.0]]}, "shape"),
         ({"parameters": list(NAMES), "covariance": (-np.eye(24)).tolist()}, "no covariance"),
+        (
+            {"parameters": list(NAMES), "covariance": (np.eye(24) + np.eye(24, k=1) / 2).tolist()},
+            "no covariance",
+        ),
     ],
 )
 def test_what_is_no_covariance_is_refused(stated, said) -> None:

@@ -1,6 +1,7 @@
 """Pairs that look through glass and water: projection, intersection, precision, the pair file."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -257,6 +258,14 @@ def test_a_z0_without_layers_is_told_of():
     data = content("port")
     del data["layers"]
     assert "no layers" in Pair.from_dict(data).remarks[0]
+
+
+def test_a_covariance_of_cameras_in_air_moves_no_point_through_media():
+    known = replace(Pair.from_dict(content("port")), orientation=np.eye(24) * 1e-6)
+    assert any("in no sigma" in remark for remark in known.remarks)
+    assert known.effect_of_orientation(POINTS) is None
+    assert not known.covariance_of_orientation(POINTS).any()
+    assert known.in_air().effect_of_orientation(POINTS).shape[:2] == (5, 3)
 
 
 def test_mixed_units_are_told_of():

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import bifocal
-from photocore.errors import InputError
+from photocore.errors import GeometryError, InputError
 
 SIZE = (401, 301)
 SCALE = [[0.01, 0, -2.0], [0, -0.01, 1.5], [0, 0, 1]]
@@ -118,6 +118,9 @@ def test_points_matched_on_colour_photos_give_the_relief_of_the_wall() -> None:
     image1 = noise()
     image2 = cv2.warpAffine(image1, zoom, SIZE, flags=cv2.INTER_CUBIC)
     colour = [np.stack([image] * 3, axis=-1) for image in (image1, image2)]
+    for reliefs in ((9.6, 12.0), (0.3, 0.2)):
+        with pytest.raises(GeometryError, match=r"below 9\.5 m only"):
+            bifocal.match(PAIR, *colour, settings=bifocal.MatchSettings(relief_range=reliefs))
     points = bifocal.match(PAIR, *colour, settings=bifocal.MatchSettings(count=200, targets=False))
     table = PAIR.intersect(points.pixels1, points.pixels2, sigma_px=0.1)
     radius = np.linalg.norm(points.pixels1 - nadir, axis=1)

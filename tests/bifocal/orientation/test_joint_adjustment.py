@@ -10,10 +10,13 @@ import pytest
 from click.testing import CliRunner
 
 from bifocal.cli.main import main
+from bifocal.model.orientation_precision import pinhole
 from bifocal.model.pair import Pair
-from bifocal.orientation.joint_adjustment import adjust_jointly
+from bifocal.orientation import joint_adjustment
+from bifocal.orientation.joint_adjustment import adjust_jointly, with_rays
 from bifocal.orientation.joint_ties import SharedPoints, into_one_frame, near_each_other
-from photocore.errors import GeometryError
+from bifocal.orientation.joint_workflow import JointTask, _adjusted_photo, _tables, adjust_pairs
+from photocore.errors import GeometryError, InputError
 from photocore.rotation import rotation_from_vector
 from photocore.similarity import Similarity
 from tests.bifocal.orientation.many_pairs import many_pairs
@@ -54,6 +57,80 @@ def test_gross_errors_of_rays_and_of_control_are_named_and_do_no_harm():
     assert got.control[bad, 2] == pytest.approx(-0.4, abs=0.05)
     error = np.abs(got.xyz - case.truth)[:, 2]
     assert np.nanmedian(error) < 0.02
+
+
+def test_what_is_known_of_focal_lengths_counts_once_however_many_rounds_there_are():
+    case = many_pairs(3, np.random.default_rng(5), control=6)
+    o, rng = replace(case.observations, sigma_focal=np.full(6, 0.001)), np.random.default_rng(1)
+    pixels = o.pixels.copy()
+    for point in range(10, 30):
+        rays = np.flatnonzero(o.point == point)[:2]
+        pixels[rays] += rng.normal(0, 3, (len(rays), 2))
+    o = replace(o, pixels=pixels)
+    got = adjust_jointly(o, case.start)
+    assert len(got.blunders) > 5
+    left = got.observations
+    kept = np.isin(o.camera * 10_000 + o.point, left.camera * 10_000 + left.point)
+    again = adjust_jointly(with_rays(o, kept), case.start)
+    for one, other in zip(got.cameras, again.cameras, strict=True):
+        assert one.matrix[0, 0] == pytest.approx(other.matrix[0, 0], rel=1e-7)
+    # By their own sigmas: the start, which is true, is one more observation of 0.1 %.
+    drift = [np.log(c.matrix[0, 0] / s.matrix[0, 0]) for c, s in
+             zip(got.cameras, case.start.cameras, strict=True)]  # fmt: skip
+    assert np.abs(drift).max() < 2e-3
+
+
+def test_features_better_than_believed_make_no_gross_errors_of_honest_picks():
+    """Features are good to 0.1 px and believed to be 0.5, picks of 0.4 px are stated as such."""
+    case = many_pairs(3, np.random.default_rng(8), control=6, noise=0.1)
+    o, rng = case.observations, np.random.default_rng(9)
+    picks = o.point < 30
+    pixels = o.pixels.copy()
+    pixels[picks] += rng.normal(0, np.sqrt(0.4**2 - 0.1**2), (picks.sum(), 2))
+    got = adjust_jointly(replace(o, pixels=pixels, sigma=np.where(picks, 0.4, 0.5)), case.start)
+    assert got.sigma0 < 0.6
+    assert got.blunders == ()
+
+
+def test_a_control_point_without_a_good_ray_says_nothing_more():
+    case = many_pairs(4, np.random.default_rng(6), control=8)
+    o = case.observations
+    pixels = o.pixels.copy()
+    pixels[o.point == 0] += np.random.default_rng(0).normal(0, 300, (2, 2))
+    got = adjust_jointly(replace(o, pixels=pixels), case.start)
+    assert ("P0", "0, far") in {(b.point, b.where) for b in got.blunders}
+    assert "control" not in {b.where for b in got.blunders}
+    assert np.isnan(got.control[0]).all()
+
+
+def test_two_control_points_hold_no_frame_and_bend_nothing():
+    case = many_pairs(3, np.random.default_rng(5), control=2)
+    o = case.observations
+    got = adjust_jointly(replace(o, known=o.known + np.array([5.0, 1.0, 0.0])), case.start)
+    assert got.blunders == ()
+    assert got.sigma0 == pytest.approx(1.0, abs=0.1)
+    assert np.array_equal(got.cameras[0].centre, case.start.cameras[0].centre)
+    assert got.control[0, 0] == pytest.approx(-5.0, abs=0.5)
+
+
+def test_more_gross_errors_than_rounds_are_said_to_be_left_in(monkeypatch):
+    monkeypatch.setattr(joint_adjustment, "ROUNDS", 1)
+    case = many_pairs(4, np.random.default_rng(5), control=8)
+    known = case.observations.known.copy()
+    known[[2, 5], 2] += 0.4
+    got = adjust_jointly(replace(case.observations, known=known), case.start)
+    assert "control" in {b.where for b in got.left_in}
+
+
+def test_points_of_far_photos_alone_start_where_their_rays_meet_the_wall():
+    case = many_pairs(4, np.random.default_rng(3), control=8, ties=80)
+    o = case.observations
+    alone = (o.point >= 8) & (o.point % 2 == 0)
+    o = with_rays(o, ~(alone & (o.camera % 2 == 1)))
+    shared = SharedPoints(photo=o.camera, point=o.point, pixels=o.pixels, count=len(o.ids))
+    start = into_one_frame(case.start.cameras, shared, shared.pixels, o.known, tuple("abcd"))
+    away = np.abs(start.xyz - case.truth)[:, :2].max(axis=1)
+    assert away[np.unique(o.point)].max() < 2.0
 
 
 def test_without_control_the_first_pair_is_held_and_without_overlap_the_pair_is_named():
@@ -99,6 +176,33 @@ def test_pairs_in_frames_of_their_own_come_roughly_into_one():
     assert near[wrong].mean() < 0.2
 
 
+def test_a_longer_principal_distance_is_stated_in_millimetres_too():
+    photo = replace(Pair.ideal(c1=35, d1=17.5, c2=19, d2=9.5).image1, sigma_pixel=0.4)
+    camera = pinhole(photo)
+    longer = camera._replace(matrix=camera.matrix * [[1.01], [1.01], [1.0]])
+    found = _adjusted_photo(photo, longer)
+    assert found.principal_distance == pytest.approx(35.35)
+    assert found.sigma_pixel == 0.4
+
+
+def test_an_output_that_cannot_be_is_refused_before_any_work(tmp_path):
+    """The photos do not exist: whoever began to work would complain of them."""
+    shown = {"plane_from_pixel": [[0.01, 0, -4], [0, -0.01, 3], [0, 0, 1]], "nadir": [0, 0]}
+    for name in "ab":
+        Pair.from_dict({
+            "format": "bifocal-pair/1",
+            "image1": shown | {"file": "none1.jpg", "distance": 17.5},
+            "image2": shown | {"file": "none2.jpg", "distance": 9.5},
+        }).write(tmp_path / f"{name}.pair.json")  # fmt: skip
+    paths = [tmp_path / f"{name}.pair.json" for name in "ab"]
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / "points.csv").write_text("mine")
+    with pytest.raises(InputError, match=r"points\.csv: exists already"):
+        adjust_pairs(paths, tmp_path / "out")
+    with pytest.raises(InputError, match="is one of the files that are read"):
+        adjust_pairs(paths, tmp_path, overwrite=True)
+
+
 @pytest.mark.acceptance
 def test_a_rendered_street_is_adjusted_by_the_command(tmp_path):
     paths = write_street(tmp_path)
@@ -125,3 +229,11 @@ def test_a_rendered_street_is_adjusted_by_the_command(tmp_path):
     assert "--overwrite" in again.stderr
     one = CliRunner().invoke(main, ["adjust", str(paths[0]), "--out", str(tmp_path / "x")])
     assert "two pair files" in one.stderr
+
+
+def test_a_control_point_without_relief_is_on_the_wall_as_for_align(tmp_path):
+    (tmp_path / "c.csv").write_text("id,X,Y,r,col1,row1,col2,row2\nA,1,2,,5,6,7,8\n")
+    pair = Pair.ideal(d1=17.5, d2=9.5)
+    named = _tables([tmp_path / "a.json"], [pair], JointTask(control=(tmp_path / "c.csv",)))
+    np.testing.assert_array_equal(named.xyz, [[1.0, 2.0, 0.0]])
+    np.testing.assert_array_equal(named.sigma, [[0.003, 0.003, 0.005]])

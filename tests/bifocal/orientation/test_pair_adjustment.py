@@ -244,8 +244,9 @@ def everything() -> tuple[PairObservations, PairUnknowns]:
         for i, k, cam in zip(bent, radial, (FAR, NEAR), strict=True)
     ]
     points = replace(
-        control(), pixels1=seen[0], pixels2=seen[1], lengths=((1, 2, 3.99), (4, 10, 2.5))
-    )
+        control(), pixels1=seen[0], pixels2=seen[1], lengths=((1, 2, 3.99), (4, 10, 2.5)),
+        sigma_lengths=(0.05, np.nan),
+    )  # fmt: skip
     points.xyz[2, :2] = points.xyz[9] = points.xyz[10, 2] = np.nan
     points.pixels1[3] = points.pixels2[8] = np.nan
     observations = PairObservations(
@@ -263,6 +264,18 @@ def everything() -> tuple[PairObservations, PairUnknowns]:
         sigma_tilt=0.01,
     )
     return observations, PairUnknowns(cameras=(FAR, NEAR), radial=radial)
+
+
+def test_a_length_weighs_by_its_own_standard_deviation() -> None:
+    observations, state = everything()
+    plain = replace(observations, control=replace(observations.control, sigma_lengths=()))
+    own, usual = (pair_equations(one, state)[0] for one in (observations, plain))
+    (row,) = np.flatnonzero(own != usual)
+    # The picks' share in metres on the wall, and 3 mm where nothing is said.
+    picks = 1.41 * observations.sigma_pick * FAR.centre[2] / FAR.matrix[0, 0]
+    least = min(0.003, observations.control.sigma.min())
+    wanted = np.hypot(least, picks) / np.hypot(0.05, picks)
+    assert own[row] / usual[row] == pytest.approx(wanted, rel=1e-9)
 
 
 def test_the_jacobian_is_the_derivative_by_every_name() -> None:

@@ -218,6 +218,16 @@ def test_a_phantom_does_not_take_the_colours_from_the_wall(wall: Path) -> None:
     assert pixels[300, 580, 0] > pixels[300, 580, 2] + 60  # what stands before it is brown
 
 
+def test_a_phantom_before_a_flat_wall_does_not_refuse_the_delivery(wall: Path) -> None:
+    relief = read_relief(wall / "relief.tif")
+    r = np.zeros_like(relief.r)
+    r[40:52, 40:52] = 2.5  # 2500 levels of the least interval, a millimetre
+    write_relief(wall / "relief.tif", replace(relief, r=r), overwrite=True)
+    done = run(wall, "--relief", "relief.tif", "--deliver", "d", "--scale", "1:50")
+    assert done.exit_code == 0, done.output
+    assert "contour lines every 0.005 m" in page_of(wall / "d" / "Torre_est_relief.pdf")
+
+
 def test_the_png_is_the_geotiff(wall: Path) -> None:
     run(wall, "--relief", "relief.tif", "--deliver", "d", "--scale", "1:50")
     with Image.open(wall / "d" / "Torre_est.png") as png:
@@ -301,6 +311,41 @@ def test_what_cannot_be_meant_is_asked_back(
     assert message in done.stderr
     assert "Traceback" not in done.output
     assert set(wall.iterdir()) == before
+
+
+@pytest.mark.parametrize(("title", "name"), [("far", "far.png"), ("wall", "wall_relief.tif")])
+def test_a_delivery_does_not_take_the_place_of_what_it_is_made_from(
+    wall: Path, title: str, name: str
+) -> None:
+    (wall / "relief.tif").rename(wall / "wall_relief.tif")
+    before = {path.name: path.read_bytes() for path in wall.iterdir()}
+    words = ("--relief", "wall_relief.tif", "--deliver", ".", "--scale", "1:50", "--title", title)
+    for more in ((), ("--overwrite",)):
+        done = run(wall, *words, *more)
+        assert done.exit_code == 1
+        assert f"{name}: is one of the files that are read" in done.stderr
+    assert {path.name: path.read_bytes() for path in wall.iterdir()} == before
+
+
+def test_a_photo_is_no_place_for_the_orthophoto(wall: Path) -> None:
+    data = json.loads((wall / "wall.pair.json").read_text())
+    with Image.open(wall / "near.png") as photo:
+        photo.save(wall / "near.tif")
+    data["image2"]["file"] = "near.tif"
+    (wall / "wall.pair.json").write_text(json.dumps(data))
+    before = (wall / "near.tif").read_bytes()
+    done = run(wall, "--plane", "--out", "near.tif", "--overwrite")
+    assert done.exit_code == 1
+    assert "near.tif: is one of the files that are read" in done.stderr
+    assert (wall / "near.tif").read_bytes() == before
+
+
+def test_too_many_contour_lines_are_refused_before_the_work(wall: Path, monkeypatch) -> None:
+    monkeypatch.setattr("bifocal.orthophotos.deliver_workflow.make_ortho", None)
+    words = ("--relief", "relief.tif", "--deliver", "d", "--scale", "1:50")
+    done = run(wall, *words, "--contours", "0.0001")
+    assert done.exit_code == 1
+    assert "choose a larger interval" in done.stderr
 
 
 @pytest.mark.parametrize("place", ["x=nan", "y=", "1,2", "0,0 inf,1"])

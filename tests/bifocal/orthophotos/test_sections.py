@@ -43,6 +43,13 @@ def test_a_broken_section_shows_the_relief_of_every_leg_to_its_corner() -> None:
     assert (np.abs(found.place - 2.0) < 1e-12).sum() == 2
 
 
+def test_a_corner_typed_twice_is_one_corner() -> None:
+    once, twice = (section(SLOPE, GRID, line, step=0.01) for line in (
+        "0.5,0.5 1,1.5", "0.5,0.5 0.5,0.5 1,1.5 1,1.5"))  # fmt: skip
+    np.testing.assert_array_equal(twice.path, once.path)
+    np.testing.assert_array_equal(twice.relief, once.relief)
+
+
 def test_a_section_tells_what_was_measured_and_joins_what_was_not_to_it() -> None:
     relief = np.full(GRID.shape, 0.1, np.float32)
     partly = relief.copy()

@@ -72,6 +72,14 @@ def test_media_that_leave_no_room_are_refused(media, error, message):
         plan_stations([35, 19], CANON, scale_number=100, media=PlannedMedia(layers=LAYERS, **media))
 
 
+def test_a_lens_whose_edges_are_totally_reflected_is_refused():
+    """From water into air: 18 mm aside by 10 mm is 61 degrees, beyond asin(1 / 1.337)."""
+    diver = PlannedMedia(layers=Layers(indices=(1.337, 1.0)), depth=0.3)
+    full = CameraSensor(width=36, height=24, columns=6000, rows=4000)
+    with pytest.raises(GeometryError, match=r"10 mm lens.*reflect"):
+        plan_stations([35, 10], full, scale_number=100, object_size=(3, 2), media=diver)
+
+
 def test_the_command_plans_a_tank(tmp_path):
     lenses = ["--focal", "35", "--focal", "19", "--sensor", "22.7x15.1"]
     words = ["plan", *lenses, "--pixels", "3072x2048", "--scale", "1:100"]

@@ -91,6 +91,16 @@ def test_existing_files_stay_unless_told(folder, tmp_path):
     assert out.read_bytes() == b"mine"
 
 
+def test_a_photo_is_no_place_for_the_preview(folder, tmp_path):
+    before = (folder / "far.png").read_bytes()
+    words = ("--out", tmp_path / "r.tif", "--preview", folder / "far.png", "--overwrite")
+    code, _, told = run(folder / "wall.pair.json", *words)
+    assert code == 1
+    assert "far.png: is one of the files that are read" in told
+    assert (folder / "far.png").read_bytes() == before
+    assert list(tmp_path.iterdir()) == []
+
+
 def test_wrong_endings_are_refused_before_any_work(folder, tmp_path):
     pair = folder / "wall.pair.json"
     for arguments, said in (

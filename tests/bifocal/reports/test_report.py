@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+import json
 import math
 import re
+from hashlib import sha256
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 from click.testing import CliRunner
 
 from bifocal.cli.main import main
 from bifocal.demo import SAMPLE
+from bifocal.reports.pair_report import _provenance
+from bifocal.reports.workflow import ReportTask, find_pairs
 from photocore.reports.words import LANGUAGES, texts_of, words_of
 from tests.bifocal.campaigns.sample_tables import write_tables
 from tests.web_page import Page
@@ -69,6 +74,30 @@ def test_accuracy_stands_first_with_a_verdict_per_scale(page):
         assert re.search(rf"<td>1:{scale}</td><td>{limit:.3g} mm: {word}</td>", page), scale
     asked = "is held" if worst <= limits[50] else "is NOT held"
     assert f"The scale asked for, 1:50, {asked}" in text
+
+
+def test_photos_of_one_name_in_two_folders_have_a_hash_each(tmp_path):
+    files = (tmp_path / "far" / "1.jpg", tmp_path / "near" / "1.jpg")
+    for path in files:
+        path.parent.mkdir()
+        path.write_text(path.parent.name)
+    task = SimpleNamespace(control=None, check=None, relief=None, ortho=files[0])
+    content = SimpleNamespace(source=PAIR, pair=SimpleNamespace(photo_files=files), task=task)
+    *_, table = _provenance(content, words_of("bifocal.reports", "en"))
+    named = [[path.name, sha256(path.read_bytes()).hexdigest()] for path in files]
+    assert table.rows[1:] == named
+
+
+def test_a_pair_in_the_frame_of_all_pairs_is_told_by_that_pair_file(tmp_path):
+    for name, inputs in (("a", {"pair": ["a.pair.json", "1"]}), ("b", {"far": ["far.jpg", "2"]})):
+        for path in (f"{name}/align/{name}.pair.json", f"joint/{name}.pair.json"):
+            (tmp_path / path).parent.mkdir(parents=True, exist_ok=True)
+            (tmp_path / path).touch()
+        (tmp_path / name / "relief").mkdir()
+        (tmp_path / name / "relief" / ".made.json").write_text(json.dumps({"inputs": inputs}))
+    sources, _ = find_pairs(tmp_path, ReportTask())
+    own = tmp_path / "b" / "align" / "b.pair.json"  # made before the frame of all was dropped
+    assert sources == [tmp_path / "joint" / "a.pair.json", own]
 
 
 def numbers(text: str) -> list[float]:

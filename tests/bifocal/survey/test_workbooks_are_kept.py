@@ -114,6 +114,38 @@ def test_options_are_written_into_the_cells_of_the_users_workbook(tmp_path, opti
             assert other[key] == pytest.approx(one[key], rel=1e-9, abs=1e-12)
 
 
+@pytest.mark.parametrize("far_first", [True, False])
+def test_a_centre_of_zoom_that_was_found_goes_into_the_cells_too(tmp_path, far_first):
+    """The near camera stands 6 cm aside: relief spreads from elsewhere than the nadir."""
+    rng = np.random.default_rng(8)
+    xyz = rng.uniform([-5, -3, -0.5], [5, 3, 0.6], (30, 3))
+    xyz[:14, 2] = 0.0
+    photos = (((0.0, 0.0), 17.5, 35), ((0.06, -0.04), 9.5, 19))
+    seen = [
+        (nadir + (xyz[:, :2] - nadir) * (d / (d - xyz[:, 2]))[:, None]) * c / d
+        for nadir, d, c in photos
+    ]
+    lenses = ("--d1", 17.5, "--d2", 9.5, "--c1", 35, "--c2", 19)
+    if not far_first:
+        seen, lenses = seen[::-1], ("--d1", 9.5, "--d2", 17.5, "--c1", 19, "--c2", 35)
+    rows = [
+        f"P{i}," + ",".join(map(repr, row)) + (",PLANE" if i < 14 else ",")
+        for i, row in enumerate(np.hstack(seen).tolist())
+    ]
+    table = write_csv(tmp_path / "p.csv", "\n".join(["id,x1,y1,x2,y2,code", *rows, ""]))
+    path = tmp_path / "s.xlsx"
+    assert run("solve", table, "--out", path, *lenses).exit_code == 0
+    found = json.loads(run("solve", path, "--adjust-setup", "--json").stdout)["points"]
+    away = np.hypot(xyz[:, 0], xyz[:, 1]) > 1.5
+    relief = np.array([point["r"] for point in found], float)
+    np.testing.assert_allclose(relief[away], xyz[away, 2], atol=1e-3)
+    solved_in_place(path, "--adjust-setup")
+    again = json.loads(run("solve", path, "--json").stdout)["points"]
+    for one, other in zip(found, again, strict=True):
+        for key in ("r", "X", "Y", "sigma_r"):
+            assert other[key] == pytest.approx(one[key], rel=1e-9, abs=1e-12)
+
+
 def test_another_language_changes_labels_and_nothing_the_user_wrote(tmp_path):
     path = with_own_chart(fill(tmp_path / "own.xlsx"))
     book = openpyxl.load_workbook(path)
@@ -502,3 +534,41 @@ def test_a_coordinate_survey_becomes_one_for_pixels_in_a_new_workbook_only(tmp_p
     # The way out of the other direction is the same.
     result = run("solve", out, "--out", out, "--overwrite")
     assert result.exit_code == 0, result.stderr
+
+
+def test_new_rows_of_an_older_workbook_calculate_as_those_above(tmp_path):
+    """Its tables lack the columns that formulas of today name: Excel would refuse the file."""
+    path = tmp_path / "s.xlsx"
+    assert (
+        run("solve", write_csv(tmp_path / "p.csv", TABLE), "--out", path, *DISTANCES).exit_code == 0
+    )
+    book = openpyxl.load_workbook(path)
+    for name in ("g_space", "g_space_block"):
+        del book.defined_names[name]
+    points, results = book["Points"], book["Results"]
+    column = [cell.value for cell in results[4]].index("sigma_E") + 1
+    last = results.max_row
+    for row in range(5, last + 1):
+        results.cell(row, column).value = "=ROWS(tblPoints[id])"
+    for row in range(last + 1, last + 9):
+        for number in range(1, 6):
+            points.cell(row, number).value = points.cell(5, number).value
+        points.cell(row, 1).value = f"Q{row}"
+    book.save(path)
+    solved_in_place(path)
+    sheet = openpyxl.load_workbook(path)["Results"]
+    assert sheet.cell(last + 8, 1).value.startswith("=")
+    assert {sheet.cell(row, column).value for row in range(5, last + 9)} == {"=ROWS(tblPoints[id])"}
+
+
+def test_the_setup_of_an_older_version_in_the_users_own_workbook_is_enough(tmp_path):
+    heads, table, head = FOREIGN["plain"]
+    path = foreign(tmp_path / "own.xlsx", heads=heads, table=table, head=head)
+    solved_in_place(path, *DISTANCES)
+    book = openpyxl.load_workbook(path)
+    before = book.sheetnames
+    for name in ("project", "client", "setup_state", "setup_missing", "check_scale"):
+        del book.defined_names[name]
+    book.save(path)
+    solved_in_place(path, *DISTANCES)
+    assert openpyxl.load_workbook(path).sheetnames == before

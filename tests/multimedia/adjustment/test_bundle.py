@@ -211,6 +211,18 @@ def test_shared_interiors_are_one_set():
     assert len({camera.principal_distance for camera in shared.project.cameras}) == 1
 
 
+def test_a_shared_interior_is_one_set_from_whatever_starts():
+    given = a_project()
+    apart = tuple(
+        camera.stepped(["c", "k1"], [0.1 * k, 1e-4 * k]) for k, camera in enumerate(given.cameras)
+    )
+    wanted = replace(ALL, shared_interior=True)
+    shared = bundle_adjust(replace(given, cameras=apart), wanted)
+    assert shared.values == pytest.approx(bundle_adjust(given, wanted).values, abs=1e-6)
+    found = [camera.principal_distance for camera in shared.project.cameras]
+    assert found == pytest.approx([shared.value("interior:c")] * len(found), rel=1e-14)
+
+
 def test_tilt_and_thickness_of_the_glass_are_found():
     given = a_project()
     tilted = {

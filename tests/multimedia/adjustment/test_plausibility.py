@@ -81,12 +81,32 @@ def test_a_prior_weighs_the_same_however_good_the_image_was_called():
     assert boast.sigma0 == pytest.approx(honest.sigma0, rel=0.05)
 
 
+def test_a_gross_error_beside_robust_weights_leaves_a_prior_its_sigma():
+    flat = with_start(a_project(noise=0.001, points=flat_control()))
+    image = flat.image_points.image.copy()
+    image[10] += 0.5
+    bad = replace(flat, image_points=replace(flat.image_points, image=image))
+    wanted = Unknowns(interior=("c",), media=("index3",), typical_priors=True, robust=2.0)
+    result = bundle_adjust(bad, wanted)
+    assert result.sigma("index3") == pytest.approx(0.005, rel=0.1)
+    assert "point 10 in camera cam0" in result.suspects()[0]
+
+
 def test_a_prior_of_c_is_that_of_every_camera():
     given = a_project(noise=0.001)
     every = bundle_adjust(given, Unknowns(interior=("c",), priors={"c": 1e-4}))
     named = {f"cam{k}:c": 1e-4 for k in range(4)}
     single = bundle_adjust(given, Unknowns(interior=("c",), priors=named))
     np.testing.assert_array_equal(every.values, single.values)
+
+
+@pytest.mark.parametrize("turned", [False, True])
+def test_a_prior_of_one_camera_counts_more_than_that_of_all(turned):
+    said = [("c", 1e-6), ("cam0:c", np.inf)]
+    priors = dict(reversed(said) if turned else said)
+    result = bundle_adjust(a_project(noise=0.001), Unknowns(interior=("c",), priors=priors))
+    assert result.sigma("cam0:c") > 1e-3
+    assert result.sigma("cam1:c") < 1e-4
 
 
 def test_unknowns_that_can_hardly_be_told_apart_are_named_with_a_remedy():
@@ -116,6 +136,30 @@ def test_auto_leaves_a_pinhole_a_pinhole():
     points = two_planes()
     given = pinholes(points, np.random.default_rng(11), 0.0005)
     result = bundle_adjust(given, Unknowns(interior=("auto",)))
+    assert "carry: none" in remark(result, "data carry")
+
+
+def test_auto_takes_priors_of_parameters_that_it_leaves_out():
+    given = pinholes(two_planes()[::3], np.random.default_rng(11), 0.0005)
+    wanted = Unknowns(interior=("auto",), priors={"c": 1.0, "cam0:k1": 1e-3})
+    assert "carry: none" in remark(bundle_adjust(given, wanted), "data carry")
+
+
+def test_auto_asks_a_set_of_its_own_how_far_it_moved():
+    """Two cameras of c 12, two of 12.5, both given rightly: nothing to estimate."""
+    given = pinholes(two_planes()[::3], np.random.default_rng(11), 0.0005)
+    longer = ("cam2", "cam3")
+    grown = np.where(np.isin(given.image_points.cameras, longer), 12.5 / 12.0, 1.0)
+    given = replace(
+        given,
+        image_points=replace(given.image_points, image=given.image_points.image * grown[:, None]),
+        cameras=tuple(
+            replace(camera, principal_distance=12.5) if camera.name in longer else camera
+            for camera in given.cameras
+        ),
+    )
+    sets = {name: "long" if name in longer else "short" for name in given.camera_names}
+    result = bundle_adjust(given, Unknowns(interior=("auto",), shared_interior=sets))
     assert "carry: none" in remark(result, "data carry")
 
 

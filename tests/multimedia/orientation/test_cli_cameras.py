@@ -178,7 +178,7 @@ def test_openptv_goes_there_and_back(tmp_path):
             ("epipolar", "{tank}", "--camera", "cam1", "--to", "cam2", "--point", "X"),
             "no image point called X",
         ),
-        (("project", "{tank}", "--out", "{tank}"), "exists already"),
+        (("project", "{tank}", "--out", "{tank}"), "one of the files that are read"),
         (("project", "{tank}", "--out", "{folder}/a.txt"), "written as .csv or .xlsx"),
     ],
 )

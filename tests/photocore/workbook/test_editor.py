@@ -1,6 +1,8 @@
 """Existing workbooks changed in place: nothing but the cells asked for may differ."""
 
+import io
 import math
+import re
 import zipfile
 
 import openpyxl
@@ -9,6 +11,7 @@ import pytest
 from photocore.errors import InputError
 from photocore.tables import Column, read_table
 from photocore.workbook.editor import WorkbookEditor
+from photocore.workbook.newbook import finished_parts
 from photocore.workbook.package import open_package
 from photocore.workbook.splice import SheetChanges, splice_sheet
 from tests import office
@@ -426,3 +429,22 @@ def test_a_plain_sheet_changes_as_by_the_parser(changes):
 
     assert spliced(plain) == spliced(other)
     assert spliced(plain)[0] != plain.encode()
+
+
+def test_a_sheet_added_under_another_title_prints_its_own_headings(tmp_path):
+    made = openpyxl.Workbook()
+    made.active.title = "Dose's"
+    made.active.print_title_rows, made.active.print_area = "4:5", "A1:C9"
+    package = io.BytesIO()
+    made.save(package)
+    own = openpyxl.Workbook()
+    own.active.title = "Dose's"
+    own.save(tmp_path / "own.xlsx")
+    editor = WorkbookEditor(tmp_path / "own.xlsx")
+    title = editor.free_title("Dose's")
+    editor.add_sheets(finished_parts(package, results={}), {"Dose's": title})
+    editor.save(tmp_path / "out.xlsx", overwrite=False)
+    with zipfile.ZipFile(tmp_path / "out.xlsx") as file:
+        book = file.read("xl/workbook.xml").decode()
+    names = re.findall(r"<definedName [^>]*localSheetId=\"1\"[^>]*>([^<]*)<", book)
+    assert sorted(names) == ["'Dose''s 2'!$4:$5", "'Dose''s 2'!$A$1:$C$9"]

@@ -60,9 +60,9 @@ export class OrientationStage {
       placeholder: t(key).replace(/ ?\[.*/, ""), inputmode: index > 1 ? "decimal" : "text", testid: `tape-${index}` }));
     const add = () => {
       const [from, to, ...numbers] = inputs.map(({ value }) => value.trim());
-      const [length, sigma] = numbers.map((text) => (text ? Number(text.replace(",", ".")) : null));
+      const length = Number(numbers[0].replace(",", "."));
       if (!from || !to || !(length > 0)) return this.app.say(t("tape.incomplete"), "warning");
-      this.app.send("tape.set", { from, to, length, sigma });
+      this.app.send("tape.set", { from, to, length, sigma: numbers[1] || null });
       for (const input of inputs) input.value = "";
       return inputs[0].focus();
     };
@@ -106,7 +106,9 @@ export class OrientationStage {
     this.mark = mark;
     this.panes = state.photos.map((photo) => this.#pane(photo));
     const [{ width, height }] = state.photos;
-    this.spread ??= new ResizeObserver(() => spread(this.photos, width, height)).observe(this.photos);
+    this.spread?.disconnect();
+    this.spread = new ResizeObserver(() => spread(this.photos, width, height));
+    this.spread.observe(this.photos);
     spread(this.photos, width, height);
     this.photos.replaceChildren(...this.panes.map(({ element }) => element));
     for (const pane of this.panes) pane.mounted();

@@ -173,11 +173,15 @@ export class Picker extends EventTarget {
 
   /** Ask for the homologous point of the one in hand; where it is in doubt, for the next place. */
   suggest() {
-    const { proposal } = this;
-    if (proposal?.others?.length && proposal.name === this.selected) {
-      const [{ column, row }, ...rest] = proposal.others;
-      const left = { column: proposal.column, row: proposal.row };
-      this.proposal = { ...proposal, column, row, others: [...rest, left] };
+    const { proposal, item } = this;
+    const from = proposal && item && this.pick(item, other(proposal.image));
+    // Once the pick itself has moved, the places are those of another line.
+    const same = proposal?.name === this.selected && String(from) === String(proposal?.from);
+    if (same && proposal.others?.length) {
+      const [next, ...rest] = proposal.others;
+      const { column, row, quality, sigma_px } = proposal;
+      const left = { column, row, quality, sigma_px };
+      this.proposal = { ...proposal, quality: null, sigma_px: null, ...next, others: [...rest, left] };
       this.say("say.other");
       return this.changed();
     }
@@ -194,7 +198,7 @@ export class Picker extends EventTarget {
     const found = await this.connection.ask("/api/suggest", { image: other(image), column, row });
     if (this.selected !== item.name) return undefined;
     this.guide = { image, line: found.line };
-    this.proposal = Number.isFinite(found.column) ? { image, name: item.name, ...found } : null;
+    this.proposal = Number.isFinite(found.column) ? { image, name: item.name, from, ...found } : null;
     const quality = Math.round(100 * (found.quality ?? 0));
     this.say(this.proposal ? "say.proposed" : "say.none", { quality });
     return this.changed();

@@ -3,12 +3,14 @@ import { h, keyedRows, number, setText } from "./dom.js";
 import { isWarning } from "./readout.js";
 import { t } from "./words/words.js";
 
+const size = (value) => (typeof value === "number" ? Math.abs(value) : null);
+
 const COLUMNS = [
   ["name", (item) => item.name],
   ["type", (item) => item.type],
   ["r", (item) => item.result?.r ?? null],
   ["sigma_r", (item) => item.result?.sigma_r ?? null],
-  ["misfit_px", (item) => (item.result ? Math.abs(item.result.misfit_px ?? 0) : null)],
+  ["misfit_px", (item) => size(item.result?.misfit_px)],
   ["flag", (item) => (item.result ? item.result.flag || "OK" : "…")],
 ];
 const DIGITS = { r: 3, sigma_r: 3, misfit_px: 1 };

@@ -40,6 +40,7 @@ export class PointsStage {
     this.quality = h("p", { class: "quality", testid: "quality" });
     this.areaButton = button(t("pick.area"), () => this.toggleArea(), { class: "quiet",
       testid: "uncertainty", "aria-pressed": "false" });
+    this.contours = [];
     this.fitButton = button(h("span", { class: "whole", "aria-hidden": "true" }), () => this.activePane?.fit(), { class: "icon", testid: "fit",
       "aria-label": t("key.fit"), title: `${t("key.fit")} (0)` });
     this.layers.element.append(this.areaButton, this.fitButton);
@@ -83,6 +84,8 @@ export class PointsStage {
     this.view = pixelView(this.wall.width, this.wall.height);
     this.tileLayers = null;
     this.area = null;
+    this.contours = [];
+    this.areaButton.setAttribute("aria-pressed", "false");
     this.#makePanes();
     const [walls, photos] = await Promise.all([this.app.pyramids.both("wall", mark),
       this.app.pyramids.both("photo", photoMark(state))]);
@@ -137,9 +140,10 @@ export class PointsStage {
     this.areaButton.setAttribute("aria-pressed", String(Boolean(this.area)));
     this.contours = [];
     this.#arrange();
-    if (this.area) {
+    const { area } = this;
+    if (area) {
       this.app.connection.get("/uncertainty.json").then((lines) => {
-        if (this.area) this.contours = lines;
+        if (this.area === area) this.contours = lines;
         this.#paint();
       }).catch((error) => this.app.refuse(error));
     }
@@ -170,7 +174,7 @@ export class PointsStage {
     const { pair } = app.state;
     if (!pair) return;
     if (pair.zoom_centre) drawing.centre(context, pane.place(pair.zoom_centre.wall), t("draw.centre"));
-    for (const { sigma_mm: sigma, line } of this.contours ?? []) {
+    for (const { sigma_mm: sigma, line } of this.contours) {
       drawing.contour(context, pane, line.map((pixel) => pane.place(pixel)), `${sigma} mm`);
     }
     this.#drawLines(context, pane);
@@ -189,7 +193,8 @@ export class PointsStage {
       }
       const place = pane.screen(proposal.image, [proposal.column, proposal.row]);
       drawing.marker(context, proposal.image, place, { selected: true, proposed: true });
-      drawing.label(context, `? ${Math.round(100 * proposal.quality)} %`, [place[0] + 16, place[1] + 18],
+      const sure = proposal.quality === null ? "" : ` ${Math.round(100 * proposal.quality)} %`;
+      drawing.label(context, `?${sure}`, [place[0] + 16, place[1] + 18],
         drawing.INK[proposal.image]);
     }
     if (cursor?.pane === pane) {
@@ -231,11 +236,13 @@ export class PointsStage {
     this.buttons.pick.setAttribute("aria-pressed", String(picking));
     for (const key of ["suggest", "snap"]) this.buttons[key].disabled = !selected;
     this.buttons.accept.disabled = !proposal && !this.picker.lacking;
-    const level = !proposal ? "" : proposal.kept ? "good" : proposal.quality > 0.5 ? "fair" : "poor";
-    const words = proposal ? t(`quality.${level}`, { percent: Math.round(100 * proposal.quality),
+    // How sure another place is that fits as well, nobody knows.
+    const known = Boolean(proposal) && proposal.quality !== null;
+    const level = !known ? "" : proposal.kept ? "good" : proposal.quality > 0.5 ? "fair" : "poor";
+    const words = known ? t(`quality.${level}`, { percent: Math.round(100 * proposal.quality),
       sigma: proposal.sigma_px?.toFixed(2) ?? "?" }) : "";
     const others = proposal?.others?.length ?? 0;
-    setText(this.quality, others ? `${words} ${t("quality.others", { count: others })}` : words);
+    setText(this.quality, [words, others && t("quality.others", { count: others })].filter(Boolean).join(" "));
     this.quality.dataset.level = level;
     this.readout.update();
     this.list.mark();

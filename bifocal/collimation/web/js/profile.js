@@ -50,7 +50,8 @@ export class Profile {
 
   /** One end, then the other, in plane metres. */
   async click(place) {
-    if (!this.drawing) return;
+    // A double click is no line.
+    if (!this.drawing || String(place) === String(this.ends[0])) return;
     this.ends = [...this.ends, place];
     this.paint();
     if (this.ends.length < 2) return this.app.say(t("profile.second"));
