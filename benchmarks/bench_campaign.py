@@ -2,7 +2,7 @@
 
     python benchmarks/bench_campaign.py [FOLDER] [PAIRS] [WIDTH]
 
-Renders PAIRS walls (default 40, photos 360 px wide; two are broken on purpose), unless FOLDER has
+Renders PAIRS walls (default 40, photos 300 px wide; two are broken on purpose), unless FOLDER has
 them, and runs:
 
 - the bare steps of every pair, one call after the other in one process, nothing recorded;
@@ -11,7 +11,8 @@ them, and runs:
 - the same once more, with nothing changed.
 
 CPU seconds are those of all processes; memory is the proportional set size of them all. Products
-of the second and the third must be the same to the last byte. About ten minutes.
+of the second and the third must be the same to the last byte. About twenty minutes
+of two cores.
 """
 
 from __future__ import annotations
@@ -140,7 +141,7 @@ if __name__ == "__main__":
     else:
         sys.path.insert(0, str(Path(__file__).parents[1]))
         given = sys.argv[1:]
-        sizes = [int(word) for word in given[1:]] + [40, 360][len(given[1:]) :]
+        sizes = [int(word) for word in given[1:]] + [40, 300][len(given[1:]) :]
         if given:
             main(Path(given[0]), *sizes)
         else:
