@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from bifocal.campaigns.pair_job import PairJob, PairOutcome, run_pair
-from bifocal.campaigns.shipping import Delivery, packed, run_parcel, unpacked
+from bifocal.campaigns.shipping import ShippedPair, packed, run_parcel, unpacked
 from bifocal.campaigns.worker_pool import Listener
 from photocore.errors import InputError
 from photocore.provenance import program
@@ -146,8 +146,8 @@ def _look(path: str) -> tuple[str, str]:
 def _outcome(future: Any, job: PairJob) -> PairOutcome:
     """Return what a future holds, its files put in place; a cluster's own failure is a pair's."""
     if future.status == "finished":
-        result: PairOutcome | Delivery = future.result()
-        return unpacked(job, result) if isinstance(result, Delivery) else result
+        result: PairOutcome | ShippedPair = future.result()
+        return unpacked(job, result) if isinstance(result, ShippedPair) else result
     error = future.exception() if future.status == "error" else "cancelled"
     return PairOutcome(
         name=job.name, failed_step="run",

@@ -38,7 +38,7 @@ class Parcel:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Delivery:
+class ShippedPair:
     """What comes back: the outcome, and the files of each step that was made."""
 
     outcome: PairOutcome
@@ -75,7 +75,7 @@ def packed(job: PairJob) -> Parcel:
     return Parcel(job=job, root=root, files=files)
 
 
-def run_parcel(parcel: Parcel) -> Delivery:
+def run_parcel(parcel: Parcel) -> ShippedPair:
     """Run a pair in a folder of its own and return what was made; the folder is removed."""
     with tempfile.TemporaryDirectory(prefix="bifocal-") as place:
         root = Path(place).resolve()
@@ -107,10 +107,10 @@ def run_parcel(parcel: Parcel) -> Delivery:
     outcome = replace(
         outcome, message=there(outcome.message), remarks=tuple(map(there, outcome.remarks))
     )
-    return Delivery(outcome=outcome, steps=steps)
+    return ShippedPair(outcome=outcome, steps=steps)
 
 
-def unpacked(job: PairJob, delivery: Delivery) -> PairOutcome:
+def unpacked(job: PairJob, delivery: ShippedPair) -> PairOutcome:
     """Put what came back in its place and return the outcome; a failure to do so becomes it."""
     hashes = FileHashes(job.folder / ".hashes.json")
     try:
