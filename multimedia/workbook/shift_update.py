@@ -21,8 +21,7 @@ from photocore.errors import InputError
 from photocore.tables import Table
 from photocore.workbook.cells import CellValue
 from photocore.workbook.editor import WorkbookEditor
-from photocore.workbook.graft import quoted_title
-from photocore.workbook.grid import TableArea, column_letters, split_area, split_cell
+from photocore.workbook.grid import TableArea, column_letters, quoted_title, split_area, split_cell
 from photocore.workbook.live_book import BookBuilder
 from photocore.workbook.named_cells import make_numbers, place_of
 from photocore.workbook.newbook import finished_parts

@@ -11,7 +11,7 @@ from pathlib import Path
 from xml.sax.saxutils import escape as escape_xml
 from xml.sax.saxutils import unescape as unescape_xml
 
-from photocore.workbook.grid import TableArea, cell_name, split_area
+from photocore.workbook.grid import TableArea, cell_name, plain_title, split_area
 from photocore.workbook.package import local, read_part, understood, xml_elements
 from photocore.workbook.xlsx import (
     SheetPart,
@@ -180,7 +180,7 @@ def grown_reference(text: str, area: TableArea, bottom: int) -> str:
     """
 
     def grow(match: re.Match[str]) -> str:
-        title = (match["sheet"] or "").removesuffix("!").strip("'").replace("''", "'")
+        title = plain_title((match["sheet"] or "").removesuffix("!"))
         plain = f"{match['c1']}{match['r1']}:{match['c2']}{match['r2']}"
         if title != area.sheet or not _ends_with(area, plain):
             return match[0]

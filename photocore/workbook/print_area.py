@@ -6,7 +6,7 @@ import re
 from xml.sax.saxutils import escape
 
 from photocore.workbook.editor import WorkbookEditor
-from photocore.workbook.graft import quoted_title
+from photocore.workbook.grid import quoted_title
 from photocore.workbook.package import open_package, read_part
 
 
