@@ -277,7 +277,7 @@ class _System:
         self.column = np.where(free, np.cumsum(free.ravel()).reshape(free.shape) - 1, -1)
         self.width = int(free.sum())
         names = [PARAMETERS[e] for e in ESTIMATED]
-        self.unknown_names = [f"{seen.names[i]}: {names[k]}" for i, k in np.argwhere(free).tolist()]
+        self.camera_names = [f"{seen.names[i]}: {names[k]}" for i, k in np.argwhere(free).tolist()]
         self.order = np.argsort(seen.camera, kind="stable")
         self.slices = np.searchsorted(seen.camera[self.order], np.arange(count + 1))
         self.fixed = np.argwhere(np.isfinite(seen.known))
@@ -288,6 +288,15 @@ class _System:
         self.reach = float(min(camera.centre[2] for camera in start.cameras))
         self.focal = np.flatnonzero(free[:, 0])
         self.first_focal = np.log(focal)
+
+    @property
+    def unknown_names(self) -> list[str]:
+        """What is unknown, cameras first."""
+        used = np.flatnonzero(self.used).tolist()
+        return [
+            *self.camera_names,
+            *(f"{self.seen.ids[k]}: {axis}" for k in used for axis in "XYr"),
+        ]
 
     def advance(self, state: JointUnknowns, step: FloatArray) -> JointUnknowns | None:
         """Return the state after a step."""
