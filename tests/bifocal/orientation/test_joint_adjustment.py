@@ -59,6 +59,17 @@ def test_gross_errors_of_rays_and_of_control_are_named_and_do_no_harm():
     assert np.nanmedian(error) < 0.02
 
 
+@pytest.mark.parametrize(("axis", "size"), [(0, 0.3), (1, 1.0), (2, 0.4)])
+def test_a_wrong_control_point_costs_no_good_rays_of_its_neighbours(axis, size):
+    case = many_pairs(6, np.random.default_rng(1), control=8)
+    known = case.observations.known.copy()
+    known[6, axis] += size
+    got = adjust_jointly(replace(case.observations, known=known), case.start)
+    assert ("P6", "control") in {(b.point, b.where) for b in got.blunders}
+    assert len(got.blunders) <= 2
+    assert got.control[6, axis] == pytest.approx(-size, abs=0.05)
+
+
 def test_what_is_known_of_focal_lengths_counts_once_however_many_rounds_there_are():
     case = many_pairs(3, np.random.default_rng(5), control=6)
     o, rng = replace(case.observations, sigma_focal=np.full(6, 0.001)), np.random.default_rng(1)
