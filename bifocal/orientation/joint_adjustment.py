@@ -13,6 +13,7 @@ import numpy as np
 from scipy.sparse import csr_matrix
 
 from bifocal.model.orientation_precision import CAMERA
+from bifocal.orientation.joint_observations import JointObservations, with_enough_rays, with_rays
 from photocore import adjustment
 from photocore.adjustment import OUTLIER_LIMIT, Fit, huber_weights, standardised
 from photocore.adjustment.sparse import SparseEquations
@@ -35,48 +36,6 @@ LOOSE = 100.0
 ROUNDING = 1e-9
 #: Redundancy from which rays of one stated precision tell how good they truly are.
 ENOUGH = 20.0
-#: Of fewer points with known coordinates no frame follows.
-FEWEST_KNOWN = 3
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class JointObservations:
-    """Rays of many cameras to common points, and what is known of the points.
-
-    Attributes
-    ----------
-    names : tuple of str
-        Of the cameras, m.
-    camera, point : ndarray of int, shape (n,)
-        Of each ray.
-    pixels : ndarray, shape (n, 2)
-        Free of lens distortion.
-    sigma : ndarray, shape (n,)
-        Precision of a coordinate. [px]
-    ids : tuple of str
-        Of the points, p.
-    known : ndarray, shape (p, 3)
-        X, Y, r of control points; NaN where not known. [m]
-    sigma_known : ndarray, shape (p, 3)
-        Their standard deviations. [m]
-    sigma_focal : ndarray, shape (m,)
-        Relative standard deviation of the focal lengths; 0: held.
-    """
-
-    names: tuple[str, ...]
-    camera: IntArray
-    point: IntArray
-    pixels: FloatArray
-    sigma: FloatArray
-    ids: tuple[str, ...]
-    known: FloatArray
-    sigma_known: FloatArray
-    sigma_focal: FloatArray
-
-    @property
-    def frame_is_known(self) -> bool:
-        """Whether control points hold the frame; else the first pair's cameras do."""
-        return int(np.isfinite(self.known).all(axis=1).sum()) >= FEWEST_KNOWN
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -169,14 +128,16 @@ def adjust_jointly(observations: JointObservations, start: JointUnknowns) -> Joi
         If the measurements leave an orientation open; the message names it.
     """
     blunders: list[Blunder] = []
-    seen = _with_enough_rays(observations)
+    seen = with_enough_rays(observations)
     # What was known before of the focal lengths, however often a round begins anew.
     focal = np.array([camera.matrix[0, 0] for camera in start.cameras])
     start, tests, control = _coarse(seen, start, focal)
     blunders += [_of_ray(seen, k, tests[k]) for k in np.flatnonzero(tests >= FAR_OFF).tolist()]
     # A wrong ray moves its own point: what is known of that is judged when the ray is gone.
     control[seen.point[tests >= FAR_OFF]] = 0.0
-    blunders += [_of_control(seen, k, control[k]) for k in np.flatnonzero(control >= FAR_OFF)]
+    blunders += [
+        _of_control(seen, k, control[k]) for k in np.flatnonzero(control >= FAR_OFF).tolist()
+    ]
     known = np.where((control < FAR_OFF)[:, None], seen.known, np.nan)
     seen = _without(seen, tests < FAR_OFF, known, blunders)
     for left in range(ROUNDS, -1, -1):
@@ -242,14 +203,6 @@ def _of_control(seen: JointObservations, point: int, test: float) -> Blunder:
     return Blunder(point=seen.ids[point], where="control", test=float(test))
 
 
-def with_rays(observations: JointObservations, keep: BoolArray) -> JointObservations:
-    """Return the observations with some of their rays."""
-    o = observations
-    return replace(
-        o, camera=o.camera[keep], point=o.point[keep], pixels=o.pixels[keep], sigma=o.sigma[keep]
-    )
-
-
 def _without(
     seen: JointObservations, keep: BoolArray, known: FloatArray, found: list[Blunder]
 ) -> JointObservations:
@@ -260,7 +213,7 @@ def _without(
     GeometryError
         If too little control is left to hold the frame.
     """
-    left = _with_enough_rays(with_rays(replace(seen, known=known), keep))
+    left = with_enough_rays(with_rays(replace(seen, known=known), keep))
     if seen.frame_is_known and not left.frame_is_known:
         control = {seen.ids[k] for k in np.flatnonzero(np.isfinite(seen.known).all(axis=1))}
         raise GeometryError(
@@ -269,22 +222,6 @@ def _without(
             "Check their coordinates and names."
         )
     return left
-
-
-def _with_enough_rays(observations: JointObservations) -> JointObservations:
-    """Leave out the rays of points that have only one and are not known, and what holds nothing.
-
-    That is what is known of points without rays, and of all where they are too few for a frame: in
-    that of the first pair they would contradict what is held.
-    """
-    count = np.bincount(observations.point, minlength=len(observations.ids))
-    fixed = np.isfinite(observations.known).all(axis=1) & (count > 0)
-    if fixed.sum() < FEWEST_KNOWN:
-        fixed[:] = False
-    enough = (count >= 2) | fixed
-    held = enough & bool(fixed.any())
-    known = np.where(held[:, None], observations.known, np.nan)
-    return replace(with_rays(observations, enough[observations.point]), known=known)
 
 
 class _System:

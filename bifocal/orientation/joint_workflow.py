@@ -16,13 +16,8 @@ from bifocal.model.photo import Photo
 from bifocal.orientation.align_workflow import SIGMA_ON_WALL
 from bifocal.orientation.control_points import Control, read_control
 from bifocal.orientation.features import Features, find_features
-from bifocal.orientation.joint_adjustment import (
-    Blunder,
-    JointAdjustment,
-    JointObservations,
-    adjust_jointly,
-    with_rays,
-)
+from bifocal.orientation.joint_adjustment import Blunder, JointAdjustment, adjust_jointly
+from bifocal.orientation.joint_observations import JointObservations, with_rays
 from bifocal.orientation.joint_ties import (
     SharedPoints,
     common_features,

@@ -13,7 +13,8 @@ from bifocal.cli.main import main
 from bifocal.model.orientation_precision import pinhole
 from bifocal.model.pair import Pair
 from bifocal.orientation import joint_adjustment
-from bifocal.orientation.joint_adjustment import adjust_jointly, with_rays
+from bifocal.orientation.joint_adjustment import adjust_jointly
+from bifocal.orientation.joint_observations import with_rays
 from bifocal.orientation.joint_ties import SharedPoints, into_one_frame, near_each_other
 from bifocal.orientation.joint_workflow import JointTask, _adjusted_photo, _tables, adjust_pairs
 from photocore.errors import GeometryError, InputError
