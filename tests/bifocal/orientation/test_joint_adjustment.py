@@ -269,13 +269,11 @@ def tables_of(folder, **texts):
 
 
 def test_rows_without_names_in_two_tables_are_not_one_point(tmp_path):
-    control = tables_of(
-        tmp_path, a="A,1,2,0,5,6,7,8\n,,,,1,2,3,4\n", b=",,,,9,8,7,6\n,,,,5,5,5,5\n"
-    )
-    pair = Pair.ideal(d1=17.5, d2=9.5)
-    named = _tables([tmp_path / "a.json", tmp_path / "b.json"], [pair, pair],
-                    JointTask(control=control))  # fmt: skip
-    assert named.ids == ("A", "a, 2", "b, 1", "b, 2")
+    first, second = "A,1,2,0,5,6,7,8\n,,,,1,2,3,4\n", ",,,,9,8,7,6\n,,,,5,5,5,5\n"
+    control, pair = tables_of(tmp_path, a=first, b=second), Pair.ideal(d1=17.5, d2=9.5)
+    paths = [tmp_path / "a.pair.json", tmp_path / "b.pair.json"]
+    named = _tables(paths, [pair, pair], JointTask(control=control))
+    assert named.ids == ("A", "a, control 2", "b, control 1", "b, control 2")
     assert named.shared.count == 4
 
 
