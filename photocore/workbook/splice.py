@@ -20,6 +20,7 @@ from photocore.workbook.xlsx import unescape
 
 _QUOTES = {"&quot;": '"', "&apos;": "'"}
 _TAG = re.compile(rb"""<[^\s/>]+(?:\s+[^\s=]+\s*=\s*(?:"[^"]*"|'[^']*'))*\s*(/?)>""")
+_INLINE = re.compile(r"\s*<(?:\w+:)?t(?:\s[^>]*)?>([^<]*)</(?:\w+:)?t>\s*")
 
 
 @dataclass(slots=True)
@@ -397,8 +398,8 @@ class _Splicer:
             if kind == "s" and isinstance(value, str):
                 return self.strings()[int(text)] == value
             if kind == "inlineStr" and isinstance(value, str):
-                plain = re.fullmatch(r"\s*<(?:\w+:)?t(?:\s[^>]*)?>([^<]*)</(?:\w+:)?t>\s*", text)
-                return plain is not None and unescape(plain[1]) == value
+                plain = _INLINE.fullmatch(inner.decode("utf-8"))
+                return plain is not None and unescape(unescape_xml(plain[1], _QUOTES)) == value
         except (ValueError, IndexError):
             return False
         return False

@@ -159,7 +159,7 @@ def store_named_cells(editor: WorkbookEditor, built: BookBuilder, content: Surve
         }
     for name, defined in built.book.defined_names.items():
         sheet, _, cell = defined.attr_text.partition("!")
-        sheet, cell = sheet.strip("'"), cell.replace("$", "")
+        sheet, cell = plain_title(sheet), cell.replace("$", "")
         if name == BLOCK:
             _store_block(editor, built.results[sheet], cell)
             continue
