@@ -12,6 +12,7 @@ from typing import Any
 from bifocal.campaigns.pair_job import FILES, JOINT_OPTIONS, PRODUCTS, PairJob, tables_of
 from photocore.errors import InputError
 from photocore.textfile import file_name, read_text
+from photocore.workbook.words import LANGUAGES
 
 FORMAT = "bifocal-survey/1"
 
@@ -72,7 +73,7 @@ OPTIONS: Mapping[str, Callable[[Any], Any]] = {
     "scale": _scale,
     "dpi": _number,
     "paper": _choice("A4", "A3", "A2", "A1", "A0"),
-    "language": _choice("en", "it", "de"),
+    "language": _choice(*LANGUAGES),
     "image": _choice("1", "2", "both"),
     "quality": _choice("fast", "standard", "best"),
     "bounds": _numbers(4),

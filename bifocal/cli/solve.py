@@ -9,6 +9,7 @@ import click
 
 from photocore.cli import print_json, remark, text_table
 from photocore.options import FILE, FOCAL, NEW_TABLE, TABLE, as_json, choice, number, overwrite
+from photocore.workbook.words import LANGUAGES
 
 EXAMPLE = """\b
 Examples:
@@ -75,7 +76,7 @@ SHOWN = 40
     "(0.2mm) or fixed cm (2cm); repeat it.  [default: the three named]",
 )  # fmt: skip
 @click.option(
-    "--lang", "language", type=click.Choice(["en", "it", "de"]),
+    "--lang", "language", type=click.Choice(LANGUAGES),
     help="Language of a new workbook.  [default: the survey's, else en]",
 )  # fmt: skip
 @overwrite

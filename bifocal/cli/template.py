@@ -8,6 +8,7 @@ import click
 
 from photocore.cli import remark
 from photocore.options import FILE, overwrite
+from photocore.workbook.words import LANGUAGES
 
 EXAMPLE = """\b
 Examples:
@@ -20,7 +21,7 @@ Examples:
 @click.command(epilog=EXAMPLE)
 @click.argument("out", type=FILE, metavar="OUT.xlsx")
 @click.option(
-    "--lang", "language", type=click.Choice(["en", "it", "de"]), default="en", show_default=True,
+    "--lang", "language", type=click.Choice(LANGUAGES), default="en", show_default=True,
     help="Language of labels and help.",
 )  # fmt: skip
 @click.option(

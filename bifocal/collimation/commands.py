@@ -24,9 +24,9 @@ from bifocal.collimation.records import (
     TapedLength,
 )
 from photocore.errors import InputError
+from photocore.workbook.words import LANGUAGES
 
 Fields = Mapping[str, Any]
-LANGUAGES = ("en", "it", "de")
 STAGES = ("photos", "orientation", "points", "products")
 #: Set-up values asked of the user.
 SETUP = (

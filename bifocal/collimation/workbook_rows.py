@@ -34,7 +34,8 @@ from photocore.output import (
 )
 from photocore.workbook.cells import CellValue
 from photocore.workbook.editor import WorkbookEditor
-from photocore.workbook.grid import TableArea, split_cell
+from photocore.workbook.grid import TableArea
+from photocore.workbook.named_cells import place_of
 
 #: Rows added at once where the prepared ones are used up.
 MORE_ROWS = 50
@@ -343,14 +344,11 @@ def _set_up(editor: WorkbookEditor, read: ReadBook, pair: Pair, pair_file: str) 
 
 def _type_names(editor: WorkbookEditor, cells: Mapping[str, CellValue]) -> None:
     """Type values into named cells, where others stand."""
-    names = {key.casefold(): place for key, place in editor.book.names.items()}
     for name, value in cells.items():
-        place = names.get(name.casefold(), "")
-        sheet, _, cell = place.rpartition("!")
-        sheet, cell = sheet.strip("'"), cell.replace("$", "")
-        if not cell or sheet not in editor.titles:
+        place = place_of(editor, name)
+        if place is None:
             continue
-        row, column = split_cell(cell)
+        sheet, row, column = place
         stands = editor.grid(sheet).rows.get(row, {}).get(column)
         if stands != value and not (stands in (None, "") and value in (None, "")):
             editor.set_value(sheet, row, column, value)

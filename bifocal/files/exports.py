@@ -154,10 +154,11 @@ def _write_dxf(
         uncertain = points.flags[i] in UNCERTAIN_FLAGS
         layer = "BIFOCAL_UNCERTAIN" if uncertain else "BIFOCAL_POINTS"
         model.add_point((x, y, z), dxfattribs={"layer": layer})
-        relief = f"{points.xyz[i, 2]:+.3f}"
         left = x + height / 2
         add_text(model, points.ids[i], (left, y + 0.4 * height, z), height, "BIFOCAL_NAMES")
-        add_text(model, relief, (left, y - 1.4 * height, z), height, "BIFOCAL_RELIEF")
+        if np.isfinite(points.xyz[i, 2]):  # a table of E, N, H alone has none
+            relief = f"{points.xyz[i, 2]:+.3f}"
+            add_text(model, relief, (left, y - 1.4 * height, z), height, "BIFOCAL_RELIEF")
         if has_ellipses and np.isfinite(ellipses[i]).all() and ellipses[i, 1] > 0:
             add_ellipse(model, (x, y, z), ellipses[i], layer_of_ellipses)
     places = dict(zip(points.ids, coordinates.tolist(), strict=True))

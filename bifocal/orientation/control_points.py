@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -110,9 +111,10 @@ def read_control(
     path: Path | str,
     *,
     sigma: float,
-    sigma_plane: float,
+    sigma_plane: float | None,
     unit: str = "",
     columns: str | None = None,
+    unnamed: str = "",
 ) -> Control:
     """Read control points: id, X, Y, r and their pixels col1, row1, col2, row2.
 
@@ -122,16 +124,19 @@ def read_control(
         ``.csv``, ``.xlsx``, ``.xlsm`` or ``.ods``.
     sigma : float
         Standard deviation of a coordinate where the table has none. [m]
-    sigma_plane : float
-        That of r = 0 for a point on the wall whose r is blank. [m]
+    sigma_plane : float or None
+        That of r = 0 for a point on the wall whose r is blank; None: it stays unknown. [m]
     unit : str
         Unit of the coordinates; by default the headings', else metres.
     columns : str, optional
         Which column is which, ``"id=A,X=East"``; by default as the headings say.
+    unnamed : str
+        Goes before the row's number in the name of a row that has none.
 
     Returns
     -------
     Control
+        A row without a name is called by its number, counted from 1, unless another one is.
         r is 0 where X and Y are given and r is blank: a point on the wall.
 
     Raises
@@ -150,7 +155,7 @@ def read_control(
         )
     if not len(table):
         raise InputError(f"{path}: no control points in the table.")
-    names = [text or str(number) for number, text in enumerate(table.texts("id"), start=1)]
+    names = _names(table.texts("id"), unnamed)
     xyz = np.column_stack([_metres(table, key, unit) for key in ("X", "Y", "r")])
     errors = table.repeated("id") if "id" in table.present else []
     errors += _halves(table, keys)
@@ -159,9 +164,10 @@ def read_control(
     own = _metres(table, "sigma", unit)
     spread = np.tile(np.where(np.isfinite(own), own, sigma)[:, None], (1, 3))
     spread = np.maximum(spread, 1e-5)
-    on_wall = np.isfinite(xyz[:, :2]).all(axis=1) & np.isnan(xyz[:, 2])
-    xyz[on_wall, 2] = 0.0
-    spread[on_wall, 2] = sigma_plane
+    if sigma_plane is not None:
+        on_wall = np.isfinite(xyz[:, :2]).all(axis=1) & np.isnan(xyz[:, 2])
+        xyz[on_wall, 2] = 0.0
+        spread[on_wall, 2] = sigma_plane
     return Control(
         ids=tuple(names),
         xyz=xyz,
@@ -169,6 +175,20 @@ def read_control(
         pixels1=np.column_stack([table.numbers("col1"), table.numbers("row1")]),
         pixels2=np.column_stack([table.numbers("col2"), table.numbers("row2")]),
     )
+
+
+def _names(texts: Sequence[str], before: str) -> list[str]:
+    """Return the rows' names; of a row without one, its number, unless another row has that name.
+
+    Examples
+    --------
+    >>> _names(["A", "", "", "2"], "")
+    ['A', 'row 2', '3', '2']
+    """
+    taken = set(texts)
+    own = [f"{before}{number}" for number in range(1, len(texts) + 1)]
+    own = [f"{before}row {k}" if name in taken else name for k, name in enumerate(own, start=1)]
+    return [text or name for text, name in zip(texts, own, strict=True)]
 
 
 def read_lengths(path: Path | str, control: Control) -> Control:

@@ -10,19 +10,14 @@ from typing import Any
 import numpy as np
 
 from bifocal.files.images import read_grey
-from bifocal.model.orientation_precision import NAMES, pinhole
+from bifocal.model.orientation_precision import NAMES, as_dict, exchanged, pinhole
 from bifocal.model.pair import Pair
 from bifocal.model.photo import Photo
 from bifocal.orientation.align_workflow import SIGMA_ON_WALL
 from bifocal.orientation.control_points import Control, read_control
 from bifocal.orientation.features import Features, find_features
-from bifocal.orientation.joint_adjustment import (
-    Blunder,
-    JointAdjustment,
-    JointObservations,
-    adjust_jointly,
-    with_rays,
-)
+from bifocal.orientation.joint_adjustment import Blunder, JointAdjustment, adjust_jointly
+from bifocal.orientation.joint_observations import JointObservations, with_rays
 from bifocal.orientation.joint_ties import (
     SharedPoints,
     common_features,
@@ -33,6 +28,7 @@ from photocore.arrays import BoolArray, FloatArray
 from photocore.camera import Pinhole, plane_from_pixel
 from photocore.cli import Progress, no_progress
 from photocore.errors import InputError, located
+from photocore.jsonfile import write_object
 from photocore.output import (
     atomic_folder,
     check_all_writable,
@@ -98,10 +94,14 @@ class JointResult:
     points: tuple[dict[str, Any], ...]
 
     def check_rms(self, kind: str) -> tuple[int, FloatArray]:
-        """Return how many points of a kind were compared, and their RMS in X, Y, r. [m]"""
+        """Return how many points of a kind were compared, and their RMS in X, Y, r. [m]
+
+        NaN for a coordinate that none of them has.
+        """
         rows = [[p[f"d{axis}"] for axis in "XYr"] for p in self.points if p["kind"] == kind]
-        away = np.array([row for row in rows if np.isfinite(row).all()], float).reshape(-1, 3)
-        rms = np.sqrt((away**2).mean(axis=0)) if len(away) else np.full(3, np.nan)
+        away = np.array([row for row in rows if np.isfinite(row).any()], float).reshape(-1, 3)
+        with np.errstate(invalid="ignore"):
+            rms = np.sqrt(np.nansum(away**2, axis=0) / np.isfinite(away).sum(axis=0))
         return len(away), rms
 
     def lines(self) -> list[str]:
@@ -117,7 +117,7 @@ class JointResult:
         for kind in ("control", "check"):
             count, off = self.check_rms(kind)
             if count:
-                said = ", ".join(f"{1000 * v:.1f}" for v in off)
+                said = ", ".join(f"{1000 * v:.1f}" if np.isfinite(v) else "-" for v in off)
                 lines.append(f"{count} {kind} points: RMS in X, Y, r {said} mm")
         where: dict[str, int] = {}
         for blunder in a.blunders:
@@ -177,7 +177,7 @@ def adjust_pairs(
         If a file is unusable, two pair files have one name, pairs do not overlap, or control is
         missing or contradictory.
     """
-    names = [path.name.removesuffix(".json").removesuffix(".pair") for path in paths]
+    names = [_name_of(path) for path in paths]
     twice = sorted({name for name in names if names.count(name) > 1})
     if len(paths) < 2:
         raise InputError("an adjustment of several pairs needs two pair files or more.")
@@ -201,6 +201,10 @@ def adjust_pairs(
             _write_pair(pair, folder / path.name, name, out)
         write_csv(folder / "points.csv", table)
     return result
+
+
+def _name_of(path: Path) -> str:
+    return path.name.removesuffix(".json").removesuffix(".pair")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -266,9 +270,12 @@ def _tables(paths: Sequence[Path], pairs: Sequence[Pair], task: JointTask) -> Na
         for index, path in enumerate(tables):
             if path is None:
                 continue
+            # That a check point without relief is on the wall is nothing to check by.
             part = read_control(
-                path, sigma=task.sigma_control, sigma_plane=SIGMA_ON_WALL, unit=task.unit
-            )
+                path, sigma=task.sigma_control, unit=task.unit,
+                sigma_plane=None if role == "check" else SIGMA_ON_WALL,
+                unnamed=f"{_name_of(paths[index])}, {role} ",
+            )  # fmt: skip
             if pairs[index].exchanged:
                 part = part.exchanged()
             _add(part, path, index, xyz, rays)
@@ -301,12 +308,13 @@ def _add(
     for k, name in enumerate(part.ids):
         if part.positioned[k]:
             before = xyz.get(name)
-            if before is not None and np.abs(before[0] - part.xyz[k]).max() > 1e-6:
+            if before is not None and np.nanmax(np.abs(before[0] - part.xyz[k])) > 1e-6:
                 raise InputError(
                     f"{path}: point {name} has other coordinates than in another pair's table; "
                     "points of one name are one point."
                 )
-            xyz[name] = part.xyz[k], part.sigma[k]
+            if before is None or np.isnan(before[0][2]):
+                xyz[name] = part.xyz[k], part.sigma[k]
         for side, pixels in enumerate((part.pixels1, part.pixels2)):
             if np.isfinite(pixels[k]).all():
                 rays.append((2 * pair + side, name, pixels[k]))
@@ -438,4 +446,10 @@ def _write_pair(pair: Pair, path: Path, name: str, folder: Path) -> None:
             extra["lens"] = lens
         file = relative_name(pair.photo_file(number), folder) if photo.file else ""
         photos.append(replace(photo, file=file, extra=extra))
-    replace(pair, image1=photos[0], image2=photos[1]).write(path)
+    content = replace(pair, image1=photos[0], image2=photos[1]).to_dict()
+    if pair.exchanged:
+        # In the order given: that of its columns in the tables of points.
+        content["image1"], content["image2"] = content["image2"], content["image1"]
+        if pair.orientation is not None:
+            content["orientation"] = as_dict(exchanged(pair.orientation))
+    write_object(path, content)

@@ -27,15 +27,19 @@ def _picks(solution: SolvedSurvey) -> str:
         return f"picks of {solution.setup.precision:.3g} mm {how}"
     photo = solution.pair.image1
     how = "assumed"
-    if any("found from the misfits" in remark for remark in solution.remarks):
-        how = "found from the misfits"
-    elif solution.sigma_px is not None or photo.sigma_pixel is not None:
+    given = solution.given.get("sigma_px") or solution.survey.setup.sigma_px
+    if given is not None or photo.sigma_pixel is not None:
         how = "given"
+    elif solution.sigma_px is not None:
+        how = "found from the misfits"
     return f"picks of {photo.precision(solution.sigma_px):.3g} px {how}"
 
 
 def _world(solution: SolvedSurvey) -> str:
     if solution.georeference is None:
         return ""
-    count = int(solution.georeference.used.sum())
-    return f"E, N, H on {count} control points taken as exact, with the transformation's own error"
+    world = solution.georeference
+    own = "with the transformation's own error"
+    if world.precision is None:
+        own = "without the transformation's own error, which is unknown"
+    return f"E, N, H on {int(world.used.sum())} control points taken as exact, {own}"

@@ -12,7 +12,7 @@ from bifocal.model.photo import Photo
 from bifocal.survey.observations import PointObservations
 from bifocal.survey.relief_table import ReliefTable
 from bifocal.survey.setup import SurveySetup
-from photocore.arrays import FloatArray
+from photocore.arrays import BoolArray, FloatArray
 from photocore.errors import GeometryError, InputError
 
 #: Misfits across the radius beyond this many sigma, at most points, are no slips of the hand.
@@ -184,34 +184,41 @@ def refuse_contradiction(points: PointObservations, table: ReliefTable, where: s
 
 
 def as_pixels(pair: Pair, points: PointObservations, where: str, unit: str) -> PointObservations:
-    """Return the points with raw pixels for every kind of input."""
+    """Return the points with raw pixels for every kind of input, row by row."""
     missing = ~points.has_pixels
-    rows = points.is_cartesian & missing
-    xy1, xy2 = points.xy1, points.xy2
-    if not rows.any():
-        rows, unit = missing & points.is_polar, "mm"
+    cartesian = points.is_cartesian & missing
+    polar = points.is_polar & missing & ~cartesian
+    if polar.any():
+        _refuse_polar(pair, points, polar & points.use, where)
+    for rows, both, own in (
+        (cartesian, (points.xy1, points.xy2), unit),
+        (polar, points.polar_xy(), "mm"),
+    ):
         if not rows.any():
-            return points
-        if np.isnan(points.polar[rows & points.use, 2]).any():
-            raise InputError(
-                f"{where}: theta is needed beside s1 and s2 to use them with a pair file."
+            continue
+        pixels = []
+        for number, (photo, xy) in enumerate(zip((pair.image1, pair.image2), both, strict=True), 1):
+            given = np.where(rows[:, None], xy, np.nan)
+            pixels.append(
+                given if own == "px" else _pixels_of_mm(photo, f"image{number}", given, where)
             )
-        if not np.allclose(pair.image1.nadir, pair.image2.nadir, atol=1e-9):
-            raise GeometryError(
-                f"{where}: the cameras of this pair have different nadir points, so s1 and"
-                " s2 do not share one direction theta; measure x1 y1 x2 y2 or pixels."
-            )
-        xy1, xy2 = points.polar_xy()
-    if unit != "px":
-        xy1, xy2 = (
-            _pixels_of_mm(photo, key, xy, where)
-            for key, photo, xy in (("image1", pair.image1, xy1), ("image2", pair.image2, xy2))
+        points = replace(
+            points,
+            pixels1=np.where(rows[:, None], pixels[0], points.pixels1),
+            pixels2=np.where(rows[:, None], pixels[1], points.pixels2),
         )
-    return replace(
-        points,
-        pixels1=np.where(rows[:, None], xy1, points.pixels1),
-        pixels2=np.where(rows[:, None], xy2, points.pixels2),
-    )
+    return points
+
+
+def _refuse_polar(pair: Pair, points: PointObservations, rows: BoolArray, where: str) -> None:
+    """Refuse radial distances that say not where in the photos a point is."""
+    if np.isnan(points.polar[rows, 2]).any():
+        raise InputError(f"{where}: theta is needed beside s1 and s2 to use them with a pair file.")
+    if not np.allclose(pair.image1.nadir, pair.image2.nadir, atol=1e-9):
+        raise GeometryError(
+            f"{where}: the cameras of this pair have different nadir points, so s1 and"
+            " s2 do not share one direction theta; measure x1 y1 x2 y2 or pixels."
+        )
 
 
 def _pixels_of_mm(photo: Photo, key: str, xy: FloatArray, where: str) -> FloatArray:

@@ -8,6 +8,7 @@ import click
 
 from photocore.cli import remark
 from photocore.options import FILE, overwrite
+from photocore.workbook.words import LANGUAGES
 
 EXAMPLE = """\b
 Examples:
@@ -27,7 +28,7 @@ Examples:
     help="Newton steps: 6 reach 1e-9 up to 75 degrees in the thinnest medium, 10 up to 85.",
 )  # fmt: skip
 @click.option(
-    "--lang", type=click.Choice(["en", "it", "de"]), default="en", show_default=True,
+    "--lang", type=click.Choice(LANGUAGES), default="en", show_default=True,
     help="Language of labels and help.",
 )  # fmt: skip
 @overwrite

@@ -21,8 +21,14 @@ from photocore.errors import InputError
 from photocore.tables import Table
 from photocore.workbook.cells import CellValue
 from photocore.workbook.editor import WorkbookEditor
-from photocore.workbook.graft import quoted_title
-from photocore.workbook.grid import TableArea, column_letters, split_area, split_cell
+from photocore.workbook.grid import (
+    TableArea,
+    column_letters,
+    plain_title,
+    quoted_title,
+    split_area,
+    split_cell,
+)
 from photocore.workbook.live_book import BookBuilder
 from photocore.workbook.named_cells import make_numbers, place_of
 from photocore.workbook.newbook import finished_parts
@@ -109,7 +115,7 @@ def _store_chart(
 ) -> None:
     """Store the numbers of the chart of our workbooks, which stand beside the table."""
     sheet, _, cells = editor.book.names.get(CHART_DATA, "").rpartition("!")
-    if sheet.strip("'") != area.sheet:
+    if plain_title(sheet) != area.sheet:
         return
     top, left, bottom, _ = split_area(cells.replace("$", ""))
     for position, row in enumerate(rows):

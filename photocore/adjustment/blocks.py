@@ -62,12 +62,30 @@ class BlockEquations:
         count = len(self.free)
         own = (self.design.T @ self.design).toarray()
         mixed = (self.design.T @ self.eliminated).toarray().reshape(own.shape[0], count, 3)
+        return own, mixed, self._blocks
+
+    @cached_property
+    def _blocks(self) -> FloatArray:
+        """Normal matrices of the points, shape (p, 3, 3)."""
         square = (self.eliminated.T @ self.eliminated).tobsr((3, 3))
-        blocks = np.zeros((count, 3, 3))
+        blocks = np.zeros((len(self.free), 3, 3))
         blocks[square.indices] = square.data
         # 1 on the diagonal where a coordinate is not an unknown.
-        blocks += np.eye(3) * ~self.free[:, :, None]
-        return own, mixed, blocks
+        return blocks + np.eye(3) * ~self.free[:, :, None]
+
+    def _open_points(self, names: Sequence[str]) -> list[str]:
+        """Return the points' coordinates that their own rows leave open, at most 20 of them."""
+        length = np.sqrt(np.maximum(np.diagonal(self._blocks, axis1=1, axis2=2), 1e-300))
+        scaled = self._blocks / (length[:, :, None] * length[:, None, :])
+        values, vectors = np.linalg.eigh(scaled)
+        share = np.abs(np.where((values <= _ROUNDING)[:, None, :], vectors, 0.0)).max(axis=2)
+        found = np.flatnonzero((share > 0.05)[self.free])[:20].tolist()
+        own = names[int(self.design.shape[1]) :]
+        places = np.argwhere(self.free)[found]
+        return [
+            own[k] if k < len(own) else f"{'XYZ'[axis]} of point {point + 1}"
+            for k, (point, axis) in zip(found, places.tolist(), strict=True)
+        ]
 
     @cached_property
     def scale(self) -> FloatArray:
@@ -79,7 +97,7 @@ class BlockEquations:
     def _reduced(self, damping: float) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Return inverse blocks, mixed part times these, and the Schur complement."""
         own, mixed, blocks = self._normal
-        inverse = np.linalg.inv(blocks * (1.0 + damping * np.eye(3)))
+        inverse = inverse_blocks(blocks * (1.0 + damping * np.eye(3)))
         solved = np.einsum("upi,pij->upj", mixed, inverse, order="C")  # else reshaping copies it
         schur = own + damping * np.diag(np.diag(own))
         shape = (len(own), self.free.size)
@@ -113,7 +131,15 @@ class BlockEquations:
         return solved
 
     def undetermined(self, names: Sequence[str]) -> list[str]:
-        """Return the remaining unknowns that the equations leave open, at most 20 of them."""
+        """Return the unknowns that the equations leave open, at most 20 of them.
+
+        Parameters
+        ----------
+        names : sequence of str
+            Of the remaining unknowns; those of the free coordinates may follow.
+        """
+        if points := self._open_points(names):
+            return points
         schur = self._solved[2]
         values, vectors = _scaled_eigen(schur)
         weak = vectors[:, values < _RANK * values.max(initial=0.0)]
@@ -156,6 +182,14 @@ class BlockEquations:
             both = np.concatenate([self.cofactor[column], 2.0 * mixed[column]])
             spread[row] += columns.data[part] * (rows[row] @ both)
         return 1.0 - spread
+
+
+def inverse_blocks(blocks: FloatArray) -> FloatArray:
+    """Return the inverse of matrices (p, 3, 3); 0 along what one of them leaves open."""
+    try:
+        return np.linalg.inv(blocks)
+    except np.linalg.LinAlgError:  # `undetermined` names it
+        return np.linalg.pinv(blocks, hermitian=True)
 
 
 def _own_spread(eliminated: csr_matrix, blocks: FloatArray) -> FloatArray:

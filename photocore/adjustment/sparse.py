@@ -18,7 +18,7 @@ from scipy.linalg import cho_solve, cholesky, solve_triangular
 from scipy.sparse import bsr_matrix, csr_matrix, diags
 from scipy.sparse.csgraph import reverse_cuthill_mckee
 
-from photocore.adjustment.blocks import BlockEquations
+from photocore.adjustment.blocks import BlockEquations, inverse_blocks
 from photocore.arrays import FloatArray, IntArray
 
 #: Least size of a block along the diagonal; smaller ones take longer than they save.
@@ -147,12 +147,8 @@ class SparseEquations(BlockEquations):
     @cached_property
     def _sparse(self) -> tuple[csr_matrix, csr_matrix, FloatArray]:
         """Normal matrix of the unknowns (u, u), with the points (u, 3 p), of them (p, 3, 3)."""
-        square = (self.eliminated.T @ self.eliminated).tobsr((3, 3))
-        blocks = np.zeros((len(self.free), 3, 3))
-        blocks[square.indices] = square.data
-        blocks += np.eye(3) * ~self.free[:, :, None]
         own = (self.design.T @ self.design).tocsr()
-        return own, (self.design.T @ self.eliminated).tocsr(), blocks
+        return own, (self.design.T @ self.eliminated).tocsr(), self._blocks
 
     @cached_property
     def scale(self) -> FloatArray:
@@ -164,7 +160,7 @@ class SparseEquations(BlockEquations):
     def _eliminated_by(self, damping: float) -> tuple[FloatArray, csr_matrix, csr_matrix]:
         """Return inverse blocks, mixed part times these, and the Schur complement."""
         own, mixed, blocks = self._sparse
-        inverse = np.linalg.inv(blocks * (1.0 + damping * np.eye(3)))
+        inverse = inverse_blocks(blocks * (1.0 + damping * np.eye(3)))
         solved = (mixed @ _block_diagonal(inverse)).tocsr()
         schur = own + damping * diags(own.diagonal()) - solved @ mixed.T
         return inverse, solved, schur.tocsr()
@@ -188,7 +184,9 @@ class SparseEquations(BlockEquations):
         return inverse, solved, _Banded(schur)
 
     def undetermined(self, names: Sequence[str]) -> list[str]:
-        """Return the remaining unknowns that the equations leave open, at most 20 of them."""
+        """Return the unknowns that the equations leave open, at most 20 of them."""
+        if points := self._open_points(names):
+            return points
         try:
             value, vector = self._factors[2].weakest()
         except np.linalg.LinAlgError:

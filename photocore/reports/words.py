@@ -8,8 +8,10 @@ from functools import cache
 from importlib.resources import files
 
 from photocore.errors import InputError
+from photocore.workbook.words import LANGUAGES
 
-LANGUAGES = ("en", "it", "de")
+__all__ = ["LANGUAGES", "words_in"]
+
 Words = Callable[..., str]
 
 

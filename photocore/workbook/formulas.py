@@ -9,7 +9,7 @@ from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from photocore.workbook.grid import TableArea, cell_name, split_area
+from photocore.workbook.grid import TableArea, cell_name, plain_title, split_area
 from photocore.workbook.package import local, read_part, understood, xml_elements
 from photocore.workbook.xlsx import (
     SheetPart,
@@ -178,7 +178,7 @@ def grown_reference(text: str, area: TableArea, bottom: int) -> str:
     """
 
     def grow(match: re.Match[str]) -> str:
-        title = (match["sheet"] or "").removesuffix("!").strip("'").replace("''", "'")
+        title = plain_title((match["sheet"] or "").removesuffix("!"))
         plain = f"{match['c1']}{match['r1']}:{match['c2']}{match['r2']}"
         if title != area.sheet or not _ends_with(area, plain):
             return match[0]

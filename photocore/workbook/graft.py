@@ -12,6 +12,7 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 from photocore.errors import InputError
+from photocore.workbook.grid import plain_title, quoted_title
 from photocore.workbook.package import read_part
 from photocore.workbook.styles import StyleSheet
 from photocore.workbook.xlsx import SheetPart, Workbook, read_directory
@@ -78,8 +79,8 @@ class Graft:
                 self._local_names(content[other.part], other, sheet, count, titles[sheet.title])
                 count += 1
         for name, reference in other.names.items():
-            title, _, place = reference.rpartition("!")
-            title = title.strip("'").replace("''", "'")
+            written, _, place = reference.rpartition("!")
+            title = plain_title(written)
             if title in titles:
                 self.define(name, f"{quoted_title(titles[title])}!{place}")
 
@@ -265,16 +266,6 @@ def _type_of(types: bytes, part: str) -> str:
     kind = re.search(rb'ContentType="([^"]*)"', match[0]) if match else None
     assert kind is not None, part
     return kind[1].decode()
-
-
-def quoted_title(title: str) -> str:
-    """Return a sheet's title as formulas write it.
-
-    >>> quoted_title("Müller's wall")
-    "'Müller''s wall'"
-    """
-    escaped = title.replace("'", "''")
-    return f"'{escaped}'"
 
 
 def _prefix_of(data: bytes) -> str:

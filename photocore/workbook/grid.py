@@ -188,6 +188,31 @@ def split_area(reference: str) -> tuple[int, int, int, int]:
     return top, left, bottom, right
 
 
+def quoted_title(title: str) -> str:
+    """Return a sheet's title as references write it.
+
+    Examples
+    --------
+    >>> quoted_title("Tom's wall")
+    "'Tom''s wall'"
+    """
+    escaped = title.replace("'", "''")
+    return f"'{escaped}'"
+
+
+def plain_title(written: str) -> str:
+    """Return a sheet's title from what stands before the "!" of a reference.
+
+    Examples
+    --------
+    >>> plain_title("'Tom''s wall'"), plain_title("Points")
+    ("Tom's wall", 'Points')
+    """
+    if len(written) > 1 and written[0] == written[-1] == "'":
+        return written[1:-1].replace("''", "'")
+    return written
+
+
 def date_of_serial(serial: float, *, since_1904: bool) -> datetime:
     """Return the moment a spreadsheet's day number stands for."""
     origin = datetime(1904, 1, 1) if since_1904 else datetime(1899, 12, 30)

@@ -7,14 +7,14 @@ from collections.abc import Callable
 from photocore.tables.model import Table
 from photocore.workbook.cells import CellValue
 from photocore.workbook.editor import WorkbookEditor
-from photocore.workbook.grid import split_cell
+from photocore.workbook.grid import plain_title, split_cell
 
 
 def place_of(editor: WorkbookEditor, name: str) -> tuple[str, int, int] | None:
     """Return sheet, row and column of a named cell; None where the name leads to no single cell."""
     place = next((v for k, v in editor.book.names.items() if k.casefold() == name.casefold()), "")
     sheet, _, cell = place.rpartition("!")
-    sheet = sheet.strip("'").replace("''", "'")
+    sheet = plain_title(sheet)
     if sheet not in editor.titles or ":" in cell or not cell:
         return None
     return (sheet, *split_cell(cell))

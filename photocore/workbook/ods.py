@@ -10,7 +10,15 @@ from pathlib import Path
 from xml.etree.ElementTree import Element
 
 from photocore.errors import InputError
-from photocore.workbook.grid import CellDate, CellFault, CellGrid, SheetFile, Value, split_cell
+from photocore.workbook.grid import (
+    CellDate,
+    CellFault,
+    CellGrid,
+    SheetFile,
+    Value,
+    plain_title,
+    split_cell,
+)
 from photocore.workbook.package import local, open_package, read_part, understood, xml_events
 
 #: Repeated cells with content beyond these are a decompression bomb, not a survey.
@@ -84,11 +92,10 @@ class _OdsReader:
         elif kind == "named-range":
             attributes = _attributes(element)
             reference = attributes.get("cell-range-address", "")
-            match = re.fullmatch(r"\$?(?:'((?:[^']|'')+)'|([^'.]+))\.(\$?[A-Z]+\$?\d+)", reference)
+            match = re.fullmatch(r"\$?('(?:[^']|'')+'|[^'.]+)\.(\$?[A-Z]+\$?\d+)", reference)
             if match:
-                title = match[1].replace("''", "'") if match[1] else match[2]
                 key = attributes.get("name", "").casefold()
-                self.names[key] = (title, *split_cell(match[3]))
+                self.names[key] = (plain_title(match[1]), *split_cell(match[2]))
 
     def end_row(self, element: Element) -> None:
         """Store one row, as often as it is repeated."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 
 from photocore.workbook.editor import WorkbookEditor
-from photocore.workbook.graft import quoted_title
+from photocore.workbook.grid import quoted_title
 from photocore.workbook.package import open_package, read_part
 from photocore.workbook.xmltext import escaped
 

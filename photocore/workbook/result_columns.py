@@ -9,8 +9,14 @@ from functools import partial
 
 from photocore.workbook.cells import CellValue
 from photocore.workbook.editor import WorkbookEditor
-from photocore.workbook.graft import quoted_title
-from photocore.workbook.grid import Value, cell_name, column_letters, split_area
+from photocore.workbook.grid import (
+    Value,
+    cell_name,
+    column_letters,
+    plain_title,
+    quoted_title,
+    split_area,
+)
 
 _COUNTED = re.compile(r"(COUNT\([^()]*\))")
 _CELL = re.compile(r"\[@(\w+)\]")
@@ -152,7 +158,7 @@ def _known(
     sheet, _, area = editor.book.names.get(mark, "").rpartition("!")
     cells = editor.grid(table.sheet).rows.get(table.head, {})
     marked: set[int] = set()
-    if sheet.strip("'").replace("''", "'") == table.sheet and "#" not in area:
+    if plain_title(sheet) == table.sheet and "#" not in area:
         top, left, _, right = split_area(area.replace("$", ""))
         marked = set(range(left, right + 1))
         if not table.head and top == min(table.rows) and len(marked) == len(columns):

@@ -18,6 +18,7 @@ from photocore.workbook.xlsx import unescape
 from photocore.workbook.xmltext import quoted, unescaped
 
 _TAG = re.compile(rb"""<[^\s/>]+(?:\s+[^\s=]+\s*=\s*(?:"[^"]*"|'[^']*'))*\s*(/?)>""")
+_INLINE = re.compile(r"\s*<(?:\w+:)?t(?:\s[^>]*)?>([^<]*)</(?:\w+:)?t>\s*")
 
 
 def splice_sheet(
@@ -360,8 +361,8 @@ class _Splicer:
             if kind == "s" and isinstance(value, str):
                 return self.strings()[int(text)] == value
             if kind == "inlineStr" and isinstance(value, str):
-                plain = re.fullmatch(r"\s*<(?:\w+:)?t(?:\s[^>]*)?>([^<]*)</(?:\w+:)?t>\s*", text)
-                return plain is not None and unescape(plain[1]) == value
+                plain = _INLINE.fullmatch(inner.decode("utf-8"))
+                return plain is not None and unescape(unescape_xml(plain[1], _QUOTES)) == value
         except (ValueError, IndexError):
             return False
         return False

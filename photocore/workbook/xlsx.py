@@ -24,6 +24,7 @@ from photocore.workbook.grid import (
     Value,
     column_number,
     date_of_serial,
+    plain_title,
     split_area,
     split_cell,
 )
@@ -271,10 +272,9 @@ def _single_cells(book: Workbook) -> dict[str, tuple[str, int, int]]:
     """Return the defined names that stand for one cell."""
     places = {}
     for name, reference in book.names.items():
-        match = re.fullmatch(r"(?:'((?:[^']|'')+)'|([^'!:]+))!(\$?[A-Z]{1,3}\$?\d+)", reference)
+        match = re.fullmatch(r"('(?:[^']|'')+'|[^'!:]+)!(\$?[A-Z]{1,3}\$?\d+)", reference)
         if match:
-            title = match[1].replace("''", "'") if match[1] else match[2]
-            places[name.casefold()] = (title, *split_cell(match[3]))
+            places[name.casefold()] = (plain_title(match[1]), *split_cell(match[2]))
     return places
 
 

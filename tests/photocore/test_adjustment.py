@@ -128,6 +128,23 @@ def test_an_open_unknown_of_a_row_of_photos_is_named():
     assert sparse.undetermined([str(k) for k in range(240)]) == ["100", "101"]
 
 
+@pytest.mark.parametrize("kind", [BlockEquations, SparseEquations])
+@pytest.mark.parametrize("column", ["blank", "doubled"])
+def test_a_point_that_its_rays_leave_open_is_named_and_not_the_photos(kind, column):
+    given = chain(np.random.default_rng(3))
+    rows = given["eliminated"].toarray()
+    rows[:, 3 * 11 + 2] = 0.0 if column == "blank" else rows[:, 3 * 11]
+    equations = kind(**{**given, "eliminated": csr_matrix(rows)})
+    photos = [str(k) for k in range(240)]
+    expected = [11 * 3 + 2] if column == "blank" else [11 * 3, 11 * 3 + 2]
+    said = [f"{'XYZ'[k % 3]} of point 12" for k in expected]
+    assert np.isfinite(equations.step(0.0)).all()
+    assert equations.undetermined(photos) == said
+    # One coordinate before it is held and has no name.
+    coordinates = [f"c{k}" for k in np.flatnonzero(given["free"])]
+    assert equations.undetermined(photos + coordinates) == [f"c{k}" for k in expected]
+
+
 def floating(rng: np.random.Generator, photos: int = 100, points: int = 600) -> dict:
     """Equations of photos in a row that a motion of all photos and points leaves as they are."""
     motion = rng.uniform(0.5, 2, 6 * photos + 3 * points)

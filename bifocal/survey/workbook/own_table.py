@@ -30,8 +30,7 @@ from photocore.errors import InputError
 from photocore.tables import Table
 from photocore.workbook.cells import CellValue
 from photocore.workbook.editor import WorkbookEditor
-from photocore.workbook.graft import quoted_title
-from photocore.workbook.grid import column_letters, split_cell
+from photocore.workbook.grid import column_letters, quoted_title, split_cell
 from photocore.workbook.live_columns import LiveColumn
 from photocore.workbook.named_cells import make_numbers, place_of
 from photocore.workbook.result_columns import (

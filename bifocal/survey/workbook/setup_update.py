@@ -13,8 +13,7 @@ from bifocal.survey.workbook.words import word
 from photocore.errors import InputError
 from photocore.workbook.cells import CellValue
 from photocore.workbook.editor import WorkbookEditor
-from photocore.workbook.graft import quoted_title
-from photocore.workbook.grid import cell_name
+from photocore.workbook.grid import cell_name, quoted_title
 from photocore.workbook.live_book import BookBuilder
 from photocore.workbook.named_cells import place_of
 from photocore.workbook.newbook import finished_parts

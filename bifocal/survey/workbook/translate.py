@@ -10,6 +10,7 @@ from bifocal.survey.workbook.book import build
 from bifocal.survey.workbook.content import SurveyContent
 from bifocal.survey.workbook.words import word
 from photocore.workbook.editor import WorkbookEditor
+from photocore.workbook.grid import plain_title
 from photocore.workbook.live_book import BookBuilder
 from photocore.workbook.named_cells import place_of
 
@@ -63,7 +64,7 @@ def _reword(
 ) -> None:
     """Write a named formula anew where words of the language stand in it."""
     sheet, _, cell = place.replace("$", "").partition("!")
-    sheet, own = sheet.strip("'"), place_of(editor, name)
+    sheet, own = plain_title(sheet), place_of(editor, name)
     if ":" in cell or own is None or old[sheet][cell].data_type != "f":
         return
     formula = built.book[sheet][cell].value

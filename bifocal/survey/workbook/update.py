@@ -25,7 +25,13 @@ from photocore.errors import InputError
 from photocore.output import free_path
 from photocore.workbook.cells import CellValue, NewColumn, escape
 from photocore.workbook.editor import WorkbookEditor
-from photocore.workbook.grid import TableArea, column_letters, split_area, split_cell
+from photocore.workbook.grid import (
+    TableArea,
+    column_letters,
+    plain_title,
+    split_area,
+    split_cell,
+)
 from photocore.workbook.live_book import BookBuilder, short_formula
 from photocore.workbook.live_columns import TEXT_KEYS, row_formula
 from photocore.workbook.named_cells import place_of, type_value
@@ -159,7 +165,7 @@ def store_named_cells(editor: WorkbookEditor, built: BookBuilder, content: Surve
         }
     for name, defined in built.book.defined_names.items():
         sheet, _, cell = defined.attr_text.partition("!")
-        sheet, cell = sheet.strip("'"), cell.replace("$", "")
+        sheet, cell = plain_title(sheet), cell.replace("$", "")
         if name == BLOCK:
             _store_block(editor, built.results[sheet], cell)
             continue
@@ -187,7 +193,7 @@ def is_older(names: Collection[str]) -> bool:
 def _store_block(editor: WorkbookEditor, results: Mapping[str, CellValue], cells: str) -> None:
     """Store the results of the formulas of `BLOCK`, wherever it stands now."""
     sheet, _, area = editor.book.names.get(BLOCK, "").rpartition("!")
-    sheet = sheet.strip("'").replace("''", "'")
+    sheet = plain_title(sheet)
     if sheet not in editor.titles or ":" not in area:
         return
     top, left, bottom, right = split_area(cells)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import struct
+from dataclasses import replace
 
 import ezdxf
 import laspy
@@ -41,6 +42,13 @@ def test_dxf_points_lie_where_they_should_in_metres(tmp_path):
     assert "001" in texts
     assert "+0.500" in texts
     assert "lost" in remarks[0]
+
+
+def test_points_that_are_known_in_the_world_alone_have_no_relief_written(tmp_path):
+    bare = replace(POINTS, xyz=np.full((4, 3), np.nan))
+    export_points(tmp_path / "p.dxf", bare, world=True)
+    texts = [e.dxf.text for e in ezdxf.readfile(tmp_path / "p.dxf").modelspace().query("TEXT")]
+    assert texts == ["001", "=HYPERLINK(1)", "C"]
 
 
 def test_csv_orders_are_pnezd_and_penzd(tmp_path):

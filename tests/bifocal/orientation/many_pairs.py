@@ -6,7 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bifocal.orientation.joint_adjustment import JointObservations, JointUnknowns
+from bifocal.orientation.joint_adjustment import JointUnknowns
+from bifocal.orientation.joint_observations import JointObservations
 from photocore.camera import Pinhole, camera_matrix, project
 from photocore.rotation import rotation_from_vector
 

@@ -13,9 +13,18 @@ from bifocal.cli.main import main
 from bifocal.model.orientation_precision import pinhole
 from bifocal.model.pair import Pair
 from bifocal.orientation import joint_adjustment
-from bifocal.orientation.joint_adjustment import adjust_jointly, with_rays
+from bifocal.orientation.control_points import read_control
+from bifocal.orientation.joint_adjustment import adjust_jointly
+from bifocal.orientation.joint_observations import with_rays
 from bifocal.orientation.joint_ties import SharedPoints, into_one_frame, near_each_other
-from bifocal.orientation.joint_workflow import JointTask, _adjusted_photo, _tables, adjust_pairs
+from bifocal.orientation.joint_workflow import (
+    JointResult,
+    JointTask,
+    _adjusted_photo,
+    _tables,
+    _write_pair,
+    adjust_pairs,
+)
 from photocore.errors import GeometryError, InputError
 from photocore.rotation import rotation_from_vector
 from photocore.similarity import Similarity
@@ -57,6 +66,17 @@ def test_gross_errors_of_rays_and_of_control_are_named_and_do_no_harm():
     assert got.control[bad, 2] == pytest.approx(-0.4, abs=0.05)
     error = np.abs(got.xyz - case.truth)[:, 2]
     assert np.nanmedian(error) < 0.02
+
+
+@pytest.mark.parametrize(("axis", "size"), [(0, 0.3), (1, 1.0), (2, 0.4)])
+def test_a_wrong_control_point_costs_no_good_rays_of_its_neighbours(axis, size):
+    case = many_pairs(6, np.random.default_rng(1), control=8)
+    known = case.observations.known.copy()
+    known[6, axis] += size
+    got = adjust_jointly(replace(case.observations, known=known), case.start)
+    assert ("P6", "control") in {(b.point, b.where) for b in got.blunders}
+    assert len(got.blunders) <= 2
+    assert got.control[6, axis] == pytest.approx(-size, abs=0.05)
 
 
 def test_what_is_known_of_focal_lengths_counts_once_however_many_rounds_there_are():
@@ -237,3 +257,59 @@ def test_a_control_point_without_relief_is_on_the_wall_as_for_align(tmp_path):
     named = _tables([tmp_path / "a.json"], [pair], JointTask(control=(tmp_path / "c.csv",)))
     np.testing.assert_array_equal(named.xyz, [[1.0, 2.0, 0.0]])
     np.testing.assert_array_equal(named.sigma, [[0.003, 0.003, 0.005]])
+
+
+def tables_of(folder, **texts):
+    """Write tables; the first row of all is the heading."""
+    paths = []
+    for name, text in texts.items():
+        paths.append(folder / f"{name}.csv")
+        paths[-1].write_text("id,X,Y,r,col1,row1,col2,row2\n" + text)
+    return tuple(paths)
+
+
+def test_rows_without_names_in_two_tables_are_not_one_point(tmp_path):
+    first, second = "A,1,2,0,5,6,7,8\n,,,,1,2,3,4\n", ",,,,9,8,7,6\n,,,,5,5,5,5\n"
+    control, pair = tables_of(tmp_path, a=first, b=second), Pair.ideal(d1=17.5, d2=9.5)
+    paths = [tmp_path / "a.pair.json", tmp_path / "b.pair.json"]
+    named = _tables(paths, [pair, pair], JointTask(control=control))
+    assert named.ids == ("A", "a, control 2", "b, control 1", "b, control 2")
+    assert named.shared.count == 4
+
+
+def test_a_row_without_a_name_takes_none_that_another_row_has(tmp_path):
+    (path,) = tables_of(tmp_path, a="A,1,2,0,5,6,7,8\n,3,2,0,1,2,3,4\n2,4,2,0,1,2,3,4\n")
+    assert read_control(path, sigma=0.003, sigma_plane=0.005).ids == ("A", "row 2", "2")
+
+
+def test_a_check_point_without_relief_is_compared_in_x_and_y_alone(tmp_path):
+    check = tables_of(tmp_path, c="A,1,2,,5,6,7,8\nB,1,3,0.4,5,6,7,8\n")
+    pair = Pair.ideal(d1=17.5, d2=9.5)
+    named = _tables([tmp_path / "a.json"], [pair], JointTask(check=check[:1]))
+    np.testing.assert_array_equal(named.xyz, [[1.0, 2.0, np.nan], [1.0, 3.0, 0.4]])
+    away = ((0.003, 0.0, np.nan), (0.004, 0.0, 0.01))
+    points = tuple(
+        {"kind": "check", **dict(zip(("dX", "dY", "dr"), row, strict=True))} for row in away
+    )
+    result = JointResult(pairs=(), names=(), adjustment=None, points=points)
+    count, rms = result.check_rms("check")
+    assert count == 2
+    assert rms == pytest.approx([np.sqrt((0.003**2 + 0.004**2) / 2), 0.0, 0.01])
+
+
+def test_a_pair_given_near_photo_first_is_written_so_again(tmp_path):
+    """Else the columns of its control table belong to the other photos."""
+    shown = {"plane_from_pixel": [[0.01, 0, -4], [0, -0.01, 3], [0, 0, 1]], "nadir": [0, 0]}
+    pair = Pair.from_dict({
+        "format": "bifocal-pair/1",
+        "image1": shown | {"file": "near.jpg", "distance": 9.5},
+        "image2": shown | {"file": "far.jpg", "distance": 17.5},
+    })  # fmt: skip
+    covariance = np.diag(np.arange(1.0, 25.0))
+    _write_pair(replace(pair, orientation=covariance), tmp_path / "p.pair.json", "p", tmp_path)
+    content = json.loads((tmp_path / "p.pair.json").read_text())
+    assert [content[f"image{k}"]["distance"] for k in (1, 2)] == [9.5, 17.5]
+    again = Pair.read(tmp_path / "p.pair.json")
+    assert again.exchanged
+    assert again.image1.distance == 17.5
+    np.testing.assert_allclose(again.orientation, covariance)

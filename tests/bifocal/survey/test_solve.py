@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import re
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from bifocal import Pair, relief
+from bifocal.survey.basis import basis
 from bifocal.survey.georeferencing import georeference
 from bifocal.survey.workflow import solve
 from photocore.errors import GeometryError, InputError
@@ -44,6 +48,58 @@ def test_columns_of_pixels_with_a_pair_give_the_points_back():
     assert survey.table.xyz == pytest.approx(XYZ, abs=1e-11)
     # By hand: 35 mm * 2 m / 16.5 m right of the nadir, in pixels of 0.0074 mm.
     assert picks["col1"][0] == pytest.approx(1536.25 + 35 * 2 / 16.5 / 0.0074)
+
+
+def test_rows_of_every_kind_in_one_table_are_solved_with_a_pair():
+    """By hand: s is the length of x, y, and theta runs clockwise from +y."""
+    pair = Pair.ideal(**LENSES, pitch=0.0074, nadir1=(1536.25, 1023.75), nadir2=(1530.0, 1020.5))
+    picks = dict(zip(("col1", "row1", "col2", "row2"), np.hstack(pair.project(XYZ)).T, strict=True))
+    table = picks | columns(XYZ)
+    table["s1"], table["s2"] = (np.hypot(table[f"x{k}"], table[f"y{k}"]) for k in (1, 2))
+    table["theta"] = np.degrees(np.arctan2(table["x1"], table["y1"]))
+    for keys, row in ((picks, 0), (columns(XYZ), 1), (("s1", "s2", "theta"), 2)):
+        for key in keys:
+            table[key] = np.where(np.arange(4) == row, table[key], np.nan)
+    for key in ("x1", "y1", "x2", "y2"):
+        table[key][3] = columns(XYZ)[key][3]
+    survey = solve({"id": list("ABCD"), **table}, pair=pair)
+    assert survey.table.xyz == pytest.approx(XYZ, abs=1e-10)
+    table["theta"][2] = np.nan
+    with pytest.raises(InputError, match="theta is needed"):
+        solve({"id": list("ABCD"), **table}, pair=pair)
+
+
+def test_a_survey_says_whether_its_picks_are_given_found_or_assumed():
+    pair = Pair.ideal(**LENSES, pitch=0.0074)
+    rng = np.random.default_rng(1)
+    xyz = np.column_stack([rng.uniform(-4, 4, 30), rng.uniform(-2, 2, 30), rng.uniform(0, 1, 30)])
+    pixels = np.hstack(pair.project(xyz)) + rng.normal(0, 0.4, (30, 4))
+    picks = dict(zip(("col1", "row1", "col2", "row2"), pixels.T, strict=True))
+    few = {key: column[:4] for key, column in picks.items()}
+    assert re.search(
+        r"picks of 0\.[345]\d* px found from the misfits;", basis(solve(picks, pair=pair))
+    )
+    assert "picks of 0.7 px given;" in basis(solve(picks, pair=pair, sigma_px=0.7))
+    assert "px assumed;" in basis(solve(few, pair=pair))
+    # A remark is a text, which may be worded anew or translated.
+    mute = replace(solve(picks, pair=pair), remarks=())
+    assert "found from the misfits" in basis(mute)
+
+
+def test_the_error_of_a_transformation_is_claimed_only_where_it_is_known():
+    ids = ["A", "B", "C", "D"]
+    survey = solve({"id": ids, **columns(XYZ)}, **LENSES)
+    wall = dict(zip(("id", "X", "Y", "Z"), (ids, *XYZ.T), strict=True))
+    known = dict(zip(("id", "E", "N", "H"), (ids, *XYZ[:, [0, 2, 1]].T * [[1], [-1], [1]]),
+                     strict=True))  # fmt: skip
+    first = {key: column[:2] for key, column in known.items()}
+    unknown = georeference({k: v[:2] for k, v in wall.items()}, first | {"H": [np.nan] * 2})
+    assert unknown.precision is None
+    said = basis(replace(survey, georeference=unknown))
+    assert "without the transformation's own error, which is unknown" in said
+    placed = georeference(survey.table, known)
+    assert placed.precision is not None
+    assert ", with the transformation's own error" in basis(replace(survey, georeference=placed))
 
 
 def test_a_unit_that_is_none_is_refused_with_a_pair_too():

@@ -4,6 +4,7 @@ import io
 import math
 import re
 import zipfile
+from pathlib import Path
 
 import openpyxl
 import pytest
@@ -254,6 +255,16 @@ def test_a_signed_workbook_is_refused(rich):
 )
 def test_a_cell_is_put_in_its_place_whatever_is_left_implied(before, after):
     assert splice(before, inputs={2: {2: 7.0}}) == after
+
+
+@pytest.mark.parametrize("text", ["a <b> & c", "&lt;", "_x0041_", "1 < 2"])
+def test_a_text_that_stands_there_already_is_no_change(text):
+    empty = b"<worksheet><sheetData/></worksheet>"
+    changes = SheetChanges(inputs={1: {1: text}})
+    once = splice_sheet(Path("b.xlsx"), "s", empty, changes)
+    assert once.inputs_changed
+    again = splice_sheet(Path("b.xlsx"), "s", once.joined(strip=False), changes)
+    assert not again.inputs_changed
 
 
 def test_clearing_a_cell_keeps_its_format():
