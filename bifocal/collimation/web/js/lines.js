@@ -73,10 +73,10 @@ export class Lines {
   #row(line) {
     const { name, points, closed } = line;
     const layer = textInput({ label: t("line.layerOf", { name }), size: "9",
-      save: (text) => this.app.send("line.set", { ...line, layer: text }) });
+      save: (text) => this.app.send("line.set", { name, layer: text }) });
     fill(layer, line.layer);
     const close = h("input", { type: "checkbox", checked: closed, "aria-label": t("line.closed", { name }),
-      onchange: () => this.app.send("line.set", { ...line, closed: close.checked }) });
+      onchange: () => this.app.send("line.set", { name, closed: close.checked }) });
     return h("tr", { "aria-selected": String(name === this.current) },
       h("th", { scope: "row" }, button(name, () => { this.current = name; this.update(); }, { class: "link" })),
       h("td", {}, layer), h("td", {}, points.join(" – ")), h("td", {}, close),
