@@ -104,6 +104,7 @@ export class Measure {
 
   clear() {
     this.names = [];
+    this.question = null;
     this.show(null);
   }
 
@@ -118,10 +119,15 @@ export class Measure {
   /** Points move, and so do the measures between them. */
   async update() {
     const known = new Set(this.app.points().map(({ name }) => name));
-    this.names = this.names.filter((name) => known.has(name));
-    if (this.names.length < 2) return this.show(null);
+    const names = this.names.filter((name) => known.has(name));
+    this.names = names;
+    // Answers may come in another order than they were asked for: the last question counts.
+    const question = {};
+    this.question = question;
+    if (names.length < 2) return this.show(null);
     try {
-      this.show(await this.app.connection.ask("/api/measure", { points: this.names }));
+      const found = await this.app.connection.ask("/api/measure", { points: names });
+      if (this.question === question) this.show(found);
     } catch (error) {
       this.app.refuse(error);
     }

@@ -104,6 +104,8 @@ export class OrientationStage {
     const mark = photoMark(state);
     if (state.photos.length < 2 || this.mark === mark) return;
     this.mark = mark;
+    this.picker.letGoOf(this.panes);
+    for (const pane of this.panes) pane.dispose();
     this.panes = state.photos.map((photo) => this.#pane(photo));
     const [{ width, height }] = state.photos;
     this.spread?.disconnect();
@@ -113,6 +115,7 @@ export class OrientationStage {
     this.photos.replaceChildren(...this.panes.map(({ element }) => element));
     for (const pane of this.panes) pane.mounted();
     const infos = await this.app.pyramids.both("photo", mark);
+    if (this.mark !== mark) return;
     infos.forEach((info, index) => {
       const { view, image } = this.panes[index];
       this.panes[index].setLayers([tileLayer(view, `layer-${image}`, `/tiles/photo/${image}`, info)]);
