@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from importlib import import_module
 from typing import Any
 
@@ -59,7 +60,7 @@ def run_on_cluster(
             )
         counted = any(RESOURCE in (info.get("resources") or {}) for info in workers.values())
         names: dict[Any, str] = {}
-        for job in jobs:
+        for job in map(found_anywhere, jobs):
             resources = {RESOURCE: job.memory()} if counted else None
             future = client.submit(
                 run_pair, job, key=f"pair-{job.folder}-{job.name}", pure=False, resources=resources
@@ -69,6 +70,15 @@ def run_on_cluster(
             outcome = _outcome(future, names[future])
             listener.ended(outcome)
             yield outcome
+
+
+def found_anywhere(job: PairJob) -> PairJob:
+    """Return a job whose paths are whole: a worker's current folder is another."""
+    return replace(
+        job, folder=job.folder.absolute(), far=job.far.absolute(), near=job.near.absolute(),
+        files={role: path.absolute() for role, path in job.files.items()},
+        joint=None if job.joint is None else job.joint.absolute(),
+    )  # fmt: skip
 
 
 def _outcome(future: Any, name: str) -> PairOutcome:

@@ -410,7 +410,7 @@ def facade_job(
     Raises
     ------
     InputError
-        If the folder is a file, a product is unknown, or nothing says how to set the pair up.
+        If the folder is a file or a product is unknown.
     """
     if out.exists() and not out.is_dir():
         raise InputError(f"{out}: is a file; name a folder with --out.")
