@@ -16,6 +16,7 @@ from bifocal.files.images import as_grey
 from bifocal.rays import plane_position, point_on_ray
 from bifocal.relief_maps import surfaces
 from bifocal.relief_maps.frame import make_frame, offsets
+from photocore.errors import InputError
 from tests.scenes import RICH, Rendering, Scene, bifocal_cameras, render
 from tests.scenes.shapes import box
 from tests.scenes.wet import pair_through_media, under_water
@@ -68,6 +69,12 @@ def test_relief_through_media_is_good_to_hundredths_of_a_pixel(name):
     found = errors(shot(name)[0], relief(name))
     assert np.median(found) < 0.004
     assert found.mean() < 0.008
+
+
+def test_relief_before_the_water_surface_is_refused_by_its_name():
+    taken, pair, _ = shot("surface")
+    with pytest.raises(InputError, match="relief_range: the last interface lies 3 m"):
+        dense_relief(pair, taken.image1, taken.image2, relief_range=(3.1, 3.5))
 
 
 @pytest.mark.parametrize("name", ["port", "surface"])
