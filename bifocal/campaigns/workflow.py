@@ -211,6 +211,10 @@ def run_survey(
             ready = [job for job in jobs if not outcomes[job.name].failed_step]
             together.append(_one_frame(ready, progress, tell))
             if together[-1].failed_step:
+                why = "waits for the common frame of all pairs, which failed: see joint."
+                for job in ready:
+                    alone = outcomes[job.name]
+                    outcomes[job.name] = replace(alone, failed_step=JOINT, message=why)
                 ready = []
         outcomes |= _made(ready, machines, _Count(ready, progress, tell))
         if mosaic:
