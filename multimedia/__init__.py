@@ -33,6 +33,7 @@ Cameras
     PointStatus               why a point is missing or doubtful
     epipolar_curve, EpipolarCurves    where a ray runs in another image
     epipolar_candidates, Candidates   image points near it
+    correspondences           which targets of several cameras are of one particle
     bundle_adjust, Adjustment cameras, points and media together
     Unknowns, ScaleBar        what it estimates and is told
 Bathymetry
@@ -52,6 +53,7 @@ Planning and simplified models
 Files
     read_project, write_project, Project, ImagePoints, ObjectPoints
     read_experiment, write_experiment     OpenPTV folders
+    convert, Conversion       cameras of COLMAP, Metashape, OpenCV, AquaCal, in and out
 
 Files in, files out: the command `multimedia`. Errors are ValueErrors with one message that says
 what is wrong, where, and how to mend it.

@@ -25,6 +25,7 @@ from .design.dispersion import (
 )
 from .design.simplified_models import Approximation, agrafiotis, lavest, telem
 from .design.studies import CalibrationCosts, Placement, Study
+from .exchange.workflow import Conversion, convert
 from .media.camera import Camera, Sensor
 from .media.flat_interface import FlatInterface
 from .media.height_field import RasterSurface, WaveSurface
@@ -34,6 +35,7 @@ from .media.projection import project, projection_status
 from .media.ray_paths import RayPaths, RayStatus
 from .media.ray_tracing import aim_rays, trace_rays
 from .media.surfaces import Cylinder, Plane, Sphere
+from .openptv.correspondences import correspondences
 from .openptv.experiment import read_experiment, write_experiment
 from .orientation.epipolar_curves import (
     Candidates,
@@ -86,6 +88,7 @@ __all__ = [
     "CalibrationCosts",
     "Camera",
     "Candidates",
+    "Conversion",
     "CorrectedPoints",
     "Cylinder",
     "EpipolarCurves",
@@ -94,8 +97,8 @@ __all__ = [
     "FlatInterface",
     "HOEHLE",
     "ImagePoints",
-    "IntersectedPoints",
     "Interfaces",
+    "IntersectedPoints",
     "Layers",
     "Material",
     "MeshSurface",
@@ -136,9 +139,11 @@ __all__ = [
     "calibration_costs",
     "colour_positions",
     "compare_placements",
+    "convert",
     "correct_bathymetry",
     "correct_dispersion",
     "correct_lidar_beams",
+    "correspondences",
     "critical_angle",
     "epipolar_candidates",
     "epipolar_curve",

@@ -157,3 +157,52 @@ def nearest_rotation(matrix: ArrayLike) -> FloatArray:
     # The SVD leaves its factors up to 15 roundings from orthonormal, otherwise on each processor:
     # one Newton step takes that to the two or three of a product.
     return np.asarray(rotation + 0.5 * rotation @ (np.eye(3) - rotation.T @ rotation))
+
+
+def rotation_from_quaternion(quaternion: ArrayLike, name: str = "quaternion") -> FloatArray:
+    """Return the rotation matrix of a quaternion w, x, y, z (Hamilton's convention), shape (3, 3).
+
+    Raises
+    ------
+    GeometryError
+        If its length is not 1 to 1e-3: it is no rotation, or its parts are in another order.
+
+    Examples
+    --------
+    >>> half = np.sqrt(0.5)
+    >>> rotation_from_quaternion([half, 0.0, 0.0, half]).round(9)[:, 0].tolist()
+    [0.0, 1.0, 0.0]
+    """
+    parts = read_only(quaternion, name, shape=(4,))
+    length = float(np.linalg.norm(parts))
+    if not abs(length - 1.0) < 1e-3:
+        raise GeometryError(
+            f"{name}: a rotation has w, x, y, z of length 1, found {length:.6g}: {parts.tolist()}."
+        )
+    w, x, y, z = parts / length
+    return np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+        ]
+    )
+
+
+def quaternion_from_rotation(rotation: ArrayLike) -> FloatArray:
+    """Return w, x, y, z of a rotation matrix, w not negative: undoes `rotation_from_quaternion`.
+
+    Notes
+    -----
+    Of the four products 4 q q^T that the matrix gives, the row of the largest part is taken:
+    nothing is divided by a small number.
+    """
+    r = as_floats(rotation, "rotation")
+    trace = float(np.trace(r))
+    outer = np.empty((4, 4))
+    outer[0, 0] = 1.0 + trace
+    outer[0, 1:] = outer[1:, 0] = r[2, 1] - r[1, 2], r[0, 2] - r[2, 0], r[1, 0] - r[0, 1]
+    outer[1:, 1:] = r + r.T + (1.0 - trace) * np.eye(3)
+    row = outer[int(np.argmax(np.diag(outer)))]
+    quaternion = row / np.linalg.norm(row)
+    return np.asarray(-quaternion if quaternion[0] < 0 else quaternion)

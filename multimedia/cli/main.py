@@ -19,6 +19,8 @@ SUMMARIES: dict[str, str] = {
     "bathymetry": "Refraction correction of a DEM or point cloud.",
     "waterlevel": "Mean water height from tie points on the surface.",
     "openptv": "Project file from an OpenPTV experiment folder.",
+    "particles": "Particles of a frame from the targets of all cameras.",
+    "convert": "Cameras of COLMAP, Metashape, OpenCV, AquaCal, in and out.",
     "design": "Accuracy studies before anyone gets wet.",
 }
 

@@ -49,14 +49,21 @@ def command(
     Reads ptv.par, .ori, .addpar, _targets, the calibration body and the first rt_is frame; finds
     the control points among the targets of the calibration images, starting from the stored
     orientation; and says what looks wrong, such as interchanged indices of glass and water.
+
+    Where multi_planes.par lists positions of the body, the .crd and .fix files of each position and
+    camera are found by name and content, whatever folder they lie in; what was taken is said, and
+    lists that no camera can have seen, alone or together with the others, are refused.
     """
     from multimedia.openptv.workflow import export_openptv, import_openptv
 
     if export is not None:
-        written = export_openptv(source, export, overwrite=overwrite)
+        written, inexact = export_openptv(source, export, overwrite=overwrite)
+        for line in inexact:
+            remark(f"Note: {line}")
         remark(f"OpenPTV folder written to {export}")
         if as_json:
-            print_json({"folder": export, "cameras": list(written.camera_names)})
+            names = list(written.camera_names)
+            print_json({"folder": export, "cameras": names, "remarks": list(inexact)})
         return
     target = out if out is not None else Path(f"{source.resolve().name}.toml")
     imported = import_openptv(source, out=target, overwrite=overwrite, **options)

@@ -8,8 +8,15 @@ from pathlib import Path
 
 import numpy as np
 
-from multimedia.media.camera import Camera, Sensor
+from multimedia.media.camera import Camera
 from multimedia.media.flat_interface import FlatInterface
+from multimedia.openptv.openptv_cameras import (
+    NO_MISFIT,
+    common_sensor,
+    glass_vector,
+    in_openptvs_terms,
+    wall_of,
+)
 from multimedia.openptv.openptv_files import (
     ControlParameters,
     DetectedTargets,
@@ -23,9 +30,12 @@ from multimedia.openptv.openptv_files import (
     read_manual,
     read_targets,
 )
+from multimedia.openptv.plane_files import find_sets, read_stems
+from multimedia.openptv.plane_sets import PlaneCandidates
 from multimedia.projects.model import SHOWN, ImagePoints, ObjectPoints, Project
+from multimedia.projects.point_tables import METRES
 from photocore.arrays import FloatArray, IntArray
-from photocore.distortion import Brown, Convention
+from photocore.distortion import Brown
 from photocore.errors import InputError
 from photocore.output import atomic_folder
 from photocore.textfile import check_name
@@ -34,6 +44,8 @@ from photocore.textfile import check_name
 _PARAMETERS = ("", "parameters", "parametersRun1", "parametersMultiPlane")
 #: A text file with fewer lines of four numbers is no calibration body.
 _FEWEST = 6
+#: Said of a camera.
+NO_TARGETS = "{}: no _targets file of its calibration image was found."
 _BODIES = ("target_on_a_side.txt", "calblock.txt", "calibration_target.txt", "target_file.txt")
 
 
@@ -54,6 +66,8 @@ class Experiment:
         Detections of that frame.
     manual : tuple of (list of str, ndarray)
         Points clicked by hand in each calibration image: ids and pixels; may be empty.
+    planes : tuple of PlaneCandidates
+        Sets of points of a multi-plane calibration, per camera; may be empty.
     """
 
     project: Project
@@ -62,6 +76,7 @@ class Experiment:
     particle_targets: IntArray
     frame_targets: tuple[DetectedTargets | None, ...]
     manual: tuple[tuple[list[str], FloatArray], ...] = ()
+    planes: tuple[PlaneCandidates, ...] = ()
 
 
 def read_experiment(folder: Path | str, *, swap_indices: bool = False) -> Experiment:
@@ -85,7 +100,8 @@ def read_experiment(folder: Path | str, *, swap_indices: bool = False) -> Experi
         raise InputError(f"{folder}: is no folder; give the folder of an OpenPTV experiment.")
     control_path = _control_path(folder)
     control = read_control(control_path)
-    roots = list(dict.fromkeys([control_path.parent, folder]))
+    home = folder.parent if control_path.parent == folder and _is_of_parameters(folder) else folder
+    roots = list(dict.fromkeys([control_path.parent, folder, home]))
     remarks: list[str] = []
     if control_path.parent.name not in _PARAMETERS and control_path.parent != folder:
         remarks.append(f"{folder}: has no ptv.par of its own; read {control_path}.")
@@ -99,13 +115,16 @@ def read_experiment(folder: Path | str, *, swap_indices: bool = False) -> Experi
         _targets(roots, [f"{name}_targets"], control.field) for name in control.calibration_images
     )
     remarks += [
-        f"{camera.name}: no _targets file of its calibration image was found."
+        NO_TARGETS.format(camera.name)
         for camera, detected in zip(cameras, targets, strict=True)
         if detected is None
     ]
     particles, numbers, frame, odd_frame = _particles(roots, control)
     manual, odd_manual = _manual(roots, len(cameras))
-    remarks += [*odd_frame, *odd_manual]
+    listed = _find(roots, "multi_planes.par")
+    stems = read_stems(listed) if listed is not None else []
+    planes, odd_planes = find_sets(home, stems, control.calibration_images, control.sensor)
+    remarks += [*odd_frame, *odd_manual, *odd_planes]
     project = Project(
         cameras=tuple(cameras),
         media=media,
@@ -124,92 +143,80 @@ def read_experiment(folder: Path | str, *, swap_indices: bool = False) -> Experi
         particle_targets=numbers,
         frame_targets=frame,
         manual=manual,
+        planes=planes,
     )
 
 
-def write_experiment(folder: Path | str, project: Project, *, overwrite: bool = False) -> None:
+def write_experiment(
+    folder: Path | str, project: Project, *, overwrite: bool = False
+) -> tuple[str, ...]:
     """Write cal/*.ori, *.addpar, *_targets, the calibration body and parameters/ptv.par.
+
+    Lengths are written in mm, whatever the unit of the project.
+
+    Returns
+    -------
+    tuple of str
+        What is not exactly as in the project, e.g. distortion that OpenPTV has no terms for.
 
     Raises
     ------
     InputError
-        If OpenPTV cannot hold the project: other than three or more parallel media fixed in the
-        world and common to all cameras, no sensor, or distortion it does not know.
+        If OpenPTV cannot hold the project: curved or more than three media, media that differ
+        between cameras, no sensor, or distortion that it cannot come near.
     """
-    first = project.interface_of(0)
-    if not isinstance(first, FlatInterface) or len(first.layers.indices) != 3:
-        raise InputError("OpenPTV needs three media (air, glass, water) before every camera.")
-    layers, sensor = first.layers, _sensor(project.cameras[0])
-    lines = [str(len(project.cameras))]
+    factor = METRES[project.unit] / METRES["mm"]
+    sensor = common_sensor(project.cameras)
+    lines, inexact = [str(len(project.cameras))], list[str]()
     files: dict[str, str] = {}
+    layers = None
     for number, camera in enumerate(project.cameras):
-        interface = project.interface_of(number)
-        if (
-            not isinstance(interface, FlatInterface)
-            or interface.moves_with_camera
-            or interface.layers != layers
-        ):
+        wall = wall_of(camera, project.interface_of(number))
+        if layers is not None and wall.layers != layers:
             raise InputError(
-                f"camera {camera.name}: OpenPTV knows only media that are fixed in the world and "
-                "the same for all cameras."
+                f"camera {camera.name}: OpenPTV knows only media that are the same for all cameras."
             )
+        layers = wall.layers
         base = f"cal/{camera.name}.tif"
-        files |= _camera_files(camera, interface, base)
+        glass = glass_vector(camera, wall) * factor
+        xyz = project.object_points.xyz
+        ours = in_openptvs_terms(camera, sensor, points=xyz, media=wall)
+        if ours.misfit > NO_MISFIT:
+            where = " (at the object points)" if ours.at_points else ""
+            inexact.append(f"{camera.name} {ours.misfit:.3g} px{where}")
+        moved = replace(ours.camera, centre=ours.camera.centre * factor)
+        files |= {f"{base}.ori": ori_text(moved, glass)}
+        files |= {f"{base}.addpar": addpar_text(moved, ours.scale)}
         lines += [f"img/{camera.name}.", base]
         rows = project.image_points.of_camera(camera.name)
         if rows:
             files[f"{base}_targets"] = _targets_text(project, camera, rows)
+    assert layers is not None  # a project has at least one camera
+    thickness = layers.thicknesses[0] * factor
     lines += ["1", "0", "1", str(sensor.width), str(sensor.height)]
-    lines += [f"{v:.15g}" for v in (*sensor.pitch, 0, *layers.indices, *layers.thicknesses)]
+    lines += [f"{v:.17g}" for v in (*sensor.pitch, 0, *layers.indices, thickness)]
     files["parameters/ptv.par"] = "\n".join(lines) + "\n"
     if project.object_points.ids:
         files["cal/calblock.txt"] = "".join(
-            f"{k} {x:.15g} {y:.15g} {z:.15g}\n"
-            for k, (x, y, z) in enumerate(project.object_points.xyz, start=1)
+            f"{k} {x:.17g} {y:.17g} {z:.17g}\n"
+            for k, (x, y, z) in enumerate(project.object_points.xyz * factor, start=1)
         )
     with atomic_folder(folder, overwrite=overwrite) as temporary:
         for name, text in files.items():
             (temporary / name).parent.mkdir(parents=True, exist_ok=True)
             (temporary / name).write_text(text, encoding="utf-8", newline="\n")
-
-
-def _sensor(camera: Camera) -> Sensor:
-    """Return the sensor of a camera, or raise InputError if it has none."""
-    if camera.sensor is None:
-        raise InputError(f"camera {camera.name}: OpenPTV needs its sensor.")
-    return camera.sensor
-
-
-def _camera_files(camera: Camera, interface: FlatInterface, base: str) -> dict[str, str]:
-    """Return the .ori and .addpar file of one camera."""
-    sensor = _sensor(camera)
-    # The glass vector runs from the origin to the foot on the water side.
-    reach = float(interface.point @ interface.normal)
-    if reach <= 0:
-        raise InputError(
-            f"camera {camera.name}: the water side of the glass must lie between origin and "
-            "camera for OpenPTV; move the origin of the object frame into the water."
-        )
-    # OpenPTV's origin of the image is the corner-to-corner centre of the sensor.
-    shift = sensor.image_from_pixel(np.array([sensor.width, sensor.height]) / 2)
-    if np.abs(shift).max() > 1e-9:
-        camera = _moved_origin(camera, shift)
-    orientation = ori_text(camera, interface.normal * reach)
-    return {f"{base}.ori": orientation, f"{base}.addpar": addpar_text(camera)}
-
-
-def _moved_origin(camera: Camera, shift: FloatArray) -> Camera:
-    """Return the camera with the image origin moved to ``shift``; distortion about it must not."""
-    if camera.distortion.convention is Convention.OPENPTV and not camera.distortion.is_identity:
-        raise InputError(
-            f"camera {camera.name}: its distortion is counted from an origin other than OpenPTV's."
-        )
-    return replace(camera, principal_point=camera.principal_point - shift)
+    if not inexact:
+        return ()
+    return (
+        "OpenPTV has no terms for this distortion as it is; it was written with those that come "
+        f"nearest. Image points move by at most: {', '.join(inexact)}.",
+    )
 
 
 def _targets_text(project: Project, camera: Camera, rows: Sequence[int]) -> str:
     """Return a _targets file; the last number is the row of the point in the calibration body."""
-    pixels = _sensor(camera).pixel_from_image(project.image_points.image[list(rows)])
+    assert camera.sensor is not None  # common_sensor has looked
+    pixels = camera.sensor.pixel_from_image(project.image_points.image[list(rows)])
     place = project.object_points.rows([project.image_points.ids[row] for row in rows])
     lines = [f"{len(rows)}\n"]
     for k, ((x, y), number) in enumerate(zip(pixels, place, strict=True)):
@@ -238,6 +245,11 @@ def _control_path(folder: Path) -> Path:
         f"{folder}: neither ptv.par nor parameters/ptv.par was found; is this the folder of an "
         "OpenPTV experiment?"
     )
+
+
+def _is_of_parameters(folder: Path) -> bool:
+    """Whether a folder is one of parameters only, the data lying beside it."""
+    return folder.name.lower().startswith("parameters") and not (folder / "cal").is_dir()
 
 
 def _find(roots: Sequence[Path], name: str) -> Path | None:

@@ -19,7 +19,7 @@ from photocore.textfile import read_text
 
 #: A printed matrix has 7 decimals; angles and matrix of one camera differ by a few of the last.
 MATRIX_ROUNDING = 1e-5
-_KIND = "file of OpenPTV"
+KIND = "file of OpenPTV"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -65,7 +65,7 @@ def read_control(path: Path) -> ControlParameters:
     InputError
         If a line is missing or not what it should be; the message names the line.
     """
-    lines = [line.strip() for line in read_text(path, _KIND).rstrip().splitlines()]
+    lines = [line.strip() for line in read_text(path, KIND).rstrip().splitlines()]
     count = _count(path, lines, "number of cameras")
     if not 1 <= count <= 64:
         raise InputError(f"{path}, line 1: {count} cameras; expected 1 to 64.")
@@ -159,14 +159,14 @@ def read_targets(path: Path, *, field: int = 0) -> DetectedTargets:
     InputError
         If the count in the first line does not fit the lines that follow.
     """
-    first, *rest = read_text(path, _KIND).split() or [""]
+    first, *rest = read_text(path, KIND).split() or [""]
     count = _count(path, [first], "number of targets")
     if len(rest) != 8 * count:
         raise InputError(
             f"{path}: its first line announces {count} targets of 8 numbers, {len(rest)} numbers "
             "follow. The file is cut off, or is no target file."
         )
-    table = _floats(path, rest, "value {} of the targets").reshape(-1, 8)
+    table = floats(path, rest, "value {} of the targets").reshape(-1, 8)
     pixels = table[:, 1:3].copy()
     if field in (1, 2):
         # Half frames: the file counts every other line.
@@ -185,7 +185,7 @@ def read_body(path: Path) -> tuple[list[str], FloatArray]:
         If a line has other than four numbers; the message names it.
     """
     ids, points = [], []
-    for number, line in enumerate(read_text(path, _KIND).splitlines(), start=1):
+    for number, line in enumerate(read_text(path, KIND).splitlines(), start=1):
         fields = line.replace(",", " ").split()
         if not fields or fields[0].startswith("#"):
             continue
@@ -194,7 +194,7 @@ def read_body(path: Path) -> tuple[list[str], FloatArray]:
                 f"{path}, line {number}: found {len(fields)} values, expected number X Y Z."
             )
         ids.append(fields[0])
-        points.append(_floats(path, fields[1:], f"line {number}"))
+        points.append(floats(path, fields[1:], f"line {number}"))
     if not ids:
         raise InputError(f"{path}: no points; expected lines of number X Y Z.")
     return ids, np.array(points)
@@ -215,8 +215,8 @@ def read_manual(points: Path, pixels: Path) -> tuple[list[str], FloatArray]:
     InputError
         If the two files do not belong together.
     """
-    ids = read_text(points, _KIND).split()
-    values = _floats(pixels, read_text(pixels, _KIND).split(), "man_ori")
+    ids = read_text(points, KIND).split()
+    values = floats(pixels, read_text(pixels, KIND).split(), "man_ori")
     if values.size != 2 * len(ids):
         raise InputError(
             f"{pixels}: holds {values.size} numbers for the {len(ids)} points of {points.name}; "
@@ -235,7 +235,7 @@ def read_correspondences(path: Path) -> tuple[FloatArray, IntArray]:
     InputError
         If the count in the first line does not fit the lines that follow.
     """
-    lines = [line for line in read_text(path, _KIND).splitlines() if line.strip()]
+    lines = [line for line in read_text(path, KIND).splitlines() if line.strip()]
     count = _count(path, lines, "number of particles")
     rows = [line.split() for line in lines[1:]]
     widths = {len(row) for row in rows}
@@ -246,43 +246,38 @@ def read_correspondences(path: Path) -> tuple[FloatArray, IntArray]:
         )
     if not rows:
         return np.empty((0, 3)), np.empty((0, 0), dtype=np.int64)
-    table = np.array([_floats(path, row, f"line {k}") for k, row in enumerate(rows, 2)])
+    table = np.array([floats(path, row, f"line {k}") for k, row in enumerate(rows, 2)])
     return table[:, 1:4].copy(), table[:, 4:].astype(np.int64)
+
+
+def rt_is_text(xyz: FloatArray, numbers: IntArray) -> str:
+    """Return the content of an rt_is file: number from 1, X, Y, Z [mm], targets of four cameras."""
+    blank = np.full((len(numbers), max(0, 4 - numbers.shape[1])), -1, dtype=np.int64)
+    lines = [str(len(xyz))]
+    for k, (place, row) in enumerate(zip(xyz, np.hstack([numbers, blank]), strict=True), start=1):
+        words = [f"{k:4d}", *(f"{v:9.3f}" for v in place), *(f"{n:4d}" for n in row)]
+        lines.append(" ".join(words))
+    return "\n".join(lines) + "\n"
 
 
 def ori_text(camera: Camera, glass: FloatArray) -> str:
     """Return the content of an .ori file."""
     x, m = camera.centre, camera.rotation
-    rows = "\n".join("    " + " ".join(f"{v:.15f}" for v in row) for row in m)
+    rows = "\n".join("    " + " ".join(f"{v:.17g}" for v in row) for row in m)
     return (
         f"{x[0]:.15g} {x[1]:.15g} {x[2]:.15g}\n"
         f"    {' '.join(f'{v:.16g}' for v in camera.angles)}\n\n{rows}\n\n"
-        f"    {camera.principal_point[0]:.16g} {camera.principal_point[1]:.16g}\n"
-        f"    {camera.principal_distance:.16g}\n\n"
-        f"    {glass[0]:.15f} {glass[1]:.15f} {glass[2]:.15f}\n"
+        f"    {camera.principal_point[0]:.17g} {camera.principal_point[1]:.17g}\n"
+        f"    {camera.principal_distance:.17g}\n\n"
+        f"    {glass[0]:.17g} {glass[1]:.17g} {glass[2]:.17g}\n"
     )
 
 
-def addpar_text(camera: Camera) -> str:
-    """Return the content of an .addpar file.
-
-    Raises
-    ------
-    InputError
-        If OpenPTV has no parameters for this distortion.
-    """
+def addpar_text(camera: Camera, scale: float) -> str:
+    """Return the content of an .addpar file: distortion of OpenPTV's convention, and ``scx``."""
     d = camera.distortion
-    centred = d.convention is Convention.OPENPTV or (
-        d.convention is Convention.BROWN and not np.any(camera.principal_point)
-    )
-    if not (centred or d.is_identity) or d.scale != 1.0:
-        raise InputError(
-            f"camera {camera.name}: OpenPTV counts distortion from the centre of the sensor and "
-            "has no separate scale of x, so this camera cannot be written exactly. Calibrate with "
-            'distortion convention = "openptv" and without scale.'
-        )
-    terms = (d.k1, d.k2, d.k3, d.p1, d.p2, 1.0, d.shear)
-    return " ".join(f"{v:.16g}" for v in terms) + "\n"
+    terms = (d.k1, d.k2, d.k3, d.p1, d.p2, scale, d.shear)
+    return " ".join(f"{v:.17g}" for v in terms) + "\n"
 
 
 def _rotation(
@@ -301,7 +296,7 @@ def _rotation(
     return nearest_rotation(matrix), (f"{path.name}: {odd}",)
 
 
-def _floats(path: Path, words: Sequence[str], what: str) -> FloatArray:
+def floats(path: Path, words: Sequence[str], what: str) -> FloatArray:
     """Return words as numbers; refuse the first that is none; {} in ``what`` is its place."""
     values = np.empty(len(words))
     for place, word in enumerate(words):
@@ -320,7 +315,7 @@ def _number(path: Path, lines: list[str], index: int, what: str) -> float:
     if index >= len(lines):
         raise InputError(f"{path}: ends before line {index + 1} ({what}).")
     words = lines[index].split()[:1] or [""]
-    return float(_floats(path, words, f"line {index + 1} ({what})")[0])
+    return float(floats(path, words, f"line {index + 1} ({what})")[0])
 
 
 def _count(path: Path, lines: list[str], what: str) -> int:
@@ -332,7 +327,7 @@ def _count(path: Path, lines: list[str], what: str) -> int:
 
 
 def _numbers(path: Path, least: int, what: str) -> FloatArray:
-    values = _floats(path, read_text(path, _KIND).split(), "value {}")
+    values = floats(path, read_text(path, KIND).split(), "value {}")
     if len(values) < least:
         raise InputError(f"{path}: {len(values)} numbers, expected at least {least}: {what}.")
     return values

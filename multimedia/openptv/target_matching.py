@@ -14,6 +14,8 @@ from photocore.errors import ConvergenceError, GeometryError, InputError
 #: two pixels. [px]
 FIRST_RADIUS, WIDEST_MISFIT, LEAST_RADIUS = 25.0, 4.0, 2.0
 _ROUNDS = 4
+#: Real matches are more than so many times as many as chance would bring.
+_BEYOND_CHANCE = 2.0
 
 
 def match_targets(
@@ -66,6 +68,48 @@ def match_targets(
             return partner
         partner = again
     return partner
+
+
+def is_chance(
+    camera: Camera,
+    control: FloatArray,
+    targets: FloatArray,
+    partner: IntArray,
+    interface: Media,
+) -> bool:
+    """Whether as many matches would be found among targets that have nothing to do with the body.
+
+    Parameters
+    ----------
+    camera, control, targets, interface
+        As for `match_targets`.
+    partner : ndarray, shape (n,)
+        What `match_targets` returned, at least one of it a match.
+
+    Notes
+    -----
+    Targets a distance s apart lie within a radius q of any place with the probability
+    pi q^2 / s^2. Points matched by chance miss their places by as much as the search allows, so q
+    is then half of s and that probability near 1; true ones miss them by a pixel.
+    """
+    from scipy.spatial import cKDTree
+
+    seen = partner >= 0
+    if camera.sensor is None or seen.sum() < 4 or len(targets) < 2:
+        return True
+    image = camera.sensor.image_from_pixel(targets[partner[seen]])
+    try:
+        found = resect(camera, control[seen], image, interface)
+        visible = project(found.camera, control, interface)
+    except (GeometryError, ConvergenceError, InputError):
+        return True
+    miss = float(np.median(np.linalg.norm(found.residuals / camera.sensor.pitch, axis=1)))
+    radius = max(LEAST_RADIUS, WIDEST_MISFIT * miss)
+    apart = float(np.median(cKDTree(targets).query(targets, k=2)[0][:, 1]))
+    share = min(1.0, np.pi * radius**2 / apart**2) if apart > 0 else 1.0
+    half = np.array([camera.sensor.width, camera.sensor.height]) * camera.sensor.pitch / 2
+    inside = (np.abs(visible) <= half).all(axis=1)
+    return bool(seen.sum() <= _BEYOND_CHANCE * share * inside.sum())
 
 
 def _nearest(

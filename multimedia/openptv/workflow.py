@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -9,15 +10,17 @@ import numpy as np
 
 from multimedia.media.camera import Camera
 from multimedia.openptv.experiment import (
+    NO_TARGETS,
     Experiment,
     particle_points,
     read_experiment,
     write_experiment,
 )
 from multimedia.openptv.openptv_files import DetectedTargets
-from multimedia.openptv.target_matching import FIRST_RADIUS, match_targets
+from multimedia.openptv.plane_matching import PlaneMatch, choose_sets
+from multimedia.openptv.target_matching import FIRST_RADIUS, is_chance, match_targets
 from multimedia.orientation.resection import resect
-from multimedia.projects.model import ImagePoints, Project
+from multimedia.projects.model import ImagePoints, ObjectPoints, Project
 from multimedia.projects.project_file import read_project, write_project
 from photocore.arrays import FloatArray, IntArray
 from photocore.errors import PhotogrammetryError
@@ -83,15 +86,18 @@ def import_openptv(
     if swap_indices:
         project = read_experiment(folder, swap_indices=True).project
     control = [_control(experiment, k, least_pixels, radius) for k in range(len(project.cameras))]
-    matched = tuple(len(ids) for ids, _, _ in control)
+    project = replace(project, object_points=_with_planes(experiment, control))
+    matched = tuple(len(one.ids) for one in control)
     _, particles = particle_points(experiment)
     images = ImagePoints(
         cameras=(*np.repeat(project.camera_names, matched).tolist(), *particles.cameras),
-        ids=(*(name for ids, _, _ in control for name in ids), *particles.ids),
-        image=np.concatenate([*(image for _, image, _ in control), particles.image]),
+        ids=(*(name for one in control for name in one.ids), *particles.ids),
+        image=np.concatenate([*(one.image for one in control), particles.image]),
         groups=("control",) * sum(matched) + ("particles",) * len(particles.ids),
     )
-    remarks = (*project.remarks, *(text for _, _, said in control for text in said))
+    of_planes = [c.name for c, one in zip(project.cameras, control, strict=True) if one.planes]
+    known = [text for text in project.remarks if text not in map(NO_TARGETS.format, of_planes)]
+    remarks = (*known, *(text for one in control for text in one.remarks))
     project = replace(project, image_points=images, remarks=remarks)
     files = () if out is None else tuple(write_project(out, project, overwrite=overwrite))
     return Import(
@@ -99,21 +105,85 @@ def import_openptv(
     )
 
 
-def export_openptv(project: Path, folder: Path, *, overwrite: bool = False) -> Project:
-    """Write a project as an OpenPTV experiment folder."""
+def export_openptv(
+    project: Path, folder: Path, *, overwrite: bool = False
+) -> tuple[Project, tuple[str, ...]]:
+    """Write a project as an OpenPTV experiment folder; return it, and what is not exact there."""
     content = read_project(project)
-    write_experiment(folder, content, overwrite=overwrite)
-    return content
+    return content, write_experiment(folder, content, overwrite=overwrite)
 
 
-def _control(
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _CameraControl:
+    """Control points of one camera: ids, image coordinates, where from, and remarks."""
+
+    ids: list[str]
+    image: FloatArray
+    remarks: list[str]
+    planes: PlaneMatch | None = None
+
+
+def _control(experiment: Experiment, k: int, least_pixels: int, radius: float) -> _CameraControl:
+    """Return the control points of a camera: of the planes if listed, else found among targets."""
+    listed = any(experiment.planes[k].positions)
+    targets = _nothing() if listed else _from_targets(experiment, k, least_pixels, radius)
+    if targets.ids or not (listed or experiment.planes[k].together):
+        return targets
+    project = experiment.project
+    camera = project.cameras[k]
+    planes = choose_sets(camera, experiment.planes[k], project.interface_of(k))
+    said = [*targets.remarks, *(f"{camera.name}: {text}" for text in planes.remarks)]
+    if not planes.labels and listed:
+        targets = _from_targets(experiment, k, least_pixels, radius)
+        return replace(targets, remarks=said + targets.remarks)
+    ids = [name_of(place) for place in planes.xyz]
+    return _CameraControl(ids=ids, image=planes.image, remarks=said, planes=planes)
+
+
+def name_of(place: FloatArray) -> str:
+    """Return the name of a point of a plane: the same for all cameras, whatever their numbers.
+
+    The numbers in .fix count what a camera saw, from 0: they mean another point in each of them.
+
+    >>> name_of(np.array([5.0, -7.5, -0.0]))
+    'X5Y-7.5Z0'
+    """
+    rounded = np.round(place, 6) + 0.0
+    return "".join(f"{axis}{v:.10g}" for axis, v in zip("XYZ", rounded.tolist(), strict=True))
+
+
+def _with_planes(experiment: Experiment, control: Sequence[_CameraControl]) -> ObjectPoints:
+    """Return the points of all planes, and those of the body where a camera was matched to it."""
+    body = experiment.project.object_points
+    found = [one for one in control if one.planes is not None]
+    if not found:
+        return body
+    points: dict[str, tuple[str, FloatArray]] = {}
+    if len(found) < len(control):
+        points |= {name: ("", place) for name, place in zip(body.ids, body.xyz, strict=True)}
+    for one in found:
+        if one.planes is not None:
+            for name, label, place in zip(one.ids, one.planes.labels, one.planes.xyz, strict=True):
+                points.setdefault(name, (label, place))
+    return ObjectPoints(
+        ids=tuple(points),
+        xyz=np.array([place for _, place in points.values()]),
+        groups=tuple(label for label, _ in points.values()),
+    )
+
+
+def _nothing(remarks: Sequence[str] = ()) -> _CameraControl:
+    return _CameraControl(ids=[], image=np.empty((0, 2)), remarks=list(remarks))
+
+
+def _from_targets(
     experiment: Experiment, k: int, least_pixels: int, radius: float
-) -> tuple[list[str], FloatArray, list[str]]:
-    """Return the control points found in one calibration image, where, and remarks."""
+) -> _CameraControl:
+    """Return the control points found among the targets of one calibration image."""
     project, targets = experiment.project, experiment.targets[k]
     camera, body = project.cameras[k], project.object_points
     if targets is None or not body.ids or camera.sensor is None:
-        return [], np.empty((0, 2)), []
+        return _nothing()
     remarks = []
     best = _matched(project, camera, k, targets, least_pixels, radius)
     others = [(camera, 1, f"targets below {least_pixels} px were needed too.")]
@@ -129,19 +199,33 @@ def _control(
             best = again
             remarks.append(f"{camera.name}: {said}")
     seen = np.flatnonzero(best >= 0)
-    if len(seen) < _FEWEST:
-        remarks.append(
-            f"{camera.name}: only {len(seen)} of {len(body.ids)} control points were found among "
-            f"{len(targets.pixels)} targets. The stored orientation may be far off (--radius), or "
-            "belong to another image."
+    if len(seen) < _FEWEST or _by_chance(project, k, targets, best):
+        return _nothing(
+            [
+                *remarks,
+                f"{camera.name}: its control points were not found: only {len(seen)} of "
+                f"{len(body.ids)} lie near one of the {len(targets.pixels)} targets, no more than "
+                "by chance; none was taken. The stored orientation may be far off (--radius), or "
+                "belong to another image.",
+            ]
         )
-    elif len(seen) < len(body.ids):
+    if len(seen) < len(body.ids):
         missing = [body.ids[row] for row in np.flatnonzero(best < 0)]
         more = f" and {len(missing) - 10} more" if len(missing) > 10 else ""
         shown = ", ".join(missing[:10])
         remarks.append(f"{camera.name}: no target for control points {shown}{more}.")
     image = camera.sensor.image_from_pixel(targets.pixels[best[seen]])
-    return [body.ids[row] for row in seen], image, remarks
+    return _CameraControl(ids=[body.ids[row] for row in seen], image=image, remarks=remarks)
+
+
+def _by_chance(project: Project, k: int, targets: DetectedTargets, best: IntArray) -> bool:
+    """Whether the targets found are no more than chance would bring."""
+    large = np.flatnonzero(targets.counts >= targets.counts[best[best >= 0]].min())
+    place = np.full(len(targets.counts), -1)
+    place[large] = np.arange(len(large))
+    partner = np.where(best >= 0, place[best], -1)
+    control, medium = project.object_points.xyz, project.interface_of(k)
+    return is_chance(project.cameras[k], control, targets.pixels[large], partner, medium)
 
 
 def _from_clicks(experiment: Experiment, k: int) -> Camera | None:

@@ -13,6 +13,7 @@ from multimedia.media.camera import EXTERIOR, Camera, Sensor
 from multimedia.media.flat_interface import FlatInterface
 from multimedia.media.interfaces import Interfaces
 from multimedia.media.surfaces import Cylinder, Plane, RefractingSurface, Sphere
+from multimedia.projects.camera_poses import POSE_KEYS, read_pose
 from multimedia.projects.model import (
     SIGMA_IMAGE,
     SIGMA_PIXEL,
@@ -288,8 +289,7 @@ def _surface_data(surface: RefractingSurface) -> dict[str, Any]:
     )
 
 
-_CAMERA_KEYS = ("name", "media", "centre", "omega", "phi", "kappa", "c", "principal_point",
-                "distortion", "sensor")  # fmt: skip
+_CAMERA_KEYS = ("name", "media", *POSE_KEYS, "c", "principal_point", "distortion", "sensor")
 
 
 def _camera(value: Any, number: int) -> tuple[Camera, str]:
@@ -297,9 +297,7 @@ def _camera(value: Any, number: int) -> tuple[Camera, str]:
     _only(value, where, _CAMERA_KEYS)
     name = str(value.get("name", f"cam{number}"))
     where = f"camera {name}"
-    angles = np.array([_number(value, key, where) for key in EXTERIOR[3:]])
-    if (np.abs(angles) > 720.0).any():
-        raise InputError(f"{where}: omega, phi, kappa are in degrees; found {angles.tolist()}.")
+    centre, rotation = read_pose(value, where)
     c = _number(value, "c", where)
     sensor = _sensor(value["sensor"], where) if "sensor" in value else None
     if sensor is not None and c > 100.0 * sensor.half_diagonal:
@@ -307,11 +305,9 @@ def _camera(value: Any, number: int) -> tuple[Camera, str]:
             f"{where}: c = {c:g} but the sensor is only {2 * sensor.half_diagonal:.4g} mm across. "
             "Is c in pixels, or the pitch in micrometres? Both are in mm."
         )
-    # Whole turns do not matter, and from_angles takes none.
-    turns = np.radians(np.remainder(angles + 180.0, 360.0) - 180.0)
-    camera = Camera.from_angles(
-        _vector(value, "centre", where),
-        *(float(a) for a in turns),
+    camera = Camera(
+        centre=centre,
+        rotation=rotation,
         principal_distance=c,
         principal_point=_vector(value, "principal_point", where, (0.0, 0.0)),
         distortion=_distortion(value.get("distortion", {}), where, c),

@@ -68,6 +68,8 @@ INPUTS: list[tuple[str, ...]] = [
     ("multimedia waterlevel {} --out o.json", "cloud.ply"),
     ("multimedia openptv {} --out o.toml", "ptv", "half"),
     ("multimedia openptv {} --export o", "tank.toml"),
+    ("multimedia convert {} o.toml", "lens.yml"),
+    ("multimedia convert {} o.xml", "tank.toml"),
     ("multimedia design {} --json", "tank.toml"),
 ]
 
@@ -122,6 +124,8 @@ OUTPUTS: list[tuple[str, ...]] = [
     ),
     ("multimedia waterlevel cloud.csv --out {}", ".json"),
     ("multimedia openptv ptv --out {}", ".toml"),
+    ("multimedia convert lens.yml {}", ".toml"),
+    ("multimedia convert tank.toml {}", ".xml"),
     ("multimedia design tank.toml --out {}", ".xlsx"),
     ("multimedia design tank.toml --plot {}", ".png"),
 ]

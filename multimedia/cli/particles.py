@@ -1,0 +1,68 @@
+"""``multimedia particles``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import click
+
+from photocore.cli import print_result, text_table
+from photocore.options import FILE, as_json, number, overwrite
+
+EXAMPLE = """\b
+Examples:
+  multimedia particles tank.toml --targets img/cam1.10001_targets \\
+    --targets img/cam2.10001_targets --targets img/cam3.10001_targets --out res/rt_is.10001
+"""
+
+
+@click.command(epilog=EXAMPLE)
+@click.argument("project", type=FILE)
+@click.option(
+    "--targets", type=FILE, multiple=True, required=True,
+    help="OpenPTV's _targets file of a camera; once per camera, in the order of PROJECT.",
+)  # fmt: skip
+@number(
+    "--tolerance", "PX", "Farthest a target may lie from where its particle is seen [px].",
+    default=2.0,
+)  # fmt: skip
+@click.option(
+    "--fewest",
+    type=click.IntRange(min=2),
+    default=3,
+    show_default=True,
+    help="Cameras that must have seen a particle; with 2, many are by chance.",
+)
+@click.option("--out", type=FILE, help="Write rt_is.FRAME as OpenPTV does, or .csv or .xlsx.")
+@overwrite
+@as_json
+def command(project: Path, targets: tuple[Path, ...], as_json: bool, **options: Any) -> None:
+    """Find the particles of one frame among the targets of all cameras of PROJECT, a .toml file.
+
+    Targets belong together where their rays through glass and water meet: along each other's
+    epipolar curves. Those seen by most cameras are taken first, the best fitting before others,
+    each target once. Positions are in the unit of the project, in rt_is in mm.
+    """
+    from multimedia.openptv.particles_workflow import find_particles
+
+    found = find_particles(project, targets, **options)
+    seen = (found.numbers >= 0).sum(axis=1)
+    names = found.project.camera_names
+    median = float(sorted(found.misfit)[len(seen) // 2]) if len(seen) else None
+    data = {
+        "particles": [
+            {"X": x, "Y": y, "Z": z, "targets": row, "misfit_px": miss}
+            for (x, y, z), row, miss in zip(
+                found.xyz.tolist(), found.numbers.tolist(), found.misfit.tolist(), strict=True
+            )
+        ],
+        "unit": found.project.unit, "median_misfit_px": median, "out": options["out"],
+    }  # fmt: skip
+    rows = [(f"seen by {k}", int((seen == k).sum())) for k in range(len(names), 1, -1)]
+    lines = [text_table(("particles", "number"), [row for row in rows if row[1]])]
+    for k, (name, count) in enumerate(zip(names, found.targets, strict=True)):
+        lines.append(f"{name}: {int((found.numbers[:, k] >= 0).sum())} of {count} targets used")
+    if median is not None:
+        lines.append(f"median misfit {median:.2f} px")
+    print_result(data, lines, as_json=as_json, remarks=())

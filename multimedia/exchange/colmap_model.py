@@ -1,0 +1,294 @@
+"""COLMAP's text models: cameras.txt, images.txt, points3D.txt; refractive cameras too.
+
+COLMAP counts pixels from the corner of the image and stores poses camera from world as quaternion
+and translation, y down, z forwards (its documentation, Output Format). COLMAP Underwater adds to a
+line of cameras.txt the name of the port and its parameters: FLATPORT Nx Ny Nz distance thickness na
+ng nw, with the normal outwards in the camera frame and the distance to the inner face; DOMEPORT Cx
+Cy Cz radius thickness na ng nw, the radius being that of the inner face.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path, PurePosixPath
+from typing import NamedTuple
+
+import numpy as np
+
+from multimedia.exchange.opencv_camera import camera_of, inexact, opencv_of
+from multimedia.media.camera import Camera
+from multimedia.media.flat_interface import FlatInterface
+from multimedia.media.interfaces import Interfaces
+from multimedia.media.surfaces import Sphere
+from multimedia.projects.camera_poses import FLIP
+from multimedia.projects.model import ImagePoints, ObjectPoints, Project
+from multimedia.refraction.layers import Layers
+from photocore.arrays import FloatArray
+from photocore.errors import LARGEST, InputError
+from photocore.lensformats import LensData, colmap_lens
+from photocore.output import atomic_folder
+from photocore.rotation import quaternion_from_rotation, rotation_from_quaternion
+from photocore.textfile import read_text
+
+_KIND = "file of a COLMAP model"
+_PORTS = ("FLATPORT", "DOMEPORT")
+#: From the corner of the image, as COLMAP counts, to pixel centres.
+_CORNER = 0.5
+_NONE = -1
+
+
+class _View(NamedTuple):
+    """One image: name, number of its camera, pose, pixels and the points they are of."""
+
+    name: str
+    camera: str
+    rotation: FloatArray
+    translation: FloatArray
+    pixels: FloatArray
+    ids: list[str]
+
+
+def is_colmap(path: Path) -> bool:
+    """Whether a folder holds a text model."""
+    return (path / "cameras.txt").is_file() and (path / "images.txt").is_file()
+
+
+def read_colmap(folder: Path, *, pitch: float, unit: str) -> Project:
+    """Return the project of a text model: one camera per image, with its points.
+
+    Parameters
+    ----------
+    folder : path
+        Holding cameras.txt, images.txt and, for object points, points3D.txt.
+    pitch : float
+        Width of a pixel, which COLMAP does not know. [mm]
+    unit : str
+        Of the model's lengths, which COLMAP does not know either.
+
+    Raises
+    ------
+    InputError
+        Naming file and line of what cannot be read.
+    """
+    lenses: dict[str, LensData] = {}
+    media: dict[str, FlatInterface | Interfaces] = {}
+    path = folder / "cameras.txt"
+    for line in _lines(path):
+        words = line.split()
+        if len(words) < 5:
+            raise InputError(f"{path}: {line!r:.60} is not a COLMAP camera line.")
+        lenses[words[0]], used = colmap_lens(words, path, more=True)
+        if words[used:] and words[used] != "NONE":
+            media[f"port{words[0]}"] = _port(words[used:], path)
+    views = _views(folder / "images.txt", lenses)
+    names = _names([view.name for view in views])
+    cameras = tuple(
+        camera_of(lenses[v.camera], v.rotation, v.translation, pitch=pitch, name=name)
+        for v, name in zip(views, names, strict=True)
+    )
+    points, seen = folder / "points3D.txt", [view for view in views if view.ids]
+    return Project(
+        cameras=cameras,
+        media=media,
+        media_of=tuple(f"port{v.camera}" if f"port{v.camera}" in media else "" for v in views),
+        object_points=_points(points) if points.is_file() else ObjectPoints(),
+        image_points=ImagePoints(
+            cameras=tuple(n for n, v in zip(names, views, strict=True) for _ in v.ids),
+            ids=tuple(name for view in seen for name in view.ids),
+            image=np.concatenate([
+                c.sensor.image_from_pixel(v.pixels)  # type: ignore[union-attr]
+                for c, v in zip(cameras, views, strict=True) if v.ids
+            ]) if seen else np.empty((0, 2)),
+        ),
+        sigma_image=0.5 * pitch,
+        unit=unit,
+        name=folder.resolve().name,
+        extra={"source": "COLMAP text model"},
+    )  # fmt: skip
+
+
+def write_colmap(folder: Path, project: Project, *, overwrite: bool = False) -> tuple[str, ...]:
+    """Write a project as a text model; return what is not exactly as in the project."""
+    views = {camera.name: opencv_of(camera) for camera in project.cameras}
+    numbers = {name: str(k) for k, name in enumerate(project.object_points.ids, start=1)}
+    remarks = [*inexact(views)]
+    if all(name.isdecimal() and name == str(int(name)) for name in numbers):
+        numbers = {name: name for name in numbers}
+    elif numbers:
+        remarks.append("COLMAP has numbers for points: they count from 1 in the project's order.")
+    lines: dict[str, str] = {}
+    images, tracks = [], {name: list[str]() for name in numbers}
+    for k, (camera, view) in enumerate(zip(project.cameras, views.values(), strict=True), start=1):
+        f, centre, d = view.matrix.diagonal(), view.matrix[:2, 2] + _CORNER, view.coefficients
+        numbered = (*f[:2], *centre)
+        model = "PINHOLE"
+        if d.any():
+            model = "FULL_OPENCV" if d[4] else "OPENCV"
+            numbered = (*numbered, *d[:4], *((d[4], 0, 0, 0) if d[4] else ()))
+        port = _port_words(camera, project.interface_of(k - 1))
+        content = f"{model} {view.size[0]} {view.size[1]} {_text(numbered)}{port}"
+        number = lines.setdefault(content, str(len(lines) + 1))
+        pose = _text((*quaternion_from_rotation(view.rotation), *view.translation))
+        images.append(f"{k} {pose} {number} {camera.name}")
+        rows = project.image_points.of_camera(camera.name)
+        images.append(_keypoints(project, camera, rows, k, numbers, tracks))
+    points = [
+        f"{numbers[name]} {_text(place)} 128 128 128 0 {' '.join(tracks[name])}".rstrip()
+        for name, place in zip(project.object_points.ids, project.object_points.xyz, strict=True)
+    ]
+    with atomic_folder(folder, overwrite=overwrite) as temporary:
+        for name, head, rows_ in (
+            ("cameras", "CAMERA_ID, MODEL, WIDTH, HEIGHT, PARAMS[]",
+             [f"{number} {content}" for content, number in lines.items()]),
+            ("images", "IMAGE_ID, QW, QX, QY, QZ, TX, TY, TZ, CAMERA_ID, NAME\n"
+             "#   POINTS2D[] as (X, Y, POINT3D_ID)", images),
+            ("points3D", "POINT3D_ID, X, Y, Z, R, G, B, ERROR, TRACK[] as (IMAGE_ID, POINT2D_IDX)",
+             points),
+        ):  # fmt: skip
+            text = "\n".join([f"#   {head}", *rows_]) + "\n"
+            (temporary / f"{name}.txt").write_text(text, encoding="utf-8", newline="\n")
+    return tuple(remarks)
+
+
+def _keypoints(
+    project: Project,
+    camera: Camera,
+    rows: Sequence[int],
+    number: int,
+    numbers: dict[str, str],
+    tracks: dict[str, list[str]],
+) -> str:
+    """Return the line of points of an image, and note them in the tracks of their points."""
+    assert camera.sensor is not None  # opencv_of has looked
+    pixels = camera.sensor.pixel_from_image(project.image_points.image[list(rows)]) + _CORNER
+    parts = []
+    for k, (row, pixel) in enumerate(zip(rows, pixels, strict=True)):
+        name = project.image_points.ids[row]
+        parts.append(f"{_text(pixel)} {numbers.get(name, str(_NONE))}")
+        if name in tracks:
+            tracks[name].append(f"{number} {k}")
+    return " ".join(parts)
+
+
+def _port(words: Sequence[str], path: Path) -> FlatInterface | Interfaces:
+    """Return the port that the words after a lens describe, in our camera frame."""
+    kind, values = words[0], _floats(words[1:], path, f"{words[0]} parameters")
+    if kind not in _PORTS or len(values) != 8:
+        raise InputError(
+            f"{path}: {kind} with {len(values)} parameters after the lens: known are "
+            f"{' and '.join(_PORTS)} with 8."
+        )
+    first, (size, thickness), indices = FLIP @ values[:3], values[3:5], tuple(values[5:].tolist())
+    if kind == "FLATPORT":
+        return FlatInterface(
+            layers=Layers(indices=indices, thicknesses=(float(thickness),)),
+            point=first / np.linalg.norm(first) * (size + thickness),
+            normal=-first,
+            moves_with_camera=True,
+        )
+    return Interfaces(
+        surfaces=tuple(Sphere(centre=first, radius=float(r)) for r in (size, size + thickness)),
+        indices=indices,
+        with_camera=(True, True),
+    )
+
+
+def _port_words(camera: Camera, media: FlatInterface | Interfaces | None) -> str:
+    """Return what follows the lens in cameras.txt: nothing, or the port as the camera has it."""
+    if media is None:
+        return ""
+    if isinstance(media, FlatInterface) and len(media.indices) in (2, 3):
+        glass = float(sum(media.layers.thicknesses))
+        there = media.medium(camera)
+        indices = media.indices if len(media.indices) == 3 else (*media.indices, media.indices[1])
+        distance = float(there.height - glass)
+        normal = -(FLIP @ there.normal)
+        return f" FLATPORT {_text([*normal, distance, glass, *indices])}"
+    if isinstance(media, Interfaces) and len(media.surfaces) == 2:
+        inner, outer = media.surfaces
+        if isinstance(inner, Sphere) and isinstance(outer, Sphere):
+            first, second = (
+                FLIP @ (s.centre if moves else camera.vectors_to(s.centre))
+                for s, moves in zip((inner, outer), media.with_camera, strict=True)
+            )
+            if np.abs(first - second).max() <= 1e-12 * inner.radius:
+                wall = outer.radius - inner.radius
+                return f" DOMEPORT {_text([*first, inner.radius, wall, *media.indices])}"
+    raise InputError(
+        f"camera {camera.name}: COLMAP knows flat ports of two or three parallel media and domes "
+        "of two concentric spheres, not what this camera looks through."
+    )
+
+
+def _views(path: Path, lenses: dict[str, LensData]) -> list[_View]:
+    """Read images.txt: two lines per image, the second of them may be empty."""
+    views: list[_View] = []
+    lines = iter(enumerate(read_text(path, _KIND).splitlines(), start=1))
+    for number, first in lines:
+        if first.startswith("#") or not first.strip():
+            continue
+        _, second = next(lines, (0, ""))
+        words = first.split(maxsplit=9)
+        where = f"{path}, line {number}"
+        if len(words) != 10:
+            raise InputError(
+                f"{where}: expected IMAGE_ID, QW to TZ, CAMERA_ID, NAME; found {first!r:.60}."
+            )
+        if words[8] not in lenses:
+            raise InputError(f"{where}: camera {words[8]} is not in cameras.txt.")
+        pose = _floats(words[1:8], path, f"line {number}")
+        table = _floats(second.split(), path, f"line {number + 1}")
+        if len(table) % 3:
+            raise InputError(f"{path}, line {number + 1}: expected X, Y, POINT3D_ID of each point.")
+        table = table.reshape(-1, 3)
+        known = np.flatnonzero(table[:, 2] != _NONE)
+        # Two keypoints of one image may be said to be of one point; the first is kept.
+        known = known[np.sort(np.unique(table[known, 2], return_index=True)[1])]
+        rotation = rotation_from_quaternion(pose[:4], f"{where}, quaternion")
+        ids = [str(int(v)) for v in table[known, 2]]
+        views.append(_View(words[9], words[8], rotation, pose[4:], table[known, :2] - _CORNER, ids))
+    if not views:
+        raise InputError(f"{path}: holds no images.")
+    return views
+
+
+def _points(path: Path) -> ObjectPoints:
+    """Read points3D.txt."""
+    ids, xyz = [], []
+    for line in _lines(path):
+        words = line.split()
+        if len(words) < 4:
+            raise InputError(f"{path}: {line!r:.60} is not a COLMAP point.")
+        ids.append(words[0])
+        xyz.append(_floats(words[1:4], path, f"point {words[0]}"))
+    return ObjectPoints(ids=tuple(ids), xyz=np.array(xyz).reshape(-1, 3))
+
+
+def _lines(path: Path) -> list[str]:
+    return [
+        line
+        for line in read_text(path, _KIND).splitlines()
+        if line.strip() and not line.startswith("#")
+    ]
+
+
+def _floats(words: Sequence[str], path: Path, where: str) -> FloatArray:
+    values = np.empty(len(words))
+    for k, word in enumerate(words):
+        try:
+            values[k] = float(word)
+        except ValueError:
+            raise InputError(f"{path}, {where}: expected a number, found {word!r:.40}.") from None
+        if not abs(values[k]) <= LARGEST:
+            raise InputError(f"{path}, {where}: {word:.40} is no finite number.")
+    return values
+
+
+def _names(names: Sequence[str]) -> list[str]:
+    """Return the names of photos without folder and ending where that leaves them different."""
+    short = [PurePosixPath(name).stem for name in names]
+    return short if len(set(short)) == len(short) else list(names)
+
+
+def _text(values: Sequence[float] | FloatArray) -> str:
+    return " ".join(f"{float(v):.17g}" for v in values)

@@ -1,0 +1,164 @@
+"""Metashape's cameras as XML (File, Export, Export Cameras, Agisoft XML).
+
+A camera's transform is world from camera, 4 x 4 row by row, y down and z forwards, in the frame of
+the chunk, whose own transform (rotation, translation, scale) leads to the world. Image points count
+from the corner of the image: u = w / 2 + cx + x' f + x' b1, v = h / 2 + cy + y' f.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from xml.etree import ElementTree
+
+import numpy as np
+
+from multimedia.exchange.opencv_camera import OpencvCamera, camera_of, inexact, opencv_of
+from multimedia.media.camera import Camera
+from multimedia.projects.model import Project
+from photocore.arrays import FloatArray
+from photocore.errors import LARGEST, InputError
+from photocore.lensformats import LensData, metashape_lens, xml_root
+from photocore.output import atomic_path
+from photocore.rotation import checked_rotation, nearest_rotation
+from photocore.textfile import read_text
+
+_KIND = "Metashape file"
+#: Printed matrices have at least so many digits.
+_PRINTED = 1e-5
+
+
+def read_metashape(path: Path, *, pitch: float, unit: str) -> Project:
+    """Return the project of all aligned cameras of the first chunk; no points.
+
+    Raises
+    ------
+    InputError
+        Naming what is missing or cannot be used.
+    """
+    root = xml_root(path, read_text(path, _KIND, form=" (XML)"))
+    chunk = root if root.tag == "chunk" else root.find(".//chunk")
+    if chunk is None:
+        raise InputError(f"{path}: holds no chunk; export the cameras as Agisoft XML.")
+    lenses: dict[str, LensData | str] = {}
+    for sensor in chunk.findall("./sensors/sensor"):
+        lenses[sensor.get("id", "")] = _lens(sensor, path)
+    rotation, translation, scale = _world_from_chunk(chunk, path)
+    cameras: list[Camera] = []
+    remarks: list[str] = []
+    for node in chunk.findall("./cameras//camera"):
+        name = node.get("label") or f"camera {node.get('id', '')}"
+        text = node.findtext("transform")
+        if text is None:
+            remarks.append(f"{name}: is not aligned; left out.")
+            continue
+        lens = lenses.get(node.get("sensor_id", ""), "has no calibration")
+        if isinstance(lens, str):
+            raise InputError(f"{path}: the sensor of camera {name} {lens}.")
+        matrix = _numbers(text, 16, path, f"transform of camera {name}").reshape(4, 4)
+        turn = checked_rotation(matrix[:3, :3], f"{path}: transform of {name}", tolerance=_PRINTED)
+        world = rotation @ nearest_rotation(turn)
+        centre = scale * (rotation @ matrix[:3, 3]) + translation
+        cameras.append(camera_of(lens, world.T, -world.T @ centre, pitch=pitch, name=name))
+    if not cameras:
+        raise InputError(f"{path}: holds no aligned camera.")
+    if chunk.find("./transform/scale") is None:
+        remarks.append("the chunk has no transform: its frame and scale are arbitrary.")
+    return Project(
+        cameras=tuple(cameras), sigma_image=0.5 * pitch, unit=unit, name=path.stem,
+        extra={"source": "Metashape"}, remarks=tuple(remarks),
+    )  # fmt: skip
+
+
+def write_metashape(path: Path, project: Project, *, overwrite: bool = False) -> tuple[str, ...]:
+    """Write the cameras of a project; return what is not exactly as in the project."""
+    views = {camera.name: opencv_of(camera) for camera in project.cameras}
+    document = ElementTree.Element("document", version="2.0.0")
+    chunk = ElementTree.SubElement(document, "chunk", label=project.name or "multimedia")
+    sensors = ElementTree.SubElement(chunk, "sensors")
+    cameras = ElementTree.SubElement(chunk, "cameras")
+    for number, (name, view) in enumerate(views.items()):
+        _add_sensor(sensors, number, name, view)
+        camera = ElementTree.SubElement(
+            cameras, "camera", id=str(number), sensor_id=str(number), label=name
+        )
+        matrix = np.eye(4)
+        matrix[:3, :3], matrix[:3, 3] = view.rotation.T, -view.rotation.T @ view.translation
+        ElementTree.SubElement(camera, "transform").text = _text(matrix.ravel())
+    # The chunk's frame is the project's.
+    transform = ElementTree.SubElement(chunk, "transform")
+    ElementTree.SubElement(transform, "rotation").text = _text(np.eye(3).ravel())
+    ElementTree.SubElement(transform, "translation").text = _text(np.zeros(3))
+    ElementTree.SubElement(transform, "scale").text = "1"
+    ElementTree.indent(document)
+    with atomic_path(path, overwrite=overwrite) as temporary:
+        content = ElementTree.tostring(document, encoding="unicode")
+        head = '<?xml version="1.0" encoding="UTF-8"?>\n'
+        temporary.write_text(f"{head}{content}\n", encoding="utf-8")
+    remarks = [*inexact(views)]
+    if any(project.media_of):
+        remarks.append("Metashape knows no media: glass and water were not written.")
+    if project.object_points.ids or project.image_points.ids:
+        remarks.append("points are not part of Metashape's camera file; they were not written.")
+    return tuple(remarks)
+
+
+def _add_sensor(parent: ElementTree.Element, number: int, name: str, view: OpencvCamera) -> None:
+    """Add the sensor of a camera with its calibration."""
+    (width, height), d = view.size, view.coefficients
+    sensor = ElementTree.SubElement(parent, "sensor", id=str(number), label=name, type="frame")
+    size = {"width": str(width), "height": str(height)}
+    ElementTree.SubElement(sensor, "resolution", size)
+    node = ElementTree.SubElement(sensor, "calibration", {"type": "frame", "class": "adjusted"})
+    ElementTree.SubElement(node, "resolution", size)
+    fx, fy = view.matrix[0, 0], view.matrix[1, 1]
+    cx, cy = view.matrix[:2, 2] + 0.5 - np.array(view.size) / 2
+    # p1 and p2 are exchanged against OpenCV's, see `photocore.lensformats`.
+    values = {"f": fy, "cx": cx, "cy": cy, "b1": fx - fy}
+    values |= dict(zip(("k1", "k2", "k3", "p1", "p2"), d[[0, 1, 4, 3, 2]].tolist(), strict=True))
+    for key, value in values.items():
+        if value or key in ("f", "cx", "cy"):
+            ElementTree.SubElement(node, key).text = f"{value:.17g}"
+
+
+def _lens(sensor: ElementTree.Element, path: Path) -> LensData | str:
+    """Return the lens of a sensor, or what is wrong with it."""
+    if sensor.get("type", "frame") != "frame":
+        return f"is of the type {sensor.get('type')}; projects hold frame cameras"
+    nodes = sensor.findall("calibration")
+    best = [node for node in nodes if node.get("class") == "adjusted"] or nodes
+    return metashape_lens(best[0], path) if best else "has no calibration"
+
+
+def _world_from_chunk(
+    chunk: ElementTree.Element, path: Path
+) -> tuple[FloatArray, FloatArray, float]:
+    """Return rotation, translation and scale of the chunk, or of its only component."""
+    node = chunk.find("./transform")
+    if node is None or node.find("scale") is None:
+        found = chunk.findall("./components/component/transform")
+        node = found[0] if len(found) == 1 else None
+    if node is None:
+        return np.eye(3), np.zeros(3), 1.0
+    parts = {}
+    for key, count, default in (("rotation", 9, np.eye(3)), ("translation", 3, np.zeros(3)),
+                                ("scale", 1, np.ones(1))):  # fmt: skip
+        text = node.findtext(key)
+        where = f"{key} of the chunk"
+        parts[key] = default if text is None else _numbers(text, count, path, where)
+    matrix = parts["rotation"].reshape(3, 3)
+    turn = checked_rotation(matrix, f"{path}: rotation of the chunk", tolerance=_PRINTED)
+    return nearest_rotation(turn), parts["translation"], float(parts["scale"][0])
+
+
+def _numbers(text: str, count: int, path: Path, where: str) -> FloatArray:
+    try:
+        values = np.array([float(word) for word in text.split()])
+    except ValueError:
+        raise InputError(f"{path}: the {where} holds what is no number.") from None
+    if len(values) != count or not (np.abs(values) <= LARGEST).all():
+        raise InputError(f"{path}: the {where} must be {count} numbers, found {len(values)}.")
+    return values
+
+
+def _text(values: FloatArray) -> str:
+    return " ".join(f"{v:.17g}" for v in values.tolist())

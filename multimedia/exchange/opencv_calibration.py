@@ -1,0 +1,151 @@
+"""OpenCV's calibrations: FileStorage YAML, XML or JSON, and plain JSON, one camera or two.
+
+Names of keys are no standard; those of OpenCV's own samples and tutorials are understood. A pose
+is ``R`` and ``T`` or ``rvec`` and ``tvec``, camera from world. A stereo file has K1 D1 K2 D2 R T
+(or M1 ...): the second camera from the first, whose frame is the world's.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+
+import numpy as np
+
+from multimedia.exchange.opencv_camera import camera_of, inexact, opencv_of
+from multimedia.media.camera import Camera
+from multimedia.projects.model import Project
+from photocore.arrays import FloatArray
+from photocore.errors import InputError
+from photocore.lensformats import LensData, opencv_values
+from photocore.output import all_or_none, atomic_path, check_all_writable
+from photocore.rotation import checked_rotation, rotation_from_vector
+from photocore.textfile import check_name
+
+ENDINGS = (".yml", ".yaml", ".json", ".xml")
+_MATRIX = ("camera_matrix", "cameraMatrix", "Camera_Matrix", "K", "M", "mtx", "intrinsic_matrix")
+_TERMS = ("distortion_coefficients", "dist_coeffs", "distCoeffs", "Distortion_Coefficients", "D",
+          "dist", "distortion")  # fmt: skip
+_TURN = ("R", "rotation", "rotation_matrix", "rvec", "rotation_vector")
+_SHIFT = ("T", "t", "translation", "tvec", "translation_vector")
+_WIDTH, _HEIGHT = (
+    ("image_width", "image_Width", "width"),
+    ("image_height", "image_Height", "height"),
+)
+_SIZE = ("image_size", "imageSize", "size", "resolution")
+
+#: Returns the value of a key as numbers, None where there is none.
+_Get = Callable[[str], FloatArray | None]
+
+
+def read_opencv(path: Path, *, pitch: float, unit: str) -> Project:
+    """Return the project of a calibration file, or of all in a folder, one camera each.
+
+    Raises
+    ------
+    InputError
+        Naming the key that is missing or damaged.
+    """
+    check_name(path)
+    files = [path]
+    if path.is_dir():
+        files = sorted(file for file in path.iterdir() if file.suffix.lower() in ENDINGS)
+    cameras: list[Camera] = []
+    remarks: list[str] = []
+    for file in files:
+        found, said = _cameras(file, opencv_values(file).get, pitch)
+        cameras += found
+        remarks += said
+    if not cameras:
+        raise InputError(f"{path}: holds no calibration ({', '.join(ENDINGS)}).")
+    return Project(
+        cameras=tuple(cameras), sigma_image=0.5 * pitch, unit=unit, name=path.stem,
+        extra={"source": "OpenCV"}, remarks=tuple(remarks),
+    )  # fmt: skip
+
+
+def write_opencv(path: Path, project: Project, *, overwrite: bool = False) -> tuple[str, ...]:
+    """Write one camera into a .yml, .yaml or .json file, several into a folder of .yml files."""
+    views = {camera.name: opencv_of(camera) for camera in project.cameras}
+    single = path.suffix.lower() in (".yml", ".yaml", ".json")
+    if single and len(views) > 1:
+        raise InputError(
+            f"{path}: OpenCV's files hold one camera, the project has {len(views)}; name a folder."
+        )
+    targets = [path] if single else [path / f"{name}.yml" for name in views]
+    check_all_writable(*targets, overwrite=overwrite)
+    with all_or_none():
+        for target, view in zip(targets, views.values(), strict=True):
+            content = {
+                "camera_matrix": view.matrix, "distortion_coefficients": view.coefficients[None],
+                "R": view.rotation, "T": view.translation[:, None],
+            }  # fmt: skip
+            target.parent.mkdir(parents=True, exist_ok=True)
+            with atomic_path(target, overwrite=overwrite) as temporary:
+                text = _storage_text(target, view.size, content)
+                temporary.write_text(text, encoding="utf-8")
+    remarks = [*inexact(views)]
+    if any(project.media_of):
+        remarks.append("OpenCV knows no media: glass and water were not written.")
+    if project.object_points.ids or project.image_points.ids:
+        remarks.append("points are not part of OpenCV's calibrations; they were not written.")
+    return tuple(remarks)
+
+
+def _storage_text(path: Path, size: tuple[int, int], content: Mapping[str, FloatArray]) -> str:
+    """Return a FileStorage by OpenCV itself, as JSON or YAML."""
+    import cv2
+
+    form = cv2.FILE_STORAGE_FORMAT_YAML
+    if path.suffix.lower() == ".json":
+        form = cv2.FILE_STORAGE_FORMAT_JSON
+    storage = cv2.FileStorage("", cv2.FILE_STORAGE_WRITE | cv2.FILE_STORAGE_MEMORY | form)
+    storage.write("image_width", size[0])
+    storage.write("image_height", size[1])
+    for key, value in content.items():
+        storage.write(key, np.ascontiguousarray(value))
+    return str(storage.releaseAndGetString())
+
+
+def _cameras(path: Path, get: _Get, pitch: float) -> tuple[list[Camera], list[str]]:
+    """Return the camera of a file, or the two of a stereo file, and remarks."""
+    size = _first(get, *_SIZE)
+    width, height = _first(get, *_WIDTH), _first(get, *_HEIGHT)
+    if size is None and width is not None and height is not None:
+        size = np.array([width.item(), height.item()])
+    if size is None or size.size != 2:
+        raise InputError(f"{path}: lacks image_width and image_height; add both.")
+    turn, shift = _first(get, *_TURN), _first(get, *_SHIFT)
+    numbers = ("1", "2") if _first(get, "K1", "M1", "camera_matrix1") is not None else ("",)
+    cameras = []
+    for number in numbers:
+        matrix = _first(get, *(key + number for key in _MATRIX))
+        terms = _first(get, *(key + number for key in _TERMS))
+        if matrix is None or matrix.shape != (3, 3):
+            raise InputError(f"{path}: lacks camera_matrix{number} (3 x 3).")
+        lens = LensData(
+            matrix, np.ravel(terms) if terms is not None else np.zeros(5), "opencv",
+            (float(size.flat[0]), float(size.flat[1])), f"OpenCV, {path.name}",
+        )  # fmt: skip
+        here = number != "1" and turn is not None and shift is not None
+        rotation, translation = _pose(path, turn, shift) if here else (np.eye(3), np.zeros(3))
+        name = f"{path.stem}{number}"
+        cameras.append(camera_of(lens, rotation, translation, pitch=pitch, name=name))
+    if turn is None or shift is None:
+        return cameras, [f"{path.name}: has no pose (R and T); its camera stands in the origin."]
+    return cameras, []
+
+
+def _pose(
+    path: Path, turn: FloatArray | None, shift: FloatArray | None
+) -> tuple[FloatArray, FloatArray]:
+    """Return a pose from a matrix or Rodrigues' vector, and a translation."""
+    if turn is None or shift is None or shift.size != 3 or turn.size not in (3, 9):
+        raise InputError(f"{path}: R must be 3 x 3 or a vector of 3, T a vector of 3.")
+    if turn.size == 3:
+        return rotation_from_vector(np.ravel(turn)), np.ravel(shift)
+    return checked_rotation(turn.reshape(3, 3), f"{path}: R"), np.ravel(shift)
+
+
+def _first(get: _Get, *names: str) -> FloatArray | None:
+    return next((value for name in names if (value := get(name)) is not None), None)

@@ -1,0 +1,155 @@
+"""Cameras in OpenCV's terms, which COLMAP, Metashape and AquaCal share.
+
+OpenCV counts in pixels with y down and z forwards: x_camera = R X + t, with the distortion of
+`photocore.distortion` about the principal point in units of the focal length. Pixels have integers
+at pixel centres; formats that count from the corner of the image are half a pixel off, which is
+mended where they are read and written.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from multimedia.media.camera import Camera, Sensor
+from multimedia.media.lens_conversion import farthest_miss, nearest_camera, sensor_rays
+from multimedia.projects.camera_poses import FLIP
+from photocore.arrays import FloatArray
+from photocore.distortion import Brown, Convention
+from photocore.errors import InputError
+from photocore.lensformats import LensData
+from photocore.rotation import nearest_rotation
+
+#: Size of a pixel where the file does not say, as these files never do. [mm]
+PITCH = 0.005
+#: Beyond so many pixels a camera of another lens model is another camera.
+FARTHEST = 1.0
+_FREE = ("c", "xh", "yh", "k1", "k2", "k3", "p1", "p2", "scale")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class OpencvCamera:
+    """A camera in OpenCV's terms.
+
+    Attributes
+    ----------
+    matrix : ndarray, shape (3, 3)
+        fx, fy, cx, cy. [px]
+    coefficients : ndarray, shape (5,)
+        k1 k2 p1 p2 k3.
+    size : tuple of int
+        Width and height. [px]
+    rotation, translation : ndarray, shape (3, 3) and (3,)
+        Camera from world.
+    misfit : float
+        Farthest that an image point of the camera it was made from moves. [px]
+    """
+
+    matrix: FloatArray
+    coefficients: FloatArray
+    size: tuple[int, int]
+    rotation: FloatArray
+    translation: FloatArray
+    misfit: float = 0.0
+
+
+def camera_of(
+    lens: LensData, rotation: FloatArray, translation: FloatArray, *, pitch: float, name: str
+) -> Camera:
+    """Return the camera with a lens in OpenCV's terms and its pose, camera from world.
+
+    Parameters
+    ----------
+    lens : LensData
+        Without fisheye, rational, thin-prism or tilted terms.
+    rotation, translation : ndarray, shape (3, 3) and (3,)
+        [object unit]
+    pitch : float
+        Width of a pixel; its height follows from fx and fy. [mm]
+    name : str
+        For tables and messages.
+
+    Raises
+    ------
+    InputError
+        If the lens has terms that the project's cameras do not have.
+    """
+    matrix = lens.camera_matrix
+    if lens.model != "opencv":
+        raise InputError(
+            f"{lens.source}: camera {name} has a {lens.model} lens; projects hold central lenses "
+            "with k1 k2 k3 p1 p2 only."
+        )
+    if abs(matrix[0, 1]) > 1e-9 * matrix[0, 0]:
+        raise InputError(f"{lens.source}: camera {name} has a skew of {matrix[0, 1]:g} px.")
+    fx, fy = float(matrix[0, 0]), float(matrix[1, 1])
+    width, height = lens.image_size
+    sensor = Sensor(
+        width=width, height=height, pitch=np.array([pitch, pitch * (fx / fy)]),  # type: ignore[arg-type]
+    )  # fmt: skip
+    turn = nearest_rotation(rotation)
+    return Camera(
+        centre=-turn.T @ translation,
+        rotation=turn.T @ FLIP,
+        principal_distance=fx * pitch,
+        principal_point=sensor.image_from_pixel(matrix[:2, 2]),
+        distortion=Brown.from_opencv(lens.coefficients.tolist(), principal_distance=fx * pitch),
+        sensor=sensor,
+        name=name,
+    )
+
+
+def opencv_of(camera: Camera) -> OpencvCamera:
+    """Return a camera in OpenCV's terms, exactly where it has them, else as near as it can.
+
+    Raises
+    ------
+    InputError
+        If the camera has no sensor, or OpenCV's model comes no nearer than a pixel.
+    """
+    if camera.sensor is None:
+        raise InputError(f"camera {camera.name}: its sensor is not described; pixels need it.")
+    misfit = 0.0
+    lens = camera.distortion
+    if not lens.is_identity and (lens.convention is not Convention.BROWN or lens.shear):
+        points, pixels = sensor_rays(camera)
+        image = camera.sensor.image_from_pixel(pixels)
+        sign = -1.0 if lens.convention is Convention.PHOTOGRAMMETRIC else 1.0
+        terms = {name: sign * getattr(lens, name) for name in ("k1", "k2", "k3", "p1", "p2")}
+        start = replace(camera, distortion=Brown(**terms))
+        camera = nearest_camera(start, points, image, _FREE)
+        misfit = farthest_miss(camera, points, image)
+        if misfit > FARTHEST:
+            raise InputError(
+                f"camera {camera.name}: OpenCV's lens model comes no nearer than {misfit:.2g} px "
+                "to this distortion."
+            )
+    assert camera.sensor is not None  # checked above; a fit keeps it
+    lens, c, sensor = camera.distortion, camera.principal_distance, camera.sensor
+    matrix = np.eye(3)
+    matrix[[0, 1], [0, 1]] = c / sensor.pitch * [lens.scale, 1.0]
+    matrix[:2, 2] = sensor.pixel_from_image(camera.principal_point)
+    rotation = FLIP @ camera.rotation.T
+    return OpencvCamera(
+        matrix=matrix,
+        coefficients=np.array(
+            [lens.k1 * c**2, lens.k2 * c**4, -lens.p2 * c, lens.p1 * c, lens.k3 * c**6]
+        )
+        + 0.0,
+        size=(sensor.width, sensor.height),
+        rotation=rotation,
+        translation=-rotation @ camera.centre,
+        misfit=misfit,
+    )
+
+
+def inexact(cameras: dict[str, OpencvCamera]) -> tuple[str, ...]:
+    """Return what to say of cameras whose lens the model of OpenCV only comes near."""
+    moved = [f"{name} {one.misfit:.2g} px" for name, one in cameras.items() if one.misfit > 1e-9]
+    if not moved:
+        return ()
+    return (
+        "OpenCV's lens model has no terms for this distortion as it is; written with those that "
+        f"come nearest. Image points move by at most: {', '.join(moved)}.",
+    )

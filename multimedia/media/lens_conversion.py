@@ -1,0 +1,101 @@
+"""A camera in the terms of another lens model: the one that sees directions most alike."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from multimedia.media.camera import Camera
+from multimedia.media.projection import Media, project, project_with_jacobian
+from photocore.adjustment import minimise
+from photocore.arrays import FloatArray
+from photocore.errors import GeometryError, InputError
+
+#: Points along the sides of the sensor at which cameras are compared.
+_GRID = (25, 21)
+
+
+def sensor_rays(camera: Camera) -> tuple[FloatArray, FloatArray]:
+    """Return points on the rays of a grid of pixels over the sensor, and these pixels.
+
+    Returns
+    -------
+    points : ndarray, shape (n, 3)
+        At the principal distance before the camera. [object unit]
+    pixels : ndarray, shape (n, 2)
+        Columns and rows; left out where the distortion cannot be undone.
+
+    Raises
+    ------
+    InputError
+        If the camera has no sensor, or its distortion can be undone nowhere.
+    """
+    if camera.sensor is None:
+        raise InputError(f"camera {camera.name}: its sensor is not described; pixels need it.")
+    sides = (camera.sensor.width, camera.sensor.height)
+    along = [np.linspace(0, side - 1, count) for side, count in zip(sides, _GRID, strict=True)]
+    pixels = np.stack(np.meshgrid(*along), axis=-1).reshape(-1, 2)
+    ideal = camera.distortion.ideal(camera.sensor.image_from_pixel(pixels), camera.principal_point)
+    seen = np.isfinite(ideal).all(axis=1)
+    if not seen.any():
+        raise InputError(f"camera {camera.name}: its distortion cannot be undone on the sensor.")
+    vectors = np.column_stack([ideal, np.full(len(ideal), -camera.principal_distance)])[seen]
+    return camera.centre + vectors @ camera.rotation.T, pixels[seen]
+
+
+def nearest_camera(
+    start: Camera,
+    points: FloatArray,
+    image: FloatArray,
+    names: tuple[str, ...],
+    *,
+    media: Media = None,
+) -> Camera:
+    """Return the camera that sees points nearest to given image coordinates.
+
+    Parameters
+    ----------
+    start : Camera
+        With the lens model wanted.
+    points : ndarray, shape (n, 3)
+        [object unit]
+    image : ndarray, shape (n, 2)
+        [mm]
+    names : tuple of str
+        Parameters that may change, of `Camera.stepped`.
+    media : Layers, FlatInterface, Interfaces or None
+        As for `project`.
+    """
+
+    def equations(camera: Camera) -> tuple[FloatArray, FloatArray] | None:
+        seen = project_with_jacobian(camera, points, media, camera_names=names)
+        if not np.isfinite(seen.image).all():
+            return None
+        return (seen.image - image).ravel(), seen.by_camera.reshape(-1, len(names))
+
+    def advance(camera: Camera, step: FloatArray) -> Camera | None:
+        try:
+            return camera.stepped(names, step)
+        except (InputError, GeometryError):
+            return None
+
+    what = f"camera {start.name} in the terms of another lens model"
+    return minimise(start, equations, advance, what=what, most=60).state
+
+
+def farthest_miss(
+    camera: Camera,
+    points: FloatArray,
+    image: FloatArray,
+    *,
+    scale: float = 1.0,
+    media: Media = None,
+) -> float:
+    """Return how far the worst point lies from given image coordinates. [px]
+
+    ``scale`` multiplies what the camera projects; infinite where a point is not seen.
+    """
+    if camera.sensor is None:
+        raise InputError(f"camera {camera.name}: its sensor is not described; pixels need it.")
+    miss = (project(camera, points, media) * scale - image) / camera.sensor.pitch
+    largest = float(np.linalg.norm(miss, axis=1).max())
+    return largest if np.isfinite(largest) else np.inf

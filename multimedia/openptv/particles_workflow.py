@@ -1,0 +1,112 @@
+"""Particles of one frame: targets of all cameras in, positions and who saw them out."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from multimedia.openptv.correspondences import TOLERANCE, correspondences
+from multimedia.openptv.openptv_files import read_targets, rt_is_text
+from multimedia.projects.model import Project
+from multimedia.projects.point_tables import METRES, write_columns
+from multimedia.projects.project_file import read_project
+from photocore.arrays import FloatArray, IntArray
+from photocore.errors import InputError
+from photocore.output import atomic_path, check_all_writable, check_not_input
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Particles:
+    """Particles of one frame.
+
+    Attributes
+    ----------
+    project : Project
+        Whose cameras saw them.
+    xyz : ndarray, shape (p, 3)
+        [unit of the project]
+    numbers : ndarray of int, shape (p, cameras)
+        Rows of the targets, from 0; -1 where a camera did not see the particle.
+    misfit : ndarray, shape (p,)
+        Root mean square distance of its targets from where it is seen. [px]
+    targets : tuple of int
+        Targets of each camera.
+    """
+
+    project: Project
+    xyz: FloatArray
+    numbers: IntArray
+    misfit: FloatArray
+    targets: tuple[int, ...]
+
+
+def find_particles(
+    project: Path,
+    targets: Sequence[Path],
+    *,
+    out: Path | None = None,
+    tolerance: float = TOLERANCE,
+    fewest: int = 3,
+    overwrite: bool = False,
+) -> Particles:
+    """Find the particles of a frame by the epipolar geometry through the media.
+
+    Parameters
+    ----------
+    project : path
+        Project file with oriented cameras.
+    targets : sequence of path
+        The ``_targets`` file of each camera, in the order of the project.
+    out : path, optional
+        ``rt_is.FRAME`` as OpenPTV reads it, in mm; or a table, .csv or .xlsx.
+    tolerance : float
+        Farthest that a target may lie from where its particle is seen. [px]
+    fewest : int
+        Cameras that must have seen a particle.
+    overwrite : bool
+        Whether an existing file may be replaced.
+    """
+    if out is not None:
+        check_all_writable(out, overwrite=overwrite)
+        check_not_input(out, project, *targets)
+        if not out.name.startswith("rt_is") and out.suffix.lower() not in (".csv", ".xlsx"):
+            raise InputError(
+                f"{out}: particles are written as rt_is.FRAME, or as a table .csv or .xlsx."
+            )
+    content = read_project(project)
+    names = content.camera_names
+    if len(targets) != len(names):
+        raise InputError(
+            f"{len(targets)} file(s) of targets for {len(names)} cameras: give --targets once per "
+            f"camera, in the order {', '.join(names)}."
+        )
+    places = [read_targets(path).pixels for path in targets]
+    xyz, numbers, misfit = correspondences(
+        content.cameras, places, content.interfaces, tolerance=tolerance, fewest=fewest
+    )
+    found = Particles(
+        project=content, xyz=xyz, numbers=numbers, misfit=misfit,
+        targets=tuple(len(place) for place in places),
+    )  # fmt: skip
+    if out is not None:
+        _write(out, found, overwrite=overwrite)
+    return found
+
+
+def _write(out: Path, found: Particles, *, overwrite: bool) -> None:
+    unit, names = found.project.unit, found.project.camera_names
+    if out.name.startswith("rt_is"):
+        with atomic_path(out, overwrite=overwrite) as temporary:
+            factor = METRES[unit] / METRES["mm"]
+            temporary.write_text(rt_is_text(found.xyz * factor, found.numbers), encoding="utf-8")
+        return
+    columns: dict[str, Any] = {"id": [str(k) for k in range(1, len(found.xyz) + 1)]}
+    columns |= {f"{axis} [{unit}]": found.xyz[:, k] for k, axis in enumerate("XYZ")}
+    columns |= {
+        f"{name} target": [str(n) if n >= 0 else "" for n in found.numbers[:, k].tolist()]
+        for k, name in enumerate(names)
+    }
+    columns["misfit [px]"] = found.misfit
+    write_columns(out, columns, overwrite=overwrite)

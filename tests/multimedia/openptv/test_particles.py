@@ -1,0 +1,132 @@
+"""Particles of a frame: exact clouds with clutter, a real frame against OpenPTV's own tuples."""
+
+from __future__ import annotations
+
+import csv
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from multimedia import correspondences, write_project
+from multimedia.cli.main import main
+from multimedia.media.flat_interface import FlatInterface
+from multimedia.media.projection import project
+from multimedia.openptv.openptv_files import (
+    glass_interface,
+    read_camera,
+    read_control,
+    read_correspondences,
+)
+from multimedia.projects.model import Project
+from photocore.errors import InputError
+from tests.multimedia.tank import LAYERS, SENSOR, cameras
+
+WALL = FlatInterface(layers=LAYERS)
+VIEWS = [replace(camera, sensor=SENSOR) for camera in cameras()]
+
+
+def frame(count: int, noise: float, clutter: int, seed: int):
+    """Return particles, the targets of each camera in any order, and the true tuples."""
+    rng = np.random.default_rng(seed)
+    xyz = rng.uniform((-60, -50, -150), (60, 50, -50), (count, 3))
+    targets, numbers = [], np.empty((count, 4), dtype=int)
+    for k, camera in enumerate(VIEWS):
+        seen = camera.sensor.pixel_from_image(project(camera, xyz, WALL))
+        seen = seen + noise * rng.standard_normal(seen.shape)
+        pixels = np.vstack([seen, rng.uniform((0, 0), (1280, 1024), (clutter, 2))])
+        order = rng.permutation(len(pixels))
+        targets.append(pixels[order])
+        numbers[:, k] = np.argsort(order)[:count]
+    return xyz, targets, numbers
+
+
+def test_all_particles_are_found_among_clutter_and_none_else():
+    xyz, targets, numbers = frame(100, 0.1, 50, 5)
+    got, tuples, misfit = correspondences(VIEWS, targets, [WALL] * 4, tolerance=0.6)
+    full = (tuples >= 0).all(axis=1)
+    truth = {tuple(row) for row in numbers.tolist()}
+    right = [tuple(row) in truth for row in tuples[full].tolist()]
+    assert sum(right) >= 98
+    assert full.sum() - sum(right) <= 1
+    assert np.median(misfit[full]) < 0.2
+    place = {tuple(row): point for row, point in zip(numbers.tolist(), xyz, strict=True)}
+    apart = [
+        np.linalg.norm(place[tuple(row)] - point)
+        for row, point in zip(tuples.tolist(), got, strict=True)
+        if tuple(row) in place
+    ]
+    assert np.median(apart) < 0.1  # 0.1 px of 12 um at 500 mm and 25 mm are 0.024 mm across
+    # Each target once.
+    for k in range(4):
+        used = tuples[tuples[:, k] >= 0, k]
+        assert len(set(used.tolist())) == len(used)
+
+
+def test_a_particle_that_a_camera_missed_is_found_by_the_others():
+    _, targets, numbers = frame(40, 0.0, 0, 6)
+    targets[2] = np.delete(targets[2], numbers[0, 2], axis=0)
+    _, tuples, _ = correspondences(VIEWS, targets, [WALL] * 4, tolerance=0.01)
+    assert len(tuples) == 40
+    lonely = tuples[tuples[:, 2] < 0]
+    assert lonely.tolist() == [[numbers[0, 0], numbers[0, 1], -1, numbers[0, 3]]]
+
+
+def test_no_targets_are_no_particles():
+    none = [np.empty((0, 2))] * 4
+    xyz, tuples, misfit = correspondences(VIEWS, none, [WALL] * 4)
+    assert (len(xyz), len(tuples), len(misfit)) == (0, 0, 0)
+    with pytest.raises(InputError, match="at least 5 to agree"):
+        correspondences(VIEWS, none, [WALL] * 4, fewest=5)
+
+
+@pytest.mark.acceptance
+def test_a_real_frame_gives_openptvs_tuples(data_dir):
+    folder = data_dir / "openptv_cavity"
+    with (folder / "particles_frame10001.csv").open() as file:
+        rows = np.array([[float(v) for v in row] for row in list(csv.reader(file))[1:]])
+    sensor, views, media = read_control(folder / "ptv.par").sensor, [], []
+    for k in range(1, 5):
+        path = folder / f"particles_cam{k}.tif.ori"
+        camera, glass, _ = read_camera(path, sensor=sensor, name=f"cam{k}")
+        views.append(camera)
+        media.append(glass_interface(glass, (1, 1.33, 1.46), 6.0))
+    orders = [np.random.default_rng(k).permutation(len(rows)) for k in range(4)]
+    targets = [rows[order][:, 2 * k : 2 * k + 2] for k, order in enumerate(orders)]
+    # Rays of this calibration miss each other by 0.31 mm, some 3 px.
+    _, tuples, _ = correspondences(views, targets, media, tolerance=5.0)
+    owner = [np.where(tuples[:, k] >= 0, orders[k][tuples[:, k]], -1) for k in range(4)]
+    alike = [len({int(n) for n in row if n >= 0}) == 1 for row in zip(*owner, strict=True)]
+    assert len(tuples) >= 290
+    assert np.mean(alike) > 0.93
+
+
+def test_the_command_writes_what_openptv_reads(tmp_path: Path):
+    xyz, targets, numbers = frame(30, 0.0, 0, 7)
+    tank = Project(cameras=tuple(VIEWS), media={"w": WALL}, media_of=("w",) * 4, unit="mm")
+    write_project(tmp_path / "tank.toml", tank)
+    words = ["particles", str(tmp_path / "tank.toml"), "--tolerance", "0.05"]
+    for k, pixels in enumerate(targets):
+        lines = [f"{n} {x:.6f} {y:.6f} 9 3 3 99 -1" for n, (x, y) in enumerate(pixels)]
+        path = tmp_path / f"cam{k}.1_targets"
+        path.write_text(f"{len(lines)}\n" + "\n".join(lines) + "\n")
+        words += ["--targets", str(path)]
+    run = CliRunner().invoke
+    got = run(main, [*words, "--json", "--out", str(tmp_path / "rt_is.1")])
+    assert got.exit_code == 0, got.output
+    assert len(json.loads(got.stdout)["particles"]) == 30
+    places, tuples = read_correspondences(tmp_path / "rt_is.1")
+    order = [numbers.tolist().index(row) for row in tuples.tolist()]
+    assert np.abs(places - xyz[order]).max() < 1e-3
+    table = run(main, [*words, "--out", str(tmp_path / "p.csv")])
+    assert "30 of 30 targets used" in table.stdout
+    assert (tmp_path / "p.csv").read_text().startswith("id,X [mm],Y [mm],Z [mm],cam1 target")
+    short = run(main, words[:-2])
+    assert short.exit_code == 1
+    assert "3 file(s) of targets for 4 cameras" in short.stderr
+    wrong = run(main, [*words, "--out", str(tmp_path / "p.txt")])
+    assert wrong.exit_code == 1
+    assert "rt_is.FRAME" in wrong.stderr
