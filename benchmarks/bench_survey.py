@@ -92,6 +92,7 @@ JOBS = {
     "read and solve 20000 rows": lambda f: solve(f / "20000.xlsx", 20_000),
     "write 1000 rows, live and solved": lambda f: write_workbook(f / "1000.xlsx", 1000),
     "read, solve, update 1000 rows": lambda f: solve(f / "1000.xlsx", 1000, f / "out.xlsx"),
+    "read, solve, update 20000 rows": lambda f: solve(f / "20000.xlsx", 20_000, f / "out20.xlsx"),
     "make 1000000 rows of text": lambda f: write_csv(f / "big.csv", 1_000_000),
     "read, solve, write 1000000 rows of text": lambda f: solve(
         f / "big.csv", 1_000_000, f / "out.csv"

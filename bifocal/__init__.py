@@ -29,6 +29,7 @@ The whole wall
     OrthoOptions              how an orthophoto is rendered
     mosaic, Mosaic            several orthophotos or relief maps made one
     MosaicOptions             how they are joined
+    relief_view               the relief in three dimensions, as a page of HTML
 
 The page
     pick                      orient, pick and draw in the browser, as the command `bifocal pick`

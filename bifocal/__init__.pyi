@@ -24,6 +24,7 @@ from .orthophotos.compose import orthophoto
 from .orthophotos.mosaic_in_memory import Mosaic, MosaicOptions, mosaic
 from .orthophotos.ortho_image import OrthoOptions, Orthophoto
 from .relief_maps.dense_matching import DenseRelief, dense_relief
+from .reports.relief_view import relief_view
 from .survey.georeferencing import georeference
 from .survey.reference import Georeference
 from .survey.workflow import SolvedSurvey, solve
@@ -67,5 +68,6 @@ __all__ = [
     "relief_displacement",
     "relief_displacements",
     "relief_from_displacement",
+    "relief_view",
     "solve",
 ]

@@ -1,4 +1,4 @@
-"""Write the pictures of README.md from a demo: `python docs/make_pictures.py bifocal-demo`."""
+"""Write pictures of the docs from a demo: `python docs/make_pictures.py bifocal-demo`."""
 
 from __future__ import annotations
 
@@ -6,6 +6,8 @@ import sys
 from pathlib import Path
 
 from PIL import Image, ImageDraw, ImageFont
+
+from bifocal.reports.view_workflow import view_relief
 
 HERE = Path(__file__).parent
 PANELS = (
@@ -33,7 +35,11 @@ def panel(path: Path, label: str) -> Image.Image:
 
 
 def main(folder: Path) -> None:
-    """Write docs/images/demo.jpg."""
+    """Write docs/images/demo.jpg, and the page of the relief in three dimensions."""
+    view_relief(
+        folder / "relief.tif", HERE / "relief-3d.html", ortho=folder / "ortho.tif",
+        title="The sample façade", overwrite=True,
+    )  # fmt: skip
     panels = [panel(folder / name, label) for name, label in PANELS]
     sheet = Image.new("RGB", (len(panels) * (WIDTH + 12) - 12, panels[0].height), "white")
     for k, picture in enumerate(panels):

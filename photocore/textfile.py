@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import unicodedata
 from collections.abc import Iterator
 from contextlib import contextmanager
 from errno import ENAMETOOLONG
@@ -69,3 +70,16 @@ def readable(path: Path, what: str, *, missing: str = "file") -> Iterator[None]:
         ) from None
     except OSError as error:
         raise InputError(f"{path}: cannot be read ({error.strerror}).") from error
+
+
+def file_name(title: str) -> str:
+    """Return a title as a file name every system and CAD program takes.
+
+    Examples
+    --------
+    >>> file_name("Palazzo Müller (nord)")
+    'Palazzo_Muller_nord'
+    """
+    plain = unicodedata.normalize("NFKD", title).encode("ascii", "ignore").decode("ascii")
+    words = "".join(c if c.isalnum() or c == "-" else " " for c in plain).split()
+    return "_".join(words) or "ortho"

@@ -115,13 +115,13 @@ def served(folder: Path, *arguments: str) -> Iterator[Served]:
 
 
 @contextlib.contextmanager
-def launched() -> Iterator[Any]:
-    """Return a headless browser."""
+def launched(*more: str) -> Iterator[Any]:
+    """Return a headless browser, with more arguments."""
     program = chromium()
     from playwright.sync_api import sync_playwright
 
     with sync_playwright() as playwright:
-        arguments = ["--no-sandbox", "--disable-gpu"]
+        arguments = ["--no-sandbox", *(more or ("--disable-gpu",))]
         browser = playwright.chromium.launch(executable_path=program, args=arguments)
         try:
             yield browser

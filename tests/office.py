@@ -13,8 +13,9 @@ from pathlib import Path
 import openpyxl
 import pytest
 
+from photocore.workbook.changes import SheetChanges
 from photocore.workbook.package import open_package, read_part, rewrite_package
-from photocore.workbook.splice import SheetChanges, splice_sheet
+from photocore.workbook.splice import splice_sheet
 from photocore.workbook.xlsx import read_directory
 
 

@@ -91,6 +91,26 @@ def test_importing_a_package_imports_nothing_heavy(name: str) -> None:
     assert done.stdout.split() == []
 
 
+def test_solving_a_survey_imports_neither_scipy_nor_the_network() -> None:
+    unused = (
+        "scipy",
+        "cv2",
+        "skimage",
+        "rasterio",
+        "matplotlib",
+        "numba",
+        "pyarrow",
+        "ssl",
+        "http",
+    )
+    code = (
+        "import sys, bifocal.cli.solve, bifocal.survey.workflow, bifocal.survey.output\n"
+        f"print(*(m for m in {unused!r} if m in sys.modules))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.split() == []
+
+
 @pytest.mark.parametrize("name", ["bifocal", "multimedia"])
 def test_the_list_of_commands_imports_nothing_heavy(name: str) -> None:
     code = (

@@ -1,4 +1,7 @@
-"""One pair of a survey: its options, the steps that follow from them, and running them."""
+"""One pair of a survey: its options, the steps that follow from them, and running them.
+
+A step imports the workflow it calls when it is made: a run that keeps everything loads none.
+"""
 
 from __future__ import annotations
 
@@ -8,7 +11,7 @@ import traceback
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import cv2
 
@@ -20,20 +23,14 @@ from bifocal.campaigns.step_store import (
     run_step,
     step_key,
 )
-from bifocal.files.images import image_info
-from bifocal.model.pair import Pair
-from bifocal.orientation.align_workflow import AlignOptions, align_photos
-from bifocal.orthophotos.deliver_workflow import DeliverTask, deliver, file_name
-from bifocal.orthophotos.ortho_image import OrthoOptions
-from bifocal.orthophotos.ortho_workflow import OrthoTask, make_ortho
-from bifocal.relief_maps.workflow import ReliefJob, relief_of_pair
-from bifocal.reports.control_survey import is_exchanged, solve_control
-from bifocal.reports.workflow import ReportTask, write_report
-from bifocal.survey.output import write_result
 from photocore.cli import Progress, no_progress, unforeseen_message
 from photocore.errors import InputError, PhotogrammetryError
 from photocore.provenance import FileHashes, recording
 from photocore.raster_places import cloud_optimised
+from photocore.textfile import file_name
+
+if TYPE_CHECKING:
+    from bifocal.orthophotos.ortho_workflow import OrthoTask
 
 #: What may be wanted of a pair, in the order of work.
 PRODUCTS = ("relief", "points", "ortho", "drawing", "report")
@@ -119,6 +116,8 @@ class PairJob:
 
         In bytes.
         """
+        from bifocal.files.images import image_info
+
         pixels = 0
         for path in (self.far, self.near):
             try:
@@ -277,6 +276,8 @@ def _align_step(job: PairJob) -> Step:
     options = _some(job, *names)
 
     def make(place: Path, progress: Progress) -> tuple[str, ...]:  # noqa: ARG001
+        from bifocal.orientation.align_workflow import AlignOptions, align_photos
+
         out = place / job.own_pair_path.name
         made = align_photos(
             job.far, job.near, out, AlignOptions.from_given({**options, **files}),
@@ -306,6 +307,8 @@ def _relief_step(job: PairJob) -> Step:
     options = _some(job, "quality", "bounds", "relief_gsd", "relief_range", "cog")
 
     def make(place: Path, progress: Progress) -> tuple[str, ...]:
+        from bifocal.relief_maps.workflow import ReliefJob, relief_of_pair
+
         out = place / job.relief_path.name
         task = ReliefJob(
             out=out, preview=out.with_suffix(".png"), gsd=options.get("relief_gsd"),
@@ -331,6 +334,10 @@ def _points_step(job: PairJob) -> Step:
     options = _some(job, "language", "unit")
 
     def make(place: Path, progress: Progress) -> tuple[str, ...]:  # noqa: ARG001
+        from bifocal.model.pair import Pair
+        from bifocal.reports.control_survey import is_exchanged, solve_control
+        from bifocal.survey.output import write_result
+
         pair = Pair.read(job.pair_path)
         tables = {"control": None, **tables_of(job)}
         solution = solve_control(
@@ -351,6 +358,9 @@ def _points_step(job: PairJob) -> Step:
 
 
 def _ortho_task(job: PairJob, options: Mapping[str, Any]) -> OrthoTask:
+    from bifocal.orthophotos.ortho_image import OrthoOptions
+    from bifocal.orthophotos.ortho_workflow import OrthoTask
+
     return OrthoTask(
         relief=job.relief_path, image=options.get("image", "1"), gsd=options.get("gsd"),
         bounds=_tuple(options.get("bounds")), options=OrthoOptions(fill=options.get("fill", False)),
@@ -361,6 +371,8 @@ def _ortho_step(job: PairJob) -> Step:
     options = _some(job, "image", "gsd", "bounds", "fill", "cog")
 
     def make(place: Path, progress: Progress) -> tuple[str, ...]:
+        from bifocal.orthophotos.ortho_workflow import make_ortho
+
         out = place / f"{job.title}_ortho.tif"
         task = _ortho_task(job, options)
         return make_ortho(job.pair_path, out, task, progress=progress).remarks
@@ -376,6 +388,8 @@ def _drawing_step(job: PairJob) -> Step:
     control = {k: v for k, v in tables_of(job).items() if k == "control"}
 
     def make(place: Path, progress: Progress) -> tuple[str, ...]:
+        from bifocal.orthophotos.deliver_workflow import DeliverTask, deliver
+
         wish = DeliverTask(
             scale=options.get("scale", 50.0), title=job.name, paper=options.get("paper"),
             sections=tuple(options.get("sections", ())), interval=options.get("contours"),
@@ -395,6 +409,8 @@ def _report_step(job: PairJob, earlier: tuple[str, ...]) -> Step:
     orthos = {"drawing": f"{job.title}.tif", "ortho": f"{job.title}_ortho.tif"}
 
     def make(place: Path, progress: Progress) -> tuple[str, ...]:
+        from bifocal.reports.workflow import ReportTask, write_report
+
         ortho = next((job.folder / k / v for k, v in orthos.items() if k in earlier), None)
         task = ReportTask(
             title=job.name, language=options.get("language", "en"), unit=options.get("unit", ""),

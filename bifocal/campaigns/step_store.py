@@ -13,8 +13,8 @@ import os
 import shutil
 import tempfile
 import time
-from collections.abc import Callable, Mapping
-from contextlib import suppress
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -138,13 +138,7 @@ def run_step(
     if not overwrite:
         _refuse_changed(folder, old, hashes)
     start = time.perf_counter()
-    with suppress(FileExistsError):
-        parent.mkdir(parents=True)
-    with interrupts.held():
-        place = Path(tempfile.mkdtemp(prefix=f".{step.name}{_WRITING}", dir=parent))
-        interrupts.temporary.add(place)
-    place.chmod(0o777 & ~_umask())
-    try:
+    with _written_aside(parent, step.name) as place:
         remarks = step.make(place, progress)
         outputs = {name.as_posix(): file_hash(place / name) for name in _files(place)}
         record = StepRecord(
@@ -153,10 +147,43 @@ def run_step(
         )  # fmt: skip
         _write_record(place, step, record, hashes)
         _publish(place, folder, old)
+    return record
+
+
+def receive_step(
+    folder: Path, files: Mapping[str, bytes], hashes: FileHashes, *, overwrite: bool = False
+) -> None:
+    """Put a step that another machine made, its record among its files, in place of the old one.
+
+    Raises
+    ------
+    InputError
+        As `run_step`.
+    """
+    old = read_record(folder)
+    if not overwrite:
+        _refuse_changed(folder, old, hashes)
+    with _written_aside(folder.parent, folder.name) as place:
+        for name, content in files.items():
+            (place / name).parent.mkdir(parents=True, exist_ok=True)
+            (place / name).write_bytes(content)
+        _publish(place, folder, old)
+
+
+@contextmanager
+def _written_aside(parent: Path, name: str) -> Iterator[Path]:
+    """Give a hidden folder to write into, and remove what is left of it in the end."""
+    with suppress(FileExistsError):
+        parent.mkdir(parents=True)
+    with interrupts.held():
+        place = Path(tempfile.mkdtemp(prefix=f".{name}{_WRITING}", dir=parent))
+        interrupts.temporary.add(place)
+    place.chmod(0o777 & ~_umask())
+    try:
+        yield place
     finally:
         shutil.rmtree(place, ignore_errors=True)
         interrupts.temporary.discard(place)
-    return record
 
 
 def clean(parent: Path) -> None:

@@ -10,9 +10,8 @@ from pathlib import Path
 from typing import Any
 
 from bifocal.campaigns.pair_job import FILES, JOINT_OPTIONS, PRODUCTS, PairJob, tables_of
-from bifocal.orthophotos.deliver_workflow import file_name
 from photocore.errors import InputError
-from photocore.textfile import read_text
+from photocore.textfile import file_name, read_text
 
 FORMAT = "bifocal-survey/1"
 

@@ -22,8 +22,6 @@ from bifocal.campaigns.step_store import (
     run_step,
     step_key,
 )
-from bifocal.orientation.joint_workflow import JointTask, adjust_pairs
-from bifocal.orthophotos.mosaic_workflow import make_mosaic
 from photocore.cli import Progress, no_progress
 from photocore.errors import InputError
 from photocore.provenance import FileHashes, recording
@@ -45,6 +43,8 @@ def joint_step(jobs: Sequence[PairJob]) -> Step:
     options = {name: said[name] for name in JOINT_OPTIONS if name in said}
 
     def make(place: Path, progress: Progress) -> tuple[str, ...]:
+        from bifocal.orientation.joint_workflow import JointTask, adjust_pairs
+
         task = JointTask(
             control=tuple(job.files.get("control") for job in jobs),
             check=tuple(job.files.get("check") for job in jobs), **options,
@@ -74,6 +74,8 @@ def mosaic_step(jobs: Sequence[PairJob]) -> Step:
     files |= {f"relief {k}": path for k, path in enumerate(reliefs)}
 
     def make(place: Path, progress: Progress) -> tuple[str, ...]:
+        from bifocal.orthophotos.mosaic_workflow import make_mosaic
+
         out = place / "mosaic.tif"
         with cloud_optimised():
             result = make_mosaic(orthos, out, relief=reliefs, progress=progress)

@@ -20,7 +20,6 @@ from bifocal.campaigns.pair_job import (
     plan_of,
     steps_of,
 )
-from bifocal.campaigns.photo_pairing import pair_photos, write_survey_file
 from bifocal.campaigns.step_store import Step, clean
 from bifocal.campaigns.whole_wall import (
     JOINT,
@@ -55,11 +54,14 @@ class Machines:
         For all of them; default most of what is free. [GiB]
     scheduler : str
         Address of a Dask scheduler; empty: this machine.
+    ship : bool
+        Send files to its workers and back even if they see the folders.
     """
 
     jobs: int | None = None
     memory: float | None = None
     scheduler: str = ""
+    ship: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -134,6 +136,8 @@ def begin_survey(
     InputError
         If no photos make a pair, or the file cannot be written.
     """
+    from bifocal.campaigns.photo_pairing import pair_photos, write_survey_file
+
     check_writable(out, overwrite=overwrite)
     pairs, left = pair_photos(folder, progress=progress)
     write_survey_file(out, folder, pairs, left, overwrite=overwrite)
@@ -288,7 +292,7 @@ def _running(
     if machines.scheduler:
         from bifocal.campaigns.dask_cluster import run_on_cluster
 
-        return run_on_cluster(machines.scheduler, jobs, listener)
+        return run_on_cluster(machines.scheduler, jobs, listener, ship=machines.ship)
     memory = None if machines.memory is None else int(machines.memory * (1 << 30))
     return run_here(jobs, listener, most=machines.jobs, memory=memory)
 

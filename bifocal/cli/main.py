@@ -24,6 +24,7 @@ SUMMARIES: dict[str, str] = {
     "facade": "Two photos and control points in, drawings and report out, in one line.",
     "survey": "The same for many pairs: resumable, in parallel, here or on a cluster.",
     "report": "What was measured and how good it is, as one HTML or PDF file.",
+    "view": "A relief map in three dimensions, as one small HTML file.",
     "export": "Points as DXF, PLY, LAS, CSV, GeoJSON or workbook.",
     "doctor": "Versions, extras, LibreOffice, memory: what a fault report needs.",
 }

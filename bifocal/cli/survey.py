@@ -31,14 +31,20 @@ Examples:
 @number("--memory", "GIB", "For all pairs at work.  [default: 80 % of what is free]")
 @click.option(
     "--scheduler", default="", metavar="tcp://...",
-    help="Address of a Dask scheduler whose workers see the same folders.",
+    help="Address of a Dask scheduler.",
+)  # fmt: skip
+@click.option(
+    "--ship", is_flag=True,
+    help="Send photos to its workers and products back.  [default: only where a worker does not "
+    "see the folders]",
 )  # fmt: skip
 @overwrite
 @as_json
 @click.pass_context
 def command(
     ctx: click.Context, survey: Path, folder: Path | None, dry_run: bool, out: Path | None,
-    jobs: int | None, memory: float | None, scheduler: str, overwrite: bool, as_json: bool,
+    jobs: int | None, memory: float | None, scheduler: str, ship: bool, overwrite: bool,
+    as_json: bool,
 ) -> None:  # fmt: skip
     """Survey many pairs: alignment, relief, points, drawings and report of each.
 
@@ -68,7 +74,9 @@ def command(
         else:
             click.echo(text_table(["pair", "step", "what"], plan))
         return
-    machines = Machines(jobs=jobs, memory=memory, scheduler=scheduler)
+    if ship and not scheduler:
+        raise click.UsageError("--ship goes with --scheduler.")
+    machines = Machines(jobs=jobs, memory=memory, scheduler=scheduler, ship=ship)
     with progress_bar("survey", quiet=as_json) as progress:
         result = run_survey(
             pairs, machines=machines, mosaic=wants_mosaic(survey), progress=progress, tell=remark

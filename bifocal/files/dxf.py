@@ -49,6 +49,9 @@ def save_drawing(drawing: Any, path: Path) -> None:
         if value:
             # A line of a DXF ends at a line break, and has no more than 255 characters in R2010.
             drawing.header.custom_vars.append(name[:255], " ".join(value.split())[:255])
+    # ezdxf adds the classes of a drawing from a set, in an order that changes from run to run.
+    for name in sorted(drawing.entitydb.dxf_types_in_use()):
+        drawing.classes.add_class(name)
     with _reproducible():
         drawing.saveas(path)
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import shutil
-import unicodedata
 from collections.abc import Sequence
 from contextlib import ExitStack, suppress
 from dataclasses import dataclass, replace
@@ -52,6 +51,7 @@ from photocore.output import (
     check_writable,
 )
 from photocore.provenance import program, today
+from photocore.textfile import file_name
 
 #: Print resolution for which 1:50 makes pixels of 5.00 mm. [dpi]
 DPI = 254.0
@@ -252,19 +252,6 @@ def default_title(source: Pair | Path, path: Path | None = None) -> str:
         return stem
     folder = (path.parent if path else pair.folder).resolve().name
     return folder if len(folder) >= _SHORT else "wall"
-
-
-def file_name(title: str) -> str:
-    """Return a title as a file name every system and CAD program takes.
-
-    Examples
-    --------
-    >>> file_name("Palazzo Müller (nord)")
-    'Palazzo_Muller_nord'
-    """
-    plain = unicodedata.normalize("NFKD", title).encode("ascii", "ignore").decode("ascii")
-    words = "".join(c if c.isalnum() or c == "-" else " " for c in plain).split()
-    return "_".join(words) or "ortho"
 
 
 def _pictures(

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+import html
 import math
 from collections.abc import Sequence
 from pathlib import Path
-from xml.sax.saxutils import escape
 
 import numpy as np
 
@@ -158,7 +158,7 @@ class _SvgCanvas:
         how += f' transform="rotate({-angle:g} {x:.3f} {y:.3f})"' if angle else ""
         self.parts.append(
             f'<text x="{x:.3f}" y="{y:.3f}" font-size="{size:g}" fill="{_hex(pen)}"{how}>'
-            f"{escape(words)}</text>"
+            f"{html.escape(words, quote=False)}</text>"
         )
 
     def _places(self, points: Sequence[Place]) -> str:

@@ -7,10 +7,10 @@ from collections.abc import Iterator
 import numpy as np
 
 from bifocal.reports.content import PairContent
-from bifocal.reports.document import Banner, Block, Paragraph, TextTable
-from bifocal.reports.words import Words
 from bifocal.survey.reference import CheckResult
 from bifocal.survey.tolerances import SCALES, Verdict
+from photocore.reports.document import Banner, Block, Paragraph, TextTable
+from photocore.reports.words import Words
 
 #: Points shown in a table; the workbook has them all.
 MOST_POINTS = 60

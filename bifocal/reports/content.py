@@ -174,7 +174,7 @@ def read_content(source: Path, task: ReportTask) -> PairContent:
                 language=task.language, unit=task.unit,
             )  # fmt: skip
     pair.refuse_media("the report")
-    ortho, gsd = (None, 0.0) if task.ortho is None else _thumbnail(task.ortho)
+    ortho, gsd = (None, 0.0) if task.ortho is None else ortho_thumbnail(task.ortho)
     return PairContent(
         task=task,
         pair=pair,
@@ -216,9 +216,20 @@ def _photos(pair: Pair) -> tuple[SeenPhoto, ...]:
     return tuple(photos)
 
 
-def _thumbnail(path: Path) -> tuple[tuple[ByteArray, Bounds], float]:
-    """Return an orthophoto made small, empty pixels white, and its pixel. [m]"""
+def ortho_thumbnail(path: Path) -> tuple[tuple[ByteArray, Bounds], float]:
+    """Return an orthophoto made small, empty pixels white, and its pixel. [m]
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read or holds no colours.
+    """
     with RasterReader(path) as reader:
+        if reader.dtype not in (np.uint8, np.uint16):
+            raise InputError(
+                f"{path}: is no orthophoto; its pixels are numbers of type {reader.dtype}, not "
+                "colours of 8 or 16 bits."
+            )
         grid = reader.grid
         step = 1
         while max(grid.width, grid.height) / step > 1.5 * SIDE and step < ROWS:

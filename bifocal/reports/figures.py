@@ -10,8 +10,8 @@ from bifocal.model.grid import Bounds
 from bifocal.model.photo import Photo
 from bifocal.model.relief_map import Quality, ReliefMap
 from bifocal.reports.content import SIDE, PairContent, SeenPhoto
-from bifocal.reports.words import Words
 from photocore.arrays import FloatArray
+from photocore.reports.words import Words
 
 #: Place of the axes in a figure, with and without room for a colour bar; of the bar.
 _WIDE, _BESIDE, _BAR = (0.08, 0.1, 0.9, 0.87), (0.08, 0.1, 0.78, 0.87), (0.885, 0.16, 0.022, 0.72)

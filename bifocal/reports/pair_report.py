@@ -14,11 +14,11 @@ from bifocal.precision import base_factor
 from bifocal.reports import figures
 from bifocal.reports.accuracy import accuracy_blocks, millimetres
 from bifocal.reports.content import PairContent
-from bifocal.reports.document import Block, Document, Heading, Paragraph, Picture, TextTable
-from bifocal.reports.words import Words, words_in
 from bifocal.reports.worked_point import method_blocks
 from bifocal.survey.tolerances import RULES
 from photocore.provenance import file_hash, program, provenance, today
+from photocore.reports.document import Block, Document, Heading, Paragraph, Picture, TextTable
+from photocore.reports.words import Words, words_of
 
 #: Relief less precise than this is drawn as the area of uncertainty where no scale was asked for;
 #: else what a line of 0.18 mm covers at that scale. [m]
@@ -27,7 +27,7 @@ _UNCERTAIN = 0.01
 
 def report_document(contents: Sequence[PairContent], language: str) -> Document:
     """Return the report of one or several pairs."""
-    say = words_in(language)
+    say = words_of("bifocal.reports", language)
     title = contents[0].title if len(contents) == 1 else say("report")
     made = say("made", program=program(), date=today())
     blocks: list[Block] = [Heading(text=title, level=1), Paragraph(text=made, small=True)]

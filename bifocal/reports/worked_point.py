@@ -8,9 +8,9 @@ import numpy as np
 
 from bifocal.reports.accuracy import millimetres
 from bifocal.reports.content import PairContent
-from bifocal.reports.document import Block, Heading, Paragraph
-from bifocal.reports.words import Words
 from photocore.arrays import FloatArray
+from photocore.reports.document import Block, Heading, Paragraph
+from photocore.reports.words import Words
 
 
 def method_blocks(content: PairContent, say: Words) -> Iterator[Block]:

@@ -8,16 +8,14 @@ from pathlib import Path
 from typing import Any
 
 from bifocal.reports.content import ReportTask, read_content
-from bifocal.reports.html_page import write_html
 from bifocal.reports.pair_report import report_document
-from bifocal.reports.pdf_pages import write_pdf
 from photocore.cli import Progress, no_progress
 from photocore.errors import InputError
 from photocore.jsonfile import read_object
 from photocore.output import check_writable
+from photocore.reports.writing import check_report, write_document
 
 __all__ = ["ReportTask", "report_of", "write_report"]
-_WRITERS = {".html": write_html, ".htm": write_html, ".pdf": write_pdf}
 
 
 def write_report(
@@ -46,8 +44,7 @@ def write_report(
     """
     for out in outs:
         check_writable(out, overwrite=overwrite)
-        if out.suffix.lower() not in _WRITERS:
-            raise InputError(f"{out}: a report is written as .html or .pdf.")
+        check_report(out)
     contents = [read_content(source, task) for source, task in zip(sources, tasks, strict=True)]
     document = report_document(contents, tasks[0].language)
     for number, out in enumerate(outs):
@@ -55,7 +52,7 @@ def write_report(
         def part(done: float, total: float, what: str = "", number: int = number) -> None:
             progress(number + done / max(total, 1), len(outs), what)
 
-        _WRITERS[out.suffix.lower()](out, document, overwrite=overwrite, progress=part)
+        write_document(out, document, overwrite=overwrite, progress=part)
     remarks = [remark for content in contents for remark in content.pair.remarks]
     return tuple(dict.fromkeys(remarks))
 

@@ -14,7 +14,6 @@ from numpy.typing import ArrayLike
 
 from bifocal.model.homography import apply_homography
 from bifocal.model.pair import Pair
-from photocore import adjustment
 from photocore.arrays import BoolArray, FloatArray, as_points
 from photocore.errors import GeometryError, InputError
 
@@ -292,6 +291,8 @@ def _fit(
 
     Residual sizes are root mean squares over the two coordinates, so that 1 is usual.
     """
+    from photocore import adjustment  # brings scipy, which only plane points need
+
     names = NAMES if used.sum() >= MINIMUM_FOR_TILT else NAMES[:4]
 
     def equations(values: FloatArray) -> tuple[FloatArray, FloatArray]:

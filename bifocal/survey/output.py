@@ -176,7 +176,9 @@ def _left_behind(solution: SolvedSurvey) -> str:
     source, survey = solution.source, solution.survey
     if not survey.titles:
         return ""
-    others = [title for title in survey.titles if bare(title) not in _OURS or not survey.is_ours]
+    # A survey workbook saved as .ods has lost its tables, but not its sheets.
+    is_ours = survey.is_ours or {"setup", "points"} <= {*map(bare, survey.titles)}
+    others = [title for title in survey.titles if bare(title) not in _OURS or not is_ours]
     said = f"a new workbook; {source.name} stays as it is"
     if source.suffix.lower() in (".xlsx", ".xlsm") and not survey.is_ours:
         return f"{said} (--out {source} --overwrite puts the results into its own table)."
@@ -419,12 +421,16 @@ def verdict_lines(solution: SolvedSurvey) -> list[str]:
 
 
 def point_rows(solution: SolvedSurvey, most: int) -> list[tuple[str, ...]]:
-    """Return the first points as rows of text: id, the columns of `SHOWN`, flag."""
+    """Return the first points as rows of text: id, the columns of `SHOWN`, flag.
+
+    A point that is not used is no good point: its flag stands in brackets.
+    """
     table = solution.table
     rows = []
     for i in range(min(most, len(table))):
         shown = [_shown(table[key][i], 4) for key in SHOWN]
-        rows.append((table.ids[i], *shown, table.flags[i]))
+        flag = table.flags[i] if solution.points.use[i] else f"({table.flags[i]}, unused)"
+        rows.append((table.ids[i], *shown, flag))
     return rows
 
 

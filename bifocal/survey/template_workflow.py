@@ -15,8 +15,9 @@ from photocore.output import check_ending, relative_name
 from photocore.provenance import file_hash, program, today
 from photocore.workbook.newbook import check_new_workbook
 
-#: Beyond this many points a spreadsheet is no tool any more.
-MOST_ROWS = 100_000
+#: With more points a workbook would unpack to more than `photocore.workbook.package` reads again: a
+#: row of `Points` and `Results` takes up to 12 kB together.
+MOST_ROWS = 30_000
 LogRow = tuple[str, str, str, str, str]
 
 

@@ -14,6 +14,7 @@ from multimedia.media.camera import EXTERIOR, INTERIOR
 from multimedia.projects.model import Project
 from photocore.arrays import FloatArray, IntArray
 from photocore.errors import GeometryError
+from photocore.reports.words import words_of
 
 #: A medium adjusted by more than this many of its prior sigmas is another one, or nonsense.
 FARTHEST = 5.0
@@ -31,14 +32,15 @@ EXACT = 1e-7
 _SHOWN = 6
 #: Interior parameters without which a camera is a pinhole: tested against zero (scale against 1).
 _TESTED = {name: 1.0 if name == "scale" else 0.0 for name in INTERIOR[3:]}
+#: Beginnings of the names of unknowns, and the text of `words.toml` on what tells them apart.
 _REMEDIES = (
-    (("thickness",), "measure the glass and give its sigma, e.g. --prior thickness1=0.1"),
-    (("index",), "measure points at more depths in the water or a distance there (--scale-bar)"),
-    (("offset", "tilt"), "measure where the interface lies and give its sigma as a --prior"),
-    (("p1", "p2"), "leave p1, p2 out, or turn the camera by 90 degrees between photos"),
-    (("k1", "k2", "k3"), "leave the higher one out, or use points out to the corners"),
-    (("xh", "yh"), "take photos turned by 90 degrees about the axis, or keep xh, yh"),
-    (("c", "scale", "shear"), "use control points at more depths or oblique photos, or keep c"),
+    (("thickness",), "remedy_thickness"),
+    (("index",), "remedy_index"),
+    (("offset", "tilt"), "remedy_offset"),
+    (("p1", "p2"), "remedy_p1"),
+    (("k1", "k2", "k3"), "remedy_k1"),
+    (("xh", "yh"), "remedy_xh"),
+    (("c", "scale", "shear"), "remedy_c"),
 )
 
 
@@ -183,35 +185,57 @@ def _uncarried(project: Project, columns: BundleColumns, result: Adjustment) -> 
 
 def _alike(result: Adjustment) -> Iterator[str]:
     """Yield the pairs that cannot be told apart, one sentence for each kind of pair."""
+    say = words_of("multimedia.adjustment", "en")
+    ranked = alike_pairs(result, ALIKE)
+    for kind, pairs in ranked[:_SHOWN]:
+        correlation, one, other = pairs[0]
+        more = f" (and {len(pairs) - 1} more such pairs)" if len(pairs) > 1 else ""
+        yield (
+            f"{one} and {other} can hardly be told apart: correlation {abs(correlation):.3f}"
+            f"{more}; {say(remedy_of(kind))}."
+        )
+    if len(ranked) > _SHOWN:
+        yield f"{len(ranked) - _SHOWN} more kinds of pairs are alike; the report shows them."
+
+
+def alike_pairs(
+    result: Adjustment, limit: float
+) -> list[tuple[tuple[str, str], list[tuple[float, str, str]]]]:
+    """Return the pairs of unknowns correlated beyond a limit, by the kinds of their parameters.
+
+    Parameters
+    ----------
+    result : Adjustment
+    limit : float
+        Of the absolute correlation.
+
+    Returns
+    -------
+    list of (kind, pairs)
+        Names of both parameters; correlation and labels of each such pair. Strongest first.
+    """
     matrix = np.nan_to_num(result.correlations)
-    first, second = np.nonzero(np.triu(np.abs(matrix) > ALIKE, 1))
+    first, second = np.nonzero(np.triu(np.abs(matrix) > limit, 1))
     kinds: dict[tuple[str, str], list[tuple[float, str, str]]] = {}
     for i, j in zip(first.tolist(), second.tolist(), strict=True):
         names = result.names[i], result.names[j]
         kind = names[0].rpartition(":")[2], names[1].rpartition(":")[2]
         # Centre and turns of one camera are alike in every narrow view; that harms no point.
         if not {*kind} <= {*EXTERIOR, "X", "Y", "Z"}:
-            kinds.setdefault(kind, []).append((abs(float(matrix[i, j])), *names))
-    ranked = sorted(kinds.items(), key=lambda item: -max(item[1])[0])
-    for kind, pairs in ranked[:_SHOWN]:
-        strength, one, other = max(pairs)
-        more = f" (and {len(pairs) - 1} more such pairs)" if len(pairs) > 1 else ""
-        yield (
-            f"{one} and {other} can hardly be told apart: correlation {strength:.3f}{more}; "
-            f"{_remedy(kind)}."
-        )
-    if len(ranked) > _SHOWN:
-        yield f"{len(ranked) - _SHOWN} more kinds of pairs are alike; the report shows them."
+            kinds.setdefault(kind, []).append((float(matrix[i, j]), *names))
+    for pairs in kinds.values():
+        pairs.sort(key=lambda pair: (-abs(pair[0]), pair[1:]))
+    return sorted(kinds.items(), key=lambda item: -abs(item[1][0][0]))
 
 
-def _remedy(kind: tuple[str, str]) -> str:
-    """Return what would tell two unknowns apart."""
+def remedy_of(kind: tuple[str, str]) -> str:
+    """Return the key of the text that says what would tell two unknowns apart."""
     for starts, remedy in _REMEDIES:
         if any(name.startswith(start) for name in kind for start in starts if len(start) > 1) or (
             "c" in kind and "c" in starts
         ):
             return remedy
-    return "leave one out, or give one a --prior"
+    return "remedy_other"
 
 
 def _insignificant(result: Adjustment) -> Iterator[str]:

@@ -1,188 +1,276 @@
-"""An adjustment as one self-contained HTML page: unknowns, residual vectors, correlations."""
+"""An adjustment as a report: precision first, media, unknowns, residuals, correlations."""
 
 from __future__ import annotations
 
-from html import escape
+from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 
+from multimedia.adjustment import report_figures as figures
+from multimedia.adjustment.plausibility import alike_pairs, remedy_of
 from multimedia.adjustment.unknowns import Adjustment
-from photocore.output import atomic_path
+from multimedia.media.flat_interface import FlatInterface
+from multimedia.media.interfaces import Interfaces
+from photocore.adjustment import OUTLIER_LIMIT
+from photocore.arrays import FloatArray
+from photocore.provenance import program, provenance, today
+from photocore.reports.document import (
+    Banner,
+    Block,
+    Document,
+    Heading,
+    Paragraph,
+    Picture,
+    TextTable,
+)
+from photocore.reports.words import Words, words_of
+from photocore.reports.writing import write_document
 
-#: Correlations from here on are printed bold: two unknowns that can hardly be told apart.
+#: Correlations from here on are listed with what tells the unknowns apart.
 STRONG = 0.9
-#: More unknowns than this would make a table nobody reads; only strong pairs are listed then.
-_LARGEST_TABLE = 45
-
-_STYLE = """
-body{font:15px/1.5 system-ui,sans-serif;margin:2em auto;max-width:72em;padding:0 1em;color:#1b2733}
-h1{margin-bottom:0}h2{margin-top:2em;border-bottom:1px solid #c8d2dc}
-table{border-collapse:collapse;font-variant-numeric:tabular-nums}
-td,th{padding:.15em .7em;text-align:right;border-bottom:1px solid #e3e9ef}
-td:first-child,th:first-child{text-align:left}
-.images{display:flex;flex-wrap:wrap;gap:1.5em}figure{margin:0}figcaption{font-size:.9em}
-.corr{font-size:11px}.corr td,.corr th{padding:.1em .3em;border:0}
-.corr th.turn{writing-mode:vertical-rl;transform:rotate(180deg);text-align:left}
-.warn{background:#fff3d6;padding:.5em 1em;border-left:4px solid #d79b00}
-"""
+#: More unknowns than this make a picture nobody reads; only the list is given then.
+_LARGEST_PICTURE = 60
+#: Cameras drawn, and rows of the longer tables.
+_CAMERAS, _SUSPECTS, _POINTS = 12, 50, 200
 
 
 def write_adjustment_report(
-    path: Path | str, result: Adjustment, *, title: str, notes: tuple[str, ...] = (),
-    overwrite: bool = False,
+    path: Path | str, result: Adjustment, *, title: str = "", language: str = "en",
+    notes: tuple[str, ...] = (), overwrite: bool = False,
 ) -> None:  # fmt: skip
-    """Write the page; no file beside it, no connection needed to read it.
+    """Write the report; no file beside it, no connection needed to read it.
+
+    Parameters
+    ----------
+    path : Path or str
+        ``.html`` or ``.pdf``.
+    result : Adjustment
+    title : str
+        By default that of the project.
+    language : str
+        ``en``, ``it`` or ``de``; remarks of the program are English.
+    notes : tuple of str
+        Remarks besides those of the adjustment.
+    overwrite : bool
 
     Raises
     ------
     InputError
-        If the file exists and ``overwrite`` is false, or cannot be written.
+        If the file exists and ``overwrite`` is false, cannot be written or has another ending, or
+        the language is unknown.
     """
-    parts = [
-        "<!doctype html><html lang=en><meta charset=utf-8>",
-        f"<title>{escape(title)}</title><style>{_STYLE}</style><h1>{escape(title)}</h1>",
-        _summary(result),
-        *(f"<p class=warn>{escape(note)}</p>" for note in (*notes, *result.remarks)),
-        "<h2>Unknowns</h2>",
-        _unknowns(result),
-        "<h2>Residuals</h2>",
-        _residuals(result),
-        "<h2>Suspected gross errors</h2>",
-        _suspects(result),
-        "<h2>Correlations</h2>",
-        _correlations(result),
-        "<h2>Object points</h2>",
-        _points(result),
-    ]
-    with atomic_path(path, overwrite=overwrite) as temporary:
-        temporary.write_text("\n".join(parts), encoding="utf-8")
+    document = adjustment_document(result, title=title, language=language, notes=notes)
+    write_document(Path(path), document, overwrite=overwrite)
 
 
-def _summary(result: Adjustment) -> str:
-    """Return the head figures."""
-    count = int(np.isfinite(result.residuals[:, 0]).sum())
-    return (
-        f"<p>{count} image points in {len(result.project.cameras)} cameras, "
-        f"{len(result.names)} unknowns besides object points, redundancy {result.redundancy}, "
-        f"{result.iterations} iterations.<br><b>sigma0 = {result.sigma0 * 1000:.3f} um</b></p>"
-    )
+def adjustment_document(
+    result: Adjustment, *, title: str = "", language: str = "en", notes: tuple[str, ...] = ()
+) -> Document:
+    """Return the blocks of the report, in the order a reader needs them."""
+    say = words_of("multimedia.adjustment", language)
+    title = title or say("title", name=result.project.name or "-")
+    made = say("made", program=program(), date=today())
+    blocks: list[Block] = [Heading(text=title, level=1), Paragraph(text=made, small=True)]
+    for part in (_precision, _media, _unknowns, _residuals, _suspects, _correlations, _points):
+        blocks += part(result, say)
+        if part is _precision:
+            blocks += _remarks((*notes, *result.remarks), say)
+    blocks += _provenance(say)
+    return Document(title=title, language=language, subject=made, blocks=tuple(blocks))
 
 
-def _unknowns(result: Adjustment) -> str:
-    """Return the table of adjusted values with their standard deviations."""
+def _precision(result: Adjustment, say: Words) -> Iterator[Block]:
+    project, suspects = result.project, result.suspects()
+    sigma = _point_sigma(result)
+    free = sigma[np.linalg.norm(np.nan_to_num(sigma), axis=1) > 0]
+    details = [say("no_suspects") if not suspects else say("some_suspects", count=len(suspects))]
+    if len(free):
+        x, y, z = (f"{v:.3g}" for v in np.sqrt(np.nanmean(free**2, axis=0)))
+        details.insert(0, say("points_sigma", x=x, y=y, z=z, unit=project.unit))
+    else:
+        details.insert(0, say("points_fixed"))
+    if result.model_error > 1:
+        details.append(say("model_error", factor=f"{result.model_error:.2f}"))
+    yield Heading(text=say("accuracy"))
+    yield Banner(
+        text=say("sigma0", sigma0=f"{result.sigma0 * 1000:.3f}"), details=tuple(details),
+        good=None if not suspects else False,
+    )  # fmt: skip
+    yield Paragraph(
+        text=say(
+            "counts", images=int(np.isfinite(result.residuals[:, 0]).sum()),
+            cameras=len(project.cameras), unknowns=len(result.names), points=len(free),
+            redundancy=result.redundancy, iterations=result.iterations,
+        )
+    )  # fmt: skip
+
+
+def _point_sigma(result: Adjustment) -> FloatArray:
+    """Return the standard deviations of the object points, shape (p, 3)."""
+    sigma: FloatArray = np.sqrt(np.diagonal(result.point_covariance, axis1=1, axis2=2))
+    return sigma
+
+
+def _remarks(remarks: tuple[str, ...], say: Words) -> Iterator[Block]:
+    if remarks:
+        yield Heading(text=say("remarks"), level=3)
+    for remark in dict.fromkeys(remarks):
+        yield Paragraph(text=remark)
+
+
+def _media(result: Adjustment, say: Words) -> Iterator[Block]:
+    project = result.project
+    yield Heading(text=say("media"))
+    if not project.media:
+        yield Paragraph(text=say("media_none"))
+        return
+    rows = []
+    for name, media in project.media.items():
+        cameras = [
+            camera.name
+            for camera, own in zip(project.cameras, project.media_of, strict=True) if own == name
+        ]  # fmt: skip
+        many = f" ... ({len(cameras)})" if len(cameras) > 6 else ""
+        thick = media.layers.thicknesses if isinstance(media, FlatInterface) else ()
+        rows.append([
+            name, ", ".join(cameras[:6]) + many, ", ".join(f"{n:.5f}" for n in media.indices),
+            ", ".join(f"{t:.6g}" for t in thick) or "-", _place(media, say),
+        ])  # fmt: skip
+    keys = ("media_name", "media_cameras", "media_indices", "media_thicknesses", "media_place")
+    yield TextTable(headings=[say(key, unit=project.unit) for key in keys], rows=rows)
+
+
+def _place(media: FlatInterface | Interfaces, say: Words) -> str:
+    """Return in words where the faces of media lie."""
+    if isinstance(media, Interfaces):
+        kinds = ", ".join(type(surface).__name__ for surface in media.surfaces)
+        return say("media_surfaces", count=len(media.surfaces), kinds=kinds)
+
+    def vector(values: FloatArray) -> str:
+        # Adding nought makes no difference of -0.
+        return "(" + ", ".join(f"{round(float(v), 5) + 0.0:g}" for v in values) + ")"
+
+    key = "media_camera" if media.moves_with_camera else "media_world"
+    return say(key, point=vector(media.point), normal=vector(media.normal))
+
+
+def _unknowns(result: Adjustment, say: Words) -> Iterator[Block]:
+    yield Heading(text=say("unknowns"))
     rows = []
     for name, value, sigma, unit in result.rows():
         digits = max(0, min(12, 2 - int(np.floor(np.log10(sigma))) if sigma > 0 else 6))
-        rows.append(
-            f"<tr><td>{escape(name)}<td>{value:.{digits}f}<td>{sigma:.{digits}f}<td>{unit}</tr>"
+        rows.append([name, f"{value:.{digits}f}", f"{sigma:.{digits}f}", unit])
+    yield TextTable(headings=[say("unknown"), say("value"), "sigma", say("unit")], rows=rows)
+    if any(":offset" in name or "tilt" in name or name == "offset" for name in result.names):
+        yield Paragraph(text=say("offsets_note"), small=True)
+
+
+def _residuals(result: Adjustment, say: Words) -> Iterator[Block]:
+    seen = [c for c in result.project.cameras if len(figures.measured_rows(result, c))]
+    if not seen:
+        return
+    yield Heading(text=say("residuals"))
+    rows = []
+    for camera in seen:
+        mine = figures.measured_rows(result, camera)
+        rms = float(np.sqrt(np.mean(result.residuals[mine] ** 2)))
+        hidden = result.smallest_detectable[mine]
+        least = f"{np.nanmedian(hidden) * 1000:.1f}" if np.isfinite(hidden).any() else "-"
+        row = (rms * 1000, result.sigma0_of[camera.name] * 1000)
+        rows.append([camera.name, str(len(mine)), *(f"{v:.3f}" for v in row), least])
+    heads = [say("camera"), say("points"), "RMS [µm]", "sigma0 [µm]", say("found_from")]
+    yield TextTable(headings=heads, rows=rows)
+    yield Paragraph(text=say("detectable"), small=True)
+    drawn = sorted(seen, key=lambda camera: -result.sigma0_of[camera.name])[:_CAMERAS]
+    if len(drawn) < len(seen):
+        yield Paragraph(text=say("more_cameras", shown=len(drawn), all=len(seen)), small=True)
+    drawn = [camera for camera in seen if camera in drawn]
+    page = 2 * figures.COLUMNS
+    for first in range(0, len(drawn), page):
+        some = drawn[first : first + page]
+        yield Picture(
+            draw=partial(figures.draw_vectors, result=result, cameras=some, say=say),
+            ratio=0.52 * -(-len(some) // figures.COLUMNS),
+            caption=say("vectors_caption", zoom=f"{figures.vector_zoom(result):g}"),
         )
-    return "<table><tr><th>unknown<th>value<th>sigma<th></tr>" + "".join(rows) + "</table>"
+    depth, radial = figures.depth_and_radial(result)
+    if (np.isfinite(depth) & np.isfinite(radial)).sum() > 3:
+        yield Heading(text=say("depth"), level=3)
+        yield Picture(
+            draw=partial(figures.draw_depth, result=result, say=say), ratio=0.45,
+            caption=say("depth_caption"),
+        )  # fmt: skip
 
 
-def _residuals(result: Adjustment) -> str:
-    """Return a figure of residual vectors for every camera."""
+def _suspects(result: Adjustment, say: Words) -> Iterator[Block]:
+    worst = np.abs(np.nan_to_num(result.standardised)).max(axis=1, initial=0.0)
+    order = [int(row) for row in np.argsort(-worst) if worst[row] > OUTLIER_LIMIT]
+    if not order:
+        return
+    yield Heading(text=say("suspects"))
     images = result.project.image_points
-    figures = []
-    every = np.hypot(*result.residuals.T)
-    typical = float(np.nanmedian(every)) if np.isfinite(every).any() else 1.0
-    for camera in result.project.cameras:
-        rows = images.of_camera(camera.name)
-        place, miss = images.image[rows], result.residuals[rows]
-        good = np.isfinite(miss[:, 0])
-        if not good.any():
-            continue
-        reach = float(np.abs(place[good]).max()) * 1.1
-        if camera.sensor is not None:
-            reach = float(max(camera.sensor.width, camera.sensor.height) * max(camera.sensor.pitch))
-            reach /= 2
-        scale = reach / 15 / max(typical, 1e-12)
-        lines = []
-        for (x, y), (dx, dy), name in zip(
-            place[good], miss[good], np.array(images.ids)[rows][good], strict=True
-        ):
-            large = np.hypot(dx, dy) > 4 * typical
-            lines.append(
-                f"<line x1={x:.4f} y1={-y:.4f} x2={x + dx * scale:.4f} y2={-y - dy * scale:.4f} "
-                f"stroke='{'#c0392b' if large else '#1f6fb2'}'><title>{escape(str(name))}: "
-                f"{dx * 1000:.1f}, {dy * 1000:.1f} um</title></line>"
-            )
-        box = f"{-reach:.4f} {-reach:.4f} {2 * reach:.4f} {2 * reach:.4f}"
-        rms = float(np.sqrt(np.mean(miss[good] ** 2)) * 1000)
-        hidden = result.smallest_detectable[rows]
-        least = float(np.nanmedian(hidden)) * 1000 if np.isfinite(hidden).any() else float("nan")
-        figures.append(
-            f"<figure><svg width=340 height=340 viewBox='{box}' role=img "
-            f"aria-label='Residual vectors of camera {escape(camera.name)}'>"
-            f"<rect x={-reach:.4f} y={-reach:.4f} width={2 * reach:.4f} height={2 * reach:.4f} "
-            f"fill='#f6f8fa' stroke='#c8d2dc' stroke-width={reach / 200:.5f} />"
-            f"<g stroke-width={reach / 150:.5f}>{''.join(lines)}</g></svg>"
-            f"<figcaption>camera {escape(camera.name)}: {int(good.sum())} points, RMS "
-            f"{rms:.2f} um, sigma0 {result.sigma0_of[camera.name] * 1000:.2f} um, "
-            f"vectors {scale:.0f} x; a gross error is found from {least:.1f} um on "
-            "(median, 80 % power)</figcaption></figure>"
-        )
-    return "<div class=images>" + "".join(figures) + "</div>"
+    rows = [
+        [images.ids[k], images.cameras[k], f"{np.hypot(*result.residuals[k]) * 1000:.1f}",
+         f"{worst[k]:.1f}"]
+        for k in order[:_SUSPECTS]
+    ]  # fmt: skip
+    heads = [say("point"), say("camera"), say("residual"), say("in_sigmas")]
+    yield TextTable(headings=heads, rows=rows)
+    if len(order) > _SUSPECTS:
+        yield Paragraph(text=say("more_rows", count=len(order) - _SUSPECTS), small=True)
 
 
-def _suspects(result: Adjustment) -> str:
-    """Return the list of suspects, or a word that there are none."""
-    suspects = result.suspects()
-    if not suspects:
-        return "<p>None beyond 3.5 standard deviations.</p>"
-    items = "".join(f"<li>{escape(sentence)}</li>" for sentence in suspects[:50])
-    more = f"<p>... and {len(suspects) - 50} more.</p>" if len(suspects) > 50 else ""
-    return f"<ol>{items}</ol>{more}"
+def _correlations(result: Adjustment, say: Words) -> Iterator[Block]:
+    if len(result.names) < 2:
+        return
+    yield Heading(text=say("correlations"))
+    yield Paragraph(text=say("correlations_meaning"))
+    ranked = alike_pairs(result, STRONG)
+    if ranked:
+        rows = [
+            [one, other, f"{value:+.3f}", str(len(pairs)), say(remedy_of(kind))]
+            for kind, pairs in ranked for value, one, other in pairs[:1]
+        ]  # fmt: skip
+        heads = [say("unknown"), say("and_other"), say("correlation_axis"), say("how_many"),
+                 say("told_apart")]  # fmt: skip
+        yield TextTable(headings=heads, rows=rows, caption=say("strong_pairs", limit=STRONG))
+    else:
+        yield Paragraph(text=say("strong_none", limit=STRONG))
+    if len(result.names) <= _LARGEST_PICTURE:
+        yield Picture(
+            draw=partial(figures.draw_correlations, result=result, say=say), ratio=0.9,
+            caption=say("correlations_caption"),
+        )  # fmt: skip
 
 
-def _correlations(result: Adjustment) -> str:
-    """Return the coloured table, or the strong pairs when it would be too large."""
-    matrix, names = result.correlations, result.names
-    if len(names) > _LARGEST_TABLE:
-        first, second = np.nonzero(np.triu(np.abs(matrix) > STRONG, 1))
-        order = np.argsort(-np.abs(matrix[first, second]))[:200]
-        rows = "".join(
-            f"<tr><td>{escape(names[i])}<td>{escape(names[j])}<td>{matrix[i, j]:+.3f}</tr>"
-            for i, j in zip(first[order], second[order], strict=True)
-        )
-        return f"<p>Pairs beyond {STRONG}:</p><table>{rows}</table>"
-    head = "".join(f"<th class=turn>{escape(name)}" for name in names)
-    lines = []
-    for i, name in enumerate(names):
-        cells = []
-        for j in range(i + 1):
-            value = matrix[i, j]
-            shade = f"rgba({'192,57,43' if value > 0 else '31,111,178'},{abs(value) * 0.8:.2f})"
-            text = f"<b>{value * 100:.0f}</b>" if abs(value) > STRONG else f"{value * 100:.0f}"
-            cells.append(f"<td style='background:{shade}'>{text}")
-        lines.append(f"<tr><th>{escape(name)}{''.join(cells)}</tr>")
-    return (
-        "<p>In per cent; bold: hardly told apart.</p>"
-        f"<table class=corr><tr><th>{head}</tr>{''.join(lines)}</table>"
-    )
-
-
-def _points(result: Adjustment) -> str:
-    """Return the adjusted points that were not fixed, the least precise first."""
-    points = result.project.object_points
-    sigma = np.sqrt(np.diagonal(result.point_covariance, axis1=1, axis2=2))
+def _points(result: Adjustment, say: Words) -> Iterator[Block]:
+    """Yield the adjusted points that were not fixed, the least precise first."""
+    points, sigma = result.project.object_points, _point_sigma(result)
     size = np.linalg.norm(np.nan_to_num(sigma), axis=1)
     order = [int(j) for j in np.argsort(-size) if size[j] > 0]
     if not order:
-        return "<p>All object points were fixed.</p>"
-    rms = np.sqrt(np.mean(sigma[order] ** 2, axis=0))
-    unit = escape(result.project.unit)
-    rows = "".join(
-        f"<tr><td>{escape(points.ids[j])}"
-        + "".join(f"<td>{v:.5f}" for v in points.xyz[j])
-        + "".join(f"<td>{v:.2g}" for v in sigma[j])
-        + "</tr>"
-        for j in order[:200]
-    )
-    more = f"<p>... and {len(order) - 200} more.</p>" if len(order) > 200 else ""
-    return (
-        f"<p>{len(order)} points; RMS of the standard deviations "
-        f"{rms[0]:.3g} / {rms[1]:.3g} / {rms[2]:.3g} {unit} in X / Y / Z; least precise first.</p>"
-        f"<table><tr><th>point<th>X<th>Y<th>Z<th>sigma X<th>sigma Y<th>sigma Z</tr>{rows}</table>"
-        + more
-    )
+        return
+    yield Heading(text=say("object_points"))
+    rows = [
+        [points.ids[j], *(f"{v:.5f}" for v in points.xyz[j]), *(f"{v:.2g}" for v in sigma[j])]
+        for j in order[:_POINTS]
+    ]
+    heads = [say("point"), "X", "Y", "Z", "sigma X", "sigma Y", "sigma Z"]
+    caption = say("least_precise", count=len(order), unit=result.project.unit)
+    yield TextTable(headings=heads, rows=rows, caption=caption)
+    if len(order) > _POINTS:
+        yield Paragraph(text=say("more_rows", count=len(order) - _POINTS), small=True)
+
+
+def _provenance(say: Words) -> Iterator[Block]:
+    made = provenance()
+    if not made.command and not made.inputs:
+        return
+    yield Heading(text=say("provenance"))
+    if made.command:
+        yield Paragraph(text=say("made_by"), lines=(made.command,), small=True)
+    if made.inputs:
+        rows = [list(row) for row in made.inputs]
+        yield TextTable(headings=[say("file"), "SHA-256"], rows=rows)

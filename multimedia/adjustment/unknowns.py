@@ -105,6 +105,13 @@ class Unknowns:
                 positive(sigma, f"prior of {label}")
 
 
+#: Units of interior parameters.
+_INTERIOR_UNITS = {
+    "c": "mm", "xh": "mm", "yh": "mm", "k1": "mm^-2", "k2": "mm^-4", "k3": "mm^-6",
+    "p1": "mm^-1", "p2": "mm^-1",
+}  # fmt: skip
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Adjustment:
     """An adjusted project with its precision.
@@ -175,10 +182,18 @@ class Adjustment:
         """Return name, value, sigma and unit of every unknown; angles in degrees."""
         table = []
         for k, name in enumerate(self.names):
-            turns = name.rsplit(":", 1)[-1] in (*EXTERIOR[3:], "tilt1", "tilt2")
-            factor, unit = (float(np.degrees(1.0)), "deg") if turns else (1.0, "")
+            unit = self._unit(name.rsplit(":", 1)[-1])
+            factor = float(np.degrees(1.0)) if unit == "deg" else 1.0
             table.append((name, float(self.values[k]) * factor, self.sigma(name) * factor, unit))
         return table
+
+    def _unit(self, parameter: str) -> str:
+        """Return the unit of a parameter; empty for numbers without one."""
+        if parameter in (*EXTERIOR[3:], "tilt1", "tilt2"):
+            return "deg"
+        if parameter in EXTERIOR or parameter.startswith(("offset", "thickness")):
+            return self.project.unit
+        return _INTERIOR_UNITS.get(parameter, "")
 
     @property
     def correlations(self) -> FloatArray:

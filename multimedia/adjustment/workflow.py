@@ -14,6 +14,8 @@ from multimedia.projects.project_file import read_project, write_project
 from multimedia.refraction.water import salinity_from_index, water_index_derivatives
 from photocore.errors import InputError
 from photocore.output import all_or_none, check_all_writable, check_ending
+from photocore.reports.words import words_of
+from photocore.reports.writing import check_report
 
 
 @all_or_none()
@@ -23,6 +25,7 @@ def adjust_project(
     *,
     out: Path | None = None,
     report: Path | None = None,
+    language: str = "en",
     overwrite: bool = False,
 ) -> tuple[Adjustment, tuple[str, ...]]:
     """Adjust a project file; write the adjusted project and the report where asked.
@@ -34,16 +37,19 @@ def adjust_project(
     """
     check_all_writable(out, report, overwrite=overwrite)
     check_ending(out, "a project is written as .toml.", ".toml")
-    check_ending(report, "a report is written as .html.", ".html")
+    check_report(report)
     project = read_project(source)
     result = bundle_adjust(project, unknowns)
     if out is not None:
         write_project(out, result.project, overwrite=overwrite)
     if report is not None:
-        title = f"Bundle adjustment of {project.name or source.name}"
-        write_adjustment_report(
-            report, result, title=title, notes=project.remarks, overwrite=overwrite
+        title = words_of("multimedia.adjustment", language)(
+            "title", name=project.name or source.name
         )
+        write_adjustment_report(
+            report, result, title=title, language=language, notes=project.remarks,
+            overwrite=overwrite,
+        )  # fmt: skip
     return result, (*project.remarks, *result.remarks)
 
 

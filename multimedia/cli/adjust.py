@@ -18,6 +18,7 @@ Examples:
   multimedia adjust tank.toml --interior c,xh,yh,k1 --media index3 --out tank2.toml
              --report tank.html
   multimedia adjust tank.toml --interior auto --media index3 --prior index3=0.0005
+             --report rapporto.pdf --language it
   multimedia adjust reef.toml --control free --scale-bar A,B,0.5,0.0001 --out reef2.toml
   multimedia adjust tank.toml --media index3 --wavelength 520 --temperature 20 --depth 0.1
 
@@ -69,13 +70,15 @@ of every camera.
 @number("--temperature", "C", "For the salinity: water temperature [deg C].", type=NUMBER)
 @number("--depth", "M", "Its depth [m].", type=NUMBER, default=0.0)
 @click.option("--out", type=FILE, help="Write the adjusted project (.toml).")
-@click.option("--report", type=FILE, help="Write a report (.html).")
+@click.option("--report", type=FILE, help="Write a report (.html, .pdf).")
+@choice("--language", "en|it|de", "Of the report.", default="en")
 @overwrite
 @as_json
 def command(
     project: Path, fix_camera: tuple[str, ...], plate: tuple[str, ...], scale_bar: tuple[str, ...],
     prior: tuple[str, ...], wavelength: float | None, temperature: float | None, depth: float,
-    out: Path | None, report: Path | None, overwrite: bool, as_json: bool, **choices: Any,
+    out: Path | None, report: Path | None, language: str, overwrite: bool, as_json: bool,
+    **choices: Any,
 ) -> None:  # fmt: skip
     """Adjust cameras, object points and the media of a project together."""
     from multimedia.adjustment import workflow as adjust
@@ -89,7 +92,7 @@ def command(
         priors=dict(adjust.parse_prior(text) for text in prior), typical_priors=True,
     )  # fmt: skip
     result, notes = adjust.adjust_project(
-        project, unknowns, out=out, report=report, overwrite=overwrite
+        project, unknowns, out=out, report=report, language=language, overwrite=overwrite
     )
     salinity = None
     if wavelength is not None and temperature is not None:

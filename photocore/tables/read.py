@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import chain
 from pathlib import Path
@@ -244,6 +244,17 @@ def _reach_below(grid: CellGrid, match: Match, bottom: int) -> None:
             f'The sheet "{grid.title}" has {row - bottom} rows directly below the table; they are '
             "used too."
         )
+    apart = [n for n, cells in grid.rows.items() if n > row and _count(cells, used) > 1]
+    if apart:
+        match.remarks.append(
+            f'The sheet "{grid.title}" has numbers below the table, from row {min(apart)} on, that '
+            "are NOT used: blank rows part them from it. Move them up if they are points."
+        )
+
+
+def _count(cells: Mapping[int, Value], columns: Collection[int]) -> int:
+    """Return how many of the columns hold a number in a row."""
+    return sum(type(cells.get(column)) is float for column in columns)
 
 
 def _in_sheet(

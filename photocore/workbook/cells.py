@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from itertools import repeat
 from typing import Literal, NamedTuple
 
@@ -197,7 +198,8 @@ class NewColumn(NamedTuple):
     formula: Callable[[int], str] | None = None
 
 
-class NewRows(NamedTuple):
+@dataclass(frozen=True, slots=True)
+class NewRows:
     """Rows to be added to a sheet: the first one, how many, their columns from left to right.
 
     Where rows are there already, the rule says what happens to their cells.
@@ -207,6 +209,12 @@ class NewRows(NamedTuple):
     size: int
     columns: Sequence[NewColumn]
     rule: Rule = "prepared"
+    by_letters: Mapping[bytes, Sequence[CellValue]] = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        """Note the columns' values by their letters, as a sheet's XML names them."""
+        values = {column_letters(own.column).encode(): own.values for own in self.columns}
+        object.__setattr__(self, "by_letters", values)
 
     def cells(self, row: int) -> dict[int, NewCell]:
         """Return the cells of one row by column; none if it is not one of these."""

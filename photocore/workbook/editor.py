@@ -17,11 +17,12 @@ from photocore.errors import InputError
 from photocore.output import atomic_path, check_writable, free_path
 from photocore.workbook import formulas
 from photocore.workbook.cells import CellValue, NewCell, NewColumn, NewRows, RowFormula, escape
+from photocore.workbook.changes import SheetChanges, Spliced
 from photocore.workbook.graft import Graft
 from photocore.workbook.grid import CellGrid, SheetFile, TableArea, cell_name
 from photocore.workbook.newbook import check_new_workbook, new_workbook
 from photocore.workbook.package import check_header, open_package, read_part, rewrite_package
-from photocore.workbook.splice import SheetChanges, Spliced, splice_sheet
+from photocore.workbook.splice import splice_sheet
 from photocore.workbook.styles import StyleSheet
 from photocore.workbook.xlsx import (
     SheetPart,
@@ -92,8 +93,7 @@ class WorkbookEditor:
 
     def table(self, name: str) -> TableArea | None:
         """Return a named table, None where there is none; upper and lower case are alike."""
-        tables = (t for t in self.tables if t.name.casefold() == name.casefold())
-        return next(tables, None)
+        return next((t for t in self.tables if t.name.casefold() == name.casefold()), None)
 
     def grid(self, title: str) -> CellGrid:
         """Return a sheet's cells as they stand in the file."""
@@ -426,9 +426,10 @@ class WorkbookEditor:
             if any(sheet.formula_lost for sheet in spliced.values()):
                 formulas.drop_order(self.path, package, self.book, parts)
             self._graft(package, parts)
-            own = {*package.namelist()}
-            original = {n: read_part(self.path, package, n) for n in own & parts.keys()}
-        return {name: data for name, data in parts.items() if data != original.get(name, b"")}
+            known = {s.part: spliced[s.title].data for s in self.book.sheets if s.title in spliced}
+            others = {*package.namelist()} & parts.keys() - known.keys()
+            known |= {name: read_part(self.path, package, name) for name in others}
+        return {name: data for name, data in parts.items() if data != known.get(name, b"")}
 
     def _graft(self, package: zipfile.ZipFile, parts: dict[str, bytes | None]) -> None:
         """Add new sheets, names and formats."""

@@ -8,8 +8,6 @@ import zipfile
 from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from xml.sax.saxutils import escape as escape_xml
-from xml.sax.saxutils import unescape as unescape_xml
 
 from photocore.workbook.grid import TableArea, cell_name, split_area
 from photocore.workbook.package import local, read_part, understood, xml_elements
@@ -20,6 +18,7 @@ from photocore.workbook.xlsx import (
     read_relations,
     row_cells,
 )
+from photocore.workbook.xmltext import escaped, unescaped
 
 _RANGE = re.compile(
     r"(?P<sheet>(?:'(?:[^']|'')+'|[A-Za-z0-9_.À-ɏ]+)!)?"
@@ -29,7 +28,6 @@ _AREA = re.compile(r"[A-Z]{1,3}\d{1,7}(:[A-Z]{1,3}\d{1,7})?")
 #: A cell without its sheet; all are alike when only sheets, tables and names matter.
 _ANY_CELL = re.compile(r"(?<![\w.'$])\$?[A-Z]{1,3}\$?\d+(?![\w.!'(])")
 _FORMULA = re.compile(rb"<(?:\w+:)?f(?:\s[^>]*)?>([^<]+)</")
-_QUOTES = {"&quot;": '"', "&apos;": "'"}
 #: Functions whose result may depend on any cell, whatever their text names.
 _FAR_REACHING = re.compile(r"\b(INDIRECT|OFFSET|CELL|INFO)\s*\(", re.IGNORECASE)
 
@@ -122,7 +120,7 @@ class References:
         """Return the formulas of a sheet as one text, those that differ only in cells once."""
         data = read_part(self.path, self.package, sheet.part)
         texts = {match.decode("utf-8", "replace") for match in _FORMULA.findall(data)}
-        shapes = {_ANY_CELL.sub("#", unescape_xml(text, _QUOTES)) for text in texts}
+        shapes = {_ANY_CELL.sub("#", unescaped(text)) for text in texts}
         return "\n".join(sorted(shapes))
 
     def grow(self, area: TableArea, bottom: int, parts: dict[str, bytes | None]) -> None:
@@ -157,9 +155,9 @@ class References:
         pattern = re.compile(rb"(<(?:\w+:)?%s(?:\s[^>]*)?>)([^<]+)(</)" % tag)
 
         def replace(match: re.Match[bytes]) -> bytes:
-            text = unescape_xml(match[2].decode("utf-8"), _QUOTES)
+            text = unescaped(match[2].decode("utf-8"))
             new = grown_reference(text, area, bottom)
-            return match[0] if new == text else match[1] + escape_xml(new).encode() + match[3]
+            return match[0] if new == text else match[1] + escaped(new).encode() + match[3]
 
         changed = pattern.sub(replace, data)
         if changed != data:

@@ -10,12 +10,12 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from xml.etree import ElementTree
-from xml.sax.saxutils import escape, quoteattr
 
 from photocore.errors import InputError
 from photocore.workbook.package import read_part
 from photocore.workbook.styles import StyleSheet
 from photocore.workbook.xlsx import SheetPart, Workbook, read_directory
+from photocore.workbook.xmltext import escaped, quoted
 
 _TYPES = "[Content_Types].xml"
 _RELATIONS = "http://schemas.openxmlformats.org/officeDocument/2006/relationships"
@@ -93,10 +93,10 @@ class Graft:
         )
         stands = pattern.search(data)
         if stands is None:
-            self._add_name(f" name={quoteattr(name)}", reference)
+            self._add_name(f" name={quoted(name)}", reference)
         elif b"#REF!" in stands[1]:
             start, end = stands.span(1)
-            self._put(self.book.part, data[:start] + escape(reference).encode() + data[end:])
+            self._put(self.book.part, data[:start] + escaped(reference).encode() + data[end:])
 
     def redefine(self, name: str, reference: str) -> None:
         """Define a name anew, wherever it led."""
@@ -106,11 +106,11 @@ class Graft:
             % re.escape(name.encode()),
             re.IGNORECASE,
         )
-        new, found = pattern.subn(lambda m: m[1] + escape(reference).encode() + m[2], data)
+        new, found = pattern.subn(lambda m: m[1] + escaped(reference).encode() + m[2], data)
         if found:
             self._put(self.book.part, new)
         else:
-            self._add_name(f" name={quoteattr(name)}", reference)
+            self._add_name(f" name={quoted(name)}", reference)
 
     def _local_names(
         self, data: bytes, other: Workbook, sheet: SheetPart, index: int, title: str
@@ -122,14 +122,14 @@ class Graft:
             old, new = f'localSheetId="{place}"', f'localSheetId="{index}"'
             if old in attributes:
                 attributes = attributes.replace(old, new)
-                before, after = (f"{escape(quoted_title(name))}!" for name in (sheet.title, title))
+                before, after = (f"{escaped(quoted_title(name))}!" for name in (sheet.title, title))
                 reference = match[2].decode().replace(before, after)
                 self._add_name(f" {attributes.strip()}", reference, raw=True)
 
     def _add_name(self, attributes: str, reference: str, *, raw: bool = False) -> None:
         data = self._book()
         prefix = _prefix_of(data)
-        text = reference if raw else escape(reference)
+        text = reference if raw else escaped(reference)
         entry = f"<{prefix}definedName{attributes}>{text}</{prefix}definedName>".encode()
         listed = re.search(rb"</(?:\w+:)?definedNames\s*>", data)
         if listed:
@@ -157,7 +157,7 @@ class Graft:
         if like is None or place is None:
             raise InputError(f"{self.path}: its list of sheets cannot be understood.")
         entry = (
-            f'<{_prefix_of(data)}sheet name={quoteattr(title)} sheetId="{max(numbers) + 1}" '
+            f'<{_prefix_of(data)}sheet name={quoted(title)} sheetId="{max(numbers) + 1}" '
             f'{like[1].decode()}:id="{key}"/>'
         )
         self._put(self.book.part, data[: place.start()] + entry.encode() + data[place.start() :])

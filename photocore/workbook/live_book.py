@@ -163,7 +163,7 @@ class SheetBuilder:
         for letter, text in zip("AB", texts, strict=True):
             self.text(f"{letter}{row}", text)
         self.text(f"D{row}", unit, LABEL_FONT)
-        self.worksheet[f"D{row}"].alignment = Alignment(indent=1)
+        self.worksheet[f"D{row}"].alignment = _UNIT_PLACE
 
     def headings(self, row: int, keys: Sequence[str], widths: Sequence[float] = ()) -> None:
         """Write a row of headings from column A, in the language of the workbook."""
@@ -171,7 +171,7 @@ class SheetBuilder:
             letter = get_column_letter(i)
             self.word(f"{letter}{row}", key, HEAD_FONT)
             self.worksheet[f"{letter}{row}"].fill = HEAD_FILL
-            place = {"value": Alignment(horizontal="right"), "unit": Alignment(indent=1)}
+            place = {"value": Alignment(horizontal="right"), "unit": _UNIT_PLACE}
             self.worksheet[f"{letter}{row}"].alignment = place.get(key, Alignment())
         for i, width in enumerate(widths, start=1):
             self.worksheet.column_dimensions[get_column_letter(i)].width = width
@@ -343,6 +343,8 @@ class SheetBuilder:
             guard(sheet)
 
 
+# Programs indent nothing that has no side of its own.
+_UNIT_PLACE = Alignment(horizontal="left", indent=1)
 _LABEL_PLACE = Alignment(wrap_text=True, vertical="bottom", horizontal="center")
 
 
@@ -367,14 +369,26 @@ def _block(
     if short:
         for i, column in enumerate(columns):
             if column.kind == "formula":
-                formulas[i] = _short_formula(table, column.formula, letters, first - 1)
+                formulas[i] = short_formula(table, column.formula, letters, first - 1)
     return RowBlock(row=first, columns=listed, formulas=formulas)
 
 
-def _short_formula(
+def short_formula(
     table: str, text: str, letters: Mapping[str, str], head: int
 ) -> Callable[[int], str]:
-    """Return a function of the row that writes the formula with A1 references."""
+    """Return a function of the row that writes a formula with A1 references.
+
+    Parameters
+    ----------
+    table : str
+        Name of the table.
+    text : str
+        The formula, with ``[@key]`` for the cell of the same row.
+    letters : mapping
+        Key to the letters of its column.
+    head : int
+        Row of the keys.
+    """
     text = text.replace(f"ROW()-ROW({table}[[#Headers],[id]])", "\0")
     parts = re.split(r"\[@(\w+)\]", text)
     pieces = [letters[part] if i % 2 else part for i, part in enumerate(parts)]

@@ -26,10 +26,11 @@ from photocore.errors import InputError
 from photocore.output import atomic_path, check_writable, free_path
 from photocore.provenance import provenance
 from photocore.workbook.cells import CellValue, NewColumn, NewRows, escape
+from photocore.workbook.changes import SheetChanges
 from photocore.workbook.formulas import ModelCell, model_cells
 from photocore.workbook.grid import split_cell
 from photocore.workbook.package import read_part, rewrite_package
-from photocore.workbook.splice import SheetChanges, splice_sheet
+from photocore.workbook.splice import splice_sheet
 from photocore.workbook.xlsx import read_directory
 
 if TYPE_CHECKING:

@@ -11,14 +11,15 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 #: Larger sheets are read piece by piece, to spare memory. [bytes]
-LARGEST = 96 * 2**20
+LARGEST = 256 * 2**20
 _ROW = re.compile(rb'\s*<row r="(\d+)"((?:\s[\w:]+="[^"<]*")*)\s*(/?)>')
 _OTHER = re.compile(rb"encoding\s*=\s*[\"'](?!utf-?8)", re.IGNORECASE)
 _END = re.compile(rb"\s*</row>")
+#: Without a way back, since no other reading of a cell would fit: a third faster.
 _CELL = re.compile(
-    rb'\s*<c r="([A-Z]{1,3})(\d+)"(?: s="(\d+)")?(?: t="(\w+)")?\s*(?:/>|>'
-    rb'(<f(?:\s[\w:]+="[^"<]*")*\s*(?:/>|>[^<]*</f>))?'
-    rb'(<v>[^<]*</v>|<v\s*/>|<is><t(?: xml:space="preserve")?>[^<]*</t></is>)?</c>)'
+    rb'\s*+<c r="([A-Z]{1,3}+)(\d++)"(?: s="(\d++)")?+(?: t="(\w++)")?+\s*+(?:/>|>'
+    rb'(<f(?:\s[\w:]++="[^"<]*+")*+\s*+(?:/>|>[^<]*+</f>))?+'
+    rb'(<v>[^<]*+</v>|<v\s*+/>|<is><t(?: xml:space="preserve")?+>[^<]*+</t></is>)?+</c>)'
 )
 
 

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import re
-from xml.sax.saxutils import escape
 
 from photocore.workbook.editor import WorkbookEditor
 from photocore.workbook.graft import quoted_title
 from photocore.workbook.package import open_package, read_part
+from photocore.workbook.xmltext import escaped
 
 
 def move_print_area(editor: WorkbookEditor, title: str, before: int, after: int) -> bool:
@@ -30,7 +30,7 @@ def move_print_area(editor: WorkbookEditor, title: str, before: int, after: int)
     """
     with open_package(editor.path) as package:
         data = read_part(editor.path, package, editor.book.part)
-    names = "|".join(re.escape(escape(name)) for name in (quoted_title(title), title))
+    names = "|".join(re.escape(escaped(name)) for name in (quoted_title(title), title))
     tag = r"<(?:\w+:)?definedName\s[^>]*_xlnm\.Print_Area[^>]*>"
     area = rf"(?:{names})!\$[A-Z]+\$\d+:\$[A-Z]+\${before}<"
     found = re.search((tag + area).encode(), data)

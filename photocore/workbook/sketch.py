@@ -6,10 +6,10 @@ Lengths are in points from the upper left corner, y down.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from xml.sax.saxutils import escape, quoteattr
 
 from photocore.workbook.grid import split_cell
 from photocore.workbook.look import FACE
+from photocore.workbook.xmltext import escaped, quoted
 
 _EMU = 12700  # per point
 _A = "http://schemas.openxmlformats.org/drawingml/2006/main"
@@ -73,7 +73,7 @@ class Sketch:
             lower = ' baseline="-25000"' if i else ""
             runs += (
                 f'<a:r><a:rPr lang="en-US" {style}{lower}>{_filled(colour)}'
-                f'<a:latin typeface="{FACE}"/></a:rPr><a:t>{escape(part)}</a:t></a:r>'
+                f'<a:latin typeface="{FACE}"/></a:rPr><a:t>{escaped(part)}</a:t></a:r>'
             )
         width, height = size * (0.8 * len(text) + 1), size * 1.5
         frame = _frame(at[0] - width / 2, at[1] - height / 2, width, height)
@@ -102,7 +102,7 @@ class Sketch:
             f"<xdr:col>{column - 1}</xdr:col><xdr:colOff>0</xdr:colOff>"
             f"<xdr:row>{row - 1}</xdr:row><xdr:rowOff>0</xdr:rowOff></xdr:from>"
             f"<xdr:ext {extent}/><xdr:grpSp><xdr:nvGrpSpPr>"
-            f'<xdr:cNvPr id="1" name="sketch" descr={quoteattr(self.told)}/><xdr:cNvGrpSpPr/>'
+            f'<xdr:cNvPr id="1" name="sketch" descr={quoted(self.told)}/><xdr:cNvGrpSpPr/>'
             f'</xdr:nvGrpSpPr><xdr:grpSpPr><a:xfrm><a:off x="0" y="0"/><a:ext {extent}/>'
             f'<a:chOff x="0" y="0"/><a:chExt {extent}/></a:xfrm></xdr:grpSpPr>'
             f"{''.join(self.shapes)}</xdr:grpSp><xdr:clientData/></xdr:oneCellAnchor></xdr:wsDr>"

@@ -5,103 +5,19 @@ from __future__ import annotations
 import re
 from collections import deque
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
 from pathlib import Path
 from xml.parsers import expat
-from xml.sax.saxutils import quoteattr
-from xml.sax.saxutils import unescape as unescape_xml
 
 from photocore.errors import InputError
-from photocore.workbook.cells import CellValue, NewCell, NewRows, cell_xml, type_and_content
-from photocore.workbook.grid import cell_name, column_number, split_area
+from photocore.workbook.cells import CellValue, NewCell, cell_xml, type_and_content
+from photocore.workbook.changes import SheetChanges, Spliced
+from photocore.workbook.grid import cell_name, column_letters, column_number, split_area
 from photocore.workbook.package import local, new_parser, understood
-from photocore.workbook.plainsheet import NotPlain, plain_rows, sheet_data
+from photocore.workbook.plainsheet import NotPlain, PlainRow, plain_rows, sheet_data
 from photocore.workbook.xlsx import unescape
+from photocore.workbook.xmltext import quoted, unescaped
 
-_QUOTES = {"&quot;": '"', "&apos;": "'"}
 _TAG = re.compile(rb"""<[^\s/>]+(?:\s+[^\s=]+\s*=\s*(?:"[^"]*"|'[^']*'))*\s*(/?)>""")
-
-
-@dataclass(slots=True)
-class SheetChanges:
-    """What is to change in one sheet; rows and columns are counted from 1.
-
-    Parameters
-    ----------
-    inputs : dict
-        Row to (column to value): typed cells, made where they are missing. The cell's format
-        stays. A cell that holds a formula is never overwritten.
-    placed : dict
-        Row to (column to cell): cells with formulas, or that may take the place of one.
-    cached : dict
-        Row to (column to result): results of formulas that are there. Cells that hold no formula
-        (any more) are left as they are.
-    added : list of NewRows
-        Rows to be added, with formulas, formats and results.
-    restates : bool
-        Whether a number may be given among the results for a cell that holds one, to replace it.
-    """
-
-    inputs: dict[int, dict[int, CellValue]] = field(default_factory=dict)
-    cached: dict[int, dict[int, CellValue]] = field(default_factory=dict)
-    added: list[NewRows] = field(default_factory=list)
-    placed: dict[int, dict[int, NewCell]] = field(default_factory=dict)
-    restates: bool = False
-
-    def __bool__(self) -> bool:
-        return bool(self.inputs or self.cached or self.added or self.placed)
-
-    def rows(self) -> list[int]:
-        """Return the numbers of the rows with cells to be typed or added, in order."""
-        added = (range(block.first, block.first + block.size) for block in self.added)
-        return sorted(set(self.inputs).union(self.placed, *added))
-
-    def cells(self, row: int) -> dict[int, NewCell]:
-        """Return the cells to be typed or added in one row, in order."""
-        typed = self.inputs.get(row, {}).items()
-        cells = {column: NewCell(None if value == "" else value) for column, value in typed}
-        for block in self.added:
-            cells = block.cells(row) | cells
-        return dict(sorted((cells | self.placed.get(row, {})).items()))
-
-
-@dataclass(slots=True)
-class Spliced:
-    """A sheet with its changes, ready to be joined with or without stale results.
-
-    Parameters
-    ----------
-    data : bytes
-        The sheet as it was.
-    edits, strips : list of (start, end, replacement)
-        The changes asked for; the results of all other formulas, to be taken out.
-    inputs_changed : bool
-        Whether any typed value differs from what was there.
-    formula_lost : bool
-        Whether a value took the place of a formula.
-    """
-
-    data: bytes
-    edits: list[tuple[int, int, bytes]] = field(default_factory=list)
-    strips: list[tuple[int, int, bytes]] = field(default_factory=list)
-    inputs_changed: bool = False
-    formula_lost: bool = False
-
-    def joined(self, *, strip: bool) -> bytes:
-        """Return the changed sheet, without results of other formulas if ``strip``."""
-        edits = self.edits
-        if strip and self.strips:
-            edits = sorted([*edits, *self.strips], key=lambda edit: edit[:2])
-        if not edits:
-            return self.data
-        pieces: list[bytes | memoryview] = []
-        position = 0
-        view = memoryview(self.data)
-        for start, end, replacement in edits:
-            pieces += [view[position:start], replacement]
-            position = end
-        pieces.append(view[position:])
-        return b"".join(pieces)
 
 
 def splice_sheet(
@@ -204,6 +120,8 @@ class _Splicer:
         self.parser.Parse(self.data[:start], False)
         self.inside, self.prefix = False, ""
         for row in plain_rows(self.data, start, end):
+            if self.fill_plain(row):
+                continue
             self.start_row(row.number, row.start, "")
             new, cached = self.new, self.cached
             for cell in row.cells:
@@ -222,6 +140,53 @@ class _Splicer:
                 self.add_cells(10**6, place)
         self.add_rows(10**9, (end, end, "", ""))
         self.parser.Parse(self.data[end:], True)
+
+    def fill_plain(self, row: PlainRow) -> bool:
+        """Give every formula of a row its result, and numbers others, if no more is to be done.
+
+        Nearly every row of a large table is such a row.
+        """
+        if not self.new_rows or self.new_rows[0] != row.number:
+            return False
+        block = self.changes.only_filled(row.number)
+        if block is None:
+            return False
+        index = row.number - block.first
+        results, found, edits, is_changed = block.by_letters, 0, [], False
+        given = self.changes.inputs.get(row.number, {}).items()
+        typed = {column_letters(column).encode(): value for column, value in given}
+        for cell in row.cells:
+            if cell[1] in typed:
+                number = typed.pop(cell[1])
+                if cell[5] or cell[4] or not cell[6] or type(number) is not float:
+                    return False
+                if float(cell[6][3:-4]) != number:
+                    new = type_and_content(number, "", formula=False)[1].encode()
+                    edits.append((*cell.span(6), new))
+                    is_changed = True
+                continue
+            values, formula, stored = results.get(cell[1]), cell[5], cell[6]
+            if values is None and not (formula and stored):
+                continue
+            if values is None or not formula or not stored or stored[:3] != b"<v>":
+                return False
+            found += 1
+            kind, content = type_and_content(values[index], "", formula=True)
+            new = content.encode()
+            if kind.encode() != (cell[4] or b""):
+                style = b' s="%s"' % cell[3] if cell[3] else b""
+                style += f' t="{kind}"'.encode() if kind else b""
+                name = cell[1] + cell[2]
+                new = b'<c r="%s"%s>%s%s</c>' % (name, style, formula, new)
+                edits.append((cell.start(1) - len(b'<c r="'), cell.end(), new))
+            elif new != stored:
+                edits.append((*cell.span(6), new))
+        if typed or found != len(results):
+            return False
+        self.new_rows.popleft()
+        self.edits += edits
+        self.result.inputs_changed |= is_changed
+        return True
 
     def take_cell(self, cell: re.Match[bytes], column: int) -> None:
         """Note where a cell of the plain form and its parts lie."""
@@ -349,7 +314,7 @@ class _Splicer:
             return False
         start = self.tag_end(place[0])
         stands = self.data[start : max(start, self.data.rfind(b"<", start, place[1]))]
-        return unescape_xml(stands.decode("utf-8"), _QUOTES) == unescape_xml(text, _QUOTES)
+        return unescaped(stands.decode("utf-8")) == unescaped(text)
 
     def put_result(self, name: str, value: CellValue) -> None:
         """Give this cell's formula another cached result."""
@@ -371,9 +336,7 @@ class _Splicer:
 
     def with_result(self, name: str, kind: str, content: str) -> tuple[int, int, bytes]:
         """Return the edit that gives a formula cell this result and keeps all else of it."""
-        kept = [
-            f" {key}={quoteattr(value)}" for key, value in self.attributes.items() if key != "t"
-        ]
+        kept = [f" {key}={quoted(value)}" for key, value in self.attributes.items() if key != "t"]
         kept += [f' t="{kind}"'] if kind else []
         before = b"".join(self.data[s:e] for k, s, e in self.children if k == "f")
         after = b"".join(self.data[s:e] for k, s, e in self.children if k not in ("f", "v", "is"))
@@ -388,7 +351,7 @@ class _Splicer:
         if content is None:
             return value is None or value == ""
         inner = self.data[self.tag_end(content[0]) : self.data.rfind(b"<", content[0], content[1])]
-        text = unescape_xml(inner.decode("utf-8"), _QUOTES)
+        text = unescaped(inner.decode("utf-8"))
         try:
             if kind == "n" and not isinstance(value, str | bool) and value is not None:
                 return float(text) == float(value)

@@ -37,6 +37,8 @@ INPUTS: list[tuple[str, ...]] = [
     ("bifocal ortho wall.pair.json --out o.tif --points {}", "result.csv", "half"),
     ("bifocal mosaic {} ortho2.tif --out o.tif", "ortho1.tif"),
     ("bifocal mosaic ortho1.tif ortho2.tif --out o.tif --relief {}", "relief.tif"),
+    ("bifocal view {} --out o.html", "relief.tif"),
+    ("bifocal view relief.tif --out o.html --ortho {}", "ortho1.tif"),
     ("bifocal export {} --out o.dxf", "result.csv", "half"),
     ("bifocal export {} --out o.dxf", "survey.xlsx"),
     ("multimedia shift {} --z0 1 --indices 1,1.337 --json", "shift.csv", "half"),
@@ -101,6 +103,7 @@ OUTPUTS: list[tuple[str, ...]] = [
             ".xlsx",
         )
     ),
+    ("bifocal view relief.tif --out {}", ".html"),
     ("multimedia template {}", ".xlsx"),
     ("multimedia shift shift.csv --z0 1 --indices 1,1.337 --out {}", ".csv"),
     ("multimedia shift shift.csv --z0 1 --indices 1,1.337 --out {}", ".xlsx"),

@@ -15,7 +15,7 @@ from bifocal.survey.weighted_similarity import TURNS, WeightedSums, determinant
 from bifocal.survey.workbook.content import SurveyContent, control_cells
 from bifocal.survey.workbook.georeference_columns import entry, georeference_columns
 from bifocal.survey.workbook.precision_lines import precision_lines, precision_values
-from bifocal.survey.workbook.space_block import SpaceBlock
+from bifocal.survey.workbook.space_block import STEP_FORM, SpaceBlock
 from photocore.arrays import FloatArray
 from photocore.workbook.cells import CellValue
 from photocore.workbook.grid import column_letters
@@ -65,7 +65,7 @@ def _write_steps(sheet: SheetBuilder, steps: Sequence[_Step]) -> None:
         left += _BESIDE if left >= _RESIDUALS else 0
         sheet.text(f"{column_letters(left)}{row}", name, LABEL_FONT)
         place = f"{column_letters(left + 1)}{row}"
-        sheet.formula(place, body, value, form="0.000000", name=name)
+        sheet.formula(place, body, value, form=STEP_FORM, name=name)
 
 
 def _model(sheet: SheetBuilder, content: SurveyContent) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 #: Turns about E, N, H and the logarithm of the scale, K.
 SMALL = "ENHK"
@@ -31,15 +31,46 @@ def added_covariance(one: str, other: str, cells: Mapping[str, str]) -> str:
     cells : mapping
         Where the point's E, N, H from the whole-metre origin stand.
     """
-    terms = [f"g_z_{one if one == other else one + other}"]
+    sums: dict[str, list[tuple[int, str]]] = {}
+
+    def add(axes: str, sign: int, name: str) -> None:
+        sums.setdefault("".join(sorted(axes, key="ENH".index)), []).append((sign, name))
+
     for own, across in ((one, other), (other, one)):
         for small, (sign, axis) in _MOVED[across].items():
-            terms.append(f"{'-' if sign > 0 else '+'}g_u_{own}{small}*{cells[axis]}")
+            add(axis, -sign, f"g_u_{own}{small}")
     for left, (sign, axis) in _MOVED[one].items():
         for right, (turned, along) in _MOVED[other].items():
-            mark = "+" if sign * turned > 0 else "-"
-            terms.append(f"{mark}g_w_{ordered(left, right)}*{cells[axis]}*{cells[along]}")
-    return "".join(terms)
+            add(axis + along, sign * turned, f"g_w_{ordered(left, right)}")
+    # Each coordinate is named as rarely as can be: these formulas stand in every row.
+    whole = f"g_z_{one if one == other else one + other}"
+    for axis in "ENH":
+        terms = [
+            (axes.removeprefix(axis), named) for axes, named in sums.items() if axes[0] == axis
+        ]
+        inner = "".join(_multiplied(named, cells.get(rest, "")) for rest, named in terms)
+        if inner:
+            whole += f"+{cells[axis]}*({inner.removeprefix('+')})"
+    return whole
+
+
+def _multiplied(named: Sequence[tuple[int, str]], cell: str) -> str:
+    """Return the terms of names with signs, equal ones once, times a cell if there is one."""
+    text = ""
+    for name, sum_of_signs in _summed(named).items():
+        count = "" if abs(sum_of_signs) == 1 else f"{abs(sum_of_signs)}*"
+        if sum_of_signs:
+            times = f"*{cell}" if cell else ""
+            text += f"{'+' if sum_of_signs > 0 else '-'}{count}{name}{times}"
+    return text
+
+
+def _summed(named: Sequence[tuple[int, str]]) -> dict[str, int]:
+    """Return how often each name is added."""
+    sums: dict[str, int] = {}
+    for sign, name in named:
+        sums[name] = sums.get(name, 0) + sign
+    return sums
 
 
 def turned_covariance(one: str, other: str, cell: str) -> str:
@@ -53,8 +84,13 @@ def turned_covariance(one: str, other: str, cell: str) -> str:
         Where its entries stand, with ``{}`` for their keys XX, XY ...
     """
     first, second = ("ENH".index(name) + 1 for name in (one, other))
-    return "+".join(
-        f"g_{first}{i}*g_{second}{j}*{cell.format(min(a, b) + max(a, b))}"
-        for i, a in enumerate("XYZ", start=1)
-        for j, b in enumerate("XYZ", start=1)
-    )
+    terms = []
+    for i, a in enumerate("XYZ", start=1):
+        for j, b in list(enumerate("XYZ", start=1))[i - 1 :]:
+            factor = f"g_{first}{i}*g_{second}{j}"
+            if i != j and one == other:
+                factor = f"2*{factor}"
+            elif i != j:
+                factor = f"({factor}+g_{first}{j}*g_{second}{i})"
+            terms.append(f"{factor}*{cell.format(a + b)}")
+    return "+".join(terms)

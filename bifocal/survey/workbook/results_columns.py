@@ -41,7 +41,7 @@ def _world_sigma(name: str, *, is_pair: bool) -> str:
     if is_pair:
         common, whole = _cell(f"o_{name}"), turned_covariance(name, name, _cell("o_{}"))
         variance += f"+IF(ISNUMBER({common}),{common}^2,g_k^2*({whole}))"
-    known = f"AND(ISNUMBER({near['E']}),ISNUMBER({_cell('cov_XX')}))"
+    known = f"COUNT({near['E']},{_cell('cov_XX')})=2"
     return f'IF({known},SQRT(MAX(0,{variance})),"")'
 
 

@@ -25,6 +25,8 @@ LEFT, TOP = 60, 3
 FOLDED = 44
 #: Name of the whole block, by which its results are stored in a workbook that exists.
 BLOCK = "g_space_block"
+#: Steps range from 1E-13 to 1E+6; a column of usual width holds them so.
+STEP_FORM = "0.00E+00"
 _KEYS = tuple((axis, world) for axis in "XYZ" for world in "ENH")
 #: Half-turn a times a column of B: for X, Y, Z which of a with which row, and what is taken off.
 _CROSS = ((1, 2, 2, 1), (2, 0, 0, 2), (0, 1, 1, 0))
@@ -91,7 +93,7 @@ class SpaceBlock:
             for j in range(shape[1]):
                 value = None if shown is None else float(shown[i, j])
                 text = f'IF(g_space=1,{body(i, j)},"")'
-                self.sheet.formula(matrix.cell(i, j), text, value, form="0.000000")
+                self.sheet.formula(matrix.cell(i, j), text, value, form=STEP_FORM)
         return matrix
 
     def _write(self) -> None:

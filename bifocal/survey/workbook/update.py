@@ -10,7 +10,7 @@ from typing import Any
 
 from bifocal.survey.workbook.book import build, unprinted_formula
 from bifocal.survey.workbook.charts import HEAD, LEFT
-from bifocal.survey.workbook.content import SurveyContent
+from bifocal.survey.workbook.content import STRUCTURED_ROWS, SurveyContent
 from bifocal.survey.workbook.reader import SurveyInput
 from bifocal.survey.workbook.setup_cells import TYPED_FORMULAS
 from bifocal.survey.workbook.setup_update import (
@@ -25,8 +25,8 @@ from photocore.errors import InputError
 from photocore.output import free_path
 from photocore.workbook.cells import CellValue, NewColumn, escape
 from photocore.workbook.editor import WorkbookEditor
-from photocore.workbook.grid import TableArea, split_area, split_cell
-from photocore.workbook.live_book import BookBuilder
+from photocore.workbook.grid import TableArea, column_letters, split_area, split_cell
+from photocore.workbook.live_book import BookBuilder, short_formula
 from photocore.workbook.live_columns import TEXT_KEYS, row_formula
 from photocore.workbook.named_cells import place_of, type_value
 from photocore.workbook.newbook import RowBlock
@@ -237,6 +237,7 @@ def _table(
     headings, first = area.headings(), area.area[0] + 1
     length = max([length, _length(area), *(row + 1 for row in rows)])
     editor.extend(name, area.area[0] + length)
+    letters = {key: column_letters(number) for key, number in headings.items()}
     styles = editor.styles_of(area.sheet, first)
     filled, prepared = [], []
     repeated: Mapping[int, str] | None = None
@@ -268,10 +269,13 @@ def _table(
             for row, value in enumerate(values, start=first):
                 editor.put(area.sheet, row, number, value, formula=text, style=style)
             continue
+        formula: Callable[[int], str] | None = _constant(escape(text))
         if is_older(editor.book.names) or _lacks(editor, text):
             repeated = _repeated(editor, area) if repeated is None else repeated
             text = repeated.get(number, "")
-        formula = _constant(escape(text)) if text else None
+            formula = _constant(escape(text)) if text else None
+        elif length > STRUCTURED_ROWS:
+            formula = _escaped(short_formula(area.name, column.formula, letters, area.area[0]))
         filled.append(NewColumn(number, values, style, formula))
     editor.fill_rows(area.sheet, first, filled)
     editor.fill_rows(area.sheet, first + _length(area), prepared)
@@ -318,6 +322,10 @@ def _complete(
 def _constant(text: str) -> Callable[[int], str]:
     """Return a function of the row that is the same formula in all."""
     return lambda _: text
+
+
+def _escaped(formula: Callable[[int], str]) -> Callable[[int], str]:
+    return lambda row: escape(formula(row))
 
 
 def _fixed_table(editor: WorkbookEditor, built: BookBuilder, name: str, key: str) -> None:

@@ -185,3 +185,14 @@ def test_error_ellipses_have_the_axes_of_the_covariance(tmp_path):
     assert said["ellipse_azimuth"] == pytest.approx(30.0)
     export_points(tmp_path / "none.dxf", points, ellipses=0)
     assert not ezdxf.readfile(tmp_path / "none.dxf").modelspace().query("ELLIPSE")
+
+
+def test_a_dxf_is_the_same_in_whatever_order_ezdxf_counts_its_classes(tmp_path, monkeypatch):
+    database = ezdxf.entitydb.EntityDB
+    in_use = database.dxf_types_in_use
+    for name, backwards in (("a.dxf", False), ("b.dxf", True)):
+        monkeypatch.setattr(
+            database, "dxf_types_in_use", lambda self, b=backwards: sorted(in_use(self), reverse=b)
+        )
+        export_points(tmp_path / name, POINTS)
+    assert (tmp_path / "a.dxf").read_bytes() == (tmp_path / "b.dxf").read_bytes()

@@ -45,12 +45,13 @@ def write_street(folder: Path, middles: tuple[float, ...] = (-2.4, 0.0, 2.4)) ->
         seen = [target for target in shot.targets if target.seen]
         for role in ("control", "check"):
             chosen = [t for t in seen if (t.name in CONTROL) == (role == "control")]
-            _write_table(folder / f"{name}_{role}.csv", chosen, rng)
+            write_table(folder / f"{name}_{role}.csv", chosen, rng)
         paths.append(path)
     return paths
 
 
-def _write_table(path: Path, targets: list[NamedPoint], rng: np.random.Generator) -> None:
+def write_table(path: Path, targets: list[NamedPoint], rng: np.random.Generator) -> None:
+    """Write a table of points: exact places, pixels as picked."""
     with path.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
         writer.writerow(HEADINGS)

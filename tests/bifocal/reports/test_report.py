@@ -6,7 +6,6 @@ import json
 import math
 import re
 from hashlib import sha256
-from html.parser import HTMLParser
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -16,45 +15,12 @@ from click.testing import CliRunner
 from bifocal.cli.main import main
 from bifocal.demo import SAMPLE
 from bifocal.reports.pair_report import _provenance
-from bifocal.reports.words import LANGUAGES, _content, words_in
 from bifocal.reports.workflow import ReportTask, find_pairs
+from photocore.reports.words import LANGUAGES, texts_of, words_of
 from tests.bifocal.campaigns.sample_tables import write_tables
+from tests.web_page import Page
 
 PAIR = SAMPLE / "facade.pair.json"
-_VOID = {"meta", "img", "link", "br", "hr"}
-
-
-class Page(HTMLParser):
-    """Checks that elements are closed in order, and gathers what a reader sees."""
-
-    def __init__(self, text: str) -> None:
-        super().__init__()
-        self.open: list[str] = []
-        self.words: list[str] = []
-        self.sources: list[str] = []
-        self.feed(text)
-        self.close()
-        assert not self.open
-
-    def handle_starttag(self, tag, attrs):
-        names = [name for name, _ in attrs]
-        assert len(names) == len(set(names))
-        if tag not in _VOID:
-            self.open.append(tag)
-        if tag == "img":
-            assert dict(attrs)["alt"]
-        self.sources += [value for name, value in attrs if name in ("src", "href")]
-
-    def handle_endtag(self, tag):
-        assert self.open.pop() == tag
-
-    def handle_data(self, data):
-        if self.open and self.open[-1] != "style":
-            self.words.append(data)
-
-    @property
-    def text(self) -> str:
-        return "\n".join(self.words)
 
 
 @pytest.fixture(scope="module")
@@ -117,7 +83,7 @@ def test_photos_of_one_name_in_two_folders_have_a_hash_each(tmp_path):
         path.write_text(path.parent.name)
     task = SimpleNamespace(control=None, check=None, relief=None, ortho=files[0])
     content = SimpleNamespace(source=PAIR, pair=SimpleNamespace(photo_files=files), task=task)
-    *_, table = _provenance(content, words_in("en"))
+    *_, table = _provenance(content, words_of("bifocal.reports", "en"))
     named = [[path.name, sha256(path.read_bytes()).hexdigest()] for path in files]
     assert table.rows[1:] == named
 
@@ -191,9 +157,16 @@ def test_what_cannot_be_reported_is_refused(tmp_path, monkeypatch, options, said
     assert not list(tmp_path.iterdir())
 
 
-def test_every_text_is_there_in_three_languages_with_the_same_blanks():
-    for key, texts in _content().items():
+@pytest.mark.parametrize("package", ["bifocal.reports", "multimedia.adjustment"])
+def test_every_text_is_there_in_three_languages_with_the_same_blanks(package):
+    for key, texts in texts_of(package).items():
         assert set(texts) == set(LANGUAGES), key
         blanks = {tuple(sorted(re.findall(r"\{\w+\}", text))) for text in texts.values()}
         assert len(blanks) == 1, key
-    assert words_in("it")("good_for", scale=50) == "Adatto a disegni in scala 1:50 e minori."
+
+
+def test_a_text_is_given_in_the_language_asked_for():
+    assert (
+        words_of("bifocal.reports", "it")("good_for", scale=50)
+        == "Adatto a disegni in scala 1:50 e minori."
+    )

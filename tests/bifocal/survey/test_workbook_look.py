@@ -121,6 +121,29 @@ def test_steps_of_the_fit_are_folded_away_and_no_yellow_cell_is_without_a_word(n
         assert not dimension(sheet, named(book, key).column).hidden, key
 
 
+def test_steps_of_the_fit_fit_their_columns_once_unfolded(books):
+    path, book = books["ideal"]
+    sheet, values = book["Georeference"], openpyxl.load_workbook(path, data_only=True)
+    seen = 0
+    for row in sheet.iter_rows(max_row=11):
+        for cell in row:
+            if not sheet.column_dimensions[cell.column_letter].hidden or cell.data_type != "f":
+                continue
+            assert cell.number_format == "0.00E+00", cell.coordinate
+            value = values["Georeference"][cell.coordinate].value
+            if isinstance(value, int | float):
+                seen += 1
+                assert len(f"{value:.2E}") < sheet.column_dimensions[cell.column_letter].width
+    assert seen > 20
+
+
+def test_units_stand_apart_from_their_values(books):
+    sheet = books["survey-en"][1]["Setup"]
+    units = [cell for row in sheet.iter_rows(min_col=4, max_col=4) for cell in row if cell.value]
+    assert len(units) > 5
+    assert {(c.alignment.horizontal, c.alignment.indent) for c in units} == {("left", 1)}
+
+
 def inputs(sheet):
     """Return the cells that may be typed into and where what they say is defined."""
     said = {}

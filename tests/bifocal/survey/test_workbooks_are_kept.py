@@ -390,6 +390,32 @@ def test_sheets_of_an_ods_are_not_dropped_without_a_word(tmp_path):
     assert ods.read_bytes() == kept
 
 
+@pytest.mark.office
+def test_of_a_survey_workbook_saved_as_ods_only_own_sheets_are_told_of(tmp_path):
+    from tests.office import convert
+
+    path = fill(tmp_path / "survey.xlsx")
+    book = openpyxl.load_workbook(path)
+    book.create_sheet("Mine")["A1"] = "kept nowhere else"
+    book.save(path)
+    result = run("solve", convert(path, tmp_path, "ods"), "--out", tmp_path / "r.xlsx")
+    assert result.exit_code == 0, result.stderr
+    assert "what else it holds is not in the new one: Mine.\n" in result.stderr
+
+
+def test_an_unused_point_shows_no_good_flag_on_the_screen(tmp_path):
+    table = [(*row, 0 if row[0] == "P2" else None) for row in rows(POINTS)]
+    lines = ["id,x1 [mm],y1 [mm],x2 [mm],y2 [mm],use"]
+    lines += [",".join("" if v is None else str(v) for v in row) for row in table]
+    path = tmp_path / "p.csv"
+    path.write_text("\n".join(lines))
+    result = run("solve", path, *DISTANCES)
+    assert result.exit_code == 0, result.stderr
+    shown = {line.split()[0]: line for line in result.stdout.splitlines() if line[:1] == "P"}
+    assert shown["P1"].endswith(" OK")
+    assert shown["P2"].endswith(", unused)")
+
+
 def test_a_text_table_is_not_replaced_by_its_own_results(tmp_path):
     path = write_csv(tmp_path / "p.csv", TABLE)
     result = run("solve", path, "--out", path, "--overwrite", *DISTANCES)

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import base64
 import importlib.util
 import json
+import re
 from pathlib import Path
 
 import pytest
@@ -12,6 +14,7 @@ from click.testing import CliRunner
 from multimedia import read_project, write_project
 from multimedia.cli.main import main
 from photocore.errors import InputError
+from tests.web_page import Page
 
 
 def bundle_project(**changes):
@@ -44,8 +47,21 @@ def test_adjusting_writes_project_and_report_and_says_the_salinity(project, tmp_
     assert media.layers.indices[2] == pytest.approx(1.3365, abs=2e-4)
     text = report.read_text()
     assert "a gross error is found from" in text
-    assert text.count("<svg") == 4
+    page = Page(text)
+    assert all(source.startswith("data:image/svg+xml") for source in page.sources)
+    assert len(page.sources) == 3  # residuals on the images, over depth, correlations
+    images = base64.b64decode(page.sources[0].partition(",")[2]).decode()
+    for name in ("cam0", "cam1", "cam2", "cam3"):
+        assert f"<td>{name}</td>" in text
+        assert f"<!-- {name} -->" in images
+    assert "<!-- x [mm] -->" in images
     assert "http" not in text
+    # Media, units, program and options.
+    assert re.search(r"<td>1\.00000, 1\.\d+, 1\.336\d+</td>", text)
+    assert re.search(r"<td>\w+:k1</td><td>\S+</td><td>\S+</td><td>mm\^-2</td>", text)
+    assert "multimedia adjust" in page.text
+    assert "tank.toml" in page.text
+    assert "Made by bifocal" in page.text
     again = CliRunner().invoke(main, arguments)
     assert again.exit_code == 1
     assert "--overwrite" in again.stderr
@@ -143,3 +159,25 @@ def test_the_files_of_an_adjustment_appear_together_or_not_at_all(
     assert result.exit_code == 1
     assert "No space left on device" in result.stderr
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    ("language", "said"),
+    [("it", "Le coordinate immagine valgono"), ("de", "Medien zwischen Kameras und Objekt")],
+)
+def test_the_report_speaks_the_language_asked_for(project, tmp_path, language, said):
+    out = tmp_path / "r.html"
+    words = ["adjust", str(project), "--report", str(out), "--language", language]
+    result = CliRunner().invoke(main, words)
+    assert result.exit_code == 0, result.stderr
+    assert said in Page(out.read_text("utf-8")).text
+
+
+def test_the_report_is_a_pdf_where_its_name_says_so_and_nothing_else(project, tmp_path):
+    words = ["adjust", str(project), "--report", str(tmp_path / "r.pdf")]
+    assert CliRunner().invoke(main, words).exit_code == 0
+    assert (tmp_path / "r.pdf").read_bytes().startswith(b"%PDF")
+    words[-1] = str(tmp_path / "r.docx")
+    result = CliRunner().invoke(main, words)
+    assert result.exit_code == 1
+    assert "written as .html or .pdf" in result.stderr

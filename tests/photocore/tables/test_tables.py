@@ -169,6 +169,23 @@ def test_rows_typed_below_a_named_table_are_used_with_a_remark(book):
     assert "1 rows directly below the table" in table.remarks[0]
 
 
+def test_rows_parted_from_a_named_table_by_a_blank_one_are_not_left_out_in_silence(book):
+    from openpyxl.worksheet.table import Table as ExcelTable
+
+    def add(workbook):
+        sheet = workbook.worksheets[0]
+        last = sheet.max_row
+        sheet.add_table(ExcelTable(displayName="tblPoints", ref=f"A1:D{last}"))
+        for column, value in enumerate(("P99", 1.5, 2.5, 3.5), start=1):
+            sheet.cell(last + 3, column).value = value
+        sheet.cell(last + 5, 1).value = "measured by 2 people"
+
+    table = read_table(book(polar_rows(), edit=add), POLAR, name="Points")
+    check_samples(table)
+    row = max(table.rows) + 3
+    assert any(f"from row {row} on, that are NOT used" in text for text in table.remarks)
+
+
 def test_a_sheet_that_is_not_there_is_named_with_those_that_are(book):
     with pytest.raises(InputError, match='no sheet "Punti"; it has "Sheet1"'):
         read_table(book(polar_rows()), POLAR, sheet="Punti")

@@ -10,10 +10,11 @@ import pytest
 
 from photocore.errors import InputError
 from photocore.tables import Column, read_table
+from photocore.workbook.changes import SheetChanges
 from photocore.workbook.editor import WorkbookEditor
 from photocore.workbook.newbook import finished_parts
 from photocore.workbook.package import open_package
-from photocore.workbook.splice import SheetChanges, splice_sheet
+from photocore.workbook.splice import splice_sheet
 from tests import office
 from tests.golden import make_rich_workbook
 
@@ -391,6 +392,9 @@ PLAIN_CHANGES = [
     {"inputs": {2: {1: "new", 3: 7.5}, 9: {2: True}}},
     {"cached": {3: {4: 0.25, 2: 5.0}, 4: {4: math.nan}}, "restates": True},
     {"added": [("filled", 2, 4)], "inputs": {3: {2: 9.0}}},
+    {"added": [("filled", 2, 2)]},
+    {"added": [("filled", 2, 2)], "inputs": {2: {2: 1.5}, 3: {2: 2.25}}},
+    {"added": [("filled", 3, 1)]},
     {"placed": {2: {4: 1.5}, 3: {1: "over"}, 12: {4: 2.5}}},
 ]
 
@@ -403,8 +407,8 @@ def test_a_plain_sheet_changes_as_by_the_parser(changes):
         '<row r="2" spans="1:4"><c r="A2" t="inlineStr"><is><t>P1 &amp; Ö</t></is></c>'
         '<c r="B2" s="3"><v>1.5</v></c><c r="D2" s="1"><f>A2&lt;B2</f><v>0.5</v></c></row>'
         '<row r="3" hidden="1"><c r="A3" t="s"><v>0</v></c><c r="B3"><v>2</v></c>'
-        '<c r="D3" t="str"><f>"x"</f><v>x</v></c></row><row r="4"><c r="D4"><f>1/0</f></c></row>'
-        '<row r="5"/><row r="7"><c r="B7" s="2"/></row>'
+        ' <c r="D3" s="4" t="str"><f>"x"</f><v>x</v></c></row>'
+        '<row r="4"><c r="D4"><f>1/0</f></c></row><row r="5"/><row r="7"><c r="B7" s="2"/></row>'
     )
     plain = f'<worksheet><dimension ref="A2:D7"/><sheetData>{cells}</sheetData></worksheet>'
     # A comment is beyond the plain form: the XML parser takes over.

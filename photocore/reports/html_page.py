@@ -10,9 +10,17 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from bifocal.reports.document import Banner, Block, Document, Heading, Paragraph, Picture, TextTable
 from photocore.cli import Progress, no_progress
 from photocore.output import atomic_path
+from photocore.reports.document import (
+    Banner,
+    Block,
+    Document,
+    Heading,
+    Paragraph,
+    Picture,
+    TextTable,
+)
 
 #: Width of figures [inch], resolution of what is drawn as pixels, quality of photos in them.
 WIDTH, DPI, JPEG = 7.4, 110, 82
@@ -24,7 +32,8 @@ solid #111}h3{font-size:1rem}
 table{border-collapse:collapse;margin:.6rem 0;font-size:.86rem;font-variant-numeric:tabular-nums}
 caption{text-align:left;font-weight:600;padding:.3rem 0}
 th,td{padding:.15rem .6rem;border-bottom:1px solid #bbb;text-align:right;overflow-wrap:anywhere}
-th{border-bottom:2px solid #111}th:first-child,td:first-child{text-align:left}
+th{border-bottom:2px solid #111;overflow-wrap:break-word}
+th:first-child,td:first-child{text-align:left}
 figure{margin:1rem 0}
 figure img{width:100%;height:auto}
 figcaption,.small{font-size:.85rem;color:#333}

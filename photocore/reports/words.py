@@ -1,4 +1,4 @@
-"""Every text of the report in English, Italian and German: read from `words.toml`."""
+"""Texts of reports in English, Italian and German, read from a package's `words.toml`."""
 
 from __future__ import annotations
 
@@ -14,11 +14,12 @@ Words = Callable[..., str]
 
 
 @cache
-def _content() -> dict[str, dict[str, str]]:
-    return tomllib.loads(files(__package__).joinpath("words.toml").read_text(encoding="utf-8"))
+def texts_of(package: str) -> dict[str, dict[str, str]]:
+    """Return the texts of a package by key and language; ``{...}`` are blanks to fill."""
+    return tomllib.loads(files(package).joinpath("words.toml").read_text(encoding="utf-8"))
 
 
-def words_in(language: str) -> Words:
+def words_of(package: str, language: str) -> Words:
     """Return the function that gives a text by its key, its blanks filled.
 
     Raises
@@ -30,6 +31,6 @@ def words_in(language: str) -> Words:
         raise InputError(f"language: {language!r} is none of {', '.join(LANGUAGES)}.")
 
     def say(key: str, **blanks: object) -> str:
-        return _content()[key][language].format(**blanks)
+        return texts_of(package)[key][language].format(**blanks)
 
     return say

@@ -8,10 +8,18 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-from bifocal.reports.document import Banner, Block, Document, Heading, Paragraph, Picture, TextTable
 from photocore.cli import Progress, no_progress
 from photocore.output import atomic_path
 from photocore.provenance import provenance, today
+from photocore.reports.document import (
+    Banner,
+    Block,
+    Document,
+    Heading,
+    Paragraph,
+    Picture,
+    TextTable,
+)
 
 #: Page and margins. [mm]
 PAGE, MARGIN = (210.0, 297.0), 18.0

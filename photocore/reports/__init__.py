@@ -1,0 +1,1 @@
+"""Reports of both packages: blocks in, HTML or PDF out, words in three languages."""
