@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from bifocal.campaigns.pair_job import PairJob, PairOutcome, run_pair
-from bifocal.campaigns.shipping import ShippedPair, packed, run_parcel, unpacked
+from bifocal.campaigns.shipping import ShippedPair, found_anywhere, packed, run_parcel, unpacked
 from bifocal.campaigns.worker_pool import Listener
 from photocore.errors import InputError
 from photocore.provenance import program
@@ -83,7 +83,7 @@ def run_on_cluster(
         while True:
             while len(running) < most and (job := next(waiting, None)) is not None:
                 try:
-                    task = (run_parcel, packed(job)) if ship else (run_pair, job)
+                    task = (run_parcel, packed(job)) if ship else (run_pair, found_anywhere(job))
                 except InputError as error:
                     yield _told(listener, PairOutcome(
                         name=job.name, failed_step="send", message=str(error)

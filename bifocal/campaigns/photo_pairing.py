@@ -54,8 +54,8 @@ def pair_photos(
 ) -> tuple[list[PhotoPair], list[Path]]:
     """Return the pairs among the photos of a folder, and the photos that are in none.
 
-    Photos are paired by content; of several candidates the one that shares most and was taken
-    next to it wins. EXIF focal lengths say which is the far one, and keep photos of one focal
+    Photos are paired by content; of several candidates the one that shares most and is next
+    to it by name wins. EXIF focal lengths say which is the far one, and keep photos of one focal
     length apart.
 
     Raises
@@ -81,7 +81,7 @@ def pair_photos(
             continue
         shared = _shared(features[i], features[j])
         if shared >= _SHARED:
-            # Neighbours in time, or in name where the camera wrote none, are likelier a pair.
+            # Neighbours by name, as cameras number what they take, are likelier a pair.
             candidates.append((shared / (1.0 + 0.1 * (j - i - 1)), i, j, shared))
     pairs, taken = [], set()
     for _, i, j, shared in sorted(candidates, key=lambda c: (-c[0], c[1], c[2])):

@@ -45,6 +45,15 @@ class ShippedPair:
     steps: Mapping[str, Mapping[str, bytes]]
 
 
+def found_anywhere(job: PairJob) -> PairJob:
+    """Return a job whose paths are absolute: a worker's current folder is another."""
+    return replace(
+        job, folder=job.folder.absolute(), far=job.far.absolute(), near=job.near.absolute(),
+        files={role: path.absolute() for role, path in job.files.items()},
+        joint=None if job.joint is None else job.joint.absolute(),
+    )  # fmt: skip
+
+
 def packed(job: PairJob) -> Parcel:
     """Return a pair with its files.
 
@@ -53,11 +62,7 @@ def packed(job: PairJob) -> Parcel:
     InputError
         If a file cannot be read, or the files have no folder in common.
     """
-    job = replace(
-        job, folder=job.folder.absolute(), far=job.far.absolute(), near=job.near.absolute(),
-        files={role: path.absolute() for role, path in job.files.items()},
-        joint=None if job.joint is None else job.joint.absolute(),
-    )  # fmt: skip
+    job = found_anywhere(job)
     needed = [job.far, job.near, *job.files.values()]
     try:
         root = Path(os.path.commonpath([job.folder, *(path.parent for path in needed)]))

@@ -215,6 +215,10 @@ def run_survey(
             ready = [job for job in jobs if not outcomes[job.name].failed_step]
             together.append(_one_frame(ready, progress, tell))
             if together[-1].failed_step:
+                why = "waits for the common frame of all pairs, which failed: see joint."
+                for job in ready:
+                    alone = outcomes[job.name]
+                    outcomes[job.name] = replace(alone, failed_step=JOINT, message=why)
                 ready = []
         outcomes |= _made(ready, machines, _Count(ready, progress, tell))
         if mosaic:
@@ -414,7 +418,7 @@ def facade_job(
     Raises
     ------
     InputError
-        If the folder is a file, a product is unknown, or nothing says how to set the pair up.
+        If the folder is a file or a product is unknown.
     """
     if out.exists() and not out.is_dir():
         raise InputError(f"{out}: is a file; name a folder with --out.")

@@ -106,8 +106,13 @@ def pixel_of(command: Fields) -> Pixel:
     return column, row
 
 
-def _known(command: Fields) -> Known:
-    return number_of(command, "X"), number_of(command, "Y"), number_of(command, "r")
+def _known(command: Fields, before: Known | None) -> Known:
+    """Return the coordinates a command gives; those it does not name stay as they were."""
+    x, y, r = (
+        number_of(command, key) if key in command else old
+        for key, old in zip(("X", "Y", "r"), before or (None, None, None), strict=True)
+    )
+    return x, y, r
 
 
 def _point(state: SurveyState, command: Fields) -> PickedPoint:
@@ -163,7 +168,8 @@ def _type(state: SurveyState, command: Fields) -> list[Change]:
 
 
 def _reference(state: SurveyState, command: Fields) -> list[Change]:
-    before, known = _point(state, command), _known(command)
+    before = _point(state, command)
+    known = _known(command, before.reference)
     after = replace(before, reference=None if known == (None, None, None) else known)
     return [Change("points", before.name, before, after)]
 
@@ -179,8 +185,12 @@ def _delete(state: SurveyState, command: Fields) -> list[Change]:
 
 
 def _line_set(state: SurveyState, command: Fields) -> list[Change]:
-    name, layer = text_of(command, "name"), text_of(command, "layer")
-    points = command.get("points")
+    name = text_of(command, "name")
+    before = state.lines.get(name)
+    if before is not None:  # what is not named stays as it was
+        kept = {"layer": before.layer, "points": list(before.points), "closed": before.closed}
+        command = {**kept, **command}
+    layer, points = text_of(command, "layer"), command.get("points")
     if not isinstance(points, list) or len(points) < 2:
         raise InputError("points: a line joins two points or more.")
     unknown = [str(point) for point in points if point not in state.points]
@@ -189,7 +199,7 @@ def _line_set(state: SurveyState, command: Fields) -> list[Change]:
     line = DrawnLine(
         name=name, layer=layer, points=tuple(points), closed=command.get("closed") is True
     )
-    return [Change("lines", name, state.lines.get(name), line)]
+    return [Change("lines", name, before, line)]
 
 
 def _line_delete(state: SurveyState, command: Fields) -> list[Change]:
@@ -211,8 +221,9 @@ def _control_name(state: SurveyState, command: Fields) -> str:
 
 
 def _control_set(state: SurveyState, command: Fields) -> list[Change]:
-    name, known = _control_name(state, command), _known(command)
+    name = _control_name(state, command)
     before = state.control.get(name)
+    known = _known(command, before.known if before else None)
     after = replace(
         before or PickedControl(name=name, order=state.next_order()), known=known
     )  # fmt: skip

@@ -57,6 +57,8 @@ from photocore.textfile import file_name
 DPI = 254.0
 #: More contour levels than this are made only where their interval is asked for.
 _MOST_AUTOMATIC = 500
+#: Every picture is written with its world file, for the web, for CAD and on a sheet.
+PICTURE_ENDINGS = ("tif", "tfw", "png", "dxf", "pdf")
 #: Names shorter than this say nothing as a title: the folder's is taken.
 _SHORT = 3
 
@@ -144,7 +146,7 @@ def deliver(
     pair.refuse_media("the set of deliverables")
     title = wish.title or default_title(pair_path)
     name = file_name(title)
-    _check_outputs(out, folder, name, (task.relief, *pair.photo_files), overwrite=overwrite)
+    _check_outputs(out, folder, name, (task.relief, *pair.photo_files))
     points, remarks = _points(wish.marked or task.points)
     control, notes_on_control = _points(wish.control)
     remarks += notes_on_control
@@ -168,6 +170,7 @@ def deliver(
         relief = None
         if not isinstance(surface, FlatSurface):
             relief = _prepared((surface, measured), reader, drawing, wish)
+        _check_free(folder, name, relief is not None, len(cuts), overwrite=overwrite)
         if out is not None:
             copy = stack.enter_context(atomic_path(out, overwrite=overwrite))
         place = stack.enter_context(atomic_folder(folder, overwrite=overwrite))
@@ -200,9 +203,9 @@ def deliver(
 
 
 def _check_outputs(
-    out: Path | None, folder: Path, name: str, inputs: Sequence[Path | None], *, overwrite: bool
+    out: Path | None, folder: Path, name: str, inputs: Sequence[Path | None]
 ) -> None:
-    """Refuse outputs that would take the place of what is read, or of a delivery."""
+    """Refuse outputs that would take the place of what is read."""
     check_ending(out, ORTHO_ENDING, ".tif", ".tiff")
     rasters = [
         folder / f"{name}{what}.{ending}"
@@ -211,8 +214,22 @@ def _check_outputs(
     ]
     for path in (out, *rasters):
         check_not_input(path, *inputs)
-    if rasters[0].exists():
-        check_writable(rasters[0], overwrite=overwrite)
+
+
+def _check_free(folder: Path, name: str, relief: bool, sections: int, *, overwrite: bool) -> None:
+    """Refuse a folder that holds a file of the delivery already; call it before the work."""
+    pictures = [name, f"{name}_relief"] if relief else [name]
+    names = [f"{one}.{ending}" for one in pictures for ending in PICTURE_ENDINGS]
+    if relief:
+        names += [f"{name}_relief_values.{ending}" for ending in ("tif", "tfw")]
+    names += [
+        f"{name}_section{number}.{ending}"
+        for number in range(1, sections + 1)
+        for ending in ("dxf", "svg")
+    ]
+    for path in map(folder.joinpath, names):
+        if path.exists():
+            check_writable(path, overwrite=overwrite)
 
 
 def default_title(source: Pair | Path, path: Path | None = None) -> str:

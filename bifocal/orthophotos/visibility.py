@@ -255,6 +255,7 @@ def _sharpen(around: _Surroundings, buffer: _Buffer) -> BoolArray:
     rise = cv2.dilate(known, square)[core] - around.relief[core]
     depth = around.distance_in(core) - around.relief[core]
     unsure |= rise * rho > np.float32(_LEAST_SHADOW) * depth
+    unsure &= rho > 0  # nothing lies between the nadir and the camera
     row, column = np.nonzero(unsure & ~sure)
     if not len(row):
         return hidden

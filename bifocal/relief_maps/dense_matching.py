@@ -150,6 +150,11 @@ def dense_relief(
     if pair.layers is not None:  # nothing stands out of the water, or through the glass
         low, high = relief_range or seed.usual_range(pair.image2.distance)
         relief_range = (low, min(high, 0.999 * pair.highest_relief))
+        if not low < relief_range[1]:
+            raise InputError(
+                f"relief_range: the last interface lies {pair.highest_relief:.3g} m before the "
+                f"plane, and nothing beyond it is measured; got {low:g}, {high:g}."
+            )
     wanted, target, work = _grids(pair, (grey1, grey2), gsd, bounds, quality, relief_range)
     frame = make_frame(pair, grey1, grey2, work)
     progress(0.1, 1.0, "First relief")

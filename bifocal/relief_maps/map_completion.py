@@ -11,11 +11,14 @@ from bifocal.relief_maps import evidence, forward_projection, levels, smoothing
 from bifocal.relief_maps.forward_projection import MapBands
 from bifocal.relief_maps.frame import Frame, offsets
 from photocore.arrays import BoolArray, Float32Array, FloatArray
+from photocore.shrinkage import shrink_noise
 
 #: Noise that is taken out of the map, of measured and of other relief, in parallax: what is smaller
 #: casts shadows that are not there (94 % of the small holes of a church). More of the measured
 #: takes detail (semireal church: 0.25 px 3.39 mm, 0.05 px 3.27 mm). [px]
 NOISE, NOISE_UNMEASURED = 0.05, 2.0
+#: Half windows on the map, where relief is final and casts shadows. [px]
+MAP_WINDOWS = (2, 4)
 #: Pixels this far inwards of what camera 2 cannot see are not called measured: raised parts come
 #: out too fat. Three pixels took 0.2 % of the measured ones and no more wrong ones than one does,
 #: since relief that falls away is told by itself (`surfaces`; façade 62, loggia 301). [px]
@@ -54,7 +57,7 @@ def complete(frame: Frame, bands: MapBands, grid: Grid, *, plain: bool = False) 
         np.minimum(bands.sigma, np.float32(NOISE) * per_pixel),
         np.minimum(bands.sigma, np.float32(NOISE_UNMEASURED) * per_pixel),
     )
-    relief = smoothing.shrink_noise(bands.r, quiet, smoothing.MAP_WINDOWS)
+    relief = shrink_noise(bands.r, quiet, MAP_WINDOWS)
     if plain:
         relief = levels.drawn_to_levels(relief, bands.sigma, bands.quality == Quality.MEASURED)
     bands = bands._replace(r=relief, sigma=_sigma_at_steps(bands, per_pixel))

@@ -61,7 +61,7 @@ def orientation_sigma(pair: Pair, relief: Float32Array, grid: Grid) -> Float32Ar
 
 
 def _variance(pair: Pair, places: FloatArray, relief: float) -> FloatArray:
-    """Return the variance of relief at places of one relief; the near ones' where none is. [m²]"""
+    """Return the variance of relief at places of one relief; the greatest where none is. [m²]"""
     xyz = np.column_stack([places, np.full(len(places), relief)])
     variance = pair.covariance_of_orientation(xyz)[:, 2, 2]
     return np.nan_to_num(variance, nan=float(np.nanmax(variance, initial=0.0)))

@@ -1,4 +1,4 @@
-"""Steps of a relief map that run straight, and how noise is taken out of relief."""
+"""Steps of a relief map that run straight."""
 
 from __future__ import annotations
 
@@ -6,10 +6,7 @@ import cv2
 import numpy as np
 
 from photocore.arrays import Float32Array
-from photocore.shrinkage import shrink_noise as shrink_noise
 
-#: Half windows on the map, where relief is final and casts shadows. [px]
-MAP_WINDOWS = (2, 4)
 #: Height from which a step of the map is tidied. [m]
 LEAST_STEP = 0.02
 

@@ -6,10 +6,11 @@ import cv2
 import numpy as np
 
 from bifocal.model.relief_map import Quality
-from bifocal.relief_maps import edges, evidence, flow, forward_projection, seed, smoothing
+from bifocal.relief_maps import edges, evidence, flow, forward_projection, seed
 from bifocal.relief_maps.forward_projection import SIDE_FACE, STRETCH, MapBands
 from bifocal.relief_maps.frame import Frame, offsets
 from photocore.arrays import BoolArray, Float32Array
+from photocore.shrinkage import shrink_noise
 
 #: Error across the radius that counts as noise rather than as an edge, for smoothing. [px]
 NOISE_CLIP = 0.25
@@ -52,7 +53,7 @@ def surfaces(
     typical = float(np.median(matched.sigma_px[::8, ::8]))
     relief, misfit = edges.sharpen(frame, relief, typical)
     quiet = np.minimum(matched.sigma_px, np.float32(NOISE_CLIP))
-    relief = smoothing.shrink_noise(relief, flow.sigma_of_relief(frame, relief, quiet))
+    relief = shrink_noise(relief, flow.sigma_of_relief(frame, relief, quiet))
     sigma = flow.sigma_of_relief(frame, relief, matched.sigma_px)
     valid &= ~_falls_away(frame, relief, misfit)
     quality = np.where(valid, Quality.MEASURED, Quality.INTERPOLATED).astype(np.uint8)
@@ -77,7 +78,7 @@ def _falls_away(frame: Frame, relief: Float32Array, misfit: Float32Array) -> Boo
     quiet = cv2.GaussianBlur(relief, (0, 0), 1.5)
     across = cv2.Sobel(quiet, cv2.CV_32F, 1, 0, ksize=3, scale=0.125)
     down = cv2.Sobel(quiet, cv2.CV_32F, 0, 1, ksize=3, scale=0.125)
-    falls = -(across * x + down * y) / (np.float32(foot.distance) - relief)
+    falls = -(across * x + down * y) / (frame.distance_at(2, x, y, relief) - relief)
     misfit = cv2.blur(misfit, (3, 3))
     return np.asarray(falls * misfit * misfit > FALLS_AWAY)
 

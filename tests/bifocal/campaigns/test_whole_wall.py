@@ -10,7 +10,8 @@ import pytest
 import rasterio
 from click.testing import CliRunner
 
-from bifocal.campaigns.pair_job import steps_of
+from bifocal.campaigns import workflow
+from bifocal.campaigns.pair_job import PairOutcome, steps_of
 from bifocal.campaigns.step_store import Step, run_step, step_key
 from bifocal.campaigns.survey_file import read_survey_file
 from bifocal.campaigns.whole_wall import joint_step, run_whole
@@ -105,6 +106,21 @@ def test_the_plan_tells_of_the_common_frame_that_is_still_to_be_found(tmp_path):
         *((name, *row) for name in "abc" for row in each),
         ("all pairs", "joint", "make"), ("all pairs", "mosaic", "make"),
     ]  # fmt: skip
+
+
+def test_pairs_that_wait_for_a_frame_that_failed_are_not_called_made(tmp_path, monkeypatch):
+    jobs = read_survey_file(survey(tmp_path, "joint = true"))
+    alone = {job.name: PairOutcome(name=job.name, done=("align",)) for job in jobs}
+    alone["b"] = PairOutcome(name="b", failed_step="align", message="no photo.")
+    broken = PairOutcome(name="joint", failed_step="joint", message="nothing joins a and c.")
+    monkeypatch.setattr(workflow, "_aligned", lambda *_: dict(alone))
+    monkeypatch.setattr(workflow, "_one_frame", lambda *_: broken)
+    result = workflow.run_survey(jobs)
+    assert result.lines()[0].startswith("3 pairs: 0 made, 0 kept as they were, 3 failed;")
+    told = {outcome.name: outcome.message for outcome in result.failed}
+    assert (told["b"], told["joint"]) == ("no photo.", "nothing joins a and c.")
+    assert told["a"] == told["c"]
+    assert "see joint" in told["a"]
 
 
 def test_a_full_disk_at_the_end_costs_no_more_than_the_last_step(tmp_path):

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from bifocal.campaigns import worker_pool
 from bifocal.campaigns.pair_job import PairJob
+from bifocal.campaigns.shipping import found_anywhere
 from bifocal.campaigns.worker_pool import Listener, run_here
 
 
@@ -53,6 +54,19 @@ def test_pairs_wait_for_memory_and_a_large_one_runs_alone(tmp_path):
         assert set(running) == {"p3"}
     finally:
         worker_pool._started = original
+
+
+def test_a_cluster_is_sent_paths_that_hold_in_any_folder(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    names = [Path(name) for name in ("out/p", "far.jpg", "near.jpg", "points.csv", "out/joint")]
+    folder, far, near, control, joint = names
+    job = PairJob(
+        name="p", folder=folder, far=far, near=near, files={"control": control}, joint=joint
+    )
+    sent = found_anywhere(job)
+    found = [sent.folder, sent.far, sent.near, sent.files["control"], sent.joint]
+    assert found == [tmp_path / name for name in names]
+    assert found_anywhere(sent) == sent
 
 
 def test_a_pair_that_fails_says_why_and_the_next_runs(tmp_path):

@@ -218,6 +218,24 @@ def test_control_points_and_tapes_are_typed_and_mended(page: Driver) -> None:
     page.settled("state.control.length === 2 && state.tapes.length === 1")
 
 
+def test_coordinates_typed_one_after_the_other_are_all_kept(page: Driver) -> None:
+    """Tab leads to the next field of the row before the answer to the first is here."""
+    page.click("mode-orientation")
+    page.command("control.set", name="K", X=None, Y=None, r=None)
+    page.settled("state.control.some(({ name }) => name === 'K')")
+    page.tab.get_by_label("X K").click()
+    for text in ("5", "6,5", "0.25"):
+        page.tab.keyboard.type(text)
+        page.keys("Tab")
+        page.settled("true")
+    known = next(item for item in page.state["control"] if item["name"] == "K")
+    assert [known[key] for key in ("X", "Y", "r")] == [5.0, 6.5, 0.25]
+    page.tab.get_by_label("X K").fill("1e999")
+    page.keys("Enter")
+    assert page.tab.get_by_label("X K").evaluate("(field) => !field.validity.valid")
+    page.command("control.delete", name="K")
+
+
 def test_a_token_is_needed(browser: Any, server: Served) -> None:
     context = browser.new_context()
     tab = context.new_page()

@@ -34,6 +34,11 @@ def distance(a: Any, b: Any) -> float:
     return float(np.hypot(a[0] - b[0], a[1] - b[1]))
 
 
+def pixel_of(image: int, place: tuple[float, float, float]) -> dict[str, float]:
+    """Return where a place is in a photo, as a command wants it."""
+    return dict(zip(("column", "row"), true_pixel(image, place), strict=True))
+
+
 def nudged(page: Driver, name: str, image: int, goal: tuple[float, float]) -> Any:
     """Move the pick in hand to a pixel by the arrow keys and return where it is."""
     page.keys(str(image))
@@ -150,6 +155,75 @@ def test_a_doubtful_suggestion_offers_the_other_place_too(page: Driver) -> None:
     picks = page.settled("state.points[0].picks[2]")["points"][0]["picks"]
     # Its partner moves as the click fell: half a screen pixel.
     assert distance(np.subtract(picks["2"], picks["1"]), (-6.2, -3.09)) < 0.5
+
+
+def test_a_poor_suggestion_is_not_urged_on_anybody(page: Driver) -> None:
+    """Neither the standing words nor the passing ones tell to accept it."""
+    poor = {
+        "column": 900.0, "row": 400.0, "quality": 0.2, "kept": False, "sigma_px": 0.8, "others": [],
+        "line": [[880.0, 400.0], [920.0, 400.0]],
+    }  # fmt: skip
+    page.tab.route("**/api/suggest", lambda route: route.fulfill(json=poor))
+    page.pick(1, (900.0, 410.0))
+    page.suggested()
+    page.tab.unroute("**/api/suggest")
+    for place in ("quality", "toast"):
+        text = str(page.tab.get_by_test_id(place).text_content())
+        assert "20 % sure. Better pick by hand." in text
+        assert "accepts" not in text
+
+
+def test_of_two_measures_the_last_asked_for_is_shown(page: Driver) -> None:
+    held: list[Any] = []
+
+    def answer(route: Any) -> None:
+        held.append(route)
+        if len(held) == 2:  # the second question is answered first
+            for number, one in ((2, held[1]), (1, held[0])):
+                one.fulfill(json={"distance": float(number)})
+
+    for number, place in enumerate((SHADED, TARGETS["T08"]), start=1):
+        name = f"M{number}"
+        page.command("point.pick", name=name, image=1, **pixel_of(1, place))
+        page.command("point.pick", name=name, image=2, **pixel_of(2, place))
+    page.settled("state.points.length === 2")
+    page.tab.route("**/api/measure", answer)
+    for name in ("M1", "M2", "M1"):
+        page.tab.get_by_role("button", name=f"Fly to {name}").click()
+        page.click("measure-add")
+    page.wait("() => document.querySelector('[data-testid=measures]').textContent")
+    page.tab.wait_for_timeout(200)
+    page.tab.unroute("**/api/measure")
+    assert "2.0000 m" in str(page.tab.get_by_test_id("measures").text_content())
+
+
+def test_maps_of_an_earlier_orientation_are_given_back(page: Driver) -> None:
+    """The same pair, its distance a little other: both panes are made anew."""
+    page.tab.evaluate(
+        """() => {
+          window.given_back = 0;
+          const before = ol.Map.prototype.disposeInternal;
+          ol.Map.prototype.disposeInternal = function () {
+            window.given_back += 1;
+            before.call(this);
+          };
+        }"""
+    )
+
+    def other(route: Any) -> None:
+        state = route.fetch().json()
+        state["pair"]["images"][0]["distance"] += 0.5
+        route.fulfill(json=state)
+
+    page.keys("k")  # the cursor stands in a pane that goes
+    page.tab.route("**/api/state", other)
+    page.command("point.pick", name="A", image=1, **pixel_of(1, SHADED))
+    page.wait("() => window.given_back === 2")
+    page.tab.unroute("**/api/state")
+    page.command("point.pick", name="B", image=1, **pixel_of(1, SHADED))
+    page.settled("state.points.length === 2")
+    page.wait("() => window.given_back === 4")
+    assert page.tab.locator(".viewer:visible .ol-viewport").count() == 2
 
 
 def test_a_pick_off_the_line_is_taken_and_its_misfit_shown(page: Driver) -> None:

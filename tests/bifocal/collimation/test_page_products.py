@@ -131,6 +131,23 @@ def test_an_impossible_command_changes_nothing(tmp_path, command, said) -> None:
         assert (tmp_path / "facade.journal.jsonl").read_bytes() == written
 
 
+def test_what_a_command_does_not_name_stays_as_it_was(tmp_path) -> None:
+    """Two fields changed one after the other, the second before the page knows of the first."""
+    with opened(sample_folder(tmp_path)) as session:
+        for name in ("T01", "T16"):
+            pick_both(session, name, sample_picks()[name])
+        for fields in ({"X": 5.0}, {"Y": 6.5}, {"X": None}):
+            session.command({"op": "control.set", "name": "K"} | fields)
+            session.command({"op": "point.reference", "name": "T01"} | fields)
+        line = {"op": "line.set", "name": "L", "layer": "a", "points": ["T01", "T16"]}
+        for fields in (line, {"layer": "doors"}, {"closed": True}):
+            session.command({"op": "line.set", "name": "L"} | fields)
+        state = session.state
+        assert state.control["K"].known == state.points["T01"].reference == (None, 6.5, None)
+        drawn = state.lines["L"]
+        assert (drawn.layer, drawn.points, drawn.closed) == ("doors", ("T01", "T16"), True)
+
+
 def test_photos_are_asked_about_and_exchanged_by_their_lenses(tmp_path) -> None:
     from PIL import Image
 

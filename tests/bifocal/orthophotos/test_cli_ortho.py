@@ -348,6 +348,25 @@ def test_too_many_contour_lines_are_refused_before_the_work(wall: Path, monkeypa
     assert "choose a larger interval" in done.stderr
 
 
+def test_any_file_of_an_earlier_delivery_is_refused_before_the_work(
+    wall: Path, monkeypatch
+) -> None:
+    words = ("--relief", "relief.tif", "--deliver", "d", "--scale", "1:50", "--section", "x=0.8")
+    assert run(wall, *words).exit_code == 0
+    names = sorted(path.name for path in (wall / "d").iterdir())
+    (wall / "kept").mkdir()
+    for name in names:
+        (wall / "d" / name).rename(wall / "kept" / name)
+    monkeypatch.setattr("bifocal.orthophotos.deliver_workflow.make_ortho", None)
+    for name in names:
+        (wall / "d" / name).write_text("mine")
+        done = run(wall, *words)
+        assert done.exit_code == 1
+        assert f"{name}: exists already; add --overwrite" in done.stderr
+        assert (wall / "d" / name).read_text() == "mine"
+        (wall / "d" / name).unlink()
+
+
 @pytest.mark.parametrize("place", ["x=nan", "y=", "1,2", "0,0 inf,1"])
 def test_a_section_must_have_a_place(wall: Path, place: str) -> None:
     words = ("--relief", "relief.tif", "--deliver", "d", "--scale", "1:50", "--section", place)

@@ -40,6 +40,16 @@ def test_99_percent_of_the_hidden_pixels_are_found_at_03_percent_false_alarms(
     assert (found & ~truth).sum() / (~truth).sum() <= 0.003
 
 
+def test_a_step_beside_the_nadir_hides_nothing_of_it() -> None:
+    """The nadir in the very middle of a pixel: its ray has no direction on the wall."""
+    grid = Grid(x0=-1.0, y0=1.0, gsd=0.01, width=201, height=201)
+    relief = np.zeros(grid.shape, np.float32)
+    relief[:, 101:] = 0.4
+    surface = MapSurface.of_array(relief, grid)
+    hidden = hidden_from(surface, grid, Foot(np.zeros(2), 17.5), relief)
+    assert not hidden.any()
+
+
 def test_tiles_and_the_whole_agree(wall: tuple[Grid, MapSurface, np.ndarray]) -> None:
     grid, surface, _ = wall
     camera = Foot(np.array([0.6, 0.4]), 10.0)  # the nadir within a tile

@@ -12,11 +12,12 @@ from bifocal import Pair, Photo, Quality, dense_relief
 from bifocal.files.images import as_grey
 from bifocal.model.grid import Grid
 from bifocal.orientation.pair_observations import at
-from bifocal.relief_maps import edges, flow, forward_projection, seed, smoothing
+from bifocal.relief_maps import edges, flow, forward_projection, seed
 from bifocal.relief_maps.frame import common_bounds, make_frame, working_grid
 from bifocal.relief_maps.orientation_sigma import orientation_sigma
 from bifocal.relief_maps.relief_files import hatched
 from photocore.errors import GeometryError, InputError
+from photocore.shrinkage import shrink_noise
 from tests.scenes import RICH, Rendering, Scene, SetupErrors, bifocal_cameras, facade, render
 from tests.scenes.shapes import box
 
@@ -304,7 +305,7 @@ def test_smoothing_quiets_a_flat_wall_and_keeps_a_step():
     wall = np.zeros((80, 80), dtype=np.float32)
     wall[:, 40:] = 0.5
     noisy = wall + rng.normal(0, 0.01, wall.shape).astype(np.float32)
-    quiet = smoothing.shrink_noise(noisy, np.full_like(wall, 0.01))
+    quiet = shrink_noise(noisy, np.full_like(wall, 0.01))
     assert np.std((quiet - wall)[:, 15:25]) < 0.003
     assert np.abs(quiet - wall)[10:-10, 38:42].max() < 0.06
 

@@ -12,6 +12,11 @@ import numpy as np
 import pytest
 
 from bifocal import dense_relief, match, orthophoto
+from bifocal.files.images import as_grey
+from bifocal.rays import plane_position, point_on_ray
+from bifocal.relief_maps import surfaces
+from bifocal.relief_maps.frame import make_frame, offsets
+from photocore.errors import InputError
 from tests.scenes import RICH, Rendering, Scene, bifocal_cameras, render
 from tests.scenes.shapes import box
 from tests.scenes.wet import pair_through_media, under_water
@@ -64,6 +69,12 @@ def test_relief_through_media_is_good_to_hundredths_of_a_pixel(name):
     found = errors(shot(name)[0], relief(name))
     assert np.median(found) < 0.004
     assert found.mean() < 0.008
+
+
+def test_relief_before_the_water_surface_is_refused_by_its_name():
+    taken, pair, _ = shot("surface")
+    with pytest.raises(InputError, match="relief_range: the last interface lies 3 m"):
+        dense_relief(pair, taken.image1, taken.image2, relief_range=(3.1, 3.5))
 
 
 @pytest.mark.parametrize("name", ["port", "surface"])
@@ -120,3 +131,26 @@ def test_homologous_points_are_found_along_bent_lines(name):
     off = np.abs(points.xyz[:, 2] - true)
     assert np.nanmedian(off) < 0.015
     assert np.median(np.abs(points.misfit)) < 0.1
+
+
+@pytest.mark.parametrize("name", ["air", "port", "surface"])
+def test_relief_falls_away_by_the_slope_of_the_bent_ray(name):
+    """At 2 % more misfit than the limit a ramp is doubted, at 2 % less it is not."""
+    taken, pair, _ = shot(name)
+    grid = taken.truth.grid
+    frame = make_frame(pair, as_grey(taken.image1, "1"), as_grey(taken.image2, "2"), grid)
+    foot = pair.image2.foot
+    x, y = offsets(grid.shape, grid.pixel_of(foot.nadir))
+    steepness = 0.1  # of relief falling outwards, metres per metre
+    relief = (-steepness * np.hypot(x, y) * grid.gsd).astype(np.float32)
+    row, column = 40, 60
+    place = np.array([grid.columns_x[column], grid.rows_y[row]])
+    # Along the ray through that place (X, Y) moves by this much per metre of relief.
+    r = float(relief[row, column])
+    ray = plane_position(np.append(place, r), foot)
+    ends = [point_on_ray(ray, np.array(r + step), foot)[:2] for step in (-0.01, 0.01)]
+    slope = np.linalg.norm(ends[1] - ends[0]) / 0.02
+    limit = np.sqrt(surfaces.FALLS_AWAY / (steepness * slope))
+    for factor, expected in ((1.02, True), (0.98, False)):
+        misfit = np.full(grid.shape, factor * limit, np.float32)
+        assert surfaces._falls_away(frame, relief, misfit)[row, column] == expected

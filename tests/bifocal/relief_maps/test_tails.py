@@ -15,12 +15,12 @@ from bifocal.relief_maps import (
     flow,
     forward_projection,
     levels,
-    smoothing,
     surfaces,
 )
 from bifocal.relief_maps.forward_projection import MapBands
 from bifocal.relief_maps.frame import Frame, radial_stretch
-from bifocal.relief_maps.map_completion import _spread_inwards, _tidy_outline
+from bifocal.relief_maps.map_completion import MAP_WINDOWS, _spread_inwards, _tidy_outline
+from photocore.shrinkage import shrink_noise
 
 METRES = [[0.01, 0, -0.995], [0, -0.01, 0.995], [0, 0, 1]]
 FAR, NEAR = (Photo(plane_from_pixel=METRES, nadir=(0, 0), distance=d) for d in (17.5, 9.5))
@@ -72,14 +72,14 @@ def test_smoothing_survives_any_sigma():
     relief = rng.normal(0.5, 0.01, (128, 128)).astype(np.float32)
     sigma = np.full(relief.shape, 1e-9, np.float32)
     sigma[::3] = 1e4
-    smooth = smoothing.shrink_noise(relief, sigma)
+    smooth = shrink_noise(relief, sigma)
     assert relief.min() - 0.01 < smooth.min() < smooth.max() < relief.max() + 0.01
 
 
 def test_smoothing_leaves_the_unknown_unknown_and_gives_it_no_say():
     relief = np.full((64, 64), 0.5, np.float32)
     relief[:, 40:] = np.nan
-    smooth = smoothing.shrink_noise(relief, np.full_like(relief, 0.05), smoothing.MAP_WINDOWS)
+    smooth = shrink_noise(relief, np.full_like(relief, 0.05), MAP_WINDOWS)
     np.testing.assert_array_equal(np.isnan(smooth), np.isnan(relief))
     np.testing.assert_allclose(smooth[:, :40], 0.5, atol=1e-5)
 

@@ -28,7 +28,8 @@ export function number(value, digits) {
 export function parseNumber(text) {
   const tidy = text.trim().replace("−", "-");
   if (tidy === "") return null;
-  return Number(/^-?\d*,\d+$/.test(tidy) ? tidy.replace(",", ".") : tidy);
+  const value = Number(/^-?\d*,\d+$/.test(tidy) ? tidy.replace(",", ".") : tidy);
+  return Number.isFinite(value) ? value : NaN;
 }
 
 /** Keep keyed rows of a table body: rebuild only those whose signature changed, in the new order. */
@@ -39,7 +40,14 @@ export function keyedRows(body, items, { key, signature, build }) {
     const name = key(item);
     const mark = signature(item);
     let row = old.get(name);
-    if (row && row.dataset.mark !== mark && !row.querySelector("input:focus, select:focus")) {
+    // A row somebody types in stays as it is, and keeps its old mark, so that its turn comes later.
+    if (row?.querySelector("input:focus, select:focus")) {
+      old.delete(name);
+      if (row === place) place = place.nextElementSibling;
+      else body.insertBefore(row, place);
+      continue;
+    }
+    if (row && row.dataset.mark !== mark) {
       const fresh = build(item);
       if (place === row) place = fresh;
       const focused = row.contains(document.activeElement);

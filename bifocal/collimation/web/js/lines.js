@@ -73,10 +73,10 @@ export class Lines {
   #row(line) {
     const { name, points, closed } = line;
     const layer = textInput({ label: t("line.layerOf", { name }), size: "9",
-      save: (text) => this.app.send("line.set", { ...line, layer: text }) });
+      save: (text) => this.app.send("line.set", { name, layer: text }) });
     fill(layer, line.layer);
     const close = h("input", { type: "checkbox", checked: closed, "aria-label": t("line.closed", { name }),
-      onchange: () => this.app.send("line.set", { ...line, closed: close.checked }) });
+      onchange: () => this.app.send("line.set", { name, closed: close.checked }) });
     return h("tr", { "aria-selected": String(name === this.current) },
       h("th", { scope: "row" }, button(name, () => { this.current = name; this.update(); }, { class: "link" })),
       h("td", {}, layer), h("td", {}, points.join(" – ")), h("td", {}, close),
@@ -104,6 +104,7 @@ export class Measure {
 
   clear() {
     this.names = [];
+    this.question = null;
     this.show(null);
   }
 
@@ -118,10 +119,15 @@ export class Measure {
   /** Points move, and so do the measures between them. */
   async update() {
     const known = new Set(this.app.points().map(({ name }) => name));
-    this.names = this.names.filter((name) => known.has(name));
-    if (this.names.length < 2) return this.show(null);
+    const names = this.names.filter((name) => known.has(name));
+    this.names = names;
+    // Answers may come in another order than they were asked for: the last question counts.
+    const question = {};
+    this.question = question;
+    if (names.length < 2) return this.show(null);
     try {
-      this.show(await this.app.connection.ask("/api/measure", { points: this.names }));
+      const found = await this.app.connection.ask("/api/measure", { points: names });
+      if (this.question === question) this.show(found);
     } catch (error) {
       this.app.refuse(error);
     }

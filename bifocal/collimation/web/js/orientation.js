@@ -2,7 +2,7 @@
  * Stage 2: control points and tape distances beside the two photos, what they say of the pair, and
  * what would help most next.
  */
-import { h, keyedRows, number, setText } from "./dom.js";
+import { h, keyedRows, number, parseNumber, setText } from "./dom.js";
 import * as drawing from "./drawing.js";
 import { button, fill, numberInput, textInput } from "./fields.js";
 import { asTaken } from "./geometry.js";
@@ -60,7 +60,7 @@ export class OrientationStage {
       placeholder: t(key).replace(/ ?\[.*/, ""), inputmode: index > 1 ? "decimal" : "text", testid: `tape-${index}` }));
     const add = () => {
       const [from, to, ...numbers] = inputs.map(({ value }) => value.trim());
-      const length = Number(numbers[0].replace(",", "."));
+      const length = parseNumber(numbers[0]);
       if (!from || !to || !(length > 0)) return this.app.say(t("tape.incomplete"), "warning");
       this.app.send("tape.set", { from, to, length, sigma: numbers[1] || null });
       for (const input of inputs) input.value = "";
@@ -104,6 +104,8 @@ export class OrientationStage {
     const mark = photoMark(state);
     if (state.photos.length < 2 || this.mark === mark) return;
     this.mark = mark;
+    this.picker.letGoOf(this.panes);
+    for (const pane of this.panes) pane.dispose();
     this.panes = state.photos.map((photo) => this.#pane(photo));
     const [{ width, height }] = state.photos;
     this.spread?.disconnect();
@@ -113,6 +115,7 @@ export class OrientationStage {
     this.photos.replaceChildren(...this.panes.map(({ element }) => element));
     for (const pane of this.panes) pane.mounted();
     const infos = await this.app.pyramids.both("photo", mark);
+    if (this.mark !== mark) return;
     infos.forEach((info, index) => {
       const { view, image } = this.panes[index];
       this.panes[index].setLayers([tileLayer(view, `layer-${image}`, `/tiles/photo/${image}`, info)]);
@@ -188,8 +191,7 @@ export class OrientationStage {
 
   #controlRow(item) {
     const { name } = item;
-    const save = (key) => (value) => this.app.send("control.set", {
-      ...Object.fromEntries(COORDINATES.map((one) => [one, item[one]])), name, [key]: value });
+    const save = (key) => (value) => this.app.send("control.set", { name, [key]: value });
     const inputs = COORDINATES.map((key) => {
       const input = numberInput({ label: `${key} ${name}`, save: save(key), size: "6" });
       fill(input, item[key]);

@@ -99,7 +99,7 @@ export class PhotosStage {
     fill(card.sensor_width_mm, photo.sensor_width_mm);
     keyedRows(card.questions, photo.missing, { key: (text) => text, signature: (text) => text,
       build: (text) => h("li", {}, text) });
-    this.#thumb(card, state);
+    this.#thumb(card, state).catch((error) => this.app.refuse(error));
   }
 
   async #thumb(card, state) {
@@ -107,6 +107,7 @@ export class PhotosStage {
     if (card.mark === mark) return;
     card.mark = mark;
     const info = await this.app.pyramids.info("photo", card.image, mark);
+    if (card.mark !== mark) return;
     const level = Math.min(THUMB_LEVEL, info.max_level);
     card.thumb.src = `/tiles/photo/${card.image}/${level}/0_0.jpg?v=${info.version}`;
   }

@@ -8,6 +8,14 @@ const FARTHEST = 16;
 
 const other = (image) => 3 - image;
 
+/** How far a proposal is to be trusted, in a word and in numbers; no word where nobody knows. */
+export function trust(proposal) {
+  if (!proposal || proposal.quality === null) return { level: "", values: {} };
+  const level = proposal.kept ? "good" : proposal.quality > 0.5 ? "fair" : "poor";
+  return { level, values: { percent: Math.round(100 * proposal.quality),
+    sigma: proposal.sigma_px?.toFixed(2) ?? "?" } };
+}
+
 export class Picker extends EventTarget {
   /**
    * `kind`: "point" or "control", the family of commands; `items()`: what can be picked;
@@ -199,8 +207,8 @@ export class Picker extends EventTarget {
     if (this.selected !== item.name) return undefined;
     this.guide = { image, line: found.line };
     this.proposal = Number.isFinite(found.column) ? { image, name: item.name, from, ...found } : null;
-    const quality = Math.round(100 * (found.quality ?? 0));
-    this.say(this.proposal ? "say.proposed" : "say.none", { quality });
+    const { level, values } = trust(this.proposal);
+    this.say(level ? `quality.${level}` : "say.none", values);
     return this.changed();
   }
 
@@ -291,6 +299,12 @@ export class Picker extends EventTarget {
     const inside = (value, size) => Math.min(Math.max(value, 0), size);
     this.cursor.place = [inside(place[0] + dx, pane.width), inside(place[1] + dy, pane.height)];
     this.#follow();
+  }
+
+  /** Panes that are taken away take the cursor and the pointer with them. */
+  letGoOf(panes) {
+    if (panes.includes(this.cursor?.pane)) this.cursor = null;
+    if (panes.includes(this.hovered?.pane)) this.hovered = null;
   }
 
   /** Tell the loupe where the pointer or the cursor is. */

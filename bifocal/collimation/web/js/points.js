@@ -6,7 +6,7 @@ import { Wall } from "./geometry.js";
 import { Superposition } from "./layers.js";
 import { Lines, Measure } from "./lines.js";
 import { Loupe } from "./loupe.js";
-import { Picker } from "./picker.js";
+import { Picker, trust } from "./picker.js";
 import { PointList } from "./pointlist.js";
 import { Readout, TYPES } from "./readout.js";
 import { photoMark, wallMark } from "./tiles.js";
@@ -104,6 +104,8 @@ export class PointsStage {
       this.app.follow(made, this.picker);
       return made;
     };
+    this.picker.letGoOf(this.panes);
+    for (const one of [this.main, this.second]) one?.dispose();
     this.main = pane(t("pane.wall"));
     this.second = pane(t("pane.photo", { image: 2, role: t("photo.near") }));
     this.photos.replaceChildren(this.main.element, this.second.element, this.layers.handle);
@@ -237,10 +239,8 @@ export class PointsStage {
     for (const key of ["suggest", "snap"]) this.buttons[key].disabled = !selected;
     this.buttons.accept.disabled = !proposal && !this.picker.lacking;
     // How sure another place is that fits as well, nobody knows.
-    const known = Boolean(proposal) && proposal.quality !== null;
-    const level = !known ? "" : proposal.kept ? "good" : proposal.quality > 0.5 ? "fair" : "poor";
-    const words = known ? t(`quality.${level}`, { percent: Math.round(100 * proposal.quality),
-      sigma: proposal.sigma_px?.toFixed(2) ?? "?" }) : "";
+    const { level, values } = trust(proposal);
+    const words = level && t(`quality.${level}`, values);
     const others = proposal?.others?.length ?? 0;
     setText(this.quality, [words, others && t("quality.others", { count: others })].filter(Boolean).join(" "));
     this.quality.dataset.level = level;

@@ -1,5 +1,5 @@
 /** Stage 4: relief and orthophoto run, looked at, delivered. */
-import { h, keyedRows, number, setText } from "./dom.js";
+import { h, keyedRows, number, parseNumber, setText } from "./dom.js";
 import * as drawing from "./drawing.js";
 import { button, choice, labelled, numberInput } from "./fields.js";
 import { Wall } from "./geometry.js";
@@ -63,8 +63,12 @@ export class ProductsStage {
     this.gsd = numberInput({ label: t("ortho.gsd"), save: () => {}, placeholder: t("ortho.auto") });
     this.source = choice({ label: t("ortho.source"), value: "both",
       options: { both: t("ortho.both"), 1: t("photo.far"), 2: t("photo.near") }, save: () => {} });
-    const run = () => this.app.job("ortho", { gsd: this.gsd.value ? Number(this.gsd.value.replace(",", ".")) / 1000 : null,
-      image: this.source.value });
+    const run = () => {
+      const gsd = parseNumber(this.gsd.value);
+      // What is no number is told at the field, and is not the same as an empty one.
+      if (Number.isNaN(gsd)) return this.gsd.reportValidity();
+      return this.app.job("ortho", { gsd: gsd === null ? null : gsd / 1000, image: this.source.value });
+    };
     this.runOrtho = button(t("ortho.run"), run, { class: "primary", testid: "run-ortho" });
     this.orthoState = h("p", { class: "hint" });
     return h("section", { class: "card" }, h("h2", {}, t("ortho.title")), this.orthoState,
@@ -109,9 +113,14 @@ export class ProductsStage {
     this.mark = mark;
     if (this.wallMark !== wallMark(state)) this.#makePane(state);
     this.wallMark = wallMark(state);
+    const runs = state.jobs.filter((job) => job.kind === "relief" && done.includes(job.id));
+    const surface = JSON.stringify([this.wallMark, relief, runs.map(({ id }) => id)]);
+    if (this.surface !== surface) this.profile.forget();
+    this.surface = surface;
     const [walls, image] = await Promise.all([
       this.app.pyramids.info("wall", 1, this.wallMark),
       ortho ? this.app.pyramids.info("ortho", 0, mark).catch(() => null) : null]);
+    if (this.mark !== mark) return;
     const layers = [tileLayer(this.view, "layer-1", "/tiles/wall/1", walls)];
     this.ortho = image && this.#orthoLayer(ortho, image);
     if (this.ortho) layers.push(this.ortho);
@@ -123,6 +132,7 @@ export class ProductsStage {
   }
 
   #makePane(state) {
+    this.pane?.dispose();
     this.wall = new Wall(state.pair);
     this.view = pixelView(this.wall.width, this.wall.height);
     this.pane = new Pane({ label: t("pane.products"), view: this.view, frame: this.wall,

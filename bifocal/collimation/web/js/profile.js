@@ -48,6 +48,11 @@ export class Profile {
     this.paint();
   }
 
+  /** The relief or the wall is another: what was drawn shows neither. */
+  forget() {
+    if (this.ends.length) this.close();
+  }
+
   /** One end, then the other, in plane metres. */
   async click(place) {
     // A double click is no line.
@@ -58,7 +63,9 @@ export class Profile {
     this.drawing = false;
     try {
       const [from, to] = this.ends;
-      this.data = await this.app.connection.ask("/relief/profile", { from, to });
+      const data = await this.app.connection.ask("/relief/profile", { from, to });
+      if (this.ends[1] !== to) return undefined; // closed or drawn anew meanwhile
+      this.data = data;
       this.#show();
     } catch (error) {
       this.app.refuse(error);
@@ -76,7 +83,10 @@ export class Profile {
   #show() {
     const { distance, r, sigma } = this.data;
     const known = r.flatMap((value, i) => (Number.isFinite(value) ? [value - (sigma[i] ?? 0), value + (sigma[i] ?? 0)] : []));
-    if (!known.length) return this.app.say(t("profile.empty"), "warning");
+    if (!known.length) {
+      this.close();
+      return this.app.say(t("profile.empty"), "warning");
+    }
     const [low, high] = [Math.min(...known), Math.max(...known)];
     const slack = Math.max(0.05 * (high - low), 0.005);
     this.length = distance.at(-1);

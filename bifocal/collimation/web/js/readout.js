@@ -50,7 +50,7 @@ export class Readout {
 
   #refer(key, value) {
     const { item } = this.picker;
-    this.app.send("point.reference", { X: null, Y: null, r: null, ...item.reference, name: item.name, [key]: value });
+    this.app.send("point.reference", { name: item.name, [key]: value });
   }
 
   update() {

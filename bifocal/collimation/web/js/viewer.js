@@ -122,7 +122,8 @@ export class Pane extends EventTarget {
       this.#tell("hover", this.map.getEventPixel(event));
     });
     this.element.addEventListener("pointerleave", () => this.#tell("hover", null));
-    new ResizeObserver(() => this.#resize()).observe(this.element);
+    this.resized = new ResizeObserver(() => this.#resize());
+    this.resized.observe(this.element);
   }
 
   get view() {
@@ -164,6 +165,17 @@ export class Pane extends EventTarget {
 
   setLayers(layers) {
     this.map.setLayers(layers);
+  }
+
+  /** Give back the map, its layers and what they hold: another pane takes this one's place. */
+  dispose() {
+    this.resized.disconnect();
+    cancelAnimationFrame(this.waiting);
+    const layers = [...this.map.getLayers().getArray()];
+    this.map.setLayers([]);
+    for (const layer of layers) layer.dispose();
+    this.map.setTarget(null);
+    this.map.dispose();
   }
 
   /** Show the whole grid. */

@@ -101,7 +101,6 @@ export default {
   "say.picked": "{name}: in Foto {image} gemessen",
   "say.complete": "{name}: in beiden Fotos gemessen",
   "say.nothing": "Wählen Sie zuerst einen Punkt.",
-  "say.proposed": "Gegenstück vorgeschlagen, {quality} % sicher; A nimmt an",
   "say.other": "Eine andere passende Stelle; S geht weiter, A nimmt an",
   "say.none": "Kein Gegenstück auf der Linie; bitte von Hand messen.",
   "say.corner": "Auf die Ecke gesetzt, ± {sigma} px",

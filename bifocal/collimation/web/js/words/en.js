@@ -101,7 +101,6 @@ export default {
   "say.picked": "{name}: picked in photo {image}",
   "say.complete": "{name}: both photos picked",
   "say.nothing": "Take a point in hand first.",
-  "say.proposed": "Partner suggested, {quality} % sure; A accepts",
   "say.other": "Another place that fits; S goes on, A accepts",
   "say.none": "No partner found along the line; pick it by hand.",
   "say.corner": "Centred on the corner, ± {sigma} px",

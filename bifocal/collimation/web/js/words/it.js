@@ -101,7 +101,6 @@ export default {
   "say.picked": "{name}: collimato nella foto {image}",
   "say.complete": "{name}: collimato in entrambe le foto",
   "say.nothing": "Prima prendi in mano un punto.",
-  "say.proposed": "Omologo proposto, sicuro al {quality} %; A accetta",
   "say.other": "Un altro posto possibile; S continua, A accetta",
   "say.none": "Nessun omologo lungo la retta; collimalo a mano.",
   "say.corner": "Centrato sullo spigolo, ± {sigma} px",
