@@ -10,7 +10,7 @@ from importlib.resources import files
 from photocore.errors import InputError
 from photocore.workbook.words import LANGUAGES
 
-__all__ = ["LANGUAGES", "words_in"]
+__all__ = ["LANGUAGES", "texts_of", "words_of"]
 
 Words = Callable[..., str]
 

@@ -362,7 +362,7 @@ class _Splicer:
                 return self.strings()[int(text)] == value
             if kind == "inlineStr" and isinstance(value, str):
                 plain = _INLINE.fullmatch(inner.decode("utf-8"))
-                return plain is not None and unescape(unescape_xml(plain[1], _QUOTES)) == value
+                return plain is not None and unescape(unescaped(plain[1])) == value
         except (ValueError, IndexError):
             return False
         return False
