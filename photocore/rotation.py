@@ -170,8 +170,8 @@ def rotation_from_quaternion(quaternion: ArrayLike, name: str = "quaternion") ->
     Examples
     --------
     >>> half = np.sqrt(0.5)
-    >>> rotation_from_quaternion([half, 0.0, 0.0, half]).round(9)[:, 0].tolist()
-    [0.0, 1.0, 0.0]
+    >>> (rotation_from_quaternion([half, 0.0, 0.0, half]) @ [2.0, 0.0, 0.0]).round(9)[1]
+    np.float64(2.0)
     """
     parts = read_only(quaternion, name, shape=(4,))
     length = float(np.linalg.norm(parts))

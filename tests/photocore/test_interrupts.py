@@ -170,7 +170,7 @@ with atomic_path('o.csv', overwrite=False) as path:
 
 
 #: Modules that are loaded when the program has just begun, and while it gets a command ready.
-LOADED = {"bifocal": ("click.types", "scipy"), "multimedia": ("importlib.metadata", "numpy")}
+LOADED = {"bifocal": ("click.types", "numpy"), "multimedia": ("importlib.metadata", "numpy")}
 
 
 @pytest.mark.parametrize(("program", "module"), [(p, m) for p in LOADED for m in LOADED[p]])

@@ -57,6 +57,7 @@ def drawn_points(step, seen) -> np.ndarray:
     return Pair(image1=photos[0], image2=photos[1]).intersect(*ideal).xyz
 
 
+@pytest.mark.acceptance
 def test_the_spread_of_points_over_drawn_orientations_is_the_covariance_stated() -> None:
     stated = replace(PAIR, orientation=covariance()).covariance_of_orientation(XYZ)
     steps = np.random.default_rng(5).multivariate_normal(np.zeros(24), covariance(), 1500)

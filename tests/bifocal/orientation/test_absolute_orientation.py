@@ -46,6 +46,7 @@ def relief_error(made) -> np.ndarray:
     return found[:, 2] - xyz[:, 2]
 
 
+@pytest.mark.acceptance
 def test_the_photos_alone_with_one_distance_give_the_relief(views) -> None:
     made = orient_pair(inputs(views), control=Control(), site=SiteMeasures(distance1=16.0))
     error = relief_error(made)
@@ -161,6 +162,7 @@ def test_a_blurred_photo_is_named(views) -> None:
         orient_pair((first, blurred), control=Control(), site=SiteMeasures(distance1=16.0))
 
 
+@pytest.mark.acceptance
 def test_without_any_distance_there_is_no_scale(views) -> None:
     with pytest.raises(GeometryError, match="nothing gives the scale"):
         orient_pair(inputs(views), control=Control(), site=SiteMeasures())

@@ -80,6 +80,7 @@ def test_a_set_up_is_taken_as_it_is() -> None:
         bifocal.align(noise(), noise(), interiors=(lens(17.5), None), site=site, as_set_up=True)
 
 
+@pytest.mark.acceptance
 def test_photos_square_to_a_wall_at_known_distances() -> None:
     far = noise()
     # The near lens is 1.1 times as long as equal scale would ask for.

@@ -257,6 +257,7 @@ def test_match_explains_what_it_cannot_do(folder, options, message, tmp_path) ->
     assert message in result.stderr
 
 
+@pytest.mark.acceptance
 def test_a_spot_on_a_board_makes_the_board_the_wall(folder) -> None:
     spot = project(FAR, np.array([[4.6, -1.0, 0.35]]))[0]
     result = align(
@@ -314,6 +315,7 @@ def test_what_a_set_up_lacks_is_said_at_once(folder, options, said) -> None:
     assert said in " ".join(result.stderr.split())
 
 
+@pytest.mark.acceptance
 def test_a_control_table_without_headings_is_read_by_columns(folder) -> None:
     lines = (folder / "control.csv").read_text(encoding="utf-8").splitlines()
     (folder / "bare.csv").write_text("\n".join(lines[1:]), encoding="utf-8")

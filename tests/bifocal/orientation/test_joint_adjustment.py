@@ -32,6 +32,7 @@ from tests.bifocal.orientation.many_pairs import many_pairs
 from tests.bifocal.orientation.street import write_street
 
 
+@pytest.mark.acceptance
 def test_twelve_pairs_are_as_precise_as_their_sigmas_say():
     """0.4 px, 6 control points of 2 mm; errors of one run are common, so several are averaged."""
     ratios, units = [], []

@@ -29,6 +29,7 @@ def wall() -> tuple[Grid, MapSurface, np.ndarray]:
     return grid, surface, truth
 
 
+@pytest.mark.acceptance
 def test_99_percent_of_the_hidden_pixels_are_found_at_03_percent_false_alarms(
     wall: tuple[Grid, MapSurface, np.ndarray],
 ) -> None:
@@ -50,6 +51,7 @@ def test_a_step_beside_the_nadir_hides_nothing_of_it() -> None:
     assert not hidden.any()
 
 
+@pytest.mark.acceptance
 def test_tiles_and_the_whole_agree(wall: tuple[Grid, MapSurface, np.ndarray]) -> None:
     grid, surface, _ = wall
     camera = Foot(np.array([0.6, 0.4]), 10.0)  # the nadir within a tile

@@ -131,6 +131,7 @@ def test_fast_quality_is_coarser_but_covers_the_same():
     assert np.nanmedian(np.abs(found.r - shot().truth.r)) < 0.03
 
 
+@pytest.mark.acceptance
 def test_pairs_of_little_difference_in_distance_work_too():
     other = shot(6, 14.0)
     found = dense_relief(other.pair, other.image1, other.image2)

@@ -32,6 +32,7 @@ def test_the_largest_workbook_that_is_written_is_read_again(tmp_path, monkeypatc
     assert sum(sizes) / count * MOST_ROWS < package.LARGEST_TOTAL
 
 
+@pytest.mark.acceptance
 @pytest.mark.office
 def test_rows_added_to_a_large_table_get_short_formulas(tmp_path, monkeypatch):
     monkeypatch.setattr(update, "STRUCTURED_ROWS", 3)

@@ -251,6 +251,7 @@ def test_formulas_of_a_general_pair_equal_the_library(principal_distance, tmp_pa
     assert assert_recalculated_equals_cached(tmp_path / "pair.xlsx", tmp_path) > 2000
 
 
+@pytest.mark.acceptance
 @pytest.mark.office
 def test_sigmas_in_the_world_of_an_uncertain_pair_equal_the_library(tmp_path):
     content = pair_content(placed=True)
@@ -264,6 +265,7 @@ def test_sigmas_in_the_world_of_an_uncertain_pair_equal_the_library(tmp_path):
     np.testing.assert_allclose(known, content.world_sigma[:, 2], rtol=1e-9)
 
 
+@pytest.mark.acceptance
 @pytest.mark.office
 def test_formulas_follow_pixels_freed_of_lens_distortion(tmp_path):
     lens = Lens(

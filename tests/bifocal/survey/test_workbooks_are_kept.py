@@ -310,6 +310,7 @@ def test_results_are_new_live_columns_of_the_users_own_table(tmp_path, name):
     assert_recalculated_equals_cached(path, tmp_path)
 
 
+@pytest.mark.acceptance
 @pytest.mark.office
 def test_sigmas_in_the_world_are_live_in_the_users_own_table(tmp_path):
     heads, table, head = FOREIGN["plain"]

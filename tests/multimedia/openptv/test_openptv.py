@@ -44,7 +44,7 @@ EXTERIOR_PHYSICAL = (6.23, 7.12, 7.95, 4.79)
 CALIBRATED_PHYSICAL = (5.67, 3.54, 4.54, 3.54)
 
 
-@pytest.mark.parametrize("swap", [False, True])
+@pytest.mark.parametrize("swap", [False, pytest.param(True, marks=pytest.mark.acceptance)])
 def test_the_real_tank_is_resected_as_stated(cavity, swap):
     found = import_openptv(cavity, out=None, swap_indices=swap)
     assert found.matched == (43, 43, 71, 71)
@@ -279,6 +279,7 @@ def test_openptvs_scale_is_a_longer_principal_distance(tmp_path, tank_project):
     assert np.abs(project(camera, points, tank_project.media["wall1"]) - want).max() < 1e-12
 
 
+@pytest.mark.acceptance
 def test_points_clicked_by_hand_replace_a_useless_orientation(tank_project, tmp_path):
     folder = tmp_path / "exp"
     write_experiment(folder, tank_project)

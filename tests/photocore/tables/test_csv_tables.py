@@ -214,6 +214,7 @@ def test_an_existing_file_unknown_flavours_and_uneven_columns_are_refused(tmp_pa
         write_csv(path, {"X": np.zeros(1), "Y": np.zeros(2)}, overwrite=True)
 
 
+@pytest.mark.acceptance
 def test_large_tables_with_blanks_and_one_odd_field_keep_every_number(tmp_path):
     random = np.random.default_rng(5)
     count = 120_000

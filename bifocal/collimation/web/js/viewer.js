@@ -70,7 +70,9 @@ export function tileLayer(view, className, address, info, place = null) {
     tileLoadFunction: loadTile,
     transition: 0,
   });
-  return new ol.layer.Tile({ className, extent, source, preload: 2 });
+  // No `preload`: its timers outlive a layer's move to another map and end in an error. The coarse
+  // tiles of the whole picture, loaded at the start, stand in for what is not there yet.
+  return new ol.layer.Tile({ className, extent, source });
 }
 
 /** Layer of one picture that covers `extent` of the grid (columns and rows of its outer edges). */
