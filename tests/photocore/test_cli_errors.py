@@ -144,6 +144,7 @@ def test_a_process_that_ends_so_is_noticed_by_every_test(unforeseen) -> None:
     assert met.startswith("exit status 70")
 
 
+@pytest.mark.acceptance
 def test_a_test_fails_that_ends_in_the_handler(pytester: pytest.Pytester, request) -> None:
     conftest = request.config.rootpath / "tests" / "conftest.py"
     pytester.makeconftest(conftest.read_text(encoding="utf-8"))

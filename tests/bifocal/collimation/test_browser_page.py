@@ -164,6 +164,7 @@ def test_it_fits_small_screens_and_large(page: Driver, size: tuple[int, int]) ->
     page.tab.set_viewport_size({"width": 1280, "height": 720})
 
 
+@pytest.mark.acceptance
 def test_it_speaks_italian_and_german(page: Driver) -> None:
     for language, word in (("it", "Orientamento"), ("de", "Orientierung"), ("en", "Orientation")):
         page.tab.get_by_test_id("language").select_option(language)

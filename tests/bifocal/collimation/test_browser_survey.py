@@ -46,6 +46,7 @@ def relief_of(book: Path) -> dict[str, float]:
     return {point["id"]: point["r"] for point in json.loads(run.stdout)["points"]}
 
 
+@pytest.mark.acceptance
 def test_noisy_picks_give_the_relief_that_solve_gives(page: Driver) -> None:
     """Clicks with 0.3 px of noise: the page's numbers against the workbook's, solved anew."""
     rng = np.random.default_rng(14)

@@ -176,6 +176,7 @@ def _server(folder: Path) -> Iterator[tuple[subprocess.Popen, str, str]]:
             process.kill()
 
 
+@pytest.mark.acceptance
 @pytest.mark.skipif(os.name == "nt", reason="Windows has no kill -9")
 def test_a_killed_server_resumes_with_everything_and_an_open_page_finds_it(tmp_path) -> None:
     folder = sample_folder(tmp_path)

@@ -106,7 +106,7 @@ def typed_rows(path, sheet: str, columns: int) -> list[tuple]:
     return body[first : first + 4]
 
 
-@pytest.mark.parametrize("between", [True, False])
+@pytest.mark.parametrize("between", [True, pytest.param(False, marks=pytest.mark.acceptance)])
 def test_rows_of_deleted_points_are_blanked_whole_and_used_again(tmp_path, between: bool) -> None:
     folder, picks = sample_folder(tmp_path), sample_picks()
     with opened(folder) as session:
@@ -250,6 +250,7 @@ def test_another_orientation_reaches_the_formulas(tmp_path) -> None:
         assert (found.pair.d1, found.pair.image2.nadir.tolist()) == (17.7, [0.02, -0.01])
 
 
+@pytest.mark.acceptance
 def test_many_points_are_written_by_a_process_of_its_own(tmp_path, monkeypatch) -> None:
     monkeypatch.setattr("bifocal.collimation.workbook_sync.LARGE", 8)
     folder, picks = sample_folder(tmp_path), sample_picks()

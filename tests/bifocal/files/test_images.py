@@ -118,6 +118,7 @@ def test_a_cut_jpeg_is_refused(tmp_path):
         read_image(path)
 
 
+@pytest.mark.acceptance
 def test_a_decompression_bomb_is_refused_by_its_header(tmp_path):
     path = tmp_path / "bomb.png"
     Image.new("1", (30_000, 30_000)).save(path)

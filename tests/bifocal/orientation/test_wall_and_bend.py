@@ -141,6 +141,7 @@ def through_water(photo: np.ndarray, cam: Pinhole, depth: float) -> np.ndarray:
     return cv2.remap(photo, at[..., 0], at[..., 1], cv2.INTER_CUBIC)
 
 
+@pytest.mark.acceptance
 def test_photos_through_water_are_said_not_to_fit() -> None:
     cameras = wall_camera(16.0), wall_camera(9.0, offset=(0.05, -0.04))
     views = take(*cameras)

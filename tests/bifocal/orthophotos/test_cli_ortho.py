@@ -456,6 +456,7 @@ def page_of(pdf: Path) -> str:
     return zlib.decompress(pieces[-1]).decode("cp1252")
 
 
+@pytest.mark.acceptance
 def test_the_relief_sheet_hatches_what_was_not_measured_and_has_a_legend(wall: Path) -> None:
     relief = read_relief(wall / "relief.tif")
     quality = relief.quality.copy()
@@ -500,6 +501,7 @@ def test_the_relief_sheet_hatches_what_was_not_measured_and_has_a_legend(wall: P
     assert min(x for line in lines for x, *_ in line.get_points()) > -1.3
 
 
+@pytest.mark.acceptance
 def test_many_marked_points_do_not_bury_the_sheet_under_their_names(wall: Path) -> None:
     rng = np.random.default_rng(3)
     lines = [

@@ -90,6 +90,7 @@ def test_photos_that_fit_are_not_blamed_but_the_scale_is_always_mentioned():
     assert "21 mm" in registration.remarks[-1]
 
 
+@pytest.mark.acceptance
 def test_offset_and_tilted_cameras_give_the_same_relief():
     errors = SetupErrors(tilt_deg=1.5, offset=0.3, distance=0.02)
     cameras = bifocal_cameras(

@@ -60,7 +60,7 @@ def errors(taken: Rendering, found) -> np.ndarray:
     return error[np.isfinite(error)]
 
 
-@pytest.mark.parametrize("name", ["port", "surface"])
+@pytest.mark.parametrize("name", ["port", pytest.param("surface", marks=pytest.mark.acceptance)])
 def test_relief_through_media_is_good_to_hundredths_of_a_pixel(name):
     """2.4 and 3.1 mm of median, 6.1 and 6.4 mm of mean here; 1 px at a metre is 0.3 m of relief.
 

@@ -20,6 +20,7 @@ def survey(path, **more):
     return fill(path, Check=CHECKS, Georeference=WORLD, **more)
 
 
+@pytest.mark.acceptance
 @pytest.mark.office
 def test_results_in_the_users_workbook_equal_its_formulas(tmp_path):
     out = tmp_path / "out.xlsx"

@@ -244,7 +244,7 @@ def test_every_formula_recalculated_by_libreoffice_equals_the_library(model, tmp
 
 @pytest.mark.office
 @pytest.mark.parametrize(
-    "principal_distance", [None, pytest.param(35.0, marks=pytest.mark.acceptance)]
+    "principal_distance", [pytest.param(None, marks=pytest.mark.acceptance), 35.0]
 )
 def test_formulas_of_a_general_pair_equal_the_library(principal_distance, tmp_path):
     write_book(tmp_path / "pair.xlsx", pair_content(principal_distance=principal_distance))
@@ -277,6 +277,7 @@ def test_formulas_follow_pixels_freed_of_lens_distortion(tmp_path):
     assert assert_recalculated_equals_cached(tmp_path / "lens.xlsx", tmp_path) > 2000
 
 
+@pytest.mark.acceptance
 @pytest.mark.office
 def test_long_tables_written_with_short_references_calculate_the_same(tmp_path, monkeypatch):
     monkeypatch.setattr("bifocal.survey.workbook.book.STRUCTURED_ROWS", 10)

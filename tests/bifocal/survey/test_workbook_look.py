@@ -201,6 +201,7 @@ def test_setup_says_in_one_line_what_is_missing_or_wrong(given, told, tmp_path):
     assert named(book, "setup_state").value.startswith(told)
 
 
+@pytest.mark.acceptance
 @pytest.mark.office
 def test_the_sheet_itself_finds_swapped_distances_and_unequal_scales(tmp_path):
     write_template(tmp_path / "form.xlsx", rows=3)

@@ -85,7 +85,7 @@ RECALCULATED = ("--d1", "--tolerance-rule", "--adjust-setup")
 OPTIONS = [
     (("--d1", 17.6), {"d_2": 9.5, "delta_d": 8.1}),
     slow(("--d2", 9.4), {"d_2": 9.4, "delta_d": 8.1}),
-    (("--c1", 35.5, "--sigma-s", 0.01), {"c_1": 35.5, "sigma_s": 0.01}),
+    slow(("--c1", 35.5, "--sigma-s", 0.01), {"c_1": 35.5, "sigma_s": 0.01}),
     slow(("--unit", "mm"), {"input_unit": "mm"}),
     slow(("--sigma-r-max", 0.5), {"sigma_r_max": 0.5}),
     (("--lang", "it"), {}),
@@ -165,6 +165,7 @@ def test_another_language_changes_labels_and_nothing_the_user_wrote(tmp_path):
     assert openpyxl.load_workbook(path)["Points"]["A3"].value == "Point"
 
 
+@pytest.mark.acceptance
 @pytest.mark.office
 def test_rows_below_the_prepared_ones_get_formulas(tmp_path):
     table = rows([(f"Q{i}", 1 + i / 50, 2, 0.3) for i in range(30)])
@@ -196,6 +197,7 @@ def test_a_row_inserted_without_formulas_gets_them(tmp_path):
     assert openpyxl.load_workbook(path, data_only=True)["Results"]["D6"].value == pytest.approx(0.7)
 
 
+@pytest.mark.acceptance
 @pytest.mark.office
 def test_check_and_control_points_below_their_tables_are_seen_by_every_sum(tmp_path):
     points = [(f"Q{i}", i / 5 - 3, 2 - i % 7, 0.1 * (i % 5)) for i in range(40)]
@@ -208,6 +210,7 @@ def test_check_and_control_points_below_their_tables_are_seen_by_every_sum(tmp_p
     assert [book["Check"]["D5"].value, book["Georeference"]["B7"].value] == [30, 40]
 
 
+@pytest.mark.acceptance
 @pytest.mark.office
 def test_deleted_rows_leave_no_errors_in_results(tmp_path):
     path = fill(tmp_path / "own.xlsx")
@@ -225,7 +228,7 @@ def test_deleted_rows_leave_no_errors_in_results(tmp_path):
 @pytest.mark.office
 @pytest.mark.parametrize(
     "title",
-    ["Setup", "Results", slow("Check"), slow("Georeference"), slow("Planning"), slow("Log")],
+    [slow("Setup"), "Results", slow("Check"), slow("Georeference"), slow("Planning"), slow("Log")],
 )
 def test_a_sheet_that_is_missing_is_added(tmp_path, title):
     path = with_own_chart(fill(tmp_path / "own.xlsx"))
@@ -336,6 +339,7 @@ def test_sigmas_in_the_world_are_live_in_the_users_own_table(tmp_path):
     assert len(used) >= 4
 
 
+@pytest.mark.acceptance
 @pytest.mark.office
 def test_values_of_the_users_own_setup_stay_where_they_are_and_live(tmp_path):
     heads, table, head = FOREIGN["plain"]

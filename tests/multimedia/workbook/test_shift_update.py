@@ -76,7 +76,7 @@ def test_live_columns_are_added_and_everything_else_stays(own: Path, tmp_path: P
 @pytest.mark.parametrize(
     "kind",
     [
-        "labels",
+        pytest.param("labels", marks=pytest.mark.acceptance),
         "texts",
         pytest.param("names", marks=pytest.mark.acceptance),
         pytest.param("radius", marks=pytest.mark.acceptance),

@@ -103,6 +103,7 @@ def test_bad_cells_are_named(file, cell, message):
         read_table(path, COLUMNS)
 
 
+@pytest.mark.acceptance
 @pytest.mark.office
 def test_what_libreoffice_writes_reads_the_same_as_the_workbook(tmp_path):
     book = openpyxl.Workbook()

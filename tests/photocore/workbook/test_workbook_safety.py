@@ -243,6 +243,7 @@ def test_formatted_empty_rows_do_not_count_as_rows(tmp_path):
     assert len(read_table(path, COLUMNS, max_rows=100)) == 1
 
 
+@pytest.mark.acceptance
 def test_a_sheet_of_a_million_rows_leads_to_csv_before_it_is_read_whole(tmp_path):
     path = tmp_path / "survey.xlsx"
     path.write_bytes(of_many_rows())
