@@ -159,7 +159,7 @@ class _Splicer:
         for cell in row.cells:
             if cell[1] in typed:
                 number = typed.pop(cell[1])
-                if cell[5] or cell[4] or not cell[6] or type(number) is not float:
+                if cell[5] or cell[4] or not _is_value(cell[6]) or type(number) is not float:
                     return False
                 if float(cell[6][3:-4]) != number:
                     new = type_and_content(number, "", formula=False)[1].encode()
@@ -169,7 +169,7 @@ class _Splicer:
             values, formula, stored = results.get(cell[1]), cell[5], cell[6]
             if values is None and not (formula and stored):
                 continue
-            if values is None or not formula or not stored or stored[:3] != b"<v>":
+            if values is None or not formula or not _is_value(stored):
                 return False
             found += 1
             kind, content = type_and_content(values[index], "", formula=True)
@@ -458,3 +458,8 @@ class _Splicer:
                 count=1,
             )
             self.edits.append((start, end, tag))
+
+
+def _is_value(stored: bytes | None) -> bool:
+    """Tell whether what stands in a cell is a value, and not an empty one."""
+    return stored is not None and stored[:3] == b"<v>" and stored[3:4] != b"<"

@@ -405,6 +405,7 @@ PLAIN_CHANGES = [
     {"added": [("filled", 2, 4)], "inputs": {3: {2: 9.0}}},
     {"added": [("filled", 2, 2)]},
     {"added": [("filled", 2, 2)], "inputs": {2: {2: 1.5}, 3: {2: 2.25}}},
+    {"added": [("filled", 2, 2)], "inputs": {2: {3: 1.5}, 3: {3: 2.25}}},
     {"added": [("filled", 3, 1)]},
     {"placed": {2: {4: 1.5}, 3: {1: "over"}, 12: {4: 2.5}}},
 ]
@@ -416,9 +417,10 @@ def test_a_plain_sheet_changes_as_by_the_parser(changes):
 
     cells = (
         '<row r="2" spans="1:4"><c r="A2" t="inlineStr"><is><t>P1 &amp; Ö</t></is></c>'
-        '<c r="B2" s="3"><v>1.5</v></c><c r="D2" s="1"><f>A2&lt;B2</f><v>0.5</v></c></row>'
+        '<c r="B2" s="3"><v>1.5</v></c><c r="C2"><v/></c>'
+        '<c r="D2" s="1"><f>A2&lt;B2</f><v>0.5</v></c></row>'
         '<row r="3" hidden="1"><c r="A3" t="s"><v>0</v></c><c r="B3"><v>2</v></c>'
-        ' <c r="D3" s="4" t="str"><f>"x"</f><v>x</v></c></row>'
+        '<c r="C3"><v></v></c> <c r="D3" s="4" t="str"><f>"x"</f><v>x</v></c></row>'
         '<row r="4"><c r="D4"><f>1/0</f></c></row><row r="5"/><row r="7"><c r="B7" s="2"/></row>'
     )
     plain = f'<worksheet><dimension ref="A2:D7"/><sheetData>{cells}</sheetData></worksheet>'
