@@ -122,6 +122,7 @@ def main() -> None:
         for module in walk_packages(package.__path__, f"{package.__name__}."):
             if not module.name.endswith("__main__"):
                 import_module(module.name)
+    import_module("tomli_w")  # which is loaded when a project is written
     with tempfile.TemporaryDirectory() as name:
         for line in sys.stdin:
             sys.__stdout__.write(json.dumps(run(json.loads(line), Path(name))) + "\n")
