@@ -169,7 +169,7 @@ class _Splicer:
             values, formula, stored = results.get(cell[1]), cell[5], cell[6]
             if values is None and not (formula and stored):
                 continue
-            if values is None or not formula or not _is_value(stored):
+            if values is None or not formula or not stored or stored[:3] != b"<v>":
                 return False
             found += 1
             kind, content = type_and_content(values[index], "", formula=True)
@@ -461,5 +461,5 @@ class _Splicer:
 
 
 def _is_value(stored: bytes | None) -> bool:
-    """Tell whether what stands in a cell is a value, and not an empty one."""
+    """Tell whether what stands in a cell is a value, and not an empty text."""
     return stored is not None and stored[:3] == b"<v>" and stored[3:4] != b"<"
