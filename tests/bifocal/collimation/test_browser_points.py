@@ -380,5 +380,6 @@ def test_opacity_swipe_blink_and_contrast_show_what_they_say(page: Driver) -> No
     page.keys("v")
     slider.fill("0")
     page.tab.get_by_test_id("contrast-1").fill("200")
-    assert seen(page).std() > 1.3 * far.std()
+    # A loaded machine draws the new contrast some frames later.
+    assert any(seen(page).std() > 1.3 * far.std() for _ in range(20))
     page.tab.get_by_test_id("contrast-1").fill("100")

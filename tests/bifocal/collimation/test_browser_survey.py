@@ -46,6 +46,34 @@ def relief_of(book: Path) -> dict[str, float]:
     return {point["id"]: point["r"] for point in json.loads(run.stdout)["points"]}
 
 
+SLOW_STATE = """() => {
+  const real = window.fetch;
+  window.fetch = async (path, ...rest) => {
+    if (path === "/api/state") await new Promise((done) => setTimeout(done, 700));
+    return real(path, ...rest);
+  };
+}"""
+
+
+def test_a_job_that_is_done_shows_what_it_made_at_once(browser: Any, tmp_path: Path) -> None:
+    """However long the state takes that tells of the new files."""
+    with sample_survey(tmp_path) as server, tab_of(browser, server) as page:
+        page.click("mode-products")
+        size = page.tab.get_by_label("Pixel on the wall")
+        size.fill("20 x")
+        page.click("run-ortho")
+        assert not size.evaluate("(field) => field.checkValidity()")
+        assert page.state["jobs"] == []
+        size.fill("20")
+        page.tab.evaluate(SLOW_STATE)
+        page.click("run-ortho")
+        shown = page.wait(
+            "() => bifocal.state().jobs.some(({ state }) => state === 'done') && bifocal.state()"
+        )
+        assert any(one["name"].endswith(".tif") for one in shown["products"]["files"])
+        assert shown["products"]["ortho"]
+
+
 @pytest.mark.acceptance
 def test_noisy_picks_give_the_relief_that_solve_gives(page: Driver) -> None:
     """Clicks with 0.3 px of noise: the page's numbers against the workbook's, solved anew."""

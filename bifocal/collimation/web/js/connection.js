@@ -42,6 +42,7 @@ export class Connection extends EventTarget {
     this.locked = false;
     this.unsent = [];
     this.running = false;
+    this.heard = 0;
     this.moved = new Map();
   }
 
@@ -139,6 +140,7 @@ export class Connection extends EventTarget {
       }
     }
     this.running = false;
+    this.#catchUp();
   }
 
   async #deliver(command) {
@@ -180,6 +182,7 @@ export class Connection extends EventTarget {
   /** Take a state unless it is older than what is shown; a restarted server counts `anew`. */
   #adopt(state, anew = false) {
     if (this.state && !anew && state.revision < this.state.revision) return;
+    if (anew) this.heard = state.revision;
     this.state = state;
     this.dispatchEvent(new Event("state"));
   }
@@ -205,8 +208,9 @@ export class Connection extends EventTarget {
     source.onmessage = ({ data }) => {
       const news = JSON.parse(data);
       if (news.job) this.#progress(news.job);
-      else if (news.revision !== this.state.revision && !this.running) {
-        this.#retry(() => this.refresh());
+      else {
+        this.heard = news.revision;
+        this.#catchUp();
       }
     };
     source.onerror = () => {
@@ -215,7 +219,17 @@ export class Connection extends EventTarget {
     };
   }
 
+  /** Fetch the state that was told of, unless the answer to a command is about to bring it. */
+  #catchUp() {
+    if (this.heard > this.state.revision && !this.running) this.#retry(() => this.refresh());
+  }
+
+  /** Show how far a job is; what has ended is shown together with what it made. */
   #progress(job) {
+    if (job.state !== "running") {
+      this.#retry(() => this.refresh());
+      return;
+    }
     const others = this.state.jobs.filter(({ id }) => id !== job.id);
     this.state = { ...this.state, jobs: [...others, job] };
     this.dispatchEvent(new Event("state"));
