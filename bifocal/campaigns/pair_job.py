@@ -36,6 +36,8 @@ if TYPE_CHECKING:
 PRODUCTS = ("relief", "points", "ortho", "drawing", "report")
 #: What is made where nothing else is said: the drawing has the orthophoto.
 MOST_PRODUCTS = ("relief", "points", "drawing", "report")
+#: The first step of every pair.
+ALIGN = "align"
 #: Files of a pair besides its photos.
 FILES = ("control", "check", "lengths", "lens", "lens1", "lens2")
 #: Options that hold for all pairs where these are adjusted in one frame.
@@ -270,9 +272,25 @@ def _some(job: PairJob, *names: str) -> dict[str, Any]:
     return {name: job.options[name] for name in names if name in job.options}
 
 
+def refusal(job: PairJob) -> str:
+    """Return why a pair cannot be aligned as it is described; empty where nothing is missing."""
+    from bifocal.orientation.align_workflow import AlignOptions, check_way
+
+    step = _align_step(job)
+    try:
+        check_way(AlignOptions.from_given({**step.options, **_align_files(job)}))
+    except InputError as error:
+        return str(error)
+    return ""
+
+
+def _align_files(job: PairJob) -> dict[str, Path]:
+    return {role: path for role, path in job.files.items() if role != "check"}
+
+
 def _align_step(job: PairJob) -> Step:
     names = [key for key in job.options if key in ALIGN_OPTIONS]
-    files = {k: v for k, v in job.files.items() if k != "check"}
+    files = _align_files(job)
     options = _some(job, *names)
 
     def make(place: Path, progress: Progress) -> tuple[str, ...]:  # noqa: ARG001
@@ -286,7 +304,7 @@ def _align_step(job: PairJob) -> Step:
         return (*made.remarks, *made.pair.remarks)
 
     photos = {"far": job.far, "near": job.near}
-    return Step(name="align", files={**photos, **files}, options=options, make=make)
+    return Step(name=ALIGN, files={**photos, **files}, options=options, make=make)
 
 
 #: Options that go to the alignment.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import tomllib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
@@ -100,6 +101,9 @@ OPTIONS: Mapping[str, Callable[[Any], Any]] = {
 )  # fmt: skip
 
 
+#: An option of the command line with its value.
+_VALUE = r"(?:[A-Z]+|\d[\d.]*\d|\d)"
+_OPTION = re.compile(rf"(?<![\w-])--([a-z][a-z0-9-]*)(?: ({_VALUE}(?:,{_VALUE})*)\b)?")
 #: What is made of all pairs together, each in a folder of its own: keys above the pairs.
 WHOLE = ("joint", "mosaic")
 
@@ -163,6 +167,31 @@ def read_survey_file(
     if faults:
         raise InputError("\n".join(f"{path}: {fault}" for fault in dict.fromkeys(faults)))
     return jobs
+
+
+def in_survey_words(text: str) -> str:
+    """Return advice to use options of the command line as keys of the survey file.
+
+    Examples
+    --------
+    >>> in_survey_words("give --control FILE, or --focal1 35 and --sensor-width 23.5; --jobs 2.")
+    'give control = "FILE", or focal1 = 35 and sensor_width = 23.5; --jobs 2.'
+    >>> in_survey_words("name a spot with --wall COL,ROW, or --auto with one of --distance1.")
+    'name a spot with wall = [COL, ROW], or auto = true with one of distance1.'
+    """
+
+    def key_of(match: re.Match[str]) -> str:
+        key, value = match[1].replace("-", "_"), match[2]
+        if key not in OPTIONS and key not in FILES:
+            return match[0]
+        if OPTIONS.get(key) is _truth:
+            return f"{key} = true" + (f" {value}" if value else "")
+        if value is None:
+            return key
+        listed = f"[{value.replace(',', ', ')}]" if "," in value else value
+        return f'{key} = "{value}"' if key in FILES else f"{key} = {listed}"
+
+    return _OPTION.sub(key_of, text)
 
 
 def _faults_of_whole(jobs: Sequence[PairJob], whole: Mapping[str, Any]) -> list[str]:

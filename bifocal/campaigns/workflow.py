@@ -12,12 +12,14 @@ from pathlib import Path
 from typing import Any
 
 from bifocal.campaigns.pair_job import (
+    ALIGN,
     FILES,
     MOST_PRODUCTS,
     PRODUCTS,
     PairJob,
     PairOutcome,
     plan_of,
+    refusal,
     steps_of,
 )
 from bifocal.campaigns.step_store import Step, clean
@@ -87,6 +89,17 @@ class SurveyResult:
         everything = (*self.outcomes, *self.together)
         return tuple(outcome for outcome in everything if outcome.failed_step)
 
+    def in_words(self, worded: Callable[[str], str]) -> SurveyResult:
+        """Return it with what it says put into other words."""
+
+        def put(outcomes: tuple[PairOutcome, ...]) -> tuple[PairOutcome, ...]:
+            return tuple(
+                replace(one, message=worded(one.message), remarks=tuple(map(worded, one.remarks)))
+                for one in outcomes
+            )
+
+        return replace(self, outcomes=put(self.outcomes), together=put(self.together))
+
     def to_dict(self) -> dict[str, Any]:
         """Return it as plain data."""
         pairs = [outcome.to_dict() for outcome in self.outcomes]
@@ -99,7 +112,7 @@ class SurveyResult:
         failed = sum(bool(outcome.failed_step) for outcome in self.outcomes)
         kept = len(self.outcomes) - made - failed
         lines = [
-            f"{len(self.outcomes)} pairs: {made} made, {kept} kept as they were, "
+            f"{pairs_in_words(len(self.outcomes))}: {made} made, {kept} kept as they were, "
             f"{failed} failed; {_duration(self.seconds)}."
         ]
         for outcome in self.together:
@@ -110,6 +123,17 @@ class SurveyResult:
             lines += ["", f"{outcome.name}, failed at {outcome.failed_step}:"]
             lines.append(f"  {outcome.message}")
         return lines
+
+
+def pairs_in_words(count: int) -> str:
+    """Return how many pairs.
+
+    Examples
+    --------
+    >>> pairs_in_words(1), pairs_in_words(40)
+    ('1 pair', '40 pairs')
+    """
+    return f"{count} pair" + ("" if count == 1 else "s")
 
 
 def _duration(seconds: float) -> str:
@@ -159,6 +183,8 @@ def plan_survey(jobs: Sequence[PairJob], *, mosaic: bool = False) -> list[tuple[
             plan = plan_of(replace(job, products=(), joint=None), hashes)
             if plan[-1][1] in ("keep", "make"):
                 plan += [(step.name, "make") for step in steps_of(job)[1:]]
+        if plan[0] == (ALIGN, "make"):
+            plan[0] = ALIGN, refusal(job) or "make"
         rows += [(job.name, step, what) for step, what in plan]
     if frame:
         rows.append((_ALL, JOINT, frame))

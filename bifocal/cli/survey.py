@@ -11,7 +11,7 @@ from photocore.options import FILE, Number, as_json, number, overwrite
 
 EXAMPLE = """\b
 Examples:
-  bifocal survey --init photos street.toml
+  bifocal survey --init photos
   bifocal survey street.toml --dry-run
   bifocal survey street.toml --jobs 4 --memory 12
   bifocal survey street.toml --scheduler tcp://192.168.0.10:8786
@@ -19,10 +19,11 @@ Examples:
 
 
 @click.command(epilog=EXAMPLE)
-@click.argument("survey", type=FILE)
+@click.argument("survey", type=FILE, required=False)
 @click.option(
-    "--init", "folder", type=FILE, metavar="DIR", help="Write SURVEY from a folder of photos."
-)
+    "--init", "folder", type=FILE, metavar="DIR",
+    help="Write SURVEY from a folder of photos.  [default: survey.toml in it]",
+)  # fmt: skip
 @click.option("--dry-run", is_flag=True, help="Show what would be made and what is kept.")
 @click.option(
     "--out", type=FILE, metavar="DIR", help="Folder of the results.  [default: the file's]"
@@ -42,7 +43,7 @@ Examples:
 @as_json
 @click.pass_context
 def command(
-    ctx: click.Context, survey: Path, folder: Path | None, dry_run: bool, out: Path | None,
+    ctx: click.Context, survey: Path | None, folder: Path | None, dry_run: bool, out: Path | None,
     jobs: int | None, memory: float | None, scheduler: str, ship: bool, overwrite: bool,
     as_json: bool,
 ) -> None:  # fmt: skip
@@ -52,27 +53,47 @@ def command(
     what changed is made anew; stopped or killed at any moment, it goes on where it was. A pair
     that fails stops no other; a table at the end says what failed and how to mend it.
     """
-    from bifocal.campaigns.survey_file import read_survey_file, wants_mosaic
-    from bifocal.campaigns.workflow import Machines, begin_survey, plan_survey, run_survey
+    from bifocal.campaigns.survey_file import in_survey_words, read_survey_file, wants_mosaic
+    from bifocal.campaigns.workflow import (
+        Machines,
+        begin_survey,
+        pairs_in_words,
+        plan_survey,
+        run_survey,
+    )
 
     if folder is not None:
+        survey = survey or folder / "survey.toml"
         with progress_bar("photos", quiet=as_json) as progress:
             found, left = begin_survey(survey, folder, overwrite=overwrite, progress=progress)
         tell_written(survey)
         print_result(
-            {"pairs": found, "left": left}, [f"{found} pairs; {left} photos in none."],
+            {"survey": str(survey), "pairs": found, "left": left},
+            [
+                f"{pairs_in_words(found)}; {left} of the photos in none.",
+                f"Say in {survey} how each is controlled, then: bifocal survey {survey} --dry-run",
+            ],
             as_json=as_json,
         )  # fmt: skip
         return
+    if survey is None:
+        raise click.UsageError("name the survey file, or --init DIR with a folder of photos.")
     pairs = read_survey_file(survey, out=out, overwrite=overwrite)
     if dry_run:
-        plan = plan_survey(pairs, mosaic=wants_mosaic(survey))
+        plan = [
+            (pair, step, in_survey_words(what))
+            for pair, step, what in plan_survey(pairs, mosaic=wants_mosaic(survey))
+        ]
         if as_json:
             print_json(
                 {"plan": [dict(zip(("pair", "step", "what"), row, strict=True)) for row in plan]}
             )
         else:
-            click.echo(text_table(["pair", "step", "what"], plan))
+            short = [(*row[:2], row[2] if row[2] in ("keep", "make") else "cannot") for row in plan]
+            click.echo(text_table(["pair", "step", "what"], short))
+            for (pair, step, why), (*_, what) in zip(plan, short, strict=True):
+                if what == "cannot":
+                    click.echo(f"\n{pair}, {step}:\n  {why}")
         return
     if ship and not scheduler:
         raise click.UsageError("--ship goes with --scheduler.")
@@ -81,6 +102,7 @@ def command(
         result = run_survey(
             pairs, machines=machines, mosaic=wants_mosaic(survey), progress=progress, tell=remark
         )
+    result = result.in_words(in_survey_words)
     print_result(result.to_dict(), result.lines(), as_json=as_json)
     if result.failed:
         ctx.exit(1)

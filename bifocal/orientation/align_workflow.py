@@ -225,6 +225,17 @@ def basis(alignment: Alignment) -> str:
     )  # fmt: skip
 
 
+def check_way(options: AlignOptions) -> None:
+    """Check that the options describe a way into the pair file, before any photo is read.
+
+    Raises
+    ------
+    InputError
+        Naming what is missing.
+    """
+    _way(options)
+
+
 def _way(options: AlignOptions) -> tuple[str, AlignOptions]:
     """Return which way into the pair file the options describe."""
     site = options.site

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shutil
 from dataclasses import replace
 from pathlib import Path
@@ -103,9 +104,29 @@ def test_photos_of_a_folder_are_paired_by_what_they_show(tmp_path, capsys):  # n
     assert {job.far.name, job.near.name} == {"b far.jpg", "c near.jpg"}
     assert job.files["control"] == tmp_path / "photos/c near.csv"
     assert "a other.jpg" in out.read_text()
+    assert f"bifocal survey {out} --dry-run" in result.stdout
     again = CliRunner().invoke(main, ["survey", "--init", str(photos), str(out)])
     assert again.exit_code == 1
     assert "--overwrite" in again.stderr
+
+
+def test_a_pair_that_nothing_controls_is_told_in_words_of_the_file_before_any_work(tmp_path):
+    shutil.copy(FAR, tmp_path / "far.jpg")
+    shutil.copy(NEAR, tmp_path / "near.jpg")
+    begun = CliRunner().invoke(main, ["survey", "--init", str(tmp_path)])
+    assert begun.exit_code == 0, begun.stderr
+    survey = str(tmp_path / "survey.toml")
+    planned = CliRunner().invoke(main, ["survey", survey, "--dry-run"])
+    assert planned.exit_code == 0, planned.stderr
+    assert " align  cannot\n" in planned.stdout
+    ran = CliRunner().invoke(main, ["survey", survey])
+    assert ran.exit_code == 1
+    assert ran.stdout.startswith("1 pair: 0 made")
+    for told in (planned.stdout, ran.stdout):
+        assert 'control = "FILE"' in told
+        assert "auto = true with one distance" in told
+        assert not re.search(r"--[a-z]", told)
+    assert CliRunner().invoke(main, ["survey"]).exit_code == 2
 
 
 def test_an_equivalent_and_a_true_focal_length_do_not_tell_which_photo_is_far():
