@@ -176,12 +176,29 @@ def undistorted(image: ImageArray, lens: Lens) -> ImageArray:
     # Strips keep the coordinate maps small, and below remap's limit of 32767 rows.
     for top in range(0, height, 512):
         bottom = min(top + 512, height)
-        columns, rows = np.meshgrid(np.arange(width), np.arange(top, bottom))
-        seen = lens.distort(np.stack([columns, rows], axis=-1)).astype(np.float32)
+        columns, rows = _seen_at(lens, top, (width, bottom - top))
         result[top:bottom] = cv2.remap(
-            image, seen, None, cv2.INTER_CUBIC, borderMode=cv2.BORDER_CONSTANT
+            image, columns, rows, cv2.INTER_CUBIC, borderMode=cv2.BORDER_CONSTANT
         )
     return result
+
+
+def _seen_at(lens: Lens, top: int, size: tuple[int, int]) -> tuple[FloatArray, FloatArray]:
+    """Return columns and rows where a strip of ideal pixels is seen, single precision. [px]"""
+    if lens.model == "radial":
+        columns, rows = np.meshgrid(np.arange(size[0]), np.arange(top, top + size[1]))
+        seen = lens.distort(np.stack([columns, rows], axis=-1)).astype(np.float32)
+        return np.ascontiguousarray(seen[..., 0]), np.ascontiguousarray(seen[..., 1])
+    matrix, terms = np.array(lens.camera_matrix), np.array(lens.coefficients)
+    strip = matrix.copy()
+    strip[1, 2] -= top
+    begin = (
+        cv2.fisheye.initUndistortRectifyMap
+        if lens.model == "fisheye"
+        else cv2.initUndistortRectifyMap
+    )
+    columns, rows = begin(matrix, terms, np.eye(3), strip, size, cv2.CV_32FC1)
+    return columns, rows
 
 
 def _common_size(images: Sequence[Path]) -> tuple[int, int]:
