@@ -26,10 +26,10 @@ LAYERS = Layers(indices=(1.0, 1.5, 1.34), thicknesses=(10.0,))
 HEIGHT = 500.0
 
 
-def reference(radius: np.ndarray, depth: np.ndarray) -> np.ndarray:
+def reference(radius: np.ndarray, depth: np.ndarray, height: float = HEIGHT) -> np.ndarray:
     """Return the shift in long double (x86: 64 bits of mantissa), by plain Newton from below."""
     r, h3 = radius.astype(np.longdouble), depth.astype(np.longdouble)
-    heights = [np.longdouble(HEIGHT), np.longdouble(LAYERS.thicknesses[0]), h3]
+    heights = [np.longdouble(height), np.longdouble(LAYERS.thicknesses[0]), h3]
     indices = [np.longdouble(n) for n in LAYERS.indices]
     t = r / sum(h / n for h, n in zip(heights, indices, strict=True))
     for _ in range(30):

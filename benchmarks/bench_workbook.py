@@ -30,9 +30,9 @@ FORMULAS = {
 }
 
 
-def columns():
+def columns(rows=ROWS):
     random = np.random.default_rng(7)
-    value = {name: random.uniform(1, 12, ROWS) for name in INPUTS}
+    value = {name: random.uniform(1, 12, rows) for name in INPUTS}
     value["s1"] = np.hypot(value["x1"], value["y1"])
     value["s2"] = np.hypot(value["x2"], value["y2"])
     value["ds"] = value["s2"] - value["s1"]
@@ -44,8 +44,8 @@ def columns():
     return value
 
 
-def start(rows):
-    """Return an openpyxl workbook with the table, its first rows filled in."""
+def start(rows, count):
+    """Return an openpyxl workbook with the table of so many rows, its first ones filled in."""
     import openpyxl
     from openpyxl.worksheet.table import Table
 
@@ -53,7 +53,7 @@ def start(rows):
     sheet = book.active
     sheet.title = "Points"
     sheet.append(["id", *INPUTS, *FORMULAS])
-    value = columns()
+    value = columns(count)
     for row in range(rows):
         inputs = [float(value[name][row]) for name in INPUTS]
         sheet.append([f"P{row + 1}", *inputs, *(f"={f}" for f in FORMULAS.values())])
@@ -61,23 +61,23 @@ def start(rows):
     return book
 
 
-def write_openpyxl(path):
-    start(ROWS).save(path)
+def write_openpyxl(path, rows=ROWS):
+    start(rows, rows).save(path)
 
 
-def write_ours(path):
+def write_ours(path, rows=ROWS):
     from photocore.workbook.editor import WorkbookEditor
 
     first = path.with_name("first.xlsx")
-    start(1).save(first)
-    value = columns()
+    start(1, rows).save(first)
+    value = columns(rows)
     editor = WorkbookEditor(first)
     editor.set_results("Points", 2, {6 + i: value[name][:1] for i, name in enumerate(FORMULAS)})
     for column, name in enumerate(INPUTS, start=2):
         # openpyxl writes 16 digits, which is one too few for some numbers.
         editor.set_value("Points", 2, column, float(value[name][0]))
     inputs = {name: value[name][1:] for name in INPUTS}
-    inputs["id"] = [f"P{row + 1}" for row in range(1, ROWS)]
+    inputs["id"] = [f"P{row + 1}" for row in range(1, rows)]
     editor.append_columns("tblPoints", inputs, {name: value[name][1:] for name in FORMULAS})
     editor.save(path)
 

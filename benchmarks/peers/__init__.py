@@ -1,0 +1,1 @@
+"""Every comparison with other programs, in one run: ``python -m benchmarks.peers``."""
