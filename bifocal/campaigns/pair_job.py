@@ -13,8 +13,6 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import cv2
-
 from bifocal.campaigns.step_store import (
     Step,
     StepRecord,
@@ -201,6 +199,8 @@ def run_pair(job: PairJob, progress: Progress = no_progress) -> PairOutcome:
     The number of threads is fixed while it runs: optical flow shares its rows among threads, and
     its last digits depend on how many there are.
     """
+    import cv2
+
     start = time.perf_counter()
     hashes = FileHashes(job.folder / ".hashes.json")
     done: list[str] = []
