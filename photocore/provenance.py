@@ -16,6 +16,7 @@ from contextlib import contextmanager, suppress
 from contextvars import ContextVar
 from dataclasses import dataclass, field
 from datetime import UTC, date, datetime
+from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
@@ -189,6 +190,7 @@ def today() -> str:
     return moment.strftime("%Y-%m-%d")
 
 
+@cache  # asked for with every step of a survey, and read from a file of the installation
 def program() -> str:
     """Return the program's name and version."""
     try:

@@ -31,8 +31,9 @@ from photocore.textfile import check_name
 
 #: Side of a tile of the file; GDAL's and most viewers' sweet spot. [px]
 BLOCK = 512
-#: GDAL keeps no more than this of a raster in memory; its own default is 5 % of the machine. [MB]
-CACHE_MB = 96
+#: GDAL keeps no more than this of rasters in memory; its own default is 5 % of the machine.
+#: Rasterio takes bytes, where GDAL takes small numbers for megabytes. [bytes]
+CACHE = 96 << 20
 
 
 class Window(NamedTuple):
@@ -99,7 +100,7 @@ class RasterFile(ExitStack):
             raise InputError(f"{self.path}: is a folder; name the raster file in it.")
         if not is_virtual(self.path) and not self.path.is_file():
             raise InputError(f"{self.path}: no such raster file.")
-        self.enter_context(rasterio.Env(GDAL_CACHEMAX=CACHE_MB))
+        self.enter_context(rasterio.Env(GDAL_CACHEMAX=CACHE))
         try:
             file = self._file = self.enter_context(_opened(self.path))
         except RasterioError:
@@ -285,9 +286,7 @@ def create_geotiff(
         "compress": "deflate", "zlevel": 1, "predictor": 3 if kind.kind == "f" else 2,
     } | ({"photometric": "RGB"} if colour else {})  # fmt: skip
     # Masks lie inside the file, and nothing beside it.
-    gdal = rasterio.Env(
-        GDAL_CACHEMAX=CACHE_MB, GDAL_TIFF_INTERNAL_MASK=True, GDAL_PAM_ENABLED=False
-    )
+    gdal = rasterio.Env(GDAL_CACHEMAX=CACHE, GDAL_TIFF_INTERNAL_MASK=True, GDAL_PAM_ENABLED=False)
     cog = is_cloud_optimised()
     with raster_place(Path(path), overwrite=overwrite) as temporary, gdal:
         # A cloud-optimised file is a copy: what comes first in it is known last.

@@ -8,12 +8,10 @@ from __future__ import annotations
 import os
 import time
 import traceback
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
-
-import cv2
 
 from bifocal.campaigns.step_store import (
     Step,
@@ -33,9 +31,9 @@ if TYPE_CHECKING:
     from bifocal.orthophotos.ortho_workflow import OrthoTask
 
 #: What may be wanted of a pair, in the order of work.
-PRODUCTS = ("relief", "points", "ortho", "drawing", "report")
+PRODUCTS = ("relief", "points", "ortho", "drawing", "view", "report")
 #: What is made where nothing else is said: the drawing has the orthophoto.
-MOST_PRODUCTS = ("relief", "points", "drawing", "report")
+MOST_PRODUCTS = ("relief", "points", "drawing", "view", "report")
 #: The first step of every pair.
 ALIGN = "align"
 #: Files of a pair besides its photos.
@@ -44,7 +42,8 @@ FILES = ("control", "check", "lengths", "lens", "lens1", "lens2")
 JOINT_OPTIONS = ("sigma_control", "sigma_pick", "unit")
 #: Share of a pair's time that each step takes, measured on church_2.
 WEIGHTS = {
-    "align": 0.14, "relief": 0.38, "points": 0.01, "ortho": 0.07, "drawing": 0.2, "report": 0.2,
+    "align": 0.22, "relief": 0.36, "points": 0.02, "ortho": 0.07, "drawing": 0.15, "view": 0.02,
+    "report": 0.16,
 }  # fmt: skip
 #: Memory of a pair in work: of the program, and for each pixel of its larger photo; a relief map
 #: of 6 MP takes 1.5 GiB. [bytes]
@@ -113,6 +112,19 @@ class PairJob:
         """The relief map."""
         return self.folder / "relief" / f"{self.title}_relief.tif"
 
+    @property
+    def view_path(self) -> Path:
+        """The page that shows the relief in three dimensions."""
+        return self.folder / "view" / f"{self.title}_view.html"
+
+    def ortho_path(self, steps: Sequence[str]) -> Path | None:
+        """Return the orthophoto that these steps make, that of the drawing first."""
+        orthos = {
+            "drawing": self.drawing_path,
+            "ortho": self.folder / "ortho" / f"{self.title}_ortho.tif",
+        }
+        return next((path for step, path in orthos.items() if step in steps), None)
+
     def memory(self) -> int:
         """Return the memory it needs at most; that of small photos where they cannot be read.
 
@@ -163,7 +175,7 @@ def steps_of(job: PairJob) -> list[Step]:
     """Return the steps that make the products of a pair, in order."""
     wanted = set(job.products)
     steps = [_align_step(job)]
-    if wanted & {"relief", "ortho", "drawing"}:
+    if wanted & {"relief", "ortho", "drawing", "view"}:
         steps.append(_relief_step(job))
     if "points" in wanted and {"control", "check"} & set(job.files):
         steps.append(_points_step(job))
@@ -171,6 +183,8 @@ def steps_of(job: PairJob) -> list[Step]:
         steps.append(_ortho_step(job))
     if "drawing" in wanted:
         steps.append(_drawing_step(job))
+    if "view" in wanted:
+        steps.append(_view_step(job, tuple(step.name for step in steps)))
     if "report" in wanted:
         steps.append(_report_step(job, tuple(step.name for step in steps)))
     return steps
@@ -203,6 +217,8 @@ def run_pair(job: PairJob, progress: Progress = no_progress) -> PairOutcome:
     The number of threads is fixed while it runs: optical flow shares its rows among threads, and
     its last digits depend on how many there are.
     """
+    import cv2
+
     start = time.perf_counter()
     hashes = FileHashes(job.folder / ".hashes.json")
     done: list[str] = []
@@ -422,19 +438,32 @@ def _drawing_step(job: PairJob) -> Step:
     )  # fmt: skip
 
 
+def _view_step(job: PairJob, earlier: tuple[str, ...]) -> Step:
+    options = {"title": job.name} | _some(job, "language")
+    ortho = job.ortho_path(earlier)
+
+    def make(place: Path, progress: Progress) -> tuple[str, ...]:  # noqa: ARG001
+        from bifocal.reports.view_workflow import view_relief
+
+        view_relief(job.relief_path, place / job.view_path.name, ortho=ortho, **options)
+        return ()
+
+    after = ("relief",) if ortho is None else ("relief", ortho.parent.name)
+    return Step(name="view", files={}, after=after, options=options, make=make)
+
+
 def _report_step(job: PairJob, earlier: tuple[str, ...]) -> Step:
     options = {"title": job.name} | _some(job, "language", "unit", "scale")
-    orthos = {"drawing": f"{job.title}.tif", "ortho": f"{job.title}_ortho.tif"}
 
     def make(place: Path, progress: Progress) -> tuple[str, ...]:
         from bifocal.reports.workflow import ReportTask, write_report
 
-        ortho = next((job.folder / k / v for k, v in orthos.items() if k in earlier), None)
         task = ReportTask(
             title=job.name, language=options.get("language", "en"), unit=options.get("unit", ""),
             scale=options.get("scale"), far=job.far,
             relief=job.relief_path if "relief" in earlier else None,
-            ortho=ortho, **tables_of(job),
+            ortho=job.ortho_path(earlier), view=job.view_path if "view" in earlier else None,
+            **tables_of(job),
         )  # fmt: skip
         outs = (place / f"{job.title}_report.html", place / f"{job.title}_report.pdf")
         return write_report([job.pair_path], outs, [task], progress=progress)

@@ -152,7 +152,7 @@ def write_survey_file(
         'out = "results"',
         "# For every pair that does not say otherwise:",
         'scale = "1:50"',
-        'products = ["relief", "points", "drawing", "report"]   # and "ortho"',
+        'products = ["relief", "points", "drawing", "view", "report"]   # and "ortho"',
         'language = "en"                                        # it, de',
     ]
     for number, pair in enumerate(pairs, start=1):

@@ -57,8 +57,8 @@ Examples:
 @choice("--paper", "A4|A3|A2|A1|A0", "Sheet of paper.  [default: the smallest that fits]")
 @click.option(
     "--products", type=Names(), metavar="NAME,NAME,...",
-    help="Of relief, points, ortho, drawing, report.  [default: all but ortho, which the drawing "
-    "has]",
+    help="Of relief, points, ortho, drawing, view, report.  [default: all but ortho, which the "
+    "drawing has]",
 )  # fmt: skip
 @click.option("--cog", is_flag=True, help="Write rasters as cloud-optimised GeoTIFF.")
 @overwrite
@@ -70,8 +70,9 @@ def command(
     """Make everything a façade needs from two photos and one table of control points.
 
     The pair is set up, the relief measured, the points solved, orthophoto and drawings made to
-    scale, and a report written; each step into a folder of its own within DIR. Run it again, and
-    only what changed is made anew; stopped, it goes on where it was.
+    scale, the relief shown in three dimensions, and a report written; each step into a folder of
+    its own within DIR. Run it again, and only what changed is made anew; stopped, it goes on where
+    it was.
     """
     from bifocal.campaigns.workflow import facade, facade_job, facade_lines
 

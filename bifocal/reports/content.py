@@ -46,6 +46,8 @@ class ReportTask:
         Photo that the tables call the far one.
     relief, ortho : Path, optional
         Relief map and orthophoto.
+    view : Path, optional
+        Page that shows the relief in three dimensions; the report leads to it.
     """
 
     title: str = ""
@@ -57,6 +59,7 @@ class ReportTask:
     far: Path | None = None
     relief: Path | None = None
     ortho: Path | None = None
+    view: Path | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -144,6 +144,9 @@ def _relief(content: PairContent, say: Words) -> Iterator[Block]:
             guessed=shares[Quality.INTERPOLATED], hidden=shares[Quality.HIDDEN],
         ),
     )  # fmt: skip
+    if content.task.view is not None:
+        view = content.task.view
+        yield Paragraph(text=say("view_link", file=view.name), link=view)
     scale = content.task.scale
     limit = (RULES[0].tolerance(round(scale)) if scale else None) or _UNCERTAIN
     yield Picture(

@@ -98,11 +98,13 @@ def find_pairs(folder: Path, task: ReportTask) -> tuple[list[Path], list[ReportT
         home, name = source.parent.parent, source.name.removesuffix(".pair.json")
         orthos = (home / "drawing" / f"{name}.tif", home / "ortho" / f"{name}_ortho.tif")
         relief = home / "relief" / f"{name}_relief.tif"
+        view = home / "view" / f"{name}_view.html"
         workbook = home / "points" / f"{name}_points.xlsx"
         given: dict[str, Any] = {
             "title": task.title if len(sources) == 1 and task.title else name,
             "relief": relief if relief.is_file() else None,
             "ortho": next((path for path in orthos if path.is_file()), None),
+            "view": view if view.is_file() else None,
         }
         found.append(workbook if workbook.is_file() else _pair_file(source, folder))
         tasks.append(replace(task, **given))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, TypeAlias
 
 #: Draws into a matplotlib Figure or SubFigure.
@@ -20,11 +21,15 @@ class Heading:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Paragraph:
-    """A text; ``small`` for what is rarely read, ``lines`` as computed line by line."""
+    """A text; ``small`` for what is rarely read, ``lines`` as computed line by line.
+
+    ``link`` is a file beside the report that a page's text leads to; the text itself names it.
+    """
 
     text: str
     small: bool = False
     lines: tuple[str, ...] = ()
+    link: Path | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

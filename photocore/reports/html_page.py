@@ -5,10 +5,12 @@ from __future__ import annotations
 import base64
 import html
 import io
+import os
 import re
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
+from urllib.parse import quote
 
 from photocore.cli import Progress, no_progress
 from photocore.output import atomic_path
@@ -52,7 +54,7 @@ def write_html(
     parts: list[str] = []
     for index, block in enumerate(document.blocks):
         progress(index, len(document.blocks), "report")
-        parts += _block(block)
+        parts += _block(block, path.parent)
     title, subject = html.escape(document.title), html.escape(document.subject)
     text = (
         f'<!DOCTYPE html>\n<html lang="{document.language}">\n<head>\n<meta charset="utf-8">\n'
@@ -64,7 +66,7 @@ def write_html(
         temporary.write_text(text, encoding="utf-8")
 
 
-def _block(block: Block) -> Iterator[str]:
+def _block(block: Block, folder: Path) -> Iterator[str]:
     if isinstance(block, Heading):
         yield f"<h{block.level}>{html.escape(block.text)}</h{block.level}>"
     elif isinstance(block, Banner):
@@ -73,13 +75,24 @@ def _block(block: Block) -> Iterator[str]:
         yield f'<div class="banner{kind}">{lines}</div>'
     elif isinstance(block, Paragraph):
         kind = ' class="small"' if block.small else ""
-        yield f"<p{kind}>{html.escape(block.text)}</p>"
+        text = html.escape(block.text)
+        if block.link is not None:
+            text = f'<a href="{html.escape(_address(block.link, folder))}">{text}</a>'
+        yield f"<p{kind}>{text}</p>"
         if block.lines:
             yield f"<pre>{html.escape(chr(10).join(block.lines))}</pre>"
     elif isinstance(block, TextTable):
         yield from _table(block)
     else:
         yield from _picture(block)
+
+
+def _address(target: Path, folder: Path) -> str:
+    """Return the way from a folder to a file, as an address: both can be moved together."""
+    try:
+        return quote(Path(os.path.relpath(target, folder)).as_posix())
+    except ValueError:  # on another drive
+        return target.absolute().as_uri()
 
 
 def _table(block: TextTable) -> Iterator[str]:

@@ -195,3 +195,34 @@ def test_gdals_own_file_systems_are_written_and_read() -> None:
         RasterFile("/vsimem/bucket/none.tif")
     with pytest.raises(InputError, match=r"cannot be reached|could not be written"):
         write_plain("/vsicurl/https://localhost:1/a.tif", values)
+
+
+def blocks_of(path: Path, **level: int) -> int:
+    """Return how many bytes the blocks of one resolution take."""
+    with rasterio.open(path, **level) as file:
+        high, wide = file.block_shapes[0]
+        places = [
+            f"BLOCK_SIZE_{column}_{row}"
+            for row in range(-(-file.height // high))
+            for column in range(-(-file.width // wide))
+        ]
+        return sum(int(file.get_tag_item(place, "TIFF", bidx=1)) for place in places)
+
+
+def test_no_block_is_written_twice(tmp_path: Path) -> None:
+    # GDAL's cache once held 96 bytes for 96 MB: blocks of reduced copies were written band by band,
+    # and what they took before stayed in the file, which became half as long again.
+    path = tmp_path / "a.tif"
+    noise = np.random.default_rng(4).integers(0, 255, (1100, 1100, 4), np.uint8)
+    with create_geotiff(
+        path, width=1100, height=1100, bands=4, dtype=np.uint8, colour=True, overviews=True
+    ) as writer:
+        for row in range(0, 1100, 512):
+            for column in range(0, 1100, 512):
+                cut = noise[row : row + 512, column : column + 512]
+                writer.write(cut, column=column, row=row)
+    with rasterio.open(path) as file:
+        levels = len(file.overviews(1))
+    assert levels == 2
+    used = blocks_of(path) + sum(blocks_of(path, overview_level=k) for k in range(levels))
+    assert path.stat().st_size < 1.01 * used

@@ -51,6 +51,24 @@ def test_distortion_is_browns_and_its_inverse_exact():
 
 @pytest.mark.parametrize(
     ("model", "coefficients"),
+    [("opencv", [-0.2, 0.06, 1e-3, -5e-4, 0.01]), ("fisheye", [-0.01, 0.002, 1e-3, 0.0])],
+)
+def test_a_photo_of_points_is_distorted_as_each_of_them(model, coefficients):
+    lens = replace(BROWN, model=model, coefficients=np.array(coefficients))
+    rng = np.random.default_rng(5)
+    points = rng.uniform(0, 700, (130, 151, 2))  # more than are projected at once, no multiple
+    seen, slopes = lens.distort(points), lens.distorted_by_ideal(points)
+    for place in ((0, 0), (54, 37), (54, 38), (54, 39), (108, 76), (129, 150)):
+        np.testing.assert_allclose(lens.distort(points[place]), seen[place], rtol=1e-13)
+        np.testing.assert_allclose(
+            lens.distorted_by_ideal(points[place]), slopes[place], rtol=1e-12, atol=1e-15
+        )
+    assert lens.distort(np.zeros((0, 2))).shape == (0, 2)
+    assert lens.distorted_by_ideal(np.zeros((0, 2))).shape == (0, 2, 2)
+
+
+@pytest.mark.parametrize(
+    ("model", "coefficients"),
     [
         ("opencv", [-0.2, 0.06, 1e-3, -5e-4, 0.01]),
         ("fisheye", [-0.01, 0.002, 1e-3, 0.0]),

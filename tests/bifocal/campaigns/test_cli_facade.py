@@ -25,23 +25,31 @@ def test_everything_is_delivered_and_a_second_run_makes_only_what_changed(tmp_pa
     control, check = write_tables(tmp_path)
     out = tmp_path / "wall"
     done = facade(out, "--control", control, "--check", check, "--scale", "1:50")
-    assert done["done"] == ["align", "relief", "points", "drawing", "report"]
+    assert done["done"] == ["align", "relief", "points", "drawing", "view", "report"]
     for name in (
         "align/wall.pair.json", "relief/wall_relief.tif", "points/wall_points.xlsx",
         "drawing/wall.tif", "drawing/wall.pdf", "drawing/wall.dxf", "drawing/wall_relief.pdf",
-        "report/wall_report.html", "report/wall_report.pdf",
+        "view/wall_view.html", "report/wall_report.html", "report/wall_report.pdf",
     ):  # fmt: skip
         assert (out / name).stat().st_size > 1000, name
-    assert "16 independent check points" in (out / "report/wall_report.html").read_text("utf-8")
+    page = (out / "report/wall_report.html").read_text("utf-8")
+    assert "16 independent check points" in page
+    assert 'href="../view/wall_view.html"' in page
+    view = (out / "view/wall_view.html").read_text("utf-8")
+    assert "data:image/jpeg" in view  # the orthophoto's colours
+    assert "http" not in view
+    assert len(view) < 1e6
     # Nothing changed; then one check point: points and report only.
     again = facade(out, "--control", control, "--check", check, "--scale", "1:50")
-    assert (again["done"], len(again["kept"])) == ([], 5)
+    assert (again["done"], len(again["kept"])) == ([], 6)
     check.write_text(check.read_text().replace("T30", "T99"))
     again = facade(out, "--control", control, "--check", check, "--scale", "1:50")
     assert again["done"] == ["points", "report"]
     report = CliRunner().invoke(main, ["report", str(out), "--out", str(tmp_path / "r.html")])
     assert report.exit_code == 0, report.stderr
-    assert "independent check points" in (tmp_path / "r.html").read_text("utf-8")
+    page = (tmp_path / "r.html").read_text("utf-8")
+    assert "independent check points" in page
+    assert 'href="wall/view/wall_view.html"' in page
 
 
 def test_what_is_at_fault_is_said_and_earlier_steps_stay(tmp_path):

@@ -14,9 +14,12 @@ from click.testing import CliRunner
 
 from bifocal.cli.main import main
 from bifocal.demo import SAMPLE
-from bifocal.reports.pair_report import _provenance
+from bifocal.reports.content import read_content
+from bifocal.reports.pair_report import _provenance, report_document
 from bifocal.reports.workflow import ReportTask, find_pairs
+from photocore.reports.document import Document
 from photocore.reports.words import LANGUAGES, texts_of, words_of
+from photocore.reports.writing import write_document
 from tests.bifocal.campaigns.sample_tables import write_tables
 from tests.web_page import Page
 
@@ -74,6 +77,18 @@ def test_accuracy_stands_first_with_a_verdict_per_scale(page):
         assert re.search(rf"<td>1:{scale}</td><td>{limit:.3g} mm: {word}</td>", page), scale
     asked = "is held" if worst <= limits[50] else "is NOT held"
     assert f"The scale asked for, 1:50, {asked}" in text
+
+
+def test_the_report_leads_to_the_view_where_it_lies(tmp_path):
+    view = tmp_path / "a wall" / "view" / "wall & 1_view.html"
+    task = ReportTask(relief=SAMPLE / "truth.tif", view=view, language="de")
+    blocks = report_document([read_content(PAIR, task)], "de").blocks
+    (block,) = (block for block in blocks if getattr(block, "link", None))
+    assert block.text == "Das Relief in drei Dimensionen, im Browser zu drehen: wall & 1_view.html"
+    (tmp_path / "out").mkdir()
+    out = tmp_path / "out" / "r.html"
+    write_document(out, Document(title="", language="de", subject="", blocks=(block,)))
+    assert Page(out.read_text("utf-8")).sources == ["../a%20wall/view/wall%20%26%201_view.html"]
 
 
 def test_photos_of_one_name_in_two_folders_have_a_hash_each(tmp_path):
