@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from copy import copy
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -37,7 +38,10 @@ def page() -> str:
     parts = [HEAD]
     for program, group in groups().items():
         parts.append(f"## {program}\n\n{group.help}\n")
-        for name, command in commands(group).items():
+        for name, own in commands(group).items():
+            # Click keeps the help option of the first context a command met, in a test perhaps.
+            command = copy(own)
+            command._help_option = None
             context = click.Context(
                 command, info_name=f"{program} {name}", max_content_width=100,
                 help_option_names=["-h", "--help"],
