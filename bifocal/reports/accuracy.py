@@ -63,12 +63,12 @@ def _banner(content: PairContent, check: CheckResult, say: Words) -> Banner:
     main = [verdict for verdict in check.verdicts if verdict.rule == check.verdicts[0].rule]
     held = [verdict.scale for verdict in main if verdict.holds]
     details = [say("good_for", scale=min(held)) if held else say("good_for_none")]
-    details += _foundation(content, check, say)
     scale, good = content.task.scale, bool(held)
     if scale:
         limit = main[0].rule.tolerance(round(scale))
         good = limit is not None and check.accuracy <= limit
         details.append(say("wanted_yes" if good else "wanted_no", scale=f"{scale:g}"))
+    details += _foundation(content, check, say)
     return Banner(
         text=say(key, accuracy=millimetres(check.accuracy), n=count), details=tuple(details),
         good=good,
