@@ -48,6 +48,17 @@ def undisturbed(survey) -> dict[str, str]:
     return digests(out)
 
 
+def whole_pairs(out: Path) -> list[str]:
+    """Return the pairs whose last step is made."""
+    return sorted(path.parent.name for path in out.glob("*/drawing"))
+
+
+def marks(folder: Path) -> dict[str, tuple[int, int]]:
+    """Return what tells a file that was left alone from one that was made again."""
+    files = [path for path in folder.rglob("*") if path.is_file() and path.name[0] != "."]
+    return {str(path): (path.stat().st_ino, path.stat().st_mtime_ns) for path in files}
+
+
 def run(survey: Path, out: Path) -> subprocess.Popen:
     words = [sys.executable, "-m", "bifocal", "survey", str(survey), "--out", str(out)]
     return subprocess.Popen(
@@ -58,7 +69,17 @@ def run(survey: Path, out: Path) -> subprocess.Popen:
 def test_killed_again_and_again_it_ends_with_the_same_files(survey, undisturbed):
     out = survey.parent / "killed"
     rng = np.random.default_rng(16)
-    for number, pause in enumerate(rng.uniform(2, 8, 5)):
+    # First as soon as a pair is whole, then at any moment.
+    process = run(survey, out)
+    while not whole_pairs(out):
+        assert process.poll() is None
+        time.sleep(0.05)
+    process.kill()
+    process.wait(60)
+    whole = whole_pairs(out)
+    assert 0 < len(whole) < 3  # of those that can be made
+    left_alone = {name: marks(out / name) for name in whole}
+    for number, pause in enumerate(rng.uniform(2, 6, 4)):
         process = run(survey, out)
         time.sleep(pause)
         # Twice as Ctrl-C does it, else as the system does without memory.
@@ -67,6 +88,7 @@ def test_killed_again_and_again_it_ends_with_the_same_files(survey, undisturbed)
     result = run_survey(read_survey_file(survey, out=out), machines=Machines(jobs=2))
     assert len(result.failed) == 2
     assert digests(out) == undisturbed
+    assert {name: marks(out / name) for name in whole} == left_alone
     assert not [p for p in out.rglob(".*-writing-*")]
     again = run_survey(read_survey_file(survey, out=out))
     assert not any(outcome.done for outcome in again.outcomes)

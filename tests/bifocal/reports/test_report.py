@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import re
+from dataclasses import replace
 from hashlib import sha256
 from pathlib import Path
 from types import SimpleNamespace
@@ -14,13 +15,14 @@ from click.testing import CliRunner
 
 from bifocal.cli.main import main
 from bifocal.demo import SAMPLE
+from bifocal.reports.accuracy import accuracy_blocks
 from bifocal.reports.content import read_content
 from bifocal.reports.pair_report import _provenance, report_document
 from bifocal.reports.workflow import ReportTask, find_pairs
 from photocore.reports.document import Document
 from photocore.reports.words import LANGUAGES, texts_of, words_of
 from photocore.reports.writing import write_document
-from tests.bifocal.campaigns.sample_tables import write_tables
+from tests.bifocal.campaigns.sample_tables import CONTROL, write_tables
 from tests.web_page import Page
 
 PAIR = SAMPLE / "facade.pair.json"
@@ -77,6 +79,52 @@ def test_accuracy_stands_first_with_a_verdict_per_scale(page):
         assert re.search(rf"<td>1:{scale}</td><td>{limit:.3g} mm: {word}</td>", page), scale
     asked = "is held" if worst <= limits[50] else "is NOT held"
     assert f"The scale asked for, 1:50, {asked}" in text
+
+
+def verdict_of(control: Path, check: Path | None, **known: object) -> tuple[str, ...]:
+    task = ReportTask(control=control, check=check, scale=50.0)
+    content = replace(read_content(PAIR, task), **known)
+    return next(accuracy_blocks(content, words_of("bifocal.reports", "en"))).details
+
+
+def test_the_verdict_says_what_it_rests_on(tables, page):
+    control, check = tables
+    _, _, axes, foundation = verdict_of(control, check)
+    shown = re.findall(r"<td>T\d\d</td><td>check</td>(.*?)</tr>", page)
+    rows = [[float(v) for v in re.findall(r"<td>(-?\d+\.\d+)</td>", rest)] for rest in shown]
+    errors, sigma = [row[3:6] for row in rows], [row[6] for row in rows]
+
+    def rms(values):
+        return math.sqrt(sum(v * v for v in values) / len(values))
+
+    by_axis = [rms([line[axis] for line in errors]) for axis in range(3)]
+    assert numbers(axes) == pytest.approx(by_axis, abs=0.03)
+    assert max(by_axis) == by_axis[2]
+    expected, ratio = numbers(foundation)
+    assert expected == pytest.approx(rms(sigma), abs=0.03)
+    # Both come with a digit behind the point: so do errors and sigmas in the table.
+    assert ratio == pytest.approx(
+        rms([e[2] / s for e, s in zip(errors, sigma, strict=True)]), rel=0.1
+    )
+    assert "within chance" in foundation
+    # Of points that the orientation was fitted to nothing is expected.
+    fitted = {"control": [{"id": name, "used": True} for name in CONTROL]}
+    assert len(verdict_of(control, None, setup=fitted)) == 3
+
+
+def test_a_verdict_on_wrong_points_names_them(tables, tmp_path):
+    control, check = tables
+    head, first, *others = check.read_text().splitlines()
+    cells = first.split(",")
+    cells[3] = str(float(cells[3]) + 0.5)
+    wrong = tmp_path / "wrong.csv"
+    wrong.write_text("\n".join([head, ",".join(cells), *others]))
+    _, asked, _, foundation, off = verdict_of(control, wrong)
+    assert "more than chance explains" in foundation
+    assert off.startswith(
+        f"More than 3 standard deviations off, to be measured again: {cells[0]} ("
+    )
+    assert "is NOT held" in asked
 
 
 def test_the_report_leads_to_the_view_where_it_lies(tmp_path):
