@@ -60,7 +60,7 @@ def unforeseen_message(task: str, error: BaseException) -> str:
     said = " ".join(str(error).split())
     said = f"{type(error).__name__}: {said}" if said else type(error).__name__
     return (
-        f"Error: {task} failed on something nobody foresaw ({said:.300}). The fault is the "
+        f"{task} failed on something nobody foresaw ({said:.300}). The fault is the "
         "program's, not yours: please report this line, your command and what it prints with "
         "--debug to its authors."
     )
@@ -163,7 +163,7 @@ class LazyGroup(click.Group):
             _show_details(ctx)
             program = self.commands_package.partition(".")[0]
             task = f"{program} {ctx.invoked_subcommand or ''}".rstrip()
-            _tell_error(unforeseen_message(task, error))
+            _tell_error(f"Error: {unforeseen_message(task, error)}")
             ctx.exit(UNFORESEEN)
         return ctx.exit(1)
 

@@ -24,6 +24,24 @@ _QUIET = "photocore.quiet"
 _FORMAT = "%(asctime)s %(levelname)-7s %(name)s: %(message)s"
 
 
+class LogFile(logging.FileHandler):
+    """A log that is written line by line, and says so once where that fails."""
+
+    _failed = False
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Add a record; the work goes on where the disk takes none."""
+        if self._failed:
+            return
+        try:
+            with Path(self.baseFilename).open("a", encoding="utf-8") as file:
+                file.write(self.format(record) + "\n")
+        except OSError as error:
+            self._failed = True
+            reason = error.strerror or error
+            click.echo(f"The log {self.baseFilename} ends here: {reason}. Work goes on.", err=True)
+
+
 def is_quiet() -> bool:
     """Tell whether the command that runs was asked to be quiet."""
     context = click.get_current_context(silent=True)
@@ -78,7 +96,7 @@ def _keep_log(ctx: click.Context, param: click.Parameter, value: Path | None) ->
                     )  # fmt: skip
         with value.open("a", encoding="utf-8") as file:
             file.write(f"{HEAD}{program()}: {ctx.meta[COMMAND_LINE]}\n")
-        handler = logging.FileHandler(value, encoding="utf-8")
+        handler = LogFile(value, encoding="utf-8", delay=True)
     except OSError as error:
         raise click.BadParameter(
             f"{value} cannot be written ({error.strerror or error}).", ctx, param

@@ -51,7 +51,8 @@ def check_writable(path: Path | str, *, overwrite: bool) -> Path:
     ------
     InputError
         If it exists and ``overwrite`` is false, is a folder, a device or a pipe, is a link that
-        leads nowhere, is open in a spreadsheet program, or its folder is missing or read-only.
+        leads nowhere, is open in a spreadsheet program, is the command's own log, or its folder is
+        missing or read-only.
     """
     path = Path(path)
     check_name(path)
@@ -66,9 +67,11 @@ def check_writable(path: Path | str, *, overwrite: bool) -> Path:
         )
     if path.exists() and not path.is_file():
         raise InputError(f"{path}: is a device or a pipe; name a file to write.")
+    real = path.resolve()
+    if any(real == log.resolve() for log in _logs()):
+        raise InputError(f"{path}: is the log of this command; name two files.")
     if path.exists() and not overwrite:
         raise InputError(f"{path}: exists already; add --overwrite to replace it.")
-    real = path.resolve()
     if not real.parent.is_dir():
         raise InputError(f"{path}: the folder {path.parent} does not exist; create it first.")
     if not os.access(real.parent, os.W_OK):
@@ -76,6 +79,12 @@ def check_writable(path: Path | str, *, overwrite: bool) -> Path:
     for place in dict.fromkeys((path, real)):
         check_not_open(place)
     return path
+
+
+def _logs() -> list[Path]:
+    """Return the files that what happens is added to."""
+    handlers = logging.getLogger(__name__.partition(".")[0]).handlers
+    return [Path(log.baseFilename) for log in handlers if isinstance(log, logging.FileHandler)]
 
 
 def check_all_writable(*paths: Path | None, overwrite: bool) -> None:
@@ -146,8 +155,8 @@ def check_not_open(path: Path) -> None:
     for program, name in locks.items():
         if (path.parent / name).exists():
             raise InputError(
-                f"{path}: is open in {program}. Close it there and try again, or write to another "
-                f"file with --out. (If it is not open, delete the left-over file {name}.)"
+                f"{path}: is open in {program}. Close it there and try again, or name another file "
+                f"to write. (If it is not open, delete the left-over file {name}.)"
             )
 
 
@@ -267,6 +276,23 @@ def scratch_beside(path: Path | str) -> Iterator[Path]:
 
 
 @contextmanager
+def told_as(path: Path, temporary: Path) -> Iterator[None]:
+    """Let what is refused in a temporary folder be told of the folder it stands for.
+
+    Raises
+    ------
+    InputError
+        What the body raises, in other words.
+    """
+    try:
+        yield
+    except InputError as error:
+        if str(temporary) not in str(error):
+            raise
+        raise InputError(str(error).replace(str(temporary), str(path))) from error
+
+
+@contextmanager
 def atomic_folder(path: Path | str, *, overwrite: bool) -> Iterator[Path]:
     """Yield a temporary folder; on success all its files move into ``path``, otherwise none.
 
@@ -290,7 +316,8 @@ def atomic_folder(path: Path | str, *, overwrite: bool) -> Iterator[Path]:
         with interrupts.held():
             temporary = Path(tempfile.mkdtemp(prefix=_prefix(".writing"), dir=path))
             interrupts.temporary.add(temporary)
-        yield temporary
+        with told_as(path, temporary):
+            yield temporary
         files = [item.relative_to(temporary) for item in temporary.rglob("*") if item.is_file()]
         taken = [str(name) for name in files if os.path.lexists(path / name)]
         if taken and not overwrite:
@@ -304,7 +331,7 @@ def atomic_folder(path: Path | str, *, overwrite: bool) -> Iterator[Path]:
         _put_in_place([(temporary / name, (path / name).resolve()) for name in files])
         done = True
     except OSError as error:
-        raise InputError(f"{path}: could not be written ({error.strerror or error}).") from error
+        raise _not_written(path, error) from error
     finally:
         if temporary is not None:
             shutil.rmtree(temporary, ignore_errors=True)

@@ -258,6 +258,9 @@ class FileHashes:
         with suppress(OSError):
             self.memory.parent.mkdir(parents=True, exist_ok=True)
             temporary = self.memory.with_name(f"{self.memory.name}.{os.getpid()}")
-            temporary.write_text(json.dumps(self._known), encoding="utf-8")
-            temporary.replace(self.memory)
+            try:
+                temporary.write_text(json.dumps(self._known), encoding="utf-8")
+                temporary.replace(self.memory)
+            finally:
+                temporary.unlink(missing_ok=True)
         self._changed = False

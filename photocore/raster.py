@@ -385,11 +385,12 @@ def written_whole(path: Path, *, width: int, height: int, bands: int) -> Iterato
     OSError
         If GDAL reports a failed write, or the file is not whole as `check_whole` says.
     """
+    from rasterio._err import CPLE_BaseError  # of building overviews
     from rasterio.errors import RasterioIOError
 
     try:
         yield
-    except RasterioIOError as error:
+    except (RasterioIOError, CPLE_BaseError) as error:
         raise OSError("writing failed; is the disk full?") from error
     check_whole(path, width=width, height=height, bands=bands)
 

@@ -23,6 +23,7 @@ from photocore import interrupts
 from photocore.cli import Progress
 from photocore.errors import InputError
 from photocore.jsonfile import to_text
+from photocore.output import told_as
 from photocore.provenance import FileHashes, file_hash, program, today
 
 FORMAT = "bifocal-step/1"
@@ -139,7 +140,8 @@ def run_step(
         _refuse_changed(folder, old, hashes)
     start = time.perf_counter()
     with _written_aside(parent, step.name) as place:
-        remarks = step.make(place, progress)
+        with told_as(folder, place):
+            remarks = step.make(place, progress)
         outputs = {name.as_posix(): file_hash(place / name) for name in _files(place)}
         record = StepRecord(
             key=key, outputs=outputs, remarks=tuple(remarks),

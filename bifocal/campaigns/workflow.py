@@ -384,12 +384,13 @@ def _locked(folders: Sequence[Path]) -> Iterator[None]:
                         f"{folder}: another run works on it ({path.read_text('utf-8').strip()}). "
                         f"Wait for it; if there is none, delete {path}."
                     )
+                taken.append(path)
                 path.write_text(mine, encoding="utf-8")
             except OSError as error:
                 raise InputError(
-                    f"{folder}: cannot be written to ({error.strerror or error})."
+                    f"{folder}: cannot be written to ({error.strerror or error}). Free some space "
+                    "or choose another place."
                 ) from error
-            taken.append(path)
         yield
     finally:
         for path in taken:

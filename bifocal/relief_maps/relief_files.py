@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 
 from bifocal.model.relief_map import Quality, ReliefMap
 from photocore.arrays import Float32Array, FloatArray
-from photocore.output import atomic_path, check_ending
+from photocore.output import check_ending
+from photocore.reports.figure_file import write_figure
 
 #: Longer side of a preview. [px]
 PREVIEW_SIDE = 2000
@@ -50,8 +51,7 @@ def write_preview(path: Path | str, relief: ReliefMap, *, overwrite: bool = Fals
         )
     bar = figure.colorbar(scale, ax=axes, fraction=0.035, pad=0.02)
     bar.set_label("relief r [m], positive towards the cameras")
-    with atomic_path(path, overwrite=overwrite) as temporary:
-        figure.savefig(temporary, bbox_inches="tight", format="png")
+    write_figure(path, figure, overwrite=overwrite, bbox_inches="tight")
 
 
 def hatched(colours: NDArray[np.floating], where: NDArray[np.bool_]) -> FloatArray:

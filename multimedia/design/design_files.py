@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from multimedia.projects.point_tables import fill_sheet
-from photocore.output import atomic_path
+from photocore.reports.figure_file import write_figure
 from photocore.workbook.newbook import new_workbook, save_book
 
 if TYPE_CHECKING:
@@ -93,5 +93,5 @@ def write_design_plot(path: Path | str, design: Design, *, overwrite: bool = Fal
         axes.set_ylim(bottom=0)
         if axes.lines:
             axes.legend()
-    with atomic_path(path, overwrite=overwrite) as temporary, mpl.rc_context():
-        figure.savefig(temporary, dpi=130)
+    with mpl.rc_context():
+        write_figure(path, figure, overwrite=overwrite, dpi=130)

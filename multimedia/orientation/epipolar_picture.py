@@ -9,7 +9,8 @@ import numpy as np
 
 from photocore.arrays import FloatArray
 from photocore.errors import InputError
-from photocore.output import atomic_path, check_ending
+from photocore.output import check_ending
+from photocore.reports.figure_file import write_figure
 from photocore.textfile import readable
 
 
@@ -75,8 +76,7 @@ def draw_epipolar(
         axes.legend(loc="upper right")
     axes.set(xlim=(-0.5, size[0] - 0.5), ylim=(size[1] - 0.5, -0.5), aspect="equal")
     axes.set(xlabel="column [px]", ylabel="row [px]", title=title)
-    with atomic_path(path, overwrite=overwrite) as temporary:
-        figure.savefig(temporary, dpi=150)
+    write_figure(path, figure, overwrite=overwrite, dpi=150)
 
 
 def _grey(photo: Path) -> np.ndarray[tuple[int, ...], np.dtype[np.uint8]]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import textwrap
 from collections.abc import Sequence
 from datetime import UTC, datetime
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
@@ -41,15 +42,16 @@ def write_pdf(
         "Title": document.title, "Creator": document.subject, "Producer": "bifocal",
         "CreationDate": made, "ModDate": made, "Subject": "; ".join(provenance().lines()),
     }  # fmt: skip
-    with (
-        atomic_path(path, overwrite=overwrite) as temporary,
-        PdfPages(temporary, metadata=info) as file,
-    ):
-        pages = _Pages(file, document.title)
-        for index, block in enumerate(document.blocks):
-            progress(index, len(document.blocks), "report")
-            pages.add(block, before=document.blocks[index + 1 : index + 2])
-        pages.end()
+    with atomic_path(path, overwrite=overwrite) as temporary:
+        # Where the disk is full, matplotlib tries again as it closes the file, and zlib fails.
+        written = BytesIO()
+        with PdfPages(written, metadata=info) as file:
+            pages = _Pages(file, document.title)
+            for index, block in enumerate(document.blocks):
+                progress(index, len(document.blocks), "report")
+                pages.add(block, before=document.blocks[index + 1 : index + 2])
+            pages.end()
+        temporary.write_bytes(written.getbuffer())
 
 
 def _height(block: Picture) -> float:

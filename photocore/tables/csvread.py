@@ -23,7 +23,8 @@ from photocore.textfile import readable
 from photocore.workbook.grid import CellGrid, SheetFile, Value, cell_name
 
 _DELIMITERS = (";", "\t", ",", "|", " ")
-_GUARDED = re.compile(r"'+[=+\-@\t\r]")
+#: The apostrophes of `photocore.tables.csvwrite.guarded`.
+_GUARDED = re.compile(r"(?:^|(?<=[;\r\n]))'(?='*[=+\-@\t\r])")
 _SAMPLE = 200
 _SAMPLE_TEXT = 2**18
 #: Few enough records to stay in the processor's cache.
@@ -321,5 +322,5 @@ def too_wide(file: CsvFile, grid: CellGrid, width: int, rows: Iterable[int]) -> 
 
 
 def unguarded(text: str | None) -> str | None:
-    """Take off the apostrophe that keeps spreadsheets from running a text as a formula."""
-    return text[1:] if text and text[0] == "'" and _GUARDED.match(text) else text
+    """Take off the apostrophes that keep spreadsheets from running a text as a formula."""
+    return _GUARDED.sub("", text) if text and "'" in text else text

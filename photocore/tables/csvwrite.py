@@ -20,7 +20,9 @@ FLAVOURS: dict[str, tuple[str, str, str, str]] = {
     "excel-it": (";", ",", "utf-8-sig", "\r\n"),
     "excel-de": (";", ",", "utf-8-sig", "\r\n"),
 }
-_DANGEROUS = re.compile(r"'*[=+\-@\t\r]")
+#: Where a text needs an apostrophe: at its beginning, and behind semicolons and line ends, at which
+#: Excel in Italy and Germany splits any text table, quotes or not.
+_DANGEROUS = re.compile(r"(?:^|(?<=[;\r\n]))(?='*[=+\-@\t\r])")
 
 
 def write_csv(
@@ -78,15 +80,15 @@ def write_csv(
 def guarded(text: str) -> str:
     """Return a text that no spreadsheet takes for a formula.
 
-    >>> guarded("=1+1"), guarded("P1")
-    ("'=1+1", 'P1')
+    >>> guarded("=1+1"), guarded("P1"), guarded("P1;=1+1")
+    ("'=1+1", 'P1', "P1;'=1+1")
     """
-    if not _DANGEROUS.match(text):
+    if not _DANGEROUS.search(text):
         return text
     try:
         float(text)
     except ValueError:
-        return f"'{text}"
+        return _DANGEROUS.sub("'", text)
     return text  # a number, however it begins, is harmless
 
 

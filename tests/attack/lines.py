@@ -131,4 +131,6 @@ OUTPUTS: list[tuple[str, ...]] = [
     ("multimedia convert tank.toml {}", ".xml"),
     ("multimedia design tank.toml --out {}", ".xlsx"),
     ("multimedia design tank.toml --plot {}", ".png"),
+    ("multimedia design tank.toml --plot {}", ".pdf"),
+    (CURVE + " --picture {}", ".pdf"),
 ]

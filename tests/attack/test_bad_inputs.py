@@ -224,6 +224,34 @@ def test_no_impossible_content_is_taken(
     refused(line, culprit, folder=site)
 
 
+#: What writes workbooks, here the user's own ones.
+BOOKS = [
+    *(line for line, ending, *_ in OUTPUTS if ending == ".xlsx"),
+    "bifocal solve survey.xlsx --out {}",
+    "multimedia particles tank.toml --targets t --targets t --targets t --targets t --out {}",
+    "multimedia resect tank.toml --residuals {}",
+    "multimedia project tank.toml --out {}",
+    CURVE + " --out {}",
+]
+
+
+@pytest.mark.parametrize("line", BOOKS)
+def test_a_workbook_that_is_open_is_not_written_to(site: Path, line: str) -> None:
+    shutil.copyfile(site / "survey.xlsx", site / "open.xlsx")
+    for name, lock in (("open.xlsx", "~$open.xlsx"), ("new.xlsx", ".~lock.new.xlsx#")):
+        (site / lock).touch()
+        said = refused(f"{line.replace('{}', name)} --overwrite", re.escape(name), folder=site)
+        assert re.search(r"is open in (Excel|LibreOffice)\. Close it there", said), said
+        assert lock in said
+
+
+@pytest.mark.parametrize("lock", ["~$survey.xlsx", ".~lock.survey.xlsx#"])
+def test_a_workbook_that_is_open_is_not_changed_in_place(site: Path, lock: str) -> None:
+    (site / lock).touch()
+    line = "bifocal solve survey.xlsx --out survey.xlsx --overwrite"
+    assert "Close it there" in refused(line, r"survey\.xlsx", folder=site)
+
+
 #: Lines whose output is one of the files they read; `resect` and `adjust` may renew their project.
 IN_PLACE = [
     (f"multimedia bathymetry dem.tif {WATER} --out {{}}", "dem.tif"),

@@ -8,6 +8,7 @@ import pytest
 from click.testing import CliRunner
 
 from bifocal.cli.main import main
+from tests.full_disk import full_after
 
 SURVEY = "id,s1 [mm],s2 [mm],theta [deg]\nP1,4.24242424,4.47058824,90\n"
 
@@ -67,6 +68,29 @@ def test_a_log_in_a_folder_that_is_not_there_is_refused(table, tmp_path):
     result = solve(table, "--log", tmp_path / "no" / "work.log")
     assert result.exit_code == 2
     assert "cannot be written" in result.stderr
+
+
+def test_a_log_is_no_output(table, tmp_path):
+    for name in ("r.csv", "r.xlsx"):
+        out = tmp_path / name
+        result = solve(table, "--log", out, "--out", out, "--overwrite")
+        assert result.exit_code == 1
+        assert f"{out}: is the log of this command; name two files." in result.stderr
+        assert out.read_text(encoding="utf-8").startswith("# log of bifocal ")
+
+
+def test_a_log_that_cannot_go_on_says_so_once_and_the_work_is_done(table, tmp_path):
+    """The disk is full after the first line of the log, which was no output of its own."""
+    log = tmp_path / "work.log"
+    options = ("--log", log, "--out", tmp_path / "r.csv", "--overwrite")
+    solve(table, *options)
+    room = log.stat().st_size + len(log.read_bytes().splitlines()[0]) + 20
+    with full_after(room):
+        result = solve(table, *options)
+    assert result.exit_code == 0, result.stderr
+    assert result.stderr.count("ends here") == 1
+    assert str(log) in result.stderr
+    assert "Traceback" not in result.stderr
 
 
 def test_the_doctor_names_what_is_there_and_what_to_install(monkeypatch):

@@ -134,6 +134,16 @@ def test_two_outputs_of_one_name_are_refused(tmp_path):
     assert path.read_text() == ""
 
 
+def test_what_fails_in_a_folder_is_told_of_the_users_folder(tmp_path):
+    with (
+        pytest.raises(InputError) as refusal,
+        atomic_folder(tmp_path / "made", overwrite=True) as place,
+    ):
+        write(place / "no" / "a.csv", "new")
+    assert f"the folder {tmp_path / 'made' / 'no'} does not exist" in str(refusal.value)
+    assert "writing" not in str(refusal.value)
+
+
 def test_a_folder_that_fails_leaves_no_folder(tmp_path):
     with pytest.raises(ZeroDivisionError), atomic_folder(tmp_path / "a" / "b", overwrite=False):
         1 / 0  # noqa: B018

@@ -84,6 +84,17 @@ def test_what_gdal_says_and_what_it_does_not_say_are_told_alike(tmp_path: Path) 
         path.write_bytes(write(path).read_bytes()[:1000])
 
 
+def test_an_error_of_gdal_while_reduced_copies_are_made_is_one_of_the_disk(tmp_path: Path) -> None:
+    """GDAL's own exception comes through rasterio's `build_overviews` as it is."""
+    from rasterio._err import CPLE_AppDefinedError
+
+    with (
+        pytest.raises(OSError, match="is the disk full"),
+        written_whole(tmp_path / "a.tif", width=1, height=1, bands=1),
+    ):
+        raise CPLE_AppDefinedError(3, 1, "TIFFAppendToStrip:Write error at scanline 0")
+
+
 def test_a_raster_comes_back_with_place_names_and_tags(tmp_path: Path) -> None:
     # The centre of the first pixel is (11, 49): its corner, of which GDAL speaks, is (10, 50).
     matrix = np.array([[2.0, 0.0, 11.0], [0.0, -2.0, 49.0]])

@@ -13,6 +13,7 @@ from bifocal.campaigns.step_store import RECORD, Step, clean, is_current, read_r
 from photocore.cli import no_progress
 from photocore.errors import InputError
 from photocore.provenance import FileHashes
+from tests.full_disk import full_after
 
 
 class Kitchen:
@@ -124,3 +125,26 @@ def test_the_record_says_what_was_made_from_what(kitchen):
     assert record["inputs"] == {"source": ["source.txt", digest]}
     assert list(record["outputs"]) == ["out.txt"]
     assert record["program"].startswith("bifocal ")
+
+
+def test_hashes_that_the_disk_does_not_take_leave_nothing(tmp_path):
+    path = tmp_path / "photo.jpg"
+    path.write_bytes(b"photo")
+    os.utime(path, (1e9, 1e9))
+    hashes = FileHashes(tmp_path / ".hashes.json")
+    hashes(path)
+    with full_after(0):
+        hashes.save()
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_what_breaks_a_step_is_told_of_the_folder_that_the_user_knows(kitchen):
+    def make(place, progress):  # noqa: ARG001
+        raise InputError(f"{place / 'out.tif'}: could not be written.")
+
+    step = Step(name="cook", files={}, make=make)
+    with pytest.raises(InputError) as refusal:
+        run_step(
+            kitchen.folder, step, "key", FileHashes(kitchen.folder / "h"), progress=no_progress
+        )
+    assert str(refusal.value) == f"{kitchen.folder / 'cook' / 'out.tif'}: could not be written."

@@ -1,5 +1,7 @@
 """Text tables: encodings, delimiters, decimal separators, and what spreadsheets do to them."""
 
+import re
+
 import numpy as np
 import pytest
 
@@ -185,6 +187,17 @@ def test_no_text_is_left_that_a_spreadsheet_would_run(tmp_path, flavour):
     raw = path.read_text(encoding="utf-8-sig").splitlines()
     assert not [line for line in raw if line.strip('"')[:1] in ("=", "+", "@")]
     assert [line for line in raw if line.startswith("-")] == ["-5"]
+
+
+def test_what_excel_in_italy_splits_is_no_formula_either(tmp_path):
+    """Excel splits at semicolons there; quotes count only where a field begins with them."""
+    texts = ["P1;=1+1", "P2;-5;'@SUM(A1);+1", "a;b", "c\r\n=1;\t=2", "';=", "-5", "d;-5"]
+    path = tmp_path / "out.csv"
+    write_csv(path, {"note": ["x"] * len(texts), "id": texts, "s1": np.zeros(len(texts))})
+    fields = re.split(r"[;\r\n]", path.read_bytes().decode())
+    assert not [field for field in fields if field.strip('"').startswith(tuple("=+-@\t"))]
+    assert "x,a" in [field.replace('"', "") for field in fields]
+    assert read_table(path, COLUMNS).texts("id") == texts
 
 
 def test_flavours_are_what_excel_expects(tmp_path):
