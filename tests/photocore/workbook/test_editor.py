@@ -203,7 +203,7 @@ def test_a_workbook_open_elsewhere_is_left_alone(rich, lock, program):
     (rich.parent / lock).touch()
     editor = WorkbookEditor(rich)
     editor.set_value("Points", 3, 2, 1.0)
-    with pytest.raises(InputError, match=rf"is open in {program}.*--out"):
+    with pytest.raises(InputError, match=rf"is open in {program}.*name another file"):
         editor.save()
 
 
