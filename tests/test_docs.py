@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import doctest
-import importlib.util
 import io
 import re
 import shlex
@@ -13,29 +12,24 @@ import click
 import pytest
 from click.testing import CliRunner
 
+from tests.page_commands import IN_PART, command_maker, shown_commands
+
 ROOT = Path(__file__).parents[1]
 DOCS = ROOT / "docs"
 PAGES = sorted([ROOT / "README.md", *DOCS.glob("*.md")])
 
 
-def maker():
-    spec = importlib.util.spec_from_file_location("make_cli", DOCS / "make_cli.py")
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
-
-
-GROUPS = maker().groups()
+GROUPS = command_maker().groups()
 COMMANDS = [
     pytest.param(program, name, command, id=f"{program} {name}")
     for program, group in GROUPS.items()
-    for name, command in maker().commands(group).items()
+    for name, command in command_maker().commands(group).items()
 ]
 
 
 def test_the_page_of_commands_is_up_to_date():
     written = (DOCS / "cli.md").read_text(encoding="utf-8")
-    assert written == maker().page(), "run: python docs/make_cli.py"
+    assert written == command_maker().page(), "run: python docs/make_cli.py"
 
 
 @pytest.mark.parametrize(("program", "name", "command"), COMMANDS)
@@ -63,26 +57,15 @@ def test_help_is_printed_without_an_error(program, name, command):  # noqa: ARG0
 def lines_shown():
     """Return every command line in the pages and in the help: (program, name, words)."""
     found = []
-    texts = {p.name: p.read_text(encoding="utf-8") for p in PAGES if p.name != "cli.md"}
-    for program, group in GROUPS.items():
-        for name, command in maker().commands(group).items():
-            # An example that goes on in the next line is indented there.
-            examples = re.sub(r"\s*\\?\n {6,}", " ", command.epilog or "")
-            texts[f"help of {program} {name}"] = "\n".join(
-                # What it does stands behind some examples.
-                re.split(" {3,}", example)[0]
-                for example in re.findall("^  (.*)", examples, re.M)
-            )
-    for source, shown in texts.items():
-        text = shown.replace("\\\n", " ")
-        lines = re.findall(r"^[ \t]*(?:\$ )?((?:bifocal|multimedia) [a-z].*)$", text, re.M)
-        for line in (part.strip() for whole in lines for part in whole.split(" | ")):
-            program, name, *words = shlex.split(line, comments=True)
-            if name in GROUPS[program].summaries:
+    for shown in (shown for shown in shown_commands() if shown.line not in IN_PART):
+        for line in shown.line.split(" | "):
+            program, name, *words = shlex.split(line)
+            if program in GROUPS and name in GROUPS[program].summaries:
                 # What the shell makes of redirections is no word of the program.
                 ends = [k for k, word in enumerate(words) if word[0] in "<>"]
                 words = words[: min(ends, default=len(words))]
-                found.append(pytest.param(program, name, words, id=f"{source}: {line[:60]}"))
+                label = f"{shown.page}: {line[:60]}"
+                found.append(pytest.param(program, name, words, id=label))
     return found
 
 

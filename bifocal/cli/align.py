@@ -22,7 +22,7 @@ Examples:
                --sensor-width 22.7 --out wall.pair.json
   bifocal align far.jpg near.jpg --as-set-up --distance1 17.5 --distance2 9.5 --focal1 35
                --focal2 19 --sensor-width 22.7 --out wall.pair.json
-  bifocal align far.jpg near.jpg --auto --distance1 17.5 --out wall.pair.json
+  bifocal align far.jpg near.jpg --auto --distance1 17.5 --wall 612,433 --out wall.pair.json
   bifocal align survey.xlsx --out wall.pair.json
 \b
 points.csv, one line per control point; r blank = on the wall; pixels in both photos:

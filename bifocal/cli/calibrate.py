@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 EXAMPLE = """\b
 Examples:
   bifocal calibrate board*.jpg --out lens35.json
-  bifocal calibrate board*.jpg --pattern charuco --board 8x11 --out lens35.json
+  bifocal calibrate charuco*.jpg --pattern charuco --board 8x11 --out lens35.json
   bifocal calibrate facade.jpg --straight-edges --focal-px 4740 --out lens35.json
   bifocal calibrate facade.jpg --lines lines.csv --out lens35.json
   bifocal calibrate facade.jpg --database --out lens35.json

@@ -22,7 +22,7 @@ from photocore.options import (
 
 EXAMPLE = """\b
 Examples:
-  bifocal facade far.jpg near.jpg --control points.csv --scale 1:50 --out wall
+  bifocal facade far.jpg near.jpg --control points.csv --scale 1:50 --out DIR
   bifocal facade far.jpg near.jpg --control points.csv --check check.csv --scale 1:20 --out wall
   bifocal facade far.jpg near.jpg --auto --distance1 17.5 --scale 1:100 --language de --out wall
 """

@@ -34,7 +34,8 @@ Examples:
   bifocal ortho wall.pair.json --relief relief.tif --image both --fill --out ortho.tif
   bifocal ortho wall.pair.json --relief relief.tif --image both --complete --out picture.tif
   bifocal ortho wall.pair.json --relief relief.tif --deliver drawing --scale 1:50 --dpi 254
-                --control control.csv --section x=1.5 --section y=2 --contours 0.05
+                --control control.csv --mark result.xlsx --section x=1.5
+                --section y=2 --contours 0.05
 """
 
 

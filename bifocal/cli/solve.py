@@ -16,7 +16,7 @@ Examples:
   bifocal solve survey.xlsx --out result.xlsx
   bifocal solve points.csv --pair wall.pair.json --json
   bifocal solve far.dxf near.dxf --pair setup.xlsx --out result.xlsx
-  bifocal solve points.csv --d1 17.5 --d2 9.5 --c1 35 --c2 19 --out result.csv
+  bifocal solve distances.csv --d1 17.5 --d2 9.5 --c1 35 --c2 19 --out result.csv
   bifocal solve old.xlsx --columns "id=A,s1=distance far,s2=D" --d1 17.5 --d2 9.5
 """
 #: Points shown on the screen; the files hold all.

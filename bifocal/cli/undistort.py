@@ -27,7 +27,7 @@ photos beforehand only for other programs.
     help="Lens file (lens.json, COLMAP cameras.txt, Metashape .xml, OpenCV .yml), or exif for the "
     "lens database.",
 )  # fmt: skip
-@click.option("--out-dir", type=FILE, help="Folder to write to.  [default: the photo's]")
+@click.option("--out-dir", type=FILE, help="Existing folder to write to.  [default: the photo's]")
 @click.option("--camera-name", default="", help="With exif: camera, if EXIF lacks it.")
 @click.option("--lens-name", default="", help="With exif: lens, if EXIF lacks it.")
 @click.option(

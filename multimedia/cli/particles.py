@@ -13,7 +13,8 @@ from photocore.options import FILE, as_json, number, overwrite
 EXAMPLE = """\b
 Examples:
   multimedia particles tank.toml --targets img/cam1.10001_targets \\
-    --targets img/cam2.10001_targets --targets img/cam3.10001_targets --out res/rt_is.10001
+    --targets img/cam2.10001_targets --targets img/cam3.10001_targets \\
+    --targets img/cam4.10001_targets --out res/rt_is.10001
 """
 
 
