@@ -100,17 +100,19 @@ def find_features(
     for top, bottom in pairwise(edges.tolist()):
         start = max(top - MARGIN, 0)
         strip = np.ascontiguousarray(small[start : min(bottom + MARGIN, height)])
-        # A second call, for the descriptors of the strongest alone, would build the pyramid anew.
-        found, every = detector.detectAndCompute(strip, None)
-        numbers = [(k.pt[0], k.pt[1] + start, k.size, k.angle, k.response) for k in found]
-        part = np.array(numbers).reshape(-1, 5)
-        row = part[:, 1]
-        inside = (row >= top - 0.5) & ((row < bottom - 0.5) | (bottom == height))
-        best = np.argsort(np.where(inside, -part[:, 4], np.inf), kind="stable")
-        best = best[: min(int(inside.sum()), int(1.3 * limit / (len(edges) - 1)) + 1)]
-        if len(best):
-            keys.append(part[best])
-            parts.append(every[best])
+        found = [
+            key
+            for key in detector.detect(strip, None)
+            if top - 0.5 <= key.pt[1] + start < bottom - 0.5
+            or height == bottom <= key.pt[1] + start
+        ]
+        # Descriptors cost as much as the search: only those of the strongest are made.
+        found.sort(key=lambda key: -key.response)
+        found, part = detector.compute(strip, found[: int(1.3 * limit / (len(edges) - 1)) + 1])
+        if len(found):
+            numbers = [(k.pt[0], k.pt[1] + start, k.size, k.angle, k.response) for k in found]
+            keys.append(np.array(numbers))
+            parts.append(part)
     table = np.concatenate(keys) if keys else np.zeros((0, 5))
     descriptors = np.concatenate(parts) if parts else np.zeros((0, 128), np.float32)
     order = np.argsort(-table[:, 4], kind="stable")[:limit]

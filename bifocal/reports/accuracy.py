@@ -17,6 +17,8 @@ MOST_POINTS = 60
 #: Errors over their sigmas (RMS) that chance explains, however many the points: an error of the
 #: orientation moves them all together, and is below two sigma in 95 of 100 surveys.
 BY_CHANCE = 2.0
+#: Smaller ones mean that less was trusted than could be; so small by chance in 24 of 100.
+TOO_SMALL = 0.3
 #: A point is named whose error is more of its sigmas. 20 points by three axes: 0.16 are expected.
 FAR_OFF = 3.0
 
@@ -94,8 +96,9 @@ def _foundation(content: PairContent, check: CheckResult, say: Words) -> Iterato
         return
     expected = float(np.sqrt(np.mean(sigma[known, worst] ** 2)))
     ratio = float(np.sqrt(np.mean(in_sigmas[known, worst] ** 2)))
-    key = "expected_agrees" if ratio <= BY_CHANCE else "expected_exceeded"
-    yield say(key, expected=millimetres(expected), ratio=f"{ratio:.1f}")
+    key = "expected_exceeded" if ratio > BY_CHANCE else "expected_agrees"
+    key = "expected_undercut" if ratio < TOO_SMALL else key
+    yield say(key, expected=millimetres(expected), ratio=f"{ratio:.2g}")
     size = np.nan_to_num(in_sigmas, nan=0.0).max(axis=1)
     off = [k for k in np.argsort(-size).tolist() if size[k] > FAR_OFF]
     if off:

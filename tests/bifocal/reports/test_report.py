@@ -127,6 +127,14 @@ def test_a_verdict_on_wrong_points_names_them(tables, tmp_path):
     assert "is NOT held" in asked
 
 
+def test_errors_far_below_what_was_expected_are_told_as_such(tables):
+    control, check = tables
+    solution = read_content(PAIR, ReportTask(control=control, check=check)).solution
+    small = replace(solution.check, errors=solution.check.errors * 0.01)
+    *_, foundation = verdict_of(control, check, solution=replace(solution, check=small))
+    assert "better than was assumed" in foundation
+
+
 def test_the_report_leads_to_the_view_where_it_lies(tmp_path):
     view = tmp_path / "a wall" / "view" / "wall & 1_view.html"
     task = ReportTask(relief=SAMPLE / "truth.tif", view=view, language="de")
