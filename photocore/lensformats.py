@@ -18,7 +18,7 @@ from photocore.arrays import FloatArray, is_finite_number
 from photocore.camera import camera_matrix
 from photocore.errors import LARGEST, InputError
 from photocore.jsonfile import read_object
-from photocore.textfile import check_name, read_text
+from photocore.textfile import check_file, check_name, read_text
 
 
 class LensData(NamedTuple):
@@ -43,8 +43,9 @@ def read_foreign_lens(path: Path | str) -> LensData:
     """
     path = Path(path)
     check_name(path)
-    if not path.is_file():
-        raise InputError(f"{path}: no such lens file.")
+    if path.is_dir():
+        raise InputError(f"{path}: is a folder, expected a lens file.")
+    check_file(path, "lens file")
     ending = path.suffix.lower()
     if ending in {".yml", ".yaml"}:
         return _opencv(path)

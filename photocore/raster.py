@@ -27,7 +27,7 @@ from photocore.raster_places import (
     is_cloud_optimised,
     raster_place,
 )
-from photocore.textfile import check_name
+from photocore.textfile import check_file, check_name
 
 #: Side of a tile of the file; GDAL's and most viewers' sweet spot. [px]
 BLOCK = 512
@@ -98,8 +98,8 @@ class RasterFile(ExitStack):
         check_name(self.path)
         if self.path.is_dir():
             raise InputError(f"{self.path}: is a folder; name the raster file in it.")
-        if not is_virtual(self.path) and not self.path.is_file():
-            raise InputError(f"{self.path}: no such raster file.")
+        if not is_virtual(self.path):
+            check_file(self.path, "raster file")
         self.enter_context(rasterio.Env(GDAL_CACHEMAX=CACHE))
         try:
             file = self._file = self.enter_context(_opened(self.path))

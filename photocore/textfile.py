@@ -51,6 +51,27 @@ def read_text(path: Path, what: str, *, form: str = "") -> str:
             raise InputError(f"{path}: is not a text file, expected a {what}{form}.") from None
 
 
+def check_file(path: Path, missing: str = "file") -> None:
+    """Refuse what is no file: nothing at all, or a pipe or device, reading which may wait for ever.
+
+    Parameters
+    ----------
+    path : Path
+        What is to be read; folders are for the caller to refuse.
+    missing : str
+        What it should be, for the message.
+
+    Raises
+    ------
+    InputError
+        Saying which of both.
+    """
+    if not path.exists():
+        raise InputError(f"{path}: no such {missing}.")
+    if not path.is_file():
+        raise InputError(f"{path}: is a pipe or a device; save what it gives as a file first.")
+
+
 @contextmanager
 def readable(path: Path, what: str, *, missing: str = "file") -> Iterator[None]:
     """Say what is wrong with a file that cannot be read: missing, a folder, a pipe, locked."""
@@ -58,8 +79,7 @@ def readable(path: Path, what: str, *, missing: str = "file") -> Iterator[None]:
     try:
         if path.is_dir():
             raise InputError(f"{path}: is a folder, expected a {what}.")
-        if path.exists() and not path.is_file():  # reading it may wait for ever
-            raise InputError(f"{path}: is a pipe or a device; save what it gives as a file first.")
+        check_file(path, missing)
         note(path)
         yield
     except FileNotFoundError:

@@ -23,7 +23,7 @@ from photocore import interrupts
 from photocore.cli import Progress
 from photocore.errors import InputError
 from photocore.jsonfile import to_text
-from photocore.output import told_as
+from photocore.output import check_not_open, told_as
 from photocore.provenance import FileHashes, file_hash, program, today
 
 FORMAT = "bifocal-step/1"
@@ -132,10 +132,11 @@ def run_step(
     ------
     InputError
         If the folder holds files that this program did not write or that were changed since, and
-        ``overwrite`` is false.
+        ``overwrite`` is false; or a workbook that is open in a spreadsheet program.
     """
     folder = parent / step.name
     old = read_record(folder)
+    _refuse_open(folder)
     if not overwrite:
         _refuse_changed(folder, old, hashes)
     start = time.perf_counter()
@@ -163,6 +164,7 @@ def receive_step(
         As `run_step`.
     """
     old = read_record(folder)
+    _refuse_open(folder)
     if not overwrite:
         _refuse_changed(folder, old, hashes)
     with _written_aside(folder.parent, folder.name) as place:
@@ -224,6 +226,13 @@ def _changed_files(
         elif hashes(path) != digest:
             changed.append(name)
     return changed
+
+
+def _refuse_open(folder: Path) -> None:
+    """Refuse to replace a workbook that a spreadsheet program has open."""
+    for name in _files(folder):
+        if name.suffix.lower() in (".xlsx", ".xlsm", ".csv"):
+            check_not_open(folder / name)
 
 
 def _refuse_changed(folder: Path, record: StepRecord | None, hashes: FileHashes) -> None:

@@ -23,7 +23,7 @@ from photocore.errors import InputError
 from photocore.output import atomic_path, check_ending
 from photocore.provenance import note
 from photocore.raster import RasterFile
-from photocore.textfile import check_name
+from photocore.textfile import check_file, check_name
 
 ImageArray = NDArray[np.uint8] | NDArray[np.uint16]
 
@@ -251,8 +251,7 @@ def _refuse_early(path: Path) -> None:
     check_name(path)
     if path.is_dir():
         raise InputError(f"{path}: is a folder, expected a photo.")
-    if not path.is_file():
-        raise InputError(f"{path}: no such image.")
+    check_file(path, "image")
     if path.stat().st_size == 0:
         raise InputError(f"{path}: the file is empty; save or copy it again.")
     if path.suffix.lower() in RAW_ENDINGS:

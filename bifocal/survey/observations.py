@@ -136,6 +136,11 @@ class PointObservations:
         return len(self.ids)
 
     @property
+    def unused(self) -> frozenset[str]:
+        """Names of the points that are listed but not used."""
+        return frozenset(name for name, use in zip(self.ids, self.use, strict=True) if not use)
+
+    @property
     def is_cartesian(self) -> BoolArray:
         """Which points have any image coordinate, shape (n,)."""
         return _any_given(self.xy1, self.xy2)

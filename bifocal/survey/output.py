@@ -129,9 +129,13 @@ def _is_survey_book(solution: SolvedSurvey) -> bool:
 def _update(path: Path, solution: SolvedSurvey, content: SurveyContent, *, overwrite: bool) -> str:
     """Put the results into a survey workbook; return where its old state is kept."""
     own = as_typed(solution, content)
-    kept = update_book(
+    done = update_book(
         solution.source, path, solution.survey, own, given=_options(solution), overwrite=overwrite
     )
+    kept = _kept_as(done.kept)
+    if done.added:
+        titles = ", ".join(done.added)
+        kept = f"missing sheets were added again, behind all others: {titles}; {kept}".rstrip("; ")
     if solution.georeference is not None and _is_older(solution):
         how = (
             "weigh all control points alike"
@@ -140,9 +144,9 @@ def _update(path: Path, solution: SolvedSurvey, content: SurveyContent, *, overw
         )
         return (
             f"its formulas {how}, since it was made by an older version; a new template does "
-            f"better. {_kept_as(kept)}"
+            f"better. {kept}"
         ).strip()
-    return _kept_as(kept)
+    return kept
 
 
 def _options(solution: SolvedSurvey) -> dict[str, Any]:
@@ -199,6 +203,7 @@ def as_typed(solution: SolvedSurvey, content: SurveyContent) -> SurveyContent:
     """Return the content as the workbook's formulas see it: images in the order they were typed."""
     table, setup, points = solution.table, solution.setup, solution.points
     world, exchanged = solution.georeference, solution.pair.exchanged
+    control = solution.survey.control.without(points.unused)
     if solution.corrections[1] is not None and setup is not None:
         setup, points = _uncorrected(solution, setup)
     if exchanged and setup is not None:
@@ -207,13 +212,11 @@ def as_typed(solution: SolvedSurvey, content: SurveyContent) -> SurveyContent:
             solution.pair, setup.in_millimetres(points), limits=setup.limits, as_given=True
         )
         if world is not None:
-            world = georeference(table, solution.survey.control, model=world.model)
+            world = georeference(table, control, model=world.model)
     if world is not None and _is_older(solution):
         alike = KnownPoints(ids=table.ids, xyz=table.xyz)
         covariance = None if _weighs_alike(solution) else table.covariance
-        world = georeference(
-            alike, solution.survey.control, model=world.model, covariance=covariance
-        )
+        world = georeference(alike, control, model=world.model, covariance=covariance)
         world = replace(world, precision=None)
     # Relief given beside the points is checked too, but stands not on the sheet Check.
     listed = len(solution.survey.known_rows)
@@ -226,7 +229,7 @@ def as_typed(solution: SolvedSurvey, content: SurveyContent) -> SurveyContent:
         points=points,
         table=table,
         known=known,
-        check=check_points(table, known),
+        check=check_points(table, known.without(points.unused)),
         georeference=world,
     )
 

@@ -15,6 +15,7 @@ from photocore.arrays import FloatArray
 from photocore.errors import CellError, InputError, WorkbookError
 from photocore.tables import Column, read_table
 from photocore.tables.numbers import Decimal
+from photocore.textfile import check_file
 
 #: Headings of image viewers: pixels, rows down.
 _COLUMNS = (
@@ -185,8 +186,9 @@ def _model_space(path: Path) -> Any:
     """Return the model space of a drawing."""
     import ezdxf
 
-    if not path.is_file():
-        raise InputError(f"{path}: there is no such file.")
+    if path.is_dir():
+        raise InputError(f"{path}: is a folder, expected a drawing.")
+    check_file(path)
     try:
         return ezdxf.readfile(path).modelspace()
     except (ezdxf.DXFError, OSError, UnicodeDecodeError) as error:

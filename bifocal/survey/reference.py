@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Any, Protocol
 
 import numpy as np
@@ -88,6 +88,11 @@ class KnownPoints:
         """Return the names that are not among other points."""
         known = set(points.ids)
         return tuple(name for name in self.ids if name not in known)
+
+    def without(self, names: Collection[str]) -> KnownPoints:
+        """Return the same points, those of these names listed but not used."""
+        kept = np.array([name not in names for name in self.ids], dtype=bool)
+        return self if kept.all() else replace(self, use=self.used & kept)
 
     @property
     def used(self) -> BoolArray:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Collection
 
 import numpy as np
 
@@ -80,6 +81,25 @@ def exchanged_remark(setup: SurveySetup) -> str:
         f"{setup.d1:g} m{camera}; if only the distances were typed the wrong way round, exchange "
         "d_1 and d_2, else all relief is wrong."
     )
+
+
+def unused_remarks(unused: Collection[str], **listed: KnownPoints) -> list[str]:
+    """Return what is said of check and control points that are out of use in the table of points.
+
+    Parameters
+    ----------
+    unused : collection of str
+        Names of points with ``use`` = 0.
+    **listed : KnownPoints
+        What is typed, by the name of its sheet.
+    """
+    said = []
+    for sheet, known in listed.items():
+        names = [n for n, use in zip(known.ids, known.used, strict=True) if use and n in unused]
+        if names:
+            verb = "takes" if len(names) == 1 else "take"
+            said.append(f"{sheet}: {', '.join(names[:10])} {verb} no part: use = 0 in Points.")
+    return said
 
 
 def opposite_signs_remark(table: ReliefTable, known: KnownPoints) -> list[str]:

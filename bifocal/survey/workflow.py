@@ -21,7 +21,7 @@ from bifocal.survey.orientation_check import (
     zoom_centre_of_points,
 )
 from bifocal.survey.point_survey import solve_points
-from bifocal.survey.reference import CheckResult, Georeference
+from bifocal.survey.reference import CheckResult, Georeference, KnownPoints
 from bifocal.survey.relief_table import ReliefTable
 from bifocal.survey.remarks import (
     exchanged_remark,
@@ -29,6 +29,7 @@ from bifocal.survey.remarks import (
     opposite_signs_remark,
     point_remarks,
     refraction_remarks,
+    unused_remarks,
 )
 from bifocal.survey.setup import SCALE_TOLERANCE, SurveySetup
 from bifocal.survey.sources import BOOKS, Source, given_pair, measured, with_setup_of
@@ -221,15 +222,18 @@ def solve(
         solved = _solve_pair(general, survey, sigma_px, adjust=adjust_setup)
     table = solved.table
     refuse_contradiction(solved.points, table, survey.where)
-    check = check_points(table, survey.known, judged)
-    world, world_remarks = _placed(survey, table, model or survey.model)
+    unused = solved.points.unused
+    known, control = survey.known.without(unused), survey.control.without(unused)
+    check = check_points(table, known, judged)
+    world, world_remarks = _placed(control, table, model or survey.model)
     remarks = (
         *survey.remarks,
         *pair_remarks,
         *solved.remarks,
         *point_remarks(solved.points, table, solved.setup),
         *check.remarks,
-        *opposite_signs_remark(table, survey.known),
+        *unused_remarks(unused, Check=survey.known, Georeference=survey.control),
+        *opposite_signs_remark(table, known),
         *world_remarks,
     )
     asked = {**given, "unit": unit, "pair": pair, "sigma_px": sigma_px, "model": model}
@@ -272,10 +276,9 @@ def _checked(**numbers: float | None) -> dict[str, Any]:
 
 
 def _placed(
-    survey: SurveyInput, table: ReliefTable, model: str
+    control: KnownPoints, table: ReliefTable, model: str
 ) -> tuple[Georeference | None, list[str]]:
     """Return the wall in the world, where there are control points, and remarks on it."""
-    control = survey.control
     if not control.used.any() or np.isnan(control.xyz).all():
         return None, []
     world = georeference(table, control, model=model)

@@ -15,7 +15,7 @@ from photocore.cloud.ply import read_ply_mesh
 from photocore.errors import LARGEST, InputError
 from photocore.jsonfile import read_object
 from photocore.raster import Window
-from photocore.textfile import check_name
+from photocore.textfile import check_file, check_name
 
 FORMAT = "multimedia-waterlevel/1"
 #: A water surface of more cells is coarser than it looks: averaging it down loses nothing.
@@ -57,8 +57,9 @@ def read_water_surface(given: str, *, crs: Any = None) -> WaterSurface:
         return _read_fitted(path)
     if kind == ".ply":
         check_name(path)
-        if not path.is_file():
-            raise InputError(f"{path}: no such water surface.")
+        if path.is_dir():
+            raise InputError(f"{path}: is a folder, expected a water surface.")
+        check_file(path, "water surface")
         vertices, triangles = read_ply_mesh(path)
         return MeshSurface(vertices=vertices, triangles=triangles)
     with Dem(path) as raster:

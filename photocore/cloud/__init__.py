@@ -12,7 +12,7 @@ from photocore.arrays import FloatArray
 from photocore.cloud.model import Cloud
 from photocore.errors import InputError
 from photocore.output import atomic_path
-from photocore.textfile import check_name
+from photocore.textfile import check_file, check_name
 
 
 def open_cloud(path: Path | str) -> Cloud:
@@ -31,8 +31,7 @@ def open_cloud(path: Path | str) -> Cloud:
     check_name(path)
     if path.is_dir():
         raise InputError(f"{path}: is a folder; name a point cloud (.csv .ply .las .laz).")
-    if not path.is_file():
-        raise InputError(f"{path}: no such file.")
+    check_file(path)
     kinds: dict[str, type[TextCloud | PlyCloud | LasCloud]] = {
         **dict.fromkeys((".csv", ".txt", ".xyz"), TextCloud),
         ".ply": PlyCloud,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from openpyxl.chart import BarChart, Reference, ScatterChart, Series
+from openpyxl.chart.layout import Layout, ManualLayout
 from openpyxl.chart.shapes import GraphicalProperties
 from openpyxl.styles import Font
 
@@ -20,7 +21,7 @@ from photocore.workbook.newbook import RowBlock
 HEAD = 4
 #: Column of the first chart data: far enough right to stay out of the charts' way.
 LEFT = 16
-_KEYS = ("X", "Y", "s_c", "sigma_r")
+KEYS = ("X", "Y", "s_c", "sigma_r")
 
 
 def charts(builder: BookBuilder, content: SurveyContent, cells: Cells) -> None:
@@ -31,7 +32,7 @@ def charts(builder: BookBuilder, content: SurveyContent, cells: Cells) -> None:
     note = word("chart_data", language).format(n=rows)
     sheet.text(f"{column_letters(LEFT + 1)}{HEAD - 2}", note, LABEL_FONT)
     columns: list[list[CellValue]] = [[] for _ in range(LEFT)]
-    for i, key in enumerate(_KEYS):
+    for i, key in enumerate(KEYS):
         letter = column_letters(LEFT + 1 + i)
         sheet.text(f"{letter}{HEAD}", key, LABEL_FONT)
         at = f"ROW()-{HEAD}"
@@ -49,7 +50,7 @@ def charts(builder: BookBuilder, content: SurveyContent, cells: Cells) -> None:
     last = HEAD + rows
     data = [
         Reference(sheet.worksheet, min_col=LEFT + 1 + i, min_row=HEAD + 1, max_row=last)
-        for i in range(len(_KEYS))
+        for i in range(len(KEYS))
     ]
     plan = scatter(word("chart_plan", language), "X [m]", "Y [m]", data[0], {"Y": data[1]})
     _equal_scales(plan, cells)
@@ -57,6 +58,7 @@ def charts(builder: BookBuilder, content: SurveyContent, cells: Cells) -> None:
     title, series = word("chart_sigma", language), {"sigma_r": data[3]}
     sigma = scatter(title, "s' [mm]", "sigma_r [m]", data[2], series)
     sigma.height, sigma.width = 7, 16
+    sigma.y_axis.number_format = "General"  # 0.00 would say the same of 1 mm and of 4 mm
     sheet.worksheet.add_chart(sigma, "A32")
     _errors(builder, content)
     sheet.finish()
@@ -78,6 +80,14 @@ def _equal_scales(chart: ScatterChart, cells: Cells) -> None:
         axis.scaling.max = axis.scaling.min + (int(span / step) + 1) * step
         axis.majorUnit = step
     chart.height, chart.width = 12.5, 13.5
+    # A square: left to themselves, spreadsheets stretch X, which has room where Y has a title.
+    side = 9.7
+    chart.layout = Layout(
+        ManualLayout(
+            layoutTarget="inner", xMode="edge", yMode="edge", x=0.18, y=0.1,
+            w=side / chart.width, h=side / chart.height,
+        )
+    )  # fmt: skip
 
 
 def _round_step(rough: float) -> float:
@@ -101,6 +111,6 @@ def _errors(builder: BookBuilder, content: SurveyContent) -> None:
     chart.set_categories(names)
     chart.x_axis.delete = chart.y_axis.delete = False
     chart.x_axis.tickLblPos, chart.y_axis.title = "low", titled("dZ [m]", 1000)
-    chart.y_axis.number_format = "0.000"
+    chart.y_axis.number_format = "General"
     chart.height, chart.width = 7, 16
     builder.book["Charts"].add_chart(chart, "A49")

@@ -313,11 +313,19 @@ def pair_points(*, undistorted: bool) -> tuple[LiveColumn, ...]:
     )
 
 
+#: Where a point of another table stands in `Points`; the second search finds the number 7 among
+#: names kept as text.
+_AT = 'IFERROR(MATCH([@id],tblPoints[id],0),MATCH([@id]&"",tblPoints[id],0))'
+#: Whether a row of another table is used, here and in `Points`; before, it was asked here only.
+USED_HERE = 'OR([@use]="",[@use]<>0)'
+USED = (
+    f'{USED_HERE},IFERROR(OR(INDEX(tblPoints[use],{_AT})="",INDEX(tblPoints[use],{_AT})<>0),TRUE)'
+)
+
+
 def look_up(axis: str, factor: str = "") -> str:
     """Return the formula that finds a column of `Points` by the name of the point."""
-    # The second search finds the number 7 among names kept as text.
-    at = 'IFERROR(MATCH([@id],tblPoints[id],0),MATCH([@id]&"",tblPoints[id],0))'
-    cell = f"INDEX(tblPoints[{axis}],{at})"
+    cell = f"INDEX(tblPoints[{axis}],{_AT})"
     return f'IF([@id]="","",IFERROR(IF(ISNUMBER({cell}),{factor}{cell},""),""))'
 
 
@@ -329,8 +337,7 @@ CHECK: tuple[LiveColumn, ...] = (
     *(
         _f(
             f"d{axis}",
-            f'IF(AND(COUNT([@{axis}],[@{axis}_ref])=2,OR([@use]="",[@use]<>0)),'
-            f'[@{axis}]-[@{axis}_ref],"")',
+            f'IF(AND(COUNT([@{axis}],[@{axis}_ref])=2,{USED}),[@{axis}]-[@{axis}_ref],"")',
             4,
             width=8.5,
         )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from bifocal.survey.workbook.columns import COVARIANCES, look_up
+from bifocal.survey.workbook.columns import COVARIANCES, USED, look_up
 from photocore.workbook.live_columns import LiveColumn, formula_column
 
 #: Entries of the weights and, after them, what each of the unknowns p, q, m is multiplied by on
@@ -70,7 +70,7 @@ _NAMED: tuple[LiveColumn, ...] = (
 _WEIGHED: tuple[LiveColumn, ...] = (
     formula_column(
         "w",
-        'IF(AND(OR([@use]="",[@use]<>0),OR([@found_bad]="",[@found_bad]<>0),'
+        f'IF(AND({USED},OR([@found_bad]="",[@found_bad]<>0),'
         "COUNT([@X],[@Y],[@Z],[@E],[@N])=5,"
         "COUNT([@q_XX],[@q_XY],[@q_YY],[@q_XZ],[@q_YZ],[@q_ZZ])=6,"
         'OR(g_used="2D",COUNT([@H])=1)),1,0)',

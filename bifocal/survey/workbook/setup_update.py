@@ -6,6 +6,7 @@ import io
 from collections.abc import Mapping
 from typing import Any
 
+from bifocal.survey.workbook.charts import HEAD, KEYS, LEFT
 from bifocal.survey.workbook.columns import adjustment_names
 from bifocal.survey.workbook.content import SurveyContent, setup_cells
 from bifocal.survey.workbook.setup_cells import PAIR_GROUPS, TITLE_BLOCK, TYPED_FORMULAS
@@ -38,9 +39,23 @@ def add_missing_sheets(editor: WorkbookEditor, built: BookBuilder) -> list[str]:
     missing = [title for title, table in _TABLES.items() if editor.table(table) is None]
     if place_of(editor, "d_1") is None:
         missing.append("Setup")
+    check = editor.table("tblCheck")
+    # Its last chart draws the errors of the sheet Check, which it finds by its title.
+    if chart_sheet(editor) is None and (check is None or check.sheet == "Check"):
+        missing.append("Charts")
     if missing:
         add_sheets(editor, built, missing)
     return missing
+
+
+def chart_sheet(editor: WorkbookEditor) -> str | None:
+    """Return the sheet of the charts, known by its columns, whatever it is called now."""
+    columns = range(LEFT + 1, LEFT + 1 + len(KEYS))
+    for title in sorted(editor.titles, key=lambda title: title != "Charts"):
+        head = editor.grid(title).rows.get(HEAD, {})
+        if tuple(head.get(column) for column in columns) == KEYS:
+            return title
+    return None
 
 
 def add_sheets(editor: WorkbookEditor, built: BookBuilder, titles: list[str]) -> None:

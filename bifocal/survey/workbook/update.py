@@ -5,16 +5,19 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from bifocal.survey.workbook.book import build, unprinted_formula
 from bifocal.survey.workbook.charts import HEAD, LEFT
+from bifocal.survey.workbook.columns import USED, USED_HERE
 from bifocal.survey.workbook.content import STRUCTURED_ROWS, SurveyContent
 from bifocal.survey.workbook.reader import SurveyInput
 from bifocal.survey.workbook.setup_cells import TYPED_FORMULAS
 from bifocal.survey.workbook.setup_update import (
     add_missing_sheets,
+    chart_sheet,
     write_corrections,
     write_options,
 )
@@ -37,6 +40,22 @@ from photocore.workbook.live_columns import TEXT_KEYS, row_formula
 from photocore.workbook.named_cells import place_of, type_value
 from photocore.workbook.newbook import RowBlock
 from photocore.workbook.print_area import move_print_area
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BookUpdate:
+    """What became of a survey workbook.
+
+    Attributes
+    ----------
+    kept : Path or None
+        The backup of a workbook changed in place.
+    added : tuple of str
+        Sheets that were missing and are there again, behind all others.
+    """
+
+    kept: Path | None
+    added: tuple[str, ...]
 
 
 def check_kind(source: Path, survey: SurveyInput, *, is_pair: bool) -> None:
@@ -65,7 +84,7 @@ def update_book(
     *,
     given: Mapping[str, Any],
     overwrite: bool = False,
-) -> Path | None:
+) -> BookUpdate:
     """Copy a survey workbook with fresh results in its formula cells; all else byte for byte.
 
     Rows that hold points but no formulas get them, tables grow over points below them, sheets that
@@ -88,8 +107,8 @@ def update_book(
 
     Returns
     -------
-    Path or None
-        The backup of a workbook changed in place.
+    BookUpdate
+        What the user should be told.
 
     Raises
     ------
@@ -105,7 +124,7 @@ def update_book(
     other_words = content.language != survey.language
     if other_words:
         translate(editor, content, survey.language)
-    add_missing_sheets(editor, built)
+    added = add_missing_sheets(editor, built)
     store_named_cells(editor, built, content)
     write_options(editor, content, given)
     write_corrections(editor, content)
@@ -118,13 +137,16 @@ def update_book(
     for name, sheet_rows in (("tblCheck", survey.known_rows), ("tblGeo", survey.control_rows)):
         own = editor.table(name)
         if own is not None:
-            _table(editor, built, name, [row - own.area[0] - 1 for row in sheet_rows])
+            rows_there = [row - own.area[0] - 1 for row in sheet_rows]
+            _table(
+                editor, built, name, rows_there, anew=_asked_here_only(editor, built, own, content)
+            )
     for name, key in (("tblPlan", "relief_cm"), ("tblFrame", "share")):
         _fixed_table(editor, built, name, key)
     _verdict(editor, built, content, rules="rules" in given, words=other_words)
     _charts(editor, built, rows)
     _log(editor, content)
-    return editor.save(target, overwrite=overwrite)
+    return BookUpdate(kept=editor.save(target, overwrite=overwrite), added=tuple(added))
 
 
 def _print_points(editor: WorkbookEditor, count: int, language: str) -> None:
@@ -147,6 +169,26 @@ def _corrected(content: SurveyContent) -> Sequence[str]:
     if content.setup is None or all(matrix is None for matrix in content.setup.adjusted):
         return ()
     return ("s1_used", "s2_used", "theta_used", "q")
+
+
+def _asked_here_only(
+    editor: WorkbookEditor, built: BookBuilder, area: TableArea, content: SurveyContent
+) -> Sequence[str]:
+    """Return the columns whose formulas do not yet see that a point is out of use in `Points`.
+
+    None where no point listed here is: formulas are not touched without need.
+    """
+    known = content.known if area.name == "tblCheck" else content.control
+    if content.points is None or content.points.unused.isdisjoint(known.ids):
+        return ()
+    headings, stands = area.headings(), editor.models(area.sheet, area.area[0] + 1)
+    older = {
+        column.key: row_formula(area.name, column.formula.replace(USED, USED_HERE))[1:]
+        for column in built.tables[area.name].columns
+        if USED in column.formula and column.key in headings
+    }
+    cells = {key: stands.get(headings[key]) for key in older}
+    return [key for key, cell in cells.items() if cell and cell.formula == older[key]]
 
 
 def _length(area: TableArea) -> int:
@@ -392,20 +434,18 @@ def _verdict(
 
 def _charts(editor: WorkbookEditor, built: BookBuilder, rows: Sequence[int]) -> None:
     """Store the numbers of the charts, blanks as #N/A."""
-    if "Charts" not in editor.titles:
+    title = chart_sheet(editor)
+    if title is None:
         return
     block: RowBlock = built.blocks["Charts"]
-    cells = editor.grid("Charts").rows
-    keys = [cells.get(HEAD, {}).get(LEFT + 1 + i) for i in range(4)]
-    if keys != ["X", "Y", "s_c", "sigma_r"]:
-        return
+    cells = editor.grid(title).rows
     last = max((row for row, values in cells.items() if LEFT + 1 in values), default=HEAD)
     for i in range(4):
         values: list[CellValue] = [float("nan")] * max(last - HEAD, 0)
         for row, value in zip(rows, block.columns[LEFT + i], strict=False):
             if 0 <= row < len(values):
                 values[row] = value
-        editor.set_results("Charts", HEAD + 1, {LEFT + 1 + i: values})
+        editor.set_results(title, HEAD + 1, {LEFT + 1 + i: values})
 
 
 def _log(editor: WorkbookEditor, content: SurveyContent) -> None:

@@ -148,3 +148,17 @@ def test_what_breaks_a_step_is_told_of_the_folder_that_the_user_knows(kitchen):
             kitchen.folder, step, "key", FileHashes(kitchen.folder / "h"), progress=no_progress
         )
     assert str(refusal.value) == f"{kitchen.folder / 'cook' / 'out.tif'}: could not be written."
+
+
+@pytest.mark.parametrize("lock", ["~$points.xlsx", ".~lock.points.xlsx#"])
+def test_a_workbook_that_is_open_is_not_replaced(kitchen, lock):
+    kitchen.run()
+    folder = kitchen.folder / "out" / "cook"
+    (folder / "points.xlsx").write_text("open")
+    (folder / lock).touch()
+    kitchen.source.write_text("two")
+    with pytest.raises(InputError, match=r"points\.xlsx: is open in"):
+        kitchen.run(overwrite=True)
+    assert kitchen.runs == 1
+    (folder / lock).unlink()
+    assert kitchen.run()
