@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from operator import itemgetter
 
 from photocore.workbook.cells import CellValue, NewCell, NewRows
 
@@ -80,10 +81,13 @@ class Spliced:
     formula_lost: bool = False
 
     def joined(self, *, strip: bool) -> bytes:
-        """Return the changed sheet, without results of other formulas if ``strip``."""
-        edits = self.edits
+        """Return the changed sheet, without results of other formulas if ``strip``; only once.
+
+        The changes, which may be as many bytes as the sheet, are let go.
+        """
+        edits, self.edits = self.edits, []
         if strip and self.strips:
-            edits = sorted([*edits, *self.strips], key=lambda edit: edit[:2])
+            edits = sorted([*edits, *self.strips], key=itemgetter(0, 1))
         if not edits:
             return self.data
         pieces: list[bytes | memoryview] = []

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import filecmp
+import math
 import shutil
 import zipfile
 from collections.abc import Iterable, Mapping, Sequence
@@ -104,7 +105,7 @@ class WorkbookEditor:
 
     def set_value(self, title: str, row: int, column: int, value: CellValue) -> None:
         """Type a value into a cell; its format stays. None clears the cell."""
-        if isinstance(value, float) and not np.isfinite(value):
+        if isinstance(value, float) and not math.isfinite(value):
             raise InputError(
                 f"{self.path.name} › {title}!{cell_name(row, column)}: {value} is not a number "
                 "that can be typed into a cell."
@@ -412,8 +413,8 @@ class WorkbookEditor:
                     changed = splice_sheet(self.path, sheet.part, data, SheetChanges())
                 if changed is not None:
                     strip = sheet.title in stale
-                    parts[sheet.part] = changed.joined(strip=strip)
                     stripped |= strip and bool(changed.strips)
+                    parts[sheet.part] = changed.joined(strip=strip)
             for area, bottom in self.grown.values():
                 references.grow(area, bottom, parts)
             for name, old, new in self.texts:
@@ -473,8 +474,9 @@ class WorkbookEditor:
         return spliced
 
     def _changes(self, title: str) -> SheetChanges:
-        self._sheet(title)
-        return self.changes.setdefault(title, SheetChanges())
+        if title not in self.changes:
+            self.changes[self._sheet(title).title] = SheetChanges()
+        return self.changes[title]
 
     def _sheet(self, title: str) -> SheetPart:
         for sheet in self.book.sheets:

@@ -4,16 +4,18 @@ from __future__ import annotations
 
 import re
 from collections import deque
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
+from operator import itemgetter
 from pathlib import Path
 from xml.parsers import expat
 
 from photocore.errors import InputError
 from photocore.workbook.cells import CellValue, NewCell, cell_xml, type_and_content
 from photocore.workbook.changes import SheetChanges, Spliced
+from photocore.workbook.formfill import FormFiller
 from photocore.workbook.grid import cell_name, column_letters, column_number, split_area
-from photocore.workbook.package import local, new_parser, understood
-from photocore.workbook.plainsheet import NotPlain, PlainRow, plain_rows, sheet_data
+from photocore.workbook.package import local, new_parser, uncollected, understood
+from photocore.workbook.plainsheet import NotPlain, PlainRow, plain_rows, sheet_data, with_cells
 from photocore.workbook.xlsx import unescape
 from photocore.workbook.xmltext import quoted, unescaped
 
@@ -93,7 +95,8 @@ class _Splicer:
         with understood(lambda: f"{complaint}{self.row}."):
             try:
                 try:
-                    self.run_plain()
+                    with uncollected():
+                        self.run_plain()
                 except NotPlain:
                     self.begin_anew()
                     self.parser.Parse(self.data, True)
@@ -103,7 +106,7 @@ class _Splicer:
                 ) from None
         if self.dimension and self.edits:
             self.grow_dimension(*self.dimension)
-        self.edits.sort(key=lambda edit: edit[:2])
+        self.edits.sort(key=itemgetter(0, 1))
         return self.result
 
     def begin_anew(self) -> None:
@@ -120,7 +123,11 @@ class _Splicer:
         start, end = sheet_data(self.data)
         self.parser.Parse(self.data[:start], False)
         self.inside, self.prefix = False, ""
-        for row in plain_rows(self.data, start, end):
+        filler = FormFiller(self.changes)
+        for found in plain_rows(self.data, start, end):
+            if found.form is not None and self.fill_formed(filler, found):
+                continue
+            row = with_cells(self.data, found)
             if self.fill_plain(row):
                 continue
             self.start_row(row.number, row.start, "")
@@ -141,6 +148,19 @@ class _Splicer:
                 self.add_cells(10**6, place)
         self.add_rows(10**9, (end, end, "", ""))
         self.parser.Parse(self.data[end:], True)
+
+    def fill_formed(self, filler: FormFiller, row: PlainRow) -> bool:
+        """Do as `fill_plain` to a row of a form, if no more is to be done."""
+        if not self.new_rows or self.new_rows[0] != row.number:
+            return False
+        filled = filler.filled(row)
+        if filled is None:
+            return False
+        self.new_rows.popleft()
+        self.result.inputs_changed |= filled.is_typed
+        if filled.parts is not None:
+            self.edits.append((row.body, row.end, b"".join(filled.parts)))
+        return True
 
     def fill_plain(self, row: PlainRow) -> bool:
         """Give every formula of a row its result, and numbers others, if no more is to be done.
@@ -439,8 +459,8 @@ class _Splicer:
 
     def grow_dimension(self, start: int, end: int, reference: str) -> None:
         """Let the sheet's stated extent take in the cells that were made."""
-        made = [(row, column) for row, cells in self.changes.inputs.items() for column in cells]
-        made += [(row, column) for row, cells in self.changes.placed.items() for column in cells]
+        made = [(row, column) for row, own in self.changes.inputs.items() for column in _ends(own)]
+        made += [(row, column) for row, own in self.changes.placed.items() for column in _ends(own)]
         for block in self.changes.added:
             numbers = [column.column for column in block.columns]
             made += [(block.first, min(numbers)), (block.first + block.size - 1, max(numbers))]
@@ -463,3 +483,8 @@ class _Splicer:
 def _is_value(stored: bytes | None) -> bool:
     """Tell whether what stands in a cell is a value, and not an empty text."""
     return stored is not None and stored[:3] == b"<v>" and stored[3:4] != b"<"
+
+
+def _ends(columns: Collection[int]) -> tuple[int, ...]:
+    """Return the first and the last of some columns."""
+    return (min(columns), max(columns)) if columns else ()

@@ -5,7 +5,7 @@ from __future__ import annotations
 import posixpath
 import re
 import zipfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from datetime import datetime
 from functools import lru_cache, partial
@@ -33,11 +33,19 @@ from photocore.workbook.package import (
     new_parser,
     open_package,
     read_part,
+    uncollected,
     understood,
     xml_elements,
     xml_root,
 )
-from photocore.workbook.plainsheet import LARGEST, NotPlain, plain_rows, sheet_data
+from photocore.workbook.plainsheet import (
+    LARGEST,
+    FormCell,
+    NotPlain,
+    RowForm,
+    plain_rows,
+    sheet_data,
+)
 from photocore.workbook.xmltext import unescaped
 
 #: Number formats 14-22, 27-36, 45-47, 50-58 are dates and times in every language of Excel.
@@ -297,6 +305,9 @@ class _SheetReader:
     since_1904: bool
     max_rows: int
     date_marks: frozenset[bytes] = field(init=False)
+    readers: dict[RowForm, list[tuple[int, Callable[[bytes], Value | None]]]] = field(
+        init=False, default_factory=dict
+    )
 
     def __post_init__(self) -> None:
         """Note the styles of dates as the XML writes them."""
@@ -313,7 +324,8 @@ class _SheetReader:
             )
         ):
             try:
-                return self.read_plain(package, title, part)
+                with uncollected():
+                    return self.read_plain(package, title, part)
             except NotPlain:
                 pass
             for element in xml_elements(self.path, package, part, "row", "mergeCell"):
@@ -351,7 +363,9 @@ class _SheetReader:
         for row in plain_rows(data, start, end):
             if b'hidden="1"' in row.attributes or b'hidden="true"' in row.attributes:
                 grid.hidden.add(row.number)
-            cells = self.plain_cells(row.cells) if row.cells else None
+            cells = (
+                self.formed_cells(row.form, row.parts) if row.form else self.plain_cells(row.cells)
+            )
             if cells and len(grid.rows) >= self.max_rows:
                 grid.truncated = True
                 break
@@ -369,26 +383,45 @@ class _SheetReader:
                 cells[_column_of(letters)] = float(content[3:-4])
                 continue
             text = b"" if content is None else content[content.find(b">") + 1 : content.rfind(b"<")]
-            if text and kind is None:
-                date = self.dates.get(style.decode()) if style else None
-                number = float(text)
-                value: Value | None = number if date is None else self.date(number, date)
-            elif text and kind == b"s":
-                value = self.strings[int(text)] or None
-            elif text and kind == b"inlineStr":
-                inner = text[text.find(b">") + 1 : text.rfind(b"<")]
-                value = unescape(_plain_text(inner)) or None
-            elif text:
-                like = Element("c", {"s": (style or b"").decode()})
-                value = self.value(_plain_text(text), (kind or b"n").decode(), like)
-            elif formula is not None and kind != b"str":
+            if text and kind == b"inlineStr":
+                text = text[text.find(b">") + 1 : text.rfind(b"<")]
+            if not text and formula is not None and kind != b"str":
                 inner = formula[formula.find(b">") + 1 : max(formula.rfind(b"<"), 0)]
-                value = NotCalculated(_plain_text(inner))
+                value: Value | None = NotCalculated(_plain_text(inner))
             else:
-                value = None
+                value = self.plain_value(text, style, kind)
             if value is not None:
                 cells[_column_of(letters)] = value
         return cells
+
+    def plain_value(self, text: bytes, style: bytes | None, kind: bytes | None) -> Value | None:
+        """Return the typed value of a cell that holds a text, None for an empty one."""
+        if not text:
+            return None
+        if kind is None:
+            date = self.dates.get(style.decode()) if style else None
+            return float(text) if date is None else self.date(float(text), date)
+        if kind == b"s":
+            return self.strings[int(text)] or None
+        if kind == b"inlineStr":
+            return unescape(_plain_text(text)) or None
+        like = Element("c", {"s": (style or b"").decode()})
+        return self.value(_plain_text(text), kind.decode(), like)
+
+    def formed_cells(self, form: RowForm, parts: Sequence[bytes]) -> dict[int, Value]:
+        """Return the typed values of a row that was taken apart by its form, by column number."""
+        if form not in self.readers:
+            self.readers[form] = [self.reader_of(cell) for cell in form.cells]
+        texts = zip(self.readers[form], parts[1::2], strict=True)
+        return {
+            column: value for (column, read), text in texts if (value := read(text)) is not None
+        }
+
+    def reader_of(self, cell: FormCell) -> tuple[int, Callable[[bytes], Value | None]]:
+        """Return the column of a cell of a form, and what makes a value of its text."""
+        is_number = cell.kind is None and cell.style not in self.date_marks
+        read = float if is_number else partial(self.plain_value, style=cell.style, kind=cell.kind)
+        return _column_of(cell.letters), read
 
     def cells(self, row: Element) -> dict[int, Value]:
         """Return the typed values of a row by column number, without those that are blank."""
