@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+import re
+from collections.abc import Collection
 from dataclasses import dataclass, field
 from operator import itemgetter
 
 from photocore.workbook.cells import CellValue, NewCell, NewRows
+from photocore.workbook.grid import cell_name, split_area
+
+_ROWS_END = re.compile(rb"</(?:\w+:)?sheetData\s*>")
 
 
 @dataclass(slots=True)
@@ -49,6 +54,22 @@ class SheetChanges:
         for block in self.added:
             cells = block.cells(row) | cells
         return dict(sorted((cells | self.placed.get(row, {})).items()))
+
+    def grown(self, reference: str) -> str:
+        """Return the stated extent of a sheet with the cells that are made."""
+        made = [(row, column) for row, own in self.inputs.items() for column in _ends(own)]
+        made += [(row, column) for row, own in self.placed.items() for column in _ends(own)]
+        for block in self.added:
+            numbers = [column.column for column in block.columns]
+            made += [(block.first, min(numbers)), (block.first + block.size - 1, max(numbers))]
+        if not made or not re.fullmatch(r"[A-Z]{1,3}\d+(:[A-Z]{1,3}\d+)?", reference):
+            return reference
+        area = top, left, bottom, right = split_area(reference)
+        top, left = min(top, *(r for r, _ in made)), min(left, *(c for _, c in made))
+        bottom, right = max(bottom, *(r for r, _ in made)), max(right, *(c for _, c in made))
+        if (top, left, bottom, right) == area:
+            return reference
+        return f"{cell_name(top, left)}:{cell_name(bottom, right)}"
 
     def only_filled(self, row: int) -> NewRows | None:
         """Return the block that fills a row to which nothing is added, None for other rows."""
@@ -98,3 +119,14 @@ class Spliced:
             position = end
         pieces.append(view[position:])
         return b"".join(pieces)
+
+
+def _ends(columns: Collection[int]) -> tuple[int, ...]:
+    """Return the first and the last of some columns."""
+    return (min(columns), max(columns)) if columns else ()
+
+
+def replaced_outside_cells(data: bytes, old: bytes, new: bytes) -> bytes:
+    """Return a part with a text replaced; of a sheet only behind its rows."""
+    end = max((match.end() for match in _ROWS_END.finditer(data)), default=0)
+    return data[:end] + data[end:].replace(old, new)

@@ -18,7 +18,7 @@ from photocore.errors import InputError
 from photocore.output import atomic_path, check_writable, free_path
 from photocore.workbook import formulas
 from photocore.workbook.cells import CellValue, NewCell, NewColumn, NewRows, RowFormula, escape
-from photocore.workbook.changes import SheetChanges, Spliced
+from photocore.workbook.changes import SheetChanges, Spliced, replaced_outside_cells
 from photocore.workbook.graft import Graft
 from photocore.workbook.grid import CellGrid, SheetFile, TableArea, cell_name
 from photocore.workbook.newbook import check_new_workbook, new_workbook
@@ -419,9 +419,7 @@ class WorkbookEditor:
                 references.grow(area, bottom, parts)
             for name, old, new in self.texts:
                 data = parts.get(name) or read_part(self.path, package, name)
-                before, cells, after = data.partition(b"</sheetData>")
-                kept, rest = (before + cells, after) if cells else (b"", data)
-                parts[name] = kept + rest.replace(old, new)
+                parts[name] = replaced_outside_cells(data, old, new)
             if stripped:
                 formulas.recalculate_on_load(self.path, package, self.book, parts)
             if any(sheet.formula_lost for sheet in spliced.values()):

@@ -57,6 +57,7 @@ _BUILT_IN_DATES = {
 _ESCAPED = re.compile(r"_x([0-9A-Fa-f]{4})_")
 _CONTENT_TYPES = "[Content_Types].xml"
 _YES = ("1", "true", "on")
+_HIDDEN = re.compile(rb'\shidden="(?:1|true|on)"')
 
 
 @dataclass(slots=True)
@@ -326,8 +327,8 @@ class _SheetReader:
             try:
                 with uncollected():
                     return self.read_plain(package, title, part)
-            except NotPlain:
-                pass
+            except (NotPlain, ValueError, IndexError):
+                pass  # the parser tells which row is damaged, if one is
             for element in xml_elements(self.path, package, part, "row", "mergeCell"):
                 if local(element.tag) == "mergeCell":
                     grid.merged.append(split_area(element.attrib["ref"]))
@@ -340,7 +341,7 @@ class _SheetReader:
                     grid.truncated = True
                     break
                 if cells:
-                    grid.rows[row] = cells
+                    grid.rows[row] = grid.rows.get(row, {}) | cells
         return grid
 
     def read_plain(self, package: zipfile.ZipFile, title: str, part: str) -> CellGrid:
@@ -361,7 +362,7 @@ class _SheetReader:
         except expat.ExpatError:
             raise NotPlain from None
         for row in plain_rows(data, start, end):
-            if b'hidden="1"' in row.attributes or b'hidden="true"' in row.attributes:
+            if _HIDDEN.search(row.attributes):
                 grid.hidden.add(row.number)
             cells = (
                 self.formed_cells(row.form, row.parts) if row.form else self.plain_cells(row.cells)
@@ -370,7 +371,7 @@ class _SheetReader:
                 grid.truncated = True
                 break
             if cells:
-                grid.rows[row.number] = cells
+                grid.rows[row.number] = grid.rows.get(row.number, {}) | cells
         return grid
 
     def plain_cells(self, row: Sequence[re.Match[bytes]]) -> dict[int, Value]:
@@ -402,7 +403,7 @@ class _SheetReader:
             date = self.dates.get(style.decode()) if style else None
             return float(text) if date is None else self.date(float(text), date)
         if kind == b"s":
-            return self.strings[int(text)] or None
+            return self.string(int(text))
         if kind == b"inlineStr":
             return unescape(_plain_text(text)) or None
         like = Element("c", {"s": (style or b"").decode()})
@@ -440,7 +441,7 @@ class _SheetReader:
             style = self.dates.get(cell.get("s", ""))
             return float(text) if style is None else self.date(float(text), style)
         if kind == "s":
-            return self.strings[int(text)] or None
+            return self.string(int(text))
         if kind == "b":
             return text.strip() in ("1", "true")
         if kind == "e":
@@ -448,6 +449,12 @@ class _SheetReader:
         if kind == "d":
             return _iso_date(text)
         return unescape(text)
+
+    def string(self, index: int) -> str | None:
+        """Return a shared string, None for an empty one."""
+        if index < 0:
+            raise IndexError(index)
+        return self.strings[index] or None
 
     def date(self, number: float, style: str) -> Value:
         """Return a date, or the plain number where no calendar reaches."""

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import random
-import zipfile
 
 import pytest
 
@@ -14,7 +13,7 @@ from photocore.workbook.changes import SheetChanges
 from photocore.workbook.plainsheet import plain_rows, sheet_data
 from photocore.workbook.splice import splice_sheet
 from photocore.workbook.xlsx import open_xlsx
-from photocore.workbook.xmltext import escaped
+from tests.bare_workbook import write
 
 ROWS = 120
 STRINGS = ["id", "Wänd & <1>", ""]
@@ -84,31 +83,8 @@ def eager(monkeypatch):
 CASES = [(1, 0.0), (2, 0.02), (3, 0.1), (4, 0.3), (5, 0.05)]
 
 
-def relations(*items):
-    """Return a relations part of kinds and targets."""
-    inside = "".join(
-        f'<Relationship Id="r{i}" Type="urn/{kind}" Target="{target}"/>'
-        for i, (kind, target) in enumerate(items)
-    )
-    return f"<Relationships>{inside}</Relationships>"
-
-
 def grid(path, text):
-    items = "".join(f"<si><t>{escaped(own)}</t></si>" for own in STRINGS)
-    parts = {
-        "[Content_Types].xml": "<Types/>",
-        "_rels/.rels": relations(("officeDocument", "xl/workbook.xml")),
-        "xl/workbook.xml": '<workbook><sheets><sheet name="S" id="r0"/></sheets></workbook>',
-        "xl/_rels/workbook.xml.rels": relations(
-            ("worksheet", "s.xml"), ("sharedStrings", "sharedStrings.xml"), ("styles", "styles.xml")
-        ),
-        "xl/s.xml": text,
-        "xl/sharedStrings.xml": f"<sst>{items}</sst>",
-        "xl/styles.xml": '<a><cellXfs><xf/><xf/><xf numFmtId="14"/></cellXfs></a>',
-    }
-    with zipfile.ZipFile(path, "w") as package:
-        for name, data in parts.items():
-            package.writestr(name, data)
+    write(path, text, strings=STRINGS)
     found = open_xlsx(path, max_rows=2**20).grid("S")
     return found.rows, found.hidden
 
