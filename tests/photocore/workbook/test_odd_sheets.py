@@ -42,7 +42,8 @@ def test_hidden_rows_are_seen_however_yes_is_written(tmp_path, end):
 
 @WAYS
 def test_a_shared_string_that_is_none_is_refused_with_its_row(tmp_path, end):
-    rows = '<row r="7"><c r="A7" t="s"><v>0</v></c></row><row r="8"><c r="A8" t="s"><v>-1</v></c></row>'
+    row = '<row r="{0}"><c r="A{0}" t="s"><v>{1}</v></c></row>'
+    rows = row.format(7, 0) + row.format(8, -1)
     path = sheet(tmp_path, rows + end, ["first", "last"])
     with pytest.raises(InputError, match="damaged near row 8"):
         grid(path)
