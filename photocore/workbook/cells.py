@@ -39,6 +39,15 @@ def escape(text: str) -> str:
     return text
 
 
+def number_text(value: float) -> str:
+    """Return a finite number as cells hold it.
+
+    >>> number_text(2.0), number_text(1e-7)
+    ('2', '1e-07')
+    """
+    return repr(value).removesuffix(".0")
+
+
 def type_and_content(value: CellValue, prefix: str, *, formula: bool) -> tuple[str, str]:
     """Return a cell's ``t`` attribute (empty for numbers) and the XML of its value.
 
@@ -57,7 +66,7 @@ def type_and_content(value: CellValue, prefix: str, *, formula: bool) -> tuple[s
         If a number is infinite or a text is longer than a cell can hold.
     """
     if type(value) is float and value - value == 0.0:  # finite, by far the most frequent
-        return "", f"<{prefix}v>{repr(value).removesuffix('.0')}</{prefix}v>"
+        return "", f"<{prefix}v>{number_text(value)}</{prefix}v>"
     if value is None:
         return "", ""
     if isinstance(value, str):
@@ -80,6 +89,27 @@ def type_and_content(value: CellValue, prefix: str, *, formula: bool) -> tuple[s
     else:
         return type_and_content(float(value), prefix, formula=formula)
     return kind, f"<{prefix}v>{text}</{prefix}v>"
+
+
+def result_texts(values: Sequence[CellValue]) -> tuple[Sequence[str], Sequence[bytes | None]]:
+    """Return the ``t`` attributes and the texts of many results, as `type_and_content` does.
+
+    Examples
+    --------
+    >>> result_texts([2.0, 0.5]), result_texts(["a<b", None])
+    ((['', ''], [b'2', b'0.5']), (['str', ''], [b'a&lt;b', None]))
+    """
+    if {*map(type, values)} == {float}:
+        joined = "\n".join([*map(repr, values), ""])
+        if "n" not in joined:  # neither nan nor inf
+            return [""] * len(values), joined.replace(".0\n", "\n").encode().split(b"\n")[:-1]
+    if {*map(type, values)} == {str}:  # few of them differ: flags, and empty ones
+        known = {value: type_and_content(value, "", formula=True) for value in {*values}}
+        cells = [known[value] for value in values]
+    else:
+        cells = [type_and_content(value, "", formula=True) for value in values]
+    texts = [content[3:-4].encode() if content else None for _, content in cells]
+    return [kind for kind, _ in cells], texts
 
 
 def cell_xml(
@@ -225,6 +255,15 @@ class NewRows:
             column: NewCell(values[index], formula or "", style, self.rule)
             for column, values, style, formula in self.columns
         }
+
+    def results(
+        self, first: int, last: int
+    ) -> list[tuple[tuple[str, ...], tuple[bytes | None, ...]]]:
+        """Return types and texts of the cells of some rows, row by row, as `result_texts` does."""
+        part = slice(first - self.first, last - self.first)
+        columns = [result_texts(column.values[part]) for column in self.columns]
+        kinds = zip(*(own for own, _ in columns), strict=True)
+        return [*zip(kinds, zip(*(texts for _, texts in columns), strict=True), strict=True)]
 
     def xml(self, rows: range, prefix: str) -> Iterator[str]:
         """Yield the XML of the cells of rows, row by row."""

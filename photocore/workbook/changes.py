@@ -2,9 +2,15 @@
 
 from __future__ import annotations
 
+import re
+from collections.abc import Collection
 from dataclasses import dataclass, field
+from operator import itemgetter
 
 from photocore.workbook.cells import CellValue, NewCell, NewRows
+from photocore.workbook.grid import cell_name, split_area
+
+_ROWS_END = re.compile(rb"</(?:\w+:)?sheetData\s*>")
 
 
 @dataclass(slots=True)
@@ -49,6 +55,22 @@ class SheetChanges:
             cells = block.cells(row) | cells
         return dict(sorted((cells | self.placed.get(row, {})).items()))
 
+    def grown(self, reference: str) -> str:
+        """Return the stated extent of a sheet with the cells that are made."""
+        made = [(row, column) for row, own in self.inputs.items() for column in _ends(own)]
+        made += [(row, column) for row, own in self.placed.items() for column in _ends(own)]
+        for block in self.added:
+            numbers = [column.column for column in block.columns]
+            made += [(block.first, min(numbers)), (block.first + block.size - 1, max(numbers))]
+        if not made or not re.fullmatch(r"[A-Z]{1,3}\d+(:[A-Z]{1,3}\d+)?", reference):
+            return reference
+        area = top, left, bottom, right = split_area(reference)
+        top, left = min(top, *(r for r, _ in made)), min(left, *(c for _, c in made))
+        bottom, right = max(bottom, *(r for r, _ in made)), max(right, *(c for _, c in made))
+        if (top, left, bottom, right) == area:
+            return reference
+        return f"{cell_name(top, left)}:{cell_name(bottom, right)}"
+
     def only_filled(self, row: int) -> NewRows | None:
         """Return the block that fills a row to which nothing is added, None for other rows."""
         if row in self.placed or row in self.cached:
@@ -80,10 +102,13 @@ class Spliced:
     formula_lost: bool = False
 
     def joined(self, *, strip: bool) -> bytes:
-        """Return the changed sheet, without results of other formulas if ``strip``."""
-        edits = self.edits
+        """Return the changed sheet, without results of other formulas if ``strip``; only once.
+
+        The changes, which may be as many bytes as the sheet, are let go.
+        """
+        edits, self.edits = self.edits, []
         if strip and self.strips:
-            edits = sorted([*edits, *self.strips], key=lambda edit: edit[:2])
+            edits = sorted([*edits, *self.strips], key=itemgetter(0, 1))
         if not edits:
             return self.data
         pieces: list[bytes | memoryview] = []
@@ -94,3 +119,14 @@ class Spliced:
             position = end
         pieces.append(view[position:])
         return b"".join(pieces)
+
+
+def _ends(columns: Collection[int]) -> tuple[int, ...]:
+    """Return the first and the last of some columns."""
+    return (min(columns), max(columns)) if columns else ()
+
+
+def replaced_outside_cells(data: bytes, old: bytes, new: bytes) -> bytes:
+    """Return a part with a text replaced; of a sheet only behind its rows."""
+    end = max((match.end() for match in _ROWS_END.finditer(data)), default=0)
+    return data[:end] + data[end:].replace(old, new)

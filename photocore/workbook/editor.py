@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import filecmp
+import math
 import shutil
 import zipfile
 from collections.abc import Iterable, Mapping, Sequence
@@ -17,7 +18,7 @@ from photocore.errors import InputError
 from photocore.output import atomic_path, check_writable, free_path
 from photocore.workbook import formulas
 from photocore.workbook.cells import CellValue, NewCell, NewColumn, NewRows, RowFormula, escape
-from photocore.workbook.changes import SheetChanges, Spliced
+from photocore.workbook.changes import SheetChanges, Spliced, replaced_outside_cells
 from photocore.workbook.graft import Graft
 from photocore.workbook.grid import CellGrid, SheetFile, TableArea, cell_name
 from photocore.workbook.newbook import check_new_workbook, new_workbook
@@ -104,7 +105,7 @@ class WorkbookEditor:
 
     def set_value(self, title: str, row: int, column: int, value: CellValue) -> None:
         """Type a value into a cell; its format stays. None clears the cell."""
-        if isinstance(value, float) and not np.isfinite(value):
+        if isinstance(value, float) and not math.isfinite(value):
             raise InputError(
                 f"{self.path.name} › {title}!{cell_name(row, column)}: {value} is not a number "
                 "that can be typed into a cell."
@@ -412,15 +413,13 @@ class WorkbookEditor:
                     changed = splice_sheet(self.path, sheet.part, data, SheetChanges())
                 if changed is not None:
                     strip = sheet.title in stale
-                    parts[sheet.part] = changed.joined(strip=strip)
                     stripped |= strip and bool(changed.strips)
+                    parts[sheet.part] = changed.joined(strip=strip)
             for area, bottom in self.grown.values():
                 references.grow(area, bottom, parts)
             for name, old, new in self.texts:
                 data = parts.get(name) or read_part(self.path, package, name)
-                before, cells, after = data.partition(b"</sheetData>")
-                kept, rest = (before + cells, after) if cells else (b"", data)
-                parts[name] = kept + rest.replace(old, new)
+                parts[name] = replaced_outside_cells(data, old, new)
             if stripped:
                 formulas.recalculate_on_load(self.path, package, self.book, parts)
             if any(sheet.formula_lost for sheet in spliced.values()):
@@ -473,8 +472,9 @@ class WorkbookEditor:
         return spliced
 
     def _changes(self, title: str) -> SheetChanges:
-        self._sheet(title)
-        return self.changes.setdefault(title, SheetChanges())
+        if title not in self.changes:
+            self.changes[self._sheet(title).title] = SheetChanges()
+        return self.changes[title]
 
     def _sheet(self, title: str) -> SheetPart:
         for sheet in self.book.sheets:

@@ -227,6 +227,16 @@ def _grown_sheet(data: bytes, area: TableArea, bottom: int) -> bytes:
     return data[:start] + re.sub(rb"(<(?:\w+:)?sqref>)([^<]*)(</)", attribute, rest)
 
 
+def areas_of_arrays(data: bytes) -> list[tuple[int, int, int, int]]:
+    """Return the ranges that a single formula fills."""
+    if not any(kind in data for kind in (b'"array"', b"'array'", b"dataTable")):
+        return []
+    tags = re.findall(rb"<(?:\w+:)?f\s[^>]*>", data)
+    found = [re.search(rb"\sref\s*=\s*[\"']([A-Z]+\d+:[A-Z]+\d+)[\"']", tag) for tag in tags]
+    kinds = [b"array" in tag or b"dataTable" in tag for tag in tags]
+    return [split_area(m[1].decode()) for m, kind in zip(found, kinds, strict=True) if m and kind]
+
+
 def charts_of(path: Path, package: zipfile.ZipFile, sheet: SheetPart) -> list[str]:
     """Return the parts of the charts that are drawn on a sheet."""
     drawings = [part for kind, part in sheet.relations.values() if kind == "drawing"]

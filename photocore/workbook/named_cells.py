@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 from photocore.tables.model import Table
 from photocore.workbook.cells import CellValue
 from photocore.workbook.editor import WorkbookEditor
-from photocore.workbook.grid import plain_title, split_cell
+from photocore.workbook.grid import Value, plain_title, split_cell
 
 
 def place_of(editor: WorkbookEditor, name: str) -> tuple[str, int, int] | None:
@@ -25,6 +25,18 @@ def type_value(editor: WorkbookEditor, place: tuple[str, int, int], value: CellV
     sheet, row, column = place
     if editor.grid(sheet).rows.get(row, {}).get(column) != value:
         editor.set_value(sheet, row, column, value)
+
+
+def type_column(
+    editor: WorkbookEditor, place: tuple[str, int, int], values: Sequence[CellValue]
+) -> None:
+    """Type values down a column from a place on, each unless it stands there already."""
+    sheet, first, column = place
+    rows = editor.grid(sheet).rows
+    nothing: dict[int, Value] = {}
+    for row, value in enumerate(values, start=first):
+        if rows.get(row, nothing).get(column) != value:
+            editor.set_value(sheet, row, column, value)
 
 
 def make_numbers(editor: WorkbookEditor, table: Table, factor: Callable[[str], float]) -> None:

@@ -24,6 +24,9 @@ from photocore.workbook.package import local, open_package, read_part, understoo
 #: Repeated cells with content beyond these are a decompression bomb, not a survey.
 _MOST_COLUMNS = 16384
 _MOST_CELLS = 20_000_000
+_DRAWINGS = tuple(
+    f"{{urn:oasis:names:tc:opendocument:xmlns:{kind}:1.0}}" for kind in ("drawing", "dr3d")
+)
 _BLANKS = {"tab": "\t", "line-break": "\n"}
 _FAULTS = re.compile(r"(#[A-Z0-9/]+[!?]?|Err:\d+)")
 
@@ -143,12 +146,12 @@ def _attributes(element: Element) -> dict[str, str]:
 
 
 def _paragraphs(element: Element) -> Iterator[str]:
-    """Yield the paragraphs of a cell; its comment does not count."""
+    """Yield the paragraphs of a cell; its comment and what is drawn upon it do not count."""
     for child in element:
         kind = local(child.tag)
         if kind == "p":
             yield _text(child)
-        elif kind != "annotation":
+        elif kind != "annotation" and not child.tag.startswith(_DRAWINGS):
             yield from _paragraphs(child)
 
 

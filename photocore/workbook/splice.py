@@ -5,15 +5,18 @@ from __future__ import annotations
 import re
 from collections import deque
 from collections.abc import Callable, Mapping
+from operator import itemgetter
 from pathlib import Path
 from xml.parsers import expat
 
 from photocore.errors import InputError
 from photocore.workbook.cells import CellValue, NewCell, cell_xml, type_and_content
 from photocore.workbook.changes import SheetChanges, Spliced
-from photocore.workbook.grid import cell_name, column_letters, column_number, split_area
-from photocore.workbook.package import local, new_parser, understood
-from photocore.workbook.plainsheet import NotPlain, PlainRow, plain_rows, sheet_data
+from photocore.workbook.formfill import FormFiller
+from photocore.workbook.formulas import areas_of_arrays
+from photocore.workbook.grid import cell_name, column_letters, column_number
+from photocore.workbook.package import local, new_parser, uncollected, understood
+from photocore.workbook.plainsheet import NotPlain, PlainRow, plain_rows, sheet_data, with_cells
 from photocore.workbook.xlsx import unescape
 from photocore.workbook.xmltext import quoted, unescaped
 
@@ -86,6 +89,7 @@ class _Splicer:
         self.new: dict[int, NewCell] = {}
         self.cached: Mapping[int, CellValue] = {}
         self.dimension: tuple[int, int, str] | None = None
+        self.arrays = areas_of_arrays(data)
 
     def run(self) -> Spliced:
         """Parse, and return the edits in the order of the file."""
@@ -93,7 +97,8 @@ class _Splicer:
         with understood(lambda: f"{complaint}{self.row}."):
             try:
                 try:
-                    self.run_plain()
+                    with uncollected():
+                        self.run_plain()
                 except NotPlain:
                     self.begin_anew()
                     self.parser.Parse(self.data, True)
@@ -103,7 +108,7 @@ class _Splicer:
                 ) from None
         if self.dimension and self.edits:
             self.grow_dimension(*self.dimension)
-        self.edits.sort(key=lambda edit: edit[:2])
+        self.edits.sort(key=itemgetter(0, 1))
         return self.result
 
     def begin_anew(self) -> None:
@@ -113,20 +118,27 @@ class _Splicer:
         self.new_rows = deque(self.changes.rows())
         self.parser = new_parser(self.path, self.part, start=self.start, end=self.end)
         self.dimension = None
-        self.prefix, self.depth, self.inside = "", 0, False
+        self.prefix, self.depth, self.inside, self.row = "", 0, False, 0
 
     def run_plain(self) -> None:
         """Take a sheet of the plain form apart, all but its rows by the XML parser."""
         start, end = sheet_data(self.data)
         self.parser.Parse(self.data[:start], False)
         self.inside, self.prefix = False, ""
-        for row in plain_rows(self.data, start, end):
+        filler = FormFiller(self.changes)
+        for found in plain_rows(self.data, start, end):
+            if found.form is not None and self.fill_formed(filler, found):
+                continue
+            row = with_cells(self.data, found)
             if self.fill_plain(row):
                 continue
             self.start_row(row.number, row.start, "")
-            new, cached = self.new, self.cached
+            new, cached, before = self.new, self.cached, 0
             for cell in row.cells:
                 column = column_number(cell[1].decode())
+                if column <= before:
+                    self.refuse_order(cell_name(row.number, column))
+                before = column
                 if new and next(iter(new)) < column:
                     self.add_cells(column, (cell.start(), cell.start(), "", ""))
                 is_asked = column in new or column in cached
@@ -142,12 +154,25 @@ class _Splicer:
         self.add_rows(10**9, (end, end, "", ""))
         self.parser.Parse(self.data[end:], True)
 
+    def fill_formed(self, filler: FormFiller, row: PlainRow) -> bool:
+        """Do as `fill_plain` to a row of a form, if no more is to be done."""
+        if not self.new_rows or self.new_rows[0] != row.number or self.arrays:
+            return False
+        filled = filler.filled(row)
+        if filled is None:
+            return False
+        self.new_rows.popleft()
+        self.result.inputs_changed |= filled.is_typed
+        if filled.parts is not None:
+            self.edits.append((row.body, row.end, b"".join(filled.parts)))
+        return True
+
     def fill_plain(self, row: PlainRow) -> bool:
         """Give every formula of a row its result, and numbers others, if no more is to be done.
 
         Nearly every row of a large table is such a row.
         """
-        if not self.new_rows or self.new_rows[0] != row.number:
+        if not self.new_rows or self.new_rows[0] != row.number or self.arrays:
             return False
         block = self.changes.only_filled(row.number)
         if block is None:
@@ -250,6 +275,8 @@ class _Splicer:
 
     def start_row(self, number: int, start: int, prefix: str) -> None:
         """Insert the new rows before this one and note what is to happen in it."""
+        if number <= self.row:
+            self.refuse_order(cell_name(number, 1))
         self.row, self.row_start, self.column = number, start, 0
         if self.new_rows and self.new_rows[0] < self.row:
             self.add_rows(self.row, (self.row_start, self.row_start, "", ""))
@@ -258,6 +285,14 @@ class _Splicer:
         self.new = {}
         if self.new_rows and self.new_rows[0] == self.row:
             self.new = self.changes.cells(self.new_rows.popleft())
+
+    def refuse_order(self, cell: str) -> None:
+        """Refuse to change a sheet where a new cell could not be put in its place."""
+        if self.changes:
+            raise InputError(
+                f"{self.path}: the rows and cells of {self.part} are not in their order (at "
+                f"{cell}). Open the file in the spreadsheet program and save it again."
+            )
 
     def end_row(self, name: str) -> None:
         """Insert the new cells behind the last one of this row."""
@@ -269,11 +304,13 @@ class _Splicer:
         self.cell_start = self.parser.CurrentByteIndex
         self.attributes = attributes
         self.children.clear()
-        reference = attributes.get("r")
+        reference, before = attributes.get("r"), self.column
         if reference is None:
             self.column += 1
         else:
             self.column = column_number(reference.rstrip("0123456789"))
+        if self.column <= before:
+            self.refuse_order(cell_name(self.row, self.column))
         if self.new and next(iter(self.new)) < self.column:
             self.add_cells(self.column, (self.cell_start, self.cell_start, "", ""))
 
@@ -302,11 +339,18 @@ class _Splicer:
             raise InputError(f"{where}: is not empty; a new row cannot be put there.")
         if not new.formula and not formula and self.holds(new.value):
             return
+        if not formula and self.is_of_array():
+            raise InputError(f"{where}: is part of an array formula, which is not overwritten.")
         self.result.formula_lost |= bool(formula) and not new.formula
         new = new._replace(style=self.attributes.get("s", "") or new.style)
         edit = self.xml(self.column, new).encode()
         self.edits.append((self.cell_start, self.cell_end, edit))
         self.result.inputs_changed = True
+
+    def is_of_array(self) -> bool:
+        """Whether this cell holds a result of a formula that stands in another one."""
+        at = self.row, self.column
+        return any(t <= at[0] <= b and left <= at[1] <= r for t, left, b, r in self.arrays)
 
     def same_formula(self, place: tuple[int, int], new: NewCell) -> bool:
         """Whether a formula that would be replaced is the same already."""
@@ -439,18 +483,8 @@ class _Splicer:
 
     def grow_dimension(self, start: int, end: int, reference: str) -> None:
         """Let the sheet's stated extent take in the cells that were made."""
-        made = [(row, column) for row, cells in self.changes.inputs.items() for column in cells]
-        made += [(row, column) for row, cells in self.changes.placed.items() for column in cells]
-        for block in self.changes.added:
-            numbers = [column.column for column in block.columns]
-            made += [(block.first, min(numbers)), (block.first + block.size - 1, max(numbers))]
-        if not made or not re.fullmatch(r"[A-Z]{1,3}\d+(:[A-Z]{1,3}\d+)?", reference):
-            return
-        top, left, bottom, right = split_area(reference)
-        top, left = min(top, *(r for r, _ in made)), min(left, *(c for _, c in made))
-        bottom, right = max(bottom, *(r for r, _ in made)), max(right, *(c for _, c in made))
-        grown = f"{cell_name(top, left)}:{cell_name(bottom, right)}"
-        if (top, left, bottom, right) != split_area(reference):
+        grown = self.changes.grown(reference)
+        if grown != reference:
             tag = re.sub(
                 rb"""(\sref\s*=\s*)("[^"]*"|'[^']*')""",
                 lambda match: match[1] + f'"{grown}"'.encode(),

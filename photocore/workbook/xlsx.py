@@ -5,7 +5,7 @@ from __future__ import annotations
 import posixpath
 import re
 import zipfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from datetime import datetime
 from functools import lru_cache, partial
@@ -33,11 +33,19 @@ from photocore.workbook.package import (
     new_parser,
     open_package,
     read_part,
+    uncollected,
     understood,
     xml_elements,
     xml_root,
 )
-from photocore.workbook.plainsheet import LARGEST, NotPlain, plain_rows, sheet_data
+from photocore.workbook.plainsheet import (
+    LARGEST,
+    FormCell,
+    NotPlain,
+    RowForm,
+    plain_rows,
+    sheet_data,
+)
 from photocore.workbook.xmltext import unescaped
 
 #: Number formats 14-22, 27-36, 45-47, 50-58 are dates and times in every language of Excel.
@@ -49,6 +57,7 @@ _BUILT_IN_DATES = {
 _ESCAPED = re.compile(r"_x([0-9A-Fa-f]{4})_")
 _CONTENT_TYPES = "[Content_Types].xml"
 _YES = ("1", "true", "on")
+_HIDDEN = re.compile(rb'\shidden="(?:1|true|on)"')
 
 
 @dataclass(slots=True)
@@ -297,6 +306,9 @@ class _SheetReader:
     since_1904: bool
     max_rows: int
     date_marks: frozenset[bytes] = field(init=False)
+    readers: dict[RowForm, list[tuple[int, Callable[[bytes], Value | None]]]] = field(
+        init=False, default_factory=dict
+    )
 
     def __post_init__(self) -> None:
         """Note the styles of dates as the XML writes them."""
@@ -313,9 +325,10 @@ class _SheetReader:
             )
         ):
             try:
-                return self.read_plain(package, title, part)
-            except NotPlain:
-                pass
+                with uncollected():
+                    return self.read_plain(package, title, part)
+            except (NotPlain, ValueError, IndexError):
+                pass  # the parser tells which row is damaged, if one is
             for element in xml_elements(self.path, package, part, "row", "mergeCell"):
                 if local(element.tag) == "mergeCell":
                     grid.merged.append(split_area(element.attrib["ref"]))
@@ -328,7 +341,7 @@ class _SheetReader:
                     grid.truncated = True
                     break
                 if cells:
-                    grid.rows[row] = cells
+                    grid.rows[row] = grid.rows.get(row, {}) | cells
         return grid
 
     def read_plain(self, package: zipfile.ZipFile, title: str, part: str) -> CellGrid:
@@ -349,14 +362,16 @@ class _SheetReader:
         except expat.ExpatError:
             raise NotPlain from None
         for row in plain_rows(data, start, end):
-            if b'hidden="1"' in row.attributes or b'hidden="true"' in row.attributes:
+            if _HIDDEN.search(row.attributes):
                 grid.hidden.add(row.number)
-            cells = self.plain_cells(row.cells) if row.cells else None
+            cells = (
+                self.formed_cells(row.form, row.parts) if row.form else self.plain_cells(row.cells)
+            )
             if cells and len(grid.rows) >= self.max_rows:
                 grid.truncated = True
                 break
             if cells:
-                grid.rows[row.number] = cells
+                grid.rows[row.number] = grid.rows.get(row.number, {}) | cells
         return grid
 
     def plain_cells(self, row: Sequence[re.Match[bytes]]) -> dict[int, Value]:
@@ -369,26 +384,45 @@ class _SheetReader:
                 cells[_column_of(letters)] = float(content[3:-4])
                 continue
             text = b"" if content is None else content[content.find(b">") + 1 : content.rfind(b"<")]
-            if text and kind is None:
-                date = self.dates.get(style.decode()) if style else None
-                number = float(text)
-                value: Value | None = number if date is None else self.date(number, date)
-            elif text and kind == b"s":
-                value = self.strings[int(text)] or None
-            elif text and kind == b"inlineStr":
-                inner = text[text.find(b">") + 1 : text.rfind(b"<")]
-                value = unescape(_plain_text(inner)) or None
-            elif text:
-                like = Element("c", {"s": (style or b"").decode()})
-                value = self.value(_plain_text(text), (kind or b"n").decode(), like)
-            elif formula is not None and kind != b"str":
+            if text and kind == b"inlineStr":
+                text = text[text.find(b">") + 1 : text.rfind(b"<")]
+            if not text and formula is not None and kind != b"str":
                 inner = formula[formula.find(b">") + 1 : max(formula.rfind(b"<"), 0)]
-                value = NotCalculated(_plain_text(inner))
+                value: Value | None = NotCalculated(_plain_text(inner))
             else:
-                value = None
+                value = self.plain_value(text, style, kind)
             if value is not None:
                 cells[_column_of(letters)] = value
         return cells
+
+    def plain_value(self, text: bytes, style: bytes | None, kind: bytes | None) -> Value | None:
+        """Return the typed value of a cell that holds a text, None for an empty one."""
+        if not text:
+            return None
+        if kind is None:
+            date = self.dates.get(style.decode()) if style else None
+            return float(text) if date is None else self.date(float(text), date)
+        if kind == b"s":
+            return self.string(int(text))
+        if kind == b"inlineStr":
+            return unescape(_plain_text(text)) or None
+        like = Element("c", {"s": (style or b"").decode()})
+        return self.value(_plain_text(text), kind.decode(), like)
+
+    def formed_cells(self, form: RowForm, parts: Sequence[bytes]) -> dict[int, Value]:
+        """Return the typed values of a row that was taken apart by its form, by column number."""
+        if form not in self.readers:
+            self.readers[form] = [self.reader_of(cell) for cell in form.cells]
+        texts = zip(self.readers[form], parts[1::2], strict=True)
+        return {
+            column: value for (column, read), text in texts if (value := read(text)) is not None
+        }
+
+    def reader_of(self, cell: FormCell) -> tuple[int, Callable[[bytes], Value | None]]:
+        """Return the column of a cell of a form, and what makes a value of its text."""
+        is_number = cell.kind is None and cell.style not in self.date_marks
+        read = float if is_number else partial(self.plain_value, style=cell.style, kind=cell.kind)
+        return _column_of(cell.letters), read
 
     def cells(self, row: Element) -> dict[int, Value]:
         """Return the typed values of a row by column number, without those that are blank."""
@@ -407,7 +441,7 @@ class _SheetReader:
             style = self.dates.get(cell.get("s", ""))
             return float(text) if style is None else self.date(float(text), style)
         if kind == "s":
-            return self.strings[int(text)] or None
+            return self.string(int(text))
         if kind == "b":
             return text.strip() in ("1", "true")
         if kind == "e":
@@ -415,6 +449,12 @@ class _SheetReader:
         if kind == "d":
             return _iso_date(text)
         return unescape(text)
+
+    def string(self, index: int) -> str | None:
+        """Return a shared string, None for an empty one."""
+        if index < 0:
+            raise IndexError(index)
+        return self.strings[index] or None
 
     def date(self, number: float, style: str) -> Value:
         """Return a date, or the plain number where no calendar reaches."""

@@ -36,6 +36,7 @@ from photocore.tables.csvread import CsvFile
 from photocore.tables.headings import bare
 from photocore.tables.numbers import Decimal
 from photocore.workbook.grid import SheetFile
+from photocore.workbook.package import uncollected
 
 _XY, _POLAR = ("x1", "y1", "x2", "y2"), ("s1", "s2", "theta")
 _PIXELS = ("col1", "row1", "col2", "row2")
@@ -164,6 +165,7 @@ def column_map(text: str | None) -> dict[str, str]:
     return parse_column_map(text, [column.key for column in point_columns()]) if text else {}
 
 
+@uncollected()
 def read_survey(path: Path | str, options: ReadOptions | None = None) -> SurveyInput:
     """Read a survey: points, set-up, check points and control points.
 

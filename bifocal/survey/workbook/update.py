@@ -37,8 +37,9 @@ from photocore.workbook.grid import (
 )
 from photocore.workbook.live_book import BookBuilder, short_formula
 from photocore.workbook.live_columns import TEXT_KEYS, row_formula
-from photocore.workbook.named_cells import place_of, type_value
+from photocore.workbook.named_cells import place_of, type_column, type_value
 from photocore.workbook.newbook import RowBlock
+from photocore.workbook.package import uncollected
 from photocore.workbook.print_area import move_print_area
 
 
@@ -76,6 +77,7 @@ def check_kind(source: Path, survey: SurveyInput, *, is_pair: bool) -> None:
         )
 
 
+@uncollected()
 def update_book(
     source: Path,
     target: Path,
@@ -296,21 +298,20 @@ def _table(
         number = headings[column.key]
         style = styles.get(number, "")
         if column.kind == "input" and column.key not in TEXT_KEYS:
+            stands = editor.grid(area.sheet).rows
             for row, value in zip(rows, given, strict=False):
-                _make_number(editor, (area.sheet, first + row, number), value)
+                if isinstance(stands.get(first + row, {}).get(number), str):
+                    _make_number(editor, (area.sheet, first + row, number), value)
         if anew and column.kind == "input" and column.key in ("x1", "y1", "x2", "y2"):
             _complete(editor, (area.sheet, first, number), rows, given)
         if column.kind != "formula":
             prepared.append(NewColumn(number, [None] * (length - _length(area)), style))
         if column.kind == "input":
             continue
-        values: list[CellValue] = [_result(column.spare)] * length
-        for row, value in zip(rows, given, strict=False):
-            if 0 <= row < len(values):
-                values[row] = _result(value)
+        values = _by_rows(given, rows, length, spare=_result(column.spare))
         if column.kind == "value":
-            for row, value in enumerate(values, start=first):
-                type_value(editor, (area.sheet, row, number), None if value == "" else value)
+            typed = [None if value == "" else value for value in values]
+            type_column(editor, (area.sheet, first, number), typed)
             continue
         text = row_formula(area.name, column.formula)[1:]
         if column.key in anew:
@@ -327,6 +328,21 @@ def _table(
         filled.append(NewColumn(number, values, style, formula))
     editor.fill_rows(area.sheet, first, filled)
     editor.fill_rows(area.sheet, first + _length(area), prepared)
+
+
+def _by_rows(
+    given: Sequence[CellValue], rows: Sequence[int], length: int, *, spare: CellValue
+) -> list[CellValue]:
+    """Return the values of a column of a table, those of its blank rows too."""
+    values = [spare] * length
+    count = min(len(rows), len(given))
+    if count and rows[0] >= 0 and [*rows[:count]] == [*range(rows[0], rows[0] + count)]:
+        values[rows[0] : rows[0] + count] = ["" if v is None else v for v in given[:count]]
+        return values[:length]
+    for row, value in zip(rows, given, strict=False):
+        if 0 <= row < length:
+            values[row] = _result(value)
+    return values
 
 
 def _lacks(editor: WorkbookEditor, formula: str) -> bool:
