@@ -76,6 +76,8 @@ def main() -> None:
     if given.child:
         _child(*given.child)
         return
+    if given.page and not given.page.parent.is_dir():
+        parser.error(f"{given.page}: the folder does not exist; create it first.")
     comparisons = _comparisons()
     unknown = set(given.only or ()) - set(comparisons)
     if unknown:
@@ -88,8 +90,12 @@ def main() -> None:
         return
     begin, found = time.monotonic(), {}
     for name, comparison in comparisons.items():
-        if not given.only or name in given.only:
+        if given.only and name not in given.only:
+            continue
+        if comparison.sizes:
             found[name] = _compared(name, comparison)
+        else:
+            print(f"\n{comparison.title}: no data here, see $BIFOCAL_DATA in CONTRIBUTING.md")
     minutes = (time.monotonic() - begin) / 60
     print(f"{minutes:.1f} minutes")
     if given.page:

@@ -388,8 +388,8 @@ COMPARISONS = {
         "photo is a smooth pattern, distorted exactly.",
         item="pixel", error="RMS difference [grey levels]", sizes=(6 * MEGA, 24 * MEGA),
         tools={
-            "bifocal": Tool(functools.partial(_undistortion, ours=True), "bifocal"),
-            "OpenCV undistort": Tool(functools.partial(_undistortion, ours=False), CV2),
+            "bifocal, cubic": Tool(functools.partial(_undistortion, ours=True), "bifocal"),
+            "OpenCV undistort, linear": Tool(functools.partial(_undistortion, ours=False), CV2),
         },
     ),
     "calibration": Comparison(
