@@ -376,11 +376,14 @@ def test_scripts_and_extras_that_pages_name_exist() -> None:
         "optional-dependencies"
     ]
     for shown in SHOWN:
-        if shown.line.startswith("pip install"):
+        if listed := re.match(r"pip install -r (\S+)", shown.line):
+            assert (ROOT / listed[1]).is_file(), shown
+        elif shown.line.startswith("pip install"):
             assert re.search(r"\[(\w+)\]", shown.line)[1] in extras
         if script := re.match(r"python (?:-m )?([\w./]+)", shown.line):
-            name = script[1] if "/" in script[1] else f"{script[1].replace('.', '/')}.py"
-            assert (ROOT / name).is_file(), shown
+            module = ROOT / script[1].replace(".", "/")
+            ways = (ROOT / script[1], module.with_suffix(".py"), module / "__main__.py")
+            assert any(way.is_file() for way in ways), shown
 
 
 @pytest.mark.acceptance

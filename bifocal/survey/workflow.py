@@ -207,12 +207,8 @@ def solve(
     by_hand = column_map(columns)
     options = ReadOptions(columns=by_hand, sheet=sheet, decimal=decimal, visible_only=visible_only)
     survey, path = measured(source, options, unit)
-    if isinstance(pair, Path | str) and Path(pair).suffix.lower() in BOOKS:
-        survey, pair = with_setup_of(Path(pair), survey), None
-    setup = replace(survey.setup, **given, unit=unit or survey.unit or survey.setup.unit)
-    survey = replace(survey, setup=setup)
-    if not len(survey.points):
-        raise InputError(f"{survey.where}: there is no point. Fill in the measured points.")
+    survey, pair = _with_setup(survey, pair, given, unit)
+    setup = survey.setup
     if pair is None:
         refuse_far_stations(setup.d1, setup.d2, setup.where, options=given)
     general, pair_path, pair_remarks = given_pair(survey, path, pair)
@@ -390,6 +386,18 @@ def _sigma_from_misfits(
         "radius; --sigma-px sets it."
     )
     return sigma, (remark,)
+
+
+def _with_setup(
+    survey: SurveyInput, pair: Pair | Path | str | None, given: Mapping[str, Any], unit: str | None
+) -> tuple[SurveyInput, Pair | Path | str | None]:
+    """Return the points with the set-up that holds for them, and the pair where it is not that."""
+    if isinstance(pair, Path | str) and Path(pair).suffix.lower() in BOOKS:
+        survey, pair = with_setup_of(Path(pair), survey), None
+    setup = replace(survey.setup, **given, unit=unit or survey.unit or survey.setup.unit)
+    if not len(survey.points):
+        raise InputError(f"{survey.where}: there is no point. Fill in the measured points.")
+    return replace(survey, setup=setup), pair
 
 
 def _solve_ideal(survey: SurveyInput, scale_tolerance: float, *, adjust: bool) -> _SolvedPoints:
