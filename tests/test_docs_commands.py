@@ -46,6 +46,7 @@ NOT_RUN = {
     "python benchmarks/bench_relief.py": MINUTES,
     "python benchmarks/bench_shift.py": MINUTES,
     "python -m benchmarks.bench_page 100": MINUTES,
+    "python -m benchmarks.peers": MINUTES,
     "python docs/make_page_pictures.py": "wants a browser, and writes into docs",
     "python docs/make_cli.py": "test_docs.py compares what it writes",
     "python docs/make_wrong_pictures.py": "writes into docs; run below into another folder",
@@ -164,8 +165,10 @@ def is_wet(source: str) -> bool:
 def written(words: list[str]) -> list[str]:
     """Return the names that a command writes."""
     names = [b for a, b in itertools.pairwise(words) if a in WRITES and b != "-"]
-    if words[1] == "template" or words[1:3] == ["survey", "--init"]:
-        names.append(words[4 if words[1] == "survey" else 2])
+    if words[1:3] == ["survey", "--init"]:
+        names.append(words[4] if len(words) > 4 else f"{words[3]}/survey.toml")
+    if words[1] == "template":
+        names.append(words[2])
     if words[1] == "convert":
         names.append(words[3])
     return names

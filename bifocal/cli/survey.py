@@ -11,7 +11,7 @@ from photocore.options import FILE, Number, as_json, number, overwrite
 
 EXAMPLE = """\b
 Examples:
-  bifocal survey --init photos
+  bifocal survey --init photos street.toml
   bifocal survey street.toml --dry-run
   bifocal survey street.toml --jobs 4 --memory 12
   bifocal survey street.toml --scheduler tcp://192.168.0.10:8786
