@@ -32,7 +32,8 @@ of every camera.
 @click.argument("project", type=FILE)
 @click.option(
     "--interior", default="", type=Names(), metavar="LIST",
-    help="Interior parameters to estimate, of c,xh,yh,k1,k2,k3,p1,p2,scale,shear; or auto: those "
+    help="Interior parameters to estimate, of c,xh,yh,k1,k2,k3,p1,p2,scale,shear, "
+    "of a fisheye c,xh,yh,k1,k2,k3,k4,scale; or auto: those "
     "that the data carry.  [default: none]",
 )  # fmt: skip
 @click.option(

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from multimedia.media.camera import EXTERIOR, Camera, Sensor
+from multimedia.media.camera import EXTERIOR, Camera, Distortion, Sensor
 from multimedia.media.flat_interface import FlatInterface
 from multimedia.media.interfaces import Interfaces
 from multimedia.media.surfaces import Cylinder, Plane, RefractingSurface, Sphere
@@ -34,6 +34,7 @@ from multimedia.refraction.layers import Layers
 from photocore.arrays import is_finite_number, positive
 from photocore.distortion import NAMES, Brown, Convention
 from photocore.errors import GeometryError, InputError, located
+from photocore.fisheye import Fisheye
 from photocore.output import all_or_none, atomic_path, check_all_writable
 from photocore.textfile import check_name, read_text
 
@@ -289,6 +290,8 @@ def _surface_data(surface: RefractingSurface) -> dict[str, Any]:
     )
 
 
+#: What a fisheye lens has in place of a convention of Brown's formula.
+_FISHEYE = "fisheye"
 _CAMERA_KEYS = ("name", "media", *POSE_KEYS, "c", "principal_point", "distortion", "sensor")
 
 
@@ -323,9 +326,11 @@ def _camera_data(camera: Camera, media: str) -> dict[str, Any]:
     data |= dict(zip(EXTERIOR[3:], np.degrees(camera.angles).tolist(), strict=True))
     data["c"] = camera.principal_distance
     data["principal_point"] = camera.principal_point.tolist()
-    if not camera.distortion.is_identity:
-        terms = {name: float(getattr(camera.distortion, name)) for name in NAMES}
-        data["distortion"] = {"convention": camera.distortion.convention.value} | terms
+    lens = camera.distortion
+    if not lens.is_identity:
+        convention = _FISHEYE if isinstance(lens, Fisheye) else lens.convention.value
+        terms = {name: float(getattr(lens, name)) for name in lens.names}
+        data["distortion"] = {"convention": convention} | terms
     if camera.sensor is not None:
         data["sensor"] = {
             "width": camera.sensor.width,
@@ -350,9 +355,14 @@ def _sensor(value: Any, where: str) -> Sensor:
     return Sensor(width=width, height=height, pitch=size, origin=origin)  # type: ignore[arg-type]
 
 
-def _distortion(value: Any, where: str, c: float) -> Brown:
+def _distortion(value: Any, where: str, c: float) -> Distortion:
     where = f"{where}, distortion"
-    _only(value, where, ("convention", *NAMES))
+    fisheye = isinstance(value, Mapping) and value.get("convention") == _FISHEYE
+    _only(value, where, ("convention", *(Fisheye.names if fisheye else NAMES)))
+    if fisheye:
+        with located(where):
+            return Fisheye(**{name: _number(value, name, where) for name in Fisheye.names
+                              if name in value})  # fmt: skip
     convention = str(value.get("convention", Convention.BROWN.value))
     terms = {name: _number(value, name, where) for name in NAMES if name in value}
     if convention == "opencv":
@@ -363,7 +373,8 @@ def _distortion(value: Any, where: str, c: float) -> Brown:
     known = {item.value: item for item in Convention}
     if convention not in known:
         raise InputError(
-            f"{where}: convention {convention!r} is not known; choose {', '.join(known)} or opencv."
+            f"{where}: convention {convention!r} is not known; choose {', '.join(known)}, opencv "
+            f"or {_FISHEYE}."
         )
     return Brown(**terms, convention=known[convention])
 
