@@ -59,6 +59,7 @@ INPUTS: list[tuple[str, ...]] = [
     ("multimedia bathymetry cloud.csv --out o.csv --index 1.34 --water-level {}", "water.json"),
     ("multimedia bathymetry cloud.csv --out o.csv --index 1.34 --water-level {}", "dem.tif"),
     ("multimedia bathymetry cloud.csv --out o.csv --index 1.34 --water-level {}", "mesh.ply"),
+    ("multimedia bathymetry cloud.csv --out o.csv --index 1.34 --water-level {}", "mesh.obj"),
     (f"multimedia bathymetry cloud.csv --out o.csv {WATER} --cameras {{}}", "eyes.csv", "half"),
     (f"multimedia bathymetry cloud.csv --out o.csv {WATER} --cameras {{}}", "tank.toml"),
     (
