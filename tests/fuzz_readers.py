@@ -22,7 +22,6 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from bifocal.calibration.board_photos import detect_board
 from bifocal.files.geotiff import read_relief
 from bifocal.files.images import image_info, read_image
 from bifocal.files.point_tables import read_survey_points
@@ -33,6 +32,7 @@ from multimedia.openptv.experiment import read_experiment
 from multimedia.projects.dem import Dem
 from multimedia.projects.project_file import read_project
 from multimedia.projects.surface_files import read_water_surface
+from photocore.boards import detect_board
 from photocore.cloud import open_cloud
 from photocore.errors import PhotogrammetryError
 from photocore.raster import Window

@@ -37,9 +37,7 @@ def read_obj_mesh(path: Path) -> tuple[FloatArray, IntArray]:
                 corners = [c - 1 if c > 0 else len(vertices) + c for c in corners]
                 if len(corners) < 3 or not all(0 <= c < len(vertices) for c in corners):
                     raise ValueError
-                triangles += [
-                    (corners[0], b, c) for b, c in pairwise(corners[1:])
-                ]
+                triangles += [(corners[0], b, c) for b, c in pairwise(corners[1:])]
         except ValueError:
             raise InputError(
                 f"{path}, line {number}: {line.strip()!r:.60} is no vertex or face of the mesh."
