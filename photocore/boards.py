@@ -15,6 +15,8 @@ from photocore.errors import InputError
 
 #: Half width of the corner refinement window [px]; smaller where squares are smaller.
 CORNER_WINDOW = 11
+#: Greys that span less of 255 are stretched where nothing was found.
+_DULL = 160
 PATTERNS = ("chessboard", "circles", "asymmetric-circles", "charuco")
 #: Fewer corners each way are not told from the pattern of a window. OpenCV takes no fewer.
 LEAST_CORNERS = 3
@@ -73,7 +75,24 @@ def detect_board(
         One of `PATTERNS`.
     size : tuple of int
         Inner corners (chessboard), circles, or squares (ChArUco) across and up.
+
+    Notes
+    -----
+    Where nothing is found, the photo is searched once more with its greys stretched: water takes
+    the contrast that thresholds ask for.
     """
+    view = _detected(image, name, pattern, size)
+    if view is None:
+        low, high = np.percentile(image, (1, 99))
+        if _DULL > high - low > 0:
+            scale = 255.0 / float(high - low)
+            bright = cv2.convertScaleAbs(cv2.subtract(image, float(low)), alpha=scale)
+            view = _detected(np.asarray(bright, dtype=np.uint8), name, pattern, size)
+    return view
+
+
+def _detected(image: ByteArray, name: str, pattern: str, size: tuple[int, int]) -> BoardView | None:
+    """Return the board's points; None when it is not found whole."""
     columns, rows = size
     if pattern == "charuco":
         return _detect_charuco(image, name, size)
@@ -88,16 +107,27 @@ def detect_board(
     else:
         asymmetric = pattern == "asymmetric-circles"
         flags = cv2.CALIB_CB_ASYMMETRIC_GRID if asymmetric else cv2.CALIB_CB_SYMMETRIC_GRID
-        seen, corners = cv2.findCirclesGrid(image, size, flags=flags)
-        if not seen:
-            seen, corners = cv2.findCirclesGrid(image, size, flags=flags | cv2.CALIB_CB_CLUSTERING)
-        if not seen:
+        corners = _circles(image, size, flags)
+        if corners is None:
             return None
         board = np.mgrid[0:columns, 0:rows].T.reshape(-1, 2)
         if asymmetric:
             board = np.column_stack([2 * board[:, 0] + board[:, 1] % 2, board[:, 1]])
     flat = np.column_stack([board, np.zeros(len(board))]).astype(np.float64)
     return BoardView(name=name, board=flat, pixels=np.asarray(corners, float).reshape(-1, 2))
+
+
+def _circles(image: ByteArray, size: tuple[int, int], flags: int) -> Any:
+    """Return the centres of a grid of circles, None if they are not all found."""
+    large = cv2.SimpleBlobDetector.Params()
+    # By default blobs of more than 5000 px are none; a circle may fill its share of the photo.
+    large.maxArea = image.size / (size[0] * size[1])
+    for blobs in (cv2.SimpleBlobDetector.create(), cv2.SimpleBlobDetector.create(large)):
+        for more in (0, cv2.CALIB_CB_CLUSTERING):
+            seen, corners = cv2.findCirclesGrid(image, size, flags=flags | more, blobDetector=blobs)
+            if seen:
+                return corners
+    return None
 
 
 def find_board_size(images: Sequence[ByteArray]) -> tuple[int, int]:

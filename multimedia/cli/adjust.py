@@ -19,6 +19,8 @@ Examples:
              --report tank.html
   multimedia adjust tank.toml --interior auto --media index3 --prior index3=0.0005
              --report rapporto.pdf --language it
+  multimedia adjust boards.toml --plate all --fix-camera cam1 --interior c,xh,yh,k1 --media index3
+             --out housing.toml
   multimedia adjust reef.toml --control free --scale-bar A,B,0.5,0.0001 --out reef2.toml
   multimedia adjust tank.toml --media index3 --wavelength 520 --temperature 20 --depth 0.1
 
@@ -53,7 +55,7 @@ of every camera.
 )  # fmt: skip
 @click.option(
     "--plate", multiple=True, metavar="GROUP",
-    help="Group of object points that is a rigid plate of unknown pose; repeat it.",
+    help="Group of object points that is a rigid plate of unknown pose; repeat it, or say all.",
 )  # fmt: skip
 @click.option(
     "--scale-bar", multiple=True, metavar="A,B,LENGTH,SIGMA",

@@ -55,7 +55,10 @@ def read_water_surface(given: str, *, waves: Sequence[str] = (), crs: Any = None
             raise InputError(f"water level: {given} is no height; give metres.")
         return _wavy(height, waves) if waves else Plane.level(height)
     if waves:
-        raise InputError(f"--wave: waves are added to a height, not to the surface {given}.")
+        raise InputError(
+            f"--wave: waves are added to a height, not to the surface {given}; choose one of both, "
+            "a height with --wave or a surface."
+        )
     path = Path(given)
     kind = path.suffix.lower()
     if kind not in (*RASTERS, *MESHES, *FITTED):
