@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from bifocal.model.lens import Lens
-from photocore.arrays import ByteArray, FloatArray
+from photocore.arrays import ByteArray, FloatArray, positive
 from photocore.camera import Pinhole, camera_matrix
 from photocore.distortion import RadialDivision
 from photocore.errors import InputError
@@ -38,7 +38,8 @@ class Interior:
     focal : float
         Principal distance in columns. [px]
     sigma_focal : float
-        Its relative standard deviation: 0.0005 for a calibration, 0.5 for "a normal lens".
+        Its relative standard deviation, no pixels: 0.0005 for a calibration, 0.5 for "a normal
+        lens".
     centre : ndarray, shape (2,)
         Principal point (column, row). [px]
     sigma_centre : float
@@ -72,6 +73,15 @@ class Interior:
     sigma_radial: float = 0.0
     pixel_size: float | None = None
     is_calibrated: bool = False
+
+    def __post_init__(self) -> None:
+        """Refuse what is no principal distance, and a standard deviation of it in pixels."""
+        positive(self.focal, "focal", unit="px")
+        if not 0 < self.sigma_focal <= 1:
+            raise InputError(
+                "sigma_focal: must be a share of the principal distance, above 0 and no more than "
+                f"1 (0.001 for 0.1 %), got {self.sigma_focal!s:.40}."
+            )
 
     @classmethod
     def from_lens(cls, lens: Lens, *, source: str) -> Interior:

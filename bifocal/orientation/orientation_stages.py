@@ -372,7 +372,9 @@ def _with_named_wall(pair: OrientedPair) -> OrientedPair:
     spread = np.linalg.svd(control.xyz[on, :2] - control.xyz[on, :2].mean(axis=0))[1]
     if spread[1] < 0.1 * spread[0]:
         return pair
-    usual = float(np.hypot(np.median(sigma[on]), wall_roughness(observations, pair.adjusted)))
+    # Points said to be on the wall, not measured against it, leave its roughness alone.
+    own = float(np.median(sigma[on])) if height[on].any() else 0.0
+    usual = float(np.hypot(own, wall_roughness(observations, pair.adjusted)))
     tolerance = (usual / float(np.sqrt(on.sum())), usual / float(spread[1]))
     walled = with_wall(observations, pair.adjusted, tolerance)
     if not walled.wall.any():

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import cv2
 import numpy as np
 import pytest
@@ -109,6 +111,11 @@ def test_what_cannot_be_meant_is_refused() -> None:
         bifocal.align(noise(), noise(), line=("along", line))
     with pytest.raises(InputError, match=r"image1: expected shape \(h, w"):
         bifocal.match(PAIR, np.zeros(7, np.uint8), noise())
+    for sigma in (0.0, -1e-4, 2.3, float("nan")):
+        with pytest.raises(InputError, match="sigma_focal: must be a share"):
+            dataclasses.replace(small, sigma_focal=sigma)
+    with pytest.raises(InputError, match="focal: must be above zero"):
+        dataclasses.replace(small, focal=0.0)
 
 
 def test_points_matched_on_colour_photos_give_the_relief_of_the_wall() -> None:
