@@ -226,7 +226,10 @@ def test_matched_points_solve_to_the_boards(folder) -> None:
     pair, out = str(folder / "wall.pair.json"), str(folder / "points.csv")
     result = CliRunner().invoke(main, ["match", pair, "--out", out, "--count", "600", "--json"])
     assert result.exit_code == 0, result.output
-    assert json.loads(result.stdout)["count"] > 300
+    said = json.loads(result.stdout)
+    assert said["count"] > 300
+    assert said["rests_on"].startswith("Sigmas rest on: matches of 0.")
+    assert "the pair as given, with the covariance of its orientation" in said["rests_on"]
     solved = CliRunner().invoke(main, ["solve", out, "--pair", pair, "--json"])
     assert solved.exit_code == 0, solved.output
     points = json.loads(solved.stdout)["points"]
