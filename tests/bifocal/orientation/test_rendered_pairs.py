@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from bifocal import Control, Interior, SiteMeasures, align
+from bifocal.model.orientation_precision import pinhole
 from photocore.similarity import fit_similarity
 from tests.scenes import SetupErrors, bifocal_cameras, facade, render
 
@@ -38,7 +39,18 @@ def test_without_control_points_are_right_to_a_millimetre(scene) -> None:
     cameras, images, xyz, pixels = scene
     distances = [float(camera.centre[2]) for camera in (cameras.far, cameras.near)]
     site = SiteMeasures(distance1=distances[0], distance2=distances[1])
-    found = align(*images, interiors=interiors(cameras), site=site).pair.intersect(*pixels).xyz
+    made = align(*images, interiors=interiors(cameras), site=site)
+    lines = made.setup["facade_lines"]
+    assert {(line["camera"], line["name"]) for line in lines} == {
+        (camera, name) for camera in (1, 2) for name in ("upright", "level")
+    }
+    assert max(abs(line["out_of_wall_deg"]) for line in lines) < 0.2
+    for number, camera in enumerate((cameras.far, cameras.near), start=1):
+        photo = made.pair.image1 if number == 1 else made.pair.image2
+        found = pinhole(photo).rotation[:, 2]
+        away = np.rad2deg(np.arccos(found @ camera.rotation[:, 2]))
+        assert away < 3 * made.deviations[f"tilt{number}_deg"]
+    found = made.pair.intersect(*pixels).xyz
     away = np.linalg.norm(fit_similarity(found, xyz)(found) - xyz, axis=1)
     assert np.sqrt((away**2).mean()) < 0.0012
 
