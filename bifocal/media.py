@@ -338,3 +338,16 @@ def interface_axes(normal: FloatArray) -> FloatArray:
     across = np.cross(normal, [1.0, 0.0, 0.0])
     across /= np.linalg.norm(across)
     return np.stack([np.cross(across, normal), across, normal])
+
+
+def media_words(layers: Layers) -> str:
+    """Return media in words, the camera's first.
+
+    Examples
+    --------
+    >>> media_words(Layers(indices=(1.0, 1.49, 1.337), thicknesses=(0.01,)))
+    'n = 1, 1.49 (10 mm), 1.337'
+    """
+    first, *inner, last = layers.indices
+    glass = [f"{n:g} ({1000 * t:g} mm)" for n, t in zip(inner, layers.thicknesses, strict=True)]
+    return f"n = {', '.join([f'{first:g}', *glass, f'{last:g}'])}"
