@@ -249,8 +249,11 @@ def seen_distance(camera: Foot) -> float:
     """
     if camera.media is None:
         return camera.distance
-    first, *_, last = camera.media.layers.indices
-    return camera.media.near_axis * first / last
+    media = camera.media
+    first = media.layers.indices[0]
+    heights = (media.z0, *media.layers.thicknesses, camera.distance - media.depth)
+    reduced = zip(heights, media.layers.indices, strict=True)
+    return float(sum(height * first / index for height, index in reduced))
 
 
 def is_before(xyz: FloatArray, camera: Foot) -> BoolArray:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 
 from bifocal.model.pair import Pair
-from bifocal.rays import near_axis, seen_distance
+from bifocal.rays import seen_distance
 from bifocal.survey.survey_media import SurveyMedia, thickness_names
 from photocore.workbook.cells import CellValue
 
@@ -102,16 +102,17 @@ def setup_values(
     if pair is None:
         return cells
     photos = pair.as_given if as_given else (pair.image1, pair.image2)
+    stretch = media.used[-1] / media.used[0]
     for image, (photo, z0) in enumerate(zip(photos, media.z0, strict=True), start=1):
         thick = sum(value or 0.0 for value in media.thicknesses)
-        reach, c = near_axis(photo.foot), photo.principal_distance
+        seen, c = seen_distance(photo.foot), photo.principal_distance
         cells |= {
             f"behind_{image}": photo.distance - (z0 or 0.0) - thick,
-            f"reach_{image}": reach,
-            f"seen_{image}": seen_distance(photo.foot),
+            f"reach_{image}": seen * stretch,
+            f"seen_{image}": seen,
             f"c_rays_{image}": photo.distance if c is None else c,
         }
-    d1, d2 = (near_axis(photo.foot) for photo in photos)
+    d1, d2 = (seen_distance(photo.foot) * stretch for photo in photos)
     cells |= {"r_top": pair.highest_relief, "b_lever": d1 * d2 / (d1 - d2)}
     first, second = photos
     seen1, seen2 = (seen_distance(photo.foot) for photo in photos)
