@@ -187,7 +187,7 @@ def adjust_pairs(
     pairs = [Pair.read(path) for path in paths]
     for path, pair in zip(paths, pairs, strict=True):
         with located(path):
-            pair.refuse_leaning_media("the joint adjustment")
+            pair.refuse_ports_that_lean("the joint adjustment")
     tables = _tables(paths, pairs, task)
     outputs = [out / "points.csv", *(out / path.name for path in paths)]
     for output in outputs:

@@ -144,7 +144,6 @@ def deliver(
     gsd = task.gsd or gsd_at_scale(positive(wish.dpi, "dpi"), scale)
     task = replace(task, gsd=gsd, scale=scale, overviews=True)
     pair = Pair.of(pair_path)
-    pair.refuse_leaning_media("the set of deliverables")
     title = wish.title or default_title(pair_path)
     name = file_name(title)
     _check_outputs(out, folder, name, (task.relief, *pair.photo_files))

@@ -88,10 +88,7 @@ def write_result(
         return ""
     if ending not in (".xlsx", ".xlsm"):
         raise InputError(f"{path}: results are written as .xlsx, .xlsm or .csv.")
-    table_name = path.with_suffix(".csv").name
-    solution.pair.refuse_leaning_media(
-        f"{path}: a workbook (write a text table: --out {table_name})"
-    )
+    solution.pair.refuse_ports_that_lean(f"{path}: a survey workbook")
     if len(solution.table) > MOST_ROWS:
         raise InputError(
             f"{path}: {len(solution.table)} points are too many for a workbook (limit {MOST_ROWS})."

@@ -108,7 +108,9 @@ def described_pair(setup: SurveySetup, file: Path | None, folder: Path) -> Pair 
     if file is not None:
         try:
             given = Pair.read(file)
-            lenses, orientation = [given.image1.lens, given.image2.lens], given.orientation
+            lenses = [given.image1.lens, given.image2.lens]
+            if setup.media is None or setup.media.layers == given.layers:
+                orientation = given.orientation  # it may count the media too
             if setup.media is None:
                 media = [
                     {name: getattr(photo, name) for name in ("layers", "z0", "interface_normal")}

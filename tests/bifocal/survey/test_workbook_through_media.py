@@ -277,9 +277,9 @@ def test_workbooks_of_air_and_media_are_not_changed_into_each_other(tmp_path):
 
 def test_a_port_that_leans_is_no_workbook(tmp_path):
     solution = solve(measured("leaning port"), pair=Pair.from_dict(content("leaning port")))
-    with pytest.raises(InputError, match=r"write a text table: --out s\.csv"):
+    with pytest.raises(InputError, match="ports that lean"):
         write_result(tmp_path / "s.xlsx", solution)
-    with pytest.raises(InputError, match=r"write a text table: \.csv"):
+    with pytest.raises(InputError, match="ports that lean"):
         write_survey(tmp_path / "p.xlsx", solution.points, pair=solution.pair)
     assert not list(tmp_path.iterdir())
 
