@@ -36,7 +36,7 @@ def match_photos(
     check_ending(out, "points are written as .xlsx (survey workbook) or .csv.", ".xlsx", ".csv")
     check_new_workbook(out, overwrite=overwrite)
     if out.suffix.lower() != ".csv":
-        Pair.of(pair_path).refuse_media("a survey workbook (write a text table: .csv)")
+        Pair.of(pair_path).refuse_ports_that_lean("a survey workbook")
     pair, matches = match_pair_file(pair_path, settings)
     if out.suffix.lower() == ".csv":
         write_csv(out, csv_columns(matches), formats=_FORMATS, overwrite=overwrite)
