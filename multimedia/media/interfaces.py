@@ -140,6 +140,11 @@ class Interfaces(SurfaceSequence, OpticalMedia):
         return paths.vertices[..., -1, :], paths.directions[..., -1, :]
 
     @property
+    def bends_in_object(self) -> bool:
+        """Whether the index of the last medium changes with depth."""
+        return self.is_graded
+
+    @property
     def bodies(self) -> tuple[Body, ...]:
         """Surfaces that keep their form together, such as the two faces of a dome."""
         return bodies_of(self.surfaces, self.with_camera)

@@ -19,6 +19,7 @@ from multimedia.media.surface_motion import SurfaceMotion
 from multimedia.media.surface_sequence import SurfaceSequence
 from multimedia.media.surfaces import RefractingSurface
 from photocore.arrays import FloatArray, IntArray
+from photocore.rotation import skew
 
 #: A ray may meet the next surface this far behind itself (share of the scene): surfaces in touch.
 TOUCH = 1e-12
@@ -170,8 +171,8 @@ def _carried(
     along = step if velocity is None else step - velocity
     turned = interfaces.surfaces[number].turn(met.place, met.outward, along)
     turned = np.where(flipped, -turned, turned)
-    if spin is not None:
-        turned = turned + np.cross(spin, normal[:, None, :])
+    if spin is not None and spin.any():
+        turned = turned + (normal @ skew(spin).transpose(0, 2, 1)).transpose(1, 0, 2)
     d_cos_a = -(bend @ normal[:, :, None])[..., 0]
     d_cos_a -= (turned @ met.heading[:, :, None])[..., 0]
     d_factor = ratio[:, None] * d_cos_a - (ratio * ratio * cos_a / cos_b)[:, None] * d_cos_a

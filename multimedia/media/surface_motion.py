@@ -21,7 +21,7 @@ from multimedia.media.surfaces import (
     tangents_of,
 )
 from photocore.arrays import FloatArray
-from photocore.rotation import rotation_from_vector
+from photocore.rotation import rotation_from_vector, skew
 
 #: Faces belong to one body if centres, axes or normals agree to this share of their size.
 TOGETHER = 1e-9
@@ -55,8 +55,10 @@ class SurfaceMotion:
 
     def velocity(self, points: FloatArray, normals: FloatArray) -> FloatArray:
         """Return how points that stick to the surface move, shape (n, 3)."""
-        moved: FloatArray = self.shift + np.cross(self.turn, points - self.pivot)
-        return moved + self.growth * normals
+        moved: FloatArray = np.broadcast_to(self.shift, points.shape)
+        if self.turn.any():
+            moved = moved + (points - self.pivot) @ skew(self.turn).T
+        return moved + self.growth * normals if self.growth else moved
 
     def seen_from(self, rotation: FloatArray, centre: FloatArray) -> SurfaceMotion:
         """Return the change in the frame in which a point of this one is rotation x + centre."""

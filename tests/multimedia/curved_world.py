@@ -8,6 +8,8 @@ of the package is used.
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 from scipy.spatial.transform import Rotation
 
@@ -36,7 +38,7 @@ def through_dome(centre, points, dome, radii, indices):
     def angle(alpha):
         distance = a * np.sin(alpha)
         total = alpha - np.arcsin(distance / radii[0])
-        for k, (before, after) in enumerate(zip(indices, indices[1:], strict=False)):
+        for k, (before, after) in enumerate(pairwise(indices)):
             distance = distance * before / after
             outer = radii[k + 1] if k + 1 < len(radii) else b
             total = total + np.arcsin(distance / radii[k]) - np.arcsin(distance / outer)

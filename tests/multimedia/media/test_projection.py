@@ -225,10 +225,9 @@ def test_shift_and_ray_tracing_give_the_same_image_and_derivatives(scene):
     )
     assert np.abs(traced.image - flat.image).max() < 1e-11
     assert np.abs(traced.by_point - flat.by_point).max() < 1e-9
-    # By the centre and the indices the traced derivatives are differences.
     size = np.abs(flat.by_camera).max(axis=(0, 1))
-    assert (np.abs(traced.by_camera - flat.by_camera).max(axis=(0, 1)) < 1e-6 * size + 1e-9).all()
-    assert np.abs(traced.by_interface - flat.by_interface).max() < 1e-5
+    assert (np.abs(traced.by_camera - flat.by_camera).max(axis=(0, 1)) < 1e-10 * size + 1e-9).all()
+    assert np.abs(traced.by_interface - flat.by_interface).max() < 1e-9
 
 
 def test_a_camera_at_the_centre_of_a_dome_sees_as_without_it():
