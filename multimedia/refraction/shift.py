@@ -144,10 +144,17 @@ def shift_ratio(
     >>> round(float(shift_ratio(0.0, [1.0, 1.0], [1.0, 1.333])), 6)
     1.142735
     """
-    radius, layers = _checked(radius, heights, indices)
+    return ratio_of(*_checked(radius, heights, indices), indices)
+
+
+def ratio_of(radius: FloatArray, layers: list[FloatArray], indices: Sequence[float]) -> FloatArray:
+    """Return `shift_ratio` of what is known to be possible."""
     radius_bar = np.asarray(solve(radius, layers, indices)[0])
-    limit = axis_ratio(layers, indices)
     whole = np.asarray(sum(layers))
+    if (radius > 1e-9 * whole).all():
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return np.asarray(radius_bar / radius)
+    limit = axis_ratio(layers, indices)
     # The ratio leaves its limit with (R / whole)², which is beyond the last digit here.
     # "Not far" rather than "near", so that an unknown radius or height (NaN) gets no limit.
     with np.errstate(divide="ignore", invalid="ignore"):
