@@ -17,6 +17,8 @@ from photocore.errors import InputError
 _COARSE = 4
 #: Most vertices of a curve; a hundred intervals of a curve over a whole sensor are nanometres.
 _MOST = 1025
+#: Share of a ray by which its first vertex lies within the object's medium.
+INSIDE = 1e-12
 #: Distances worked out at a time when looking for candidates.
 _CHUNK = 4_000_000
 
@@ -205,6 +207,8 @@ def _ends(
         # A ray starts where it enters the object's medium, even within the range.
         start, end = np.maximum(np.minimum(one, two), 0.0), np.maximum(one, two)
         end = np.where(np.isfinite(end) & (end > start), end, np.nan)
+        # Just beyond the interface: on it, rounding decides on which side a point lies.
+        start = np.maximum(start, INSIDE * end)
     return origins + start[:, None] * directions, origins + end[:, None] * directions
 
 

@@ -256,3 +256,13 @@ def test_the_radial_shift_makes_collinearity_a_multimedia_model():
     moved = points.copy()
     moved[:, :2] = camera.centre[:2] + offset * (shifted / radius)[:, None]
     assert np.abs(project(camera, moved) - project(camera, points, layers)).max() < 1e-11
+
+
+def test_points_at_infinity_have_no_image_and_no_warning():
+    """Warnings are errors here."""
+    camera, layers = camera_of(PLAIN), interface_of(PLAIN).layers
+    far = [(0.1, 0.0, -np.inf), (np.inf, 0.0, -0.2), POINTS[0]]
+    image = project(camera, far, layers)
+    assert np.isnan(image[:2]).all()
+    np.testing.assert_array_equal(image[2], project(camera, POINTS[0], layers))
+    assert projection_status(camera, far, layers) == ["not a number", "not a number", "ok"]
