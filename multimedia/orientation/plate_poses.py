@@ -65,7 +65,9 @@ def carried_by(
             surface if moves else surface.moved(turn, -turn @ camera.centre)
             for surface, moves in zip(media.surfaces, media.with_camera, strict=True)
         )
-        return replace(media, surfaces=surfaces, with_camera=(True,) * len(surfaces))
+        # A gradient goes by the height in the world; for a start its mean does.
+        moving = (True,) * len(surfaces)
+        return replace(media, surfaces=surfaces, with_camera=moving, gradient=0.0)
     if media is None or media.moves_with_camera:
         return media
     point = turn @ (np.asarray(media.point) - camera.centre)

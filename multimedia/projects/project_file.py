@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import os
 import tomllib
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -33,7 +33,13 @@ from multimedia.projects.point_tables import (
     read_object_points,
     write_columns,
 )
-from multimedia.projects.surface_files import read_mesh, read_raster, wave_rows, waves_of
+from multimedia.projects.surface_files import (
+    read_mesh,
+    read_raster,
+    relative_path,
+    wave_rows,
+    waves_of,
+)
 from multimedia.refraction.layers import Layers
 from photocore.arrays import is_finite_number, positive
 from photocore.distortion import NAMES, Brown, Convention
@@ -160,7 +166,7 @@ def project_data(project: Project, folder: Path) -> dict[str, Any]:
 
 
 #: Keys of media; at the top of a file, where unknown keys are kept, they would have no effect.
-_OF_MEDIA = frozenset(("layers", "indices", "thicknesses", "surfaces", "medium"))
+_OF_MEDIA = frozenset(("layers", "indices", "thicknesses", "surfaces", "medium", "gradient"))
 
 
 def _toml(path: Path) -> dict[str, Any]:
@@ -243,18 +249,32 @@ def _sigma(data: dict[str, Any], cameras: tuple[Camera, ...]) -> float:
 def _media(value: Any, where: str, folder: Path) -> FlatInterface | Interfaces:
     if isinstance(value, Mapping) and "surfaces" in value:
         return _surfaces(value, where, folder)
-    _only(value, where, ("indices", "thicknesses", "point", "normal", "moves_with_camera"))
-    return FlatInterface(
-        layers=Layers.from_dict(value, where=where),
-        point=_vector(value, "point", where, (0.0, 0.0, 0.0)),
-        normal=_vector(value, "normal", where, (0.0, 0.0, 1.0)),
-        moves_with_camera=_flag(value, "moves_with_camera", where),
-    )
+    flat = ("indices", "thicknesses", "point", "normal", "moves_with_camera")
+    _only(value, where, (*flat, *_GRADED))
+    layers = Layers.from_dict(value, where=where)
+    point = _vector(value, "point", where, (0.0, 0.0, 0.0))
+    normal = _vector(value, "normal", where, (0.0, 0.0, 1.0))
+    moves = _flag(value, "moves_with_camera", where)
+    if any(key in value for key in _GRADED):
+        traced = Interfaces.parallel(layers, point=point, normal=normal, with_camera=moves)
+        gradient, level = _graded(value, where)
+        return replace(traced, gradient=gradient, level=level)
+    return FlatInterface(layers=layers, point=point, normal=normal, moves_with_camera=moves)
+
+
+#: Keys of a last medium whose index changes with depth, and the attributes they become.
+_GRADED = {"gradient": "gradient", "gradient_level": "level"}
+
+
+def _graded(value: Mapping[str, Any], where: str) -> tuple[float, float]:
+    """Return by how much the index of the last medium grows with depth, and from which level."""
+    gradient, level = (_number(value, k, where) if k in value else 0.0 for k in _GRADED)
+    return gradient, level
 
 
 def _surfaces(value: Mapping[str, Any], where: str, folder: Path) -> Interfaces:
     """Return ray-traced surfaces of any form."""
-    _only(value, where, ("indices", "surfaces"))
+    _only(value, where, ("indices", "surfaces", *_GRADED))
     listed = value["surfaces"]
     if not isinstance(listed, list) or not listed:
         raise InputError(f"{where}: surfaces must be a list of sections, camera side first.")
@@ -267,10 +287,12 @@ def _surfaces(value: Mapping[str, Any], where: str, folder: Path) -> Interfaces:
     indices = value.get("indices")
     if not isinstance(indices, list):
         raise InputError(f"{where}: indices must be a list of numbers, camera side first.")
+    gradient, level = _graded(value, where)
     with located(where):
         return Interfaces(
-            surfaces=tuple(surfaces), indices=tuple(indices), with_camera=tuple(moving)
-        )
+            surfaces=tuple(surfaces), indices=tuple(indices), with_camera=tuple(moving),
+            gradient=gradient, level=level,
+        )  # fmt: skip
 
 
 def _surface(item: Any, place: str, folder: Path) -> RefractingSurface:
@@ -278,10 +300,9 @@ def _surface(item: Any, place: str, folder: Path) -> RefractingSurface:
     kind = str(item.get("kind", "")) if isinstance(item, Mapping) else ""
     if kind in _FILED:
         _only(item, place, ("kind", "moves_with_camera", "file"))
-        file: RefractingSurface = _FILED[kind][1](
-            folder / _file_name(_given(item, "file", place), f"{place}, file")
-        )
-        return file
+        name = _file_name(_given(item, "file", place), f"{place}, file")
+        surface: RefractingSurface = _FILED[kind][1](folder / name)
+        return surface
     if kind == _WAVES:
         _only(item, place, ("kind", "moves_with_camera", "level", "waves"))
         rows = _given(item, "waves", place)
@@ -304,8 +325,10 @@ def _surface(item: Any, place: str, folder: Path) -> RefractingSurface:
 
 def _media_data(media: FlatInterface | Interfaces, folder: Path) -> dict[str, Any]:
     if isinstance(media, Interfaces):
+        graded = {key: getattr(media, name) for key, name in _GRADED.items() if media.is_graded}
         return {
             "indices": list(media.indices),
+            **graded,
             "surfaces": [
                 _surface_data(surface, folder) | ({"moves_with_camera": True} if moves else {})
                 for surface, moves in zip(media.surfaces, media.with_camera, strict=True)
@@ -323,7 +346,7 @@ def _surface_data(surface: RefractingSurface, folder: Path) -> dict[str, Any]:
         return {"kind": _WAVES, "level": float(surface.level), "waves": wave_rows(surface)}
     for kind, (filed, _) in _FILED.items():
         if isinstance(surface, filed) and surface.source:
-            return {"kind": kind, "file": _relative(Path(surface.source), folder)}
+            return {"kind": kind, "file": relative_path(Path(surface.source), folder)}
     for kind, (form, keys) in _KINDS.items():
         if type(surface) is form:
             return {"kind": kind} | {k: np.asarray(getattr(surface, k)).tolist() for k in keys}
@@ -331,14 +354,6 @@ def _surface_data(surface: RefractingSurface, folder: Path) -> dict[str, Any]:
         f"a {type(surface).__name__} cannot be written into a project file; it holds "
         f"{', '.join((*_KINDS, _WAVES))}, and {' and '.join(_FILED)} read from a file."
     )
-
-
-def _relative(file: Path, folder: Path) -> str:
-    """Return the way from a folder to a file; the whole way where there is none (other drive)."""
-    try:
-        return Path(os.path.relpath(file, folder.resolve())).as_posix()
-    except ValueError:
-        return file.as_posix()
 
 
 #: What a fisheye lens has in place of a convention of Brown's formula.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -173,6 +174,14 @@ def wave_rows(surface: WaveSurface) -> list[list[float]]:
         [surface.amplitude, 2 * np.pi / number, turn, np.degrees(surface.phase)]
     ).tolist()
     return rows
+
+
+def relative_path(file: Path, folder: Path) -> str:
+    """Return the way from a folder to a file; the whole way where there is none (other drive)."""
+    try:
+        return Path(os.path.relpath(file, folder.resolve())).as_posix()
+    except ValueError:
+        return file.as_posix()
 
 
 def _wavy(level: float, waves: Sequence[str]) -> WaveSurface:
