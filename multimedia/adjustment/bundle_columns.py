@@ -10,6 +10,7 @@ import numpy as np
 from multimedia.adjustment.unknowns import Unknowns
 from multimedia.media.camera import EXTERIOR, INTERIOR
 from multimedia.projects.model import Project
+from photocore.adjustment.priors import typical_sigma
 from photocore.arrays import BoolArray, IntArray
 from photocore.errors import InputError
 
@@ -45,20 +46,6 @@ class BundleColumns:
     plates: tuple[Places, ...]
     points: IntArray
     priors: Mapping[int, float]
-
-
-def typical_sigma(name: str, start: float) -> float:
-    """Return how well an index or a thickness is known before it is measured.
-
-    Indices to 0.005 (water from 0 to 40 degrees and fresh to sea differs by 0.01 in all, glass
-    of one kind by less), thicknesses to a tenth.
-
-    Examples
-    --------
-    >>> typical_sigma("index3", 1.33), typical_sigma("thickness1", 6.0)
-    (0.005, 0.6000000000000001)
-    """
-    return 0.005 if name.startswith("index") else 0.1 * abs(start)
 
 
 def place_columns(

@@ -8,20 +8,21 @@ from dataclasses import replace
 import numpy as np
 from scipy.stats import chi2, norm
 
-from multimedia.adjustment.bundle_columns import BundleColumns, typical_sigma
+from multimedia.adjustment.bundle_columns import BundleColumns
 from multimedia.adjustment.unknowns import Adjustment
 from multimedia.media.camera import EXTERIOR, INTERIOR
 from multimedia.projects.model import Project
+from photocore.adjustment.priors import (
+    ALIKE,
+    UNCARRIED,
+    hardly_carried,
+    is_possible,
+    typical_sigma,
+)
 from photocore.arrays import FloatArray, IntArray
 from photocore.errors import GeometryError
 from photocore.reports.words import words_of
 
-#: A medium adjusted by more than this many of its prior sigmas is another one, or nonsense.
-FARTHEST = 5.0
-#: Media unknowns whose sigma keeps this share of the prior's are not carried by the data.
-UNCARRIED = 0.9
-#: Correlations from which two unknowns can hardly be told apart.
-ALIKE = 0.95
 #: Risk of calling a parameter significant, or residuals not white, that are so by chance.
 RISK_PARAMETER, RISK_WHITE = 0.01, 0.001
 #: Points of one image that may share what the model lacks; the largest effect counts.
@@ -66,9 +67,7 @@ def refuse_impossible_media(
     for label, name, start in material_unknowns(project, columns):
         sigma = given.get(label, typical_sigma(name, start))
         value, own = result.value(label), result.sigma(label)
-        least, most = (1.0, 3.0) if name.startswith("index") else (1e-6 * start, np.inf)
-        reach = FARTHEST * sigma
-        if max(least, start - reach) < value < min(most, start + reach):
+        if is_possible(name, value, start=start, sigma=sigma):
             continue
         row = result.names.index(label)
         others = np.abs(result.correlations[row])
@@ -177,10 +176,7 @@ def _uncarried(project: Project, columns: BundleColumns, result: Adjustment) -> 
     for label, _, start in material_unknowns(project, columns):
         prior = columns.priors.get(columns.labels.index(label))
         if prior is not None and result.sigma(label) > UNCARRIED * prior * result.model_error:
-            yield (
-                f"{label}: the data hardly carry it; it rests on what was given, {start:g} "
-                f"+- {prior:.2g}."
-            )
+            yield hardly_carried(label, start=start, sigma=prior)
 
 
 def _alike(result: Adjustment) -> Iterator[str]:
