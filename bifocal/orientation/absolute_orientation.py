@@ -31,8 +31,9 @@ from bifocal.orientation.orientation_stages import (
     oriented_in_stages,
     without_gross,
 )
-from bifocal.orientation.pair_media import PairMedia
+from bifocal.orientation.pair_media import THROUGH_MEDIA, PairMedia
 from bifocal.orientation.pair_observations import PairObservations, PairUnknowns
+from bifocal.orientation.refracted_bend import refracted_bend
 from bifocal.orientation.refracted_resection import resect_through
 from bifocal.orientation.relative_orientation import (
     Ties,
@@ -152,12 +153,7 @@ def _through_media(given: _Given, media: PairMedia) -> OrientedPair:
     Common points do not take part: they only tell whether the wall, freed of refraction, is flat.
     """
     if not given.enough:
-        raise GeometryError(
-            "through glass or water a pair is set up by control points, at least four with X, Y "
-            "and pixels in each photo (--control), or exactly as typed (--as-set-up). Photos alone "
-            "(--auto, or distances without control) are oriented in air only: neither lines nor "
-            "planes stay what they are."
-        )
+        raise GeometryError(THROUGH_MEDIA)
     control, interiors = given.control, given.interiors
     agree = np.ones(len(control.ids), dtype=bool)
     found = []
@@ -175,12 +171,19 @@ def _through_media(given: _Given, media: PairMedia) -> OrientedPair:
     validation.check_units(cameras, given.site)
     observations = replace(_observations(given, interiors, None, agree), media=media)
     start = PairUnknowns(cameras=cameras, media=media)
-    pair = without_gross(control_alone(observations, start, named=given.site.wall is not None))
+    pair = control_alone(observations, start, named=given.site.wall is not None)
+    ties, remarks = _ties(given, needed=False)
+    if ties is not None:
+        size = interiors[0].image_size
+        bend = refracted_bend(pair.adjusted, ties.seen1, ties.seen2, size)
+        pair = replace(pair, bend=bend)
+    pair = pair if pair.bend > MOST_BENT else without_gross(pair)
     refuse_impossible_media(pair.adjusted, media)
     check_room(pair.adjusted.media, pair.adjusted.cameras)
     validation.check_determined(pair.adjusted)
     validation.check_movement(pair.adjusted)
     told = (
+        *remarks,
         *model_remarks(pair, given.site),
         *media_remarks(pair.adjusted, media),
         *control_remarks(control, pair),

@@ -125,8 +125,8 @@ def _of_typed(media: PairMedia, cameras: Cameras, sigma: float) -> FloatArray:
         apparent = media.path(number, camera).near_axis / media.near_axis_rate()
         row[at("focal length", number + 1)] = 1.0 / apparent
         out += sigma**2 * np.outer(row, row)
-    for row, name in enumerate(media.names[len(NAMES) :], start=len(NAMES)):
+    for place, name in enumerate(media.names[len(NAMES) :], start=len(NAMES)):
         known = media.sigmas[name]
-        out[row, row] = known**2 if np.isfinite(known) else 0.0
+        out[place, place] = known**2 if np.isfinite(known) else 0.0
     by = media.by_unknowns()
     return by @ out @ by.T

@@ -103,7 +103,9 @@ def _fitted(
     return matrix, k, weight
 
 
-def bend_in_words(bend: float, *, with_lens: bool) -> str:
+def bend_in_words(
+    bend: float, *, with_lens: bool, through_media: bool = False, left_out: bool = False
+) -> str:
     """Return the warning that the model does not fit; empty if the wall is flat enough.
 
     Parameters
@@ -112,20 +114,34 @@ def bend_in_words(bend: float, *, with_lens: bool) -> str:
         From `wall_bend`. [px]
     with_lens : bool
         Whether the lens was calibrated, or estimated from the photos.
+    through_media : bool
+        Whether the pair was set up through media, and the ties are freed of their refraction.
+    left_out : bool
+        Whether control points that no camera fits were left out.
     """
     if not bend > MOST_BENT:
         return ""
     sure = "" if bend > STRONGLY_BENT else " probably"
     reason = (
-        "refraction (photos taken through glass or water: `multimedia`), a lens file of another "
-        "camera or focus, or wrong distances"
+        "refraction (photos taken through glass or water: give --indices with --port or --depth), "
+        "a lens file of another camera or focus, or wrong distances"
         if with_lens
         else "lens distortion (calibrate with `bifocal calibrate`, give --lens), or refraction "
-        "(photos taken through glass or water: `multimedia`)"
+        "(photos taken through glass or water: give --indices with --port or --depth)"
     )
+    if through_media:
+        reason = (
+            "that the media are not as given (--indices in their order from the camera to the "
+            "wall, --thicknesses, --port for glass that moves with the camera, --depth for what "
+            "stays with the wall), or lens distortion (--lens)"
+        )
     return (
         f"THE MODEL DOES NOT FIT: between the photos the wall is bent by {bend:.2f} px (an honest "
         f"pair: at most {MOST_BENT:g}). The likely reason is{sure} {reason}. Relief may be wrong "
-        "by many times its stated precision, although every point lies on its line; no control "
-        "point was left out for it."
+        "by many times its stated precision, although every point lies on its line; "
+        + (
+            "control points that fit no camera were left out, but may be good."
+            if left_out
+            else "no control point was left out for it."
+        )
     )

@@ -361,7 +361,8 @@ def _control(
         split = turn @ np.concatenate([misfit, (known - xyz) / sigma], axis=1)[..., None]
         xyz = xyz + np.linalg.solve(triangle, split[:, :3])[..., 0]
     by = np.zeros((len(xyz), 4, len(names_of(state.layers))))
-    for number, (view, model, x) in enumerate(zip(views, models, raw, strict=True)):
+    for number, (model, x) in enumerate(zip(models, raw, strict=True)):
+        view = views[number]
         half, first = slice(2 * number, 2 * number + 2), number * len(CAMERA)
         by[:, half, first : first + len(PARAMETERS)] = -view.by_camera
         by[:, half, first + len(PARAMETERS) : first + len(CAMERA)] = model.undistorted_by_k(x)

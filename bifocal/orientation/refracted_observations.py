@@ -17,10 +17,8 @@ from photocore.camera import (
     triangulate,
 )
 
-Views = list[ProjectedPoints] | list[RefractedView]
 
-
-def views_of(state: PairUnknowns, xyz: FloatArray) -> Views:
+def views_of(state: PairUnknowns, xyz: FloatArray) -> list[ProjectedPoints] | list[RefractedView]:
     """Return both cameras' pixels of points with their derivatives."""
     if state.media is None:
         return [project_with_jacobian(camera, xyz) for camera in state.cameras]

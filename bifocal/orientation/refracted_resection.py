@@ -61,7 +61,7 @@ def resect_through(
     )
     for _ in range(ROUNDS):
         seeming = _seeming(camera, media, number, xyz)
-        there = np.isfinite(seeming).all(axis=1)
+        there = np.asarray(np.isfinite(seeming).all(axis=1))
         if there.sum() < 4:
             raise GeometryError(
                 "the control points do not lie behind the media as they are given. Check --depth "
