@@ -11,7 +11,7 @@ import numpy as np
 
 from bifocal.orientation import validation
 from bifocal.orientation.as_set_up import check_room
-from bifocal.orientation.bend import MOST_BENT, STRONGLY_BENT, bend_in_words, wall_bend
+from bifocal.orientation.bend import MOST_BENT, STRONGLY_BENT, bend_in_words, bend_of_wall
 from bifocal.orientation.control_points import Control, SiteMeasures
 from bifocal.orientation.features import find_features
 from bifocal.orientation.interior_orientation import Cameras, Interiors, with_one_lens
@@ -43,7 +43,7 @@ from bifocal.orientation.relative_orientation import (
     plane_scale,
 )
 from bifocal.orientation.space_resection import resect
-from bifocal.orientation.tie_points import robust_sigma
+from bifocal.orientation.tie_points import robust_sigma, tie_positions
 from photocore.arrays import BoolArray
 from photocore.camera import fundamental, ray_on_plane
 from photocore.errors import GeometryError, located
@@ -200,7 +200,9 @@ def _bend(observations: PairObservations, state: PairUnknowns) -> float:
     if used.sum() < 30:
         return float("nan")
     seen1, seen2 = observations.straight_ties(state.radial)
-    return wall_bend(seen1[used], seen2[used], observations.interiors[0].image_size)
+    height = tie_positions(observations, state)[used, 2] / state.cameras[0].centre[2]
+    size = observations.interiors[0].image_size
+    return bend_of_wall(seen1[used], seen2[used], size, height)
 
 
 def _reason(

@@ -8,10 +8,10 @@ import numpy as np
 from bifocal import rays
 from bifocal.model.homography import apply_homography
 from bifocal.model.refracted_view import foot_of
-from bifocal.orientation.bend import wall_bend
+from bifocal.orientation.bend import bend_of_wall
 from bifocal.orientation.pair_adjustment import AdjustedPair
 from bifocal.orientation.pair_observations import PairUnknowns
-from bifocal.orientation.refracted_observations import pixels_of
+from bifocal.orientation.refracted_observations import guessed_points, pixels_of
 from photocore.arrays import FloatArray
 from photocore.camera import project, ray_on_plane
 
@@ -37,12 +37,14 @@ def refracted_bend(
     Returns
     -------
     float
-        As of `bifocal.orientation.bend.wall_bend`; NaN too where it is no more than cameras and
+        As of `bifocal.orientation.bend.bend_of_wall`; NaN too where it is no more than cameras and
         media, as uncertain as they are, leave open. [px, at 3000 px of width]
     """
     flat = straightened(adjusted, pixels1, pixels2)
     known = np.isfinite(np.concatenate(flat, axis=1)).all(axis=1)
-    bend = wall_bend(flat[0][known], flat[1][known], size)
+    xyz = guessed_points(adjusted, np.hstack([pixels1, pixels2])[known])[0]
+    height = xyz[:, 2] / adjusted.cameras[0].centre[2]
+    bend = bend_of_wall(flat[0][known], flat[1][known], size, height)
     return bend if bend > BEYOND * _open(adjusted, size) else float("nan")
 
 
