@@ -35,6 +35,7 @@ from bifocal.orientation.pair_media import THROUGH_MEDIA, PairMedia
 from bifocal.orientation.pair_observations import PairObservations, PairUnknowns
 from bifocal.orientation.refracted_bend import refracted_bend
 from bifocal.orientation.refracted_resection import resect_through
+from bifocal.orientation.refracted_stage import with_bent_ties
 from bifocal.orientation.relative_orientation import (
     Ties,
     epipolar_distance,
@@ -148,9 +149,9 @@ def orient_pair(
 
 
 def _through_media(given: _Given, media: PairMedia) -> OrientedPair:
-    """Return the cameras of a pair that looks through media, from its control points.
+    """Return the cameras of a pair that looks through media, from control and common points.
 
-    Common points do not take part: they only tell whether the wall, freed of refraction, is flat.
+    Common points say that their bent rays meet; the plane is that of the control points.
     """
     if not given.enough:
         raise GeometryError(THROUGH_MEDIA)
@@ -173,9 +174,10 @@ def _through_media(given: _Given, media: PairMedia) -> OrientedPair:
     start = PairUnknowns(cameras=cameras, media=media)
     pair = control_alone(observations, start, named=given.site.wall is not None)
     ties, remarks = _ties(given, needed=False)
+    note = "the media as given, no common points: control points alone"
     if ties is not None:
-        size = interiors[0].image_size
-        bend = refracted_bend(pair.adjusted, ties.seen1, ties.seen2, size)
+        pair, note = with_bent_ties(pair, ties), "the media as given"
+        bend = refracted_bend(pair.adjusted, ties.seen1, ties.seen2, interiors[0].image_size)
         pair = replace(pair, bend=bend)
     pair = pair if pair.bend > MOST_BENT else without_gross(pair)
     refuse_impossible_media(pair.adjusted, media)
@@ -189,7 +191,6 @@ def _through_media(given: _Given, media: PairMedia) -> OrientedPair:
         *control_remarks(control, pair),
         *distance_remarks(pair),
     )
-    note = "common points of the photos take no part through media: control points alone"
     assumed = (*pair.assumed, note, *assumptions(pair.observations, given.site))
     return replace(pair, remarks=told, assumed=assumed)
 

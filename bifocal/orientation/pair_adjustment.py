@@ -25,6 +25,7 @@ from bifocal.orientation.refracted_observations import (
     views_of,
     with_media_priors,
 )
+from bifocal.orientation.refracted_ties import bent_equations, bent_misfit
 from photocore import adjustment
 from photocore.arrays import BoolArray, FloatArray
 from photocore.camera import (
@@ -142,11 +143,18 @@ def adjust(observations: PairObservations, start: PairUnknowns) -> AdjustedPair:
 
 def tie_misfit(observations: PairObservations, state: PairUnknowns) -> FloatArray:
     """Return the signed distance of all ties from their epipolar lines, shape (m,). [px]"""
+    if state.media is not None:
+        return bent_misfit(observations, state, np.ones(len(observations.tie1), dtype=bool))
     return _epipolar(observations, state, np.ones(len(observations.tie1), dtype=bool))[0]
 
 
 def wall_misfit(observations: PairObservations, state: PairUnknowns) -> FloatArray:
-    """Return how far all ties lie from the wall plane's transfer, shape (m,). [px]"""
+    """Return how far all ties lie from the wall plane's transfer, shape (m,). [px]
+
+    NaN through media, where the plane is no homography.
+    """
+    if state.media is not None:
+        return np.full(len(observations.tie1), np.nan)
     return _transfer(observations, state, np.ones(len(observations.tie1), dtype=bool))[0]
 
 
@@ -166,9 +174,10 @@ def pair_equations(observations: PairObservations, state: PairUnknowns) -> Equat
     if observations.media is not None and state.media is not None:
         parts = [with_media_priors(parts[0], observations.media, state.media)]
     if used.any():
-        values, by = _epipolar(observations, state, used)
+        rows_of = _epipolar if state.media is None else bent_equations
+        values, by = rows_of(observations, state, used)
         parts.append((values / observations.sigma_ties, by / observations.sigma_ties))
-    if wall.any():
+    if wall.any() and state.media is None:
         parts.append(wall_equations(observations, state))
     if observations.control.ids:
         control = _control(observations, state)

@@ -20,7 +20,11 @@ from bifocal.cli.main import main
 from bifocal.media import MediaPath, interface_axes
 from bifocal.model.orientation_precision import NAMES, names_of
 from bifocal.model.refracted_view import seen_through, view_through
+from bifocal.orientation.absolute_orientation import orient_pair
 from bifocal.orientation.bend import bend_in_words
+from bifocal.orientation.orientation_stages import PhotoInput
+from bifocal.orientation.refracted_stage import with_bent_ties
+from bifocal.orientation.relative_orientation import Ties
 from multimedia import Layers
 from photocore.camera import Pinhole, camera_matrix
 from photocore.errors import GeometryError, InputError
@@ -192,6 +196,38 @@ def test_photos_given_the_other_way_round_take_their_ports_along():
     assert made.pair.image1.distance == pytest.approx(taken[0].centre[2], abs=1e-6)
     assert made.pair.image2.z0 == pytest.approx(0.06, abs=1e-12)
     assert "port1" in made.deviations
+
+
+def test_common_points_say_that_their_bent_rays_meet():
+    """Wrong ones are left out, right ones make the cameras' tilts more certain and move nothing."""
+    taken, (indices, thicknesses), placed = cameras("surface")
+    xyz = points(np.random.default_rng(1), 12)
+    lenses = [lens(c) for c in taken]
+    photos = [PhotoInput(grey=None, interior=i, name=n) for i, n in zip(lenses, "ab", strict=True)]
+    alone = orient_pair(
+        (photos[0], photos[1]), site=SiteMeasures(sigma_pick=0.3),
+        control=control_of(xyz, [c.view_of(xyz) for c in taken], 0.0005),
+        media=PairMedia.stated(indices, thicknesses, **placed),
+    )  # fmt: skip
+    assert not alone.observations.tie_used.any()
+    rng = np.random.default_rng(8)
+    seen = [c.view_of(points(rng, 160)) for c in taken[:1]]
+    rng = np.random.default_rng(8)
+    seen.append(taken[1].view_of(points(rng, 160)))
+    seen[1][:12] += rng.normal(0, 40, (12, 2))
+    ties = Ties(
+        pixels1=seen[0], pixels2=seen[1], seen1=seen[0], seen2=seen[1], homography=np.eye(3),
+        on_plane=np.zeros(160, dtype=bool), tolerance=0.3,
+    )  # fmt: skip
+    pair = with_bent_ties(alone, ties)
+    used = pair.observations.tie_used
+    assert used[12:].all()
+    assert used[:12].sum() <= 2  # some lie on their line by chance
+    assert np.abs(pair.adjusted.tie_misfit[12:]).max() < 1e-3
+    for number, camera in enumerate(taken, start=1):
+        found = pair.adjusted.cameras[number - 1].centre
+        np.testing.assert_allclose(found, camera.centre, atol=1e-4)
+        assert pair.adjusted.sigma("turn X", number) < 0.9 * alone.adjusted.sigma("turn X", number)
 
 
 def noisy(kind, draw, name, sigma):
