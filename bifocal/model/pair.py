@@ -254,8 +254,8 @@ class Pair:
         of_cameras = None if self.orientation is None else self.orientation[:_IN_AIR, :_IN_AIR]
         return replace(self, image1=photos[0], image2=photos[1], remarks=(), orientation=of_cameras)
 
-    def refuse_media(self, what: str) -> None:
-        """Raise where the pair looks through media and the work asked for knows only air.
+    def refuse_ports_that_lean(self, what: str) -> None:
+        """Raise where interfaces lean against the reference plane and the work asked for cannot.
 
         Parameters
         ----------
@@ -267,11 +267,11 @@ class Pair:
         InputError
             Naming it.
         """
-        if self.layers is not None:
+        if any(photo.media and photo.media.turn is not None for photo in self.as_given):
             raise InputError(
-                f"{what} is not made for pairs seen through other media (`layers`): it would be "
-                "wrong by what refraction does. `solve` (to .csv), `match`, `relief` and `ortho` "
-                "know them."
+                f"{what} is not made through ports that lean (`interface_normal`): it needs media "
+                "parallel to the reference plane. Single points are solved through them: `solve`, "
+                "to a text table (.csv)."
             )
 
     def refuse_leaning_media(self, what: str) -> None:

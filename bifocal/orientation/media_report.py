@@ -9,6 +9,8 @@ from bifocal.orientation.pair_media import PairMedia
 from photocore.adjustment import correlations
 from photocore.adjustment.priors import (
     ALIKE,
+    LEAST_INDEX,
+    MOST_INDEX,
     UNCARRIED,
     hardly_carried,
     is_possible,
@@ -89,7 +91,10 @@ def refuse_impossible_media(adjusted: AdjustedPair, given: PairMedia) -> None:
     for row, name in _estimated(adjusted, media):
         start, value = given.value(name), media.value(name)
         sigma = given.sigmas[name]
-        if is_possible(name, value, start=start, sigma=sigma):
+        least, most = 1e-6 * start, np.inf
+        if name.startswith("index"):
+            least, most = LEAST_INDEX, MOST_INDEX
+        if is_possible(value, start=start, sigma=sigma, least=least, most=most):
             continue
         own, twin = float(np.sqrt(adjusted.of_unknowns[row, row])), _twin(adjusted, media, row)
         alike = (

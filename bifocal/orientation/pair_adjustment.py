@@ -7,12 +7,14 @@ prior, and the covariance says so.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from bifocal.model.orientation_precision import CAMERA, NAMES, names_of, place_by_media
 from bifocal.model.refracted_view import RefractedView
+from bifocal.orientation.facade_lines import FacadeDirection
 from bifocal.orientation.pair_observations import (
     Equations,
     PairObservations,
@@ -20,7 +22,7 @@ from bifocal.orientation.pair_observations import (
     at,
 )
 from bifocal.orientation.refracted_observations import (
-    guessed_points,
+    known_points,
     pixels_of,
     views_of,
     with_media_priors,
@@ -37,8 +39,6 @@ from photocore.camera import (
 from photocore.errors import GeometryError
 from photocore.rotation import skew
 
-#: A coordinate that was not measured, as a standard deviation. [m]
-UNKNOWN = 1e6
 #: Rounding error of pixels and metres, as a share of their standard deviations.
 ROUNDING = 1e-9
 #: Relative standard deviation with which one camera body has one aspect.
@@ -179,6 +179,8 @@ def pair_equations(observations: PairObservations, state: PairUnknowns) -> Equat
         parts.append((values / observations.sigma_ties, by / observations.sigma_ties))
     if wall.any() and state.media is None:
         parts.append(wall_equations(observations, state))
+    if observations.lines:
+        parts.append(line_equations(observations.lines, state))
     if observations.control.ids:
         control = _control(observations, state)
         by = control.by_unknowns
@@ -197,6 +199,23 @@ def wall_equations(observations: PairObservations, state: PairUnknowns) -> Equat
     values, by = _transfer(observations, state, asked)
     rows = observations.wall_rows[:, asked]
     return rows @ values, rows @ by
+
+
+def line_equations(lines: Sequence[FacadeDirection], state: PairUnknowns) -> Equations:
+    """Return how far the façade's lines come out of the wall, in sigma; adjusted: nothing."""
+    values, by = np.zeros(len(lines)), np.zeros((len(lines), len(NAMES)))
+    for row, line in enumerate(lines):
+        seen = line.in_frame(state.cameras[line.camera - 1])
+        turn = at("turn X", line.camera)
+        values[row] = seen[2] / line.sigma
+        by[row, turn : turn + 3] = skew(seen)[2] / line.sigma
+    return values, by
+
+
+def line_test(line: FacadeDirection, adjusted: AdjustedPair) -> float:
+    """Return how far a direction of lines comes out of the wall adjusted without it, in sigma."""
+    values, by = line_equations([line], adjusted)
+    return float(abs(values[0]) / np.sqrt(1.0 + by[0] @ adjusted.covariance @ by[0]))
 
 
 def _priors(observations: PairObservations, state: PairUnknowns) -> Equations:
@@ -355,7 +374,7 @@ def _control(
     models = observations.radial_models(state.radial)
     raw = (control.pixels1, control.pixels2)
     picks = np.concatenate([m.undistort(x) for m, x in zip(models, raw, strict=True)], axis=1)
-    known, sigma = _known_points(observations, state, picks)
+    known, sigma = known_points(observations, state, picks)
     xyz = known
     seen = np.isfinite(picks) & used[:, None]
     held = np.eye(3) / sigma[:, :, None]
@@ -386,20 +405,6 @@ def _control(
         xyz=xyz,
         xyz_by_unknowns=np.linalg.solve(triangle, split_by[:, :3]),
     )
-
-
-def _known_points(
-    observations: PairObservations, state: PairUnknowns, picks: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    """Return control points, what was not measured filled in roughly, and their sigmas."""
-    control = observations.control
-    both, first, second = guessed_points(state, picks)
-    single = np.where(np.isfinite(first), first, second)
-    guess = np.where(np.isfinite(both), both, single)
-    flat = control.sigma[:, 2:] < UNKNOWN  # relief known: the plane fixes X and Y better
-    guess = np.where(flat & np.isfinite(single) & (control.xyz[:, 2:] == 0), single, guess)
-    known = np.where(np.isfinite(control.xyz), control.xyz, np.nan_to_num(guess))
-    return known, np.where(np.isfinite(control.xyz), control.sigma, UNKNOWN)
 
 
 def _control_residuals(observations: PairObservations, state: PairUnknowns) -> FloatArray:

@@ -18,7 +18,7 @@ from bifocal.model.orientation_precision import NAMES, names_of
 from bifocal.model.photo import AXIS
 from bifocal.model.refracted_view import common_names
 from multimedia import Layers
-from photocore.adjustment.priors import parse_prior, typical_sigma
+from photocore.adjustment.priors import LEAST_INDEX, MOST_INDEX, parse_prior, typical_sigma
 from photocore.arrays import FloatArray, not_negative, positive
 from photocore.camera import Pinhole
 from photocore.errors import InputError
@@ -34,8 +34,6 @@ THROUGH_MEDIA = (
     "in air only: bent rays leave neither epipolar lines nor planes what they are. Measure points "
     "of the wall and off it, or set the cameras up square to it and give --as-set-up."
 )
-#: Denser than any medium that photos are taken through (diamond 2.42).
-MOST_INDEX = 3.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -179,7 +177,7 @@ class PairMedia:
             depth += by_name.get("depth", 0.0)
         if min(*thicknesses, *(port or ()), depth or 0.0, 0.0) < 0 or depth == 0:
             return None
-        if min(indices) < 1.0 or max(indices) > MOST_INDEX:
+        if min(indices) < LEAST_INDEX or max(indices) > MOST_INDEX:
             return None
         layers = Layers(indices=indices, thicknesses=thicknesses)
         return replace(self, layers=layers, port=port, depth=depth)

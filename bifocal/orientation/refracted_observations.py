@@ -7,7 +7,7 @@ import numpy as np
 from bifocal import rays
 from bifocal.model.refracted_view import RefractedView, foot_of, seen_through, view_through
 from bifocal.orientation.pair_media import PairMedia
-from bifocal.orientation.pair_observations import Equations, PairUnknowns
+from bifocal.orientation.pair_observations import Equations, PairObservations, PairUnknowns
 from photocore.arrays import FloatArray
 from photocore.camera import (
     ProjectedPoints,
@@ -16,6 +16,9 @@ from photocore.camera import (
     ray_on_plane,
     triangulate,
 )
+
+#: A coordinate that was not measured, as a standard deviation. [m]
+UNKNOWN = 1e6
 
 
 def views_of(state: PairUnknowns, xyz: FloatArray) -> list[ProjectedPoints] | list[RefractedView]:
@@ -48,6 +51,20 @@ def guessed_points(
     both = rays.point_on_ray(q1, rays.relief_of_rays(q1, q2, far, near), far)
     flat = np.zeros(len(picks))
     return both, rays.point_on_ray(q1, flat, far), rays.point_on_ray(q2, flat, near)
+
+
+def known_points(
+    observations: PairObservations, state: PairUnknowns, picks: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return control points, what was not measured filled in roughly, and their sigmas."""
+    control = observations.control
+    both, first, second = guessed_points(state, picks)
+    single = np.where(np.isfinite(first), first, second)
+    guess = np.where(np.isfinite(both), both, single)
+    flat = control.sigma[:, 2:] < UNKNOWN  # relief known: the plane fixes X and Y better
+    guess = np.where(flat & np.isfinite(single) & (control.xyz[:, 2:] == 0), single, guess)
+    known = np.where(np.isfinite(control.xyz), control.xyz, np.nan_to_num(guess))
+    return known, np.where(np.isfinite(control.xyz), control.sigma, UNKNOWN)
 
 
 def with_media_priors(cameras: Equations, given: PairMedia, state: PairMedia) -> Equations:

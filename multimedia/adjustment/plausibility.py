@@ -9,6 +9,7 @@ import numpy as np
 from scipy.stats import chi2, norm
 
 from multimedia.adjustment.bundle_columns import BundleColumns
+from multimedia.adjustment.media_unknowns import media_unknowns
 from multimedia.adjustment.unknowns import Adjustment
 from multimedia.media.camera import EXTERIOR, INTERIOR
 from multimedia.projects.model import Project
@@ -17,7 +18,6 @@ from photocore.adjustment.priors import (
     UNCARRIED,
     hardly_carried,
     is_possible,
-    typical_sigma,
 )
 from photocore.arrays import FloatArray, IntArray
 from photocore.errors import GeometryError
@@ -37,6 +37,8 @@ _TESTED = {name: 1.0 if name == "scale" else 0.0 for name in INTERIOR[3:]}
 _REMEDIES = (
     (("thickness",), "remedy_thickness"),
     (("index",), "remedy_index"),
+    (("radius", "centre", "shift"), "remedy_radius"),
+    (("gradient",), "remedy_gradient"),
     (("offset", "tilt"), "remedy_offset"),
     (("p1", "p2"), "remedy_p1"),
     (("k1", "k2", "k3"), "remedy_k1"),
@@ -48,7 +50,7 @@ _REMEDIES = (
 def refuse_impossible_media(
     project: Project, columns: BundleColumns, result: Adjustment, given: Mapping[str, float]
 ) -> None:
-    """Refuse indices and thicknesses that the medium named cannot have.
+    """Refuse indices, thicknesses, radii and gradients that the media named cannot have.
 
     Parameters
     ----------
@@ -64,10 +66,13 @@ def refuse_impossible_media(
     GeometryError
         Naming the unknown, its value and what it cannot be told apart from.
     """
-    for label, name, start in material_unknowns(project, columns):
-        sigma = given.get(label, typical_sigma(name, start))
+    for item in media_unknowns(project, columns.labels, columns.media):
+        label, start = item.label, item.start
         value, own = result.value(label), result.sigma(label)
-        if is_possible(name, value, start=start, sigma=sigma):
+        if is_possible(
+            value, start=start, sigma=given.get(label, item.typical), least=item.least,
+            most=item.most,
+        ):  # fmt: skip
             continue
         row = result.names.index(label)
         others = np.abs(result.correlations[row])
@@ -81,20 +86,9 @@ def refuse_impossible_media(
         raise GeometryError(
             f"adjust: {label} comes out as {value:.4g} +- {own:.2g}, {start:g} was given: the data "
             f"cannot carry it{alike}. Give what is known as a standard deviation (--prior "
-            f"{label}={typical_sigma(name, start):.3g}), measure points at more depths, or take "
-            f"{name} out of --media. If it really is another medium, change its start value in the "
-            "project."
+            f"{label}={item.typical:.3g}), measure points at more depths, or take {item.name} out "
+            "of --media. If it really is so, change its start value in the project."
         )
-
-
-def material_unknowns(project: Project, columns: BundleColumns) -> Iterator[tuple[str, str, float]]:
-    """Yield label, parameter and start value of every unknown index and thickness, once."""
-    told = set()
-    for owner, places in columns.media.items():
-        for name, column in places.items():
-            if name.startswith(("index", "thickness")) and column not in told:
-                told.add(column)
-                yield columns.labels[column], name, float(project.media[owner].value(name))
 
 
 def with_model_error(result: Adjustment, order: tuple[IntArray, ...]) -> Adjustment:
@@ -172,11 +166,11 @@ def remarks_on_unknowns(
 
 
 def _uncarried(project: Project, columns: BundleColumns, result: Adjustment) -> Iterator[str]:
-    """Yield the indices and thicknesses that rest on their priors alone."""
-    for label, _, start in material_unknowns(project, columns):
-        prior = columns.priors.get(columns.labels.index(label))
-        if prior is not None and result.sigma(label) > UNCARRIED * prior * result.model_error:
-            yield hardly_carried(label, start=start, sigma=prior)
+    """Yield the unknowns of media that rest on their priors alone."""
+    for item in media_unknowns(project, columns.labels, columns.media):
+        prior, own = columns.priors.get(item.column), result.sigma(item.label)
+        if prior is not None and own > UNCARRIED * prior * result.model_error:
+            yield hardly_carried(item.label, start=item.start, sigma=prior)
 
 
 def _alike(result: Adjustment) -> Iterator[str]:
@@ -235,7 +229,7 @@ def remedy_of(kind: tuple[str, str]) -> str:
 
 
 def _insignificant(result: Adjustment) -> Iterator[str]:
-    """Yield the lens parameters that the geometry does not carry."""
+    """Yield the lens parameters and gradients that the geometry does not carry."""
     for name, neutral in _TESTED.items():
         labels = [label for label in result.names if label.rpartition(":")[2] == name]
         if labels and significance(result, labels, neutral) > RISK_PARAMETER:
@@ -243,6 +237,12 @@ def _insignificant(result: Adjustment) -> Iterator[str]:
             yield (
                 f"{name} is not significant at 1 % ({whose}): leave it out of --interior, or say "
                 "--interior auto."
+            )
+    for label in result.names:
+        if label.endswith("gradient") and significance(result, [label]) > RISK_PARAMETER:
+            yield (
+                f"{label} is not significant at 1 %: the water may be the same at all depths; "
+                "leave it out of --media."
             )
 
 

@@ -10,40 +10,41 @@ FARTHEST = 5.0
 UNCARRIED = 0.9
 #: Correlations from which two unknowns can hardly be told apart.
 ALIKE = 0.95
+#: How well an index is known (water from 0 to 40 degrees and fresh to sea differs by 0.01 in all,
+#: glass of one kind by less), and the share to which a thickness or a radius is.
+SIGMA_INDEX, SIGMA_SHARE = 0.005, 0.1
+#: No transparent medium in front of a camera has an index beyond these.
+LEAST_INDEX, MOST_INDEX = 1.0, 3.0
 
 
 def typical_sigma(name: str, start: float) -> float:
-    """Return how well an index or a thickness is known before it is measured.
-
-    Indices to 0.005 (water from 0 to 40 degrees and fresh to sea differs by 0.01 in all, glass
-    of one kind by less), thicknesses to a tenth.
+    """Return how well an index, or else a length, is known before it is measured.
 
     Examples
     --------
     >>> typical_sigma("index3", 1.33), typical_sigma("thickness1", 6.0)
     (0.005, 0.6000000000000001)
     """
-    return 0.005 if name.startswith("index") else 0.1 * abs(start)
+    return SIGMA_INDEX if name.startswith("index") else SIGMA_SHARE * abs(start)
 
 
-def is_possible(name: str, value: float, *, start: float, sigma: float) -> bool:
-    """Tell whether an adjusted index or length may be that of the medium named.
+def is_possible(value: float, *, start: float, sigma: float, least: float, most: float) -> bool:
+    """Tell whether an adjusted value may be that of the medium named.
 
     Parameters
     ----------
-    name : str
-        Beginning with ``index``; anything else is a length above zero.
     value : float
         As adjusted.
     start, sigma : float
         What was given, and its standard deviation; infinite: anything that physics allows.
+    least, most : float
+        What physics allows.
 
     Examples
     --------
-    >>> is_possible("index3", 1.026, start=1.337, sigma=0.005)
+    >>> is_possible(1.026, start=1.337, sigma=0.005, least=LEAST_INDEX, most=MOST_INDEX)
     False
     """
-    least, most = (1.0, 3.0) if name.startswith("index") else (1e-6 * start, float("inf"))
     reach = FARTHEST * sigma
     return max(least, start - reach) < value < min(most, start + reach)
 
