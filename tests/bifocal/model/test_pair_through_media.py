@@ -9,7 +9,6 @@ import pytest
 import bifocal
 from bifocal import Pair
 from bifocal.media import MediaPath, interface_axes
-from bifocal.survey.orientation_check import check_orientation
 from multimedia import Layers
 from photocore.errors import GeometryError, InputError
 from tests.scenes.refracted import pixels_of
@@ -273,10 +272,8 @@ def test_mixed_units_are_told_of():
     assert any("thickest layer" in remark for remark in Pair.from_dict(data).remarks)
 
 
-def test_what_knows_only_air_says_so():
-    pair, photos = Pair.from_dict(content("port")), [np.zeros((60, 80), np.uint8)] * 2
-    with pytest.raises(InputError, match="seen through other media"):
-        check_orientation(pair, np.zeros((5, 2)), np.zeros((5, 2)))
+def test_what_needs_parallel_media_says_so():
+    photos = [np.zeros((60, 80), np.uint8)] * 2
     leaning = Pair.from_dict(content("leaning port"))
     for work in (
         lambda: bifocal.dense_relief(leaning, *photos),
