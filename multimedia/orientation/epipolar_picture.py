@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -11,6 +12,9 @@ from multimedia.projects.photos import read_photo
 from photocore.arrays import FloatArray
 from photocore.output import check_ending
 from photocore.reports.figure_file import write_figure
+
+#: Curves whose depth marks are named; more would cover the photo.
+MOST_NAMED = 3
 
 
 def draw_epipolar(
@@ -20,6 +24,7 @@ def draw_epipolar(
     targets: FloatArray,
     *,
     size: tuple[int, int],
+    depths: Sequence[FloatArray] = (),
     photo: Path | None = None,
     title: str = "",
     overwrite: bool = False,
@@ -38,6 +43,8 @@ def draw_epipolar(
         Candidates. [px]
     size : tuple of int
         Width and height of the image. [px]
+    depths : sequence of ndarray, shape (k,)
+        Z of the vertices, for marks at round values; none without it. [object unit]
     photo : path, optional
         The image to draw over.
     title : str
@@ -67,6 +74,8 @@ def draw_epipolar(
                 label, seen[len(seen) // 2], color=line.get_color(), fontsize=9,
                 xytext=(4, 4), textcoords="offset points",
             )  # fmt: skip
+    if depths:
+        _mark_depths(axes, curves, depths)
     if len(targets):
         axes.plot(
             targets[:, 0], targets[:, 1], "o", fillstyle="none", markersize=7, color="tab:red",
@@ -76,3 +85,32 @@ def draw_epipolar(
     axes.set(xlim=(-0.5, size[0] - 0.5), ylim=(size[1] - 0.5, -0.5), aspect="equal")
     axes.set(xlabel="column [px]", ylabel="row [px]", title=title)
     write_figure(path, figure, overwrite=overwrite, dpi=150)
+
+
+def _mark_depths(axes: Any, curves: Sequence[FloatArray], depths: Sequence[FloatArray]) -> None:
+    """Mark round values of Z along the curves, named on the first of them."""
+    from matplotlib.ticker import MaxNLocator
+
+    low = min(float(np.min(z)) for z in depths)
+    high = max(float(np.max(z)) for z in depths)
+    values = [v for v in MaxNLocator(5).tick_values(low, high) if low <= v <= high]
+    named = 0
+    for curve, z in zip(curves, depths, strict=True):
+        good = np.isfinite(curve).all(axis=1) & np.isfinite(z)
+        if good.sum() < 2:
+            continue
+        order = np.argsort(z[good])
+        along, places = z[good][order], curve[good][order]
+        inside = [v for v in values if along[0] <= v <= along[-1]]
+        marks = np.column_stack([np.interp(inside, along, places[:, k]) for k in (0, 1)])
+        # White with a dark rim: seen on dark water and on bright glass.
+        axes.plot(
+            marks[:, 0], marks[:, 1], "o", markersize=4, markerfacecolor="white",
+            markeredgecolor="black", linestyle="none", gid="depth-marks",
+        )  # fmt: skip
+        for value, mark in zip(inside, marks, strict=True) if named < MOST_NAMED else ():
+            axes.annotate(
+                f"Z {value:g}", mark, fontsize=7, xytext=(-36, -3), textcoords="offset points",
+                bbox={"boxstyle": "round,pad=0.15", "facecolor": "white", "linewidth": 0.3},
+            )  # fmt: skip
+        named += 1

@@ -145,6 +145,7 @@ def epipolar_project(
             picture, [c["pixels"] for c in curves], [c["id"] for c in curves],
             second.sensor.pixel_from_image(targets[near.targets]),
             size=(second.sensor.width, second.sensor.height), photo=photo,
+            depths=[c["points"][:, 2] for c in curves],
             title=f"Epipolar curves of {camera} in {other}", overwrite=overwrite,
         )  # fmt: skip
     return EpipolarResult(

@@ -130,7 +130,9 @@ def test_epipolar_lists_candidates_and_draws_them(tank, tmp_path):
     assert own[0]["Z"] == pytest.approx(POINTS[5, 2], abs=1e-9)
     assert picture.read_bytes()[1:4] == b"PNG"
     assert len(table.read_text().splitlines()) == 1 + len(found["curves"][0]["image"])
-    run("epipolar", tank, "--camera", "cam1", "--to", "cam3", "--at", "640,512")
+    drawn = tmp_path / "curves.svg"
+    run("epipolar", tank, "--camera", "cam1", "--to", "cam3", "--at", "640,512", "--picture", drawn)
+    assert 'id="depth-marks"' in drawn.read_text()
 
 
 def test_openptv_goes_there_and_back(tmp_path):
