@@ -85,9 +85,18 @@ class WetCamera(SceneCamera):
         return places, points - places
 
     @property
+    def steps(self) -> int:
+        """Into how many parts edges are cut, since they are seen bent.
+
+        A cornice 18 m long, seen from 9.5 m through a port, bends by half of how high it is seen:
+        by its corners alone the middle of it was left out of the photo.
+        """
+        return 16
+
+    @property
     def bulge(self) -> float:
-        """How far the outline of a body may bend out of its corners' box. [px]"""
-        return 0.04 * max(self.size)
+        """How far edges may bend out of the box of the points along them. [px]"""
+        return 0.02 * max(self.size)
 
 
 def under_water(

@@ -71,6 +71,19 @@ def test_relief_through_media_is_good_to_hundredths_of_a_pixel(name):
     assert found.mean() < 0.008
 
 
+def test_photos_are_continued_beyond_their_rim_where_media_bend_it():
+    """The rim runs across the grid; matching along an edge to black went wrong there."""
+    taken, pair, _ = shot("port")
+    grid = taken.truth.grid
+    frame = make_frame(pair, as_grey(taken.image1, "1"), as_grey(taken.image2, "2"), grid)
+    for image, seen in ((frame.image1, frame.seen1), (frame.image2, frame.seen2)):
+        assert not seen.all()
+        row = grid.height // 2
+        left = int(np.flatnonzero(seen[row])[0])
+        assert left > 1
+        np.testing.assert_allclose(image[row, :left].astype(float), image[row, left], atol=20)
+
+
 def test_relief_before_the_water_surface_is_refused_by_its_name():
     taken, pair, _ = shot("surface")
     with pytest.raises(InputError, match="relief_range: the last interface lies 3 m"):
