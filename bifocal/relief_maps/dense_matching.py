@@ -141,7 +141,6 @@ def dense_relief(
     >>> result.shape, round(result.gsd, 6)
     ((67, 100), 0.06)
     """
-    pair.refuse_leaning_media("a dense relief map")
     grey1, grey2 = as_grey(image1, "image1"), as_grey(image2, "image2")
     if quality not in QUALITIES:
         raise InputError(f"quality: expected {', '.join(QUALITIES)}, got {quality!r}.")
@@ -156,7 +155,7 @@ def dense_relief(
                 f"plane, and nothing beyond it is measured; got {low:g}, {high:g}."
             )
     wanted, target, work = _grids(pair, (grey1, grey2), gsd, bounds, quality, relief_range)
-    frame = make_frame(pair, grey1, grey2, work)
+    frame = make_frame(pair, grey1, grey2, work, relief_range)
     progress(0.1, 1.0, "First relief")
     coarse, _ = seed.coarse_relief(frame, relief_range)
     frame = match_exposure(frame, coarse)
