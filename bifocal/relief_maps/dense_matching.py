@@ -23,6 +23,7 @@ from bifocal.relief_maps.frame import (
     working_grid,
     zoomed_box,
 )
+from bifocal.relief_maps.haze import greys_through_water
 from bifocal.relief_maps.map_completion import complete
 from bifocal.relief_maps.orientation_sigma import orientation_sigma
 from bifocal.relief_maps.registration import Registration, check_registration
@@ -147,6 +148,7 @@ def dense_relief(
     if relief_range is not None:
         _check_range(relief_range, pair.image2.distance)
     if pair.layers is not None:  # nothing stands out of the water, or through the glass
+        grey1, grey2 = greys_through_water(image1, image2)
         low, high = relief_range or seed.usual_range(pair.image2.distance)
         relief_range = (low, min(high, 0.999 * pair.highest_relief))
         if not low < relief_range[1]:

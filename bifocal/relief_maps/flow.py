@@ -116,19 +116,25 @@ def measure(frame: Frame, coarse: Float32Array, *, stride: int = STRIDE) -> Meas
 
 def _is_plain(frame: Frame) -> bool:
     """Return whether half of photo 1 has hardly more contrast than noise."""
-    quiet = cv2.GaussianBlur(frame.image1.astype(np.float32), (0, 0), PLAIN_BLUR)
+    contrast = local_contrast(frame.image1)[frame.seen1]
+    return bool(np.median(contrast) < PLAIN_CONTRAST * noise(frame.image1, frame.seen1))
+
+
+def local_contrast(image: ByteArray | Float32Array) -> Float32Array:
+    """Return the standard deviation within 15 px of a photo blurred by a pixel. [grey levels]"""
+    quiet = cv2.GaussianBlur(image.astype(np.float32), (0, 0), PLAIN_BLUR)
     mean = cv2.blur(quiet, CONTRAST_WINDOW)
     square = cv2.blur(quiet * quiet, CONTRAST_WINDOW) - mean * mean
-    contrast = np.sqrt(np.maximum(square, 0))[frame.seen1]
-    return bool(np.median(contrast) < PLAIN_CONTRAST * _noise(frame))
+    return np.asarray(np.sqrt(np.maximum(square, 0)))
 
 
-def _noise(frame: Frame) -> float:
-    """Return the noise of photo 1 (Immerkaer 1996, with the median for the mean). [grey levels]"""
+def noise(image: ByteArray | Float32Array, seen: BoolArray | None = None) -> float:
+    """Return the noise of a photo (Immerkaer 1996, with the median for the mean). [grey levels]"""
     mask = np.array([[1, -2, 1], [-2, 4, -2], [1, -2, 1]], dtype=np.float32)
-    second = cv2.filter2D(frame.image1, cv2.CV_32F, mask)
+    second = cv2.filter2D(image, cv2.CV_32F, mask)
+    second = second if seen is None else second[seen]
     # Six is the mask's norm; 1.4826 makes the median of |N(0, 1)| one. Rounding is noise, too.
-    return max(1.4826 / 6 * float(np.median(np.abs(second[frame.seen1]))), 0.29)
+    return max(1.4826 / 6 * float(np.median(np.abs(second))), 0.29)
 
 
 def split(frame: Frame, flow: Float32Array) -> tuple[Float32Array, Float32Array]:

@@ -8,6 +8,7 @@ import cv2
 import numpy as np
 
 from bifocal.model.grid import Grid
+from bifocal.model.ray_field import RayField
 from bifocal.model.relief_map import Quality
 from bifocal.rays import Foot, magnification, reduction
 from bifocal.relief_maps.frame import Frame, offsets, values_at, zoom_map
@@ -274,13 +275,14 @@ def hidden_in_second(
     return np.asarray(inside & (above > relief + step))
 
 
-def hidden_on_map(frame: Frame, relief: Float32Array, grid: Grid) -> BoolArray:
-    """Return which pixels of a relief map camera 2 cannot see, to a pixel.
+def hidden_on_map(
+    relief: Float32Array, grid: Grid, camera: Foot, field: RayField | None = None
+) -> BoolArray:
+    """Return which pixels of a relief map a camera, or bent rays, cannot see, to a pixel.
 
     On one ray, at one q = N + (P - N) d / (d - r), the highest point is the nearest to the camera:
     each cell of q keeps it, and a point is hidden if its cell holds one a pixel and more before it.
     """
-    camera = frame.foot(2)
     x = ((grid.columns_x - camera.nadir[0]) / grid.gsd).astype(np.float32)[None, :]
     y = ((camera.nadir[1] - grid.rows_y) / grid.gsd).astype(np.float32)[:, None]
     column0, row0 = grid.pixel_of(camera.nadir)
@@ -289,9 +291,9 @@ def hidden_on_map(frame: Frame, relief: Float32Array, grid: Grid) -> BoolArray:
     with np.errstate(invalid="ignore"):
         pixel = (distance - relief) / np.maximum(np.sqrt(x * x + y * y), 1)
         column, row = x * factor, y * factor
-        if frame.fields is not None:
+        if field is not None:
             gsd = np.float32(grid.gsd)
-            column, row, across, down = frame.fields[1].through(x * gsd, y * -gsd, relief)
+            column, row, across, down = field.through(x * gsd, y * -gsd, relief)
             column, row = column / gsd, row / -gsd
             pixel = np.minimum(gsd / np.hypot(across, down), distance - relief)
         column += np.float32(column0 + 0.5)
