@@ -165,7 +165,7 @@ class _Surroundings(NamedTuple):
     rho: Float32Array  # distance from the nadir [px]
     distance: np.float32  # of the camera [px]
     core: tuple[slice, slice]  # the window itself
-    bent: _BentRays | None = None  # through media
+    bent: _RaysOfWindow | None = None  # through media
 
     def seen_at(self, share: np.float32) -> tuple[Float32Array, Float32Array]:
         """Return where the rays to all pixels meet the plane, times a share, y upwards. [px]"""
@@ -182,7 +182,7 @@ class _Surroundings(NamedTuple):
         return self.x[column], self.y[row]
 
 
-class _BentRays(NamedTuple):
+class _RaysOfWindow(NamedTuple):
     """Rays through media to the pixels of a window, y upwards. [px]"""
 
     u: Float32Array  # where they meet the plane, from the nadir
@@ -193,7 +193,7 @@ class _BentRays(NamedTuple):
     @classmethod
     def of_window(
         cls, relief: Float32Array, grid: Grid, camera: Foot, at: tuple[Float32Array, Float32Array]
-    ) -> _BentRays:
+    ) -> _RaysOfWindow:
         """Return the rays to points at offsets ``at`` [px] from the straight camera's nadir."""
         reliefs = (float(f.reduce(relief, axis=None, initial=0.0)) for f in (np.fmin, np.fmax))
         low, high = reliefs
@@ -220,7 +220,7 @@ def _hidden(
     if camera.media is None:
         rho = np.sqrt(x * x + (y * y)[:, None])
     else:
-        bent = _BentRays.of_window(relief, grid, camera, (x, y))
+        bent = _RaysOfWindow.of_window(relief, grid, camera, (x, y))
         rho = np.nan_to_num(np.hypot(bent.x, bent.y))
     around = _Surroundings(
         relief=relief * np.float32(1 / gsd),
