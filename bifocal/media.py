@@ -44,6 +44,25 @@ class ObjectRays(NamedTuple):
     slope: FloatArray
 
 
+class RadialWays(NamedTuple):
+    """What media parallel to the plane make of tan beta_1 = t of rays, shape (...).
+
+    Attributes
+    ----------
+    arm : ndarray
+        Radius at which the ray meets the reference plane, over t. [m]
+    bend : ndarray
+        Tangent in the object's medium, over t.
+    pace, turn : ndarray
+        Derivatives of radius and tangent by t. [m, -]
+    """
+
+    arm: FloatArray
+    bend: FloatArray
+    pace: FloatArray
+    turn: FloatArray
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class MediaPath:
     """What lies between one camera and the reference plane.
@@ -152,7 +171,23 @@ class MediaPath:
         of them.
         """
         tangent = away / self.distance if self.turn is None else self._tangent(away)
-        square = (tangent * tangent).sum(-1)
+        (arm, by_arm), (bend, by_bend) = self._ways((tangent * tangent).sum(-1))
+        if self.turn is None:
+            rays = ObjectRays(tangent * arm[..., None], tangent * -bend[..., None])
+        else:
+            rays = self._lines(tangent * arm[..., None], tangent * bend[..., None])
+        return rays, tangent, (arm, by_arm), (bend, by_bend)
+
+    def radial_ways(self, tangent: FloatArray) -> RadialWays:
+        """Return what interfaces parallel to the reference plane make of tan beta_1."""
+        square = tangent * tangent
+        (arm, by_arm), (bend, by_bend) = self._ways(square)
+        return RadialWays(arm, bend, arm + 2 * square * by_arm, bend + 2 * square * by_bend)
+
+    def _ways(
+        self, square: FloatArray
+    ) -> tuple[tuple[FloatArray, FloatArray], tuple[FloatArray, FloatArray]]:
+        """Return arm and k_m of tan² beta_1, each with its derivative by it."""
         first = self.layers.indices[0]
         heights = [*self.layers.thicknesses, self.distance - self.depth]
         if self.turn is not None:
@@ -167,11 +202,7 @@ class MediaPath:
                 by_bend = -0.5 * excess * bend * cosine * cosine
                 arm = arm + height * bend
                 by_arm = by_arm + height * by_bend
-        if self.turn is None:
-            rays = ObjectRays(tangent * arm[..., None], tangent * -bend[..., None])
-        else:
-            rays = self._lines(tangent * arm[..., None], tangent * bend[..., None])
-        return rays, tangent, (arm, by_arm), (bend, by_bend)
+        return (arm, by_arm), (bend, by_bend)
 
     def apparent(self, offset: FloatArray, relief: FloatArray) -> FloatArray:
         """Return where straight rays in the first medium would show points, from the nadir.
@@ -267,3 +298,16 @@ def interface_axes(normal: FloatArray) -> FloatArray:
     across = np.cross(normal, [1.0, 0.0, 0.0])
     across /= np.linalg.norm(across)
     return np.stack([np.cross(across, normal), across, normal])
+
+
+def media_words(layers: Layers) -> str:
+    """Return media in words, the camera's first.
+
+    Examples
+    --------
+    >>> media_words(Layers(indices=(1.0, 1.49, 1.337), thicknesses=(0.01,)))
+    'n = 1, 1.49 (10 mm), 1.337'
+    """
+    first, *inner, last = layers.indices
+    glass = [f"{n:g} ({1000 * t:g} mm)" for n, t in zip(inner, layers.thicknesses, strict=True)]
+    return f"n = {', '.join([f'{first:g}', *glass, f'{last:g}'])}"

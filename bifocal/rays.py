@@ -238,6 +238,20 @@ def straight(camera: Foot) -> Foot:
     return Foot(camera.nadir + moved[:2], camera.distance + float(moved[2]))
 
 
+def seen_distance(camera: Foot) -> float:
+    """Return the distance at which the wall seems to lie near the axis; in air the true one. [m]
+
+    The scale near the axis is c over it: ``z0 + sum t n1/n + H n1/nm`` through media.
+    """
+    if camera.media is None:
+        return camera.distance
+    media = camera.media
+    first = media.layers.indices[0]
+    heights = (media.z0, *media.layers.thicknesses, camera.distance - media.depth)
+    reduced = zip(heights, media.layers.indices, strict=True)
+    return float(sum(height * first / index for height, index in reduced))
+
+
 def is_before(xyz: FloatArray, camera: Foot) -> BoolArray:
     """Return which points lie before the camera, in its last medium; False for NaN."""
     if camera.media is None:

@@ -81,9 +81,10 @@ def read_only(value: ArrayLike, name: str, *, shape: tuple[int, ...] | None = No
     array = np.array(as_floats(value, name))
     if shape is not None and array.shape != shape:
         raise InputError(f"{name}: expected shape {shape}, found {array.shape}.")
-    if not np.isfinite(array).all():
-        raise InputError(f"{name}: every value must be a finite number.")
-    if (np.abs(array) > LARGEST).any():
+    # One pass tells both in the ordinary case: NaN is not below anything.
+    if not (np.abs(array) <= LARGEST).all():
+        if not np.isfinite(array).all():
+            raise InputError(f"{name}: every value must be a finite number.")
         raise InputError(f"{name}: {np.abs(array).max():.3g} is beyond reason; check the unit.")
     array.setflags(write=False)
     return array

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from math import hypot, sin
+
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -120,10 +122,10 @@ def rotation_from_vector(vector: ArrayLike) -> FloatArray:
     [0.0, 1.0, 0.0]
     """
     cross = skew(vector)
-    angle = float(np.linalg.norm(vector))
-    # np.sinc keeps both factors exact down to angle 0.
-    first = np.sinc(angle / np.pi)
-    second = 0.5 * np.sinc(angle / (2.0 * np.pi)) ** 2
+    angle = hypot(*as_floats(vector, "vector").tolist())
+    # sin(x) / x keeps both factors exact down to the smallest angle.
+    first, half = (sin(x) / x if x > 0 else 1.0 for x in (angle, 0.5 * angle))
+    second = 0.5 * half**2
     return np.eye(3) + first * cross + second * (cross @ cross)
 
 
@@ -136,12 +138,13 @@ def checked_rotation(matrix: ArrayLike, name: str, *, tolerance: float = 1e-6) -
         If its rows are no unit vectors at right angles to ``tolerance``, or it mirrors.
     """
     rotation = read_only(matrix, name, shape=(3, 3))
-    if not np.allclose(rotation @ rotation.T, np.eye(3), atol=tolerance):
+    if not (np.abs(rotation @ rotation.T - np.eye(3)) <= tolerance + 1e-5 * np.eye(3)).all():
         raise GeometryError(
             f"{name} is not a rotation matrix: its rows must be unit vectors at right angles. "
             "Check the nine numbers, or give the three angles."
         )
-    if np.linalg.det(rotation) < 0:
+    (a, b, c), (d, e, f), (g, h, i) = rotation.tolist()
+    if a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g) < 0:
         raise GeometryError(
             f"{name} is not a rotation but mirrors the world: one of the coordinate systems is "
             "left-handed. Exchange two axes or change the sign of one."

@@ -83,8 +83,8 @@ def _ours(_pixels: int, folder: Path) -> Task:
     height, width = shot.images[0].shape[:2]
     interiors = tuple(
         Interior(
-            focal=matrix[0, 0], sigma_focal=matrix[0, 0] * 1e-4, centre=matrix[:2, 2],
-            sigma_centre=0.1, image_size=(width, height), source="known",
+            focal=matrix[0, 0], sigma_focal=1e-4, centre=matrix[:2, 2], sigma_centre=0.1,
+            image_size=(width, height), source="known",
         )
         for matrix in shot.matrices
     )  # fmt: skip

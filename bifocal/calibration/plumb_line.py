@@ -24,6 +24,11 @@ LEAST_LENGTH = 0.15
 EDGE_LIMIT = 1.5
 #: As many of the longest edges are taken.
 MOST_LINES = 80
+#: A correction that leaves more than this of the lines' bend is none: on undistorted photos of a
+#: church it left 80 to 100 %, with k1 up to 0.28 at a stated 0.03: real edges are not straight.
+STRAIGHTENS = 0.8
+#: Relative standard deviation of a principal distance from EXIF or data sheet, and of a guess.
+GIVEN_FOCAL, GUESSED_FOCAL = 0.02, 0.5
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -47,6 +52,18 @@ class PlumbLine:
     rms_before: float
     rms_after: float
     lines: int
+
+    @property
+    def straightens(self) -> bool:
+        """Whether the correction makes the lines straighter by more than a fifth."""
+        return self.rms_after <= STRAIGHTENS * self.rms_before
+
+    def without_distortion(self) -> PlumbLine:
+        """Return the lens as undistorted, for lines that ask for no correction."""
+        source = f"plumb line, {self.lines} lines: no distortion shows; "
+        source += "principal distance and point assumed"
+        lens = replace(self.lens, coefficients=np.zeros(4), sigma0=self.rms_before, source=source)
+        return replace(self, lens=lens)
 
 
 def calibrate_from_lines(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -12,9 +13,15 @@ import numpy as np
 from bifocal.calibration.board_calibration import Calibration
 from bifocal.calibration.board_photos import calibrate
 from bifocal.calibration.lens_database import lens_from_database
-from bifocal.calibration.plumb_line import PlumbLine, calibrate_from_lines, find_straight_edges
+from bifocal.calibration.plumb_line import (
+    GIVEN_FOCAL,
+    GUESSED_FOCAL,
+    PlumbLine,
+    calibrate_from_lines,
+    find_straight_edges,
+)
 from bifocal.files.images import ImageArray, image_info, read_grey, read_image, write_image
-from bifocal.model.lens import Lens
+from bifocal.model.lens import SIGMA_FOCAL, Lens
 from photocore.arrays import FloatArray
 from photocore.cli import Progress, no_progress
 from photocore.errors import InputError, located
@@ -73,6 +80,7 @@ def calibrate_from_edges(
     size = _common_size(images)
     remarks: list[str] = []
     focal_px = focal_px or image_info(images[0]).focal_pixels
+    sigma_focal = GIVEN_FOCAL if focal_px else GUESSED_FOCAL
     if focal_px is None:
         focal_px = float(np.hypot(*size))
         remarks.append(
@@ -85,11 +93,16 @@ def calibrate_from_edges(
         chains = [line for path in images for line in find_straight_edges(read_grey(path))]
     with located(lines or ", ".join(map(str, images[:3]))):
         result = calibrate_from_lines(chains, size, focal_px=focal_px)
-    if result.rms_after > 0.8 * result.rms_before:
+    if not result.straightens:
+        k1, k2 = result.lens.coefficients[:2]
         remarks.append(
-            "the correction hardly straightens the lines: either the lens has little distortion, "
-            "or these edges are not straight in reality. Prefer a board, or pick lines yourself."
+            f"the best correction (k1 = {k1:+.4f}, k2 = {k2:+.4f}) hardly straightens the lines: "
+            "either the lens has little distortion, or these edges are not straight in reality. "
+            "The lens file therefore says that there is none. If you see straight lines bent near "
+            "the photo's edge, use a board, or pick points along them (--lines)."
         )
+        result = result.without_distortion()
+    result = replace(result, lens=replace(result.lens, extra={SIGMA_FOCAL: sigma_focal}))
     result.lens.write(out, overwrite=overwrite)
     return result, tuple(remarks)
 

@@ -84,7 +84,9 @@ def command(
         text = [
             f"{found.lines} lines; straight to {found.rms_before:.2f} px before, "
             f"{found.rms_after:.2f} px after the correction",
-            f"k1 = {k1:+.5f} (sigma {found.sigma_k1:.5f}), k2 = {k2:+.5f} ({found.sigma_k2:.5f})",
+            f"k1 = {k1:+.5f} (sigma {found.sigma_k1:.5f}), k2 = {k2:+.5f} ({found.sigma_k2:.5f})"
+            if found.straightens
+            else "no distortion: k1 = k2 = 0",
         ]
         data = found.lens.to_dict()
     else:

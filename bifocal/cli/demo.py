@@ -96,8 +96,7 @@ def _lines(result: DemoResult) -> Iterator[str]:
         )
     yield f"\nResults in {result.folder}/"
     yield text_table(("file", "content"), result.files)
-    table = next(name for name, _ in result.files if name.startswith("result"))
-    yield f"\nOpen ortho.png, relief.png and {table} first."
+    yield "\nOpen ortho.png, relief.png and result.xlsx first."
 
 
 def _limit(result: DemoResult, space: str) -> str:

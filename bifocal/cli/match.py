@@ -117,12 +117,19 @@ def _lines(summary: dict[str, Any]) -> Iterator[str]:
     )
     yield summary["rests_on"]
     if summary["empty"]:
-        named = "; ".join(
-            f"columns {c[0]}-{c[1]}, rows {r[0]}-{r[1]}"
-            for c, r in ((part["columns"], part["rows"]) for part in summary["empty"][:8])
-        )
-        more = len(summary["empty"]) - 8
-        yield (
-            f"NOTHING FOUND in {len(summary['empty'])} of 24 parts of the far photo, seen by both: "
-            f"{named}{f' and {more} more' if more > 0 else ''} (no texture, or hidden)."
-        )
+        yield _empty_in_words(summary)
+
+
+def _empty_in_words(summary: dict[str, Any]) -> str:
+    """Return in which parts of the far photo there are no points, or hardly any."""
+    parts, least = summary["empty"], summary["fewest_in_part"]
+    named = "; ".join(
+        f"columns {c[0]}-{c[1]}, rows {r[0]}-{r[1]}"
+        for c, r in ((part["columns"], part["rows"]) for part in parts[:8])
+    )
+    more = f" and {len(parts) - 8} more" if len(parts) > 8 else ""
+    where = f"{len(parts)} of 24 parts of the far photo, seen by both: {named}{more}"
+    if "feature" not in summary["kinds"]:
+        return f"No target in {where}."
+    what = "NOTHING FOUND" if least == 1 else f"FEWER THAN {least} POINTS"
+    return f"{what} in {where} (no texture, or hidden)."

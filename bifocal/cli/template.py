@@ -15,6 +15,7 @@ Examples:
   bifocal template survey.xlsx
   bifocal template rilievo.xlsx --lang it
   bifocal template large.xlsx --rows 1500
+  bifocal template tank.xlsx --media 3
 """
 
 
@@ -28,13 +29,18 @@ Examples:
     "--rows", type=int, default=300, show_default=True, metavar="N",
     help="Rows prepared for points.",
 )  # fmt: skip
+@click.option(
+    "--media", type=int, metavar="N",
+    help="Media between camera and wall that Setup gets cells for: 2 for a water surface, 3 for "
+    "air, glass and water; up to 6. By default none: photos in air.",
+)  # fmt: skip
 @overwrite
-def command(out: Path, language: str, rows: int, overwrite: bool) -> None:
+def command(out: Path, language: str, rows: int, media: int | None, overwrite: bool) -> None:
     """Write an empty survey workbook: type what you measured, relief appears beside it.
 
     Every result is a live formula; the workbook needs neither this program nor macros.
     """
     from bifocal.survey.template_workflow import write_template
 
-    write_template(out, language=language, rows=rows, overwrite=overwrite)
+    write_template(out, language=language, rows=rows, media=media, overwrite=overwrite)
     remark(f"{out}: fill in Setup and Points; then: bifocal solve {out} --out result.xlsx")

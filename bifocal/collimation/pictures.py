@@ -17,6 +17,7 @@ from bifocal.files.geotiff import RasterReader
 from bifocal.files.images import ImageArray, ImageInfo, image_info, read_image
 from bifocal.model.grid import Grid
 from bifocal.model.pair import Pair
+from bifocal.model.photo import Photo
 from photocore.arrays import ByteArray, FloatArray
 from photocore.errors import InputError
 from photocore.jsonfile import plain
@@ -74,6 +75,7 @@ class Pictures:
                 f"wall-{number}",
                 RectifiedPhoto.of(photo, number, pyramid, grid),
                 *_facts(self.infos[number - 1].path), photo.plane_from_pixel.tolist(), lens, grid,
+                *_media_facts(photo),
             )  # fmt: skip
         self.pair, self.grid = pair, grid
 
@@ -155,6 +157,14 @@ class Pictures:
         assert grid is not None
         matrix = np.linalg.inv(pair.photo(number).plane_from_pixel) @ grid.plane_from_pixel
         return np.asarray(matrix / matrix[2, 2])
+
+
+def _media_facts(photo: Photo) -> tuple[object, ...]:
+    """Return what a photo on the wall depends on besides, through media."""
+    if photo.layers is None:
+        return ()
+    lean = None if photo.interface_normal is None else photo.interface_normal.tolist()
+    return photo.layers.as_dict(), photo.z0, lean, photo.nadir.tolist(), photo.distance
 
 
 def _reader(path: Path) -> Any:

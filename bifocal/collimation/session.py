@@ -436,6 +436,7 @@ def _typed(pair: Pair) -> list[object]:
         [
             *(photo.file, photo.plane_from_pixel.tolist(), list(photo.nadir)),
             *(photo.distance, photo.principal_distance, photo.sigma_pixel),
+            *(photo.layers, photo.z0),
         ]
         for photo in (pair.image1, pair.image2)
     ]

@@ -128,7 +128,8 @@ def _pair(session: Session, pair: Pair) -> dict[str, Any]:
     assert grid is not None
     images = []
     for number in (1, 2):
-        lens = pair.photo(number).lens
+        photo = pair.photo(number)
+        lens, media = photo.lens, photo.media
         images.append(
             {
                 "photo_from_wall": session.pictures.photo_from_wall(number),
@@ -139,7 +140,16 @@ def _pair(session: Session, pair: Pair) -> dict[str, Any]:
                     "model": lens.model,
                     "coefficients": lens.coefficients,
                 },
-                "distance": pair.photo(number).distance,
+                "distance": photo.distance,
+                "media": None
+                if media is None
+                else {
+                    **media.layers.as_dict(),
+                    "z0": media.z0,
+                    "distance": photo.distance,
+                    "nadir": photo.nadir,
+                    "turn": media.turn,
+                },
             }
         )
     centre = np.asarray(pair.zoom_centre)

@@ -17,12 +17,14 @@ from bifocal.orientation.matching import (
     seen_at,
 )
 from bifocal.orientation.patches import PatchResult, refine, same_scale
-from bifocal.rays import relief_from_zoom, zoom_factor
+from bifocal.rays import point_on_ray, relief_from_zoom, zoom_factor
 from photocore.arrays import ByteArray, Float32Array, FloatArray
 from photocore.errors import InputError
 
 #: Relief searched, in parts of the near distance; as `bifocal match` does.
 NEAREST, FARTHEST = 0.4, -0.5
+#: What stands nearer to the last interface than this share of its height is not looked for.
+BEFORE_MEDIA = 0.99
 #: Half the window of the search, in samples of the coarser photo: wider than that of the match.
 HALF = 10
 #: Samples along the line: so many pixels apart, at most so many; the match reaches 4 px.
@@ -97,9 +99,7 @@ def radial_line(
     count : int
         Points along the line; it is bent where a lens distorts.
     """
-    d1, d2 = pair.d1, pair.d2
-    ends = zoom_factor(np.array([-2.0 * d2, 0.7 * d2]), d1=d1, d2=d2)
-    reliefs = relief_from_zoom(np.linspace(ends[0], ends[1], count), d1=d1, d2=d2)
+    reliefs = _even(pair, (-2.0 * pair.d2, 0.7 * pair.d2), count)
     line = seen_in_other(pair, image, pixel, reliefs)
     margin = 0.25 * max(size)
     inside = np.isfinite(line).all(axis=1) & (line > -margin).all(axis=1)
@@ -112,6 +112,9 @@ def seen_in_other(pair: Pair, image: int, pixel: FloatArray, reliefs: FloatArray
     pixels = np.broadcast_to(pixel, (len(reliefs), 2))
     if image == 1:
         return seen_at(pair, pixels, reliefs)
+    if pair.layers is not None:
+        positions = pair.image2.apparent_from_pixels(pixels)
+        return pair.image1.project(point_on_ray(positions, reliefs, pair.image2.foot))
     centre = pair.zoom_centre
     factor = zoom_factor(reliefs, d1=pair.d1, d2=pair.d2)[:, None]
     q2 = pair.image2.plane_from_pixels(pixels)
@@ -288,17 +291,24 @@ def _reliefs(
     pair: Pair, image: int, pixel: FloatArray, ends: tuple[float, float], shape: tuple[int, ...]
 ) -> FloatArray:
     """Return the reliefs of places a pixel apart on the line, inside the other photo."""
-    factors = zoom_factor(np.array(ends), d1=pair.d1, d2=pair.d2)
-    probe = relief_from_zoom(np.linspace(factors[0], factors[1], 33), d1=pair.d1, d2=pair.d2)
+    probe = _even(pair, ends, 33)
     places = seen_in_other(pair, image, pixel, probe)
     length = float(np.nansum(np.linalg.norm(np.diff(places, axis=0), axis=1)))
     count = int(np.clip(length / STEP, 33, MOST))
-    reliefs = relief_from_zoom(np.linspace(factors[0], factors[1], count), d1=pair.d1, d2=pair.d2)
+    reliefs = _even(pair, ends, count)
     places = seen_in_other(pair, image, pixel, reliefs)
     inside = (places > HALF).all(axis=1) & (places < np.array(shape[1::-1]) - HALF).all(axis=1)
     if not inside.any():
         raise InputError("the other photo does not show this place.")
     return np.asarray(reliefs[inside])
+
+
+def _even(pair: Pair, ends: tuple[float, float], count: int) -> FloatArray:
+    """Return reliefs whose places are evenly apart on the line, below the last interface. [m]"""
+    d1, d2 = pair.straight_distances
+    top = min(ends[1], BEFORE_MEDIA * pair.highest_relief) if pair.layers else ends[1]
+    factors = zoom_factor(np.array([ends[0], top]), d1=d1, d2=d2)
+    return relief_from_zoom(np.linspace(factors[0], factors[1], count), d1=d1, d2=d2)
 
 
 def _crop(image: ByteArray, places: FloatArray, reach: float) -> tuple[ByteArray, FloatArray]:

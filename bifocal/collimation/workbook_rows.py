@@ -18,6 +18,7 @@ from bifocal.model.flags import FlagLimits
 from bifocal.model.pair import Pair
 from bifocal.survey.output import as_typed, result_content
 from bifocal.survey.pair_workflow import is_survey
+from bifocal.survey.survey_media import MOST, SurveyMedia, media_names
 from bifocal.survey.template_workflow import write_survey
 from bifocal.survey.workbook.content import SurveyContent, name_cell, setup_cells
 from bifocal.survey.workbook.reader import SurveyInput, read_survey
@@ -46,7 +47,7 @@ _RAW, _IDEAL = ("col1", "row1", "col2", "row2"), ("x1", "y1", "x2", "y2")
 _REFERENCE = ("id", "use", "X_ref", "Y_ref", "Z_ref")
 #: Cells of the sheet Setup that hold the orientation.
 _TYPED = {
-    "pair_file", "d_1", "d_2", "c_1", "c_2", "pitch",
+    "pair_file", "d_1", "d_2", "c_1", "c_2", "pitch", *media_names(MOST),
     *(name for group in (*MATRICES, *NADIRS) for name in group),
 }  # fmt: skip
 
@@ -242,6 +243,12 @@ def _edit(
             f"{'with' if has_lens else 'without'} lens distortion, the orientation is "
             "not; give another workbook with --workbook."
         )
+    bent = read.survey.setup.media is not None
+    if pair.layers is not None and not bent:
+        raise InputError(
+            f"{editor.path.name}: its formulas are made for photos in air, the orientation looks "
+            "through media; give another workbook with --workbook."
+        )
     if pair_file is not None:
         _set_up(editor, read, pair, pair_file)
     elif places is _IDEAL:
@@ -338,7 +345,9 @@ def _set(
 
 def _set_up(editor: WorkbookEditor, read: ReadBook, pair: Pair, pair_file: str) -> None:
     """Type the orientation into the sheet Setup, where it is another one."""
-    content = SurveyContent(pair=pair, pair_file=pair_file, sigma_px=read.sigma_px)
+    typed = read.survey.setup.media
+    media = SurveyMedia.of_photos((pair.image1, pair.image2), typed.media) if typed else None
+    content = SurveyContent(pair=pair, pair_file=pair_file, sigma_px=read.sigma_px, media=media)
     _type_names(editor, {n: value for n, value in setup_cells(content).items() if n in _TYPED})
 
 

@@ -24,7 +24,6 @@ def pair_of(files: SurveyFiles) -> Pair | None:
     if files.pair is None:
         return None
     pair = read_pair(files.pair)
-    pair.refuse_media("bifocal pick")
     if files.pair_is_workbook and pair.exchanged:
         raise InputError(
             f"{files.pair}: d_1 is less than d_2; photo_1 and d_1 belong to the far photo: "

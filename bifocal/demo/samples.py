@@ -28,8 +28,6 @@ class Sample:
         Errors of the relief map beyond this are counted. [m]
     far, near : str
         What the photos are.
-    result : tuple of str
-        File that the solved points go to, and what it is.
     """
 
     folder: Path
@@ -38,10 +36,6 @@ class Sample:
     limit: float
     far: str
     near: str
-    result: tuple[str, str] = (
-        "result.xlsx",
-        "solved workbook, live formulas: relief, coordinates, precision, check",
-    )
 
     @property
     def files(self) -> tuple[tuple[str, str], ...]:
@@ -51,7 +45,10 @@ class Sample:
             ("near.jpg", f"near photo, {self.near}"),
             ("facade.pair.json", "the pair: homographies, nadirs, distances"),
             ("targets.csv", "picked targets in pixels, and their true relief to check"),
-            self.result,
+            (
+                "result.xlsx",
+                "solved workbook, live formulas: relief, coordinates, precision, check",
+            ),
             ("relief.tif", "relief map: relief, sigma, quality"),
             ("relief.png", "the same as a picture"),
             ("ortho.tif", "orthophoto to scale"),
@@ -74,5 +71,4 @@ FACADE = Sample(
 WATER = Sample(
     folder=WATER_SAMPLE, bounds=(-0.86, -0.62, 0.86, 0.56), sheet_scale=10.0, limit=0.01,
     far="from 3.5 m through a flat port", near="from 1.9 m through a flat port",
-    result=("result.csv", "solved points: relief, coordinates, precision, flags"),
 )  # fmt: skip

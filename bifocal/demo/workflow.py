@@ -99,11 +99,11 @@ def run_demo(
             f"{folder}: holds {', '.join(taken[:3])} ... already; add --overwrite, or name another "
             "folder with --out."
         )
-    progress(0.0, 1.0, f"surveying targets into {sample.result[0]}")
+    progress(0.0, 1.0, "surveying targets in the workbook")
     for name in sample.given:
         with atomic_path(folder / name, overwrite=True) as path:
             path.write_bytes((sample.folder / name).read_bytes())
-    ids, true, relief, sigma, flags = _survey(folder, sample)
+    ids, true, relief, sigma, flags = _survey(folder)
     progress(0.2, 1.0, "measuring dense relief")
     pair_file = folder / "facade.pair.json"
     job = ReliefJob(
@@ -131,13 +131,13 @@ def run_demo(
 
 
 def _survey(
-    folder: Path, sample: Sample
+    folder: Path,
 ) -> tuple[tuple[str, ...], FloatArray, FloatArray, FloatArray, tuple[str, ...]]:
-    """Solve and write the targets; return ids, true and found relief, sigma, flags."""
+    """Solve the targets into the workbook; return ids, true and found relief, sigma, flags."""
     with (folder / "targets.csv").open(encoding="utf-8", newline="") as file:
         true = np.array([float(row["r measured [m]"]) for row in csv.DictReader(file)])
     solution = solve(folder / "targets.csv", pair=folder / "facade.pair.json", sigma_px=PICK_SIGMA)
-    write_result(folder / sample.result[0], solution, overwrite=True)
+    write_result(folder / "result.xlsx", solution, overwrite=True)
     table = solution.table
     return table.ids, true, table["r"], table["sigma_r"], table.flags
 

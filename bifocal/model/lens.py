@@ -22,6 +22,8 @@ from photocore.jsonfile import read_object, write_object
 from photocore.lensformats import read_foreign_lens
 
 FORMAT = "bifocal-lens/1"
+#: Key of `Lens.extra`: relative standard deviation of a principal distance that was assumed.
+SIGMA_FOCAL = "sigma_focal"
 #: No photo is larger. [px]
 LARGEST_SIDE = 1e6
 #: Points projected at once: what fits the processor's cache.

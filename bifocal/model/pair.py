@@ -241,8 +241,8 @@ class Pair:
         photos = [replace(photo, layers=None, z0=None) for photo in (self.image1, self.image2)]
         return replace(self, image1=photos[0], image2=photos[1], remarks=())
 
-    def refuse_media(self, what: str) -> None:
-        """Raise where the pair looks through media and the work asked for knows only air.
+    def refuse_ports_that_lean(self, what: str) -> None:
+        """Raise where interfaces lean against the reference plane and the work asked for cannot.
 
         Parameters
         ----------
@@ -254,11 +254,11 @@ class Pair:
         InputError
             Naming it.
         """
-        if self.layers is not None:
+        if any(photo.media and photo.media.turn is not None for photo in self.as_given):
             raise InputError(
-                f"{what} is not made for pairs seen through other media (`layers`): it would be "
-                "wrong by what refraction does. `solve` (to .csv), `match`, `relief` and `ortho` "
-                "know them."
+                f"{what} is not made through ports that lean (`interface_normal`): it needs media "
+                "parallel to the reference plane. Single points are solved through them: `solve`, "
+                "to a text table (.csv)."
             )
 
     @property

@@ -205,7 +205,7 @@ def alignment_as_dict(alignment: Alignment) -> dict[str, Any]:
 
 #: What gives the scale of relief, by the way into the pair file.
 _SCALES = {
-    "control": "control points taken as exact",
+    "control": "control points and tapes as precise as stated",
     "site": "distances as taped",
     "as set up": "distances, focal lengths and nadir points as typed",
     "auto": "one measure taped",

@@ -6,7 +6,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
-import cv2
 import numpy as np
 
 from bifocal.model.homography import apply_homography
@@ -14,6 +13,7 @@ from bifocal.model.lens import Lens
 from bifocal.model.orientation_precision import CAMERA, NAMES, moved
 from bifocal.model.pair import Pair
 from bifocal.model.photo import Photo
+from bifocal.orientation.facade_lines import LEAST_IN_LINE, facade_turn
 from bifocal.orientation.interior_orientation import Cameras, Interior
 from bifocal.orientation.orientation_report import orientation_in_words
 from bifocal.orientation.orientation_stages import OrientedPair, PhotoInput, Photos
@@ -21,12 +21,9 @@ from bifocal.orientation.pair_adjustment import AdjustedPair
 from bifocal.orientation.pair_observations import PairObservations, at
 from bifocal.orientation.reference_plane import rivals
 from bifocal.orientation.tie_points import robust_sigma, tie_positions
-from photocore.arrays import BoolArray, ByteArray, FloatArray
+from photocore.arrays import BoolArray, FloatArray
 from photocore.camera import Pinhole, camera_matrix, plane_from_pixel
 from photocore.distortion import RadialDivision
-
-#: Façade lines farther than this from the photo's own upright are not asked. [deg]
-WIDEST = 20.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -163,55 +160,13 @@ def _facade_axes(
         note = f"{'Y' if vertical else 'X'} axis along the line given"
     else:
         turn, share = (
-            (0.0, 0.0) if photo.grey is None else _facade_turn(photo.grey, far, photo.interior)
+            (0.0, 0.0) if photo.grey is None else facade_turn(photo.grey, far, photo.interior)
         )
         note = "axes along the façade's straight lines"
-        if share < 0.25:
+        if share < LEAST_IN_LINE:
             turn, note = 0.0, "Y axis as upright as the far photo"
     cosine, sine = np.cos(turn), np.sin(turn)
     return np.array([[cosine, sine, 0.0], [-sine, cosine, 0.0], [0.0, 0.0, 1.0]]), note
-
-
-def _facade_turn(image: ByteArray, camera: Pinhole, interior: Interior) -> tuple[float, float]:
-    """Return the turn that makes the façade's lines upright and level, and their agreement.
-
-    Parameters
-    ----------
-    image : ndarray, shape (h, w)
-    camera : Pinhole
-    interior : Interior
-
-    Returns
-    -------
-    turn : float
-        Counter-clockwise turn to apply to the plane frame's axes. [rad]
-    share : float
-        Share of line length within 1° of it or of its perpendicular; below 0.25 trust nothing.
-    """
-    reduction = max(1.0, float(np.sqrt(image.size / 1.5e6)))
-    size = (round(image.shape[1] / reduction), round(image.shape[0] / reduction))
-    small = cv2.resize(image, size, interpolation=cv2.INTER_AREA)
-    lines = cv2.createLineSegmentDetector().detect(small)[0]
-    if lines is None:
-        return 0.0, 0.0
-    ends: FloatArray = (np.asarray(lines, dtype=np.float64).reshape(-1, 2) + 0.5) * reduction - 0.5
-    ends = apply_homography(plane_from_pixel(camera), interior.ideal(ends)).reshape(-1, 2, 2)
-    reach = 6 * camera.centre[2]
-    ends = ends[(np.linalg.norm(ends - camera.centre[:2], axis=2) < reach).all(axis=1)]
-    along = ends[:, 1] - ends[:, 0]
-    length = np.hypot(along[:, 0], along[:, 1])
-    degrees = (np.rad2deg(np.arctan2(along[:, 1], along[:, 0])) + 45.0) % 90.0 - 45.0
-    near = (np.abs(degrees) < WIDEST) & (length > 0.01 * camera.centre[2])
-    degrees, weight = degrees[near], length[near] ** 1.5
-    if len(degrees) < 20:
-        return 0.0, 0.0
-    trial = np.arange(-WIDEST, WIDEST, 0.05)
-    votes = np.exp(-0.5 * ((trial[:, None] - degrees) / 0.4) ** 2) @ weight
-    best = trial[votes.argmax()]
-    for _ in range(3):
-        close = np.abs(degrees - best) < 1.0
-        best = float(np.average(degrees[close], weights=weight[close]))
-    return float(np.deg2rad(best)), float(weight[close].sum() / weight.sum())
 
 
 def _lens_of(interior: Interior, radial: FloatArray) -> Lens | None:
@@ -297,6 +252,17 @@ def _diagnostics(
         "planes": [
             {"offset": face.offset, "share": face.share, "pixel": list(face.pixel)}
             for face in oriented.faces
+        ],
+        "facade_lines": [
+            {
+                "camera": line.camera,
+                "name": line.name,
+                "count": line.count,
+                "out_of_wall_deg": float(
+                    np.rad2deg(line.in_frame(adjusted.cameras[line.camera - 1])[2])
+                ),
+            }
+            for line in observations.lines
         ],
         "wall_bend_px": oriented.bend if np.isfinite(oriented.bend) else None,
         "focal_given_px": [interior.focal for interior in observations.interiors],

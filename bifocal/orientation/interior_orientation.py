@@ -6,8 +6,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from bifocal.model.lens import Lens
-from photocore.arrays import ByteArray, FloatArray
+from bifocal.model.lens import SIGMA_FOCAL, Lens
+from photocore.arrays import ByteArray, FloatArray, is_finite_number, positive
 from photocore.camera import Pinhole, camera_matrix
 from photocore.distortion import RadialDivision
 from photocore.errors import InputError
@@ -38,7 +38,8 @@ class Interior:
     focal : float
         Principal distance in columns. [px]
     sigma_focal : float
-        Its relative standard deviation: 0.0005 for a calibration, 0.5 for "a normal lens".
+        Its relative standard deviation, no pixels: 0.0005 for a calibration, 0.5 for "a normal
+        lens".
     centre : ndarray, shape (2,)
         Principal point (column, row). [px]
     sigma_centre : float
@@ -73,16 +74,36 @@ class Interior:
     pixel_size: float | None = None
     is_calibrated: bool = False
 
+    def __post_init__(self) -> None:
+        """Refuse what is no principal distance, and a standard deviation of it in pixels."""
+        positive(self.focal, "focal", unit="px")
+        if not 0 < self.sigma_focal <= 1:
+            raise InputError(
+                "sigma_focal: must be a share of the principal distance, above 0 and no more than "
+                f"1 (0.001 for 0.1 %), got {self.sigma_focal!s:.40}."
+            )
+
     @classmethod
     def from_lens(cls, lens: Lens, *, source: str) -> Interior:
-        """Return the interior orientation of a calibrated lens (already of the photo's format)."""
+        """Return the interior orientation of a calibrated lens (already of the photo's format).
+
+        Raises
+        ------
+        InputError
+            If the file's ``sigma_focal`` is no share of the principal distance.
+        """
         matrix = lens.camera_matrix
         distorted = bool(np.any(lens.coefficients)) or lens.model == "fisheye"
+        # Straight lines give the distortion; distance and principal point are then assumed.
+        assumed = lens.extra.get(SIGMA_FOCAL)
+        if assumed is not None and not is_finite_number(assumed):
+            raise InputError(f"{source}: {SIGMA_FOCAL}: expected a number, got {assumed!r:.40}.")
+        centre = MOVED_CENTRE if assumed is None else UNKNOWN_CENTRE
         return cls(
             focal=float(matrix[0, 0]),
-            sigma_focal=0.0005,
+            sigma_focal=0.0005 if assumed is None else assumed,
             centre=np.array(matrix[:2, 2]),
-            sigma_centre=MOVED_CENTRE * float(np.hypot(*lens.image_size)),
+            sigma_centre=centre * float(np.hypot(*lens.image_size)),
             image_size=lens.image_size,
             source=source,
             aspect=float(matrix[1, 1] / matrix[0, 0]),
@@ -230,7 +251,7 @@ def lens_of_photo(lens: Lens, size: tuple[int, int], *, orientation: int = 1) ->
         coefficients=coefficients,
         image_size=size,
         source=f"{lens.source} (resized or turned)".strip(),
-        extra={},
+        extra={key: value for key, value in lens.extra.items() if key == SIGMA_FOCAL},
     )
 
 

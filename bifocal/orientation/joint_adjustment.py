@@ -13,12 +13,13 @@ import numpy as np
 from scipy.sparse import csr_matrix
 
 from bifocal.model.orientation_precision import CAMERA
+from bifocal.orientation.joint_media import project_through
 from bifocal.orientation.joint_observations import JointObservations, with_enough_rays, with_rays
 from photocore import adjustment
 from photocore.adjustment import OUTLIER_LIMIT, Fit, huber_weights, standardised
 from photocore.adjustment.sparse import SparseEquations
 from photocore.arrays import BoolArray, FloatArray, IntArray
-from photocore.camera import PARAMETERS, Pinhole, project_with_jacobian
+from photocore.camera import PARAMETERS, Pinhole
 from photocore.errors import GeometryError
 
 #: What is unknown of a camera, by its place in `PARAMETERS`; the focal length comes first.
@@ -283,7 +284,8 @@ class _System:
         by_camera = np.empty((count, 2, len(ESTIMATED)))
         for number, camera in enumerate(state.cameras):
             rows = self.order[self.slices[number] : self.slices[number + 1]]
-            view = project_with_jacobian(camera, state.xyz[self.seen.point[rows]])
+            media = self.seen.media_of(number)
+            view = project_through(camera, media, state.xyz[self.seen.point[rows]])
             pixels[rows], by_point[rows] = view.pixels, view.by_point
             by_camera[rows] = view.by_camera[:, :, ESTIMATED]
         return pixels, by_point, by_camera

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from bifocal.orientation.joint_media import CameraMedia
 from photocore.arrays import BoolArray, FloatArray, IntArray
 
 #: Of fewer points with known coordinates no frame follows.
@@ -34,6 +35,8 @@ class JointObservations:
         Their standard deviations. [m]
     sigma_focal : ndarray, shape (m,)
         Relative standard deviation of the focal lengths; 0: held.
+    media : tuple of CameraMedia or None
+        What each camera looks through; empty where all are in air.
     """
 
     names: tuple[str, ...]
@@ -45,6 +48,11 @@ class JointObservations:
     known: FloatArray
     sigma_known: FloatArray
     sigma_focal: FloatArray
+    media: tuple[CameraMedia | None, ...] = ()
+
+    def media_of(self, camera: int) -> CameraMedia | None:
+        """Return what a camera looks through; None in air."""
+        return self.media[camera] if self.media else None
 
     @property
     def frame_is_known(self) -> bool:

@@ -11,11 +11,20 @@ import numpy as np
 
 from bifocal.orientation.features import Features, alike, match_features, spread_evenly
 from bifocal.orientation.joint_adjustment import JointUnknowns
+from bifocal.orientation.joint_media import (
+    CameraMedia,
+    highest_relief,
+    meeting_point,
+    place_on_plane,
+)
 from photocore.arrays import BoolArray, FloatArray, IntArray
-from photocore.camera import Pinhole, ray_on_plane, triangulate
+from photocore.camera import Pinhole
 from photocore.errors import GeometryError
 from photocore.similarity import Similarity, fit_plane
 
+Media = Sequence[CameraMedia | None]
+#: Where points begin, they keep this share of the way to the last interface, in which none lies.
+BEFORE_MEDIA = 0.8
 #: Matches of two photos that one geometry explains to this are kept. [px of the searched photo]
 TOLERANCE = 2.0
 #: Fewer of them are chance.
@@ -126,6 +135,7 @@ def into_one_frame(
     ideal: FloatArray,
     known: FloatArray,
     names: Sequence[str],
+    media: Media = (),
 ) -> JointUnknowns:
     """Return all cameras and points roughly in the frame of the control points.
 
@@ -140,6 +150,8 @@ def into_one_frame(
         Control points, NaN for others. [m]
     names : sequence of str
         Of the pairs.
+    media : sequence of CameraMedia or None
+        What each camera looks through; empty where all are in air.
 
     Raises
     ------
@@ -147,7 +159,8 @@ def into_one_frame(
         If a pair shares no points with the others; it is named.
     """
     count = len(cameras) // 2
-    places = _places_by_pair(cameras, shared, ideal)
+    media = media or (None,) * len(cameras)
+    places = _places_by_pair(cameras, shared, ideal, media)
     fixed = [int(np.isfinite(known + place).all(axis=1).sum()) for place in places]
     root = int(np.argmax(fixed))
     xyz: FloatArray = places[root].copy()
@@ -175,20 +188,21 @@ def into_one_frame(
         whole = _robust(xyz, known)
         xyz, moved = _moved(xyz, whole), [_moved_camera(camera, whole) for camera in moved]
     # What no pair sees in both photos stands on the wall, where its rays meet that.
-    xyz = np.where(np.isfinite(xyz), xyz, _on_the_wall(moved, shared, ideal))
+    xyz = np.where(np.isfinite(xyz), xyz, _on_the_wall(moved, shared, ideal, media))
     middle = np.nanmedian(xyz, axis=0)
     return JointUnknowns(cameras=tuple(moved), xyz=np.where(np.isfinite(xyz), xyz, middle[None, :]))
 
 
 def near_each_other(
-    cameras: Sequence[Pinhole], shared: SharedPoints, ideal: FloatArray
+    cameras: Sequence[Pinhole], shared: SharedPoints, ideal: FloatArray, media: Media = ()
 ) -> BoolArray:
     """Return which rays meet the wall near the others of their point, shape (n,).
 
     Repeated windows are matched a window apart; what is left of the frames' tilts, and the relief
     itself, put rays of one point apart by a few per cent of the distance.
     """
-    places = _meeting_the_wall(cameras, shared, ideal)[:, :2]
+    media = media or (None,) * len(cameras)
+    places = _meeting_the_wall(cameras, shared, ideal, media)[:, :2]
     reach = NEAR * np.array([camera.centre[2] for camera in cameras])[shared.photo]
     order = np.argsort(shared.point, kind="stable")
     starts = np.searchsorted(shared.point[order], np.arange(shared.count + 1))
@@ -204,19 +218,21 @@ def near_each_other(
 
 
 def _meeting_the_wall(
-    cameras: Sequence[Pinhole], shared: SharedPoints, ideal: FloatArray
+    cameras: Sequence[Pinhole], shared: SharedPoints, ideal: FloatArray, media: Media
 ) -> FloatArray:
     """Return where rays meet the reference plane, shape (n, 3); NaN where they do not. [m]"""
     places = np.full((len(ideal), 3), np.nan)
-    for number, camera in enumerate(cameras):
+    for number, (camera, through) in enumerate(zip(cameras, media, strict=True)):
         rays = shared.photo == number
-        places[rays] = ray_on_plane(camera, ideal[rays])
+        places[rays] = place_on_plane(camera, through, ideal[rays])
     return places
 
 
-def _on_the_wall(cameras: Sequence[Pinhole], shared: SharedPoints, ideal: FloatArray) -> FloatArray:
+def _on_the_wall(
+    cameras: Sequence[Pinhole], shared: SharedPoints, ideal: FloatArray, media: Media
+) -> FloatArray:
     """Return the mean of the places where each point's rays meet the wall, shape (p, 3). [m]"""
-    places = _meeting_the_wall(cameras, shared, ideal)
+    places = _meeting_the_wall(cameras, shared, ideal, media)
     met = np.isfinite(places).all(axis=1)
     total = np.zeros((shared.count, 3))
     np.add.at(total, shared.point[met], places[met])
@@ -225,7 +241,7 @@ def _on_the_wall(cameras: Sequence[Pinhole], shared: SharedPoints, ideal: FloatA
 
 
 def _places_by_pair(
-    cameras: Sequence[Pinhole], shared: SharedPoints, ideal: FloatArray
+    cameras: Sequence[Pinhole], shared: SharedPoints, ideal: FloatArray, media: Media
 ) -> list[FloatArray]:
     """Return the points seen in both photos of each pair, in its frame; NaN for others."""
     places = []
@@ -234,9 +250,11 @@ def _places_by_pair(
         for side in (0, 1):
             rays = shared.photo == 2 * k + side
             seen[side, shared.point[rays]] = ideal[rays]
-        xyz = triangulate(cameras[2 * k], cameras[2 * k + 1], seen[0], seen[1])
+        both = slice(2 * k, 2 * k + 2)
+        xyz = meeting_point(cameras[both], media[both], (seen[0], seen[1]))
         lowest = min(cameras[2 * k].centre[2], cameras[2 * k + 1].centre[2])
         wild = ~(np.abs(xyz[:, 2]) < 0.5 * lowest)  # near the zoom centre relief is not known
+        wild |= xyz[:, 2] > BEFORE_MEDIA * highest_relief(cameras[both], media[both])
         xyz[wild] = np.nan
         places.append(xyz)
     return places

@@ -17,6 +17,7 @@ from bifocal.orientation.align_workflow import SIGMA_ON_WALL
 from bifocal.orientation.control_points import Control, read_control
 from bifocal.orientation.features import Features, find_features
 from bifocal.orientation.joint_adjustment import Blunder, JointAdjustment, adjust_jointly
+from bifocal.orientation.joint_media import CameraMedia, bent_again, media_of, straightened
 from bifocal.orientation.joint_observations import JointObservations, with_rays
 from bifocal.orientation.joint_ties import (
     SharedPoints,
@@ -186,7 +187,7 @@ def adjust_pairs(
     pairs = [Pair.read(path) for path in paths]
     for path, pair in zip(paths, pairs, strict=True):
         with located(path):
-            pair.refuse_media("the joint adjustment")
+            pair.refuse_ports_that_lean("the joint adjustment")
     tables = _tables(paths, pairs, task)
     outputs = [out / "points.csv", *(out / path.name for path in paths)]
     for output in outputs:
@@ -236,7 +237,9 @@ def joint_adjustment(
             features.append(find_features(image, limit=FEATURES, budget=PIXELS))
             shapes.append(image.shape)
     progress(len(pairs), len(pairs), "matches")
-    ties = common_features(features, shapes, _together(photos, shapes))
+    straight = [straightened(p, f) for p, f in zip(photos, features, strict=True)]
+    ties = common_features(straight, shapes, _together(photos, shapes))
+    ties = _as_taken(photos, ties)
     shared = SharedPoints(
         photo=np.r_[named.shared.photo, ties.photo],
         point=np.r_[named.shared.point, ties.point + named.shared.count],
@@ -244,10 +247,13 @@ def joint_adjustment(
         count=named.shared.count + ties.count,
     )
     cameras = [pinhole(photo) for photo in photos]
+    media = tuple(through for pair in pairs for through in media_of(pair))
     ideal = _ideal(photos, shared)
     observed = _observations(pairs, names, named, shared, ideal, features, task)
-    start = into_one_frame(cameras, shared, ideal, observed.known, names)
-    good = near_each_other(start.cameras, shared, ideal) | (shared.point < named.shared.count)
+    observed = replace(observed, media=media)
+    start = into_one_frame(cameras, shared, ideal, observed.known, names, media)
+    good = near_each_other(start.cameras, shared, ideal, media)
+    good |= shared.point < named.shared.count
     observed = with_rays(observed, good & np.isfinite(ideal).all(axis=1))
     adjusted = adjust_jointly(observed, start)
     return JointResult(
@@ -351,6 +357,15 @@ def _footprint(photo: Photo, shape: tuple[int, ...]) -> FloatArray:
     return np.r_[plane.min(axis=0), plane.max(axis=0)]
 
 
+def _as_taken(photos: Sequence[Photo], ties: SharedPoints) -> SharedPoints:
+    """Return features that were straightened for matching where the photos show them."""
+    pixels = ties.pixels.copy()
+    for index, photo in enumerate(photos):
+        rays = ties.photo == index
+        pixels[rays] = bent_again(photo, ties.pixels[rays])
+    return replace(ties, pixels=pixels)
+
+
 def _ideal(photos: Sequence[Photo], shared: SharedPoints) -> FloatArray:
     """Return the pixels free of the lenses' distortion."""
     ideal = shared.pixels.copy()
@@ -397,8 +412,10 @@ def _observations(
 def _adjusted_pair(pair: Pair, adjusted: JointAdjustment, index: int) -> Pair:
     """Return a pair with its adjusted cameras."""
     photos = [
-        _adjusted_photo(photo, adjusted.cameras[2 * index + side])
-        for side, photo in enumerate((pair.image1, pair.image2))
+        _adjusted_photo(photo, adjusted.cameras[2 * index + side], through)
+        for side, (photo, through) in enumerate(
+            zip((pair.image1, pair.image2), media_of(pair), strict=True)
+        )
     ]
     extra = {key: value for key, value in pair.extra.items() if key != "setup"}
     said = {"way": "joint adjustment", "sigma0": adjusted.sigma0}
@@ -408,12 +425,14 @@ def _adjusted_pair(pair: Pair, adjusted: JointAdjustment, index: int) -> Pair:
     )  # fmt: skip
 
 
-def _adjusted_photo(photo: Photo, camera: Pinhole) -> Photo:
+def _adjusted_photo(photo: Photo, camera: Pinhole, media: CameraMedia | None = None) -> Photo:
     stretch = float(camera.matrix[0, 0] / pinhole(photo).matrix[0, 0])
     c = photo.principal_distance
+    distance = float(camera.centre[2])
     return replace(
         photo, plane_from_pixel=plane_from_pixel(camera), nadir=camera.centre[:2],
-        distance=float(camera.centre[2]), principal_distance=None if c is None else stretch * c,
+        distance=distance, z0=photo.z0 if media is None else media.z0_at(distance),
+        principal_distance=None if c is None else stretch * c,
     )  # fmt: skip
 
 

@@ -36,7 +36,7 @@ def match_photos(
     check_ending(out, "points are written as .xlsx (survey workbook) or .csv.", ".xlsx", ".csv")
     check_new_workbook(out, overwrite=overwrite)
     if out.suffix.lower() != ".csv":
-        Pair.of(pair_path).refuse_media("a survey workbook (write a text table: .csv)")
+        Pair.of(pair_path).refuse_ports_that_lean("a survey workbook")
     pair, matches = match_pair_file(pair_path, settings)
     if out.suffix.lower() == ".csv":
         write_csv(out, csv_columns(matches), formats=_FORMATS, overwrite=overwrite)
@@ -74,8 +74,10 @@ def match_pair_file(pair_path: Pair | Path, settings: MatchSettings) -> tuple[Pa
     return pair, match_pair(pair, images, settings)
 
 
-#: A part of the photo with fewer points counts as empty.
+#: A part of the photo with fewer features counts as empty: one or two may be chance.
 FEWEST_IN_PART = 3
+#: Parts of the far photo that are asked, across and down.
+PARTS = (6, 4)
 _PIXELS = ("col1 [px]", "row1 [px]", "col2 [px]", "row2 [px]")
 _FORMATS = dict.fromkeys(_PIXELS, ".4f") | dict.fromkeys(
     ("sigma [px]", "misfit [px]", "agreement"), ".3f"
@@ -99,6 +101,7 @@ def match_summary(pair: Pair, matches: Matches) -> dict[str, Any]:
     """Return what `match` reports."""
     solved = pair.intersect(matches.pixels1, matches.pixels2, sigma_px=precision(matches))
     kinds = {kind: matches.kinds.count(kind) for kind in sorted(set(matches.kinds))}
+    least = fewest_in_part(matches)
     return {
         "count": len(matches.ids),
         "kinds": kinds,
@@ -111,17 +114,28 @@ def match_summary(pair: Pair, matches: Matches) -> dict[str, Any]:
             setup="the pair as given",
             picks=f"matches of {precision(matches):.2g} px measured",
         ),
-        "empty": empty_parts(pair, matches),
+        "fewest_in_part": least,
+        "empty": empty_parts(pair, matches, least),
     }
 
 
-def empty_parts(pair: Pair, matches: Matches) -> list[dict[str, list[int]]]:
-    """Return the parts of the far photo, of six by four, that both photos show without a point.
+def fewest_in_part(matches: Matches) -> int:
+    """Return how many points a part of the far photo must hold, not to count as empty.
+
+    One, where there are only targets, which stand where they were put, or so few points that an
+    even spread leaves hardly more than that in a part.
+    """
+    features = matches.kinds.count("feature")
+    return FEWEST_IN_PART if features >= 4 * FEWEST_IN_PART * PARTS[0] * PARTS[1] else 1
+
+
+def empty_parts(pair: Pair, matches: Matches, least: int) -> list[dict[str, list[int]]]:
+    """Return the parts of the far photo that both photos show with fewer points than ``least``.
 
     Each as ``columns`` and ``rows``, first and last. [px]
     """
     sizes = [image_info(pair.photo_file(number)).size for number in (1, 2)]
-    parts = np.array([6, 4])
+    parts = np.array(PARTS)
     side = np.array(sizes[0]) / parts
     place = np.clip((matches.pixels1 + 0.5) // side, 0, parts - 1).astype(int)
     counts = np.zeros(parts, dtype=int)
@@ -133,7 +147,7 @@ def empty_parts(pair: Pair, matches: Matches) -> list[dict[str, list[int]]]:
             corners = low + side * np.array([[0.2, 0.2], [0.8, 0.2], [0.2, 0.8], [0.8, 0.8]])
             near = pair.image2.pixels_from_plane(pair.image1.plane_from_pixels(corners))
             shown = ((near > 0) & (near < sizes[1])).all()
-            if shown and counts[column, row] < FEWEST_IN_PART:
+            if shown and counts[column, row] < least:
                 last = low + side - 1
                 out.append(
                     {

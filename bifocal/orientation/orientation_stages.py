@@ -14,8 +14,14 @@ from bifocal.model.orientation_precision import NAMES
 from bifocal.orientation import validation
 from bifocal.orientation.area_points import even_points
 from bifocal.orientation.control_points import SiteMeasures
+from bifocal.orientation.facade_lines import contradiction_in_words, lines_of_photos
 from bifocal.orientation.interior_orientation import SIGMA_RADIAL, Cameras, Images, Interior
-from bifocal.orientation.pair_adjustment import AdjustedPair, adjust, evaluated
+from bifocal.orientation.pair_adjustment import (
+    AdjustedPair,
+    adjust,
+    evaluated,
+    line_test,
+)
 from bifocal.orientation.pair_observations import PairObservations, PairUnknowns, at
 from bifocal.orientation.reference_plane import STEEPEST, Face, choose_wall, rivals_in_words
 from bifocal.orientation.tie_points import (
@@ -40,8 +46,7 @@ from photocore.rotation import rotation_from_vector
 
 #: "Image plane parallel to the wall" when nothing contradicts it. [rad]
 SIGMA_PARALLEL = np.deg2rad(0.3)
-#: A wall's own face may slope by this against the plane it was meant to be. [m/m]
-UNEVEN = 0.004
+UNEVEN = 0.004  #: A wall's face slopes by this against the plane it was meant to be. [m/m]
 #: A control point's misfit beyond this many standard deviations is a gross error.
 GROSS_LIMIT = 4.0
 #: Control points of so small a relief, in their sigma, say that they lie on the wall; it is
@@ -160,6 +165,7 @@ def oriented_in_stages(
             if not with_control:
                 pair = _facing_the_wall(pair, site)
                 pair = _on_the_wall(pair, (images[0], images[1]), site)
+                pair = _with_lines(pair, (images[0], images[1]))
         if with_control:
             pair = _with_named_wall(pair)
     if not with_control:
@@ -345,6 +351,22 @@ def _on_the_wall(pair: OrientedPair, images: Images, site: SiteMeasures) -> Orie
     return replace(pair, observations=ties).readjusted(start).settled()
 
 
+def _with_lines(pair: OrientedPair, images: Images) -> OrientedPair:
+    """Return the pair with the façade's uprights and levels lying along the wall.
+
+    Directions that contradict the wall found by the ties are told of and not used.
+    """
+    old, adjusted = pair.observations, pair.adjusted
+    bent = old.radial_models(adjusted.radial)
+    lines = lines_of_photos(images, adjusted.cameras, old.interiors, bent)
+    tests = [line_test(line, adjusted) for line in lines]
+    for line, test in zip(lines, tests, strict=True):
+        if test > WALL_LIMIT:
+            pair = pair.told(contradiction_in_words(line, adjusted.cameras, test))
+    kept = tuple(x for x, test in zip(lines, tests, strict=True) if test <= WALL_LIMIT)
+    return pair.readjusted(lines=kept).settled() if kept else pair
+
+
 def _sigma_ratio(pair: OrientedPair) -> float:
     """Return the standard deviation of ln(d1 / d2); infinite where both tapes are in already."""
     if len(pair.observations.measured) > 1:
@@ -372,7 +394,9 @@ def _with_named_wall(pair: OrientedPair) -> OrientedPair:
     spread = np.linalg.svd(control.xyz[on, :2] - control.xyz[on, :2].mean(axis=0))[1]
     if spread[1] < 0.1 * spread[0]:
         return pair
-    usual = float(np.hypot(np.median(sigma[on]), wall_roughness(observations, pair.adjusted)))
+    # Points said to be on the wall, not measured against it, leave its roughness alone.
+    own = float(np.median(sigma[on])) if height[on].any() else 0.0
+    usual = float(np.hypot(own, wall_roughness(observations, pair.adjusted)))
     tolerance = (usual / float(np.sqrt(on.sum())), usual / float(spread[1]))
     walled = with_wall(observations, pair.adjusted, tolerance)
     if not walled.wall.any():

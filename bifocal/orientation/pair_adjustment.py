@@ -7,11 +7,13 @@ prior, and the covariance says so.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from bifocal.model.orientation_precision import CAMERA, NAMES
+from bifocal.orientation.facade_lines import FacadeDirection
 from bifocal.orientation.interior_orientation import Cameras
 from bifocal.orientation.pair_observations import (
     Equations,
@@ -158,6 +160,8 @@ def pair_equations(observations: PairObservations, state: PairUnknowns) -> Equat
         parts.append((values / observations.sigma_ties, by / observations.sigma_ties))
     if wall.any():
         parts.append(wall_equations(observations, state))
+    if observations.lines:
+        parts.append(line_equations(observations.lines, state))
     if observations.control.ids:
         control = _control(observations, state)
         parts.append((control.misfit.ravel(), control.by_unknowns.reshape(-1, len(NAMES))))
@@ -175,6 +179,23 @@ def wall_equations(observations: PairObservations, state: PairUnknowns) -> Equat
     values, by = _transfer(observations, state, asked)
     rows = observations.wall_rows[:, asked]
     return rows @ values, rows @ by
+
+
+def line_equations(lines: Sequence[FacadeDirection], state: PairUnknowns) -> Equations:
+    """Return how far the façade's lines come out of the wall, in sigma; adjusted: nothing."""
+    values, by = np.zeros(len(lines)), np.zeros((len(lines), len(NAMES)))
+    for row, line in enumerate(lines):
+        seen = line.in_frame(state.cameras[line.camera - 1])
+        turn = at("turn X", line.camera)
+        values[row] = seen[2] / line.sigma
+        by[row, turn : turn + 3] = skew(seen)[2] / line.sigma
+    return values, by
+
+
+def line_test(line: FacadeDirection, adjusted: AdjustedPair) -> float:
+    """Return how far a direction of lines comes out of the wall adjusted without it, in sigma."""
+    values, by = line_equations([line], adjusted)
+    return float(abs(values[0]) / np.sqrt(1.0 + by[0] @ adjusted.covariance @ by[0]))
 
 
 def _priors(observations: PairObservations, state: PairUnknowns) -> Equations:

@@ -8,6 +8,7 @@ import numpy as np
 
 from bifocal.model.orientation_precision import CAMERA, NAMES
 from bifocal.orientation.control_points import Control
+from bifocal.orientation.facade_lines import FacadeDirection
 from bifocal.orientation.interior_orientation import Cameras, Interiors
 from photocore.arrays import BoolArray, FloatArray
 from photocore.distortion import RadialDivision
@@ -58,6 +59,8 @@ class PairObservations:
         ``distance1``, ``distance2``, ``delta_d``. [m]
     sigma_tilt : float or None
         Standard deviation of "image plane parallel to the wall". [rad]
+    lines : tuple of FacadeDirection
+        Directions of the façade's lines, each along the wall.
     free_datum : bool
         Whether origin and turn of the plane frame are free and must be held.
     """
@@ -76,6 +79,7 @@ class PairObservations:
     sigma_zoom: float | None = None
     measured: dict[str, tuple[float, float]] = field(default_factory=dict)
     sigma_tilt: float | None = None
+    lines: tuple[FacadeDirection, ...] = ()
     free_datum: bool = False
 
     @property

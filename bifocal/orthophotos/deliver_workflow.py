@@ -18,6 +18,7 @@ from bifocal.files.geotiff import (
     gsd_at_scale,
 )
 from bifocal.files.strips import write_png
+from bifocal.media import media_words
 from bifocal.model.grid import Grid
 from bifocal.model.pair import Pair
 from bifocal.model.points import SurveyPoints
@@ -143,7 +144,6 @@ def deliver(
     gsd = task.gsd or gsd_at_scale(positive(wish.dpi, "dpi"), scale)
     task = replace(task, gsd=gsd, scale=scale, overviews=True)
     pair = Pair.of(pair_path)
-    pair.refuse_media("the set of deliverables")
     title = wish.title or default_title(pair_path)
     name = file_name(title)
     _check_outputs(out, folder, name, (task.relief, *pair.photo_files))
@@ -392,9 +392,11 @@ def _notes(pair: Pair, grid: Grid, wish: DeliverTask, task: OrthoTask) -> tuple[
     relief = task.relief or task.points
     dpi = dpi_at_scale(grid.gsd, wish.scale)
     image = {"1": "far photo", "2": "near photo", "both": "both photos"}[task.image]
+    media = () if pair.layers is None else (f"seen through {media_words(pair.layers)}",)
     return (
         f"pixel {grid.gsd * 1000:.4g} mm on the wall, {dpi:.4g} dpi on paper",
         f"{image}, camera distances {pair.image1.distance:.3f} m and {pair.image2.distance:.3f} m",
+        *media,
         f"relief: {relief.name if relief else f'plane at {task.plane:g} m'}",
         f"{program()}, {today()}",
     )

@@ -5,10 +5,12 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from bifocal.media import media_words
 from photocore.workbook.newbook import new_workbook, save_book
 
 if TYPE_CHECKING:
     from bifocal.planning.camera_plan import Plan
+    from bifocal.planning.planned_media import PlannedMedia
 
 _COLUMNS: tuple[tuple[str, str, str], ...] = (
     ("pair", "Lenses", "@"),
@@ -28,6 +30,28 @@ _COLUMNS: tuple[tuple[str, str, str], ...] = (
     ("feasible", "Fits?", "@"),
     ("note", "Note", "@"),
 )
+#: Columns of plans through media, after delta_d.
+_MEDIA_COLUMNS = (
+    ("z0_1", "Camera 1 to the first interface [m]", "0.000"),
+    ("z0_2", "Camera 2 to the first interface [m]", "0.000"),
+)
+
+
+def _columns(plan: Plan) -> tuple[tuple[str, str, str], ...]:
+    """Return key, label and number format of every column."""
+    if plan.media is None:
+        return _COLUMNS
+    after = [key for key, *_ in _COLUMNS].index("delta_d") + 1
+    return (*_COLUMNS[:after], *_MEDIA_COLUMNS, *_COLUMNS[after:])
+
+
+def _media_words(media: PlannedMedia) -> str:
+    """Return what the photos of a plan look through."""
+    if media.depth is not None:
+        stays = f"reference plane {media.depth:g} m behind the last interface"
+    else:
+        stays = f"port {media.port or 0.0:g} m before the cameras"
+    return f"; through media of {media_words(media.layers)}, {stays}; d counts all of them"
 
 
 def write_plan(path: Path | str, plan: Plan, *, overwrite: bool = False) -> None:
@@ -61,8 +85,9 @@ def _stations_sheet(sheet: Any, plan: Plan) -> None:
         f"Sensor {sensor.width:g} x {sensor.height:g} mm, {sensor.columns} x {sensor.rows} px; "
         f"picks precise to {plan.sigma_px:g} px; area of uncertainty: sigma r above "
         f"{plan.sigma_r_max * 1000:.0f} mm"
-    )
-    for column, (key, label, _) in enumerate(_COLUMNS, start=1):
+    ) + ("" if plan.media is None else _media_words(plan.media))
+    columns = _columns(plan)
+    for column, (key, label, _) in enumerate(columns, start=1):
         # Labels for people above, stable keys for formulas as the table's headings.
         sheet.cell(4, column, key).font = Font(color="808080", size=8)
         cell = sheet.cell(3, column, label)
@@ -73,6 +98,7 @@ def _stations_sheet(sheet: Any, plan: Plan) -> None:
         sheet.row_dimensions[row].height = 30 if station.note else 15
         values = (
             f"{station.c1:g}/{station.c2:g} mm", station.d1, station.d2, station.delta_d,
+            *(() if plan.media is None else (station.z0_1, station.z0_2)),
             station.scale_number, station.gsd * 1000, *station.footprint,
             f"{station.photos[0]} x {station.photos[1]}", station.sigma_r_rms * 1000,
             station.sigma_r_corner * 1000, station.sigma_ortho * 1000, station.uncertain_radius,
@@ -80,20 +106,21 @@ def _stations_sheet(sheet: Any, plan: Plan) -> None:
         )  # fmt: skip
         for column, value in enumerate(values, start=1):
             cell = sheet.cell(row, column, value)
-            cell.number_format = _COLUMNS[column - 1][2]
+            cell.number_format = columns[column - 1][2]
             cell.alignment = Alignment(wrap_text=True, vertical="top")
             if station is plan.best:
                 cell.fill = PatternFill("solid", fgColor="E2F0D9")
     last = 4 + len(plan.stations)
     table = Table(
-        displayName="tblPlan", ref=f"A4:{sheet.cell(4, len(_COLUMNS)).column_letter}{last}"
+        displayName="tblPlan", ref=f"A4:{sheet.cell(4, len(columns)).column_letter}{last}"
     )
     table.tableStyleInfo = TableStyleInfo(name="TableStyleLight1", showRowStripes=False)
     sheet.add_table(table)
     sheet.freeze_panes = "B5"
     chart = BarChart()
     chart.title = "Expected sigma of the relief [mm]"
-    figures = Reference(sheet, min_col=10, max_col=12, min_row=4, max_row=last)
+    first = [key for key, *_ in columns].index("sigma_rms") + 1
+    figures = Reference(sheet, min_col=first, max_col=first + 2, min_row=4, max_row=last)
     chart.add_data(figures, titles_from_data=True)
     chart.set_categories(Reference(sheet, min_col=1, min_row=5, max_row=last))
     chart.y_axis.title = "mm"

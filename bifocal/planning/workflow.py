@@ -12,7 +12,6 @@ from bifocal.planning.plan_workbook import write_plan
 from bifocal.planning.planned_media import PlannedMedia
 from bifocal.planning.stations import plan_stations
 from multimedia import Layers
-from photocore.errors import InputError
 from photocore.output import check_ending
 from photocore.workbook.newbook import check_new_workbook
 
@@ -32,8 +31,6 @@ def make_plan(
     check_ending(out, "a plan is written as a workbook; name it .xlsx.", ".xlsx")
     if out is not None:
         check_new_workbook(out, overwrite=overwrite)
-    if out is not None and wishes.get("media") is not None:
-        raise InputError(f"{out}: no workbook is written of a plan through media; use --json.")
     plan = plan_stations(focal_lengths, sensor, **wishes)
     if out is not None:
         write_plan(out, plan, overwrite=overwrite)

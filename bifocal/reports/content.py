@@ -176,7 +176,6 @@ def read_content(source: Path, task: ReportTask) -> PairContent:
                 source, control=task.control, check=task.check, exchanged=exchanged,
                 language=task.language, unit=task.unit,
             )  # fmt: skip
-    pair.refuse_media("the report")
     ortho, gsd = (None, 0.0) if task.ortho is None else ortho_thumbnail(task.ortho)
     return PairContent(
         task=task,

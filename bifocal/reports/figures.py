@@ -49,7 +49,8 @@ def draw_plan(figure: Any, content: PairContent, say: Words) -> None:
         x, d = float(photo.nadir[0]), photo.distance
         left, right = _footprint(content, number)
         for end in (left, right):
-            axes.plot([x, end], [d, 0], color="black", lw=0.9, ls=style)
+            axes.plot(*_way_to(photo, end), color="black", lw=0.9, ls=style)
+        _draw_media(axes, photo, (left, right))
         ends += [left, right, x]
         name = say("far") if number == 1 else say("near")
         axes.plot([x], [d], marker="^", color="black", ms=9)
@@ -71,6 +72,36 @@ def draw_plan(figure: Any, content: PairContent, say: Words) -> None:
     axes.set_xlabel("X [m]", fontsize=8)
     axes.set_ylabel(say("distance_axis"), fontsize=8)
     axes.tick_params(labelsize=8)
+
+
+def _way_to(photo: Photo, end: float) -> tuple[list[float], list[float]]:
+    """Return X and distance along the ray of a photo to a place on the wall. [m]"""
+    x, d = float(photo.nadir[0]), photo.distance
+    media = photo.media
+    if media is None or media.turn is not None:
+        return [x, end], [d, 0.0]
+    offset = np.array([end - x, 0.0])
+    tangent = float(media.apparent(offset, np.zeros(()))[0]) / d
+    places, heights = [x], [d]
+    for index, thickness in zip(
+        media.layers.indices, (media.z0, *media.layers.thicknesses), strict=False
+    ):
+        first = media.layers.indices[0]
+        bend = first / np.sqrt(index**2 + (index**2 - first**2) * tangent**2)
+        places.append(places[-1] + thickness * tangent * float(bend))
+        heights.append(heights[-1] - thickness)
+    return [*places, end], [*heights, 0.0]
+
+
+def _draw_media(axes: Any, photo: Photo, ends: tuple[float, float]) -> None:
+    """Draw the first and the last interface before a photo, as wide as its rays are there."""
+    media = photo.media
+    if media is None or media.turn is not None:
+        return
+    ways = [_way_to(photo, end) for end in ends]
+    for row in {1, len(ways[0][0]) - 2}:
+        across = [xs[row] for xs, _ in ways]
+        axes.plot(across, [ways[0][1][row]] * 2, color="0.5", lw=1.2)
 
 
 def plan_ratio(content: PairContent) -> float:
@@ -309,6 +340,6 @@ def _scale_bar(axes: Any, bounds: Bounds) -> None:
 def tilt_of(photo: Photo, seen: SeenPhoto) -> float:
     """Return the angle between the wall's normal and the ray of a photo's middle. [deg]"""
     width, height = seen.size
-    middle = photo.plane_from_pixels(np.array([(width - 1) / 2, (height - 1) / 2]))
+    middle = photo.apparent_from_pixels(np.array([(width - 1) / 2, (height - 1) / 2]))
     away = float(np.hypot(*(middle - photo.nadir)))
     return float(np.rad2deg(np.arctan2(away, photo.distance)))

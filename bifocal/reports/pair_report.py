@@ -9,11 +9,12 @@ from typing import Any
 
 import numpy as np
 
+from bifocal.media import media_words
 from bifocal.model.relief_map import Quality
-from bifocal.precision import base_factor
 from bifocal.reports import figures
 from bifocal.reports.accuracy import accuracy_blocks, millimetres
 from bifocal.reports.content import PairContent
+from bifocal.reports.refraction import refraction_blocks
 from bifocal.reports.worked_point import method_blocks
 from bifocal.survey.tolerances import RULES
 from photocore.provenance import file_hash, program, provenance, today
@@ -92,9 +93,14 @@ def _geometry(content: PairContent, say: Words) -> Iterator[Block]:
             say("tilt"),
             *(f"{figures.tilt_of(seen.photo, seen):.2f}°" for seen in content.photos),
         ])  # fmt: skip
-    base = base_factor(d1=content.pair.d1, d2=content.pair.d2)
-    rows.append([say("base"), f"{base:.2f} m", ""])
+    layers = content.pair.layers
+    if layers is not None:
+        rows.append([say("media"), media_words(layers), ""])
+        rows.append([say("z0"), *(f"{photo.z0 or 0.0:.3f} m" for photo in photos)])
+    key = "base" if layers is None else "base_media"
+    rows.append([say(key), f"{content.pair.base_factor:.2f} m", ""])
     yield TextTable(headings=[say("quantity"), say("far"), say("near")], rows=rows)
+    yield from refraction_blocks(content, say)
     if content.task.language == "en":
         for sentence in content.setup.get("words", ()):
             yield Paragraph(text=str(sentence), small=True)

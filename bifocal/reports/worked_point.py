@@ -6,6 +6,9 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from bifocal.media import media_words
+from bifocal.model.photo import Photo
+from bifocal.rays import object_rays
 from bifocal.reports.accuracy import millimetres
 from bifocal.reports.content import PairContent
 from photocore.arrays import FloatArray
@@ -31,15 +34,12 @@ def method_blocks(content: PairContent, say: Words) -> Iterator[Block]:
     q, v, s = np.zeros((2, 2)), np.zeros((2, 2)), np.zeros(2)
     pixel_lines, plane_lines, slope_lines = [], [], []
     picks = (points.pixels1[row], points.pixels2[row])
+    relief = float(table["Z"][row])
     for k, (photo, raw) in enumerate(zip((pair.image1, pair.image2), picks, strict=True)):
         ideal = raw if photo.lens is None else photo.lens.undistort(raw)
         matrix = photo.plane_from_pixel / photo.plane_from_pixel[2, 2]
         x, y, w = matrix @ [*ideal, 1.0]
         q[k] = x / w, y / w
-        v[k] = (q[k] - photo.nadir) / photo.distance
-        sigma_px = photo.precision(solution.sigma_px)
-        scale = np.sqrt(abs(np.linalg.det(photo.metres_per_pixel(raw[None])[0])))
-        s[k] = sigma_px * scale
         pixel_lines.append(f"({ideal[0]:.3f}, {ideal[1]:.3f})_{k + 1}")
         plane_lines += _matrix_lines(f"H{k + 1}", matrix)
         plane_lines.append(
@@ -48,12 +48,39 @@ def method_blocks(content: PairContent, say: Words) -> Iterator[Block]:
         )
         slope_lines.append(
             f"N{k + 1} = ({photo.nadir[0]:.4f}, {photo.nadir[1]:.4f}) m, d{k + 1} = "
-            f"{photo.distance:.4f} m    v{k + 1} = ({v[k][0]:.7f}, {v[k][1]:.7f})"
+            f"{photo.distance:.4f} m    "
         )
+        if photo.media is not None:
+            tangent = (q[k] - photo.nadir) / photo.distance
+            slope_lines[k] += f"z0 = {photo.z0:.4f} m    t{k + 1} = {_vector(tangent, 7)}    "
+            q[k], slope = object_rays(q[k], photo.foot)
+            v[k] = -slope
+            slope_lines[k] += f"a{k + 1} = {_vector(q[k], 5)} m    "
+        else:
+            v[k] = (q[k] - photo.nadir) / photo.distance
+        s[k] = photo.precision(solution.sigma_px) * _spacing(photo, raw, relief)
+        slope_lines[k] += f"v{k + 1} = {_vector(v[k], 7)}"
+    bent = pair.layers is not None
+    if pair.layers is not None:
+        slope_lines.insert(0, media_words(pair.layers))
     yield Paragraph(text=say("step_pixels"), lines=("   ".join(pixel_lines),))
     yield Paragraph(text=say("step_plane"), lines=tuple(plane_lines))
-    yield Paragraph(text=say("step_slope"), lines=tuple(slope_lines))
+    yield Paragraph(text=say("step_bent" if bent else "step_slope"), lines=tuple(slope_lines))
     yield from _solved(content, row, (q, v, s), say)
+
+
+def _vector(values: FloatArray, digits: int) -> str:
+    return f"({values[0]:.{digits}f}, {values[1]:.{digits}f})"
+
+
+def _spacing(photo: Photo, raw: FloatArray, relief: float) -> float:
+    """Return the pixel on the wall; through media by how much it moves the ray at a relief. [m]"""
+    if photo.media is None:
+        return float(np.sqrt(abs(np.linalg.det(photo.metres_per_pixel(raw[None])[0]))))
+    away = photo.apparent_from_pixels(raw[None]) - photo.nadir
+    _, place, slope = photo.media.trace_with_jacobian(away)
+    moved = (place + relief * slope) @ photo.apparent_by_pixel(raw[None])
+    return float(np.sqrt(abs(np.linalg.det(moved[0]))))
 
 
 def _solved(
@@ -63,22 +90,30 @@ def _solved(
     assert content.solution is not None
     q, v, s = rays
     table, pair = content.solution.table, content.pair
+    bent = pair.layers is not None
     shift, slope = q[0] - q[1], v[0] - v[1]
     square = float(slope @ slope)
     r = float(shift @ slope) / square
+
+    def named(text: str) -> str:
+        """Return text in which places on the wall are called a where the rays are bent."""
+        return text.replace("q1", "a1").replace("q2", "a2") if bent else text
+
     yield Paragraph(
-        text=say("step_relief"),
+        text=named(say("step_relief")),
         lines=(
-            f"q1 - q2 = ({shift[0]:.5f}, {shift[1]:.5f}) m    v1 - v2 = ({slope[0]:.7f}, "
-            f"{slope[1]:.7f})",
+            named(f"q1 - q2 = ({shift[0]:.5f}, {shift[1]:.5f}) m")
+            + f"    v1 - v2 = ({slope[0]:.7f}, {slope[1]:.7f})",
             f"r = {float(shift @ slope):.7e} / {square:.7e} = {r:.4f} m",
         ),
     )
     place = (q - v * r).mean(axis=0)
-    yield Paragraph(text=say("step_xy"), lines=(f"X = {place[0]:.4f} m    Y = {place[1]:.4f} m",))
-    parts = (1 - r / np.array([pair.d1, pair.d2])) * s
     yield Paragraph(
-        text=say("step_sigma"),
+        text=named(say("step_xy")), lines=(f"X = {place[0]:.4f} m    Y = {place[1]:.4f} m",)
+    )
+    parts = s if bent else (1 - r / np.array([pair.d1, pair.d2])) * s
+    yield Paragraph(
+        text=say("step_sigma_bent" if bent else "step_sigma"),
         lines=(
             f"s1 = {1000 * s[0]:.3f} mm    s2 = {1000 * s[1]:.3f} mm    |v1 - v2| = "
             f"{np.sqrt(square):.6f}    sigma_r = "
@@ -92,7 +127,7 @@ def _solved(
             sigma=millimetres(float(table["sigma_r"][row])),
         )
     )  # fmt: skip
-    yield Paragraph(text=say("method_source"), small=True)
+    yield Paragraph(text=say("method_source_bent" if bent else "method_source"), small=True)
 
 
 def _matrix_lines(name: str, matrix: FloatArray) -> list[str]:

@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike
 
+from bifocal import rays
 from bifocal.model.homography import apply_homography
 from bifocal.model.pair import Pair
 from photocore.arrays import BoolArray, FloatArray, as_points
@@ -143,12 +144,12 @@ def check_orientation(
     -----
     Least squares on ``q1 = G q2`` with G = scale, rotation, shift and, from five points on, the two
     projective terms of a tilt; weighted by the picks' precision in both photos. Points beyond
-    four sigma (robustly scaled) are left out one by one, worst first. Shift and tilt are counted
-    at the near nadir. Scale: false relief ``eps B`` everywhere; shift t: ``t B / s'`` at a fifth
-    of the points' largest radius; tilt p: ``p s' B`` at that radius. Rotation moves points across
-    the radius and makes no relief.
+    four sigma (robustly scaled) are left out one by one, worst first. Through media q1 is where
+    photo 2 would show the place that photo 1 sees, its ray going straight on: there its homography
+    counts. Shift and tilt are counted at the near nadir. Scale: false relief ``eps B`` everywhere;
+    shift t: ``t B / s'`` at a fifth of the points' largest radius; tilt p: ``p s' B`` at that
+    radius. Rotation moves points across the radius and makes no relief.
     """
-    pair.refuse_media("the check of the set-up by points of the plane (code PLANE)")
     first = as_points(pixels1, "pixels1", dimension=2)
     second = as_points(pixels2, "pixels2", dimension=2)
     labels = list(names) if names is not None else [str(i + 1) for i in range(len(first))]
@@ -159,8 +160,9 @@ def check_orientation(
             "on the plane; at least 2 are needed, 5 or more well spread are better."
         )
     origin = pair.image2.nadir
-    q1 = pair.image1.plane_from_pixels(first) - origin
-    q2 = pair.image2.plane_from_pixels(second) - origin
+    places = pair.image1.plane_from_pixels(first)
+    q1 = rays.apparent_of_plane(places, pair.image2.foot) - origin
+    q2 = pair.image2.apparent_from_pixels(second) - origin
     sigma = pair.image2.precision(sigma_px or pair.image2.sigma_pixel or pair.image1.sigma_pixel)
     weight = _root_weights(pair, first, second, sigma)
     used = measured.copy()
@@ -250,10 +252,14 @@ def with_zoom_centre(pair: Pair, centre: FloatArray) -> Pair:
 
 
 def _root_weights(pair: Pair, first: FloatArray, second: FloatArray, sigma: float) -> FloatArray:
-    """Return matrices that make differences on the plane unit normal, shape (n, 2, 2)."""
+    """Return matrices that make differences of apparent positions unit normal, (n, 2, 2)."""
     covariance = np.zeros((len(first), 2, 2))
-    for photo, pixels in ((pair.image1, first), (pair.image2, second)):
-        metres = photo.metres_per_pixel(pixels)
+    seen = pair.image1.metres_per_pixel(first)
+    if pair.layers is not None:
+        places = pair.image1.plane_from_pixels(first)
+        on_plane = np.column_stack([places, np.zeros(len(places))])
+        seen = rays.design_rows(on_plane, pair.image2.foot)[:, :, :2] @ seen
+    for metres in (seen, pair.image2.apparent_by_pixel(second)):
         covariance += metres @ metres.transpose(0, 2, 1) * sigma**2
     safe = np.where(np.isfinite(covariance), covariance, np.eye(2))
     inverse_root: FloatArray = np.linalg.inv(np.linalg.cholesky(safe))
@@ -334,12 +340,14 @@ def _parameters(
 ) -> tuple[OrientationParameter, ...]:
     """Return the parameters in a surveyor's units with the false relief each one causes."""
     base, distance = pair.base_factor, pair.d2
+    # What lies on the wall seems displaced by more, or less, where its rays are bent.
+    wall = 1000.0 * rays.seen_distance(pair.image2.foot) / distance
     inner = radius / 5
     # The correction maps image 2 onto image 1: image 2 itself deviates by the opposite.
     values = np.concatenate([[values[0] / (1 + values[0])], values[1:]])
     degrees = float(np.degrees(1.0))
     table = [(100.0, "%", base), (degrees, "deg", 0.0)]
-    table += [(1000.0, "mm", base / inner)] * 2 + [(degrees * distance, "deg", -base * radius)] * 2
+    table += [(wall, "mm", base / inner)] * 2 + [(degrees * distance, "deg", -base * radius)] * 2
     return tuple(
         OrientationParameter(
             name=name,

@@ -22,7 +22,7 @@ from bifocal.survey.tolerances import RULES, sentence
 from bifocal.survey.workbook.book import write_book
 from bifocal.survey.workbook.content import SurveyContent
 from bifocal.survey.workbook.own_table import add_results
-from bifocal.survey.workbook.update import check_kind, is_older, update_book
+from bifocal.survey.workbook.update import check_kind, is_older, is_same_kind, update_book
 from bifocal.survey.workflow import SolvedSurvey
 from photocore.errors import InputError
 from photocore.jsonfile import to_text
@@ -88,11 +88,7 @@ def write_result(
         return ""
     if ending not in (".xlsx", ".xlsm"):
         raise InputError(f"{path}: results are written as .xlsx, .xlsm or .csv.")
-    if solution.pair.layers is not None:
-        raise InputError(
-            f"{path}: no workbook is written for a pair seen through media, whose formulas it does "
-            f"not have yet. Write a text table: --out {path.with_suffix('.csv').name}"
-        )
+    solution.pair.refuse_ports_that_lean(f"{path}: a survey workbook")
     if len(solution.table) > MOST_ROWS:
         raise InputError(
             f"{path}: {len(solution.table)} points are too many for a workbook (limit {MOST_ROWS})."
@@ -100,7 +96,7 @@ def write_result(
         )
     content = result_content(solution, path, language)
     in_place, is_book = _is_same_file(path, solution.source), _is_survey_book(solution)
-    same_kind = content.is_pair == ("col1" in solution.survey.table.present)
+    same_kind = is_same_kind(solution.survey, content)
     if is_book and (in_place or same_kind):
         return _update(path, solution, content, overwrite=overwrite)
     if not solution.survey.is_ours and (ending == ".xlsm" or in_place):
@@ -118,7 +114,7 @@ def check_target(path: Path, solution: SolvedSurvey, *, overwrite: bool) -> None
         As `write_result`.
     """
     if _is_survey_book(solution) and _is_same_file(path, solution.source):
-        check_kind(solution.source, solution.survey, is_pair=solution.is_pair)
+        check_kind(solution.source, solution.survey, solution)
     check_new_workbook(path, overwrite=overwrite, source=solution.source)
 
 

@@ -108,6 +108,8 @@ def _general(setup: SurveySetup, path: Path) -> Pair:
     pair = described_pair(setup, file, path.parent)
     if pair is None:
         raise InputError("the distances d_1 and d_2 are needed beside the homographies.")
+    if setup.media is not None and setup.media.layers is None:
+        pair = pair.in_air()
     first, second = pair.as_given
     typed = _photo_files(setup, path.parent)
     given = Pair.read(file) if file is not None and not all(typed) else None
@@ -177,6 +179,12 @@ def _ideal(setup: SurveySetup, folder: Path) -> Pair:
         replace(photo, file=name, plane_from_pixel=_corrected(photo, matrix))
         for photo, name, matrix in zip(pair.as_given, names, setup.adjusted, strict=True)
     ]
+    if setup.media is not None and setup.media.layers is not None:
+        through = [setup.media.through(number) for number in (1, 2)]
+        photos = [
+            replace(photo, layers=layers, z0=z0)
+            for photo, (layers, z0) in zip(photos, through, strict=True)
+        ]
     return Pair(
         image1=photos[0],
         image2=photos[1],

@@ -2,24 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from bifocal.equations import plane_coordinates, relief, relief_displacement
-from bifocal.media import ObjectRays
 from bifocal.model.flags import FlagLimits, point_flags
 from bifocal.model.intersection import PlanePicks, intersect
 from bifocal.model.pair import Pair
 from bifocal.model.photo import Photo
 from bifocal.precision import point_covariance, sigma_relief
 from bifocal.rays import in_line, meeting_of, object_rays, zoom_centre
+from bifocal.survey.bent_radii import bent_radii, carried_rays, length, met_rays, scale_ratio
 from bifocal.survey.observations import PointObservations
+from bifocal.survey.radii import Radii
 from bifocal.survey.relief_table import ReliefTable, entries
-from photocore.arrays import BoolArray, FloatArray
-from photocore.errors import InputError
+from photocore.arrays import FloatArray
 
 
 def solve_points(
@@ -62,7 +60,7 @@ def solve_points(
     least squares, so that the result equals `Pair.intersect`; ``e1``, ``e2`` and ``s_c`` count
     from each camera's own nadir.
 
-    Through media (raw pixels only) the columns hold what refraction leaves: ``s1_used`` and
+    Through media the columns hold what refraction leaves: ``s1_used`` and
     ``s2_used`` are radii of where the bent rays meet the reference plane, ``den`` is how much their
     slopes differ, ``ds`` their distance along that difference, and ``r = ds / den`` is as closed as
     Eq. (6) (`bifocal.media`).
@@ -85,10 +83,7 @@ def solve_points(
         radii = _measured_radii(first, second, points, sigma_px)
     s1, s2, d1, d2 = radii.s1, radii.s2, first.distance, second.distance
     if radii.bent is not None:
-        ds, den, r = radii.bent.ds, radii.bent.den, radii.bent.relief
-        foot1, foot2 = radii.bent.places
-        e1: FloatArray = np.asarray(radii.own1 - _length(foot1))
-        e2: FloatArray = np.asarray(radii.own2 - _length(foot2))
+        ds, den, r, e1, e2, _ = radii.bent
     else:
         ds, den = s2 - s1, s2 / d2 - s1 / d1
         (d_far, far), (d_near, near) = _far_first((d1, s1), (d2, s2))
@@ -98,7 +93,7 @@ def solve_points(
         )
     x, y = plane_coordinates(radii.own1, e1, np.radians(radii.own_theta))  # Eq. (7)
     if radii.bent is not None:
-        x, y = radii.bent.places[0].T  # a port that leans bends rays also across the radius
+        x, y = radii.bent.place.T  # a port that leans bends rays also across the radius
     sigma_r = np.where(np.isnan(r), np.nan, radii.sigma_r)
     return ReliefTable(
         ids=points.ids,
@@ -138,53 +133,16 @@ def solve_points(
     )
 
 
-class _BentRays(NamedTuple):
-    """What Eq. (6) becomes through media, shape (n,): lengths [mm at the scale of image 1]."""
-
-    ds: FloatArray
-    den: FloatArray  # [mm/m]
-    relief: FloatArray  # [m]
-    places: tuple[FloatArray, FloatArray]  # of the points, from each camera's nadir, (n, 2)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class _Radii:
-    """Points as radial distances [mm at the scale of image 1] and directions [deg], shape (n,).
-
-    ``s1, s2, theta`` count from the zoom centre, ``own1, own2, own_theta`` from each camera's
-    nadir; ``q`` is the misfit across the radius, ``standardised`` in its sigma,
-    ``covariance`` that of X, Y and r from the picks, shape (n, 3, 3) [m²].
-    """
-
-    scale_number: float
-    s1: FloatArray
-    s2: FloatArray
-    theta: FloatArray
-    own1: FloatArray
-    own2: FloatArray
-    own_theta: FloatArray
-    q: FloatArray
-    standardised: FloatArray
-    at_nadir: BoolArray
-    sigma_r: FloatArray
-    covariance: FloatArray
-    sigma_px: float | None = None
-    carried: Mapping[str, FloatArray] = field(default_factory=dict)
-    bent: _BentRays | None = None
-
-
 def _measured_radii(
     first: Photo, second: Photo, points: PointObservations, sigma: float | None
-) -> _Radii:
+) -> Radii:
     """Return radial distances as measured on the photos of an ideal pair."""
-    if first.media is not None:
-        raise InputError(
-            "points seen through media are solved from pixels: give the pair with --pair."
-        )
     scale_number = first.scale_number
     k12 = 1.0
     if scale_number is not None and second.scale_number is not None:
         k12 = second.scale_number / scale_number  # brings image 2 to the scale of image 1
+        if first.media is not None:
+            k12 = scale_ratio(first, second)
     (x1, y1), (x2, y2) = points.xy1.T, points.xy2.T
     cartesian = points.is_cartesian
     s1 = np.where(cartesian, np.sqrt(x1**2 + y1**2), points.polar[:, 0])
@@ -202,7 +160,7 @@ def _measured_radii(
         q = np.where(s1 > 0, across, np.where(cartesian & ~incomplete, 0.0, np.nan))
         spread = sigma * np.sqrt(1.0 + (s2 / s1) ** 2)
         standardised = q / np.where(s1 > 0, spread, np.nan)
-    return _Radii(
+    found = Radii(
         scale_number=np.nan if scale_number is None else scale_number,
         s1=s1,
         s2=s2,
@@ -219,6 +177,9 @@ def _measured_radii(
             sigma_2=k12 * sigma, metres=np.nan if scale_number is None else scale_number / 1000,
         ),
     )  # fmt: skip
+    if first.media is None:
+        return found
+    return bent_radii(found, (first, second), (s1, s2 / k12), sigma)
 
 
 def _adjusted_radii(
@@ -228,7 +189,7 @@ def _adjusted_radii(
     sigma_px: float | None,
     limits: FlagLimits,
     pair: Pair,
-) -> _Radii:
+) -> Radii:
     """Return radial distances of raw pixels after least squares moved them onto one line.
 
     The movement is kept as gains (movement per millimetre of misfit q), which lets the workbook's
@@ -265,16 +226,16 @@ def _adjusted_radii(
     carried = dict(zip(names, np.hstack([x1, x2, gain1, gain2]).T, strict=True))
     bent = None
     if pair.layers is not None:
-        bent = _bent_rays(fitted, (moved1, moved2), (own1, own2), to_mm, solved.xyz[:, 2])
-        carried |= _carried_slopes(places, fitted, q, to_mm)
-    s1 = _length(moved1)
-    return _Radii(
+        bent = met_rays(fitted, (moved1, moved2), (own1, own2), to_mm, solved.xyz[:, 2])
+        carried |= carried_rays(picks, places, fitted, q, to_mm)
+    s1 = length(moved1)
+    return Radii(
         scale_number=scale_number,
         s1=s1,
-        s2=_length(moved2),
+        s2=length(moved2),
         theta=np.where(s1 == 0, 0.0, np.degrees(np.arctan2(moved1[:, 0], moved1[:, 1]))),
-        own1=_length(own1),
-        own2=_length(own2),
+        own1=length(own1),
+        own2=length(own2),
         own_theta=np.degrees(np.arctan2(own1[:, 0], own1[:, 1])),
         q=q,
         standardised=standardised,
@@ -296,50 +257,9 @@ def _adjusted_radii(
     )
 
 
-def _bent_rays(
-    rays: list[ObjectRays],
-    feet: tuple[FloatArray, FloatArray],
-    own: tuple[FloatArray, FloatArray],
-    to_mm: float,
-    solved: FloatArray,
-) -> _BentRays:
-    """Return what Eq. (6) becomes for rays through media; NaN where the relief solved is.
-
-    ``feet`` and ``own`` are where they meet the plane, from one point and from each nadir. [mm]
-    """
-    gap = feet[1] - feet[0]
-    rate = (rays[0].slope - rays[1].slope) * to_mm
-    den = _length(rate)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        ds = np.where(den > 0, (gap * rate).sum(axis=1) / den, 0.0)
-        relief = np.where(~np.isnan(solved) & (den > 0), ds / den, np.nan)
-    places = [
-        foot + ray.slope * (to_mm * relief)[:, None] for foot, ray in zip(own, rays, strict=True)
-    ]
-    return _BentRays(ds, den, relief, (places[0], places[1]))
-
-
-def _carried_slopes(
-    places: list[ObjectRays], fitted: list[ObjectRays], q: FloatArray, to_mm: float
-) -> dict[str, FloatArray]:
-    """Return slopes [mm/m, outwards] of the picks' rays and how they move with their misfit."""
-    columns = {}
-    for image, (place, moved) in enumerate(zip(places, fitted, strict=True), start=1):
-        with np.errstate(divide="ignore", invalid="ignore"):
-            gain = np.where((q != 0)[:, None], (moved.slope - place.slope) / q[:, None], 0.0)
-        for axis, k in (("x", 0), ("y", 1)):
-            columns[f"t{image}{axis}"] = -place.slope[:, k] * to_mm
-            columns[f"u{image}{axis}"] = gain[:, k] * to_mm
-    return columns
-
-
 def _far_first(*photos: tuple[Any, ...]) -> list[tuple[Any, ...]]:
     """Return what is known of both photos, each with its distance first, the far one's first."""
     return sorted(photos, key=lambda photo: -photo[0])
-
-
-def _length(vectors: FloatArray) -> FloatArray:
-    return np.asarray(np.sqrt((vectors**2).sum(axis=1)))
 
 
 def _miss(
@@ -356,14 +276,14 @@ def _miss(
     if picks[0].foot.media is None:
         value, g1, g2 = in_line(x1, x2)
         radius = np.hypot(x1[:, 0], x1[:, 1])
-        q, unit = np.where(radius > 0, value / radius, 0.0), to_mm / _length(x1)
+        q, unit = np.where(radius > 0, value / radius, 0.0), to_mm / length(x1)
     else:
         feet = [pick.foot for pick in picks]
         value, g1, g2 = meeting_of(feet[0], feet[1], centre)(
             *(pick.positions - centre for pick in picks)
         )
         rays = [object_rays(pick.positions, pick.foot) for pick in picks]
-        rate = _length(rays[0].slope - rays[1].slope)
+        rate = length(rays[0].slope - rays[1].slope)
         unit = to_mm / rate
         q = np.where(rate > 0, value * unit, 0.0)
     variance = sum(

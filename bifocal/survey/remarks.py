@@ -12,6 +12,7 @@ from bifocal.survey.observations import PointObservations
 from bifocal.survey.reference import Georeference, KnownPoints
 from bifocal.survey.relief_table import ReliefTable
 from bifocal.survey.setup import SurveySetup
+from photocore.arrays import FloatArray
 
 #: A scale further from 1 than this is no matter of taping distances.
 SCALE_SHARE = 0.01
@@ -152,16 +153,11 @@ def refraction_remarks(pair: Pair, points: PointObservations) -> list[str]:
     pair : Pair
         As solved.
     points : PointObservations
-        With ``pixels1`` and ``pixels2``; only points in use are counted. [px]
+        With ``pixels1`` and ``pixels2`` [px]; of an ideal pair image coordinates [mm]. Only points
+        in use are counted.
     """
-    if pair.layers is None:
-        return []
-    bent, straight = (
-        one.intersect(points.pixels1, points.pixels2).xyz for one in (pair, pair.in_air())
-    )
-    off = np.abs(straight - bent)[points.use]
-    off = off[np.isfinite(off).all(axis=1)]
-    if not len(off):
+    off = refraction_errors(pair, points)
+    if pair.layers is None or not len(off):
         return []
     aside = float(np.hypot(off[:, 0], off[:, 1]).max())
     return [
@@ -169,3 +165,26 @@ def refraction_remarks(pair: Pair, points: PointObservations) -> list[str]:
         f"falsify relief by up to {off[:, 2].max():.3f} m (median {np.median(off[:, 2]):.3f} m) "
         f"and places by up to {aside:.3f} m."
     ]
+
+
+def refraction_errors(pair: Pair, points: PointObservations) -> FloatArray:
+    """Return by how much points would be wrong if their pair were taken for one in air.
+
+    Parameters
+    ----------
+    pair, points
+        As in `refraction_remarks`.
+
+    Returns
+    -------
+    ndarray, shape (n, 3)
+        Sizes of the errors of X, Y and r of points in use that both ways solve; none in air. [m]
+    """
+    if pair.layers is None or len(set(pair.layers.indices)) == 1:
+        return np.zeros((0, 3))
+    picks = points.all_xy()
+    if points.has_pixels.any():
+        picks = points.pixels1, points.pixels2
+    bent, straight = (one.intersect(*picks).xyz for one in (pair, pair.in_air()))
+    off = np.abs(straight - bent)[points.use]
+    return np.asarray(off[np.isfinite(off).all(axis=1)])

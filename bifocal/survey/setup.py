@@ -12,7 +12,9 @@ from bifocal.model.flags import SIGMA_PIXEL, FlagLimits
 from bifocal.model.homography import apply_homography
 from bifocal.model.pair import Pair
 from bifocal.precision import false_relief_of_scale
+from bifocal.survey.bent_radii import scale_ratio
 from bifocal.survey.observations import PointObservations
+from bifocal.survey.survey_media import SurveyMedia
 from photocore.arrays import FloatArray, positive
 from photocore.errors import GeometryError, InputError, located
 
@@ -63,6 +65,8 @@ class SurveySetup:
         from points of the reference plane; None where there is no correction.
     places : mapping
         Where each value was found: key to sheet and cell.
+    media : SurveyMedia or None
+        What the photos look through, where the workbook has cells for it.
     where : str
         File and sheet, for messages.
     remarks, text_cells : tuple of str
@@ -91,6 +95,7 @@ class SurveySetup:
     nadirs: tuple[FloatArray, FloatArray] = (np.zeros(2), np.zeros(2))
     adjusted: tuple[FloatArray | None, FloatArray | None] = (None, None)
     places: Mapping[str, tuple[str, str]] = field(default_factory=dict)
+    media: SurveyMedia | None = None
     where: str = ""
     remarks: tuple[str, ...] = ()
     text_cells: tuple[str, ...] = ()
@@ -148,7 +153,19 @@ class SurveySetup:
         for name in ("pitch", "sigma_r_max"):
             if (value := getattr(self, name)) is not None:
                 positive(value, name)
-        return Pair.ideal(d1=self.d1, d2=self.d2, c1=self.c1, c2=self.c2, sigma=self.precision)
+        pair = Pair.ideal(d1=self.d1, d2=self.d2, c1=self.c1, c2=self.c2, sigma=self.precision)
+        if self.media is None:
+            return pair
+        if self.media.layers is not None and self.c1 is None:
+            raise InputError(
+                "c_1 and c_2, the principal distances [mm], are needed: how far a ray is bent "
+                "follows from its angle, s / c."
+            )
+        photos = []
+        for number, photo in enumerate(pair.as_given, start=1):
+            layers, z0 = self.media.through(number)
+            photos.append(replace(photo, layers=layers, z0=z0))
+        return Pair(image1=photos[0], image2=photos[1])
 
     def in_millimetres(self, points: PointObservations) -> PointObservations:
         """Return the points as image coordinates of `pair`, without raw pixels."""
@@ -176,7 +193,8 @@ class SurveySetup:
             for name in ("d", "c", "nadir", "photo")
             for image in "12"
         }
-        return replace(self, **swapped, adjusted=self.adjusted[::-1])
+        media = None if self.media is None else self.media.exchanged()
+        return replace(self, **swapped, adjusted=self.adjusted[::-1], media=media)
 
     def check_scales(self, tolerance: float = SCALE_TOLERANCE) -> str:
         """Return a remark on the scales of the photos; empty where they agree.
@@ -188,9 +206,19 @@ class SurveySetup:
         """
         if self.c1 is None or self.c2 is None or self.d1 is None or self.d2 is None:
             return ""
+        media = None if self.media is None else self.media.layers
         share = (1000.0 * self.d2 / self.c2) / (1000.0 * self.d1 / self.c1) - 1.0
+        if media is not None:
+            share = scale_ratio(*self.pair().as_given) - 1.0
         if abs(share) > tolerance:
             place = f"{self.where}: " if self.where else ""
+            if media is not None:
+                raise GeometryError(
+                    f"{place}the scales of the photos, as seen through the media near the axis, "
+                    f"differ by {abs(share):.1%}: a bifocal pair has the same scale in both "
+                    "photos. Check c, d, z0 and the indices; of photos taken so, allow it with "
+                    "--scale-tolerance (`bifocal plan` places cameras at equal scale)."
+                )
             raise GeometryError(
                 f"{place}c_1/d_1 = {self.c1 / self.d1:.4g} and c_2/d_2 = {self.c2 / self.d2:.4g} "
                 f"differ by {abs(share):.1%}: a bifocal pair has the same scale in both photos. "
@@ -199,6 +227,8 @@ class SurveySetup:
         if abs(share) < 1e-4:
             return ""
         far, near = max(self.d1, self.d2), min(self.d1, self.d2)
+        if media is not None:
+            far, near = self.pair().straight_distances
         return (
             f"the scales of the photos differ by {share:+.2%}; image 2 is brought to the scale of "
             "image 1 (k_12). If c or d is wrong instead, this is "

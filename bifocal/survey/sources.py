@@ -82,29 +82,40 @@ def given_pair(
     described = described_pair(setup, file, path.parent)
     if described is None:
         return None, None, []
-    return described, file, [f"{setup.where}: {remark}" for remark in described.remarks]
+    said = described.remarks
+    if setup.media is not None and setup.media.layers is None:
+        said = tuple(remark for remark in said if not remark.startswith("layers:"))
+    return described, file, [f"{setup.where}: {remark}" for remark in said]
 
 
 def described_pair(setup: SurveySetup, file: Path | None, folder: Path) -> Pair | None:
     """Return the pair whose homographies `Setup` holds, with the lenses of its pair file.
 
-    Where that file is not read a remark says that pixels count as free of lens distortion.
+    Where that file is not read a remark says that pixels count as free of lens distortion. Media
+    are those of the workbook, where it has cells for them (`UNBENT` where these are blank), else
+    those of the file.
     """
     if setup.matrices is None or setup.d1 is None or setup.d2 is None:
         return None
     lenses: list[Lens | None] = [None, None]
     orientation, doubt = None, ""
     media: list[dict[str, Any]] = [{}, {}]
+    if setup.media is not None:
+        through = [setup.media.through(number) for number in (1, 2)]
+        media = [{"layers": layers, "z0": z0} for layers, z0 in through]
     if setup.pair_file and file is None:
         doubt = f"{setup.pair_file} is not found"
     if file is not None:
         try:
             given = Pair.read(file)
-            lenses, orientation = [given.image1.lens, given.image2.lens], given.orientation
-            media = [
-                {name: getattr(photo, name) for name in ("layers", "z0", "interface_normal")}
-                for photo in (given.image1, given.image2)
-            ]
+            lenses = [given.image1.lens, given.image2.lens]
+            if setup.media is None or setup.media.layers == given.layers:
+                orientation = given.orientation  # it may count the media too
+            if setup.media is None:
+                media = [
+                    {name: getattr(photo, name) for name in ("layers", "z0", "interface_normal")}
+                    for photo in (given.image1, given.image2)
+                ]
         except (InputError, GeometryError) as error:
             doubt = f"{setup.pair_file} cannot be used ({error})"
     remarks = (f"{doubt}: pixels are taken as free of lens distortion.",) if doubt else ()

@@ -7,6 +7,7 @@ from pathlib import Path
 from bifocal.model.pair import Pair
 from bifocal.survey.observations import PointObservations
 from bifocal.survey.point_survey import solve_points
+from bifocal.survey.survey_media import SurveyMedia
 from bifocal.survey.workbook.book import write_book
 from bifocal.survey.workbook.content import POINT_ROWS, SurveyContent
 from bifocal.survey.workbook.words import LANGUAGES
@@ -22,7 +23,12 @@ LogRow = tuple[str, str, str, str, str]
 
 
 def write_template(
-    path: Path | str, *, language: str = "en", rows: int = POINT_ROWS, overwrite: bool = False
+    path: Path | str,
+    *,
+    language: str = "en",
+    rows: int = POINT_ROWS,
+    media: int | None = None,
+    overwrite: bool = False,
 ) -> None:
     """Write an empty survey workbook with live formulas.
 
@@ -34,21 +40,27 @@ def write_template(
         Of labels and help; keys and flags are the same in all.
     rows : int
         Rows prepared for points.
+    media : int, optional
+        How many media `Setup` gets cells for: 2 for a water surface, 3 for air, glass and water;
+        none by default, for photos in air.
     overwrite : bool
         Replace an existing file.
 
     Raises
     ------
     InputError
-        If the language is unknown or the file cannot be written.
+        If the language is unknown, media are fewer than 2 or more than 6, or the file cannot be
+        written.
     """
     if language not in LANGUAGES:
         raise InputError(f"language: {language!r} is none of {', '.join(LANGUAGES)}.")
     if not 1 <= rows <= MOST_ROWS:
         raise InputError(f"rows: must be 1 to {MOST_ROWS}, got {rows}.")
+    cells = None if media is None else SurveyMedia.blank(media)
     check_book_path(path)
     check_new_workbook(path, overwrite=overwrite, other="")
-    write_book(path, SurveyContent(language=language, rows=rows), overwrite=overwrite)
+    content = SurveyContent(language=language, rows=rows, media=cells)
+    write_book(path, content, overwrite=overwrite)
 
 
 def write_survey(
@@ -94,7 +106,7 @@ def write_survey(
     scale about the zoom centre. `bifocal solve` gives the same from the workbook as from the pair.
     """
     path = check_book_path(path)
-    pair.refuse_media("a survey workbook (write a text table: .csv)")
+    pair.refuse_ports_that_lean("a survey workbook")
     check_new_workbook(path, overwrite=overwrite)
     content = SurveyContent(
         language=language,

@@ -33,6 +33,7 @@ from bifocal.survey.remarks import (
 )
 from bifocal.survey.setup import SCALE_TOLERANCE, SurveySetup
 from bifocal.survey.sources import BOOKS, Source, given_pair, measured, with_setup_of
+from bifocal.survey.survey_media import UNBENT, SurveyMedia
 from bifocal.survey.tolerances import RULES, ToleranceRule, as_rule
 from bifocal.survey.units import (
     as_pixels,
@@ -251,12 +252,23 @@ def solve(
         sensor=setup.sensor,
         limits=setup.limits,
         orientation_check=solved.check,
+        media=_media(survey, pair, general),
         adjusted=adjust_setup,
         corrections=solved.corrections,
         given={name: value for name, value in asked.items() if value is not None},
         rules=judged,
         remarks=tuple(dict.fromkeys(remarks)),
     )
+
+
+def _media(
+    survey: SurveyInput, pair: Pair | Path | str | None, general: Pair | None
+) -> SurveyMedia | None:
+    """Return what the cells of media hold of a general pair: as typed, or those of its file."""
+    typed = survey.setup.media
+    if general is None or pair is None:
+        return typed
+    return SurveyMedia.of_photos((general.image1, general.image2), typed.media if typed else 0)
 
 
 def _checked(**numbers: float | None) -> dict[str, Any]:
@@ -327,7 +339,12 @@ def _with_centre(
     pixels: tuple[FloatArray, FloatArray],
     sigma_px: float | None,
 ) -> tuple[Pair, tuple[str, ...]]:
-    """Return a pair corrected by its plane points with the centre of zoom that the others show."""
+    """Return a pair corrected by its plane points with the centre of zoom that the others show.
+
+    Through media relief spreads from no one point: the nadirs stay as stated.
+    """
+    if pair.layers not in (None, UNBENT):
+        return pair, ()
     rows = points.use & ~points.on_plane
     first, second = (
         photo.picks(picked[rows], sigma_px)
@@ -424,7 +441,9 @@ def _solve_ideal(survey: SurveyInput, scale_tolerance: float, *, adjust: bool) -
     if check is not None:
         remarks += check.remarks
         if adjust:
-            scale = pair.image1.plane_from_pixel[0, 0]
+            # Through media image 2 keeps its own scale: what the wall seems is not c / d.
+            bent = setup.media is not None and setup.media.layers is not None
+            scale = (pair.image2 if bent else pair.image1).plane_from_pixel[0, 0]
             correction = check.matrix @ pair.image2.plane_from_pixel / [[scale], [scale], [1.0]]
             moved = apply_homography(correction, xy2)
             only_theta = points.polar * np.array([np.nan, np.nan, 1.0])
@@ -436,6 +455,8 @@ def _solve_ideal(survey: SurveyInput, scale_tolerance: float, *, adjust: bool) -
             )
             corrections = _with_corrections(setup, correction, centre)
             c2 = None if setup.c1 is None else setup.c1 * pair.d2 / pair.d1
+            if bent:
+                c2 = setup.c2
             setup = replace(setup, unit="mm", c2=c2, adjusted=(None, None))
             pair = setup.pair()
             remarks += said
@@ -443,7 +464,7 @@ def _solve_ideal(survey: SurveyInput, scale_tolerance: float, *, adjust: bool) -
                 remarks.append("Set-up: coordinates count from the centre of zoom found.")
             remarks.append(
                 "Set-up: image 2 was corrected by the points of the reference plane; its "
-                "coordinates are now in mm at the scale of image 1."
+                f"coordinates are now in mm at the scale of image {2 if bent else 1}."
             )
     if setup.c1 is None:
         remarks.append("c_1 and c_2 are not given: relief is solved, X and Y are not.")
@@ -454,7 +475,7 @@ def _solve_ideal(survey: SurveyInput, scale_tolerance: float, *, adjust: bool) -
         setup=setup,
         check=check,
         corrections=corrections,
-        remarks=tuple(filter(None, remarks)),
+        remarks=(*filter(None, remarks), *refraction_remarks(pair, measured)),
     )
 
 

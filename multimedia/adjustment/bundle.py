@@ -16,6 +16,7 @@ from multimedia.adjustment.bundle_equations import (
     Pose,
 )
 from multimedia.adjustment.interior_choice import choose_interior, with_interior
+from multimedia.adjustment.media_unknowns import WITH_VALUE
 from multimedia.adjustment.plausibility import (
     EXACT,
     refuse_impossible_media,
@@ -58,8 +59,8 @@ def bundle_adjust(project: Project, unknowns: Unknowns | None = None) -> Adjustm
     InputError
         If the project lacks measurements, or names in ``unknowns`` do not exist.
     GeometryError
-        If the data leave a combination of unknowns open: the message names them. If an index or a
-        thickness comes out as none that the medium can have.
+        If the data leave a combination of unknowns open: the message names them. If an index, a
+        thickness, a radius or a gradient comes out as none that the media can have.
     ConvergenceError
         If the iteration does not settle.
 
@@ -358,7 +359,7 @@ def _values(bundle: Bundle, state: BundleState) -> tuple[FloatArray, FloatArray]
     for who, at in place.media.items():
         interface = state.media[who]
         for name, column in at.items():
-            if name.startswith(("index", "thickness")):
+            if name.startswith(WITH_VALUE):
                 values[column] = interface.value(name)
     kept = place.points >= 0
     values[place.points[kept]] = state.points[kept]

@@ -7,14 +7,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from multimedia.adjustment.media_unknowns import OF_MATERIAL, media_unknowns
 from multimedia.adjustment.unknowns import Unknowns
 from multimedia.media.camera import EXTERIOR, INTERIOR
 from multimedia.projects.model import Project
 from photocore.arrays import BoolArray, IntArray
 from photocore.errors import InputError
 
-#: Media parameters that are properties of a material: one value for all media unless named.
-_MATERIAL = ("index", "thickness")
 #: Columns by the name of the parameter.
 Places = Mapping[str, int]
 
@@ -45,20 +44,6 @@ class BundleColumns:
     plates: tuple[Places, ...]
     points: IntArray
     priors: Mapping[int, float]
-
-
-def typical_sigma(name: str, start: float) -> float:
-    """Return how well an index or a thickness is known before it is measured.
-
-    Indices to 0.005 (water from 0 to 40 degrees and fresh to sea differs by 0.01 in all, glass
-    of one kind by less), thicknesses to a tenth.
-
-    Examples
-    --------
-    >>> typical_sigma("index3", 1.33), typical_sigma("thickness1", 6.0)
-    (0.005, 0.6000000000000001)
-    """
-    return 0.005 if name.startswith("index") else 0.1 * abs(start)
 
 
 def place_columns(
@@ -125,11 +110,9 @@ def _prior_columns(
     if missing:
         shown = ", ".join(list(labels)[:40])
         raise InputError(f"priors: {', '.join(missing)} is not estimated; unknowns are {shown}.")
-    for owner, places in media.items() if unknowns.typical_priors else ():
-        for name, column in places.items():
-            if name.startswith(_MATERIAL):
-                start = float(project.media[owner].value(name))
-                priors.setdefault(column, typical_sigma(name, start))
+    if unknowns.typical_priors:
+        for item in media_unknowns(project, tuple(labels), media):
+            priors.setdefault(item.column, item.typical)
     return {column: sigma for column, sigma in priors.items() if np.isfinite(sigma)}
 
 
@@ -154,18 +137,16 @@ def _media_columns(
             if owner not in project.media:
                 raise InputError(f"media: there are no media {owner!r}, only {', '.join(used)}.")
             allowed = project.media[owner].parameter_names
-            if not allowed:
-                raise InputError(
-                    f"media: {owner} is ray-traced; only plane-parallel media can be estimated."
-                )
             if parameter not in allowed:
+                hint = " For a gradient write gradient = 0 into its section."
                 raise InputError(
                     f"media: {owner} has no {parameter!r}; its parameters are {', '.join(allowed)}."
+                    + hint * (parameter == "gradient")
                 )
             own = columns.setdefault(owner, {})
             if parameter in own:
                 raise InputError(f"media: {', '.join(wanted)} names the same unknown twice.")
-            common = not who and parameter.startswith(_MATERIAL)
+            common = not who and parameter.startswith(OF_MATERIAL)
             label = parameter if common else f"{owner}:{parameter}"
             own[parameter] = labels.setdefault(label, len(labels))
     return dict(columns)
@@ -177,7 +158,7 @@ def with_common_values(project: Project, unknowns: Unknowns) -> Project:
     Cameras that share a set of interior parameters have those in common that are estimated.
     """
     media = dict(project.media)
-    for item in (n for n in unknowns.media if n.startswith(_MATERIAL) and ":" not in n):
+    for item in (n for n in unknowns.media if n.startswith(OF_MATERIAL) and ":" not in n):
         flat = {
             name: interface
             for name, interface in media.items()

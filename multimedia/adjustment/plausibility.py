@@ -8,7 +8,8 @@ from dataclasses import replace
 import numpy as np
 from scipy.stats import chi2, norm
 
-from multimedia.adjustment.bundle_columns import BundleColumns, typical_sigma
+from multimedia.adjustment.bundle_columns import BundleColumns
+from multimedia.adjustment.media_unknowns import media_unknowns
 from multimedia.adjustment.unknowns import Adjustment
 from multimedia.media.camera import EXTERIOR, INTERIOR
 from multimedia.projects.model import Project
@@ -36,6 +37,8 @@ _TESTED = {name: 1.0 if name == "scale" else 0.0 for name in INTERIOR[3:]}
 _REMEDIES = (
     (("thickness",), "remedy_thickness"),
     (("index",), "remedy_index"),
+    (("radius", "centre", "shift"), "remedy_radius"),
+    (("gradient",), "remedy_gradient"),
     (("offset", "tilt"), "remedy_offset"),
     (("p1", "p2"), "remedy_p1"),
     (("k1", "k2", "k3"), "remedy_k1"),
@@ -47,7 +50,7 @@ _REMEDIES = (
 def refuse_impossible_media(
     project: Project, columns: BundleColumns, result: Adjustment, given: Mapping[str, float]
 ) -> None:
-    """Refuse indices and thicknesses that the medium named cannot have.
+    """Refuse indices, thicknesses, radii and gradients that the media named cannot have.
 
     Parameters
     ----------
@@ -63,12 +66,11 @@ def refuse_impossible_media(
     GeometryError
         Naming the unknown, its value and what it cannot be told apart from.
     """
-    for label, name, start in material_unknowns(project, columns):
-        sigma = given.get(label, typical_sigma(name, start))
+    for item in media_unknowns(project, columns.labels, columns.media):
+        label, start = item.label, item.start
+        reach = FARTHEST * given.get(label, item.typical)
         value, own = result.value(label), result.sigma(label)
-        least, most = (1.0, 3.0) if name.startswith("index") else (1e-6 * start, np.inf)
-        reach = FARTHEST * sigma
-        if max(least, start - reach) < value < min(most, start + reach):
+        if max(item.least, start - reach) < value < min(item.most, start + reach):
             continue
         row = result.names.index(label)
         others = np.abs(result.correlations[row])
@@ -82,20 +84,9 @@ def refuse_impossible_media(
         raise GeometryError(
             f"adjust: {label} comes out as {value:.4g} +- {own:.2g}, {start:g} was given: the data "
             f"cannot carry it{alike}. Give what is known as a standard deviation (--prior "
-            f"{label}={typical_sigma(name, start):.3g}), measure points at more depths, or take "
-            f"{name} out of --media. If it really is another medium, change its start value in the "
-            "project."
+            f"{label}={item.typical:.3g}), measure points at more depths, or take {item.name} out "
+            "of --media. If it really is so, change its start value in the project."
         )
-
-
-def material_unknowns(project: Project, columns: BundleColumns) -> Iterator[tuple[str, str, float]]:
-    """Yield label, parameter and start value of every unknown index and thickness, once."""
-    told = set()
-    for owner, places in columns.media.items():
-        for name, column in places.items():
-            if name.startswith(("index", "thickness")) and column not in told:
-                told.add(column)
-                yield columns.labels[column], name, float(project.media[owner].value(name))
 
 
 def with_model_error(result: Adjustment, order: tuple[IntArray, ...]) -> Adjustment:
@@ -173,13 +164,13 @@ def remarks_on_unknowns(
 
 
 def _uncarried(project: Project, columns: BundleColumns, result: Adjustment) -> Iterator[str]:
-    """Yield the indices and thicknesses that rest on their priors alone."""
-    for label, _, start in material_unknowns(project, columns):
-        prior = columns.priors.get(columns.labels.index(label))
-        if prior is not None and result.sigma(label) > UNCARRIED * prior * result.model_error:
+    """Yield the unknowns of media that rest on their priors alone."""
+    for item in media_unknowns(project, columns.labels, columns.media):
+        prior, own = columns.priors.get(item.column), result.sigma(item.label)
+        if prior is not None and own > UNCARRIED * prior * result.model_error:
             yield (
-                f"{label}: the data hardly carry it; it rests on what was given, {start:g} "
-                f"+- {prior:.2g}."
+                f"{item.label}: the data hardly carry it; it rests on what was given, "
+                f"{item.start:g} +- {prior:.2g}."
             )
 
 
@@ -239,7 +230,7 @@ def remedy_of(kind: tuple[str, str]) -> str:
 
 
 def _insignificant(result: Adjustment) -> Iterator[str]:
-    """Yield the lens parameters that the geometry does not carry."""
+    """Yield the lens parameters and gradients that the geometry does not carry."""
     for name, neutral in _TESTED.items():
         labels = [label for label in result.names if label.rpartition(":")[2] == name]
         if labels and significance(result, labels, neutral) > RISK_PARAMETER:
@@ -247,6 +238,12 @@ def _insignificant(result: Adjustment) -> Iterator[str]:
             yield (
                 f"{name} is not significant at 1 % ({whose}): leave it out of --interior, or say "
                 "--interior auto."
+            )
+    for label in result.names:
+        if label.endswith("gradient") and significance(result, [label]) > RISK_PARAMETER:
+            yield (
+                f"{label} is not significant at 1 %: the water may be the same at all depths; "
+                "leave it out of --media."
             )
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from functools import partial
 from pathlib import Path
 
@@ -10,9 +10,10 @@ import numpy as np
 
 from multimedia.adjustment import report_figures as figures
 from multimedia.adjustment.plausibility import alike_pairs, remedy_of
-from multimedia.adjustment.unknowns import Adjustment
+from multimedia.adjustment.unknowns import Adjustment, decimals
 from multimedia.media.flat_interface import FlatInterface
 from multimedia.media.interfaces import Interfaces
+from multimedia.media.surfaces import Cylinder, Plane, RefractingSurface, Sphere
 from photocore.adjustment import OUTLIER_LIMIT
 from photocore.arrays import FloatArray
 from photocore.provenance import program, provenance, today
@@ -136,22 +137,43 @@ def _media(result: Adjustment, say: Words) -> Iterator[Block]:
         thick = media.layers.thicknesses if isinstance(media, FlatInterface) else ()
         rows.append([
             name, ", ".join(cameras[:6]) + many, ", ".join(f"{n:.5f}" for n in media.indices),
-            ", ".join(f"{t:.6g}" for t in thick) or "-", _place(media, say),
+            ", ".join(f"{t:.6g}" for t in thick) or "-", _place(media, say, project.unit),
         ])  # fmt: skip
     keys = ("media_name", "media_cameras", "media_indices", "media_thicknesses", "media_place")
     yield TextTable(headings=[say(key, unit=project.unit) for key in keys], rows=rows)
 
 
-def _place(media: FlatInterface | Interfaces, say: Words) -> str:
+def _surface(surface: RefractingSurface, say: Words, vector: Callable[[FloatArray], str]) -> str:
+    """Return in words where a surface lies."""
+    if isinstance(surface, Plane):
+        place, direction, radius = surface.point, surface.normal, 0.0
+    elif isinstance(surface, Cylinder):
+        place, direction, radius = surface.point, surface.axis, surface.radius
+    elif isinstance(surface, Sphere):
+        place, direction, radius = surface.centre, surface.centre, surface.radius
+    else:
+        return type(surface).__name__
+    return say(
+        f"surface_{type(surface).__name__}", place=vector(place), direction=vector(direction),
+        radius=f"{radius:.7g}",
+    )  # fmt: skip
+
+
+def _place(media: FlatInterface | Interfaces, say: Words, unit: str) -> str:
     """Return in words where the faces of media lie."""
-    if isinstance(media, Interfaces):
-        kinds = ", ".join(type(surface).__name__ for surface in media.surfaces)
-        return say("media_surfaces", count=len(media.surfaces), kinds=kinds)
 
     def vector(values: FloatArray) -> str:
         # Adding nought makes no difference of -0.
         return "(" + ", ".join(f"{round(float(v), 5) + 0.0:g}" for v in values) + ")"
 
+    if isinstance(media, Interfaces):
+        kinds = "; ".join(_surface(surface, say, vector) for surface in media.surfaces)
+        told = say("media_surfaces", count=len(media.surfaces), kinds=kinds)
+        if not media.is_graded:
+            return told
+        return told + say(
+            "media_gradient", gradient=f"{media.gradient:.3g}", level=f"{media.level:g}", unit=unit
+        )
     key = "media_camera" if media.moves_with_camera else "media_world"
     return say(key, point=vector(media.point), normal=vector(media.normal))
 
@@ -160,10 +182,11 @@ def _unknowns(result: Adjustment, say: Words) -> Iterator[Block]:
     yield Heading(text=say("unknowns"))
     rows = []
     for name, value, sigma, unit in result.rows():
-        digits = max(0, min(12, 2 - int(np.floor(np.log10(sigma))) if sigma > 0 else 6))
+        digits = decimals(sigma)
         rows.append([name, f"{value:.{digits}f}", f"{sigma:.{digits}f}", unit])
     yield TextTable(headings=[say("unknown"), say("value"), "sigma", say("unit")], rows=rows)
-    if any(":offset" in name or "tilt" in name or name == "offset" for name in result.names):
+    counted = ("offset", "tilt", "shift")
+    if any(name.rpartition(":")[2].startswith(counted) for name in result.names):
         yield Paragraph(text=say("offsets_note"), small=True)
 
 

@@ -58,9 +58,9 @@ class Unknowns:
         One set for all cameras (the same camera moved), one for each, or camera name to the name
         of a set.
     media : tuple of str
-        Unknowns of the media. ``index3`` or ``thickness1``: one value common to all media;
-        ``offset``, ``tilt1``, ``tilt2``: one for each; ``wall:index3``: of the media ``wall``
-        only.
+        Unknowns of the media. ``index3``, ``thickness1`` or ``gradient``: one value common to all
+        media; ``offset``, ``tilt1``, ``tilt2``, ``radius``, ``centreX``... (see
+        `Interfaces.parameter_names`): one for each; ``wall:index3``: of the media ``wall`` only.
     control : str
         ``fixed``: control points are error-free unless they have a sigma; ``weighted``: all
         need a sigma; ``free``: their coordinates are start values, the datum is that of a free
@@ -74,7 +74,9 @@ class Unknowns:
         2 mm is ``{"water:offset": 0.002}``; ``c`` alone means that of every camera. Infinite:
         nothing is known, any value that physics allows is taken.
     typical_priors : bool
-        Give indices (0.005) and thicknesses (a tenth) a prior where ``priors`` has none.
+        Give indices (0.005), thicknesses and radii (a tenth), centres and axes (a tenth of the
+        radius) and gradients (0.005 over the depth of the points) a prior where ``priors`` has
+        none.
     robust : float or None
         Huber's bound in standard deviations; observations beyond it lose weight. None: plain
         least squares.
@@ -105,6 +107,8 @@ class Unknowns:
                 positive(sigma, f"prior of {label}")
 
 
+#: Beginnings of the names of lengths among the parameters of media.
+_LENGTHS = ("offset", "thickness", "radius", "centre", "shift")
 #: Units of interior parameters.
 _INTERIOR_UNITS = {
     "c": "mm", "xh": "mm", "yh": "mm", "k1": "mm^-2", "k2": "mm^-4", "k3": "mm^-6",
@@ -124,7 +128,8 @@ class Adjustment:
         Labels of the unknowns that are not object points: ``cam1:X0``, ``interior:c``,
         ``index3``, ``wall:offset``, ``plate A:X0``.
     values : ndarray, shape (u,)
-        Their adjusted values; offsets and tilts count from the start. [object unit, rad, mm]
+        Their adjusted values; offsets, shifts and tilts count from the start. [object unit, rad,
+        mm]
     covariance : ndarray, shape (u, u)
         Of those, with the a-posteriori sigma0.
     point_covariance : ndarray, shape (p, 3, 3)
@@ -189,9 +194,11 @@ class Adjustment:
 
     def _unit(self, parameter: str) -> str:
         """Return the unit of a parameter; empty for numbers without one."""
-        if parameter in (*EXTERIOR[3:], "tilt1", "tilt2"):
+        if parameter in EXTERIOR[3:] or parameter.startswith("tilt"):
             return "deg"
-        if parameter in EXTERIOR or parameter.startswith(("offset", "thickness")):
+        if parameter == "gradient":
+            return f"1/{self.project.unit}"
+        if parameter in EXTERIOR or parameter.startswith(_LENGTHS):
             return self.project.unit
         return _INTERIOR_UNITS.get(parameter, "")
 
@@ -219,3 +226,14 @@ class Adjustment:
             f"{np.hypot(*self.residuals[row]) * 1000:.1f} um, {worst[row]:.1f} sigma"
             for row in rows
         ]
+
+
+def decimals(sigma: float) -> int:
+    """Return how many decimals a value of this standard deviation is worth: three of its digits.
+
+    Examples
+    --------
+    >>> decimals(0.0123), decimals(25.0), decimals(0.0)
+    (4, 1, 6)
+    """
+    return max(0, min(12, 2 - int(np.floor(np.log10(sigma))) if sigma > 0 else 6))

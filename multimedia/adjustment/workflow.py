@@ -98,8 +98,8 @@ def salinity_of(
     None if the last medium's index was not estimated.
     """
     media = [interface for interface in result.project.interfaces if interface is not None]
-    last = media[0].parameter_names[-1:] if media else ()
-    names = [name for name in result.names if name.rpartition(":")[2] in last]
+    last = f"index{len(media[0].indices)}" if media else ""
+    names = [name for name in result.names if name.rpartition(":")[2] == last]
     if not names:
         return None
     water: dict[str, Any] = {"wavelength_nm": wavelength_nm, "temperature_c": temperature_c}

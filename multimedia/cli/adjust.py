@@ -23,8 +23,9 @@ Examples:
   multimedia adjust tank.toml --media index3 --wavelength 520 --temperature 20 --depth 0.1
 
 Unknowns of the media: offset, tilt1, tilt2, thickness1..., index1... counted from the camera;
-NAME:index3 for one media of several. Labels for --prior are those of the result; c alone means that
-of every camera.
+radius, centreX, centreY, centreZ of a dome; radius, shift1, shift2, tilt1, tilt2 of a tube;
+gradient of the index with depth; NAME:index3 for one media of several. Labels for --prior are those
+of the result; c alone means that of every camera.
 """
 
 
@@ -61,7 +62,8 @@ of every camera.
 @click.option(
     "--prior", multiple=True, metavar="LABEL=SIGMA",
     help="Standard deviation of an unknown's start value [its unit]; inf: not known at all; repeat "
-    "it.  [default: indices 0.005, thicknesses a tenth, others inf]",
+    "it.  [default: indices 0.005, thicknesses and radii a tenth, centres a tenth of the radius, "
+    "gradients 0.005 over the depth of the points, others inf]",
 )  # fmt: skip
 @number(
     "--robust", "K", "Huber weights beyond K standard deviations.  [default: plain least squares]"
@@ -109,7 +111,12 @@ def command(
 
 def _lines(result: Adjustment) -> list[str]:
     """Return sigma0, the unknowns and the suspects."""
-    rows = [(name, f"{value:.6f}", f"{s:.2g}", unit) for name, value, s, unit in result.rows()]
+    from multimedia.adjustment.unknowns import decimals
+
+    rows = [
+        (name, f"{value:.{max(6, decimals(s))}f}", f"{s:.2g}", unit)
+        for name, value, s, unit in result.rows()
+    ]
     suspects = result.suspects()
     return [
         text_table(("unknown", "value", "sigma", ""), rows),

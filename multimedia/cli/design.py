@@ -128,7 +128,7 @@ def _lines(result: Design) -> Iterator[str]:
             [(n, *(f"{v:.3g}" for v in e), f"{s * 1000:.2f}") for n, e, s in cases],
         )
     if result.models:
-        yield f"\nSimplified models in place of the rigorous one, error across the ray [{unit}]"
+        yield f"\nSimplified models in place of the rigorous one, error at the points [{unit}]"
         yield text_table(
             ("model", "RMS", "largest"),
             [(name, f"{rms:.3g}", f"{largest:.3g}") for name, rms, largest in result.models],

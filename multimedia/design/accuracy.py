@@ -16,6 +16,7 @@ from multimedia.design.studies import CalibrationCosts, Placement, Study
 from multimedia.media.camera import EXTERIOR, Camera
 from multimedia.media.flat_interface import FlatInterface
 from multimedia.media.projection import project, project_with_jacobian
+from multimedia.media.surfaces import tangents_of, unit_vector
 from multimedia.orientation.intersection import intersect
 from multimedia.orientation.object_rays import image_rays, largest_angle
 from multimedia.orientation.resection import resect
@@ -170,7 +171,7 @@ def ring_of_cameras(
     target: ArrayLike,
     principal_distance: float,
 ) -> tuple[Camera, ...]:
-    """Return cameras evenly on a cone about the vertical through the target, all looking at it.
+    """Return cameras evenly on a cone about the faces' normal through the target, looking at it.
 
     Parameters
     ----------
@@ -181,7 +182,8 @@ def ring_of_cameras(
     half_angle : float
         Of the cone, in air; 0 puts them all on the axis. [rad]
     interface : FlatInterface
-        What they look through; a camera that would stand inside it raises `GeometryError`.
+        What they look through, standing still in the world at any place and tilt; a camera that
+        would stand inside it raises `GeometryError`.
     target : array_like, shape (3,)
         Point in the object's medium that they aim at as it appears.
     principal_distance : float
@@ -189,14 +191,20 @@ def ring_of_cameras(
     """
     cameras = []
     target = as_points(target, "target", dimension=3)
-    top = np.array([target[0], target[1], 0.0])
+    if interface.moves_with_camera:
+        raise InputError(
+            "ring_of_cameras: the interface moves with the camera; give one that stands still in "
+            "the world, a water surface or the wall of a tank."
+        )
+    normal = interface.normal
+    top = target + ((interface.point - target) @ normal) * normal
+    # Azimuths from X, or what is left of it in the face.
+    level = np.eye(3)[0] - normal[0] * normal
+    across = tangents_of(normal)[0] if np.linalg.norm(level) < 0.1 else unit_vector(level, "level")
     for k in range(count):
         azimuth = 2 * np.pi * k / count
-        offset = np.array(
-            [np.sin(half_angle) * np.cos(azimuth), np.sin(half_angle) * np.sin(azimuth),
-             np.cos(half_angle)]
-        )  # fmt: skip
-        centre = top + distance * offset
+        aside = np.cos(azimuth) * across + np.sin(azimuth) * np.cross(normal, across)
+        centre = top + distance * (np.cos(half_angle) * normal + np.sin(half_angle) * aside)
         # Aim where the target appears: shift the aim by the image of the target.
         aim = target.copy()
         for _ in range(AIMING_ROUNDS):

@@ -38,7 +38,8 @@ class Approximation(NamedTuple):
     image_error : ndarray, shape (...)
         Radial distance the model predicts minus the true one, positive outwards. [mm]
     object_error : ndarray, shape (...)
-        The same at the point, across the line of sight. [unit of the heights]
+        Where the model would put a point of this image, at its true depth: its true distance from
+        the nadir minus that, to first order. [unit of the heights]
     rms : float
         Root mean square of image_error. [mm]
     """
@@ -239,6 +240,8 @@ def _judged(seen: _Seen, absorbed: float, distortion: tuple[float, ...] = ()) ->
     plain = absorbed * seen.tangent
     predicted = plain * (1 + sum(k * plain ** (2 * i) for i, k in enumerate(distortion, start=1)))
     error = np.asarray(predicted - seen.image)
-    # An image error seen as a displacement of the point: the scale there is true image / R.
-    at_object = np.asarray(error * seen.whole / absorbed)
+    # An image error seen as a displacement of the point, to first order: the model's own scale
+    # there is the slope of its radial distance over R.
+    rate = 1 + sum((2 * i + 1) * k * plain ** (2 * i) for i, k in enumerate(distortion, start=1))
+    at_object = np.asarray(error * seen.whole / (absorbed * rate))
     return Approximation(absorbed, distortion, error, at_object, float(np.sqrt(np.mean(error**2))))

@@ -88,7 +88,7 @@ class Design:
     placements : tuple of Placement
     costs : CalibrationCosts or None
     models : tuple of (model, RMS error, largest error)
-        What simplified refraction models would get wrong at the points, across the line of sight,
+        What simplified refraction models would get wrong at the points, at their depth,
         were the camera square to the media. [unit]
     seam : float
         Largest distance of red and blue in the image of the points. [mm]

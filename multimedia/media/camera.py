@@ -260,7 +260,9 @@ class Camera:
             # The product of many small turns drifts off by rounding; one polar step mends it.
             rotation = rotation @ (1.5 * np.eye(3) - 0.5 * rotation.T @ rotation)
         terms = {
-            name: getattr(self.distortion, name) + change.get(name, 0.0) for name in DISTORTION
+            name: getattr(self.distortion, name) + change[name]
+            for name in DISTORTION
+            if name in change
         }
         return replace(
             self,
@@ -268,7 +270,7 @@ class Camera:
             rotation=rotation,
             principal_distance=self.principal_distance + change.get("c", 0.0),
             principal_point=self.principal_point + [change.get(n, 0.0) for n in ("xh", "yh")],
-            distortion=replace(self.distortion, **terms),
+            distortion=replace(self.distortion, **terms) if terms else self.distortion,
         )
 
     def angle_rates(self) -> FloatArray:

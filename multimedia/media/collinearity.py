@@ -27,7 +27,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from multimedia.refraction.layers import Layers
-from multimedia.refraction.shift import shift_ratio
+from multimedia.refraction.shift import ratio_of, shift_ratio
 from photocore.arrays import FloatArray
 
 
@@ -216,7 +216,8 @@ def _inverse_ratio(
     indices = medium.layers.indices
     heights: list[FloatArray | float] = [medium.first_height, *medium.layers.thicknesses, depth]
     if below.all():
-        return rho2, 1.0 / shift_ratio(np.sqrt(rho2), heights, indices), heights
+        layers = [np.asarray(height) for height in heights]
+        return rho2, 1.0 / ratio_of(np.sqrt(rho2), layers, indices), heights
     q = np.full_like(w, np.nan)
     inside = [h[below] if isinstance(h, np.ndarray) else h for h in heights]
     q[below] = 1.0 / shift_ratio(np.sqrt(rho2[below]), inside, indices)

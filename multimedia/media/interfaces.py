@@ -2,26 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from multimedia.media.camera import EXTERIOR, Camera
+from multimedia.media.camera import Camera
 from multimedia.media.optical_media import OpticalMedia, Sight, SightDerivatives
+from multimedia.media.ray_march import PathChanges
 from multimedia.media.ray_paths import RayStatus
-from multimedia.media.ray_tracing import aim_rays, trace_rays
+from multimedia.media.ray_tracing import aim_rays, pointing_changes, trace_rays
+from multimedia.media.surface_motion import Body, SurfaceMotion, bodies_of
 from multimedia.media.surface_sequence import SurfaceSequence
 from multimedia.media.surfaces import Plane, RefractingSurface
 from multimedia.refraction.layers import Layers
-from photocore.arrays import FloatArray, read_only
+from photocore.arrays import FloatArray, as_floats, read_only
 from photocore.errors import InputError
 from photocore.rotation import checked_rotation, skew
-
-#: Step of central differences as a share of the distance: paths are exact to 1e-13 of the scene,
-#: so differences are good to 1e-8.
-STEP = 1e-5
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -37,6 +35,8 @@ class Interfaces(SurfaceSequence, OpticalMedia):
     with_camera : tuple of bool
         Per surface: True if it is given in the camera frame and moves with the camera (the window
         or dome of a housing), False if it stands still in the object frame (a tank, the sea).
+    gradient, level : float
+        In the object frame, see `SurfaceSequence`; 0: the object's medium is the same everywhere.
 
     Examples
     --------
@@ -120,7 +120,7 @@ class Interfaces(SurfaceSequence, OpticalMedia):
             surface.moved(rotation, translation) if moves else surface
             for surface, moves in zip(self.surfaces, self.with_camera, strict=True)
         )
-        return Interfaces(surfaces=surfaces, indices=self.indices)
+        return replace(self, surfaces=surfaces, with_camera=())
 
     def seen(self, camera: Camera, points: FloatArray) -> tuple[FloatArray, NDArray[np.object_]]:
         """Return vectors as long as those to the points, along the rays that reach them.
@@ -139,83 +139,133 @@ class Interfaces(SurfaceSequence, OpticalMedia):
         paths = trace_rays(camera.centre, directions @ camera.rotation.T, fixed)
         return paths.vertices[..., -1, :], paths.directions[..., -1, :]
 
+    @property
+    def bends_in_object(self) -> bool:
+        """Whether the index of the last medium changes with depth."""
+        return self.is_graded
+
+    @property
+    def bodies(self) -> tuple[Body, ...]:
+        """Surfaces that keep their form together, such as the two faces of a dome."""
+        return bodies_of(self.surfaces, self.with_camera)
+
+    @property
+    def parameter_names(self) -> tuple[str, ...]:
+        """Names of everything that an adjustment may estimate.
+
+        Of each body: ``centreX``, ``centreY``, ``centreZ`` and ``radius`` of spheres; ``shift1``,
+        ``shift2`` across and ``tilt1``, ``tilt2`` of the axis and ``radius`` of cylinders;
+        ``offset``, ``tilt1``, ``tilt2`` of planes, as in `FlatInterface`. Those of a body whose
+        first surface is number k > 1 end in ``@k``. The radius is that of the first face; all
+        grow alike. Then ``thickness1``... of the layers between the faces of one body, the last
+        face staying where it is, ``index1``... and ``gradient``.
+        """
+        bodies = self.bodies
+        return (
+            *(name for body in bodies for name in body.parameters),
+            *(name for body in bodies for name in body.layers),
+            *(f"index{k}" for k in range(1, len(self.indices) + 1)),
+            "gradient",
+        )
+
+    def value(self, name: str) -> float:
+        """Return a parameter; offsets, shifts and tilts count from where the body is."""
+        self._refuse_unknown([name])
+        if name == "gradient":
+            return self.gradient
+        if name.startswith("index"):
+            return self.indices[int(name[5:]) - 1]
+        return self._body_of(name).value(name)
+
+    def stepped(self, names: Sequence[str], step: ArrayLike) -> Interfaces:
+        """Return the interfaces after adding ``step`` to the named parameters.
+
+        Raises
+        ------
+        InputError
+            If a name is unknown, or an index or radius leaves what is possible.
+        """
+        self._refuse_unknown(names)
+        surfaces, indices, gradient = list(self.surfaces), list(self.indices), self.gradient
+        for name, size in zip(names, as_floats(step, "step").tolist(), strict=True):
+            if name == "gradient":
+                gradient += size
+            elif name.startswith("index"):
+                indices[int(name[5:]) - 1] += size
+            else:
+                body = self._body_of(name)
+                for k, motion in enumerate(body.motions(name), start=body.first - 1):
+                    surfaces[k] = motion.applied(surfaces[k], size)
+        # A surface that is met twice stays one.
+        kept: dict[int, RefractingSurface] = {}
+        moved = tuple(
+            kept.setdefault(id(old), new) for old, new in zip(self.surfaces, surfaces, strict=True)
+        )
+        return replace(self, surfaces=moved, indices=tuple(indices), gradient=gradient)
+
     def sight(
         self, camera: Camera, points: FloatArray, *, exterior: bool, names: Sequence[str] = ()
     ) -> Sight:
-        """Return directions with derivatives; of the parameters ``index1``, ``index2``... only.
-
-        Notes
-        -----
-        Analytic by the point, and by the camera as far as the interfaces stand still with the
-        object (rotation) or all move with the camera (everything). What remains, the shift of a
-        camera before interfaces that stand still, and the indices, are central differences.
-        """
+        """Return directions with derivatives, all of them analytic."""
+        self._refuse_unknown(names)
         fixed = self.seen_from(camera.centre, camera.rotation)
-        paths = aim_rays(camera.centre, points, fixed, jacobian=True)
-        directions: FloatArray = paths.directions[:, 0]
-        by_point: FloatArray = camera.rotation.T @ np.asarray(paths.jacobian)
-        pose = [self._by_exterior(camera, points, directions, by_point)] if exterior else []
-        by_exterior = np.concatenate([np.empty((len(points), 3, 0)), *pose], axis=-1)
-        by_indices = [self._by_index(camera, points, name)[..., None] for name in names]
-        by_media = np.concatenate([np.empty((len(points), 3, 0)), *by_indices], axis=-1)
+        directions: FloatArray = aim_rays(camera.centre, points, fixed).directions[:, 0]
+        # Where nothing moves with the camera, a turn of it only turns what it sees.
+        pose = (6 if any(self.with_camera) else 3) if exterior else 0
+        changes = self._changes(camera, pose, names)
+        centres = np.broadcast_to(camera.centre, points.shape)
+        by_point, by_changes = pointing_changes(centres, points, directions, fixed, changes)
+        by_pose = np.zeros((len(points), 3, 6 if exterior else 0))
+        by_pose[:, :, :pose] = by_changes[:, :, :pose]
+        if exterior:
+            by_pose[:, :, 3:] += skew(directions)
+        slopes = [camera.rotation.T @ d for d in (by_point, by_pose, by_changes[:, :, pose:])]
 
         def derivatives(by_seen: FloatArray) -> SightDerivatives:
-            return SightDerivatives(by_seen @ by_point, by_seen @ by_exterior, by_seen @ by_media)
+            return SightDerivatives(*(by_seen @ slope for slope in slopes))
 
         return Sight(directions @ camera.rotation, derivatives)
 
-    def _directions(self, camera: Camera, points: FloatArray) -> FloatArray:
-        """Return the unit vectors in the first medium towards points, in the camera frame."""
-        fixed = self.seen_from(camera.centre, camera.rotation)
-        vectors: FloatArray = aim_rays(camera.centre, points, fixed).directions[:, 0]
-        return vectors @ camera.rotation
-
-    def _by_exterior(
-        self, camera: Camera, points: FloatArray, directions: FloatArray, by_point: FloatArray
-    ) -> FloatArray:
-        """Return the derivatives of unit vectors by centre and rotation vector, (n, 3, 6)."""
-        distances = np.linalg.norm(points - camera.centre, axis=1)
-        distance = float(np.median(distances)) if len(points) else 1.0
-
-        def changed(steps: FloatArray) -> FloatArray:
-            def at(sign: float, step: FloatArray) -> FloatArray:
-                return self._directions(camera.stepped(EXTERIOR, sign * step), points)
-
-            sizes = np.linalg.norm(steps, axis=1)
-            both = [(at(1.0, step) - at(-1.0, step)) / 2.0 for step in steps]
-            return np.stack(both, axis=-1) / sizes
-
-        # R^T d turns by R^T (d x v): d is the ray where the interfaces stand still, the vector to
-        # the point where they turn with the camera.
-        by_turn: FloatArray
-        by_centre, by_turn = -by_point, by_point @ skew(points - camera.centre)
-        if not all(self.with_camera):
-            by_centre = changed(STEP * distance * np.eye(6)[:3])
-            turned = camera.rotation.T @ skew(directions)
-            by_turn = changed(STEP * np.eye(6)[3:]) if any(self.with_camera) else turned
-        return np.concatenate([by_centre, by_turn], axis=-1)
-
-    def _by_index(self, camera: Camera, points: FloatArray, name: str) -> FloatArray:
-        """Return the derivative of unit vectors by one refractive index."""
-        known = [f"index{k}" for k in range(1, len(self.indices) + 1)]
-        if name not in known:
-            raise InputError(
-                f"interface parameter {name}: of ray-traced surfaces only {', '.join(known)} can "
-                "be estimated."
+    def _changes(self, camera: Camera, pose: int, names: Sequence[str]) -> PathChanges:
+        """Return centre, turn (as far as ``pose`` goes) and named parameters as changes of rays."""
+        count, none = pose + len(names), (None,) * len(self.surfaces)
+        starts, motions = np.zeros((count, 3)), []
+        indices, gradients = np.zeros((count, len(self.indices))), np.zeros(count)
+        starts[: min(pose, 3)] = np.eye(3)[: min(pose, 3)]
+        for k in range(pose):
+            axis = np.eye(3)[k % 3]
+            own = (
+                SurfaceMotion(shift=axis)
+                if k < 3
+                else SurfaceMotion(turn=axis, pivot=camera.centre)
             )
-        place = known.index(name)
+            motions.append(tuple(own if moves else None for moves in self.with_camera))
+        for k, name in enumerate(names, start=pose):
+            if name == "gradient":
+                gradients[k] = 1.0
+            elif name.startswith("index"):
+                indices[k, int(name[5:]) - 1] = 1.0
+            motions.append(none if gradients[k] or indices[k].any() else self._moved(name, camera))
+        return PathChanges(
+            starts=starts, motions=tuple(motions), indices=indices, gradients=gradients
+        )
 
-        def at(step: float) -> FloatArray:
-            indices = [n + step * (k == place) for k, n in enumerate(self.indices)]
-            return self.with_indices(indices)._directions(camera, points)
+    def _moved(self, name: str, camera: Camera) -> tuple[SurfaceMotion | None, ...]:
+        """Return how each surface moves with a parameter, in the object frame."""
+        body = self._body_of(name)
+        motions: list[SurfaceMotion | None] = [None] * len(self.surfaces)
+        for k, motion in enumerate(body.motions(name), start=body.first - 1):
+            moves = self.with_camera[k]
+            motions[k] = motion.seen_from(camera.rotation, camera.centre) if moves else motion
+        return tuple(motions)
 
-        # Vacuum is the lower limit of an index: differences on one side there.
-        if self.indices[place] < 1.0 + STEP:
-            here, one, two = at(0.0), at(STEP), at(2 * STEP)
-            return (4.0 * one - 3.0 * here - two) / (2 * STEP)
-        return _difference(at, STEP)
+    def _body_of(self, name: str) -> Body:
+        """Return the body that has a parameter."""
+        return next(b for b in self.bodies if name in b.parameters or name in b.layers)
 
-
-def _difference(function: Callable[[float], FloatArray], size: float) -> FloatArray:
-    """Return the central difference."""
-    return (function(size) - function(-size)) / (2.0 * size)
+    def _refuse_unknown(self, names: Sequence[str]) -> None:
+        """Refuse names that are no parameter."""
+        known = self.parameter_names
+        for name in names:
+            if name not in known:
+                raise InputError(f"interface parameter {name}: not one of {', '.join(known)}.")

@@ -58,6 +58,11 @@ class OpticalMedia(ABC):
         return self
 
     @property
+    def bends_in_object(self) -> bool:
+        """Whether rays are curved in the object's medium itself; not unless a subclass says so."""
+        return False
+
+    @property
     def remarks(self) -> tuple[str, ...]:
         """What is odd about the media, in words; nothing unless a subclass says so."""
         return ()

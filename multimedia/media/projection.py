@@ -104,12 +104,17 @@ def project(camera: Camera, points: ArrayLike, layers: Media = None) -> FloatArr
     """
     xyz = as_points(points, "points", dimension=3)
     media = as_media(layers)
-    flat = xyz.reshape(-1, 3)
+    flat = _known(xyz.reshape(-1, 3))
     image: FloatArray = np.empty((len(flat), 2))
     for start in range(0, max(len(flat), 1), BLOCK):
         part = slice(start, start + BLOCK)
         image[part] = _image_of(media.apparent_vectors(camera, flat[part]), camera)
     return image.reshape(*xyz.shape[:-1], 2)
+
+
+def _known(points: FloatArray) -> FloatArray:
+    """Return points with NaN in place of infinities: both have no image."""
+    return np.where(np.isinf(points), np.nan, points) if np.isinf(points).any() else points
 
 
 def projection_status(camera: Camera, points: ArrayLike, layers: Media = None) -> list[str]:
@@ -127,7 +132,7 @@ def projection_status(camera: Camera, points: ArrayLike, layers: Media = None) -
         ``outside the lens model`` or ``outside the sensor`` (still projected).
     """
     xyz = as_points(points, "points", dimension=3).reshape(-1, 3)
-    vectors, reasons = as_media(layers).seen(camera, xyz)
+    vectors, reasons = as_media(layers).seen(camera, _known(xyz))
     image = _image_of(vectors, camera)
     outside: BoolArray = np.zeros(len(xyz), dtype=bool)
     if camera.sensor is not None:

@@ -11,16 +11,17 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import partial
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from multimedia.media.least_time import least_time_path
+from multimedia.media.ray_march import March, PathChanges, drift_at, march_rays, miss_of
 from multimedia.media.ray_paths import RayPaths, RayStatus
 from multimedia.media.surface_sequence import SurfaceSequence
 from multimedia.media.surfaces import Plane
-from photocore.arrays import BoolArray, FloatArray, IntArray, as_points
+from photocore.arrays import BoolArray, FloatArray, as_points
 
 #: Rays per block: keeps the working set of a block in the cache and memory constant.
 BLOCK = 32_768
@@ -33,34 +34,13 @@ STALLED = 0.97
 #: Other starts lie on rings around the best direction, so many misses wide (at the point).
 RINGS = (1.5, 6.0, 25.0)
 RING_STARTS = 6
-#: A ray may meet the next surface this far behind itself (share of the scene): surfaces in touch.
-TOUCH = 1e-12
 #: A path is accepted when it misses the point by less than this share of the scene size.
 TOLERANCE = 1e-13
 #: Stages in which the indices are brought in when the straight start does not reach the point.
 STAGES = (8, 64)
 
 
-class _March(NamedTuple):
-    """Rays after the last surface, with derivatives by the two start parameters."""
-
-    vertices: FloatArray  # (n, k, 3)
-    directions: FloatArray  # (n, k + 1, 3)
-    steps: FloatArray  # (n, 2, 3): derivative of the last vertex
-    bends: FloatArray  # (n, 2, 3): derivative of the last direction
-    status: IntArray  # (n,)
-
-    @property
-    def paths(self) -> RayPaths:
-        """Without derivatives."""
-        return RayPaths(vertices=self.vertices, directions=self.directions, status=self.status)
-
-    def take(self, rows: IntArray) -> _March:
-        """Return some of the rays."""
-        return _March._make(field[rows] for field in self)
-
-
-_Reached = tuple[_March, BoolArray]
+_Reached = tuple[March, BoolArray]
 
 
 def trace_rays(origins: ArrayLike, directions: ArrayLike, interfaces: SurfaceSequence) -> RayPaths:
@@ -83,8 +63,8 @@ def trace_rays(origins: ArrayLike, directions: ArrayLike, interfaces: SurfaceSeq
 
     Notes
     -----
-    Snell's law for unit vectors, with the normal n against the ray and mu = n1 / n2:
-    ``d' = mu d + (mu cos a - cos b) n``, ``cos a = -n . d``, ``cos b = sqrt(1 - mu^2 sin^2 a)``.
+    Snell's law in vector form, see `multimedia.media.ray_march`. In a last medium whose index
+    changes with depth the direction is that where the ray enters it.
 
     References
     ----------
@@ -103,7 +83,9 @@ def trace_rays(origins: ArrayLike, directions: ArrayLike, interfaces: SurfaceSeq
     return _blockwise(
         as_points(origins, "origins", dimension=3),
         as_points(directions, "directions", dimension=3),
-        lambda start, heading: _march(start, _unit(heading), interfaces, derivatives=False).paths,
+        lambda start, heading: (
+            march_rays(start, _unit(heading), interfaces, derivatives=False).paths
+        ),
     )
 
 
@@ -153,7 +135,7 @@ def aim_rays(
         paths = _aim_block(centre, target, interfaces)
         if not jacobian:
             return paths
-        derivative = _pointing_derivative(centre, target, paths.directions[:, 0], interfaces)
+        derivative, _ = pointing_changes(centre, target, paths.directions[:, 0], interfaces)
         return replace(paths, jacobian=derivative)
 
     return _blockwise(
@@ -185,64 +167,6 @@ def _blockwise(
     )
 
 
-def _march(
-    origins: FloatArray,
-    directions: FloatArray,
-    interfaces: SurfaceSequence,
-    *,
-    derivatives: bool = True,
-    frame: FloatArray | None = None,
-) -> _March:
-    """Trace unit directions; with derivatives by steps along the two vectors of ``frame``."""
-    count, total = len(interfaces.surfaces), len(origins)
-    vertices = np.full((total, count, 3), np.nan)
-    headings = np.full((total, count + 1, 3), np.nan)
-    headings[:, 0] = directions
-    status = np.zeros(total, dtype=np.int64)
-    here, heading = origins, directions
-    step = np.zeros((total, 2, 3))
-    bend = frame if frame is not None else np.zeros((total, 2, 3))
-    before = None
-    for number, surface in enumerate(interfaces.surfaces):
-        scale = np.abs(here).max(-1) + 1e-300
-        # A surface met twice in a row must be left first; different ones may touch.
-        beyond = (1e-9 if surface is before else -TOUCH) * scale
-        distance = surface.hop(here, heading, beyond)
-        status[(status == RayStatus.OK) & ~np.isfinite(distance)] = RayStatus.MISSED
-        moved = here + distance[:, None] * heading
-        normal = surface.normals(moved)
-        incline = (normal * heading).sum(-1)
-        normal = np.where((incline > 0)[:, None], -normal, normal)
-        cos_a = np.abs(incline)
-        ratio = interfaces.indices[number] / interfaces.indices[number + 1]
-        square = 1 - ratio * ratio * (1 - cos_a) * (1 + cos_a)
-        status[(status == RayStatus.OK) & (square < 0)] = RayStatus.TOTAL_REFLECTION
-        with np.errstate(invalid="ignore", divide="ignore"):
-            cos_b = np.sqrt(square)
-            factor = ratio * cos_a - cos_b
-            bent = ratio * heading + factor[:, None] * normal
-            if derivatives:
-                # The vertex slides along the surface, the normal turns, Snell's law follows.
-                free = step + distance[:, None, None] * bend
-                slide = (free @ normal[:, :, None])[..., 0] / cos_a[:, None]
-                step = free + slide[..., None] * heading[:, None, :]
-                turned = surface.turn(moved, surface.normals(moved), step)
-                turned = np.where((incline > 0)[:, None, None], -turned, turned)
-                d_cos_a = -(bend @ normal[:, :, None])[..., 0]
-                d_cos_a -= (turned @ heading[:, :, None])[..., 0]
-                d_cos_b = (ratio * ratio * cos_a / cos_b)[:, None] * d_cos_a
-                bend = (
-                    ratio * bend
-                    + (ratio * d_cos_a - d_cos_b)[..., None] * normal[:, None, :]
-                    + factor[:, None, None] * turned
-                )
-        here, heading, before = moved, bent, surface
-        vertices[:, number], headings[:, number + 1] = here, heading
-    lost = status != RayStatus.OK
-    vertices[lost], headings[lost] = np.nan, np.nan
-    return _March(vertices, headings, step, bend, status)
-
-
 def _aim_block(centre: FloatArray, target: FloatArray, interfaces: SurfaceSequence) -> RayPaths:
     """Return the rays from centre to target."""
     count = len(interfaces.surfaces)
@@ -252,7 +176,7 @@ def _aim_block(centre: FloatArray, target: FloatArray, interfaces: SurfaceSequen
     status = np.where(finite, RayStatus.NOT_CONVERGED, RayStatus.MISSED).astype(np.int64)
     status[finite & ~interfaces.separates(centre, target)] = RayStatus.WRONG_SIDE
     # Shoot from the thinner medium: through flat interfaces no such ray is totally reflected.
-    backwards = interfaces.indices[0] > interfaces.indices[-1]
+    backwards = interfaces.indices[0] > interfaces.indices[-1] and not interfaces.is_graded
     path = interfaces.reversed() if backwards else interfaces
     start, end = (target, centre) if backwards else (centre, target)
     rows = np.flatnonzero(status == RayStatus.NOT_CONVERGED)
@@ -274,7 +198,7 @@ def _aim_block(centre: FloatArray, target: FloatArray, interfaces: SurfaceSequen
 def _attempts(path: SurfaceSequence) -> Iterator[Callable[[FloatArray, FloatArray], _Reached]]:
     """Yield ways to find a ray, the cheap one first; each is tried on what the others left."""
     yield partial(_by_stages, path=path, stages=1)
-    flat = all(isinstance(surface, Plane) for surface in path.surfaces)
+    flat = all(isinstance(surface, Plane) for surface in path.surfaces) and not path.is_graded
     if flat:
         yield partial(_by_least_time, path=path)
     for stages in STAGES:
@@ -312,7 +236,7 @@ def _by_least_time(start: FloatArray, end: FloatArray, *, path: SurfaceSequence)
     vertices[done], directions[done] = march.vertices[followed], march.directions[followed]
     empty = np.zeros((len(start), 2, 3))
     status = np.where(reached, RayStatus.OK, RayStatus.TOTAL_REFLECTION).astype(np.int64)
-    return _March(vertices, directions, empty, empty, status), reached
+    return March(vertices, directions, empty, empty, status), reached
 
 
 def _from_ring(
@@ -328,19 +252,19 @@ def _from_ring(
 
 def _newton(
     start: FloatArray, end: FloatArray, heading: FloatArray, path: SurfaceSequence
-) -> tuple[FloatArray, _March, FloatArray, BoolArray]:
+) -> tuple[FloatArray, March, FloatArray, BoolArray]:
     """Turn start directions until the traced rays pass through the end points."""
     scale = np.linalg.norm(end - start, axis=-1) + np.abs(end).max(-1) + np.abs(start).max(-1)
     scale = scale + 1e-300
     heading = heading.copy()
     frame = _across(heading)
-    march = _march(start, heading, path, frame=frame)
-    miss, size = _miss(end, march)
+    march = march_rays(start, heading, path, frame=frame)
+    miss, size = miss_of(end, march, path)
     rows = np.flatnonzero(np.isfinite(size))
     for _ in range(MOST_STEPS):
         if not rows.size:
             break
-        across, change = _sensitivity(end[rows], march.take(rows))
+        across, change = _sensitivity(end[rows], march.take(rows), path)
         turn = _solve_2x2(change, (across @ miss[rows, :, None])[..., 0])
         old = size[rows].copy()
         pending, share = rows, np.ones(len(rows))
@@ -351,8 +275,8 @@ def _newton(
                 + share[place, None] * (turn[place, :, None] * frame[pending]).sum(-2)
             )
             tried_frame = _across(tried)
-            new = _march(start[pending], tried, path, frame=tried_frame)
-            new_miss, new_size = _miss(end[pending], new)
+            new = march_rays(start[pending], tried, path, frame=tried_frame)
+            new_miss, new_size = miss_of(end[pending], new, path)
             with np.errstate(invalid="ignore"):
                 better = new_size < old[place]
             good = pending[better]
@@ -376,35 +300,49 @@ def _newton(
     return heading, march, size, reached
 
 
-def _miss(end: FloatArray, march: _March) -> tuple[FloatArray, FloatArray]:
-    """Return the vector from the ray to the point, at right angles, and its length; NaN if lost."""
-    toward = end - march.vertices[:, -1]
-    heading = march.directions[:, -1]
-    miss: FloatArray = toward - (toward * heading).sum(-1)[:, None] * heading
-    return miss, np.sqrt((miss * miss).sum(-1))
+def _sensitivity(
+    end: FloatArray, march: March, path: SurfaceSequence, changes: PathChanges | None = None
+) -> tuple[FloatArray, FloatArray]:
+    """Return a frame across the ray at the end point and, in it, how the ray moves there.
 
-
-def _sensitivity(end: FloatArray, march: _March) -> tuple[FloatArray, FloatArray]:
-    """Return a frame across the last ray and, in it, how the ray moves at the end point.
-
-    ``change[n, i, j]`` is the movement along frame vector i per unit of start parameter j.
+    ``change[n, i, j]`` is the movement along frame vector i per unit of parameter j: the two start
+    angles, then the changes.
     """
-    heading = march.directions[:, -1]
+    heading, drift = drift_at(end, march, path, changes)
     frame = _across(heading)
-    ahead = ((end - march.vertices[:, -1]) * heading).sum(-1)
-    drift = march.steps + ahead[:, None, None] * march.bends
     return frame, np.einsum("nik,njk->nij", frame, drift)
 
 
-def _pointing_derivative(
-    centre: FloatArray, target: FloatArray, heading: FloatArray, interfaces: SurfaceSequence
-) -> FloatArray:
-    """Return the derivative of the unit direction at the camera by the object point."""
+def pointing_changes(
+    centre: FloatArray, target: FloatArray, heading: FloatArray, interfaces: SurfaceSequence,
+    changes: PathChanges | None = None,
+) -> tuple[FloatArray, FloatArray]:  # fmt: skip
+    """Return how the unit direction at the camera changes while its ray leads to the target.
+
+    Parameters
+    ----------
+    centre, target, heading : ndarray, shape (n, 3)
+        Starts, ends, and the directions of `aim_rays` between them.
+    interfaces : SurfaceSequence
+    changes : PathChanges, optional
+        Parameters of the start, the surfaces and the media, all in the frame of the rays.
+
+    Returns
+    -------
+    by_target : ndarray, shape (n, 3, 3)
+    by_changes : ndarray, shape (n, 3, k)
+
+    Notes
+    -----
+    The miss at the target, a function of the two start angles and everything else, stays zero.
+    """
     frame = _across(heading)
-    march = _march(centre, heading, interfaces, frame=frame)
-    end_frame, change = _sensitivity(target, march)
-    columns = [_solve_2x2(change, end_frame[:, :, axis]) for axis in range(3)]
-    return np.einsum("nji,njk->nik", frame, np.stack(columns, axis=-1))
+    march = march_rays(centre, heading, interfaces, frame=frame, changes=changes)
+    end_frame, change = _sensitivity(target, march, interfaces, changes)
+    right = np.concatenate([end_frame, -change[:, :, 2:]], axis=-1)
+    columns = [_solve_2x2(change, right[:, :, k]) for k in range(right.shape[-1])]
+    moved = np.einsum("nji,njk->nik", frame, np.stack(columns, axis=-1))
+    return moved[..., :3], moved[..., 3:]
 
 
 def _solve_2x2(matrix: FloatArray, right: FloatArray) -> FloatArray:

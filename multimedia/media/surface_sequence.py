@@ -10,7 +10,7 @@ import numpy as np
 
 from multimedia.media.surfaces import RefractingSurface
 from multimedia.refraction.layers import checked_indices
-from photocore.arrays import BoolArray, FloatArray
+from photocore.arrays import BoolArray, FloatArray, as_floats
 from photocore.errors import InputError
 
 
@@ -24,10 +24,16 @@ class SurfaceSequence:
         One per interface. A ray may cross the same surface twice: list it twice.
     indices : tuple of float
         Refractive indices of the media, from the ray's start to its end; one more than surfaces.
+    gradient : float
+        By how much the index of the last medium grows per unit of depth (towards -Z).
+    level : float
+        Z where that medium has the index given.
     """
 
     surfaces: tuple[RefractingSurface, ...]
     indices: tuple[float, ...]
+    gradient: float = 0.0
+    level: float = 0.0
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "surfaces", tuple(self.surfaces))
@@ -37,10 +43,33 @@ class SurfaceSequence:
                 f"indices: {len(self.surfaces)} surfaces lie between {len(self.surfaces) + 1} "
                 f"media, but {len(self.indices)} indices are given."
             )
+        for name in ("gradient", "level"):
+            value = as_floats(getattr(self, name), name)
+            if value.ndim or not np.isfinite(value):
+                raise InputError(f"{name}: expected a number, found {value.tolist()}.")
+            object.__setattr__(self, name, float(value))
 
     def reversed(self) -> SurfaceSequence:
-        """Return the same media in the order of a ray from the object."""
+        """Return the same media in the order of a ray from the object; none may be graded."""
         return SurfaceSequence(surfaces=self.surfaces[::-1], indices=self.indices[::-1])
+
+    @property
+    def is_graded(self) -> bool:
+        """Whether the index of the last medium changes with depth: rays are bent in it."""
+        return self.gradient != 0.0
+
+    @property
+    def gradient_vector(self) -> FloatArray:
+        """Gradient of the index of the last medium, shape (3,)."""
+        return np.array([0.0, 0.0, -self.gradient])
+
+    def index_behind(self, number: int, places: FloatArray) -> float | FloatArray:
+        """Return the index behind a surface, where rays meet it, shape (n,) if it varies."""
+        index = self.indices[number + 1]
+        if not self.is_graded or number + 1 < len(self.surfaces):
+            return index
+        varied: FloatArray = index + self.gradient * (self.level - places[:, 2])
+        return varied
 
     def with_indices(self, indices: Sequence[float]) -> Self:
         """Return the same surfaces between other media."""

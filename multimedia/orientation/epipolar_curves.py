@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from multimedia.media.camera import Camera
 from multimedia.media.projection import Media, as_media, project
-from multimedia.orientation.object_rays import image_rays
+from multimedia.orientation.object_rays import image_rays, refuse_bent_rays
 from photocore.arrays import FloatArray, IntArray, as_points, positive
 from photocore.errors import InputError
 
@@ -17,6 +17,8 @@ from photocore.errors import InputError
 _COARSE = 4
 #: Most vertices of a curve; a hundred intervals of a curve over a whole sensor are nanometres.
 _MOST = 1025
+#: Share of a ray by which its first vertex lies within the object's medium.
+INSIDE = 1e-12
 #: Distances worked out at a time when looking for candidates.
 _CHUNK = 4_000_000
 
@@ -128,6 +130,7 @@ def epipolar_curve(
         raise InputError(f"vertices: expected 2 to {_MOST}, found {vertices}.")
     positive(chord_error, "chord_error", unit="mm")
     second = as_media(second)
+    refuse_bent_rays([as_media(first)], "epipolar")
     flat = measured.reshape(-1, 2)
     origins, directions = image_rays(camera, flat, first)
     near, far = _ends(origins, directions, low, high)
@@ -204,6 +207,8 @@ def _ends(
         # A ray starts where it enters the object's medium, even within the range.
         start, end = np.maximum(np.minimum(one, two), 0.0), np.maximum(one, two)
         end = np.where(np.isfinite(end) & (end > start), end, np.nan)
+        # Just beyond the interface: on it, rounding decides on which side a point lies.
+        start = np.maximum(start, INSIDE * end)
     return origins + start[:, None] * directions, origins + end[:, None] * directions
 
 

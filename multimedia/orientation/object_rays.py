@@ -9,8 +9,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from multimedia.media.camera import Camera
+from multimedia.media.optical_media import OpticalMedia
 from multimedia.media.projection import Media, as_media
 from photocore.arrays import BoolArray, FloatArray, as_points
+from photocore.errors import InputError
 
 
 def image_rays(
@@ -56,6 +58,22 @@ def image_rays(
     shape = (*measured.shape[:-1], 3)
     origins, rays = as_media(layers).object_rays(camera, directions)
     return origins.reshape(shape), rays.reshape(shape)
+
+
+def refuse_bent_rays(media: Sequence[OpticalMedia], what: str) -> None:
+    """Refuse media in which what takes rays for straight lines would be wrong.
+
+    Raises
+    ------
+    InputError
+        If the index changes with depth.
+    """
+    if any(item.bends_in_object for item in media):
+        raise InputError(
+            f"{what}: in water whose index changes with depth rays are curves, and this takes them "
+            "for straight lines. Use project, resect, intersect or adjust, or leave the gradient "
+            "out of the media."
+        )
 
 
 def nearest_points(origins: Sequence[FloatArray], directions: Sequence[FloatArray]) -> FloatArray:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -144,7 +145,7 @@ def project_data(project: Project) -> dict[str, Any]:
 
 
 #: Keys of media; at the top of a file, where unknown keys are kept, they would have no effect.
-_OF_MEDIA = frozenset(("layers", "indices", "thicknesses", "surfaces", "medium"))
+_OF_MEDIA = frozenset(("layers", "indices", "thicknesses", "surfaces", "medium", "gradient"))
 
 
 def _toml(path: Path) -> dict[str, Any]:
@@ -227,18 +228,32 @@ def _sigma(data: dict[str, Any], cameras: tuple[Camera, ...]) -> float:
 def _media(value: Any, where: str) -> FlatInterface | Interfaces:
     if isinstance(value, Mapping) and "surfaces" in value:
         return _surfaces(value, where)
-    _only(value, where, ("indices", "thicknesses", "point", "normal", "moves_with_camera"))
-    return FlatInterface(
-        layers=Layers.from_dict(value, where=where),
-        point=_vector(value, "point", where, (0.0, 0.0, 0.0)),
-        normal=_vector(value, "normal", where, (0.0, 0.0, 1.0)),
-        moves_with_camera=_flag(value, "moves_with_camera", where),
-    )
+    flat = ("indices", "thicknesses", "point", "normal", "moves_with_camera")
+    _only(value, where, (*flat, *_GRADED))
+    layers = Layers.from_dict(value, where=where)
+    point = _vector(value, "point", where, (0.0, 0.0, 0.0))
+    normal = _vector(value, "normal", where, (0.0, 0.0, 1.0))
+    moves = _flag(value, "moves_with_camera", where)
+    if any(key in value for key in _GRADED):
+        traced = Interfaces.parallel(layers, point=point, normal=normal, with_camera=moves)
+        gradient, level = _graded(value, where)
+        return replace(traced, gradient=gradient, level=level)
+    return FlatInterface(layers=layers, point=point, normal=normal, moves_with_camera=moves)
+
+
+#: Keys of a last medium whose index changes with depth, and the attributes they become.
+_GRADED = {"gradient": "gradient", "gradient_level": "level"}
+
+
+def _graded(value: Mapping[str, Any], where: str) -> tuple[float, float]:
+    """Return by how much the index of the last medium grows with depth, and from which level."""
+    gradient, level = (_number(value, k, where) if k in value else 0.0 for k in _GRADED)
+    return gradient, level
 
 
 def _surfaces(value: Mapping[str, Any], where: str) -> Interfaces:
     """Return ray-traced surfaces of any form."""
-    _only(value, where, ("indices", "surfaces"))
+    _only(value, where, ("indices", "surfaces", *_GRADED))
     listed = value["surfaces"]
     if not isinstance(listed, list) or not listed:
         raise InputError(f"{where}: surfaces must be a list of sections, camera side first.")
@@ -257,16 +272,20 @@ def _surfaces(value: Mapping[str, Any], where: str) -> Interfaces:
     indices = value.get("indices")
     if not isinstance(indices, list):
         raise InputError(f"{where}: indices must be a list of numbers, camera side first.")
+    gradient, level = _graded(value, where)
     with located(where):
         return Interfaces(
-            surfaces=tuple(surfaces), indices=tuple(indices), with_camera=tuple(moving)
-        )
+            surfaces=tuple(surfaces), indices=tuple(indices), with_camera=tuple(moving),
+            gradient=gradient, level=level,
+        )  # fmt: skip
 
 
 def _media_data(media: FlatInterface | Interfaces) -> dict[str, Any]:
     if isinstance(media, Interfaces):
+        graded = {key: getattr(media, name) for key, name in _GRADED.items() if media.is_graded}
         return {
             "indices": list(media.indices),
+            **graded,
             "surfaces": [
                 _surface_data(surface) | ({"moves_with_camera": True} if moves else {})
                 for surface, moves in zip(media.surfaces, media.with_camera, strict=True)

@@ -88,9 +88,7 @@ def compiled_solve(
                 out[left] = tangent.solve_row(row[left], rest, indices)[0]
             return out, out, 0.0
 
-        return tangent.solve(
-            radius, heights, indices, tangent=False, row_solver=solve_row, block=OUTER
-        )[0]
+        return tangent.solve(radius, heights, indices, row_solver=solve_row, block=OUTER)[0]
 
 
 @cache

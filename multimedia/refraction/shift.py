@@ -24,6 +24,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from multimedia.refraction.compiled import WORTHWHILE, compiled_solve, is_available
+from multimedia.refraction.shift_slopes import BLOCK, slopes_row
 from multimedia.refraction.tangent import solve
 from photocore.arrays import FloatArray, as_floats
 from photocore.errors import InputError
@@ -112,7 +113,7 @@ def shifted_radius(
         compiled = size >= WORTHWHILE and is_available()
     if compiled:
         return compiled_solve(radius, layers, indices)
-    return solve(radius, layers, indices, tangent=False)[0]
+    return np.asarray(solve(radius, layers, indices)[0])
 
 
 def shift_ratio(
@@ -143,10 +144,17 @@ def shift_ratio(
     >>> round(float(shift_ratio(0.0, [1.0, 1.0], [1.0, 1.333])), 6)
     1.142735
     """
-    radius, layers = _checked(radius, heights, indices)
-    radius_bar, _, _ = solve(radius, layers, indices, tangent=False)
-    limit = axis_ratio(layers, indices)
+    return ratio_of(*_checked(radius, heights, indices), indices)
+
+
+def ratio_of(radius: FloatArray, layers: list[FloatArray], indices: Sequence[float]) -> FloatArray:
+    """Return `shift_ratio` of what is known to be possible."""
+    radius_bar = np.asarray(solve(radius, layers, indices)[0])
     whole = np.asarray(sum(layers))
+    if (radius > 1e-9 * whole).all():
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return np.asarray(radius_bar / radius)
+    limit = axis_ratio(layers, indices)
     # The ratio leaves its limit with (R / whole)², which is beyond the last digit here.
     # "Not far" rather than "near", so that an unknown radius or height (NaN) gets no limit.
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -184,17 +192,7 @@ def shift_derivatives(
 
     Notes
     -----
-    Both R and :math:`\bar R` are functions of the invariant :math:`p = n_i \sin\beta_i`. With
-    :math:`T_i = \tan\beta_i`, :math:`c_i = \cos\beta_i`:
-
-    .. math:: D = \frac{\partial\bar R}{\partial R}
-                = \frac{H / (n_1 c_1^3)}{\sum h_i / (n_i c_i^3)}, \quad
-              \frac{\partial\bar R}{\partial h_i} = T_1 - D T_i, \quad
-              \frac{\partial\bar R}{\partial n_i}
-                = D \frac{h_i T_i}{n_i c_i^2} - [i = 1] \frac{H T_1}{n_1 c_1^2}
-
-    with :math:`H = \sum h_i`. The differences are formed from :math:`n_1 - n_i`, so that they keep
-    their digits where the media hardly differ, and are zero where they do not.
+    Closed forms in blocks, see `multimedia.refraction.shift_slopes`.
 
     Examples
     --------
@@ -205,58 +203,19 @@ def shift_derivatives(
     0.06
     """
     radius, layers = _checked(radius, heights, indices)
-    radius_bar, t, lowest = solve(radius, layers, indices, tangent=True)
-    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        d_radius, d_heights, d_indices = _derivatives(t, lowest, layers, indices)
-    shape = radius_bar.shape
-    derivatives = ShiftDerivatives(
-        radius_bar,
-        np.broadcast_to(d_radius, shape).copy(),
-        np.stack([np.broadcast_to(d, shape) for d in d_heights], axis=-1),
-        np.stack([np.broadcast_to(d, shape) for d in d_indices], axis=-1),
+    count = len(layers)
+    found = solve(
+        radius, layers, indices, row_solver=slopes_row, results=2 + 2 * count, block=BLOCK
     )
-    unknown = np.isnan(radius_bar)
-    for derivative in derivatives[1:]:
-        derivative[unknown] = np.nan
-    return derivatives
-
-
-def _derivatives(
-    t: FloatArray, lowest: FloatArray, heights: list[FloatArray], indices: Sequence[float]
-) -> tuple[FloatArray, list[FloatArray], list[FloatArray]]:
-    """Return the derivatives of the shifted radius with respect to R, heights and indices."""
-    squared_invariant = (lowest * t) ** 2 / (1 + t * t)
-    tangents = [lowest * t / np.sqrt(n**2 + (n - lowest) * (n + lowest) * t**2) for n in indices]
-    secants = [np.sqrt(1 + tangent**2) for tangent in tangents]
-
-    def gap(i: int, j: int) -> FloatArray:
-        """Return tan²βi - tan²βj, through the invariant."""
-        split = (indices[j] - indices[i]) * (indices[j] + indices[i])
-        return split * squared_invariant * (secants[i] * secants[j] / indices[i] / indices[j]) ** 2
-
-    def sum_over_layers(terms: list[FloatArray]) -> FloatArray:
-        """Return sum(h_i term_i); what an absent layer would do to the ray does not count."""
-        parts = [np.where(h > 0, h * term, 0.0) for h, term in zip(heights, terms, strict=True)]
-        return np.asarray(sum(parts))
-
-    layers = range(len(indices))
-    steepness = [secants[i] ** 3 / indices[i] for i in layers]
-    slope = sum_over_layers(steepness)
-    whole = np.asarray(sum(heights))
-    d_radius = whole * steepness[0] / slope
-
-    rise = tangents[0] * sum_over_layers([secants[i] / indices[i] * gap(i, 0) for i in layers])
-    d_heights = []
-    for i in layers:
-        apart = [gap(j, i) / (tangents[i] + tangents[j]) for j in layers]
-        apart = [np.where(t == 0, 0.0, a) for a in apart]
-        d_heights.append((rise + steepness[0] * sum_over_layers(apart)) / slope)
-
-    stretch = [tangents[i] * secants[i] ** 2 / indices[i] for i in layers]
-    d_indices = [np.where(heights[i] > 0, d_radius * heights[i] * stretch[i], 0.0) for i in layers]
-    others = sum_over_layers([np.zeros(()), *steepness[1:]])
-    d_indices[0] = -stretch[0] * whole * others / slope
-    return d_radius, d_heights, d_indices
+    unknown = np.isnan(found[0])
+    if unknown.any():
+        found[:, unknown] = np.nan
+    return ShiftDerivatives(
+        np.asarray(found[0]),
+        np.asarray(found[1]),
+        np.moveaxis(found[2 : 2 + count], 0, -1),
+        np.moveaxis(found[2 + count :], 0, -1),
+    )
 
 
 def as_layers(heights: Sequence[ArrayLike], indices: Sequence[float]) -> list[FloatArray]:

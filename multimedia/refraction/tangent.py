@@ -48,7 +48,7 @@ FEW_STEPS = 12
 Height = float | FloatArray
 #: Shifted radius, t, and the index of the layer t belongs to, of one row.
 Row = tuple[FloatArray, FloatArray, Height]
-RowSolver = Callable[[FloatArray, list[Height], Sequence[float]], Row]
+RowSolver = Callable[[FloatArray, list[Height], Sequence[float]], tuple[Height, ...]]
 
 
 def layer_terms(square: FloatArray, reduced: Height, bend: float) -> tuple[FloatArray, FloatArray]:
@@ -78,11 +78,11 @@ def solve(
     heights: list[FloatArray],
     indices: Sequence[float],
     *,
-    tangent: bool,
+    results: int = 1,
     row_solver: RowSolver | None = None,
     block: int = BLOCK,
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return the shifted radius and, if asked for, t and the index of the layer t belongs to.
+) -> FloatArray:
+    """Return the shifted radius, or whatever a row solver makes, shape (results, ...).
 
     Parameters
     ----------
@@ -92,8 +92,8 @@ def solve(
         Height of each layer, of shapes that broadcast with radius.
     indices : sequence of float
         Refractive index of each layer.
-    tangent : bool
-        Whether t and its index are wanted.
+    results : int
+        How many of the row solver's results are wanted.
     row_solver : callable, optional
         What solves a row of at most ``block`` elements, by default `solve_row`.
     block : int
@@ -102,16 +102,26 @@ def solve(
     fixed = [h.item() if h.size == 1 else None for h in heights]
     varying = [h for h, f in zip(heights, fixed, strict=True) if f is None]
     shape = np.broadcast_shapes(radius.shape, *(h.shape for h in heights))
-    outputs = [np.empty(shape) for _ in range(3 if tangent else 1)]
+    outputs = np.empty((results, *shape))
+    targets = [outputs[k, ...] for k in range(results)]
     count = 1 + len(varying)
     with np.errstate(all="ignore"):
-        for row in contiguous_rows((radius, *varying), outputs, size=block):
+        if len(shape) == 1 and shape[0] <= block and all(len(h) == shape[0] for h in varying):
+            # One row as it is: for a few points the walk would take as long as the work.
+            moving = iter(varying)
+            layers = [next(moving) if f is None else f for f in fixed]
+            goal = radius if radius.shape == shape else np.broadcast_to(radius, shape)
+            solution = (row_solver or solve_row)(goal, layers, indices)
+            for target, values in zip(targets, solution, strict=False):
+                target[...] = values
+            return outputs
+        for row in contiguous_rows((radius, *varying), targets, size=block):
             moving = iter(row[1:count])
             layers = [next(moving) if f is None else f for f in fixed]
             solution = (row_solver or solve_row)(row[0], layers, indices)
             for target, values in zip(row[count:], solution, strict=False):
                 target[...] = values
-    return outputs[0], outputs[-2 if tangent else 0], outputs[-1]
+    return outputs
 
 
 def solve_row(radius: FloatArray, heights: list[Height], indices: Sequence[float]) -> Row:

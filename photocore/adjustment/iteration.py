@@ -26,6 +26,9 @@ LARGEST = 400
 SETTLE = 1e-10
 #: The same where points are eliminated: normal equations see no smaller ones.
 SETTLE_BLOCKS = 1e-6
+#: Share of the square sum that is its own rounding. A step that drops it by less is taken without
+#: seeing it fall: 20 control points need 7 evaluations in place of 14 to 18.
+ROUNDED = 1e-13
 #: Where a step brings this share of the drop foretold, the valley is straight enough.
 STRAIGHT = 0.9
 
@@ -154,7 +157,12 @@ def minimise(
             following = advance(state, step)
             new = None if following is None else _linear(equations(following), largest)
             new_cost = np.inf if new is None else float(new.residuals @ new.residuals)
-            if following is not None and new is not None and new_cost <= cost:
+            # A step that moves so little drops the square sum by less than its own rounding:
+            # whether it went downhill cannot be seen, that it goes the right way is known.
+            slack = ROUNDED * cost + 10.0 * rounding * float(np.sqrt(count * cost))
+            unseen = float(change @ change) <= slack
+            limit = cost + slack if unseen else cost
+            if following is not None and new is not None and new_cost <= limit:
                 break
             # At the rounding level no step goes downhill any more.
             if small or damping > 1e8:
@@ -164,7 +172,7 @@ def minimise(
             growth *= 2.0
         # Nielsen's rule: the damping follows how well the linear model foretold the drop.
         foretold = -float(change @ (2.0 * linear.residuals + change))
-        ratio = (cost - new_cost) / foretold if foretold > 0 else 1.0
+        ratio = (cost - new_cost) / foretold if foretold > 0 and not unseen else 1.0
         damping *= max(0.1, 1.0 - (2.0 * min(ratio, 1.0) - 1.0) ** 3)
         growth, curved = 2.0, ratio < STRAIGHT
         settled = small or cost - new_cost <= 1e-14 * cost

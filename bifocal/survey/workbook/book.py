@@ -79,7 +79,7 @@ def build(content: SurveyContent) -> BookBuilder:
     builder = BookBuilder(language=content.language, words=WORDS)
     builder.book.properties.creator = "bifocal"
     builder.book.properties.title = "bifocal survey"
-    _readme(builder)
+    _readme(builder, media=bool(content.media_cells))
     setup_sheet(builder, content)
     cells = point_cells(content)
     _points(builder, content, cells)
@@ -93,11 +93,11 @@ def build(content: SurveyContent) -> BookBuilder:
     return builder
 
 
-def _readme(builder: BookBuilder) -> None:
+def _readme(builder: BookBuilder, *, media: bool) -> None:
     sheet = builder.sheet("Readme")
     sheet.worksheet.column_dimensions["A"].width = 80
     sheet.worksheet.column_dimensions["B"].width = 2
-    for row, line in enumerate(readme(builder.language), start=3):
+    for row, line in enumerate(readme(builder.language, media=media), start=3):
         heading = line.startswith("#")
         sheet.text(f"A{row}", line.lstrip("#"), HEAD_FONT if heading else None)
     sketch = cameras_sketch(builder.word("nadir"), builder.word("sketch"))

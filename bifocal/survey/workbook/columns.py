@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Collection
 
 from bifocal.model.flags import FlagLimits
+from bifocal.survey.workbook.media_columns import bent_ideal_points, bent_pair_points
 from bifocal.survey.workbook.placed_formulas import (
     IS_CONTROL,
     added_covariance,
@@ -141,6 +142,7 @@ def ideal_points(
     polar: bool = True,
     theta: bool = True,
     adjusted: Collection[int] = (),
+    media: int = 0,
 ) -> tuple[LiveColumn, ...]:
     """Return the `Points` table of an ideal pair.
 
@@ -150,6 +152,8 @@ def ideal_points(
         Whether the table has the columns x1 y1 x2 y2, s1 s2, and theta; formulas name no others.
     adjusted : collection of int
         Images whose coordinates are corrected by the cells a1_11 ..., a2_11 ... of `Setup`.
+    media : int
+        How many media `Setup` has cells for; 0 in air.
     """
     (x1, y1), (x2, y2) = (_millimetres(image, adjusted=image in adjusted) for image in (1, 2))
     kinds = {"has_xy": xy, "has_polar": polar}
@@ -169,7 +173,7 @@ def ideal_points(
     ]
     miss = f"(({x1})*({y2})-({y1})*({x2}))*k_12/[@s1_used]"
     off = "ABS(N([@q]))>k_off*sigma_s*SQRT(1+([@s2_used]/[@s1_used])^2)" if xy else "FALSE"
-    return (
+    columns = (
         LiveColumn(key="id", width=12),
         *(LiveColumn(key=key, places=4, width=10.5) for key in ("x1", "y1", "x2", "y2") if xy),
         *(LiveColumn(key=key, places=4, width=11.5) for key in ("s1", "s2") if polar),
@@ -201,6 +205,14 @@ def ideal_points(
         ),
         _f("flag", _flag(measured, off), width=13),
     )
+    if not media:
+        return columns
+    typed = {1: (x1, y1, "[@s1]"), 2: (x2, y2, "[@s2]")}
+    return bent_ideal_points(
+        columns,
+        media,
+        lambda image, per: _radius(*typed[image], per, has_xy=xy, has_polar=polar),
+    )
 
 
 IDEAL_POINTS = ideal_points()
@@ -216,17 +228,22 @@ def _carried_to_the_plane(prefix: str) -> list[LiveColumn]:
     """
     columns = []
     for image in (1, 2):
-        col, row = f"[@{prefix}col{image}]", f"[@{prefix}row{image}]"
-        h = f"h{image}_"
-        below = f"({h}31*{col}+{h}32*{row}+{h}33)"
-        for axis, line in (("x", 1), ("y", 2)):
-            above = f"({h}{line}1*{col}+{h}{line}2*{row}+{h}{line}3)"
-            formula = f'IF(COUNT({col},{row})=2,({above}/{below}-e_{axis})*1000/m_1,"")'
+        for axis in "xy":
+            known, place = _on_the_plane(prefix, image, axis)
+            formula = f'IF({known},({place}-e_{axis})*1000/m_1,"")'
             columns.append(_f(f"{axis}{image}", formula, 4))
     return columns
 
 
-def pair_points(*, undistorted: bool) -> tuple[LiveColumn, ...]:
+def _on_the_plane(prefix: str, image: int, axis: str) -> tuple[str, str]:
+    """Return whether a pixel is known, and where its straight ray meets the plane, as formulas."""
+    col, row, h = f"[@{prefix}col{image}]", f"[@{prefix}row{image}]", f"h{image}_"
+    line = "xy".index(axis) + 1
+    above = f"({h}{line}1*{col}+{h}{line}2*{row}+{h}{line}3)"
+    return f"COUNT({col},{row})=2", f"{above}/({h}31*{col}+{h}32*{row}+{h}33)"
+
+
+def pair_points(*, undistorted: bool, media: int = 0) -> tuple[LiveColumn, ...]:
     """Return the `Points` table of a general pair measured in raw pixels.
 
     Parameters
@@ -234,6 +251,8 @@ def pair_points(*, undistorted: bool) -> tuple[LiveColumn, ...]:
     undistorted : bool
         Whether the photos have lens distortion, which no formula can take out: the pixels freed of
         it are then written beside the raw ones.
+    media : int
+        How many media `Setup` has cells for; 0 in air.
     """
     prefix = "u" if undistorted else ""
     moved, own = {}, {}
@@ -248,7 +267,7 @@ def pair_points(*, undistorted: bool) -> tuple[LiveColumn, ...]:
     def place(axis: str) -> str:
         return f"e_{axis}+({moved[f'{axis}1']}-{own[f'{axis}1']}*[@r]/d_1)*m_1/1000"
 
-    return (
+    columns = (
         LiveColumn(key="id", width=12),
         *(LiveColumn(key=key, places=3, width=10.5) for key in ("col1", "row1", "col2", "row2")),
         LiveColumn(key="use", width=9, choices="1,0"),
@@ -311,6 +330,9 @@ def pair_points(*, undistorted: bool) -> tuple[LiveColumn, ...]:
             width=13,
         ),
     )
+    if not media:
+        return columns
+    return bent_pair_points(columns, media, lambda image, axis: _on_the_plane(prefix, image, axis))
 
 
 #: Where a point of another table stands in `Points`; the second search finds the number 7 among

@@ -15,6 +15,7 @@ from bifocal.survey.observations import PointObservations
 from bifocal.survey.reference import CheckResult, Georeference, KnownPoints
 from bifocal.survey.relief_table import ReliefTable, entries
 from bifocal.survey.setup import SurveySetup
+from bifocal.survey.survey_media import SurveyMedia
 from bifocal.survey.tolerances import RULES, ToleranceRule
 from bifocal.survey.weighted_similarity import weights_of
 from bifocal.survey.workbook.columns import (
@@ -23,6 +24,7 @@ from bifocal.survey.workbook.columns import (
     ideal_points,
     pair_points,
 )
+from bifocal.survey.workbook.media_formulas import setup_values
 from bifocal.survey.workbook.setup_cells import MATRICES, NADIRS, PHOTOS, setup_checks
 from photocore.arrays import BoolArray, FloatArray
 from photocore.workbook.cells import CellValue
@@ -79,6 +81,9 @@ class SurveyContent:
         Rows of the sheet `Log`: date, program, what, file, SHA-256.
     rows : int
         Rows of `Points` in an empty template.
+    media : SurveyMedia or None
+        Cells of media in an empty template, and of a general pair; None for those that follow from
+        the pair. An ideal pair's stand in its set-up.
     """
 
     language: str = "en"
@@ -101,6 +106,21 @@ class SurveyContent:
     links: Mapping[str, str] = field(default_factory=dict)
     log: Sequence[tuple[str, str, str, str, str]] = ()
     rows: int = POINT_ROWS
+    media: SurveyMedia | None = None
+
+    @property
+    def bent(self) -> SurveyMedia | None:
+        """What the cells of media hold; None in a workbook that has none."""
+        if self.setup is not None:
+            return self.setup.media
+        if self.media is not None or self.pair is None:
+            return self.media
+        return SurveyMedia.of_photos(self.photos)
+
+    @property
+    def media_cells(self) -> int:
+        """How many media there are cells for; 0 in air."""
+        return 0 if self.bent is None else self.bent.media
 
     @property
     def is_pair(self) -> bool:
@@ -123,10 +143,11 @@ class SurveyContent:
     def point_columns(self) -> tuple[LiveColumn, ...]:
         """The columns of `Points`."""
         if self.is_pair:
-            return pair_points(undistorted=self.undistorted)
+            return pair_points(undistorted=self.undistorted, media=self.media_cells)
         corrected = self.setup.adjusted if self.setup is not None else ()
         return ideal_points(
-            adjusted=[image for image, matrix in enumerate(corrected, 1) if matrix is not None]
+            adjusted=[image for image, matrix in enumerate(corrected, 1) if matrix is not None],
+            media=self.media_cells,
         )
 
     @property
@@ -238,11 +259,10 @@ def point_cells(content: SurveyContent) -> dict[str, list[CellValue]]:
         blank = placeless if key in _PLACES or key.startswith("cov_") else incomplete
         if key in ("q", "theta_used"):
             blank = np.isnan(values)
-        cells[key] = [
-            None if empty else value
-            for empty, value in zip(blank.tolist(), values.tolist(), strict=True)
-        ]
+        cells[key] = _unless(blank, values)
     cells |= {key: inputs(values) for key, values in table.carried.items()}
+    for key in {"g1", "g2"} & table.carried.keys():
+        cells[key] = _unless(incomplete, table.carried[key])
     cells |= {key: inputs(content.near[:, i]) for i, key in enumerate(NEAR[:3])}
     placed = content.world_covariance
     cells[NEAR[3]] = [None] * len(table) if placed is None else inputs(placed[:, 0, 1])
@@ -271,19 +291,24 @@ def _radial_variances(content: SurveyContent, blank: BoolArray) -> dict[str, lis
     r, den = table["r"], table["den"]
     near, far = table["s2_used"] / d2, table["s1_used"] / d1
     with np.errstate(divide="ignore", invalid="ignore"):
-        v1 = ((1 - r / d1) * sigma / den) ** 2
-        v2 = ((1 - r / d2) * k12 * sigma / den) ** 2
+        g1, g2, aside = 1 - r / d1, (1 - r / d2) * k12, 1 - r / d1
+        if "t1" in table.carried:
+            near, far, g1, g2 = (table.carried[key] for key in ("t2", "t1", "g1", "g2"))
+            aside = table["s_c"] / (table.carried["tan1"] * (first.principal_distance or d1))
+        v1, v2 = (g1 * sigma / den) ** 2, (g2 * sigma / den) ** 2
     found = {
         "v_1": v1,
         "v_2": v2,
         "v_s": (v1 * near**2 + v2 * far**2) * (m1 / 1000) ** 2,
-        "v_t": ((1 - r / d1) * sigma * m1 / 1000) ** 2,
+        "v_t": (aside * sigma * m1 / 1000) ** 2,
         "v_sr": -(v1 * near + v2 * far) * m1 / 1000,
     }
-    return {
-        key: [None if no else v for no, v in zip(blank.tolist(), values.tolist(), strict=True)]
-        for key, values in found.items()
-    }
+    return {key: _unless(blank, values) for key, values in found.items()}
+
+
+def _unless(blank: BoolArray, values: FloatArray) -> list[CellValue]:
+    """Return a column of numbers, blank where a condition holds."""
+    return [None if no else v for no, v in zip(blank.tolist(), values.tolist(), strict=True)]
 
 
 def result_cells(
@@ -366,8 +391,10 @@ def _weight_cells(geo: Georeference) -> dict[str, list[CellValue]]:
 
 def setup_cells(content: SurveyContent) -> dict[str, CellValue]:
     """Return the value of every named cell of `Setup`; what is absent is blank."""
+    pair, is_pair, media = content.pair, content.is_pair, content.bent
     cells = _setup_cells(content)
-    return cells | setup_checks(cells, is_pair=content.is_pair)
+    cells |= setup_values(media, pair, as_given=content.as_given, is_pair=is_pair)
+    return cells | setup_checks(cells, is_pair=is_pair, media=content.media_cells)
 
 
 def _setup_cells(content: SurveyContent) -> dict[str, CellValue]:

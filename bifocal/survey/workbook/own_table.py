@@ -155,13 +155,14 @@ def _columns(table: OwnTable, content: SurveyContent) -> list[ResultColumn]:
     corrected = [] if content.setup is None else content.setup.adjusted
     images = [image for image, matrix in enumerate(corrected, start=1) if matrix is not None]
     if content.is_pair:
-        described = pair_points(undistorted=content.undistorted)
+        described = pair_points(undistorted=content.undistorted, media=content.media_cells)
     else:
         described = ideal_points(
             xy="x1" in table.columns or bool(images),
             polar="s1" in table.columns,
             theta="theta" in table.columns,
             adjusted=images,
+            media=content.media_cells,
         )
     results = []
     for column in described:

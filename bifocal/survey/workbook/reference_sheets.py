@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 from openpyxl.styles import Alignment
 
@@ -17,6 +18,7 @@ from bifocal.survey.workbook.columns import (
     verdict_columns,
 )
 from bifocal.survey.workbook.content import SurveyContent, check_cells, setup_cells
+from bifocal.survey.workbook.media_formulas import planned
 from bifocal.survey.workbook.words import word
 from photocore.workbook.cells import CellValue
 from photocore.workbook.grid import column_letters
@@ -101,9 +103,14 @@ def _verdict(sheet: SheetBuilder, content: SurveyContent, accuracy: float) -> No
 def planning(builder: BookBuilder, content: SurveyContent) -> None:
     """Write what precision to expect over the frame and where relief cannot be told from zero."""
     sheet, cells = builder.sheet("Planning", "type"), setup_cells(content)
+    scale_name = "m_seen" if content.media_cells and not content.is_pair else "m_1"
     scale, pitch, sigma, base = (
-        float(cells.get(name) or math.nan) for name in ("m_1", "pitch", "sigma_s", "b_lever")
+        float(cells.get(name) or math.nan) for name in (scale_name, "pitch", "sigma_s", "b_lever")
     )
+
+    def live(formula: str) -> str:
+        return planned(formula, content.media_cells, is_pair=content.is_pair)
+
     sizes = content.sensor or (math.nan, math.nan)
     sheet.word("A6", "footprint")
     for row, (name, size) in enumerate(zip(_SENSOR, sizes, strict=True), start=4):
@@ -111,13 +118,15 @@ def planning(builder: BookBuilder, content: SurveyContent) -> None:
         sheet.input(f"B{row}", size, form="0.00", name=name)
         sheet.validate(f"B{row}", title=name, prompt=word(name, builder.language), above_zero=True)
     # By the principal distance: without it the image scale of a general pair is only nominal.
-    c1, d1 = (float(cells.get(name) or math.nan) for name in ("c_1", "d_1"))
+    d1_name = "seen_1" if content.media_cells else "d_1"
+    c1, d1 = (float(cells.get(name) or math.nan) for name in ("c_1", d1_name))
     for letter, name, size in zip("BC", _SENSOR, sizes, strict=True):
         body, covered = f'IF(COUNT({name},c_1,d_1)=3,{name}*d_1/c_1,"")', _known(size * d1 / c1)
+        body = live(body)
         named = name.replace("sensor", "covered")
         sheet.formula(f"{letter}6", body, covered, form="0.00", name=named)
     sheet.word("A7", "gsd")
-    body, pixel = 'IF(COUNT(pitch,m_1)=2,pitch*m_1,"")', pitch * scale
+    body, pixel = live('IF(COUNT(pitch,m_1)=2,pitch*m_1,"")'), pitch * scale
     if content.is_pair:
         body = 'IF(COUNT(pixel_wall)=1,pixel_wall,"")'
         pixel = float(cells.get("pixel_wall") or math.nan)
@@ -125,7 +134,8 @@ def planning(builder: BookBuilder, content: SurveyContent) -> None:
     diagonal = math.hypot(*sizes)
     sheet.word("A9", "uncertainty", HEAD_FONT)
     shown = _uncertainty(content, sigma, scale, diagonal)
-    sheet.table("tblPlan", UNCERTAINTY, at=(11, 1), rows=len(PLANNED_RELIEF), cells=shown)
+    columns = [replace(column, formula=live(column.formula)) for column in UNCERTAINTY]
+    sheet.table("tblPlan", columns, at=(11, 1), rows=len(PLANNED_RELIEF), cells=shown)
     head = 11 + len(PLANNED_RELIEF) + 4
     sheet.word(f"A{head - 2}", "over_frame", HEAD_FONT)
     radii = [share / 200 * diagonal for share in FRAME_SHARES]
@@ -147,7 +157,7 @@ def _known(value: float) -> float | None:
 
 def _uncertainty(content: SurveyContent, sigma: float, scale: float, diagonal: float) -> Cells:
     """Return the radii inside which a relief is below twice its standard deviation."""
-    d1, d2 = (content.pair.d1, content.pair.d2) if content.pair else (math.nan, math.nan)
+    d1, d2 = content.pair.straight_distances if content.pair else (math.nan, math.nan)
     radii = []
     for cm in PLANNED_RELIEF:
         r = cm / 100

@@ -6,6 +6,8 @@ from collections.abc import Mapping, Sequence
 
 from bifocal.model.flags import SIGMA_PIXEL, UNCERTAIN_SHARE
 from bifocal.survey.setup import SCALE_TOLERANCE, SIGMA_RADIAL
+from bifocal.survey.survey_media import HEIGHTS, index_names, media_names
+from bifocal.survey.workbook.media_formulas import calculated_names, setup_formulas
 from photocore.workbook.cells import CellValue
 
 Groups = tuple[tuple[str, ...], ...]
@@ -55,7 +57,8 @@ PAIR_GROUPS: Groups = (
 FORMS: Mapping[str, str] = {
     **dict.fromkeys(("d_1", "d_2", "delta_d", "b_lever"), "0.000"),
     **dict.fromkeys(("pitch", "sigma_s", "k_12"), "0.000000"),
-    **dict.fromkeys(("m_1", "m_2"), "0.00"),
+    **dict.fromkeys(("m_1", "m_2", "m_seen", "mm_1"), "0.00"),
+    **{f"{name}_{image}": "0.000" for name in ("behind", "seen", "reach") for image in "12"},
     "sigma_r_max": "0.0000",
     **dict.fromkeys((*PHOTOS, *TITLE_BLOCK), "@"),
 }
@@ -79,9 +82,18 @@ _NEEDED = (
 _IDEAL_NEEDED, _PAIR_NEEDED = _NEEDED, _NEEDED[:2]
 
 
-def _missing_formula(needed: Sequence[tuple[str, tuple[str, ...], str]]) -> str:
-    """Return the formula that names the cells still to be filled in."""
-    parts = []
+def _missing_formula(
+    needed: Sequence[tuple[str, tuple[str, ...], str]], stated: Sequence[str] = ()
+) -> str:
+    """Return the formula that names the cells still to be filled in.
+
+    ``stated`` are the cells of refractive indices that make z0 needed.
+    """
+    parts = [
+        f'IF(AND(COUNT({",".join(stated)})>0,COUNT({z0})=0),", {z0}","")'
+        for z0 in HEIGHTS
+        if stated
+    ]
     for name, cells, unit in needed:
         blank = f"COUNT({','.join(cells)})<{len(cells)}"
         test = f'AND(input_unit="{unit}",{blank})' if unit else blank
@@ -89,14 +101,21 @@ def _missing_formula(needed: Sequence[tuple[str, tuple[str, ...], str]]) -> str:
     return f"MID({'&'.join(parts)},3,200)"
 
 
-def setup_checks(cells: Mapping[str, CellValue], *, is_pair: bool) -> dict[str, CellValue]:
-    """Return what the checks of the set-up show: what is missing, d_1 > d_2, the scales."""
+def setup_checks(
+    cells: Mapping[str, CellValue], *, is_pair: bool, media: int = 0
+) -> dict[str, CellValue]:
+    """Return what the checks of the set-up show: what is missing, d_1 > d_2, the scales.
+
+    ``media`` is how many media there are cells for.
+    """
 
     def known(*names: str) -> bool:
         return all(isinstance(cells.get(name), int | float) for name in names)
 
     needed = _PAIR_NEEDED if is_pair else _IDEAL_NEEDED
-    missing = [
+    bent = any(known(name) for name in _stated(media))
+    missing = [name for name in HEIGHTS if bent and not known(name)]
+    missing += [
         name
         for name, wanted, unit in needed
         if not known(*wanted) and unit in ("", cells["input_unit"])
@@ -168,3 +187,39 @@ PAIR_FORMULAS: Mapping[str, str] = {
     "e_x": "(d_1*n2_x-d_2*n1_x)/(d_1-d_2)",
     "e_y": "(d_1*n2_y-d_2*n1_y)/(d_1-d_2)",
 }
+
+
+def _stated(media: int) -> tuple[str, ...]:
+    """Return the indices that tell that light is bent, with cells for so many media."""
+    return index_names(media)[1:]
+
+
+def groups(*, is_pair: bool, media: int) -> Groups:
+    """Return the cells of `Setup` group by group; the last group is calculated.
+
+    Parameters
+    ----------
+    is_pair : bool
+        Whether the points are raw pixels of a general pair.
+    media : int
+        How many media there are cells for; 0 in air.
+    """
+    first, *others, last = PAIR_GROUPS if is_pair else IDEAL_GROUPS
+    if not media:
+        return (first, *others, last)
+    return (first, media_names(media), *others, (*last, *calculated_names(media, is_pair=is_pair)))
+
+
+def formulas(*, is_pair: bool, media: int) -> Mapping[str, str]:
+    """Return the formulas of `Setup` by name."""
+    own = PAIR_FORMULAS if is_pair else IDEAL_FORMULAS
+    if not media:
+        return own
+    needed = _PAIR_NEEDED if is_pair else _IDEAL_NEEDED
+    missing = _missing_formula(needed, _stated(media))
+    return {**own, **setup_formulas(media, is_pair=is_pair), "setup_missing": missing}
+
+
+def may_be_zero(name: str) -> bool:
+    """Tell whether a length of media may be zero: a window, or a camera at it."""
+    return name in HEIGHTS or name.startswith("thick_")

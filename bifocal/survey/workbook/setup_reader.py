@@ -3,15 +3,25 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from pathlib import Path
 
 import numpy as np
 
 from bifocal.model.flags import FlagLimits
 from bifocal.survey.setup import SurveySetup
+from bifocal.survey.survey_media import (
+    FEWEST,
+    HEIGHTS,
+    MOST,
+    SurveyMedia,
+    index_names,
+    media_names,
+    thickness_names,
+)
 from bifocal.survey.workbook.columns import adjustment_names
 from bifocal.survey.workbook.known_reader import LARGEST
+from bifocal.survey.workbook.media_formulas import INDEX_LIMITS
 from bifocal.survey.workbook.setup_cells import (
     MATRICES,
     NADIRS,
@@ -64,6 +74,9 @@ def read_setup(
         # Our own workbook: every value has its name, labels need not be searched for.
         titles = [Column(key, kind="text") for key in TITLE_BLOCK]
         columns = [c for c in (*columns, *titles) if c.key.casefold() in book.names]
+    else:
+        # Cells of media are found by name only: no workbook of a user's own has them otherwise.
+        columns = [c for c in columns if c.key not in media_names(MOST)]
     values = read_named_values(book, columns, sheet="Setup", decimal=decimal, errors=complaints)
     where = f"{book.label} › Setup" if "Setup" in book.titles else book.label
     formulas = _formulas(path, values)
@@ -72,6 +85,7 @@ def read_setup(
     errors += [e for e in complaints if e.column not in formulas]
     number = {key: _number(values, key) for key in _NUMBERS if key not in defaults}
     _check_positive(values, number, errors)
+    media = _media(book, values, errors)
     d1 = _distance(values, number, "d_1" in formulas, errors)
     matrices, nadirs = _general(values)
     limits = FlagLimits()
@@ -97,6 +111,7 @@ def read_setup(
         matrices=matrices,
         nadirs=nadirs,
         adjusted=_adjusted(book),
+        media=media,
         places=values.places,
         where=where,
         remarks=tuple(values.remarks),
@@ -116,6 +131,61 @@ def _adjusted(book: SheetFile) -> tuple[FloatArray | None, FloatArray | None]:
     return found[0], found[1]
 
 
+def media_count(names: Collection[str]) -> int:
+    """Return for how many media a workbook has cells, by the names of its cells; 0 for air."""
+    count = sum(name in names for name in index_names(MOST))
+    return count if count >= FEWEST else 0
+
+
+def _media(book: SheetFile, values: NamedValues, errors: list[CellError]) -> SurveyMedia | None:
+    """Return what the cells of media hold, complaining about what cannot be meant."""
+    count = media_count(book.names)
+    if not count:
+        return None
+    cells = {name: _number(values, name) for name in media_names(count)}
+    media = SurveyMedia.of_cells(cells, count)
+    complaints = {**_bad_indices(media), **_bad_thicknesses(media)}
+    for name in HEIGHTS:
+        z0 = cells[name]
+        if z0 is not None and z0 < 0:
+            complaints[name] = f"found {z0:g} m, expected zero or more."
+        elif z0 is None and any(index is not None for index in media.indices[1:]):
+            complaints[name] = "is blank: type the way from the camera to the first interface [m]."
+    errors += [values.error(name, told) for name, told in complaints.items()]
+    return media
+
+
+def _bad_indices(media: SurveyMedia) -> dict[str, str]:
+    """Return what is wrong with refractive indices, by cell."""
+    low, high = INDEX_LIMITS
+    return {
+        name: f"found {index:g}, expected a refractive index, {low:g} to {high:g}."
+        for name, index in zip(index_names(media.media), media.indices, strict=True)
+        if index is not None and not low <= index <= high
+    }
+
+
+def _bad_thicknesses(media: SurveyMedia) -> dict[str, str]:
+    """Return what is wrong with thicknesses, by cell: media between two others have one."""
+    stated = [n for n, index in enumerate(media.indices, start=1) if index is not None or n == 1]
+    complaints = {}
+    names = thickness_names(media.media)
+    for n, (name, thick) in enumerate(zip(names, media.thicknesses, strict=True), start=2):
+        inside = n in stated and n != stated[-1]
+        if thick is not None and thick < 0:
+            complaints[name] = f"found {thick:g} m, expected zero or more."
+        elif inside and thick is None:
+            complaints[name] = f"is blank: type the thickness of medium {n} in metres."
+        elif n not in stated and thick:
+            complaints[name] = f"found {thick:g} m, but index_{n} is blank: type it, or clear this."
+        elif not inside and thick:
+            complaints[name] = (
+                f"found {thick:g} m, but medium {n} is the last one with an index, which has no "
+                f"thickness: type index_{n + 1}, or clear this cell."
+            )
+    return complaints
+
+
 def is_general(book: SheetFile) -> bool:
     """Whether a workbook describes a general pair by homographies."""
     return "h1_11" in book.names
@@ -123,7 +193,7 @@ def is_general(book: SheetFile) -> bool:
 
 def _columns() -> list[Column]:
     columns = []
-    for key in (*_NUMBERS, *_general_names(), *_TEXTS):
+    for key in (*_NUMBERS, *media_names(MOST), *_general_names(), *_TEXTS):
         known = term("setup", key)
         unit = known.unit if known is not None and key not in _TEXTS else ""
         kind: Kind = "text" if key in _TEXTS else "number"

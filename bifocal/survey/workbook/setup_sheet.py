@@ -8,15 +8,15 @@ from openpyxl.styles import Alignment
 
 from bifocal.survey.workbook.columns import adjustment_names
 from bifocal.survey.workbook.content import SurveyContent, setup_cells
+from bifocal.survey.workbook.media_formulas import INDEX_LIMITS
 from bifocal.survey.workbook.setup_cells import (
     FORMS,
-    IDEAL_FORMULAS,
-    IDEAL_GROUPS,
-    PAIR_FORMULAS,
-    PAIR_GROUPS,
     POSITIVE,
     STATES,
     TEXTS,
+    formulas,
+    groups,
+    may_be_zero,
     state,
     state_formula,
 )
@@ -24,6 +24,7 @@ from bifocal.survey.workbook.words import term, word
 from photocore.workbook.cells import CellValue
 from photocore.workbook.live_book import BookBuilder, SheetBuilder
 from photocore.workbook.look import GOOD, HEAD_FONT, WRONG, colour_words
+from photocore.workbook.words import Wording
 
 #: What a typed number of the set-up may be, where it need not be above zero.
 _NUMBERS = (-1e7, 1e7)
@@ -36,11 +37,11 @@ def setup_sheet(builder: BookBuilder, content: SurveyContent) -> None:
     line = state_formula(words, is_pair=content.is_pair)
     sheet.formula("A3", line, state(cells, words), name="setup_state", font=HEAD_FONT)
     sheet.headings(4, ("name", "description", "value", "unit"), (15, 61, 18, 9))
-    groups = PAIR_GROUPS if content.is_pair else IDEAL_GROUPS
+    listed = groups(is_pair=content.is_pair, media=content.media_cells)
     row = 5
-    for group in groups:
+    for group in listed:
         for name in group:
-            _setup_cell(sheet, row, name, cells, content, typed=group is not groups[-1])
+            _setup_cell(sheet, row, name, cells, content, typed=group is not listed[-1])
             row += 1
         row += 1
     for image in (1, 2):
@@ -65,9 +66,9 @@ def _setup_cell(
     typed: bool,
 ) -> None:
     """Write one named value with its description and unit."""
-    known = term("setup", name)
+    known = _wording(name, content)
     matrix = f"H{name[1]}({name[3:4]},{name[4:5]})"
-    told = known.in_language(sheet.book.language) if known else matrix
+    told = known.in_language(sheet.book.language).format(n=name[-1]) if known else matrix
     unit = known.unit if known else ""
     sheet.describe(row, (name, told), unit)
     cell, form, value = f"C{row}", FORMS.get(name, "General"), cells.get(name)
@@ -77,16 +78,22 @@ def _setup_cell(
     if name in content.links:
         sheet.formula(cell, content.links[name], value, form=form, name=name, editable=True)
         return
-    formulas = PAIR_FORMULAS if content.is_pair else IDEAL_FORMULAS
+    live = formulas(is_pair=content.is_pair, media=content.media_cells)
     is_default = {
         "d_1": content.pair is None,
         "sigma_s": content.setup is None or content.setup.sigma_s is None,
         "sigma_r_max": content.limits.sigma_r_max is None,
     }
-    if not typed or (name in formulas and is_default.get(name, False)):
-        sheet.formula(cell, formulas[name], value, form=form, name=name, editable=typed)
+    if not typed or (name in live and is_default.get(name, False)):
+        sheet.formula(cell, live[name], value, form=form, name=name, editable=typed)
         return
     sheet.input(cell, value, form=form, name=name)
+
+
+def _wording(name: str, content: SurveyContent) -> Wording | None:
+    """Return what a cell is called; numbered ones share an entry, some differ with media."""
+    bent = term("setup", f"{name}_media") if content.media_cells else None
+    return bent or term("setup", name) or term("setup", name.rstrip("0123456789"))
 
 
 def _validate(sheet: SheetBuilder, cell: str, name: str, prompt: str) -> None:
@@ -98,4 +105,8 @@ def _validate(sheet: SheetBuilder, cell: str, name: str, prompt: str) -> None:
     else:
         above = name in POSITIVE
         limits = None if above else _NUMBERS
+        if name.startswith("index_"):
+            limits = INDEX_LIMITS
+        elif may_be_zero(name):
+            limits = (0.0, _NUMBERS[1])
         sheet.validate(cell, title=name, prompt=prompt, above_zero=above, limits=limits)

@@ -9,7 +9,7 @@ from typing import Any
 from bifocal.survey.workbook.charts import HEAD, KEYS, LEFT
 from bifocal.survey.workbook.columns import adjustment_names
 from bifocal.survey.workbook.content import SurveyContent, setup_cells
-from bifocal.survey.workbook.setup_cells import PAIR_GROUPS, TITLE_BLOCK, TYPED_FORMULAS
+from bifocal.survey.workbook.setup_cells import TITLE_BLOCK, TYPED_FORMULAS, groups
 from bifocal.survey.workbook.words import word
 from photocore.errors import InputError
 from photocore.workbook.cells import CellValue
@@ -81,7 +81,8 @@ def write_options(editor: WorkbookEditor, content: SurveyContent, given: Mapping
         if content.sigma_px is not None:
             wanted.add("sigma_px")
         if "pair" in given or "adjust_setup" in given:
-            typed = {name for group in PAIR_GROUPS[:-1] for name in group}
+            listed = groups(is_pair=True, media=content.media_cells)
+            typed = {name for group in listed[:-1] for name in group}
             wanted |= typed - {"delta_d", "sigma_r_max", "k_off", "k_plane", *TITLE_BLOCK}
     elif content.setup is not None:
         wanted |= {"input_unit"} | ({"c_2"} if "adjust_setup" in given else set())

@@ -15,6 +15,7 @@ from bifocal.survey.workbook.columns import USED, USED_HERE
 from bifocal.survey.workbook.content import STRUCTURED_ROWS, SurveyContent
 from bifocal.survey.workbook.reader import SurveyInput
 from bifocal.survey.workbook.setup_cells import TYPED_FORMULAS
+from bifocal.survey.workbook.setup_reader import media_count
 from bifocal.survey.workbook.setup_update import (
     add_missing_sheets,
     chart_sheet,
@@ -59,22 +60,34 @@ class BookUpdate:
     added: tuple[str, ...]
 
 
-def check_kind(source: Path, survey: SurveyInput, *, is_pair: bool) -> None:
+def is_same_kind(survey: SurveyInput, content: SurveyContent) -> bool:
+    """Tell whether a survey workbook has the formulas that what came out of it needs."""
+    names = () if survey.book is None else survey.book.names
+    measured = content.is_pair == ("col1" in survey.table.present)
+    return measured and content.media_cells == media_count(names)
+
+
+def check_kind(source: Path, survey: SurveyInput, content: SurveyContent) -> None:
     """Refuse to change a survey workbook for coordinates into one for raw pixels, or the reverse.
+
+    Nor one for photos in air into one for media.
 
     Raises
     ------
     InputError
         Naming the way out.
     """
-    if is_pair != ("col1" in survey.table.present):
-        other = free_path(source.parent, f"{source.stem}-result", source.suffix).name
-        raise InputError(
-            f"{source}: its formulas are made for another kind of measurement "
-            f"({'coordinates in mm or px' if is_pair else 'raw pixels of a pair'}) and are not "
-            f"changed into others in place. Write to a new workbook, e.g. --out {other}; this one "
-            "stays as it is."
-        )
+    if is_same_kind(survey, content):
+        return
+    other = free_path(source.parent, f"{source.stem}-result", source.suffix).name
+    kind = "coordinates in mm or px" if content.is_pair else "raw pixels of a pair"
+    if content.is_pair == ("col1" in survey.table.present):
+        kind = "photos in air"
+    raise InputError(
+        f"{source}: its formulas are made for another kind of measurement ({kind}) and are not "
+        f"changed into others in place. Write to a new workbook, e.g. --out {other}; this one "
+        "stays as it is."
+    )
 
 
 @uncollected()
@@ -122,7 +135,7 @@ def update_book(
     points = editor.table("tblPoints")
     if points is None:
         raise InputError(f"{source}: has lost its table tblPoints; write to a new workbook.")
-    check_kind(source, survey, is_pair=content.is_pair)
+    check_kind(source, survey, content)
     other_words = content.language != survey.language
     if other_words:
         translate(editor, content, survey.language)

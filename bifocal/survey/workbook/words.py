@@ -7,7 +7,17 @@ from photocore.workbook.words import LANGUAGES, WordBook
 __all__ = ["LANGUAGES", "WORDS", "headings", "readme", "term", "word"]
 
 WORDS = WordBook(__package__)
-term, word, readme = WORDS.term, WORDS.word, WORDS.readme
+term, word = WORDS.term, WORDS.word
+
+
+def readme(language: str, *, media: bool = False) -> list[str]:
+    """Return the paragraphs of the sheet `Readme`; with media the formulas of bent rays."""
+    lines = WORDS.readme(language)
+    if not media:
+        return lines
+    bent = str(WORDS.content["readme_media"][language]).splitlines()
+    first = next(row for row, line in enumerate(lines) if line.startswith("ds ="))
+    return [*lines[:first], *bent, *lines[first + len(bent) :]]
 
 
 def headings(section: str, key: str) -> tuple[str, ...]:

@@ -11,7 +11,7 @@ import pytest
 from click.testing import CliRunner
 from PIL import Image
 
-from bifocal import Lens, calibrate
+from bifocal import Interior, Lens, calibrate
 from bifocal.calibration.board_calibration import (
     BoardView,
     detect_board,
@@ -22,6 +22,7 @@ from bifocal.calibration.plumb_line import calibrate_from_lines, find_straight_e
 from bifocal.calibration.workflow import undistorted
 from bifocal.cli.main import main
 from bifocal.files.images import read_image, write_image
+from bifocal.orientation.interior_orientation import lens_of_photo
 from photocore.errors import InputError
 
 MATRIX = np.array([[900.0, 0, 511.5], [0, 905.0, 383.5], [0, 0, 1]])
@@ -398,6 +399,37 @@ def test_edges_of_a_picture_are_enough():
     found = calibrate_from_lines(lines, (1024, 768), focal_px=900.0)
     assert found.lines >= 6
     assert np.abs(found.lens.undistort(GRID) - lens.undistort(GRID)).max() < 1.5
+
+
+@pytest.mark.parametrize(("given", "sigma"), [(["--focal-px", "900"], 0.02), ([], 0.5)])
+def test_lines_that_ask_for_no_correction_give_a_lens_without_distortion(tmp_path, given, sigma):
+    # Edges that are not straight themselves: smooth bends of half a pixel, each its own.
+    rng = np.random.default_rng(3)
+    rows = ["line,col [px],row [px]"]
+    along = np.linspace(20, 1000, 30)
+    for number, at in enumerate(np.linspace(30, 740, 8)):
+        row = at + 0.5 * np.sin(along / rng.uniform(60, 160) + rng.uniform(0, 6))
+        rows += [f"L{number},{x:.3f},{y:.3f}" for x, y in zip(along, row, strict=True)]
+    (tmp_path / "lines.csv").write_text("\n".join(rows))
+    write_image(tmp_path / "wall.png", np.full((768, 1024), 128, np.uint8))
+    out = tmp_path / "lens.json"
+    words = [str(tmp_path / "wall.png"), "--lines", str(tmp_path / "lines.csv"), *given]
+    done = CliRunner().invoke(main, ["calibrate", *words, "--out", str(out)])
+    assert done.exit_code == 0, done.stderr
+    assert "hardly straightens" in done.stderr
+    assert "use a board" in done.stderr
+    assert "no distortion: k1 = k2 = 0" in done.stdout
+    lens = Lens.read(out)
+    assert not lens.coefficients.any()
+    # Nothing calibrated the principal distance: `align` takes it as what it is, also resized.
+    for one in (lens, lens_of_photo(lens, (512, 384))):
+        assert Interior.from_lens(one, source="lens.json").sigma_focal == sigma
+
+
+def test_a_lens_file_whose_precision_is_no_number_is_named():
+    lens = replace(BROWN, extra={"sigma_focal": "two"})
+    with pytest.raises(InputError, match=r"lens\.json: sigma_focal: expected a number"):
+        Interior.from_lens(lens, source="lens.json")
 
 
 def test_too_few_lines_are_refused():

@@ -218,6 +218,19 @@ def test_no_points_give_no_points():
     assert len(ideal().intersect(np.zeros((0, 2)), np.zeros((0, 2)))) == 0
 
 
+def test_masked_picks_are_unknown_and_words_are_none():
+    picks = np.array([[[100.0, 100.0], [400.0, 90.0]], [[200.0, 300.0], [50.0, 60.0]]])
+    masked = np.ma.masked_array(picks * 1.01, mask=False)
+    masked[1, 0, 0] = np.ma.masked
+    found = ideal().intersect(picks, masked)
+    assert found.xyz.shape == (2, 2, 3)
+    np.testing.assert_array_equal(np.isnan(found.xyz).any(axis=-1), [[False, False], [True, False]])
+    with pytest.raises(InputError, match="pixels2: expected numbers, found"):
+        ideal().intersect([[1, 2]], [["1", "2"]])
+    with pytest.raises(InputError, match=r"pixels1: expected points of shape \(..., 2\)"):
+        ideal().intersect([1, 2, 3], [1, 2, 3])
+
+
 def test_unequal_numbers_of_picks_are_refused():
     with pytest.raises(InputError, match="both have shape"):
         ideal().intersect(np.zeros((2, 2)), np.zeros((3, 2)))

@@ -11,7 +11,6 @@ from bifocal import Pair
 from bifocal.media import MediaPath, interface_axes
 from bifocal.model.ray_field import RayField
 from bifocal.rays import object_rays, plane_position, straight
-from bifocal.survey.orientation_check import check_orientation
 from multimedia import Layers
 from photocore.errors import GeometryError, InputError
 from tests.scenes.refracted import pixels_of
@@ -273,12 +272,6 @@ def test_a_covariance_of_cameras_in_air_moves_no_point_through_media():
 def test_mixed_units_are_told_of():
     data = content("port") | {"layers": {"indices": [1.0, 1.49, 1.337], "thicknesses": [1e-8]}}
     assert any("thickest layer" in remark for remark in Pair.from_dict(data).remarks)
-
-
-def test_what_knows_only_air_says_so():
-    pair = Pair.from_dict(content("port"))
-    with pytest.raises(InputError, match="seen through other media"):
-        check_orientation(pair, np.zeros((5, 2)), np.zeros((5, 2)))
 
 
 @pytest.mark.parametrize("name", ["port", "tank", "surface", "leaning port"])

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import cv2
 import numpy as np
 import pytest
 
 import bifocal
+from bifocal.orientation.align_workflow import basis
 from photocore.errors import GeometryError, InputError
 
 SIZE = (401, 301)
@@ -99,6 +102,39 @@ def test_photos_square_to_a_wall_at_known_distances() -> None:
     assert len(alignment.tie1) > 50
 
 
+@pytest.mark.parametrize(
+    ("site", "asked"),
+    [(None, True), (bifocal.SiteMeasures(distance1=17.5, distance2=9.5), False)],
+)
+def test_without_a_tape_the_size_of_relief_is_said_to_be_weak(site, asked) -> None:
+    points = dataclasses.replace(control(), sigma=np.full(WALL.shape, 0.003))
+    lenses = [
+        bifocal.Interior.from_focal(f, image_size=SIZE, sigma=0.04, source="EXIF")
+        for f in (1750, 950)
+    ]
+    found = bifocal.align(None, None, interiors=tuple(lenses), control=points, site=site)
+    said = [text for text in found.remarks if "tape one distance" in text]
+    assert bool(said) == asked
+    assert asked == (found.deviations["relief_scale"] > 0.01)
+    if asked:
+        share = 100 * found.deviations["relief_scale"]
+        assert f"the size of relief is known only to {share:.1f} %" in said[0]
+
+
+def test_an_alignment_says_in_one_line_what_its_sigmas_rest_on() -> None:
+    lenses = lens(17.5), lens(9.5)
+    found = bifocal.align(None, None, interiors=lenses, control=control())
+    line = basis(found)
+    assert line.startswith("Sigmas rest on: no common points; control points and tapes as precise")
+    assert "with the covariance of its orientation; assumed: principal point of photo 1" in line
+    assert "\n" not in line
+    typed = bifocal.align(
+        None, None, interiors=lenses, as_set_up=True,
+        site=bifocal.SiteMeasures(distance1=17.5, distance2=9.5),
+    )  # fmt: skip
+    assert "distances, focal lengths and nadir points as typed" in basis(typed)
+
+
 def test_what_cannot_be_meant_is_refused() -> None:
     with pytest.raises(InputError, match="image1: give the photo"):
         bifocal.align(None, None, control=control())
@@ -109,6 +145,11 @@ def test_what_cannot_be_meant_is_refused() -> None:
         bifocal.align(noise(), noise(), line=("along", line))
     with pytest.raises(InputError, match=r"image1: expected shape \(h, w"):
         bifocal.match(PAIR, np.zeros(7, np.uint8), noise())
+    for sigma in (0.0, -1e-4, 2.3, float("nan")):
+        with pytest.raises(InputError, match="sigma_focal: must be a share"):
+            dataclasses.replace(small, sigma_focal=sigma)
+    with pytest.raises(InputError, match="focal: must be above zero"):
+        dataclasses.replace(small, focal=0.0)
 
 
 def test_points_matched_on_colour_photos_give_the_relief_of_the_wall() -> None:

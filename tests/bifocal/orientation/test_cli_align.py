@@ -9,8 +9,11 @@ import pytest
 from click.testing import CliRunner
 
 from bifocal import Pair
+from bifocal.cli import match as match_command
 from bifocal.cli.main import main
 from bifocal.orientation.interior_orientation import Interior
+from bifocal.orientation.match_workflow import match_summary
+from bifocal.orientation.matching import Matches
 from bifocal.orientation.validation import check_distortion
 from photocore.camera import project
 from photocore.errors import GeometryError
@@ -223,13 +226,46 @@ def test_matched_points_solve_to_the_boards(folder) -> None:
     pair, out = str(folder / "wall.pair.json"), str(folder / "points.csv")
     result = CliRunner().invoke(main, ["match", pair, "--out", out, "--count", "600", "--json"])
     assert result.exit_code == 0, result.output
-    assert json.loads(result.stdout)["count"] > 300
+    said = json.loads(result.stdout)
+    assert said["count"] > 300
+    assert said["rests_on"].startswith("Sigmas rest on: matches of 0.")
+    assert "the pair as given, with the covariance of its orientation" in said["rests_on"]
     solved = CliRunner().invoke(main, ["solve", out, "--pair", pair, "--json"])
     assert solved.exit_code == 0, solved.output
     points = json.loads(solved.stdout)["points"]
     xyz = np.array([[p["X"], p["Y"], p["r"]] for p in points], dtype=float)
     error = xyz[:, 2] - relief_at(xyz)
     assert np.median(np.abs(error)) < 0.012
+
+
+@pytest.mark.parametrize(
+    ("kind", "count", "said"),
+    [
+        ("disc", 18, "No target in "),
+        ("feature", 18, "NOTHING FOUND in "),
+        ("feature", 400, "FEWER THAN 3 POINTS in "),
+    ],
+)
+def test_parts_without_points_are_named_for_what_they_are(folder, kind, count, said) -> None:
+    rng, ones = np.random.default_rng(5), np.ones(count)
+    xyz = np.column_stack([rng.uniform(-4.5, -0.5, count), rng.uniform(-3, 3, count), 0 * ones])
+    found = Matches(
+        pixels1=project(FAR, xyz), pixels2=project(NEAR, xyz), sigma=0.1 * ones, misfit=0.1 * ones,
+        agreement=ones, ids=tuple(map(str, range(count))), kinds=(kind,) * count,
+    )  # fmt: skip
+    summary = match_summary(Pair.read(folder / "wall.pair.json"), found)
+    words = list(match_command._lines(summary))[-1]
+    assert words.startswith(f"{said}{len(summary['empty'])} of 24 parts")
+    # No part with a target or, of few points, a point is called empty.
+    held = [
+        (part["columns"][0] <= found.pixels1[:, 0] + 0.5)
+        & (found.pixels1[:, 0] + 0.5 <= part["columns"][1] + 1)
+        & (part["rows"][0] <= found.pixels1[:, 1] + 0.5)
+        & (found.pixels1[:, 1] + 0.5 <= part["rows"][1] + 1)
+        for part in summary["empty"]
+    ]
+    assert held
+    assert max(int(inside.sum()) for inside in held) < summary["fewest_in_part"]
 
 
 @pytest.mark.acceptance

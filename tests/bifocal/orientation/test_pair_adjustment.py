@@ -7,9 +7,10 @@ import pytest
 
 from bifocal.orientation.absolute_orientation import orient_pair
 from bifocal.orientation.control_points import Control, SiteMeasures
+from bifocal.orientation.facade_lines import FacadeDirection, contradiction_in_words
 from bifocal.orientation.interior_orientation import Interior
 from bifocal.orientation.orientation_stages import PhotoInput
-from bifocal.orientation.pair_adjustment import adjust, pair_equations
+from bifocal.orientation.pair_adjustment import adjust, line_test, pair_equations
 from bifocal.orientation.pair_observations import NAMES, PairObservations, PairUnknowns, at
 from bifocal.orientation.space_resection import resect
 from bifocal.orientation.tie_points import with_wall
@@ -262,6 +263,10 @@ def everything() -> tuple[PairObservations, PairUnknowns]:
         sigma_zoom=0.01,
         measured={"distance1": (16.1, 0.01), "delta_d": (7.0, 0.02)},
         sigma_tilt=0.01,
+        lines=tuple(
+            FacadeDirection(camera=n, name="upright", direction=way, sigma=0.003, count=50)
+            for n, way in ((1, np.array([0.1, -0.9, 0.4])), (2, np.array([0.9, 0.2, -0.4])))
+        ),
     )
     return observations, PairUnknowns(cameras=(FAR, NEAR), radial=radial)
 
@@ -290,6 +295,43 @@ def test_the_jacobian_is_the_derivative_by_every_name() -> None:
         np.testing.assert_allclose(
             jacobian[:, column], slope, atol=1e-6 * np.abs(slope).max(), err_msg=name
         )
+
+
+def test_lines_feed_the_tilt_by_their_precision_and_contradictions_are_named() -> None:
+    exact = tuple(
+        replace(interior(focal=cam.matrix[0, 0]), sigma_focal=1e-3) for cam in (FAR, NEAR)
+    )
+    points = control(sigma_px=0.3)
+    wide = replace(points, sigma=np.full(points.sigma.shape, 0.03))
+    problem = PairObservations(interiors=exact, control=wide, pick_used=np.ones(len(POINTS), bool))
+    start = PairUnknowns(cameras=(FAR, NEAR))
+    before = adjust(problem, start)
+
+    def lines(angle_deg: float) -> tuple[FacadeDirection, FacadeDirection]:
+        """Return uprights that come out of the wall by an angle, in the true cameras."""
+        angle = np.deg2rad(angle_deg)
+        way = np.array([0.0, np.cos(angle), np.sin(angle)])
+        first, second = (
+            FacadeDirection(
+                camera=n, name="upright", direction=cam.rotation @ way, sigma=0.0035, count=50
+            )
+            for n, cam in ((1, FAR), (2, NEAR))
+        )
+        return first, second
+
+    after = adjust(replace(problem, lines=lines(0.0)), start)
+    for number, (cam, old, new) in enumerate(
+        zip((FAR, NEAR), before.cameras, after.cameras, strict=True), start=1
+    ):
+        assert after.sigma("turn X", number) < 0.8 * before.sigma("turn X", number)
+        out = [(c.rotation.T @ cam.rotation @ [0.0, 1.0, 0.0])[2] for c in (old, new)]
+        assert abs(out[1]) <= abs(out[0])
+    assert line_test(lines(0.0)[0], before) < 3
+    test = line_test(lines(6.0)[0], before)
+    assert test > 3
+    said = contradiction_in_words(lines(6.0)[0], before.cameras, test)
+    assert "upright lines of the far photo" in said
+    assert "°" in said
 
 
 def test_points_measured_in_part_tell_less_than_measured_whole() -> None:

@@ -3,6 +3,7 @@
 import json
 
 import numpy as np
+import openpyxl
 import pytest
 from click.testing import CliRunner
 
@@ -13,6 +14,7 @@ from bifocal.planning.stations import plan_stations
 from multimedia import Layers
 from photocore.errors import GeometryError, InputError
 from tests.scenes.refracted import seen_at
+from tests.workbook_lint import lint
 
 CANON = CameraSensor(width=22.7, height=15.1, columns=3072, rows=2048)
 LAYERS = Layers(indices=(1.0, 1.49, 1.337), thicknesses=(0.01,))
@@ -91,6 +93,17 @@ def test_the_command_plans_a_tank(tmp_path):
     text = CliRunner().invoke(main, [*words, *wet])
     assert "first interface" in text.stdout
     out = CliRunner().invoke(main, [*words, *wet, "--out", str(tmp_path / "plan.xlsx")])
-    assert out.exit_code == 1
-    assert "through media" in out.stderr
+    assert out.exit_code == 0, out.output
+    sheet = openpyxl.load_workbook(tmp_path / "plan.xlsx")["Planning"]
+    row = dict(zip((c.value for c in sheet[4]), (c.value for c in sheet[5]), strict=True))
+    for key in ("d1", "d2", "z0_1", "z0_2"):
+        assert row[key] == pytest.approx(best[key], rel=1e-12)
+    # Glass and water alike behind both: 0.91 m.
+    assert row["d2"] - row["z0_2"] == pytest.approx(0.91)
+    assert row["sigma_rms"] == pytest.approx(1000 * best["sigma_r_rms"], rel=1e-12)
+    assert "1.49 (10 mm)" in sheet["A2"].value
+    bars = sheet._charts[0].series
+    names = [sheet[bar.tx.strRef.f.split("!")[1].replace("$", "")].value for bar in bars]
+    assert names == ["sigma_rms", "sigma_corner", "sigma_ortho"]
+    assert lint(tmp_path / "plan.xlsx") == []
     assert CliRunner().invoke(main, [*words, "--depth", "0.9"]).exit_code == 2

@@ -179,6 +179,27 @@ def test_what_falls_away_from_camera_2_where_the_photos_do_not_fit_is_not_measur
     assert not surfaces._falls_away(frame, relief, np.full(relief.shape, 2.0, np.float32)).any()
 
 
+def test_the_side_face_of_a_step_is_put_nowhere_and_the_step_stands_on_its_line():
+    frame = frame_of(Pair(image1=FAR, image2=NEAR))
+    x = np.arange(200) - 99.5
+    # A pier 2 m before the wall, 60 to 80 px from the nadir: photo 1 sees its foot at 60 px and its
+    # inner edge at 60 / (1 - 2 / 17.5) = 67.7 px, and flow runs from the one to the other.
+    profile = np.interp(x, [59, 69, 90, 94], [0.0, 2.0, 2.0, 0.0])
+    relief = np.broadcast_to(profile, (200, 200)).astype(np.float32)
+    row = forward_projection.side_faces(frame, relief)[99]
+    assert row[(x > 60) & (x < 68)].all()
+    assert not row[(x < 57) | (x > 71)].any()
+    nothing = np.zeros_like(relief)
+    matched = flow.Measurement(
+        r=relief, across=nothing, loop=nothing, sigma_px=nothing + np.float32(0.001)
+    )
+    bands, usable = surfaces.surfaces(frame, matched, (-1.0, 3.0))
+    assert not usable[99, (x > 60) & (x < 68)].any()
+    found = forward_projection.to_plane(frame, bands, usable, frame.grid).r[99]
+    assert np.abs(found[(x > 50) & (x < 59)]).max() < 1e-3
+    assert np.abs(found[(x > 61) & (x < 79)] - 2.0).max() < 1e-3
+
+
 def test_half_the_resolution_lies_where_the_whole_one_does():
     frame = frame_of(Pair(image1=FAR, image2=NEAR), side=201)
     half = coarse_level.halved(frame)

@@ -9,9 +9,6 @@ from click.testing import CliRunner
 from bifocal import solve
 from bifocal.cli.main import main
 from bifocal.model.pair import Pair
-from bifocal.survey.output import write_result
-from bifocal.survey.template_workflow import write_survey
-from photocore.errors import InputError
 from tests.bifocal.model.test_pair_through_media import PAIRS, POINTS, content
 from tests.scenes.refracted import pixels_of
 
@@ -87,12 +84,6 @@ def test_millimetres_are_carried_to_pixels_without_bending_them():
     np.testing.assert_allclose(solve(picks, pair=pair).table.xyz, POINTS, atol=1e-9)
 
 
-def test_plane_points_do_not_check_a_set_up_through_media():
-    picks = measured("tank") | {"code": ["PLANE"] * len(POINTS)}
-    with pytest.raises(InputError, match="PLANE"):
-        solve(picks, pair=Pair.from_dict(content("tank")))
-
-
 def test_what_neglecting_refraction_costs_is_said():
     """The points as a pair in air makes them, from the same pixels."""
     data, picks = content("tank"), measured("tank")
@@ -102,12 +93,3 @@ def test_what_neglecting_refraction_costs_is_said():
     assert f"up to {np.abs(off[:, 2]).max():.3f} m" in said
     assert f"places by up to {np.hypot(*off[:, :2].T).max():.3f} m" in said
     assert np.abs(off[:, 2]).max() > 0.05
-
-
-def test_no_workbook_is_written_with_formulas_of_air(tmp_path):
-    solution = solve(measured("tank"), pair=Pair.from_dict(content("tank")))
-    with pytest.raises(InputError, match=r"--out solved\.csv"):
-        write_result(tmp_path / "solved.xlsx", solution)
-    with pytest.raises(InputError, match=r"write a text table: \.csv"):
-        write_survey(tmp_path / "points.xlsx", solution.points, pair=solution.pair)
-    assert not list(tmp_path.iterdir())

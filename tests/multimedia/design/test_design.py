@@ -146,3 +146,27 @@ def test_a_ring_takes_its_target_as_any_three_numbers() -> None:
         np.testing.assert_array_equal([c.centre for c in ring], [c.centre for c in rings[0]])
     with pytest.raises(InputError, match="target"):
         ring_of_cameras(3, 0.6, 0.4, interface=interface, target=(0, 0), principal_distance=25.0)
+
+
+def test_a_ring_stands_before_its_faces_wherever_they_are() -> None:
+    """A wall at X = 2, looked through along X: turned, it is the ring above the water at Z = 0."""
+    layers = Layers(indices=(1.0, 1.5, 1.337), thicknesses=(0.01,))
+    wall = FlatInterface(layers=layers, point=(2.0, 0.5, -0.3), normal=(1.0, 0.0, 0.0))
+    given = {"principal_distance": 25.0}
+    ring = ring_of_cameras(3, 0.6, 0.4, interface=wall, target=(1.9, 0.2, 0.1), **given)
+    level = ring_of_cameras(
+        3, 0.6, 0.4, interface=FlatInterface(layers=layers), target=(0, 0, -0.1), **given
+    )
+    for camera, other in zip(ring, level, strict=True):
+        assert camera.centre[0] - 2.0 == pytest.approx(other.centre[2], abs=1e-12)
+        away = np.hypot(camera.centre[1] - 0.2, camera.centre[2] - 0.1)
+        assert away == pytest.approx(0.6 * np.sin(0.4), abs=1e-12)
+        np.testing.assert_allclose(project(camera, (1.9, 0.2, 0.1), wall), 0, atol=1e-9)
+    raised = FlatInterface(layers=layers, point=(0.0, 0.0, 5.0))
+    high = ring_of_cameras(3, 0.6, 0.4, interface=raised, target=(0, 0, 4.9), **given)
+    np.testing.assert_allclose(
+        [c.centre - (0, 0, 5.0) for c in high], [c.centre for c in level], atol=1e-12
+    )
+    port = FlatInterface(layers=layers, point=(0, 0, -0.03), moves_with_camera=True)
+    with pytest.raises(InputError, match="moves with the camera"):
+        ring_of_cameras(3, 0.6, 0.4, interface=port, target=(0, 0, -1), **given)

@@ -9,6 +9,7 @@ import pytest
 
 from multimedia.media.projection import project
 from multimedia.orientation.epipolar_curves import epipolar_candidates, epipolar_curve
+from multimedia.orientation.object_rays import image_rays
 from photocore.errors import InputError
 from tests.multimedia.tank import LAYERS, cameras, control, images
 
@@ -103,3 +104,12 @@ def test_an_empty_depth_range_and_a_zero_chord_are_named():
         epipolar_curve(VIEWS[1], IMAGE[1], VIEWS[2], LAYERS, z_range=DEPTHS, chord_error=0.0)
     with pytest.raises(InputError, match="vertices"):
         epipolar_curve(VIEWS[1], IMAGE[1], VIEWS[2], LAYERS, z_range=DEPTHS, vertices=1)
+
+
+def test_a_range_that_reaches_above_the_water_begins_where_the_ray_enters_it():
+    """Every vertex is there; the first is the image of the point on the last face."""
+    over = epipolar_curve(VIEWS[1], IMAGE[1], VIEWS[2], LAYERS, z_range=(DEPTHS[0], 30.0))
+    assert np.isfinite(over.image).all()
+    entry, _ = image_rays(VIEWS[1], IMAGE[1], LAYERS)
+    below = entry - np.array([0.0, 0.0, 1e-9])
+    np.testing.assert_allclose(over.image[:, 0], project(VIEWS[2], below, LAYERS), atol=1e-9)

@@ -66,6 +66,15 @@ def test_glass_thinner_than_water_is_remarked_upon() -> None:
     assert Layers(indices=(1.0, 1.46, 1.33), thicknesses=(6.0,)).remarks == ()
 
 
+@pytest.mark.parametrize(
+    ("indices", "thicknesses"),
+    [((1.0, 1.337, 1.5, 1.0), (0.1, 0.01)), ((1.0, 1.337, 1.49, 1.337), (0.2, 0.01))],
+)
+def test_water_before_glass_is_not_remarked_upon(indices, thicknesses) -> None:
+    """Looked at through water, then the wall of the tank: nothing is swapped."""
+    assert Layers(indices=indices, thicknesses=thicknesses).remarks == ()
+
+
 def test_an_air_gap_is_not_remarked_upon() -> None:
     assert Layers(indices=(1.33, 1.5, 1.0003, 1.5, 1.33), thicknesses=(5, 1, 5)).remarks == ()
 

@@ -4,6 +4,7 @@
  */
 import { Lens } from "./lens.js";
 import { invert, project } from "./matrices.js";
+import { Media } from "./media.js";
 
 /** The wall's pixel grid, common to both images. */
 export class Wall {
@@ -15,11 +16,14 @@ export class Wall {
     this.wallFromPhoto = this.photoFromWall.map(invert);
     this.known = [new WeakMap(), new WeakMap()];
     this.lenses = pair.images.map((image) => (image.lens ? new Lens(image.lens) : null));
+    this.media = pair.images.map((image) => (image.media ? new Media(image.media) : null));
   }
 
   /** Wall pixel -> pixel of the original photo `image` (1 or 2). */
   toPhoto(image, pixel) {
-    const straight = project(this.photoFromWall[image - 1], pixel);
+    const media = this.media[image - 1];
+    const seen = media ? this.fromPlane(media.apparent(this.toPlane(pixel))) : pixel;
+    const straight = project(this.photoFromWall[image - 1], seen);
     return this.lenses[image - 1]?.distort(straight) ?? straight;
   }
 
@@ -30,6 +34,8 @@ export class Wall {
     if (!place) {
       const straight = this.lenses[image - 1]?.undistort(pixel) ?? pixel;
       place = project(this.wallFromPhoto[image - 1], straight);
+      const media = this.media[image - 1];
+      if (media) place = this.fromPlane(media.onPlane(this.toPlane(place)));
       known.set(pixel, place);
     }
     return place;

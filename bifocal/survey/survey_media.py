@@ -1,0 +1,166 @@
+"""Media as the cells of a survey workbook state them: blank cells are air."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from bifocal.model.photo import Photo
+from multimedia import Layers
+from photocore.errors import InputError
+
+#: Media a workbook can be prepared for, from the camera to the object.
+FEWEST, MOST = 2, 6
+#: Light that is nowhere bent, where the cells of a workbook with media are blank.
+UNBENT = Layers(indices=(1.0, 1.0))
+
+
+def index_names(media: int) -> tuple[str, ...]:
+    """Return the cells of the refractive indices, the camera's medium first."""
+    return tuple(f"index_{number}" for number in range(1, media + 1))
+
+
+def thickness_names(media: int) -> tuple[str, ...]:
+    """Return the cells of the thicknesses, of all media but the first and the last."""
+    return tuple(f"thick_{number}" for number in range(2, media))
+
+
+#: Cells of the ways from both cameras to the first interface.
+HEIGHTS = ("z0_1", "z0_2")
+
+
+def media_names(media: int) -> tuple[str, ...]:
+    """Return the cells a user types in a workbook prepared for so many media; none for none."""
+    return (*index_names(media), *thickness_names(media), *HEIGHTS) if media else ()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SurveyMedia:
+    """What the cells of a workbook say of the media between cameras and object.
+
+    Attributes
+    ----------
+    indices : tuple of float or None
+        Of each medium there is a cell for, the camera's first; blank: as the one before it, the
+        first 1.
+    thicknesses : tuple of float or None
+        Of all but the first and the last; blank: 0. [m]
+    z0 : tuple of float or None
+        Both cameras' centres to the first interface, in the order of the workbook. [m]
+    """
+
+    indices: tuple[float | None, ...]
+    thicknesses: tuple[float | None, ...]
+    z0: tuple[float | None, float | None]
+
+    @classmethod
+    def blank(cls, media: int) -> SurveyMedia:
+        """Return the blank cells of a workbook prepared for so many media.
+
+        Raises
+        ------
+        InputError
+            If that is no number of media.
+        """
+        if not FEWEST <= media <= MOST:
+            raise InputError(
+                f"media: must be {FEWEST} (a water surface) to {MOST}, got {media}; air, glass and "
+                "water are 3."
+            )
+        return cls(indices=(None,) * media, thicknesses=(None,) * (media - 2), z0=(None, None))
+
+    @classmethod
+    def of_cells(cls, cells: Mapping[str, float | None], media: int) -> SurveyMedia:
+        """Return what cells hold, by their names."""
+        first, second = (cells.get(name) for name in HEIGHTS)
+        return cls(
+            indices=tuple(cells.get(name) for name in index_names(media)),
+            thicknesses=tuple(cells.get(name) for name in thickness_names(media)),
+            z0=(first, second),
+        )
+
+    @classmethod
+    def of_photos(cls, photos: tuple[Photo, ...], media: int = 0) -> SurveyMedia | None:
+        """Return the cells that state a pair's media; None for one in air without such cells.
+
+        Parameters
+        ----------
+        photos : tuple of Photo
+            In the order of the workbook.
+        media : int
+            How many the workbook has cells for; 0 for a new one.
+
+        Raises
+        ------
+        InputError
+            If the pair looks through more.
+        """
+        layers = photos[0].layers
+        if layers is None or layers == UNBENT:
+            return cls.blank(media) if media else None
+        count = len(layers.indices)
+        if media and count > media:
+            raise InputError(
+                f"the workbook is prepared for {media} media, the pair looks through {count}; "
+                "write to a new workbook."
+            )
+        more = max(media - count, 0)
+        first, second = (photo.z0 for photo in photos)
+        inner = (*layers.thicknesses, *(None,) * more)
+        return cls(
+            indices=(*layers.indices, *(None,) * more), thicknesses=inner, z0=(first, second)
+        )
+
+    @property
+    def media(self) -> int:
+        """How many media there are cells for."""
+        return len(self.indices)
+
+    @property
+    def used(self) -> tuple[float, ...]:
+        """Indices that count, blanks filled in, one a cell."""
+        found: list[float] = []
+        for index in self.indices:
+            found.append(index if index is not None else found[-1] if found else 1.0)
+        return tuple(found)
+
+    @property
+    def layers(self) -> Layers | None:
+        """The media stated; None in air."""
+        stated = [n for n, index in enumerate(self.indices) if n == 0 or index is not None]
+        if len(stated) < 2:
+            return None
+        used = self.used
+        inner = tuple(self.thicknesses[n - 1] or 0.0 for n in stated[1:-1])
+        return Layers(indices=tuple(used[n] for n in stated), thicknesses=inner)
+
+    @property
+    def cells(self) -> dict[str, float | None]:
+        """What the cells hold, by their names."""
+        media = self.media
+        values = (*self.indices, *self.thicknesses, *self.z0)
+        return dict(zip(media_names(media), values, strict=True))
+
+    def through(self, number: int) -> tuple[Layers, float]:
+        """Return the media before photo 1 or 2 and its z0; light is not bent where cells are blank.
+
+        Raises
+        ------
+        InputError
+            If z0 is missing.
+        """
+        layers, z0 = self.layers, self.z0[number - 1]
+        if layers is None:
+            return UNBENT, 0.0
+        if z0 is None:
+            raise InputError(
+                f"z0_{number} is blank: type how far it is from the centre of camera {number} to "
+                "the first interface [m]; or clear the refractive indices, for air."
+            )
+        return layers, z0
+
+    def exchanged(self) -> SurveyMedia:
+        """Return the same with the cameras exchanged."""
+        return SurveyMedia(
+            indices=self.indices, thicknesses=self.thicknesses, z0=(self.z0[1], self.z0[0])
+        )

@@ -1,0 +1,166 @@
+"""The sheet `Setup` and the bent ray as formulas, for pairs that look through media.
+
+On the measured side every ray is known, so a spreadsheet follows it layer by layer without
+iterating: see `bifocal.media`, whose notation this is.
+"""
+
+from __future__ import annotations
+
+import re
+
+from bifocal.model.pair import Pair
+from bifocal.rays import seen_distance
+from bifocal.survey.survey_media import SurveyMedia, thickness_names
+from photocore.workbook.cells import CellValue
+
+#: What may be typed as refractive index: vacuum to germanium.
+INDEX_LIMITS = (1.0, 4.1)
+
+
+def _used(media: int) -> tuple[str, ...]:
+    return tuple(f"n_used_{number}" for number in range(1, media + 1))
+
+
+def calculated_names(media: int, *, is_pair: bool) -> tuple[str, ...]:
+    """Return the cells of `Setup` that follow from those of the media."""
+    if not media:
+        return ()
+    rays = () if is_pair else ("c_rays_1", "c_rays_2", "mm_1", "m_seen")
+    both = tuple(f"{name}_{image}" for name in ("behind", "seen", "reach") for image in "12")
+    return (*_used(media), *both, "r_top", *rays)
+
+
+def setup_formulas(media: int, *, is_pair: bool) -> dict[str, str]:
+    """Return the formulas of the sheet `Setup` that media add or change.
+
+    Blank cells are air: a medium without an index has that of the one before it.
+    """
+    if not media:
+        return {}
+    formulas = {"n_used_1": "IF(COUNT(index_1)=1,index_1,1)"}
+    for n in range(2, media + 1):
+        formulas[f"n_used_{n}"] = f"IF(COUNT(index_{n})=1,index_{n},n_used_{n - 1})"
+    inner = "".join(f"-N({name})" for name in thickness_names(media))
+    for image in "12":
+        glass = "".join(f"+N(thick_{n})*n_used_1/n_used_{n}" for n in range(2, media))
+        seen = f"N(z0_{image}){glass}+behind_{image}*n_used_1/n_used_{media}"
+        lens = f'IF(COUNT(c_1,c_2)=2,c_{image},IF(COUNT(d_{image})=1,d_{image},""))'
+        formulas |= {
+            f"behind_{image}": f'IF(COUNT(d_{image})=1,d_{image}-N(z0_{image}){inner},"")',
+            f"seen_{image}": f'IF(COUNT(d_{image})=1,{seen},"")',
+            f"reach_{image}": f'IF(COUNT(d_{image})=1,seen_{image}*n_used_{media}/n_used_1,"")',
+            f"c_rays_{image}": lens,
+        }
+    stated = ",".join(f"index_{n}" for n in range(2, media + 1))
+    lever = 'IF(reach_1=reach_2,"",reach_1*reach_2/(reach_1-reach_2))'
+    formulas |= {
+        "r_top": f'IF(COUNT(d_1,d_2)<2,"",IF(COUNT({stated})=0,MIN(d_1,d_2),'
+        "MIN(behind_1,behind_2)))",
+        "b_lever": f'IF(COUNT(d_1,d_2)=2,{lever},"")',
+        "mm_1": "IF(COUNT(m_1,m_2)=2,1000/m_1,1)",
+        "m_seen": 'IF(COUNT(c_1,d_1)=2,1000*seen_1/c_1,"")',
+    }
+    if not is_pair:
+        formulas["k_12"] = "IF(COUNT(m_1,m_2)=2,(seen_2/c_2)/(seen_1/c_1),1)"
+    return formulas
+
+
+def planned(formula: str, media: int, *, is_pair: bool) -> str:
+    """Return a formula of the sheet `Planning` as it is near the axis of cameras behind media.
+
+    Straight cameras that see alike there stand at ``reach``; the wall seems to lie at ``seen``.
+    """
+    if not media:
+        return formula
+    formula = formula.replace("*d_1/c_1", "*seen_1/c_1")
+    formula = re.sub(r"\(d_([12])-", r"(reach_\1-", formula)
+    formula = formula.replace("ABS(reach_1-d_2)", "ABS(reach_1-reach_2)")
+    return formula if is_pair else re.sub(r"\bm_1\b", "m_seen", formula)
+
+
+def setup_values(
+    media: SurveyMedia | None, pair: Pair | None, *, as_given: bool, is_pair: bool
+) -> dict[str, CellValue]:
+    """Return the numbers of the cells of media, typed and calculated; none without such cells.
+
+    Parameters
+    ----------
+    media : SurveyMedia or None
+        What is typed.
+    pair : Pair or None
+        As solved, through the same media; None in an empty template.
+    as_given : bool
+        Whether the workbook has the photos in the order in which an exchanged pair was given.
+    is_pair : bool
+        Whether the points are raw pixels of a general pair.
+    """
+    if media is None:
+        return {}
+    used = dict(zip(_used(media.media), media.used, strict=True))
+    cells: dict[str, CellValue] = {**media.cells, **used}
+    cells["mm_1"] = 1
+    if pair is None:
+        return cells
+    photos = pair.as_given if as_given else (pair.image1, pair.image2)
+    stretch = media.used[-1] / media.used[0]
+    for image, (photo, z0) in enumerate(zip(photos, media.z0, strict=True), start=1):
+        thick = sum(value or 0.0 for value in media.thicknesses)
+        seen, c = seen_distance(photo.foot), photo.principal_distance
+        cells |= {
+            f"behind_{image}": photo.distance - (z0 or 0.0) - thick,
+            f"reach_{image}": seen * stretch,
+            f"seen_{image}": seen,
+            f"c_rays_{image}": photo.distance if c is None else c,
+        }
+    d1, d2 = (seen_distance(photo.foot) * stretch for photo in photos)
+    cells |= {"r_top": pair.highest_relief, "b_lever": d1 * d2 / (d1 - d2)}
+    first, second = photos
+    seen1, seen2 = (seen_distance(photo.foot) for photo in photos)
+    c1, c2 = first.principal_distance, second.principal_distance
+    if c1 is not None:
+        cells["m_seen"] = 1000 * seen1 / c1
+    if c1 is not None and c2 is not None and not is_pair:
+        cells |= {"mm_1": c1 / first.distance, "k_12": (seen2 / c2) / (seen1 / c1)}
+    return cells
+
+
+def _bend(number: int, square: str) -> str:
+    """Return k of medium ``number``: the tangent in it over that in the first."""
+    n = f"n_used_{number}^2"
+    return f"n_used_1/SQRT({n}+({n}-n_used_1^2)*{square})"
+
+
+def _bend_rate(number: int, square: str) -> str:
+    """Return d(tangent in medium ``number``) / d(tangent in the first)."""
+    n = f"n_used_{number}^2"
+    return f"n_used_1*{n}/({n}+({n}-n_used_1^2)*{square})^1.5"
+
+
+def bend(media: int, square: str, *, rate: bool = False) -> str:
+    """Return the formula of the tangent in the object's medium over that in the first.
+
+    Parameters
+    ----------
+    media : int
+        How many there are cells for.
+    square : str
+        Of the tangent in the first medium.
+    rate : bool
+        Of the changes of both instead.
+    """
+    return (_bend_rate if rate else _bend)(media, square)
+
+
+def arm(image: int, media: int, square: str, *, rate: bool = False) -> str:
+    """Return the formula of where a ray meets the plane, over its tangent in the first medium. [m]
+
+    Parameters
+    ----------
+    image : int
+        1 or 2.
+    media, square, rate
+        As in `bend`.
+    """
+    of = _bend_rate if rate else _bend
+    glass = "".join(f"+N(thick_{n})*{of(n, square)}" for n in range(2, media))
+    return f"N(z0_{image}){glass}+behind_{image}*{of(media, square)}"

@@ -1,0 +1,201 @@
+"""Pairs of one wall behind water or ports, adjusted together; rays from tests/scenes/wet.py."""
+
+from __future__ import annotations
+
+import csv
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+from PIL import Image
+
+from bifocal.cli.main import main
+from bifocal.model.pair import Pair
+from bifocal.orientation.joint_adjustment import JointUnknowns, adjust_jointly
+from bifocal.orientation.joint_media import CameraMedia, media_of, project_through
+from bifocal.orientation.joint_observations import JointObservations
+from multimedia import Layers
+from photocore.camera import Pinhole, camera_matrix
+from photocore.rotation import rotation_from_vector
+from tests.bifocal.model.test_pair_through_media import PAIRS, content
+from tests.bifocal.orientation.street import CONTROL, write_table
+from tests.scenes import SetupErrors, bifocal_cameras, demo_scene, render
+from tests.scenes.wet import WetCamera, under_water
+
+AQUARIUM = {"indices": (1.0, 1.49, 1.337), "thicknesses": (0.02,)}
+#: First interface over the wall where it stays with the object, else z0 of a port. [m]
+KINDS = {"tank": (2.0, None), "port": (None, 0.06)}
+
+
+def wet(camera, kind):
+    """Return a camera behind media, and what the package is told of them."""
+    height, port = KINDS[kind]
+    z0 = camera.centre[2] - height if height else port
+    told = CameraMedia(layers=Layers(**AQUARIUM), z0=float(z0), height=height)
+    return WetCamera(
+        matrix=camera.matrix, rotation=camera.rotation, centre=camera.centre, size=(5000, 3300),
+        z0=z0, **AQUARIUM,
+    ), told  # fmt: skip
+
+
+def camera_at(rng, middle, distance, focal):
+    turn = np.diag([1.0, -1, -1]) @ rotation_from_vector(rng.normal(0, 0.01, 3))
+    centre = np.array([middle, 0.0, distance]) + rng.normal(0, 0.05, 3)
+    return Pinhole(camera_matrix(focal, 1.0, 2500, 1650), turn, centre)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_camera_sees_through_media_what_traced_rays_show(kind):
+    """Pixels, and their slopes as the camera moves and turns, and the interface with it or not."""
+    rng = np.random.default_rng(1)
+    camera = camera_at(rng, 0.5, 7.0, 6000.0)
+    xyz = rng.uniform([-2, -1.5, -0.4], [2, 1.5, 0.6], (20, 3))
+    scene, media = wet(camera, kind)
+    view = project_through(camera, media, xyz)
+    np.testing.assert_allclose(view.pixels, scene.view_of(xyz), atol=1e-7)
+
+    def slope(change, step=1e-5):
+        moved = [wet(camera.stepped(sign * step * change), kind)[0] for sign in (1, -1)]
+        return (moved[0].view_of(xyz) - moved[1].view_of(xyz)) / (2 * step)
+
+    for k in (0, *range(4, 10)):
+        np.testing.assert_allclose(
+            view.by_camera[:, :, k], slope(np.eye(10)[k]), rtol=1e-5, atol=2e-3
+        )
+    for k, way in enumerate(1e-5 * np.eye(3)):
+        numeric = (scene.view_of(xyz + way) - scene.view_of(xyz - way)) / 2e-5
+        np.testing.assert_allclose(view.by_point[:, :, k], numeric, rtol=1e-5, atol=2e-3)
+
+
+def measured(kind, rng, pairs=3, noise=0.4):
+    """Return observations, a start and true points of overlapping pairs through media."""
+    cameras = [
+        camera_at(rng, 3.0 * k, distance, focal)
+        for k in range(pairs) for focal, distance in ((6000.0, 9.0), (3400.0, 5.2))
+    ]  # fmt: skip
+    count = 40 * pairs
+    xyz = rng.uniform([-3, -2, -0.3], [3.0 * pairs, 2, 0.5], (count, 3))
+    known = np.full((count, 3), np.nan)
+    known[:8] = xyz[:8] + rng.normal(0, 0.001, (8, 3))
+    seen = []
+    for number, camera in enumerate(cameras):
+        pixels = wet(camera, kind)[0].view_of(xyz)
+        inside = ((pixels > 0) & (pixels < (5000, 3300))).all(axis=1)
+        seen += [(number, k, *pixels[k]) for k in np.flatnonzero(inside)]
+    rays = np.array(seen)
+    observations = JointObservations(
+        names=tuple(f"{k // 2}, {('far', 'near')[k % 2]}" for k in range(len(cameras))),
+        camera=rays[:, 0].astype(int), point=rays[:, 1].astype(int),
+        pixels=rays[:, 2:] + rng.normal(0, noise, (len(rays), 2)),
+        sigma=np.full(len(rays), noise), ids=tuple(f"P{k}" for k in range(count)),
+        known=known, sigma_known=np.full((count, 3), 0.001), sigma_focal=np.zeros(len(cameras)),
+        media=tuple(wet(camera, kind)[1] for camera in cameras),
+    )  # fmt: skip
+    off = [np.r_[np.zeros(4), rng.normal(0, 0.003, 3), rng.normal(0, 0.05, 3)] for _ in cameras]
+    start = JointUnknowns(
+        cameras=tuple(c.stepped(step) for c, step in zip(cameras, off, strict=True)),
+        xyz=xyz + rng.normal(0, 0.05, xyz.shape),
+    )
+    return observations, start, xyz
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_pairs_behind_media_are_as_precise_as_their_sigmas_say(kind):
+    observations, start, xyz = measured(kind, np.random.default_rng(2))
+    got = adjust_jointly(observations, start)
+    assert got.sigma0 == pytest.approx(1.0, abs=0.1)
+    error = (got.xyz - xyz)[8:]
+    there = np.isfinite(error).all(axis=1)
+    twice = np.bincount(observations.point, minlength=len(xyz))[8:] >= 2
+    assert there[twice].mean() > 0.95
+    variance = np.diagonal(got.covariance, axis1=1, axis2=2)[8:]
+    ratio = np.sqrt((error[there] ** 2 / variance[there]).mean())
+    assert 0.7 < ratio < 1.4
+    assert np.sqrt((error[there] ** 2).mean(axis=0)).max() < 0.012
+    # The same rays taken for rays in air.
+    dry = adjust_jointly(replace(observations, media=()), start)
+    assert dry.sigma0 > 3 or len(dry.blunders) > 20
+
+
+def test_ports_move_with_the_camera_and_tanks_stay():
+    port, tank = (Pair.from_dict(content(name)) for name in ("port", "tank"))
+    assert [one.height for one in media_of(port)] == [None, None]
+    assert [one.height for one in media_of(tank)] == pytest.approx([0.9, 0.9])
+    assert media_of(tank)[0].z0_at(3.6) == pytest.approx(2.7)
+    assert PAIRS["tank"][1]["z0"] == 2.6
+
+
+def street_under_water(folder, depth=3.0, middles=(-2.4, 0.0, 2.4)):
+    """Write photos, nominal pair files and tables of a façade under a surface of water."""
+    rng, paths = np.random.default_rng(7), []
+    for number, middle in enumerate(middles):
+        name = "abc"[number]
+        cameras = bifocal_cameras(
+            size=(720, 600), pixel=0.0085, nadir=(middle, 0.0), rng=rng,
+            errors=SetupErrors(principal_point=0.0, focal=0.0),
+        )  # fmt: skip
+        z0 = tuple(float(c.centre[2]) - depth for c in (cameras.far, cameras.near))
+        sunk = under_water(cameras, indices=(1.0, 1.337), z0=z0)
+        shot = render(demo_scene(), sunk, rng=rng, gsd=0.1)
+        photos = []
+        for side, image, camera, nominal in (
+            ("far", shot.image1, sunk.far, cameras.nominal_far),
+            ("near", shot.image2, sunk.near, cameras.nominal_near),
+        ):
+            Image.fromarray(image).save(folder / f"{name}_{side}.png")
+            shift = np.array([[1.0, 0, -middle], [0, 1, 0], [0, 0, 1]])
+            stated = replace(nominal, matrix=camera.matrix).photo(f"{name}_{side}.png")
+            photos.append(
+                replace(
+                    stated, nadir=stated.nadir - [middle, 0.0],
+                    plane_from_pixel=shift @ stated.plane_from_pixel,
+                    layers=Layers(indices=(1.0, 1.337)), z0=stated.distance - depth,
+                )
+            )  # fmt: skip
+        path = folder / f"{name}.pair.json"
+        Pair(image1=photos[0], image2=photos[1]).write(path)
+        seen = [target for target in shot.targets if target.seen]
+        for role in ("control", "check"):
+            chosen = [t for t in seen if (t.name in CONTROL) == (role == "control")]
+            write_table(folder / f"{name}_{role}.csv", chosen, rng)
+        paths.append(path)
+    return paths
+
+
+@pytest.mark.acceptance
+def test_a_rendered_street_under_water_is_adjusted_by_the_command(tmp_path):
+    paths = street_under_water(tmp_path)
+    words = ["adjust", *map(str, paths), "--out", str(tmp_path / "joint"), "--json"]
+    for path in paths:
+        name = path.name[0]
+        words += ["--control", str(tmp_path / f"{name}_control.csv")]
+        words += ["--check", str(tmp_path / f"{name}_check.csv")]
+    result = CliRunner().invoke(main, [*words, "--sigma-pick", "0.2"])
+    assert result.exit_code == 0, result.stderr
+    said = json.loads(result.stdout)
+    checks = [p for p in said["points"] if p["kind"] == "check"]
+    assert len(checks) >= 15
+    assert max(said["rms_px"]) < 0.25
+    # 8.5 mm pixels, picks of 0.15 px; a pixel of parallax is worth 1.2 times as much as in air.
+    assert np.sqrt(np.mean([p["dX"] ** 2 + p["dY"] ** 2 for p in checks])) < 0.004
+    assert np.median([abs(p["dr"]) for p in checks]) < 0.025
+    for path in paths:
+        pair = Pair.read(tmp_path / "joint" / path.name)
+        for photo in (pair.image1, pair.image2):
+            assert photo.distance - photo.z0 == pytest.approx(3.0, abs=1e-9)
+        with (tmp_path / f"{path.name[0]}_check.csv").open(encoding="utf-8") as file:
+            rows = [row for row in csv.reader(file)][1:]
+        numbers = np.array([[float(v) for v in row[1:]] for row in rows])
+        found = pair.intersect(numbers[:, 3:5], numbers[:, 5:]).xyz - numbers[:, :3]
+        assert np.median(np.abs(found[:, 2])) < 0.03
+
+
+def test_a_port_that_leans_is_not_adjusted(tmp_path):
+    for name in "ab":
+        (tmp_path / f"{name}.pair.json").write_text(json.dumps(content("leaning port")))
+    words = ["adjust", *(str(tmp_path / f"{n}.pair.json") for n in "ab")]
+    done = CliRunner().invoke(main, [*words, "--out", str(tmp_path / "out")])
+    assert done.exit_code == 1
+    assert "ports that lean" in done.stderr
