@@ -6,7 +6,7 @@ looked for: nothing here comes from the package.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -32,7 +32,7 @@ class WetCamera(SceneCamera):
     indices: tuple[float, ...]
     thicknesses: tuple[float, ...]
     z0: float
-    axes: FloatArray
+    axes: FloatArray = field(default_factory=lambda: np.eye(3))
 
     @property
     def heights(self) -> list[float]:
