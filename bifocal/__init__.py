@@ -16,7 +16,7 @@ The pair
     Lens                      principal distance, principal point and distortion of a lens
     calibrate, Calibration    a lens from photos of a board
     align, Alignment          a pair from two photos and what was measured on site
-    Control, Interior, SiteMeasures   what `align` is told
+    Control, Interior, SiteMeasures, PairMedia   what `align` is told
 Points
     solve, SolvedSurvey       relief, coordinates, precision, check of measured points
     georeference, Georeference   wall coordinates to world coordinates by control points

@@ -19,6 +19,7 @@ from .orientation.control_points import Control, SiteMeasures
 from .orientation.homologous_points import match
 from .orientation.interior_orientation import Interior
 from .orientation.matching import Matches, MatchSettings
+from .orientation.pair_media import PairMedia
 from .orientation.photo_alignment import align
 from .orthophotos.compose import orthophoto
 from .orthophotos.mosaic_in_memory import Mosaic, MosaicOptions, mosaic
@@ -48,6 +49,7 @@ __all__ = [
     "Orthophoto",
     "PageServer",
     "Pair",
+    "PairMedia",
     "Photo",
     "Quality",
     "ReliefMap",

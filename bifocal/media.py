@@ -17,14 +17,20 @@ References
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
 
 from multimedia import Layers, radial_shift_ratio
 from photocore.arrays import BoolArray, FloatArray
+from photocore.rotation import rotation_from_vector
 
+#: Step of the derivatives by the media; central differences are then right to 1e-9. [-, m, rad]
+_STEP = 1e-5
+#: What a path is differentiated by after its indices and thicknesses: the way to the first
+#: interface [m], a small turn of the interfaces about the axes of the plane frame [rad].
+PLACING = ("z0", "lean X", "lean Y", "lean Z")
 #: A point on the last interface is behind it, whatever the last digit says. Relative.
 _ROUNDING = 1e-14
 
@@ -160,6 +166,38 @@ class MediaPath:
         turned = -(by_away @ away[..., None])[..., 0] / self.distance
         return by_away, turned - rays.slope
 
+    def moved_by_media(self, away: FloatArray, relief: FloatArray) -> FloatArray:
+        """Return how rays at a relief move with the media, at kept apparent positions, (n, 2, k).
+
+        By the indices and the thicknesses, from the camera to the object, and by `PLACING`.
+        """
+        count = len(self.layers.indices)
+        least = np.array([1.0] * count + [0.0] * (count - 1) + [-np.inf] * 3)
+        value = np.array([*self.layers.indices, *self.layers.thicknesses, self.z0, 0.0, 0.0, 0.0])
+        out = np.zeros((len(away), 2, len(value)))
+        for column in range(len(value)):
+            ends = np.maximum(value[column] + np.array([_STEP, -_STEP]), least[column])
+            places = []
+            for end in ends:
+                stepped = value.copy()
+                stepped[column] = end
+                rays = self._with(stepped).trace(away)
+                places.append(rays.position + relief[:, None] * rays.slope)
+            out[:, :, column] = (places[0] - places[1]) / (ends[0] - ends[1])
+        return out
+
+    def _with(self, values: FloatArray) -> MediaPath:
+        """Return the path with other indices, thicknesses and `PLACING`."""
+        count = len(self.layers.indices)
+        layers = Layers(
+            indices=tuple(values[:count]), thicknesses=tuple(values[count : 2 * count - 2])
+        )
+        turn = self.turn
+        if values[-3:].any():
+            turn = np.eye(3) if turn is None else turn
+            turn = turn @ rotation_from_vector(values[-3:])
+        return replace(self, layers=layers, z0=float(values[-4]), turn=turn)
+
     def _traced(
         self, away: FloatArray
     ) -> tuple[
@@ -261,6 +299,11 @@ class MediaPath:
         reduced = sum(h * last / index for h, index in zip(heights, before, strict=True))
         normal = np.array([0.0, 0.0, 1.0]) if self.turn is None else self.turn[2]
         return np.asarray((reduced - self.depth) * normal)
+
+    @property
+    def near_axis(self) -> float:
+        """Distance of a straight camera whose rays run alike near the axis. [m]"""
+        return self.distance + float(self.apparent_move[2])
 
     def _turned_back(self, along: FloatArray, down: float) -> FloatArray:
         """Return vectors of the interfaces' frame in the plane frame, shape (..., 3)."""

@@ -234,8 +234,7 @@ def straight(camera: Foot) -> Foot:
     """
     if camera.media is None:
         return camera
-    moved = camera.media.apparent_move
-    return Foot(camera.nadir + moved[:2], camera.distance + float(moved[2]))
+    return Foot(camera.nadir + camera.media.apparent_move[:2], camera.media.near_axis)
 
 
 def seen_distance(camera: Foot) -> float:

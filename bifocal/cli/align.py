@@ -10,7 +10,18 @@ import click
 from click.core import ParameterSource
 
 from photocore.cli import print_result, remark
-from photocore.options import FILE, FOCAL, TABLE, Numbers, as_json, choice, number, overwrite
+from photocore.options import (
+    FILE,
+    FOCAL,
+    NOT_NEGATIVE,
+    TABLE,
+    Names,
+    Numbers,
+    as_json,
+    choice,
+    number,
+    overwrite,
+)
 
 if TYPE_CHECKING:
     from bifocal.orientation.alignment import Alignment
@@ -23,6 +34,8 @@ Examples:
   bifocal align far.jpg near.jpg --as-set-up --distance1 17.5 --distance2 9.5 --focal1 35
                --focal2 19 --sensor-width 22.7 --out wall.pair.json
   bifocal align far.jpg near.jpg --auto --distance1 17.5 --wall 612,433 --out wall.pair.json
+  bifocal align reef_far.jpg reef_near.jpg --control reef.csv --indices 1,1.49,1.337
+               --thicknesses 0.01 --port 0.05 --prior index3=0.003 --out reef.pair.json
   bifocal align survey.xlsx --out wall.pair.json
 \b
 points.csv, one line per control point; r blank = on the wall; pixels in both photos:
@@ -82,6 +95,38 @@ points.csv, one line per control point; r blank = on the wall; pixels in both ph
     "--vertical", type=Numbers(4), metavar="COL,ROW,COL,ROW",
     help="Two points of the far photo on an upright line of the wall [px].",
 )  # fmt: skip
+@click.option(
+    "--indices", type=Numbers(), metavar="N,N,...",
+    help="Refractive indices from the camera to the wall, where the photos look through media.",
+)  # fmt: skip
+@click.option(
+    "--thicknesses", type=Numbers(), metavar="T,...",
+    help="Thicknesses of the media between the first and the last [m].",
+)  # fmt: skip
+@number(
+    "--port", "M", "Camera centre to the first interface, where that moves with the camera [m].",
+    type=NOT_NEGATIVE,
+)  # fmt: skip
+@number("--port1", "M", "The same, far photo only [m].", type=NOT_NEGATIVE)
+@number("--port2", "M", "The same, near photo only [m].", type=NOT_NEGATIVE)
+@number("--depth", "M", "Wall behind the glass or surface that stays with it [m].")
+@click.option(
+    "--port-normal", metavar="axis|X,Y,R",
+    help="A port that leans: square to the camera's optical axis, or its normal in the plane "
+    "frame, towards the camera.  [default: parallel to the wall]",
+)  # fmt: skip
+@click.option("--port-normal1", metavar="axis|X,Y,R", help="The same, far photo only.")
+@click.option("--port-normal2", metavar="axis|X,Y,R", help="The same, near photo only.")
+@click.option(
+    "--estimate", default="", type=Names(), metavar="LIST",
+    help="Unknowns of the media, of index1,..., thickness1,..., port, port1, port2, depth; known "
+    "beforehand as --prior says, indices else to 0.005, lengths to a tenth.  [default: none]",
+)  # fmt: skip
+@click.option(
+    "--prior", multiple=True, metavar="NAME=SIGMA",
+    help="Standard deviation of what is given of an unknown of the media [-, m]; inf: not known at "
+    "all; repeat it.",
+)  # fmt: skip
 @choice("--unit", "m|cm|mm", "Unit of the control coordinates.  [default: the headings', else m]")
 @number("--sigma-pick", "PX", "Precision of a pick [px].", default=0.5)
 @number("--sigma-control", "M", "Precision of a control coordinate [m].", default=0.003)
@@ -99,8 +144,9 @@ def command(
     FAR is the photo taken from afar with the long lens, NEAR the other one. Four ways: control
     points measured on the wall (--control), distances measured on site with the cameras square to
     the wall (--distance1, --distance2), the same taken as they are (--as-set-up), or the photos
-    alone (--auto) and one distance or length. FAR alone may be a survey workbook that states
-    distances, focal lengths and nadirs: they are taken as they are.
+    alone (--auto) and one distance or length. Photos taken through glass or water are set up by
+    control points or as they are, with --indices and --port or --depth. FAR alone may be a survey
+    workbook that states distances, focal lengths and nadirs: they are taken as they are.
     """
     from bifocal.survey.pair_workflow import is_workbook
 

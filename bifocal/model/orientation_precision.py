@@ -11,8 +11,22 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from bifocal.media import PLACING, MediaPath
+from bifocal.model.refracted_view import (
+    RefractedView,
+    common_names,
+    media_names,
+    view_through,
+)
+from multimedia import Layers
 from photocore.arrays import FloatArray, as_floats, read_only
-from photocore.camera import PARAMETERS, Pinhole, camera_matrix, project_with_jacobian
+from photocore.camera import (
+    PARAMETERS,
+    Pinhole,
+    ProjectedPoints,
+    camera_matrix,
+    project_with_jacobian,
+)
 from photocore.errors import InputError
 
 #: What each camera's covariance counts: a pinhole's parameters and two terms of radial distortion.
@@ -34,6 +48,15 @@ class PlanePhoto(Protocol):
     @property
     def distance(self) -> float:
         """Distance of the camera. [m]"""
+
+    @property
+    def media(self) -> MediaPath | None:
+        """What lies between it and the plane; None in air."""
+
+
+def names_of(layers: Layers | None) -> tuple[str, ...]:
+    """Return what the covariance of a pair counts: `NAMES`, and through media those of them."""
+    return NAMES if layers is None else (*NAMES, *media_names(layers))
 
 
 def pinhole(photo: PlanePhoto) -> Pinhole:
@@ -68,8 +91,8 @@ def orientation_covariance(
     Parameters
     ----------
     photos : pair of photos
-    covariance : ndarray, shape (24, 24)
-        Of `NAMES`.
+    covariance : ndarray, shape (k, k)
+        Of `NAMES`, through media of `names_of`.
     xyz : ndarray, shape (n, 3)
         Points. [m]
 
@@ -94,7 +117,7 @@ def orientation_effect(
 
     Returns
     -------
-    ndarray, shape (n, 3, 24)
+    ndarray, shape (n, 3, k)
         NaN where a point is.
     """
     scale = np.sqrt(np.diag(covariance))
@@ -106,19 +129,25 @@ def orientation_effect(
 
 
 def _by_orientation(photos: tuple[PlanePhoto, PlanePhoto], xyz: FloatArray) -> FloatArray:
-    """Return the derivative of points at fixed pixels by the orientation, shape (n, 3, 24).
+    """Return the derivative of points at fixed pixels by the orientation, shape (n, 3, k).
 
     Notes
     -----
     The four pixels p of a point P in cameras c stay: ``A dP = -dp/dc dc`` by least squares with
     ``A = dp/dP``, so ``J = -(AᵀA)⁻¹Aᵀ dp/dc``.
     """
-    by_point, by_camera = [], np.zeros((len(xyz), 4, len(NAMES)))
+    media = photos[0].media
+    count = len(names_of(None if media is None else media.layers))
+    by_point, by_camera = [], np.zeros((len(xyz), 4, count))
     for number, photo in enumerate(photos):
         camera = pinhole(photo)
-        view = project_with_jacobian(camera, xyz)
-        by_point.append(view.by_point)
         rows, first = slice(2 * number, 2 * number + 2), number * len(CAMERA)
+        if photo.media is None:
+            view: ProjectedPoints | RefractedView = project_with_jacobian(camera, xyz)
+        else:
+            view = view_through(camera, photo.media, xyz)
+            place_by_media(by_camera[:, rows], view.by_media, number, photo.media.layers)
+        by_point.append(view.by_point)
         by_camera[:, rows, first : first + len(PARAMETERS)] = view.by_camera
         # Straightened by 1 / (1 + k1 rho² + k2 rho⁴), ideal pixels move inwards.
         away = view.pixels - camera.matrix[:2, 2]
@@ -127,9 +156,28 @@ def _by_orientation(photos: tuple[PlanePhoto, PlanePhoto], xyz: FloatArray) -> F
         by_camera[:, rows, first + len(PARAMETERS) + 1] = away * square**2
     design = np.concatenate(by_point, axis=1)
     known = np.isfinite(design).all(axis=(1, 2))
-    out = np.full((len(xyz), 3, len(NAMES)), np.nan)
+    out = np.full((len(xyz), 3, count), np.nan)
     out[known] = -np.linalg.pinv(design[known]) @ by_camera[known]
     return out
+
+
+def place_by_media(rows: FloatArray, by_media: FloatArray, number: int, layers: Layers) -> None:
+    """Put the derivatives of camera 0's or 1's pixels by its media where `names_of` has them.
+
+    Parameters
+    ----------
+    rows : ndarray, shape (n, 2, len(names_of(layers)))
+        Changed in place.
+    by_media : ndarray, shape (n, 2, k)
+        As of `view_through`.
+    number : int
+    layers : Layers
+    """
+    common = len(common_names(layers))
+    own = by_media.shape[-1] - common
+    first = len(NAMES) + common + number * own
+    rows[..., len(NAMES) : len(NAMES) + common] = by_media[..., :common]
+    rows[..., first : first + own] = by_media[..., common:]
 
 
 def of_distances(d1: float, d2: float, sigma: float) -> FloatArray:
@@ -164,48 +212,56 @@ def of_distances(d1: float, d2: float, sigma: float) -> FloatArray:
 def exchanged(covariance: FloatArray) -> FloatArray:
     """Return the covariance with both cameras exchanged."""
     order = np.roll(np.arange(len(NAMES)), len(CAMERA))
+    rest = np.arange(len(NAMES), len(covariance))
+    if len(rest):  # what the media have in common stays, what places them goes with its camera
+        own = 2 * len(PLACING)
+        rest = np.concatenate([rest[:-own], np.roll(rest[-own:], len(PLACING))])
+    order = np.concatenate([order, rest])
     return covariance[np.ix_(order, order)]
 
 
 def moved(covariance: FloatArray, axes: FloatArray) -> FloatArray:
     """Return the covariance in a frame whose axes are the rows of ``axes``."""
-    turn = np.eye(len(NAMES))
+    turn = np.eye(len(covariance))
     for number in (0, 1):
         for name in ("turn X", "X"):
             first = number * len(CAMERA) + CAMERA.index(name)
             turn[first : first + 3, first : first + 3] = axes
+        if len(covariance) > len(NAMES):  # the interfaces lean about the same axes
+            first = len(covariance) - (1 - number) * len(PLACING) - 3
+            turn[first : first + 3, first : first + 3] = axes
     return turn @ covariance @ turn.T
 
 
-def as_dict(covariance: FloatArray) -> dict[str, Any]:
+def as_dict(covariance: FloatArray, layers: Layers | None = None) -> dict[str, Any]:
     """Return what the pair file holds under ``orientation``."""
-    return {
-        "parameters": list(NAMES),
-        "units": "ln, ln, px, px, rad, rad, rad, m, m, m, 1, 1 for either camera",
-        "covariance": covariance,
-    }
+    names = names_of(layers if len(covariance) > len(NAMES) else None)
+    units = "ln, ln, px, px, rad, rad, rad, m, m, m, 1, 1 for either camera"
+    if len(names) > len(NAMES):
+        units += "; then 1 for indices, m for thicknesses; m, rad, rad, rad for either camera"
+    return {"parameters": list(names), "units": units, "covariance": covariance}
 
 
-def from_dict(data: Any) -> FloatArray:
+def from_dict(data: Any, layers: Layers | None = None) -> FloatArray:
     """Return the covariance that a pair file holds under ``orientation``.
 
     Raises
     ------
     InputError
-        If it is not one of `NAMES`, or no covariance.
+        If it is not one of `names_of` the pair's media or of `NAMES`, or no covariance.
     """
-    if not isinstance(data, Mapping) or list(data.get("parameters", ())) != list(NAMES):
+    stated = list(data.get("parameters", ())) if isinstance(data, Mapping) else []
+    if stated not in (list(NAMES), list(names_of(layers))):
         raise InputError(
             '"orientation": expected {"parameters": [...], "covariance": [[...]]} with the '
-            f"{len(NAMES)} parameters that `bifocal align` writes; leave the key out if the "
-            "orientation's precision is not known."
+            f"{len(names_of(layers))} parameters that `bifocal align` writes; leave the key out if "
+            "the orientation's precision is not known."
         )
-    return checked(as_floats(data.get("covariance", ()), "orientation.covariance"))
+    return checked(as_floats(data.get("covariance", ()), "orientation.covariance"), len(stated))
 
 
-def checked(covariance: FloatArray) -> FloatArray:
-    """Return a read-only covariance of `NAMES`, refusing what is none."""
-    size = len(NAMES)
+def checked(covariance: FloatArray, size: int = len(NAMES)) -> FloatArray:
+    """Return a read-only covariance of ``size`` parameters, refusing what is none."""
     matrix = read_only(covariance, "orientation", shape=(size, size))
     scale = np.sqrt(np.maximum(np.diag(matrix), 0.0))
     largest = np.outer(scale, scale) + 1e-30

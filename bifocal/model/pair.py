@@ -23,6 +23,8 @@ from photocore.jsonfile import read_object, write_object
 from photocore.series import check_index
 
 FORMAT = "bifocal-pair/1"
+#: Parameters of two cameras in air.
+_IN_AIR = len(orientation_precision.NAMES)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -42,9 +44,10 @@ class Pair:
     exchanged : bool
         Whether the images stand the other way round than they were given: measurements in the
         order given have to be exchanged too.
-    orientation : ndarray, shape (24, 24), or None
-        Covariance of both cameras (`bifocal.model.orientation_precision.NAMES`), common to all
-        points; None where it is not known.
+    orientation : ndarray, shape (k, k), or None
+        Covariance of both cameras, and of the media where it counts them
+        (`bifocal.model.orientation_precision.names_of`), common to all points; None where it is
+        not known. That of cameras alone (24 parameters) says nothing of a pair through media.
     """
 
     image1: Photo
@@ -62,7 +65,10 @@ class Pair:
                 "for the pair."
             )
         if self.orientation is not None:
-            object.__setattr__(self, "orientation", orientation_precision.checked(self.orientation))
+            whole = len(orientation_precision.names_of(self.layers))
+            size = whole if np.shape(self.orientation) == (whole, whole) else _IN_AIR
+            matrix = orientation_precision.checked(self.orientation, size)
+            object.__setattr__(self, "orientation", matrix)
         d1, d2 = self.image1.distance, self.image2.distance
         if d1 == d2:
             raise GeometryError(
@@ -94,7 +100,7 @@ class Pair:
             photo.distance - z - self.layers.thickness for photo, z in zip(photos, z0, strict=True)
         ]
         found = self.layers.remarks_about(z0=z0, zp=beyond)
-        if self.orientation is not None:
+        if self.orientation is not None and not self._knows_its_precision:
             found += ("the covariance of the cameras, `orientation`, is in no sigma.",)
         return tuple(f"layers: {doubt}" for doubt in found)
 
@@ -206,7 +212,7 @@ class Pair:
             for key in ("image1", "image2")
         )
         stated = data.pop("orientation", None)
-        precision = None if stated is None else orientation_precision.from_dict(stated)
+        precision = None if stated is None else orientation_precision.from_dict(stated, layers)
         return cls(image1=far, image2=near, folder=folder, extra=data, orientation=precision)
 
     def to_dict(self) -> dict[str, Any]:
@@ -219,12 +225,18 @@ class Pair:
             **self.extra,
         }
         if self.orientation is not None:
-            data["orientation"] = orientation_precision.as_dict(self.orientation)
+            data["orientation"] = orientation_precision.as_dict(self.orientation, self.layers)
         return data
 
     def write(self, path: Path | str, *, overwrite: bool = False) -> None:
         """Write a pair file, whole or not at all."""
         write_object(path, self.to_dict(), overwrite=overwrite)
+
+    @property
+    def _knows_its_precision(self) -> bool:
+        """Whether the covariance is that of all that places and bends the pair's rays."""
+        whole = len(orientation_precision.names_of(self.layers))
+        return self.orientation is not None and len(self.orientation) == whole
 
     @property
     def zoom_centre(self) -> FloatArray:
@@ -239,7 +251,8 @@ class Pair:
     def in_air(self) -> Pair:
         """Return the pair with its media left out: what neglecting refraction makes of it."""
         photos = [replace(photo, layers=None, z0=None) for photo in (self.image1, self.image2)]
-        return replace(self, image1=photos[0], image2=photos[1], remarks=())
+        of_cameras = None if self.orientation is None else self.orientation[:_IN_AIR, :_IN_AIR]
+        return replace(self, image1=photos[0], image2=photos[1], remarks=(), orientation=of_cameras)
 
     def refuse_ports_that_lean(self, what: str) -> None:
         """Raise where interfaces lean against the reference plane and the work asked for cannot.
@@ -404,10 +417,10 @@ class Pair:
         Returns
         -------
         ndarray, shape (n, 3, 3)
-            Zero where the pair does not state it, or looks through media. Common to all points:
-            neighbours share it.
+            Zero where the pair does not state it, or through media only that of its cameras.
+            Common to all points: neighbours share it.
         """
-        if self.orientation is None or self.layers is not None:
+        if self.orientation is None or not self._knows_its_precision:
             return np.zeros((len(xyz), 3, 3))
         photos = (self.image1, self.image2)
         return orientation_precision.orientation_covariance(photos, self.orientation, xyz)
@@ -424,9 +437,9 @@ class Pair:
         -------
         ndarray, shape (n, 3, k), or None
             Errors in X, Y, r [m], the same k errors for all points; None where the pair does not
-            state its covariance, or looks through media.
+            state its covariance, or through media only that of its cameras.
         """
-        if self.orientation is None or self.layers is not None:
+        if self.orientation is None or not self._knows_its_precision:
             return None
         photos = (self.image1, self.image2)
         return orientation_precision.orientation_effect(photos, self.orientation, xyz)

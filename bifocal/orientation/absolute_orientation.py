@@ -10,10 +10,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from bifocal.orientation import validation
-from bifocal.orientation.bend import MOST_BENT, STRONGLY_BENT, bend_in_words, wall_bend
+from bifocal.orientation.as_set_up import check_room
+from bifocal.orientation.bend import MOST_BENT, STRONGLY_BENT, bend_in_words, bend_of_wall
 from bifocal.orientation.control_points import Control, SiteMeasures
 from bifocal.orientation.features import find_features
 from bifocal.orientation.interior_orientation import Cameras, Interiors, with_one_lens
+from bifocal.orientation.media_report import media_remarks, refuse_impossible_media
 from bifocal.orientation.orientation_remarks import (
     assumptions,
     control_remarks,
@@ -25,10 +27,15 @@ from bifocal.orientation.orientation_stages import (
     SIGMA_PARALLEL,
     OrientedPair,
     Photos,
+    control_alone,
     oriented_in_stages,
     without_gross,
 )
+from bifocal.orientation.pair_media import THROUGH_MEDIA, PairMedia
 from bifocal.orientation.pair_observations import PairObservations, PairUnknowns
+from bifocal.orientation.refracted_bend import refracted_bend
+from bifocal.orientation.refracted_resection import resect_through
+from bifocal.orientation.refracted_stage import with_bent_ties
 from bifocal.orientation.relative_orientation import (
     Ties,
     epipolar_distance,
@@ -37,7 +44,7 @@ from bifocal.orientation.relative_orientation import (
     plane_scale,
 )
 from bifocal.orientation.space_resection import resect
-from bifocal.orientation.tie_points import robust_sigma
+from bifocal.orientation.tie_points import robust_sigma, tie_positions
 from photocore.arrays import BoolArray
 from photocore.camera import fundamental, ray_on_plane
 from photocore.errors import GeometryError, located
@@ -51,6 +58,7 @@ class _Given:
     photos: Photos
     control: Control
     site: SiteMeasures
+    media: PairMedia | None = None
 
     @property
     def names(self) -> tuple[str, str]:
@@ -62,8 +70,19 @@ class _Given:
         """Interior orientations of the photos."""
         return self.photos[0].interior, self.photos[1].interior
 
+    @property
+    def enough(self) -> bool:
+        """Whether control points alone orient both cameras."""
+        known, control = self.control.positioned, self.control
+        return all(
+            (known & np.isfinite(pixels).all(axis=1)).sum() >= 4
+            for pixels in (control.pixels1, control.pixels2)
+        )
 
-def orient_pair(photos: Photos, *, control: Control, site: SiteMeasures) -> OrientedPair:
+
+def orient_pair(
+    photos: Photos, *, control: Control, site: SiteMeasures, media: PairMedia | None = None
+) -> OrientedPair:
     """Return the cameras of a pair.
 
     Parameters
@@ -74,21 +93,21 @@ def orient_pair(photos: Photos, *, control: Control, site: SiteMeasures) -> Orie
         Points measured on site; may be empty.
     site : SiteMeasures
         Distances measured on site.
+    media : PairMedia, optional
+        What lies between cameras and wall.
 
     Raises
     ------
     GeometryError
         If the photos and measurements do not make a pair; the message says why and what to do.
     """
+    if media is not None:
+        return _through_media(_Given(photos=photos, control=control, site=site, media=media), media)
     interiors, one_lens = with_one_lens((photos[0].interior, photos[1].interior))
     first, second = (replace(p, interior=i) for p, i in zip(photos, interiors, strict=True))
     photos = (first, second)
     given = _Given(photos=photos, control=control, site=site)
-    known = control.positioned
-    enough = all(
-        (known & np.isfinite(pixels).all(axis=1)).sum() >= 4
-        for pixels in (control.pixels1, control.pixels2)
-    )
+    enough = given.enough
     ties, remarks = _ties(given, needed=not enough)
     cameras, agree, interiors = _start(given, ties, enough)
     if enough and ties is not None:
@@ -129,13 +148,62 @@ def orient_pair(photos: Photos, *, control: Control, site: SiteMeasures) -> Orie
     return replace(pair, remarks=told, assumed=assumed)
 
 
+def _through_media(given: _Given, media: PairMedia) -> OrientedPair:
+    """Return the cameras of a pair that looks through media, from control and common points.
+
+    Common points say that their bent rays meet; the plane is that of the control points.
+    """
+    if not given.enough:
+        raise GeometryError(THROUGH_MEDIA)
+    control, interiors = given.control, given.interiors
+    agree = np.ones(len(control.ids), dtype=bool)
+    found = []
+    seen_in = zip((control.pixels1, control.pixels2), given.photos, strict=True)
+    for number, (pixels, photo) in enumerate(seen_in):
+        seen = control.positioned & np.isfinite(pixels).all(axis=1)
+        xyz, ideal = np.nan_to_num(control.xyz[seen]), photo.interior.ideal(pixels[seen])
+        with located(photo.name):
+            camera, fits = resect_through(xyz, ideal, photo.interior, media, number)
+        found.append(camera)
+        agree[np.flatnonzero(seen)[~fits]] = False
+    cameras = found[0], found[1]
+    if cameras[0].centre[2] < cameras[1].centre[2]:
+        return _with_photos_exchanged(given)
+    validation.check_units(cameras, given.site)
+    observations = replace(_observations(given, interiors, None, agree), media=media)
+    start = PairUnknowns(cameras=cameras, media=media)
+    pair = control_alone(observations, start, named=given.site.wall is not None)
+    ties, remarks = _ties(given, needed=False)
+    note = "the media as given, no common points: control points alone"
+    if ties is not None:
+        pair, note = with_bent_ties(pair, ties), "the media as given"
+        bend = refracted_bend(pair.adjusted, ties.seen1, ties.seen2, interiors[0].image_size)
+        pair = replace(pair, bend=bend)
+    pair = pair if pair.bend > MOST_BENT else without_gross(pair)
+    refuse_impossible_media(pair.adjusted, media)
+    check_room(pair.adjusted.media, pair.adjusted.cameras)
+    validation.check_determined(pair.adjusted)
+    validation.check_movement(pair.adjusted)
+    told = (
+        *remarks,
+        *model_remarks(pair, given.site),
+        *media_remarks(pair.adjusted, media),
+        *control_remarks(control, pair),
+        *distance_remarks(pair),
+    )
+    assumed = (*pair.assumed, note, *assumptions(pair.observations, given.site))
+    return replace(pair, remarks=told, assumed=assumed)
+
+
 def _bend(observations: PairObservations, state: PairUnknowns) -> float:
     """Return how far the wall is from a plane between the photos. [px at 3000 px of width]"""
     used = observations.tie_used
     if used.sum() < 30:
         return float("nan")
     seen1, seen2 = observations.straight_ties(state.radial)
-    return wall_bend(seen1[used], seen2[used], observations.interiors[0].image_size)
+    height = tie_positions(observations, state)[used, 2] / state.cameras[0].centre[2]
+    size = observations.interiors[0].image_size
+    return bend_of_wall(seen1[used], seen2[used], size, height)
 
 
 def _reason(
@@ -202,7 +270,10 @@ def _with_photos_exchanged(given: _Given) -> OrientedPair:
         )
     if site.distance1 and site.distance2 and site.distance1 < site.distance2:
         site = replace(site, distance1=site.distance2, distance2=site.distance1)
-    pair = orient_pair(given.photos[::-1], control=given.control.exchanged(), site=site)
+    media = given.media and given.media.exchanged()
+    pair = orient_pair(
+        given.photos[::-1], control=given.control.exchanged(), site=site, media=media
+    )
     note = (
         f"{near} is the near photo; the two were exchanged. Image 1 of the pair file is {far}, and "
         "--distance1 means its distance."

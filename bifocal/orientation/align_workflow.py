@@ -19,6 +19,7 @@ from bifocal.orientation.as_set_up import pair_as_set_up
 from bifocal.orientation.control_points import Control, SiteMeasures, read_control, read_lengths
 from bifocal.orientation.interior_orientation import Interior, lens_of_photo
 from bifocal.orientation.orientation_stages import PhotoInput
+from bifocal.orientation.pair_media import THROUGH_MEDIA, PairMedia, media_of
 from photocore.arrays import FloatArray
 from photocore.errors import InputError
 from photocore.output import (
@@ -78,6 +79,8 @@ class AlignOptions:
         A level or upright line of the wall in the far photo.
     unit : str
         Unit of the control coordinates; empty: as the headings say, else metres.
+    media : PairMedia or None
+        What lies between cameras and wall.
     """
 
     lenses: tuple[KnownLens, KnownLens] = field(default_factory=lambda: (KnownLens(), KnownLens()))
@@ -90,6 +93,7 @@ class AlignOptions:
     length: tuple[tuple[float, ...], float] | None = None
     line: tuple[tuple[float, ...], bool] | None = None
     unit: str = ""
+    media: PairMedia | None = None
 
     @classmethod
     def from_given(cls, given: Mapping[str, Any]) -> AlignOptions:
@@ -120,6 +124,7 @@ class AlignOptions:
             length=(tuple(length[:4]), length[4]) if length else None,
             line=(tuple(line), horizontal is None) if line else None,
             unit=given.get("unit") or "",
+            media=media_of(given),
         )
 
 
@@ -159,12 +164,14 @@ def align_photos(
         for number, (info, known) in enumerate(zip(infos, options.lenses, strict=True), start=1)
     )
     if way == "as set up":
-        oriented = pair_as_set_up((first, second), options.site)
+        oriented = pair_as_set_up((first, second), options.site, options.media)
     else:
         if way == "site" and options.length is None:
             _check_focal((first, second))
         control = _control(options, (first.interior.image_size, second.interior.image_size))
-        oriented = orient_pair((first, second), control=control, site=options.site)
+        oriented = orient_pair(
+            (first, second), control=control, site=options.site, media=options.media
+        )
     paths, ordered = (far, near), (first, second)
     if oriented.exchanged:
         paths, ordered = (near, far), (second, first)
@@ -242,6 +249,8 @@ def _way(options: AlignOptions) -> tuple[str, AlignOptions]:
     measured = [value for value in (site.distance1, site.distance2, site.delta_d) if value]
     if site.distance1 and site.distance2 and site.delta_d:
         raise InputError("give two of --distance1, --distance2 and --delta-d; the third follows.")
+    if options.media is not None and options.control is None and not options.as_set_up:
+        raise InputError(THROUGH_MEDIA)
     if options.as_set_up:
         if options.control is not None or options.auto:
             raise InputError("--as-set-up registers nothing: leave out --control and --auto.")

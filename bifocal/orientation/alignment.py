@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from bifocal import rays
 from bifocal.model.homography import apply_homography
 from bifocal.model.lens import Lens
 from bifocal.model.orientation_precision import CAMERA, NAMES, moved
@@ -15,9 +16,11 @@ from bifocal.model.pair import Pair
 from bifocal.model.photo import Photo
 from bifocal.orientation.facade_lines import LEAST_IN_LINE, facade_turn
 from bifocal.orientation.interior_orientation import Cameras, Interior
+from bifocal.orientation.media_report import media_in_words, straight_distance
 from bifocal.orientation.orientation_report import orientation_in_words
 from bifocal.orientation.orientation_stages import OrientedPair, PhotoInput, Photos
 from bifocal.orientation.pair_adjustment import AdjustedPair
+from bifocal.orientation.pair_media import PairMedia
 from bifocal.orientation.pair_observations import PairObservations, at
 from bifocal.orientation.reference_plane import rivals
 from bifocal.orientation.tie_points import robust_sigma, tie_positions
@@ -102,9 +105,9 @@ def make_alignment(
         covariance = moved(covariance, axes)
         oriented = replace(oriented, assumed=(*oriented.assumed, note))
     far, near = (
-        _photo(camera, interior, _lens_of(interior, radial))
-        for camera, interior, radial in zip(
-            cameras, observations.interiors, adjusted.radial, strict=True
+        _photo(camera, interior, _lens_of(interior, radial), (adjusted.media, number))
+        for number, (camera, interior, radial) in enumerate(
+            zip(cameras, observations.interiors, adjusted.radial, strict=True)
         )
     )
     deviations = standard_deviations(adjusted)
@@ -113,15 +116,19 @@ def make_alignment(
         deviations["relief_offset"] = max(abs(face.offset) for face in others)
     used = observations.tie_used
     sigma_tie = robust_sigma(adjusted.tie_misfit[used]) if used.any() else observations.sigma_pick
-    words = orientation_in_words(cameras, deviations, sigma_px=max(sigma_tie, 0.05))
+    words = orientation_in_words(
+        cameras, deviations, sigma_px=max(sigma_tie, 0.05), media=adjusted.media
+    )
+    words = (*words, *media_in_words(adjusted, observations.media))
     first, second = observations.interiors
-    homography = plane_from_pixel(cameras[0])
     return Alignment(
         pair=Pair(image1=far, image2=near, orientation=covariance),
         way=way,
         deviations=deviations,
         control_ids=observations.control.ids,
-        control_positions=apply_homography(homography, observations.control.pixels1),
+        control_positions=rays.object_rays(
+            apply_homography(far.plane_from_pixel, observations.control.pixels1), far.foot
+        ).position,
         control_residuals=adjusted.control_residuals,
         control_used=observations.pick_used,
         control_test=adjusted.control_test,
@@ -136,7 +143,7 @@ def make_alignment(
 
 def _of_pixels(adjusted: AdjustedPair, observations: PairObservations) -> FloatArray:
     """Return the covariance of the cameras as the pair file counts it, shape (24, 24)."""
-    unit = np.ones(len(NAMES))
+    unit = np.ones(len(adjusted.covariance))
     for number, (camera, interior) in enumerate(
         zip(adjusted.cameras, observations.interiors, strict=True)
     ):
@@ -188,8 +195,12 @@ def _lens_of(interior: Interior, radial: FloatArray) -> Lens | None:
     )
 
 
-def _photo(camera: Pinhole, interior: Interior, lens: Lens | None) -> Photo:
+def _photo(
+    camera: Pinhole, interior: Interior, lens: Lens | None, seen: tuple[PairMedia | None, int]
+) -> Photo:
+    """Return the photo of a camera; ``seen`` are the media and which of their cameras it is."""
     pitch = interior.pixel_size
+    media, number = seen
     return Photo(
         plane_from_pixel=plane_from_pixel(camera),
         nadir=camera.centre[:2],
@@ -197,6 +208,9 @@ def _photo(camera: Pinhole, interior: Interior, lens: Lens | None) -> Photo:
         lens=lens,
         principal_distance=None if pitch is None else float(camera.matrix[0, 0]) * pitch,
         pixel_size=pitch,
+        layers=None if media is None else media.layers,
+        z0=None if media is None else media.z0(number, camera),
+        interface_normal=None if media is None else media.normal(number, camera),
     )
 
 
@@ -209,7 +223,6 @@ def standard_deviations(adjusted: AdjustedPair) -> dict[str, float]:
     for number, (camera, sign) in enumerate(
         zip(adjusted.cameras, (-1.0, 1.0), strict=True), start=1
     ):
-        distance = float(camera.centre[2])
         nadir = np.hypot(adjusted.sigma("X", number), adjusted.sigma("Y", number))
         tilt = np.hypot(adjusted.sigma("turn X", number), adjusted.sigma("turn Y", number))
         out[f"distance{number}"] = adjusted.sigma("Z", number)
@@ -217,12 +230,17 @@ def standard_deviations(adjusted: AdjustedPair) -> dict[str, float]:
         out[f"focal{number}"] = adjusted.sigma("focal length", number) * camera.matrix[0, 0]
         out[f"tilt{number}_deg"] = float(np.rad2deg(tilt / np.sqrt(2)))
         by_scale[at("focal length", number)] = sign
-        by_scale[at("Z", number)] = -sign / distance
-        by_relief[at("Z", number)] = -sign / distance**2
-    d1, d2 = (float(camera.centre[2]) for camera in adjusted.cameras)
-    scale, relief = (
-        float(np.sqrt(np.abs(row @ adjusted.covariance @ row))) for row in (by_scale, by_relief)
+        straight, rate = straight_distance(camera, adjusted.media, number - 1)
+        by_scale[at("Z", number)] = -sign * rate / straight
+        by_relief[at("Z", number)] = -sign * rate / straight**2
+    d1, d2 = (
+        straight_distance(camera, adjusted.media, k)[0] for k, camera in enumerate(adjusted.cameras)
     )
+    cameras = adjusted.covariance[: len(NAMES), : len(NAMES)]
+    scale, relief = (float(np.sqrt(np.abs(row @ cameras @ row))) for row in (by_scale, by_relief))
+    if adjusted.media is not None and adjusted.of_unknowns.size:
+        for row, name in enumerate(adjusted.media.sigmas, start=len(NAMES)):
+            out[name] = float(np.sqrt(adjusted.of_unknowns[row, row]))
     return out | {"scale": scale, "relief_scale": relief / abs(1 / d2 - 1 / d1)}
 
 

@@ -4,16 +4,21 @@ from __future__ import annotations
 
 import numpy as np
 
-from bifocal.model.orientation_precision import of_distances
+from bifocal.model.orientation_precision import NAMES, of_distances
 from bifocal.orientation.control_points import SiteMeasures
+from bifocal.orientation.interior_orientation import Cameras
 from bifocal.orientation.orientation_stages import OrientedPair, Photos
 from bifocal.orientation.pair_adjustment import AdjustedPair
-from bifocal.orientation.pair_observations import PairObservations
+from bifocal.orientation.pair_media import PairMedia
+from bifocal.orientation.pair_observations import PairObservations, at
+from photocore.arrays import FloatArray
 from photocore.camera import Pinhole
 from photocore.errors import InputError
 
 
-def pair_as_set_up(photos: Photos, site: SiteMeasures) -> OrientedPair:
+def pair_as_set_up(
+    photos: Photos, site: SiteMeasures, media: PairMedia | None = None
+) -> OrientedPair:
     """Return the pair whose cameras stand square to the wall, one behind the other, as typed.
 
     Parameters
@@ -22,11 +27,15 @@ def pair_as_set_up(photos: Photos, site: SiteMeasures) -> OrientedPair:
         Far photo first; their interior orientations are taken as they are.
     site : SiteMeasures
         Both distances. [m]
+    media : PairMedia, optional
+        What lies between cameras and wall; nothing of it is estimated, the sigmas of its unknowns
+        go into the pair's covariance.
 
     Raises
     ------
     InputError
-        If a distance or a focal length is missing, or the far camera is the nearer.
+        If a distance or a focal length is missing, the far camera is the nearer, or the media leave
+        no room.
     """
     d1, d2 = site.distances
     if not (d1 and d2):
@@ -51,10 +60,15 @@ def pair_as_set_up(photos: Photos, site: SiteMeasures) -> OrientedPair:
         Pinhole(photo.interior.matrix, square_on, np.array([0.0, 0.0, distance]))
         for photo, distance in zip(photos, (d1, d2), strict=True)
     )
+    check_room(media, (first, second))
+    covariance = of_distances(d1, d2, site.sigma)
+    if media is not None:
+        covariance = _of_typed(media, (first, second), site.sigma)
     nothing = np.zeros((0, 4))
     adjusted = AdjustedPair(
         cameras=(first, second),
-        covariance=of_distances(d1, d2, site.sigma),
+        media=media,
+        covariance=covariance,
         sigma0=1.0,
         control_residuals=nothing,
         control_test=np.zeros(0),
@@ -63,10 +77,56 @@ def pair_as_set_up(photos: Photos, site: SiteMeasures) -> OrientedPair:
     )
     interiors = photos[0].interior, photos[1].interior
     return OrientedPair(
-        observations=PairObservations(interiors=interiors),
+        observations=PairObservations(interiors=interiors, media=media),
         adjusted=adjusted,
         assumed=(
             "the set-up exactly as typed: square to the wall, nadirs in the principal points, both "
-            f"photos at the typed scales; distances within {1000 * site.sigma:.0f} mm",
+            f"photos at the typed scales; distances within {1000 * site.sigma:.0f} mm"
+            + ("" if media is None else "; media as typed"),
         ),
     )
+
+
+def check_room(media: PairMedia | None, cameras: Cameras) -> None:
+    """Refuse media that begin before a camera, or end behind the wall.
+
+    Raises
+    ------
+    InputError
+    """
+    for number, camera in enumerate(cameras if media is not None else ()):
+        assert media is not None
+        path = media.path(number, camera)
+        if path.z0 < 0:
+            raise InputError(
+                f"--depth {media.depth:g} m: with {media.layers.thickness:g} m of media before it "
+                f"the first interface would lie behind camera {number + 1}, which stands "
+                f"{path.distance:.3f} m from the wall. --depth is from the last interface to the "
+                "wall; for a port that moves with the camera give --port."
+            )
+        if not path.holds(np.zeros(2), np.zeros(())):
+            raise InputError(
+                f"--port: the last interface would lie {path.depth:.3f} m before camera "
+                f"{number + 1}, which stands {path.distance:.3f} m from the wall. --port is from "
+                "the camera's centre to the glass, in metres."
+            )
+
+
+def _of_typed(media: PairMedia, cameras: Cameras, sigma: float) -> FloatArray:
+    """Return the covariance of typed distances and media at scales that are exact.
+
+    The scale on the wall near the axis is the principal distance over `MediaPath.near_axis`: that
+    is what an error of the distance leaves as it is.
+    """
+    out = np.zeros((len(media.names), len(media.names)))
+    for number, camera in enumerate(cameras):
+        row = np.zeros(len(media.names))
+        row[at("Z", number + 1)] = 1.0
+        apparent = media.path(number, camera).near_axis / media.near_axis_rate()
+        row[at("focal length", number + 1)] = 1.0 / apparent
+        out += sigma**2 * np.outer(row, row)
+    for place, name in enumerate(media.names[len(NAMES) :], start=len(NAMES)):
+        known = media.sigmas[name]
+        out[place, place] = known**2 if np.isfinite(known) else 0.0
+    by = media.by_unknowns()
+    return by @ out @ by.T

@@ -470,5 +470,5 @@ def _write_pair(pair: Pair, path: Path, name: str, folder: Path) -> None:
         # In the order given: that of its columns in the tables of points.
         content["image1"], content["image2"] = content["image2"], content["image1"]
         if pair.orientation is not None:
-            content["orientation"] = as_dict(exchanged(pair.orientation))
+            content["orientation"] = as_dict(exchanged(pair.orientation), pair.layers)
     write_object(path, content)

@@ -24,7 +24,10 @@ def model_remarks(pair: OrientedPair, site: SiteMeasures) -> list[str]:
     """Return where photos and what was given contradict each other, with the likely reason."""
     observations, adjusted = pair.observations, pair.adjusted
     known = any(i.is_calibrated or i.sigma_radial > 0 for i in observations.interiors)
-    remarks = [bend_in_words(pair.bend, with_lens=known)]
+    wet = observations.media is not None
+    lost = not observations.pick_used.all()
+    bend = bend_in_words(pair.bend, with_lens=known, through_media=wet, left_out=lost)
+    remarks = [bend]
     unit = max(observations.interiors[0].image_size) / 3000
     sigma = observations.sigma_tie
     if observations.tie_used.sum() >= 20 and sigma > WORST_FIT * unit:

@@ -6,12 +6,18 @@ import numpy as np
 
 from bifocal import rays
 from bifocal.orientation.interior_orientation import Cameras
+from bifocal.orientation.media_report import straight_distance
+from bifocal.orientation.pair_media import PairMedia
 from bifocal.precision import base_factor
 from photocore.camera import Pinhole
 
 
 def orientation_in_words(
-    cameras: Cameras, deviations: dict[str, float], *, sigma_px: float
+    cameras: Cameras,
+    deviations: dict[str, float],
+    *,
+    sigma_px: float,
+    media: PairMedia | None = None,
 ) -> tuple[str, ...]:
     """Return the orientation in sentences.
 
@@ -24,18 +30,27 @@ def orientation_in_words(
         (relative); ``relief_offset`` if another plane may be the wall [m].
     sigma_px : float
         Expected precision of a homologous point, for the precision of relief. [px]
+    media : PairMedia, optional
+        What lies between cameras and wall.
     """
     far, near = cameras
     d1, d2 = float(far.centre[2]), float(near.centre[2])
-    base = base_factor(d1=d1, d2=d2)
+    # Near the axis; in air the distances themselves.
+    straight1, straight2 = (
+        straight_distance(camera, media, number)[0] for number, camera in enumerate(cameras)
+    )
+    base = base_factor(d1=straight1, d2=straight2)
+    bent = 1.0 if media is None else media.layers.indices[0] / media.layers.indices[-1]
+    scales = far.matrix[0, 0] / straight1, near.matrix[0, 0] / straight2
+    pixel = max(straight1 / far.matrix[0, 0], straight2 / near.matrix[0, 0]) * bent
     words = [
         f"Far camera {d1:.3f} m ± {_mm(deviations['distance1'])}, near camera {d2:.3f} m ± "
         f"{_mm(deviations['distance2'])} from the wall; {d1 - d2:.3f} m apart in depth.",
         _offset(far, near),
         *(_turn(name, camera) for name, camera in (("Far", far), ("Near", near))),
         _roll(far, near),
-        _scale(far, near, base, deviations.get("scale", 0.0)),
-        _zone(far, near, base, sigma_px, deviations.get("relief_scale", 0.0)),
+        _scale(scales[1] / scales[0], base, deviations.get("scale", 0.0)),
+        _zone(d1, pixel, base, sigma_px, deviations.get("relief_scale", 0.0)),
         _plane(deviations.get("relief_offset", 0.0)),
     ]
     return tuple(word for word in words if word)
@@ -99,9 +114,8 @@ def _roll(far: Pinhole, near: Pinhole) -> str:
     return f"The near photo is turned {abs(turn):.1f}° {side} against the far one (corrected)."
 
 
-def _scale(far: Pinhole, near: Pinhole, base: float, sigma: float) -> str:
+def _scale(ratio: float, base: float, sigma: float) -> str:
     """Say how far the photos are from one scale, where that is more than its own uncertainty."""
-    ratio = (near.matrix[0, 0] / near.centre[2]) / (far.matrix[0, 0] / far.centre[2])
     off = ratio - 1.0
     if abs(off) < max(2 * sigma, 1e-4):
         return ""
@@ -118,12 +132,11 @@ def _scale(far: Pinhole, near: Pinhole, base: float, sigma: float) -> str:
     )
 
 
-def _zone(far: Pinhole, near: Pinhole, base: float, sigma_px: float, relief_scale: float) -> str:
-    """Say what precision to expect where."""
-    pixel = max(far.centre[2] / far.matrix[0, 0], near.centre[2] / near.matrix[0, 0])
+def _zone(d1: float, pixel: float, base: float, sigma_px: float, relief_scale: float) -> str:
+    """Say what precision to expect where, for pixels of a size on the wall. [m]"""
     sigma_m = sigma_px * pixel
     radius = sigma_m * base / 0.01
-    at = 0.25 * far.centre[2]
+    at = 0.25 * d1
     # All relief is too large or too small by one factor: what the distances leave open.
     share = (
         f", plus {1000 * relief_scale:.2g} mm for every metre of relief ({100 * relief_scale:.2g} "

@@ -149,7 +149,7 @@ def oriented_in_stages(
     images = photos[0].grey, photos[1].grey
     named = site.wall is not None
     if with_control:
-        pair = _control_alone(observations, start, named)
+        pair = control_alone(observations, start, named)
     else:
         # Distances count from the wall, and which face that is shows only in the relative model.
         few = _relative_measures(observations)
@@ -175,9 +175,7 @@ def oriented_in_stages(
     return pair
 
 
-def _control_alone(
-    observations: PairObservations, start: PairUnknowns, named: bool
-) -> OrientedPair:
+def control_alone(observations: PairObservations, start: PairUnknowns, named: bool) -> OrientedPair:
     """Return the pair oriented by control points alone, the lens as undistorted as scanned."""
     none = np.zeros(len(observations.tie1), dtype=bool)
     first, second = (replace(i, sigma_radial=0.0) for i in observations.interiors)

@@ -8,19 +8,26 @@ prior, and the covariance says so.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from bifocal.model.orientation_precision import CAMERA, NAMES
+from bifocal.model.orientation_precision import CAMERA, NAMES, names_of, place_by_media
+from bifocal.model.refracted_view import RefractedView
 from bifocal.orientation.facade_lines import FacadeDirection
-from bifocal.orientation.interior_orientation import Cameras
 from bifocal.orientation.pair_observations import (
     Equations,
     PairObservations,
     PairUnknowns,
     at,
 )
+from bifocal.orientation.refracted_observations import (
+    known_points,
+    pixels_of,
+    views_of,
+    with_media_priors,
+)
+from bifocal.orientation.refracted_ties import bent_equations, bent_misfit
 from photocore import adjustment
 from photocore.arrays import BoolArray, FloatArray
 from photocore.camera import (
@@ -28,16 +35,10 @@ from photocore.camera import (
     fundamental_with_jacobian,
     homogeneous,
     plane_transfer_with_jacobian,
-    project,
-    project_with_jacobian,
-    ray_on_plane,
-    triangulate,
 )
 from photocore.errors import GeometryError
 from photocore.rotation import skew
 
-#: A coordinate that was not measured, as a standard deviation. [m]
-UNKNOWN = 1e6
 #: Rounding error of pixels and metres, as a share of their standard deviations.
 ROUNDING = 1e-9
 #: Relative standard deviation with which one camera body has one aspect.
@@ -52,8 +53,11 @@ class AdjustedPair(PairUnknowns):
 
     Attributes
     ----------
-    covariance : ndarray, shape (24, 24)
-        Of all `NAMES`; zero where held.
+    covariance : ndarray, shape (k, k)
+        Of all `NAMES`, through media of all that `bifocal.model.orientation_precision.names_of`
+        counts; zero where held.
+    of_unknowns : ndarray, shape (u, u)
+        Of `PairObservations.names`, zero where held; the same in air.
     sigma0 : float
         Standard deviation of unit weight.
     control_residuals : ndarray, shape (n, 4)
@@ -67,6 +71,7 @@ class AdjustedPair(PairUnknowns):
     """
 
     covariance: FloatArray
+    of_unknowns: FloatArray = field(default_factory=lambda: np.zeros((0, 0)))
     sigma0: float
     control_residuals: FloatArray
     control_test: FloatArray
@@ -93,22 +98,22 @@ def adjust(observations: PairObservations, start: PairUnknowns) -> AdjustedPair:
     GeometryError
         If the observations leave a parameter undetermined.
     """
-    free = observations.estimated
+    free, names = observations.estimated, observations.names
 
     def equations(state: PairUnknowns) -> Equations:
         residuals, jacobian = pair_equations(observations, state)
         return residuals, jacobian[:, free]
 
-    def advance(state: PairUnknowns, step: FloatArray) -> PairUnknowns:
-        whole = np.zeros(len(NAMES))
+    def advance(state: PairUnknowns, step: FloatArray) -> PairUnknowns | None:
+        whole = np.zeros(len(names))
         whole[free] = step
         return state.stepped(whole)
 
-    names = [name for name, estimated in zip(NAMES, free, strict=True) if estimated]
-    start = PairUnknowns(cameras=start.cameras, radial=start.radial)
+    asked = [name for name, estimated in zip(names, free, strict=True) if estimated]
+    start = PairUnknowns(cameras=start.cameras, radial=start.radial, media=start.media)
     try:
         fit = adjustment.fit(
-            start, equations, advance, names=names, what="the pair", rounding=ROUNDING
+            start, equations, advance, names=asked, what="the pair", rounding=ROUNDING
         )
     except GeometryError:
         raise GeometryError(
@@ -117,16 +122,20 @@ def adjust(observations: PairObservations, start: PairUnknowns) -> AdjustedPair:
         ) from None
     redundancy = max(fit.redundancy, 1)
     sigma0 = float(np.sqrt((fit.residuals @ fit.residuals) / redundancy))
-    covariance = np.zeros((len(NAMES), len(NAMES)))
-    covariance[np.ix_(free, free)] = fit.linear.cofactor
+    cofactor = np.zeros((len(names), len(names)))
+    cofactor[np.ix_(free, free)] = fit.linear.cofactor
     state = fit.state
+    covariance = cofactor * max(sigma0, 1.0) ** 2
+    by = None if state.media is None else state.media.by_unknowns()
     return AdjustedPair(
         cameras=state.cameras,
         radial=state.radial,
-        covariance=covariance * max(sigma0, 1.0) ** 2,
+        media=state.media,
+        covariance=covariance if by is None else by @ covariance @ by.T,
+        of_unknowns=covariance,
         sigma0=sigma0,
         control_residuals=_control_residuals(observations, state),
-        control_test=_control_test(observations, state, covariance),
+        control_test=_control_test(observations, state, cofactor),
         tie_misfit=tie_misfit(observations, state),
         wall_misfit=wall_misfit(observations, state),
     )
@@ -134,11 +143,18 @@ def adjust(observations: PairObservations, start: PairUnknowns) -> AdjustedPair:
 
 def tie_misfit(observations: PairObservations, state: PairUnknowns) -> FloatArray:
     """Return the signed distance of all ties from their epipolar lines, shape (m,). [px]"""
+    if state.media is not None:
+        return bent_misfit(observations, state, np.ones(len(observations.tie1), dtype=bool))
     return _epipolar(observations, state, np.ones(len(observations.tie1), dtype=bool))[0]
 
 
 def wall_misfit(observations: PairObservations, state: PairUnknowns) -> FloatArray:
-    """Return how far all ties lie from the wall plane's transfer, shape (m,). [px]"""
+    """Return how far all ties lie from the wall plane's transfer, shape (m,). [px]
+
+    NaN through media, where the plane is no homography.
+    """
+    if state.media is not None:
+        return np.full(len(observations.tie1), np.nan)
     return _transfer(observations, state, np.ones(len(observations.tie1), dtype=bool))[0]
 
 
@@ -155,16 +171,20 @@ def pair_equations(observations: PairObservations, state: PairUnknowns) -> Equat
     """Return everything observed against computed in standard deviations, and derivatives."""
     used, wall = observations.tie_used, observations.wall
     parts = [_priors(observations, state)]
+    if observations.media is not None and state.media is not None:
+        parts = [with_media_priors(parts[0], observations.media, state.media)]
     if used.any():
-        values, by = _epipolar(observations, state, used)
+        rows_of = _epipolar if state.media is None else bent_equations
+        values, by = rows_of(observations, state, used)
         parts.append((values / observations.sigma_ties, by / observations.sigma_ties))
-    if wall.any():
+    if wall.any() and state.media is None:
         parts.append(wall_equations(observations, state))
     if observations.lines:
         parts.append(line_equations(observations.lines, state))
     if observations.control.ids:
         control = _control(observations, state)
-        parts.append((control.misfit.ravel(), control.by_unknowns.reshape(-1, len(NAMES))))
+        by = control.by_unknowns
+        parts.append((control.misfit.ravel(), by.reshape(-1, by.shape[-1])))
         parts.append(_lengths(observations, state, control))
     residuals = np.concatenate([values for values, _ in parts])
     jacobian = np.concatenate([by for _, by in parts])
@@ -354,12 +374,12 @@ def _control(
     models = observations.radial_models(state.radial)
     raw = (control.pixels1, control.pixels2)
     picks = np.concatenate([m.undistort(x) for m, x in zip(models, raw, strict=True)], axis=1)
-    known, sigma = _known_points(observations, state.cameras, picks)
+    known, sigma = known_points(observations, state, picks)
     xyz = known
     seen = np.isfinite(picks) & used[:, None]
     held = np.eye(3) / sigma[:, :, None]
     for _ in range(3):
-        views = [project_with_jacobian(camera, xyz) for camera in state.cameras]
+        views = views_of(state, xyz)
         rows = np.concatenate([view.by_point for view in views], axis=1) / sigma_pick
         misfit = (picks - np.concatenate([view.pixels for view in views], axis=1)) / sigma_pick
         rows = np.where(seen[:, :, None], np.nan_to_num(rows), 0.0)
@@ -368,11 +388,16 @@ def _control(
         turn, triangle = base.transpose(0, 2, 1), triangle[:, :3]
         split = turn @ np.concatenate([misfit, (known - xyz) / sigma], axis=1)[..., None]
         xyz = xyz + np.linalg.solve(triangle, split[:, :3])[..., 0]
-    by = np.zeros((len(xyz), 4, len(NAMES)))
-    for number, (view, model, x) in enumerate(zip(views, models, raw, strict=True)):
+    by = np.zeros((len(xyz), 4, len(names_of(state.layers))))
+    for number, (model, x) in enumerate(zip(models, raw, strict=True)):
+        view = views[number]
         half, first = slice(2 * number, 2 * number + 2), number * len(CAMERA)
         by[:, half, first : first + len(PARAMETERS)] = -view.by_camera
         by[:, half, first + len(PARAMETERS) : first + len(CAMERA)] = model.undistorted_by_k(x)
+        if isinstance(view, RefractedView) and state.layers is not None:
+            place_by_media(by[:, half], -view.by_media, number, state.layers)
+    if state.media is not None:
+        by = by @ state.media.by_unknowns()
     split_by = turn[:, :, :4] @ np.where(seen[:, :, None], np.nan_to_num(by / sigma_pick), 0.0)
     return _AdjustedControl(
         misfit=split[:, 3:, 0],
@@ -382,23 +407,6 @@ def _control(
     )
 
 
-def _known_points(
-    observations: PairObservations, cameras: Cameras, picks: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    """Return control points, what was not measured filled in roughly, and their sigmas."""
-    control = observations.control
-    both = triangulate(*cameras, picks[:, :2], picks[:, 2:])
-    first, second = (
-        ray_on_plane(c, p) for c, p in zip(cameras, (picks[:, :2], picks[:, 2:]), strict=True)
-    )
-    single = np.where(np.isfinite(first), first, second)
-    guess = np.where(np.isfinite(both), both, single)
-    flat = control.sigma[:, 2:] < UNKNOWN  # relief known: the plane fixes X and Y better
-    guess = np.where(flat & np.isfinite(single) & (control.xyz[:, 2:] == 0), single, guess)
-    known = np.where(np.isfinite(control.xyz), control.xyz, np.nan_to_num(guess))
-    return known, np.where(np.isfinite(control.xyz), control.sigma, UNKNOWN)
-
-
 def _control_residuals(observations: PairObservations, state: PairUnknowns) -> FloatArray:
     """Return picks minus the projection of the control points as given, shape (n, 4). [px]"""
     control = observations.control
@@ -406,10 +414,10 @@ def _control_residuals(observations: PairObservations, state: PairUnknowns) -> F
         return np.zeros((0, 4))
     xyz = np.where(np.isfinite(control.xyz), control.xyz, _control(observations, state).xyz)
     parts = [
-        model.undistort(pixels) - project(camera, xyz)
-        for model, pixels, camera in zip(
+        model.undistort(pixels) - seen
+        for model, pixels, seen in zip(
             observations.radial_models(state.radial), (control.pixels1, control.pixels2),
-            state.cameras, strict=True,
+            pixels_of(state, xyz), strict=True,
         )
     ]  # fmt: skip
     return np.concatenate(parts, axis=1)
@@ -427,7 +435,7 @@ def _lengths(
         if used[a] and used[b]
     ]
     if not lengths:
-        return np.zeros(0), np.zeros((0, len(NAMES)))
+        return np.zeros(0), np.zeros((0, len(observations.names)))
     first, second, taped, own = (np.array(column) for column in zip(*lengths, strict=True))
     between = control.xyz[first] - control.xyz[second]
     between_by = control.xyz_by_unknowns[first] - control.xyz_by_unknowns[second]

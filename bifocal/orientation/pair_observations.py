@@ -10,6 +10,8 @@ from bifocal.model.orientation_precision import CAMERA, NAMES
 from bifocal.orientation.control_points import Control
 from bifocal.orientation.facade_lines import FacadeDirection
 from bifocal.orientation.interior_orientation import Cameras, Interiors
+from bifocal.orientation.pair_media import PairMedia
+from multimedia import Layers
 from photocore.arrays import BoolArray, FloatArray
 from photocore.distortion import RadialDivision
 
@@ -63,6 +65,8 @@ class PairObservations:
         Directions of the façade's lines, each along the wall.
     free_datum : bool
         Whether origin and turn of the plane frame are free and must be held.
+    media : PairMedia or None
+        What lies between cameras and object, as given, with its unknowns; None in air.
     """
 
     interiors: Interiors
@@ -81,11 +85,17 @@ class PairObservations:
     sigma_tilt: float | None = None
     lines: tuple[FacadeDirection, ...] = ()
     free_datum: bool = False
+    media: PairMedia | None = None
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The unknowns: `NAMES`, and those of the media."""
+        return NAMES if self.media is None else self.media.names
 
     @property
     def estimated(self) -> BoolArray:
-        """Which of `NAMES` are estimated, the others being held."""
-        free = np.ones(len(NAMES), dtype=bool)
+        """Which of `names` are estimated, the others being held."""
+        free = np.ones(len(self.names), dtype=bool)
         for number, interior in enumerate(self.interiors, start=1):
             free[[at("k1", number), at("k2", number)]] = interior.sigma_radial > 0
             free[at("aspect", number)] = interior.sigma_aspect > 0
@@ -118,16 +128,29 @@ class PairUnknowns:
     cameras : pair of Pinhole
     radial : ndarray, shape (2, 2)
         Radial distortion k1, k2 of either photo.
+    media : PairMedia or None
+        What lies between cameras and object; None in air.
     """
 
     cameras: Cameras
     radial: FloatArray = field(default_factory=lambda: np.zeros((2, 2)))
+    media: PairMedia | None = None
 
-    def stepped(self, step: FloatArray) -> PairUnknowns:
-        """Return the unknowns after a step of all `NAMES`."""
-        parts = step.reshape(2, len(CAMERA))
+    @property
+    def layers(self) -> Layers | None:
+        """The media's indices and thicknesses; None in air."""
+        return None if self.media is None else self.media.layers
+
+    def stepped(self, step: FloatArray) -> PairUnknowns | None:
+        """Return the unknowns after a step of all names; None where media cannot be so."""
+        media = self.media and self.media.stepped(step[len(NAMES) :])
+        if media is None and self.media is not None:
+            return None
+        parts = step[: len(NAMES)].reshape(2, len(CAMERA))
         first, second = (c.stepped(p) for c, p in zip(self.cameras, parts, strict=True))
-        return PairUnknowns(cameras=(first, second), radial=self.radial + parts[:, -2:])
+        return PairUnknowns(
+            cameras=(first, second), radial=self.radial + parts[:, -2:], media=media
+        )
 
     def values(self) -> FloatArray:
         """Return the unknowns in the order of `NAMES`, turns counted from here."""

@@ -14,6 +14,7 @@ from bifocal.orientation.as_set_up import pair_as_set_up
 from bifocal.orientation.control_points import Control, SiteMeasures
 from bifocal.orientation.interior_orientation import Interior
 from bifocal.orientation.orientation_stages import PhotoInput
+from bifocal.orientation.pair_media import PairMedia
 from photocore.arrays import as_points
 from photocore.errors import InputError
 
@@ -27,6 +28,7 @@ def align(
     site: SiteMeasures | None = None,
     line: tuple[Literal["level", "upright"], ArrayLike] | None = None,
     as_set_up: bool = False,
+    media: PairMedia | None = None,
 ) -> Alignment:
     r"""Orient a pair of photos: where both cameras stood, how they looked, at which scale.
 
@@ -50,6 +52,9 @@ def align(
         Whether distances and principal distances are taken exactly as they are given: cameras
         square to the wall, nadirs in the principal points, nothing registered. The distances'
         ``site.sigma`` goes into the pair; ``interiors`` must tell both principal distances.
+    media : PairMedia, optional
+        Plane-parallel media that both cameras look through, with what is unknown of them
+        (`PairMedia.stated`): with ``control`` of four points and more, or ``as_set_up``.
 
     Returns
     -------
@@ -100,8 +105,8 @@ def align(
     if as_set_up:
         if control is not None or line is not None:
             raise InputError("as_set_up registers nothing: leave out control and line.")
-        return make_alignment(pair_as_set_up(photos, site), photos, way="as set up")
-    oriented = orient_pair(photos, control=control or Control(), site=site)
+        return make_alignment(pair_as_set_up(photos, site, media), photos, way="as set up")
+    oriented = orient_pair(photos, control=control or Control(), site=site, media=media)
     way = "control" if control is not None else "site" if site.parallel else "auto"
     ordered = (photos[1], photos[0]) if oriented.exchanged else photos
     return make_alignment(oriented, ordered, way=way, direction=direction)

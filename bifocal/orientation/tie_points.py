@@ -12,6 +12,7 @@ from bifocal.orientation.pair_adjustment import AdjustedPair, wall_equations
 from bifocal.orientation.pair_observations import PairObservations, PairUnknowns
 from bifocal.orientation.patches import refine, same_scale
 from bifocal.orientation.reference_plane import NarrowFace, narrow_face
+from bifocal.orientation.refracted_observations import guessed_points
 from bifocal.orientation.relative_orientation import supported
 from photocore.arrays import BoolArray, FloatArray
 from photocore.camera import (
@@ -110,6 +111,8 @@ def with_support(observations: PairObservations, adjusted: AdjustedPair) -> Pair
 
 def tie_positions(observations: PairObservations, state: PairUnknowns) -> FloatArray:
     """Return where the rays of the ties meet, shape (m, 3). [m]"""
+    if state.media is not None:
+        return guessed_points(state, np.hstack(observations.straight_ties(state.radial)))[0]
     return triangulate(*state.cameras, *observations.straight_ties(state.radial))
 
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from multimedia.projects.model import Project
+from photocore.adjustment.priors import LEAST_INDEX, MOST_INDEX, SIGMA_INDEX, SIGMA_SHARE
 
 #: Unknowns that are properties of a material: one value for all media unless named.
 OF_MATERIAL = ("index", "thickness", "gradient")
@@ -15,11 +16,6 @@ OF_MATERIAL = ("index", "thickness", "gradient")
 WITH_VALUE = (*OF_MATERIAL, "radius", "centre")
 #: Unknowns of which something is known before.
 _KNOWN = (*WITH_VALUE, "shift")
-#: How well an index is known (water from 0 to 40 degrees and fresh to sea differs by 0.01 in all,
-#: glass of one kind by less), and the share to which a thickness or a radius is.
-SIGMA_INDEX, SIGMA_SHARE = 0.005, 0.1
-#: No transparent medium in front of a camera has an index beyond these.
-LEAST_INDEX, MOST_INDEX = 1.0, 3.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

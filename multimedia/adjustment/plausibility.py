@@ -13,16 +13,16 @@ from multimedia.adjustment.media_unknowns import media_unknowns
 from multimedia.adjustment.unknowns import Adjustment
 from multimedia.media.camera import EXTERIOR, INTERIOR
 from multimedia.projects.model import Project
+from photocore.adjustment.priors import (
+    ALIKE,
+    UNCARRIED,
+    hardly_carried,
+    is_possible,
+)
 from photocore.arrays import FloatArray, IntArray
 from photocore.errors import GeometryError
 from photocore.reports.words import words_of
 
-#: A medium adjusted by more than this many of its prior sigmas is another one, or nonsense.
-FARTHEST = 5.0
-#: Media unknowns whose sigma keeps this share of the prior's are not carried by the data.
-UNCARRIED = 0.9
-#: Correlations from which two unknowns can hardly be told apart.
-ALIKE = 0.95
 #: Risk of calling a parameter significant, or residuals not white, that are so by chance.
 RISK_PARAMETER, RISK_WHITE = 0.01, 0.001
 #: Points of one image that may share what the model lacks; the largest effect counts.
@@ -68,9 +68,11 @@ def refuse_impossible_media(
     """
     for item in media_unknowns(project, columns.labels, columns.media):
         label, start = item.label, item.start
-        reach = FARTHEST * given.get(label, item.typical)
         value, own = result.value(label), result.sigma(label)
-        if max(item.least, start - reach) < value < min(item.most, start + reach):
+        if is_possible(
+            value, start=start, sigma=given.get(label, item.typical), least=item.least,
+            most=item.most,
+        ):  # fmt: skip
             continue
         row = result.names.index(label)
         others = np.abs(result.correlations[row])
@@ -168,10 +170,7 @@ def _uncarried(project: Project, columns: BundleColumns, result: Adjustment) -> 
     for item in media_unknowns(project, columns.labels, columns.media):
         prior, own = columns.priors.get(item.column), result.sigma(item.label)
         if prior is not None and own > UNCARRIED * prior * result.model_error:
-            yield (
-                f"{item.label}: the data hardly carry it; it rests on what was given, "
-                f"{item.start:g} +- {prior:.2g}."
-            )
+            yield hardly_carried(item.label, start=item.start, sigma=prior)
 
 
 def _alike(result: Adjustment) -> Iterator[str]:

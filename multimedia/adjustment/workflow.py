@@ -73,23 +73,6 @@ def parse_scale_bar(text: str) -> ScaleBar:
         ) from None
 
 
-def parse_prior(text: str) -> tuple[str, float]:
-    """Return label and standard deviation of ``label=sigma``.
-
-    Raises
-    ------
-    InputError
-        If it has another form.
-    """
-    label, _, sigma = text.rpartition("=")
-    try:
-        return label.strip(), float(sigma)
-    except ValueError:
-        raise InputError(
-            f"--prior {text}: expected label=sigma, e.g. tank:offset=0.002, or label=inf"
-        ) from None
-
-
 def salinity_of(
     result: Adjustment, *, wavelength_nm: float, temperature_c: float, depth: float
 ) -> tuple[float, float] | None:

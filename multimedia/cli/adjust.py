@@ -85,13 +85,14 @@ def command(
     """Adjust cameras, object points and the media of a project together."""
     from multimedia.adjustment import workflow as adjust
     from multimedia.adjustment.unknowns import Unknowns
+    from photocore.adjustment.priors import parse_prior
 
     if (wavelength is None) != (temperature is None):
         raise click.UsageError("the salinity needs both --wavelength and --temperature.")
     unknowns = Unknowns(
         fixed_cameras=fix_camera, plates=plate, **choices,
         scale_bars=tuple(adjust.parse_scale_bar(text) for text in scale_bar),
-        priors=dict(adjust.parse_prior(text) for text in prior), typical_priors=True,
+        priors=dict(parse_prior(text) for text in prior), typical_priors=True,
     )  # fmt: skip
     result, notes = adjust.adjust_project(
         project, unknowns, out=out, report=report, language=language, overwrite=overwrite

@@ -19,7 +19,7 @@ EXAMPLE = """\b
 Examples:
   multimedia design --cameras 4 --distance 0.6 --half-angle 30 --c 25 --extent 0.3x0.3
              --depths 0.02x0.2 --indices 1,1.5,1.337 --thicknesses 0.01 --sigma 0.0012
-  multimedia design tank.toml --out design.xlsx --plot design.png
+  multimedia design tank.toml --out design.xlsx --plot design.png --flatness
 """
 
 
@@ -55,13 +55,17 @@ Examples:
     "--seed", type=click.IntRange(min=0), default=1, show_default=True,
     help="Of the simulated noise.",
 )  # fmt: skip
+@click.option(
+    "--flatness", is_flag=True,
+    help="Also study how plane and parallel the faces must be (bent, wedged, wavy ones).",
+)  # fmt: skip
 @click.option("--out", type=FILE, help="Write the tables (.xlsx).")
 @click.option("--plot", type=FILE, help="Draw them (.png, .svg, .pdf).")
 @overwrite
 @as_json
 def command(
-    project: Path | None, seed: int, out: Path | None, plot: Path | None, overwrite: bool,
-    as_json: bool, **ring: Any,
+    project: Path | None, seed: int, flatness: bool, out: Path | None, plot: Path | None,
+    overwrite: bool, as_json: bool, **ring: Any,
 ) -> None:  # fmt: skip
     """Predict precision, ray angles, sensitivities and calibration costs of a set-up.
 
@@ -78,14 +82,14 @@ def command(
                 raise click.UsageError(
                     "cameras come from the PROJECT file or from options; give one of them."
                 )
-        result = design.design_project(project, seed=seed)
+        result = design.design_project(project, seed=seed, flatness=flatness)
     else:
         needed = {"--distance": "distance", "--c": "principal_distance", "--extent": "extent",
                   "--depths": "depths"}  # fmt: skip
         missing = [option for option, name in needed.items() if ring[name] is None]
         if missing:
             raise click.UsageError(f"give a PROJECT file, or {', '.join(missing)} as well.")
-        result = design.design_ring(seed=seed, **ring)
+        result = design.design_ring(seed=seed, flatness=flatness, **ring)
     design.write_design(result, out=out, plot=plot, overwrite=overwrite)
     print_result(design.as_dict(result), _lines(result), as_json=as_json, remarks=result.remarks)
     tell_written(out, plot)
@@ -93,6 +97,8 @@ def command(
 
 def _lines(result: Design) -> Iterator[str]:
     """Yield the tables."""
+    from multimedia.design.studies import best_placement
+
     unit = result.unit
     rows = [
         (f"{d:.4g}", f"{x:.3g}", f"{y:.3g}", f"{z:.3g}", f"{a:.1f}", f"{b:.1f}")
@@ -113,8 +119,15 @@ def _lines(result: Design) -> Iterator[str]:
             for p in result.placements
         ]  # fmt: skip
         yield text_table(("half angle", "sigma X", "sigma Y", "sigma Z", "rays"), places)
-        best = min(result.placements, key=lambda p: sum(v * v for v in p.sigma))
-        yield f"Best: half angle {degrees(best.half_angle):.0f} deg."
+        best, open_end = best_placement(result.placements)
+        angle = f"half angle {degrees(best.half_angle):.0f} deg"
+        yield (
+            f"Best: {angle}, the last that works of those tried; there is no optimum before it."
+            if open_end
+            else f"Best: {angle}."
+        )
+    if result.planarity:
+        yield from _planarity(result)
     if result.costs is not None:
         costs = result.costs
         cases = (
@@ -137,3 +150,19 @@ def _lines(result: Design) -> Iterator[str]:
             f"Colour seam, red (650 nm) to blue (450 nm): up to {result.seam * 1000:.1f} um in the "
             "image (camera square to the media)."
         )
+
+
+def _planarity(result: Design) -> Iterator[str]:
+    """Yield what faces cost that are not plane or not parallel, and what is allowed."""
+    unit = result.unit
+    yield f"\nFaces that are not plane or not parallel, RMS error of the points [{unit}]"
+    rows = []
+    for one in result.planarity:
+        bent = one.kind == "bend"
+        size, allowed = (
+            f"{v:.3g} {unit} sag" if bent else f"{v * 1000:.3g} mrad"
+            for v in (one.size, one.allowed)
+        )
+        name = one.kind if one.kind != "waves" else f"waves {one.wavelength:.3g} {unit} long"
+        rows.append((name, size, *(f"{v:.3g}" for v in one.shift), f"{one.largest:.3g}", allowed))
+    yield text_table(("deviation", "of", "dX", "dY", "dZ", "largest", "as much as noise"), rows)

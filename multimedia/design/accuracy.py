@@ -227,7 +227,7 @@ def compare_placements(
     points: FloatArray,
     principal_distance: float,
     sigma_image: float,
-    half_angles: Sequence[float] = tuple(np.radians(np.arange(5, 61, 5)).tolist()),
+    half_angles: Sequence[float] = tuple(np.radians(np.arange(5, 86, 5)).tolist()),
 ) -> tuple[Placement, ...]:
     """Return the expected precision of rings of cameras of different opening.
 

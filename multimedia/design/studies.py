@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from multimedia.design.planarity import Deviation
 from photocore.arrays import FloatArray
 
 
@@ -75,6 +76,13 @@ class Placement:
     angle: float
 
 
+def best_placement(placements: Sequence[Placement]) -> tuple[Placement, bool]:
+    """Return the most precise placement, and whether better ones may lie beyond those tried."""
+    ranked = [sum(v * v for v in place.sigma) for place in placements]
+    best = ranked.index(min(ranked))
+    return placements[best], best in (0, len(placements) - 1)
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Design:
     """Everything the command shows.
@@ -94,6 +102,8 @@ class Design:
         Largest distance of red and blue in the image of the points. [mm]
     unit : str
     remarks : tuple of str
+    planarity : tuple of Deviation
+        What bent, wedged or wavy faces cost, where asked for.
     """
 
     study: Study
@@ -105,3 +115,4 @@ class Design:
     seam: float
     unit: str
     remarks: tuple[str, ...]
+    planarity: tuple[Deviation, ...] = ()

@@ -19,6 +19,7 @@ from multimedia.design.accuracy import (
 )
 from multimedia.design.design_files import write_design_plot, write_design_workbook
 from multimedia.design.dispersion import layers_per_colour, seam_width
+from multimedia.design.planarity import Deviation, planarity_study
 from multimedia.design.simplified_models import agrafiotis, lavest, telem
 from multimedia.design.studies import Design, Placement, Study
 from multimedia.media.camera import Camera
@@ -49,11 +50,12 @@ def design_ring(
     sigma_image: float,
     seed: int = 1,
     unit: str = "m",
+    flatness: bool = False,
 ) -> Design:
     """Study cameras on a cone above a water surface or a glass.
 
     Arguments as in `Layers`, `ring_of_cameras`, `object_grid` and `study_setup`; ``seed`` is that
-    of the noise in the simulated calibrations.
+    of the noise in the simulated calibrations, ``flatness`` asks for `planarity_study`.
     """
     if not 0 <= depths[0] < depths[1]:
         raise InputError(
@@ -77,11 +79,11 @@ def design_ring(
     )  # fmt: skip
     return _design(
         cameras, [interface] * count, points, sigma_image, ("media",) * count, placements, seed,
-        unit, (),
+        unit, (), flatness,
     )  # fmt: skip
 
 
-def design_project(source: Path, *, seed: int = 1) -> Design:
+def design_project(source: Path, *, seed: int = 1, flatness: bool = False) -> Design:
     """Study the cameras of a project file at its object points."""
     project = read_project(source)
     if not project.object_points.ids:
@@ -90,14 +92,14 @@ def design_project(source: Path, *, seed: int = 1) -> Design:
         )
     return _design(
         project.cameras, project.interfaces, project.object_points.xyz, project.sigma_image,
-        project.media_of, (), seed, project.unit, project.remarks,
+        project.media_of, (), seed, project.unit, project.remarks, flatness,
     )  # fmt: skip
 
 
 def _design(
     cameras: Sequence[Camera], media: Sequence[Any], points: FloatArray, sigma_image: float,
     names: Sequence[str], placements: tuple[Placement, ...], seed: int, unit: str,
-    remarks: tuple[str, ...],
+    remarks: tuple[str, ...], flatness: bool,
 ) -> Design:  # fmt: skip
     """Run all studies of one set-up."""
     study = study_setup(
@@ -125,12 +127,23 @@ def _design(
         (name, STEPS[name.rpartition(":")[2].rstrip("0123456789")][1], tuple(moved.tolist()))
         for name, moved in study.sensitivity.items()
     )
+    planarity: tuple[Deviation, ...] = ()
+    if flatness:
+        planarity = planarity_study(
+            cameras, media, points[study.seen_by >= 2][::_every(points)],
+            expected=float(np.linalg.norm(study.rms_sigma)), millimetre=MILLIMETRE.get(unit, 1e-3),
+        )  # fmt: skip
     models, seam = _simplified(cameras[0], interface, points)
     return Design(
         study=study, by_depth=_by_depth(study), sensitivities=sensitivities,
         placements=placements, costs=costs, models=models, seam=seam, unit=unit,
-        remarks=tuple(notes),
+        remarks=tuple(notes), planarity=planarity,
     )  # fmt: skip
+
+
+def _every(points: FloatArray) -> int:
+    """Return the step in which points are taken for ray tracing: some hundred tell as much."""
+    return 1 + len(points) // 128
 
 
 def _simplified(
@@ -238,5 +251,10 @@ def as_dict(design: Design) -> dict[str, Any]:
             {"model": name, "rms": rms, "largest": largest} for name, rms, largest in design.models
         ],
         "colour_seam_mm": design.seam,
+        "planarity": [
+            {"kind": d.kind, "size": d.size, "wavelength": d.wavelength, "shift": d.shift,
+             "largest": d.largest, "allowed": d.allowed}
+            for d in design.planarity
+        ],
         "remarks": design.remarks,
     }  # fmt: skip

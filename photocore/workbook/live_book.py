@@ -227,7 +227,7 @@ class SheetBuilder:
         """Write label and key of a column, and set its width."""
         sheet, (head, number) = self.worksheet, at
         above, key = sheet.cell(head - 1, number), sheet.cell(head, number)
-        above.value = self.book.words.label(column.key, self.book.language)
+        above.value = self.book.words.label(column.label or column.key, self.book.language)
         above.font, above.alignment = LABEL_FONT, _LABEL_PLACE
         key.value, key.font, key.fill = column.key, HEAD_FONT, HEAD_FILL
         key.alignment = Alignment(horizontal="center")

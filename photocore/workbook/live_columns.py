@@ -23,6 +23,8 @@ class LiveColumn:
     ----------
     key : str
         Heading; stable, ASCII, never translated.
+    label : str
+        Which words stand above it; empty: those of its key.
     kind : str
         ``input`` (typed by the user), ``formula``, or ``value`` (written by the program).
     formula : str
@@ -44,6 +46,7 @@ class LiveColumn:
     """
 
     key: str
+    label: str = ""
     kind: str = "input"
     formula: str = ""
     places: int | None = None

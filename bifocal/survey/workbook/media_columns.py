@@ -108,7 +108,8 @@ def _with(
     for column in columns:
         own = column
         if column.key in formulas:
-            own = replace(column, formula=formulas[column.key])
+            label = "den_media" if column.key == "den" else ""
+            own = replace(column, formula=formulas[column.key], label=label)
         made += [*before.get(column.key, ()), own, *after.get(column.key, ())]
     return made
 

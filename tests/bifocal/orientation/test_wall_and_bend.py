@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from bifocal.orientation.absolute_orientation import orient_pair
-from bifocal.orientation.bend import MOST_BENT, bend_in_words, wall_bend
+from bifocal.orientation.bend import MOST_BENT, bend_in_words, bend_of_wall, wall_bend
 from bifocal.orientation.control_points import Control, SiteMeasures
 from bifocal.orientation.features import Features, match_features
 from bifocal.orientation.interior_orientation import Interior
@@ -51,6 +51,22 @@ def test_the_bend_counts_at_one_size_of_photo() -> None:
     first, second = wall_ties(-0.15)
     half = wall_bend(first / 2 - 0.25, second / 2 - 0.25, (SIZE[0] // 2, SIZE[1] // 2))
     assert half == pytest.approx(wall_bend(first, second, SIZE), rel=0.15)
+
+
+def test_relief_before_the_wall_does_not_bend_it() -> None:
+    """Mouldings that stand out more towards top and bottom read as a bend of all ties."""
+    rng = np.random.default_rng(2)
+    cameras = bifocal_cameras(size=SIZE, errors=SetupErrors(tilt_deg=1.0), rng=rng)
+    xyz = np.column_stack([rng.uniform(-5, 5, 3000), rng.uniform(-3, 3, 3000), np.zeros(3000)])
+    moulded = rng.random(3000) < 0.8
+    xyz[moulded, 2] = 0.03 * np.abs(xyz[moulded, 1])
+    x1, x2 = (c.view_of(xyz) + rng.normal(0, 0.1, (3000, 2)) for c in (cameras.far, cameras.near))
+    height = xyz[:, 2] / float(cameras.far.centre[2])
+    assert wall_bend(x1, x2, SIZE) > 1.5 * MOST_BENT
+    assert bend_of_wall(x1, x2, SIZE, height) < 0.5 * MOST_BENT
+    # Where no detail is near the plane, all of them decide, and more generously.
+    assert np.isnan(bend_of_wall(*wall_ties(0.0), SIZE, np.full(900, 0.1)))
+    assert bend_of_wall(*wall_ties(-0.15), SIZE, np.full(900, 0.1)) > MOST_BENT
 
 
 def test_wrong_ties_on_their_lines_have_no_support() -> None:
@@ -125,6 +141,23 @@ def test_one_detail_in_two_orientations_is_no_rival_of_itself() -> None:
     np.testing.assert_array_equal(rows2 // 2, rows1)
 
 
+def through_port(photo: np.ndarray, cam: Pinhole) -> np.ndarray:
+    """Return a square photo of the wall as seen in water through 10 mm of glass, 50 mm before it.
+
+    By hand: sin a = 1.49 sin g = 1.337 sin b; a ray meets the wall at 0.05 tan a + 0.01 tan g +
+    (d - 0.06) tan b instead of d tan a. The lens is 1.337 times as wide, for as much of the wall.
+    """
+    middle, focal, d = cam.matrix[:2, 2], cam.matrix[0, 0], cam.centre[2]
+    column, row = np.meshgrid(np.arange(photo.shape[1]), np.arange(photo.shape[0]))
+    away = np.stack([column - middle[0], row - middle[1]], axis=-1) / (focal / 1.337)
+    air = np.linalg.norm(away, axis=-1, keepdims=True)
+    sine = np.sin(np.arctan(air))
+    glass, water = np.tan(np.arcsin(sine / 1.49)), np.tan(np.arcsin(sine / 1.337))
+    reach = (0.05 * air + 0.01 * glass + (d - 0.06) * water) / d
+    at = (middle + focal * away * reach / np.maximum(air, 1e-12)).astype(np.float32)
+    return cv2.remap(photo, at[..., 0], at[..., 1], cv2.INTER_CUBIC)
+
+
 def through_water(photo: np.ndarray, cam: Pinhole, depth: float) -> np.ndarray:
     """Return a square photo of the wall as seen through a level of water before it. [m]
 
@@ -142,14 +175,18 @@ def through_water(photo: np.ndarray, cam: Pinhole, depth: float) -> np.ndarray:
 
 
 @pytest.mark.acceptance
-def test_photos_through_water_are_said_not_to_fit() -> None:
+@pytest.mark.parametrize("medium", ["port", "surface"])
+def test_photos_through_water_are_said_not_to_fit(medium: str) -> None:
     cameras = wall_camera(16.0), wall_camera(9.0, offset=(0.05, -0.04))
     views = take(*cameras)
     photos = [
         PhotoInput(
-            grey=through_water(image, cam, 2.0),
+            grey=through_port(image, cam) if medium == "port" else through_water(image, cam, 2.0),
             interior=Interior.from_focal(
-                cam.matrix[0, 0], image_size=WALL_SIZE, sigma=0.005, source="test"
+                cam.matrix[0, 0] / (1.337 if medium == "port" else 1.0),
+                image_size=WALL_SIZE,
+                sigma=0.005,
+                source="test",
             ),
             name=name,
         )
@@ -157,5 +194,5 @@ def test_photos_through_water_are_said_not_to_fit() -> None:
             (views.far, views.near), cameras, ("a.jpg", "b.jpg"), strict=True
         )
     ]
-    with pytest.raises(GeometryError, match=r"THE MODEL DOES NOT FIT.*refraction"):
+    with pytest.raises(GeometryError, match=r"THE MODEL DOES NOT FIT.*refraction.*--indices"):
         orient_pair((photos[0], photos[1]), control=Control(), site=SiteMeasures(distance1=16.0))

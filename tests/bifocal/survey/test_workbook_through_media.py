@@ -317,3 +317,52 @@ def test_a_workbook_with_media_is_taken_as_a_pair(tank, tmp_path):
     pixels = pair.project(POINTS)
     xy = [(p - [149.5, 99.5]) * [0.1, -0.1] for p in pixels]
     np.testing.assert_allclose(xy, tank_points(), atol=1e-10)
+
+
+@pytest.mark.acceptance
+@pytest.mark.office
+def test_results_beside_a_table_of_ones_own_follow_the_bent_rays(tmp_path):
+    """New columns and a sheet Setup with the cells of media, in the user's own workbook."""
+    picks, book = measured("oblique"), openpyxl.Workbook()
+    sheet = book.active
+    sheet.append(["my points"])
+    sheet.append(["id", "col1", "row1", "col2", "row2"])
+    for row in zip(*picks.values(), strict=True):
+        sheet.append([value if isinstance(value, str) else float(value) for value in row])
+    own, pair_file = tmp_path / "own.xlsx", tmp_path / "oblique.pair.json"
+    book.save(own)
+    pair_file.write_text(json.dumps(content("oblique")))
+    words = ["solve", str(own), "--pair", str(pair_file), "--out", str(own), "--overwrite"]
+    done = CliRunner().invoke(main, words)
+    assert done.exit_code == 0, done.output
+    assert lint(own) == []
+    fresh = recalculated(own, tmp_path)
+    assert named(fresh, "index_2").value == 1.49
+    rows = list(fresh[sheet.title].iter_rows(min_row=2, values_only=True))
+    keys = [str(key).split(" ")[0] for key in rows[0]]
+    found = [[row[keys.index(key)] for key in ("X", "Y", "r")] for row in rows[1 : 1 + len(POINTS)]]
+    np.testing.assert_allclose(np.array(found, float), POINTS, atol=1e-9)
+
+
+@pytest.mark.acceptance
+def test_options_and_languages_are_written_into_a_form_with_media(tank, tmp_path):
+    out = tmp_path / "out.xlsx"
+    words = ["solve", str(tank), "--d2", "2.1", "--lang", "de", "--out", str(out)]
+    done = CliRunner().invoke(main, [*words, "--scale-tolerance", "0.1"])
+    assert done.exit_code == 0, done.output
+    book = openpyxl.load_workbook(out)
+    told = {row[0].value: row[1].value for row in book["Setup"].iter_rows(min_row=5)}
+    assert "Medium 3" in told["index_3"]
+    assert named(book, "index_3").value == 1.337
+    assert named(book, "d_2").value == 2.1
+    again = solve(out, scale_tolerance=0.1)
+    assert again.setup.d2 == 2.1
+    assert again.pair.layers.indices == (1.0, 1.49, 1.337)
+
+
+def test_the_heading_of_the_slopes_says_what_they_are(tmp_path):
+    write_template(tmp_path / "t.xlsx", media=2, rows=3)
+    sheet = openpyxl.load_workbook(tmp_path / "t.xlsx")["Points"]
+    labels = {cell.value: sheet.cell(3, cell.column).value for cell in sheet[4]}
+    assert labels["den"] == "T2 - T1 of the rays [mm/m]"
+    assert "image 2" in labels["tan2"]

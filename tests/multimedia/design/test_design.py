@@ -73,8 +73,9 @@ def test_sensitivities_are_what_a_wrong_index_does():
 
 def test_wider_placements_give_better_depth():
     found = compare_placements(
-        4, 0.6, interface=TANK, points=POINTS, principal_distance=25.0, sigma_image=0.001
-    )
+        4, 0.6, interface=TANK, points=POINTS, principal_distance=25.0, sigma_image=0.001,
+        half_angles=np.radians(np.arange(5, 61, 5)).tolist(),
+    )  # fmt: skip
     depth = [p.sigma[2] for p in found]
     assert depth == sorted(depth, reverse=True)
 

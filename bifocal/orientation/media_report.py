@@ -1,0 +1,134 @@
+"""What is to be told of the media of a pair, and what is not to be believed of them."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from bifocal.orientation.pair_adjustment import AdjustedPair
+from bifocal.orientation.pair_media import PairMedia
+from photocore.adjustment import correlations
+from photocore.adjustment.priors import (
+    ALIKE,
+    LEAST_INDEX,
+    MOST_INDEX,
+    UNCARRIED,
+    hardly_carried,
+    is_possible,
+    typical_sigma,
+)
+from photocore.camera import Pinhole
+from photocore.errors import GeometryError
+
+
+def straight_distance(camera: Pinhole, media: PairMedia | None, number: int) -> tuple[float, float]:
+    """Return the distance of the straight camera that sees alike near the axis, and its rate.
+
+    Parameters
+    ----------
+    camera : Pinhole
+    media : PairMedia or None
+        None in air, where both are the camera's own distance and one.
+    number : int
+        0 for the far camera, 1 for the near one.
+    """
+    distance = float(camera.centre[2])
+    if media is None:
+        return distance, 1.0
+    return media.path(number, camera).near_axis, media.near_axis_rate()
+
+
+def media_in_words(adjusted: AdjustedPair, given: PairMedia | None) -> tuple[str, ...]:
+    """Return what lies between cameras and wall, and what of it was estimated, in sentences."""
+    media = adjusted.media
+    if media is None or given is None:
+        return ()
+    indices = ", ".join(f"{n:.4g}" for n in media.layers.indices)
+    layers = ", ".join(f"{1000 * t:.4g} mm" for t in media.layers.thicknesses)
+    z0 = [media.z0(number, camera) for number, camera in enumerate(adjusted.cameras)]
+    words = [
+        f"Through media of index {indices}{f' ({layers} between)' if layers else ''}: the first "
+        f"begins {z0[0]:.3f} m before the far and {z0[1]:.3f} m before the near camera, "
+        + ("with the camera." if media.depth is None else "and stays with the wall.")
+    ]
+    for row, name in _estimated(adjusted, media):
+        sigma = float(np.sqrt(adjusted.of_unknowns[row, row]))
+        words.append(
+            f"{name} came out {_shown(name, media.value(name))} ± {_shown(name, sigma)} "
+            f"(given {_shown(name, given.value(name))} ± {_shown(name, given.sigmas[name])})."
+        )
+    return tuple(words)
+
+
+def media_remarks(adjusted: AdjustedPair, given: PairMedia | None) -> tuple[str, ...]:
+    """Return which unknowns of the media the data do not carry, or cannot tell from others."""
+    media = adjusted.media
+    if media is None or given is None:
+        return ()
+    told = []
+    factor = max(adjusted.sigma0, 1.0)
+    for row, name in _estimated(adjusted, media):
+        prior, own = given.sigmas[name], float(np.sqrt(adjusted.of_unknowns[row, row]))
+        if own > UNCARRIED * prior * factor:
+            told.append(hardly_carried(name, start=given.value(name), sigma=prior))
+        if (twin := _twin(adjusted, media, row)) and twin[1] > ALIKE:
+            told.append(
+                f"{name} and {twin[0]} can hardly be told apart: correlation {twin[1]:.3f}; points "
+                "off the wall, a taped distance, or a lens file tell them."
+            )
+    return tuple(told)
+
+
+def refuse_impossible_media(adjusted: AdjustedPair, given: PairMedia) -> None:
+    """Refuse indices and lengths that the medium named cannot have.
+
+    Raises
+    ------
+    GeometryError
+        Naming the unknown, its value and what it cannot be told apart from.
+    """
+    media = adjusted.media
+    assert media is not None
+    for row, name in _estimated(adjusted, media):
+        start, value = given.value(name), media.value(name)
+        sigma = given.sigmas[name]
+        least, most = 1e-6 * start, np.inf
+        if name.startswith("index"):
+            least, most = LEAST_INDEX, MOST_INDEX
+        if is_possible(value, start=start, sigma=sigma, least=least, most=most):
+            continue
+        own, twin = float(np.sqrt(adjusted.of_unknowns[row, row])), _twin(adjusted, media, row)
+        alike = (
+            f"; it goes with {twin[0]} (correlation {twin[1]:.2f})"
+            if twin and twin[1] > ALIKE / 2
+            else ""
+        )
+        raise GeometryError(
+            f"{name} comes out as {value:.4g} +- {own:.2g}, {start:g} was given: the control "
+            f"points cannot carry it{alike}. Give what is known as a standard deviation (--prior "
+            f"{name}={typical_sigma(name, start):.3g}), measure points farther off the wall, or "
+            f"take {name} out of --estimate. Check the focal lengths too: a wrong one looks like a "
+            "wrong index."
+        )
+
+
+def _estimated(adjusted: AdjustedPair, media: PairMedia) -> list[tuple[int, str]]:
+    """Return where in the unknowns the media's stand, and their names; none where all is typed."""
+    if not adjusted.of_unknowns.size:
+        return []
+    first = len(media.names) - len(media.sigmas)
+    return list(enumerate(media.sigmas, start=first))
+
+
+def _twin(adjusted: AdjustedPair, media: PairMedia, row: int) -> tuple[str, float] | None:
+    """Return the unknown that goes with one of the media's the most, and their correlation."""
+    others = np.nan_to_num(np.abs(correlations(adjusted.of_unknowns)[row]))
+    others[row] = 0.0
+    twin = int(others.argmax())
+    return None if not others[twin] else (media.names[twin], float(others[twin]))
+
+
+def _shown(name: str, value: float) -> str:
+    """Return an index, or a length in millimetres."""
+    if not np.isfinite(value):
+        return "anything"
+    return f"{value:.4f}" if name.startswith("index") else f"{1000 * value:.1f} mm"

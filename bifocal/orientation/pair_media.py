@@ -1,0 +1,308 @@
+"""What lies between both cameras of a pair and the object: as stated, and as unknowns.
+
+A flat port moves with its camera (``port``), the glass of a tank or the surface of water stays with
+the object (``depth``). Indices, thicknesses and these lengths may be unknown, with what was given
+as an observation.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from bifocal.media import MediaPath, interface_axes
+from bifocal.model.orientation_precision import NAMES, names_of
+from bifocal.model.photo import AXIS
+from bifocal.model.refracted_view import common_names
+from multimedia import Layers
+from photocore.adjustment.priors import LEAST_INDEX, MOST_INDEX, parse_prior, typical_sigma
+from photocore.arrays import FloatArray, not_negative, positive
+from photocore.camera import Pinhole
+from photocore.errors import InputError
+
+#: Normal of one camera's interfaces: a direction in the plane frame, square to the optical axis, or
+#: None where they are parallel to the reference plane.
+Normal = FloatArray | str | None
+#: How a pair through media is set up, and how not.
+THROUGH_MEDIA = (
+    "through glass or water a pair is set up by control points, at least four with X, Y and pixels "
+    "in each photo (--control FILE; distances may be given with it), or exactly as typed "
+    "(--as-set-up). From the photos alone (--auto, or distances without control) pairs are set up "
+    "in air only: bent rays leave neither epipolar lines nor planes what they are. Measure points "
+    "of the wall and off it, or set the cameras up square to it and give --as-set-up."
+)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class PairMedia:
+    """Plane-parallel media before both cameras of a pair.
+
+    Attributes
+    ----------
+    layers : Layers
+    port : pair of float, or None
+        Each camera's centre to the first interface, where that moves with it. [m]
+    depth : float or None
+        Last interface to the reference plane, where that stays with the object. [m]
+    normals : pair
+        Of either camera's interfaces: (X, Y, r) in the plane frame, ``"axis"`` for a port square to
+        its optical axis, None where they are parallel to the reference plane.
+    sigmas : mapping of str to float
+        The unknowns with the standard deviations of what was given; infinite: not known. Names:
+        ``index1`` ..., ``thickness1`` ... counted from the camera, ``port`` (of both cameras
+        alike), ``port1``, ``port2``, ``depth``.
+
+    Raises
+    ------
+    InputError
+        If ports and depth are both given or neither, an unknown is none of theirs, or a normal is
+        stated for media that stay with the object.
+    """
+
+    layers: Layers
+    port: tuple[float, float] | None = None
+    depth: float | None = None
+    normals: tuple[Normal, Normal] = (None, None)
+    sigmas: Mapping[str, float] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        if (self.port is None) == (self.depth is None):
+            raise InputError(
+                "media: give the port's distance from the camera (--port), or how deep the wall "
+                "lies behind the glass or surface that stays with it (--depth); one of the two."
+            )
+        for number, value in enumerate(self.port or (), start=1):
+            not_negative(value, f"port{number}")
+        if self.depth is not None:
+            positive(self.depth, "depth", unit="m")
+            if any(normal is not None for normal in self.normals):
+                raise InputError(
+                    "a normal of the port (--port-normal) goes with --port: glass or a surface "
+                    "that stays with the object is taken as parallel to the reference plane."
+                )
+        allowed = self._allowed
+        for name, sigma in self.sigmas.items():
+            if name not in allowed:
+                raise InputError(
+                    f"media: {name!r} is no unknown of them; possible are {', '.join(allowed)}."
+                )
+            if not sigma > 0:
+                raise InputError(f"--prior {name}={sigma:g}: expected a number above zero, or inf.")
+        if "port" in self.sigmas and ({"port1", "port2"} & set(self.sigmas)):
+            raise InputError("media: estimate port (of both cameras alike), or port1 and port2.")
+
+    @classmethod
+    def stated(
+        cls,
+        indices: Sequence[float],
+        thicknesses: Sequence[float] = (),
+        *,
+        ports: tuple[float | None, float | None] = (None, None),
+        depth: float | None = None,
+        normals: tuple[Normal, Normal] = (None, None),
+        estimate: Sequence[str] = (),
+        priors: Mapping[str, float] | None = None,
+    ) -> PairMedia:
+        """Return media as typed: unknowns are what is to be estimated, or has a prior.
+
+        Parameters
+        ----------
+        indices, thicknesses : sequence of float
+            As of `multimedia.Layers`.
+        ports, depth, normals
+            As of the class; a port of one camera stands for the other's where that is None.
+        estimate : sequence of str
+            Unknowns; their sigmas are typical ones: indices 0.005, lengths a tenth.
+        priors : mapping of str to float, optional
+            Unknowns with their sigmas.
+
+        Raises
+        ------
+        InputError
+            As of the class, or where indices and thicknesses do not go together.
+        """
+        first, second = ports
+        if first is None:
+            first = second
+        port = None if first is None else (first, first if second is None else second)
+        layers = Layers(indices=tuple(indices), thicknesses=tuple(thicknesses))
+        media = cls(layers=layers, port=port, depth=depth, normals=normals)
+        sigmas = {}
+        for name in (*estimate, *(priors or {})):
+            start = media.value(name) if name in media._allowed else 0.0
+            sigmas[name] = (priors or {}).get(name) or max(typical_sigma(name, start), 1e-6)
+        return replace(media, sigmas=sigmas)
+
+    @property
+    def _allowed(self) -> tuple[str, ...]:
+        """Names that may be unknown."""
+        placed = ("depth",) if self.port is None else ("port", "port1", "port2")
+        return (*common_names(self.layers), *placed)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The unknowns: the cameras', then those of the media."""
+        return (*NAMES, *self.sigmas)
+
+    def value(self, name: str) -> float:
+        """Return a length or index by the name it has as an unknown; of ``port`` the first."""
+        if name.startswith("index"):
+            return self.layers.indices[int(name[5:]) - 1]
+        if name.startswith("thickness"):
+            return self.layers.thicknesses[int(name[9:]) - 1]
+        if self.port is None:
+            assert self.depth is not None
+            return self.depth
+        return self.port[int(name == "port2")]
+
+    def stepped(self, step: FloatArray) -> PairMedia | None:
+        """Return the media after a step of their unknowns; None where it leaves what can be."""
+        by_name = dict(zip(self.sigmas, step.tolist(), strict=True))
+        indices, thicknesses = (
+            tuple(value + by_name.get(f"{kind}{k}", 0.0) for k, value in enumerate(values, start=1))
+            for kind, values in (
+                ("index", self.layers.indices),
+                ("thickness", self.layers.thicknesses),
+            )
+        )
+        port, depth = self.port, self.depth
+        if port is not None:
+            both = by_name.get("port", 0.0)
+            ends = (port[k] + both + by_name.get(f"port{k + 1}", 0.0) for k in (0, 1))
+            port = (next(ends), next(ends))
+        if depth is not None:
+            depth += by_name.get("depth", 0.0)
+        if min(*thicknesses, *(port or ()), depth or 0.0, 0.0) < 0 or depth == 0:
+            return None
+        if min(indices) < LEAST_INDEX or max(indices) > MOST_INDEX:
+            return None
+        layers = Layers(indices=indices, thicknesses=thicknesses)
+        return replace(self, layers=layers, port=port, depth=depth)
+
+    def exchanged(self) -> PairMedia:
+        """Return the media with far and near camera exchanged."""
+        turned = {"port1": "port2", "port2": "port1"}
+        return replace(
+            self,
+            port=None if self.port is None else self.port[::-1],
+            normals=self.normals[::-1],
+            sigmas={turned.get(name, name): sigma for name, sigma in self.sigmas.items()},
+        )
+
+    def z0(self, number: int, camera: Pinhole) -> float:
+        """Return camera 0's or 1's way to the first interface. [m]"""
+        if self.port is not None:
+            return self.port[number]
+        assert self.depth is not None
+        return float(camera.centre[2]) - self.depth - self.layers.thickness
+
+    def normal(self, number: int, camera: Pinhole) -> FloatArray | None:
+        """Return the unit normal of camera 0's or 1's interfaces towards it, shape (3,)."""
+        stated = self.normals[number]
+        if stated is None:
+            return None
+        if isinstance(stated, str):
+            assert stated == AXIS
+            return -camera.rotation[2]
+        return np.asarray(stated / np.linalg.norm(stated))
+
+    def path(self, number: int, camera: Pinhole) -> MediaPath:
+        """Return what camera 0's or 1's rays cross."""
+        normal = self.normal(number, camera)
+        return MediaPath(
+            layers=self.layers,
+            z0=self.z0(number, camera),
+            distance=float(camera.centre[2]),
+            turn=None if normal is None else interface_axes(normal),
+        )
+
+    def by_unknowns(self) -> FloatArray:
+        """Return how what `names_of` counts moves with the unknowns `names`, shape (k, u).
+
+        A port goes with its camera, and one square to the optical axis turns with it; what stays
+        with the object is the farther from a camera that moves away.
+        """
+        rows, names = list(names_of(self.layers)), self.names
+        out = np.zeros((len(rows), len(names)))
+        out[: len(NAMES), : len(NAMES)] = np.eye(len(NAMES))
+        for column, name in enumerate(names[len(NAMES) :], start=len(NAMES)):
+            if name in rows:
+                out[rows.index(name), column] = 1.0
+            for number in (1, 2):
+                z0 = rows.index(f"z0 {number}")
+                if name in ("port", f"port{number}"):
+                    out[z0, column] = 1.0
+                elif self.depth is not None and (name == "depth" or name.startswith("thickness")):
+                    out[z0, column] = -1.0
+        for number in (1, 2):
+            if self.depth is not None:
+                out[rows.index(f"z0 {number}"), names.index(f"Z {number}")] = 1.0
+            if isinstance(self.normals[number - 1], str):
+                for axis in "XYZ":
+                    lean, turn = f"lean {axis} {number}", f"turn {axis} {number}"
+                    out[rows.index(lean), names.index(turn)] = 1.0
+        return out
+
+    def near_axis_rate(self) -> float:
+        """Return how `bifocal.media.MediaPath.near_axis` grows with the camera's distance."""
+        if self.port is not None:
+            return 1.0
+        return self.layers.indices[-1] / self.layers.indices[0]
+
+
+def media_of(given: Mapping[str, Any]) -> PairMedia | None:
+    """Return media as options name them (``indices``, ``thicknesses``, ``port`` ...); None in air.
+
+    Raises
+    ------
+    InputError
+        If they do not describe media.
+    """
+    if given.get("indices") is None:
+        lost = [name for name in _WITH_INDICES if given.get(name) not in (None, ())]
+        if lost:
+            raise InputError(
+                f"--{lost[0].replace('_', '-')} goes with --indices: the refractive indices from "
+                "the camera to the wall, e.g. --indices 1,1.49,1.337 --thicknesses 0.01."
+            )
+        return None
+    ports, normals = (
+        (_own(given, name, 1), _own(given, name, 2)) for name in ("port", "port_normal")
+    )
+    return PairMedia.stated(
+        given["indices"], given.get("thicknesses") or (), ports=ports, depth=given.get("depth"),
+        normals=(_normal(normals[0]), _normal(normals[1])), estimate=given.get("estimate") or (),
+        priors=dict(parse_prior(text) for text in given.get("prior") or ()),
+    )  # fmt: skip
+
+
+def _own(given: Mapping[str, Any], name: str, number: int) -> Any:
+    """Return an option of one camera, or else that of both."""
+    own = given.get(f"{name}{number}")
+    return given.get(name) if own is None else own
+
+
+def _normal(stated: str | None) -> Normal:
+    """Return the normal that an option states: "axis", or X,Y,r towards the camera."""
+    if stated is None or stated == AXIS:
+        return stated
+    try:
+        normal = np.array([float(part) for part in stated.split(",")])
+    except ValueError:
+        normal = np.zeros(0)
+    if normal.shape != (3,) or not normal[2] > 0.1 * np.linalg.norm(normal):
+        raise InputError(
+            f"--port-normal {stated}: expected axis (square to the camera's optical axis) or X,Y,r "
+            "in the plane frame, towards the camera: 0,0,1 is parallel to the wall."
+        )
+    return normal
+
+
+#: Options that say nothing without the indices.
+_WITH_INDICES = (
+    "thicknesses", "port", "port1", "port2", "depth", "port_normal", "port_normal1", "port_normal2",
+    "estimate", "prior",
+)  # fmt: skip
