@@ -25,6 +25,7 @@ Surfaces and rays
     RayPaths, RayStatus       their way, and why one has none
 Cameras
     Camera, Sensor            exterior and interior orientation
+    Brown, Fisheye            distortion of a lens, or the law of a fisheye
     project, projection_status   image coordinates through the media, and why there are none
     image_rays                the ray of an image point in the object's medium
     resect, Resection         a camera from control points

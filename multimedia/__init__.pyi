@@ -26,7 +26,7 @@ from .design.dispersion import (
 from .design.simplified_models import Approximation, agrafiotis, lavest, telem
 from .design.studies import CalibrationCosts, Placement, Study
 from .exchange.workflow import Conversion, convert
-from .media.camera import Camera, Sensor
+from .media.camera import Brown, Camera, Fisheye, Sensor
 from .media.flat_interface import FlatInterface
 from .media.height_field import RasterSurface, WaveSurface
 from .media.interfaces import Interfaces
@@ -86,6 +86,7 @@ __all__ = [
     "Approximation",
     "BathymetryStatus",
     "CalibrationCosts",
+    "Brown",
     "Camera",
     "Candidates",
     "Conversion",
@@ -94,6 +95,7 @@ __all__ = [
     "EpipolarCurves",
     "FLOAT_GLASS",
     "FUSED_SILICA",
+    "Fisheye",
     "FlatInterface",
     "HOEHLE",
     "ImagePoints",

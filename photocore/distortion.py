@@ -18,7 +18,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum
-from typing import NamedTuple
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -64,6 +64,9 @@ class Brown:
     >>> Brown(k1=1e-5).measured([10.0, 0.0], [0.0, 0.0]).round(9).tolist()
     [10.01, 0.0]
     """
+
+    #: Names of the parameters.
+    names: ClassVar[tuple[str, ...]] = NAMES
 
     k1: float = 0.0
     k2: float = 0.0
@@ -113,7 +116,12 @@ class Brown:
             self.scale == 1.0
         )
 
-    def measured(self, ideal: ArrayLike, principal_point: ArrayLike) -> FloatArray:
+    def measured(
+        self,
+        ideal: ArrayLike,
+        principal_point: ArrayLike,
+        principal_distance: float = 1.0,  # noqa: ARG002
+    ) -> FloatArray:
         """Return where ideal coordinates (about the principal point) are measured. [mm]
 
         Parameters
@@ -122,6 +130,8 @@ class Brown:
             Central projection, origin at the principal point. [mm]
         principal_point : array_like, shape (2,)
             [mm]
+        principal_distance : float
+            Not needed: the terms count in mm; see `photocore.fisheye.Fisheye`.
 
         Returns
         -------
@@ -138,7 +148,12 @@ class Brown:
             return self._formula(points + centre)
         return self._inverse(points) + centre
 
-    def ideal(self, measured: ArrayLike, principal_point: ArrayLike) -> FloatArray:
+    def ideal(
+        self,
+        measured: ArrayLike,
+        principal_point: ArrayLike,
+        principal_distance: float = 1.0,  # noqa: ARG002
+    ) -> FloatArray:
         """Return the ideal coordinates of measured ones: undoes `measured`, shape (..., 2). [mm]"""
         points = as_points(measured, "measured", dimension=2)
         centre = as_points(principal_point, "principal_point", dimension=2)
@@ -151,7 +166,11 @@ class Brown:
         return self._formula(points - centre)
 
     def measured_with_jacobian(
-        self, ideal: FloatArray, principal_point: FloatArray, names: Sequence[str] = ()
+        self,
+        ideal: FloatArray,
+        principal_point: FloatArray,
+        names: Sequence[str] = (),
+        principal_distance: float = 1.0,  # noqa: ARG002
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Return `measured` with its derivatives.
 
@@ -160,7 +179,7 @@ class Brown:
         ideal, principal_point
             As for `measured`.
         names : sequence of str
-            Of `NAMES` and ``xh``, ``yh`` (principal point).
+            Of `NAMES`, ``xh``, ``yh`` (principal point) and ``c``, the last for nothing.
 
         Returns
         -------
@@ -178,7 +197,7 @@ class Brown:
             argument = measured - principal_point
         by_argument = self._by_argument(argument)
         for k, name in enumerate(names):
-            if name not in ("xh", "yh"):
+            if name in NAMES:
                 by_names[..., k] = self._by_coefficient(argument, name)
         if self.convention is Convention.PHOTOGRAMMETRIC:
             # ideal = B(m): dm = (dB/dm)^-1 (d ideal - dB of the coefficients).

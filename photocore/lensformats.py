@@ -120,12 +120,13 @@ def colmap_lens(words: Sequence[str], path: Path, *, more: bool = False) -> tupl
 
 
 def _metashape(path: Path, text: str) -> LensData:
-    """Read a Metashape camera calibration (frame camera)."""
+    """Read a Metashape camera calibration."""
     root = xml_root(path, text)
     node = root if root.tag == "calibration" else root.find(".//calibration")
-    if node is None or node.findtext("projection") not in {"frame", "perspective"}:
-        raise InputError(f"{path}: holds no frame calibration of Metashape.")
-    return metashape_lens(node, path)
+    kind = None if node is None else node.findtext("projection")
+    if node is None or kind not in {"frame", "perspective", "fisheye"}:
+        raise InputError(f"{path}: holds no frame or fisheye calibration of Metashape.")
+    return metashape_lens(node, path, fisheye=kind == "fisheye")
 
 
 def xml_root(path: Path, text: str) -> ElementTree.Element:
@@ -146,8 +147,11 @@ def xml_root(path: Path, text: str) -> ElementTree.Element:
         raise InputError(f"{path}: is not valid XML ({error}).") from None
 
 
-def metashape_lens(node: ElementTree.Element, path: Path) -> LensData:
-    """Return the lens of a ``calibration`` node; its size in elements or in ``resolution``."""
+def metashape_lens(node: ElementTree.Element, path: Path, *, fisheye: bool = False) -> LensData:
+    """Return the lens of a ``calibration`` node; its size in elements or in ``resolution``.
+
+    Metashape's fisheye (equidistant, then k1 to k4) is OpenCV's where p1 and p2 are zero.
+    """
     resolution = node.find("resolution")
 
     def value(name: str) -> float:
@@ -159,9 +163,11 @@ def metashape_lens(node: ElementTree.Element, path: Path) -> LensData:
         except ValueError:
             raise InputError(f"{path}: <{name}> is not a number.") from None
 
-    if any(abs(value(name)) > 1e-9 for name in ("k4", "b2", "p3", "p4")):
+    lacking = ("p1", "p2", "b2", "p3", "p4") if fisheye else ("k4", "b2", "p3", "p4")
+    if any(abs(value(name)) > 1e-9 for name in lacking):
         raise InputError(
-            f"{path}: uses k4, b2, p3 or p4, which OpenCV's model lacks; "
+            f"{path}: uses {', '.join(lacking[:-1])} or {lacking[-1]}, which OpenCV's "
+            f"{'fisheye ' if fisheye else ''}model lacks; "
             "calibrate again in Metashape with these switched off."
         )
     width, height, f = value("width"), value("height"), value("f")
@@ -171,8 +177,10 @@ def metashape_lens(node: ElementTree.Element, path: Path) -> LensData:
     matrix = camera_matrix(f + value("b1"), f / (f + value("b1")), *centre)
     # Metashape's p1 goes with r² + 2x², OpenCV's with 2xy in x: they are exchanged.
     terms = [value("k1"), value("k2"), value("p2"), value("p1"), value("k3")]
-    source = f"Metashape, {path.name}"
-    return LensData(matrix, np.array(terms), "opencv", (width, height), source)
+    if fisheye:
+        terms = [value(name) for name in ("k1", "k2", "k3", "k4")]
+    source, model = f"Metashape, {path.name}", "fisheye" if fisheye else "opencv"
+    return LensData(matrix, np.array(terms), model, (width, height), source)
 
 
 def _opencv(path: Path) -> LensData:
@@ -193,8 +201,15 @@ def _opencv(path: Path) -> LensData:
     if width is None or height is None or width.size != 1 or height.size != 1:
         raise InputError(f"{path}: lacks image_width and image_height; add both.")
     size = (float(width.item()), float(height.item()))
-    return LensData(matrix, np.ravel(terms), "opencv", size, f"OpenCV, {path.name}")
+    model = "fisheye" if np.any(values.get(FISHEYE_KEY, 0.0)) else "opencv"
+    return LensData(matrix, np.ravel(terms), model, size, f"OpenCV, {path.name}")
 
+
+#: Says in an OpenCV file that its terms are a fisheye's: OpenCV's own sample writes it as a number;
+#: ROS and Kalibr name the model instead.
+FISHEYE_KEY = "fisheye_model"
+_NAMED = ("distortion_model", "camera_model")
+_FISHEYES = ("equidistant", "fisheye")
 
 #: A number, a list or a matrix at the top of OpenCV's YAML; ROS leaves tag and dt out.
 _YAML = re.compile(
@@ -224,9 +239,11 @@ def opencv_values(path: Path) -> dict[str, FloatArray]:
 
 
 def _json_values(path: Path) -> dict[str, FloatArray]:
-    found = {}
+    found: dict[str, FloatArray] = {}
     for key, value in read_object(path, what="OpenCV calibration").items():
-        if isinstance(value, Mapping) and {"rows", "cols", "data"} <= value.keys():
+        if key in _NAMED and value in _FISHEYES:
+            found[FISHEYE_KEY] = np.ones(1)
+        elif isinstance(value, Mapping) and {"rows", "cols", "data"} <= value.keys():
             found[key] = _table(path, key, value["data"], [value["rows"], value["cols"]])
         elif isinstance(value, list) or is_finite_number(value):
             found[key] = _table(path, key, value, None)
@@ -251,7 +268,10 @@ def _xml_values(path: Path, text: str) -> dict[str, FloatArray]:
 def _yaml_values(path: Path, text: str) -> dict[str, FloatArray]:
     if not re.search(r"^\w+:", text, re.MULTILINE):
         raise InputError(f"{path}: is not an OpenCV calibration file.")
-    found = {}
+    found: dict[str, FloatArray] = {}
+    named = rf"^(?:{'|'.join(_NAMED)}):\s*[\"']?(?:{'|'.join(_FISHEYES)})\b"
+    if re.search(named, text, re.MULTILINE):
+        found[FISHEYE_KEY] = np.ones(1)
     for match in _YAML.finditer(text):
         words = (match["number"] or match["list"] or match["data"] or "").replace(",", " ").split()
         if match["rows"] is not None:

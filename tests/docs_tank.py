@@ -13,7 +13,9 @@ import openpyxl
 import rasterio
 from click.testing import CliRunner
 
+from multimedia.boards.workflow import find_boards
 from multimedia.cli.main import main
+from multimedia.media.camera import Camera, Sensor
 from multimedia.media.flat_interface import FlatInterface
 from multimedia.media.projection import project
 from multimedia.openptv.experiment import write_experiment
@@ -21,6 +23,7 @@ from multimedia.projects.model import ImagePoints, ObjectPoints, Project
 from multimedia.projects.project_file import read_project, write_project
 from multimedia.refraction.layers import Layers
 from photocore.distortion import Brown, Convention
+from tests.multimedia.rendered_boards import Housing, chessboard, photo, poses
 from tests.multimedia.tank import LAYERS, SENSOR, cameras, control
 
 #: OpenPTV counts from a point in the water. [mm]
@@ -50,6 +53,7 @@ def make_tank(folder: Path) -> None:
     shutil.copyfile(folder / "tank_image_points.csv", folder / "frame.csv")
     cv2.imwrite(str(folder / "cam2.tif"), np.full((1024, 1280), 90, np.uint8))
     _shifted_points(folder)
+    _boards(folder)
 
 
 def _project(views, media, xyz: np.ndarray, unit: str = "mm") -> Project:
@@ -125,6 +129,30 @@ def _shifted_points(folder: Path) -> None:
     words = ["shift", str(folder / "water_points.csv"), "--out", str(folder / "tank.xlsx")]
     media = ["--camera", "0.2,0.1,0.51", "--indices", "1,1.5,1.337", "--thicknesses", "0.01"]
     assert CliRunner().invoke(main, [*words, *media]).exit_code == 0
+
+
+def _boards(folder: Path) -> None:
+    """Write photos of a chessboard through the port of a housing, and the project of its points."""
+    eye = Housing(width=480, height=360, pitch=0.008, c=2.8, k1=-4e-3)
+    photos = []
+    for k, (turn, shift) in enumerate(poses(4, (192, 120), near=300.0, far=560.0, seed=2)):
+        photos.append(folder / f"dive{k}.png")
+        image = photo(eye, chessboard(9, 6, 24.0), turn, shift, seed=k)
+        cv2.imwrite(str(photos[-1]), image)
+    camera = Camera(
+        centre=np.zeros(3), rotation=np.eye(3), principal_distance=2.85, name="cam1",
+        sensor=Sensor(width=eye.width, height=eye.height, pitch=np.array([0.008, 0.008])),
+    )  # fmt: skip
+    port = FlatInterface(
+        layers=Layers(indices=(1.0, 1.5, 1.337), thicknesses=(8.0,)), point=(0, 0, -46.0),
+        normal=(0, 0, 1.0), moves_with_camera=True,
+    )  # fmt: skip
+    housing = Project(cameras=(camera,), media={"port": port}, media_of=("port",), unit="mm")
+    write_project(folder / "housing.toml", housing)
+    find_boards(
+        folder / "housing.toml", photos, folder / "boards.toml", pattern="chessboard", board=(9, 6),
+        square=24.0,
+    )  # fmt: skip
 
 
 def make_bed(folder: Path) -> None:

@@ -22,17 +22,17 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from bifocal.calibration.board_photos import detect_board
 from bifocal.files.geotiff import read_relief
 from bifocal.files.images import image_info, read_image
 from bifocal.files.point_tables import read_survey_points
 from bifocal.model.lens import Lens
 from bifocal.model.pair import Pair
 from bifocal.survey.workflow import solve
-from multimedia.bathymetry.dem import Dem
-from multimedia.bathymetry.water_surfaces import read_water_surface
 from multimedia.openptv.experiment import read_experiment
+from multimedia.projects.dem import Dem
 from multimedia.projects.project_file import read_project
+from multimedia.projects.surface_files import read_water_surface
+from photocore.boards import detect_board
 from photocore.cloud import open_cloud
 from photocore.errors import PhotogrammetryError
 from photocore.raster import Window
@@ -91,6 +91,7 @@ READERS: dict[str, Reader] = {
     "openptv body": Reader("ptv/cal/calblock.txt", _experiment),
     "ply": Reader("cloud.ply", _cloud),
     "ply mesh": Reader("mesh.ply", lambda p: read_water_surface(str(p))),
+    "obj mesh": Reader("mesh.obj", lambda p: read_water_surface(str(p))),
     "las": Reader("cloud.las", _cloud),
     "laz": Reader("cloud.laz", _cloud),
     "text cloud": Reader("cloud.csv", _cloud),

@@ -1,8 +1,7 @@
-"""Lens calibration from photos of a board: detection, choice of model, outliers, verdict."""
+"""Lens calibration from photos of a board: choice of model, outliers, verdict."""
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
@@ -13,38 +12,15 @@ import numpy as np
 from scipy.stats import f as f_distribution
 
 from bifocal.model.lens import Lens
-from photocore.arrays import ByteArray, FloatArray, IntArray
+from photocore.arrays import FloatArray, IntArray
+from photocore.boards import BoardView
 from photocore.errors import GeometryError, InputError
 
-#: Half width of the corner refinement window [px]; smaller where squares are smaller.
-CORNER_WINDOW = 11
 #: A photo whose RMS is this many times the median is named; beyond the second it is left out.
 SUSPICIOUS, DROPPED = 4.0, 8.0
 #: Error probability of the F test that lets another distortion term in.
 SIGNIFICANCE = 0.01
 COVERAGE_CELLS = (8, 6)
-PATTERNS = ("chessboard", "circles", "asymmetric-circles", "charuco")
-#: Fewer corners each way are not told from the pattern of a window. OpenCV takes no fewer.
-LEAST_CORNERS = 3
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class BoardView:
-    """The board as one photo shows it.
-
-    Attributes
-    ----------
-    name : str
-        Of the photo.
-    board : ndarray, shape (n, 3)
-        Points on the board, z = 0. [squares]
-    pixels : ndarray, shape (n, 2)
-        Where they are seen. [px]
-    """
-
-    name: str
-    board: FloatArray
-    pixels: FloatArray
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -89,111 +65,6 @@ def _distortion_terms() -> dict[str, tuple[int, tuple[str, ...]]]:
         "k1k2p": (k3, ("k1", "k2", "p1", "p2")),
         "k1k2pk3": (0, ("k1", "k2", "p1", "p2", "k3")),
     }
-
-
-def detect_board(
-    image: ByteArray, name: str, *, pattern: str, size: tuple[int, int]
-) -> BoardView | None:
-    """Return the board's points in a grey photo; None when it is not found whole.
-
-    Parameters
-    ----------
-    image : ndarray, shape (h, w), uint8
-    name : str
-        Of the photo.
-    pattern : str
-        One of `PATTERNS`.
-    size : tuple of int
-        Inner corners (chessboard), circles, or squares (ChArUco) across and up.
-    """
-    columns, rows = size
-    if pattern == "charuco":
-        return _detect_charuco(image, name, size)
-    if pattern == "chessboard":
-        flags = cv2.CALIB_CB_ADAPTIVE_THRESH | cv2.CALIB_CB_NORMALIZE_IMAGE
-        seen, corners = cv2.findChessboardCorners(_reduced(image)[0], size, flags=flags)
-        if not seen:
-            return None
-        corners = corners.reshape(-1, 2) * _reduced(image)[1]
-        corners = _refined(image, corners.astype(np.float32), size)
-        board = np.mgrid[0:columns, 0:rows].T.reshape(-1, 2)
-    else:
-        asymmetric = pattern == "asymmetric-circles"
-        flags = cv2.CALIB_CB_ASYMMETRIC_GRID if asymmetric else cv2.CALIB_CB_SYMMETRIC_GRID
-        seen, corners = cv2.findCirclesGrid(image, size, flags=flags)
-        if not seen:
-            seen, corners = cv2.findCirclesGrid(image, size, flags=flags | cv2.CALIB_CB_CLUSTERING)
-        if not seen:
-            return None
-        board = np.mgrid[0:columns, 0:rows].T.reshape(-1, 2)
-        if asymmetric:
-            board = np.column_stack([2 * board[:, 0] + board[:, 1] % 2, board[:, 1]])
-    flat = np.column_stack([board, np.zeros(len(board))]).astype(np.float64)
-    return BoardView(name=name, board=flat, pixels=np.asarray(corners, float).reshape(-1, 2))
-
-
-def find_board_size(images: Sequence[ByteArray]) -> tuple[int, int]:
-    """Return the inner corners of the chessboard that most photos show.
-
-    Raises
-    ------
-    InputError
-        If no two photos agree.
-    """
-    flags = cv2.CALIB_CB_LARGER | cv2.CALIB_CB_EXHAUSTIVE
-    flags |= cv2.CALIB_CB_ACCURACY | cv2.CALIB_CB_NORMALIZE_IMAGE
-    votes: Counter[tuple[int, int]] = Counter()
-    for image in images:
-        found, _, meta = cv2.findChessboardCornersSBWithMeta(_reduced(image)[0], (3, 3), flags)
-        if found:
-            rows, columns = sorted(meta.shape)
-            votes[(int(columns), int(rows))] += 1
-    if not votes or votes.most_common(1)[0][1] < min(2, len(images)):
-        raise InputError(
-            "no chessboard was recognised. Say which board it is, e.g. --pattern chessboard "
-            "--board 9x6 (inner corners), or use straight façade lines with --lines."
-        )
-    return votes.most_common(1)[0][0]
-
-
-def _reduced(image: ByteArray) -> tuple[ByteArray, float]:
-    """Return a copy of at most 2000 px for the search, and the factor back."""
-    factor = max(1.0, max(image.shape[:2]) / 2000)
-    if factor == 1.0:
-        return image, 1.0
-    small = cv2.resize(image, None, fx=1 / factor, fy=1 / factor, interpolation=cv2.INTER_AREA)
-    return small, factor
-
-
-def _refined(image: ByteArray, corners: Any, size: tuple[int, int]) -> FloatArray:
-    """Return corners refined in a window that reaches half-way to the usual neighbour."""
-    grid = corners.reshape(size[1], size[0], 2)
-    gaps = [np.median(np.linalg.norm(np.diff(grid, axis=axis), axis=2)) for axis in (0, 1)]
-    window = int(np.clip(min(gaps) / 2 - 1, 2, CORNER_WINDOW))
-    criteria = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 100, 1e-4)
-    refined = cv2.cornerSubPix(
-        image, np.array(corners[:, None], order="C"), (window, window), (-1, -1), criteria
-    )
-    return np.asarray(refined, dtype=np.float64).reshape(-1, 2)
-
-
-def _detect_charuco(image: ByteArray, name: str, size: tuple[int, int]) -> BoardView | None:
-    """Return the ChArUco corners seen, over the common dictionaries; at least six."""
-    best: BoardView | None = None
-    for dictionary in (
-        cv2.aruco.DICT_4X4_250, cv2.aruco.DICT_5X5_250, cv2.aruco.DICT_6X6_250,
-        cv2.aruco.DICT_ARUCO_ORIGINAL,
-    ):  # fmt: skip
-        board = cv2.aruco.CharucoBoard(
-            size, 1.0, 0.7, cv2.aruco.getPredefinedDictionary(dictionary)
-        )
-        corners, ids, _, _ = cv2.aruco.CharucoDetector(board).detectBoard(image)
-        if ids is not None and len(ids) >= 6 and (best is None or len(ids) > len(best.pixels)):
-            points = np.asarray(board.getChessboardCorners(), dtype=np.float64)[np.ravel(ids)]
-            best = BoardView(
-                name=name, board=points, pixels=np.asarray(corners, float).reshape(-1, 2)
-            )
-    return best
 
 
 def lens_of_views(

@@ -9,17 +9,15 @@ from itertools import chain, islice
 import numpy as np
 from numpy.typing import NDArray
 
-from bifocal.calibration.board_calibration import (
-    LEAST_CORNERS,
-    PATTERNS,
-    BoardView,
-    Calibration,
-    detect_board,
-    find_board_size,
-    lens_of_views,
-)
+from bifocal.calibration.board_calibration import Calibration, lens_of_views
 from bifocal.files.images import as_grey
 from photocore.arrays import ByteArray
+from photocore.boards import (
+    BoardView,
+    checked_board,
+    detect_board,
+    find_board_size,
+)
 from photocore.cli import Progress, no_progress
 from photocore.errors import InputError
 
@@ -92,15 +90,8 @@ def calibrate(
     >>> bool(abs(lens.camera_matrix[0, 0] - 400) < 4)
     True
     """
-    if pattern not in PATTERNS:
-        raise InputError(f"pattern: {pattern!r} is not one of {', '.join(PATTERNS)}.")
-    if board is None and pattern != "chessboard":
-        raise InputError(f"give the size of the {pattern} board, e.g. --board 7x5.")
-    if board is not None and min(board) < LEAST_CORNERS:
-        raise InputError(
-            f"board: {board[0]}x{board[1]} is too small; at least {LEAST_CORNERS} each way are "
-            "needed. Count the inner corners of a chessboard, not its squares."
-        )
+    if board is not None or pattern != "chessboard":
+        checked_board(pattern, board)
     photos = _named_photos(images, names)
     if board is None:
         sample = list(islice(photos, _SAMPLE))

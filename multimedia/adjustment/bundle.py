@@ -26,10 +26,11 @@ from multimedia.adjustment.plausibility import (
 from multimedia.adjustment.unknowns import AUTO, Adjustment, Unknowns
 from multimedia.media.camera import EXTERIOR, Camera
 from multimedia.orientation.intersection import intersect
+from multimedia.orientation.plate_poses import FEWEST, plate_pose
 from multimedia.projects.model import ObjectPoints, Project
 from photocore.adjustment import Fit, huber_weights
 from photocore.arrays import BoolArray, FloatArray, IntArray
-from photocore.errors import GeometryError, InputError
+from photocore.errors import ConvergenceError, GeometryError, InputError
 from photocore.rotation import skew
 from photocore.similarity import fit_similarity
 
@@ -257,7 +258,8 @@ def _start_poses(
     Raises
     ------
     GeometryError
-        If fewer than three points of a plate can be intersected, or these lie on a line.
+        If neither three points of a plate can be intersected nor one camera sees enough of it, or
+        these lie on a line.
     """
     poses = []
     for plate, label in enumerate(plates):
@@ -265,19 +267,44 @@ def _start_poses(
         xyz = _intersected(project, ids, on)
         good = np.isfinite(xyz).all(axis=1)
         if good.sum() < 3:
-            raise GeometryError(
-                f"adjust: plate {label}: only {int(good.sum())} of its points are seen by two "
-                "cameras; at least 3 are needed for a start."
-            )
+            poses.append(_pose_from_one(project, [ids[j] for j in on.tolist()], local[on], label))
+            continue
         start = fit_similarity(local[on][good], xyz[good])
         poses.append((start.rotation, start.target_centre - start.rotation @ start.source_centre))
     return tuple(poses)
 
 
+def _pose_from_one(project: Project, names: Sequence[str], local: FloatArray, label: str) -> Pose:
+    """Return the pose of a plate from the camera that sees most of it.
+
+    Raises
+    ------
+    GeometryError
+        If no camera sees enough of its points, or these give no pose.
+    """
+    image, _ = project.image_points.grid(project.camera_names, names)
+    seen: BoolArray = np.asarray(np.isfinite(image).all(axis=2))
+    k = int(seen.sum(axis=1).argmax())
+    if seen[k].sum() < FEWEST:
+        raise GeometryError(
+            f"adjust: plate {label}: fewer than 3 of its points are seen by two cameras and fewer "
+            f"than {FEWEST} by one; that is too few for a start."
+        )
+    try:
+        return plate_pose(
+            project.cameras[k], local[seen[k]], image[k, seen[k]], project.interface_of(k)
+        )
+    except (GeometryError, ConvergenceError, InputError) as error:
+        raise GeometryError(
+            f"adjust: plate {label}: camera {project.camera_names[k]} gives no start for its pose: "
+            f"{error}"
+        ) from None
+
+
 def _intersected(project: Project, ids: Sequence[str], which: IntArray) -> FloatArray:
     """Return points intersected from the start orientations; NaN where that fails."""
-    if not which.size:
-        return np.empty((0, 3))
+    if not which.size or len(project.cameras) < 2:
+        return np.full((which.size, 3), np.nan)
     image, _ = project.image_points.grid(project.camera_names, [ids[j] for j in which.tolist()])
     return intersect(project.cameras, image, project.interfaces).xyz
 

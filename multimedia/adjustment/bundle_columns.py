@@ -9,7 +9,7 @@ import numpy as np
 
 from multimedia.adjustment.media_unknowns import OF_MATERIAL, media_unknowns
 from multimedia.adjustment.unknowns import Unknowns
-from multimedia.media.camera import EXTERIOR, INTERIOR
+from multimedia.media.camera import ANY_INTERIOR, EXTERIOR, Camera
 from multimedia.projects.model import Project
 from photocore.arrays import BoolArray, IntArray
 from photocore.errors import InputError
@@ -69,8 +69,8 @@ def place_columns(
         for name in project.camera_names
     ]
     interior = [
-        places(interior_group(name, unknowns.shared_interior), unknowns.interior)
-        for name in project.camera_names
+        places(interior_group(camera.name, unknowns.shared_interior), names)
+        for camera, names in zip(project.cameras, _interior_names(project, unknowns), strict=True)
     ]
     media = _media_columns(project, unknowns.media, labels)
     alike = {f"plate {plate}" for plate in unknowns.plates} & set(project.camera_names)
@@ -95,6 +95,35 @@ def place_columns(
     )  # fmt: skip
 
 
+def _interior_names(project: Project, unknowns: Unknowns) -> list[tuple[str, ...]]:
+    """Return the interior unknowns of each camera: those wanted that its lens model has.
+
+    Raises
+    ------
+    InputError
+        If no camera has a parameter, or cameras of different lens models share a set.
+    """
+    names = [
+        tuple(name for name in unknowns.interior if name in camera.interior_names)
+        for camera in project.cameras
+    ]
+    lacking = sorted(set(unknowns.interior) - {name for own in names for name in own})
+    if lacking:
+        raise InputError(
+            f"interior: no camera's lens model has {', '.join(lacking)}; camera "
+            f"{project.cameras[0].name} has {', '.join(project.cameras[0].interior_names)}."
+        )
+    model: dict[str, Camera] = {}
+    for camera in project.cameras if unknowns.interior else ():
+        first = model.setdefault(interior_group(camera.name, unknowns.shared_interior), camera)
+        if type(first.distortion) is not type(camera.distortion):
+            raise InputError(
+                f"shared_interior: cameras {first.name} and {camera.name} have different lens "
+                "models; give each its own set."
+            )
+    return names
+
+
 def _prior_columns(
     project: Project, unknowns: Unknowns, labels: Mapping[str, int], media: Mapping[str, Places]
 ) -> dict[int, float]:
@@ -103,7 +132,7 @@ def _prior_columns(
     priors: dict[int, float] = {}
     # What is said of one unknown counts more than what is said of all alike.
     for label, sigma in sorted(unknowns.priors.items(), key=lambda prior: prior[0] in labels):
-        every = [name for name in labels if name.rpartition(":")[2] == label in INTERIOR]
+        every = [name for name in labels if name.rpartition(":")[2] == label in ANY_INTERIOR]
         own = [label] if label in labels else every
         missing += [] if own else [label]
         priors |= {labels[name]: sigma for name in own}
@@ -174,7 +203,9 @@ def with_common_values(project: Project, unknowns: Unknowns) -> Project:
     for k, camera in enumerate(cameras):
         groups.setdefault(interior_group(camera.name, unknowns.shared_interior), []).append(k)
     for group in groups.values():
-        for item in unknowns.interior:
+        for item in set(unknowns.interior).intersection(
+            *(cameras[k].interior_names for k in group)
+        ):
             values = [cameras[k].value(item) for k in group]
             if len(set(values)) > 1:
                 mean = float(np.mean(values))

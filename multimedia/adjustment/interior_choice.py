@@ -10,13 +10,23 @@ import numpy as np
 from multimedia.adjustment.bundle_columns import interior_group
 from multimedia.adjustment.plausibility import significance
 from multimedia.adjustment.unknowns import Adjustment, Unknowns
-from multimedia.media.camera import INTERIOR
+from multimedia.media.camera import ANY_INTERIOR
 from multimedia.projects.model import Project
 from photocore.errors import ConvergenceError, GeometryError
 
 #: Tried in this order, from what matters most in an ordinary lens; those in one group together.
-GROUPS = (("c",), ("xh", "yh"), ("k1",), ("k2",), ("p1", "p2"), ("scale",), ("shear",), ("k3",))
-#: Risk of taking a parameter that is not needed; each of the eight groups is a trial.
+GROUPS = (
+    ("c",),
+    ("xh", "yh"),
+    ("k1",),
+    ("k2",),
+    ("p1", "p2"),
+    ("scale",),
+    ("shear",),
+    ("k3",),
+    ("k4",),
+)
+#: Risk of taking a parameter that is not needed; each of the nine groups is a trial.
 RISK = 0.001
 
 
@@ -40,6 +50,8 @@ def choose_interior(
     """
     taken: tuple[str, ...] = ()
     for group in GROUPS:
+        if not any(set(group) <= set(camera.interior_names) for camera in project.cameras):
+            continue
         trial = (*taken, *group)
         try:
             result = adjust(project, with_interior(unknowns, trial))
@@ -56,7 +68,7 @@ def choose_interior(
 
 def with_interior(unknowns: Unknowns, interior: tuple[str, ...]) -> Unknowns:
     """Return unknowns with these interior parameters, without the priors of others."""
-    left_out = set(INTERIOR) - set(interior)
+    left_out = set(ANY_INTERIOR) - set(interior)
     priors = {
         label: sigma
         for label, sigma in unknowns.priors.items()

@@ -11,7 +11,7 @@ from scipy.stats import chi2, norm
 from multimedia.adjustment.bundle_columns import BundleColumns
 from multimedia.adjustment.media_unknowns import media_unknowns
 from multimedia.adjustment.unknowns import Adjustment
-from multimedia.media.camera import EXTERIOR, INTERIOR
+from multimedia.media.camera import ANY_INTERIOR, EXTERIOR
 from multimedia.projects.model import Project
 from photocore.adjustment.priors import (
     ALIKE,
@@ -32,7 +32,7 @@ _FEWEST_CELLS = 6
 EXACT = 1e-7
 _SHOWN = 6
 #: Interior parameters without which a camera is a pinhole: tested against zero (scale against 1).
-_TESTED = {name: 1.0 if name == "scale" else 0.0 for name in INTERIOR[3:]}
+_TESTED = {name: 1.0 if name == "scale" else 0.0 for name in ANY_INTERIOR[3:]}
 #: Beginnings of the names of unknowns, and the text of `words.toml` on what tells them apart.
 _REMEDIES = (
     (("thickness",), "remedy_thickness"),

@@ -7,11 +7,12 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from multimedia.media.camera import EXTERIOR, INTERIOR
+from multimedia.media.camera import ANY_INTERIOR, EXTERIOR
 from multimedia.projects.model import Project
 from photocore.adjustment import OUTLIER_LIMIT, correlations, standardised
 from photocore.arrays import FloatArray, positive
 from photocore.errors import InputError
+from photocore.fisheye import TERMS, Fisheye
 
 #: How control points enter: error-free, with their sigmas, or as a free network.
 CONTROL = ("fixed", "weighted", "free")
@@ -52,7 +53,8 @@ class Unknowns:
     fixed_cameras : tuple of str
         Cameras whose exterior orientation is kept.
     interior : tuple of str
-        Of c, xh, yh, k1, k2, k3, p1, p2, scale, shear; for every camera. ``("auto",)``: those
+        Of c, xh, yh, k1, k2, k3, p1, p2, scale, shear, for a fisheye k4 too; for every camera
+        whose lens model has them. ``("auto",)``: those
         that the data determine and need.
     shared_interior : bool or mapping of str to str
         One set for all cameras (the same camera moved), one for each, or camera name to the name
@@ -94,10 +96,12 @@ class Unknowns:
     robust: float | None = None
 
     def __post_init__(self) -> None:
-        unknown = [name for name in self.interior if name not in INTERIOR]
+        unknown = [name for name in self.interior if name not in ANY_INTERIOR]
         unknown = [] if self.interior == AUTO else unknown
         if unknown:
-            raise InputError(f"interior: {', '.join(unknown)} is not one of {', '.join(INTERIOR)}.")
+            raise InputError(
+                f"interior: {', '.join(unknown)} is not one of {', '.join(ANY_INTERIOR)}."
+            )
         if self.control not in CONTROL:
             raise InputError(f"control: {self.control!r} is not one of {', '.join(CONTROL)}.")
         if self.robust is not None:
@@ -187,19 +191,24 @@ class Adjustment:
         """Return name, value, sigma and unit of every unknown; angles in degrees."""
         table = []
         for k, name in enumerate(self.names):
-            unit = self._unit(name.rsplit(":", 1)[-1])
+            unit = self._unit(name)
             factor = float(np.degrees(1.0)) if unit == "deg" else 1.0
             table.append((name, float(self.values[k]) * factor, self.sigma(name) * factor, unit))
         return table
 
-    def _unit(self, parameter: str) -> str:
-        """Return the unit of a parameter; empty for numbers without one."""
+    def _unit(self, label: str) -> str:
+        """Return the unit of an unknown; empty for numbers without one."""
+        owner, _, parameter = label.rpartition(":")
         if parameter in EXTERIOR[3:] or parameter.startswith("tilt"):
             return "deg"
         if parameter == "gradient":
             return f"1/{self.project.unit}"
         if parameter in EXTERIOR or parameter.startswith(_LENGTHS):
             return self.project.unit
+        cameras = self.project.cameras
+        cameras = tuple(camera for camera in cameras if camera.name == owner) or cameras
+        if parameter in TERMS and any(isinstance(c.distortion, Fisheye) for c in cameras):
+            return ""
         return _INTERIOR_UNITS.get(parameter, "")
 
     @property

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +18,9 @@ from photocore.output import all_or_none, check_all_writable, check_ending
 from photocore.reports.words import words_of
 from photocore.reports.writing import check_report
 
+#: Every group of object points is a plate.
+ALL = ("all",)
+
 
 @all_or_none()
 def adjust_project(
@@ -30,6 +34,8 @@ def adjust_project(
 ) -> tuple[Adjustment, tuple[str, ...]]:
     """Adjust a project file; write the adjusted project and the report where asked.
 
+    Plates `ALL` are all groups of its object points.
+
     Returns
     -------
     result : Adjustment
@@ -39,6 +45,9 @@ def adjust_project(
     check_ending(out, "a project is written as .toml.", ".toml")
     check_report(report)
     project = read_project(source)
+    groups = dict.fromkeys(group for group in project.object_points.groups if group)
+    if unknowns.plates == ALL and ALL[0] not in groups:
+        unknowns = replace(unknowns, plates=tuple(groups))
     result = bundle_adjust(project, unknowns)
     if out is not None:
         write_project(out, result.project, overwrite=overwrite)

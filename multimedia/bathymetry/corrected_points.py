@@ -8,14 +8,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from multimedia.media.height_field import HeightField
+from multimedia.media.height_field import WaterSurface as WaterSurface
 from multimedia.media.surfaces import Plane
 from multimedia.refraction.layers import checked_index
 from photocore.arrays import FloatArray, IntArray, as_floats, not_negative
 from photocore.errors import GeometryError, InputError
 from photocore.labelled import LabelledCode
-
-#: A water surface: flat or tilted, a raster, a mesh or waves.
-WaterSurface = Plane | HeightField
 
 
 class BathymetryStatus(LabelledCode):

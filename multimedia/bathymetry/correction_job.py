@@ -31,6 +31,8 @@ class Job:
     source, target : Path
     water_level : str
         A height [m] or a file, see `read_water_surface`.
+    waves : tuple of str
+        Waves upon that height.
     index : float
     cameras, visibility, trajectory : Path or None
         Camera positions; who saw what; sensor positions over time (lidar).
@@ -54,6 +56,7 @@ class Job:
     target: Path
     water_level: str
     index: float
+    waves: tuple[str, ...] = ()
     cameras: Path | None = None
     visibility: Path | None = None
     trajectory: Path | None = None
@@ -116,6 +119,13 @@ class Outcome:
                 "no point has a position: heights are blank, or the rays of each point are "
                 "parallel, point upwards or have no direction."
             )
+        outside = self.counts.get(BathymetryStatus.NO_SURFACE.label, 0)
+        if outside and not self._wet and not allow_dry:
+            raise GeometryError(
+                f"the water surface covers none of the points: {outside} of "
+                f"{sum(self.counts.values())} lie outside it, or their rays meet it nowhere. Check "
+                "that surface and data are in the same place and reference system."
+            )
         if not self._wet and not allow_dry:
             level = surface.middle
             hint = ""
@@ -140,7 +150,6 @@ class Outcome:
         failed = self.counts.get(BathymetryStatus.FAILED.label, 0)
         if failed:
             self.remarks.append(f"{failed} points could not be corrected and are marked so.")
-        outside = self.counts.get(BathymetryStatus.NO_SURFACE.label, 0)
         if outside:
             self.remarks.append(
                 f"{outside} points lie outside the modelled water surface and were left as given."

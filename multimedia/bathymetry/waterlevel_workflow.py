@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from multimedia.bathymetry.mean_water_level import WaterLevel, mean_water_level
-from multimedia.bathymetry.water_surfaces import FORMAT
+from multimedia.projects.surface_files import FORMAT
 from photocore.cloud import open_cloud
 from photocore.jsonfile import write_object
 from photocore.output import check_all_writable, check_ending

@@ -15,7 +15,6 @@ from multimedia.bathymetry.corrected_points import (
     status_labels,
 )
 from multimedia.bathymetry.correction_job import MIXED_UNITS, Job, Outcome
-from multimedia.bathymetry.dem import SENTINELS, Dem
 from multimedia.bathymetry.refracted_rays import correct_lidar_beams, intersect_refracted_rays
 from multimedia.bathymetry.refraction_correction import correct_bathymetry
 from multimedia.bathymetry.regrid import pull_back
@@ -26,8 +25,9 @@ from multimedia.bathymetry.survey_tables import (
     read_trajectory,
     read_visibility,
 )
-from multimedia.bathymetry.water_surfaces import read_water_surface
 from multimedia.media.surfaces import Plane
+from multimedia.projects.dem import SENTINELS, Dem
+from multimedia.projects.surface_files import read_water_surface
 from photocore.arrays import FloatArray
 from photocore.cli import Progress, no_progress
 from photocore.cloud import open_cloud
@@ -93,7 +93,7 @@ def _correct_cloud(job: Job, progress: Progress) -> Outcome:
             f"{job.source}: has an attribute '{MARK}', so it has been corrected already. Correct "
             "the original, or remove the attribute."
         )
-    surface = read_water_surface(job.water_level)
+    surface = read_water_surface(job.water_level, waves=job.waves)
     correct, remarks = _corrector(job, cloud, surface)
     outcome = Outcome(remarks=[*cloud.remarks, *remarks])
     is_precise = job.precision.is_given and not job.beams
@@ -248,7 +248,7 @@ def _correct_dem(job: Job, progress: Progress) -> Outcome:
     with Dem(job.source, nodata=job.nodata) as dem:
         if "REFRACTION_INDEX" in dem.tags:
             raise InputError(f"{job.source}: has been corrected for refraction already.")
-        surface = read_water_surface(job.water_level, crs=dem.crs)
+        surface = read_water_surface(job.water_level, waves=job.waves, crs=dem.crs)
         is_level = isinstance(surface, Plane) and abs(surface.normal[2]) == 1.0
         if not dem.has_position and (job.cameras is not None or not is_level):
             raise InputError(
@@ -268,7 +268,8 @@ def _correct_dem(job: Job, progress: Progress) -> Outcome:
                 outcome.remarks.append(
                     "Every camera is taken to see every cell; --max-angle limits that."
                 )
-        tags = {"REFRACTION_INDEX": f"{job.index:g}", "REFRACTION_WATER_LEVEL": job.water_level}
+        level = " ".join((job.water_level, *job.waves))
+        tags = {"REFRACTION_INDEX": f"{job.index:g}", "REFRACTION_WATER_LEVEL": level}
         bands = ("height", "sigma") if job.precision.is_given else ("height",)
         windows = list(dem.windows(WINDOW))
         with dem.copy(job.target, bands=bands, tags=tags, overwrite=job.overwrite) as write:
@@ -347,7 +348,7 @@ def _correct_rays(job: Job) -> Outcome:
     if job.nodata is not None:
         raise InputError(f"{job.source}: --nodata is for the cells of a DEM, these are rays.")
     table = read_rays(job.source)
-    surface = read_water_surface(job.water_level)
+    surface = read_water_surface(job.water_level, waves=job.waves)
     points = intersect_refracted_rays(
         table.origins,
         table.directions,

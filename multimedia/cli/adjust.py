@@ -19,6 +19,8 @@ Examples:
              --report tank.html
   multimedia adjust tank.toml --interior auto --media index3 --prior index3=0.0005
              --report rapporto.pdf --language it
+  multimedia adjust boards.toml --plate all --fix-camera cam1 --interior c,xh,yh,k1 --media index3
+             --out housing.toml
   multimedia adjust reef.toml --control free --scale-bar A,B,0.5,0.0001 --out reef2.toml
   multimedia adjust tank.toml --media index3 --wavelength 520 --temperature 20 --depth 0.1
 
@@ -33,7 +35,8 @@ of the result; c alone means that of every camera.
 @click.argument("project", type=FILE)
 @click.option(
     "--interior", default="", type=Names(), metavar="LIST",
-    help="Interior parameters to estimate, of c,xh,yh,k1,k2,k3,p1,p2,scale,shear; or auto: those "
+    help="Interior parameters to estimate, of c,xh,yh,k1,k2,k3,p1,p2,scale,shear, "
+    "of a fisheye c,xh,yh,k1,k2,k3,k4,scale; or auto: those "
     "that the data carry.  [default: none]",
 )  # fmt: skip
 @click.option(
@@ -53,7 +56,7 @@ of the result; c alone means that of every camera.
 )  # fmt: skip
 @click.option(
     "--plate", multiple=True, metavar="GROUP",
-    help="Group of object points that is a rigid plate of unknown pose; repeat it.",
+    help="Group of object points that is a rigid plate of unknown pose; repeat it, or say all.",
 )  # fmt: skip
 @click.option(
     "--scale-bar", multiple=True, metavar="A,B,LENGTH,SIGMA",

@@ -21,6 +21,9 @@ Examples:
   with the precision that follows from index and level:
     multimedia bathymetry cloud.csv --water-level water.json --index 1.337 \\
         --sigma-index 0.001 --sigma-level 0.01 --out bed.csv
+  the same under a swell of 5 cm, 4 m long, that runs to the north-east:
+    multimedia bathymetry cloud.las --water-level 102.4 --wave 0.05,4,45 --index 1.337 \\
+        --cameras cameras.csv --max-angle 40 --out waves.las
   lidar echoes with the positions of the sensor:
     multimedia bathymetry echoes.las --water-level 102.4 --index 1.337 --group-index 1.36 \\
         --beams --trajectory flight.csv --out bed.las
@@ -33,8 +36,13 @@ Examples:
 @click.argument("source", metavar="IN", type=TABLE)
 @click.option(
     "--water-level", required=True, metavar="Z|FILE",
-    help="Height of the water [m]; or its surface as a .tif raster, a .ply triangle mesh or the "
-    ".json of `multimedia waterlevel`.",
+    help="Height of the water [m]; or its surface as a .tif or .asc raster, a .ply or .obj "
+    "triangle mesh or the .json of `multimedia waterlevel`.",
+)  # fmt: skip
+@click.option(
+    "--wave", "waves", multiple=True, metavar="A,L[,DIR[,PHASE]]",
+    help="A wave upon the height: amplitude and length [m], direction of travel clockwise from +Y "
+    "and phase at X = Y = 0 [deg]; repeat it. [default: none, flat water]",
 )  # fmt: skip
 @number(
     "--index", "N", "Refractive index of the water relative to the air [-], about 1.33 to 1.35.",

@@ -14,6 +14,7 @@ SUMMARIES: dict[str, str] = {
     "project": "Image coordinates of object points through the media.",
     "intersect": "Object points from image points of two or more cameras.",
     "resect": "Orientation and calibration of each camera from control points.",
+    "boards": "Points of a chessboard, ChArUco or dot board in photos, for adjust.",
     "adjust": "Bundle adjustment: cameras, points, media.",
     "epipolar": "Epipolar curves and the candidates along them.",
     "bathymetry": "Refraction correction of a DEM or point cloud.",

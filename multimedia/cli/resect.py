@@ -24,7 +24,8 @@ Examples:
 @click.option(
     "--estimate", type=Names(), default="", metavar="NAMES",
     help="Interior parameters to determine beside the exterior orientation, with commas: c, xh, "
-    "yh [mm], k1, k2, k3, p1, p2, scale, shear; or 'all'.  [default: none]",
+    "yh [mm], k1, k2, k3, p1, p2, scale, shear (fisheye: k1 to k4, scale); or 'all'.  "
+    "[default: none]",
 )  # fmt: skip
 @click.option("--camera", "cameras", multiple=True, help="Only this camera; repeatable.")
 @click.option("--out", type=FILE, help="Write the project with the new orientations.")
@@ -46,8 +47,6 @@ def command(
     """
     from multimedia.orientation.workflow import resect_project, resected_as_dict
 
-    if estimate == ("all",):
-        estimate = ("c", "xh", "yh", "k1", "k2", "k3", "p1", "p2", "scale", "shear")
     resected = resect_project(project, estimate=estimate, out=out, residuals=residuals, **options)
     data = resected_as_dict(resected)
     notes = (f"Note: {line}" for line in resected.remarks)

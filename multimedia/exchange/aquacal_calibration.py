@@ -63,12 +63,10 @@ def read_aquacal(path: Path, *, pitch: float) -> Project:
         node = _section(data["cameras"], label, path)
         inner = _section(node, "intrinsics", where)
         outer = _section(node, "extrinsics", where)
-        if inner.get("is_fisheye"):
-            raise InputError(f"{where}: has a fisheye lens, which projects do not hold.")
         lens = LensData(
             camera_matrix=_array(inner, "K", (3, 3), where),
             coefficients=np.ravel(_array(inner, "dist_coeffs", None, where)),
-            model="opencv",
+            model="fisheye" if inner.get("is_fisheye") else "opencv",
             image_size=tuple(_array(inner, "image_size", (2,), where).tolist()),
             source=f"AquaCal, {path.name}",
         )
@@ -115,7 +113,7 @@ def write_aquacal(path: Path, project: Project, *, overwrite: bool = False) -> t
             "name": name,
             "intrinsics": {
                 "K": view.matrix, "dist_coeffs": view.coefficients, "image_size": list(view.size)
-            },
+            } | ({"is_fisheye": True} if view.fisheye else {}),
             "extrinsics": {"R": view.rotation @ turn, "t": view.translation * factor},
             "water_z": float((turn @ surface.point)[2]) * factor,
         }

@@ -122,7 +122,9 @@ def write_colmap(folder: Path, project: Project, *, overwrite: bool = False) -> 
         f, centre, d = view.matrix.diagonal(), view.matrix[:2, 2] + _CORNER, view.coefficients
         numbered = (*f[:2], *centre)
         model = "PINHOLE"
-        if d.any():
+        if view.fisheye:
+            model, numbered = "OPENCV_FISHEYE", (*numbered, *d)
+        elif d.any():
             model = "FULL_OPENCV" if d[4] else "OPENCV"
             numbered = (*numbered, *d[:4], *((d[4], 0, 0, 0) if d[4] else ()))
         port = _port_words(camera, project.interface_of(k - 1))

@@ -105,16 +105,22 @@ def write_metashape(path: Path, project: Project, *, overwrite: bool = False) ->
 def _add_sensor(parent: ElementTree.Element, number: int, name: str, view: OpencvCamera) -> None:
     """Add the sensor of a camera with its calibration."""
     (width, height), d = view.size, view.coefficients
-    sensor = ElementTree.SubElement(parent, "sensor", id=str(number), label=name, type="frame")
+    kind = "fisheye" if view.fisheye else "frame"
+    sensor = ElementTree.SubElement(parent, "sensor", id=str(number), label=name, type=kind)
     size = {"width": str(width), "height": str(height)}
     ElementTree.SubElement(sensor, "resolution", size)
-    node = ElementTree.SubElement(sensor, "calibration", {"type": "frame", "class": "adjusted"})
+    node = ElementTree.SubElement(sensor, "calibration", {"type": kind, "class": "adjusted"})
     ElementTree.SubElement(node, "resolution", size)
     fx, fy = view.matrix[0, 0], view.matrix[1, 1]
     cx, cy = view.matrix[:2, 2] + 0.5 - np.array(view.size) / 2
     # p1 and p2 are exchanged against OpenCV's, see `photocore.lensformats`.
     values = {"f": fy, "cx": cx, "cy": cy, "b1": fx - fy}
-    values |= dict(zip(("k1", "k2", "k3", "p1", "p2"), d[[0, 1, 4, 3, 2]].tolist(), strict=True))
+    keys, terms = ["k1", "k2", "k3", "p1", "p2"], d
+    if view.fisheye:
+        keys = ["k1", "k2", "k3", "k4"]
+    else:
+        terms = d[[0, 1, 4, 3, 2]]
+    values |= dict(zip(keys, terms.tolist(), strict=True))
     for key, value in values.items():
         if value or key in ("f", "cx", "cy"):
             ElementTree.SubElement(node, key).text = f"{value:.17g}"
@@ -122,11 +128,14 @@ def _add_sensor(parent: ElementTree.Element, number: int, name: str, view: Openc
 
 def _lens(sensor: ElementTree.Element, path: Path) -> LensData | str:
     """Return the lens of a sensor, or what is wrong with it."""
-    if sensor.get("type", "frame") != "frame":
-        return f"is of the type {sensor.get('type')}; projects hold frame cameras"
+    kind = sensor.get("type", "frame")
+    if kind not in ("frame", "fisheye"):
+        return f"is of the type {kind}; projects hold frame cameras and fisheyes"
     nodes = sensor.findall("calibration")
     best = [node for node in nodes if node.get("class") == "adjusted"] or nodes
-    return metashape_lens(best[0], path) if best else "has no calibration"
+    return (
+        metashape_lens(best[0], path, fisheye=kind == "fisheye") if best else "has no calibration"
+    )
 
 
 def _world_from_chunk(

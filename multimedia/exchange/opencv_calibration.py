@@ -1,8 +1,10 @@
 """OpenCV's calibrations: FileStorage YAML, XML or JSON, and plain JSON, one camera or two.
 
 Names of keys are no standard; those of OpenCV's own samples and tutorials are understood. A pose
-is ``R`` and ``T`` or ``rvec`` and ``tvec``, camera from world. A stereo file has K1 D1 K2 D2 R T
-(or M1 ...): the second camera from the first, whose frame is the world's.
+is ``R`` and ``T`` or ``rvec`` and ``tvec``, camera from world. ``fisheye_model: 1`` (OpenCV's own
+sample) or ``distortion_model: equidistant`` (ROS, Kalibr) says that k1 to k4 are a fisheye's. A
+stereo file has K1 D1 K2 D2 R T (or M1 ...): the second camera from the first, whose frame is
+the world's.
 """
 
 from __future__ import annotations
@@ -17,7 +19,7 @@ from multimedia.media.camera import Camera
 from multimedia.projects.model import Project
 from photocore.arrays import FloatArray
 from photocore.errors import InputError
-from photocore.lensformats import LensData, opencv_values
+from photocore.lensformats import FISHEYE_KEY, LensData, opencv_values
 from photocore.output import all_or_none, atomic_path, check_all_writable
 from photocore.rotation import checked_rotation, rotation_from_vector
 from photocore.textfile import check_name
@@ -80,6 +82,8 @@ def write_opencv(path: Path, project: Project, *, overwrite: bool = False) -> tu
                 "camera_matrix": view.matrix, "distortion_coefficients": view.coefficients[None],
                 "R": view.rotation, "T": view.translation[:, None],
             }  # fmt: skip
+            if view.fisheye:
+                content[FISHEYE_KEY] = np.ones(1)
             target.parent.mkdir(parents=True, exist_ok=True)
             with atomic_path(target, overwrite=overwrite) as temporary:
                 text = _storage_text(target, view.size, content)
@@ -103,7 +107,8 @@ def _storage_text(path: Path, size: tuple[int, int], content: Mapping[str, Float
     storage.write("image_width", size[0])
     storage.write("image_height", size[1])
     for key, value in content.items():
-        storage.write(key, np.ascontiguousarray(value))
+        plain = key == FISHEYE_KEY
+        storage.write(key, 1 if plain else np.ascontiguousarray(value))
     return str(storage.releaseAndGetString())
 
 
@@ -115,6 +120,8 @@ def _cameras(path: Path, get: _Get, pitch: float) -> tuple[list[Camera], list[st
         size = np.array([width.item(), height.item()])
     if size is None or size.size != 2:
         raise InputError(f"{path}: lacks image_width and image_height; add both.")
+    said = get(FISHEYE_KEY)
+    fisheye = said is not None and bool(np.any(said))
     turn, shift = _first(get, *_TURN), _first(get, *_SHIFT)
     numbers = ("1", "2") if _first(get, "K1", "M1", "camera_matrix1") is not None else ("",)
     cameras = []
@@ -124,7 +131,8 @@ def _cameras(path: Path, get: _Get, pitch: float) -> tuple[list[Camera], list[st
         if matrix is None or matrix.shape != (3, 3):
             raise InputError(f"{path}: lacks camera_matrix{number} (3 x 3).")
         lens = LensData(
-            matrix, np.ravel(terms) if terms is not None else np.zeros(5), "opencv",
+            matrix, np.ravel(terms) if terms is not None else np.zeros(4 if fisheye else 5),
+            "fisheye" if fisheye else "opencv",
             (float(size.flat[0]), float(size.flat[1])), f"OpenCV, {path.name}",
         )  # fmt: skip
         here = number != "1" and turn is not None and shift is not None

@@ -12,12 +12,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from multimedia.media.camera import Camera, Sensor
+from multimedia.media.camera import Camera, Distortion, Sensor
 from multimedia.media.lens_conversion import farthest_miss, nearest_camera, sensor_rays
 from multimedia.projects.camera_poses import FLIP
 from photocore.arrays import FloatArray
 from photocore.distortion import Brown, Convention
 from photocore.errors import InputError
+from photocore.fisheye import TERMS, Fisheye
 from photocore.lensformats import LensData
 from photocore.rotation import nearest_rotation
 
@@ -25,6 +26,7 @@ from photocore.rotation import nearest_rotation
 PITCH = 0.005
 #: Beyond so many pixels a camera of another lens model is another camera.
 FARTHEST = 1.0
+_FISHEYE = "fisheye"
 _FREE = ("c", "xh", "yh", "k1", "k2", "k3", "p1", "p2", "scale")
 
 
@@ -36,8 +38,10 @@ class OpencvCamera:
     ----------
     matrix : ndarray, shape (3, 3)
         fx, fy, cx, cy. [px]
-    coefficients : ndarray, shape (5,)
-        k1 k2 p1 p2 k3.
+    coefficients : ndarray, shape (5,) or (4,)
+        k1 k2 p1 p2 k3; of a fisheye k1 k2 k3 k4.
+    fisheye : bool
+        Whether the lens is one.
     size : tuple of int
         Width and height. [px]
     rotation, translation : ndarray, shape (3, 3) and (3,)
@@ -52,6 +56,7 @@ class OpencvCamera:
     rotation: FloatArray
     translation: FloatArray
     misfit: float = 0.0
+    fisheye: bool = False
 
 
 def camera_of(
@@ -62,7 +67,7 @@ def camera_of(
     Parameters
     ----------
     lens : LensData
-        Without fisheye, rational, thin-prism or tilted terms.
+        Of the fisheye model, or without rational, thin-prism or tilted terms.
     rotation, translation : ndarray, shape (3, 3) and (3,)
         [object unit]
     pitch : float
@@ -76,10 +81,10 @@ def camera_of(
         If the lens has terms that the project's cameras do not have.
     """
     matrix = lens.camera_matrix
-    if lens.model != "opencv":
+    if lens.model not in ("opencv", _FISHEYE):
         raise InputError(
             f"{lens.source}: camera {name} has a {lens.model} lens; projects hold central lenses "
-            "with k1 k2 k3 p1 p2 only."
+            "with k1 k2 k3 p1 p2 and fisheyes with k1 k2 k3 k4."
         )
     if abs(matrix[0, 1]) > 1e-9 * matrix[0, 0]:
         raise InputError(f"{lens.source}: camera {name} has a skew of {matrix[0, 1]:g} px.")
@@ -89,15 +94,32 @@ def camera_of(
         width=width, height=height, pitch=np.array([pitch, pitch * (fx / fy)]),  # type: ignore[arg-type]
     )  # fmt: skip
     turn = nearest_rotation(rotation)
+    distortion: Distortion
+    if lens.model == _FISHEYE:
+        distortion = _fisheye(lens, name)
+    else:
+        terms = lens.coefficients.tolist()
+        distortion = Brown.from_opencv(terms, principal_distance=fx * pitch)
     return Camera(
         centre=-turn.T @ translation,
         rotation=turn.T @ FLIP,
         principal_distance=fx * pitch,
         principal_point=sensor.image_from_pixel(matrix[:2, 2]),
-        distortion=Brown.from_opencv(lens.coefficients.tolist(), principal_distance=fx * pitch),
+        distortion=distortion,
         sensor=sensor,
         name=name,
     )
+
+
+def _fisheye(lens: LensData, name: str) -> Fisheye:
+    """Return the fisheye of four terms."""
+    terms = lens.coefficients.tolist()
+    if len(terms) != len(TERMS):
+        raise InputError(
+            f"{lens.source}: camera {name} is a fisheye with {len(terms)} terms, expected "
+            f"{' '.join(TERMS)}."
+        )
+    return Fisheye(**dict(zip(TERMS, terms, strict=True)))
 
 
 def opencv_of(camera: Camera) -> OpencvCamera:
@@ -112,12 +134,16 @@ def opencv_of(camera: Camera) -> OpencvCamera:
         raise InputError(f"camera {camera.name}: its sensor is not described; pixels need it.")
     misfit = 0.0
     lens = camera.distortion
-    if not lens.is_identity and (lens.convention is not Convention.BROWN or lens.shear):
+    if (
+        isinstance(lens, Brown)
+        and not lens.is_identity
+        and (lens.convention is not Convention.BROWN or lens.shear)
+    ):
         points, pixels = sensor_rays(camera)
         image = camera.sensor.image_from_pixel(pixels)
         sign = -1.0 if lens.convention is Convention.PHOTOGRAMMETRIC else 1.0
-        terms = {name: sign * getattr(lens, name) for name in ("k1", "k2", "k3", "p1", "p2")}
-        start = replace(camera, distortion=Brown(**terms))
+        start_terms = {name: sign * getattr(lens, name) for name in ("k1", "k2", "k3", "p1", "p2")}
+        start = replace(camera, distortion=Brown(**start_terms))
         camera = nearest_camera(start, points, image, _FREE)
         misfit = farthest_miss(camera, points, image)
         if misfit > FARTHEST:
@@ -131,12 +157,16 @@ def opencv_of(camera: Camera) -> OpencvCamera:
     matrix[[0, 1], [0, 1]] = c / sensor.pitch * [lens.scale, 1.0]
     matrix[:2, 2] = sensor.pixel_from_image(camera.principal_point)
     rotation = FLIP @ camera.rotation.T
-    return OpencvCamera(
-        matrix=matrix,
-        coefficients=np.array(
+    if isinstance(lens, Fisheye):
+        terms = np.array([getattr(lens, name) for name in TERMS])
+    else:
+        terms = np.array(
             [lens.k1 * c**2, lens.k2 * c**4, -lens.p2 * c, lens.p1 * c, lens.k3 * c**6]
         )
-        + 0.0,
+    return OpencvCamera(
+        matrix=matrix,
+        coefficients=terms + 0.0,
+        fisheye=isinstance(lens, Fisheye),
         size=(sensor.width, sensor.height),
         rotation=rotation,
         translation=-rotation @ camera.centre,

@@ -10,8 +10,9 @@ from numpy.typing import ArrayLike
 
 from photocore.arrays import FloatArray, as_floats, as_points, positive, read_only
 from photocore.distortion import NAMES as DISTORTION
-from photocore.distortion import Brown
+from photocore.distortion import Brown as Brown
 from photocore.errors import GeometryError, InputError
+from photocore.fisheye import Fisheye as Fisheye
 from photocore.rotation import (
     angles_from_rotation,
     checked_rotation,
@@ -24,6 +25,10 @@ from photocore.rotation import (
 EXTERIOR = ("X0", "Y0", "Z0", "omega", "phi", "kappa")
 #: Parameters of the interior orientation; ``scale`` is that of x against y.
 INTERIOR = ("c", "xh", "yh", *DISTORTION)
+#: Those of any lens model; a camera has those of its own (`Camera.interior_names`).
+ANY_INTERIOR = (*INTERIOR, "k4")
+#: Models of a lens: Brown's formula on the central projection, or a fisheye.
+Distortion = Brown | Fisheye
 #: A full turn and a little: larger "radians" are degrees.
 LARGEST_ANGLE = 6.2832
 
@@ -101,8 +106,8 @@ class Camera:
         [mm]
     principal_point : ndarray, shape (2,)
         Image coordinates of the foot of the projection centre. [mm]
-    distortion : Brown
-        Lens distortion.
+    distortion : Brown or Fisheye
+        Lens distortion, or the whole law of a fisheye lens.
     sensor : Sensor or None
         Needed only where pixels are read or written.
     name : str
@@ -121,7 +126,7 @@ class Camera:
     rotation: FloatArray
     principal_distance: float
     principal_point: FloatArray = (0.0, 0.0)  # type: ignore[assignment]
-    distortion: Brown = field(default_factory=Brown)
+    distortion: Distortion = field(default_factory=Brown)
     sensor: Sensor | None = None
     name: str = ""
 
@@ -145,7 +150,7 @@ class Camera:
         *,
         principal_distance: float,
         principal_point: ArrayLike = (0.0, 0.0),
-        distortion: Brown | None = None,
+        distortion: Distortion | None = None,
         sensor: Sensor | None = None,
         name: str = "",
     ) -> Camera:
@@ -162,7 +167,7 @@ class Camera:
             [mm]
         principal_point : array_like, shape (2,)
             [mm]
-        distortion : Brown, optional
+        distortion : Brown or Fisheye, optional
             None: no distortion.
         sensor : Sensor, optional
             Needed only where pixels are read or written.
@@ -221,6 +226,22 @@ class Camera:
         """Unit vector of the viewing direction in the world, shape (3,)."""
         return -self.rotation[:, 2]
 
+    @property
+    def interior_names(self) -> tuple[str, ...]:
+        """Names of the parameters of this camera's interior orientation, of `ANY_INTERIOR`."""
+        return ("c", "xh", "yh", *self.distortion.names)
+
+    def ideal(self, measured: ArrayLike) -> FloatArray:
+        """Return image coordinates without distortion, about the principal point, (..., 2). [mm]
+
+        NaN where no direction is seen there.
+        """
+        return self.distortion.ideal(measured, self.principal_point, self.principal_distance)
+
+    def measured(self, ideal: ArrayLike) -> FloatArray:
+        """Return where ideal image coordinates are measured: undoes `ideal`, (..., 2). [mm]"""
+        return self.distortion.measured(ideal, self.principal_point, self.principal_distance)
+
     def vectors_to(self, points: FloatArray) -> FloatArray:
         """Return the vectors from the projection centre in the camera frame, shape (..., 3)."""
         vectors: FloatArray = (points - self.centre) @ self.rotation
@@ -228,8 +249,10 @@ class Camera:
 
     def value(self, name: str) -> float:
         """Return the parameter of `EXTERIOR` or `INTERIOR` called ``name``."""
-        if name in DISTORTION:
+        if name in self.distortion.names:
             return float(getattr(self.distortion, name))
+        if name in ANY_INTERIOR[3:]:
+            raise InputError(f"camera {self.name}: its lens model has no {name}.")
         values = (*self.centre, *self.angles, self.principal_distance, *self.principal_point)
         return float(values[(EXTERIOR + INTERIOR).index(name)])
 
@@ -244,15 +267,16 @@ class Camera:
         Raises
         ------
         InputError
-            If some but not all angles are named, or a name is unknown.
+            If some but not all angles are named, a name is unknown, or the lens has no such term.
         """
         change = dict(zip(names, as_floats(step, "step").tolist(), strict=True))
-        unknown = [name for name in change if name not in EXTERIOR + INTERIOR]
+        known = EXTERIOR + self.interior_names
+        unknown = [name for name in change if name not in known]
         angles = [change[name] for name in EXTERIOR[3:] if name in change]
         if unknown or len(angles) not in (0, 3):
             raise InputError(
                 f"camera parameters {', '.join(names)}: name omega, phi and kappa together; the "
-                f"others are {', '.join(EXTERIOR[:3] + INTERIOR)}."
+                f"others are {', '.join(EXTERIOR[:3] + self.interior_names)}."
             )
         rotation = self.rotation
         if angles:
@@ -261,7 +285,7 @@ class Camera:
             rotation = rotation @ (1.5 * np.eye(3) - 0.5 * rotation.T @ rotation)
         terms = {
             name: getattr(self.distortion, name) + change[name]
-            for name in DISTORTION
+            for name in self.distortion.names
             if name in change
         }
         return replace(

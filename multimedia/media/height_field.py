@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from multimedia.media.surfaces import RefractingSurface
+from multimedia.media.surfaces import Plane, RefractingSurface
 from photocore.arrays import BoolArray, FloatArray, as_floats, as_points, positive, read_only
 from photocore.errors import InputError
 
@@ -278,10 +278,13 @@ class RasterSurface(HeightField):
         Heights at cell centres; NaN where unknown. At least 3 x 3.
     xy_from_cell : ndarray, shape (2, 3)
         Affine map from (column, row, 1), integers at cell centres, to (X, Y).
+    source : str
+        File it was read from; a project file names it.
     """
 
     raster: FloatArray
     xy_from_cell: FloatArray
+    source: str = ""
     _padded: FloatArray = field(init=False, repr=False)
     _cell_from_xy: FloatArray = field(init=False, repr=False)
 
@@ -367,7 +370,11 @@ class RasterSurface(HeightField):
         step = as_floats(vector, "vector")
         affine = self.xy_from_cell.copy()
         affine[:, 2] += step[:2]
-        return replace(self, raster=self.raster + step[2], xy_from_cell=affine)
+        return replace(self, raster=self.raster + step[2], xy_from_cell=affine, source="")
+
+
+#: A surface of water that has a height above every place.
+WaterSurface = Plane | HeightField
 
 
 def _keys_weights(share: FloatArray, order: int) -> Sequence[FloatArray]:

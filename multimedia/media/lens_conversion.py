@@ -8,10 +8,27 @@ from multimedia.media.camera import Camera
 from multimedia.media.projection import Media, project, project_with_jacobian
 from photocore.adjustment import minimise
 from photocore.arrays import FloatArray
+from photocore.distortion import Brown
 from photocore.errors import GeometryError, InputError
 
 #: Points along the sides of the sensor at which cameras are compared.
 _GRID = (25, 21)
+
+
+def brown_of(camera: Camera, program: str) -> Brown:
+    """Return the distortion of a camera that follows Brown's formula.
+
+    Raises
+    ------
+    InputError
+        If the camera has a fisheye lens, naming the program that cannot hold it.
+    """
+    if isinstance(camera.distortion, Brown):
+        return camera.distortion
+    raise InputError(
+        f"camera {camera.name}: has a fisheye lens, for which {program} has no model; write it for "
+        "COLMAP, Metashape or OpenCV (`multimedia convert`), or calibrate with a central lens."
+    )
 
 
 def sensor_rays(camera: Camera) -> tuple[FloatArray, FloatArray]:
@@ -34,7 +51,7 @@ def sensor_rays(camera: Camera) -> tuple[FloatArray, FloatArray]:
     sides = (camera.sensor.width, camera.sensor.height)
     along = [np.linspace(0, side - 1, count) for side, count in zip(sides, _GRID, strict=True)]
     pixels = np.stack(np.meshgrid(*along), axis=-1).reshape(-1, 2)
-    ideal = camera.distortion.ideal(camera.sensor.image_from_pixel(pixels), camera.principal_point)
+    ideal = camera.ideal(camera.sensor.image_from_pixel(pixels))
     seen = np.isfinite(ideal).all(axis=1)
     if not seen.any():
         raise InputError(f"camera {camera.name}: its distortion cannot be undone on the sensor.")

@@ -28,10 +28,13 @@ class MeshSurface(HeightField):
         Corner points.
     triangles : ndarray of int, shape (m, 3)
         Three vertex numbers per triangle, counted from 0, in any sense of rotation.
+    source : str
+        File it was read from; a project file names it.
     """
 
     vertices: FloatArray
     triangles: IntArray
+    source: str = ""
     _facet: FloatArray = field(init=False, repr=False)
     _corner: FloatArray = field(init=False, repr=False)
     _to_corners: FloatArray = field(init=False, repr=False)
@@ -129,7 +132,7 @@ class MeshSurface(HeightField):
 
     def shifted(self, vector: ArrayLike) -> MeshSurface:
         """Return the mesh moved by a vector."""
-        return replace(self, vertices=self.vertices + as_floats(vector, "vector"))
+        return replace(self, vertices=self.vertices + as_floats(vector, "vector"), source="")
 
 
 @dataclass(frozen=True, slots=True, eq=False)

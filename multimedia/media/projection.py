@@ -8,13 +8,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from multimedia.media.camera import EXTERIOR, INTERIOR, Camera
+from multimedia.media.camera import ANY_INTERIOR, EXTERIOR, Camera
 from multimedia.media.flat_interface import FlatInterface
 from multimedia.media.optical_media import OpticalMedia, StraightRays
 from multimedia.refraction.layers import Layers
 from photocore.arrays import BoolArray, FloatArray, as_points
 from photocore.camera import central, central_with_jacobian
 from photocore.errors import InputError
+from photocore.fisheye import Fisheye
 
 #: What may be given to look through: parallel layers whose last face is the plane Z = 0, the same
 #: anywhere else (`FlatInterface`), surfaces of any form (`Interfaces`, ray-traced), or nothing.
@@ -128,7 +129,8 @@ def projection_status(camera: Camera, points: ArrayLike, layers: Media = None) -
     Returns
     -------
     list of str
-        ``ok``, ``not a number``, ``before the interface``, ``behind the camera``,
+        ``ok``, ``not a number``, ``before the interface``, ``behind the camera`` (of a fisheye
+        ``90 degrees or more off the axis``),
         ``outside the lens model`` or ``outside the sensor`` (still projected).
     """
     xyz = as_points(points, "points", dimension=3).reshape(-1, 3)
@@ -142,7 +144,9 @@ def projection_status(camera: Camera, points: ArrayLike, layers: Media = None) -
     status = np.full(len(xyz), "ok", dtype=object)
     status[outside] = "outside the sensor"
     status[np.isnan(image).any(axis=-1)] = "outside the lens model"
-    status[vectors[:, 2] >= 0] = "behind the camera"
+    fisheye = isinstance(camera.distortion, Fisheye)
+    behind = "90 degrees or more off the axis" if fisheye else "behind the camera"
+    status[vectors[:, 2] >= 0] = behind
     hidden = reasons != ""
     status[hidden] = reasons[hidden]
     status[~np.isfinite(xyz).all(axis=-1)] = "not a number"
@@ -166,7 +170,7 @@ def project_with_jacobian(
     points : ndarray, shape (n, 3)
         Object points.
     camera_names : sequence of str
-        Of `EXTERIOR` (omega, phi, kappa together) and `INTERIOR`, in any order.
+        Of `EXTERIOR` (omega, phi, kappa together) and `ANY_INTERIOR`, in any order.
     interface_names : sequence of str
         Of `FlatInterface.parameter_names`.
 
@@ -201,22 +205,22 @@ def _through_lens(
         By each of ``names`` that belongs to the interior orientation.
     """
     ideal, by_seen = central_with_jacobian(seen, -camera.principal_distance)
-    own = [name for name in names if name in INTERIOR and name != "c"]
+    own = [name for name in names if name in ANY_INTERIOR]
     by_c = ideal / camera.principal_distance
-    if camera.distortion.is_identity and not own:
+    if camera.distortion.is_identity and set(own) <= {"c"}:
         return ideal + camera.principal_point, by_seen, {"c": by_c}
     image, by_ideal, by_own = camera.distortion.measured_with_jacobian(
-        ideal, camera.principal_point, own
+        ideal, camera.principal_point, own, camera.principal_distance
     )
     by_interior = {name: by_own[:, :, k] for k, name in enumerate(own)}
-    by_interior["c"] = (by_ideal @ by_c[..., None])[..., 0]
+    if "c" in by_interior:
+        by_interior["c"] = by_interior["c"] + (by_ideal @ by_c[..., None])[..., 0]
     return image, by_ideal @ by_seen, by_interior
 
 
 def _image_of(seen: FloatArray, camera: Camera) -> FloatArray:
     """Return measured image coordinates of camera-frame vectors in the first medium, (n, 2)."""
-    ideal = central(seen, -camera.principal_distance)
-    return camera.distortion.measured(ideal, camera.principal_point)
+    return camera.measured(central(seen, -camera.principal_distance))
 
 
 def refuse_pixels(camera: Camera, image: FloatArray) -> None:

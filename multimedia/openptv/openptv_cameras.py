@@ -15,7 +15,12 @@ import numpy as np
 from multimedia.media.camera import EXTERIOR, Camera, Sensor
 from multimedia.media.flat_interface import FlatInterface
 from multimedia.media.interfaces import Interfaces
-from multimedia.media.lens_conversion import farthest_miss, nearest_camera, sensor_rays
+from multimedia.media.lens_conversion import (
+    brown_of,
+    farthest_miss,
+    nearest_camera,
+    sensor_rays,
+)
 from multimedia.media.projection import project
 from multimedia.refraction.layers import Layers
 from photocore.arrays import FloatArray
@@ -71,7 +76,7 @@ def common_sensor(cameras: Sequence[Camera]) -> Sensor:
                 f"camera {camera.name}: its photos of {sensor.width} x {sensor.height} px are not "
                 f"of the size of the others, {first.width} x {first.height}: OpenPTV has one."
             )
-        lens = camera.distortion
+        lens = brown_of(camera, "OpenPTV")
         # Which height of a pixel makes scale and shear those of OpenPTV.
         shape = np.sqrt(lens.scale**2 - np.sin(lens.shear) ** 2) / np.cos(lens.shear)
         if lens.convention is Convention.PHOTOGRAMMETRIC:
@@ -199,7 +204,7 @@ def glass_vector(camera: Camera, wall: FlatInterface) -> FloatArray:
 
 def _start(camera: Camera, own: Sensor, sensor: Sensor) -> tuple[Camera, float]:
     """Return the camera with the same coefficients in OpenPTV's terms, and scx."""
-    lens = camera.distortion
+    lens = brown_of(camera, "OpenPTV")
     stretch = float(sensor.pitch[0] / own.pitch[0])
     scale = lens.scale * stretch
     turn = float(np.arcsin(np.sin(lens.shear) / lens.scale))

@@ -10,6 +10,7 @@ import numpy as np
 
 from multimedia.media.camera import Camera, Sensor
 from multimedia.media.flat_interface import FlatInterface
+from multimedia.media.lens_conversion import brown_of
 from multimedia.refraction.layers import Layers
 from photocore.arrays import FloatArray, IntArray
 from photocore.distortion import Brown, Convention
@@ -275,7 +276,7 @@ def ori_text(camera: Camera, glass: FloatArray) -> str:
 
 def addpar_text(camera: Camera, scale: float) -> str:
     """Return the content of an .addpar file: distortion of OpenPTV's convention, and ``scx``."""
-    d = camera.distortion
+    d = brown_of(camera, "OpenPTV")
     terms = (d.k1, d.k2, d.k3, d.p1, d.p2, scale, d.shear)
     return " ".join(f"{v:.17g}" for v in terms) + "\n"
 

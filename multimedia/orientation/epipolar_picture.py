@@ -7,11 +7,10 @@ from pathlib import Path
 
 import numpy as np
 
+from multimedia.projects.photos import read_photo
 from photocore.arrays import FloatArray
-from photocore.errors import InputError
 from photocore.output import check_ending
 from photocore.reports.figure_file import write_figure
-from photocore.textfile import readable
 
 
 def draw_epipolar(
@@ -59,7 +58,7 @@ def draw_epipolar(
     FigureCanvasAgg(figure)
     axes = figure.add_subplot()
     if photo is not None:
-        axes.imshow(_grey(photo), cmap="gray", interpolation="nearest")
+        axes.imshow(read_photo(photo), cmap="gray", interpolation="nearest")
     for curve, label in zip(curves, labels, strict=True):
         seen = curve[np.isfinite(curve).all(axis=1)]
         (line,) = axes.plot(seen[:, 0], seen[:, 1], "-", linewidth=1.2)
@@ -77,19 +76,3 @@ def draw_epipolar(
     axes.set(xlim=(-0.5, size[0] - 0.5), ylim=(size[1] - 0.5, -0.5), aspect="equal")
     axes.set(xlabel="column [px]", ylabel="row [px]", title=title)
     write_figure(path, figure, overwrite=overwrite, dpi=150)
-
-
-def _grey(photo: Path) -> np.ndarray[tuple[int, ...], np.dtype[np.uint8]]:
-    """Return a photo as grey values."""
-    from PIL import Image, UnidentifiedImageError
-
-    with readable(photo, "photo", missing="image"):
-        try:
-            with Image.open(photo) as image:
-                return np.asarray(image.convert("L"), dtype=np.uint8)
-        except (UnidentifiedImageError, SyntaxError, ValueError) as error:
-            raise InputError(f"{photo}: is no image that can be read ({error}).") from None
-        except OSError as error:
-            if error.errno is not None:
-                raise
-            raise InputError(f"{photo}: is no image that can be read ({error}).") from None

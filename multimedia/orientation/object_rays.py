@@ -51,7 +51,7 @@ def image_rays(
     ([1.0, 0.0, 0.0], 32.04)
     """
     measured = as_points(image_points, "image_points", dimension=2)
-    ideal = camera.distortion.ideal(measured, camera.principal_point).reshape(-1, 2)
+    ideal = camera.ideal(measured).reshape(-1, 2)
     directions: FloatArray = np.empty((len(ideal), 3))
     directions[:, :2] = ideal
     directions[:, 2] = -camera.principal_distance

@@ -48,7 +48,7 @@ def pose_starts(
     better ones.
     """
     yield camera
-    ideal = camera.distortion.ideal(image, camera.principal_point)
+    ideal = camera.ideal(image)
     good = np.isfinite(ideal).all(axis=1)
     if good.sum() < 3:
         return

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from multimedia.media.camera import EXTERIOR, INTERIOR, Camera
+from multimedia.media.camera import ANY_INTERIOR, EXTERIOR, Camera
 from multimedia.media.optical_media import OpticalMedia
 from multimedia.media.projection import Media, as_media, project_with_jacobian, refuse_pixels
 from multimedia.orientation.pose_starts import pose_starts
@@ -97,7 +97,7 @@ def resect(
         As for `project`.
     estimate : sequence of str
         Parameters to determine: the exterior orientation and any of c, xh, yh, k1, k2, k3, p1,
-        p2, scale, shear.
+        p2, scale, shear; of a fisheye c, xh, yh, k1, k2, k3, k4, scale.
     sigma : array_like, broadcast to shape (n, 2), optional
         Standard deviations of the image coordinates; only their ratios matter. [mm]
 
@@ -133,7 +133,7 @@ def resect(
     >>> resection.camera.centre.round(9).tolist()
     [0.1, 0.2, 0.6]
     """
-    names = _checked_names(estimate)
+    names = _checked_names(camera, estimate)
     control, image, sigmas, used = _checked_points(
         camera, object_points, image_points, sigma, len(names)
     )
@@ -235,15 +235,17 @@ def _best_start(camera: Camera, problem: _ControlImages) -> Camera:
     return min(poses, key=lambda pair: pair[0])[1]
 
 
-def _checked_names(estimate: Sequence[str]) -> tuple[str, ...]:
+def _checked_names(camera: Camera, estimate: Sequence[str]) -> tuple[str, ...]:
     """Return the parameters in canonical order; the exterior orientation always belongs."""
-    unknown = [name for name in estimate if name not in EXTERIOR + INTERIOR]
+    own = camera.interior_names
+    unknown = [name for name in estimate if name not in EXTERIOR + own]
     if unknown:
+        who = f"camera {camera.name}: " if camera.name else ""
         raise InputError(
-            f"estimate: {', '.join(unknown)} is no camera parameter; choose of "
-            f"{', '.join(INTERIOR)} (the exterior orientation is always estimated)."
+            f"{who}estimate: {', '.join(unknown)} is no camera parameter of its lens model; "
+            f"choose of {', '.join(own)} (the exterior orientation is always estimated)."
         )
-    return EXTERIOR + tuple(name for name in INTERIOR if name in estimate)
+    return EXTERIOR + tuple(name for name in ANY_INTERIOR if name in estimate)
 
 
 def _checked_points(

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from multimedia.media.camera import EXTERIOR, INTERIOR
+from multimedia.media.camera import EXTERIOR
 from multimedia.media.projection import project as project_points
 from multimedia.media.projection import projection_status
 from multimedia.orientation.intersection import (
@@ -181,7 +181,10 @@ def resect_project(
     residuals: Path | None = None,
     overwrite: bool = False,
 ) -> Resected:
-    """Orient the cameras of a project, each on its own, from its control points."""
+    """Orient the cameras of a project, each on its own, from its control points.
+
+    ``("all",)`` estimates every interior parameter of the camera's lens model.
+    """
     check_ending(out, "a project is written as .toml.", ".toml")
     check_not_input(residuals, *project_files(path))
     check_all_writable(out, residuals, overwrite=overwrite)
@@ -226,9 +229,10 @@ def _resected(
             f"{', '.join(strange[:SHOWN])}{more}"
         )
     rows, place = rows[place >= 0], place[place >= 0]
+    wanted = project.cameras[k].interior_names if tuple(estimate) == ("all",) else estimate
     result = resect(
         project.cameras[k], objects.xyz[place], images.image[rows], project.interface_of(k),
-        estimate=estimate, sigma=_image_sigma(project, rows),
+        estimate=wanted, sigma=_image_sigma(project, rows),
     )  # fmt: skip
     if result.redundancy == 0:
         remarks.append(
@@ -262,7 +266,9 @@ def resected_as_dict(resected: Resected) -> dict[str, Any]:
     """Return resections as plain data for ``--json``; angles in degrees."""
     cameras = []
     for name, result in resected.results.items():
-        values = {p: _shown(p, result.camera.value(p)) for p in EXTERIOR + INTERIOR}
+        values = {
+            p: _shown(p, result.camera.value(p)) for p in EXTERIOR + result.camera.interior_names
+        }
         sigmas = {p: _shown(p, s) for p, s in result.sigmas.items()}
         cameras.append(
             {

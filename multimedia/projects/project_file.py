@@ -10,9 +10,11 @@ from typing import Any
 
 import numpy as np
 
-from multimedia.media.camera import EXTERIOR, Camera, Sensor
+from multimedia.media.camera import EXTERIOR, Camera, Distortion, Sensor
 from multimedia.media.flat_interface import FlatInterface
+from multimedia.media.height_field import RasterSurface, WaveSurface
 from multimedia.media.interfaces import Interfaces
+from multimedia.media.mesh_surface import MeshSurface
 from multimedia.media.surfaces import Cylinder, Plane, RefractingSurface, Sphere
 from multimedia.projects.camera_poses import POSE_KEYS, read_pose
 from multimedia.projects.model import (
@@ -31,10 +33,18 @@ from multimedia.projects.point_tables import (
     read_object_points,
     write_columns,
 )
+from multimedia.projects.surface_files import (
+    read_mesh,
+    read_raster,
+    relative_path,
+    wave_rows,
+    waves_of,
+)
 from multimedia.refraction.layers import Layers
 from photocore.arrays import is_finite_number, positive
 from photocore.distortion import NAMES, Brown, Convention
 from photocore.errors import GeometryError, InputError, located
+from photocore.fisheye import Fisheye
 from photocore.output import all_or_none, atomic_path, check_all_writable
 from photocore.textfile import check_name, read_text
 
@@ -45,6 +55,12 @@ _KINDS: Mapping[str, tuple[Callable[..., RefractingSurface], tuple[str, ...]]] =
     "sphere": (Sphere, ("centre", "radius")),
     "cylinder": (Cylinder, ("point", "axis", "radius")),
 }
+#: Surfaces whose form lies in a file beside the project: what they are and what reads them.
+_FILED: Mapping[str, tuple[type[RasterSurface | MeshSurface], Callable[[Path], Any]]] = {
+    "raster": (RasterSurface, read_raster),
+    "mesh": (MeshSurface, read_mesh),
+}
+_WAVES = "waves"
 _HEAD = """\
 # Project of the `multimedia` commands; object lengths in `unit`, image lengths in mm, angles in
 # degrees. Tables of points: paths relative to this file.
@@ -74,7 +90,7 @@ def read_project(path: Path | str) -> Project:
 
 
 def project_files(path: Path | str) -> tuple[Path, ...]:
-    """Return a project file and the tables that it names, whether they are there or not.
+    """Return a project file and the tables and surfaces it names, whether they are there or not.
 
     Raises
     ------
@@ -83,8 +99,13 @@ def project_files(path: Path | str) -> tuple[Path, ...]:
     """
     path = Path(path)
     data = _toml(path)
-    tables = (data.get(key) for key in ("object_points", "image_points"))
-    return (path, *(path.parent / name for name in tables if isinstance(name, str)))
+    names = [data.get(key) for key in ("object_points", "image_points")]
+    media = data.get("media")
+    for section in media.values() if isinstance(media, Mapping) else ():
+        surfaces = section.get("surfaces") if isinstance(section, Mapping) else None
+        for surface in surfaces if isinstance(surfaces, list) else ():
+            names += [surface.get("file")] if isinstance(surface, Mapping) else []
+    return (path, *(path.parent / name for name in names if isinstance(name, str)))
 
 
 def write_project(path: Path | str, project: Project, *, overwrite: bool = False) -> list[Path]:
@@ -106,7 +127,7 @@ def write_project(path: Path | str, project: Project, *, overwrite: bool = False
     import tomli_w
 
     path = Path(path)
-    data = project_data(project)
+    data = project_data(project, path.parent)
     tables: dict[Path, dict[str, Any]] = {}
     if project.object_points.ids:
         table = path.with_name(f"{path.stem}_object_points.csv")
@@ -128,15 +149,15 @@ def write_project(path: Path | str, project: Project, *, overwrite: bool = False
     return [path, *tables]
 
 
-def project_data(project: Project) -> dict[str, Any]:
-    """Return the content of the project file, without the names of the tables."""
+def project_data(project: Project, folder: Path) -> dict[str, Any]:
+    """Return the content of the project file in a folder, without the names of the tables."""
     data: dict[str, Any] = {"format": FORMAT}
     if project.name:
         data["name"] = project.name
     data["unit"] = project.unit
     data["sigma_image"] = float(project.sigma_image)
     data |= {k: v for k, v in project.extra.items() if k not in data}
-    data["media"] = {name: _media_data(media) for name, media in project.media.items()}
+    data["media"] = {name: _media_data(media, folder) for name, media in project.media.items()}
     data["camera"] = [
         _camera_data(camera, media)
         for camera, media in zip(project.cameras, project.media_of, strict=True)
@@ -182,7 +203,7 @@ def _project(data: dict[str, Any], folder: Path) -> Project:
     described = data.pop("media", {})
     if not isinstance(described, dict):
         raise InputError("media: expected sections such as [media.tank].")
-    media = {name: _media(value, f"media.{name}") for name, value in described.items()}
+    media = {name: _media(value, f"media.{name}", folder) for name, value in described.items()}
     sections = data.pop("camera", [])
     if not isinstance(sections, list) or not sections:
         raise InputError("there is no camera; add at least one section [[camera]].")
@@ -225,9 +246,9 @@ def _sigma(data: dict[str, Any], cameras: tuple[Camera, ...]) -> float:
     return SIGMA_PIXEL * float(np.mean(pitches)) if pitches else SIGMA_IMAGE
 
 
-def _media(value: Any, where: str) -> FlatInterface | Interfaces:
+def _media(value: Any, where: str, folder: Path) -> FlatInterface | Interfaces:
     if isinstance(value, Mapping) and "surfaces" in value:
-        return _surfaces(value, where)
+        return _surfaces(value, where, folder)
     flat = ("indices", "thicknesses", "point", "normal", "moves_with_camera")
     _only(value, where, (*flat, *_GRADED))
     layers = Layers.from_dict(value, where=where)
@@ -251,7 +272,7 @@ def _graded(value: Mapping[str, Any], where: str) -> tuple[float, float]:
     return gradient, level
 
 
-def _surfaces(value: Mapping[str, Any], where: str) -> Interfaces:
+def _surfaces(value: Mapping[str, Any], where: str, folder: Path) -> Interfaces:
     """Return ray-traced surfaces of any form."""
     _only(value, where, ("indices", "surfaces", *_GRADED))
     listed = value["surfaces"]
@@ -261,13 +282,7 @@ def _surfaces(value: Mapping[str, Any], where: str) -> Interfaces:
     moving: list[bool] = []
     for number, item in enumerate(listed, start=1):
         place = f"{where}, surface {number}"
-        kind = str(item.get("kind", "")) if isinstance(item, Mapping) else ""
-        if kind not in _KINDS:
-            raise InputError(f"{place}: kind must be one of {', '.join(_KINDS)}, found {kind!r}.")
-        form, keys = _KINDS[kind]
-        _only(item, place, ("kind", "moves_with_camera", *keys))
-        read = {key: _number if key == "radius" else _vector for key in keys}
-        surfaces.append(form(**{key: read[key](item, key, place) for key in keys}))
+        surfaces.append(_surface(item, place, folder))
         moving.append(_flag(item, "moves_with_camera", place))
     indices = value.get("indices")
     if not isinstance(indices, list):
@@ -280,14 +295,42 @@ def _surfaces(value: Mapping[str, Any], where: str) -> Interfaces:
         )  # fmt: skip
 
 
-def _media_data(media: FlatInterface | Interfaces) -> dict[str, Any]:
+def _surface(item: Any, place: str, folder: Path) -> RefractingSurface:
+    """Return one ray-traced surface."""
+    kind = str(item.get("kind", "")) if isinstance(item, Mapping) else ""
+    if kind in _FILED:
+        _only(item, place, ("kind", "moves_with_camera", "file"))
+        name = _file_name(_given(item, "file", place), f"{place}, file")
+        surface: RefractingSurface = _FILED[kind][1](folder / name)
+        return surface
+    if kind == _WAVES:
+        _only(item, place, ("kind", "moves_with_camera", "level", "waves"))
+        rows = _given(item, "waves", place)
+        if not isinstance(rows, list) or not all(
+            isinstance(row, list) and all(is_finite_number(v) for v in row) for row in rows
+        ):
+            raise InputError(
+                f"{place}: waves must be a list of [amplitude, length, direction, phase], found "
+                f"{rows!r:.60}."
+            )
+        return waves_of(_number(item, "level", place), rows, place)
+    if kind not in _KINDS:
+        known = ", ".join((*_KINDS, *_FILED, _WAVES))
+        raise InputError(f"{place}: kind must be one of {known}, found {kind!r}.")
+    form, keys = _KINDS[kind]
+    _only(item, place, ("kind", "moves_with_camera", *keys))
+    read = {key: _number if key == "radius" else _vector for key in keys}
+    return form(**{key: read[key](item, key, place) for key in keys})
+
+
+def _media_data(media: FlatInterface | Interfaces, folder: Path) -> dict[str, Any]:
     if isinstance(media, Interfaces):
         graded = {key: getattr(media, name) for key, name in _GRADED.items() if media.is_graded}
         return {
             "indices": list(media.indices),
             **graded,
             "surfaces": [
-                _surface_data(surface) | ({"moves_with_camera": True} if moves else {})
+                _surface_data(surface, folder) | ({"moves_with_camera": True} if moves else {})
                 for surface, moves in zip(media.surfaces, media.with_camera, strict=True)
             ],
         }
@@ -298,16 +341,23 @@ def _media_data(media: FlatInterface | Interfaces) -> dict[str, Any]:
     return data
 
 
-def _surface_data(surface: RefractingSurface) -> dict[str, Any]:
+def _surface_data(surface: RefractingSurface, folder: Path) -> dict[str, Any]:
+    if isinstance(surface, WaveSurface):
+        return {"kind": _WAVES, "level": float(surface.level), "waves": wave_rows(surface)}
+    for kind, (filed, _) in _FILED.items():
+        if isinstance(surface, filed) and surface.source:
+            return {"kind": kind, "file": relative_path(Path(surface.source), folder)}
     for kind, (form, keys) in _KINDS.items():
         if type(surface) is form:
             return {"kind": kind} | {k: np.asarray(getattr(surface, k)).tolist() for k in keys}
     raise InputError(
         f"a {type(surface).__name__} cannot be written into a project file; it holds "
-        f"{', '.join(_KINDS)}."
+        f"{', '.join((*_KINDS, _WAVES))}, and {' and '.join(_FILED)} read from a file."
     )
 
 
+#: What a fisheye lens has in place of a convention of Brown's formula.
+_FISHEYE = "fisheye"
 _CAMERA_KEYS = ("name", "media", *POSE_KEYS, "c", "principal_point", "distortion", "sensor")
 
 
@@ -342,9 +392,11 @@ def _camera_data(camera: Camera, media: str) -> dict[str, Any]:
     data |= dict(zip(EXTERIOR[3:], np.degrees(camera.angles).tolist(), strict=True))
     data["c"] = camera.principal_distance
     data["principal_point"] = camera.principal_point.tolist()
-    if not camera.distortion.is_identity:
-        terms = {name: float(getattr(camera.distortion, name)) for name in NAMES}
-        data["distortion"] = {"convention": camera.distortion.convention.value} | terms
+    lens = camera.distortion
+    if not lens.is_identity:
+        convention = _FISHEYE if isinstance(lens, Fisheye) else lens.convention.value
+        terms = {name: float(getattr(lens, name)) for name in lens.names}
+        data["distortion"] = {"convention": convention} | terms
     if camera.sensor is not None:
         data["sensor"] = {
             "width": camera.sensor.width,
@@ -369,9 +421,14 @@ def _sensor(value: Any, where: str) -> Sensor:
     return Sensor(width=width, height=height, pitch=size, origin=origin)  # type: ignore[arg-type]
 
 
-def _distortion(value: Any, where: str, c: float) -> Brown:
+def _distortion(value: Any, where: str, c: float) -> Distortion:
     where = f"{where}, distortion"
-    _only(value, where, ("convention", *NAMES))
+    fisheye = isinstance(value, Mapping) and value.get("convention") == _FISHEYE
+    _only(value, where, ("convention", *(Fisheye.names if fisheye else NAMES)))
+    if fisheye:
+        with located(where):
+            return Fisheye(**{name: _number(value, name, where) for name in Fisheye.names
+                              if name in value})  # fmt: skip
     convention = str(value.get("convention", Convention.BROWN.value))
     terms = {name: _number(value, name, where) for name in NAMES if name in value}
     if convention == "opencv":
@@ -382,7 +439,8 @@ def _distortion(value: Any, where: str, c: float) -> Brown:
     known = {item.value: item for item in Convention}
     if convention not in known:
         raise InputError(
-            f"{where}: convention {convention!r} is not known; choose {', '.join(known)} or opencv."
+            f"{where}: convention {convention!r} is not known; choose {', '.join(known)}, opencv "
+            f"or {_FISHEYE}."
         )
     return Brown(**terms, convention=known[convention])
 

@@ -7,6 +7,7 @@ from tests.attack.lines import ALIGN, CANON, CURVE, RING, SITE, SOLVE, WATER
 DELIVER = "bifocal ortho wall.pair.json --relief relief.tif --deliver d --any-size"
 ORTHO = "bifocal ortho wall.pair.json --out o.tif"
 ADJUST = "multimedia adjust tank.toml"
+BOARDS = "multimedia boards tank.toml far.jpg --board 9x6"
 SHIFT = "multimedia shift shift.csv --json"
 BATHY = "multimedia bathymetry cloud.csv --out o.csv"
 LIDAR = "multimedia bathymetry cloud.las --out o.las"
@@ -332,6 +333,19 @@ WORDS: list[tuple[str, str]] = [
     ("multimedia waterlevel cloud.csv --out o.txt", "o.txt"),
     ("multimedia waterlevel far.jpg", "far.jpg"),
     ("multimedia waterlevel cloud.csv --out cloud.csv --overwrite", "cloud.csv"),
+    ("multimedia bathymetry cloud.csv --out o.csv --water-level 1 --index 1.34 --wave 1", "--wave"),
+    (
+        "multimedia bathymetry cloud.csv --out o.csv --water-level dem.tif --index 1.34 --wave 1,2",
+        "--wave",
+    ),
+    (f"{BOARDS} --out o.txt --square 1", "o.txt"),
+    (f"{BOARDS} --out tank.toml --overwrite --square 1", "tank.toml"),
+    (f"{BOARDS} --out o.toml --square 0", "square"),
+    (f"{BOARDS} --out o.toml --square nan", "square"),
+    (f"{BOARDS} --out o.toml --square 1", "far.jpg.*which camera"),
+    ("multimedia boards tank.toml far.jpg --board 2x2 --square 1 --out o.toml", "2x2 is too small"),
+    ("multimedia boards tank.toml far.jpg --board nine --square 1 --out o.toml", "--board"),
+    ("multimedia boards tank.toml --board 9x6 --square 1 --out o.toml", "PHOTOS"),
     ("multimedia openptv far.jpg", "far.jpg"),
     ("multimedia openptv ptv --out o.json", "o.json"),
     ("multimedia openptv ptv --out o.toml --radius 0", "--radius"),

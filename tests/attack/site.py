@@ -168,6 +168,7 @@ def _rasters_and_clouds(folder: Path, rng: np.random.Generator) -> None:
         "property list uchar int vertex_indices\nend_header\n"
         "-9 -9 1\n9 -9 1\n9 9 1\n-9 9 1\n3 0 1 2\n3 0 2 3\n"
     )
+    (folder / "mesh.obj").write_text("v -9 -9 1\nv 9 -9 1\nv 9 9 1\nv -9 9 1\nf 1 2 3\nf 1 3 4\n")
     (folder / "cloud.csv").write_text("X,Y,Z\n" + text.replace(" ", ",") + "\n")
     las = laspy.create(point_format=1, file_version="1.2")
     las.header.scales, las.header.offsets = [1e-3] * 3, [0, 0, 0]

@@ -85,7 +85,10 @@ def test_a_suggestion_is_found_along_the_bent_line(image):
     assert np.linalg.norm(found.pixel - seen[2 - image]) < 0.1
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize(
+    "name",
+    ["leaning port", *(pytest.param(n, marks=pytest.mark.acceptance) for n in NAMES[:2])],
+)
 def test_points_measured_on_the_page_are_where_shot_rays_put_them(name, tmp_path):
     """Picks, results with sigmas, conversion of pixels; the browser's own conversion too."""
     folder, seen = folder_of(name, tmp_path), shot(name)
@@ -138,6 +141,7 @@ console.log(JSON.stringify([1, 2].map((image) => [
         np.testing.assert_allclose(back, places[0], atol=1e-6)
 
 
+@pytest.mark.acceptance
 def test_the_workbook_of_the_page_follows_the_bent_rays(tmp_path):
     """Written new, then changed in place by the page's own way."""
     folder, seen = folder_of("tank", tmp_path), shot("tank")

@@ -101,7 +101,7 @@ def measured(kind, rng, pairs=3, noise=0.4):
     return observations, start, xyz
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", [pytest.param("tank", marks=pytest.mark.acceptance), "port"])
 def test_pairs_behind_media_are_as_precise_as_their_sigmas_say(kind):
     observations, start, xyz = measured(kind, np.random.default_rng(2))
     got = adjust_jointly(observations, start)

@@ -81,6 +81,7 @@ def test_the_cost_over_the_wall_is_that_of_shot_rays(tank):
     assert errors[:, 2].min() < single[:, 2].min() < single[:, 2].max() < errors[:, 2].max()
 
 
+@pytest.mark.acceptance
 def test_a_set_of_deliverables_is_made_through_media(tank, tmp_path):
     """The sheet says the media; the picture is the orthophoto, its pixels where shot rays lead."""
     folder = tmp_path / "set"

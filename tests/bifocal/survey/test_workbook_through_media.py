@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 from dataclasses import replace
 
 import numpy as np
@@ -78,11 +79,17 @@ def fill(path, out, cells, xy, code=None):
     book.save(out)
 
 
+@pytest.fixture(scope="module")
+def form(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("tank")
+    write_template(folder / "tank.xlsx", rows=7, media=3)
+    fill(folder / "tank.xlsx", folder / "filled.xlsx", tank_cells(), tank_points())
+    return folder / "filled.xlsx"
+
+
 @pytest.fixture
-def tank(tmp_path):
-    write_template(tmp_path / "tank.xlsx", rows=15, media=3)
-    fill(tmp_path / "tank.xlsx", tmp_path / "filled.xlsx", tank_cells(), tank_points())
-    return tmp_path / "filled.xlsx"
+def tank(form, tmp_path):
+    return shutil.copyfile(form, tmp_path / "filled.xlsx")
 
 
 @pytest.mark.office
@@ -216,6 +223,7 @@ def test_media_cells_that_cannot_be_meant_are_named(tank, tmp_path):
         solve(tank, c1=40.0)
 
 
+@pytest.mark.acceptance
 def test_a_medium_without_a_cell_filled_in_is_left_out(tmp_path):
     """A bare surface of water typed into a form for three media."""
     (c1, c2), (d1, d2) = TANK["c"], TANK["d"]
@@ -232,6 +240,7 @@ def test_a_medium_without_a_cell_filled_in_is_left_out(tmp_path):
     np.testing.assert_allclose(found.table.xyz, POINTS, atol=1e-9)
 
 
+@pytest.mark.acceptance
 def test_plane_points_check_and_correct_a_set_up_through_media(tmp_path):
     """Image 2 turned by 0.1 deg, stretched by 0.3 % and shifted: points of the plane tell."""
     rng = np.random.default_rng(3)
@@ -262,6 +271,7 @@ def test_plane_points_of_a_true_pair_find_nothing_to_correct():
     assert not any(p.is_significant for p in check.parameters)
 
 
+@pytest.mark.acceptance
 def test_workbooks_of_air_and_media_are_not_changed_into_each_other(tmp_path):
     air, wet = tmp_path / "air.xlsx", tmp_path / "tank.pair.json"
     picks, pair = measured("tank"), Pair.from_dict(content("tank"))
@@ -290,9 +300,8 @@ def test_a_form_is_made_for_two_to_six_media(media, tmp_path):
         write_template(tmp_path / "t.xlsx", media=media)
 
 
-@pytest.mark.parametrize(
-    "language", ["it", *(pytest.param(n, marks=pytest.mark.acceptance) for n in ("en", "de"))]
-)
+@pytest.mark.acceptance
+@pytest.mark.parametrize("language", ["en", "it", "de"])
 def test_media_have_their_words_in_every_language(language, tmp_path):
     write_template(tmp_path / "t.xlsx", media=4, rows=3, language=language)
     book = openpyxl.load_workbook(tmp_path / "t.xlsx")
@@ -303,6 +312,7 @@ def test_media_have_their_words_in_every_language(language, tmp_path):
     assert lint(tmp_path / "t.xlsx") == []
 
 
+@pytest.mark.acceptance
 def test_a_workbook_with_media_is_taken_as_a_pair(tank, tmp_path):
     from PIL import Image
 
@@ -360,6 +370,7 @@ def test_options_and_languages_are_written_into_a_form_with_media(tank, tmp_path
     assert again.pair.layers.indices == (1.0, 1.49, 1.337)
 
 
+@pytest.mark.acceptance
 def test_the_heading_of_the_slopes_says_what_they_are(tmp_path):
     write_template(tmp_path / "t.xlsx", media=2, rows=3)
     sheet = openpyxl.load_workbook(tmp_path / "t.xlsx")["Points"]

@@ -93,3 +93,70 @@ def test_points_on_one_line_do_not_show_a_tilt(direction) -> None:
     with pytest.raises(GeometryError, match="lie on one line"):
         mm.mean_water_level(points, tilted=True)
     assert mm.mean_water_level(points).level == pytest.approx(1.8, abs=0.001)
+
+
+#: Points on the water, on the bank above it and on the bottom below; spread, slope of the bank,
+#: share of gross errors.
+BANKS = {
+    "open water": (80, 0, 0, 0.02, 0.1, 0.0),
+    "bottom": (80, 0, 200, 0.02, 0.1, 0.02),
+    "bank": (80, 100, 0, 0.02, 0.1, 0.02),
+    "both": (80, 100, 200, 0.02, 0.1, 0.03),
+    "few": (30, 60, 150, 0.01, 0.2, 0.05),
+    "flat": (200, 100, 100, 0.03, 0.05, 0.02),
+}
+
+
+def bank(seed: int, counts, spread: float, slope: float, gross: float, tilt: float = 0.0):
+    """Return tie points where land meets water at 102.4 m.
+
+    The bank rises from the water line and the bottom falls from it, seen 1.34 times too shallow;
+    gross errors reach 3 m to either side.
+    """
+    rng = np.random.default_rng(seed)
+    water, above, below = counts
+    x = np.concatenate(
+        [rng.uniform(0, 30, water), rng.uniform(-15, 0, above), rng.uniform(0, 30, below)]
+    )
+    y = rng.uniform(-20, 20, len(x))
+    z = 102.4 + np.where(np.arange(len(x)) < water, 0.0, -slope * x / np.where(x > 0, 1.34, 1.0))
+    z += tilt * y + spread * rng.standard_normal(len(x))
+    wrong = rng.choice(len(x), int(gross * len(x)), replace=False)
+    z[wrong] += rng.uniform(-3, 3, len(wrong))
+    return np.column_stack([x, y, z])
+
+
+def assert_honest(pulls: np.ndarray) -> None:
+    """Errors over their sigmas are as normal as they should be, in the middle and both tails."""
+    low, left, middle, right, high = np.percentile(pulls, [2.5, 16, 50, 84, 97.5])
+    tell = np.round([low, left, middle, right, high], 2)
+    assert abs(middle) < 0.4, tell
+    assert -1.45 < left < -0.6, tell
+    assert 0.6 < right < 1.45, tell
+    assert -2.9 < low < -1.2, tell
+    assert 1.2 < high < 2.9, tell
+    assert np.mean(np.abs(pulls) > 5) <= 0.02
+
+
+@pytest.mark.parametrize(
+    ("scene", "draws"),
+    [("both", 40), *(pytest.param(s, 150, marks=pytest.mark.acceptance) for s in BANKS)],
+)
+def test_the_sigma_of_a_level_between_banks_is_honest_in_both_tails(scene, draws) -> None:
+    *counts, spread, slope, gross = BANKS[scene]
+    levels = [
+        mm.mean_water_level(bank(5000 + k, counts, spread, slope, gross)) for k in range(draws)
+    ]
+    assert_honest(np.array([(water.level - 102.4) / water.sigma for water in levels]))
+
+
+@pytest.mark.acceptance
+def test_the_sigmas_of_a_tilted_surface_between_banks_are_honest() -> None:
+    pulls = []
+    for k in range(100):
+        points = bank(7000 + k, (120, 60, 120), 0.02, 0.1, 0.02, tilt=5e-4)
+        water = mm.mean_water_level(points, tilted=True)
+        at = water.level + float(water.slope @ (np.array([15.0, 0.0]) - water.centre))
+        assert abs(at - 102.4) < 0.05
+        pulls.append((water.slope[1] - 5e-4) / water.slope_sigma[1])
+    assert_honest(np.array(pulls))

@@ -423,7 +423,7 @@ def test_damaged_colmap_models_are_named(tmp_path):
     convert(save(tmp_path, made()), tmp_path / "model")
     for file, old, new, message in (
         ("images.txt", "cam2", "", "expected IMAGE_ID"),
-        ("cameras.txt", "OPENCV", "OPENCV_FISHEYE", "has a fisheye lens"),
+        ("cameras.txt", "OPENCV", "THIN_PRISM_FISHEYE", "with 8 parameters is not read"),
         ("cameras.txt", "1936", "wide", "is not a COLMAP camera line"),
         ("points3D.txt", "3 ", "3 x", "found 'x"),
     ):

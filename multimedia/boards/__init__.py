@@ -1,0 +1,1 @@
+"""Photos of boards as points of a project."""
