@@ -18,17 +18,14 @@ References
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from multimedia import Layers, radial_shift_ratio
 from photocore.arrays import BoolArray, FloatArray
 from photocore.rotation import rotation_from_vector
 
-#: Rays in the table of distances.
-_TABLE = 4096
 #: Step of the derivatives by the media; central differences are then right to 1e-9. [-, m, rad]
 _STEP = 1e-5
 #: What a path is differentiated by after its indices and thicknesses: the way to the first
@@ -102,6 +99,11 @@ class MediaPath:
     def depth(self) -> float:
         """Camera centre to the last interface, along its normal. [m]"""
         return self.z0 + self.layers.thickness
+
+    @property
+    def highest(self) -> float:
+        """Relief of the last interface over the nadir. [m]"""
+        return self.distance - self.depth / (1.0 if self.turn is None else float(self.turn[2, 2]))
 
     def holds(self, offset: FloatArray, relief: FloatArray) -> BoolArray:
         """Return which points, (X, Y) from the nadir and r, lie behind the last interface."""
@@ -286,59 +288,22 @@ class MediaPath:
             return np.asarray(ratio / below)
 
     @property
+    def apparent_move(self) -> FloatArray:
+        """Where rays near the axis of the interfaces come from, seen from the centre, (3,). [m]
+
+        In the object's medium they run as from a point on that axis which lies
+        ``z0 n_m / n_1 + sum t_i n_m / n_i`` before the last interface.
+        """
+        *before, last = self.layers.indices
+        heights = [self.z0, *self.layers.thicknesses]
+        reduced = sum(h * last / index for h, index in zip(heights, before, strict=True))
+        normal = np.array([0.0, 0.0, 1.0]) if self.turn is None else self.turn[2]
+        return np.asarray((reduced - self.depth) * normal)
+
+    @property
     def near_axis(self) -> float:
-        """Distance of a straight camera whose rays run alike near the axis. [m]
-
-        It is the limit of `distance_at` on the axis.
-        """
-        first, *others = self.layers.indices
-        heights = [self.z0, *self.layers.thicknesses, self.distance - self.depth]
-        reduced = zip(heights, self.layers.indices, strict=True)
-        return float(sum(height * first / index for height, index in reduced) * others[-1] / first)
-
-    def distance_at(self, radius: NDArray[Any], relief: Any = None) -> NDArray[Any]:
-        """Return at what distance a straight camera over the same nadir sees as these rays do.
-
-        Parameters
-        ----------
-        radius : ndarray, shape (...)
-            Of places of the reference plane, from the nadir; with ``relief`` of points. [m]
-        relief : ndarray, shape (...), optional
-            Of the points. [m]
-
-        Returns
-        -------
-        ndarray, shape (...)
-            A / |S|: with it for d, ``A = P d / (d - r)`` holds along the ray as it does in air. In
-            the precision of ``radius``; right to 1e-7 of it. [m]
-
-        Notes
-        -----
-        Interpolated in a table over the radius A, which grows with the angle of the ray; that of a
-        point is found by fixed point, since the distance hardly changes with the radius.
-        """
-        reach = float(np.fmax.reduce(np.abs(radius), axis=None, initial=1e-9))
-        top = 0.0 if relief is None else float(np.fmax.reduce(relief, axis=None, initial=0.0))
-        reach *= 1.5 * max(1.0, self.near_axis / max(self.near_axis - top, 0.1 * self.near_axis))
-        steepest = 1.0
-        for _ in range(12):
-            tangents = np.linspace(0.0, steepest * self.distance, _TABLE)
-            rays = self.trace(np.stack([tangents, np.zeros(_TABLE)], axis=-1))
-            places, slopes = rays.position[:, 0], -rays.slope[:, 0]
-            if not places[-1] < reach:
-                break
-            steepest *= 2.0
-        known = np.isfinite(places) & np.isfinite(slopes)
-        known[0] = False
-        places, distances = places[known], places[known] / slopes[known]
-        found = np.interp(radius, places, distances).astype(radius.dtype)
-        if relief is None:
-            return found
-        for _ in range(4):
-            with np.errstate(invalid="ignore", divide="ignore"):
-                seen = radius * (found / np.maximum(found - relief, 0.05 * found))
-            found = np.interp(seen, places, distances).astype(radius.dtype)
-        return found
+        """Distance of a straight camera whose rays run alike near the axis. [m]"""
+        return self.distance + float(self.apparent_move[2])
 
     def _turned_back(self, along: FloatArray, down: float) -> FloatArray:
         """Return vectors of the interfaces' frame in the plane frame, shape (..., 3)."""

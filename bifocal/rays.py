@@ -219,16 +219,6 @@ def apparent_of_plane(positions: FloatArray, camera: Foot) -> FloatArray:
     return camera.nadir + camera.media.apparent(away, np.zeros(away.shape[:-1]))
 
 
-def distance_at(camera: Foot, radius: Any, relief: Any = None) -> Any:
-    """Return the distance of the straight camera that sees places at radii as this one does.
-
-    In air the camera's own; see `bifocal.media.MediaPath.distance_at`.
-    """
-    if camera.media is None:
-        return camera.distance
-    return camera.media.distance_at(radius, relief)
-
-
 def apparent_magnification(radius: FloatArray, relief: FloatArray, camera: Foot) -> FloatArray:
     """Return (q - N) / (P - N) of points at radii from the nadir: `magnification` in air."""
     if camera.media is None:
@@ -237,9 +227,14 @@ def apparent_magnification(radius: FloatArray, relief: FloatArray, camera: Foot)
     return np.asarray(steepness * camera.distance)
 
 
-def near_axis(camera: Foot) -> float:
-    """Return the distance of the straight camera that sees as this one does near its axis. [m]"""
-    return camera.distance if camera.media is None else camera.media.near_axis
+def straight(camera: Foot) -> Foot:
+    """Return the straight camera that sees as this one does near the axis of its interfaces.
+
+    In air the camera itself; through media it lies on their axis through the centre.
+    """
+    if camera.media is None:
+        return camera
+    return Foot(camera.nadir + camera.media.apparent_move[:2], camera.media.near_axis)
 
 
 def seen_distance(camera: Foot) -> float:

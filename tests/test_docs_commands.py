@@ -58,6 +58,7 @@ NOT_RUN = {
     "--cog": "wants an account on object storage",
     "bifocal demo": "tutorial-facade.md runs it with --out",
     "bifocal demo --out sample --overwrite": "tutorial-facade.md runs it with another folder",
+    "bifocal demo --water --out under-water": "tests/bifocal/demo runs it with another folder",
     "bifocal adjust a.pair.json b.pair.json c.pair.json --control a.csv --control none --control "
     "c.csv --out joint": "wants a street; test_joint_adjustment.py has one",
     **dict.fromkeys(IN_PART, "names options, is no whole line"),

@@ -18,6 +18,7 @@ EXAMPLE = """\b
 Examples:
   bifocal demo
   bifocal demo --out sample --overwrite
+  bifocal demo --water --out under-water
 """
 
 
@@ -26,14 +27,20 @@ Examples:
     "--out", type=FILE, default=Path("bifocal-demo"), show_default=True,
     help="Folder for the results; it is made.",
 )  # fmt: skip
+@click.option(
+    "--water", is_flag=True,
+    help="A façade under water, through flat ports, from 3.5/1.9 m: bent rays, haze.",
+)  # fmt: skip
 @overwrite
 @as_json
-def command(out: Path, overwrite: bool, as_json: bool) -> None:
+def command(out: Path, water: bool, overwrite: bool, as_json: bool) -> None:
     """Survey a sample façade from two photos, and compare with the exact truth.
 
     The photos, 35/19 mm from 17.5/9.5 m, come with the package; targets picked on them go through
     the survey workbook; dense relief and the orthophoto follow. About a quarter of a minute.
+    With --water it also says what neglecting refraction would cost.
     """
+    from bifocal.demo.samples import FACADE, WATER
     from bifocal.demo.workflow import run_demo
 
     with progress_bar("Demo", quiet=as_json) as bar:
@@ -43,19 +50,22 @@ def command(out: Path, overwrite: bool, as_json: bool) -> None:
             if what and not as_json:
                 remark(f"... {what}")
 
-        result = run_demo(out, overwrite=overwrite, progress=tell)
+        sample = WATER if water else FACADE
+        result = run_demo(out, sample=sample, overwrite=overwrite, progress=tell)
     points = zip(
         result.ids, result.true, result.found, result.sigma, result.flags, strict=True
     )  # fmt: skip
     data = {
         "folder": result.folder, "rmse_targets": result.rmse,
-        "map_median": result.map_median, "map_beyond_3cm": result.map_share,
+        "map_median": result.map_median, f"map_beyond_{_limit(result, '')}": result.map_share,
         "map_known": result.map_known, "files": [name for name, _ in result.files],
         "points": [
             dict(zip(("id", "r_true", "r", "sigma_r", "flag"), point, strict=True))
             for point in points
         ],
     }  # fmt: skip
+    if result.neglect is not None:
+        data["median_neglecting_refraction"] = result.neglect
     print_result(data, _lines(result), as_json=as_json)
 
 
@@ -76,8 +86,21 @@ def _lines(result: DemoResult) -> Iterator[str]:
     yield f"\nAll {len(result.ids)} targets: RMS error {result.rmse * 1000:.1f} mm"
     yield (
         f"Relief map: median error {result.map_median * 1000:.1f} mm, "
-        f"{result.map_share:.1%} beyond 3 cm, {result.map_known:.1%} of the visible wall known"
+        f"{result.map_share:.1%} beyond {_limit(result, ' ')}, "
+        f"{result.map_known:.1%} of the visible wall known"
     )
+    if result.neglect is not None:
+        yield (
+            f"Without `layers` in the pair file, refraction neglected: median error "
+            f"{result.neglect * 1000:.0f} mm, with perfect picks"
+        )
     yield f"\nResults in {result.folder}/"
     yield text_table(("file", "content"), result.files)
     yield "\nOpen ortho.png, relief.png and result.xlsx first."
+
+
+def _limit(result: DemoResult, space: str) -> str:
+    """Return the limit of the map's errors with its unit."""
+    if result.limit < 0.01:
+        return f"{result.limit * 1000:g}{space}mm"
+    return f"{result.limit * 100:g}{space}cm"

@@ -1,7 +1,7 @@
-"""The whole workflow on the sample pair: photos, points, workbook, relief map, orthophoto.
+"""The whole workflow on a sample pair: photos, points, workbook, relief map, orthophoto.
 
-The sample lies in the folder ``sample`` beside this module. It was rendered by a ray caster
-(``tests/scenes/make_sample.py``), so everything about it is known exactly.
+The samples lie in folders beside this module. They were rendered by a ray caster
+(``tests/scenes/make_sample.py``), so everything about them is known exactly.
 """
 
 from __future__ import annotations
@@ -12,10 +12,11 @@ from pathlib import Path
 
 import numpy as np
 
-from bifocal.demo import SAMPLE
+from bifocal.demo.samples import FACADE, PICK_SIGMA, Sample
 from bifocal.files.geotiff import RasterReader, dpi_at_scale, read_relief
 from bifocal.files.images import read_image
 from bifocal.files.strips import write_png
+from bifocal.model.pair import Pair
 from bifocal.model.relief_map import ReliefMap
 from bifocal.orthophotos.ortho_workflow import OrthoTask, make_ortho
 from bifocal.relief_maps.workflow import ReliefJob, relief_of_pair
@@ -26,12 +27,8 @@ from photocore.cli import Progress, no_progress
 from photocore.errors import InputError
 from photocore.output import atomic_path
 
-#: Precision of the sample's picks, those of a careful hand. [px]
-PICK_SIGMA = 0.2
-#: The part of the wall that both photos show whole, up to the top of the cornice. [m]
-BOUNDS = (-5.3, -3.45, 5.3, 3.42)
-#: Scale 1:N at which the picture of the orthophoto prints.
-SHEET_SCALE = 50.0
+#: Every so many pixels of the exact relief are asked what neglecting refraction would cost.
+_EVERY = 7
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -49,9 +46,13 @@ class DemoResult:
         Relief of the targets and its expected precision. [m]
     flags : tuple of str
     map_median, map_share : float
-        Median error of the relief map [m] and share of it beyond 3 cm, where both photos see.
+        Median error of the relief map [m] and share of it beyond ``limit``, where both photos see.
     map_known : float
         Share of the wall with a measured relief.
+    limit : float
+        [m]
+    neglect : float, optional
+        Median error of relief if refraction were neglected, where both photos see. [m]
     """
 
     folder: Path
@@ -64,6 +65,8 @@ class DemoResult:
     map_median: float
     map_share: float
     map_known: float
+    limit: float
+    neglect: float | None = None
 
     @property
     def rmse(self) -> float:
@@ -73,9 +76,13 @@ class DemoResult:
 
 
 def run_demo(
-    folder: Path, *, overwrite: bool = False, progress: Progress = no_progress
+    folder: Path,
+    *,
+    sample: Sample = FACADE,
+    overwrite: bool = False,
+    progress: Progress = no_progress,
 ) -> DemoResult:
-    """Survey the sample pair in every way, and compare with the truth.
+    """Survey a sample pair in every way, and compare with the truth.
 
     Raises
     ------
@@ -86,51 +93,41 @@ def run_demo(
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise InputError(f"{folder}: cannot be made ({error.strerror}).") from error
-    taken = [name for name, _ in _FILES if (folder / name).exists()]
+    taken = [name for name, _ in sample.files if (folder / name).exists()]
     if taken and not overwrite:
         raise InputError(
             f"{folder}: holds {', '.join(taken[:3])} ... already; add --overwrite, or name another "
             "folder with --out."
         )
     progress(0.0, 1.0, "surveying targets in the workbook")
-    for name in _GIVEN:
+    for name in sample.given:
         with atomic_path(folder / name, overwrite=True) as path:
-            path.write_bytes((SAMPLE / name).read_bytes())
+            path.write_bytes((sample.folder / name).read_bytes())
     ids, true, relief, sigma, flags = _survey(folder)
     progress(0.2, 1.0, "measuring dense relief")
+    pair_file = folder / "facade.pair.json"
     job = ReliefJob(
-        out=folder / "relief.tif", preview=folder / "relief.png", bounds=BOUNDS, overwrite=True
-    )
-    relief_of_pair(folder / "facade.pair.json", job)
-    progress(0.85, 1.0, "making the orthophoto")
-    make_ortho(
-        folder / "facade.pair.json", folder / "ortho.tif",
-        OrthoTask(relief=folder / "relief.tif", bounds=BOUNDS), overwrite=True,
+        out=folder / "relief.tif", preview=folder / "relief.png", bounds=sample.bounds,
+        overwrite=True,
     )  # fmt: skip
+
+    def measured(done: float, total: float, what: str = "") -> None:  # noqa: ARG001
+        progress(0.2 + 0.65 * done / total, 1.0, "")
+
+    relief_of_pair(pair_file, job, progress=measured)
+    progress(0.85, 1.0, "making the orthophoto")
+    task = OrthoTask(relief=folder / "relief.tif", bounds=sample.bounds)
+    make_ortho(pair_file, folder / "ortho.tif", task, overwrite=True)
     with RasterReader(folder / "ortho.tif") as file:
-        dpi = dpi_at_scale(file.grid.gsd, SHEET_SCALE)
+        dpi = dpi_at_scale(file.grid.gsd, sample.sheet_scale)
         write_png(folder / "ortho.png", file, dpi=dpi, overwrite=True)
     progress(1.0, 1.0, "done")
-    median, share, known = _against_truth(read_relief(folder / "relief.tif"))
+    median, share, known = _against_truth(read_relief(folder / "relief.tif"), sample)
     return DemoResult(
-        folder=folder, files=_FILES, ids=ids, true=true, found=relief, sigma=sigma, flags=flags,
-        map_median=median, map_share=share, map_known=known,
+        folder=folder, files=sample.files, ids=ids, true=true, found=relief, sigma=sigma,
+        flags=flags, map_median=median, map_share=share, map_known=known, limit=sample.limit,
+        neglect=_cost_of_neglect(Pair.read(pair_file), sample),
     )  # fmt: skip
-
-
-_FILES: tuple[tuple[str, str], ...] = (
-    ("far.jpg", "far photo, 35 mm from 17.5 m"),
-    ("near.jpg", "near photo, 19 mm from 9.5 m"),
-    ("facade.pair.json", "the pair: homographies, nadirs, distances"),
-    ("targets.csv", "picked targets in pixels, and their true relief to check"),
-    ("result.xlsx", "solved workbook, live formulas: relief, coordinates, precision, check"),
-    ("relief.tif", "relief map: relief, sigma, quality"),
-    ("relief.png", "the same as a picture"),
-    ("ortho.tif", "orthophoto to scale"),
-    ("ortho.png", "the same as a picture"),
-    ("truth.tif", "the exact relief, to compare"),
-)
-_GIVEN = ("far.jpg", "near.jpg", "facade.pair.json", "targets.csv", "truth.tif")
 
 
 def _survey(
@@ -145,19 +142,33 @@ def _survey(
     return table.ids, true, table["r"], table["sigma_r"], table.flags
 
 
-def _against_truth(relief: ReliefMap) -> tuple[float, float, float]:
-    """Return median error, share beyond 3 cm and share known, where both cameras see the wall."""
-    truth = read_relief(SAMPLE / "truth.tif")
-    both = read_image(SAMPLE / "seen.png") > 0
+def _seen_truth(sample: Sample) -> tuple[FloatArray, FloatArray]:
+    """Return places within the bounds that both cameras see, (n, 2), and their relief. [m]"""
+    truth = read_relief(sample.folder / "truth.tif")
+    both = read_image(sample.folder / "seen.png") > 0
     places = np.concatenate(
         [truth.plane_positions(slice(k, k + 1)).reshape(-1, 2) for k in range(len(both))]
     )
-    west, south, east, north = BOUNDS
+    west, south, east, north = sample.bounds
     x, y = places.T
-    inside = (x > west) & (x < east) & (y > south) & (y < north)
-    both &= inside.reshape(both.shape)
-    measured = relief.sample(places).reshape(both.shape)
-    known = both & np.isfinite(measured)
-    error = np.abs(measured - truth.r)[known]
-    share = float(known.sum() / both.sum())
-    return float(np.median(error)), float((error > 0.03).mean()), share
+    inside = (x > west) & (x < east) & (y > south) & (y < north) & both.ravel()
+    return places[inside], truth.r.ravel()[inside]
+
+
+def _against_truth(relief: ReliefMap, sample: Sample) -> tuple[float, float, float]:
+    """Return median error, share beyond the limit and share known, where both cameras see."""
+    places, true = _seen_truth(sample)
+    measured = relief.sample(places)
+    known = np.isfinite(measured)
+    error = np.abs(measured - true)[known]
+    return float(np.median(error)), float((error > sample.limit).mean()), float(known.mean())
+
+
+def _cost_of_neglect(pair: Pair, sample: Sample) -> float | None:
+    """Return the median error of relief if the pair's media were left out; None in air. [m]"""
+    if pair.layers is None:
+        return None
+    places, true = (values[::_EVERY] for values in _seen_truth(sample))
+    points = np.column_stack([places, true]).astype(np.float64)
+    off = pair.in_air().intersect(*pair.project(points)).xyz[:, 2] - points[:, 2]
+    return float(np.nanmedian(np.abs(off)))

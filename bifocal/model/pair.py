@@ -274,25 +274,6 @@ class Pair:
                 "to a text table (.csv)."
             )
 
-    def refuse_leaning_media(self, what: str) -> None:
-        """Raise where interfaces are not parallel to the reference plane and must be.
-
-        Parameters
-        ----------
-        what : str
-            The work asked for.
-
-        Raises
-        ------
-        InputError
-            Naming it.
-        """
-        if any(photo.media and photo.media.turn is not None for photo in self.as_given):
-            raise InputError(
-                f"{what} is made through media parallel to the reference plane only, not through "
-                "ports that lean (`interface_normal`); single points are solved through them."
-            )
-
     @property
     def d1(self) -> float:
         """Distance of the far camera to the reference plane. [m]"""
@@ -315,15 +296,15 @@ class Pair:
     @property
     def straight_distances(self) -> tuple[float, float]:
         """Distances of straight cameras that see as these near the axis; in air d1, d2. [m]"""
-        return rays.near_axis(self.image1.foot), rays.near_axis(self.image2.foot)
+        return rays.straight(self.image1.foot).distance, rays.straight(self.image2.foot).distance
 
     @property
     def highest_relief(self) -> float:
-        """Relief at which the last interface lies, before the lower one; in air d2. [m]"""
+        """Relief at which the last interface lies over a nadir, the lower one's; in air d2. [m]"""
         if self.layers is None:
             return self.d2
         photos = (self.image1, self.image2)
-        return min(photo.distance - photo.media.depth for photo in photos if photo.media)
+        return min(photo.media.highest for photo in photos if photo.media)
 
     def photo(self, number: int) -> Photo:
         """Return image 1 or 2."""

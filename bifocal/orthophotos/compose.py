@@ -114,7 +114,6 @@ def orthophoto(
     >>> bool((flat.image == photo).all()), round(flat.gsd, 9)
     (True, 0.01)
     """
-    pair.refuse_leaning_media("an orthophoto")
     options = options or OrthoOptions()
     surface = as_surface(relief)
     if isinstance(image, np.ndarray):

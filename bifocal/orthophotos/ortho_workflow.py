@@ -117,7 +117,6 @@ def make_ortho(
     pair = Pair.of(pair_path)
     check_not_input(out, task.relief, *pair.photo_files)
     check_writable(out, overwrite=overwrite)
-    pair.refuse_leaning_media("an orthophoto")
     with open_surface(task, pair) as (surface, _, remarks):
         numbers = {"1": (1,), "2": (2,), "both": (1, 2)}[task.image]
         images = {number: read_image(pair.photo_file(number)) for number in numbers}

@@ -13,7 +13,7 @@ from bifocal.model.grid import Bounds, Grid, bounds_of
 from bifocal.model.image import ImageArray, as_photo
 from bifocal.model.photo import Photo
 from bifocal.orthophotos.ortho_image import Interpolation
-from bifocal.rays import apparent_magnification
+from bifocal.rays import apparent_magnification, plane_position
 from photocore.arrays import BoolArray, Float32Array, FloatArray
 from photocore.errors import GeometryError, InputError
 
@@ -196,6 +196,8 @@ def _project(
     ``q = N + (P - N) k`` with ``k = d / (d - r)``, Midulla Eq. (1) on the plane; the homography
     is linear in (q, 1), so it becomes ``a + k (b (X - Nx) + c (Y - Ny))`` in each of its rows.
     """
+    if photo.media is not None and photo.media.turn is not None:
+        return _project_leaning(photo, size, grid, relief)
     matrix = np.linalg.inv(photo.plane_from_pixel)
     nx, ny = photo.nadir
     x, y = grid.columns_x - nx, grid.rows_y - ny
@@ -223,6 +225,21 @@ def _project(
     middle = float(photo.plane_from_pixel[2] @ np.array([size[0] / 2, size[1] / 2, 1.0]))
     scale[scale * middle <= 0] = np.nan
     return row_of(0) * scale, row_of(1) * scale
+
+
+def _project_leaning(
+    photo: Photo, size: tuple[int, int], grid: Grid, relief: Float32Array
+) -> tuple[FloatArray, FloatArray]:
+    """Return `_project` through interfaces that lean, where nothing is radial about the nadir."""
+    x, y = np.broadcast_arrays(grid.columns_x[None, :], grid.rows_y[:, None])
+    xyz = np.stack([x, y, relief.astype(np.float64)], axis=-1)
+    q = plane_position(xyz, photo.foot)
+    matrix = np.linalg.inv(photo.plane_from_pixel)
+    seen = q @ matrix[:, :2].T + matrix[:, 2]
+    middle = float(photo.plane_from_pixel[2] @ np.array([size[0] / 2, size[1] / 2, 1.0]))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        scale = np.where(seen[..., 2] * middle > 0, 1.0 / seen[..., 2], np.nan)
+    return seen[..., 0] * scale, seen[..., 1] * scale
 
 
 def _reduced(image: ImageArray, factor: int) -> ImageArray:

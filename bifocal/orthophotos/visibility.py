@@ -9,9 +9,10 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from bifocal.model.grid import Bounds, Grid
+from bifocal.model.grid import Bounds, Grid, bounds_of
+from bifocal.model.ray_field import RayField
 from bifocal.model.surface import EVERYWHERE, Surface
-from bifocal.rays import Foot, distance_at, magnification, near_axis
+from bifocal.rays import Foot, magnification, object_rays, plane_position, straight
 from photocore.arrays import BoolArray, Float32Array
 
 #: A pixel of the buffer is a candidate when another on its ray lies this much farther in. [px]
@@ -77,7 +78,7 @@ def hidden_from(surface: Surface, grid: Grid, camera: Foot, relief: Float32Array
         relief_wide = relief
     # The same cells for every window, so that windows fit together.
     _, high = surface.extremes(EVERYWHERE)
-    largest = float(magnification(high, near_axis(camera)))
+    largest = float(magnification(high, straight(camera).distance))
     if camera.media is not None:
         largest *= _BENT
     return _hidden(relief_wide, wide, camera, (column, row), grid.shape, largest)
@@ -93,15 +94,16 @@ def _reach(surface: Surface, grid: Grid, camera: Foot) -> tuple[Grid, int, int] 
     bounds = grid.bounds
     if math.isnan(low):
         return None
+    if camera.media is not None:
+        box = _bent_reach(surface, grid, camera, low)
+        return None if box is None else _grown(grid, box)
     left, bottom, right, top = bounds
     farthest = max(
         math.hypot(x - camera.nadir[0], y - camera.nadir[1])
         for x in (left, right)
         for y in (bottom, top)
     )
-    least = near_axis(camera)
-    if camera.media is not None:
-        least = min(least, float(distance_at(camera, np.array([farthest]))[0]))
+    least = camera.distance
     share = 1.0
     # The first pass takes everything up to the nadir, the next only what the relief there needs.
     for _ in range(3):
@@ -111,7 +113,30 @@ def _reach(surface: Surface, grid: Grid, camera: Foot) -> tuple[Grid, int, int] 
     reach = share * farthest
     if reach < grid.gsd:
         return None
-    box = _towards(bounds, camera, share)
+    return _grown(grid, _towards(bounds, camera, share))
+
+
+def _bent_reach(surface: Surface, grid: Grid, camera: Foot, low: float) -> Bounds | None:
+    """Return a window's box grown by all that can hide a part of it from a camera through media.
+
+    None if nothing can. A ray rises from a hidden point at ``low`` to the highest relief.
+    """
+    bounds = grid.bounds
+    x, y = np.linspace(bounds[0], bounds[2], 9), np.linspace(bounds[1], bounds[3], 9)
+    xyz = np.stack(np.broadcast_arrays(*np.meshgrid(x, y), low), axis=-1)
+    slope = object_rays(plane_position(xyz, camera), camera).slope.reshape(-1, 2)
+    slope = np.nan_to_num(slope)
+    xy, box, rise = xyz[..., :2].reshape(-1, 2), EVERYWHERE, 0.0
+    for _ in range(3):
+        _, high = surface.extremes(box)
+        rise = max(high - low, 0.0)
+        box = bounds_of(np.concatenate([xy, xy + slope * rise]))
+    return box if rise * float(np.hypot(*slope.T).max()) >= grid.gsd else None
+
+
+def _grown(grid: Grid, box: Bounds) -> tuple[Grid, int, int]:
+    """Return a grid grown to a box, and the column and row where it begins therein."""
+    left, bottom, right, top = grid.bounds
     margins = (left - box[0], box[3] - top, box[2] - right, bottom - box[1])
     c0, r0, c1, r1 = (math.ceil(margin / grid.gsd) + 2 if margin > 0 else 0 for margin in margins)
     wide = grid.window(-c0, -r0, grid.width + c0 + c1, grid.height + r0 + r1)
@@ -138,12 +163,45 @@ class _Surroundings(NamedTuple):
     x: Float32Array  # of every column, from the nadir [px]
     y: Float32Array  # of every row, upwards [px]
     rho: Float32Array  # distance from the nadir [px]
-    distance: Any  # of the camera; through media of straight ones that see alike, (h, w) [px]
+    distance: np.float32  # of the camera [px]
     core: tuple[slice, slice]  # the window itself
+    bent: _RaysOfWindow | None = None  # through media
 
-    def distance_in(self, where: Any) -> Any:
-        """Return the distance for some of the pixels."""
-        return self.distance if np.ndim(self.distance) == 0 else self.distance[where]
+    def seen_at(self, share: np.float32) -> tuple[Float32Array, Float32Array]:
+        """Return where the rays to all pixels meet the plane, times a share, y upwards. [px]"""
+        if self.bent is not None:
+            return self.bent.u * share, self.bent.v * share
+        stretch = magnification(self.relief, self.distance)  # Eq. (1)
+        stretch *= share
+        return self.x * stretch, self.y[:, None] * stretch
+
+    def away(self, row: Any, column: Any) -> tuple[Float32Array, Float32Array]:
+        """Return offsets of pixels, of length rho, from the foot of the camera on their rays."""
+        if self.bent is not None:
+            return self.bent.x[row, column], self.bent.y[row, column]
+        return self.x[column], self.y[row]
+
+
+class _RaysOfWindow(NamedTuple):
+    """Rays through media to the pixels of a window, y upwards. [px]"""
+
+    u: Float32Array  # where they meet the plane, from the nadir
+    v: Float32Array
+    x: Float32Array  # of their points from where they reach the height of the camera
+    y: Float32Array
+
+    @classmethod
+    def of_window(
+        cls, relief: Float32Array, grid: Grid, camera: Foot, at: tuple[Float32Array, Float32Array]
+    ) -> _RaysOfWindow:
+        """Return the rays to points at offsets ``at`` [px] from the straight camera's nadir."""
+        reliefs = (float(f.reduce(relief, axis=None, initial=0.0)) for f in (np.fmin, np.fmax))
+        low, high = reliefs
+        gsd = np.float32(grid.gsd)
+        field = RayField.over(camera, grid.bounds, (low, high))
+        u, v, across, up = field.through(at[0] * gsd, at[1][:, None] * gsd, relief)
+        rise = (np.float32(field.foot.distance) - relief) / gsd
+        return cls(u / gsd, v / gsd, -across * rise, -up * rise)
 
 
 def _hidden(
@@ -156,19 +214,21 @@ def _hidden(
 ) -> BoolArray:
     """Return the hidden pixels of the part of ``grid`` that starts at a column and row."""
     column, row = start
-    gsd = grid.gsd
-    x = ((grid.columns_x - camera.nadir[0]) / gsd).astype(np.float32)
-    y = ((grid.rows_y - camera.nadir[1]) / gsd).astype(np.float32)
-    rho = np.sqrt(x * x + (y * y)[:, None])
-    distance: Any = np.float32(camera.distance / gsd)
-    if camera.media is not None:
-        distance = distance_at(camera, rho * np.float32(gsd), relief) * np.float32(1 / gsd)
+    gsd, foot, bent = grid.gsd, straight(camera), None
+    x = ((grid.columns_x - foot.nadir[0]) / gsd).astype(np.float32)
+    y = ((grid.rows_y - foot.nadir[1]) / gsd).astype(np.float32)
+    if camera.media is None:
+        rho = np.sqrt(x * x + (y * y)[:, None])
+    else:
+        bent = _RaysOfWindow.of_window(relief, grid, camera, (x, y))
+        rho = np.nan_to_num(np.hypot(bent.x, bent.y))
     around = _Surroundings(
         relief=relief * np.float32(1 / gsd),
         x=x,
         y=y,
         rho=rho,
-        distance=distance,
+        distance=np.float32(foot.distance / gsd),
+        bent=bent,
         core=np.s_[row : row + shape[0], column : column + shape[1]],
     )
     buffer = _Buffer.of_surroundings(around, largest)
@@ -188,14 +248,13 @@ class _Buffer(NamedTuple):
     def of_surroundings(cls, around: _Surroundings, largest: float) -> _Buffer | None:
         """Return the filled buffer; None if nothing of the core is known."""
         core = around.core
-        stretch = magnification(around.relief, around.distance)  # Eq. (1)
         if math.isnan(largest):
+            stretch = magnification(around.relief, around.distance)  # Eq. (1)
             largest = float(np.fmax.reduce(stretch, axis=None))
-        if np.isnan(np.fmax.reduce(stretch[core], axis=None)):
-            return None
         # Just wider than the widest gap between neighbours on a flat part: no cell stays empty.
-        stretch *= np.float32(1 / (1.02 * largest))
-        u, v = around.x * stretch, around.y[:, None] * stretch
+        u, v = around.seen_at(np.float32(1 / (1.02 * largest)))
+        if np.isnan(np.fmax.reduce(u[core], axis=None)):
+            return None
         # Only cells that hold a pixel of the core matter; the rest goes to a cell of its own.
         u0, u1 = (float(f.reduce(u[core], axis=None)) for f in (np.fmin, np.fmax))
         v0, v1 = (float(f.reduce(v[core], axis=None)) for f in (np.fmin, np.fmax))
@@ -253,7 +312,7 @@ def _sharpen(around: _Surroundings, buffer: _Buffer) -> BoolArray:
     unsure = (cv2.dilate(flags, square) > 0) & ~sure
     known = np.where(np.isnan(around.relief), np.float32(-1e9), around.relief)
     rise = cv2.dilate(known, square)[core] - around.relief[core]
-    depth = around.distance_in(core) - around.relief[core]
+    depth = around.distance - around.relief[core]
     unsure |= rise * rho > np.float32(_LEAST_SHADOW) * depth
     unsure &= rho > 0  # nothing lies between the nadir and the camera
     row, column = np.nonzero(unsure & ~sure)
@@ -275,8 +334,9 @@ def _above_ray(
     """Return which pixels' rays to the camera run into relief beside them or at the occluder."""
     rows, columns = around.relief.shape
     r, rho = around.relief[row, column], around.rho[row, column]
-    slope = (around.distance_in((row, column)) - r) / rho
-    to_x, to_y = -around.x[column] / rho, around.y[row] / rho
+    slope = (around.distance - r) / rho
+    x, y = around.away(row, column)
+    to_x, to_y = -x / rho, y / rho
     hidden = np.zeros(len(row), bool)
     to_occluder = np.where(np.isfinite(occluder), rho - occluder, np.float32(0))
 

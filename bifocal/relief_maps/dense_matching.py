@@ -23,6 +23,7 @@ from bifocal.relief_maps.frame import (
     working_grid,
     zoomed_box,
 )
+from bifocal.relief_maps.haze import greys_through_water
 from bifocal.relief_maps.map_completion import complete
 from bifocal.relief_maps.orientation_sigma import orientation_sigma
 from bifocal.relief_maps.registration import Registration, check_registration
@@ -141,13 +142,13 @@ def dense_relief(
     >>> result.shape, round(result.gsd, 6)
     ((67, 100), 0.06)
     """
-    pair.refuse_leaning_media("a dense relief map")
     grey1, grey2 = as_grey(image1, "image1"), as_grey(image2, "image2")
     if quality not in QUALITIES:
         raise InputError(f"quality: expected {', '.join(QUALITIES)}, got {quality!r}.")
     if relief_range is not None:
         _check_range(relief_range, pair.image2.distance)
     if pair.layers is not None:  # nothing stands out of the water, or through the glass
+        grey1, grey2 = greys_through_water(image1, image2)
         low, high = relief_range or seed.usual_range(pair.image2.distance)
         relief_range = (low, min(high, 0.999 * pair.highest_relief))
         if not low < relief_range[1]:
@@ -156,7 +157,7 @@ def dense_relief(
                 f"plane, and nothing beyond it is measured; got {low:g}, {high:g}."
             )
     wanted, target, work = _grids(pair, (grey1, grey2), gsd, bounds, quality, relief_range)
-    frame = make_frame(pair, grey1, grey2, work)
+    frame = make_frame(pair, grey1, grey2, work, relief_range)
     progress(0.1, 1.0, "First relief")
     coarse, _ = seed.coarse_relief(frame, relief_range)
     frame = match_exposure(frame, coarse)

@@ -74,7 +74,7 @@ def _margin(frame: Frame, median: Float32Array) -> Float32Array:
     blurred = cv2.blur(median, (9, 9))
     across = cv2.Sobel(blurred, cv2.CV_32F, 1, 0, ksize=3)
     down = cv2.Sobel(blurred, cv2.CV_32F, 0, 1, ksize=3)
-    x, y = offsets(frame.grid.shape, frame.grid.pixel_of(frame.pair.image1.nadir))
+    x, y = offsets(frame.grid.shape, frame.grid.pixel_of(frame.foot(1).nadir))
     steepest = np.sqrt((across * across + down * down) * (x * x + y * y)) + np.float32(1e-9)
     rising = np.clip((across * x + down * y) / steepest, 0, 1)
     grey = frame.image1.astype(np.float32)

@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 
 from bifocal import rays
-from bifocal.relief_maps.frame import Frame, nadir_pixels, offsets, radial_stretch, zoom_map
+from bifocal.relief_maps.frame import Frame, offsets, radial_stretch, zoom_map
 from photocore.arrays import BoolArray, ByteArray, Float32Array
 
 #: Weight of smoothness; 30 is as good before noise is taken out, 20 keeps more detail for it.
@@ -116,19 +116,25 @@ def measure(frame: Frame, coarse: Float32Array, *, stride: int = STRIDE) -> Meas
 
 def _is_plain(frame: Frame) -> bool:
     """Return whether half of photo 1 has hardly more contrast than noise."""
-    quiet = cv2.GaussianBlur(frame.image1.astype(np.float32), (0, 0), PLAIN_BLUR)
+    contrast = local_contrast(frame.image1)[frame.seen1]
+    return bool(np.median(contrast) < PLAIN_CONTRAST * noise(frame.image1, frame.seen1))
+
+
+def local_contrast(image: ByteArray | Float32Array) -> Float32Array:
+    """Return the standard deviation within 15 px of a photo blurred by a pixel. [grey levels]"""
+    quiet = cv2.GaussianBlur(image.astype(np.float32), (0, 0), PLAIN_BLUR)
     mean = cv2.blur(quiet, CONTRAST_WINDOW)
     square = cv2.blur(quiet * quiet, CONTRAST_WINDOW) - mean * mean
-    contrast = np.sqrt(np.maximum(square, 0))[frame.seen1]
-    return bool(np.median(contrast) < PLAIN_CONTRAST * _noise(frame))
+    return np.asarray(np.sqrt(np.maximum(square, 0)))
 
 
-def _noise(frame: Frame) -> float:
-    """Return the noise of photo 1 (Immerkaer 1996, with the median for the mean). [grey levels]"""
+def noise(image: ByteArray | Float32Array, seen: BoolArray | None = None) -> float:
+    """Return the noise of a photo (Immerkaer 1996, with the median for the mean). [grey levels]"""
     mask = np.array([[1, -2, 1], [-2, 4, -2], [1, -2, 1]], dtype=np.float32)
-    second = cv2.filter2D(frame.image1, cv2.CV_32F, mask)
+    second = cv2.filter2D(image, cv2.CV_32F, mask)
+    second = second if seen is None else second[seen]
     # Six is the mask's norm; 1.4826 makes the median of |N(0, 1)| one. Rounding is noise, too.
-    return max(1.4826 / 6 * float(np.median(np.abs(second[frame.seen1]))), 0.29)
+    return max(1.4826 / 6 * float(np.median(np.abs(second))), 0.29)
 
 
 def split(frame: Frame, flow: Float32Array) -> tuple[Float32Array, Float32Array]:
@@ -147,22 +153,20 @@ def split(frame: Frame, flow: Float32Array) -> tuple[Float32Array, Float32Array]
 
 def _rates(
     frame: Frame, column: Float32Array, row: Float32Array
-) -> tuple[Float32Array, Float32Array, Float32Array]:
+) -> tuple[Float32Array, Float32Array]:
     """Return how rays of photo 2 at (column, row) and those of photo 1 part with relief. [px/m]
 
-    Along columns and rows; and the distance of photo 2 for its rays. [m]
+    Along columns and rows.
     """
-    (far_x, far_y), (near_x, near_y) = nadir_pixels(frame)
-    x1, y1 = offsets(frame.grid.shape, (far_x, far_y))
-    x2, y2 = column - near_x, row - near_y
-    d1, d2 = frame.distance_at(1, x1, y1), frame.distance_at(2, x2, y2)
-    return x2 / d2 - x1 / d1, y2 / d2 - y1 / d1, d2
+    x1, y1 = frame.slopes(1, *offsets(frame.grid.shape))
+    x2, y2 = frame.slopes(2, column, row)
+    return x1 - x2, y1 - y2
 
 
 def _split_bent(frame: Frame, flow: Float32Array) -> tuple[Float32Array, Float32Array]:
     """Return `split` for rays through media: linear in r, as `rays.relief_of_rays`."""
     x, y = offsets(frame.grid.shape)
-    rate_x, rate_y, _ = _rates(frame, x + flow[..., 0], y + flow[..., 1])
+    rate_x, rate_y = _rates(frame, x + flow[..., 0], y + flow[..., 1])
     square = np.maximum(rate_x * rate_x + rate_y * rate_y, np.float32(1e-6))
     relief = (flow[..., 0] * rate_x + flow[..., 1] * rate_y) / square
     across = (flow[..., 1] * rate_x - flow[..., 0] * rate_y) / np.sqrt(square)
@@ -177,9 +181,10 @@ def sigma_of_relief(frame: Frame, relief: Float32Array, sigma_px: Float32Array) 
     with all error in image 2.
     """
     if frame.pair.layers is not None:
-        rate_x, rate_y, near = _rates(frame, *zoom_map(frame, relief))
+        rate_x, rate_y = _rates(frame, *zoom_map(frame, relief))
         away = np.maximum(np.hypot(rate_x, rate_y), np.float32(0.5 / frame.pair.base_factor))
-        return np.asarray(np.abs(rays.reduction(relief, near)) * sigma_px / away, dtype=np.float32)
+        share = np.abs(rays.reduction(relief, np.float32(frame.distances[1])))
+        return np.asarray(share * sigma_px / away, dtype=np.float32)
     x, y = frame.from_centre()
     reach = np.maximum(np.sqrt(x * x + y * y), np.float32(0.5))
     d1, d2 = frame.distances

@@ -8,8 +8,9 @@ import cv2
 import numpy as np
 
 from bifocal.model.grid import Grid
+from bifocal.model.ray_field import RayField
 from bifocal.model.relief_map import Quality
-from bifocal.rays import Foot, distance_at, magnification, reduction
+from bifocal.rays import Foot, magnification, reduction
 from bifocal.relief_maps.frame import Frame, offsets, values_at, zoom_map
 from photocore.arrays import BoolArray, ByteArray, Float32Array, FloatArray, IntArray
 
@@ -50,12 +51,15 @@ def stretch(frame: Frame, relief: Float32Array) -> Float32Array:
     on a true surface, more on a ramp that no camera can have seen as a surface (`STRETCH`), near
     zero on the side face of a step, which has no place of its own on the map (`SIDE_FACE`).
     """
-    foot = frame.pair.image1.foot
-    x, y = offsets(frame.grid.shape, frame.grid.pixel_of(foot.nadir))
+    foot = frame.foot(1)
     across = cv2.Sobel(relief, cv2.CV_32F, 1, 0, ksize=3, scale=0.125)
     down = cv2.Sobel(relief, cv2.CV_32F, 0, 1, ksize=3, scale=0.125)
+    distance = np.float32(foot.distance)
+    if frame.fields is not None:
+        x, y = frame.slopes(1, *offsets(frame.grid.shape))
+        return np.asarray(reduction(relief, distance) + across * x + down * y)
+    x, y = offsets(frame.grid.shape, frame.grid.pixel_of(foot.nadir))
     # d s'/d s of s' = s (1 - r / d), Eq. (1).
-    distance = frame.distance_at(1, x, y)
     return np.asarray(reduction(relief + across * x + down * y, distance))
 
 
@@ -83,7 +87,7 @@ def to_plane(frame: Frame, source: MapBands, usable: BoolArray, grid: Grid) -> M
     grid : Grid
         Of the relief map.
     """
-    foot = frame.pair.image1.foot
+    foot = frame.foot(1)
     relief = np.where(usable, source.r, np.float32(np.nan))
     first = _scatter(frame, relief, source.quality == Quality.MEASURED, grid, foot)
     known = np.isfinite(first)
@@ -107,12 +111,18 @@ def _scatter(
     A spike that nothing validates would otherwise win against the wall that it is a mismatch of.
     """
     x, y = offsets(frame.grid.shape, frame.grid.pixel_of(foot.nadir))
-    share = reduction(relief, frame.distance_at(1, x, y))  # Eq. (1): s' = s - e = s (1 - r / d)
+    if frame.fields is None:
+        # Eq. (1): s' = s - e = s (1 - r / d)
+        share = reduction(relief, np.float32(foot.distance))
+        x, y = x * share, y * share
+    else:
+        across, down = frame.slopes(1, *offsets(frame.grid.shape))
+        x, y = x + relief * across, y + relief * down
     ratio = frame.grid.gsd / grid.gsd
     nadir = grid.pixel_of(foot.nadir)
     with np.errstate(invalid="ignore"):
-        column = x * share * np.float32(ratio) + np.float32(nadir[0] + 0.5)
-        row = y * share * np.float32(ratio) + np.float32(nadir[1] + 0.5)
+        column = x * np.float32(ratio) + np.float32(nadir[0] + 0.5)
+        row = y * np.float32(ratio) + np.float32(nadir[1] + 0.5)
         inside = (column >= 0) & (column < grid.width) & (row >= 0) & (row < grid.height)
     index = row[inside].astype(np.int32) * np.int64(grid.width) + column[inside].astype(np.int32)
     empty = np.full(grid.shape, np.nan, dtype=np.float32)
@@ -167,8 +177,12 @@ def _look_up(
     final, tolerance = start, np.float32(AGREEMENT * foot.distance)
     for _ in range(3):
         value = final
-        distance = frame.distance_at(1, away[..., 0], away[..., 1], value)
-        q = nadir + away * magnification(value, distance)[..., None]
+        if frame.fields is None:
+            distance = np.float32(foot.distance)
+            q = nadir + away * magnification(value, distance)[..., None]
+        else:
+            at = nadir + away
+            q = np.stack(frame.shown(1, at[..., 0], at[..., 1], value), axis=-1)
         q[~np.isfinite(q)] = -1e4
         final = values_at(relief, q, cv2.INTER_NEAREST)
     with np.errstate(invalid="ignore"):
@@ -272,8 +286,10 @@ def hidden_in_second(
     return np.asarray(inside & (above > relief + step))
 
 
-def hidden_on_map(relief: Float32Array, grid: Grid, camera: Foot) -> BoolArray:
-    """Return which pixels of a relief map a camera cannot see, to a pixel.
+def hidden_on_map(
+    relief: Float32Array, grid: Grid, camera: Foot, field: RayField | None = None
+) -> BoolArray:
+    """Return which pixels of a relief map a camera, or bent rays, cannot see, to a pixel.
 
     On one ray, at one q = N + (P - N) d / (d - r), the highest point is the nearest to the camera:
     each cell of q keeps it, and a point is hidden if its cell holds one a pixel and more before it.
@@ -282,19 +298,23 @@ def hidden_on_map(relief: Float32Array, grid: Grid, camera: Foot) -> BoolArray:
     y = ((camera.nadir[1] - grid.rows_y) / grid.gsd).astype(np.float32)[:, None]
     column0, row0 = grid.pixel_of(camera.nadir)
     distance = np.float32(camera.distance)
-    if camera.media is not None:
-        distance = distance_at(camera, np.sqrt(x * x + y * y) * np.float32(grid.gsd), relief)
     factor = magnification(relief, distance)  # Eq. (1)
     with np.errstate(invalid="ignore"):
-        column = x * factor + np.float32(column0 + 0.5)
-        row = y * factor + np.float32(row0 + 0.5)
+        pixel = (distance - relief) / np.maximum(np.sqrt(x * x + y * y), 1)
+        column, row = x * factor, y * factor
+        if field is not None:
+            gsd = np.float32(grid.gsd)
+            column, row, across, down = field.through(x * gsd, y * -gsd, relief)
+            column, row = column / gsd, row / -gsd
+            pixel = np.minimum(gsd / np.hypot(across, down), distance - relief)
+        column += np.float32(column0 + 0.5)
+        row += np.float32(row0 + 0.5)
         inside = (column >= 0) & (column < grid.width) & (row >= 0) & (row < grid.height)
         index = np.where(inside, row, 0).astype(np.int64) * grid.width
         index += np.where(inside, column, 0).astype(np.int64)
     top = np.full(grid.shape, np.float32(-1e3))
     _highest(relief[inside], index[inside], top)
     top = cv2.morphologyEx(top, cv2.MORPH_CLOSE, np.ones((3, 3), np.uint8))
-    pixel = (distance - relief) / np.maximum(np.sqrt(x * x + y * y), 1)
     with np.errstate(invalid="ignore"):
         return np.asarray(inside & (top.ravel()[index] > relief + pixel))
 

@@ -15,6 +15,7 @@ from bifocal import rays
 from bifocal.model.grid import Bounds, Grid, bounds_of, cut
 from bifocal.model.pair import Pair
 from bifocal.model.photo import Photo
+from bifocal.model.ray_field import RayField
 from photocore.arrays import BoolArray, ByteArray, Float32Array, FloatArray
 from photocore.errors import GeometryError, InputError
 
@@ -41,6 +42,8 @@ class Frame:
     seen1, seen2 : ndarray of bool, shape (height, width)
         Where each photo has content.
     pair : Pair
+    fields : tuple of RayField, or None
+        The rays of both photos where the pair looks through media.
     """
 
     grid: Grid
@@ -49,24 +52,64 @@ class Frame:
     seen1: BoolArray
     seen2: BoolArray
     pair: Pair
+    fields: tuple[RayField, RayField] | None = None
 
     @property
     def centre(self) -> FloatArray:
         """Zoom centre e in pixels of the grid, shape (2,)."""
-        return self.grid.pixel_of(self.pair.zoom_centre)
+        return self.grid.pixel_of(self.zoom_centre)
 
     @property
     def distances(self) -> tuple[float, float]:
         """d1, d2; through media those of straight cameras that see alike near the axis. [m]"""
         return self.pair.straight_distances
 
-    def distance_at(self, number: int, x: Any, y: Any, relief: Any = None) -> Any:
-        """Return a camera's distance at offsets [px] from its nadir; see `rays.distance_at`. [m]"""
-        foot = self.pair.photo(number).foot
-        if foot.media is None:
-            return np.float32(foot.distance)
-        radius = np.sqrt(x * x + y * y) * np.float32(self.grid.gsd)
-        return rays.distance_at(foot, radius, relief)
+    @property
+    def zoom_centre(self) -> FloatArray:
+        """Zoom centre e, through media that of straight cameras that see alike, shape (2,). [m]"""
+        return rays.zoom_centre(self.foot(1), self.foot(2))
+
+    def foot(self, number: int) -> rays.Foot:
+        """Return a camera; through media the straight one that sees alike near its axis."""
+        return rays.straight(self.pair.photo(number).foot)
+
+    def slopes(
+        self, number: int, column: Any, row: Any, relief: Any = None
+    ) -> tuple[Float32Array, Float32Array]:
+        """Return how bent rays move along columns and rows per metre of relief. [px/m]
+
+        Parameters
+        ----------
+        number : int
+            1 or 2.
+        column, row : ndarray of float32
+            Where the rays meet the plane, or with ``relief`` the points they pass.
+        relief : ndarray of float32, optional
+            Of the points. [m]
+        """
+        field = self._field(number)
+        x, y = self._metres(field, column, row)
+        slope = field.slopes(x, y) if relief is None else field.through(x, y, relief)[2:]
+        share = np.float32(1 / self.grid.gsd)
+        return slope[0] * share, slope[1] * -share
+
+    def shown(
+        self, number: int, column: Any, row: Any, relief: Any
+    ) -> tuple[Float32Array, Float32Array]:
+        """Return where bent rays through points meet the plane (columns, rows). [px]"""
+        field = self._field(number)
+        x, y, _, _ = field.through(*self._metres(field, column, row), relief)
+        at, share = self.grid.pixel_of(field.foot.nadir), np.float32(1 / self.grid.gsd)
+        return x * share + np.float32(at[0]), np.float32(at[1]) - y * share
+
+    def _field(self, number: int) -> RayField:
+        assert self.fields is not None
+        return self.fields[number - 1]
+
+    def _metres(self, field: RayField, column: Any, row: Any) -> tuple[Float32Array, Float32Array]:
+        """Return offsets of pixels from a field's nadir along X and Y. [m]"""
+        at, gsd = self.grid.pixel_of(field.foot.nadir), np.float32(self.grid.gsd)
+        return (column - np.float32(at[0])) * gsd, (np.float32(at[1]) - row) * gsd
 
     def from_centre(self) -> tuple[Float32Array, Float32Array]:
         """Return offsets from the zoom centre, shapes (1, width) and (height, 1). [px]"""
@@ -91,7 +134,7 @@ def radial_stretch(frame: Frame) -> Float32Array:
         axis=-1,
     )
     shape = places.shape[:2]
-    away = places.reshape(-1, 2) - frame.pair.zoom_centre
+    away = places.reshape(-1, 2) - frame.zoom_centre
     along = away / np.maximum(np.linalg.norm(away, axis=1), 1e-9)[:, None]
     across = along[:, ::-1] * [-1, 1]
     flat, photos = places.reshape(-1, 2), (frame.pair.image1, frame.pair.image2)
@@ -139,7 +182,8 @@ def zoomed_box(pair: Pair, shape2: tuple[int, ...], box: Bounds, relief: float) 
     d1, d2 = pair.straight_distances
     factor = rays.zoom_factor(relief, d1=d1, d2=d2)
     corners = np.reshape(box, (2, 2))
-    grown = pair.zoom_centre + (corners - pair.zoom_centre) * factor
+    centre = rays.zoom_centre(*(rays.straight(photo.foot) for photo in (pair.image1, pair.image2)))
+    grown = centre + (corners - centre) * factor
     footprint = _footprint(pair.image2, shape2)
     low = np.minimum(corners[0], np.maximum(grown[0], footprint.min(0)))
     high = np.maximum(corners[1], np.minimum(grown[1], footprint.max(0)))
@@ -199,9 +243,16 @@ def working_grid(pair: Pair, shape1: tuple[int, ...], box: Bounds, gsd: float) -
 
 
 def make_frame(
-    pair: Pair, image1: NDArray[np.uint8], image2: NDArray[np.uint8], grid: Grid
+    pair: Pair,
+    image1: NDArray[np.uint8],
+    image2: NDArray[np.uint8],
+    grid: Grid,
+    relief_range: tuple[float, float] | None = None,
 ) -> Frame:
-    """Bring both photos onto the grid; each is sampled once, through lens and homography."""
+    """Bring both photos onto the grid; each is sampled once, through lens and homography.
+
+    Through media their rays are tabulated for the reliefs to expect.
+    """
     first, seen1 = _on_grid(pair.image1, image1, grid)
     second, seen2 = _on_grid(pair.image2, image2, grid)
     if not (seen1 & seen2).any():
@@ -209,11 +260,25 @@ def make_frame(
             "the two photos have no common area within the bounds: check the bounds and that the "
             "photos show the same wall."
         )
-    return Frame(grid=grid, image1=first, image2=second, seen1=seen1, seen2=seen2, pair=pair)
+    fields = None
+    if pair.layers is not None:
+        reliefs = relief_range or (0.0, 0.0)
+        first_rays, second_rays = (
+            RayField.over(photo.foot, grid.bounds, reliefs) for photo in (pair.image1, pair.image2)
+        )
+        fields = first_rays, second_rays
+    return Frame(
+        grid=grid, image1=first, image2=second, seen1=seen1, seen2=seen2, pair=pair, fields=fields
+    )
 
 
 def _on_grid(photo: Photo, image: ByteArray, grid: Grid) -> tuple[ByteArray, BoolArray]:
-    """Return a photo on the grid and where it has content."""
+    """Return a photo on the grid and where it has content.
+
+    Through media the rim of a photo is curved and lies within the grid. There the last pixels are
+    continued: matching would run along an edge to black (façades 11 and 23 through a port, mean
+    error within 10 px of the rim 4.9 and 6.0 to 4.0 and 2.2 mm, measured 90.3 to 92.0 %).
+    """
     matrix = np.linalg.inv(photo.plane_from_pixel) @ grid.plane_from_pixel
     matrix = matrix / matrix[2, 2]
     height, width = image.shape
@@ -245,7 +310,8 @@ def _on_grid(photo: Photo, image: ByteArray, grid: Grid) -> tuple[ByteArray, Boo
         result[rows] = cv2.remap(
             image, maps, None, cv2.INTER_CUBIC, borderMode=cv2.BORDER_REPLICATE
         )
-    result[~seen] = 0
+    if photo.media is None:
+        result[~seen] = 0
     return result, seen
 
 
@@ -278,21 +344,10 @@ def shown_at(
 ) -> tuple[Float32Array, Float32Array]:
     """Return where photo 2 shows pixels of photo 1 seen through media at given relief. [px]
 
-    Down the ray of photo 1 to the point by Eq. (1), up that of photo 2.
+    Along the ray of photo 1 to the point, back to the plane along that of photo 2.
     """
-    (far_x, far_y), (near_x, near_y) = nadir_pixels(frame)
-    x, y = column - far_x, row - far_y
-    share = rays.reduction(relief, frame.distance_at(1, x, y))
-    x, y = x * share + (far_x - near_x), y * share + (far_y - near_y)
-    factor = rays.magnification(relief, frame.distance_at(2, x, y, relief))
-    moved = (x * factor + near_x, y * factor + near_y)
-    return np.asarray(moved[0], np.float32), np.asarray(moved[1], np.float32)
-
-
-def nadir_pixels(frame: Frame) -> list[Float32Array]:
-    """Return both nadirs in pixels of the grid, (column, row) each."""
-    photos = (frame.pair.image1, frame.pair.image2)
-    return [frame.grid.pixel_of(photo.nadir).astype(np.float32) for photo in photos]
+    across, down = frame.slopes(1, column, row)
+    return frame.shown(2, column + relief * across, row + relief * down, relief)
 
 
 def values_at(band: NDArray[Any], places: NDArray[np.floating], how: int) -> NDArray[Any]:

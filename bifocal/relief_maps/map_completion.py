@@ -48,7 +48,7 @@ def complete(frame: Frame, bands: MapBands, grid: Grid, *, plain: bool = False) 
     """
     # Holes outside what both photos see stay unknown.
     holes = ~np.isfinite(bands.r) & _cover(frame, grid)
-    forward_projection.fill_from_behind(bands, holes, grid, frame.pair.image1.nadir)
+    forward_projection.fill_from_behind(bands, holes, grid, frame.foot(1).nadir)
     forward_projection.fill_small(bands, holes)
     bands = bands._replace(r=smoothing.tidy_steps(bands.r))
     per_pixel = _relief_per_pixel(frame, grid)
@@ -80,8 +80,8 @@ def _cover(frame: Frame, grid: Grid) -> BoolArray:
 
 def _relief_per_pixel(frame: Frame, grid: Grid) -> Float32Array:
     """Return the relief that shifts a point by one pixel between the photos: B / s. [m]"""
-    x = (grid.columns_x - frame.pair.zoom_centre[0]).astype(np.float32)[None, :]
-    y = (grid.rows_y - frame.pair.zoom_centre[1]).astype(np.float32)[:, None]
+    x = (grid.columns_x - frame.zoom_centre[0]).astype(np.float32)[None, :]
+    y = (grid.rows_y - frame.zoom_centre[1]).astype(np.float32)[:, None]
     reach = np.sqrt(x * x + y * y) / np.float32(frame.grid.gsd)
     return np.float32(frame.pair.base_factor) / np.maximum(reach, np.float32(0.5))
 
@@ -100,8 +100,9 @@ def _guard(frame: Frame, bands: MapBands, grid: Grid) -> None:
     """Call nothing measured that camera 2 cannot see, or hardly (in place)."""
     vague = ~(bands.sigma < evidence.SIGMA_SHARE * frame.distances[1])
     bands.quality[vague & (bands.quality == Quality.MEASURED)] = Quality.INTERPOLATED
-    hidden = forward_projection.hidden_on_map(bands.r, grid, frame.pair.image2.foot)
-    near = _spread_inwards(hidden, grid.pixel_of(frame.pair.image2.nadir), GUARD)
+    rays = None if frame.fields is None else frame.fields[1]
+    hidden = forward_projection.hidden_on_map(bands.r, grid, frame.foot(2), rays)
+    near = _spread_inwards(hidden, grid.pixel_of(frame.foot(2).nadir), GUARD)
     bands.quality[near & (bands.quality == Quality.MEASURED)] = Quality.HIDDEN
 
 

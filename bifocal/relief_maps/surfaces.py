@@ -74,12 +74,16 @@ def _falls_away(frame: Frame, relief: Float32Array, misfit: Float32Array) -> Boo
     know to be hidden: flow runs over the step as a slope. It is taken as a share of the slope of
     camera 2's rays, the steepest that camera 2 can see.
     """
-    foot = frame.pair.image2.foot
-    x, y = offsets(frame.grid.shape, frame.grid.pixel_of(foot.nadir))
+    foot = frame.foot(2)
     quiet = cv2.GaussianBlur(relief, (0, 0), 1.5)
     across = cv2.Sobel(quiet, cv2.CV_32F, 1, 0, ksize=3, scale=0.125)
     down = cv2.Sobel(quiet, cv2.CV_32F, 0, 1, ksize=3, scale=0.125)
-    falls = -(across * x + down * y) / (frame.distance_at(2, x, y, relief) - relief)
+    if frame.fields is None:
+        x, y = offsets(frame.grid.shape, frame.grid.pixel_of(foot.nadir))
+        falls = -(across * x + down * y) / (np.float32(foot.distance) - relief)
+    else:
+        x, y = frame.slopes(2, *offsets(frame.grid.shape), relief)
+        falls = across * x + down * y
     misfit = cv2.blur(misfit, (3, 3))
     return np.asarray(falls * misfit * misfit > FALLS_AWAY)
 
@@ -100,7 +104,7 @@ def _uncover(
     perhaps = forward_projection.hidden_in_second(frame, relief, step(COVERS_UNVALIDATED))
     covered |= perhaps & ~valid
     before = MapBands(bands.r.copy(), bands.sigma.copy(), bands.quality.copy())
-    nadir = frame.pair.image1.nadir
+    nadir = frame.foot(1).nadir
     filled = forward_projection.fill_from_behind(bands, covered, frame.grid, nadir)
     # What is behind lies lower: a fill that rises leans on the wrong surface.
     rises = filled & (bands.r > before.r + least)

@@ -40,6 +40,28 @@ class Exposure:
     noise: float = 1.5
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Haze:
+    """What water does to light on its way: J exp(-c d) + B (1 - exp(-b d)) (Jaffe 1990, McGlamery).
+
+    Attributes
+    ----------
+    attenuation, backscatter : tuple of float
+        c and b of red, green and blue. [1/m]
+    veil : tuple of float
+        B: the light of the water where nothing is seen through it.
+    """
+
+    attenuation: tuple[float, float, float]
+    backscatter: tuple[float, float, float]
+    veil: tuple[float, float, float]
+
+    def seen(self, light: FloatArray, way: FloatArray) -> FloatArray:
+        """Return light (n, 3) as it arrives after ways through water (n,). [m]"""
+        direct = light * np.exp(-way[:, None] * np.array(self.attenuation))
+        return direct + self.veil * (1 - np.exp(-way[:, None] * np.array(self.backscatter)))
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class NamedPoint:
     """A target or corner with its exact place.
@@ -99,6 +121,7 @@ def render(
     rng: np.random.Generator,
     exposures: tuple[Exposure, Exposure] = (Exposure(), Exposure()),
     gsd: float | None = None,
+    haze: Haze | None = None,
 ) -> Rendering:
     """Photograph a scene with a bifocal pair.
 
@@ -112,11 +135,13 @@ def render(
         Of the far and the near photo.
     gsd : float, optional
         Pixel of the truth; by default that of the nominal far photo. [m]
+    haze : Haze, optional
+        Of the water behind the last interface.
     """
     tracer = Tracer(scene)
     painter = Painter(scene, tracer)
     images = [
-        expose(photograph(tracer, painter, camera), exposure, rng)
+        expose(photograph(tracer, painter, camera, haze), exposure, rng)
         for camera, exposure in zip((cameras.far, cameras.near), exposures, strict=True)
     ]
     nominal = cameras.nominal
@@ -144,7 +169,9 @@ def render(
     )
 
 
-def photograph(tracer: Tracer, painter: Painter, camera: SceneCamera) -> FloatArray:
+def photograph(
+    tracer: Tracer, painter: Painter, camera: SceneCamera, haze: Haze | None = None
+) -> FloatArray:
     """Return the light in each pixel, shape (height, width, 3), about 0..1."""
     width, height = camera.size
     light = np.empty((height, width, 3), dtype=np.float32)
@@ -155,18 +182,23 @@ def photograph(tracer: Tracer, painter: Painter, camera: SceneCamera) -> FloatAr
     steps = (np.arange(SUBSAMPLES) + 0.5) / SUBSAMPLES - 0.5
     inner = np.stack(np.meshgrid(steps, steps), axis=-1).reshape(1, -1, 2)
 
-    def shoot(pixels: FloatArray) -> tuple[FloatArray, Faces, BoolArray]:
+    def shoot(pixels: FloatArray) -> tuple[FloatArray, Faces, BoolArray, FloatArray]:
         origins, rays = camera.emitted(pixels)
         distance, face = tracer.cast(origins, rays, pixels, bounds)
         points = origins + rays * distance[:, None]
-        return points, face, tracer.lit(points, shadows, sun)
+        way = distance * np.linalg.norm(rays, axis=1)
+        return points, face, tracer.lit(points, shadows, sun), way
+
+    def colours(points: FloatArray, face: Faces, lit: BoolArray, way: FloatArray) -> FloatArray:
+        light = painter.colours(points, face, lit)
+        return light if haze is None else haze.seen(light, way)
 
     for top in range(0, height, _TILE):
         for left in range(0, width, _TILE):
             rows = np.arange(top - 1, min(top + _TILE, height) + 1)
             columns = np.arange(left - 1, min(left + _TILE, width) + 1)
             pixels = np.stack(np.meshgrid(columns, rows), axis=-1).reshape(-1, 2).astype(float)
-            points, face, lit = shoot(pixels)
+            points, face, lit, way = shoot(pixels)
             shape = (len(rows), len(columns))
             mixed = _mixed((2 * face + lit).reshape(shape))
             for box in marks:
@@ -175,12 +207,11 @@ def photograph(tracer: Tracer, painter: Painter, camera: SceneCamera) -> FloatAr
             core[1:-1, 1:-1] = True
             plain = np.flatnonzero(core & ~mixed)
             tile = np.zeros((len(pixels), 3))
-            tile[plain] = painter.colours(points[plain], face[plain], lit[plain])
+            tile[plain] = colours(points[plain], face[plain], lit[plain], way[plain])
             some = np.flatnonzero(core & mixed)
             if len(some):
                 many = (pixels[some][:, None, :] + inner).reshape(-1, 2)
-                colours = painter.colours(*shoot(many))
-                tile[some] = colours.reshape(len(some), -1, 3).mean(1)
+                tile[some] = colours(*shoot(many)).reshape(len(some), -1, 3).mean(1)
             light[top : rows[-1], left : columns[-1]] = tile.reshape(*shape, 3)[1:-1, 1:-1]
     return light
 

@@ -19,6 +19,7 @@ from tests.scenes import (
 from tests.scenes.shapes import boss, box, column, prism
 from tests.scenes.tracing import Tracer
 from tests.scenes.truth import look_square_on, relief_truth, visible_from
+from tests.scenes.wet import under_water
 
 PIXEL = 0.02
 SIZE = (320, 240)  # 6.4 x 4.8 m
@@ -118,3 +119,18 @@ def test_the_demo_scene_has_targets_that_both_cameras_see():
     result = render(demo_scene(texel=0.04), cameras, rng=np.random.default_rng(1))
     assert sum(target.seen for target in result.targets) >= 24
     assert any(target.xyz[2] > 0.1 for target in result.targets)
+
+
+def test_a_long_cornice_seen_through_a_port_is_whole():
+    """Its ends, seen far out, bend away from its middle; by its corners alone that was left out."""
+    cameras = under_water(CAMERAS, indices=(1.0, 1.49, 1.337), thicknesses=(0.05,), z0=(0.25, 0.25))
+    span, y = np.linspace(-9, 9, 37), 1.9
+    scene = Scene(wall=RICH.wall)
+    scene.add(box((-9.0, 9.0), (y - 0.05, y + 0.05), (-0.1, 0.1), RICH.trim))
+    for camera in (cameras.far, cameras.near):
+        low, high = np.split(Tracer(scene).bounds(camera)[0], 2)
+        seen = camera.view_of(np.column_stack([span, 0 * span + y, 0 * span]))
+        assert ((seen >= low) & (seen <= high)).all()
+    middle = cameras.near.view_of(np.array([[0.0, y, 0.1]]))[0]
+    ends = cameras.near.view_of(np.array([[9.0, y - 0.05, -0.1]]))[0]
+    assert middle[1] - ends[1] > 0.1 * SIZE[0]  # so far does it bend

@@ -80,10 +80,9 @@ class Tracer:
         """Return the view rectangle of every body, shape (bodies, 4): low, high."""
         bodies = [*self.scene.solids, *self.scene.cavities]
         rectangles = np.zeros((len(bodies), 4))
+        bulge, steps = getattr(view, "bulge", 0.0), getattr(view, "steps", 1)
         for i, body in enumerate(bodies):
-            grid = np.meshgrid(*body.box.T, indexing="ij")
-            seen = view.view_of(np.stack([axis.ravel() for axis in grid], axis=-1))
-            bulge = getattr(view, "bulge", 0.0)
+            seen = view.view_of(_along_edges(body.box, steps))
             rectangles[i] = *(seen.min(0) - bulge), *(seen.max(0) + bulge)
         return rectangles
 
@@ -233,6 +232,18 @@ def crossing(
         which = np.where(first > enter, len(body.planes), which)
         enter, leave = np.maximum(enter, first), np.minimum(leave, last)
     return enter, leave, which
+
+
+def _along_edges(box: FloatArray, steps: int) -> FloatArray:
+    """Return points along the edges of a box, corners included, shape (n, 3)."""
+    share = np.linspace(0.0, 1.0, steps + 1)
+    edges = []
+    for axis in range(3):
+        sides = [np.array([0.0, 1.0])] * 3
+        sides[axis] = share
+        grid = np.meshgrid(*sides, indexing="ij")
+        edges.append(np.stack([part.ravel() for part in grid], axis=-1))
+    return np.asarray(box[0] + np.concatenate(edges) * (box[1] - box[0]))
 
 
 def _inside(seen: FloatArray, rectangle: FloatArray) -> BoolArray:

@@ -9,6 +9,8 @@ import pytest
 import bifocal
 from bifocal import Pair
 from bifocal.media import MediaPath, interface_axes
+from bifocal.model.ray_field import RayField
+from bifocal.rays import object_rays, plane_position, straight
 from multimedia import Layers
 from photocore.errors import GeometryError, InputError
 from tests.scenes.refracted import pixels_of
@@ -272,25 +274,36 @@ def test_mixed_units_are_told_of():
     assert any("thickest layer" in remark for remark in Pair.from_dict(data).remarks)
 
 
-def test_what_needs_parallel_media_says_so():
-    photos = [np.zeros((60, 80), np.uint8)] * 2
-    leaning = Pair.from_dict(content("leaning port"))
-    for work in (
-        lambda: bifocal.dense_relief(leaning, *photos),
-        lambda: bifocal.orthophoto(leaning, photos[0]),
-    ):
-        with pytest.raises(InputError, match="ports that lean"):
-            work()
+@pytest.mark.parametrize("name", ["port", "tank", "surface", "leaning port"])
+def test_tabulated_rays_are_the_bent_rays(name):
+    """Where they meet the plane to 0.02 mm, against the rays shot to the points."""
+    foot = Pair.from_dict(content(name)).image1.foot
+    field = RayField.over(foot, (-1.2, -0.9, 1.2, 0.9), (-0.4, 0.35))
+    x, y = (a.astype(np.float32) for a in np.meshgrid([-1.1, -0.3, 0.01, 1.0], [-0.8, 0.2, 0.7]))
+    relief = np.linspace(-0.4, 0.35, x.size, dtype=np.float32).reshape(x.shape)
+    points = np.stack([x + field.foot.nadir[0], y + field.foot.nadir[1], relief], axis=-1)
+    rays = object_rays(plane_position(points.astype(float), foot), foot)
+    at_x, at_y, along_x, along_y = field.through(x, y, relief)
+    np.testing.assert_allclose(at_x + field.foot.nadir[0], rays.position[..., 0], atol=2e-5)
+    np.testing.assert_allclose(at_y + field.foot.nadir[1], rays.position[..., 1], atol=2e-5)
+    np.testing.assert_allclose(np.dstack([along_x, along_y]), rays.slope, atol=5e-5)
+    np.testing.assert_allclose(np.dstack(field.slopes(at_x, at_y)), rays.slope, atol=5e-5)
+    flat = field.through(x.ravel(), y.ravel(), relief.ravel())
+    np.testing.assert_array_equal(flat[0], at_x.ravel())
 
 
-@pytest.mark.parametrize("name", ["port", "tank", "surface"])
-def test_a_straight_camera_at_the_distance_sees_as_the_bent_rays_do(name):
-    """A = P d / (d - r) with d = A / |S|, against the rays shot to the points."""
-    path = Pair.from_dict(content(name)).image1.media
-    radius, relief = np.array([1e-3, 0.3, 0.9, 1.4]), np.array([0.2, -0.4, 0.35, 0.1])
-    found = path.distance_at(radius, relief)
-    seen = path.apparent(np.stack([radius, 0 * radius], axis=-1), relief)
-    at_plane = path.trace(seen).position[:, 0]
-    np.testing.assert_allclose(radius * found / (found - relief), at_plane, rtol=1e-6)
-    np.testing.assert_allclose(path.distance_at(at_plane), found, rtol=1e-6)
-    assert path.distance_at(np.array([1e-6]))[0] == pytest.approx(path.near_axis, rel=1e-5)
+@pytest.mark.parametrize("name", ["port", "tank", "surface", "leaning port"])
+def test_near_the_axis_of_the_interfaces_a_straight_camera_sees_alike(name):
+    photo = Pair.from_dict(content(name)).image1
+    foot, axis = photo.foot, np.array([0.0, 0.0, 1.0])
+    if photo.interface_normal is not None:
+        axis = photo.interface_normal / np.linalg.norm(photo.interface_normal)
+    alike = straight(foot)
+    # The ray along the axis and one a thousandth beside it; both meet the plane.
+    for beside in (np.zeros(3), np.array([1e-4, -2e-4, 0.0])):
+        way = -axis + beside
+        away = way[:2] * (-foot.distance / way[2])
+        rays = object_rays(foot.nadir + away, foot)
+        np.testing.assert_allclose(
+            rays.slope, (alike.nadir - rays.position) / alike.distance, atol=1e-9
+        )

@@ -1,4 +1,4 @@
-"""Dense relief and orthophotos of a wall photographed through a port and through a water surface.
+"""Dense relief and orthophotos of a wall photographed through ports and through a water surface.
 
 The photos are rendered by casting refracted rays (tests/scenes/wet.py); lengths are five times
 those of a tank: refraction knows no scale.
@@ -13,7 +13,7 @@ import pytest
 
 from bifocal import dense_relief, match, orthophoto
 from bifocal.files.images import as_grey
-from bifocal.rays import plane_position, point_on_ray
+from bifocal.rays import plane_position, point_on_ray, straight
 from bifocal.relief_maps import surfaces
 from bifocal.relief_maps.frame import make_frame, offsets
 from photocore.errors import InputError
@@ -22,10 +22,14 @@ from tests.scenes.shapes import box
 from tests.scenes.wet import pair_through_media, under_water
 
 PIXEL = 0.0148
-#: Media and the camera centres' distances to the first interface; None in air. [m]
+LEVEL = ((0.0, 0.0), (0.0, 0.0))
+#: Media, the camera centres' distances to the first interface [m] and by what it leans [deg];
+#: None in air.
+LEANS = ((6.0, -4.0), (4.0, -5.0))
 MEDIA = {
     "air": None,
     "port": ((1.0, 1.49, 1.337), (0.05,), (0.25, 0.25)),
+    "leaning port": ((1.0, 1.49, 1.337), (0.05,), (0.25, 0.25), LEANS),
     "surface": ((1.0, 1.337), (), (14.5, 6.5)),
 }
 
@@ -41,8 +45,10 @@ def shot(name):
     if MEDIA[name] is None:
         taken = render(scene, cameras, rng=np.random.default_rng(4))
         return taken, taken.pair, cameras.far
-    indices, thicknesses, z0 = MEDIA[name]
-    wet = under_water(cameras, indices=indices, thicknesses=thicknesses, z0=z0)
+    indices, thicknesses, z0, *leans = MEDIA[name]
+    wet = under_water(
+        cameras, indices=indices, thicknesses=thicknesses, z0=z0, leans=leans[0] if leans else LEVEL
+    )
     taken = render(scene, wet, rng=np.random.default_rng(4))
     return taken, pair_through_media(wet), wet.far
 
@@ -60,7 +66,9 @@ def errors(taken: Rendering, found) -> np.ndarray:
     return error[np.isfinite(error)]
 
 
-@pytest.mark.parametrize("name", ["port", pytest.param("surface", marks=pytest.mark.acceptance)])
+@pytest.mark.parametrize(
+    "name", ["port", "leaning port", pytest.param("surface", marks=pytest.mark.acceptance)]
+)
 def test_relief_through_media_is_good_to_hundredths_of_a_pixel(name):
     """2.4 and 3.1 mm of median, 6.1 and 6.4 mm of mean here; 1 px at a metre is 0.3 m of relief.
 
@@ -69,6 +77,19 @@ def test_relief_through_media_is_good_to_hundredths_of_a_pixel(name):
     found = errors(shot(name)[0], relief(name))
     assert np.median(found) < 0.004
     assert found.mean() < 0.008
+
+
+def test_photos_are_continued_beyond_their_rim_where_media_bend_it():
+    """The rim runs across the grid; matching along an edge to black went wrong there."""
+    taken, pair, _ = shot("port")
+    grid = taken.truth.grid
+    frame = make_frame(pair, as_grey(taken.image1, "1"), as_grey(taken.image2, "2"), grid)
+    for image, seen in ((frame.image1, frame.seen1), (frame.image2, frame.seen2)):
+        assert not seen.all()
+        row = grid.height // 2
+        left = int(np.flatnonzero(seen[row])[0])
+        assert left > 1
+        np.testing.assert_allclose(image[row, :left].astype(float), image[row, left], atol=20)
 
 
 def test_relief_before_the_water_surface_is_refused_by_its_name():
@@ -87,7 +108,7 @@ def test_neglecting_refraction_would_cost_centimetres(name):
     assert np.nanmean(np.abs(off[:, 2])) > 10 * errors(taken, relief(name)).mean()
 
 
-@pytest.mark.parametrize("name", ["port", "surface"])
+@pytest.mark.parametrize("name", ["port", "leaning port", "surface"])
 def test_the_orthophoto_shows_each_place_its_own_pixel(name):
     taken, pair, camera = shot(name)
     places = taken.truth.plane_positions()
@@ -104,11 +125,11 @@ def test_the_orthophoto_shows_each_place_its_own_pixel(name):
 
     wanted = cv2.remap(taken.image1, seen.astype(np.float32), None, cv2.INTER_CUBIC)
     shown = taken.visible1 & (picture.sum(axis=-1) > 0)
-    assert shown.mean() > 0.8
+    assert shown.mean() > (0.7 if name == "leaning port" else 0.8)  # it shows less of the scene
     assert np.abs(picture - wanted)[shown].mean() < 0.5
 
 
-@pytest.mark.parametrize("name", ["air", "port", "surface"])
+@pytest.mark.parametrize("name", ["air", "port", "leaning port", "surface"])
 def test_hidden_pixels_are_found_as_in_air(name):
     taken, pair, camera = shot(name)
     found = orthophoto(pair, taken.image1, taken.truth).hidden
@@ -133,14 +154,16 @@ def test_homologous_points_are_found_along_bent_lines(name):
     assert np.median(np.abs(points.misfit)) < 0.1
 
 
-@pytest.mark.parametrize("name", ["air", "port", "surface"])
+@pytest.mark.parametrize("name", ["air", "port", "leaning port", "surface"])
 def test_relief_falls_away_by_the_slope_of_the_bent_ray(name):
     """At 2 % more misfit than the limit a ramp is doubted, at 2 % less it is not."""
     taken, pair, _ = shot(name)
     grid = taken.truth.grid
-    frame = make_frame(pair, as_grey(taken.image1, "1"), as_grey(taken.image2, "2"), grid)
+    grey = as_grey(taken.image1, "1"), as_grey(taken.image2, "2")
+    frame = make_frame(pair, *grey, grid, (-0.5, 0.0))
     foot = pair.image2.foot
-    x, y = offsets(grid.shape, grid.pixel_of(foot.nadir))
+    # Outwards from where the ray square to the plane meets it.
+    x, y = offsets(grid.shape, grid.pixel_of(straight(foot).nadir))
     steepness = 0.1  # of relief falling outwards, metres per metre
     relief = (-steepness * np.hypot(x, y) * grid.gsd).astype(np.float32)
     row, column = 40, 60

@@ -1,0 +1,84 @@
+"""Grey values to match photos by that were taken through water: weighted, contrast restored.
+
+On its way through water light is lost, red first, and what the water scatters back lies over the
+photo like a veil: the light ``J exp(-c d) + B (1 - exp(-b d))`` of a place at distance d (Jaffe
+1990). Paths to both cameras differ by nearly the same everywhere, so the veil is smooth, and the
+exposure of photo 2 is brought to that of photo 1 as in air. What is lost is contrast, in some
+channels more than in others: their mean has the noise of all and the texture of few.
+"""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from bifocal.files.images import as_grey
+from bifocal.model.image import as_photo
+from bifocal.relief_maps import flow
+from photocore.arrays import ByteArray, Float32Array
+
+#: Grey values that all but these percentiles are stretched to.
+DARKEST, BRIGHTEST, TAILS = 18.0, 238.0, (0.5, 99.5)
+#: Variance that white noise keeps of itself blurred by one pixel: 1 / (4 pi). [px]
+BLURRED = 1 / (4 * np.pi)
+#: Contrast that no channel is taken to fall below. [grey levels]
+LEAST = 0.03
+
+
+def greys_through_water(
+    image1: NDArray[np.generic], image2: NDArray[np.generic]
+) -> tuple[ByteArray, ByteArray]:
+    """Return both photos in grey, for matching.
+
+    Parameters
+    ----------
+    image1, image2 : ndarray of uint8 or uint16, shape (height, width[, 3])
+        Far and near photo.
+
+    Returns
+    -------
+    ndarray of uint8, shape (height, width)
+
+    Raises
+    ------
+    InputError
+        If one is no photo.
+
+    Notes
+    -----
+    Channels weigh as ``contrast / noise²`` of the far photo, the hazier one: of all weighted means
+    the one with the most texture for its noise. Façade 11 through a port, rendered in coastal,
+    turbid and murky water (1 MP; light of 400 to 600 nm lost by 0.2, 0.5 and 0.75 per metre): mean
+    error 3.6 to 3.3, 5.1 to 4.4 and 9.2 to 8.7 mm, measured 91 to 91, 90 to 88 and 63 to 79 %; in
+    clear water as before, 3.1 mm and 91 %.
+    """
+    for image, name in ((image1, "image1"), (image2, "image2")):
+        as_grey(image, name)  # refused by its name if it is no photo
+    photos = [as_photo(image) for image in (image1, image2)]
+    if any(photo.ndim == 2 for photo in photos):
+        plain = [np.asarray(p if p.ndim == 2 else p.mean(-1), np.float32) for p in photos]
+        return _stretched(plain[0]), _stretched(plain[1])
+    weights = _weights(photos[0])
+    first, second = (cv2.transform(photo.astype(np.float32), weights[None]) for photo in photos)
+    return _stretched(np.asarray(first)), _stretched(np.asarray(second))
+
+
+def _weights(photo: NDArray[np.generic]) -> Float32Array:
+    """Return contrast / noise² of the channels, of sum one."""
+    level = 257.0 if photo.dtype == np.uint16 else 1.0
+    shares = []
+    for channel in np.moveaxis(photo, -1, 0):
+        grey = np.asarray(channel, np.float32) / np.float32(level)
+        noise = flow.noise(grey)
+        variance = float(np.median(flow.local_contrast(grey))) ** 2 - BLURRED * noise**2
+        shares.append(np.sqrt(max(variance, LEAST**2)) / noise**2)
+    return np.asarray(shares, np.float32) / np.float32(sum(shares))
+
+
+def _stretched(grey: Float32Array) -> ByteArray:
+    """Return grey values stretched to eight bits."""
+    low, high = np.percentile(grey[::4, ::4], TAILS)
+    share = (BRIGHTEST - DARKEST) / max(float(high - low), 1.0)
+    stretched = (grey - np.float32(low)) * np.float32(share) + np.float32(DARKEST)
+    return np.clip(np.rint(stretched), 0, 255).astype(np.uint8)
