@@ -106,7 +106,7 @@ _GROUPS: tuple[tuple[str, str, tuple[tuple[str, str], ...]], ...] = (
             ("bend = first * cosine  # Maas Eq. (3)", "bend = index * cosine  # Maas Eq. (3)"),
             ("by_bend = -0.5 * excess", "by_bend = 0.5 * excess"),
             ("return by_away, turned - rays.slope", "return by_away, turned + rays.slope"),
-            ("* others[-1] / first)", "* others[0] / first)"),
+            ("h * last / index for h", "h * index / last for h"),
         ),
     ),
     (

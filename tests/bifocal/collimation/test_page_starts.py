@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import shutil
 
 import openpyxl
@@ -195,17 +194,6 @@ def test_a_set_up_that_is_no_pair_is_refused_in_words(survey, cells, words) -> N
         pass
     after = [n for n in sorted(p.name for p in survey.parent.iterdir()) if "journal" not in n]
     assert after == before
-
-
-def test_a_pair_through_water_is_refused_before_anything_is_drawn_wrongly(tmp_path) -> None:
-    folder = sample_folder(tmp_path)
-    path = folder / "facade.pair.json"
-    data = json.loads(path.read_text())
-    data["layers"] = {"indices": [1.0, 1.5, 1.337], "thicknesses": [0.01]}
-    data["image1"]["z0"] = data["image2"]["z0"] = 0.05
-    path.write_text(json.dumps(data))
-    with pytest.raises(ValueError, match="bifocal pick"), opened(path):
-        pass
 
 
 def test_other_photos_than_the_workbooks_are_refused(survey) -> None:
