@@ -11,10 +11,9 @@ from typing import Any
 import numpy as np
 
 from bifocal.model.orientation_precision import NAMES
-from bifocal.orientation import validation
+from bifocal.orientation import facade_lines, validation
 from bifocal.orientation.area_points import even_points
 from bifocal.orientation.control_points import SiteMeasures
-from bifocal.orientation.facade_lines import contradiction_in_words, lines_of_photos
 from bifocal.orientation.interior_orientation import SIGMA_RADIAL, Cameras, Images, Interior
 from bifocal.orientation.pair_adjustment import (
     AdjustedPair,
@@ -356,13 +355,18 @@ def _with_lines(pair: OrientedPair, images: Images) -> OrientedPair:
     """
     old, adjusted = pair.observations, pair.adjusted
     bent = old.radial_models(adjusted.radial)
-    lines = lines_of_photos(images, adjusted.cameras, old.interiors, bent)
+    lines = facade_lines.lines_of_photos(images, adjusted.cameras, old.interiors, bent)
     tests = [line_test(line, adjusted) for line in lines]
     for line, test in zip(lines, tests, strict=True):
         if test > WALL_LIMIT:
-            pair = pair.told(contradiction_in_words(line, adjusted.cameras, test))
+            pair = pair.told(facade_lines.contradiction_in_words(line, adjusted.cameras, test))
     kept = tuple(x for x, test in zip(lines, tests, strict=True) if test <= WALL_LIMIT)
-    return pair.readjusted(lines=kept).settled() if kept else pair
+    try:
+        turned = pair.readjusted(lines=kept).settled() if kept else pair
+    except GeometryError:  # no tie was left on the wall
+        return pair.told(facade_lines.LINES_OFF_WALL)
+    stays = turned.observations.wall.sum() >= facade_lines.WALL_KEPT * old.wall.sum()
+    return turned if stays else pair.told(facade_lines.LINES_OFF_WALL)
 
 
 def _sigma_ratio(pair: OrientedPair) -> float:

@@ -5,6 +5,7 @@ from __future__ import annotations
 SOLVE = "--d1 17.5 --d2 9.5 --c1 35 --c2 19"
 WATER = "--water-level 1 --index 1.34"
 CURVE = "multimedia epipolar tank.toml --camera cam1 --to cam2"
+BOARDS = "cam1_1.png cam1_2.png cam1_3.png"
 RING = "multimedia design --distance 0.6 --c 25 --extent 0.3x0.3 --depths 0.02x0.2"
 CANON = "bifocal plan --focal 35 --focal 19 --sensor 22.7x15.1 --pixels 3072x2048"
 ALIGN = "bifocal align far.jpg near.jpg --focal1 35 --focal2 19 --sensor-width 22.7 --out o.json"
@@ -115,7 +116,7 @@ OUTPUTS: list[tuple[str, ...]] = [
     ("multimedia resect tank.toml --out {}", ".toml"),
     ("multimedia resect tank.toml --residuals {}", ".csv"),
     ("multimedia adjust tank.toml --out {}", ".toml"),
-    ("multimedia boards tank.toml far.jpg --board 9x6 --square 1 --out {}", ".toml"),
+    (f"multimedia boards tank.toml {BOARDS} --board 9x6 --square 5 --out {{}}", ".toml"),
     ("multimedia adjust tank.toml --report {}", ".html"),
     (CURVE + " --out {}", ".csv"),
     (CURVE + " --picture {}", ".png"),

@@ -7,6 +7,7 @@ import zipfile
 from dataclasses import replace
 from pathlib import Path
 
+import cv2
 import laspy
 import numpy as np
 import rasterio
@@ -203,5 +204,19 @@ def _tank(folder: Path) -> None:
             image=np.concatenate([project(c, points, glass) for c in views]),
         ),
     )  # fmt: skip
+    _boards(folder)
     write_project(folder / "tank.toml", whole)
     write_experiment(folder / "ptv", whole)
+
+
+def _boards(folder: Path) -> None:
+    """Write three photos of a chessboard, of the first camera of the tank."""
+    squares = np.kron(np.indices((7, 10)).sum(0) % 2, np.ones((60, 60)))
+    board = np.pad(np.where(squares > 0, 20, 235), 60, constant_values=235).astype(np.uint8)
+    height, width = board.shape
+    corners = np.array([[0, 0], [width, 0], [width, height], [0, height]], np.float32)
+    for number, (x, y) in enumerate(((0, 0), (120, 40), (-60, 90)), start=1):
+        seen = [[200 + x / 2, 150 + y], [980, 160 + y / 2], [1000 - x, 760], [220, 740 - y]]
+        turn = cv2.getPerspectiveTransform(corners, np.array(seen, np.float32))
+        image = cv2.warpPerspective(board, turn, (1280, 1024), borderValue=(128,))
+        cv2.imwrite(str(folder / f"cam1_{number}.png"), image)
