@@ -17,6 +17,7 @@ from photocore.distortion import NAMES, Brown, Convention
 from photocore.errors import GeometryError, InputError
 from photocore.rotation import rotation_vector_from_angle_rates
 from tests.multimedia.mp_camera import derivative, image
+from tests.rounding import EPS
 
 PLAIN = {
     "X0": 0.05, "Y0": -0.03, "Z0": 0.5, "omega": 0.2, "phi": -0.15, "kappa": 0.7,
@@ -264,5 +265,6 @@ def test_points_at_infinity_have_no_image_and_no_warning():
     far = [(0.1, 0.0, -np.inf), (np.inf, 0.0, -0.2), POINTS[0]]
     image = project(camera, far, layers)
     assert np.isnan(image[:2]).all()
-    np.testing.assert_array_equal(image[2], project(camera, POINTS[0], layers))
+    # Three points and one take other roads through linear algebra: 1 ulp apart on some processors.
+    np.testing.assert_allclose(image[2], project(camera, POINTS[0], layers), rtol=16 * EPS)
     assert projection_status(camera, far, layers) == ["not a number", "not a number", "ok"]
