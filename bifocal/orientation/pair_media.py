@@ -130,10 +130,10 @@ class PairMedia:
         port = None if first is None else (first, first if second is None else second)
         layers = Layers(indices=tuple(indices), thicknesses=tuple(thicknesses))
         media = cls(layers=layers, port=port, depth=depth, normals=normals)
-        sigmas = {}
-        for name in (*estimate, *(priors or {})):
+        sigmas, known = {}, dict(priors or {})
+        for name in (*estimate, *known):
             start = media.value(name) if name in media._allowed else 0.0
-            sigmas[name] = (priors or {}).get(name) or max(typical_sigma(name, start), 1e-6)
+            sigmas[name] = known.get(name, max(typical_sigma(name, start), 1e-6))
         return replace(media, sigmas=sigmas)
 
     @property

@@ -375,6 +375,7 @@ def test_a_set_up_as_typed_goes_through_media_with_what_is_uncertain_of_it(place
         (["--indices", "1,1.337", "--depth", "0.6", "--port-normal", "axis"], "goes with --port"),
         (["--indices", "1,1.337", "--port", "0.05", "--port-normal", "up"], "expected axis"),
         (["--indices", "1,1.337", "--port", "0.05", "--prior", "index2"], "label=sigma"),
+        (["--indices", "1,1.337", "--port", "0.05", "--prior", "index2=0"], "above zero"),
     ],
 )
 def test_options_that_do_not_describe_media_are_refused(desk, options, message):
