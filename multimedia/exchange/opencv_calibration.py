@@ -82,7 +82,7 @@ def write_opencv(path: Path, project: Project, *, overwrite: bool = False) -> tu
     texts = {name: _calibration_text(path, view) for name, view in views.items()}
     if single:
         with atomic_path(path, overwrite=overwrite) as temporary:
-            temporary.write_text(*texts.values(), encoding="utf-8")
+            temporary.write_text("".join(texts.values()), encoding="utf-8")
     else:
         with atomic_folder(path, overwrite=overwrite) as folder:
             for name, text in texts.items():
