@@ -110,7 +110,8 @@ def _mark_depths(axes: Any, curves: Sequence[FloatArray], depths: Sequence[Float
         )  # fmt: skip
         for value, mark in zip(inside, marks, strict=True) if named < MOST_NAMED else ():
             axes.annotate(
-                f"Z {value:g}", mark, fontsize=7, xytext=(-36, -3), textcoords="offset points",
+                f"Z {value:g}", mark, fontsize=7, textcoords="offset points",
+                xytext=(8 if named % 2 else -36, -3),  # neighbours keep off each other
                 bbox={"boxstyle": "round,pad=0.15", "facecolor": "white", "linewidth": 0.3},
             )  # fmt: skip
         named += 1
