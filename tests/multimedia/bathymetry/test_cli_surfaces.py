@@ -18,7 +18,11 @@ from click.testing import CliRunner
 from scipy.optimize import minimize
 
 from multimedia import read_project
+from multimedia.bathymetry.correction_job import Outcome
 from multimedia.cli.main import main
+from multimedia.media.height_field import WaveSurface
+from multimedia.media.surfaces import Plane
+from photocore.errors import GeometryError
 
 INDEX = 1.34
 RNG = np.random.default_rng(12)
@@ -265,3 +269,14 @@ def test_bad_surfaces_of_a_project_are_named(tmp_path) -> None:
         (tmp_path / "sea.toml").write_text(head + media + camera)
         with pytest.raises(ValueError, match=message):
             read_project(tmp_path / "sea.toml")
+
+
+def test_points_that_no_rays_reach_are_not_said_to_be_dry() -> None:
+    wavy = WaveSurface.sinusoid(0.0, amplitude=0.05, wavelength=4.0)
+    for surface, more in ((wavy, r"oblique rays out with --max-angle"), (Plane.level(0.0), "")):
+        outcome = Outcome(counts={"failed": 2}, lowest=-2.0, highest=-1.0)
+        with pytest.raises(GeometryError, match=rf"none of 2 points could be corrected.*{more}"):
+            outcome.judge(surface, allow_dry=False)
+        outcome = Outcome(counts={"failed": 1, "rays": 1}, lowest=-2.0, highest=-1.0, _wet=1)
+        outcome.judge(surface, allow_dry=False)
+        assert ("--max-angle" in outcome.remarks[0]) == bool(more)
