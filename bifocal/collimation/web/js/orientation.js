@@ -58,11 +58,14 @@ export class OrientationStage {
     const heads = ["tape.from", "tape.to", "tape.length", "tape.sigma"];
     const inputs = heads.map((key, index) => h("input", { type: "text", "aria-label": t(key),
       placeholder: t(key).replace(/ ?\[.*/, ""), inputmode: index > 1 ? "decimal" : "text", testid: `tape-${index}` }));
-    const add = () => {
-      const [from, to, ...numbers] = inputs.map(({ value }) => value.trim());
+    const add = async () => {
+      const typed = inputs.map(({ value }) => value);
+      const [from, to, ...numbers] = typed.map((value) => value.trim());
       const length = parseNumber(numbers[0]);
       if (!from || !to || !(length > 0)) return this.app.say(t("tape.incomplete"), "warning");
-      this.app.send("tape.set", { from, to, length, sigma: numbers[1] || null });
+      const accepted = await this.app.send("tape.set", { from, to, length, sigma: numbers[1] || null });
+      // A refused tape stays to be mended; so does one typed meanwhile.
+      if (!accepted || inputs.some(({ value }, index) => value !== typed[index])) return undefined;
       for (const input of inputs) input.value = "";
       return inputs[0].focus();
     };
@@ -97,7 +100,7 @@ export class OrientationStage {
     const area = h("textarea", { rows: "8", "aria-label": t("control.pasteArea"),
       placeholder: t("control.pasteArea"), testid: "paste-area" });
     this.app.dialog(t("control.paste"), [h("p", { class: "hint" }, t("control.pasteHint")), area],
-      t("control.pasteTake"), () => this.app.send("control.paste", { text: area.value }));
+      t("control.pasteTake"), () => this.app.connection.send("control.paste", { text: area.value }));
   }
 
   async prepare(state) {

@@ -1,6 +1,6 @@
 /** Stage 1: two photos dropped; what their files do not tell is asked in words. */
 import { h, keyedRows, setText } from "./dom.js";
-import { button, fill, labelled, numberInput } from "./fields.js";
+import { afresh, button, fill, labelled, numberInput } from "./fields.js";
 import { photoMark } from "./tiles.js";
 import { t } from "./words/words.js";
 
@@ -92,6 +92,7 @@ export class PhotosStage {
     const photo = state.photos.find(({ image }) => image === card.image);
     card.element.hidden = !photo;
     if (!photo) return;
+    if (card.name.textContent !== photo.name) afresh([card.focal_mm, card.sensor_width_mm]);
     setText(card.name, photo.name);
     const size = `${photo.width} × ${photo.height} px`;
     setText(card.facts, [size, photo.camera].filter(Boolean).join(" · "));

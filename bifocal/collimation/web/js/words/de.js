@@ -50,6 +50,7 @@ export default {
   "setup.sigma_d1": "Sigma von d1",
   "setup.sigma_d2": "Sigma von d2",
   "field.number": "Bitte eine Zahl eingeben.",
+  "field.refused": "So abgelehnt; bitte ändern.",
   "pane.photo": "Foto {image}, {role}",
   "pane.wall": "Beide Fotos auf der Wand, überlagert",
   "pane.products": "Relief und Orthofoto auf der Wand",

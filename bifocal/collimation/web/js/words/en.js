@@ -50,6 +50,7 @@ export default {
   "setup.sigma_d1": "Sigma of d1",
   "setup.sigma_d2": "Sigma of d2",
   "field.number": "Please type a number.",
+  "field.refused": "Refused as it is; change it.",
   "pane.photo": "Photo {image}, {role}",
   "pane.wall": "Both photos on the wall, superimposed",
   "pane.products": "Relief and orthophoto on the wall",

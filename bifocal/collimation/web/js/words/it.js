@@ -50,6 +50,7 @@ export default {
   "setup.sigma_d1": "Sigma di d1",
   "setup.sigma_d2": "Sigma di d2",
   "field.number": "Scrivi un numero.",
+  "field.refused": "Così è rifiutato; cambialo.",
   "pane.photo": "Foto {image}, {role}",
   "pane.wall": "Le due foto sul muro, sovrapposte",
   "pane.products": "Rilievo e ortofoto sul muro",
