@@ -7,6 +7,7 @@ import * as drawing from "./drawing.js";
 import { button, fill, numberInput, textInput } from "./fields.js";
 import { asTaken } from "./geometry.js";
 import { Loupe } from "./loupe.js";
+import { mediaWords } from "./media.js";
 import { Picker } from "./picker.js";
 import { photoMark } from "./tiles.js";
 import { Pane, pixelView, spread, tileLayer } from "./viewer.js";
@@ -190,6 +191,15 @@ export class OrientationStage {
     this.known.replaceChildren(...rows.filter(([, value, sigma]) => value !== null || Number.isFinite(sigma))
       .map(([name, value, sigma]) => h("div", {}, h("dt", {}, name), h("dd", {},
         `${value === null ? "" : number(value, 3)}${Number.isFinite(sigma) ? ` ± ${number(sigma, 3)}` : ""} m`.trim()))));
+    this.#tellMedia(pair?.images.map(({ media }) => media) ?? [], sigmas);
+  }
+
+  /** What the pair looks through, and where that begins. */
+  #tellMedia(seen, sigmas) {
+    if (!seen[0]) return;
+    const rows = [[t("known.media"), mediaWords(seen[0], sigmas)],
+      ...seen.map(({ z0 }, index) => [t("known.interface", { image: index + 1 }), `${number(z0, 3)} m`])];
+    this.known.append(...rows.map(([name, text]) => h("div", {}, h("dt", {}, name), h("dd", {}, text))));
   }
 
   #controlRow(item) {
