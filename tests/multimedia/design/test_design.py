@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from types import SimpleNamespace
 
 import numpy as np
 import openpyxl
@@ -11,6 +12,7 @@ from click.testing import CliRunner
 
 from multimedia import Camera, FlatInterface, Layers, intersect, project
 from multimedia.cli.main import main
+from multimedia.design import design_files
 from multimedia.design.accuracy import (
     calibration_costs,
     compare_placements,
@@ -18,6 +20,7 @@ from multimedia.design.accuracy import (
     ring_of_cameras,
     study_setup,
 )
+from multimedia.design.design_files import write_design_plot
 from photocore.errors import GeometryError, InputError
 
 TANK = FlatInterface(layers=Layers(indices=(1.0, 1.5, 1.337), thicknesses=(0.01,)))
@@ -171,3 +174,23 @@ def test_a_ring_stands_before_its_faces_wherever_they_are() -> None:
     port = FlatInterface(layers=layers, point=(0, 0, -0.03), moves_with_camera=True)
     with pytest.raises(InputError, match="moves with the camera"):
         ring_of_cameras(3, 0.6, 0.4, interface=port, target=(0, 0, -1), **given)
+
+
+def test_the_plot_holds_no_empty_panel_and_no_curve_beyond_its_rim(monkeypatch, tmp_path):
+    """Angles near 180 degrees, no cone to place, sigmas of micrometres in their own unit."""
+    figures = []
+    monkeypatch.setattr(
+        design_files, "write_figure", lambda _, figure, **__: figures.append(figure)
+    )
+    depth = np.linspace(0.02, 0.2, 4)
+    by_depth = np.column_stack([depth, *(np.full(4, s) for s in (2e-5, 2e-5, 6e-5, 173.0, 171.0))])
+    design = SimpleNamespace(by_depth=by_depth, placements=(), planarity=(), unit="m")
+    write_design_plot(tmp_path / "design.png", design)
+    precision, angles = figures[0].axes
+    for axes in (precision, angles):
+        low, high = axes.get_ylim()
+        values = np.concatenate([line.get_ydata() for line in axes.lines])
+        assert low == 0
+        assert values.max() < 0.9 * high
+    assert precision.get_ylabel() == "[µm]"
+    np.testing.assert_allclose(precision.lines[2].get_ydata(), 60.0)
