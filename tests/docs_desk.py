@@ -18,7 +18,7 @@ from PIL import Image
 
 from bifocal import Pair
 from bifocal.cli.main import main
-from bifocal.demo import SAMPLE
+from bifocal.demo import SAMPLE, WATER_SAMPLE
 from photocore.arrays import ByteArray
 from tests.bifocal.campaigns import sample_tables
 from tests.scenes import demo_scene
@@ -61,6 +61,7 @@ def make_desk(folder: Path) -> None:
     _workbook(folder, rows)
     _pick_tables(folder, rows)
     _reef(folder, rows)
+    shutil.copytree(WATER_SAMPLE, folder / "under-water")
     _lenses(folder)
     shutil.copyfile(folder / "points.csv", folder / "control.csv")
     for pair, name in (("a", "left"), ("b", "middle"), ("c", "right")):

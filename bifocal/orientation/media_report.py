@@ -103,7 +103,7 @@ def refuse_impossible_media(adjusted: AdjustedPair, given: PairMedia) -> None:
             else ""
         )
         raise GeometryError(
-            f"{name} comes out as {value:.4g} +- {own:.2g}, {start:g} was given: the control "
+            f"{name} comes out as {value:.4g} ± {own:.2g}, {start:g} was given: the control "
             f"points cannot carry it{alike}. Give what is known as a standard deviation (--prior "
             f"{name}={typical_sigma(name, start):.3g}), measure points farther off the wall, or "
             f"take {name} out of --estimate. Check the focal lengths too: a wrong one looks like a "
