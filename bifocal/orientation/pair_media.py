@@ -227,7 +227,9 @@ class PairMedia:
         """
         rows, names = list(names_of(self.layers)), self.names
         out = np.zeros((len(rows), len(names)))
-        out[: len(NAMES), : len(NAMES)] = np.eye(len(NAMES))
+        first, second = (isinstance(normal, str) for normal in self.normals)
+        stays = self.depth is not None
+        out[:, : len(NAMES)] = by_cameras(self.layers, stays=stays, turning=(first, second))
         for column, name in enumerate(names[len(NAMES) :], start=len(NAMES)):
             if name in rows:
                 out[rows.index(name), column] = 1.0
@@ -235,15 +237,8 @@ class PairMedia:
                 z0 = rows.index(f"z0 {number}")
                 if name in ("port", f"port{number}"):
                     out[z0, column] = 1.0
-                elif self.depth is not None and (name == "depth" or name.startswith("thickness")):
+                elif stays and (name == "depth" or name.startswith("thickness")):
                     out[z0, column] = -1.0
-        for number in (1, 2):
-            if self.depth is not None:
-                out[rows.index(f"z0 {number}"), names.index(f"Z {number}")] = 1.0
-            if isinstance(self.normals[number - 1], str):
-                for axis in "XYZ":
-                    lean, turn = f"lean {axis} {number}", f"turn {axis} {number}"
-                    out[rows.index(lean), names.index(turn)] = 1.0
         return out
 
     def near_axis_rate(self) -> float:
@@ -251,6 +246,28 @@ class PairMedia:
         if self.port is not None:
             return 1.0
         return self.layers.indices[-1] / self.layers.indices[0]
+
+
+def by_cameras(layers: Layers, *, stays: bool, turning: tuple[bool, bool]) -> FloatArray:
+    """Return how what `names_of` counts moves with the cameras, their media given, shape (k, 24).
+
+    Parameters
+    ----------
+    layers : Layers
+    stays : bool
+        Whether the media stay with the object: the farther from a camera that moves away.
+    turning : pair of bool
+        Whether the far and the near camera's port turns with it.
+    """
+    rows = list(names_of(layers))
+    out = np.eye(len(rows), len(NAMES))
+    for number, turns in enumerate(turning, start=1):
+        if stays:
+            out[rows.index(f"z0 {number}"), NAMES.index(f"Z {number}")] = 1.0
+        for axis in "XYZ" if turns else "":
+            lean, turn = f"lean {axis} {number}", f"turn {axis} {number}"
+            out[rows.index(lean), NAMES.index(turn)] = 1.0
+    return out
 
 
 def media_of(given: Mapping[str, Any]) -> PairMedia | None:
