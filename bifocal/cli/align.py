@@ -119,13 +119,14 @@ points.csv, one line per control point; r blank = on the wall; pixels in both ph
 @click.option("--port-normal2", metavar="axis|X,Y,R", help="The same, near photo only.")
 @click.option(
     "--estimate", default="", type=Names(), metavar="LIST",
-    help="Unknowns of the media, of index1,..., thickness1,..., port, port1, port2, depth; known "
-    "beforehand as --prior says, indices else to 0.005, lengths to a tenth.  [default: none]",
+    help="Unknowns of the media, of index1,..., thickness1,..., port, port1, port2, lean1, lean2 "
+    "(how a port leans), depth; known beforehand as --prior says, indices else to 0.005, lengths "
+    "to a tenth, leans to 1 degree.  [default: none]",
 )  # fmt: skip
 @click.option(
     "--prior", multiple=True, metavar="NAME=SIGMA",
-    help="Standard deviation of what is given of an unknown of the media [-, m]; inf: not known at "
-    "all; repeat it.",
+    help="Standard deviation of what is given of an unknown of the media [-, m, leans: degrees]; "
+    "inf: not known at all; repeat it.",
 )  # fmt: skip
 @choice("--unit", "m|cm|mm", "Unit of the control coordinates.  [default: the headings', else m]")
 @number("--sigma-pick", "PX", "Precision of a pick [px].", default=0.5)
