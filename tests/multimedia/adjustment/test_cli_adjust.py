@@ -58,7 +58,7 @@ def test_adjusting_writes_project_and_report_and_says_the_salinity(project, tmp_
     assert "http" not in text
     # Media, units, program and options.
     assert re.search(r"<td>1\.00000, 1\.\d+, 1\.336\d+</td>", text)
-    assert re.search(r"<td>\w+:k1</td><td>\S+</td><td>\S+</td><td>mm\^-2</td>", text)
+    assert re.search(r"<td>\w+:k1</td><td>\S+</td><td>\S+</td><td>mm⁻²</td>", text)
     assert "multimedia adjust" in page.text
     assert "tank.toml" in page.text
     assert "Made by bifocal" in page.text

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from types import SimpleNamespace
 
 import numpy as np
 import openpyxl
@@ -11,6 +12,7 @@ from click.testing import CliRunner
 
 from multimedia import Camera, FlatInterface, Interfaces, Layers, intersect, project, write_project
 from multimedia.cli.main import main
+from multimedia.design import design_files
 from multimedia.design.accuracy import (
     calibration_costs,
     compare_placements,
@@ -18,6 +20,7 @@ from multimedia.design.accuracy import (
     ring_of_cameras,
     study_setup,
 )
+from multimedia.design.design_files import write_design_plot
 from multimedia.media.surfaces import Sphere
 from multimedia.projects.model import ObjectPoints, Project
 from photocore.errors import GeometryError, InputError
@@ -203,3 +206,23 @@ def test_domes_and_graded_water_are_studied_too(tmp_path) -> None:
     assert "port:centreX" in done.stdout
     assert "0.001 per m" in done.stdout
     assert "needs cameras that all look through the same plane-parallel layers" in done.stderr
+
+
+def test_the_plot_holds_no_empty_panel_and_no_curve_beyond_its_rim(monkeypatch, tmp_path):
+    """Angles near 180 degrees, no cone to place, sigmas of micrometres in their own unit."""
+    figures = []
+    monkeypatch.setattr(
+        design_files, "write_figure", lambda _, figure, **__: figures.append(figure)
+    )
+    depth = np.linspace(0.02, 0.2, 4)
+    by_depth = np.column_stack([depth, *(np.full(4, s) for s in (2e-5, 2e-5, 6e-5, 173.0, 171.0))])
+    design = SimpleNamespace(by_depth=by_depth, placements=(), planarity=(), unit="m")
+    write_design_plot(tmp_path / "design.png", design)
+    precision, angles = figures[0].axes
+    for axes in (precision, angles):
+        low, high = axes.get_ylim()
+        values = np.concatenate([line.get_ydata() for line in axes.lines])
+        assert low == 0
+        assert values.max() < 0.9 * high
+    assert precision.get_ylabel() == "[µm]"
+    np.testing.assert_allclose(precision.lines[2].get_ydata(), 60.0)
