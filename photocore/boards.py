@@ -101,7 +101,7 @@ def _detected(image: ByteArray, name: str, pattern: str, size: tuple[int, int]) 
         seen, corners = cv2.findChessboardCorners(_reduced(image)[0], size, flags=flags)
         if not seen:
             return None
-        corners = corners.reshape(-1, 2) * _reduced(image)[1]
+        corners = (corners.reshape(-1, 2) + 0.5) * _reduced(image)[1] - 0.5
         corners = _refined(image, corners.astype(np.float32), size)
         board = np.mgrid[0:columns, 0:rows].T.reshape(-1, 2)
     else:

@@ -275,8 +275,8 @@ class Pair:
         if self.leans:
             raise InputError(
                 f"{what} is not made through ports that lean (`interface_normal`): it needs media "
-                "parallel to the reference plane. Single points are solved through them: `solve`, "
-                "to a text table (.csv)."
+                "parallel to the reference plane. Single points are matched and solved through "
+                "them by `match` and `solve`, to a text table (.csv)."
             )
 
     @property

@@ -118,11 +118,11 @@ def find_sets(
     sensor : Sensor
         For the units of the image coordinates.
     """
-    files = [
-        path for path in sorted(folder.rglob("*.crd")) if not path.name.startswith((".", "._"))
-    ]
-    bodies = [path for path in sorted(folder.rglob("*.fix")) if not path.name.startswith(".")]
-    texts = [path for path in sorted(folder.rglob("*.txt")) if not path.name.startswith(".")]
+    found = [path for path in sorted(folder.rglob("*")) if not path.name.startswith(".")]
+    files, bodies, texts = (
+        [path for path in found if path.suffix.lower() == ending]
+        for ending in (".crd", ".fix", ".txt")
+    )
     labels, odd = labels_of(stems), dict[str, None]()
     cameras = []
     for k, image in enumerate(images):
@@ -135,7 +135,7 @@ def find_sets(
             theirs += [path for path in texts if _position(label).search(path.name)]
             positions.append(_pairs(folder, ours, theirs, sensor, label, odd))
         own = Path(image.replace("\\", "/")).name
-        taken = [path for path in files if path.name == f"{own}.crd"]
+        taken = [path for path in files if path.name.lower() == f"{own}.crd".lower()]
         whole = _pairs(folder, taken, [], sensor, "", odd)
         cameras.append(PlaneCandidates(positions=tuple(positions), together=whole))
     return tuple(cameras), tuple(odd)
@@ -152,7 +152,8 @@ def _pairs(
     """Return the sets that each .crd makes with the .fix beside it, else with another's."""
     sets: list[PlaneSet] = []
     for crd in files:
-        beside = crd.with_suffix(".fix")
+        beside = crd.with_suffix(".FIX")
+        beside = beside if beside.is_file() else crd.with_suffix(".fix")
         for fix in dict.fromkeys([*([beside] if beside.is_file() else []), *bodies]):
             source = crd.relative_to(folder).as_posix()
             if fix != beside:
@@ -160,7 +161,7 @@ def _pairs(
             try:
                 sets.append(read_set(crd, fix, sensor=sensor, label=label, source=source))
             except InputError as error:
-                if fix.suffix == ".fix":  # other text may be of anything
+                if fix.suffix.lower() == ".fix":  # other text may be of anything
                     odd[f"left out: {error}"] = None
                 continue
             break

@@ -192,6 +192,14 @@ def test_a_body_file_in_another_folder_serves_where_the_own_is_missing(folder):
     assert "plane1 (cal/plane1_cam1.tif.crd with cal/old/plane1_cam1 copy.tif.fix)" in said
 
 
+def test_endings_in_capitals_are_the_same_files(folder):
+    for path in [*folder.rglob("*_cam1.tif.crd"), *folder.rglob("*_cam1.tif.fix")]:
+        path.rename(path.with_name(path.name.replace(path.suffixes[-1], path.suffixes[-1].upper())))
+    said = " ".join(import_openptv(folder, out=None).project.remarks)
+    assert "plane2 (cal/plane2_cam1.tif.CRD)" in said
+    assert "cam1.tif.CRD with" not in said
+
+
 @pytest.mark.acceptance
 def test_the_body_named_like_the_position_serves_where_no_fix_is_left(folder):
     for path in folder.rglob("plane1_cam1*.fix"):
