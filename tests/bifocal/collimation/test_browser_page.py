@@ -251,3 +251,35 @@ def test_the_page_ships_with_the_package() -> None:
     assert all((WEB / name).is_file() for name in wanted)
     ignored = Path(".gitignore").read_text().split()
     assert not any(f"/{name}/" in str(path) for path in WEB.rglob("*") for name in ignored)
+
+
+def test_a_late_answer_does_not_bring_back_an_older_state(page: Driver) -> None:
+    """Asked for when the stream of news opened, answered after a command had changed the state."""
+    seen = page.tab.evaluate("""async () => {
+        const { Connection } = await import("/js/connection.js");
+        const kept = [window.fetch, window.EventSource];
+        let stream, answer;
+        window.EventSource = class { constructor() { stream = this; } };
+        const connection = new Connection();
+        await connection.start();
+        const first = connection.state;
+        const later = (n, serving = first.serving) =>
+            new Response(JSON.stringify({ ...first, serving, revision: first.revision + n }));
+        window.fetch = async (path) => path === "/api/state"
+            ? new Promise((resolve) => { answer = resolve; })
+            : Response.json({ result: null, state: await later(2).json() });
+        const shown = [];
+        const refreshed = stream.onopen();
+        await connection.send("undo");
+        shown.push(connection.state.revision - first.revision);
+        answer(later(1));
+        await refreshed;
+        shown.push(connection.state.revision - first.revision);
+        const restarted = stream.onopen();
+        answer(later(-1, "another run of the server"));
+        await restarted;
+        shown.push(connection.state.revision - first.revision);
+        [window.fetch, window.EventSource] = kept;
+        return shown;
+    }""")
+    assert seen == [2, 2, -1]
