@@ -131,7 +131,7 @@ _GROUPS: tuple[tuple[str, str, tuple[tuple[str, str], ...]], ...] = (
     (
         "bifocal/files/haze.py",
         "tests/bifocal/files/test_haze.py",
-        (("max(variance, LEAST**2)) / own**2", "max(variance, LEAST**2)) / own"),),
+        (("weights[None])", "weights[None, ::-1])"),),
     ),
     (
         "bifocal/planning/planned_media.py",
