@@ -60,6 +60,7 @@ def make_desk(folder: Path) -> None:
     _workbook(folder, rows)
     _pick_tables(folder, rows)
     _reef(folder)
+    shutil.copytree(WATER_SAMPLE, folder / "under-water")
     _lenses(folder)
     shutil.copyfile(folder / "points.csv", folder / "control.csv")
     for pair, name in (("a", "left"), ("b", "middle"), ("c", "right")):

@@ -377,11 +377,12 @@ def _check_inside(control: Control, pixels: FloatArray, size: tuple[int, int], p
     width, height = size
     outside = (pixels < -0.5).any(axis=1) | (pixels > [width, height]).any(axis=1)
     if outside.any():
-        name = control.ids[int(np.flatnonzero(outside)[0])]
+        name, others = control.ids[int(np.flatnonzero(outside)[0])], int(outside.sum()) - 1
+        lie = f"and {others} more lie" if others else "lies"
         raise InputError(
-            f'control point "{name}" and {int(outside.sum()) - 1} more lie outside the '
-            f"{photo} photo ({width} x {height} px). Were the picks made on a photo of another "
-            "size, or are far and near exchanged?"
+            f'control point "{name}" {lie} outside the {photo} photo '
+            f"({width} x {height} px). Were the picks made on a photo of another size, or are far "
+            "and near exchanged?"
         )
 
 

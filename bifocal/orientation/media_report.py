@@ -109,7 +109,7 @@ def refuse_impossible_media(adjusted: AdjustedPair, given: PairMedia) -> None:
             option, typical = f"lean{name[-1]}", 1.0
             value, own, start = np.degrees([value, own, start]).tolist()
         raise GeometryError(
-            f"{name} comes out as {value:.4g} +- {own:.2g}, {start:g} was given: the control "
+            f"{name} comes out as {value:.4g} ± {own:.2g}, {start:g} was given: the control "
             f"points cannot carry it{alike}. Give what is known as a standard deviation (--prior "
             f"{option}={typical:.3g}), measure points farther off the wall, or take {option} out "
             "of --estimate. Check the focal lengths too: a wrong one looks like a wrong index."

@@ -144,12 +144,12 @@ class PairMedia:
         port = None if first is None else (first, first if second is None else second)
         layers = Layers(indices=tuple(indices), thicknesses=tuple(thicknesses))
         media = cls(layers=layers, port=port, depth=depth, normals=normals)
-        sigmas = {}
-        for name in (*estimate, *(priors or {})):
+        sigmas, known = {}, dict(priors or {})
+        for name in (*estimate, *known):
             start = media.value(name) if name in media._allowed and name not in LEANS else 0.0
             usual = SIGMA_LEAN if name in LEANS else max(typical_sigma(name, start), 1e-6)
             for own in _unknowns(name):
-                sigmas[own] = (priors or {}).get(name) or usual
+                sigmas[own] = known.get(name, usual)
         return replace(media, sigmas=sigmas)
 
     @property

@@ -18,7 +18,7 @@ from click.testing import CliRunner
 from bifocal import Control, Interior, Pair, PairMedia, SiteMeasures, align
 from bifocal.cli.main import main
 from bifocal.media import MediaPath, interface_axes
-from bifocal.model.orientation_precision import NAMES, names_of
+from bifocal.model.orientation_precision import NAMES, from_dict, names_of
 from bifocal.model.refracted_view import seen_through, view_through
 from bifocal.orientation.absolute_orientation import orient_pair
 from bifocal.orientation.bend import bend_in_words
@@ -277,6 +277,17 @@ def test_an_impossible_index_is_never_accepted():
         aligned("port", off_index=0.1, priors={"index3": 0.005})
 
 
+def test_a_surface_behind_the_cameras_is_said_to_be_there():
+    taken, (indices, thicknesses), _ = cameras("surface")
+    xyz = points(np.random.default_rng(1), 12)
+    with pytest.raises(GeometryError, match=r"behind the media as they are given. Check --depth"):
+        align(
+            None, None, interiors=tuple(lens(c) for c in taken),
+            control=control_of(xyz, [c.view_of(xyz) for c in taken], 0.001),
+            media=PairMedia.stated(indices, thicknesses, depth=50.0),
+        )  # fmt: skip
+
+
 def test_without_enough_control_it_says_how_to_go_on():
     taken, (indices, thicknesses), placed = cameras("port")
     xyz = points(np.random.default_rng(1), 3)
@@ -479,6 +490,7 @@ def test_a_set_up_as_typed_goes_through_media_with_what_is_uncertain_of_it(place
         (["--indices", "1,1.337", "--depth", "0.6", "--port-normal", "axis"], "goes with --port"),
         (["--indices", "1,1.337", "--port", "0.05", "--port-normal", "up"], "expected axis"),
         (["--indices", "1,1.337", "--port", "0.05", "--prior", "index2"], "label=sigma"),
+        (["--indices", "1,1.337", "--port", "0.05", "--prior", "index2=0"], "above zero"),
         (["--indices", "1,1.337", "--depth", "0.6", "--estimate", "lean1"], "possible are index1"),
         (["--indices", "1,1.337", "--port", "0.05", "--prior", "lean1=-1"], "above zero"),
     ],
@@ -521,6 +533,12 @@ def test_the_command_writes_media_as_the_pair_file_has_them(desk):
     covariance = np.array(data["orientation"]["covariance"])
     place = data["orientation"]["parameters"].index("index3")
     assert covariance[place, place] == pytest.approx(0.003**2)
+
+
+@pytest.mark.parametrize("stated", [5, None, "ln", [1, 2], {"index1": 1}])
+def test_parameters_of_a_covariance_that_are_no_list_are_refused(stated):
+    with pytest.raises(InputError, match=r'"orientation": expected .* 24 parameters'):
+        from_dict({"parameters": stated, "covariance": [[1.0]]})
 
 
 def test_a_bent_wall_proposes_the_options_for_media():
