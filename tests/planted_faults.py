@@ -110,6 +110,30 @@ _GROUPS: tuple[tuple[str, str, tuple[tuple[str, str], ...]], ...] = (
         ),
     ),
     (
+        "bifocal/orientation/joint_media.py",
+        "tests/bifocal/orientation/test_adjustment_through_media.py",
+        (
+            ("by_camera[:, :, 4:7] += view.by_media", "by_camera[:, :, 4:7] -= view.by_media"),
+            ("self.axes[2] @ camera.rotation)", "self.axes[2] @ camera.rotation.T)"),
+        ),
+    ),
+    (
+        "bifocal/orientation/pair_media.py",
+        "tests/bifocal/orientation/test_align_through_media.py",
+        (
+            ('if name[5] == "X" else 0.0 - aside', 'if name[5] == "X" else aside'),
+            (
+                "return np.asarray(-camera.rotation[2] @ lean)",
+                "return np.asarray(-camera.rotation[2])",
+            ),
+        ),
+    ),
+    (
+        "bifocal/files/haze.py",
+        "tests/bifocal/files/test_haze.py",
+        (("weights[None])", "weights[None, ::-1])"),),
+    ),
+    (
         "bifocal/planning/planned_media.py",
         "tests/bifocal/planning/test_plan_through_media.py",
         (("(rest - self.port) * last / first", "(rest - self.port) * first / last"),),

@@ -479,8 +479,11 @@ def facade(
     Raises
     ------
     InputError
-        Where a step fails: with what it said. What was made before stays and counts.
+        Where a step fails: with what it said. What was made before stays and counts; where nothing
+        was, and the pair cannot be set up as it is described, nothing is written.
     """
+    if not job.folder.exists() and (told := refusal(job)):
+        raise InputError(told)
     outcome = run_survey([job], machines=machines, progress=progress).outcomes[0]
     if outcome.failed_step:
         raise InputError(outcome.message)

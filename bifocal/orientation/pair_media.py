@@ -324,8 +324,8 @@ def media_of(given: Mapping[str, Any]) -> PairMedia | None:
         lost = [name for name in _WITH_INDICES if given.get(name) not in (None, ())]
         if lost:
             raise InputError(
-                f"--{lost[0].replace('_', '-')} goes with --indices: the refractive indices from "
-                "the camera to the wall, e.g. --indices 1,1.49,1.337 --thicknesses 0.01."
+                f"--{lost[0].replace('_', '-')} goes with --indices: give the refractive indices "
+                "from the camera to the wall, e.g. --indices 1,1.49,1.337 --thicknesses 0.01."
             )
         return None
     ports, normals = (
