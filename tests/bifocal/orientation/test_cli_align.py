@@ -183,7 +183,7 @@ def test_a_pick_outside_its_photo_is_refused(folder, column, photo) -> None:
     (folder / "out.csv").write_text("\n".join([*lines[:2], ",".join(fields), *lines[3:]]))
     result = align(folder, "--control", "out.csv", *lens(), out="outside.pair.json")
     assert result.exit_code == 1
-    assert f'"b" and 0 more lie outside the {photo} photo (960 x 640 px)' in result.stderr
+    assert f'"b" lies outside the {photo} photo (960 x 640 px)' in result.stderr
 
 
 def test_a_pair_file_ends_in_json(folder) -> None:
