@@ -97,6 +97,8 @@ def test_json_holds_values_sigmas_and_correlations(project):
         (["none.toml"], 1, "none.toml"),
         (["PROJECT", "--media", "index7"], 1, "index7"),
         (["PROJECT", "--interior", "focus"], 1, "focus"),
+        (["PROJECT", "--interior", "auto,c"], 1, "auto stands alone"),
+        (["PROJECT", "--plate", "all"], 1, "no object point belongs to a group"),
         (["PROJECT", "--scale-bar", "1,2"], 1, "first,second,length,sigma"),
         (["PROJECT", "--prior", "offset"], 1, "label=sigma"),
         (["PROJECT", "--control", "maybe"], 2, "maybe"),
