@@ -9,7 +9,7 @@ from pathlib import Path
 from time import monotonic
 from typing import Any
 
-from bifocal.collimation.stated_media import media_of
+from bifocal.collimation.stated_media import media_from_dict
 from bifocal.files.geotiff import gsd_at_scale
 from bifocal.orientation.align_workflow import (
     AlignOptions,
@@ -74,7 +74,7 @@ def _align(task: Task, progress: Progress) -> dict[str, Any]:
         site=site,
         auto=task["auto"],
         as_set_up=task["as_set_up"],
-        media=media_of(task["setup"]),
+        media=media_from_dict(task["media"]),
         control=_path(task["control"]),
         lengths=_path(task["lengths"]),
     )

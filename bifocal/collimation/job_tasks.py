@@ -15,7 +15,7 @@ from bifocal.collimation.drawing import write_points_drawing
 from bifocal.collimation.jobs import PageJob
 from bifocal.collimation.live_orientation import control_of, lenses_of, site_of
 from bifocal.collimation.session import Session
-from bifocal.collimation.stated_media import lacking
+from bifocal.collimation.stated_media import lacking, media_as_dict, media_of
 from bifocal.collimation.wording import say, without_options
 from bifocal.orientation.control_points import Control
 from photocore.errors import InputError
@@ -169,7 +169,7 @@ def _align_task(session: Session, options: Options) -> dict[str, Any]:
         "lenses": [plain(asdict(lens)) for lens in lenses_of(state)],
         "auto": way == "auto",
         "as_set_up": way == "as set up",
-        "setup": dict(state.setup),
+        "media": media_as_dict(media_of(state.setup, session.pictures.pair)),
         **{key: None if path is None else str(path.resolve()) for key, path in tables.items()},
     }
 
@@ -185,7 +185,7 @@ def _through_media(session: Session, way: str, given: list[float | None]) -> str
     setup, language = session.state.setup, session.state.language or session.language
     if missing := lacking(setup):
         raise InputError(say("media", missing, language))
-    if setup.get("water_index") is None or way == "control":
+    if media_of(setup, session.pictures.pair) is None or way == "control":
         return way
     if None in given[:2]:
         raise InputError(say("media", "control", language))

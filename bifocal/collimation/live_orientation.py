@@ -12,6 +12,7 @@ from bifocal.collimation.stated_media import lacking, media_of
 from bifocal.collimation.wording import say, without_options
 from bifocal.files.images import ImageInfo
 from bifocal.model.orientation_precision import CAMERA, names_of, place_by_media
+from bifocal.model.pair import Pair
 from bifocal.model.refracted_view import RefractedView, foot_of
 from bifocal.orientation.absolute_orientation import orient_pair
 from bifocal.orientation.align_workflow import SIGMA_ON_WALL, KnownLens, interior_of_photo
@@ -106,8 +107,20 @@ def _known(point: PickedControl) -> list[float]:
     return [np.nan if value is None else value for value in point.known]
 
 
-def live_orientation(state: SurveyState, infos: list[ImageInfo], language: str) -> LiveOrientation:
-    """Return what the control points tell, without a look at the photos' content."""
+def live_orientation(
+    state: SurveyState, infos: list[ImageInfo], language: str, pair: Pair | None = None
+) -> LiveOrientation:
+    """Return what the control points tell, without a look at the photos' content.
+
+    Parameters
+    ----------
+    state : SurveyState
+    infos : list of ImageInfo
+        Of both photos.
+    language : str
+    pair : Pair, optional
+        The pair that is shown; what it looks through counts where nothing else was typed.
+    """
     control = control_of(state)
     complete = [
         point for point in state.control.values()
@@ -127,7 +140,7 @@ def live_orientation(state: SurveyState, infos: list[ImageInfo], language: str) 
             (_unseen(interiors[0], infos[0]), _unseen(interiors[1], infos[1])),
             control=control,
             site=site_of(state),
-            media=media_of(state.setup),
+            media=media_of(state.setup, pair),
         )
     except PhotogrammetryError as error:
         told = without_options(str(error))

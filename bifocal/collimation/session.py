@@ -413,9 +413,12 @@ class Session:
         if len(infos) != 2:
             return None
         language = state.language or self.language
-        facts = (dict(state.control), dict(state.tapes), state.setup, state.lenses, language)
+        pair = self.pictures.pair
+        facts = (
+            dict(state.control), dict(state.tapes), state.setup, state.lenses, language, id(pair),
+        )  # fmt: skip
         if self.orientation is None or self.orientation[0] != facts:
-            self.orientation = facts, live_orientation(state, infos, language)
+            self.orientation = facts, live_orientation(state, infos, language, pair)
         return self.orientation[1]
 
     def measure(self, names: Sequence[str]) -> dict[str, float | None]:

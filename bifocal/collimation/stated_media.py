@@ -3,8 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Any
 
+import numpy as np
+
+from bifocal.model.pair import Pair
+from bifocal.orientation.joint_media import media_of as media_of_cameras
 from bifocal.orientation.pair_media import PairMedia
+from multimedia import Layers
 from photocore.adjustment.priors import LEAST_INDEX, MOST_INDEX
 from photocore.errors import InputError
 
@@ -46,11 +52,14 @@ def lacking(setup: Setup) -> str:
     return "" if len(typed & {"port", "depth"}) == 1 else "place"
 
 
-def media_of(setup: Setup) -> PairMedia | None:
+def media_of(setup: Setup, pair: Pair | None = None) -> PairMedia | None:
     """Return the media that are typed; None in air, and while something is lacking.
 
-    With a sigma of its index the water's is an unknown, known so well beforehand.
+    With a sigma of its index the water's is an unknown, known so well beforehand. Where nothing was
+    ever typed, those of the pair that is shown: it may have come with its file.
     """
+    if pair is not None and not any(name in setup for name in MEDIA):
+        return _of_pair(pair)
     water = setup.get("water_index")
     if water is None or lacking(setup):
         return None
@@ -63,3 +72,41 @@ def media_of(setup: Setup) -> PairMedia | None:
     return PairMedia.stated(
         indices, thicknesses, ports=(port, port), depth=setup.get("depth"), priors=priors
     )
+
+
+def _of_pair(pair: Pair) -> PairMedia | None:
+    """Return what a pair looks through: ports that move with it, or what stays with the object."""
+    first, second = media_of_cameras(pair)
+    if first is None or second is None:
+        return None
+    if first.height is not None:
+        return PairMedia(layers=first.layers, depth=first.height - first.layers.thickness)
+    return PairMedia(
+        layers=first.layers,
+        port=(first.z0, second.z0),
+        normals=(pair.image1.interface_normal, pair.image2.interface_normal),
+    )
+
+
+def media_as_dict(media: PairMedia | None) -> dict[str, Any] | None:
+    """Return media as plain data, for the process of a job."""
+    if media is None:
+        return None
+    normals = [None if normal is None else np.asarray(normal).tolist() for normal in media.normals]
+    return {
+        **media.layers.as_dict(), "port": media.port, "depth": media.depth, "normals": normals,
+        "sigmas": dict(media.sigmas),
+    }  # fmt: skip
+
+
+def media_from_dict(data: Mapping[str, Any] | None) -> PairMedia | None:
+    """Return the media of `media_as_dict`."""
+    if data is None:
+        return None
+    layers = Layers(indices=tuple(data["indices"]), thicknesses=tuple(data["thicknesses"]))
+    first, second = (None if n is None else np.array(n) for n in data["normals"])
+    port = data["port"] and (data["port"][0], data["port"][1])
+    return PairMedia(
+        layers=layers, port=port, depth=data["depth"], normals=(first, second),
+        sigmas=data["sigmas"],
+    )  # fmt: skip

@@ -34,6 +34,8 @@ def setup_sheet(builder: BookBuilder, content: SurveyContent) -> None:
     """Write the set-up, typed and calculated, and in one line what it still lacks."""
     sheet, cells = builder.sheet("Setup", "type"), setup_cells(content)
     words = {key: builder.word(key) for key in STATES}
+    if content.media_cells:
+        words["state_scale"] = builder.word("state_scale_media")
     line = state_formula(words, is_pair=content.is_pair)
     sheet.formula("A3", line, state(cells, words), name="setup_state", font=HEAD_FONT)
     sheet.headings(4, ("name", "description", "value", "unit"), (15, 61, 18, 9))

@@ -219,6 +219,21 @@ def test_control_points_and_tapes_are_typed_and_mended(page: Driver) -> None:
     page.settled("state.control.length === 2 && state.tapes.length === 1")
 
 
+#: The next command waits on its way to the server until it is let go.
+SLOW_COMMAND = """() => {
+  const real = window.fetch;
+  window.held = {};
+  const gate = new Promise((done) => { held.release = done; });
+  window.fetch = async (path, ...rest) => {
+    if (path === "/api/command") {
+      await gate;
+      window.fetch = real;
+    }
+    return real(path, ...rest);
+  };
+}"""
+
+
 def test_what_is_refused_stays_as_it_was_typed(page: Driver) -> None:
     """Tape, table and fields keep what the survey does not take, until it is mended."""
     page.click("mode-orientation")
@@ -260,8 +275,14 @@ def test_what_is_refused_stays_as_it_was_typed(page: Driver) -> None:
     page.settled("state.control.some(({ name }) => name === 'K')")
     page.click("mode-photos")
     site = page.tab.get_by_label("Far distance d1")
+    # The page drawn anew while the answer is on its way takes nothing away either.
+    page.tab.evaluate(SLOW_COMMAND)
     site.fill("-17,5")
     page.keys("Enter")
+    page.click("mode-orientation")
+    page.click("mode-photos")
+    assert site.input_value() == "-17,5"
+    page.tab.evaluate("() => held.release()")
     page.wait(f"{toast}.includes('above zero')")
     page.command("control.delete", name="K")
     page.settled("!state.control.some(({ name }) => name === 'K')")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import shutil
 import subprocess
+from types import SimpleNamespace
 
 import cv2
 import numpy as np
@@ -13,7 +14,7 @@ import pytest
 from bifocal import solve
 from bifocal.collimation.job_tasks import task_of
 from bifocal.collimation.pyramids import RectifiedPhoto, max_level
-from bifocal.collimation.stated_media import media_of
+from bifocal.collimation.stated_media import media_from_dict, media_of
 from bifocal.collimation.suggestions import radial_line, seen_in_other, suggest
 from bifocal.model.pair import Pair
 from tests.bifocal.model.test_pair_through_media import PAIRS, content
@@ -225,8 +226,35 @@ def test_media_are_typed_on_the_page_and_what_lacks_is_said(tmp_path):
         assert (state["setup"]["water_index"], state["setup"]["port"]) == (1.337, 0.05)
         task = task_of(session, "align", {})
         assert (task["as_set_up"], task["auto"]) == (True, False)
-        media = media_of(task["setup"])
+        media = media_from_dict(json.loads(json.dumps(task["media"])))
         assert media.layers.indices == (1.0, 1.49, 1.337)
         assert (media.layers.thicknesses, media.port, media.sigmas) == ((0.01,), (0.05, 0.05), {})
         typed(sigma_water_index=0.003)
         assert media_of(session.state.setup).sigmas == {"index3": 0.003}
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_pair_that_came_with_media_is_oriented_through_them_again(name, tmp_path):
+    """Nothing typed: its own ports or glass. Typed, then emptied: air."""
+    folder, seen = folder_of(name, tmp_path), shot(name)
+    pair = Pair.read(folder / "wall.pair.json")
+    with opened(folder / "wall.pair.json") as session:
+        for row, (xyz, one, two) in enumerate(zip(POINTS, *seen, strict=True)):
+            known = dict(zip("XYr", xyz.tolist(), strict=True))
+            session.command({"op": "control.set", "name": f"C{row}", **known})
+            for image, pixel in enumerate((one, two), start=1):
+                pick = {"image": image, "column": pixel[0], "row": pixel[1]}
+                session.command({"op": "control.pick", "name": f"C{row}", **pick})
+        media = media_from_dict(json.loads(json.dumps(task_of(session, "align", {})["media"])))
+        assert media.layers == pair.layers
+        for number, photo in enumerate((pair.image1, pair.image2)):
+            camera = SimpleNamespace(centre=[*photo.nadir, photo.distance])
+            assert media.z0(number, camera) == pytest.approx(photo.z0, abs=1e-12)
+            found = media.normal(number, camera)
+            assert (found is None) == (photo.interface_normal is None)
+            if found is not None:
+                own = np.array(photo.interface_normal)
+                np.testing.assert_allclose(found, own / np.linalg.norm(own), atol=1e-15)
+        session.command({"op": "setup.set", "water_index": 1.337})
+        session.command({"op": "setup.set", "water_index": None})
+        assert task_of(session, "align", {})["media"] is None

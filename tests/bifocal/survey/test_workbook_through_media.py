@@ -107,6 +107,16 @@ def test_a_form_filled_in_by_hand_shows_where_shot_rays_meet(tank, tmp_path):
     assert book["Setup"]["A3"].value == "The set-up is complete."
 
 
+def test_unequal_scales_are_told_as_seen_through_the_media(form):
+    """The sentence names what is compared: not c/d, which is never equal through media."""
+    for language, told in (("en", "c_1/seen_1"), ("it", "mezzi"), ("de", "Medien")):
+        path = form.parent / f"{language}.xlsx"
+        write_template(path, rows=3, media=3, language=language)
+        formula = openpyxl.load_workbook(path)["Setup"]["A3"].value
+        assert told in formula
+        assert "c_1/d_1" not in formula
+
+
 def test_what_comes_out_of_the_form_is_written_into_it(tank, tmp_path):
     out = tmp_path / "solved.xlsx"
     done = CliRunner().invoke(main, ["solve", str(tank), "--out", str(out)])

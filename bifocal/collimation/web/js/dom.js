@@ -40,9 +40,9 @@ export function keyedRows(body, items, { key, signature, build }) {
     const name = key(item);
     const mark = signature(item);
     let row = old.get(name);
-    // A row somebody types in, or has still to mend, stays as it is, and keeps its old mark, so that
-    // its turn comes later.
-    if (row?.querySelector("input:focus, select:focus, input:invalid")) {
+    // A row somebody types in, waits for an answer to, or has still to mend, stays as it is, and
+    // keeps its old mark, so that its turn comes later.
+    if (row?.querySelector("input:focus, select:focus, input:invalid, input[data-sent]")) {
       old.delete(name);
       if (row === place) place = place.nextElementSibling;
       else body.insertBefore(row, place);

@@ -7,23 +7,29 @@ import { t } from "./words/words.js";
 
 let count = 0;
 
-/** Write a value into a field unless somebody is typing in it, or has still to mend it. */
+/** Write a value into a field unless somebody types in it, waits for the answer, or has to mend it. */
 export function fill(input, value) {
   const text = value === null || value === undefined ? "" : String(value);
-  const free = document.activeElement !== input && input.validity.valid;
+  const free = document.activeElement !== input && !input.dataset.sent && input.validity.valid;
   if (free && input.value !== text) input.value = text;
   input.dataset.known = text;
 }
 
 /** Let fields show something else than they did: what was refused is forgotten. */
 export function afresh(inputs) {
-  for (const input of inputs) input.setCustomValidity("");
+  for (const input of inputs) {
+    input.setCustomValidity("");
+    delete input.dataset.sent;
+  }
 }
 
 /** Send what was typed; `save` resolves to false where it was refused. */
 async function hand(input, value, save) {
   const typed = input.value;
+  // News of others that come before the answer do not take it away.
+  input.dataset.sent = "true";
   const accepted = await save(value);
+  delete input.dataset.sent;
   if (accepted === false && input.value === typed) input.setCustomValidity(t("field.refused"));
 }
 
