@@ -179,6 +179,23 @@ def test_what_falls_away_from_camera_2_where_the_photos_do_not_fit_is_not_measur
     assert not surfaces._falls_away(frame, relief, np.full(relief.shape, 2.0, np.float32)).any()
 
 
+def test_only_a_pixel_that_fits_and_has_texture_is_pardoned_for_not_coming_back():
+    frame = frame_of(Pair(image1=FAR, image2=NEAR))
+    texture = np.zeros((200, 200), np.uint8)
+    texture[:100, ::8] = 200  # above; below there is nothing to tell one place from another
+    misfit = np.full(texture.shape, 3.0, np.float32)
+    misfit[:, 100:] = 9.0
+    zero = np.zeros(texture.shape, np.float32)
+    matched = flow.Measurement(r=zero, across=zero, loop=zero + 2, sigma_px=zero + 0.03)
+    frame, sigma = replace(frame, image1=texture), zero + 0.001
+    pardoned = surfaces._pardoned(frame, matched, sigma, misfit)
+    assert pardoned[10:90, 10:90].all()
+    assert not pardoned[:, 102:].any()
+    assert not pardoned[112:].any()
+    for worse in (replace(matched, loop=zero + 6), replace(matched, across=zero + 0.6)):
+        assert not surfaces._pardoned(frame, worse, sigma, misfit).any()
+
+
 def test_the_side_face_of_a_step_is_put_nowhere_and_the_step_stands_on_its_line():
     frame = frame_of(Pair(image1=FAR, image2=NEAR))
     x = np.arange(200) - 99.5
