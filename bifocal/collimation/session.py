@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 import queue
 import threading
+import uuid
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, replace
 from datetime import UTC, datetime
@@ -56,6 +57,8 @@ class Session:
         self.language = language
         self.lock = threading.RLock()
         self.listeners: set[queue.SimpleQueue[dict[str, Any] | None]] = set()
+        #: Tells this run of the server from the one before it, whose revisions mean nothing now.
+        self.serving = uuid.uuid4().hex
         self.revision = 0
         self.answered: dict[str, Any] = {}
         self.results: LiveResults | None = None

@@ -23,6 +23,7 @@ def state_of(session: Session) -> dict[str, Any]:
         if session.files.pair is None or state.control:
             live = session.oriented_live()
         return {
+            "serving": session.serving,
             "revision": session.revision,
             "language": state.language or session.language,
             "title": session.files.stem,

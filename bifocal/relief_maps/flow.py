@@ -8,6 +8,7 @@ import cv2
 import numpy as np
 
 from bifocal import rays
+from bifocal.model.image import QUIET_BLUR, local_contrast, noise
 from bifocal.relief_maps.frame import Frame, offsets, radial_stretch, zoom_map
 from photocore.arrays import BoolArray, ByteArray, Float32Array
 
@@ -16,10 +17,10 @@ ALPHA = 20.0
 #: On plain walls a smoother flow between blurred photos is better: the texture lies in the noise
 #: (plaster, façade 62: 6.4 to 6.1 mm of median error, measured RMSE 14 to 11.6 mm; textured
 #: façades get worse by it).
-PLAIN_ALPHA, PLAIN_BLUR = 60.0, 1.0
+PLAIN_ALPHA = 60.0
 #: A photo is plain where its contrast within 15 px, blurred, is less than this times its noise:
 #: 0.8 on the plaster of façade 62, 7 and more on textured façades and the church.
-PLAIN_CONTRAST, CONTRAST_WINDOW = 2.0, (15, 15)
+PLAIN_CONTRAST = 2.0
 #: Weight of constant grey value, against 10 for constant gradient.
 DELTA = 10.0
 #: Stride of the inverse search's patches: 2 is a little better and half as quick again. [px]
@@ -102,7 +103,7 @@ def measure(frame: Frame, coarse: Float32Array, *, stride: int = STRIDE) -> Meas
     plain = _is_plain(frame)
     if plain:
         first, second = (
-            cv2.GaussianBlur(image, (0, 0), PLAIN_BLUR) for image in (frame.image1, frame.image2)
+            cv2.GaussianBlur(image, (0, 0), QUIET_BLUR) for image in (frame.image1, frame.image2)
         )
         photos, alpha = replace(frame, image1=first, image2=second), PLAIN_ALPHA
     flow = seeded_flow(photos.image1, photos.image2, seed, finest=0, stride=stride, alpha=alpha)
@@ -118,23 +119,6 @@ def _is_plain(frame: Frame) -> bool:
     """Return whether half of photo 1 has hardly more contrast than noise."""
     contrast = local_contrast(frame.image1)[frame.seen1]
     return bool(np.median(contrast) < PLAIN_CONTRAST * noise(frame.image1, frame.seen1))
-
-
-def local_contrast(image: ByteArray | Float32Array) -> Float32Array:
-    """Return the standard deviation within 15 px of a photo blurred by a pixel. [grey levels]"""
-    quiet = cv2.GaussianBlur(image.astype(np.float32), (0, 0), PLAIN_BLUR)
-    mean = cv2.blur(quiet, CONTRAST_WINDOW)
-    square = cv2.blur(quiet * quiet, CONTRAST_WINDOW) - mean * mean
-    return np.asarray(np.sqrt(np.maximum(square, 0)))
-
-
-def noise(image: ByteArray | Float32Array, seen: BoolArray | None = None) -> float:
-    """Return the noise of a photo (Immerkaer 1996, with the median for the mean). [grey levels]"""
-    mask = np.array([[1, -2, 1], [-2, 4, -2], [1, -2, 1]], dtype=np.float32)
-    second = cv2.filter2D(image, cv2.CV_32F, mask)
-    second = second if seen is None else second[seen]
-    # Six is the mask's norm; 1.4826 makes the median of |N(0, 1)| one. Rounding is noise, too.
-    return max(1.4826 / 6 * float(np.median(np.abs(second))), 0.29)
 
 
 def split(frame: Frame, flow: Float32Array) -> tuple[Float32Array, Float32Array]:

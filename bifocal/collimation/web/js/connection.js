@@ -57,9 +57,9 @@ export class Connection extends EventTarget {
     this.#listen();
   }
 
-  async refresh(anew = false) {
+  async refresh() {
     const answer = await call("/api/state", { cache: "no-store" });
-    this.#adopt(await answer.json(), anew);
+    this.#adopt(await answer.json());
   }
 
   /** Send one command; resolves to its result, rejects with a Refusal in words. */
@@ -179,10 +179,11 @@ export class Connection extends EventTarget {
     }
   }
 
-  /** Take a state unless it is older than what is shown; a restarted server counts `anew`. */
-  #adopt(state, anew = false) {
-    if (this.state && !anew && state.revision < this.state.revision) return;
-    if (anew) this.heard = state.revision;
+  /** Take a state unless it is older than what is shown; a restarted server counts anew. */
+  #adopt(state) {
+    const same = this.state?.serving === state.serving;
+    if (same && state.revision < this.state.revision) return;
+    if (!same) this.heard = state.revision;
     this.state = state;
     this.dispatchEvent(new Event("state"));
   }
@@ -204,7 +205,7 @@ export class Connection extends EventTarget {
 
   #listen() {
     const source = new EventSource("/api/events");
-    source.onopen = () => this.#retry(() => this.refresh(true));
+    source.onopen = () => this.#retry(() => this.refresh());
     source.onmessage = ({ data }) => {
       const news = JSON.parse(data);
       if (news.job) this.#progress(news.job);
