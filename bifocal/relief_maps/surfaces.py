@@ -5,6 +5,7 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
+from bifocal.model.image import local_contrast
 from bifocal.model.relief_map import Quality
 from bifocal.relief_maps import edges, evidence, flow, forward_projection, seed
 from bifocal.relief_maps.forward_projection import STRETCH, MapBands
@@ -88,7 +89,7 @@ def _pardoned(
     loop = matched.loop * np.float32(evidence.LOOP_LIMIT / PARDON_LOOP)
     near = evidence.validated(matched.across, loop, sigma, frame.distances[1])
     fits = cv2.blur(misfit, (3, 3)) < PARDON_MISFIT
-    return np.asarray(near & fits & (flow.local_contrast(frame.image1) > PARDON_CONTRAST))
+    return np.asarray(near & fits & (local_contrast(frame.image1) > PARDON_CONTRAST))
 
 
 def _falls_away(frame: Frame, relief: Float32Array, misfit: Float32Array) -> BoolArray:
