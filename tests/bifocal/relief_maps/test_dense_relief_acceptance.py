@@ -19,7 +19,7 @@ DIM = Exposure(gain=0.8, gamma=1.15, vignetting=0.3, noise=2.0)
 #: Name: seed, d2, palette, exposure of photo 2, then the limits: median [mm], share beyond 3 cm,
 #: RMSE away from edges [mm] of all pixels seen by both cameras, orthophoto beyond 1 px.
 SCENES = {
-    "35/19": (41, 9.5, RICH, Exposure(), 0.7, 0.0135, 11.0, 0.0155),
+    "35/19": (41, 9.5, RICH, Exposure(), 0.7, 0.0125, 11.0, 0.0145),
     "35/28": (42, 14.0, RICH, Exposure(), 1.8, 0.030, 12.0, 0.035),
     "plain plaster": (43, 9.5, POOR, Exposure(), 5.5, 0.11, 36.0, 0.14),
     "radiometry": (44, 9.5, RICH, DIM, 0.9, 0.031, 16.0, 0.035),
@@ -54,7 +54,7 @@ def test_rendered_facades_are_measured_as_well_as_promised(name):
     held = (np.abs(found.r - truth) < 2 * found.sigma)[measured & away]
     assert held.mean() > 0.85
     if name == "35/19":
-        assert measured.sum() >= 0.94 * both.sum()
+        assert measured.sum() >= 0.945 * both.sum()
         assert 1e3 * np.median(error[measured]) < 0.65
         assert (error[measured] > 0.03).mean() < 0.0075
         assert 1e3 * np.sqrt(np.mean(error[measured & away] ** 2)) < 5.5

@@ -11,6 +11,7 @@ from bifocal import Pair, Photo, Quality
 from bifocal.model.grid import Grid
 from bifocal.relief_maps import (
     coarse_level,
+    edges,
     evidence,
     flow,
     forward_projection,
@@ -177,6 +178,42 @@ def test_what_falls_away_from_camera_2_where_the_photos_do_not_fit_is_not_measur
     assert not row[x < 58].any()
     assert not row[x > 71].any()
     assert not surfaces._falls_away(frame, relief, np.full(relief.shape, 2.0, np.float32)).any()
+
+
+def test_what_counts_as_noise_follows_the_frame_and_grows_towards_the_zoom_centre():
+    frame = frame_of(Pair(image1=FAR, image2=NEAR))
+    reach = np.hypot(*(axis - 99.5 for axis in np.mgrid[:200, :200]))
+    for typical, elsewhere in ((0.02, 0.05), (0.16, 0.16), (0.6, 0.25)):
+        noise = surfaces._noise(frame, typical)
+        # 20 px² over the distance from the centre, 0.25 px at most, never below what is typical.
+        expected = np.clip(20 / reach, elsewhere, 0.25)
+        np.testing.assert_allclose(noise, expected, rtol=1e-4)
+
+
+def test_a_ramp_counts_by_its_parallax_a_pixel():
+    relief = np.broadcast_to(0.02 * np.arange(40.0), (40, 40)).astype(np.float32)
+    # 0.02 m a pixel are 0.15 px of parallax at 7.5 px/m: half of what makes a ramp.
+    steep = edges._ramp(relief, np.float32(7.5))[20, 20]
+    np.testing.assert_allclose(steep, 0.5 * edges.RAMP, rtol=1e-4)
+    np.testing.assert_allclose(edges._ramp(relief, np.float32(75))[20, 20], edges.RAMP, rtol=1e-6)
+    assert not edges._ramp(np.full((40, 40), 0.3, np.float32), np.float32(75)).any()
+
+
+def test_only_a_pixel_that_fits_and_has_texture_is_pardoned_for_not_coming_back():
+    frame = frame_of(Pair(image1=FAR, image2=NEAR))
+    texture = np.zeros((200, 200), np.uint8)
+    texture[:100, ::8] = 200  # above; below there is nothing to tell one place from another
+    misfit = np.full(texture.shape, 3.0, np.float32)
+    misfit[:, 100:] = 9.0
+    zero = np.zeros(texture.shape, np.float32)
+    matched = flow.Measurement(r=zero, across=zero, loop=zero + 2, sigma_px=zero + 0.03)
+    frame, sigma = replace(frame, image1=texture), zero + 0.001
+    pardoned = surfaces._pardoned(frame, matched, sigma, misfit)
+    assert pardoned[10:90, 10:90].all()
+    assert not pardoned[:, 102:].any()
+    assert not pardoned[112:].any()
+    for worse in (replace(matched, loop=zero + 6), replace(matched, across=zero + 0.6)):
+        assert not surfaces._pardoned(frame, worse, sigma, misfit).any()
 
 
 def test_the_side_face_of_a_step_is_put_nowhere_and_the_step_stands_on_its_line():
