@@ -18,12 +18,11 @@ from PIL import Image
 
 from bifocal import Pair
 from bifocal.cli.main import main
-from bifocal.demo import SAMPLE
+from bifocal.demo import SAMPLE, WATER_SAMPLE
 from photocore.arrays import ByteArray
 from tests.bifocal.campaigns import sample_tables
 from tests.scenes import demo_scene
 from tests.scenes.make_sample import PIXEL
-from tests.scenes.wet import WetCamera
 
 #: The sample's targets are called P1 to P32 here.
 CONTROL = frozenset(f"P{int(name[1:])}" for name in sample_tables.CONTROL)
@@ -60,7 +59,8 @@ def make_desk(folder: Path) -> None:
         _table(folder / f"{name}.csv", _inside(rows, part))
     _workbook(folder, rows)
     _pick_tables(folder, rows)
-    _reef(folder, rows)
+    _reef(folder)
+    shutil.copytree(WATER_SAMPLE, folder / "under-water")
     _lenses(folder)
     shutil.copyfile(folder / "points.csv", folder / "control.csv")
     for pair, name in (("a", "left"), ("b", "middle"), ("c", "right")):
@@ -195,24 +195,16 @@ def _type(sheet: Worksheet, rows: list[dict[str, object]]) -> None:
             sheet.cell(number, columns[key], value)
 
 
-def _reef(folder: Path, rows: list[list[float | str]]) -> None:
-    """Write photos and control points as through a flat port; the photos are those in air."""
-    shown = []
-    xyz = np.array([row[1:4] for row in rows], dtype=np.float64)
-    for side, focal, distance in (("far", 35.0, 17.5), ("near", 19.0, 9.5)):
-        shutil.copyfile(folder / f"{side}.jpg", folder / f"reef_{side}.jpg")
-        middle = (SIZE[0] - 1) / 2, (SIZE[1] - 1) / 2
-        camera = WetCamera(
-            matrix=np.array([[focal / PITCH, 0, middle[0]], [0, focal / PITCH, middle[1]],
-                             [0, 0, 1]]),
-            rotation=np.diag([1.0, -1.0, -1.0]), centre=np.array([0.0, 0.0, distance]), size=SIZE,
-            indices=(1.0, 1.49, 1.337), thicknesses=(0.01,), z0=0.05,
-        )  # fmt: skip
-        shown.append(camera.view_of(xyz))
-    pixels = np.round(np.column_stack(shown), 3)
-    inside = ((pixels > 10) & (pixels < [SIZE[0] - 10, SIZE[1] - 10] * 2)).all(axis=1)
-    lines = zip(rows, pixels, inside, strict=True)
-    _table(folder / "reef.csv", [[*row[:4], *seen] for row, seen, keep in lines if keep])
+def _reef(folder: Path) -> None:
+    """Write photos of the sample under water, through flat ports, and its targets as control."""
+    for side in ("far", "near"):
+        shutil.copyfile(WATER_SAMPLE / f"{side}.jpg", folder / f"reef_{side}.jpg")
+    with (WATER_SAMPLE / "targets.csv").open(encoding="utf-8", newline="") as file:
+        names, *values = zip(*list(csv.reader(file))[1:], strict=True)
+    seen = np.array(values, dtype=np.float64).T
+    place = Pair.read(WATER_SAMPLE / "facade.pair.json").intersect(seen[:, :2], seen[:, 2:4]).xyz
+    rows = zip(names, place.round(4).tolist(), seen.tolist(), strict=True)
+    _table(folder / "reef.csv", [[name, *at[:2], own[4], *own[:4]] for name, at, own in rows])
 
 
 def _pick_tables(folder: Path, rows: list[list[float | str]]) -> None:

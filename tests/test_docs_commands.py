@@ -125,6 +125,8 @@ SAYS = (
     ("refraction.md", "--from-index", "with a standard deviation of 0.075 %", "deviation 0.075 %"),
     ("planning.md", "60x40", "flying heights of 83 and 42 m, 15 mm pixels", "83.21  41.60"),
     ("planning.md", "60x40", "15 mm pixels, B = 83 m", "1 % of scale is 0.83 m"),
+    ("through-water.md", "multimedia index", "says 1.34284", "1.34284"),
+    ("through-water.md", "targets.csv", "says RMSE 0.0040 m", "RMSE 0.0040 m"),
     ("through-water.md", "--depth 0.9", "gives 3.73 and 2.13 m", "3.73  2.13"),
     ("through-water.md", "--depth 0.9", "the glass 2.82 and 1.22 m", "2.820 and 1.220 m before"),
     ("tutorial-excel.md", "solve", "P1 has r = 1.000 m", "1.0000"),

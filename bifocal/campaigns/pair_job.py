@@ -327,7 +327,9 @@ def _align_step(job: PairJob) -> Step:
 ALIGN_OPTIONS = (
     "auto", "distance1", "distance2", "delta_d", "focal1", "focal2", "sensor_width",
     "sensor_width1", "sensor_width2", "pixel_size", "pixel_size1", "pixel_size2", "wall", "length",
-    "horizontal", "vertical", "unit", "sigma_pick", "sigma_control", "sigma_distance",
+    "horizontal", "vertical", "unit", "sigma_pick", "sigma_control", "sigma_distance", "as_set_up",
+    "indices", "thicknesses", "port", "port1", "port2", "depth", "port_normal", "port_normal1",
+    "port_normal2", "estimate", "prior",
 )  # fmt: skip
 
 
@@ -378,6 +380,13 @@ def _points_step(job: PairJob) -> Step:
             job.pair_path, **tables, exchanged=is_exchanged(pair, job.far),
             language=options.get("language", "en"), unit=options.get("unit", ""),
         )  # fmt: skip
+        if pair.leans:
+            write_result(place / f"{job.title}_points.csv", solution)
+            told = (
+                "ports that lean have no formulas in a survey workbook: the points are a text "
+                "table (.csv)."
+            )
+            return (*solution.remarks, told)
         write_result(place / f"{job.title}_points.xlsx", solution)
         return solution.remarks
 

@@ -24,13 +24,22 @@ def _number(value: Any) -> float:
     return float(value)
 
 
-def _numbers(count: int) -> Callable[[Any], tuple[float, ...]]:
+def _not_negative(value: Any) -> float:
+    if value == 0 and not isinstance(value, bool):
+        return 0.0
+    try:
+        return _number(value)
+    except ValueError:
+        raise ValueError("a number not below zero") from None
+
+
+def _numbers(count: int | None = None) -> Callable[[Any], tuple[float, ...]]:
     def check(value: Any) -> tuple[float, ...]:
-        good = isinstance(value, list) and len(value) == count
+        good = isinstance(value, list) and count in (None, len(value))
         if not good or not all(
             isinstance(v, int | float) and not isinstance(v, bool) and abs(v) < 1e9 for v in value
         ):
-            raise ValueError(f"a list of {count} numbers")
+            raise ValueError(f"a list of {'' if count is None else f'{count} '}numbers")
         return tuple(float(v) for v in value)
 
     return check
@@ -69,6 +78,16 @@ def _words(value: Any) -> tuple[str, ...]:
     return tuple(value)
 
 
+def _normal(value: Any) -> str:
+    """Return the normal of a port as the commands take it."""
+    if value == "axis":
+        return "axis"
+    try:
+        return ",".join(map(str, _numbers(3)(value)))
+    except ValueError:
+        raise ValueError('"axis", or a list of 3 numbers: X, Y, r') from None
+
+
 #: Every option of a pair, and what reads it; lengths in metres, picks in pixels.
 OPTIONS: Mapping[str, Callable[[Any], Any]] = {
     "scale": _scale,
@@ -91,7 +110,14 @@ OPTIONS: Mapping[str, Callable[[Any], Any]] = {
     "length": _numbers(5),
     "horizontal": _numbers(4),
     "vertical": _numbers(4),
-} | dict.fromkeys(
+    "as_set_up": _truth,
+    "indices": _numbers(),
+    "thicknesses": _numbers(),
+    "estimate": _words,
+    "prior": _words,
+} | dict.fromkeys(("port", "port1", "port2", "depth"), _not_negative) | dict.fromkeys(
+    ("port_normal", "port_normal1", "port_normal2"), _normal
+) | dict.fromkeys(
     (
         "distance1", "distance2", "delta_d", "focal1", "focal2", "sensor_width", "sensor_width1",
         "sensor_width2", "pixel_size", "pixel_size1", "pixel_size2", "sigma_pick", "sigma_control",
@@ -102,7 +128,7 @@ OPTIONS: Mapping[str, Callable[[Any], Any]] = {
 
 
 #: An option of the command line with its value.
-_VALUE = r"(?:[A-Z]+|\d[\d.]*\d|\d)"
+_VALUE = r"(?:[a-z]+\d?=[\d.e+-]*\d|[A-Z]+|\d[\d.]*\d|\d)"
 _OPTION = re.compile(rf"(?<![\w-])--([a-z][a-z0-9-]*)(?: ({_VALUE}(?:,{_VALUE})*)\b)?")
 #: What is made of all pairs together, each in a folder of its own: keys above the pairs.
 WHOLE = ("joint", "mosaic")
@@ -176,6 +202,8 @@ def in_survey_words(text: str) -> str:
     --------
     >>> in_survey_words("give --control FILE, or --focal1 35 and --sensor-width 23.5; --jobs 2.")
     'give control = "FILE", or focal1 = 35 and sensor_width = 23.5; --jobs 2.'
+    >>> in_survey_words("(--prior index3=0.005)")
+    '(prior = ["index3=0.005"])'
     >>> in_survey_words("name a spot with --wall COL,ROW, or --auto with one of --distance1.")
     'name a spot with wall = [COL, ROW], or auto = true with one of distance1.'
     """
@@ -188,6 +216,8 @@ def in_survey_words(text: str) -> str:
             return f"{key} = true" + (f" {value}" if value else "")
         if value is None:
             return key
+        if key == "prior":
+            return f'{key} = ["{value}"]'
         listed = f"[{value.replace(',', ', ')}]" if "," in value else value
         return f'{key} = "{value}"' if key in FILES else f"{key} = {listed}"
 

@@ -436,7 +436,8 @@ def facade_job(
     name : str
         Title; default that of the folder.
     given : mapping
-        Files and options by the names of the survey file; None and False count as not given.
+        Files and options by the names of the survey file; None, False and nothing in a list count
+        as not given.
     products : tuple of str, optional
         Of `PRODUCTS`.
     overwrite : bool
@@ -452,7 +453,12 @@ def facade_job(
     unknown = [product for product in products or () if product not in PRODUCTS]
     if unknown:
         raise InputError(f"--products: {unknown[0]!r} is none of {', '.join(PRODUCTS)}.")
-    said = {key: value for key, value in (given or {}).items() if value not in (None, False)}
+    # A port may begin at the camera's centre: zero is a number, not nothing.
+    said = {
+        key: value
+        for key, value in (given or {}).items()
+        if not (value is None or value is False or value == ())
+    }
     return PairJob(
         name=name or out.resolve().name,
         folder=out,

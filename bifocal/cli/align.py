@@ -9,13 +9,12 @@ from typing import TYPE_CHECKING, Any
 import click
 from click.core import ParameterSource
 
+from bifocal.cli.media_options import media_of_pair
 from photocore.cli import print_result, remark
 from photocore.options import (
     FILE,
     FOCAL,
-    NOT_NEGATIVE,
     TABLE,
-    Names,
     Numbers,
     as_json,
     choice,
@@ -95,38 +94,7 @@ points.csv, one line per control point; r blank = on the wall; pixels in both ph
     "--vertical", type=Numbers(4), metavar="COL,ROW,COL,ROW",
     help="Two points of the far photo on an upright line of the wall [px].",
 )  # fmt: skip
-@click.option(
-    "--indices", type=Numbers(), metavar="N,N,...",
-    help="Refractive indices from the camera to the wall, where the photos look through media.",
-)  # fmt: skip
-@click.option(
-    "--thicknesses", type=Numbers(), metavar="T,...",
-    help="Thicknesses of the media between the first and the last [m].",
-)  # fmt: skip
-@number(
-    "--port", "M", "Camera centre to the first interface, where that moves with the camera [m].",
-    type=NOT_NEGATIVE,
-)  # fmt: skip
-@number("--port1", "M", "The same, far photo only [m].", type=NOT_NEGATIVE)
-@number("--port2", "M", "The same, near photo only [m].", type=NOT_NEGATIVE)
-@number("--depth", "M", "Wall behind the glass or surface that stays with it [m].")
-@click.option(
-    "--port-normal", metavar="axis|X,Y,R",
-    help="A port that leans: square to the camera's optical axis, or its normal in the plane "
-    "frame, towards the camera.  [default: parallel to the wall]",
-)  # fmt: skip
-@click.option("--port-normal1", metavar="axis|X,Y,R", help="The same, far photo only.")
-@click.option("--port-normal2", metavar="axis|X,Y,R", help="The same, near photo only.")
-@click.option(
-    "--estimate", default="", type=Names(), metavar="LIST",
-    help="Unknowns of the media, of index1,..., thickness1,..., port, port1, port2, depth; known "
-    "beforehand as --prior says, indices else to 0.005, lengths to a tenth.  [default: none]",
-)  # fmt: skip
-@click.option(
-    "--prior", multiple=True, metavar="NAME=SIGMA",
-    help="Standard deviation of what is given of an unknown of the media [-, m]; inf: not known at "
-    "all; repeat it.",
-)  # fmt: skip
+@media_of_pair
 @choice("--unit", "m|cm|mm", "Unit of the control coordinates.  [default: the headings', else m]")
 @number("--sigma-pick", "PX", "Precision of a pick [px].", default=0.5)
 @number("--sigma-control", "M", "Precision of a control coordinate [m].", default=0.003)

@@ -7,6 +7,7 @@ from typing import Any
 
 import click
 
+from bifocal.cli.media_options import media_of_pair
 from photocore.cli import print_result, progress_bar
 from photocore.options import (
     FILE,
@@ -25,6 +26,8 @@ Examples:
   bifocal facade far.jpg near.jpg --control points.csv --scale 1:50 --out DIR
   bifocal facade far.jpg near.jpg --control points.csv --check check.csv --scale 1:20 --out wall
   bifocal facade far.jpg near.jpg --auto --distance1 17.5 --scale 1:100 --language de --out wall
+  bifocal facade reef_far.jpg reef_near.jpg --control reef.csv --indices 1,1.49,1.337
+                 --thicknesses 0.01 --port 0.05 --prior index3=0.003 --out reef
 """
 
 
@@ -45,11 +48,17 @@ Examples:
 @click.option("--lens2", type=FILE, help="Lens file of the near photo.")
 @click.option("--lengths", type=FILE, help="Table of taped lengths: from, to, length [m].")
 @click.option("--auto", is_flag=True, help="Without control points: from the photos alone.")
+@click.option(
+    "--as-set-up",
+    is_flag=True,
+    help="Take the set-up exactly as typed, square to the wall; nothing is registered anew.",
+)
 @number("--distance1", "M", "Far camera to the wall [m].")
 @number("--distance2", "M", "Near camera to the wall [m].")
 @number("--focal1", "MM", "Focal length, far photo [mm].  [default: EXIF]")
 @number("--focal2", "MM", "Focal length, near photo [mm].  [default: EXIF]")
 @number("--sensor-width", "MM", "Longer side of the sensor, both photos [mm].")
+@media_of_pair
 @choice("--unit", "m|cm|mm", "Unit of the coordinates.  [default: the headings', else m]")
 @choice("--quality", "fast|standard|best", "Of the relief map.  [default: standard]")
 @bounds("Part of the wall [m].  [default: all that is known]")

@@ -8,13 +8,12 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from bifocal.cli.media_options import media
 from photocore.cli import print_result, remark, text_table
 from photocore.options import (
     FILE,
-    NOT_NEGATIVE,
     POSITIVE,
     THOUSANDTHS,
-    Numbers,
     Scale,
     Size,
     as_json,
@@ -64,19 +63,7 @@ Examples:
     "[default: 3 x that of the best pair]", type=THOUSANDTHS,
 )  # fmt: skip
 @number("--free-space", "M", "Room in front of the wall [m].")
-@click.option(
-    "--indices", type=Numbers(), metavar="N,N,...",
-    help="Refractive indices from the camera to the object, where the photos look through media.",
-)  # fmt: skip
-@click.option(
-    "--thicknesses", type=Numbers(), metavar="T,...",
-    help="Thicknesses of the media between the first and the last [m].",
-)  # fmt: skip
-@number(
-    "--port", "M", "Camera centre to the first interface, where that moves with the camera [m].",
-    type=NOT_NEGATIVE,
-)  # fmt: skip
-@number("--depth", "M", "Object behind the glass or surface that stays with it [m].")
+@media
 @click.option("--out", type=FILE, help="Also write the plan as .xlsx.")
 @overwrite
 @as_json

@@ -23,6 +23,7 @@ from bifocal.collimation.records import (
     SurveyState,
     TapedLength,
 )
+from bifocal.collimation.stated_media import INDICES, MEDIA, check_index
 from photocore.errors import InputError
 from photocore.workbook.words import LANGUAGES
 
@@ -30,7 +31,7 @@ Fields = Mapping[str, Any]
 STAGES = ("photos", "orientation", "points", "products")
 #: Set-up values asked of the user.
 SETUP = (
-    "d1", "d2", "delta_d", "c1", "c2", "sigma_d1", "sigma_d2", "sigma_delta_d", "sigma_d",
+    "d1", "d2", "delta_d", "c1", "c2", "sigma_d1", "sigma_d2", "sigma_delta_d", "sigma_d", *MEDIA,
 )  # fmt: skip
 #: No name, layer or photo is longer, no wall larger.
 LONGEST_NAME, LARGEST, MOST_POINTS = 80, 1e6, 20_000
@@ -320,6 +321,8 @@ def _setup_set(state: SurveyState, command: Fields) -> None:
     given = {key: positive_of(command, key) for key in command if key in SETUP}
     if not given:
         raise InputError(f"nothing to set; known are {', '.join(SETUP)}.")
+    for key in INDICES:
+        check_index(key, given.get(key))
     state.setup |= given
 
 

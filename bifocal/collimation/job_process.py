@@ -9,6 +9,7 @@ from pathlib import Path
 from time import monotonic
 from typing import Any
 
+from bifocal.collimation.stated_media import media_of
 from bifocal.files.geotiff import gsd_at_scale
 from bifocal.orientation.align_workflow import (
     AlignOptions,
@@ -72,6 +73,8 @@ def _align(task: Task, progress: Progress) -> dict[str, Any]:
         lenses=(lenses[0], lenses[1]),
         site=site,
         auto=task["auto"],
+        as_set_up=task["as_set_up"],
+        media=media_of(task["setup"]),
         control=_path(task["control"]),
         lengths=_path(task["lengths"]),
     )

@@ -15,7 +15,8 @@ from bifocal.collimation.drawing import write_points_drawing
 from bifocal.collimation.jobs import PageJob
 from bifocal.collimation.live_orientation import control_of, lenses_of, site_of
 from bifocal.collimation.session import Session
-from bifocal.collimation.wording import without_options
+from bifocal.collimation.stated_media import lacking
+from bifocal.collimation.wording import say, without_options
 from bifocal.orientation.control_points import Control
 from photocore.errors import InputError
 from photocore.jsonfile import plain
@@ -150,6 +151,7 @@ def _align_task(session: Session, options: Options) -> dict[str, Any]:
     way = options.get("way") or ("control" if len(control.ids) else "site")
     if way == "site" and sum(value is not None for value in given) < 2:
         way = "auto"
+    way = _through_media(session, way, given)
     if way == "auto" and not any(given) and not control.lengths:
         raise InputError(
             "nothing says how large the wall is: pick four control points with X and Y, or type "
@@ -166,8 +168,28 @@ def _align_task(session: Session, options: Options) -> dict[str, Any]:
         "site": plain(asdict(site)),
         "lenses": [plain(asdict(lens)) for lens in lenses_of(state)],
         "auto": way == "auto",
+        "as_set_up": way == "as set up",
+        "setup": dict(state.setup),
         **{key: None if path is None else str(path.resolve()) for key, path in tables.items()},
     }
+
+
+def _through_media(session: Session, way: str, given: list[float | None]) -> str:
+    """Return the way to set a pair up: through media by control points, or else as it is typed.
+
+    Raises
+    ------
+    InputError
+        If something of the media is lacking, or neither is given.
+    """
+    setup, language = session.state.setup, session.state.language or session.language
+    if missing := lacking(setup):
+        raise InputError(say("media", missing, language))
+    if setup.get("water_index") is None or way == "control":
+        return way
+    if None in given[:2]:
+        raise InputError(say("media", "control", language))
+    return "as set up"
 
 
 def _write_control(session: Session, control: Control) -> dict[str, Path | None]:

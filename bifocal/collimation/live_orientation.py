@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from bifocal.collimation.records import PickedControl, SurveyState
+from bifocal.collimation.stated_media import lacking, media_of
 from bifocal.collimation.wording import say, without_options
 from bifocal.files.images import ImageInfo
-from bifocal.model.orientation_precision import CAMERA, NAMES
+from bifocal.model.orientation_precision import CAMERA, names_of, place_by_media
+from bifocal.model.refracted_view import RefractedView, foot_of
 from bifocal.orientation.absolute_orientation import orient_pair
 from bifocal.orientation.align_workflow import SIGMA_ON_WALL, KnownLens, interior_of_photo
 from bifocal.orientation.alignment import standard_deviations
@@ -17,8 +20,10 @@ from bifocal.orientation.control_points import Control, SiteMeasures
 from bifocal.orientation.interior_orientation import Interior
 from bifocal.orientation.orientation_stages import OrientedPair, PhotoInput
 from bifocal.orientation.pair_observations import at
+from bifocal.orientation.refracted_observations import views_of
+from bifocal.rays import object_rays
 from photocore.arrays import FloatArray
-from photocore.camera import PARAMETERS, project_with_jacobian, ray_on_plane
+from photocore.camera import PARAMETERS, ProjectedPoints, ray_on_plane
 from photocore.errors import PhotogrammetryError
 
 #: Points that stand out or lie back by this part of the near distance are thought of.
@@ -122,6 +127,7 @@ def live_orientation(state: SurveyState, infos: list[ImageInfo], language: str) 
             (_unseen(interiors[0], infos[0]), _unseen(interiors[1], infos[1])),
             control=control,
             site=site_of(state),
+            media=media_of(state.setup),
         )
     except PhotogrammetryError as error:
         told = without_options(str(error))
@@ -146,9 +152,10 @@ def _unseen(interior: Interior, info: ImageInfo) -> PhotoInput:
 
 def _to_complete(state: SurveyState, complete: int, language: str) -> list[str]:
     """Return what is missing of the control points, the nearest step first."""
+    missing = lacking(state.setup)
+    hints = [say("media", missing, language)] if missing else []
     if not state.control:
-        return [say("advice", "none", language)]
-    hints = []
+        return [*hints, say("advice", "none", language)]
     for point in state.sorted_control():
         if None in point.picks and point.picks != (None, None):
             hints.append(say("advice", "other", language, name=point.name))
@@ -181,7 +188,7 @@ def _most_help(oriented: OrientedPair, language: str) -> list[str]:
         for across in range(3):
             for down in range(3):
                 pixel = np.array([[width * (0.1 + 0.4 * across), height * (0.1 + 0.4 * down)]])
-                place = ray_on_plane(cameras[0], pixel)
+                place = _on_wall(oriented, pixel)
                 place[:, 2] = relief
                 design, noise = _control_rows(oriented, place)
                 after = _sigma_with(covariance, design, noise, watched)
@@ -189,7 +196,7 @@ def _most_help(oriented: OrientedPair, language: str) -> list[str]:
     measured = oriented.observations.measured
     for number in (1, 2):
         if f"distance{number}" not in measured:
-            design = np.zeros((1, len(NAMES)))
+            design = np.zeros((1, len(covariance)))
             design[0, at("Z", number)] = 1.0
             noise = np.array([[SiteMeasures().sigma ** 2]])
             after = _sigma_with(covariance, design, noise, watched)
@@ -207,14 +214,27 @@ def _most_help(oriented: OrientedPair, language: str) -> list[str]:
     ]  # fmt: skip
 
 
+def _on_wall(oriented: OrientedPair, pixel: FloatArray) -> FloatArray:
+    """Return where the ray of a far photo's pixel meets the reference plane, shape (1, 3). [m]"""
+    camera, media = oriented.adjusted.cameras[0], oriented.adjusted.media
+    place = ray_on_plane(camera, pixel)
+    if media is not None:
+        foot = foot_of(camera, media.path(0, camera))
+        place[:, :2] = object_rays(place[:, :2], foot).position
+    return place
+
+
 def _control_rows(oriented: OrientedPair, place: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the rates of a control point's four pixels by all `NAMES`, and their covariance."""
+    """Return the rates of a control point's four pixels by all `names_of`, and their covariance."""
     rows, by_points = [], []
-    for number, camera in enumerate(oriented.adjusted.cameras):
-        seen = project_with_jacobian(camera, place)
-        design = np.zeros((2, len(NAMES)))
+    layers = oriented.adjusted.layers
+    views: Sequence[ProjectedPoints | RefractedView] = views_of(oriented.adjusted, place)
+    for number, seen in enumerate(views):
+        design = np.zeros((2, len(names_of(layers))))
         first = number * len(CAMERA)
         design[:, first : first + len(PARAMETERS)] = seen.by_camera[0]
+        if isinstance(seen, RefractedView) and layers is not None:
+            place_by_media(design, seen.by_media[0], number, layers)
         rows.append(design)
         by_points.append(seen.by_point[0])
     by_point = np.concatenate(by_points)

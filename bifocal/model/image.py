@@ -4,10 +4,15 @@ from __future__ import annotations
 
 from typing import Any
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from photocore.arrays import BoolArray, ByteArray, Float32Array
 from photocore.errors import InputError
+
+#: Contrast is looked for in a photo blurred by so much, within a window of so many pixels. [px]
+QUIET_BLUR, CONTRAST_WINDOW = 1.0, (15, 15)
 
 #: 8 or 16 bits, shape (h, w, 3) or (h, w).
 ImageArray = NDArray[Any]
@@ -49,3 +54,20 @@ def as_photo(
     if array.ndim == 3:
         array = array[:, :, 0] if array.shape[2] == 1 else array[:, :, :3]
     return np.ascontiguousarray(array)
+
+
+def local_contrast(image: ByteArray | Float32Array) -> Float32Array:
+    """Return the standard deviation within 15 px of a photo blurred by a pixel. [grey levels]"""
+    quiet = cv2.GaussianBlur(image.astype(np.float32), (0, 0), QUIET_BLUR)
+    mean = cv2.blur(quiet, CONTRAST_WINDOW)
+    square = cv2.blur(quiet * quiet, CONTRAST_WINDOW) - mean * mean
+    return np.asarray(np.sqrt(np.maximum(square, 0)))
+
+
+def noise(image: ByteArray | Float32Array, seen: BoolArray | None = None) -> float:
+    """Return the noise of a photo (Immerkaer 1996, with the median for the mean). [grey levels]"""
+    mask = np.array([[1, -2, 1], [-2, 4, -2], [1, -2, 1]], dtype=np.float32)
+    second = cv2.filter2D(image, cv2.CV_32F, mask)
+    second = second if seen is None else second[seen]
+    # Six is the mask's norm; 1.4826 makes the median of |N(0, 1)| one. Rounding is noise, too.
+    return max(1.4826 / 6 * float(np.median(np.abs(second))), 0.29)

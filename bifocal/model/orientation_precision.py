@@ -250,8 +250,8 @@ def from_dict(data: Any, layers: Layers | None = None) -> FloatArray:
     InputError
         If it is not one of `names_of` the pair's media or of `NAMES`, or no covariance.
     """
-    stated = list(data.get("parameters", ())) if isinstance(data, Mapping) else []
-    if stated not in (list(NAMES), list(names_of(layers))):
+    stated = data.get("parameters") if isinstance(data, Mapping) else None
+    if not isinstance(stated, list) or stated not in (list(NAMES), list(names_of(layers))):
         raise InputError(
             '"orientation": expected {"parameters": [...], "covariance": [[...]]} with the '
             f"{len(names_of(layers))} parameters that `bifocal align` writes; leave the key out if "

@@ -254,6 +254,11 @@ class Pair:
         of_cameras = None if self.orientation is None else self.orientation[:_IN_AIR, :_IN_AIR]
         return replace(self, image1=photos[0], image2=photos[1], remarks=(), orientation=of_cameras)
 
+    @property
+    def leans(self) -> bool:
+        """Whether interfaces lean against the reference plane."""
+        return any(photo.media and photo.media.turn is not None for photo in self.as_given)
+
     def refuse_ports_that_lean(self, what: str) -> None:
         """Raise where interfaces lean against the reference plane and the work asked for cannot.
 
@@ -267,7 +272,7 @@ class Pair:
         InputError
             Naming it.
         """
-        if any(photo.media and photo.media.turn is not None for photo in self.as_given):
+        if self.leans:
             raise InputError(
                 f"{what} is not made through ports that lean (`interface_normal`): it needs media "
                 "parallel to the reference plane. Single points are solved through them: `solve`, "

@@ -9,7 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from bifocal.files.images import WRITTEN, ImageInfo, image_info, read_grey
+from bifocal.files.haze import read_greys
+from bifocal.files.images import WRITTEN, ImageInfo, image_info
 from bifocal.model.basis import rests_on
 from bifocal.model.lens import Lens
 from bifocal.orientation.absolute_orientation import orient_pair
@@ -155,13 +156,12 @@ def align_photos(
     check_not_input(picture, far, near)
     check_all_writable(out, picture, overwrite=overwrite)
     infos = image_info(far), image_info(near)
+    greys = read_greys(far, near, in_water=options.media is not None)
     first, second = (
-        PhotoInput(
-            grey=read_grey(info.path),
-            interior=interior_of_photo(info, known, number),
-            name=info.path.name,
+        PhotoInput(grey=grey, interior=interior_of_photo(info, known, number), name=info.path.name)
+        for number, (info, known, grey) in enumerate(
+            zip(infos, options.lenses, greys, strict=True), start=1
         )
-        for number, (info, known) in enumerate(zip(infos, options.lenses, strict=True), start=1)
     )
     if way == "as set up":
         oriented = pair_as_set_up((first, second), options.site, options.media)
@@ -377,11 +377,12 @@ def _check_inside(control: Control, pixels: FloatArray, size: tuple[int, int], p
     width, height = size
     outside = (pixels < -0.5).any(axis=1) | (pixels > [width, height]).any(axis=1)
     if outside.any():
-        name = control.ids[int(np.flatnonzero(outside)[0])]
+        name, others = control.ids[int(np.flatnonzero(outside)[0])], int(outside.sum()) - 1
+        lie = f"and {others} more lie" if others else "lies"
         raise InputError(
-            f'control point "{name}" and {int(outside.sum()) - 1} more lie outside the '
-            f"{photo} photo ({width} x {height} px). Were the picks made on a photo of another "
-            "size, or are far and near exchanged?"
+            f'control point "{name}" {lie} outside the {photo} photo '
+            f"({width} x {height} px). Were the picks made on a photo of another size, or are far "
+            "and near exchanged?"
         )
 
 

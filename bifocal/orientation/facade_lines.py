@@ -25,11 +25,13 @@ SEARCHED = 1.5e6
 SHORTEST, ASTRAY, FEWEST_LINES = 0.02, 12.0, 40
 #: Directions tried for their common direction, and the width in which lines agree on it. [deg]
 TRIED, AGREE = 4.0, 0.25
-#: Precision of a direction parallel to the wall, from the lines of one photo. On two real pairs
-#: (church_1, church_2) eight came out 0.05 to 0.39 degrees off, 0.20 in the root mean square, at a
-#: formal 0.06 to 0.10: sills and cornices are not level, and some belong to other faces. Both
-#: photos show the same lines and most of it is common: each counts for less, by a root of 2. [rad]
-SIGMA_DIRECTION = np.deg2rad(0.3)
+#: How far the lines of a façade as a whole come out of its wall. On two real pairs (church_1,
+#: church_2) eight directions came out 0.03 to 0.27 degrees off, 0.2 in the root mean square, where
+#: their own scatter says 0.05: sills and cornices are not level, and some belong to other faces.
+#: Not used to find it: 0.27 on a third church (semireal_church), 0.06 on six renderings. [rad]
+BUILT = np.deg2rad(0.2)
+#: Lines within the same of so many by so many parts of a photo err together.
+PARTS = 5
 #: Lines that turn the plane off more of the wall's details than this are not the wall's: of the
 #: 457 on a bumpy wall of a phone's photos (berlin_1) they left 27 and then none.
 WALL_KEPT = 0.5
@@ -53,7 +55,9 @@ class FacadeDirection:
     direction : ndarray, shape (3,)
         Unit vector in the camera's axes, x right, y down, z along the view.
     sigma : float
-        Precision of its angle to the wall. [rad]
+        Precision of its angle to the wall: its lines' scatter from part to part of the photo, and
+        what façades are built to. Both photos show the same lines and most of it is common: each
+        counts for less, by a root of 2. [rad]
     count : int
         Lines that agree on it.
     """
@@ -177,8 +181,9 @@ def facade_directions(
     and then by least squares in which lines that do not agree count nothing.
     """
     ends = line_segments(image)
-    long = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1) > SHORTEST * image.shape[1]
-    seen = radial.undistort(interior.ideal(ends[long].reshape(-1, 2)))
+    ends = ends[np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1) > SHORTEST * image.shape[1]]
+    part = np.floor(ends.mean(axis=1) / image.shape[::-1] * PARTS) @ [PARTS, 1]
+    seen = radial.undistort(interior.ideal(ends.reshape(-1, 2)))
     flat = np.column_stack([seen, np.ones(len(seen))])
     cosine, sine = np.cos(turn), np.sin(turn)
     axes = (
@@ -188,26 +193,47 @@ def facade_directions(
     rays /= np.linalg.norm(rays, axis=2, keepdims=True)
     normals = np.cross(rays[:, 0], rays[:, 1])
     length = np.linalg.norm(normals, axis=1)
-    normals, length = normals[length > 0] / length[length > 0, None], length[length > 0]
+    some = length > 0
+    normals, part, length = normals[some] / length[some, None], part[some], length[some]
     out = []
     for name, axis in (("upright", 1), ("level", 0)):
         near = np.abs(normals[:, axis]) < np.sin(np.deg2rad(ASTRAY))
-        found, count = _common_direction(normals[near], length[near], axis)
+        found, scatter, count = _common_direction(normals[near], length[near], part[near], axis)
         if count >= FEWEST_LINES:
+            sigma = float(np.sqrt(2.0) * np.hypot(BUILT, scatter))
             out.append(
                 FacadeDirection(
-                    camera=number, name=name, direction=axes.T @ found, sigma=SIGMA_DIRECTION,
-                    count=count,
+                    camera=number, name=name, direction=axes.T @ found, sigma=sigma, count=count
                 )
-            )  # fmt: skip
+            )
     return out
 
 
-def _common_direction(normals: FloatArray, length: FloatArray, axis: int) -> tuple[FloatArray, int]:
-    """Return the unit direction near an axis on which most lines agree, and how many do."""
+def _common_direction(
+    normals: FloatArray, length: FloatArray, part: FloatArray, axis: int
+) -> tuple[FloatArray, float, int]:
+    """Return the unit direction near an axis on which most lines agree, and how many do.
+
+    Parameters
+    ----------
+    normals : ndarray, shape (n, 3)
+    length : ndarray, shape (n,)
+        Weights.
+    part : ndarray, shape (n,)
+        Which part of the photo each lies in.
+    axis : int
+
+    Returns
+    -------
+    direction : ndarray, shape (3,)
+    scatter : float
+        Standard deviation of its angle to the wall, from the parts' contributions to the normal
+        equations (the cluster-robust covariance of Liang and Zeger, 1986). [rad]
+    count : int
+    """
     direction = np.eye(3)[axis]
     if len(normals) < FEWEST_LINES:
-        return direction, 0
+        return direction, np.inf, 0
     fixed, free = normals[:, axis], normals[:, [1 - axis, 2]]
     steps = np.deg2rad(np.arange(-TRIED, TRIED + 0.01, 0.5))
     trials = np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2)
@@ -219,7 +245,14 @@ def _common_direction(normals: FloatArray, length: FloatArray, axis: int) -> tup
         weight = length / (1.0 + (left / width) ** 2) ** 2 * (np.abs(left) < 3 * width)
         normal = (free * weight[:, None]).T @ free + 1e-12 * np.eye(2)
         found = found - np.linalg.solve(normal, (free * weight[:, None]).T @ left)
+    which = np.unique(part[weight > 0], return_inverse=True)[1]
+    pulls = (free * (weight * left)[:, None])[weight > 0]
+    parts = np.stack([np.bincount(which, pull) for pull in pulls.T], axis=1)
+    count = len(parts)
+    inverse = np.linalg.inv(normal)
+    spread = inverse @ (parts.T @ parts) @ inverse * count / max(count - 1, 1)
     direction = direction.copy()
     direction[[1 - axis, 2]] = found
     agree = np.abs(fixed + free @ found) < np.deg2rad(2 * AGREE)
-    return direction / np.linalg.norm(direction), int(agree.sum())
+    unit = direction / np.linalg.norm(direction)
+    return unit, float(np.sqrt(spread[1, 1])), int(agree.sum())

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from bifocal.files.haze import greys_through_water
 from bifocal.files.images import as_grey
 from bifocal.model.pair import Pair
 from bifocal.orientation.matching import Matches, MatchSettings, match_pair
@@ -63,4 +64,7 @@ def match(
     >>> bool(np.abs(points.pixels1 - points.pixels2).max() < 0.001)
     True
     """
-    return match_pair(pair, (as_grey(image1, "image1"), as_grey(image2, "image2")), settings)
+    greys = as_grey(image1, "image1"), as_grey(image2, "image2")
+    if pair.layers is not None:
+        greys = greys_through_water(image1, image2)
+    return match_pair(pair, greys, settings)

@@ -10,7 +10,7 @@ from bifocal.model.lens import SIGMA_FOCAL, Lens
 from photocore.arrays import ByteArray, FloatArray, is_finite_number, positive
 from photocore.camera import Pinhole, camera_matrix
 from photocore.distortion import RadialDivision
-from photocore.errors import InputError
+from photocore.errors import InputError, located
 
 #: Standard deviation of a principal point, as shares of the diagonal: of a calibrated lens (focus,
 #: stabiliser and crop move it: 5 px freed turned the wall's normal on a castle from 0.9 to 0.02
@@ -99,18 +99,19 @@ class Interior:
         if assumed is not None and not is_finite_number(assumed):
             raise InputError(f"{source}: {SIGMA_FOCAL}: expected a number, got {assumed!r:.40}.")
         centre = MOVED_CENTRE if assumed is None else UNKNOWN_CENTRE
-        return cls(
-            focal=float(matrix[0, 0]),
-            sigma_focal=0.0005 if assumed is None else assumed,
-            centre=np.array(matrix[:2, 2]),
-            sigma_centre=centre * float(np.hypot(*lens.image_size)),
-            image_size=lens.image_size,
-            source=source,
-            aspect=float(matrix[1, 1] / matrix[0, 0]),
-            sigma_aspect=0.0001,
-            lens=lens if distorted else None,
-            is_calibrated=True,
-        )
+        with located(source):
+            return cls(
+                focal=float(matrix[0, 0]),
+                sigma_focal=0.0005 if assumed is None else assumed,
+                centre=np.array(matrix[:2, 2]),
+                sigma_centre=centre * float(np.hypot(*lens.image_size)),
+                image_size=lens.image_size,
+                source=source,
+                aspect=float(matrix[1, 1] / matrix[0, 0]),
+                sigma_aspect=0.0001,
+                lens=lens if distorted else None,
+                is_calibrated=True,
+            )
 
     @classmethod
     def from_focal(

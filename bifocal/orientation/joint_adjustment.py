@@ -13,7 +13,7 @@ import numpy as np
 from scipy.sparse import csr_matrix
 
 from bifocal.model.orientation_precision import CAMERA
-from bifocal.orientation.joint_media import project_through
+from bifocal.orientation.joint_media import media_with_cameras, project_through
 from bifocal.orientation.joint_observations import JointObservations, with_enough_rays, with_rays
 from photocore import adjustment
 from photocore.adjustment import OUTLIER_LIMIT, Fit, huber_weights, standardised
@@ -103,14 +103,20 @@ class JointAdjustment(JointUnknowns):
     between: FloatArray
 
     def orientation(self, pair: int) -> FloatArray:
-        """Return the covariance of a pair's cameras as its file states it, shape (24, 24)."""
+        """Return the covariance of a pair's cameras as its file states it, shape (k, k).
+
+        24 in air. Through media, which are taken as given, what moves and turns with the cameras
+        follows them.
+        """
         whole = np.zeros((2 * len(CAMERA), 2 * len(CAMERA)))
         places = [[k * len(CAMERA) + e for e in ESTIMATED] for k in (0, 1)]
         for k in (0, 1):
             whole[np.ix_(places[k], places[k])] = self.by_camera[2 * pair + k]
         whole[np.ix_(*places)] = self.between[pair]
         whole[np.ix_(*places[::-1])] = self.between[pair].T
-        return whole
+        seen = self.observations
+        by = media_with_cameras((seen.media_of(2 * pair), seen.media_of(2 * pair + 1)))
+        return whole if by is None else by @ whole @ by.T
 
 
 def adjust_jointly(observations: JointObservations, start: JointUnknowns) -> JointAdjustment:

@@ -187,7 +187,7 @@ def adjust_pairs(
     pairs = [Pair.read(path) for path in paths]
     for path, pair in zip(paths, pairs, strict=True):
         with located(path):
-            pair.refuse_ports_that_lean("the joint adjustment")
+            media_of(pair)
     tables = _tables(paths, pairs, task)
     outputs = [out / "points.csv", *(out / path.name for path in paths)]
     for output in outputs:
@@ -432,6 +432,7 @@ def _adjusted_photo(photo: Photo, camera: Pinhole, media: CameraMedia | None = N
     return replace(
         photo, plane_from_pixel=plane_from_pixel(camera), nadir=camera.centre[:2],
         distance=distance, z0=photo.z0 if media is None else media.z0_at(distance),
+        interface_normal=photo.interface_normal if media is None else media.normal(camera),
         principal_distance=None if c is None else stretch * c,
     )  # fmt: skip
 

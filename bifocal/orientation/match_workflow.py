@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from bifocal.files.images import image_info, read_grey
+from bifocal.files.haze import read_greys
+from bifocal.files.images import image_info
 from bifocal.model.basis import rests_on
 from bifocal.model.pair import Pair
 from bifocal.orientation.matching import Matches, MatchSettings, match_pair, precision
@@ -70,7 +71,8 @@ def match_pair_file(pair_path: Pair | Path, settings: MatchSettings) -> tuple[Pa
         If a file is at fault, or photos and pair do not belong together.
     """
     pair = Pair.of(pair_path)
-    images = (read_grey(pair.photo_file(1)), read_grey(pair.photo_file(2)))
+    paths = pair.photo_file(1), pair.photo_file(2)
+    images = read_greys(*paths, in_water=pair.layers is not None)
     return pair, match_pair(pair, images, settings)
 
 

@@ -69,7 +69,7 @@ def media_remarks(adjusted: AdjustedPair, given: PairMedia | None) -> tuple[str,
     for row, name in _estimated(adjusted, media):
         prior, own = given.sigmas[name], float(np.sqrt(adjusted.of_unknowns[row, row]))
         if own > UNCARRIED * prior * factor:
-            told.append(hardly_carried(name, start=given.value(name), sigma=prior))
+            told.append(_hardly_carried(name, given.value(name), prior))
         if (twin := _twin(adjusted, media, row)) and twin[1] > ALIKE:
             told.append(
                 f"{name} and {twin[0]} can hardly be told apart: correlation {twin[1]:.3f}; points "
@@ -94,6 +94,8 @@ def refuse_impossible_media(adjusted: AdjustedPair, given: PairMedia) -> None:
         least, most = 1e-6 * start, np.inf
         if name.startswith("index"):
             least, most = LEAST_INDEX, MOST_INDEX
+        elif name.startswith("lean"):
+            least = -np.inf
         if is_possible(value, start=start, sigma=sigma, least=least, most=most):
             continue
         own, twin = float(np.sqrt(adjusted.of_unknowns[row, row])), _twin(adjusted, media, row)
@@ -102,12 +104,15 @@ def refuse_impossible_media(adjusted: AdjustedPair, given: PairMedia) -> None:
             if twin and twin[1] > ALIKE / 2
             else ""
         )
+        option, typical = name, typical_sigma(name, start)
+        if name.startswith("lean"):
+            option, typical = f"lean{name[-1]}", 1.0
+            value, own, start = np.degrees([value, own, start]).tolist()
         raise GeometryError(
-            f"{name} comes out as {value:.4g} +- {own:.2g}, {start:g} was given: the control "
+            f"{name} comes out as {value:.4g} ± {own:.2g}, {start:g} was given: the control "
             f"points cannot carry it{alike}. Give what is known as a standard deviation (--prior "
-            f"{name}={typical_sigma(name, start):.3g}), measure points farther off the wall, or "
-            f"take {name} out of --estimate. Check the focal lengths too: a wrong one looks like a "
-            "wrong index."
+            f"{option}={typical:.3g}), measure points farther off the wall, or take {option} out "
+            "of --estimate. Check the focal lengths too: a wrong one looks like a wrong index."
         )
 
 
@@ -128,7 +133,17 @@ def _twin(adjusted: AdjustedPair, media: PairMedia, row: int) -> tuple[str, floa
 
 
 def _shown(name: str, value: float) -> str:
-    """Return an index, or a length in millimetres."""
+    """Return an index, a lean in degrees, or a length in millimetres."""
     if not np.isfinite(value):
         return "anything"
+    if name.startswith("lean"):
+        return f"{np.degrees(value):.2f}°"
     return f"{value:.4f}" if name.startswith("index") else f"{1000 * value:.1f} mm"
+
+
+def _hardly_carried(name: str, start: float, sigma: float) -> str:
+    """Return `hardly_carried`, of a lean in degrees."""
+    if name.startswith("lean"):
+        start, sigma = np.degrees([start, sigma]).tolist()
+        return hardly_carried(f"{name} [degrees]", start=start, sigma=sigma)
+    return hardly_carried(name, start=start, sigma=sigma)

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from math import atan2
 from typing import Any
 
 import numpy as np
@@ -22,10 +23,17 @@ from photocore.adjustment.priors import LEAST_INDEX, MOST_INDEX, parse_prior, ty
 from photocore.arrays import FloatArray, not_negative, positive
 from photocore.camera import Pinhole
 from photocore.errors import InputError
+from photocore.rotation import rotation_from_vector
 
 #: Normal of one camera's interfaces: a direction in the plane frame, square to the optical axis, or
 #: None where they are parallel to the reference plane.
 Normal = FloatArray | str | None
+#: How far a port may lean off what was given, as an unknown without a prior of its own. [rad]
+SIGMA_LEAN = float(np.radians(1.0))
+#: Cosine of the most that it does.
+STEEPEST = 0.7
+#: What states the lean of the far and of the near camera's port as unknown.
+LEANS = ("lean1", "lean2")
 #: How a pair through media is set up, and how not.
 THROUGH_MEDIA = (
     "through glass or water a pair is set up by control points, at least four with X, Y and pixels "
@@ -50,10 +58,13 @@ class PairMedia:
     normals : pair
         Of either camera's interfaces: (X, Y, r) in the plane frame, ``"axis"`` for a port square to
         its optical axis, None where they are parallel to the reference plane.
+    leans : pair of ndarray, shape (3, 3)
+        Small turns of either camera's interfaces from there, as found: rows are multiplied by it.
     sigmas : mapping of str to float
         The unknowns with the standard deviations of what was given; infinite: not known. Names:
         ``index1`` ..., ``thickness1`` ... counted from the camera, ``port`` (of both cameras
-        alike), ``port1``, ``port2``, ``depth``.
+        alike), ``port1``, ``port2``, ``depth``; ``lean X 1``, ``lean Y 1``, ``lean X 2``,
+        ``lean Y 2``: turns of a port about the axes of the plane frame. [-, m, rad]
 
     Raises
     ------
@@ -66,6 +77,7 @@ class PairMedia:
     port: tuple[float, float] | None = None
     depth: float | None = None
     normals: tuple[Normal, Normal] = (None, None)
+    leans: tuple[FloatArray, FloatArray] = field(default_factory=lambda: (np.eye(3), np.eye(3)))
     sigmas: Mapping[str, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -84,8 +96,9 @@ class PairMedia:
                     "that stays with the object is taken as parallel to the reference plane."
                 )
         allowed = self._allowed
+        possible = {own for name in allowed for own in _unknowns(name)}
         for name, sigma in self.sigmas.items():
-            if name not in allowed:
+            if name not in possible:
                 raise InputError(
                     f"media: {name!r} is no unknown of them; possible are {', '.join(allowed)}."
                 )
@@ -115,9 +128,10 @@ class PairMedia:
         ports, depth, normals
             As of the class; a port of one camera stands for the other's where that is None.
         estimate : sequence of str
-            Unknowns; their sigmas are typical ones: indices 0.005, lengths a tenth.
+            Unknowns; their sigmas are typical ones: indices 0.005, lengths a tenth, leans 1 degree.
+            ``lean1`` and ``lean2`` stand for both turns of a port.
         priors : mapping of str to float, optional
-            Unknowns with their sigmas.
+            Unknowns with their sigmas. [-, m, rad]
 
         Raises
         ------
@@ -130,16 +144,18 @@ class PairMedia:
         port = None if first is None else (first, first if second is None else second)
         layers = Layers(indices=tuple(indices), thicknesses=tuple(thicknesses))
         media = cls(layers=layers, port=port, depth=depth, normals=normals)
-        sigmas = {}
-        for name in (*estimate, *(priors or {})):
-            start = media.value(name) if name in media._allowed else 0.0
-            sigmas[name] = (priors or {}).get(name) or max(typical_sigma(name, start), 1e-6)
+        sigmas, known = {}, dict(priors or {})
+        for name in (*estimate, *known):
+            start = media.value(name) if name in media._allowed and name not in LEANS else 0.0
+            usual = SIGMA_LEAN if name in LEANS else max(typical_sigma(name, start), 1e-6)
+            for own in _unknowns(name):
+                sigmas[own] = known.get(name, usual)
         return replace(media, sigmas=sigmas)
 
     @property
     def _allowed(self) -> tuple[str, ...]:
-        """Names that may be unknown."""
-        placed = ("depth",) if self.port is None else ("port", "port1", "port2")
+        """What may be stated as unknown."""
+        placed = ("depth",) if self.port is None else ("port", "port1", "port2", *LEANS)
         return (*common_names(self.layers), *placed)
 
     @property
@@ -148,7 +164,13 @@ class PairMedia:
         return (*NAMES, *self.sigmas)
 
     def value(self, name: str) -> float:
-        """Return a length or index by the name it has as an unknown; of ``port`` the first."""
+        """Return an index, a length or a turn by the name it has as an unknown.
+
+        Of ``port`` that of the first camera.
+        """
+        if name.startswith("lean"):
+            aside, up, along = self.leans[int(name[-1]) - 1][2].tolist()
+            return atan2(up if name[5] == "X" else 0.0 - aside, along)
         if name.startswith("index"):
             return self.layers.indices[int(name[5:]) - 1]
         if name.startswith("thickness"):
@@ -175,20 +197,28 @@ class PairMedia:
             port = (next(ends), next(ends))
         if depth is not None:
             depth += by_name.get("depth", 0.0)
+        leans = tuple(
+            lean @ rotation_from_vector([*(by_name.get(f"lean {a} {k}", 0.0) for a in "XY"), 0.0])
+            for k, lean in enumerate(self.leans, start=1)
+        )
         if min(*thicknesses, *(port or ()), depth or 0.0, 0.0) < 0 or depth == 0:
+            return None
+        if min(lean[2, 2] for lean in leans) < STEEPEST:
             return None
         if min(indices) < LEAST_INDEX or max(indices) > MOST_INDEX:
             return None
         layers = Layers(indices=indices, thicknesses=thicknesses)
-        return replace(self, layers=layers, port=port, depth=depth)
+        return replace(self, layers=layers, port=port, depth=depth, leans=(leans[0], leans[1]))
 
     def exchanged(self) -> PairMedia:
         """Return the media with far and near camera exchanged."""
         turned = {"port1": "port2", "port2": "port1"}
+        turned |= {f"lean {a} {k}": f"lean {a} {3 - k}" for a in "XY" for k in (1, 2)}
         return replace(
             self,
             port=None if self.port is None else self.port[::-1],
             normals=self.normals[::-1],
+            leans=self.leans[::-1],
             sigmas={turned.get(name, name): sigma for name, sigma in self.sigmas.items()},
         )
 
@@ -201,13 +231,17 @@ class PairMedia:
 
     def normal(self, number: int, camera: Pinhole) -> FloatArray | None:
         """Return the unit normal of camera 0's or 1's interfaces towards it, shape (3,)."""
-        stated = self.normals[number]
-        if stated is None:
-            return None
+        stated, lean = self.normals[number], self.leans[number]
         if isinstance(stated, str):
             assert stated == AXIS
-            return -camera.rotation[2]
-        return np.asarray(stated / np.linalg.norm(stated))
+            return np.asarray(-camera.rotation[2] @ lean)
+        if stated is None:
+            return lean[2] if self._may_lean(number) else None
+        return np.asarray(stated / np.linalg.norm(stated) @ lean)
+
+    def _may_lean(self, number: int) -> bool:
+        """Tell whether the lean of camera 0's or 1's port is unknown."""
+        return any(f"lean {axis} {number + 1}" in self.sigmas for axis in "XY")
 
     def path(self, number: int, camera: Pinhole) -> MediaPath:
         """Return what camera 0's or 1's rays cross."""
@@ -227,7 +261,12 @@ class PairMedia:
         """
         rows, names = list(names_of(self.layers)), self.names
         out = np.zeros((len(rows), len(names)))
-        out[: len(NAMES), : len(NAMES)] = np.eye(len(NAMES))
+        first, second = (isinstance(normal, str) for normal in self.normals)
+        stays = self.depth is not None
+        out[:, : len(NAMES)] = by_cameras(self.layers, stays=stays, turning=(first, second))
+        for number, lean in enumerate(self.leans, start=1):  # a lean turns with what it leans from
+            own = [rows.index(f"lean {axis} {number}") for axis in "XYZ"]
+            out[own, : len(NAMES)] = lean.T @ out[own, : len(NAMES)]
         for column, name in enumerate(names[len(NAMES) :], start=len(NAMES)):
             if name in rows:
                 out[rows.index(name), column] = 1.0
@@ -235,15 +274,8 @@ class PairMedia:
                 z0 = rows.index(f"z0 {number}")
                 if name in ("port", f"port{number}"):
                     out[z0, column] = 1.0
-                elif self.depth is not None and (name == "depth" or name.startswith("thickness")):
+                elif stays and (name == "depth" or name.startswith("thickness")):
                     out[z0, column] = -1.0
-        for number in (1, 2):
-            if self.depth is not None:
-                out[rows.index(f"z0 {number}"), names.index(f"Z {number}")] = 1.0
-            if isinstance(self.normals[number - 1], str):
-                for axis in "XYZ":
-                    lean, turn = f"lean {axis} {number}", f"turn {axis} {number}"
-                    out[rows.index(lean), names.index(turn)] = 1.0
         return out
 
     def near_axis_rate(self) -> float:
@@ -251,6 +283,33 @@ class PairMedia:
         if self.port is not None:
             return 1.0
         return self.layers.indices[-1] / self.layers.indices[0]
+
+
+def _unknowns(name: str) -> tuple[str, ...]:
+    """Return the unknowns that a name states: of a lean both turns of the port."""
+    return tuple(f"lean {axis} {name[4:]}" for axis in "XY") if name in LEANS else (name,)
+
+
+def by_cameras(layers: Layers, *, stays: bool, turning: tuple[bool, bool]) -> FloatArray:
+    """Return how what `names_of` counts moves with the cameras, their media given, shape (k, 24).
+
+    Parameters
+    ----------
+    layers : Layers
+    stays : bool
+        Whether the media stay with the object: the farther from a camera that moves away.
+    turning : pair of bool
+        Whether the far and the near camera's port turns with it.
+    """
+    rows = list(names_of(layers))
+    out = np.eye(len(rows), len(NAMES))
+    for number, turns in enumerate(turning, start=1):
+        if stays:
+            out[rows.index(f"z0 {number}"), NAMES.index(f"Z {number}")] = 1.0
+        for axis in "XYZ" if turns else "":
+            lean, turn = f"lean {axis} {number}", f"turn {axis} {number}"
+            out[rows.index(lean), NAMES.index(turn)] = 1.0
+    return out
 
 
 def media_of(given: Mapping[str, Any]) -> PairMedia | None:
@@ -275,8 +334,14 @@ def media_of(given: Mapping[str, Any]) -> PairMedia | None:
     return PairMedia.stated(
         given["indices"], given.get("thicknesses") or (), ports=ports, depth=given.get("depth"),
         normals=(_normal(normals[0]), _normal(normals[1])), estimate=given.get("estimate") or (),
-        priors=dict(parse_prior(text) for text in given.get("prior") or ()),
+        priors=dict(_prior(text) for text in given.get("prior") or ()),
     )  # fmt: skip
+
+
+def _prior(text: str) -> tuple[str, float]:
+    """Return the name and standard deviation of an option: leans are typed in degrees."""
+    name, sigma = parse_prior(text)
+    return name, float(np.radians(sigma)) if name in LEANS else sigma
 
 
 def _own(given: Mapping[str, Any], name: str, number: int) -> Any:

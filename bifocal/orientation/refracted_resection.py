@@ -60,8 +60,10 @@ def resect_through(
         interior, focal=interior.focal * ratio, sigma_focal=min(interior.sigma_focal, 0.02)
     )
     for _ in range(ROUNDS):
-        seeming = _seeming(camera, media, number, xyz)
-        there = np.asarray(np.isfinite(seeming).all(axis=1))
+        there = np.zeros(len(xyz), dtype=bool)
+        if media.z0(number, camera) >= 0:
+            seeming = _seeming(camera, media, number, xyz)
+            there = np.asarray(np.isfinite(seeming).all(axis=1))
         if there.sum() < 4:
             raise GeometryError(
                 "the control points do not lie behind the media as they are given. Check --depth "

@@ -8,6 +8,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from bifocal.files.haze import greys_through_water
 from bifocal.files.images import as_grey
 from bifocal.model.grid import Bounds, Grid, bounds_of
 from bifocal.model.pair import Pair
@@ -24,7 +25,6 @@ from bifocal.relief_maps.frame import (
     working_grid,
     zoomed_box,
 )
-from bifocal.relief_maps.haze import greys_through_water
 from bifocal.relief_maps.map_completion import complete
 from bifocal.relief_maps.orientation_sigma import orientation_sigma
 from bifocal.relief_maps.registration import Registration, check_registration

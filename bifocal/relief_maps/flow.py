@@ -8,6 +8,7 @@ import cv2
 import numpy as np
 
 from bifocal import rays
+from bifocal.model.image import QUIET_BLUR, local_contrast, noise
 from bifocal.relief_maps.frame import Frame, offsets, radial_stretch, zoom_map
 from photocore.arrays import BoolArray, ByteArray, Float32Array
 
@@ -16,12 +17,12 @@ ALPHA = 20.0
 #: On plain walls a smoother flow between blurred photos is better: the texture lies in the noise
 #: (plaster, façade 62: 6.4 to 6.1 mm of median error, measured RMSE 14 to 11.6 mm; textured
 #: façades get worse by it).
-PLAIN_ALPHA, PLAIN_BLUR = 60.0, 1.0
+PLAIN_ALPHA = 60.0
 #: A photo is plain if this share of it has less contrast within 15 px, blurred, than its noise is:
 #: 0.4 to 0.7 times on plaster (façades 12 and 62, loggia 302), whose median edges and bars can lift
 #: to 4; at half the resolution, where a smoother flow does harm, 1.2 and more; 2.9 to 10 on
 #: textured façades and churches. [per cent]
-PLAIN_SHARE, CONTRAST_WINDOW = 30, (15, 15)
+PLAIN_SHARE = 30
 #: Weight of constant grey value, against 10 for constant gradient.
 DELTA = 10.0
 #: Stride of the inverse search's patches: 2 is a little better and half as quick again. [px]
@@ -104,7 +105,7 @@ def measure(frame: Frame, coarse: Float32Array, *, stride: int = STRIDE) -> Meas
     plain = _is_plain(frame)
     if plain:
         first, second = (
-            cv2.GaussianBlur(image, (0, 0), PLAIN_BLUR) for image in (frame.image1, frame.image2)
+            cv2.GaussianBlur(image, (0, 0), QUIET_BLUR) for image in (frame.image1, frame.image2)
         )
         photos, alpha = replace(frame, image1=first, image2=second), PLAIN_ALPHA
     flow = seeded_flow(photos.image1, photos.image2, seed, finest=0, stride=stride, alpha=alpha)
@@ -120,23 +121,6 @@ def _is_plain(frame: Frame) -> bool:
     """Return whether a good part of photo 1 has less contrast than noise."""
     contrast = local_contrast(frame.image1)[frame.seen1]
     return bool(np.percentile(contrast, PLAIN_SHARE) < noise(frame.image1, frame.seen1))
-
-
-def local_contrast(image: ByteArray | Float32Array) -> Float32Array:
-    """Return the standard deviation within 15 px of a photo blurred by a pixel. [grey levels]"""
-    quiet = cv2.GaussianBlur(image.astype(np.float32), (0, 0), PLAIN_BLUR)
-    mean = cv2.blur(quiet, CONTRAST_WINDOW)
-    square = cv2.blur(quiet * quiet, CONTRAST_WINDOW) - mean * mean
-    return np.asarray(np.sqrt(np.maximum(square, 0)))
-
-
-def noise(image: ByteArray | Float32Array, seen: BoolArray | None = None) -> float:
-    """Return the noise of a photo (Immerkaer 1996, with the median for the mean). [grey levels]"""
-    mask = np.array([[1, -2, 1], [-2, 4, -2], [1, -2, 1]], dtype=np.float32)
-    second = cv2.filter2D(image, cv2.CV_32F, mask)
-    second = second if seen is None else second[seen]
-    # Six is the mask's norm; 1.4826 makes the median of |N(0, 1)| one. Rounding is noise, too.
-    return max(1.4826 / 6 * float(np.median(np.abs(second))), 0.29)
 
 
 def split(frame: Frame, flow: Float32Array) -> tuple[Float32Array, Float32Array]:

@@ -57,6 +57,7 @@ def draw_plan(figure: Any, content: PairContent, say: Words) -> None:
         axes.annotate(
             f"{name}\nd{number} = {d:.3f} m", (x, d), (10, -4), textcoords="offset points",
             fontsize=8, va="center",
+            bbox={"boxstyle": "square,pad=0.1", "facecolor": "white", "edgecolor": "none"},
         )  # fmt: skip
     first = (float(pair.image1.nadir[0]), pair.image1.distance)
     zoom = float(pair.zoom_centre[0])
@@ -238,14 +239,22 @@ def draw_errors(figure: Any, content: PairContent, say: Words) -> None:
         places[:, 0], places[:, 1], c=errors[:, 2] * 1000, cmap="RdBu_r", vmin=-reach, vmax=reach,
         s=34, edgecolors="black", linewidths=0.8, zorder=3,
     )  # fmt: skip
-    axes.quiver(
-        places[:, 0], places[:, 1], errors[:, 0] * zoom, errors[:, 1] * zoom, angles="xy",
-        scale_units="xy", scale=1, width=0.004, color="black", zorder=4,
-    )  # fmt: skip
+    if {"X", "Y"} & {*compared_axes(content)}:
+        axes.quiver(
+            places[:, 0], places[:, 1], errors[:, 0] * zoom, errors[:, 1] * zoom, angles="xy",
+            scale_units="xy", scale=1, width=0.004, color="black", zorder=4,
+        )  # fmt: skip
     bar = figure.colorbar(dots, cax=figure.add_axes(_BAR))
     bar.set_label(say("error_of"), fontsize=8)
     bar.ax.tick_params(labelsize=7)
     _scale_bar(axes, bounds)
+
+
+def compared_axes(content: PairContent) -> list[str]:
+    """Return which of X, Y, r were known of any compared point."""
+    assert content.solution is not None
+    errors = content.solution.check.errors
+    return [name for k, name in enumerate("XYr") if np.isfinite(errors[:, k]).any()]
 
 
 def error_zoom(content: PairContent) -> float:
@@ -278,9 +287,10 @@ def draw_histogram(figure: Any, content: PairContent, say: Words) -> None:
     errors = 1000 * content.solution.check.errors
     reach = max(float(np.nanmax(np.abs(errors))), 0.1)
     edges = np.linspace(-reach, reach, 16)
-    for index, (name, hatch) in enumerate((("X", "///"), ("Y", "..."), ("r", ""))):
+    hatches = {"X": "///", "Y": "...", "r": ""}
+    for index, name in enumerate(compared_axes(content)):
         axes = figure.add_axes((0.08 + 0.315 * index, 0.24, 0.27, 0.66))
-        values = errors[:, index]
+        values, hatch = errors[:, "XYr".index(name)], hatches[name]
         axes.hist(values[np.isfinite(values)], edges, color="0.75", edgecolor="black", hatch=hatch)
         axes.axvline(0, color="black", lw=0.8)
         axes.set_xlabel(f"{name} [mm]", fontsize=8)

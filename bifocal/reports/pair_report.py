@@ -16,6 +16,7 @@ from bifocal.reports.accuracy import accuracy_blocks, millimetres
 from bifocal.reports.content import PairContent
 from bifocal.reports.refraction import refraction_blocks
 from bifocal.reports.worked_point import method_blocks
+from bifocal.survey.remarks import refraction_remarks
 from bifocal.survey.tolerances import RULES
 from photocore.provenance import file_hash, program, provenance, today
 from photocore.reports.document import Block, Document, Heading, Paragraph, Picture, TextTable
@@ -167,14 +168,16 @@ def _residuals(content: PairContent, say: Words) -> Iterator[Block]:
     if control or compared:
         yield Heading(text=say("residuals"))
     if compared:
+        axes = figures.compared_axes(content)
+        key = "vector_caption" if {"X", "Y"} & {*axes} else "relief_errors_caption"
         yield Picture(
             draw=partial(figures.draw_errors, content=content, say=say),
             ratio=figures.ratio_of(figures.error_bounds(content)),
-            caption=say("vector_caption", zoom=f"{figures.error_zoom(content):g}"),
+            caption=say(key, zoom=f"{figures.error_zoom(content):g}"),
         )
         yield Picture(
             draw=partial(figures.draw_histogram, content=content, say=say), ratio=0.3,
-            caption=say("histogram_caption"),
+            caption=say("histogram_caption", axes=", ".join(axes)),
         )  # fmt: skip
     if control:
         headings = [say("point"), "Δcol1", "Δrow1", "Δcol2", "Δrow2", "test", say("used")]
@@ -223,7 +226,10 @@ def _foundations(content: PairContent, say: Words) -> Iterator[Block]:
             yield Paragraph(text=say("rest_assumed", what=text))
         if not assumed:
             yield Paragraph(text=say("rest_nothing"))
-    remarks = (*content.pair.remarks, *(content.solution.remarks if content.solution else ()))
+    remarks = [*content.pair.remarks, *(content.solution.remarks if content.solution else ())]
+    if content.solution is not None:  # told with the geometry, in the language of the report
+        told = refraction_remarks(content.solution.pair, content.solution.points)
+        remarks = [remark for remark in remarks if remark not in told]
     if remarks:
         yield Heading(text=say("remarks"), level=3)
         for remark in dict.fromkeys(remarks):

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from bifocal.model.flags import FlagLimits
 from bifocal.model.homography import apply_homography
 from bifocal.model.pair import Pair
 from bifocal.survey.check_points import check_points
@@ -390,13 +391,21 @@ def _check_plane(
 def _sigma_from_misfits(
     pair: Pair, points: PointObservations
 ) -> tuple[float | None, tuple[str, ...]]:
-    """Return the picks' precision from their misfits across the radius, robustly; None if few."""
+    """Return the picks' precision from their misfits across the radius, robustly; None if few.
+
+    Root mean square of those that it does not make OFF-RADIAL. Real picks have long tails: the
+    median alone says 0.32 px of church_2, where 0.44 px is what the points kept are good to.
+    """
     rows = points.use & ~np.isnan(np.hstack([points.pixels1, points.pixels2])).any(axis=1)
     if rows.sum() < MINIMUM_FOR_SIGMA:
         return None, ()
     trial = pair.intersect(points.pixels1[rows], points.pixels2[rows], sigma_px=1.0)
+    away = np.abs(trial.standardised[np.isfinite(trial.standardised)])
     # 1.4826 x median of |N(0, s)| is s: half of the points may be blunders.
-    spread = 1.4826 * float(np.nanmedian(np.abs(trial.standardised)))
+    spread = 1.4826 * float(np.median(away)) if len(away) else 0.0
+    for _ in range(10):
+        kept = away[away <= FlagLimits().off_radial * spread]
+        spread = float(np.sqrt(np.mean(kept**2))) if len(kept) else spread
     sigma = max(spread, BEST_SIGMA_PX)
     remark = (
         f"sigma_px = {sigma:.3g} px, found from the misfits of {int(rows.sum())} points across the "

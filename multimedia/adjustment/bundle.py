@@ -188,7 +188,8 @@ def _used_points(
     for names, why in ((alone, "measured in one camera only"), (unseen, "measured in no camera")):
         if names:
             shown = ", ".join(names[:8]) + (" ..." if len(names) > 8 else "")
-            remarks.append(f"{len(names)} point(s) {why}, left out: {shown}")
+            points = "point" if len(names) == 1 else "points"
+            remarks.append(f"{len(names)} {points} {why}, left out: {shown}")
     dropped = set(alone)
     rows = [row for row, name in enumerate(images.ids) if name not in dropped]
     on_bars = {end for bar in unknowns.scale_bars for end in (bar.first, bar.second)}

@@ -84,7 +84,7 @@ def refuse_impossible_media(
             else ""
         )
         raise GeometryError(
-            f"adjust: {label} comes out as {value:.4g} +- {own:.2g}, {start:g} was given: the data "
+            f"adjust: {label} comes out as {value:.4g} ± {own:.2g}, {start:g} was given: the data "
             f"cannot carry it{alike}. Give what is known as a standard deviation (--prior "
             f"{label}={item.typical:.3g}), measure points at more depths, or take {item.name} out "
             "of --media. If it really is so, change its start value in the project."
@@ -160,7 +160,7 @@ def remarks_on_unknowns(
     """Return what the user should know of the unknowns: alike, insignificant, or not carried."""
     return (
         *_uncarried(project, columns, result),
-        *_alike(result),
+        *alike_remarks(result),
         *_insignificant(result),
     )
 
@@ -173,7 +173,7 @@ def _uncarried(project: Project, columns: BundleColumns, result: Adjustment) -> 
             yield hardly_carried(item.label, start=item.start, sigma=prior)
 
 
-def _alike(result: Adjustment) -> Iterator[str]:
+def alike_remarks(result: Adjustment) -> Iterator[str]:
     """Yield the pairs that cannot be told apart, one sentence for each kind of pair."""
     say = words_of("multimedia.adjustment", "en")
     ranked = alike_pairs(result, ALIKE)

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from multimedia.adjustment import report_figures as figures
-from multimedia.adjustment.plausibility import alike_pairs, remedy_of
+from multimedia.adjustment.plausibility import alike_pairs, alike_remarks, remedy_of
 from multimedia.adjustment.unknowns import Adjustment, decimals
 from multimedia.media.flat_interface import FlatInterface
 from multimedia.media.interfaces import Interfaces
@@ -35,6 +35,7 @@ STRONG = 0.9
 _LARGEST_PICTURE = 60
 #: Cameras drawn, and rows of the longer tables.
 _CAMERAS, _SUSPECTS, _POINTS = 12, 50, 200
+_RAISED = str.maketrans("-12345678", "⁻¹²³⁴⁵⁶⁷⁸")
 
 
 def write_adjustment_report(
@@ -77,7 +78,10 @@ def adjustment_document(
     for part in (_precision, _media, _unknowns, _residuals, _suspects, _correlations, _points):
         blocks += part(result, say)
         if part is _precision:
-            blocks += _remarks((*notes, *result.remarks), say)
+            # What is alike has a section of its own.
+            alike = set(alike_remarks(result))
+            told = [text for text in (*notes, *result.remarks) if text not in alike]
+            blocks += _remarks((*told, *([say("see_correlations")] if alike else [])), say)
     blocks += _provenance(say)
     return Document(title=title, language=language, subject=made, blocks=tuple(blocks))
 
@@ -183,7 +187,9 @@ def _unknowns(result: Adjustment, say: Words) -> Iterator[Block]:
     rows = []
     for name, value, sigma, unit in result.rows():
         digits = decimals(sigma)
-        rows.append([name, f"{value:.{digits}f}", f"{sigma:.{digits}f}", unit])
+        base, _, power = unit.partition("^")
+        shown = base + power.translate(_RAISED)
+        rows.append([name, f"{value:.{digits}f}", f"{sigma:.{digits}f}", shown])
     yield TextTable(headings=[say("unknown"), say("value"), "sigma", say("unit")], rows=rows)
     counted = ("offset", "tilt", "shift")
     if any(name.rpartition(":")[2].startswith(counted) for name in result.names):

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from multimedia.adjustment.unknowns import Adjustment
-from multimedia.media.camera import Camera
+from multimedia.media.camera import Camera, Sensor
 from photocore.arrays import FloatArray, IntArray
 from photocore.reports.words import Words
 
@@ -69,6 +69,8 @@ def draw_vectors(figure: Any, result: Adjustment, cameras: Sequence[Camera], say
         axes.set_ylim(-reach, reach)
         axes.axhline(0, color="0.7", lw=0.6, zorder=0)
         axes.axvline(0, color="0.7", lw=0.6, zorder=0)
+        if camera.sensor is not None:
+            _draw_outline(axes, camera.sensor)
         axes.set_title(_plain(camera.name), fontsize=8)
         axes.set_xlabel("x [mm]", fontsize=7)
         axes.set_ylabel("y [mm]", fontsize=7)
@@ -81,6 +83,13 @@ def draw_vectors(figure: Any, result: Adjustment, cameras: Sequence[Camera], say
             say("residual_bar", size=f"{size:g}"), (left, low), (0, 3),
             textcoords="offset points", fontsize=6,
         )  # fmt: skip
+
+
+def _draw_outline(axes: Any, sensor: Sensor) -> None:
+    """Draw the rim of the sensor: how much of the image the points fill."""
+    rim = np.array([[0, 0], [sensor.width, 0], [sensor.width, sensor.height], [0, sensor.height]])
+    corners = sensor.image_from_pixel(rim - 0.5)
+    axes.fill(*corners.T, facecolor="0.97", edgecolor="0.4", lw=0.8, zorder=-1)
 
 
 def depth_and_radial(result: Adjustment) -> tuple[FloatArray, FloatArray]:
@@ -121,8 +130,8 @@ def draw_depth(figure: Any, result: Adjustment, say: Words) -> None:
         if inside.sum() > 2:
             values = radial[inside] * 1000
             axes.errorbar(
-                (low + high) / 2, values.mean(), yerr=2 * values.std(ddof=1) / len(values) ** 0.5,
-                fmt="s", color="black", ms=5, capsize=3,
+                depth[inside].mean(), values.mean(), fmt="s",
+                yerr=2 * values.std(ddof=1) / len(values) ** 0.5, color="black", ms=5, capsize=3,
             )  # fmt: skip
     axes.set_xlabel(say("depth_axis", unit=result.project.unit), fontsize=8)
     axes.set_ylabel(say("radial_axis"), fontsize=8)

@@ -100,7 +100,8 @@ class Unknowns:
         unknown = [] if self.interior == AUTO else unknown
         if unknown:
             raise InputError(
-                f"interior: {', '.join(unknown)} is not one of {', '.join(ANY_INTERIOR)}."
+                f"interior: {', '.join(unknown)} is not one of {', '.join(ANY_INTERIOR)}; auto "
+                "stands alone."
             )
         if self.control not in CONTROL:
             raise InputError(f"control: {self.control!r} is not one of {', '.join(CONTROL)}.")

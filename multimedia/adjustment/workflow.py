@@ -47,6 +47,11 @@ def adjust_project(
     project = read_project(source)
     groups = dict.fromkeys(group for group in project.object_points.groups if group)
     if unknowns.plates == ALL and ALL[0] not in groups:
+        if not groups:
+            raise InputError(
+                f"{source}: --plate all: no object point belongs to a group; name the plate of "
+                "each in the column group of its object points, or leave --plate out."
+            )
         unknowns = replace(unknowns, plates=tuple(groups))
     result = bundle_adjust(project, unknowns)
     if out is not None:

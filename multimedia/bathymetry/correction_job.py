@@ -13,6 +13,7 @@ from multimedia.bathymetry.corrected_points import (
     Precision,
     WaterSurface,
 )
+from multimedia.media.surfaces import Plane
 from photocore.arrays import FloatArray
 from photocore.errors import GeometryError
 
@@ -126,6 +127,15 @@ class Outcome:
                 f"{sum(self.counts.values())} lie outside it, or their rays meet it nowhere. Check "
                 "that surface and data are in the same place and reference system."
             )
+        failed = self.counts.get(BathymetryStatus.FAILED.label, 0)
+        dry = self.counts.get(BathymetryStatus.DRY.label, 0)
+        flat = isinstance(surface, Plane)
+        if failed and not (self._wet or dry or allow_dry):
+            raise GeometryError(
+                f"none of {failed} points could be corrected: no rays from their cameras meet in "
+                "one place through this water surface. Check the cameras, and which of them saw "
+                "which point" + ("." if flat else "; leave oblique rays out with --max-angle.")
+            )
         if not self._wet and not allow_dry:
             level = surface.middle
             hint = ""
@@ -147,9 +157,9 @@ class Outcome:
                 f"The deepest point lies {self.max_depth:.0f} m under water, deeper than photos "
                 "see: are the heights in millimetres, or is the water level wrong?"
             )
-        failed = self.counts.get(BathymetryStatus.FAILED.label, 0)
         if failed:
-            self.remarks.append(f"{failed} points could not be corrected and are marked so.")
+            hint = "" if flat else " Oblique rays through waves have many ways: try --max-angle 40."
+            self.remarks.append(f"{failed} points could not be corrected and are marked so.{hint}")
         if outside:
             self.remarks.append(
                 f"{outside} points lie outside the modelled water surface and were left as given."

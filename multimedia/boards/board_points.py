@@ -67,6 +67,12 @@ def with_boards(
             groups += [pose] * len(names)
             image.append(sensor.image_from_pixel(each.view.pixels))
     own, seen = project.object_points, project.image_points
+    taken = {name.rpartition(" ")[0] for name in set(own.ids) & objects.keys()}
+    if taken:
+        raise InputError(
+            f"the project has points of the board in {', '.join(sorted(taken)[:8])} already; give "
+            "the project without boards, or photos of other names."
+        )
     sigma = np.concatenate([own.sigma, np.full((len(objects), 3), np.nan)])
     places = np.array([point for _, point in objects.values()]).reshape(-1, 3)
     return replace(
@@ -103,14 +109,19 @@ def _agreeing(project: Project, views: list[PosedView], square: float) -> list[P
 
 
 def _turned(each: PosedView) -> list[PosedView]:
-    """Return the view with its points numbered from every corner that might be the first."""
+    """Return the view with its points numbered from every corner that might be the first.
+
+    Turned, an asymmetric grid of an odd number of rows is another one, and has but one first.
+    """
     board = each.view.board
     size = board.max(axis=0)
     choices = [board, size - board]
     if size[0] == size[1]:
         quarter = np.column_stack([size[0] - board[:, 1], board[:, 0], board[:, 2]])
         choices += [quarter, size - quarter]
-    return [each._replace(view=replace(each.view, board=choice)) for choice in choices]
+    places = set(map(tuple, board.tolist()))
+    alike = [choice for choice in choices if set(map(tuple, choice.tolist())) == places]
+    return [each._replace(view=replace(each.view, board=choice)) for choice in alike]
 
 
 def _by_place(world: FloatArray, each: PosedView, like: PosedView) -> FloatArray:

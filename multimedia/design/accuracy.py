@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike
 from multimedia.design.studies import CalibrationCosts, Placement, Study
 from multimedia.media.camera import EXTERIOR, Camera
 from multimedia.media.flat_interface import FlatInterface
+from multimedia.media.interfaces import Interfaces
 from multimedia.media.projection import project, project_with_jacobian
 from multimedia.media.surfaces import tangents_of, unit_vector
 from multimedia.orientation.intersection import intersect
@@ -26,18 +27,36 @@ from photocore.errors import GeometryError, InputError, PhotogrammetryError
 
 #: Rounds of aiming at where a target appears; each leaves a small share of the miss before.
 AIMING_ROUNDS = 7
-#: Steps in which sensitivities are given: what one can be wrong by on a good day. Lengths in mm.
+#: Steps in which sensitivities are given: what one can be wrong by on a good day. Lengths in mm, a
+#: gradient of the index per mm.
 STEPS: Mapping[str, tuple[float, str]] = {
     "index": (0.001, "0.001"),
     "offset": (1.0, "1 mm"),
     "tilt": (float(np.radians(0.1)), "0.1 deg"),
     "thickness": (0.1, "0.1 mm"),
+    "radius": (1.0, "1 mm"),
+    "centre": (1.0, "1 mm"),
+    "shift": (1.0, "1 mm"),
+    "gradient": (1e-6, "0.001 per m"),
 }
+#: Those that count in millimetres; a gradient counts per millimetre.
+_LENGTHS = ("offset", "thickness", "radius", "centre", "shift")
+
+
+def kind_of(parameter: str) -> str:
+    """Return which of `STEPS` belongs to a parameter of media.
+
+    Examples
+    --------
+    >>> [kind_of(name) for name in ("index3", "tank:tilt1", "dome:centreX@3", "gradient")]
+    ['index', 'tilt', 'centre', 'gradient']
+    """
+    return parameter.rpartition(":")[2].partition("@")[0].rstrip("0123456789XYZ")
 
 
 def study_setup(
     cameras: Sequence[Camera],
-    media: Sequence[FlatInterface | None],
+    media: Sequence[FlatInterface | Interfaces | None],
     points: FloatArray,
     *,
     sigma_image: float,
@@ -50,7 +69,7 @@ def study_setup(
     ----------
     cameras : sequence of Camera
         At least two.
-    media : sequence of FlatInterface or None
+    media : sequence of FlatInterface, Interfaces or None
         What each camera looks through.
     points : ndarray, shape (n, 3)
         Object points, where measurements are planned. [object unit]
@@ -117,8 +136,12 @@ def study_setup(
     sigma = sigma_image * np.sqrt(np.diagonal(inverse, axis1=1, axis2=2))
     sensitivity = {}
     for key, moment in moments.items():
-        kind = key.rpartition(":")[2].rstrip("0123456789")
-        step = STEPS[kind][0] * (millimetre if kind in ("offset", "thickness") else 1.0)
+        kind = kind_of(key)
+        step = STEPS[kind][0]
+        if kind in _LENGTHS:
+            step *= millimetre
+        elif kind == "gradient":
+            step /= millimetre
         moved = np.einsum("nij,nj->ni", inverse, moment)
         sensitivity[key] = np.sqrt(np.nanmean(moved**2, axis=0)) * step
     return Study(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -87,33 +88,15 @@ def write_design_plot(path: Path | str, design: Design, *, overwrite: bool = Fal
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    count = 4 if design.planarity else 3
-    figure = Figure(figsize=(4 * count, 4.2), layout="constrained")
+    parts = [_draw_precision, _draw_angles]
+    parts += [_draw_placements] if design.placements else []
+    parts += [_draw_flatness] if design.planarity else []
+    figure = Figure(figsize=(4 * len(parts), 4.2), layout="constrained")
     FigureCanvasAgg(figure)
-    left, middle, right, *more = figure.subplots(1, count)
-    depth = design.by_depth[:, 0]
-    for column, (name, style) in enumerate(_STYLES.items(), start=1):
-        left.plot(depth, design.by_depth[:, column], label=f"sigma {name}", **style)
-    left.set(xlabel=f"depth [{design.unit}]", ylabel=f"[{design.unit}]", title="Expected precision")
-    middle.plot(depth, design.by_depth[:, 4], marker="o", label="through water")
-    middle.plot(depth, design.by_depth[:, 5], marker="s", label="tank empty")
-    middle.set(xlabel=f"depth [{design.unit}]", ylabel="[deg]", title="Intersection angle")
-    if design.placements:
-        angles = [np.degrees(p.half_angle) for p in design.placements]
-        for axis, (name, style) in enumerate(_STYLES.items()):
-            sigma = [p.sigma[axis] for p in design.placements]
-            right.plot(angles, sigma, label=f"sigma {name}", **style)
-        best, open_end = best_placement(design.placements)
-        label = "best tried" if open_end else "best"
-        right.axvline(np.degrees(best.half_angle), color="grey", linestyle=":", label=label)
-    right.set(xlabel="half opening in air [deg]", ylabel=f"[{design.unit}]", title="Placement")
-    for axes in more:
-        _draw_flatness(axes, design)
-    for axes in (left, middle, right, *more):
+    for axes, draw in zip(figure.subplots(1, len(parts)), parts, strict=True):
+        draw(axes, design)
         axes.grid(alpha=0.3)
-        axes.set_ylim(bottom=0)
-        if axes.lines:
-            axes.legend()
+        axes.legend()
     with mpl.rc_context():
         write_figure(path, figure, overwrite=overwrite, dpi=130)
 
@@ -127,24 +110,74 @@ _STYLES: dict[str, dict[str, Any]] = {
 }
 
 
+#: Steps from a unit to a smaller one, in which small values are shown.
+_SMALLER = {"m": ("mm", "µm"), "mm": ("µm",)}
+
+
+def _shown(values: Sequence[float], unit: str) -> tuple[float, str]:
+    """Return factor and unit in which the largest of values has a digit before the point."""
+    factor = 1.0
+    for smaller in _SMALLER.get(unit, ()):
+        if max(values) * factor >= 1.0:
+            break
+        factor, unit = 1000 * factor, smaller
+    return factor, unit
+
+
+def _draw_precision(axes: Axes, design: Design) -> None:
+    """Draw standard deviations over depth."""
+    depth, sigmas = design.by_depth[:, 0], design.by_depth[:, 1:4]
+    factor, unit = _shown([float(sigmas.max())], design.unit)
+    for sigma, (name, style) in zip(sigmas.T, _STYLES.items(), strict=True):
+        axes.plot(depth, factor * sigma, label=f"sigma {name}", **style)
+    axes.set(xlabel=f"depth [{design.unit}]", ylabel=f"[{unit}]", title="Expected precision")
+    axes.set_ylim(0, 1.15 * factor * float(sigmas.max()))
+    axes.locator_params(axis="x", nbins=5)
+
+
+def _draw_angles(axes: Axes, design: Design) -> None:
+    """Draw the angles of rays over depth, in water and with the tank empty."""
+    depth, water, air = design.by_depth[:, [0, 4, 5]].T
+    axes.plot(depth, water, marker="o", markersize=9, markerfacecolor="none", label="through water")
+    axes.plot(depth, air, marker="s", markersize=5, linestyle="--", label="tank empty")
+    axes.set(xlabel=f"depth [{design.unit}]", ylabel="[deg]", title="Intersection angle")
+    axes.set_ylim(0, 1.15 * float(np.nanmax(design.by_depth[:, 4:6])))
+    axes.locator_params(axis="x", nbins=5)
+
+
+def _draw_placements(axes: Axes, design: Design) -> None:
+    """Draw standard deviations over the opening of the cone of cameras, and the best of them."""
+    angles = [np.degrees(p.half_angle) for p in design.placements]
+    sigmas = np.array([p.sigma for p in design.placements])
+    factor, unit = _shown([float(sigmas.min(axis=0).max())], design.unit)
+    for sigma, (name, style) in zip(sigmas.T, _STYLES.items(), strict=True):
+        axes.plot(angles, factor * sigma, label=f"sigma {name}", **style)
+    best, open_end = best_placement(design.placements)
+    label = "best tried" if open_end else "best"
+    axes.axvline(np.degrees(best.half_angle), color="grey", linestyle=":", label=label)
+    axes.set(xlabel="half opening in air [deg]", ylabel=f"[{unit}]", title="Placement")
+    axes.set_ylim(0, 1.15 * factor * float(sigmas.max()))
+
+
 def _draw_flatness(axes: Axes, design: Design) -> None:
     """Draw what waves cost over their length, with bend and wedge as lines across."""
     waves = [d for d in design.planarity if d.kind == "waves"]
     lengths = [d.wavelength for d in waves]
+    highest = max(float(np.linalg.norm(d.shift)) for d in design.planarity)
+    factor, unit = _shown([highest], design.unit)
     for axis, (name, style) in enumerate(_STYLES.items()):
         axes.plot(
-            lengths, [d.shift[axis] for d in waves],
+            lengths, [factor * d.shift[axis] for d in waves],
             label=f"d{name}, waves of {waves[0].size * 1000:g} mrad", **style,
         )  # fmt: skip
     for one, dashes in zip((d for d in design.planarity if d.kind != "waves"), ("-.", ":"),
                            strict=False):  # fmt: skip
-        total = float(np.linalg.norm(one.shift))
+        total = factor * float(np.linalg.norm(one.shift))
         size = f"{one.size:g} {design.unit}" if one.kind == "bend" else f"{one.size * 1000:g} mrad"
         axes.axhline(total, color="black", linestyle=dashes, label=f"{one.kind} of {size}, total")
-    highest = max(float(np.linalg.norm(d.shift)) for d in design.planarity)
     axes.set(
-        xscale="log", ylim=(0, 1.7 * highest), title="Faces that are not plane",
-        xlabel=f"length of the waves [{design.unit}]", ylabel=f"RMS error [{design.unit}]",
+        xscale="log", ylim=(0, 1.7 * factor * highest), title="Faces that are not plane",
+        xlabel=f"length of the waves [{design.unit}]", ylabel=f"RMS error [{unit}]",
     )  # fmt: skip
     axes.set_xticks(lengths, labels=[f"{v:.2g}" for v in lengths])
     axes.minorticks_off()

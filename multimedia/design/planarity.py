@@ -26,6 +26,8 @@ from photocore.errors import GeometryError, InputError
 #: Deviations that are studied: sag over the part of the faces that rays cross [mm], angle between
 #: the faces and slope of waves [rad]. Small enough for costs to grow with them.
 SAG, WEDGE, SLOPE = 0.01, 1e-4, 1e-4
+#: Errors below this share of the width that rays cross are rounding: media that do not refract.
+ROUNDING = 1e-12
 #: Lengths of waves as shares of the width that rays cross.
 WAVELENGTHS = (2.0, 1.0, 0.5, 0.25, 0.125)
 
@@ -47,7 +49,8 @@ class Deviation:
     largest : float
         Largest error of a point.
     allowed : float
-        Size whose RMS error equals the expected standard deviation of the points.
+        Size whose RMS error equals the expected standard deviation of the points; infinite where
+        it costs nothing, as behind media of one index.
     """
 
     kind: str
@@ -149,7 +152,8 @@ def planarity_study(
         if not np.isfinite(shift).all():
             raise GeometryError("planarity: no point is seen by two cameras.")
         largest = float(np.nanmax(np.linalg.norm(moved, axis=-1)))
-        allowed = size * expected / float(np.linalg.norm(shift))
+        cost = float(np.linalg.norm(shift))
+        allowed = size * expected / cost if cost > ROUNDING * width else np.inf
         found.append(
             Deviation(
                 kind=kind, size=size, wavelength=wavelength, shift=tuple(shift.tolist()),

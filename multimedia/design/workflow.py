@@ -13,6 +13,7 @@ from multimedia.design.accuracy import (
     STEPS,
     calibration_costs,
     compare_placements,
+    kind_of,
     object_grid,
     ring_of_cameras,
     study_setup,
@@ -122,9 +123,12 @@ def _design(
         except (GeometryError, InputError) as error:
             notes.append(f"calibration not simulated: {error}")
     else:
-        notes.append("calibration not simulated: the cameras look through different media.")
+        notes.append(
+            "calibration not simulated: that needs cameras that all look through the same "
+            "plane-parallel layers."
+        )
     sensitivities = tuple(
-        (name, STEPS[name.rpartition(":")[2].rstrip("0123456789")][1], tuple(moved.tolist()))
+        (name, STEPS[kind_of(name)][1], tuple(moved.tolist()))
         for name, moved in study.sensitivity.items()
     )
     planarity: tuple[Deviation, ...] = ()

@@ -14,13 +14,13 @@ from pathlib import Path
 
 import numpy as np
 
-from multimedia.exchange.opencv_camera import camera_of, inexact, opencv_of
+from multimedia.exchange.opencv_camera import OpencvCamera, camera_of, inexact, opencv_of
 from multimedia.media.camera import Camera
 from multimedia.projects.model import Project
 from photocore.arrays import FloatArray
 from photocore.errors import InputError
 from photocore.lensformats import FISHEYE_KEY, LensData, opencv_values
-from photocore.output import all_or_none, atomic_path, check_all_writable
+from photocore.output import atomic_folder, atomic_path
 from photocore.rotation import checked_rotation, rotation_from_vector
 from photocore.textfile import check_name
 
@@ -74,26 +74,36 @@ def write_opencv(path: Path, project: Project, *, overwrite: bool = False) -> tu
         raise InputError(
             f"{path}: OpenCV's files hold one camera, the project has {len(views)}; name a folder."
         )
-    targets = [path] if single else [path / f"{name}.yml" for name in views]
-    check_all_writable(*targets, overwrite=overwrite)
-    with all_or_none():
-        for target, view in zip(targets, views.values(), strict=True):
-            content = {
-                "camera_matrix": view.matrix, "distortion_coefficients": view.coefficients[None],
-                "R": view.rotation, "T": view.translation[:, None],
-            }  # fmt: skip
-            if view.fisheye:
-                content[FISHEYE_KEY] = np.ones(1)
-            target.parent.mkdir(parents=True, exist_ok=True)
-            with atomic_path(target, overwrite=overwrite) as temporary:
-                text = _storage_text(target, view.size, content)
-                temporary.write_text(text, encoding="utf-8")
+    odd = [name for name in views if not single and Path(name).name != name]
+    if odd:
+        raise InputError(
+            f"{path}: camera {odd[0]!r} cannot give its name to a file in a folder; rename it."
+        )
+    texts = {name: _calibration_text(path, view) for name, view in views.items()}
+    if single:
+        with atomic_path(path, overwrite=overwrite) as temporary:
+            temporary.write_text("".join(texts.values()), encoding="utf-8")
+    else:
+        with atomic_folder(path, overwrite=overwrite) as folder:
+            for name, text in texts.items():
+                (folder / f"{name}.yml").write_text(text, encoding="utf-8")
     remarks = [*inexact(views)]
     if any(project.media_of):
         remarks.append("OpenCV knows no media: glass and water were not written.")
     if project.object_points.ids or project.image_points.ids:
         remarks.append("points are not part of OpenCV's calibrations; they were not written.")
     return tuple(remarks)
+
+
+def _calibration_text(path: Path, view: OpencvCamera) -> str:
+    """Return the calibration of a camera; JSON if the file's name says so, else YAML."""
+    content = {
+        "camera_matrix": view.matrix, "distortion_coefficients": view.coefficients[None],
+        "R": view.rotation, "T": view.translation[:, None],
+    }  # fmt: skip
+    if view.fisheye:
+        content[FISHEYE_KEY] = np.ones(1)
+    return _storage_text(path, view.size, content)
 
 
 def _storage_text(path: Path, size: tuple[int, int], content: Mapping[str, FloatArray]) -> str:

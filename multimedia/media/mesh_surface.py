@@ -60,6 +60,7 @@ class MeshSurface(HeightField):
                 f"triangles: {int((area == 0).sum())} of {len(area)} triangles have no extent in X "
                 "and Y; a water surface has no vertical faces. Remove them."
             )
+        _refuse_folds(vertices, triangles, area)
         triangles.setflags(write=False)
         corners = vertices[triangles]
         # (b1, b2) = _to_corners @ (xy - corner 0); b0 = 1 - b1 - b2.
@@ -133,6 +134,31 @@ class MeshSurface(HeightField):
     def shifted(self, vector: ArrayLike) -> MeshSurface:
         """Return the mesh moved by a vector."""
         return replace(self, vertices=self.vertices + as_floats(vector, "vector"), source="")
+
+
+def _refuse_folds(vertices: FloatArray, triangles: IntArray, area: FloatArray) -> None:
+    """Refuse triangles on the same side of a common edge: there the surface is folded back.
+
+    Raises
+    ------
+    InputError
+        With the place of the first. Triangles that share no vertex numbers are not compared.
+    """
+    first, second, third = triangles.T
+    ends = np.sort(np.concatenate([[first, second], [second, third], [third, first]], axis=1).T)
+    # Along the edge from its lower vertex number the triangle lies left or right.
+    turned = np.sign(np.concatenate([second - first, third - second, first - third]))
+    side = turned * np.tile(np.sign(area), 3)
+    order = np.lexsort((side, ends[:, 1], ends[:, 0]))
+    ends, side = ends[order], side[order]
+    same = (ends[1:] == ends[:-1]).all(axis=1) & (side[1:] == side[:-1])
+    if same.any():
+        x, y = vertices[ends[int(same.argmax())], :2].mean(axis=0)
+        raise InputError(
+            f"triangles: {int(same.sum())} edges have two triangles on one side of them, the first "
+            f"at X = {x:g}, Y = {y:g}; a water surface has no overhangs and no triangle twice. "
+            "Remove one of both."
+        )
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -81,6 +81,13 @@ def read_set(crd: Path, fix: Path, *, sensor: Sensor, label: str, source: str) -
         order = _by_number(crd, fix, numbers, body)
     seen = numbers != _NOT_FOUND
     places, xyz = places[seen], xyz[order[seen]]
+    _, row, count = np.unique(xyz, axis=0, return_index=True, return_counts=True)
+    if (count > 1).any():
+        number = numbers[seen][row[int(count.argmax())]]
+        raise InputError(
+            f"{crd} and {fix.name}: {int((count > 1).sum())} points stand there more than once, "
+            f"such as that of number {number:g}."
+        )
     if len(places) < _FEWEST:
         raise InputError(f"{crd}: holds {len(places)} points; expected at least {_FEWEST}.")
     half = np.array([sensor.width, sensor.height]) * sensor.pitch / 2

@@ -122,7 +122,14 @@ def _agreeing(
     camera: Camera, chosen: Sequence[PlaneSet], media: Media, remarks: list[str]
 ) -> Iterator[PlaneSet]:
     """Yield the sets that agree with each other, leaving out the one that disturbs most."""
-    sets = list(chosen)
+    sets: list[PlaneSet] = []
+    for one in chosen:
+        places = set(map(tuple, one.xyz.tolist()))
+        again = [other for other in sets if places & set(map(tuple, other.xyz.tolist()))]
+        if again:
+            remarks.append(f"{one.source} was left out: it has points of {again[0].source}.")
+        else:
+            sets.append(one)
     while len(sets) > 1 and not _fit_together(camera, sets, media):
         if len(sets) == 2:
             names = " and ".join(one.source for one in sets)

@@ -15,6 +15,10 @@ from photocore.reports.figure_file import write_figure
 
 #: Curves whose depth marks are named; more would cover the photo.
 MOST_NAMED = 3
+#: Around a name no other one begins. [dots]
+_ROOM = 2.0
+#: What takes less than this share of the image is shown enlarged.
+_SMALL = 0.25
 
 
 def draw_epipolar(
@@ -59,6 +63,7 @@ def draw_epipolar(
     """
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
+    from matplotlib.patheffects import withStroke
 
     check_ending(path, "a picture is written as .png, .svg or .pdf.", ".png", ".svg", ".pdf")
     figure = Figure(figsize=(9.0, 9.0 * size[1] / size[0] + 0.4), layout="constrained")
@@ -73,17 +78,20 @@ def draw_epipolar(
             axes.annotate(
                 label, seen[len(seen) // 2], color=line.get_color(), fontsize=9,
                 xytext=(4, 4), textcoords="offset points",
+                path_effects=[withStroke(linewidth=2.0, foreground="white")],
             )  # fmt: skip
-    if depths:
-        _mark_depths(axes, curves, depths)
     if len(targets):
         axes.plot(
             targets[:, 0], targets[:, 1], "o", fillstyle="none", markersize=7, color="tab:red",
             label="candidates",
         )  # fmt: skip
         axes.legend(loc="upper right")
-    axes.set(xlim=(-0.5, size[0] - 0.5), ylim=(size[1] - 0.5, -0.5), aspect="equal")
+    columns, rows = _window([*curves, targets], size)
+    axes.set(xlim=columns, ylim=rows[::-1], aspect="equal")
     axes.set(xlabel="column [px]", ylabel="row [px]", title=title)
+    if depths:
+        figure.draw_without_rendering()  # where marks lie decides which names have room
+        _mark_depths(axes, curves, depths)
     write_figure(path, figure, overwrite=overwrite, dpi=150)
 
 
@@ -94,7 +102,7 @@ def _mark_depths(axes: Any, curves: Sequence[FloatArray], depths: Sequence[Float
     low = min(float(np.min(z)) for z in depths)
     high = max(float(np.max(z)) for z in depths)
     values = [v for v in MaxNLocator(5).tick_values(low, high) if low <= v <= high]
-    named = 0
+    named, taken = 0, list[Any]()
     for curve, z in zip(curves, depths, strict=True):
         good = np.isfinite(curve).all(axis=1) & np.isfinite(z)
         if good.sum() < 2:
@@ -108,9 +116,55 @@ def _mark_depths(axes: Any, curves: Sequence[FloatArray], depths: Sequence[Float
             marks[:, 0], marks[:, 1], "o", markersize=4, markerfacecolor="white",
             markeredgecolor="black", linestyle="none", gid="depth-marks",
         )  # fmt: skip
-        for value, mark in zip(inside, marks, strict=True) if named < MOST_NAMED else ():
-            axes.annotate(
-                f"Z {value:g}", mark, fontsize=7, xytext=(-36, -3), textcoords="offset points",
-                bbox={"boxstyle": "round,pad=0.15", "facecolor": "white", "linewidth": 0.3},
-            )  # fmt: skip
-        named += 1
+        if named < MOST_NAMED:
+            level = float(np.ptp(places[:, 0])) > float(np.ptp(places[:, 1]))
+            named += _name_depths(axes, inside, marks, taken, level=level)
+
+
+def _name_depths(
+    axes: Any, depths: Sequence[float], marks: FloatArray, taken: list[Any], *, level: bool
+) -> bool:
+    """Name the marks of a curve where a name hides no other one; return whether any is named.
+
+    Below the marks of a curve that runs level, else beside them, to the left. The ends come first,
+    and lean outwards.
+    """
+    before = len(taken)
+    last = len(marks) - 1
+    for k in sorted(range(len(marks)), key=lambda k: k not in (0, last)):
+        place = {"xytext": (-8, 0), "ha": "right", "va": "center"}
+        if level:
+            outwards = np.sign(marks[k, 0] - marks[last - k, 0]) if k in (0, last) else 0
+            side = {-1: "right", 0: "center", 1: "left"}[int(outwards)]
+            place = {"xytext": (-3 * outwards, -8), "ha": side, "va": "top"}
+        name = axes.annotate(
+            f"Z {depths[k]:g}", marks[k], fontsize=7, textcoords="offset points",
+            bbox={"boxstyle": "round,pad=0.15", "facecolor": "white", "linewidth": 0.3}, **place,
+        )  # fmt: skip
+        box = name.get_window_extent().padded(_ROOM)
+        if any(box.overlaps(other) for other in taken):
+            name.remove()
+        else:
+            taken.append(box)
+    return len(taken) > before
+
+
+def _window(
+    drawn: Sequence[FloatArray], size: tuple[int, int]
+) -> tuple[tuple[float, float], tuple[float, float]]:
+    """Return limits of columns and rows: the whole image, or what is drawn where that is small."""
+    whole = (-0.5, size[0] - 0.5), (-0.5, size[1] - 0.5)
+    places = np.concatenate([np.zeros((0, 2)), *drawn])
+    places = places[np.isfinite(places).all(axis=1)]
+    if not len(places):
+        return whole
+    low, high = places.min(axis=0), places.max(axis=0)
+    share = float(np.max((high - low) / size))
+    if share > _SMALL:
+        return whole
+    # Twice as much as is drawn, of the form of the image, and inside it.
+    half = max(share, 20 / min(size)) * np.array(size, dtype=float)
+    middle = np.clip((low + high) / 2, half - 0.5, np.array(size) - 0.5 - half)
+    left, top = (middle - half).tolist()
+    right, bottom = (middle + half).tolist()
+    return (left, right), (top, bottom)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -16,6 +17,10 @@ from photocore.raster import RasterFile, Window, create_geotiff
 SENTINELS = (-9999.0, -99999.0, -32768.0, -32767.0, 9999.0, 1e20, -1e20)
 #: A height repeated this often and this far from the others is no height (share of their range).
 REPEATS, APART = 16, 3.0
+#: What no number of an ASCII grid holds; its heading: lines of a word and a value, before the line
+#: in which cells begin at the latest.
+_STRANGE, _HEADING = re.compile(rb"[^\s0-9.,eE+-]"), re.compile(rb"\s*[A-Za-z_]+\s+\S")
+_FIRST_CELLS = 8
 
 
 class Dem(RasterFile):
@@ -29,11 +34,13 @@ class Dem(RasterFile):
     Raises
     ------
     InputError
-        If it is a picture.
+        If it is a picture, or an ASCII grid with a cell that is no number.
     """
 
     def __init__(self, path: Path | str, *, nodata: float | None = None) -> None:
         super().__init__(path, nodata=nodata)
+        if self.path.suffix.lower() == ".asc":
+            _refuse_bad_cells(self.path)
         if self.dtype == np.uint8 and self.bands > 2:
             raise InputError(
                 f"{path}: is a picture of {self.bands} bands, expected a raster of heights [m] in "
@@ -145,3 +152,15 @@ class Dem(RasterFile):
                 out.write(block.transpose(1, 2, 0), column=window.column, row=window.row)
 
             yield write
+
+
+def _refuse_bad_cells(path: Path) -> None:
+    """Raise InputError where a cell of an ASCII grid is no number: GDAL takes it for zero."""
+    with path.open("rb") as file:
+        for number, line in enumerate(file, start=1):
+            if not _STRANGE.search(line) or (_HEADING.match(line) and number < _FIRST_CELLS):
+                continue
+            for word in line.split():
+                if _STRANGE.search(word) and word.lower().lstrip(b"+-") not in (b"nan", b"inf"):
+                    shown = word.decode("ascii", "replace")
+                    raise InputError(f"{path}, line {number}: {shown!r:.40} is no height.")

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeAlias
 
+#: Numbers with signs and a short unit: what is compared digit by digit.
+_NUMBER = re.compile(r"(?=.*\d)[-+±<>≤≥≈~\d.,:;/×e%() ]+[^\W\d]{0,3}[%°²³]?")
 #: Draws into a matplotlib Figure or SubFigure.
 Draw: TypeAlias = Callable[[Any], None]
 
@@ -43,11 +46,31 @@ class Banner:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TextTable:
-    """A table; first column to the left, the others to the right."""
+    """A table; its first column and those of words to the left, those of numbers to the right."""
 
     headings: Sequence[str]
     rows: Sequence[Sequence[str]]
     caption: str = ""
+
+    @property
+    def to_the_left(self) -> tuple[bool, ...]:
+        """Which columns are set to the left: most of their filled cells are no numbers.
+
+        Examples
+        --------
+        >>> rows = [["P1", "0.125", "mm", "-"], ["P2", "-3.1", "mm", "12 %"]]
+        >>> TextTable(headings=["point", "r", "unit", "share"], rows=rows).to_the_left
+        (True, False, True, False)
+        """
+        return tuple(
+            column == 0 or _are_words([row[column] for row in self.rows])
+            for column in range(len(self.headings))
+        )
+
+
+def _are_words(cells: Sequence[str]) -> bool:
+    filled = [cell for cell in cells if cell.strip(" -\N{EN DASH}")]
+    return 2 * sum(_NUMBER.fullmatch(cell.strip()) is not None for cell in filled) < len(filled)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -35,16 +35,20 @@ table{border-collapse:collapse;margin:.6rem 0;font-size:.86rem;font-variant-nume
 caption{text-align:left;font-weight:600;padding:.3rem 0}
 th,td{padding:.15rem .6rem;border-bottom:1px solid #bbb;text-align:right;overflow-wrap:anywhere}
 th{border-bottom:2px solid #111;overflow-wrap:break-word}
-th:first-child,td:first-child{text-align:left}
 figure{margin:1rem 0}
 figure img{width:100%;height:auto}
 figcaption,.small{font-size:.85rem;color:#333}
-pre{background:#f2f2f2;padding:.4rem .6rem;overflow-x:auto;font-size:.8rem}
+pre{background:#f2f2f2;padding:.4rem .6rem;white-space:pre-wrap;overflow-wrap:anywhere;
+font-size:.8rem}
 .banner{border:3px solid #111;border-left-width:14px;padding:.6rem 1rem;margin:.6rem 0}
 .banner p{margin:.2rem 0}.banner p:first-child{font-size:1.25rem;font-weight:700}
 .good{border-color:#1a6e2e}.bad{border-color:#b00020}
 @media print{body{margin:0;max-width:none;font-size:11px}figure,table,.banner{break-inside:avoid}}
 """
+#: Columns of words, to the left.
+_LEFT = "\n".join(
+    f".left{column} :is(th,td):nth-child({column}){{text-align:left}}" for column in range(1, 17)
+)
 
 
 def write_html(
@@ -60,7 +64,9 @@ def write_html(
         f'<!DOCTYPE html>\n<html lang="{document.language}">\n<head>\n<meta charset="utf-8">\n'
         '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
         f'<meta name="generator" content="{subject}">\n<title>{title}</title>\n'
-        f"<style>{_STYLE}</style>\n</head>\n<body>\n" + "\n".join(parts) + "\n</body>\n</html>\n"
+        f"<style>{_STYLE}{_LEFT}\n</style>\n</head>\n<body>\n"
+        + "\n".join(parts)
+        + "\n</body>\n</html>\n"
     )
     with atomic_path(path, overwrite=overwrite) as temporary:
         temporary.write_text(text, encoding="utf-8")
@@ -98,7 +104,8 @@ def _address(target: Path, folder: Path) -> str:
 def _table(block: TextTable) -> Iterator[str]:
     caption = f"<caption>{html.escape(block.caption)}</caption>" if block.caption else ""
     head = "".join(f'<th scope="col">{html.escape(text)}</th>' for text in block.headings)
-    yield f"<table>{caption}<thead><tr>{head}</tr></thead><tbody>"
+    left = [f"left{column}" for column, words in enumerate(block.to_the_left, start=1) if words]
+    yield f'<table class="{" ".join(left)}">{caption}<thead><tr>{head}</tr></thead><tbody>'
     for row in block.rows:
         yield "<tr>" + "".join(f"<td>{html.escape(cell)}</td>" for cell in row) + "</tr>"
     yield "</tbody></table>"

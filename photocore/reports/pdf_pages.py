@@ -181,12 +181,13 @@ class _Pages:
                 textwrap.wrap(cell, length) or [""]
                 for cell, length in zip(row, lengths, strict=True)
             ]
-            self._row(cells, widths, size, heading=index == 0)
+            self._row(cells, widths, size, left_columns=block.to_the_left, heading=index == 0)
         self.y -= 2.5
 
     def _row(
-        self, cells: list[list[str]], widths: list[float], size: float, *, heading: bool
-    ) -> None:
+        self, cells: list[list[str]], widths: list[float], size: float, *,
+        left_columns: Sequence[bool], heading: bool,
+    ) -> None:  # fmt: skip
         from matplotlib.lines import Line2D
 
         deep = max(map(len, cells)) * size * _MM * _LINE
@@ -194,11 +195,11 @@ class _Pages:
         left = MARGIN
         for column, (lines, width) in enumerate(zip(cells, widths, strict=True)):
             for number, line in enumerate(lines, start=1):
-                first = column == 0
+                words = left_columns[column]
                 self._put(
-                    line, x=left if first else left + width - 1.0,
+                    line, x=left if words else left + width - 1.0,
                     y=self.y - number * size * _MM * _LINE + 0.6, size=size,
-                    ha="left" if first else "right", weight="bold" if heading else "normal",
+                    ha="left" if words else "right", weight="bold" if heading else "normal",
                 )  # fmt: skip
             left += width
         self.y -= deep

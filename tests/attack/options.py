@@ -113,6 +113,15 @@ WORDS: list[tuple[str, str]] = [
         "--out o.json",
         "--focal1",
     ),
+    ("bifocal facade far.jpg near.jpg --out o --control control.csv --port 0.1", "--indices"),
+    ("bifocal facade far.jpg near.jpg --out o --indices 1,x --port 0", "--indices"),
+    ("bifocal facade far.jpg near.jpg --out o --indices 1,1.337 --port -1", "--port"),
+    ("bifocal facade far.jpg near.jpg --out o --indices 1,1.337 --port 0 --auto", "--control"),
+    (
+        "bifocal facade far.jpg near.jpg --out o --control control.csv --indices 1,1.337 --port 0 "
+        "--estimate lean3",
+        "lean3",
+    ),
     ("bifocal match wall.pair.json", "--out"),
     ("bifocal match wall.pair.json --out o.pdf", "o.pdf"),
     ("bifocal match wall.pair.json --out o.xlsx --count 0", "--count"),

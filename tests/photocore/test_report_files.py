@@ -5,8 +5,9 @@ from __future__ import annotations
 import pytest
 
 from photocore.errors import InputError
-from photocore.reports.document import Document, Paragraph
+from photocore.reports.document import Document, Paragraph, TextTable
 from photocore.reports.figure_file import write_figure
+from photocore.reports.html_page import write_html
 from photocore.reports.writing import write_document
 from tests.full_disk import full_after
 
@@ -36,3 +37,19 @@ def test_a_figure_is_whole_or_absent(tmp_path, ending, size):
     with full_after(size), pytest.raises(InputError, match="could not be written"):
         write_figure(path, figure, overwrite=True)
     assert [p.read_bytes() for p in tmp_path.iterdir()] == [b"mine"]
+
+
+def test_words_stand_to_the_left_and_numbers_to_the_right(tmp_path):
+    rows = [
+        ["1", "cam1, cam2", "1.00000, 1.46000", "-0.3 ± 0.1", "047b8c82", "-", "12 %", "mm⁻²"],
+        ["2", "cam3", "1.33", "1e-05", "fe41c0", "plane, fixed", "-", "mm"],
+    ]
+    table = TextTable(headings=list("abcdefgh"), rows=rows)
+    assert table.to_the_left == (True, True, False, False, True, True, False, True)
+    blocks = (table, Paragraph(text="Made by:", lines=("long " * 100,)))
+    document = Document(title="T", language="en", subject="s", blocks=blocks)
+    write_html(tmp_path / "t.html", document)
+    page = (tmp_path / "t.html").read_text(encoding="utf-8")
+    assert '<table class="left1 left2 left5 left6 left8">' in page
+    assert ".left8 :is(th,td):nth-child(8){text-align:left}" in page
+    assert "white-space:pre-wrap" in page

@@ -423,9 +423,10 @@ def test_lines_that_ask_for_no_correction_give_a_lens_without_distortion(tmp_pat
 
 
 def test_a_lens_file_whose_precision_is_no_number_is_named():
-    lens = replace(BROWN, extra={"sigma_focal": "two"})
-    with pytest.raises(InputError, match=r"lens\.json: sigma_focal: expected a number"):
-        Interior.from_lens(lens, source="lens.json")
+    for wrong, said in (("two", "expected a number"), (2.0, "must be a share"), (0, "must be a")):
+        lens = replace(BROWN, extra={"sigma_focal": wrong})
+        with pytest.raises(InputError, match=rf"lens\.json: sigma_focal: {said}"):
+            Interior.from_lens(lens, source="lens.json")
 
 
 def test_too_few_lines_are_refused():

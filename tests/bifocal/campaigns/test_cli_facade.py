@@ -6,10 +6,14 @@ import json
 import shutil
 from pathlib import Path
 
+import numpy as np
 import pytest
+import rasterio
 from click.testing import CliRunner
 
 from bifocal.cli.main import main
+from bifocal.demo import WATER_SAMPLE
+from bifocal.model.pair import Pair
 from tests.bifocal.campaigns.sample_tables import FAR, NEAR, write_tables
 
 
@@ -77,3 +81,55 @@ def test_impossible_wishes_are_refused(tmp_path, options, said):
     result = CliRunner().invoke(main, words)
     assert result.exit_code == 1
     assert said in result.stderr
+
+
+@pytest.mark.acceptance
+@pytest.mark.parametrize("leans", [False, True])
+def test_a_facade_under_water_is_delivered_by_the_bent_rays(tmp_path, leans):
+    """The sample's cameras as they stood; its points' relief is known."""
+    away = ["--port-normal", "0.0001,0,1"] if leans else []  # next to nothing, yet no workbook
+    out = tmp_path / "reef"
+    photos = [str(WATER_SAMPLE / name) for name in ("far.jpg", "near.jpg")]
+    typed = "--as-set-up --distance1 3.5 --distance2 1.9 --sensor-width 19.2 --indices 1,1.49,1.337"
+    rows = (WATER_SAMPLE / "targets.csv").read_text("utf-8").splitlines()[1:]
+    numbers = np.array([[float(v) for v in row.split(",")[1:]] for row in rows])
+    xyz = (
+        Pair.read(WATER_SAMPLE / "facade.pair.json").intersect(numbers[:, :2], numbers[:, 2:4]).xyz
+    )
+    table = ["id,X [m],Y [m],r [m],col1,row1,col2,row2"]
+    for name, at, seen in zip(rows, xyz, numbers, strict=True):
+        values = [at[0], at[1], seen[4], *seen[:4]]
+        table.append(",".join([name.split(",")[0], *map(str, values)]))
+    (tmp_path / "check.csv").write_text("\n".join(table))
+    pair = json.loads((WATER_SAMPLE / "facade.pair.json").read_text("utf-8"))
+    focal = []
+    for number in (1, 2):
+        photo = pair[f"image{number}"]
+        length = 19.2 / 960 * photo["distance"] / photo["plane_from_pixel"][0][0]
+        focal += [f"--focal{number}", str(length)]
+    words = ["facade", *photos, *typed.split(), *focal, "--thicknesses", "0.01", "--port", "0.05"]
+    words += ["--scale", "1:20", "--quality", "fast", "--out", str(out), "--json", *away]
+    words += ["--check", str(tmp_path / "check.csv")]
+    words += ["--products", "points" if leans else "relief,points,report"]
+    result = CliRunner().invoke(main, words)
+    assert result.exit_code == 0, result.stderr
+    made = Pair.read(out / "align/reef.pair.json")
+    assert made.layers.indices == (1.0, 1.49, 1.337)
+    found = made.intersect(numbers[:, :2], numbers[:, 2:4]).xyz[:, 2]
+    assert np.median(np.abs(found - numbers[:, 4])) < 0.004
+    ending = "csv" if leans else "xlsx"
+    assert (out / f"points/reef_points.{ending}").is_file()
+    assert ("text table" in result.stderr) == leans
+    if leans:
+        return
+    assert "neglect" in (out / "report/reef_report.html").read_text("utf-8").lower()
+    places = [(x, y) for x in np.linspace(-0.9, 0.9, 50) for y in np.linspace(-0.55, 0.55, 30)]
+    with (
+        rasterio.open(out / "relief/reef_relief.tif") as relief,
+        rasterio.open(WATER_SAMPLE / "truth.tif") as truth,
+    ):
+        off = [
+            a[0] - b[0] for a, b in zip(relief.sample(places), truth.sample(places), strict=True)
+        ]
+    assert np.isfinite(off).mean() > 0.7
+    assert np.nanmedian(np.abs(off)) < 0.006  # fast; 80 mm where refraction is neglected

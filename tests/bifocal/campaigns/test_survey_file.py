@@ -11,9 +11,13 @@ import pytest
 from click.testing import CliRunner
 
 from bifocal.campaigns import photo_pairing
-from bifocal.campaigns.survey_file import read_survey_file
+from bifocal.campaigns.pair_job import ALIGN_OPTIONS, refusal, steps_of
+from bifocal.campaigns.survey_file import OPTIONS, in_survey_words, read_survey_file
 from bifocal.cli.main import main
 from bifocal.files.images import ImageInfo
+from bifocal.orientation.align_workflow import AlignOptions
+from bifocal.orientation.pair_media import _WITH_INDICES
+from multimedia import Layers
 from photocore.errors import InputError
 from tests.bifocal.campaigns.sample_tables import FAR, NEAR
 
@@ -60,12 +64,59 @@ def test_common_entries_hold_for_every_pair_that_does_not_say_otherwise(tmp_path
         ('quality = "superb"', "expected one of fast, standard, best"),
         ('products = ["poster"]', "expected some of relief, points"),
         ("control = 7", "expected the name of a file"),
+        ("port = -1", "port = -1: expected a number not below zero"),
+        ("indices = 1.337", "expected a list of numbers"),
+        ('port_normal = "up"', 'expected "axis", or a list of 3 numbers'),
+        ('prior = "index3=0.1"', "expected a list of texts"),
     ],
 )
 def test_a_wrong_entry_is_named_with_its_pair(tmp_path, wrong, said):
     (tmp_path / "s.toml").write_text(f'[[pair]]\nname = "A"\nfar = "a"\nnear = "b"\n{wrong}\n')
     with pytest.raises(InputError, match=f"pair A: .*{said}"):
         read_survey_file(tmp_path / "s.toml")
+
+
+MEDIA = """
+indices = [1, 1.49, 1.337]
+thicknesses = [0.01]
+prior = ["index3=0.003"]
+port = 0
+
+[[pair]]
+far = "a.jpg"
+near = "b.jpg"
+control = "a.csv"
+port_normal1 = "axis"
+port_normal2 = [0.1, 0, 1]
+
+[[pair]]
+far = "c.jpg"
+near = "d.jpg"
+distance1 = 3.5
+distance2 = 1.9
+"""
+
+
+def test_media_are_keys_of_the_file_and_reach_the_set_up(tmp_path):
+    """Refused in the words of the file; what `align` knows of media has a key of its name."""
+    (tmp_path / "sea.toml").write_text(MEDIA)
+    first, second = read_survey_file(tmp_path / "sea.toml")
+    step = steps_of(first)[0]
+    stated = AlignOptions.from_given({**step.options, **step.files}).media
+    assert stated.layers == Layers(indices=(1.0, 1.49, 1.337), thicknesses=(0.01,))
+    assert (stated.port, stated.sigmas) == ((0.0, 0.0), {"index3": 0.003})
+    assert stated.normals[0] == "axis"
+    assert stated.normals[1].tolist() == [0.1, 0.0, 1.0]
+    assert refusal(first) == ""
+    told = in_survey_words(refusal(second))
+    assert 'control = "FILE"' in told
+    assert "as_set_up = true" in told
+    assert not re.search(r"--[a-z]", told)
+    for key in (*_WITH_INDICES, "indices", "as_set_up"):
+        assert key in OPTIONS
+        assert key in ALIGN_OPTIONS
+        for command in ("align", "facade"):
+            assert key in {p.name for p in main.get_command(None, command).params}
 
 
 def test_all_faults_are_told_at_once(tmp_path):

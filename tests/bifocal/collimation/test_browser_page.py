@@ -219,6 +219,60 @@ def test_control_points_and_tapes_are_typed_and_mended(page: Driver) -> None:
     page.settled("state.control.length === 2 && state.tapes.length === 1")
 
 
+def test_what_is_refused_stays_as_it_was_typed(page: Driver) -> None:
+    """Tape, table and fields keep what the survey does not take, until it is mended."""
+    page.click("mode-orientation")
+    page.click("control-paste")
+    paste = page.tab.get_by_test_id("paste-area")
+    paste.fill("G\t0,5\t1,25\nH\t3,5\tupwards")
+    page.click("dialog-yes")
+    page.tab.get_by_test_id("dialog-fault").wait_for(state="visible")
+    assert paste.input_value() == "G\t0,5\t1,25\nH\t3,5\tupwards"
+    paste.fill("G\t0,5\t1,25\nH\t3,5\t1,25")
+    page.click("dialog-yes")
+    page.settled("state.control.some(({ name }) => name === 'H')")
+    fields = [page.tab.get_by_test_id(f"tape-{index}") for index in range(4)]
+    toast = "() => document.querySelector('[data-testid=toast]').textContent"
+    # A sigma with its unit and an unknown point are refused, a decimal comma is none of both.
+    for name, sigma, told in (("H", "5 mm", "no number"), ("Z", "0,005", "no control point Z")):
+        typed = ["G", name, "3,002", sigma]
+        for field, text in zip(fields, typed, strict=True):
+            field.fill(text)
+        page.click("tape-add")
+        page.wait(f"{toast}.includes('{told}')")
+        assert [field.input_value() for field in fields] == typed
+        assert not any(tape["from"] == "G" for tape in page.state["tapes"])
+    fields[1].fill("H")
+    page.click("tape-add")
+    tape = page.settled("state.tapes.find((one) => one.from === 'G')")["tapes"][-1]
+    assert (tape["length"], tape["sigma"]) == (3.002, 0.005)
+    page.wait("() => document.querySelector('[data-testid=tape-0]').value === ''")
+    # A name that is taken: refused, and still there when another row is taken in hand.
+    label = page.tab.locator("tr[data-key=G]").get_by_label("Name")
+    label.fill("H")
+    page.keys("Enter")
+    page.wait("() => document.querySelector('tr[data-key=G] input:invalid')")
+    page.tab.get_by_label("X H").focus()
+    page.settled("true")
+    assert label.input_value() == "H"
+    label.fill("K")
+    page.keys("Enter")
+    page.settled("state.control.some(({ name }) => name === 'K')")
+    page.click("mode-photos")
+    site = page.tab.get_by_label("Far distance d1")
+    site.fill("-17,5")
+    page.keys("Enter")
+    page.wait(f"{toast}.includes('above zero')")
+    page.command("control.delete", name="K")
+    page.settled("!state.control.some(({ name }) => name === 'K')")
+    assert site.input_value() == "-17,5"
+    site.fill("17,5")
+    page.keys("Enter")
+    page.settled("state.setup.d1 === 17.5")
+    page.command("control.delete", name="H")
+    page.command("setup.set", d1=None)
+
+
 def test_coordinates_typed_one_after_the_other_are_all_kept(page: Driver) -> None:
     """Tab leads to the next field of the row before the answer to the first is here."""
     page.click("mode-orientation")

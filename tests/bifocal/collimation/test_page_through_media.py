@@ -11,12 +11,14 @@ import numpy as np
 import pytest
 
 from bifocal import solve
+from bifocal.collimation.job_tasks import task_of
 from bifocal.collimation.pyramids import RectifiedPhoto, max_level
+from bifocal.collimation.stated_media import media_of
 from bifocal.collimation.suggestions import radial_line, seen_in_other, suggest
 from bifocal.model.pair import Pair
 from tests.bifocal.model.test_pair_through_media import PAIRS, content
 from tests.bifocal.model.test_pair_through_media import POINTS as WIDE
-from tests.page_session import client_of, opened, pick_both
+from tests.page_session import client_of, opened, pick_both, sample_folder
 from tests.scenes.refracted import pixels_of
 from tests.workbook_lint import lint
 
@@ -190,3 +192,41 @@ def test_the_wall_is_shown_by_bent_rays(tmp_path):
             rows, columns = np.nonzero(grey > 100)
             shown = (np.array([columns.mean(), rows.mean()]) + 0.5) * 2**level - 0.5
             assert np.linalg.norm(shown - at) < 1.5 * 2**level
+
+
+def test_media_are_typed_on_the_page_and_what_lacks_is_said(tmp_path):
+    """One field after the other: the advice, and the refusal of the job, name what is missing."""
+    sample_folder(tmp_path)
+    (tmp_path / "facade.pair.json").unlink()
+    with opened(tmp_path / "far.jpg", tmp_path / "near.jpg") as session:
+        client = client_of(session)
+
+        def typed(**fields):
+            body = {"id": str(fields), "op": "setup.set", **fields}
+            return client.post("/api/command", json=body)
+
+        for fields, missing in (
+            ({"glass_index": "1,49"}, "index of the water"),
+            ({"water_index": 1.337}, "thickness"),
+            ({"glass_thickness": "0,01"}, "one of the two"),
+            ({"port": 0.05, "depth": 0.6}, "one of the two"),
+            ({"depth": None}, "four control points"),
+        ):
+            state = typed(**fields).json()["state"]
+            refused = client.post("/api/jobs", json={"kind": "align", "options": {}})
+            assert refused.status_code == 422
+            assert missing in refused.json()["error"]
+            assert missing in state["advice"][0] or missing == "four control points"
+        for value in (0.8, 13.37, "water"):
+            answer = typed(water_index=value)
+            assert answer.status_code == 422
+            assert "water_index" in answer.json()["error"]
+        state = typed(d1=3.5, d2=1.9).json()["state"]
+        assert (state["setup"]["water_index"], state["setup"]["port"]) == (1.337, 0.05)
+        task = task_of(session, "align", {})
+        assert (task["as_set_up"], task["auto"]) == (True, False)
+        media = media_of(task["setup"])
+        assert media.layers.indices == (1.0, 1.49, 1.337)
+        assert (media.layers.thicknesses, media.port, media.sigmas) == ((0.01,), (0.05, 0.05), {})
+        typed(sigma_water_index=0.003)
+        assert media_of(session.state.setup).sigmas == {"index3": 0.003}

@@ -18,7 +18,7 @@ from click.testing import CliRunner
 from bifocal import Control, Interior, Pair, PairMedia, SiteMeasures, align
 from bifocal.cli.main import main
 from bifocal.media import MediaPath, interface_axes
-from bifocal.model.orientation_precision import NAMES, names_of
+from bifocal.model.orientation_precision import NAMES, from_dict, names_of
 from bifocal.model.refracted_view import seen_through, view_through
 from bifocal.orientation.absolute_orientation import orient_pair
 from bifocal.orientation.bend import bend_in_words
@@ -162,6 +162,110 @@ def test_a_depth_and_a_glass_may_be_unknown_too():
     assert set(made.deviations) > {"depth", "thickness1"}
 
 
+def leaning(leans=((1.5, -1.0), (-0.8, 2.0)), *, turned=0.0):
+    """Return cameras of ports that lean against the wall by degrees about X and Y."""
+    square = bifocal_cameras(
+        size=SIZE, pixel=0.00074, d1=3.5, d2=1.9, rng=np.random.default_rng(4),
+        errors=SetupErrors(tilt_deg=turned, distance=0.02, offset=0.1),
+    )  # fmt: skip
+    wet = under_water(square, indices=GLASS[0], thicknesses=GLASS[1], z0=(0.05, 0.06), leans=leans)
+    return wet.far, wet.near
+
+
+def aligned_leaning(taken, xyz, picks, *, sigma=0.01, known=1e-6, **media):
+    return align(
+        None, None, interiors=tuple(lens(c) for c in taken),
+        control=control_of(xyz, picks, known), site=SiteMeasures(sigma_pick=sigma),
+        media=PairMedia.stated(*GLASS, ports=(0.05, 0.06), **media),
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("from_axis", [False, True])
+def test_how_ports_lean_is_found_where_the_points_carry_it(from_axis):
+    """Nothing is typed but that they may lean; rays are shot by tests/scenes/wet.py."""
+    taken = leaning(turned=2.0)
+    xyz, check = (points(np.random.default_rng(k), count) for k, count in ((1, 14), (5, 20)))
+    made = aligned_leaning(
+        taken, xyz, [c.view_of(xyz) for c in taken], sigma=1e-4, known=1e-8,
+        normals=("axis", "axis") if from_axis else (None, None),
+        priors={"lean1": np.radians(2.0), "lean2": np.inf},
+    )  # fmt: skip
+    for photo, camera in zip((made.pair.image1, made.pair.image2), taken, strict=True):
+        assert np.abs(photo.interface_normal - camera.axes[2]).max() < 1e-5
+    found = made.pair.intersect(*(c.view_of(check) for c in taken)).xyz
+    np.testing.assert_allclose(found, check, atol=1e-6)
+    assert set(made.deviations) > {"lean X 1", "lean Y 1", "lean X 2", "lean Y 2"}
+    stated = " ".join(made.words)
+    if not from_axis:
+        assert "lean X 1 came out 1.50°" in stated
+        assert "(given 0.00° ± 2.00°)" in stated
+        assert "(given 0.00° ± anything)" in stated
+    # Taken as parallel to the wall the same picks are wrong by millimetres.
+    dull = aligned_leaning(taken, xyz, [c.view_of(xyz) for c in taken], known=1e-3, sigma=0.5)
+    off = dull.pair.intersect(*(c.view_of(check) for c in taken)).xyz - check
+    assert np.abs(off).max() > 0.001
+    assert made.pair.orientation.shape == (36, 36)
+
+
+def test_a_lean_that_points_do_not_carry_is_said_to_rest_on_the_prior():
+    """A lean turns all rays nearly alike, as the camera's own turn does."""
+    taken, rng = leaning(), np.random.default_rng(1)
+    xyz = points(rng, 12, 0.02) * [0.3, 0.3, 1.0]
+    picks = [c.view_of(xyz) + rng.normal(0, 0.5, (12, 2)) for c in taken]
+    made = aligned_leaning(taken, xyz, picks, sigma=0.5, known=0.003, estimate=["lean1"])
+    assert any(
+        r.startswith("lean X 1 [degrees]: the data hardly carry it; it rests on what was given, 0")
+        for r in made.remarks
+    )
+    assert made.deviations["lean X 1"] == pytest.approx(np.radians(1.0), rel=0.1)
+
+
+def test_photos_the_other_way_round_take_their_leans_along():
+    taken, xyz = leaning(), points(np.random.default_rng(1), 14)
+    made = align(
+        None, None, interiors=(lens(taken[1]), lens(taken[0])),
+        control=control_of(xyz, [taken[1].view_of(xyz), taken[0].view_of(xyz)], 1e-8),
+        site=SiteMeasures(sigma_pick=1e-4),
+        media=PairMedia.stated(
+            *GLASS, ports=(0.06, 0.05), normals=(taken[1].axes[2], None), priors={"lean2": 0.03}
+        ),
+    )  # fmt: skip
+    assert np.abs(made.pair.image1.interface_normal - taken[0].axes[2]).max() < 1e-5
+    assert "lean X 1" in made.deviations
+
+
+def noisy_leans(draw):
+    """Return errors over sigmas of the leans (4,) and of 30 check points (30, 3)."""
+    rng = np.random.default_rng(900 + draw)
+    leans = rng.normal(0, 1.0, (2, 2))
+    taken = leaning(tuple(map(tuple, leans)), turned=1.0)
+    xyz, check = points(rng, 14), points(rng, 30)
+    picks = [[c.view_of(p) + rng.normal(0, 0.35, (len(p), 2)) for c in taken] for p in (xyz, check)]
+    lenses = [lens(c, factor=np.exp(rng.normal(0, 5e-4)), away=rng.normal(0, 5, 2)) for c in taken]
+    made = align(
+        None, None, interiors=tuple(lenses), site=SiteMeasures(sigma_pick=0.35),
+        control=control_of(xyz + rng.normal(0, 5e-4, xyz.shape), picks[0], 5e-4),
+        media=PairMedia.stated(*GLASS, ports=(0.05, 0.06), estimate=["lean1", "lean2"]),
+    )  # fmt: skip
+    found = made.pair.intersect(*picks[1], sigma_px=0.35)
+    off = []
+    for number, (photo, camera) in enumerate(
+        zip((made.pair.image1, made.pair.image2), taken, strict=True), start=1
+    ):
+        apart = np.cross(camera.axes[2], photo.interface_normal)
+        off += [apart[k] / made.deviations[f"lean {a} {number}"] for k, a in enumerate("XY")]
+    return np.array(off), (found.xyz - check) / found.sigma
+
+
+@pytest.mark.acceptance
+def test_errors_of_leans_are_as_large_as_their_sigmas_say():
+    drawn = [noisy_leans(draw) for draw in range(40)]
+    leans = np.concatenate([off for off, _ in drawn])
+    spread = np.concatenate([off for _, off in drawn])
+    assert 0.85 < np.sqrt((leans**2).mean()) < 1.15
+    assert 0.9 < np.sqrt((spread**2).mean()) < 1.1
+
+
 def test_what_a_flat_field_does_not_carry_is_said_to_rest_on_the_prior():
     made = aligned("port", relief=0.02, known=0.003, pick=0.5, estimate=["index3"])
     assert any(r.startswith("index3: the data hardly carry it") for r in made.remarks)
@@ -171,6 +275,17 @@ def test_what_a_flat_field_does_not_carry_is_said_to_rest_on_the_prior():
 def test_an_impossible_index_is_never_accepted():
     with pytest.raises(GeometryError, match=r"index3 comes out as 1\.3\d+ .*1\.437 was given"):
         aligned("port", off_index=0.1, priors={"index3": 0.005})
+
+
+def test_a_surface_behind_the_cameras_is_said_to_be_there():
+    taken, (indices, thicknesses), _ = cameras("surface")
+    xyz = points(np.random.default_rng(1), 12)
+    with pytest.raises(GeometryError, match=r"behind the media as they are given. Check --depth"):
+        align(
+            None, None, interiors=tuple(lens(c) for c in taken),
+            control=control_of(xyz, [c.view_of(xyz) for c in taken], 0.001),
+            media=PairMedia.stated(indices, thicknesses, depth=50.0),
+        )  # fmt: skip
 
 
 def test_without_enough_control_it_says_how_to_go_on():
@@ -375,6 +490,9 @@ def test_a_set_up_as_typed_goes_through_media_with_what_is_uncertain_of_it(place
         (["--indices", "1,1.337", "--depth", "0.6", "--port-normal", "axis"], "goes with --port"),
         (["--indices", "1,1.337", "--port", "0.05", "--port-normal", "up"], "expected axis"),
         (["--indices", "1,1.337", "--port", "0.05", "--prior", "index2"], "label=sigma"),
+        (["--indices", "1,1.337", "--port", "0.05", "--prior", "index2=0"], "above zero"),
+        (["--indices", "1,1.337", "--depth", "0.6", "--estimate", "lean1"], "possible are index1"),
+        (["--indices", "1,1.337", "--port", "0.05", "--prior", "lean1=-1"], "above zero"),
     ],
 )
 def test_options_that_do_not_describe_media_are_refused(desk, options, message):
@@ -415,6 +533,12 @@ def test_the_command_writes_media_as_the_pair_file_has_them(desk):
     covariance = np.array(data["orientation"]["covariance"])
     place = data["orientation"]["parameters"].index("index3")
     assert covariance[place, place] == pytest.approx(0.003**2)
+
+
+@pytest.mark.parametrize("stated", [5, None, "ln", [1, 2], {"index1": 1}])
+def test_parameters_of_a_covariance_that_are_no_list_are_refused(stated):
+    with pytest.raises(InputError, match=r'"orientation": expected .* 24 parameters'):
+        from_dict({"parameters": stated, "covariance": [[1.0]]})
 
 
 def test_a_bent_wall_proposes_the_options_for_media():

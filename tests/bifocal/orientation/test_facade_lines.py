@@ -20,21 +20,25 @@ MATRIX = camera_matrix(1500.0, 1.0, 605.0, 396.0)
 SQUARE = np.diag([1.0, -1.0, -1.0])
 
 
-def windows() -> list[np.ndarray]:
-    """Return the corners of windows on the wall, each of shape (4, 3). [m]"""
+def windows(lean: float = 0.0) -> list[np.ndarray]:
+    """Return the corners of windows on the wall, each of shape (4, 3). [m]
+
+    They lean out of it by random slopes of that size.
+    """
+    rng = np.random.default_rng(2)
     out = []
     for x in np.arange(-6.0, 6.1, 1.5):
         for y in np.arange(-4.0, 4.1, 1.6):
             box = np.array([[x, y], [x + 0.8, y], [x + 0.8, y + 1.0], [x, y + 1.0]])
-            out.append(np.column_stack([box, np.zeros(4)]))
+            out.append(np.column_stack([box, lean * rng.choice([-1, 1]) * (box[:, 1] - y)]))
     return out
 
 
-def drawn(camera: Pinhole, radial: RadialDivision) -> np.ndarray:
+def drawn(camera: Pinhole, radial: RadialDivision, lean: float = 0.0) -> np.ndarray:
     """Return a photo of the windows."""
     # Drawn four times as large and reduced: OpenCV's own smoothing leaves edges on whole rows.
     image = np.full((4 * SIZE[1], 4 * SIZE[0]), 200, np.uint8)
-    for box in windows():
+    for box in windows(lean):
         steps = np.linspace(0, 1, 20, endpoint=False)[:, None]
         edge = [a + (b - a) * steps for a, b in zip(box, np.roll(box, -1, axis=0), strict=True)]
         seen = radial.distort(project(camera, np.concatenate(edge)))
@@ -68,6 +72,20 @@ def test_the_tilt_of_a_photo_is_how_far_its_lines_come_out_of_the_wall(k1) -> No
             assert abs(np.rad2deg(np.arcsin(abs(z))) - abs(angle)) < 0.15
             # In the true camera they lie along the wall.
             assert abs(np.rad2deg(lines[camera, name].in_frame(true[camera - 1])[2])) < 0.15
+
+
+def test_lines_that_scatter_tell_less() -> None:
+    radial = RadialDivision(0.0, MATRIX[:2, 2], 1500.0)
+    camera = view(0, 0, 0)
+    even, leaning = (
+        found((drawn(camera, radial, lean),) * 2, (camera, camera), radial)[1, "upright"]
+        for lean in (0.0, 0.02)
+    )
+    # What façades are built to, 0.2 degrees, and a root of 2 for two photos of the same lines.
+    assert np.rad2deg(even.sigma) == pytest.approx(0.2 * np.sqrt(2), rel=0.02)
+    assert leaning.sigma > 1.1 * even.sigma
+    out = np.arcsin(abs(leaning.in_frame(camera)[2]))
+    assert out < 2 * leaning.sigma
 
 
 def test_a_turned_facade_is_turned_first() -> None:

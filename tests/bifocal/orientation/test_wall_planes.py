@@ -61,6 +61,13 @@ def test_the_measured_distances_choose_the_plane() -> None:
     assert chosen(250, 350, turned)[0].slope == pytest.approx(0.268, abs=0.01)
 
 
+def test_a_chance_plane_of_the_right_ratio_does_not_replace_a_full_wall() -> None:
+    # The wall is 2.5 of the rough model's standard deviations off the ratio of the distances.
+    turned = SiteMeasures(distance1=TURNED[0], distance2=TURNED[1])
+    assert chosen(250, 700, turned, sigma=0.016)[0].slope < 0.02
+    assert chosen(250, 700, turned, sigma=0.008)[0].slope > 0.2
+
+
 def test_a_spot_of_the_wall_chooses_the_plane() -> None:
     wall, question = chosen(300, 500, SiteMeasures(distance1=27.0, wall=(1500.0, -400.0)))
     assert wall.slope == pytest.approx(0.268, abs=0.01)

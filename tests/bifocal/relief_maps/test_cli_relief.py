@@ -43,6 +43,13 @@ def test_relief_writes_three_bands_and_says_what_guarantees_the_scale(folder, tm
     assert code == 0
     assert "measured" in text
     assert "relative scale" in told
+    d1, d2 = Pair.read(folder / "wall.pair.json").straight_distances
+    slip = 0.01 / (1 / d2 - 1 / d1)  # B of the paper times the slip
+    said = text.split("(median of the measured)\n")[1].splitlines()[0]
+    assert said == (
+        "Sigmas rest on: the photos' own misfit across the radius, measured; the pair as given, "
+        f"of which 1 % of scale is {slip:.2f} m of relief and in no sigma."
+    )
     with rasterio.open(out) as file:
         assert file.count == 3
         assert file.dtypes == ("float32",) * 3
@@ -61,8 +68,10 @@ def test_json_preview_and_clouds(folder, tmp_path):
     from PIL import Image
 
     out, ply, png = (tmp_path / name for name in ("r.tif", "r.ply", "r.png"))
+    pair = folder / "known.pair.json"
+    replace(Pair.read(folder / "wall.pair.json"), orientation=1e-12 * np.eye(24)).write(pair)
     code, text, _ = run(
-        folder / "wall.pair.json", "--out", out, "--json", "--cloud", ply, "--preview", png,
+        pair, "--out", out, "--json", "--cloud", ply, "--preview", png,
         "--gsd", "0.05", "--bounds", "-3,-2,3,2", "--quality", "fast",
     )  # fmt: skip
     assert code == 0
@@ -70,6 +79,9 @@ def test_json_preview_and_clouds(folder, tmp_path):
     assert summary["size"] == [120, 80]
     assert sum(summary["shares"].values()) == pytest.approx(1.0)
     assert len(summary["written"]) == 3
+    assert summary["rests_on"].endswith(
+        "the pair as given, with the covariance of its orientation."
+    )
     with Image.open(png) as picture:
         assert picture.size[0] > 800
     header, body = ply.read_bytes().split(b"end_header\n")

@@ -104,3 +104,17 @@ def test_a_set_of_deliverables_is_made_through_media(tank, tmp_path):
                for c, r in pixels]  # fmt: skip
     shown = [picture[r, c] for r, c in zip(rows.ravel(), columns.ravel(), strict=True)]
     assert np.corrcoef(sampled, shown)[0, 1] > 0.5
+
+
+def test_only_what_was_compared_is_drawn_and_nothing_is_told_twice(tank, tmp_path):
+    """Known relief alone: no empty histogram of X and Y, no arrows, refraction said once."""
+    lines = [line.split(",") for line in (tmp_path / "check.csv").read_text().splitlines()]
+    lines[1:] = [[name, "", "", *rest] for name, _, _, *rest in lines[1:]]
+    (tmp_path / "relief.csv").write_text("\n".join(map(",".join, lines)) + "\n")
+    out = tmp_path / "report.html"
+    run("report", tank, "--check", tmp_path / "relief.csv", "--out", out, "--language", "de")
+    page = out.read_text(encoding="utf-8")
+    assert "Fehler an den verglichenen Punkten: r." in page
+    assert "Pfeile in X und Y" not in page
+    assert "An den 5 gemessenen Punkten" in page
+    assert "neglected" not in page

@@ -419,7 +419,7 @@ def test_usage_errors_are_status_two():
 @pytest.mark.skipif("BIFOCAL_DATA" not in os.environ, reason="BIFOCAL_DATA is not set")
 @pytest.mark.parametrize(
     ("name", "median", "rms", "sigma_px"),
-    [("church_1", 0.0042, 0.0078, 0.36), ("church_2", 0.0105, 0.020, 0.32)],
+    [("church_1", 0.0042, 0.0078, 0.45), ("church_2", 0.0105, 0.020, 0.44)],
 )
 def test_real_church_points_reach_the_accuracy_of_the_pair(name, median, rms, sigma_px, tmp_path):
     folder = Path(os.environ["BIFOCAL_DATA"]) / "facade_pairs" / name
@@ -444,5 +444,11 @@ def test_real_church_points_reach_the_accuracy_of_the_pair(name, median, rms, si
     error = (r - reference["relief_m"])[away]
     assert np.nanmedian(np.abs(error)) <= median
     assert np.sqrt(np.nanmean(error**2)) <= rms
-    formal = np.hypot(sigma, reference["srelief_m"])[away]
-    assert 0.7 <= 1.4826 * np.nanmedian(np.abs(error / formal)) <= 1.4
+    # The same points from the other images only: these picks are no part of that truth.
+    apart = (r - reference["relief_indep_m"]) / np.hypot(sigma, reference["sindep_m"])
+    kept = np.array([p["flag"] != "OFF-RADIAL" for p in answer["points"]])
+    pull = np.abs(apart[away & kept & np.isfinite(apart)])
+    assert len(pull) > 1000
+    assert 0.8 <= 1.4826 * np.median(pull) <= 1.2
+    # 90.5 and 88.8 %; by the median of the misfits alone 86 and 79 %, at 1.37 for church_2.
+    assert 0.88 < np.mean(pull < 2) < 0.97

@@ -58,7 +58,7 @@ def test_adjusting_writes_project_and_report_and_says_the_salinity(project, tmp_
     assert "http" not in text
     # Media, units, program and options.
     assert re.search(r"<td>1\.00000, 1\.\d+, 1\.336\d+</td>", text)
-    assert re.search(r"<td>\w+:k1</td><td>\S+</td><td>\S+</td><td>mm\^-2</td>", text)
+    assert re.search(r"<td>\w+:k1</td><td>\S+</td><td>\S+</td><td>mm⁻²</td>", text)
     assert "multimedia adjust" in page.text
     assert "tank.toml" in page.text
     assert "Made by bifocal" in page.text
@@ -97,6 +97,8 @@ def test_json_holds_values_sigmas_and_correlations(project):
         (["none.toml"], 1, "none.toml"),
         (["PROJECT", "--media", "index7"], 1, "index7"),
         (["PROJECT", "--interior", "focus"], 1, "focus"),
+        (["PROJECT", "--interior", "auto,c"], 1, "auto stands alone"),
+        (["PROJECT", "--plate", "all"], 1, "no object point belongs to a group"),
         (["PROJECT", "--scale-bar", "1,2"], 1, "first,second,length,sigma"),
         (["PROJECT", "--prior", "offset"], 1, "label=sigma"),
         (["PROJECT", "--control", "maybe"], 2, "maybe"),

@@ -68,7 +68,7 @@ def test_flat_control_leaves_the_index_to_its_typical_prior():
     result = bundle_adjust(flat, wanted)
     assert abs(result.value("index3") - 1.33) < 0.005
     assert result.sigma("index3") == pytest.approx(0.005, rel=0.1)
-    assert "rests on what was given, 1.33 +- 0.005" in remark(result, "hardly carry")
+    assert "rests on what was given, 1.33 ± 0.005" in remark(result, "hardly carry")
 
 
 def test_a_prior_weighs_the_same_however_good_the_image_was_called():

@@ -6,11 +6,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 
 import multimedia
 from multimedia.adjustment.report import adjustment_document
-from multimedia.adjustment.report_figures import depth_and_radial
+from multimedia.adjustment.report_figures import depth_and_radial, draw_vectors
 from photocore.reports.document import Picture, TextTable
+from photocore.reports.words import words_of
 
 LAYERS = multimedia.Layers(indices=(1.0, 1.5, 1.337), thicknesses=(0.01,))
 
@@ -63,6 +65,21 @@ def test_a_wrong_index_shows_over_depth_where_no_other_unknown_takes_it_up(proje
     near, far = radial[depth < lower], radial[depth > upper]
     spread = np.hypot(near.std() / near.size**0.5, far.std() / far.size**0.5)
     assert abs(near.mean() - far.mean()) > 3 * spread
+
+
+def test_the_residuals_lie_within_the_rim_of_the_sensor(adjusted):
+    """The outer edges of its pixels, in the axes of the image; nothing where none is known."""
+    sensor = multimedia.Sensor(width=400, height=300, pitch=[0.05, 0.05], origin=[199.5, 120.0])
+    cameras = [replace(adjusted.project.cameras[0], sensor=sensor), adjusted.project.cameras[1]]
+    project = replace(adjusted.project, cameras=(*cameras, *adjusted.project.cameras[2:]))
+    figure = Figure()
+    say = words_of("multimedia.adjustment", "en")
+    draw_vectors(figure, replace(adjusted, project=project), cameras, say)
+    first, second = figure.axes
+    (rim,) = first.patches
+    assert not second.patches
+    low, high = rim.get_xy().min(axis=0), rim.get_xy().max(axis=0)
+    np.testing.assert_allclose([low, high], [[-10.0, -8.975], [10.0, 6.025]])
 
 
 def test_the_tables_hold_media_unknowns_and_what_is_alike(adjusted):

@@ -18,7 +18,11 @@ from click.testing import CliRunner
 from scipy.optimize import minimize
 
 from multimedia import read_project
+from multimedia.bathymetry.correction_job import Outcome
 from multimedia.cli.main import main
+from multimedia.media.height_field import WaveSurface
+from multimedia.media.surfaces import Plane
+from photocore.errors import GeometryError
 
 INDEX = 1.34
 RNG = np.random.default_rng(12)
@@ -220,6 +224,8 @@ def test_what_a_surface_does_not_cover_is_said(tmp_path, monkeypatch) -> None:
         (("--water-level", "bad.obj"), "bad.obj, line 4: 'f 1 2 9' is no vertex or face"),
         (("--water-level", "dots.obj"), "dots.obj: holds no faces"),
         (("--water-level", "upright.obj"), "upright.obj: triangles: 1 of 1 triangles have no ext"),
+        (("--water-level", "folded.obj"), "folded.obj: triangles: 1 edges have two triangles on"),
+        (("--water-level", "typo.asc"), "typo.asc, line 7: '0.l' is no height"),
         (("--water-level", "nowhere.tif"), "nowhere.tif: has no position"),
         (("--water-level", "water.stl"), "neither a height in metres nor a .tif or .asc raster"),
     ],
@@ -231,6 +237,9 @@ def test_bad_surfaces_are_refused_in_one_sentence(words, message, tmp_path, monk
     Path("bad.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 9\n")
     Path("dots.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\n")
     Path("upright.obj").write_text("v 0 0 0\nv 1 0 0\nv 0.5 0 1\nf 1 2 3\n")
+    Path("folded.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 1\nf 1 2 3\nf 4 2 1\n")
+    head = "ncols 3\nnrows 3\nxllcorner -1\nyllcorner -1\ncellsize 1\n"
+    Path("typo.asc").write_text(f"{head}0.1 0.1 0.1\n0.1 0.l 0.1\n0.1 0.1 nan\n")
     with rasterio.open(
         "nowhere.tif", "w", driver="GTiff", width=4, height=4, count=1, dtype="float32"
     ) as out:
@@ -260,3 +269,14 @@ def test_bad_surfaces_of_a_project_are_named(tmp_path) -> None:
         (tmp_path / "sea.toml").write_text(head + media + camera)
         with pytest.raises(ValueError, match=message):
             read_project(tmp_path / "sea.toml")
+
+
+def test_points_that_no_rays_reach_are_not_said_to_be_dry() -> None:
+    wavy = WaveSurface.sinusoid(0.0, amplitude=0.05, wavelength=4.0)
+    for surface, more in ((wavy, r"oblique rays out with --max-angle"), (Plane.level(0.0), "")):
+        outcome = Outcome(counts={"failed": 2}, lowest=-2.0, highest=-1.0)
+        with pytest.raises(GeometryError, match=rf"none of 2 points could be corrected.*{more}"):
+            outcome.judge(surface, allow_dry=False)
+        outcome = Outcome(counts={"failed": 1, "rays": 1}, lowest=-2.0, highest=-1.0, _wet=1)
+        outcome.judge(surface, allow_dry=False)
+        assert ("--max-angle" in outcome.remarks[0]) == bool(more)

@@ -10,6 +10,7 @@ import cv2
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from PIL import Image
 
 from multimedia import read_project
 from multimedia.adjustment.bundle import bundle_adjust
@@ -21,8 +22,10 @@ from multimedia.media.flat_interface import FlatInterface
 from multimedia.media.projection import project
 from multimedia.orientation.plate_poses import plate_pose
 from multimedia.projects.model import Project
+from multimedia.projects.photos import read_photo
 from multimedia.refraction.layers import Layers
 from photocore.boards import BoardView, detect_board
+from photocore.errors import InputError
 from tests.multimedia.rendered_boards import Housing, chessboard, dots, drawn, photo, poses
 
 EYE = Housing(width=480, height=360, pitch=0.008, c=2.8, k1=-4e-3)
@@ -145,6 +148,20 @@ def test_points_are_found_where_rays_say(pattern: str) -> None:
     assert np.abs(_image(points) - view.pixels).max() < 0.4
 
 
+def test_photos_of_more_than_eight_bits_keep_their_greys(tmp_path) -> None:
+    grey = np.tile(np.arange(0, 250, 5, dtype=np.uint8), (40, 1))
+    for bits in (10, 12, 16):
+        whole = np.round(grey * ((2**bits - 1) / 255)).astype(np.uint16)
+        whole[0, 0] = 2**bits - 1
+        for ending in ("png", "tif"):
+            cv2.imwrite(str(tmp_path / f"{bits}.{ending}"), whole)
+            read = read_photo(tmp_path / f"{bits}.{ending}")[1:]
+            assert np.abs(read.astype(int) - grey[1:]).max() <= 1
+    Image.new("1", (14_000, 13_000)).save(tmp_path / "bomb.png")
+    with pytest.raises(InputError, match=r"bomb\.png: has more pixels than any camera"):
+        read_photo(tmp_path / "bomb.png")
+
+
 def _image(points: np.ndarray) -> np.ndarray:
     """Return pixels of points in the rendering's frame, by the nearest rendered ray."""
     from scipy.interpolate import griddata
@@ -208,12 +225,14 @@ def test_a_plate_is_placed_by_one_camera(still: bool) -> None:
         assert np.abs(place - shift).max() < 1e-4
 
 
-def seen_by(given: Project, numbers: dict[str, np.ndarray]) -> list[PosedView]:
+def seen_by(
+    given: Project, numbers: dict[str, np.ndarray], board: np.ndarray = BOARD
+) -> list[PosedView]:
     """Return exact views of three poses; the board of each camera as it numbers it."""
     views = []
     for pose, (turn, shift) in enumerate(placed(3)):
         for k, camera in enumerate(given.cameras):
-            image = project(camera, (BOARD * 30.0) @ turn.T + shift, given.interfaces[k])
+            image = project(camera, (board * 30.0) @ turn.T + shift, given.interfaces[k])
             pixels = SENSOR.pixel_from_image(image)
             view = BoardView(
                 name=f"{camera.name}_{pose}", board=numbers[camera.name], pixels=pixels
@@ -246,6 +265,24 @@ def test_boards_of_two_cameras_get_one_numbering_and_adjust() -> None:
     )  # fmt: skip
     result = bundle_adjust(one, Unknowns(plates=("0", "1", "2"), fixed_cameras=("left",)))
     assert result.sigma0 < 1e-9
+
+
+@pytest.mark.parametrize("rows", [5, 8])
+def test_asymmetric_grids_of_two_cameras_get_one_numbering(rows: int) -> None:
+    grid = np.mgrid[0:4, 0:rows].T.reshape(-1, 2)
+    board = np.column_stack([2 * grid[:, 0] + grid[:, 1] % 2, grid[:, 1], 0 * grid[:, 0]]) * 1.0
+    # Turned by half a turn it is the same grid only if its number of rows is even.
+    right = board if rows % 2 else board.max(axis=0) - board
+    given = rig()
+    views = seen_by(given, {"left": board, "right": right}, board)[:2]
+    made = with_boards(given, views, square=30.0, numbered=False)
+    assert len(made.object_points.ids) == 4 * rows
+    seen, _ = made.image_points.grid(("left", "right"), made.object_points.ids)
+    apart = seen[0] - seen[1]
+    # One numbering: disparities of neighbours are alike, those of two numberings cross over.
+    assert np.ptp(apart[:, 0]) < 0.5 * np.ptp(seen[0, :, 0])
+    with pytest.raises(InputError, match=r"board in 0 already; give the project without"):
+        with_boards(made, views, square=30.0, numbered=False)
 
 
 def test_photos_of_several_cameras_are_told_apart_by_name(tmp_path, monkeypatch) -> None:

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import json
+from types import SimpleNamespace
 
 import numpy as np
 import openpyxl
 import pytest
 from click.testing import CliRunner
 
-from multimedia import Camera, FlatInterface, Layers, intersect, project
+from multimedia import Camera, FlatInterface, Interfaces, Layers, intersect, project, write_project
 from multimedia.cli.main import main
+from multimedia.design import design_files
 from multimedia.design.accuracy import (
     calibration_costs,
     compare_placements,
@@ -18,6 +20,9 @@ from multimedia.design.accuracy import (
     ring_of_cameras,
     study_setup,
 )
+from multimedia.design.design_files import write_design_plot
+from multimedia.media.surfaces import Sphere
+from multimedia.projects.model import ObjectPoints, Project
 from photocore.errors import GeometryError, InputError
 
 TANK = FlatInterface(layers=Layers(indices=(1.0, 1.5, 1.337), thicknesses=(0.01,)))
@@ -171,3 +176,53 @@ def test_a_ring_stands_before_its_faces_wherever_they_are() -> None:
     port = FlatInterface(layers=layers, point=(0, 0, -0.03), moves_with_camera=True)
     with pytest.raises(InputError, match="moves with the camera"):
         ring_of_cameras(3, 0.6, 0.4, interface=port, target=(0, 0, -1), **given)
+
+
+def test_domes_and_graded_water_are_studied_too(tmp_path) -> None:
+    views = [
+        Camera.looking_at(eye, (0, 0, -0.5), principal_distance=20.0, name=name)
+        for name, eye in (("left", (-0.4, 0, 0.6)), ("right", (0.4, 0.1, 0.7)))
+    ]
+    dome = Interfaces(
+        surfaces=tuple(Sphere(centre=(0, 0.001, 0.008), radius=r) for r in (0.05, 0.06)),
+        indices=(1.0, 1.5, 1.337), with_camera=(True, True), gradient=0.002,
+    )  # fmt: skip
+    xyz = np.random.default_rng(3).uniform((-0.2, -0.2, -0.7), (0.2, 0.2, -0.3), (12, 3))
+    study = study_setup(views, [dome] * 2, xyz, sigma_image=0.001, names=("port",) * 2)
+    for name, step in (("radius", 1e-3), ("centreZ", 1e-3), ("gradient", 1e-3), ("index3", 1e-3)):
+        small = 0.01 * step
+        other = dome.stepped([name], [small])
+        image = np.stack([project(view, xyz, other) for view in views])
+        moved = (intersect(views, image, dome).xyz - xyz) / 0.01
+        found = study.sensitivity[f"port:{name}"]
+        np.testing.assert_allclose(found, np.sqrt((moved**2).mean(axis=0)), rtol=0.02)
+    content = Project(
+        cameras=tuple(views), media={"port": dome}, media_of=("port",) * 2,
+        object_points=ObjectPoints(ids=tuple(map(str, range(12))), xyz=xyz), unit="m",
+    )  # fmt: skip
+    write_project(tmp_path / "dome.toml", content)
+    done = CliRunner().invoke(main, ["design", str(tmp_path / "dome.toml")])
+    assert done.exit_code == 0, done.output
+    assert "port:centreX" in done.stdout
+    assert "0.001 per m" in done.stdout
+    assert "needs cameras that all look through the same plane-parallel layers" in done.stderr
+
+
+def test_the_plot_holds_no_empty_panel_and_no_curve_beyond_its_rim(monkeypatch, tmp_path):
+    """Angles near 180 degrees, no cone to place, sigmas of micrometres in their own unit."""
+    figures = []
+    monkeypatch.setattr(
+        design_files, "write_figure", lambda _, figure, **__: figures.append(figure)
+    )
+    depth = np.linspace(0.02, 0.2, 4)
+    by_depth = np.column_stack([depth, *(np.full(4, s) for s in (2e-5, 2e-5, 6e-5, 173.0, 171.0))])
+    design = SimpleNamespace(by_depth=by_depth, placements=(), planarity=(), unit="m")
+    write_design_plot(tmp_path / "design.png", design)
+    precision, angles = figures[0].axes
+    for axes in (precision, angles):
+        low, high = axes.get_ylim()
+        values = np.concatenate([line.get_ydata() for line in axes.lines])
+        assert low == 0
+        assert values.max() < 0.9 * high
+    assert precision.get_ylabel() == "[µm]"
+    np.testing.assert_allclose(precision.lines[2].get_ydata(), 60.0)

@@ -142,6 +142,12 @@ def test_media_that_are_no_layers_are_refused():
         planarity_study(CAMERAS, [other] * 2, POINT[None], expected=1e-5)
 
 
+def test_faces_between_media_of_one_index_may_be_as_they_like():
+    none = FlatInterface(layers=Layers(indices=(1.337,) * 3, thicknesses=(GLASS,)))
+    study = planarity_study(CAMERAS, [none] * 2, POINT[None] + 0.01 * np.eye(3), expected=1e-5)
+    assert [one.allowed for one in study] == [np.inf] * len(study)
+
+
 def test_the_best_placement_says_when_better_ones_may_lie_beyond():
     def places(*sigmas):
         return [Placement(half_angle=0.1 * k, sigma=(s,) * 3, angle=0.2) for k, s in

@@ -324,6 +324,25 @@ def test_opencv_sees_the_same_pixels_and_comes_back(tmp_path, ending):
     assert np.abs(pixels(back) - theirs).max() < 1e-9
 
 
+def test_several_cameras_make_a_folder_of_opencv_files(tmp_path):
+    given = cameras(k3=1e-8)
+    source = save(tmp_path, made(given))
+    said = convert(source, tmp_path / "lenses", form="opencv").remarks
+    assert not any("exist" in remark for remark in said)
+    assert {file.stem for file in (tmp_path / "lenses").iterdir()} == {c.name for c in given}
+    back = convert(tmp_path / "lenses", tmp_path / "back.toml").project
+    for camera in given:
+        again = back.cameras[back.camera_index(camera.name)]
+        assert np.abs(pixels(again) - pixels(camera)).max() < 1e-9
+    with pytest.raises(InputError, match=r"holds .*\.yml already; add --overwrite"):
+        convert(source, tmp_path / "lenses", form="opencv")
+    (tmp_path / "odd").mkdir()
+    odd = save(tmp_path / "odd", made((replace(given[0], name="dive/1"), *given[1:])))
+    with pytest.raises(InputError, match="camera 'dive/1' cannot give its name to a file"):
+        convert(odd, tmp_path / "other", form="opencv")
+    assert not (tmp_path / "other").exists()
+
+
 def test_plain_json_rodrigues_vectors_and_stereo_files_are_read(tmp_path):
     matrix = [[900.0, 0, 320.5], [0, 905.0, 239.0], [0, 0, 1]]
     terms, rvec, tvec = [-0.2, 0.05, 0.001, -0.002, 0.01], [0.1, -0.2, 0.05], [0.1, 0.2, 1.5]

@@ -215,6 +215,21 @@ def test_damaged_and_lonely_files_are_named_and_nothing_stops(folder):
     assert "of different calibrations" in said
 
 
+def test_points_that_stand_twice_are_named_and_nothing_stops(folder):
+    for path in (folder / "cal/old").iterdir():
+        path.unlink()
+    rewritten(folder / "cal/plane2_cam1.tif.crd", lambda t: np.vstack([t, t[4:5]]))
+    for ending in ("crd", "fix"):
+        (folder / f"cal/cam2_plane3.tif.{ending}").write_bytes(
+            (folder / f"cal/cam2_plane1.tif.{ending}").read_bytes()
+        )
+    said = " ".join(import_openptv(folder, out=None).project.remarks)
+    assert "plane2_cam1.tif.fix: 1 points stand there more than once, such as that of number 4" in (
+        said
+    )
+    assert "cal/cam2_plane3.tif.crd was left out: it has points of cal/cam2_plane1.tif.crd" in said
+
+
 @pytest.mark.acceptance
 def test_two_planes_that_contradict_each_other_are_both_refused_one_alone_is_said(folder):
     for ending in ("crd", "fix"):

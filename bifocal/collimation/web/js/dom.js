@@ -40,8 +40,9 @@ export function keyedRows(body, items, { key, signature, build }) {
     const name = key(item);
     const mark = signature(item);
     let row = old.get(name);
-    // A row somebody types in stays as it is, and keeps its old mark, so that its turn comes later.
-    if (row?.querySelector("input:focus, select:focus")) {
+    // A row somebody types in, or has still to mend, stays as it is, and keeps its old mark, so that
+    // its turn comes later.
+    if (row?.querySelector("input:focus, select:focus, input:invalid")) {
       old.delete(name);
       if (row === place) place = place.nextElementSibling;
       else body.insertBefore(row, place);

@@ -1,14 +1,30 @@
-/** Fields that a person types into: a command is sent when the value has changed. */
+/**
+ * Fields that a person types into: a command is sent when the value has changed. What is refused
+ * stays as it was typed, marked, until it is mended.
+ */
 import { h, parseNumber } from "./dom.js";
 import { t } from "./words/words.js";
 
 let count = 0;
 
-/** Write a value into a field unless somebody is typing in it. */
+/** Write a value into a field unless somebody is typing in it, or has still to mend it. */
 export function fill(input, value) {
   const text = value === null || value === undefined ? "" : String(value);
-  if (document.activeElement !== input && input.value !== text) input.value = text;
+  const free = document.activeElement !== input && input.validity.valid;
+  if (free && input.value !== text) input.value = text;
   input.dataset.known = text;
+}
+
+/** Let fields show something else than they did: what was refused is forgotten. */
+export function afresh(inputs) {
+  for (const input of inputs) input.setCustomValidity("");
+}
+
+/** Send what was typed; `save` resolves to false where it was refused. */
+async function hand(input, value, save) {
+  const typed = input.value;
+  const accepted = await save(value);
+  if (accepted === false && input.value === typed) input.setCustomValidity(t("field.refused"));
 }
 
 /** A number field: `save(number or null)`; refuses what is no number, in words. */
@@ -19,8 +35,9 @@ export function numberInput({ save, label, ...attributes }) {
     const value = parseNumber(input.value);
     input.setCustomValidity(Number.isNaN(value) ? t("field.number") : "");
     if (!input.reportValidity()) return;
-    if (input.value !== input.dataset.known) save(value);
+    if (input.value !== input.dataset.known) hand(input, value, save);
   });
+  input.addEventListener("input", () => afresh([input]));
   return input;
 }
 
@@ -28,8 +45,9 @@ export function textInput({ save, label, ...attributes }) {
   const input = h("input", { type: "text", autocomplete: "off", "aria-label": label, ...attributes });
   input.addEventListener("change", () => {
     const value = input.value.trim();
-    if (value !== input.dataset.known) save(value);
+    if (value !== input.dataset.known) hand(input, value, save);
   });
+  input.addEventListener("input", () => afresh([input]));
   return input;
 }
 

@@ -20,7 +20,8 @@ class App {
     this.connection = connection;
     this.pyramids = new Pyramids(connection);
     this.boxes = [];
-    this.send = (op, args) => connection.send(op, args).catch((error) => this.refuse(error));
+    /** Send a command; false where it was refused, which is said. */
+    this.send = (op, args) => connection.send(op, args).then(() => true, (error) => this.refuse(error));
   }
 
   get state() {
@@ -213,17 +214,29 @@ class App {
   refuse(error) {
     if (!(error instanceof Refusal)) console.error(error);
     this.say(error.message, "warning");
+    return false;
   }
 
+  /** `act` may throw a Refusal: it is told in the dialog, which stays open with what it holds. */
   dialog(title, content, action = null, act = null) {
-    const box = h("dialog", { "aria-label": title }, h("form", { method: "dialog" }, h("h2", {}, title), content,
+    const fault = h("p", { class: "fault", role: "alert", hidden: true, testid: "dialog-fault" });
+    const form = h("form", { method: "dialog" }, h("h2", {}, title), content, fault,
       h("div", { class: "row end" },
         h("button", { value: "", class: "quiet" }, action ? t("dialog.cancel") : t("dialog.close")),
-        action && h("button", { value: "yes", class: "primary", testid: "dialog-yes" }, action))));
-    box.addEventListener("close", () => {
-      if (box.returnValue === "yes") act();
-      box.remove();
+        action && h("button", { value: "yes", class: "primary", testid: "dialog-yes" }, action)));
+    const box = h("dialog", { "aria-label": title }, form);
+    form.addEventListener("submit", async (event) => {
+      if (event.submitter?.value !== "yes") return;
+      event.preventDefault();
+      try {
+        await act();
+        box.close();
+      } catch (error) {
+        setText(fault, error.message);
+        fault.hidden = false;
+      }
     });
+    box.addEventListener("close", () => box.remove());
     document.body.append(box);
     box.showModal();
   }

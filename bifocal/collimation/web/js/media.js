@@ -3,6 +3,8 @@
  * bifocal/media.py. Places are (X, Y) in metres; "apparent" is where the ray would meet the plane
  * if it went straight on in the first medium.
  */
+import { number } from "./dom.js";
+
 const IDENTITY = [[1, 0, 0], [0, 1, 0], [0, 0, 1]];
 
 /** Vector [x, y, z] by the rows of a matrix. */
@@ -11,6 +13,15 @@ const turned = (rows, v) => rows.map((row) => row[0] * v[0] + row[1] * v[1] + ro
 /** Vector [x, y, z] by the columns of a matrix: back again. */
 const turnedBack = (rows, v) =>
   [0, 1, 2].map((k) => rows[0][k] * v[0] + rows[1][k] * v[1] + rows[2][k] * v[2]);
+
+/** What one photo looks through, for people: indices, thicknesses, and what is known of the last. */
+export function mediaWords({ indices, thicknesses }, sigmas = {}) {
+  return indices.map((index, k) => {
+    const thick = k > 0 && k < indices.length - 1 ? ` (${number(1000 * thicknesses[k - 1], 1)} mm)` : "";
+    const sigma = sigmas[`index${k + 1}`];
+    return `${number(index, 4)}${Number.isFinite(sigma) ? ` ± ${number(sigma, 4)}` : ""}${thick}`;
+  }).join(" · ");
+}
 
 export class Media {
   constructor({ indices, thicknesses, z0, distance, nadir, turn }) {

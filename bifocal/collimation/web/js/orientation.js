@@ -7,6 +7,7 @@ import * as drawing from "./drawing.js";
 import { button, fill, numberInput, textInput } from "./fields.js";
 import { asTaken } from "./geometry.js";
 import { Loupe } from "./loupe.js";
+import { mediaWords } from "./media.js";
 import { Picker } from "./picker.js";
 import { photoMark } from "./tiles.js";
 import { Pane, pixelView, spread, tileLayer } from "./viewer.js";
@@ -58,11 +59,14 @@ export class OrientationStage {
     const heads = ["tape.from", "tape.to", "tape.length", "tape.sigma"];
     const inputs = heads.map((key, index) => h("input", { type: "text", "aria-label": t(key),
       placeholder: t(key).replace(/ ?\[.*/, ""), inputmode: index > 1 ? "decimal" : "text", testid: `tape-${index}` }));
-    const add = () => {
-      const [from, to, ...numbers] = inputs.map(({ value }) => value.trim());
+    const add = async () => {
+      const typed = inputs.map(({ value }) => value);
+      const [from, to, ...numbers] = typed.map((value) => value.trim());
       const length = parseNumber(numbers[0]);
       if (!from || !to || !(length > 0)) return this.app.say(t("tape.incomplete"), "warning");
-      this.app.send("tape.set", { from, to, length, sigma: numbers[1] || null });
+      const accepted = await this.app.send("tape.set", { from, to, length, sigma: numbers[1] || null });
+      // A refused tape stays to be mended; so does one typed meanwhile.
+      if (!accepted || inputs.some(({ value }, index) => value !== typed[index])) return undefined;
       for (const input of inputs) input.value = "";
       return inputs[0].focus();
     };
@@ -97,7 +101,7 @@ export class OrientationStage {
     const area = h("textarea", { rows: "8", "aria-label": t("control.pasteArea"),
       placeholder: t("control.pasteArea"), testid: "paste-area" });
     this.app.dialog(t("control.paste"), [h("p", { class: "hint" }, t("control.pasteHint")), area],
-      t("control.pasteTake"), () => this.app.send("control.paste", { text: area.value }));
+      t("control.pasteTake"), () => this.app.connection.send("control.paste", { text: area.value }));
   }
 
   async prepare(state) {
@@ -187,6 +191,15 @@ export class OrientationStage {
     this.known.replaceChildren(...rows.filter(([, value, sigma]) => value !== null || Number.isFinite(sigma))
       .map(([name, value, sigma]) => h("div", {}, h("dt", {}, name), h("dd", {},
         `${value === null ? "" : number(value, 3)}${Number.isFinite(sigma) ? ` ± ${number(sigma, 3)}` : ""} m`.trim()))));
+    this.#tellMedia(pair?.images.map(({ media }) => media) ?? [], sigmas);
+  }
+
+  /** What the pair looks through, and where that begins. */
+  #tellMedia(seen, sigmas) {
+    if (!seen[0]) return;
+    const rows = [[t("known.media"), mediaWords(seen[0], sigmas)],
+      ...seen.map(({ z0 }, index) => [t("known.interface", { image: index + 1 }), `${number(z0, 3)} m`])];
+    this.known.append(...rows.map(([name, text]) => h("div", {}, h("dt", {}, name), h("dd", {}, text))));
   }
 
   #controlRow(item) {

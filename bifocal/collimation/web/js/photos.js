@@ -1,10 +1,14 @@
 /** Stage 1: two photos dropped; what their files do not tell is asked in words. */
-import { h, keyedRows, setText } from "./dom.js";
-import { button, fill, labelled, numberInput } from "./fields.js";
+import { h, keyedRows, number, setText } from "./dom.js";
+import { afresh, button, fill, labelled, numberInput } from "./fields.js";
+import { mediaWords } from "./media.js";
 import { photoMark } from "./tiles.js";
 import { t } from "./words/words.js";
 
 const SITE = [["d1", "m"], ["sigma_d1", "m"], ["d2", "m"], ["sigma_d2", "m"]];
+/** What lies between cameras and wall; all empty in air. */
+const MEDIA = [["water_index", null], ["sigma_water_index", null], ["glass_index", null],
+  ["glass_thickness", "m"], ["port", "m"], ["depth", "m"]];
 const THUMB_LEVEL = 9;
 
 export class PhotosStage {
@@ -18,15 +22,21 @@ export class PhotosStage {
       h("p", { class: "lead" }, t("photos.drop")),
       h("p", { class: "hint" }, t("photos.dropHint")),
       h("label", { for: "photo-files", class: "button" }, t("photos.choose")), this.input);
-    this.site = Object.fromEntries(SITE.map(([key]) => [key, numberInput({
+    this.site = Object.fromEntries([...SITE, ...MEDIA].map(([key]) => [key, numberInput({
       label: t(`setup.${key}`), save: (value) => app.send("setup.set", { [key]: value }) })]));
+    const fields = (names) => h("div", { class: "fields" },
+      names.map(([key, unit]) => labelled(t(`setup.${key}`), this.site[key], unit)));
+    this.through = h("p", { testid: "pair-media" });
     this.form = h("section", { class: "card site" }, h("h2", {}, t("photos.site")),
-      h("p", { class: "hint" }, t("photos.siteHint")), h("div", { class: "fields" },
-        SITE.map(([key, unit]) => labelled(t(`setup.${key}`), this.site[key], unit))));
+      h("p", { class: "hint" }, t("photos.siteHint")), fields(SITE));
+    // Most walls stand in air: what is folded is opened where it is needed.
+    this.media = h("details", { class: "card site", testid: "media" },
+      h("summary", {}, h("h2", {}, t("photos.media"))), this.through,
+      h("p", { class: "hint" }, t("photos.mediaHint")), fields(MEDIA));
     this.exchange = button(t("photos.exchange"), () => app.send("photos.exchange"), { class: "quiet" });
     this.next = button(t("photos.next"), () => app.open("orientation"), { class: "primary" });
     this.element = h("main", { class: "stage photos", id: "stage-photos" }, this.zone,
-      h("div", { class: "cards" }, this.cards.map(({ element }) => element)), this.form,
+      h("div", { class: "cards" }, this.cards.map(({ element }) => element)), this.form, this.media,
       h("div", { class: "row end" }, this.exchange, this.next));
     this.#listen();
   }
@@ -83,21 +93,36 @@ export class PhotosStage {
   update(state) {
     const ready = state.photos.length === 2;
     this.zone.classList.toggle("small", ready);
-    this.form.hidden = this.exchange.hidden = this.next.hidden = !ready;
+    this.form.hidden = this.media.hidden = this.exchange.hidden = this.next.hidden = !ready;
     for (const card of this.cards) this.#fillCard(card, state);
-    for (const [key] of SITE) fill(this.site[key], state.setup?.[key]);
+    for (const [key] of [...SITE, ...MEDIA]) fill(this.site[key], state.setup?.[key]);
+    this.#tellMedia(state);
+  }
+
+  /** What the oriented pair looks through; the card opens by itself where there is something. */
+  #tellMedia({ pair, setup }) {
+    const seen = pair?.images.map(({ media }) => media) ?? [];
+    this.through.hidden = !seen[0];
+    if (seen[0]) {
+      setText(this.through, t("photos.through", { media: mediaWords(seen[0]),
+        far: number(seen[0].z0, 3), near: number(seen[1].z0, 3) }));
+    }
+    const typed = MEDIA.some(([key]) => (setup?.[key] ?? null) !== null);
+    if ((seen[0] || typed) && !this.told) this.media.open = this.told = true;
   }
 
   #fillCard(card, state) {
     const photo = state.photos.find(({ image }) => image === card.image);
     card.element.hidden = !photo;
     if (!photo) return;
+    if (card.name.textContent !== photo.name) afresh([card.focal_mm, card.sensor_width_mm]);
     setText(card.name, photo.name);
     const size = `${photo.width} × ${photo.height} px`;
     setText(card.facts, [size, photo.camera].filter(Boolean).join(" · "));
     fill(card.focal_mm, photo.focal_mm);
     fill(card.sensor_width_mm, photo.sensor_width_mm);
-    keyedRows(card.questions, photo.missing, { key: (text) => text, signature: (text) => text,
+    // An oriented pair knows its cameras.
+    keyedRows(card.questions, state.pair ? [] : photo.missing, { key: (text) => text, signature: (text) => text,
       build: (text) => h("li", {}, text) });
     this.#thumb(card, state).catch((error) => this.app.refuse(error));
   }

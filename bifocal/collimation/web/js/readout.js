@@ -1,6 +1,6 @@
 /** The point in hand: its name, type, reference and everything that follows from its picks. */
 import { h, number, setText } from "./dom.js";
-import { button, choice, fill, labelled, numberInput, textInput } from "./fields.js";
+import { afresh, button, choice, fill, labelled, numberInput, textInput } from "./fields.js";
 import { t } from "./words/words.js";
 
 export const TYPES = ["plain", "wall", "check", "control"];
@@ -42,15 +42,15 @@ export class Readout {
     try {
       await this.app.connection.send("point.rename", { name: selected, new: name });
       if (this.picker.selected === selected) this.picker.select(name);
+      return true;
     } catch (error) {
-      this.app.refuse(error);
-      this.update();
+      return this.app.refuse(error);
     }
   }
 
   #refer(key, value) {
     const { item } = this.picker;
-    this.app.send("point.reference", { name: item.name, [key]: value });
+    return this.app.send("point.reference", { name: item.name, [key]: value });
   }
 
   update() {
@@ -58,6 +58,9 @@ export class Readout {
     this.empty.hidden = Boolean(item);
     for (const part of [this.fields, this.values, this.foot]) part.hidden = !item;
     this.references.hidden = !item || !["check", "control"].includes(item.type);
+    // What was refused for one point is not another's.
+    if (item?.name !== this.shown) afresh([this.name, ...Object.values(this.reference)]);
+    this.shown = item?.name;
     if (!item) return;
     fill(this.name, item.name);
     this.type.value = item.type;

@@ -9,13 +9,14 @@ channels more than in others: their mean has the noise of all and the texture of
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from bifocal.files.images import as_grey
-from bifocal.model.image import as_photo
-from bifocal.relief_maps import flow
+from bifocal.files.images import as_grey, read_grey, read_image
+from bifocal.model.image import as_photo, local_contrast, noise
 from photocore.arrays import ByteArray, Float32Array
 
 #: Grey values that all but these percentiles are stretched to.
@@ -27,7 +28,9 @@ LEAST = 0.03
 
 
 def greys_through_water(
-    image1: NDArray[np.generic], image2: NDArray[np.generic]
+    image1: NDArray[np.generic],
+    image2: NDArray[np.generic],
+    names: tuple[str, str] = ("image1", "image2"),
 ) -> tuple[ByteArray, ByteArray]:
     """Return both photos in grey, for matching.
 
@@ -35,6 +38,8 @@ def greys_through_water(
     ----------
     image1, image2 : ndarray of uint8 or uint16, shape (height, width[, 3])
         Far and near photo.
+    names : pair of str
+        What to call them.
 
     Returns
     -------
@@ -51,9 +56,9 @@ def greys_through_water(
     the one with the most texture for its noise. Façade 11 through a port, rendered in coastal,
     turbid and murky water (1 MP; light of 400 to 600 nm lost by 0.2, 0.5 and 0.75 per metre): mean
     error 3.6 to 3.3, 5.1 to 4.4 and 9.2 to 8.7 mm, measured 91 to 91, 90 to 88 and 63 to 79 %; in
-    clear water as before, 3.1 mm and 91 %.
+    clear water as before, 3.1 mm and 91 %. Points of `match`: docs/through-water.md.
     """
-    for image, name in ((image1, "image1"), (image2, "image2")):
+    for image, name in zip((image1, image2), names, strict=True):
         as_grey(image, name)  # refused by its name if it is no photo
     photos = [as_photo(image) for image in (image1, image2)]
     if any(photo.ndim == 2 for photo in photos):
@@ -64,15 +69,31 @@ def greys_through_water(
     return _stretched(np.asarray(first)), _stretched(np.asarray(second))
 
 
+def read_greys(
+    path1: Path | str, path2: Path | str, *, in_water: bool
+) -> tuple[ByteArray, ByteArray]:
+    """Return far and near photo in grey, for matching; see `greys_through_water`.
+
+    Raises
+    ------
+    InputError
+        If a file is no photo.
+    """
+    if not in_water:
+        return read_grey(path1), read_grey(path2)
+    names = str(path1), str(path2)
+    return greys_through_water(read_image(path1), read_image(path2), names)
+
+
 def _weights(photo: NDArray[np.generic]) -> Float32Array:
     """Return contrast / noise² of the channels, of sum one."""
     level = 257.0 if photo.dtype == np.uint16 else 1.0
     shares = []
     for channel in np.moveaxis(photo, -1, 0):
         grey = np.asarray(channel, np.float32) / np.float32(level)
-        noise = flow.noise(grey)
-        variance = float(np.median(flow.local_contrast(grey))) ** 2 - BLURRED * noise**2
-        shares.append(np.sqrt(max(variance, LEAST**2)) / noise**2)
+        own = noise(grey)
+        variance = float(np.median(local_contrast(grey))) ** 2 - BLURRED * own**2
+        shares.append(np.sqrt(max(variance, LEAST**2)) / own**2)
     return np.asarray(shares, np.float32) / np.float32(sum(shares))
 
 
