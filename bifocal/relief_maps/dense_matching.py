@@ -19,6 +19,7 @@ from bifocal.relief_maps.exposure import match_exposure
 from bifocal.relief_maps.forward_projection import MapBands
 from bifocal.relief_maps.frame import (
     LONGEST_SIDE,
+    Frame,
     common_bounds,
     make_frame,
     working_grid,
@@ -28,7 +29,7 @@ from bifocal.relief_maps.map_completion import complete
 from bifocal.relief_maps.orientation_sigma import orientation_sigma
 from bifocal.relief_maps.registration import Registration, check_registration
 from bifocal.relief_maps.surfaces import surfaces
-from photocore.arrays import ByteArray
+from photocore.arrays import BoolArray, ByteArray
 from photocore.cli import Progress, no_progress
 from photocore.errors import InputError
 
@@ -165,14 +166,12 @@ def dense_relief(
     small = quality != "fast" and work.width * work.height < SMALL
     matched = flow.measure(frame, coarse, stride=flow.FINE_STRIDE if small else flow.STRIDE)
     registration = check_registration(frame, matched)
-    backing = None
+    progress(0.7, 1.0, "Relief map")
     if quality != "fast" and (matched.plain or coarse_level.is_unsure(matched)):
-        matched, backing = coarse_level.backed(frame, matched, coarse)
-    progress(0.7, 1.0, "Edges")
-    source, usable = surfaces(frame, matched, relief_range, backing)
-    progress(0.85, 1.0, "Relief map")
-    bands = forward_projection.to_plane(frame, source, usable, target)
-    bands = complete(frame, bands, target, plain=matched.plain)
+        backed = coarse_level.backed(frame, matched, coarse)
+        bands = _backed_map(frame, backed, relief_range, target)
+    else:
+        bands = _map_of(frame, matched, relief_range, target)
     progress(1.0, 1.0)
     bands = _resampled(bands, target, wanted)
     known = np.isfinite(bands.r)
@@ -188,6 +187,36 @@ def dense_relief(
         registration=registration,
         working_gsd=work.gsd,
     )
+
+
+def _map_of(
+    frame: Frame,
+    matched: flow.Measurement,
+    relief_range: tuple[float, float] | None,
+    grid: Grid,
+    known: BoolArray | None = None,
+) -> MapBands:
+    """Return the relief map of a measurement; what another level knows is to be believed."""
+    source, usable = surfaces(frame, matched, relief_range, known)
+    bands = forward_projection.to_plane(frame, source, usable, grid)
+    return complete(frame, bands, grid, plain=matched.plain)
+
+
+def _backed_map(
+    frame: Frame,
+    backed: coarse_level.Backed,
+    relief_range: tuple[float, float] | None,
+    grid: Grid,
+) -> MapBands:
+    """Return the relief map of a measurement that half the resolution backs."""
+    bands = _map_of(frame, backed.matched, relief_range, grid, backed.known)
+    if backed.matched.plain:
+        gsd = max(backed.half.grid.gsd, grid.gsd)
+        coarser = Grid.from_bounds(grid.bounds, gsd=gsd)
+        coarse = _map_of(backed.half, backed.coarse, relief_range, coarser)
+        scale = frame.grid.gsd / grid.gsd
+        coarse_level.take_over(bands, _resampled(coarse, coarser, grid), scale)
+    return bands
 
 
 def _grids(

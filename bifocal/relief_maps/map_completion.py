@@ -62,7 +62,7 @@ def complete(frame: Frame, bands: MapBands, grid: Grid, *, plain: bool = False) 
         relief = levels.drawn_to_levels(relief, bands.sigma, bands.quality == Quality.MEASURED)
     bands = bands._replace(r=relief, sigma=_sigma_at_steps(bands, per_pixel))
     _guard(frame, bands, grid)
-    forward_projection.forget_outside(bands)
+    forward_projection.forget_outside(bands, plain=plain)
     _tidy_outline(bands)
     return bands
 

@@ -269,9 +269,57 @@ def test_plaster_that_is_lost_in_noise_is_known_better_at_half_the_resolution():
     first = np.full((10, 10), 0.25, np.float32)
     fine = flow.measure(frame, first)
     assert coarse_level.is_unsure(fine)
-    both, known = coarse_level.backed(frame, fine, first)
+    both, known, _, _ = coarse_level.backed(frame, fine, first)
     assert known.mean() > 0.1
     before, after = (np.abs(found.r[known] - 0.3).mean() for found in (fine, both))
     assert after < 0.85 * before
     valid = ~known & (np.abs(both.r - fine.r) < coarse_level.GROSS)
     np.testing.assert_array_equal(both.r[valid], fine.r[valid])
+
+
+def test_the_coarse_map_takes_over_where_nothing_around_was_measured():
+    def bands(relief: float, quality: Quality) -> MapBands:
+        shape = (80, 80)
+        r, sigma = np.full(shape, relief, np.float32), np.full(shape, 0.1, np.float32)
+        return MapBands(r, sigma, np.full(shape, quality, np.uint8))
+
+    fine, coarse = bands(0.0, Quality.INTERPOLATED), bands(0.5, Quality.MEASURED)
+    fine.quality[:, :20] = Quality.MEASURED
+    coarse.r[:10] = np.nan
+    fine.r[70:, 60:] = np.nan
+    fine.quality[70:, 60:] = Quality.UNKNOWN
+    coarse_level.take_over(fine, coarse)
+    # From 16 px on, 35, it begins, to 32 px, 52, it goes over; half of it at 43.
+    assert (fine.r[10:, 55:] == 0.5).all()
+    assert (fine.r[:, :35] == 0).all()
+    assert (np.diff(fine.r[20]) >= 0).all()
+    assert abs(np.interp(0.25, fine.r[20], np.arange(80)) - 43) < 2
+    assert (fine.r[:10] == 0).all()
+    # Half the resolution measures nothing by itself: the promise of "measured" is the whole one's.
+    assert (fine.quality[:, 20:] == Quality.INTERPOLATED).all()
+
+
+def test_a_wall_is_plain_by_its_plain_part_however_strong_the_edges_on_it():
+    rng = np.random.default_rng(3)
+    noise = rng.normal(0, 1.5, (200, 200))
+    frame = frame_of(Pair(image1=FAR, image2=NEAR))
+    plaster = np.full((200, 200), 150.0)
+    plaster[:, ::40] = 20.0  # bars: 15 px around them half of the wall has contrast
+    stone = 150 + 8 * cv2.GaussianBlur(rng.normal(0, 12, (200, 200)), (0, 0), 2.0)
+    for wall, plain in ((plaster, True), (stone, False)):
+        image = np.clip(wall + noise, 0, 255).astype(np.uint8)
+        assert flow._is_plain(replace(frame, image1=image)) is plain
+
+
+def test_on_plain_walls_filled_relief_leans_on_what_is_interpolated():
+    def lost(*, plain: bool) -> int:
+        r = np.zeros((200, 200), np.float32)
+        bands = MapBands(r, np.full_like(r, 0.1), np.full(r.shape, Quality.HIDDEN, np.uint8))
+        bands.quality[:, :100] = Quality.MEASURED
+        bands.quality[:, 100:140] = Quality.INTERPOLATED
+        forward_projection.forget_outside(bands, plain=plain)
+        return int(np.isnan(bands.r[100]).sum())
+
+    # Hidden is what lies beyond 140 px; OpenCV's distances run up to 5 % short.
+    assert lost(plain=False) == 60
+    assert abs(lost(plain=True) - (60 - forward_projection.FRINGE_HIDDEN)) < 3
