@@ -20,8 +20,10 @@ LEAST_STEP = 0.5
 NOISE_STEPS = 4.0
 #: Differences of grey value and of its gradient beyond these count alike: façades 81 / 83, beyond
 #: 3 cm 1.28 / 2.33 % with 20 and 14, 1.13 / 2.15 with 12 and 8, 1.08 / 2.07 with 9 and 6, 1.13 /
-#: 2.07 with 7 and 4.5, 1.78 / 2.24 with 5 and 3. [grey levels]
-GREY_LIMIT, GRADIENT_LIMIT, GREY_SHARE = 9.0, 6.0, 0.4
+#: 2.07 with 7 and 4.5, 1.78 / 2.24 with 5 and 3. Where matching is imprecise, the photos differ by
+#: more than relief: the second ones (church_1, beyond 10 cm 9.1 %, with the first 10.1).
+#: [grey levels]
+LIMITS, IMPRECISE_LIMITS, GREY_SHARE = (9.0, 6.0), (12.0, 8.0), 0.4
 #: Half window and regularisation of the guided filter (He et al. 2013). [px, grey levels²]
 WINDOW, SOFTNESS = 3, 50.0
 #: By how much the upper surface must fit better than the lower one: always, and more where relief
@@ -36,9 +38,9 @@ CONTRAST, CONTRAST_WINDOW = 8.0, 15
 #: What the measured value is favoured by; where it rises or falls by so much parallax a pixel it is
 #: a ramp, which fits by what flow bent and stands on no surface. [grey levels; grey levels, px]
 FAVOUR, RAMP, RAMP_SLOPE = 0.05, 0.6, 0.3
-#: Where matching is as imprecise as this, slopes are noise: ramps count less from half of it on
-#: (façade 84, poor texture, 0.5 px: 13.4 % beyond 3 cm, with ramps 14.4 %). [px]
-RAMP_SIGMA = 0.25
+#: Matching is imprecise from this on, and precise up to half of it. Where it is imprecise, slopes
+#: are noise, no ramps (façade 84, poor texture, 0.5 px: 13.4 % beyond 3 cm, with ramps 14.4 %). [px]
+IMPRECISE = 0.25
 
 
 def sharpen(
@@ -66,9 +68,15 @@ def sharpen(
     result = relief.copy()
     far, near = _features(frame.image1), _features(frame.image2)
     guide = _Guide(far[..., 0])
-    misfits = [_mismatch(frame, far, near, candidate) for candidate in (relief, upper, lower)]
+    precise = precision(sigma_px)
+    limits = precise * np.array(LIMITS) + (1 - precise) * np.array(IMPRECISE_LIMITS)
+    grey, gradient = limits.tolist()
+    misfits = [
+        _mismatch(frame, far, near, candidate, grey, gradient)
+        for candidate in (relief, upper, lower)
+    ]
     own, high, low = (guide.smooth(misfit) for misfit in misfits)
-    textured, precise = _textured(frame), np.clip(2 - 2 * sigma_px / RAMP_SIGMA, 0, 1)
+    textured = _textured(frame)
     own += np.float32(precise) * textured * _ramp(median, per_relief) - np.float32(FAVOUR)
     margin = textured * _margin(frame, median) * np.clip(parallax / np.float32(WIDE_STEP), 0, 1)
     up = band & (high + margin <= low) & (high + margin < own)
@@ -76,6 +84,11 @@ def sharpen(
     result[up] = upper[up]
     result[down] = lower[down]
     return result, misfits[0]
+
+
+def precision(sigma_px: float) -> float:
+    """Return how far matching of this precision [px] is precise, 0 to 1."""
+    return float(np.clip(2 - 2 * sigma_px / IMPRECISE, 0, 1))
 
 
 def _ramp(median: Float32Array, per_relief: Float32Array) -> Float32Array:
@@ -116,14 +129,19 @@ def _features(image: np.ndarray) -> Float32Array:
 
 
 def _mismatch(
-    frame: Frame, far: Float32Array, near: Float32Array, relief: Float32Array
+    frame: Frame,
+    far: Float32Array,
+    near: Float32Array,
+    relief: Float32Array,
+    most_grey: float,
+    most_gradient: float,
 ) -> Float32Array:
     """Return how badly photo 2 fits photo 1 at given relief. [grey levels]"""
     columns, rows = zoom_map(frame, relief)
     moved = cv2.remap(near, columns, rows, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
     off = cv2.absdiff(moved, far)
-    grey = np.minimum(off[..., 0], GREY_LIMIT) * np.float32(GREY_SHARE)
-    return np.asarray(grey + np.minimum(off[..., 1] + off[..., 2], GRADIENT_LIMIT))
+    grey = np.minimum(off[..., 0], np.float32(most_grey)) * np.float32(GREY_SHARE)
+    return np.asarray(grey + np.minimum(off[..., 1] + off[..., 2], np.float32(most_gradient)))
 
 
 class _Guide:
