@@ -39,7 +39,7 @@ CONTRAST, CONTRAST_WINDOW = 8.0, 15
 #: a ramp, which fits by what flow bent and stands on no surface. [grey levels; grey levels, px]
 FAVOUR, RAMP, RAMP_SLOPE = 0.05, 0.6, 0.3
 #: Matching is imprecise from this on, and precise up to half of it. Where it is imprecise, slopes
-#: are noise, no ramps (façade 84, poor texture, 0.5 px: 13.4 % beyond 3 cm, with ramps 14.4 %). [px]
+#: are noise and no ramps (façade 84, poor texture: 13.4 % beyond 3 cm, with ramps 14.4 %). [px]
 IMPRECISE = 0.25
 
 
