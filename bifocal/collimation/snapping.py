@@ -7,6 +7,7 @@ from typing import NamedTuple
 import cv2
 import numpy as np
 
+from bifocal.collimation.corners import at_places, crossing
 from bifocal.orientation.targets import LARGEST, find_targets
 from photocore.arrays import ByteArray, Float32Array, FloatArray
 
@@ -22,8 +23,8 @@ LEAST_SYMMETRY, LEAST_CONTRAST = 0.9, 20.0
 WORST_TARGET = 0.06
 #: Grey levels of noise assumed for the precision of a corner; of a photo at low ISO.
 NOISE = 3.0
-#: Weaker corners are none: mean squared gradient across the weaker direction. [grey levels²/px²]
-LEAST_GRADIENT = 25.0
+#: No edge is straighter than that. [px]
+BEST_CORNER = 0.03
 #: Half the window of a corner's measurement. [px]
 _HALF = 5
 #: Best and worst precision that is told. [px]
@@ -141,7 +142,10 @@ def _disc_centre(grey: ByteArray, place: FloatArray) -> FloatArray:
     if not len(edges) or not 2 <= edges[0] <= RADII[-1] / 1.6:
         return place
     size = float(edges[0])
-    inner, plate = (away < 0.7 * size), (away > size + 1.5) & (away < 1.6 * size + 0.5)
+    inner, plate = (
+        (away < 0.7 * size),
+        (away > size + 1.5) & (away < max(1.6 * size + 0.5, size + 3.0)),
+    )
     low, high = float(np.median(grey[inner])), float(np.median(grey[plate]))
     if abs(high - low) < 2 * LEAST_CONTRAST or grey[inner].std() > 0.2 * abs(high - low):
         return place
@@ -201,11 +205,11 @@ def _refined(values: FloatArray, start: FloatArray, size: float) -> tuple[FloatA
     place = start.copy()
     sigma, symmetry = np.inf, 0.0
     for turn in range(16):
-        one, other = (_at(values, place + sign * offsets) for sign in (1, -1))
+        one, other = (at_places(values, place + sign * offsets) for sign in (1, -1))
         slopes = []
         for axis in np.eye(2) * 0.5:
             ahead, behind = (
-                [_at(values, place + s * axis + sign * offsets) for sign in (1, -1)]
+                [at_places(values, place + s * axis + sign * offsets) for sign in (1, -1)]
                 for s in (1, -1)
             )
             slopes.append((ahead[0] - ahead[1]) - (behind[0] - behind[1]))
@@ -234,17 +238,6 @@ def _refined(values: FloatArray, start: FloatArray, size: float) -> tuple[FloatA
     return place, sigma
 
 
-def _at(coefficients: FloatArray, places: FloatArray) -> FloatArray:
-    """Return a picture, given by its spline, at places, shape (n, 2).
-
-    Not by cv2.remap: it rounds places to 1/32 px.
-    """
-    from scipy.ndimage import map_coordinates
-
-    found = map_coordinates(coefficients, places.T[::-1], order=3, mode="nearest", prefilter=False)
-    return np.asarray(found)
-
-
 def _corner(grey: ByteArray, pick: FloatArray, radius: float) -> tuple[FloatArray, float] | None:
     """Return the nearest strong corner and its precision; None without one."""
     smooth = cv2.GaussianBlur(grey.astype(np.float32), (0, 0), 0.7)
@@ -260,31 +253,16 @@ def _corner(grey: ByteArray, pick: FloatArray, radius: float) -> tuple[FloatArra
         return None
     places = np.stack([columns[peaks], rows[peaks]], axis=-1).astype(np.float64)
     start = places[int(np.linalg.norm(places - pick, axis=1).argmin())]
-    criteria = (cv2.TERM_CRITERIA_EPS | cv2.TERM_CRITERIA_COUNT, 60, 1e-4)
     fine = cv2.cornerSubPix(
-        grey, start.astype(np.float32).reshape(1, 1, 2), (_HALF, _HALF), (-1, -1), criteria
+        grey,
+        start.astype(np.float32).reshape(1, 1, 2),
+        (_HALF, _HALF),
+        (-1, -1),
+        (cv2.TERM_CRITERIA_EPS | cv2.TERM_CRITERIA_COUNT, 60, 1e-4),
     )
-    place = np.asarray(fine, dtype=np.float64).reshape(2)
-    sigma = _corner_sigma(smooth, place)
-    if sigma is None or np.linalg.norm(place - start) > _HALF:
+    found = crossing(smooth, np.asarray(fine, dtype=np.float64).reshape(2))
+    if found is None or found[1] > _WORST or np.linalg.norm(found[0] - start) > _HALF:
         return None
-    return (place, sigma) if np.linalg.norm(place - pick) <= radius + 1.0 else None
-
-
-def _corner_sigma(smooth: Float32Array, place: FloatArray) -> float | None:
-    """Return the precision of a corner: the worse axis of its normal equations; None if weak."""
-    column, row = np.round(place).astype(int)
-    reach = (
-        slice(max(row - _HALF, 0), row + _HALF + 1),
-        slice(max(column - _HALF, 0), column + _HALF + 1),
-    )
-    part = smooth[reach]
-    if min(part.shape) < _HALF:
+    if np.linalg.norm(found[0] - pick) > radius + 1.0:
         return None
-    down, across = np.gradient(part.astype(np.float64))
-    gradient = np.stack([across.ravel(), down.ravel()])
-    least = float(np.linalg.eigvalsh(gradient @ gradient.T)[0])
-    if least / part.size < LEAST_GRADIENT:
-        return None
-    # Grey values were smoothed: neighbours are not independent.
-    return float(2.0 * NOISE / np.sqrt(least))
+    return found[0], max(found[1], BEST_CORNER)

@@ -166,6 +166,47 @@ def test_snap_finds_a_corner_and_leaves_plaster_alone() -> None:
     assert snap(plaster, (30.0, 31.0), 6.0) == (30.0, 31.0, "none", None)
 
 
+def _corner_drawn(centre: np.ndarray, opening: float, turn: float, blur: float, rng) -> np.ndarray:
+    """Return a dark corner of an opening [degrees], blurred, with noise."""
+    fine, side = 8, 72
+    at = (np.arange(side * fine) + 0.5) / fine - 0.5
+    x, y = np.meshgrid(at - centre[0], at - centre[1])
+    inside = (np.degrees(np.arctan2(y, x)) - turn) % 360 < opening
+    grey = np.where(inside, 70.0, 170.0).reshape(side, fine, side, fine).mean(axis=(1, 3))
+    grey = cv2.GaussianBlur(grey, (0, 0), blur) + rng.normal(0, 2.0, (side, side))
+    return np.clip(np.rint(grey), 0, 255).astype(np.uint8)
+
+
+@pytest.mark.parametrize("opening", [60.0, 90.0, 120.0, 270.0])
+@pytest.mark.parametrize("blur", [0.6, 1.2])
+def test_blur_does_not_draw_a_corner_away_from_where_its_edges_cross(
+    opening: float, blur: float
+) -> None:
+    rng = np.random.default_rng(int(opening))
+    errors, sigmas = [], []
+    for turn in range(0, 360, 30):
+        true = 35.5 + rng.uniform(-1, 1, 2)
+        grey = _corner_drawn(true, opening, turn + rng.uniform(0, 30), blur, rng)
+        found = snap(grey, tuple(true + rng.normal(0, 1, 2)), 6.0)
+        if found.kind == "corner":
+            errors.append(np.hypot(found.column - true[0], found.row - true[1]))
+            sigmas.append(found.sigma_px)
+    assert len(errors) >= 10
+    assert np.median(errors) < (0.25 if opening == 60.0 else 0.12)
+    assert np.sqrt(np.mean(np.square(errors) / np.square(sigmas))) < 2.5
+
+
+@pytest.mark.parametrize("size", [3.0, 4.0, 5.0, 6.0, 8.0])
+def test_the_rim_of_a_small_disc_is_no_corner(size: float) -> None:
+    rng = np.random.default_rng(int(size))
+    for _ in range(10):
+        true = 31.5 + rng.uniform(-2, 2, 2)
+        found = snap(_drawn("disc", tuple(true), size, rng), tuple(true + rng.normal(0, 1, 2)), 6.0)
+        assert found.kind != "corner"
+        if found.kind == "target":
+            assert np.hypot(found.column - true[0], found.row - true[1]) < 0.15
+
+
 def tile_of(client, space: str, image: int, level: int, column: int, row: int) -> np.ndarray:
     answer = client.get(f"/tiles/{space}/{image}/{level}/{column}_{row}.jpg")
     assert answer.status_code == 200
