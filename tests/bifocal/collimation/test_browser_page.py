@@ -83,6 +83,28 @@ def test_the_page_bends_pixels_as_the_library_does(page: Driver, name: str) -> N
     np.testing.assert_allclose(lens.distort(straight), pixels, rtol=0, atol=1e-7)
 
 
+@pytest.mark.parametrize("indices", [(1.0, 1.49, 1.337), (1.337, 1.49, 1.0)])
+def test_the_page_bends_rays_into_water_and_out_of_it(page: Driver, indices: Any) -> None:
+    z0, glass, distance = 0.05, 0.01, 2.0
+    # Out of water rays are reflected from 48.4 degrees on; the last is 0.1 degrees short of that.
+    angles = np.radians([0.0, 5.0, 30.0, 45.0, 48.3])
+    heights = np.array([z0, glass, distance - z0 - glass])
+    bent = np.arcsin(np.sin(angles)[:, None] * indices[0] / np.array(indices))
+    radius = np.tan(bent) @ heights
+    script = """async ([media, places]) => {
+        const { Media } = await import("/js/media.js");
+        const through = new Media(media);
+        const apparent = places.map((one) => through.apparent(one));
+        return [apparent, apparent.map((one) => through.onPlane(one))];
+    }"""
+    media = {"indices": indices, "thicknesses": [glass], "z0": z0, "distance": distance}
+    places = np.stack([radius * 0.6 + 0.1, radius * 0.8 - 0.2], axis=-1)
+    shown, back = page.tab.evaluate(script, [media | {"nadir": [0.1, -0.2]}, places.tolist()])
+    seen = np.hypot(*(np.array(shown) - [0.1, -0.2]).T)
+    np.testing.assert_allclose(seen, distance * np.tan(angles), rtol=1e-9, atol=1e-12)
+    np.testing.assert_allclose(back, places, rtol=1e-9, atol=1e-12)
+
+
 def test_nothing_is_asked_of_anybody_else(page: Driver) -> None:
     for stage in STAGES:
         page.click(f"mode-{stage}")

@@ -49,13 +49,21 @@ export class Media {
     return [arm, rate];
   }
 
+  /** Tangent in the first medium beyond which a later, thinner one reflects the ray. */
+  get limit() {
+    const [first, thinnest] = [this.indices[0], Math.min(...this.indices)];
+    return thinnest < first ? thinnest / Math.sqrt(first ** 2 - thinnest ** 2) : Infinity;
+  }
+
   /** Tangent in the first medium of the ray to a radius, by Newton's steps. */
   tangent(radius, below) {
     const last = below - this.depth;
-    let tangent = radius / this.arm(0, last)[0];
+    const limit = this.limit;
+    let tangent = Math.min(radius / this.arm(0, last)[0], limit / 2);
     for (let round = 0; round < 50; round++) {
       const [arm, rate] = this.arm(tangent, last);
-      const step = (radius - tangent * arm) / rate;
+      // The radius grows without end towards the limit: a step may lead half of the way there.
+      const step = Math.min((radius - tangent * arm) / rate, (limit - tangent) / 2);
       tangent += step;
       if (Math.abs(step) < 1e-15 * (1 + Math.abs(tangent))) break;
     }
