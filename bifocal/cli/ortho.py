@@ -135,7 +135,7 @@ def command(
     """
     from bifocal.orthophotos.deliver_workflow import DeliverTask, default_title, deliver
     from bifocal.orthophotos.ortho_image import OrthoOptions
-    from bifocal.orthophotos.ortho_workflow import OrthoTask, make_ortho
+    from bifocal.orthophotos.ortho_workflow import OrthoTask, make_ortho, not_measured
     from bifocal.survey.pair_workflow import is_workbook, points_of, read_pair
 
     if out is None and folder is None:
@@ -186,10 +186,8 @@ def command(
         f"{result.path}: {grid.width} x {grid.height} px of {grid.gsd * 1000:g} mm; "
         f"{100 * (1 - shares['none']):.1f} % covered, {100 * shares['hidden']:.1f} % hidden"
     ]
-    estimated = {"interpolated": "on interpolated relief", "plane": "on the plane"}
-    told = [f"{100 * shares[key]:.1f} % {where}" for key, where in estimated.items() if shares[key]]
-    if told:
-        lines.append("Not measured: " + ", ".join(told))
+    if told := not_measured(shares):
+        lines.append(f"Not measured: {told}")
     if files:
         lines.append(f"{folder}: {', '.join(done.files)} (sheet {done.sheet})")
     print_result(result.to_dict() | files, lines, as_json=as_json, remarks=result.remarks)

@@ -9,7 +9,17 @@ from typing import Any
 import click
 
 from photocore.cli import print_result, progress_bar
-from photocore.options import FILE, Numbers, as_json, bounds, choice, cog, number, overwrite
+from photocore.options import (
+    FILE,
+    Length,
+    Numbers,
+    as_json,
+    bounds,
+    choice,
+    cog,
+    number,
+    overwrite,
+)
 
 EXAMPLE = """\b
 Examples:
@@ -28,8 +38,8 @@ photos, 2 interpolated, 3 hidden from a camera, 0 unknown).
 @click.option("--out", required=True, type=FILE, help="Relief map to write (.tif).")
 @number(
     "--gsd", "M",
-    "Side of a pixel of the map on the plane [m], 0.2 at most; a coarse one is also matched "
-    "more coarsely.  [default: that of the far photo]",
+    "Side of a pixel of the map on the plane [m] or 5mm, 0.2 at most; a coarse one is also "
+    "matched more coarsely.  [default: that of the far photo]", type=Length(above=0),
 )  # fmt: skip
 @bounds("Part of the plane [m].  [default: all that both photos see]")
 @choice(

@@ -12,6 +12,9 @@ import numpy as np
 from photocore.arrays import FloatArray
 from photocore.provenance import provenance
 
+#: Flag of a polyline (PLINEGEN).
+_PATTERN_RUNS_ON = 128
+
 
 def new_drawing(
     layers: Mapping[str, int], *, point_style: int, point_size: float
@@ -35,6 +38,8 @@ def new_drawing(
     drawing.units = units.M
     drawing.header["$PDMODE"] = point_style
     drawing.header["$PDSIZE"] = point_size
+    # Dashes are as long on a sheet as its viewport's scale makes those of the model.
+    drawing.header["$PSLTSCALE"] = 0
     for layer, colour in layers.items():
         drawing.layers.add(layer, color=colour)
     return drawing, drawing.modelspace()
@@ -82,6 +87,16 @@ def turned(text: Any, angle: float, *, middle: bool) -> None:
     text.dxf.rotation = angle
     if middle:
         text.set_placement(text.dxf.insert, align=TextEntityAlignment.CENTER)
+
+
+def dashed(model: Any, linetype: str, length: float) -> dict[str, object]:
+    """Return the attributes of a dashed polyline whose pattern repeats after a length.
+
+    In units of the drawing. The pattern runs on over corners: beginning anew at each of them, it
+    would leave a profile of points 5 mm apart without a gap.
+    """
+    pattern = model.doc.linetypes.get(linetype).pattern_tags.tags.get_first_value(40)
+    return {"linetype": linetype, "ltscale": length / pattern, "flags": _PATTERN_RUNS_ON}
 
 
 def add_ellipse(model: Any, place: tuple[float, ...], ellipse: FloatArray, layer: str) -> None:

@@ -228,8 +228,9 @@ def _check_space(path: Path, grid: Grid, bytes_per_pixel: int) -> None:
     free = shutil.disk_usage(path.parent).free
     if needed > free:
         raise InputError(
-            f"{path}: {grid.width} x {grid.height} px need more than {bytes_in_words(needed)} and "
-            f"{bytes_in_words(free)} are free. Choose another disk, a coarser --gsd or --bounds."
+            f"{path}: {grid.width:,} x {grid.height:,} px need more than "
+            f"{bytes_in_words(needed)} and {bytes_in_words(free)} are free. Choose another disk, "
+            "a coarser --gsd or --bounds."
         )
 
 
@@ -238,8 +239,10 @@ def bytes_in_words(count: float) -> str:
 
     Examples
     --------
-    >>> bytes_in_words(18), bytes_in_words(6_300_000)
-    ('18 bytes', '6.3 MB')
+    >>> bytes_in_words(18), bytes_in_words(6_300_000), bytes_in_words(2e16)
+    ('18 bytes', '6.3 MB', '20,000 TB')
     """
-    power = min(int(np.log10(float(max(count, 1)))) // 3, 3)
-    return f"{count / 1000**power:.4g} {('bytes', 'kB', 'MB', 'GB')[power]}"
+    power = min(int(np.log10(float(max(count, 1)))) // 3, 4)
+    number = count / 1000**power
+    words = f"{number:.4g}" if number < 1000 else f"{number:,.0f}"
+    return f"{words} {('bytes', 'kB', 'MB', 'GB', 'TB')[power]}"

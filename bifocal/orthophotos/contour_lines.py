@@ -13,7 +13,7 @@ import numpy as np
 from bifocal.model.grid import Grid
 from bifocal.model.surface import Surface
 from bifocal.orthophotos.canvas import text_width
-from bifocal.orthophotos.drawing import Contour, multiples
+from bifocal.orthophotos.drawing import Contour, multiples, signed
 from photocore.arrays import BoolArray, Float32Array, FloatArray
 from photocore.errors import InputError
 from photocore.shrinkage import shrink_noise
@@ -29,6 +29,9 @@ _LARGEST = 4000
 #: Relief is compared so far to both sides of a line, and on average over so much of it: a line that
 #: wanders over a flat wall has nothing higher on its one side. On paper. [mm]
 _ASIDE, _STRETCH = 2.0, 8.0
+#: And so far, where as much less will do: on a flat strip that is narrower than 2 x 2 mm a line of
+#: its own level would lean on the steps at both its edges.
+_NEAR = 0.8
 #: What must lie between both sides of a line, in standard deviations of one pixel. The sigma of a
 #: relief map is that of a pixel and rather too large; the mean of a stretch is far better known.
 _CLEAR = 1.0
@@ -123,10 +126,12 @@ def contour_labels(lines: Sequence[Contour], scale: float) -> list[ContourLabel]
     paper = scale / 1000.0
     labels: list[ContourLabel] = []
     taken = np.empty((0, 2))
-    for contour in sorted((line for line in lines if line.index), key=lambda one: -len(one.line)):
+    thick = [line for line in lines if line.index]
+    digits = _digits([line.level for line in thick])
+    for contour in sorted(thick, key=lambda one: -len(one.line)):
         line = contour.line / paper
         along = _lengths(line)
-        words = f"{contour.level:+.2f}"
+        words = signed(contour.level, digits)
         need = text_width(words, LABEL_SIZE) + 1.0
         if along[-1] < max(_ROOM, 2 * need):
             continue
@@ -145,6 +150,11 @@ def contour_labels(lines: Sequence[Contour], scale: float) -> list[ContourLabel]
             place = float(base[0] * paper), float(base[1] * paper)
             labels.append(ContourLabel(place, angle, words))
     return labels
+
+
+def _digits(levels: Sequence[float]) -> int:
+    """Return how many decimals show all levels as they are: two, or up to four."""
+    return next((n for n in (2, 3) if all(abs(round(v, n) - v) < 1e-6 for v in levels)), 4)
 
 
 def _straightest(
@@ -187,27 +197,38 @@ def _clear_parts(
         return []
     direction = np.gradient(line, axis=0)
     direction /= np.maximum(np.hypot(*direction.T), 1e-9)[:, None]
-    aside = _ASIDE * factor * np.stack([-direction[:, 1], direction[:, 0]], axis=-1)
-    left, right, level = (_looked_up(relief, place) for place in (line + aside, line - aside, line))
-    side = max(3, round(_STRETCH / _SPACING))
-    padded = (side // 2, side - 1 - side // 2)
-
-    def stretch(rise: Float32Array, instead: Float32Array) -> FloatArray:
-        """Return the mean rise along the line; beside unknown relief the other side's."""
-        whole = np.nan_to_num(np.where(np.isnan(rise), instead, rise))
-        kernel = np.ones(side) / side
-        return np.convolve(np.pad(whole, padded, mode="edge"), kernel, "valid")
-
-    up, down = stretch(left - level, level - right), stretch(level - right, left - level)
-    wanted = np.nan_to_num(_looked_up(least, line))
-    clear = np.abs(up + down) > wanted
-    # A line at the foot of a step follows what the flat wall does at its own level.
-    clear &= np.minimum(up * np.sign(up + down), down * np.sign(up + down)) > _EITHER * wanted
+    normal = factor * np.stack([-direction[:, 1], direction[:, 0]], axis=-1)
+    level, wanted = _looked_up(relief, line), np.nan_to_num(_looked_up(least, line))
+    clear = np.ones(len(line), bool)
+    for aside, stretch in ((_ASIDE, _STRETCH), (_NEAR, 4 * _NEAR)):
+        left, right = (_looked_up(relief, line + way * aside * normal) for way in (1, -1))
+        clear &= _rises(left, right, level, wanted * aside / _ASIDE, stretch)
     bounds = [0, *(np.flatnonzero(np.diff(clear)) + 1).tolist(), len(clear)]
     return [
         line[a:b] for a, b in pairwise(bounds)
         if clear[a] and b - a > shortest
     ]  # fmt: skip
+
+
+def _rises(
+    left: Float32Array, right: Float32Array, level: Float32Array, wanted: Float32Array,
+    stretch: float,
+) -> BoolArray:  # fmt: skip
+    """Return where the relief beside a line differs from side to side by more than is wanted."""
+    side = max(3, round(stretch / _SPACING))
+    padded = (side // 2, side - 1 - side // 2)
+
+    def averaged(rise: Float32Array, instead: Float32Array) -> FloatArray:
+        """Return the mean rise along the line; beside unknown relief the other side's."""
+        whole = np.nan_to_num(np.where(np.isnan(rise), instead, rise))
+        kernel = np.ones(side) / side
+        return np.convolve(np.pad(whole, padded, mode="edge"), kernel, "valid")
+
+    up, down = averaged(left - level, level - right), averaged(level - right, left - level)
+    way = np.sign(up + down)
+    # A line at the foot of a step follows what the flat wall does at its own level.
+    either = np.minimum(up * way, down * way) > _EITHER * wanted
+    return np.asarray((np.abs(up + down) > wanted) & either)
 
 
 def _looked_up(field: Float32Array, places: FloatArray) -> Float32Array:

@@ -32,6 +32,7 @@ from bifocal.orthophotos.ortho_workflow import (
     ORTHO_ENDING,
     OrthoTask,
     make_ortho,
+    not_measured,
     open_surface,
     planned_grid,
     survey_points_of,
@@ -177,7 +178,10 @@ def deliver(
         result = make_ortho(
             pair_path, place / f"{name}.tif", task, world_file=True, progress=progress
         )
-        nameless = _pictures(place, name, drawing, sheet, relief.lines if relief else ())
+        guess = not_measured(result.shares)
+        told = (f"not measured: {guess}; last band of the .tif",) if guess else ()
+        picture = replace(drawing, notes=(*told, *drawing.notes))
+        nameless = _pictures(place, name, picture, sheet, relief.lines if relief else ())
         if nameless:
             remarks += (
                 f"{nameless} marked points stand on the sheet without name, since names would "
@@ -314,7 +318,6 @@ def _draw_relief(
             )
             guessed += int(np.count_nonzero((known > 0) & np.isnan(measured.window(part))))
             writer.write(picture, column=column, row=row, mask=known > 0)
-    words = f"relief {low:+.2f} to {high:+.2f} m, contour lines every {relief.interval:g} m"
     share = guessed / (grid.width * grid.height)
     scale = np.concatenate([np.linspace(low, 0, 18), np.linspace(0, high, 18)])
     colours = np.rint(tints(scale, (low, high))).astype(int).tolist()
@@ -322,6 +325,7 @@ def _draw_relief(
         limits=(low, high), beyond=relief.beyond, colours=tuple((r, g, b) for r, g, b in colours),
         guessed=share,
     )  # fmt: skip
+    words = f"relief {' to '.join(legend.words)} m, contour lines every {relief.interval:g} m"
     drawing = replace(
         drawing, subtitle="Relief", contours=relief.lines, notes=(words, *drawing.notes),
         legend=legend,

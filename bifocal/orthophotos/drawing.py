@@ -26,6 +26,8 @@ PAPERS: Mapping[str, tuple[float, float]] = {
 LEFT, MARGIN = 20.0, 10.0
 #: Room between the frame and the picture for the numbers of the grid. [mm]
 BAND = 9.0
+#: From the edge of the picture to the letter of a section, outside of the grid's numbers. [mm]
+BEYOND = 6.8
 #: Height of the strip with title, scale bar and level mark. [mm]
 STRIP = 34.0
 
@@ -73,6 +75,11 @@ class Section:
         if not along.any():
             along = self.path[1] - self.path[0]
         return np.array([-along[1], along[0]]) / np.hypot(*along)
+
+    def ends(self) -> list[tuple[FloatArray, FloatArray]]:
+        """Return both ends and the directions out of the line there, each of shape (2,)."""
+        pairs = ((self.path[0], self.path[1]), (self.path[-1], self.path[-2]))
+        return [(end, (end - before) / np.hypot(*(end - before))) for end, before in pairs]
 
     def pieces(self) -> list[tuple[bool, FloatArray]]:
         """Return the known pieces as drawn, measured or not, relief to the right or upwards.
@@ -133,6 +140,12 @@ class Legend:
     colours: tuple[tuple[int, int, int], ...]
     guessed: float = 0.0
 
+    @property
+    def words(self) -> tuple[str, str]:
+        """The limits as they are written: to millimetres on a flat wall."""
+        digits = 2 if max(-self.limits[0], self.limits[1]) >= 0.1 else 3
+        return signed(self.limits[0], digits), signed(self.limits[1], digits)
+
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Drawing:
@@ -170,6 +183,12 @@ class Drawing:
         """Width and height of the picture on paper. [mm]"""
         factor = 1000.0 / self.scale * self.grid.gsd
         return self.grid.width * factor, self.grid.height * factor
+
+    def at_the_edge(self, end: FloatArray) -> bool:
+        """Return whether a section's end is so near the edge that its letter stands beyond it."""
+        xmin, ymin, xmax, ymax = self.grid.bounds
+        gaps = np.abs([end[0] - xmin, end[0] - xmax, end[1] - ymin, end[1] - ymax])
+        return bool(gaps.min() * 1000.0 / self.scale < BEYOND)
 
     def grid_step(self) -> float:
         """Return the spacing of grid crosses: about 5 cm on paper, a round number. [m]"""
@@ -253,6 +272,18 @@ def round_step(length: float) -> float:
         if factor * power <= length * (1 + 1e-9):
             return round(factor * power, 9)
     return round(power, 9)
+
+
+def signed(value: float, digits: int) -> str:
+    """Return a relief as drawings write it, with its sign; what is 0 has none.
+
+    Examples
+    --------
+    >>> signed(-0.25, 2), signed(0.5, 1), signed(-0.0, 2)
+    ('-0.25', '+0.5', '0.00')
+    """
+    words = f"{value:+.{digits}f}"
+    return words[1:] if float(words) == 0 else words
 
 
 def multiples(low: float, high: float, step: float) -> FloatArray:

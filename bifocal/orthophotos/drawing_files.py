@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from bifocal.files.dxf import add_text, new_drawing, save_drawing, turned
+from bifocal.files.dxf import add_text, dashed, new_drawing, save_drawing, turned
 from bifocal.model.points import SurveyPoints
 from bifocal.orthophotos.contour_lines import LABEL_SIZE, contour_labels
 from bifocal.orthophotos.drawing import Drawing, PrintSheet, Section
@@ -27,10 +28,16 @@ LAYERS = {
     "BIFOCAL_CONTOURS_INDEX": 30,
     "BIFOCAL_CONTOUR_TEXT": 30,
     "BIFOCAL_SECTION_LINES": 5,
+    "BIFOCAL_SECTION_NAMES": 5,
     "BIFOCAL_FRAME": 7,
     "BIFOCAL_LEGEND": 7,
     "BIFOCAL_VIEWPORT": 8,
 }
+
+
+#: Strokes of a section line repeat after this, and labels stand so far above their contour lines.
+#: On paper. [mm]
+_CUT, _ABOVE = 8.6, 0.6
 
 
 def write_drawing(
@@ -62,10 +69,10 @@ def write_drawing(
             dxfattribs={"layer": "BIFOCAL_IMAGE", "flags": 1 | 2 | 8},
         )
     paper = drawing.scale / 1000.0  # metres on the wall per millimetre on paper
-    style, arm = {"layer": "BIFOCAL_GRID"}, 2 * paper
+    arm, on_grid = 2 * paper, {"layer": "BIFOCAL_GRID"}
     for x, y in drawing.crosses().tolist():
-        model.add_line((x - arm, y), (x + arm, y), dxfattribs=style)
-        model.add_line((x, y - arm), (x, y + arm), dxfattribs=style)
+        model.add_line((x - arm, y), (x + arm, y), dxfattribs=on_grid)
+        model.add_line((x, y - arm), (x, y + arm), dxfattribs=on_grid)
         beside = (x + 0.5 * paper, y + 0.5 * paper)
         add_text(model, f"{x:g} / {y:g}", beside, 1.6 * paper, "BIFOCAL_GRID")
     _scale_bar(model, drawing, paper)
@@ -73,11 +80,9 @@ def write_drawing(
     _points(model, drawing.control, "BIFOCAL_CONTROL", 2.0 * paper)
     _contours(model, drawing, paper)
     for cut in drawing.sections:
-        dashed = {"linetype": "DASHDOT", "ltscale": 5 * paper}
-        model.add_lwpolyline(
-            cut.path.tolist(), dxfattribs={"layer": "BIFOCAL_SECTION_LINES", **dashed}
-        )
-        _section_names(model, cut, paper)
+        style = {"layer": "BIFOCAL_SECTION_LINES", **dashed(model, "DASHDOT", _CUT * paper)}
+        model.add_lwpolyline(cut.path.tolist(), dxfattribs=style)
+        _section_names(model, drawing, cut, paper)
     document.set_modelspace_vport(
         height=1.15 * (ymax - ymin), center=((xmin + xmax) / 2, (ymin + ymax) / 2)
     )
@@ -93,20 +98,29 @@ def _contours(model: Any, drawing: Drawing, paper: float) -> None:
         style["lineweight"] = 25 if contour.index else 9
         model.add_lwpolyline(contour.line.tolist(), dxfattribs=style)
     for label in contour_labels(drawing.contours, drawing.scale):
-        entity = add_text(
-            model, label.words, label.place, LABEL_SIZE * paper, "BIFOCAL_CONTOUR_TEXT"
-        )
+        # Above the line, for nothing hides the line behind a text of CAD.
+        turn, lift = math.radians(label.angle), (0.36 * LABEL_SIZE + _ABOVE) * paper
+        place = label.place[0] - lift * math.sin(turn), label.place[1] + lift * math.cos(turn)
+        entity = add_text(model, label.words, place, LABEL_SIZE * paper, "BIFOCAL_CONTOUR_TEXT")
         turned(entity, label.angle, middle=True)
 
 
-def _section_names(model: Any, cut: Section, paper: float) -> None:
-    """Write a section's letter beyond both its ends, off its line."""
-    for end, before in ((cut.path[0], cut.path[1]), (cut.path[-1], cut.path[-2])):
-        outwards = (end - before) / np.hypot(*(end - before))
-        x, y = (end + 3 * paper * outwards).tolist()
-        place = (x, y - 1.25 * paper)
-        entity = add_text(model, cut.letter, place, 2.5 * paper, "BIFOCAL_SECTION_LINES")
+def _section_names(model: Any, drawing: Drawing, cut: Section, paper: float) -> None:
+    """Write a section's letter beyond both its ends, off its line, with the way one looks.
+
+    Those at the edge of the picture on a layer that the sheet, which has its own, does not show.
+    """
+    look = cut.looking()
+    side = np.array([-look[1], look[0]])
+    for end, outwards in cut.ends():
+        layer = "BIFOCAL_SECTION_NAMES" if drawing.at_the_edge(end) else "BIFOCAL_SECTION_LINES"
+        tip = end + 3 * paper * outwards
+        place = (float(tip[0]), float(tip[1]) - 1.25 * paper)
+        entity = add_text(model, cut.letter, place, 2.5 * paper, layer)
         turned(entity, 0.0, middle=True)
+        foot = tip + 2 * paper * look
+        corners = [foot - 0.8 * paper * side, foot + 0.8 * paper * side, foot + 1.4 * paper * look]
+        model.add_solid([corner.tolist() for corner in corners], dxfattribs={"layer": layer})
 
 
 def _lay_out(document: Any, drawing: Drawing, sheet: PrintSheet) -> None:
@@ -117,7 +131,7 @@ def _lay_out(document: Any, drawing: Drawing, sheet: PrintSheet) -> None:
     layout.page_setup(size=(sheet.width, sheet.height), margins=(0, 0, 0, 0), units="mm")
     (x, y), (wide, high) = sheet.origin(drawing), drawing.paper_size
     xmin, ymin, xmax, ymax = drawing.grid.bounds
-    layout.add_viewport(
+    window = layout.add_viewport(
         center=(x + wide / 2, y + high / 2),
         size=(wide, high),
         view_center_point=((xmin + xmax) / 2, (ymin + ymax) / 2),
@@ -125,7 +139,10 @@ def _lay_out(document: Any, drawing: Drawing, sheet: PrintSheet) -> None:
         dxfattribs={"layer": "BIFOCAL_VIEWPORT"},
     )
     document.layers.get("BIFOCAL_VIEWPORT").dxf.plot = 0
-    SheetMargins(DxfCanvas(layout), drawing, sheet).draw()
+    # These stand on the sheet, outside of the grid's numbers.
+    window.frozen_layers = ["BIFOCAL_SECTION_NAMES"]
+    # What lies on a viewport may be drawn under it.
+    SheetMargins(DxfCanvas(layout), drawing, sheet, within=False).draw()
 
 
 def _points(model: Any, points: SurveyPoints | None, layer: str, height: float) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from bifocal.files.dxf import add_text, turned
+from bifocal.files.dxf import add_text, dashed, turned
 from bifocal.orthophotos.canvas import BLACK, Colour, Pen, Place
 
 #: Widths that drawings know, in hundredths of a millimetre.
@@ -30,7 +30,7 @@ class DxfCanvas:
         """Draw a line through points."""
         style = self._style(pen)
         if pen.dashes:
-            style |= {"linetype": "DASHED", "ltscale": sum(pen.dashes[:2]) * self.unit}
+            style |= dashed(self.space, "DASHED", sum(pen.dashes) * self.unit)
         self.space.add_lwpolyline(self._scaled(points), dxfattribs=style)
 
     def area(self, corners: Sequence[Place], pen: Pen) -> None:

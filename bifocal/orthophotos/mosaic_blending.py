@@ -68,6 +68,8 @@ class SeamPlan:
         Factors that make the colours equal.
     differences : dict of (int, int) to float
         Median difference of two layers on their overlap, before any gain; first band.
+    likeness : dict of (int, int) to float
+        Correlation of what two layers show on their overlap, where it is wide enough to tell.
     """
 
     coarse: Grid
@@ -75,6 +77,7 @@ class SeamPlan:
     rank: Float32Array
     gains: FloatArray
     differences: dict[tuple[int, int], float]
+    likeness: dict[tuple[int, int], float]
 
 
 def common_grid(
@@ -126,8 +129,11 @@ def _refuse_unrelated(boxes: Sequence[Bounds]) -> None:
         )
 
 
-def _refuse_strangers(images: Sequence[Float32Array], valid: Sequence[BoolArray]) -> None:
-    """Refuse layers that overlap widely, show something each, and not the same."""
+def _likeness(
+    images: Sequence[Float32Array], valid: Sequence[BoolArray]
+) -> dict[tuple[int, int], float]:
+    """Return the correlation of layers that overlap widely and show something; refuse strangers."""
+    found = {}
     fine = [_detail(image, seen) for image, seen in zip(images, valid, strict=True)]
     for i, j in combinations(range(len(images)), 2):
         both = valid[i] & valid[j]
@@ -144,6 +150,8 @@ def _refuse_strangers(images: Sequence[Float32Array], valid: Sequence[BoolArray]
                 f"{likeness:+.2f}): their X and Y are not of one frame. Orient their pairs by "
                 "control points in one system, then make them again."
             )
+        found[i, j] = likeness
+    return found
 
 
 def _detail(image: Float32Array, seen: BoolArray) -> Float32Array:
@@ -188,18 +196,18 @@ def plan_mosaic(
     side = min(max(COARSE_SHARE * max(grid.shape), COARSE_LEAST), COARSE)
     coarse = Grid.from_bounds(grid.bounds, gsd=grid.gsd * max(1.0, max(grid.shape) / side))
     images, valid = zip(*(_onto(layer, coarse) for layer in layers), strict=True)
-    _refuse_strangers(images, valid)
+    likeness = _likeness(images, valid)
     depth = np.stack([_depth(seen) for seen in valid])
     gains, differences = _gains(images, valid, wanted=gain)
     if priority:
         labels = np.where(np.any(valid, axis=0), np.argmax(valid, axis=0), -1)
         order = np.arange(len(layers), 0, -1, dtype=np.float32)
         rank = np.broadcast_to(order[:, None, None], (len(layers), *coarse.shape))
-        return SeamPlan(coarse, labels, rank, gains, differences)
+        return SeamPlan(coarse, labels, rank, gains, differences, likeness)
     even = [image * factor for image, factor in zip(images, gains, strict=True)]
     edges = None if relief is None else relief(coarse)
     labels = _seams(even, valid, depth, edges, coarse.gsd)
-    return SeamPlan(coarse, labels, depth, gains, differences)
+    return SeamPlan(coarse, labels, depth, gains, differences, likeness)
 
 
 def mosaic_window(

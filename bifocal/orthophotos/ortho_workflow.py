@@ -161,6 +161,14 @@ def make_ortho(
     )
 
 
+def not_measured(shares: dict[str, float]) -> str:
+    """Return in words how much of a picture was not measured; empty if all that is seen was."""
+    parts = {"interpolated": "on interpolated relief", "plane": "on the plane", "filled": "filled"}
+    return ", ".join(
+        f"{100 * shares[key]:.1f} % {where}" for key, where in parts.items() if shares[key]
+    )
+
+
 def _advice(shares: dict[str, float], task: OrthoTask) -> list[str]:
     """Return what could be done about the empty part of a picture."""
     if shares["none"] < WORTH_A_REMARK or task.options.complete:
@@ -171,7 +179,7 @@ def _advice(shares: dict[str, float], task: OrthoTask) -> list[str]:
     if not task.options.fill:
         ways.append("--fill closes holes with the colours around them")
     ways.append("--complete makes a whole picture and marks what is not measured")
-    return [f"{shares['none']:.0%} of the picture are empty: {'; '.join(ways)}."]
+    return [f"{shares['none']:.0%} of the picture is empty: {'; '.join(ways)}."]
 
 
 @contextmanager

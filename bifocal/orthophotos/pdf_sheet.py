@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 import zlib
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -32,6 +33,8 @@ _RED: Colour = (110, 20, 20)
 _CONTOUR = Pen(layer="", width=0.1, colour=_RED)
 _INDEX = Pen(layer="", width=0.22, colour=_RED)
 _CUT = Pen(layer="", width=0.15, colour=BLUE, dashes=(6.0, 1.0, 0.6, 1.0))
+#: White around a section line, whose blue is lost on dark glass.
+_CUT_RIM = replace(_CUT, width=0.45, colour=WHITE)
 _NAME = Pen(layer="")
 
 
@@ -202,6 +205,7 @@ class _Page:
         self._contours()
         for cut in self.drawing.sections:
             line = [self.margins.place(*corner) for corner in cut.path.tolist()]
+            self.canvas.line(line, _CUT_RIM)
             self.canvas.line(line, _CUT)
         parts.append("Q")
         self._points()

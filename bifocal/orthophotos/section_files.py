@@ -20,7 +20,7 @@ from bifocal.orthophotos.canvas import (
     scale_bar,
     text_width,
 )
-from bifocal.orthophotos.drawing import Section, multiples, round_step
+from bifocal.orthophotos.drawing import Section, multiples, round_step, signed
 from bifocal.orthophotos.dxf_canvas import DxfCanvas
 from photocore.arrays import FloatArray
 from photocore.output import atomic_path
@@ -88,7 +88,7 @@ def draw_section(canvas: Canvas, cut: Section, scale: float) -> None:
         digits = max(0, -math.floor(math.log10(step) + 1e-9))
         for value in multiples(low / factor, high / factor, step).tolist():
             at = value * factor
-            words = f"{value:.{digits}f}" if paper == _ALONG else f"{value:+.{digits}f}"
+            words = f"{value:.{digits}f}" if paper == _ALONG else signed(value, digits)
             if vertical:
                 canvas.line([(left - 1.2, at), (left, at)], _AXIS)
                 place = (left - 1.8 - text_width(words, 2.0), at - 0.7)

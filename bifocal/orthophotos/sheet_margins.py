@@ -7,6 +7,7 @@ import numpy as np
 from bifocal.orthophotos.canvas import (
     BLUE,
     LETTER_WIDTH,
+    WHITE,
     Canvas,
     Pen,
     Place,
@@ -14,17 +15,15 @@ from bifocal.orthophotos.canvas import (
     scale_bar,
     text_width,
 )
-from bifocal.orthophotos.drawing import BAND, STRIP, Drawing, PrintSheet, Section, multiples
-from photocore.arrays import FloatArray
+from bifocal.orthophotos.drawing import BAND, BEYOND, STRIP, Drawing, PrintSheet, Section, multiples
 
 _FRAME = Pen(layer="BIFOCAL_FRAME")
 _THICK = Pen(layer="BIFOCAL_FRAME", width=0.5)
 _RULE = Pen(layer="BIFOCAL_FRAME", width=0.35)
 _BAR = Pen(layer="BIFOCAL_SCALEBAR")
+_PAPER = Pen(layer="BIFOCAL_SECTION_LINES", colour=WHITE)
 _MARK = Pen(layer="BIFOCAL_SECTION_LINES", width=0.5, colour=BLUE)
-#: From the edge of the picture to the letter of a section, outside of the grid's numbers. [mm]
-_BEYOND = 6.8
-#: The same where a section ends within the picture.
+#: From the end of a section within the picture to its letter. [mm]
 _WITHIN = 3.0
 #: Size of the letters. [mm]
 _LETTER = 3.0
@@ -39,9 +38,14 @@ class SheetMargins:
         In millimetres from the lower left corner of the sheet.
     drawing : Drawing
     sheet : PrintSheet
+    within : bool
+        Draw the letters of sections that end within the picture, too.
     """
 
-    def __init__(self, canvas: Canvas, drawing: Drawing, sheet: PrintSheet) -> None:
+    def __init__(
+        self, canvas: Canvas, drawing: Drawing, sheet: PrintSheet, *, within: bool = True
+    ) -> None:
+        self.within = within
         self.canvas, self.drawing, self.sheet = canvas, drawing, sheet
         self.origin = sheet.origin(drawing)
         self.factor = 1000.0 / drawing.scale
@@ -93,26 +97,27 @@ class SheetMargins:
 
     def _section_ends(self, cut: Section) -> None:
         """Draw the letter of a section beyond both its ends, with the way one looks."""
-        for end, before in ((cut.path[0], cut.path[1]), (cut.path[-1], cut.path[-2])):
-            outwards = (end - before) / np.hypot(*(end - before))
+        for end, outwards in cut.ends():
+            beyond = self.drawing.at_the_edge(end)
+            if not (beyond or self.within):
+                continue
             x, y = self.place(*end.tolist())
-            away = _BEYOND if self._at_the_edge(end) else _WITHIN
+            away = BEYOND if beyond else _WITHIN
             self.canvas.line([(x, y), (x + 1.5 * outwards[0], y + 1.5 * outwards[1])], _MARK)
             tip = np.array([x, y]) + away * outwards
             look = cut.looking()
+            side = np.array([-look[1], look[0]])
+            if not beyond:  # white, for letters are lost on a dark picture
+                near, far = tip - 1.9 * look, tip + 3.7 * look
+                rim = [near - 1.9 * side, far - 1.9 * side, far + 1.9 * side, near + 1.9 * side]
+                self.canvas.area([(float(a), float(b)) for a, b in rim], _PAPER)
             self.canvas.text(
                 (float(tip[0]), float(tip[1]) - 0.36 * _LETTER), cut.letter, _MARK, size=_LETTER,
                 bold=True, middle=True,
             )  # fmt: skip
-            side = np.array([-look[1], look[0]])
             foot = tip + 2.0 * look
             corners = [foot - 0.8 * side, foot + 0.8 * side, foot + 1.4 * look]
             self.canvas.area([(float(a), float(b)) for a, b in corners], _MARK)
-
-    def _at_the_edge(self, end: FloatArray) -> bool:
-        xmin, ymin, xmax, ymax = self.drawing.grid.bounds
-        gaps = np.abs([end[0] - xmin, end[0] - xmax, end[1] - ymin, end[1] - ymax])
-        return bool(gaps.min() * self.factor < _BEYOND)
 
     def _title(self) -> None:
         left, bottom, right, _ = self.sheet.frame
@@ -132,7 +137,7 @@ class SheetMargins:
         name = self.sheet.name
         place = (right - 3 - text_width(name, 2.2), bottom + 2.5)
         self.canvas.text(place, name, _FRAME, size=2.2)
-        lines = self.drawing.notes[:6]
+        lines = self.drawing.notes
         pitch = min(3.2, 12.8 / max(len(lines) - 1, 1))
         for number, note in enumerate(lines):
             place = (block + 3, top - 19 - pitch * number)
@@ -170,9 +175,9 @@ class SheetMargins:
             corners = [(a, y), (b, y), (b, y + high), (a, y + high)]
             self.canvas.area(corners, Pen(layer="BIFOCAL_LEGEND", colour=colour))
         box(self.canvas, (x, y), wide, high, _FRAME)
-        low, top = legend.limits
-        ends = (("< " if legend.beyond[0] else "") + f"{low:+.2f}", "0.00 wall",
-                ("> " if legend.beyond[1] else "") + f"{top:+.2f} m")  # fmt: skip
+        low, top = legend.words
+        ends = (("< " if legend.beyond[0] else "") + low, "0.00 wall",
+                ("> " if legend.beyond[1] else "") + f"{top} m")  # fmt: skip
         for share, words in zip((0.0, 0.5, 1.0), ends, strict=True):
             self.canvas.text((x + share * wide, y + 3), words, _FRAME, size=2.2, middle=True)
         if not legend.guessed:

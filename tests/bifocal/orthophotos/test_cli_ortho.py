@@ -159,9 +159,77 @@ def test_the_drawing_has_a_sheet_with_a_viewport_to_scale_and_the_contours(wall:
     labels = {text.dxf.text for text in model.query('TEXT[layer=="BIFOCAL_CONTOUR_TEXT"]')}
     assert "+0.10" in labels
     assert all(round(float(label) / 0.02) % 5 == 0 for label in labels)
-    letters = model.query('TEXT[layer=="BIFOCAL_SECTION_LINES"]')
+    letters = model.query('TEXT[layer=="BIFOCAL_SECTION_NAMES"]')
     assert sorted(text.dxf.align_point.y > 0 for text in letters) == [False, True]
     assert min(abs(text.dxf.align_point.y) for text in letters) > 1.5 + 0.05
+
+
+def test_dashes_are_seen_on_the_sheet_and_letters_once(wall: Path) -> None:
+    done = run(
+        wall, "--relief", "relief.tif", "--deliver", "d", "--scale", "1:50", "--section", "x=0.8",
+        "--section", "-1,0 0,0.5 1,0", "--contours", "0.02",
+    )  # fmt: skip
+    assert done.exit_code == 0, done.output
+    drawing = ezdxf.readfile(wall / "d" / "Torre_est.dxf")
+    # Else a viewport at 1:50 would make the dashes 50 times as short.
+    assert drawing.header["$PSLTSCALE"] == 0
+    model, sheet = drawing.modelspace(), drawing.paperspace("A4 landscape")
+    for line in model.query('LWPOLYLINE[layer=="BIFOCAL_SECTION_LINES"]'):
+        assert line.dxf.flags & 128  # the pattern runs on over corners
+        pattern = drawing.linetypes.get(line.dxf.linetype).pattern_tags.tags.get_first_value(40)
+        # As in print: 8.6 mm on paper.
+        assert pattern * line.dxf.ltscale * 1000 / 50 == pytest.approx(8.6)
+    (window,) = sheet.query('VIEWPORT[layer=="BIFOCAL_VIEWPORT"]')
+    frozen = set(window.frozen_layers)
+    seen = [text.dxf.text for text in model.query("TEXT") if text.dxf.layer not in frozen]
+    seen += [text.dxf.text for text in sheet.query("TEXT")]
+    assert (seen.count("A"), seen.count("B")) == (2, 2)
+    arrows = model.query('SOLID[layer=="BIFOCAL_SECTION_LINES"]')
+    assert [max(v.y for v in arrow.vertices()) > 0.1 for arrow in arrows] == [True, True]
+    # Labels of contour lines stand beside their lines.
+    line = np.concatenate(
+        [
+            np.array(line.get_points("xy"))
+            for line in model.query('LWPOLYLINE[layer=="BIFOCAL_CONTOURS_INDEX"]')
+        ]
+    )
+    labels = model.query('TEXT[layer=="BIFOCAL_CONTOUR_TEXT"]')
+    assert labels
+    for text in labels:
+        turn = np.radians(text.dxf.rotation)
+        middle = np.array(text.dxf.align_point)[:2]
+        middle += text.dxf.height / 2 * np.array([-np.sin(turn), np.cos(turn)])
+        assert np.hypot(*(line - middle).T).min() > text.dxf.height / 2
+
+
+def test_numbers_of_a_flat_wall_have_millimetres(wall: Path) -> None:
+    grid = Grid.from_bounds((-2.1, -1.5, 2.1, 1.5), gsd=GSD)
+    flat = np.broadcast_to(0.004 * grid.columns_x, grid.shape).astype(np.float32)
+    relief = ReliefMap.from_relief(flat, plane_from_pixel=grid.plane_from_pixel)
+    write_relief(wall / "relief.tif", relief, overwrite=True)
+    done = run(wall, "--relief", "relief.tif", "--deliver", "d", "--scale", "1:50")
+    assert done.exit_code == 0, done.output
+    page = page_of(wall / "d" / "Torre_est_relief.pdf")
+    assert "(relief -0.008 to +0.008 m, contour lines every 0.001 m)" in page
+    assert "+0.008 m)" in page.replace("relief", "")
+
+
+def test_the_sheet_of_a_whole_picture_says_what_was_not_measured(wall: Path) -> None:
+    relief = read_relief(wall / "relief.tif")
+    r = relief.r.copy()
+    r[100:200, 100:200] = np.nan
+    write_relief(wall / "relief.tif", replace(relief, r=r), overwrite=True)
+    done = run(
+        wall, "--relief", "relief.tif", "--deliver", "d", "--scale", "1:50", "--complete",
+        "--section", "y=-1.2",
+    )  # fmt: skip
+    assert done.exit_code == 0, done.output
+    page = page_of(wall / "d" / "Torre_est.pdf")
+    (told,) = re.findall(r"\(not measured: (.*); last band of the .tif\)", page)
+    assert f"Not measured: {told}\n" in done.stdout
+    assert "on interpolated relief" in told
+    # All notes are there, the last too, though the relief has one more.
+    assert "(sections A-A  y=-1.2)" in page_of(wall / "d" / "Torre_est_relief.pdf")
 
 
 def test_sigma_and_quality_lie_beside_the_delivered_relief(wall: Path) -> None:

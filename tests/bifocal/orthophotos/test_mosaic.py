@@ -115,7 +115,7 @@ def test_relief_maps_are_joined_without_mixing(tmp_path: Path) -> None:
             writer.write(relief)
     done = run(tmp_path, "a.tif", "b.tif", "--out", "m.tif")
     assert done.exit_code == 0, done.output
-    assert "a.tif lies -30 mm before b.tif" in done.stderr
+    assert "a.tif lies 30 mm behind b.tif" in done.stderr
     with rasterio.open(tmp_path / "m.tif") as file:
         relief = file.read(1)
     assert np.isnan(relief[:20]).all()
@@ -132,12 +132,13 @@ def test_what_cannot_be_joined_is_refused(tmp_path: Path) -> None:
         (("a.tif",), "two rasters or more"),
         (("a.tif", "r.tif"), "cannot be joined"),
         (("a.tif", "absent.tif"), "no such raster"),
+        (("a.tif", "a.tif", "--out", "m.png"), "m.png: a mosaic is written as GeoTIFF"),
         (("a.tif", "a.tif", "--bounds", "50,50,51,51"), "none of the rasters"),
     ):
-        done = run(tmp_path, *arguments, "--out", "m.tif")
+        done = run(tmp_path, "--out", "m.tif", *arguments)
         assert done.exit_code == 1, done.output
         assert message in done.stderr
-        assert not (tmp_path / "m.tif").exists()
+        assert not any((tmp_path / name).exists() for name in ("m.tif", "m.png"))
 
 
 def test_rasters_that_have_nothing_in_common_are_refused(tmp_path: Path) -> None:
@@ -174,6 +175,25 @@ def test_rasters_that_overlap_but_show_different_walls_are_refused(tmp_path: Pat
     assert done.exit_code == 1, done.output
     assert "nothing in common" in done.stderr
     assert not (tmp_path / "m.tif").exists()
+
+
+def test_rasters_that_are_little_alike_are_pointed_out_by_their_paths(tmp_path: Path) -> None:
+    grid = Grid.from_bounds((0, 0, 2, 1.5), gsd=GSD)
+    x, y = np.meshgrid(grid.columns_x, grid.rows_y)
+    wall, other = np.sin(30 * x) * np.cos(25 * y), np.sin(43 * x) * np.cos(25 * y)
+    for folder, part in (("left", 0.0), ("right", 0.95)):
+        (tmp_path / folder).mkdir()
+        relief = (0.1 * (np.sqrt(1 - part**2) * wall + part * other)).astype(np.float32)
+        with create_raster(
+            tmp_path / folder / "relief.tif", grid, bands=1, dtype=np.float32
+        ) as writer:
+            writer.write(relief)
+    done = run(tmp_path, "left/relief.tif", "right/relief.tif", "--out", "m.tif")
+    assert done.exit_code == 0, done.output
+    told = "left/relief.tif and right/relief.tif are little alike on their overlap (correlation +0."
+    assert told in done.stderr
+    twice = run(tmp_path, "left/relief.tif", "left/relief.tif", "--out", "n.tif")
+    assert "alike" not in twice.stderr
 
 
 def test_rasters_of_different_coordinate_systems_are_refused(tmp_path: Path) -> None:

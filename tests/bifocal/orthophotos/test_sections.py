@@ -91,6 +91,30 @@ def test_the_level_of_the_wall_itself_draws_no_noise() -> None:
     assert all(np.abs(line.line[:, 0] - 3).max() < 0.15 for line in lines)
 
 
+def test_a_flat_strip_between_two_steps_bears_no_line_of_its_own_level() -> None:
+    # 3 mm on paper: what lies 2 mm aside of a line is beyond the steps.
+    x = np.broadcast_to(WALL.columns_x, WALL.shape)
+    strip = noisy(np.select([x < 3, x > 3.15], [0.3, -0.3], 0.0), 0.003)
+    precision = MapSurface.of_array(np.full(WALL.shape, 0.003, np.float32), WALL)
+    lines = contours(strip, WALL, interval=0.1, scale=50, sigma=precision)
+    amid = 0.0
+    for line in lines:
+        lengths = np.hypot(*np.diff(line.line, axis=0).T)
+        amid += lengths[np.abs(line.line[1:, 0] - 3.075) < 0.03].sum()
+    assert amid < 0.3  # 1.3 m of 4 if only what lies 2 mm aside is compared
+    # The other levels are drawn at the steps, all along them.
+    for level in (-0.2, -0.1, 0.1, 0.2):
+        found = [line for line in lines if line.level == pytest.approx(level)]
+        assert sum(np.ptp(line.line[:, 1]) for line in found) > 3.8
+
+
+def test_a_label_says_its_level_to_the_last_decimal() -> None:
+    slope = np.broadcast_to(0.02 * (WALL.columns_x - 3), WALL.shape).astype(np.float32)
+    lines = contours(MapSurface.of_array(slope, WALL), WALL, interval=0.005, scale=50)
+    words = {label.words for label in contour_labels(lines, 50)}
+    assert words == {"-0.050", "-0.025", "0.000", "+0.025", "+0.050"}
+
+
 def test_lines_on_a_slope_are_where_it_has_their_level_and_every_fifth_is_labelled() -> None:
     slope = MapSurface.of_array(
         np.broadcast_to(0.1 * WALL.columns_x, WALL.shape).astype(np.float32), WALL

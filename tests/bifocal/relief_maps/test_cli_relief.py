@@ -134,7 +134,7 @@ def test_a_mistaken_gsd_is_asked_back(folder, tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.parametrize("gsd", ["5", "1", "0.25", "0.15"])
+@pytest.mark.parametrize("gsd", ["5", "1", "0.25", "0.15", "150mm"])
 def test_a_gsd_too_coarse_to_match_at_is_asked_back(folder, tmp_path, gsd):
     code, _, told = run(folder / "wall.pair.json", "--out", tmp_path / "r.tif", "--gsd", gsd)
     assert code == 1
