@@ -61,6 +61,8 @@ DPI = 254.0
 _MOST_AUTOMATIC = 500
 #: Every picture is written with its world file, for the web, for CAD and on a sheet.
 PICTURE_ENDINGS = ("tif", "tfw", "png", "dxf", "pdf")
+#: What is no part of the name of a pair's file.
+_PAIR_ENDINGS = (".pair.json", ".json", ".xlsx", ".xlsm")
 #: Names shorter than this say nothing as a title: the folder's is taken.
 _SHORT = 3
 
@@ -260,7 +262,10 @@ def default_title(source: Pair | Path, path: Path | None = None) -> str:
     pair = Pair.of(source)
     if pair.extra.get("name"):
         return str(pair.extra["name"])
-    stem = path.name.split(".")[0] if path else ""
+    stem = path.name if path else ""
+    # A name may have dots of its own: S. Maria.pair.json.
+    ending = next((end for end in _PAIR_ENDINGS if stem.lower().endswith(end)), "")
+    stem = stem[: len(stem) - len(ending)]
     if len(stem) >= _SHORT:
         return stem
     folder = (path.parent if path else pair.folder).resolve().name

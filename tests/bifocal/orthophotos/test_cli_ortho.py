@@ -314,7 +314,7 @@ def test_a_nameless_pair_is_called_as_its_folder_where_its_file_has_no_name(wall
     folder.mkdir()
     for name in ("far.png", "near.png"):
         (wall / name).rename(folder / name)
-    for name, title in (("w", "Via_Roma_7"), ("north", "north")):
+    for name, title in (("w", "Via_Roma_7"), ("north", "north"), ("S. Maria", "S_Maria")):
         (folder / f"{name}.pair.json").write_text(json.dumps(data))
         words = [str(folder / f"{name}.pair.json"), "--plane", "--deliver", str(wall / name)]
         done = CliRunner().invoke(main, ["ortho", *words, "--scale", "1:50"])
