@@ -48,6 +48,9 @@ _SPACING = 0.5
 _EACH = 5
 #: Height of labels, the line that a label needs, and between labels of a line. On paper. [mm]
 LABEL_SIZE, _ROOM, _BETWEEN = 1.8, 14.0, 110.0
+#: A line shorter than this does without a label where one of its level stands within that: joints
+#: and stones of one level would be labelled each. On paper. [mm]
+_SHORT, _NEIGHBOUR = 60.0, 40.0
 
 
 class ContourLabel(NamedTuple):
@@ -125,7 +128,7 @@ def contour_labels(lines: Sequence[Contour], scale: float) -> list[ContourLabel]
     """Return the labels of the thick lines, each where its line is straightest."""
     paper = scale / 1000.0
     labels: list[ContourLabel] = []
-    taken = np.empty((0, 2))
+    taken, levels = np.empty((0, 2)), np.empty(0)
     thick = [line for line in lines if line.index]
     digits = _digits([line.level for line in thick])
     for contour in sorted(thick, key=lambda one: -len(one.line)):
@@ -141,9 +144,11 @@ def contour_labels(lines: Sequence[Contour], scale: float) -> list[ContourLabel]
             middle, angle = _straightest(
                 line, along, (ends[0] + need / 2, ends[1] - need / 2), need
             )
-            if len(taken) and np.hypot(*(taken - middle).T).min() < need + 1.0:
+            gaps = np.hypot(*(taken - middle).T)
+            alike = (levels == contour.level) & (gaps < _NEIGHBOUR)
+            if (gaps < need + 1.0).any() or (along[-1] < _SHORT and alike.any()):
                 continue
-            taken = np.vstack([taken, middle])
+            taken, levels = np.vstack([taken, middle]), np.append(levels, contour.level)
             # On the line, not above it: down by half the height of a digit.
             turn = math.radians(angle)
             base = middle + 0.36 * LABEL_SIZE * np.array([math.sin(turn), -math.cos(turn)])

@@ -37,7 +37,7 @@ from bifocal.orthophotos.ortho_workflow import (
     planned_grid,
     survey_points_of,
 )
-from bifocal.orthophotos.pdf_sheet import write_sheet
+from bifocal.orthophotos.pdf_sheet import LeftOut, write_sheet
 from bifocal.orthophotos.section_files import write_section_dxf, write_section_svg
 from bifocal.orthophotos.sections import section, section_letter
 from bifocal.orthophotos.shading import colour_limits, shaded, tints, unmeasured
@@ -61,6 +61,8 @@ DPI = 254.0
 _MOST_AUTOMATIC = 500
 #: Every picture is written with its world file, for the web, for CAD and on a sheet.
 PICTURE_ENDINGS = ("tif", "tfw", "png", "dxf", "pdf")
+#: What is no part of the name of a pair's file.
+_PAIR_ENDINGS = (".pair.json", ".json", ".xlsx", ".xlsm")
 #: Names shorter than this say nothing as a title: the folder's is taken.
 _SHORT = 3
 
@@ -171,8 +173,10 @@ def deliver(
         relief = None
         if not isinstance(surface, FlatSurface):
             relief = _prepared((surface, measured), reader, drawing, wish)
-        _check_free(folder, name, relief is not None, len(cuts), overwrite=overwrite)
-        if out is not None:
+        inside = out is not None and out.resolve().parent == folder.resolve()
+        extra = (out.name,) if out is not None and inside else ()
+        _check_free(folder, name, relief is not None, len(cuts), extra, overwrite=overwrite)
+        if out is not None and not inside:
             copy = stack.enter_context(atomic_path(out, overwrite=overwrite))
         place = stack.enter_context(atomic_folder(folder, overwrite=overwrite))
         result = make_ortho(
@@ -181,11 +185,16 @@ def deliver(
         guess = not_measured(result.shares)
         told = (f"not measured: {guess}; last band of the .tif",) if guess else ()
         picture = replace(drawing, notes=(*told, *drawing.notes))
-        nameless = _pictures(place, name, picture, sheet, relief.lines if relief else ())
-        if nameless:
+        missing = _pictures(place, name, picture, sheet, relief.lines if relief else ())
+        if missing.names:
             remarks += (
-                f"{nameless} marked points stand on the sheet without name, since names would "
+                f"{missing.names} marked points stand on the sheet without name, since names would "
                 "lie over each other; the drawing (.dxf) has them all.",
+            )
+        if missing.points:
+            remarks += (
+                f"{missing.points} points lie outside the picture and are not on the sheet; the "
+                "drawing (.dxf) has them.",
             )
         if relief:
             share = _draw_relief(place, f"{name}_relief", relief, drawing, sheet)
@@ -198,8 +207,8 @@ def deliver(
             for writer, ending in ((write_section_dxf, "dxf"), (write_section_svg, "svg")):
                 target = place / f"{name}_section{number}.{ending}"
                 writer(target, cut, scale=scale, overwrite=False)
-        if out is not None:
-            shutil.copyfile(place / f"{name}.tif", copy)
+        if out is not None and extra != (f"{name}.tif",):
+            shutil.copyfile(place / f"{name}.tif", place / out.name if inside else copy)
         files = tuple(sorted(item.name for item in place.iterdir()))
     path = out or folder / f"{name}.tif"
     result = replace(result, path=path, remarks=(*result.remarks, *remarks))
@@ -220,10 +229,12 @@ def _check_outputs(
         check_not_input(path, *inputs)
 
 
-def _check_free(folder: Path, name: str, relief: bool, sections: int, *, overwrite: bool) -> None:
+def _check_free(
+    folder: Path, name: str, relief: bool, sections: int, extra: Sequence[str], *, overwrite: bool
+) -> None:
     """Refuse a folder that holds a file of the delivery already; call it before the work."""
     pictures = [name, f"{name}_relief"] if relief else [name]
-    names = [f"{one}.{ending}" for one in pictures for ending in PICTURE_ENDINGS]
+    names = [f"{one}.{ending}" for one in pictures for ending in PICTURE_ENDINGS] + [*extra]
     if relief:
         names += [f"{name}_relief_values.{ending}" for ending in ("tif", "tfw")]
     names += [
@@ -251,7 +262,10 @@ def default_title(source: Pair | Path, path: Path | None = None) -> str:
     pair = Pair.of(source)
     if pair.extra.get("name"):
         return str(pair.extra["name"])
-    stem = path.name.split(".")[0] if path else ""
+    stem = path.name if path else ""
+    # A name may have dots of its own: S. Maria.pair.json.
+    ending = next((end for end in _PAIR_ENDINGS if stem.lower().endswith(end)), "")
+    stem = stem[: len(stem) - len(ending)]
     if len(stem) >= _SHORT:
         return stem
     folder = (path.parent if path else pair.folder).resolve().name
@@ -260,8 +274,8 @@ def default_title(source: Pair | Path, path: Path | None = None) -> str:
 
 def _pictures(
     place: Path, name: str, drawing: Drawing, sheet: PrintSheet, lines: tuple[Contour, ...]
-) -> int:
-    """Write PNG, drawing and print sheet of a raster; return how many points bear no name.
+) -> LeftOut:
+    """Write PNG, drawing and print sheet of a raster; return what the sheet left out.
 
     The drawing has the contour lines whatever the sheet shows: CAD switches their layer off.
     """

@@ -170,6 +170,8 @@ def _relief_of(paths: Sequence[Path], stack: ExitStack, coarse: Grid) -> Float32
         reader = stack.enter_context(RasterReader(path))
         check_relief(reader)
         part = MapSurface(reader.grid, reader.read_floats).window(coarse)
+        if np.isnan(part).all():
+            raise InputError(f"{path}: knows no relief anywhere in the mosaic; see its X and Y.")
         relief = np.where(np.isnan(relief), part, relief)
     return relief
 

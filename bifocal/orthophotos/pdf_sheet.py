@@ -7,11 +7,12 @@ Written directly: the picture goes from the raster to the page strip by strip, s
 from __future__ import annotations
 
 import math
+import warnings
 import zlib
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any, BinaryIO, NamedTuple
 
 import numpy as np
 
@@ -38,10 +39,17 @@ _CUT_RIM = replace(_CUT, width=0.45, colour=WHITE)
 _NAME = Pen(layer="")
 
 
+class LeftOut(NamedTuple):
+    """How many names of points had no room on a sheet, and how many points lie outside of it."""
+
+    names: int
+    points: int
+
+
 def write_sheet(
     path: Path, drawing: Drawing, sheet: PrintSheet, reader: RasterReader, *, overwrite: bool
-) -> int:
-    """Write a drawing on a sheet; empty pixels are white; return how many points bear no name.
+) -> LeftOut:
+    """Write a drawing on a sheet; empty pixels are white; return what was left out.
 
     Names that would lie over others are left out, and where points are many their names keep
     apart, so that they never bury the picture.
@@ -62,7 +70,7 @@ def write_sheet(
         pdf.end_stream()
         page = _Page(drawing, sheet)
         pdf.finish(page.commands(), picture, sheet)
-    return page.nameless
+    return LeftOut(names=page.nameless, points=page.outside)
 
 
 class _Pdf:
@@ -148,6 +156,7 @@ class _PdfCanvas:
 
     def __init__(self) -> None:
         self.parts = [f"{_UNITS_PER_MM:.8f} 0 0 {_UNITS_PER_MM:.8f} 0 0 cm"]
+        self._rim = False
 
     def line(self, points: Sequence[Place], pen: Pen) -> None:
         start, *rest = (f"{x:.4f} {y:.4f}" for x, y in points)
@@ -172,12 +181,18 @@ class _PdfCanvas:
         x, y = place[0] - shift * cos, place[1] - shift * sin
         matrix = f"{cos:g} {sin:g} {0.0 - sin:g} {cos:g} {x:.4f} {y:.4f}"
         self.parts.append(f"{_tint(pen.colour)} rg")
+        if not _in_pdf_font(words):
+            how = "S" if self._rim else "f"
+            self.parts.append(f"q {matrix} cm {outlines(words, size, bold=bold)} {how} Q")
+            return
         self.parts.append(f"BT /F{2 if bold else 1} {size} Tf {matrix} Tm ({clean}) Tj ET")
 
     def label(self, place: Place, words: str, pen: Pen, **how: Any) -> None:
         """Write with a white outline: legible on any colour."""
         self.parts.append("1 G 0.7 w [] 0 d 1 Tr")
+        self._rim = True
         self.text(place, words, pen, **how)
+        self._rim = False
         self.parts.append("0 Tr")
         self.text(place, words, pen, **how)
 
@@ -189,9 +204,10 @@ class _Page:
         self.drawing, self.sheet = drawing, sheet
         self.canvas = _PdfCanvas()
         self.margins = SheetMargins(self.canvas, drawing, sheet)
-        #: Left, right, bottom, top of the names of points; how many points have none. [mm]
+        #: Left, right, bottom, top of the names of points; how many points have none, or are
+        #: not on the picture. [mm]
         self.labels: list[tuple[float, float, float, float]] = []
-        self.nameless = 0
+        self.nameless = self.outside = 0
 
     def commands(self) -> str:
         """Return all commands."""
@@ -247,8 +263,17 @@ class _Page:
                 size /= 2
             for name, (x, y, _) in zip(points.ids, points.xyz.tolist(), strict=True):
                 if np.isfinite(x) and np.isfinite(y):
+                    if not self._shown(x, y):
+                        self.outside += 1
+                        continue
                     place = self.margins.place(x, y)
                     self._point(name, place, size, points is self.drawing.control)
+
+    def _shown(self, x: float, y: float) -> bool:
+        """Return whether a point lies on the picture: elsewhere it might lie over the title."""
+        xmin, ymin, xmax, ymax = self.drawing.grid.bounds
+        slack = self.drawing.scale / 1000.0  # 1 mm on paper
+        return xmin - slack <= x <= xmax + slack and ymin - slack <= y <= ymax + slack
 
     def _point(self, name: str, place: Place, size: float, is_control: bool) -> None:
         px, py = place
@@ -274,3 +299,38 @@ class _Page:
 
 def _tint(colour: Colour) -> str:
     return " ".join(f"{value / 255:.3g}" for value in colour)
+
+
+def _in_pdf_font(words: str) -> bool:
+    """Return whether every viewer has the letters of a text: those of Western Europe."""
+    try:
+        words.encode("cp1252")
+    except UnicodeEncodeError:
+        return False
+    return True
+
+
+def outlines(words: str, size: float, *, bold: bool = False) -> str:
+    """Return a text as a path of PDF, as wide as in Helvetica: letters of any script. [mm]"""
+    from matplotlib.font_manager import FontProperties
+    from matplotlib.textpath import TextPath
+
+    font = FontProperties(family="DejaVu Sans", weight="bold" if bold else "normal")
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # a letter that it lacks becomes a box
+        path = TextPath((0, 0), words, size=size, prop=font, usetex=False)
+    wide = path.vertices[:, 0].max() if len(path.vertices) else 0.0
+    squeeze = min(1.0, text_width(words, size) / max(wide, 1e-9))
+    commands, last = [], np.zeros(2)
+    for flat, code in path.iter_segments(simplify=False):
+        places = np.reshape(flat, (-1, 2)) * [squeeze, 1.0]
+        if code == path.CLOSEPOLY:
+            commands.append("h")
+            continue
+        if code == path.CURVE3:  # PDF knows cubic curves only
+            bend, end = places
+            places = np.array([last + 2 / 3 * (bend - last), end + 2 / 3 * (bend - end), end])
+        letter = {path.MOVETO: "m", path.LINETO: "l"}.get(code, "c")
+        commands.append(" ".join(f"{value:.4f}" for value in places.ravel()) + f" {letter}")
+        last = places[-1]
+    return " ".join(commands)

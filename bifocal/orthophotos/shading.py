@@ -21,8 +21,9 @@ _LIGHT = np.array([-0.5, 0.5, 0.7071])
 
 #: Of relief that was not measured: how pale its colours become, and how dark its lines are.
 _PALE, _LINES = 0.45, 0.55
-#: Distance and width of the lines, and what is narrower than this bears none. On paper. [mm]
-_PERIOD, _STROKE, _NARROW = 1.5, 0.2, 1.0
+#: Distance and width of the lines; what is narrower than this is not paler, either, and what is
+#: narrower than that bears no lines, which would be a rash of dashes. On paper. [mm]
+_PERIOD, _STROKE, _NARROW, _LINED = 1.5, 0.2, 1.0, 2.5
 
 
 def tints(relief: NDArray[np.floating], limits: tuple[float, float]) -> Float32Array:
@@ -59,12 +60,23 @@ def colour_limits(relief: Float32Array) -> tuple[tuple[float, float], tuple[bool
 
 def unmeasured(surface: Surface, measured: Surface, grid: Grid, *, scale: float) -> BoolArray:
     """Return where relief is known but was not measured, but for parts too narrow to be drawn."""
-    side = max(3, round(_NARROW / 1000 * scale / grid.gsd) | 1)
-    wide = grid.window(-side, -side, grid.width + 2 * side, grid.height + 2 * side)
+    return _unmeasured(surface, measured, grid, scale)[0]
+
+
+def _unmeasured(
+    surface: Surface, measured: Surface, grid: Grid, scale: float
+) -> tuple[BoolArray, BoolArray]:
+    """Return where relief was not measured, and where that is broad enough for lines."""
+    small, large = (max(3, round(wide / 1000 * scale / grid.gsd) | 1) for wide in (_NARROW, _LINED))
+    wide = grid.window(-large, -large, grid.width + 2 * large, grid.height + 2 * large)
     mask = np.isfinite(surface.window(wide)) & np.isnan(measured.window(wide))
-    disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (side, side))
-    opened = cv2.morphologyEx(mask.astype(np.uint8), cv2.MORPH_OPEN, disc)
-    return np.asarray(opened[side:-side, side:-side] > 0)
+    disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (small, small))
+    opened = [
+        cv2.morphologyEx(mask.astype(np.uint8), cv2.MORPH_OPEN, kernel)
+        for kernel in (disc, np.ones((large, large), np.uint8))
+    ]
+    core = np.s_[large:-large, large:-large]
+    return np.asarray(opened[0][core] > 0), np.asarray(opened[1][core] > 0)
 
 
 def shaded(
@@ -99,13 +111,14 @@ def shaded(
     tint = tints(middle, limits)
     picture = tint * (0.35 + 0.92 * np.clip(light, 0, 1))[..., None]
     if measured is not None:
-        rows, columns = np.nonzero(unmeasured(surface, measured, grid, scale=scale))
+        guessed, broad = _unmeasured(surface, measured, grid, scale)
+        rows, columns = np.nonzero(guessed)
         pixel = 1000 * grid.gsd / scale  # on paper [mm]
         period = max(4, round(_PERIOD * np.sqrt(2) / pixel))
         stroke = max(1, round(_STROKE * np.sqrt(2) / pixel))
         # Counted from the plane's origin, so that the lines go on from tile to tile.
         first = round((grid.x0 - grid.y0) / grid.gsd)
-        lined = (rows + columns + first) % period < stroke
+        lined = ((rows + columns + first) % period < stroke) & broad[rows, columns]
         pale = picture[rows, columns] * (1 - _PALE) + 255 * _PALE
         picture[rows, columns] = np.where(lined[:, None], pale * _LINES, pale)
     picture[~known] = 255

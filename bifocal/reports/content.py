@@ -17,10 +17,11 @@ from bifocal.model.grid import Bounds
 from bifocal.model.pair import Pair
 from bifocal.model.photo import Photo
 from bifocal.model.relief_map import Quality, ReliefMap
+from bifocal.model.surface import MapSurface
 from bifocal.reports.control_survey import is_exchanged, solve_control
 from bifocal.survey.workflow import SolvedSurvey, solve
 from photocore.arrays import BoolArray, ByteArray, FloatArray
-from photocore.errors import InputError
+from photocore.errors import InputError, located
 
 #: Longer side of pictures in a report. [px]
 SIDE = 1000
@@ -184,10 +185,18 @@ def read_content(source: Path, task: ReportTask) -> PairContent:
         setup=setup if isinstance(setup, dict) else {},
         solution=solution,
         photos=_photos(pair),
-        relief=None if task.relief is None else read_relief(task.relief),
+        relief=None if task.relief is None else _relief(task.relief),
         ortho=ortho,
         ortho_gsd=gsd,
     )
+
+
+def _relief(path: Path) -> ReliefMap:
+    """Return a relief map; refuse one that knows nothing, or infinite values."""
+    relief = read_relief(path)
+    with located(path):
+        MapSurface.of_array(relief.r, relief.grid)
+    return relief
 
 
 def _with_photos(pair: Pair, path: Path) -> Pair:

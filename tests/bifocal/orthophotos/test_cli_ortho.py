@@ -202,6 +202,58 @@ def test_dashes_are_seen_on_the_sheet_and_letters_once(wall: Path) -> None:
         assert np.hypot(*(line - middle).T).min() > text.dxf.height / 2
 
 
+def test_out_may_lie_in_the_folder_that_a_delivery_makes(wall: Path) -> None:
+    few = ("--plane", "--bounds", "0,0,0.5,0.5", "--scale", "1:50", "--deliver", "d")
+    done = run(wall, *few, "--out", "d/own.tif")
+    assert done.exit_code == 0, done.output
+    whole = (wall / "d" / "own.tif").read_bytes()
+    assert whole == (wall / "d" / "Torre_est.tif").read_bytes()
+    again = run(wall, *few, "--title", "Other", "--out", "d/own.tif")
+    assert again.exit_code == 1, again.output
+    assert "own.tif: exists already" in again.stderr
+    assert not (wall / "d" / "Other.tif").exists()
+    same = run(wall, *few[:-1], "e", "--out", "e/Torre_est.tif")
+    assert same.exit_code == 0, same.output
+    assert sorted(p.suffix for p in (wall / "e").iterdir()) == [
+        ".dxf", ".pdf", ".png", ".tfw", ".tif"
+    ]  # fmt: skip
+
+
+def test_points_beside_the_picture_are_not_drawn_over_the_title(wall: Path) -> None:
+    (wall / "c.csv").write_text("id,X,Y,Z\nIN,0.2,0.2,0\nBELOW,0.2,-2.5,0\nAWAY,900,0,0\n")
+    done = run(
+        wall, "--plane", "--bounds", "0,0,0.5,0.5", "--scale", "1:50", "--deliver", "d",
+        "--control", "c.csv",
+    )  # fmt: skip
+    assert done.exit_code == 0, done.output
+    page = page_of(wall / "d" / "Torre_est.pdf")
+    assert "(IN) Tj" in page
+    assert "(BELOW) Tj" not in page
+    assert "2 points lie outside the picture" in done.stderr
+    texts = {text.dxf.text for text in ezdxf.readfile(wall / "d" / "Torre_est.dxf").query("TEXT")}
+    assert {"IN", "BELOW", "AWAY"} <= texts
+
+
+def test_a_title_in_any_script_is_on_the_sheet(wall: Path) -> None:
+    pages = []
+    for folder, title in (("d", "Łódź, Αθήνα"), ("e", "Łódź, Αθήνή"), ("f", "Torre")):
+        done = run(
+            wall, "--plane", "--bounds", "0,0,0.5,0.5", "--scale", "1:50", "--deliver", folder,
+            "--title", title,
+        )  # fmt: skip
+        assert done.exit_code == 0, done.output
+        (path,) = (wall / folder).glob("*.pdf")
+        pages.append(page_of(path))
+    assert not any("?" in page for page in pages)
+    assert "(Torre) Tj" in pages[2]
+    # The letters' outlines: other letters make other ones; none is wider than the title's room.
+    drawn = [re.findall(r"q 1 0 0 1 \S+ \S+ cm (.*) f Q", page) for page in pages]
+    assert [len(found) for found in drawn] == [1, 1, 0]
+    assert drawn[0] != drawn[1]
+    places = [float(x) for x in re.findall(r"(\S+) \S+ [mlc]\b", drawn[0][0])]
+    assert 15 < max(places) <= len("Łódź, Αθήνα") * 0.556 * 5.0 + 0.01
+
+
 def test_numbers_of_a_flat_wall_have_millimetres(wall: Path) -> None:
     grid = Grid.from_bounds((-2.1, -1.5, 2.1, 1.5), gsd=GSD)
     flat = np.broadcast_to(0.004 * grid.columns_x, grid.shape).astype(np.float32)
@@ -262,7 +314,7 @@ def test_a_nameless_pair_is_called_as_its_folder_where_its_file_has_no_name(wall
     folder.mkdir()
     for name in ("far.png", "near.png"):
         (wall / name).rename(folder / name)
-    for name, title in (("w", "Via_Roma_7"), ("north", "north")):
+    for name, title in (("w", "Via_Roma_7"), ("north", "north"), ("S. Maria", "S_Maria")):
         (folder / f"{name}.pair.json").write_text(json.dumps(data))
         words = [str(folder / f"{name}.pair.json"), "--plane", "--deliver", str(wall / name)]
         done = CliRunner().invoke(main, ["ortho", *words, "--scale", "1:50"])

@@ -128,10 +128,15 @@ def test_what_cannot_be_joined_is_refused(tmp_path: Path) -> None:
         tmp_path / "r.tif", Grid.from_bounds((0, 0, 1, 1), gsd=GSD), bands=1, dtype=np.float32
     ) as writer:
         writer.write(np.zeros((200, 200), np.float32))
+    with create_raster(
+        tmp_path / "away.tif", Grid.from_bounds((9, 9, 10, 10), gsd=GSD), bands=1, dtype=np.float32
+    ) as writer:
+        writer.write(np.zeros((200, 200), np.float32))
     for arguments, message in (
         (("a.tif",), "two rasters or more"),
         (("a.tif", "r.tif"), "cannot be joined"),
         (("a.tif", "absent.tif"), "no such raster"),
+        (("a.tif", "a.tif", "--relief", "away.tif"), "away.tif: knows no relief anywhere"),
         (("a.tif", "a.tif", "--out", "m.png"), "m.png: a mosaic is written as GeoTIFF"),
         (("a.tif", "a.tif", "--bounds", "50,50,51,51"), "none of the rasters"),
     ):

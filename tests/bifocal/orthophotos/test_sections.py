@@ -131,6 +131,18 @@ def test_lines_on_a_slope_are_where_it_has_their_level_and_every_fifth_is_labell
     assert all(abs(label.place[0] - float(label.words) / 0.1) < 0.04 for label in labels)
 
 
+def test_stones_of_one_level_near_each_other_share_a_label() -> None:
+    x, y = np.meshgrid(WALL.columns_x, WALL.rows_y)
+    # Two stones 30 mm apart on paper, one 160 mm away, of 0.25 m in lines of 0.05 m.
+    stones = [np.hypot(x - at, y - 2) for at in (0.8, 2.3, 5.2)]
+    relief = sum(np.clip(0.6 - distance, 0, 0.4) for distance in stones).astype(np.float32)
+    lines = contours(MapSurface.of_array(relief, WALL), WALL, interval=0.05, scale=50)
+    assert sum(line.level == 0.25 for line in lines) == 3
+    places = [label.place[0] for label in contour_labels(lines, 50)]
+    assert len(places) == 2
+    assert sorted(place > 3.5 for place in places) == [False, True]
+
+
 def test_a_line_shorter_than_eight_millimetres_on_paper_is_left_out() -> None:
     x, y = np.meshgrid(WALL.columns_x, WALL.rows_y)
     for radius, drawn in ((0.04, 0), (0.3, 1)):

@@ -10,11 +10,14 @@ from hashlib import sha256
 from pathlib import Path
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 from click.testing import CliRunner
 
 from bifocal.cli.main import main
 from bifocal.demo import SAMPLE
+from bifocal.files.geotiff import create_raster
+from bifocal.model.grid import Grid
 from bifocal.reports.accuracy import accuracy_blocks
 from bifocal.reports.content import read_content
 from bifocal.reports.pair_report import _provenance, report_document
@@ -226,6 +229,19 @@ def test_what_cannot_be_reported_is_refused(tmp_path, monkeypatch, options, said
     assert result.exit_code == 1
     assert said in result.stderr
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(("value", "said"), [(np.nan, "is empty"), (np.inf, "infinite values")])
+def test_a_relief_map_without_relief_is_not_reported(tmp_path, monkeypatch, value, said):
+    monkeypatch.chdir(tmp_path)
+    grid = Grid.from_bounds((0, 0, 1, 1), gsd=0.05)
+    with create_raster(tmp_path / "r.tif", grid, bands=1, dtype=np.float32) as writer:
+        writer.write(np.full(grid.shape, value, np.float32))
+    result = CliRunner().invoke(main, ["report", str(PAIR), "--out", "r.html", "--relief", "r.tif"])
+    assert result.exit_code == 1
+    assert "r.tif: the relief map" in result.stderr
+    assert said in result.stderr
+    assert not (tmp_path / "r.html").exists()
 
 
 @pytest.mark.parametrize("package", ["bifocal.reports", "multimedia.adjustment"])
