@@ -19,9 +19,9 @@ from photocore.shrinkage import shrink_noise
 #: near the centre than 20 px²/distance left noise: loggia 201). [px², px]
 NOISE_AT_CENTRE, NOISE_CLIP = 20.0, (0.05, 0.25)
 #: Share of the error across the radius that smoothing takes for noise where matching is precise:
-#: the rest stems from edges within its window, or is wider than the windows (façade 83 and loggia
-#: 94, both 35/28, beyond 3 cm: 1.93 to 1.89 and 1.16 to 1.13 %; 35/19 as before). Of imprecise
-#: matching it is all (façade 84, poor texture: 13.3 %, with 0.7 13.5).
+#: the rest stems from edges within its window, or is wider than the windows (façade 83, 35/28,
+#: beyond 3 cm: 1.93 to 1.89 %, loggia 94 1.19 to 1.15; 35/19 as before). Of imprecise matching it
+#: is all (façade 84, poor texture: 13.3 %, with 0.7 13.5).
 NOISE_SHARE = 0.85
 #: Slope outwards, as a share of that of camera 2's rays, times the square of the misfit of the
 #: photos [grey levels²] from which a pixel counts as not measured: of 14 features of façade 61 and
