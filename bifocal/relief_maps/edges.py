@@ -81,8 +81,8 @@ def sharpen(
     margin = textured * _margin(frame, median) * np.clip(parallax / np.float32(WIDE_STEP), 0, 1)
     up = band & (high + margin <= low) & (high + margin < own)
     down = band & (low - margin < own) & (low < high + margin)
-    result[up] = upper[up]
-    result[down] = lower[down]
+    np.copyto(result, upper, where=up)
+    np.copyto(result, lower, where=down)
     return result, misfits[0]
 
 
@@ -140,8 +140,12 @@ def _mismatch(
     columns, rows = zoom_map(frame, relief)
     moved = cv2.remap(near, columns, rows, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
     off = cv2.absdiff(moved, far)
-    grey = np.minimum(off[..., 0], np.float32(most_grey)) * np.float32(GREY_SHARE)
-    return np.asarray(grey + np.minimum(off[..., 1] + off[..., 2], np.float32(most_gradient)))
+    total = off[..., 1] + off[..., 2]
+    np.minimum(total, np.float32(most_gradient), out=total)
+    grey = np.minimum(off[..., 0], np.float32(most_grey))
+    grey *= np.float32(GREY_SHARE)
+    total += grey
+    return total
 
 
 class _Guide:
@@ -155,9 +159,14 @@ class _Guide:
     def smooth(self, values: Float32Array) -> Float32Array:
         """Return the values smoothed."""
         mean = self._blur(values)
-        slope = (self._blur(self.image * values) - self.mean * mean) / self.spread
-        level = mean - slope * self.mean
-        return np.asarray(self._blur(slope) * self.image + self._blur(level))
+        slope = self._blur(self.image * values)
+        slope -= self.mean * mean
+        slope /= self.spread
+        mean -= slope * self.mean
+        result = self._blur(slope)
+        result *= self.image
+        result += self._blur(mean)
+        return result
 
     @staticmethod
     def _blur(values: np.ndarray) -> Float32Array:

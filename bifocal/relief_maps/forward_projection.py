@@ -165,6 +165,27 @@ def _away(
     return np.stack(np.broadcast_arrays(x[None, :], y[:, None]), axis=-1)
 
 
+def shown_by_first(frame: Frame, away: Float32Array, relief: Float32Array) -> Float32Array:
+    """Return where photo 1 shows points of the wall (column, row), shape (..., 2). [px]
+
+    Parameters
+    ----------
+    frame : Frame
+    away : ndarray of float32, shape (..., 2)
+        How far they lie from the nadir, in pixels of photo 1's grid.
+    relief : ndarray of float32, shape (...)
+        Of the points. [m]
+    """
+    foot = frame.foot(1)
+    nadir = frame.grid.pixel_of(foot.nadir).astype(np.float32)
+    if frame.fields is None:
+        return np.asarray(
+            nadir + away * magnification(relief, np.float32(foot.distance))[..., None]
+        )
+    at = nadir + away
+    return np.stack(frame.shown(1, at[..., 0], at[..., 1], relief), axis=-1)
+
+
 def _look_up(
     frame: Frame,
     source: MapBands,
@@ -177,16 +198,10 @@ def _look_up(
 
     Eq. (1), s = s' d / (d - r), with the r it is meant to find: a fixed point.
     """
-    nadir = frame.grid.pixel_of(foot.nadir).astype(np.float32)
     final, tolerance = start, np.float32(AGREEMENT * foot.distance)
     for _ in range(3):
         value = final
-        if frame.fields is None:
-            distance = np.float32(foot.distance)
-            q = nadir + away * magnification(value, distance)[..., None]
-        else:
-            at = nadir + away
-            q = np.stack(frame.shown(1, at[..., 0], at[..., 1], value), axis=-1)
+        q = shown_by_first(frame, away, value)
         q[~np.isfinite(q)] = -1e4
         final = values_at(relief, q, cv2.INTER_NEAREST)
     with np.errstate(invalid="ignore"):

@@ -7,7 +7,7 @@ import numpy as np
 
 from bifocal.model.grid import Grid
 from bifocal.model.relief_map import Quality
-from bifocal.relief_maps import evidence, forward_projection, levels, smoothing
+from bifocal.relief_maps import evidence, forward_projection, levels, smoothing, snapping
 from bifocal.relief_maps.forward_projection import MapBands
 from bifocal.relief_maps.frame import Frame, offsets
 from photocore.arrays import BoolArray, Float32Array, FloatArray
@@ -60,7 +60,9 @@ def complete(frame: Frame, bands: MapBands, grid: Grid, *, plain: bool = False) 
     relief = shrink_noise(bands.r, quiet, MAP_WINDOWS)
     if plain:
         relief = levels.drawn_to_levels(relief, bands.sigma, bands.quality == Quality.MEASURED)
-    bands = bands._replace(r=relief, sigma=_sigma_at_steps(bands, per_pixel))
+    bounds = _around(relief)
+    relief = snapping.snapped(frame, relief, grid, bounds)
+    bands = bands._replace(r=relief, sigma=_sigma_at_steps(bands, per_pixel, bounds))
     _guard(frame, bands, grid)
     forward_projection.forget_outside(bands, plain=plain)
     _tidy_outline(bands)
@@ -86,14 +88,22 @@ def _relief_per_pixel(frame: Frame, grid: Grid) -> Float32Array:
     return np.float32(frame.pair.base_factor) / np.maximum(reach, np.float32(0.5))
 
 
-def _sigma_at_steps(bands: MapBands, per_pixel: Float32Array) -> Float32Array:
+def _around(relief: Float32Array) -> tuple[Float32Array, Float32Array]:
+    """Return the greatest and the least known relief of 5 x 5 pixels."""
+    known = np.isfinite(relief)
+    square = np.ones((5, 5), np.uint8)
+    high = cv2.dilate(np.where(known, relief, np.float32(-1e3)), square)
+    low = cv2.erode(np.where(known, relief, np.float32(1e3)), square)
+    return high, low
+
+
+def _sigma_at_steps(
+    bands: MapBands, per_pixel: Float32Array, bounds: tuple[Float32Array, Float32Array]
+) -> Float32Array:
     """Return sigma with the doubt of which side of a step a pixel is on."""
-    known = np.isfinite(bands.r)
-    around = np.ones((5, 5), np.uint8)
-    high = cv2.dilate(np.where(known, bands.r, np.float32(-1e3)), around)
-    low = cv2.erode(np.where(known, bands.r, np.float32(1e3)), around)
-    step = np.where(high - low > per_pixel, np.float32(SIGMA_OF_STEP) * (high - low), 0)
-    return np.where(known, np.hypot(bands.sigma, step), np.float32(np.nan))
+    height = bounds[0] - bounds[1]
+    step = np.where(height > per_pixel, np.float32(SIGMA_OF_STEP) * height, 0)
+    return np.where(np.isfinite(bands.r), np.hypot(bands.sigma, step), np.float32(np.nan))
 
 
 def _guard(frame: Frame, bands: MapBands, grid: Grid) -> None:

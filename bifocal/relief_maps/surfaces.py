@@ -18,13 +18,20 @@ from photocore.shrinkage import shrink_noise
 #: A fixed 0.25 px took small steps for noise (façade 83, 35/28: 2.44 to 2.15 % beyond 3 cm; less
 #: near the centre than 20 px²/distance left noise: loggia 201). [px², px]
 NOISE_AT_CENTRE, NOISE_CLIP = 20.0, (0.05, 0.25)
+#: Share of the error across the radius that smoothing takes for noise where matching is precise:
+#: the rest stems from edges within its window, or is wider than the windows (façade 83, 35/28,
+#: beyond 3 cm: 1.93 to 1.89 %, loggia 94 1.19 to 1.15; 35/19 as before). Of imprecise matching it
+#: is all (façade 84, poor texture: 13.3 %, with 0.7 13.5).
+NOISE_SHARE = 0.85
 #: Slope outwards, as a share of that of camera 2's rays, times the square of the misfit of the
 #: photos [grey levels²] from which a pixel counts as not measured: of 14 features of façade 61 and
 #: loggia 301 these two tell best. Such pixels are not called measured, but placed all the same:
 #: left out, 1.57 instead of 1.33 % of the orthophoto were beyond 1 px (81). Where matching is
 #: imprecise the second: measured 72 and 65 % of the points of church_2 and church_1, as good as the
-#: 69 and 62 % that the first leaves.
-FALLS_AWAY, FALLS_AWAY_IMPRECISE = 7.5, 22.0
+#: 69 and 62 % that the first leaves. The first is to be multiplied by a power of 1 - d2 / d1, the
+#: parallax of a step whose strip is one pixel wide: the less of it, the less misfit tells the strip
+#: (at 95 % measured 35/19 bears 6.3 and 4.2 % false, façade 81, 35/28 2.0 and 4.8 %, façade 83).
+FALLS_AWAY, FALLS_POWER, FALLS_AWAY_IMPRECISE = 20.0, 1.4, 25.0
 #: A pixel that does not come back to itself is measured all the same if it lands no farther away
 #: than this [px], and the photos fit at it better than this, and have this contrast [grey levels].
 #: Flow back runs as a ramp over every step, on its seen side, too: 3.3 % of façade 81 failed by it
@@ -62,13 +69,13 @@ def surfaces(
     side_face = forward_projection.side_faces(frame, relief)
     typical = float(np.median(matched.sigma_px[::8, ::8]))
     relief, misfit = edges.sharpen(frame, relief, typical)
-    quiet = np.minimum(matched.sigma_px, _noise(frame, typical))
+    precise = edges.precision(typical)
+    share = precise * NOISE_SHARE + (1 - precise)
+    quiet = np.float32(share) * np.minimum(matched.sigma_px, _noise(frame, typical))
     relief = shrink_noise(relief, flow.sigma_of_relief(frame, relief, quiet))
     sigma = flow.sigma_of_relief(frame, relief, matched.sigma_px)
     measured = valid if backing is not None else valid | _pardoned(frame, matched, sigma, misfit)
-    precise = edges.precision(typical)
-    limit = precise * FALLS_AWAY + (1 - precise) * FALLS_AWAY_IMPRECISE
-    measured = measured & ~_falls_away(frame, relief, misfit, limit)
+    measured = measured & ~_falls_away(frame, relief, misfit, precise)
     quality = np.where(measured, Quality.MEASURED, Quality.INTERPOLATED).astype(np.uint8)
     bands = MapBands(relief, sigma, quality)
     covered, filled = _uncover(frame, bands, valid, support)
@@ -97,7 +104,7 @@ def _pardoned(
 
 
 def _falls_away(
-    frame: Frame, relief: Float32Array, misfit: Float32Array, limit: float = FALLS_AWAY
+    frame: Frame, relief: Float32Array, misfit: Float32Array, precise: float = 1.0
 ) -> BoolArray:
     """Return where relief falls outwards and the photos do not fit: camera 2 may see nothing there.
 
@@ -106,7 +113,7 @@ def _falls_away(
     camera 2's rays, the steepest that camera 2 can see.
     """
     foot = frame.foot(2)
-    quiet = cv2.GaussianBlur(relief, (0, 0), 1.5)
+    quiet = cv2.GaussianBlur(cv2.medianBlur(relief, 5), (0, 0), 1.0)
     across = cv2.Sobel(quiet, cv2.CV_32F, 1, 0, ksize=3, scale=0.125)
     down = cv2.Sobel(quiet, cv2.CV_32F, 0, 1, ksize=3, scale=0.125)
     if frame.fields is None:
@@ -116,7 +123,14 @@ def _falls_away(
         x, y = frame.slopes(2, *offsets(frame.grid.shape), relief)
         falls = across * x + down * y
     misfit = cv2.blur(misfit, (3, 3))
-    return np.asarray(falls * misfit * misfit > limit)
+    return np.asarray(falls * misfit * misfit > _most_falling(frame, precise))
+
+
+def _most_falling(frame: Frame, precise: float = 1.0) -> float:
+    """Return the limit of slope times misfit squared, `FALLS_AWAY`. [grey levels²]"""
+    d1, d2 = frame.distances
+    limit = FALLS_AWAY * (1 - d2 / d1) ** FALLS_POWER
+    return float(precise * limit + (1 - precise) * FALLS_AWAY_IMPRECISE)
 
 
 def _uncover(

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import cv2
 import numpy as np
+import pytest
 
 from bifocal import Pair, Photo, Quality
 from bifocal.model.grid import Grid
@@ -16,11 +17,17 @@ from bifocal.relief_maps import (
     flow,
     forward_projection,
     levels,
+    snapping,
     surfaces,
 )
 from bifocal.relief_maps.forward_projection import MapBands
 from bifocal.relief_maps.frame import Frame, radial_stretch
-from bifocal.relief_maps.map_completion import MAP_WINDOWS, _spread_inwards, _tidy_outline
+from bifocal.relief_maps.map_completion import (
+    MAP_WINDOWS,
+    _around,
+    _spread_inwards,
+    _tidy_outline,
+)
 from photocore.shrinkage import shrink_noise
 
 METRES = [[0.01, 0, -0.995], [0, -0.01, 0.995], [0, 0, 1]]
@@ -178,6 +185,55 @@ def test_what_falls_away_from_camera_2_where_the_photos_do_not_fit_is_not_measur
     assert not row[x < 58].any()
     assert not row[x > 71].any()
     assert not surfaces._falls_away(frame, relief, np.full(relief.shape, 2.0, np.float32)).any()
+
+
+def test_less_parallax_takes_less_misfit_to_doubt_what_falls_away():
+    x = np.arange(200) - 99.5
+    profile = np.interp(x, [40, 60, 68], [0.5, 0.5, 0.0])
+    relief = np.broadcast_to(profile, (200, 200)).astype(np.float32)
+    misfit = np.full(relief.shape, 3.0, np.float32)
+    doubted = []
+    for distance in (9.5, 14.0):
+        frame = frame_of(Pair(image1=FAR, image2=replace(NEAR, distance=distance)))
+        doubted.append(surfaces._falls_away(frame, relief, misfit)[99, 158:169].any())
+    assert doubted == [False, True]
+
+
+def step_in_photo_1(edge: float, height: float, difference: float) -> Frame:
+    """Return a frame whose photo 1 shows a surface right of X = edge [px from the nadir]."""
+    frame = frame_of(Pair(image1=FAR, image2=NEAR))
+    x = np.arange(200) - 99.5
+    # Magnified about the nadir, Eq. (1); the pixel that the edge runs through is mixed.
+    share = np.clip(x + 0.5 - edge * 17.5 / (17.5 - height), 0, 1)
+    rng = np.random.default_rng(5)
+    grey = 80 + difference * share[None, :] + rng.normal(0, 1.5, (200, 200))
+    return replace(frame, image1=np.rint(grey).astype(np.uint8))
+
+
+def snapped_row(frame: Frame, steps_at: float, below: float, above: float) -> np.ndarray:
+    x = np.arange(200) - 99.5
+    relief = np.broadcast_to(np.where(x > steps_at, above, below), (200, 200)).astype(np.float32)
+    return snapping.snapped(frame, relief, frame.grid, _around(relief))[20:180]
+
+
+@pytest.mark.parametrize("edge", [40.1, 40.3, 40.7, 40.9])
+@pytest.mark.parametrize("off", [-1.0, 0.0, 1.0])
+def test_a_step_moves_to_the_edge_that_photo_1_shows_of_it(edge, off):
+    found = snapped_row(step_in_photo_1(edge, 0.3, 60.0), edge + off, 0.0, 0.3)
+    true = np.where(np.arange(200) - 99.5 > edge, 0.3, 0.0)
+    np.testing.assert_allclose(found, np.broadcast_to(true, found.shape), atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("difference", "off", "below", "above"),
+    [(10.0, 1.0, 0.0, 0.3), (60.0, 4.0, 0.0, 0.3), (60.0, 1.0, 0.3, 0.0), (60.0, 1.0, 0.0, 0.02)],
+    ids=["faint", "far", "falling outwards", "low"],
+)
+def test_a_step_stays_where_its_edge_is_not_sure(difference, off, below, above):
+    frame = step_in_photo_1(40.3, max(below, above), difference)
+    found = snapped_row(frame, 40.3 + off, below, above)
+    kept = np.where(np.arange(200) - 99.5 > 40.3 + off, above, below)
+    np.testing.assert_allclose(found, np.broadcast_to(kept, found.shape), atol=1e-6)
 
 
 def test_what_counts_as_noise_follows_the_frame_and_grows_towards_the_zoom_centre():

@@ -1,0 +1,152 @@
+"""Steps of the map drawn to the edges that photo 1 shows of them, to a fraction of a pixel.
+
+Every pixel of the map takes the relief of one pixel of photo 1, so that a step lies up to half a
+pixel off even where the surfaces are known exactly. Its edge in the picture is sharper than that:
+the grey values beside a step, averaged along it, say where the one surface ends.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import cv2
+import numpy as np
+
+from bifocal.model.grid import Grid
+from bifocal.relief_maps.forward_projection import shown_by_first
+from bifocal.relief_maps.frame import Frame, offsets, values_at
+from photocore.arrays import Float32Array, FloatArray, IntArray
+
+#: Steps of the map from this height on are drawn to edges, and steeper ones than 45 degrees. [m]
+STEP = 0.03
+#: How far a step is moved at most, how finely, and across how much of it grey values are compared.
+#: [px]
+REACH, FINE, ACROSS = 2.0, 0.5, 1.5
+#: Pixels on either side along the step whose edges are averaged.
+ALONG = 1
+#: Grey values that an edge must differ by; weaker ones are texture and shadow (façades 81 / 83: of
+#: the pixels moved at fainter edges one half was right before). [grey levels]
+CONTRAST = 20.0
+#: Share of its strength that an edge loses per pixel of distance.
+DISTANCE_COST = 0.15
+
+
+class _Steps(NamedTuple):
+    """Pixels of the map beside a step.
+
+    Attributes
+    ----------
+    row, column : ndarray of int, shape (n,)
+    across, down : ndarray of float32
+        Unit vector towards the upper surface.
+    place : ndarray of float32
+        Distance from the step, positive on its upper side. [px]
+    """
+
+    row: IntArray
+    column: IntArray
+    across: Float32Array
+    down: Float32Array
+    place: Float32Array
+
+
+def snapped(
+    frame: Frame, relief: Float32Array, grid: Grid, bounds: tuple[Float32Array, Float32Array]
+) -> Float32Array:
+    """Return a relief map whose steps lie at the edges of photo 1 beside them.
+
+    Parameters
+    ----------
+    frame : Frame
+    relief : ndarray of float32, shape (height, width)
+        Relief map. [m]
+    grid : Grid
+        Of the map.
+    bounds : tuple of ndarray
+        Greatest and least relief of the 5 x 5 pixels around each: the surfaces of a step. [m]
+    """
+    steps = _steps(relief, bounds, grid.pixel_of(frame.foot(1).nadir), grid.gsd)
+    if not len(steps.row):
+        return relief
+    here = (steps.row, steps.column)
+    upper, lower = (bound[here] for bound in bounds)
+    contrast = _along(steps, relief.shape, _contrast(frame, grid, steps, upper))
+    shift, clear = _strongest(contrast)
+    above = steps.place > shift
+    moved = clear & (above != (steps.place > 0))
+    result = relief.copy()
+    at = (steps.row[moved], steps.column[moved])
+    result[at] = np.where(above, upper, lower)[moved]
+    return result
+
+
+def _steps(
+    relief: Float32Array,
+    bounds: tuple[Float32Array, Float32Array],
+    nadir: FloatArray,
+    gsd: float,
+) -> _Steps:
+    """Return the pixels beside steps that rise outwards.
+
+    Where a step falls outwards photo 1 sees behind it, and flow has found it as well as its edge
+    (façades 81 and 83: of pixels moved there as many were right before as after).
+    """
+    least = np.float32(max(STEP, 4 * gsd))
+    quiet = cv2.GaussianBlur(relief, (0, 0), 1.0)
+    row, column = np.nonzero(bounds[0] - bounds[1] > least)
+    slopes = [cv2.Sobel(quiet, cv2.CV_32F, *way, ksize=3, scale=0.125) for way in ((1, 0), (0, 1))]
+    across, down = (slope[row, column] for slope in slopes)
+    steepness = np.sqrt(across * across + down * down) + np.float32(1e-9)
+    middle = (bounds[0][row, column] + bounds[1][row, column]) / 2
+    place = (quiet[row, column] - middle) / steepness
+    x, y = (offset.ravel() for offset in offsets(relief.shape, nadir))
+    with np.errstate(invalid="ignore"):
+        near = (across * x[column] + down * y[row] > 0) & (np.abs(place) < REACH)
+    across, down = across / steepness, down / steepness
+    return _Steps(row[near], column[near], across[near], down[near], place[near])
+
+
+def _contrast(frame: Frame, grid: Grid, steps: _Steps, upper: Float32Array) -> Float32Array:
+    """Return how grey values rise across steps moved by -REACH to REACH, (shifts, n)."""
+    image = frame.image1.astype(np.float32)
+    nadir = grid.pixel_of(frame.foot(1).nadir).astype(np.float32)
+    ways = np.stack([steps.across, steps.down], axis=-1)
+    places = np.stack([steps.column, steps.row], axis=-1).astype(np.float32)
+    start = places - nadir - steps.place[:, None] * ways
+    ratio = np.float32(grid.gsd / frame.grid.gsd)
+    first, beyond = (shown_by_first(frame, away * ratio, upper) for away in (start, start + ways))
+    half, count = ACROSS / 2, round(ACROSS / FINE)
+    shifts = np.arange(-REACH - half, REACH + half + FINE / 2, FINE, dtype=np.float32)
+    greys = np.stack(
+        [values_at(image, first + t * (beyond - first), cv2.INTER_LINEAR) for t in shifts]
+    )
+    return np.nan_to_num(greys[count:] - greys[:-count])
+
+
+def _along(steps: _Steps, shape: tuple[int, ...], values: Float32Array) -> Float32Array:
+    """Return values averaged over pixels of the same step, along it."""
+    number = np.full(shape, -1, dtype=np.int32)
+    number[steps.row, steps.column] = np.arange(len(steps.row), dtype=np.int32)
+    total, count = values.copy(), np.ones(len(steps.row), dtype=np.float32)
+    for t in (t for t in range(-ALONG, ALONG + 1) if t):
+        row = np.clip(np.rint(steps.row + t * steps.across).astype(int), 0, shape[0] - 1)
+        column = np.clip(np.rint(steps.column - t * steps.down).astype(int), 0, shape[1] - 1)
+        beside = number[row, column]
+        known = np.flatnonzero(beside >= 0)
+        total[:, known] += values[:, beside[known]]
+        count[known] += 1
+    return np.asarray(np.abs(total) / count)
+
+
+def _strongest(contrast: Float32Array) -> tuple[Float32Array, FloatArray]:
+    """Return the shift to the strongest edge [px], and where there is one within reach."""
+    shifts = np.arange(len(contrast), dtype=np.float32) * np.float32(FINE) - np.float32(REACH)
+    cost = np.float32(DISTANCE_COST) * np.abs(shifts)[:, None] * contrast.max(0)
+    best = (contrast - cost).argmax(0)
+    peak = np.take_along_axis(contrast, best[None], 0)[0]
+    clear = (peak > CONTRAST) & (best > 0) & (best < len(contrast) - 1)
+    inner = np.clip(best, 1, len(contrast) - 2)
+    before, at, after = (np.take_along_axis(contrast, inner[None] + i, 0)[0] for i in (-1, 0, 1))
+    bend = np.minimum(before - 2 * at + after, np.float32(-1e-6))
+    vertex = np.clip((before - after) / (2 * bend), -0.5, 0.5)
+    return shifts[inner] + np.float32(FINE) * vertex, clear
