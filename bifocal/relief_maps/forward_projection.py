@@ -329,8 +329,8 @@ def hidden_on_map(
         column += np.float32(column0 + 0.5)
         row += np.float32(row0 + 0.5)
         inside = (column >= 0) & (column < grid.width) & (row >= 0) & (row < grid.height)
-        index = np.where(inside, row, 0).astype(np.int64) * grid.width
-        index += np.where(inside, column, 0).astype(np.int64)
+        index = np.where(inside, row, 0).astype(np.int32) * np.int32(grid.width)
+        index += np.where(inside, column, 0).astype(np.int32)
     top = np.full(grid.shape, np.float32(-1e3))
     _highest(relief[inside], index[inside], top)
     top = cv2.morphologyEx(top, cv2.MORPH_CLOSE, np.ones((3, 3), np.uint8))

@@ -7,7 +7,7 @@ import numpy as np
 
 from bifocal.model.grid import Grid
 from bifocal.model.relief_map import Quality
-from bifocal.relief_maps import evidence, forward_projection, levels, smoothing, snapping
+from bifocal.relief_maps import evidence, forward_projection, levels, rims, smoothing, snapping
 from bifocal.relief_maps.forward_projection import MapBands
 from bifocal.relief_maps.frame import Frame, offsets
 from photocore.arrays import BoolArray, Float32Array, FloatArray
@@ -51,6 +51,7 @@ def complete(frame: Frame, bands: MapBands, grid: Grid, *, plain: bool = False) 
     forward_projection.fill_from_behind(bands, holes, grid, frame.foot(1).nadir)
     forward_projection.fill_small(bands, holes)
     bands = bands._replace(r=smoothing.tidy_steps(bands.r))
+    rims.draw_in(frame, bands, grid)
     per_pixel = _relief_per_pixel(frame, grid)
     quiet = np.where(
         bands.quality == Quality.MEASURED,
@@ -138,11 +139,13 @@ def _tidy_outline(bands: MapBands) -> None:
     if len(area) > 1:
         scrap = area < min(SCRAP, SCRAP_SHARE * area[1:].max())
         scrap[0] = False
-        wanted[scrap[label]] = 0
+        if scrap.any():
+            wanted[scrap[label]] = 0
     _, label, stats, _ = cv2.connectedComponentsWithStats(1 - wanted, connectivity=4)
     pinhole = stats[:, cv2.CC_STAT_AREA] < HOLE
     pinhole[0] = False
-    wanted[pinhole[label]] = 1
+    if pinhole.any():
+        wanted[pinhole[label]] = 1
     forward_projection.fill_small(bands, (wanted > 0) & ~known)
     lost = wanted == 0
     bands.r[lost] = bands.sigma[lost] = np.nan

@@ -17,6 +17,7 @@ from bifocal.relief_maps import (
     flow,
     forward_projection,
     levels,
+    rims,
     snapping,
     surfaces,
 )
@@ -379,3 +380,41 @@ def test_on_plain_walls_filled_relief_leans_on_what_is_interpolated():
     # Hidden is what lies beyond 140 px; OpenCV's distances run up to 5 % short.
     assert lost(plain=False) == 60
     assert abs(lost(plain=True) - (60 - forward_projection.FRINGE_HIDDEN)) < 3
+
+
+def fat_slab() -> tuple[Frame, MapBands]:
+    """A slab 0.5 m before the wall, whose rim stands 60 px from the nadir; the map has it fatter.
+
+    Photo 1 shows the rim at 60 / (1 - 0.5 / 17.5) = 61.8 px; camera 2 cannot see 3.2 px behind it.
+    """
+    frame = frame_of(Pair(image1=FAR, image2=NEAR))
+    x = np.arange(200) - 99.5
+    image = np.full((200, 200), 60, np.uint8)
+    image[:, x < 61.8] = 150
+    r = np.zeros((200, 200), np.float32)
+    quality = np.full(r.shape, Quality.MEASURED, np.uint8)
+    for row in range(200):
+        fat = 2 + (row // 5) % 2
+        r[row, (x > 20) & (x < 60 + fat)] = 0.5
+        quality[row, (x > 58) & (x < 66)] = Quality.INTERPOLATED
+    return replace(frame, image1=image), MapBands(r, np.full_like(r, 0.001), quality)
+
+
+def test_a_rim_that_flow_made_too_fat_is_drawn_in_to_the_edge_of_the_photo():
+    frame, bands = fat_slab()
+    rims.draw_in(frame, bands, frame.grid)
+    x = np.arange(200) - 99.5
+    middle = bands.r[80:120]
+    np.testing.assert_array_equal(middle[:, (x > 20) & (x < 60)], 0.5)
+    np.testing.assert_array_equal(middle[:, x > 61], 0)
+    assert (bands.quality[80:120, (x > 61) & (x < 62)] == Quality.HIDDEN).all()
+
+
+def test_rims_stay_where_they_are_measured_and_where_the_photo_shows_no_edge():
+    frame, bands = fat_slab()
+    plain, fat = replace(frame, image1=np.full_like(frame.image1, 120)), bands.r.copy()
+    rims.draw_in(plain, bands, frame.grid)
+    np.testing.assert_array_equal(bands.r, fat)
+    bands.quality[:] = Quality.MEASURED
+    rims.draw_in(frame, bands, frame.grid)
+    np.testing.assert_array_equal(bands.r, fat)
