@@ -7,7 +7,7 @@ import numpy as np
 
 from bifocal.model.image import local_contrast
 from bifocal.model.relief_map import Quality
-from bifocal.relief_maps import edges, evidence, flow, forward_projection, seed
+from bifocal.relief_maps import edges, evidence, flow, forward_projection, lost_regions, seed
 from bifocal.relief_maps.forward_projection import STRETCH, MapBands
 from bifocal.relief_maps.frame import Frame, offsets
 from photocore.arrays import BoolArray, Float32Array
@@ -66,6 +66,8 @@ def surfaces(
     valid = evidence.validated(matched.across, matched.loop, sigma, d2)
     support = evidence.supported(valid if backing is None else valid | backing)
     relief = evidence.held_back(relief, support, d2)
+    least = _covering(frame, COVERS)
+    relief = lost_regions.put_behind(frame, relief, matched.loop, support, least)
     side_face = forward_projection.side_faces(frame, relief)
     typical = float(np.median(matched.sigma_px[::8, ::8]))
     relief, misfit = edges.sharpen(frame, relief, typical)
@@ -133,20 +135,22 @@ def _most_falling(frame: Frame, precise: float = 1.0) -> float:
     return float(precise * limit + (1 - precise) * FALLS_AWAY_IMPRECISE)
 
 
+def _covering(frame: Frame, covers: tuple[float, float]) -> Float32Array:
+    """Return how much higher than another a surface must be to cover it in photo 2. [m]"""
+    x, y = frame.from_centre()
+    reach = np.maximum(np.sqrt(x * x + y * y), 1)
+    parallax = covers[0] * frame.pair.base_factor / reach
+    return np.asarray(parallax + covers[1] * frame.distances[1], dtype=np.float32)
+
+
 def _uncover(
     frame: Frame, bands: MapBands, valid: BoolArray, support: BoolArray
 ) -> tuple[BoolArray, BoolArray]:
     """Give what photo 2 cannot see the surface behind (in place); return it and what changed."""
-
-    def step(covers: tuple[float, float]) -> Float32Array:
-        x, y = frame.from_centre()
-        reach = np.maximum(np.sqrt(x * x + y * y), 1)
-        parallax = covers[0] * frame.pair.base_factor / reach
-        return np.asarray(parallax + covers[1] * frame.distances[1], dtype=np.float32)
-
-    relief, least = bands.r, step(COVERS)
+    relief, least = bands.r, _covering(frame, COVERS)
     covered = forward_projection.hidden_in_second(frame, relief, least, support)
-    perhaps = forward_projection.hidden_in_second(frame, relief, step(COVERS_UNVALIDATED))
+    unsure = _covering(frame, COVERS_UNVALIDATED)
+    perhaps = forward_projection.hidden_in_second(frame, relief, unsure)
     covered |= perhaps & ~valid
     before = MapBands(bands.r.copy(), bands.sigma.copy(), bands.quality.copy())
     nadir = frame.foot(1).nadir

@@ -17,6 +17,7 @@ from bifocal.relief_maps import (
     flow,
     forward_projection,
     levels,
+    lost_regions,
     rims,
     snapping,
     surfaces,
@@ -418,3 +419,35 @@ def test_rims_stay_where_they_are_measured_and_where_the_photo_shows_no_edge():
     bands.quality[:] = Quality.MEASURED
     rims.draw_in(frame, bands, frame.grid)
     np.testing.assert_array_equal(bands.r, fat)
+
+
+def test_a_door_of_which_camera_2_sees_half_stays_one_door():
+    # Wall at 0 m right of the door, door 1.4 m behind it; on its last 0.6 m matching is lost.
+    pair = Pair(
+        image1=Photo(plane_from_pixel=METRES, nadir=(6.0, 0.0), distance=9.4),
+        image2=Photo(plane_from_pixel=METRES, nadir=(7.0, 0.0), distance=6.0),
+    )
+    frame = frame_of(pair, side=400)
+    truth = np.zeros(frame.grid.shape, np.float32)
+    truth[:, :240] = -1.4
+    found, loop = truth.copy(), np.zeros(truth.shape, np.float32)
+    found[:, 160:240] = np.random.default_rng(3).uniform(-1.4, 0.0, (400, 80))
+    loop[:, 160:240] = 60.0
+    mended = lost_regions.put_behind(frame, found, loop, loop == 0, np.float32(0.02))
+    assert (np.abs(mended - truth) < 0.05).mean() > 0.99
+    # What a loop shorter than a ramp's explains is imprecise, not lost.
+    np.testing.assert_array_equal(
+        lost_regions.put_behind(frame, found, loop / 15, loop == 0, np.float32(0.02)), found
+    )
+
+
+def test_a_lost_region_that_camera_2_would_see_is_left_alone():
+    pair = Pair(
+        image1=Photo(plane_from_pixel=METRES, nadir=(6.0, 0.0), distance=9.4),
+        image2=Photo(plane_from_pixel=METRES, nadir=(7.0, 0.0), distance=6.0),
+    )
+    frame = frame_of(pair, side=400)
+    relief, loop = np.zeros(frame.grid.shape, np.float32), np.zeros(frame.grid.shape, np.float32)
+    relief[:, 160:240], loop[:, 160:240] = 0.3, 60.0
+    mended = lost_regions.put_behind(frame, relief, loop, loop == 0, np.float32(0.02))
+    np.testing.assert_array_equal(mended, relief)
