@@ -33,7 +33,7 @@ COARSEST = 3
 #: Photos that miss the radius by more than this, in the median, are not refined: they fit no
 #: better than that (fast, church_2: 0.45 px, refined 2.5 instead of 2.0 % beyond 10 cm; semireal
 #: church: 0.04 px). [px]
-FIT = 0.15
+FIT = 0.3
 #: Window and limits of the local error across the radius. [px]
 WINDOW, CLIP, FLOOR = 31, 2.0, 0.02
 
