@@ -44,7 +44,8 @@ photos, 2 interpolated, 3 hidden from a camera, 0 unknown).
 @bounds("Part of the plane [m].  [default: all that both photos see]")
 @choice(
     "--quality", "fast|standard|best",
-    "fast: half the resolution; best: full resolution also above 9 megapixels.",
+    "fast: a quarter of the time, from half the resolution; best: full resolution also above "
+    "9 megapixels.",
     default="standard",
 )  # fmt: skip
 @number(

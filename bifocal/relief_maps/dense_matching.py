@@ -14,7 +14,7 @@ from bifocal.model.grid import Bounds, Grid, bounds_of
 from bifocal.model.pair import Pair
 from bifocal.model.relief_map import Quality, ReliefMap
 from bifocal.rays import object_rays, plane_position
-from bifocal.relief_maps import coarse_level, flow, forward_projection, seed
+from bifocal.relief_maps import coarse_level, flow, forward_projection, seed, smoothing
 from bifocal.relief_maps.exposure import match_exposure
 from bifocal.relief_maps.forward_projection import MapBands
 from bifocal.relief_maps.frame import (
@@ -33,7 +33,8 @@ from photocore.arrays import BoolArray, ByteArray
 from photocore.cli import Progress, no_progress
 from photocore.errors import InputError
 
-#: Coarsening of the working frame, and the most pixels it may have.
+#: Coarsening of the working frame, and the most pixels it may have. Every second pixel of a frame
+#: is matched in `fast`, but all of them refine it.
 QUALITIES = {"fast": (2.0, 3.2e6), "standard": (1.0, 9e6), "best": (1.0, 30e6)}
 #: Working frames of fewer pixels can afford the finer search.
 SMALL = 3e6
@@ -104,7 +105,8 @@ def dense_relief(
     bounds : tuple of float, optional
         X min, Y min, X max, Y max; by default all that both photos see of the plane. [m]
     quality : str
-        ``fast`` matches at half the resolution, ``best`` also large photos at full resolution.
+        ``fast`` matches at half the resolution and refines at the whole one, ``best`` matches
+        also large photos at full resolution.
     relief_range : tuple of float, optional
         Least and greatest relief to expect; by default -36 % to +22 % of d2. [m]
     progress : callable
@@ -158,16 +160,22 @@ def dense_relief(
                 f"plane, and nothing beyond it is measured; got {low:g}, {high:g}."
             )
     wanted, target, work = _grids(pair, (grey1, grey2), gsd, bounds, quality, relief_range)
-    frame = make_frame(pair, grey1, grey2, work, relief_range)
+    whole = make_frame(pair, grey1, grey2, work, relief_range)
+    fast = quality == "fast"
+    frame = coarse_level.halved(whole) if fast else whole
     progress(0.1, 1.0, "First relief")
-    coarse, _ = seed.coarse_relief(frame, relief_range)
-    frame = match_exposure(frame, coarse)
+    side = seed.FAST_SIDE if fast else seed.COARSE_SIDE
+    coarse, _ = seed.coarse_relief(frame, relief_range, side=side)
+    whole = match_exposure(whole, coarse)
+    frame = coarse_level.halved(whole) if fast else whole
     progress(0.2, 1.0, "Matching")
-    small = quality != "fast" and work.width * work.height < SMALL
-    matched = flow.measure(frame, coarse, stride=flow.FINE_STRIDE if small else flow.STRIDE)
+    small = not fast and work.width * work.height < SMALL
+    stride = flow.FINE_STRIDE if small else flow.STRIDE
+    matched = flow.measure(frame, coarse, stride=stride, finer=whole if fast else None)
+    del whole
     registration = check_registration(frame, matched)
     progress(0.7, 1.0, "Relief map")
-    if quality != "fast" and (matched.plain or coarse_level.is_unsure(matched)):
+    if not fast and (matched.plain or coarse_level.is_unsure(matched)):
         backed = coarse_level.backed(frame, matched, coarse)
         bands = _backed_map(frame, backed, relief_range, target)
     else:
@@ -185,7 +193,7 @@ def dense_relief(
         quality=np.where(known, bands.quality, np.uint8(Quality.UNKNOWN)),
         plane_from_pixel=wanted.plane_from_pixel,
         registration=registration,
-        working_gsd=work.gsd,
+        working_gsd=frame.grid.gsd,
     )
 
 
@@ -199,7 +207,7 @@ def _map_of(
     """Return the relief map of a measurement; what another level knows is to be believed."""
     source, usable = surfaces(frame, matched, relief_range, known)
     bands = forward_projection.to_plane(frame, source, usable, grid)
-    return complete(frame, bands, grid, plain=matched.plain)
+    return complete(frame, bands, grid, plain=matched.plain, refined=matched.refined)
 
 
 def _backed_map(
@@ -259,15 +267,17 @@ def _grids(
     factor, most = QUALITIES[quality]
     area = (reach[2] - reach[0]) * (reach[3] - reach[1])
     fine = max(native * factor, np.sqrt(area / most), step / 2)
-    if factor == 1.0 and fine < 1.01 * native:
-        fine = native
+    if fine < 1.01 * factor * native:
+        fine = factor * native
     wide = zoomed_box(pair, images[1].shape, reach, min(high, 0.6 * pair.image2.distance))
-    work = working_grid(pair, images[0].shape, wide, fine)
-    if min(work.shape) < SMALLEST_WORK:
+    # Matched at half of what it is refined at.
+    halved = 2 if quality == "fast" else 1
+    work = working_grid(pair, images[0].shape, wide, fine / halved)
+    if min(work.shape) < SMALLEST_WORK * halved:
         raise InputError(
-            f"the photos would be matched on {work.width} x {work.height} px of {fine:.3g} m; at "
-            f"least {SMALLEST_WORK} a side are needed. Give larger bounds, a finer gsd or quality "
-            "standard."
+            f"the photos would be matched on {work.width // halved} x {work.height // halved} px "
+            f"of {fine:.3g} m; at least {SMALLEST_WORK} a side are needed. Give larger bounds, a "
+            "finer gsd or quality standard."
         )
     if bounds is None and gsd is None:
         # The map's pixels are those of photo 1, where that is square to the wall.
@@ -296,7 +306,7 @@ def _seen_box(pair: Pair, box: Bounds, low: float, high: float) -> Bounds:
 
 
 def _resampled(bands: MapBands, grid: Grid, wanted: Grid) -> MapBands:
-    """Return the map on the grid asked for, interpolated if that is finer."""
+    """Return the map on the grid asked for, interpolated if that is finer, but for steps."""
     if wanted.gsd >= 0.999 * grid.gsd:
         return bands
     column, row = wanted.offset_in(grid)
@@ -308,6 +318,8 @@ def _resampled(bands: MapBands, grid: Grid, wanted: Grid) -> MapBands:
         return cv2.warpAffine(band, matrix, size, flags=flags, borderMode=cv2.BORDER_REPLICATE)
 
     nearest, smoothed = warp(bands.r, cv2.INTER_NEAREST), warp(bands.r, cv2.INTER_LINEAR)
+    step = warp(smoothing.steps(bands.r).astype(np.uint8), cv2.INTER_NEAREST) > 0
+    smoothed = np.where(step, cv2.medianBlur(nearest, 3), smoothed)
     return MapBands(
         np.where(np.isfinite(smoothed), smoothed, nearest),
         warp(bands.sigma, cv2.INTER_NEAREST),

@@ -125,7 +125,7 @@ def _features(image: np.ndarray) -> Float32Array:
     grey = image.astype(np.float32)
     across = cv2.Sobel(image, cv2.CV_32F, 1, 0, ksize=3, scale=0.25)
     down = cv2.Sobel(image, cv2.CV_32F, 0, 1, ksize=3, scale=0.25)
-    return np.dstack([grey, across, down])
+    return np.asarray(cv2.merge([grey, across, down]))
 
 
 def _mismatch(

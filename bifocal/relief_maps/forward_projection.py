@@ -136,18 +136,16 @@ def _scatter(
 def _highest(
     relief: Float32Array, index: IntArray, result: Float32Array, first: BoolArray | None = None
 ) -> Float32Array:
-    """Return an image with values put at flat indices, the highest where several fall.
+    """Return an image with values put at flat indices, the highest where several fall (in place).
 
     Those of ``first`` win against all others, however high.
     """
-    if relief.size:
-        low, high = float(relief.min()), float(relief.max())
-        # A radix sort of 15-bit levels and the class: later writes win, so the highest comes last.
-        level = ((relief - low) * (32767 / max(high - low, 1e-9))).astype(np.uint16)
-        if first is not None:
-            level += first.astype(np.uint16) << 15
-        order = np.argsort(level, kind="stable")
-        result.ravel()[index[order]] = relief[order]
+    np.fmax.at(result.ravel(), index, relief)
+    if first is not None:
+        best = np.full(result.size, np.nan, dtype=np.float32)
+        np.fmax.at(best, index[first], relief[first])
+        known = np.isfinite(best)
+        result.ravel()[known] = best[known]
     return result
 
 

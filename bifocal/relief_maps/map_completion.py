@@ -32,7 +32,9 @@ OUTLINE = 7
 SCRAP, SCRAP_SHARE, HOLE = 4000, 0.05, 25
 
 
-def complete(frame: Frame, bands: MapBands, grid: Grid, *, plain: bool = False) -> MapBands:
+def complete(
+    frame: Frame, bands: MapBands, grid: Grid, *, plain: bool = False, refined: bool = False
+) -> MapBands:
     """Return the map with hidden strips filled, noise taken out and its precision stated.
 
     Parameters
@@ -45,6 +47,8 @@ def complete(frame: Frame, bands: MapBands, grid: Grid, *, plain: bool = False) 
     plain : bool
         Walls without texture: relief is drawn to the levels around it. On texture sigma is up to
         three times too large, and drawing costs detail (semireal church: 3.39 to 3.55 mm).
+    refined : bool
+        Measured at twice the resolution of the frame: there is half the noise to take out.
     """
     # Holes outside what both photos see stay unknown.
     holes = ~np.isfinite(bands.r) & _cover(frame, grid)
@@ -55,7 +59,7 @@ def complete(frame: Frame, bands: MapBands, grid: Grid, *, plain: bool = False) 
     per_pixel = _relief_per_pixel(frame, grid)
     quiet = np.where(
         bands.quality == Quality.MEASURED,
-        np.minimum(bands.sigma, np.float32(NOISE) * per_pixel),
+        np.minimum(bands.sigma, np.float32(NOISE / 2 if refined else NOISE) * per_pixel),
         np.minimum(bands.sigma, np.float32(NOISE_UNMEASURED) * per_pixel),
     )
     relief = shrink_noise(bands.r, quiet, MAP_WINDOWS)
