@@ -203,9 +203,10 @@ def _map_of(
     relief_range: tuple[float, float] | None,
     grid: Grid,
     known: BoolArray | None = None,
+    half: Frame | None = None,
 ) -> MapBands:
     """Return the relief map of a measurement; what another level knows is to be believed."""
-    source, usable = surfaces(frame, matched, relief_range, known)
+    source, usable = surfaces(frame, matched, relief_range, known, half)
     bands = forward_projection.to_plane(frame, source, usable, grid)
     return complete(frame, bands, grid, plain=matched.plain, refined=matched.refined)
 
@@ -217,7 +218,8 @@ def _backed_map(
     grid: Grid,
 ) -> MapBands:
     """Return the relief map of a measurement that half the resolution backs."""
-    bands = _map_of(frame, backed.matched, relief_range, grid, backed.known)
+    half = backed.half if backed.matched.plain else None
+    bands = _map_of(frame, backed.matched, relief_range, grid, backed.known, half)
     if backed.matched.plain:
         gsd = max(backed.half.grid.gsd, grid.gsd)
         coarser = Grid.from_bounds(grid.bounds, gsd=gsd)

@@ -130,10 +130,10 @@ def _scatter(
         inside = (column >= 0) & (column < grid.width) & (row >= 0) & (row < grid.height)
     index = row[inside].astype(np.int32) * np.int64(grid.width) + column[inside].astype(np.int32)
     empty = np.full(grid.shape, np.nan, dtype=np.float32)
-    return _highest(relief[inside], index, empty, validated[inside])
+    return highest(relief[inside], index, empty, validated[inside])
 
 
-def _highest(
+def highest(
     relief: Float32Array, index: IntArray, result: Float32Array, first: BoolArray | None = None
 ) -> Float32Array:
     """Return an image with values put at flat indices, the highest where several fall (in place).
@@ -294,9 +294,9 @@ def hidden_in_second(
     index = np.where(inside, row.astype(np.int64) * width + column, height * width).ravel()
     top = np.full(relief.size + 1, np.float32(-1e3))
     if covers is None:
-        _highest(relief.ravel(), index, top)
+        highest(relief.ravel(), index, top)
     else:
-        _highest(relief[covers], index[covers.ravel()], top)
+        highest(relief[covers], index[covers.ravel()], top)
     cracked = top[:-1].reshape(height, width)
     covering = cv2.morphologyEx(cracked, cv2.MORPH_CLOSE, np.ones((3, 3), np.uint8))
     above = covering.ravel().take(index, mode="clip").reshape(height, width)
@@ -330,7 +330,7 @@ def hidden_on_map(
         index = np.where(inside, row, 0).astype(np.int32) * np.int32(grid.width)
         index += np.where(inside, column, 0).astype(np.int32)
     top = np.full(grid.shape, np.float32(-1e3))
-    _highest(relief[inside], index[inside], top)
+    highest(relief[inside], index[inside], top)
     top = cv2.morphologyEx(top, cv2.MORPH_CLOSE, np.ones((3, 3), np.uint8))
     with np.errstate(invalid="ignore"):
         return np.asarray(inside & (top.ravel()[index] > relief + pixel))
