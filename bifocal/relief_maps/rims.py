@@ -15,8 +15,7 @@ import numpy as np
 
 from bifocal.model.grid import Grid
 from bifocal.model.relief_map import Quality
-from bifocal.rays import magnification
-from bifocal.relief_maps.forward_projection import MapBands
+from bifocal.relief_maps.forward_projection import MapBands, shown_by_first
 from bifocal.relief_maps.frame import Frame
 from photocore.arrays import BoolArray, ByteArray, Float32Array, IntArray
 
@@ -176,15 +175,10 @@ def _seen(
     frame: Frame, grid: Grid, column: Any, row: Any, relief: Float32Array
 ) -> tuple[Float32Array, Float32Array]:
     """Return where photo 1 shows pixels of the map with given relief. [px]"""
-    left, top = grid.offset_in(frame.grid)
-    ratio = np.float32(grid.gsd / frame.grid.gsd)
-    x = np.asarray(column * ratio + left, dtype=np.float32)
-    y = np.asarray(row * ratio + top, dtype=np.float32)
-    if frame.fields is not None:
-        return frame.shown(1, x, y, relief)
-    nadir = frame.grid.pixel_of(frame.foot(1).nadir).astype(np.float32)
-    scale = magnification(relief, np.float32(frame.foot(1).distance))  # Eq. (1)
-    return (x - nadir[0]) * scale + nadir[0], (y - nadir[1]) * scale + nadir[1]
+    nadir, ratio = grid.pixel_of(frame.foot(1).nadir), grid.gsd / frame.grid.gsd
+    away = np.stack([column - nadir[0], row - nadir[1]], axis=-1) * ratio
+    shown = shown_by_first(frame, away.astype(np.float32), relief)
+    return shown[..., 0], shown[..., 1]
 
 
 def _strength(
