@@ -82,7 +82,7 @@ def relief_figures(found: ReliefMap, shot: Rendering) -> dict[str, float]:
 
 
 def hidden_figures(hidden: BoolArray, shot: Rendering) -> dict[str, float]:
-    """Return recall and precision, to 2 px, of the pixels called hidden from the far camera."""
+    """Return how well pixels hidden from the far camera are told, to 2 px."""
     inside = in_frames(shot)
     covered, hidden = inside & ~shot.visible1, hidden & inside
     disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (5, 5))
@@ -90,6 +90,7 @@ def hidden_figures(hidden: BoolArray, shot: Rendering) -> dict[str, float]:
     return {
         "hidden recall": float(called[covered].mean()),
         "hidden precision": float(near[hidden].mean()) if hidden.any() else 1.0,
+        "wrongly hidden %": 100 * float((hidden & ~near).sum() / inside.sum()),
     }
 
 
