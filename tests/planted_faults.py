@@ -228,7 +228,7 @@ _GROUPS: tuple[tuple[str, str, tuple[tuple[str, str], ...]], ...] = (
     (
         "bifocal/relief_maps/edges.py",
         "tests/bifocal/relief_maps/test_dense_relief.py",
-        (("level = mean - slope * self.mean", "level = mean + slope * self.mean"),),
+        (("mean -= slope * self.mean", "mean += slope * self.mean"),),
     ),
     (
         "photocore/shrinkage.py",
