@@ -11,7 +11,7 @@ from multimedia.bathymetry.refracted_rays import intersect_refracted_rays
 from multimedia.media.height_field import WaveSurface
 from multimedia.media.interfaces import Interfaces
 from multimedia.media.ray_tracing import aim_rays
-from photocore.arrays import FloatArray, as_points
+from photocore.arrays import FloatArray, IntArray, as_points
 from photocore.errors import InputError
 
 #: Positions of the wave train that are tried: enough for 0.1 % of a root mean square.
@@ -28,7 +28,9 @@ class WaveEffect:
         Computed minus true position, one per position of the wave. [m]
     mean, rms, largest : ndarray, shape (n, 3)
         Over the phases: what averaging many photos would leave, what one set of photos has, and
-        the worst. [m]
+        the worst. [m] Of the phases at which rays reach both cameras.
+    left_out : ndarray of int, shape (n,)
+        Phases at which they do not, as behind a crest.
     """
 
     errors: FloatArray
@@ -47,6 +49,11 @@ class WaveEffect:
     def largest(self) -> FloatArray:
         """Largest absolute error over the phases."""
         return np.nanmax(np.abs(self.errors), axis=0)
+
+    @property
+    def left_out(self) -> IntArray:
+        """Number of phases that the figures leave out."""
+        return np.isnan(self.errors).any(axis=-1).sum(axis=0)
 
 
 def wave_effect(

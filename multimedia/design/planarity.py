@@ -51,6 +51,8 @@ class Deviation:
     allowed : float
         Size whose RMS error equals the expected standard deviation of the points; infinite where
         it costs nothing, as behind media of one index.
+    left_out : int
+        Points, counted in each variant, that two cameras no longer see and no figure here counts.
     """
 
     kind: str
@@ -59,6 +61,7 @@ class Deviation:
     shift: tuple[float, ...]
     largest: float
     allowed: float
+    left_out: int
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -158,6 +161,7 @@ def planarity_study(
             Deviation(
                 kind=kind, size=size, wavelength=wavelength, shift=tuple(shift.tolist()),
                 largest=largest, allowed=allowed,
+                left_out=int(np.isnan(moved).any(axis=-1).sum()),
             )
         )  # fmt: skip
     return tuple(found)

@@ -137,6 +137,11 @@ def _design(
             cameras, media, points[study.seen_by >= 2][::_every(points)],
             expected=float(np.linalg.norm(study.rms_sigma)), millimetre=MILLIMETRE.get(unit, 1e-3),
         )  # fmt: skip
+        notes += [
+            f"flatness, {one.kind}: {one.left_out} sights of points are no longer seen by two "
+            "cameras; the figures leave them out."
+            for one in planarity if one.left_out
+        ]  # fmt: skip
     models, seam = _simplified(cameras[0], interface, points)
     return Design(
         study=study, by_depth=_by_depth(study), sensitivities=sensitivities,
@@ -257,7 +262,7 @@ def as_dict(design: Design) -> dict[str, Any]:
         "colour_seam_mm": design.seam,
         "planarity": [
             {"kind": d.kind, "size": d.size, "wavelength": d.wavelength, "shift": d.shift,
-             "largest": d.largest, "allowed": d.allowed}
+             "largest": d.largest, "allowed": d.allowed, "left_out": d.left_out}
             for d in design.planarity
         ],
         "remarks": design.remarks,

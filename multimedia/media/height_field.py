@@ -211,7 +211,8 @@ class WaveSurface(HeightField):
         number = np.hypot(*vector.T)
         if not (number > 0).all():
             raise InputError("wave_vector: a wave needs a length; the vector must not be zero.")
-        reach = float(np.abs(amplitude).sum()) + 1e-12 * abs(self.level)
+        # Wider than the waves by more than rounding: a ray to a crest must not end before it.
+        reach = float(np.abs(amplitude).sum()) * (1 + 1e-9) + 1e-12 * abs(self.level)
         self._keep(
             amplitude=amplitude,
             wave_vector=vector,

@@ -12,6 +12,7 @@ from scipy.optimize import least_squares, root
 
 from multimedia import Camera, FlatInterface, Interfaces, Layers
 from multimedia.cli.main import main
+from multimedia.design import planarity
 from multimedia.design.planarity import SAG, SLOPE, WEDGE, planarity_study
 from multimedia.design.studies import Placement, best_placement
 from photocore.errors import InputError
@@ -181,3 +182,20 @@ def test_the_study_of_flatness_is_told_as_data():
     data = json.loads(CliRunner().invoke(main, arguments).stdout)
     # One face alone has no wedge.
     assert [d["kind"] for d in data["planarity"]] == ["bend", *["waves"] * 5]
+
+
+def test_sights_that_the_figures_leave_out_are_counted(monkeypatch):
+    """Every ray of one camera through waves is lost: no point is seen by two."""
+    whole = planarity_study(CAMERAS, [TANK] * 2, np.array([POINT, POINT + 0.01]), expected=1e-5)
+    assert [one.left_out for one in whole] == [0] * len(whole)
+    real = planarity.project
+
+    def losing(camera, points, faces):
+        pixels = np.array(real(camera, points, faces))
+        if camera.centre[0] > 0:
+            pixels[0] = np.nan
+        return pixels
+
+    monkeypatch.setattr(planarity, "project", losing)
+    partly = planarity_study(CAMERAS, [TANK] * 2, np.array([POINT, POINT + 0.01]), expected=1e-5)
+    assert [one.left_out for one in partly] == [1, 2, *[4] * 5]

@@ -429,3 +429,26 @@ def test_a_surface_moved_with_its_points_stays_the_same_to_them(surface) -> None
     moved, there = surface.moved(turn, shift), points @ turn.T + shift
     np.testing.assert_allclose(moved.side(there), surface.side(points), atol=1e-12)
     np.testing.assert_allclose(moved.normals(there), surface.normals(points) @ turn.T, atol=1e-13)
+
+
+@pytest.mark.parametrize("level", [0.0, 0.3, -120.0])
+def test_rays_that_meet_a_crest_or_trough_exactly_are_found(level) -> None:
+    rng = np.random.default_rng(11)
+    for _ in range(40):
+        amplitude, length = 10 ** rng.uniform(-6, 0), 10 ** rng.uniform(-2, 2)
+        wave = mm.WaveSurface.sinusoid(
+            level, amplitude=amplitude, wavelength=length, direction=rng.uniform(0, 2 * np.pi)
+        )
+        along = wave.wave_vector[0] / np.linalg.norm(wave.wave_vector[0])
+        half_turns = rng.integers(-6, 7, 20)
+        at = np.outer(half_turns * length / 2, along)
+        at += np.outer(rng.uniform(-5, 5, 20) * length, [-along[1], along[0]])
+        top = level + np.where(half_turns % 2, -amplitude, amplitude)
+        target = np.column_stack([at, top])
+        # From above, steeper than the waves: each ray meets them once.
+        flow = 0.5 * min(1.0, 1 / wave.steepest) * rng.uniform(-0.7, 0.7, (20, 2))
+        reach = rng.uniform(2, 20) + 2 * amplitude
+        origin = target + reach * np.column_stack([flow, np.ones(20)])
+        away = np.linalg.norm(target - origin, axis=1)
+        hop = wave.hop(origin, (target - origin) / away[:, None], np.zeros(20))
+        np.testing.assert_allclose(hop, away, rtol=1e-9)
