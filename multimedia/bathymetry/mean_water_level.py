@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.spatial import cKDTree
 from scipy.special import ndtr
 from scipy.stats import poisson
 
@@ -31,6 +32,10 @@ SAME = 0.4
 #: Heights among which groups are looked for.
 ENOUGH = 4000
 ROUNDS = 400
+#: Neighbours that show whether a point lies on a slope.
+NEIGHBOURS = 16
+#: Steeper than this no water stands, level or tilted; banks and bottoms rise by 0.05 and more.
+STEEPEST = (0.02, 0.04)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -57,6 +62,8 @@ class WaterLevel:
         Its standard deviation.
     centre : ndarray, shape (2,)
         Mean X and Y of the used points. [m]
+    larger : tuple of (int, float), optional
+        Points and height of the largest group, where that is not the highest. [m]
     """
 
     level: float
@@ -69,6 +76,7 @@ class WaterLevel:
     slope: FloatArray
     slope_sigma: FloatArray
     centre: FloatArray
+    larger: tuple[int, float] | None = None
 
 
 def mean_water_level(
@@ -103,7 +111,8 @@ def mean_water_level(
     The water surface is the highest dense group of heights, not the largest: clear water gives
     more tie points on the bottom. A group is a place that holds more points than its flanks let
     chance put there; of those that hold at least 5 points and a tenth of the largest, the highest
-    is taken. Around it heights are a mixture: a normal distribution (the surface), and the bottom
+    is taken. Points that lie with their neighbours on a slope steeper than water are no group's.
+    Around it heights are a mixture: a normal distribution (the surface), and the bottom
     below and the bank above it, whose densities may differ and end at the surface, as unsharp as
     its points are. Points count with the probability that they belong to the surface, so that a
     bank that starts at the water line does not pull the level; the standard deviation is that of
@@ -127,7 +136,11 @@ def mean_water_level(
     if spread is not None and not spread > 0:
         raise InputError(f"spread: must be above zero [m], got {spread}.")
     heights = xyz[finite, 2]
-    start, width = _highest_group(heights, spread)
+    some = xyz[finite][:: max(1, len(heights) // ENOUGH)]
+    level = _level_points(some, STEEPEST[tilted])
+    start, width, larger = _highest_group(
+        some[level, 2] if level.sum() >= FEWEST else heights, spread
+    )
     near = np.abs(heights - start) <= 3.0 * width
     centre = xyz[finite][near, :2].mean(0)
     design = np.ones((len(xyz), 1))
@@ -153,16 +166,45 @@ def mean_water_level(
         surface=Plane.tilted(float(at_origin), slope_x=float(slope[0]), slope_y=float(slope[1])),
         slope=slope,
         slope_sigma=sigma[1:] if tilted else np.zeros(2),
-        centre=centre,
-    )
+        centre=centre, larger=larger,
+    )  # fmt: skip
 
 
-def _highest_group(heights: FloatArray, spread: float | None) -> tuple[float, float]:
-    """Return middle and standard deviation of the highest group that may be a surface."""
+def _level_points(xyz: FloatArray, steepest: float) -> BoolArray:
+    """Return which points do not lie, with their neighbours, on ground steeper than water.
+
+    Points that crowd on a bank are at one height, too; those around them show that it is a slope.
+    """
+    tree = cKDTree(xyz[:, :2])
+    count = min(NEIGHBOURS, len(xyz) - 1)
+    radius = float(np.median(tree.query(xyz[:, :2], [count + 1])[0]))
+    level = np.ones(len(xyz), dtype=bool)
+    for row, near in enumerate(tree.query_ball_point(xyz[:, :2], radius)):
+        around = xyz[near] - xyz[row]
+        design = np.column_stack([np.ones(len(near)), around[:, :2]])
+        kept = np.ones(len(near), dtype=bool)
+        for _ in range(3):
+            plane = np.linalg.lstsq(design[kept], around[kept, 2], rcond=None)[0]
+            away = np.abs(around[:, 2] - design @ plane)
+            scatter = 1.4826 * float(np.median(away))
+            kept = away <= 3.0 * scatter
+            if kept.sum() < FEWEST:
+                break
+        else:
+            rise = float(np.std(design[kept, 1:] @ plane[1:]))
+            steep = float(np.hypot(*plane[1:])) > steepest and rise > scatter
+            level[row] = not (steep and abs(plane[0]) <= 3.0 * scatter)
+    return level
+
+
+def _highest_group(
+    heights: FloatArray, spread: float | None
+) -> tuple[float, float, tuple[int, float] | None]:
+    """Return middle and width of the highest group that may be a surface, and any larger group."""
     ordered = np.sort(heights)
     extent = float(ordered[-1] - ordered[0])
     if extent == 0:
-        return float(ordered[0]), 1e-9 * max(1.0, abs(float(ordered[0])))
+        return float(ordered[0]), 1e-9 * max(1.0, abs(float(ordered[0]))), None
     # Of very many heights some thousands show the groups as well.
     few = ordered[:: max(1, len(ordered) // ENOUGH)]
     widths = [spread] if spread is not None else _widths(few)
@@ -188,8 +230,10 @@ def _highest_group(heights: FloatArray, spread: float | None) -> tuple[float, fl
             f"points: no {FEWEST} tie points lie at about one height, so none of them shows the "
             "water surface. Add points on the surface, or give their expected spread."
         )
-    highest = kept[max(good, key=lambda k: middles[k])]
-    return highest.middle, highest.width
+    highest, most = max(good, key=lambda k: middles[k]), max(good, key=lambda k: counts[k])
+    share = len(ordered) / len(few)
+    larger = None if most == highest else (round(counts[most] * share), middles[most])
+    return kept[highest].middle, kept[highest].width, larger
 
 
 def _widths(ordered: FloatArray) -> list[float]:

@@ -68,6 +68,12 @@ def fit_water_level(
             f"A surface point scatters by {fitted.water.spread:.3g} m; are the heights in "
             "millimetres?"
         )
+    if fitted.water.larger is not None:
+        count, height = fitted.water.larger
+        fitted.remarks.append(
+            f"{count} tie points at about {height:.3f} m are a larger group than the highest one, "
+            "which is taken for the water. If they are the water, leave out the points above them."
+        )
     if target is not None:
         write_object(target, fitted.as_dict(), overwrite=overwrite)
     return fitted

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import multimedia as mm
+from multimedia.bathymetry.waterlevel_workflow import fit_water_level
 from photocore.errors import GeometryError, InputError
 
 
@@ -160,3 +161,89 @@ def test_the_sigmas_of_a_tilted_surface_between_banks_are_honest() -> None:
         assert abs(at - 102.4) < 0.05
         pulls.append((water.slope[1] - 5e-4) / water.slope_sigma[1])
     assert_honest(np.array(pulls))
+
+
+def chance_bank(seed: int, crowded: float = 0.0) -> tuple[np.ndarray, float]:
+    """Return tie points of a shore of chance shape, and the height of its water.
+
+    Counts, slopes and gross errors lie in the ranges that docs/bathymetry.md names; bank and bottom
+    have slopes of their own. A share of the points may crowd at chance places.
+    """
+    rng = np.random.default_rng(seed)
+    water, beside = int(rng.integers(30, 201)), int(rng.integers(0, 501))
+    above = int(rng.random() * beside)
+    below = beside - above
+    spread = 10 ** rng.uniform(np.log10(0.005), np.log10(0.04))
+    bank_slope, bottom_slope = rng.uniform(0.05, 0.3, 2)
+    gross = rng.uniform(0, 0.05)
+    length, breadth = rng.uniform(8, 60), rng.uniform(4, 30)
+    level = rng.uniform(-5, 400)
+
+    def places(count, width):
+        along = rng.uniform(0, width, count)
+        many = int(crowded * count)
+        if many:
+            centres = rng.uniform(0, width, max(1, many // 15))
+            at = rng.choice(centres, many) + rng.normal(0, 0.03 * width, many)
+            along[:many] = np.clip(at, 0, width)
+        return along
+
+    on_water, on_bank, on_bottom = (
+        places(water, length),
+        places(above, breadth),
+        places(below, length),
+    )
+    x = np.concatenate([on_water, -on_bank, on_bottom])
+    y = rng.uniform(-20, 20, len(x))
+    rise = np.concatenate([0 * on_water, bank_slope * on_bank, -bottom_slope * on_bottom / 1.34])
+    z = level + rise + spread * rng.standard_normal(len(x))
+    wrong = rng.choice(len(x), int(gross * len(x)), replace=False)
+    z[wrong] += rng.uniform(-3, 3, len(wrong))
+    return np.column_stack([x, y, z]), level
+
+
+@pytest.mark.parametrize(
+    "seeds",
+    [range(312, 342), pytest.param(range(2000, 2400), marks=pytest.mark.acceptance)],
+    ids=["some", "many"],
+)
+def test_no_chance_bank_is_taken_for_the_water(seeds) -> None:
+    pulls = []
+    for seed in seeds:
+        points, level = chance_bank(seed)
+        water = mm.mean_water_level(points)
+        pulls.append((water.level - level) / water.sigma)
+    assert np.abs(pulls).max() < 4.0
+    assert 0.75 < np.std(pulls) < 1.25
+
+
+@pytest.mark.parametrize(
+    ("seeds", "worst"),
+    [
+        (range(16, 22), 0),
+        pytest.param(range(1000, 1300), 3, marks=pytest.mark.acceptance),
+    ],
+)
+def test_points_that_crowd_on_a_bank_are_not_the_water_or_a_remark_says_so(seeds, worst) -> None:
+    wrong = []
+    for seed in seeds:
+        points, level = chance_bank(seed, crowded=0.4)
+        water = mm.mean_water_level(points)
+        if abs(water.level - level) > 4.5 * water.sigma:
+            wrong.append(seed)
+            assert water.larger is not None
+            assert abs(water.larger[1] - level) < 0.1
+    assert len(wrong) <= worst
+
+
+def test_a_larger_group_below_the_highest_is_told(tmp_path) -> None:
+    rng = np.random.default_rng(4)
+    xy = rng.uniform(-2, 2, (90, 2))
+    z = np.concatenate([rng.normal(1.8, 0.002, 20), rng.normal(1.2, 0.002, 70)])
+    points = np.column_stack([xy, z])
+    water = mm.mean_water_level(points)
+    assert water.level == pytest.approx(1.8, abs=0.003)
+    assert water.larger == (pytest.approx(70, abs=8), pytest.approx(1.2, abs=0.002))
+    np.savetxt(tmp_path / "ties.csv", points, delimiter=",", header="X,Y,Z", comments="")
+    remarks = fit_water_level(tmp_path / "ties.csv").remarks
+    assert "tie points at about 1.200 m are a larger group than the highest one" in remarks[-1]
