@@ -23,6 +23,8 @@ from photocore.arrays import FloatArray, IntArray
 from photocore.errors import GeometryError
 from photocore.reports.words import words_of
 
+#: So many typical deviations of what is known of a medium tell nothing of it.
+UNDETERMINED = 1000.0
 #: Risk of calling a parameter significant, or residuals not white, that are so by chance.
 RISK_PARAMETER, RISK_WHITE = 0.01, 0.001
 #: Points of one image that may share what the model lacks; the largest effect counts.
@@ -72,7 +74,7 @@ def refuse_impossible_media(
         if is_possible(
             value, start=start, sigma=given.get(label, item.typical), least=item.least,
             most=item.most,
-        ):  # fmt: skip
+        ) and not own > UNDETERMINED * item.typical:  # fmt: skip
             continue
         row = result.names.index(label)
         others = np.abs(result.correlations[row])

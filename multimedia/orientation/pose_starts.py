@@ -9,7 +9,7 @@ import numpy as np
 
 from multimedia.media.camera import Camera
 from multimedia.media.optical_media import OpticalMedia
-from photocore.arrays import FloatArray
+from photocore.arrays import LARGEST, FloatArray
 from photocore.camera import cameras_seeing
 from photocore.errors import GeometryError
 
@@ -109,4 +109,5 @@ def _straight(camera: Camera, control: FloatArray, ideal: FloatArray) -> list[Ca
     return [
         replace(camera, centre=found.centre, rotation=found.rotation.T @ _FLIP)
         for found in cameras_seeing(control, rays, np.eye(3), methods=methods)
+        if (np.abs(found.centre) <= LARGEST).all()
     ]

@@ -149,6 +149,7 @@ def resect(
     residuals[used] = -result.residuals.reshape(-1, 2) * sigmas
     normed[used] = -result.standardised.reshape(-1, 2)
     covariance = result.linear.cofactor * result.sigma0**2
+    _refuse_flat(result.state, names, covariance, what)
     return Resection(
         camera=result.state,
         names=names,
@@ -308,6 +309,17 @@ def _refuse_mirrored(camera: Camera, sigma0: float, problem: _ControlImages) -> 
             f"{problem.what}: the control points fit the image only as in a mirror. One coordinate "
             "system is left-handed, or x or y of the image points the wrong way: image x runs to "
             "the right, y up; X, Y, Z must be right-handed."
+        )
+
+
+def _refuse_flat(camera: Camera, names: tuple[str, ...], covariance: FloatArray, what: str) -> None:
+    """Refuse a principal distance that is known no better than by half of itself."""
+    own = float(np.sqrt(covariance[names.index("c"), names.index("c")])) if "c" in names else 0.0
+    if own > camera.principal_distance / 2:
+        raise GeometryError(
+            f"{what}: the data cannot determine c and Z0: c comes out as "
+            f"{camera.principal_distance:.3g} ± {own:.2g} mm. The points lie about on one plane "
+            "square to the axis: add points at other depths, turn the camera, or keep c."
         )
 
 

@@ -77,9 +77,9 @@ class DenseEquations:
         else:
             slope = right @ ((self.jacobian.T @ misfit) / self.scale)
         largest = values.max(initial=0.0)
-        # Never below rounding: directions without information stay where they are.
-        least = (largest * RANK_TOLERANCE) ** 2 + 1e-300
-        return -(right.T @ (slope / (values**2 + damping * largest**2 + least))) / self.scale
+        # Never along rounding: directions without information stay where they are.
+        slope[values <= largest * RANK_TOLERANCE] = 0.0
+        return -(right.T @ (slope / (values**2 + damping * largest**2 + 1e-300))) / self.scale
 
     def change(self, step: FloatArray) -> FloatArray:
         """Return how a step moves the residuals, were the equations linear."""

@@ -11,6 +11,7 @@ import numpy as np
 from photocore.adjustment.blocks import BlockEquations
 from photocore.adjustment.dense import DenseEquations
 from photocore.adjustment.outliers import standardised
+from photocore.adjustment.priors import ALIKE
 from photocore.arrays import FloatArray
 from photocore.errors import ConvergenceError, GeometryError
 
@@ -252,9 +253,13 @@ def fit(
             "points or scale bars, or measure more points, better spread in the image and in depth."
         )
     if not result.settled:
+        alike = np.abs(np.triu(np.nan_to_num(correlations(result.linear.cofactor)), 1))
+        one, other = np.unravel_index(int(alike.argmax()), alike.shape)
+        apart = f"{names[one]} and {names[other]}" if alike.max() > ALIKE else "the unknowns"
         raise ConvergenceError(
-            f"{what}: the adjustment does not settle. The data can hardly tell the unknowns apart, "
-            "or image and object points do not belong together",
+            f"{what}: the adjustment does not settle. The data can hardly tell {apart} apart: "
+            "fix one, or measure points at more depths and better spread; or image and object "
+            "points do not belong together",
             iterations=result.iterations,
             residual=float(np.sqrt(np.mean(result.residuals**2))),
         )

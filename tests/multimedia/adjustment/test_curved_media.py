@@ -234,6 +234,21 @@ def test_a_camera_in_the_middle_of_its_dome_leaves_the_radius_to_the_prior():
     assert any("port:radius: the data hardly carry it" in line for line in result.remarks)
 
 
+def test_a_camera_in_the_middle_of_its_dome_cannot_tell_its_radius_without_a_prior():
+    given = dome_project(count=12)
+    at_home = Interfaces(
+        surfaces=tuple(Sphere(centre=(0, 0, 0), radius=r) for r in RADII),  # type: ignore[arg-type]
+        indices=INDICES, with_camera=(True, True),
+    )  # fmt: skip
+    straight = [image_of(given.object_points.xyz - pose[:3], pose[3:], C) for pose in STATIONS]
+    noisy = a_project(STATIONS, straight, given.object_points.xyz, at_home, noise=0.001)
+    wanted = r"port:radius comes out as 80 ± \S+, 80 was given: the data cannot carry it.*--prior"
+    with pytest.raises(GeometryError, match=wanted):
+        bundle_adjust(noisy, Unknowns(media=("radius",)))
+    with pytest.raises(GeometryError, match=r"index3 comes out as 1\.3.*cannot carry it"):
+        bundle_adjust(noisy, Unknowns(media=("index3",)))
+
+
 @pytest.mark.acceptance
 def test_a_dome_of_another_size_is_refused():
     with pytest.raises(GeometryError, match=r"port:radius comes out as 79.* 200 was given"):

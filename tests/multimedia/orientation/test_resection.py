@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -13,6 +15,7 @@ from multimedia.media.flat_interface import FlatInterface
 from multimedia.media.interfaces import Interfaces
 from multimedia.media.projection import project
 from multimedia.media.surfaces import Sphere
+from multimedia.orientation import pose_starts
 from multimedia.orientation.resection import resect
 from multimedia.refraction.layers import Layers
 from photocore.distortion import Brown
@@ -179,6 +182,40 @@ def test_what_a_flat_target_parallel_to_the_image_cannot_determine_is_named():
     image = project(truth, flat)
     with pytest.raises(GeometryError, match=r"cannot determine .*Z0.*c"):
         resect(truth, flat, image, estimate=("c",))
+
+
+@pytest.mark.parametrize("estimate", [("c",), ("c", "k1"), ("c", "xh", "yh")])
+def test_noise_on_a_flat_target_parallel_to_the_image_determines_nothing_either(estimate):
+    for seed in range(12):
+        rng = np.random.default_rng(seed)
+        plane = np.column_stack([rng.uniform(-0.3, 0.3, (9, 2)), np.full(9, -0.2)])
+        camera = Camera.from_angles((0.02, 0.01, 1.0), 0, 0, 0.3, principal_distance=24.0)
+        image = project(camera, plane) + 1e-3 * rng.standard_normal((9, 2))
+        start = Camera.from_angles((0, 0, 1.2), 0, 0, 0.2, principal_distance=25.0)
+        try:
+            found = resect(start, plane, image, estimate=estimate)
+        except (GeometryError, ConvergenceError) as error:
+            assert re.search(r"Z0.*\bc\b|c and Z0", str(error))
+            continue
+        # A chance tilt may tell something of c: then its sigma says how little.
+        assert found.sigmas["c"] < found.camera.principal_distance / 2
+        assert abs(found.camera.principal_distance - 24.0) < 4 * found.sigmas["c"]
+
+
+def test_no_start_lies_beyond_reason(monkeypatch):
+    """Pose solvers return camera positions of any size where points determine none."""
+    points, truth = control(8), cameras()[0]
+    real = pose_starts.cameras_seeing
+
+    def with_a_wild_one(*given, **options):
+        found = real(*given, **options)
+        wild = SimpleNamespace(centre=np.full(3, 4e48), rotation=found[0].rotation)
+        return [wild, *found]
+
+    monkeypatch.setattr(pose_starts, "cameras_seeing", with_a_wild_one)
+    seen = project(truth, points, LAYERS)
+    start = truth.stepped(EXTERIOR, np.array([9.0, 9.0, 99.0, 0.5, 0.5, 2.0]))
+    np.testing.assert_allclose(resect(start, points, seen, LAYERS).camera.centre, truth.centre)
 
 
 def test_a_mirrored_coordinate_system_is_named():
