@@ -318,7 +318,7 @@ def _observations(table: Table, errors: list[CellError]) -> tuple[PointObservati
         ids = [str(number) for number in range(1, len(table) + 1)]
     ids = [name or "" for name in ids]
     said = bare(table.headings.get("theta", "")) in ("angle", "angolo", "winkel")
-    if said and "s1" in table.present and "x1" not in table.present:
+    if said and len(table) and "s1" in table.present and "x1" not in table.present:
         table.remarks.append(
             f'{table.cell(0, "theta")}: "{table.headings["theta"]}" is read as theta, clockwise '
             "from up (+y). Of angles that run counter-clockwise from +x, as in CAD, X and Y would "

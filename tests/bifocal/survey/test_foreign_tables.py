@@ -242,3 +242,8 @@ def test_the_number_of_a_point_is_told_from_its_north(book):
         "3",
         "4",
     )
+
+
+def test_a_table_of_angles_without_points_says_what_is_missing(book):
+    with pytest.raises(InputError, match="there is no point"):
+        bifocal.solve(book(Picks=[("id", "s1", "s2", "Winkel")]), **OPTIONS)
