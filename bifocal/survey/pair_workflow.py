@@ -153,7 +153,7 @@ def _ideal(setup: SurveySetup, folder: Path) -> Pair:
         raise InputError("c_1 and c_2, the principal distances [mm], are needed to use the photos.")
     setup.check_scales()
     sizes = [image_info(folder / name).size for name in names]
-    remarks: list[str] = []
+    remarks = [*setup.remarks]
     pitch = setup.pitch
     if pitch is None:
         if setup.sensor is None:

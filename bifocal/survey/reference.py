@@ -89,6 +89,12 @@ class KnownPoints:
         known = set(points.ids)
         return tuple(name for name in self.ids if name not in known)
 
+    def called_as(self, names: Collection[str]) -> KnownPoints:
+        """Return the same points under these names where only leading zeros differ, 007 from 7."""
+        alike = {name.lstrip("0"): name for name in names}
+        ids = [n if n in names else alike.get(n.lstrip("0"), n) for n in self.ids]
+        return self if len(set(ids)) < len(ids) else replace(self, ids=tuple(ids))
+
     def without(self, names: Collection[str]) -> KnownPoints:
         """Return the same points, those of these names listed but not used."""
         kept = np.array([name not in names for name in self.ids], dtype=bool)

@@ -135,6 +135,7 @@ class SurveySetup:
             raise InputError(
                 f"no value for {', '.join(missing)}. Fill in the sheet Setup (d_2 and delta_d, or "
                 "d_1), or give --d1 and --d2 in metres, or a pair file with --pair."
+                f"{''.join(f' {remark}' for remark in self.remarks)}"
             )
         if self.unit == "px" and self.pitch is None:
             raise InputError("pitch: the size of a pixel [mm/px] is needed to read pixels.")

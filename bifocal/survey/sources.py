@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -13,6 +13,7 @@ from bifocal.model.photo import Photo
 from bifocal.survey.observations import PointObservations
 from bifocal.survey.pick_lists import joined, left_over, read_picks
 from bifocal.survey.setup import SurveySetup
+from bifocal.survey.units import refuse_far_stations
 from bifocal.survey.workbook.known_reader import with_measured
 from bifocal.survey.workbook.reader import ReadOptions, SurveyInput, read_survey
 from photocore.errors import GeometryError, InputError
@@ -49,9 +50,27 @@ def measured(source: Source, options: ReadOptions, unit: str | None) -> tuple[Su
     return read_survey(source, options), Path(source)
 
 
-def with_setup_of(path: Path, survey: SurveyInput) -> SurveyInput:
+def set_up(
+    survey: SurveyInput,
+    pair: Pair | Path | str | None,
+    given: Mapping[str, Any],
+    unit: str | None,
+    options: ReadOptions,
+) -> tuple[SurveyInput, Pair | Path | str | None]:
+    """Return the points with the set-up that holds for them, and the pair where it is not that."""
+    if isinstance(pair, Path | str) and Path(pair).suffix.lower() in BOOKS:
+        survey, pair = _with_setup_of(Path(pair), survey, options.given), None
+    setup = replace(survey.setup, **given, unit=unit or survey.unit or survey.setup.unit)
+    if not len(survey.points):
+        raise InputError(f"{survey.where}: there is no point. Fill in the measured points.")
+    if pair is None:
+        refuse_far_stations(setup.d1, setup.d2, setup.where, options=given)
+    return replace(survey, setup=setup), pair
+
+
+def _with_setup_of(path: Path, survey: SurveyInput, given: Collection[str]) -> SurveyInput:
     """Return measured points with the set-up, check and control points of a survey workbook."""
-    book = read_survey(path)
+    book = read_survey(path, ReadOptions(given=given))
     setup = book.setup
     if setup.pair_file:
         setup = replace(setup, pair_file=str((path.parent / setup.pair_file).resolve()))

@@ -33,18 +33,18 @@ from bifocal.survey.remarks import (
     unused_remarks,
 )
 from bifocal.survey.setup import SCALE_TOLERANCE, SurveySetup
-from bifocal.survey.sources import BOOKS, Source, given_pair, measured, with_setup_of
+from bifocal.survey.sources import Source, given_pair, measured, set_up
 from bifocal.survey.survey_media import UNBENT, SurveyMedia
 from bifocal.survey.tolerances import RULES, ToleranceRule, as_rule
 from bifocal.survey.units import (
     as_pixels,
     refuse_contradiction,
-    refuse_far_stations,
     refuse_millimetres,
     refuse_wrong_unit,
 )
 from bifocal.survey.workbook.content import SurveyContent
 from bifocal.survey.workbook.reader import ReadOptions, SurveyInput, column_map
+from bifocal.survey.workbook.setup_cells import OPTION_CELLS
 from photocore.arrays import FloatArray, as_floats
 from photocore.errors import InputError
 from photocore.tables.numbers import Decimal
@@ -206,19 +206,20 @@ def solve(
     given = _checked(**lengths, sigma_s=sigma_s, sigma_r_max=sigma_r_max)
     _checked(sigma_px=sigma_px, scale_tolerance=scale_tolerance)
     judged = tuple(as_rule(rule) for rule in rules) or RULES
-    by_hand = column_map(columns)
-    options = ReadOptions(columns=by_hand, sheet=sheet, decimal=decimal, visible_only=visible_only)
+    asked = {**given, "unit": unit, "pair": pair, "sigma_px": sigma_px, "model": model}
+    asked = {name: value for name, value in asked.items() if value is not None}
+    options = ReadOptions(
+        columns=column_map(columns), sheet=sheet, decimal=decimal, visible_only=visible_only,
+        given=[OPTION_CELLS.get(option, option) for option in asked],
+    )  # fmt: skip
     survey, path = measured(source, options, unit)
-    survey, pair = _with_setup(survey, pair, given, unit)
-    setup = survey.setup
-    if pair is None:
-        refuse_far_stations(setup.d1, setup.d2, setup.where, options=given)
+    survey, pair = set_up(survey, pair, given, unit, options)
     general, pair_path, pair_remarks = given_pair(survey, path, pair)
     if general is None:
         solved = _solve_ideal(survey, scale_tolerance, adjust=adjust_setup)
     else:
         solved = _solve_pair(general, survey, sigma_px, adjust=adjust_setup)
-    table = solved.table
+    table, setup = solved.table, survey.setup
     refuse_contradiction(solved.points, table, survey.where)
     unused = solved.points.unused
     known, control = survey.known.without(unused), survey.control.without(unused)
@@ -234,7 +235,6 @@ def solve(
         *opposite_signs_remark(table, known),
         *world_remarks,
     )
-    asked = {**given, "unit": unit, "pair": pair, "sigma_px": sigma_px, "model": model}
     return SolvedSurvey(
         language=survey.language,
         source=path,
@@ -256,7 +256,7 @@ def solve(
         media=_media(survey, pair, general),
         adjusted=adjust_setup,
         corrections=solved.corrections,
-        given={name: value for name, value in asked.items() if value is not None},
+        given=asked,
         rules=judged,
         remarks=tuple(dict.fromkeys(remarks)),
     )
@@ -414,18 +414,6 @@ def _sigma_from_misfits(
     return sigma, (remark,)
 
 
-def _with_setup(
-    survey: SurveyInput, pair: Pair | Path | str | None, given: Mapping[str, Any], unit: str | None
-) -> tuple[SurveyInput, Pair | Path | str | None]:
-    """Return the points with the set-up that holds for them, and the pair where it is not that."""
-    if isinstance(pair, Path | str) and Path(pair).suffix.lower() in BOOKS:
-        survey, pair = with_setup_of(Path(pair), survey), None
-    setup = replace(survey.setup, **given, unit=unit or survey.unit or survey.setup.unit)
-    if not len(survey.points):
-        raise InputError(f"{survey.where}: there is no point. Fill in the measured points.")
-    return replace(survey, setup=setup), pair
-
-
 def _solve_ideal(survey: SurveyInput, scale_tolerance: float, *, adjust: bool) -> _SolvedPoints:
     """Solve image coordinates or radial distances with the ideal pair of `Setup`."""
     points, setup = survey.points, survey.setup
@@ -438,7 +426,7 @@ def _solve_ideal(survey: SurveyInput, scale_tolerance: float, *, adjust: bool) -
         points = replace(points, xy1=points.pixels1, xy2=points.pixels2)
         setup = replace(setup, unit="px")
     pair = setup.pair()
-    remarks = [setup.check_scales(scale_tolerance)]
+    remarks = [*setup.remarks, setup.check_scales(scale_tolerance)]
     refuse_wrong_unit(setup, points, survey.where, said=survey.unit)
     if pair.exchanged:
         remarks.append(exchanged_remark(setup))

@@ -99,7 +99,7 @@ def read_shift_input(
     names += [Column(f"t_{i}") for i in range(1, MOST_LAYERS - 1)]
     names += [Column("z_0"), Column("X_0"), Column("Y_0")]
     errors: list[CellError] = []
-    values = read_named_values(book, names, sheet="Multimedia", errors=errors)
+    values = read_named_values(book, names, sheet="Multimedia", errors=errors, several=True)
     given = given or {}
     if errors := [error for error in errors if error.column not in given]:
         raise WorkbookError(errors)

@@ -19,7 +19,7 @@ from photocore.tables.numbers import (
     take_apart,
     unit_symbol,
 )
-from photocore.workbook.grid import CellDate, CellFault, NotCalculated, Value
+from photocore.workbook.grid import CellDate, CellFault, NamedNumber, NotCalculated, Value
 
 Complain = Callable[[int, str], None]
 
@@ -120,7 +120,9 @@ def texts(values: Sequence[Value | None], complain: Complain) -> list[str]:
     result = []
     for index, value in enumerate(values):
         text = ""
-        if isinstance(value, float):
+        if isinstance(value, NamedNumber):
+            text = value.shown
+        elif isinstance(value, float):
             text = str(int(value)) if value.is_integer() and abs(value) < 1e15 else repr(value)
         elif isinstance(value, str):
             text = value.strip()

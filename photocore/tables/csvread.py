@@ -16,7 +16,7 @@ import numpy as np
 
 from photocore.arrays import FloatArray
 from photocore.errors import CellError, InputError
-from photocore.tables.headings import Match, describe, find_columns
+from photocore.tables.headings import Match, describe, find_columns, is_summary
 from photocore.tables.model import Column
 from photocore.tables.numbers import ArrowTexts, Decimal, is_clear, plain_numbers
 from photocore.textfile import readable
@@ -245,7 +245,7 @@ def plain_rows(
         for key in others:
             texts[key] += fields[key][:]
         last += len(filled)
-    if last < match.first:
+    if last < match.first or is_summary({1: texts.get("id", [""])[-1]}, 1):
         return None
     for key in quick:
         elsewhere = set[str]().union(*(proven[other] for other in quick if other != key))

@@ -25,6 +25,19 @@ _FOREIGN = frozenset(
 _NO_LENGTHS = frozenset(("1", "–", "s", "‰"))
 _DROPPED = re.compile(r"[\s_.\-:/'\"`´]+")
 _PHOTO = re.compile(r"(?:image|photo|picture|foto|bild|immagine|aufnahme)\s*([12])$")
+#: Headings of point names that are believed where each name stands once.
+_OF_POINTS = re.compile(
+    "(id|n|nr|no|n°|num|numero|nome|codice)?"
+    "(punt[oi]|point|punkt|pto|pkt|vertice|vertex|target|label|bezeichnung|etichetta|sigla|ziel)"
+)
+_NUMBER = re.compile(r"[+-]?[\d.,]+")
+#: A name: a whole number, or neither number (with or without unit), time nor date.
+_NAME = re.compile(r"\d{1,9}|(?![+-]?[\d.,]+\s*(?:mm|cm|m|px|°)?\Z|\d+(?::|([-./])\d+\1)\d).{1,24}")
+#: What rows are called that hold no point.
+_SUMMARIES = re.compile(
+    "mean|average|avg|sum|total|min|max|std(ev|dev)?|rmse?|media|somma|totale|devst|scarto|summe|gesamt"
+    "|mittel(wert)?|durchschnitt|stabw|standardabweichung|(min|max)imum"
+)
 #: Rows of a sheet that are searched for headings.
 _SEARCHED = 400
 
@@ -49,6 +62,8 @@ class Match:
         How many columns matched, how many by their own key, and 1 for a single heading row.
     remarks : list of str
         Choices made that the user should know.
+    guessed : str
+        That of them which says which column was taken for the names by what it holds.
     """
 
     columns: dict[str, int]
@@ -60,6 +75,7 @@ class Match:
     doubles: dict[str, list[int]] = field(default_factory=dict)
     score: tuple[int, int, int] = (0, 0, 0)
     remarks: list[str] = field(default_factory=list)
+    guessed: str = ""
 
     def missing(self, columns: Sequence[Column]) -> list[str]:
         """Return the keys of required columns that were not found."""
@@ -142,9 +158,10 @@ def find_columns(
         for texts, header in _heading_texts(grid, row, span):
             match = _assign(wanted, texts, fixed, header, column_map or {})
             match.score = (*match.score[:2], int(header == row))
-            _take_nameless(grid, match, wanted)
             if match.score[0] > len(fixed) and (best is None or match.score > best.score):
                 best = match
+    if best is not None:
+        _take_names(grid, best, wanted, span or (1, 10**6))
     return best
 
 
@@ -298,20 +315,71 @@ def _assign(
     return match
 
 
-def _take_nameless(grid: CellGrid, match: Match, columns: Sequence[Column]) -> None:
-    """Take the column left of the others for the point names when only its heading is missing."""
+def _take_names(
+    grid: CellGrid, match: Match, columns: Sequence[Column], span: tuple[int, int]
+) -> None:
+    """Take for the point names what looks like them, where no heading says so.
+
+    That is the column left of the others if only its heading is missing; else one of short texts or
+    whole numbers, each once: one whose heading speaks of points, or the first of those that stand
+    without a gap left of the measurements.
+    """
     name = next((column for column in columns if column.kind == "text"), None)
     if name is None or name.key != "id" or name.key in match.columns or not match.columns:
         return
-    number = min(match.columns.values()) - 1
-    below = [row for row in grid.rows if match.header < row <= match.header + 50]
-    filled = sum(number in grid.rows[row] for row in below)
-    if number > 0 and filled > len(below) / 2 and number not in grid.rows[match.header]:
-        match.columns[name.key] = number
-        match.headings[name.key] = ""
-        match.remarks.append(
-            f"Column {column_letters(number)} has no heading; it is taken for the point names."
+    used, heads = match.columns.values(), grid.rows.get(match.header, {})
+    below = [row for row in sorted(grid.rows) if row >= match.first][:_SEARCHED]
+    number = min(used) - 1
+    filled = sum(number in grid.rows[row] for row in below if row <= match.header + 50)
+    count = sum(row <= match.header + 50 for row in below)
+    if number > 0 and filled > count / 2 and number not in heads:
+        remark = f"Column {column_letters(number)} has no heading; it is taken for the point names."
+    else:
+        kinds = {column.key: column.kind for column in columns}
+        measured = [n for key, n in match.columns.items() if kinds[key] in ("number", "integer")]
+        data = [grid.rows[row] for row in below if _is_measured(grid.rows[row], measured)]
+        edge = first = min(measured, default=0)
+        while any(edge - 1 in cells for cells in (heads, *data)):
+            edge -= 1
+        north = [n for n in heads if heads[n] == "N" and "E" in heads.values()]
+        named = [n for n in sorted(heads) if _OF_POINTS.match(bare(str(heads[n])))]
+        places = [n for n in (*named, *range(edge, first)) if span[0] <= n <= span[1]]
+        free = (n for n in places if n not in (*used, *north))
+        number = next((n for n in free if _are_names(heads.get(n, ""), n, data)), 0)
+        remark = match.guessed = (
+            f'"{heads.get(number, "")}" (column {column_letters(number)}) is taken for the point '
+            "names."
         )
+    if number:
+        match.columns[name.key] = number
+        match.headings[name.key] = str(heads.get(number, ""))
+        match.remarks.append(remark)
+        # "N." of points beside "N" of the north.
+        others = {key: [n for n in own if n != number] for key, own in match.doubles.items()}
+        match.doubles = {key: own for key, own in others.items() if len(own) > 1}
+
+
+def _is_measured(cells: Mapping[int, Value], measured: Sequence[int]) -> bool:
+    """Whether a row holds a number in half of the columns, and is no mean or sum of others."""
+    numbers = [n for n in measured if _NUMBER.match(str(cells.get(n, "")).strip())]
+    return 2 * len(numbers) >= len(measured) > 0 and not is_summary(cells, min(measured))
+
+
+def _are_names(heading: Value, number: int, rows: Sequence[Mapping[int, Value]]) -> bool:
+    """Whether a column holds a short text or a whole number in each row, none of them twice."""
+    text = str(heading)
+    if unit_of(text) or unknown_unit(text) or re.fullmatch("[^np#]", bare(text)):
+        return False
+    values = (cells.get(number) for cells in rows)
+    texts = [f"{v:.15g}" if isinstance(v, float) else v for v in values]
+    plain = sum(isinstance(v, str) and _NAME.fullmatch(v.strip()) is not None for v in texts)
+    return 0 < len(rows) == plain == len(set(texts))
+
+
+def is_summary(cells: Mapping[int, Value], first: int) -> bool:
+    """Whether a row says left of a column, or in it, that it is the mean, sum or like of others."""
+    texts = (value for number, value in cells.items() if number <= first)
+    return any(isinstance(text, str) and _SUMMARIES.fullmatch(bare(text)) for text in texts)
 
 
 def _forms(variants: Sequence[str]) -> list[str]:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import re
+from collections.abc import Collection, Iterable, Mapping, Sequence
 
 import numpy as np
 
@@ -13,10 +14,12 @@ from photocore.tables.headings import bare, unit_of, unknown_unit
 from photocore.tables.model import Column, NamedValues
 from photocore.tables.numbers import Decimal, converted, take_apart
 from photocore.tables.read import Source, open_tables
-from photocore.workbook.grid import CellGrid, SheetFile, Value, cell_name
+from photocore.workbook.grid import CellGrid, NotCalculated, SheetFile, Value, cell_name
 
 #: Rows of a sheet in which labels of single values are looked for.
 _LABELLED = 400
+#: What the labels of a sheet must weigh together to be believed where several are asked for.
+_BELIEVED = 3
 
 
 def read_named_values(
@@ -26,6 +29,8 @@ def read_named_values(
     sheet: str | None = None,
     decimal: Decimal | None = None,
     errors: list[CellError] | None = None,
+    several: bool = False,
+    given: Collection[str] = (),
 ) -> NamedValues:
     """Read single values: by defined name, else the value to the right of a label.
 
@@ -39,6 +44,11 @@ def read_named_values(
         Sheet to prefer when looking for labels, e.g. ``"Setup"``.
     decimal, errors
         As for `read_table`.
+    several : bool
+        Believe labels on ``sheet``, and elsewhere only where several of them stand together with
+        numbers; the remarks then say which cells were read, and which labels were not believed.
+    given : collection of str
+        Keys that options replace: no remark is on them.
 
     Raises
     ------
@@ -52,7 +62,15 @@ def read_named_values(
         book = book.as_sheets()
     complaints = errors if errors is not None else []
     titles = sorted(book.titles, key=lambda title: bare(title) != bare(sheet or ""))
+    labels: dict[str, dict[str, str]] = {}
+    if several:
+        labels = {title: _found(book, title, names) for title in titles}
+        weights = {title: _weight(book, title, labels[title].values()) for title in titles}
+        weights[titles[0]] += _BELIEVED * (len(titles) == 1 or bare(titles[0]) == bare(sheet or ""))
+        enough = [title for title in titles if weights[title] >= _BELIEVED]
+        titles = sorted(enough, key=weights.__getitem__, reverse=True)
     result = NamedValues(file=book.label, values={}, places={})
+    said = []
     for name in names:
         place, label = _by_defined_name(book, name), ""
         if place is None:
@@ -67,8 +85,20 @@ def read_named_values(
             complaints.append(result.error(key, message))
 
         result.values[name.key] = _single(name, value, label, decimal, complain)
+        if label and several and result.has(name.key) and name.key not in given:
+            text = str(result.values[name.key]).removesuffix(".0")
+            said.append(f"{name.key} = {text} ({'!'.join(result.places[name.key])})")
         if place and name.kind == "number" and isinstance(value, str) and result.has(name.key):
             result.text_cells.append(f"{place[0]}!{result.cell(name.key)}")
+    if said:
+        result.remarks.append(f"Read beside labels: {', '.join(said)}.")
+    for title in sorted({*labels} - {*titles}):
+        left = [f'"{v}"' for k, v in labels[title].items() if k not in {*given, *result.places}]
+        if left:
+            result.remarks.append(
+                f'Not read: {", ".join(left)} on the sheet "{title}", which does not look like a '
+                f'set-up. If it is one, call it "{sheet}".'
+            )
     if errors is None and complaints:
         raise WorkbookError(complaints)
     faulty = {error.column for error in complaints}
@@ -127,6 +157,33 @@ def _by_label(
     return None, ""
 
 
+def _found(book: SheetFile, title: str, names: Sequence[Column]) -> dict[str, str]:
+    """Return the labels on a sheet that have a number, by key."""
+    labels = {}
+    for name in names:
+        place, label = _by_label(book, [title], name) if name.kind == "number" else (None, "")
+        value = book.grid(title).rows[place[1]].get(place[2]) if place else None
+        if _is_number(value) or isinstance(value, NotCalculated):
+            labels[name.key] = label
+    return labels
+
+
+def _weight(book: SheetFile, title: str, labels: Iterable[str]) -> int:
+    """Return how far the labels of a sheet can be believed to be those asked for.
+
+    D1 and D2 may be doors, columns or bolts, d1 and d2 less likely, and d_1 or "pixel size" hardly;
+    nothing counts that goes on with a third.
+    """
+    texts, weight = _labels(book.grid(title)), 0
+    for label in labels:
+        plain = bare(label)
+        if "_" in label or (len(plain) > 8 and not plain[-1].isdigit()):
+            weight += 3
+        elif f"{plain[:-1]}3" not in texts:
+            weight += 1 if re.fullmatch(r"[A-Z]\d", label.strip()) else 2
+    return weight
+
+
 def _labels(grid: CellGrid) -> dict[str, tuple[int, int]]:
     """Return the place of each text near the top of a sheet, the first one of its kind."""
     if grid.labels is None:
@@ -134,9 +191,15 @@ def _labels(grid: CellGrid) -> dict[str, tuple[int, int]]:
         grid.labels = {}
         for row in sorted(grid.rows)[:_LABELLED]:
             for column, text in sorted(grid.rows[row].items()):
-                if isinstance(text, str) and row != headings:
+                named = [_is_number(grid.rows[row].get(column + step)) for step in (1, 2, 3)]
+                # A text before three numbers is the name of a point.
+                if isinstance(text, str) and row != headings and not all(named):
                     grid.labels.setdefault(bare(text), (row, column))
     return grid.labels
+
+
+def _is_number(value: Value | None) -> bool:
+    return isinstance(value, float) or (isinstance(value, str) and take_apart(value) is not None)
 
 
 def _value_column(grid: CellGrid) -> tuple[int, int]:

@@ -151,6 +151,11 @@ def read_table(
         table = _new_table(book, place, rows)
         _refuse_merged(table, place.grid, complaints)
         fill(table, columns, _cells(place, rows), decimal, complaints)
+    guessed = place.match.guessed
+    if guessed in table.remarks and ("" in table.texts("id") or table.repeated("id")):
+        table.values["id"], table.present = [""] * len(table), table.present - {"id"}
+        del table.columns["id"], table.headings["id"]
+        table.remarks.remove(guessed)
     if errors is None and complaints:
         raise WorkbookError(complaints)
     return table
@@ -254,7 +259,7 @@ def _reach_below(grid: CellGrid, match: Match, bottom: int) -> None:
 
 def _count(cells: Mapping[int, Value], columns: Collection[int]) -> int:
     """Return how many of the columns hold a number in a row."""
-    return sum(type(cells.get(column)) is float for column in columns)
+    return sum(isinstance(cells.get(column), float) for column in columns)
 
 
 def _in_sheet(

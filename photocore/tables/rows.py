@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
-from photocore.tables.headings import Match, bare
+from photocore.tables.headings import Match, bare, is_summary
 from photocore.tables.model import Column
 from photocore.workbook.grid import CellGrid, Value
 
@@ -124,6 +124,15 @@ def data_rows(
         data.rows.append(row)
         data.blocks.append(sorter.block)
     data.remarks += sorter.remarks()
+    named = match.columns.get("id", min(match.columns.values()))
+    after = 0
+    for index in reversed(range(len(data.rows))):
+        row = data.rows[index]
+        if after == row + 1 or len(data.rows) == 1 or not is_summary(grid.rows[row], named):
+            after = row
+            continue
+        del data.rows[index], data.blocks[index]
+        data.remarks.append(f"Row {row} is left out: a mean, a sum or the like is no point.")
     if hidden:
         what = "were left out" if visible_only else "are used too; --visible-only leaves them out"
         data.remarks.append(f"{hidden} hidden or filtered rows {what}.")

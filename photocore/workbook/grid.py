@@ -30,6 +30,19 @@ class CellDate:
         return self.when.strftime("%Y-%m-%d" if midnight else "%Y-%m-%d %H:%M:%S")
 
 
+class NamedNumber(float):
+    """A whole number that a spreadsheet shows with leading zeros or letters: 7 as ``P007``."""
+
+    shown: str = ""
+
+
+def named_number(number: float, shown: str) -> NamedNumber:
+    """Return a number with the text that is shown for it."""
+    named = NamedNumber(number)
+    named.shown = shown
+    return named
+
+
 @dataclass(frozen=True, slots=True)
 class CellFault:
     """An error value such as ``#DIV/0!``."""

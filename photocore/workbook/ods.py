@@ -16,6 +16,7 @@ from photocore.workbook.grid import (
     CellGrid,
     SheetFile,
     Value,
+    named_number,
     plain_title,
     split_cell,
 )
@@ -28,6 +29,8 @@ _DRAWINGS = tuple(
     f"{{urn:oasis:names:tc:opendocument:xmlns:{kind}:1.0}}" for kind in ("drawing", "dr3d")
 )
 _BLANKS = {"tab": "\t", "line-break": "\n"}
+#: Whole numbers with leading zeros, or with letters before them.
+_SHOWN = re.compile(r"0\d+|[^\W\d_]+\d+")
 _FAULTS = re.compile(r"(#[A-Z0-9/]+[!?]?|Err:\d+)")
 
 
@@ -175,7 +178,8 @@ def _value(attributes: dict[str, str], cell: Element) -> Value | None:
     if "formula" in attributes and _FAULTS.fullmatch(text.strip()):
         return CellFault(text.strip())
     if kind in ("float", "percentage", "currency"):
-        return float(attributes["value"]) if "value" in attributes else None
+        number = float(attributes["value"]) if "value" in attributes else None
+        return named_number(number, text) if number and _SHOWN.fullmatch(text) else number
     if kind == "boolean":
         return attributes.get("boolean-value") == "true"
     if kind == "date":

@@ -24,6 +24,7 @@ from photocore.workbook.grid import (
     Value,
     column_number,
     date_of_serial,
+    named_number,
     plain_title,
     split_area,
     split_cell,
@@ -55,6 +56,7 @@ _BUILT_IN_DATES = {
     **dict.fromkeys([18, 19, 20, 21, 45, 46, 47], "h:mm"),
 }
 _ESCAPED = re.compile(r"_x([0-9A-Fa-f]{4})_")
+_NAMED = re.compile(r'((?:"[^"]*"|\\.)*)(0+)(?<!^0)').fullmatch
 _CONTENT_TYPES = "[Content_Types].xml"
 _YES = ("1", "true", "on")
 _HIDDEN = re.compile(rb'\shidden="(?:1|true|on)"')
@@ -250,7 +252,7 @@ def _date_styles(path: Path, package: zipfile.ZipFile, book: Workbook) -> dict[s
                 cells += [
                     int(own.get("numFmtId", "0")) for own in element if local(own.tag) == "xf"
                 ]
-    dates = {number: code for number, code in codes.items() if is_date_format(code)}
+    dates = {n: code for n, code in codes.items() if is_date_format(code) or _NAMED(code)}
     return {str(index): dates[number] for index, number in enumerate(cells) if number in dates}
 
 
@@ -457,7 +459,10 @@ class _SheetReader:
         return self.strings[index] or None
 
     def date(self, number: float, style: str) -> Value:
-        """Return a date, or the plain number where no calendar reaches."""
+        """Return a date, a number shown as ``007``, or the number where no calendar reaches."""
+        if name := _NAMED(style):
+            shown = re.sub(r'["\\]', "", name[1]) + f"{number:0{len(name[2])}.0f}"
+            return named_number(number, shown) if number >= 0 and number % 1 == 0 else number
         try:
             return CellDate(date_of_serial(number, since_1904=self.since_1904), style)
         except (OverflowError, ValueError):

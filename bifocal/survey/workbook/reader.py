@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -131,12 +131,15 @@ class ReadOptions:
         Decimal separator of numbers typed as text.
     visible_only : bool
         Leave hidden rows out.
+    given : collection of str
+        Cells of the set-up that options replace, by their names; ``pair`` replaces them all.
     """
 
     columns: Mapping[str, str] = field(default_factory=dict)
     sheet: str | None = None
     decimal: Decimal | None = None
     visible_only: bool = False
+    given: Collection[str] = ()
 
 
 def where_of(table: Table) -> str:
@@ -194,7 +197,7 @@ def read_survey(path: Path | str, options: ReadOptions | None = None) -> SurveyI
     _require_coordinates(table, book, path)
     points, unit = _observations(table, errors)
     sheets = book if isinstance(book, SheetFile) else None
-    setup = read_setup(Path(path), sheets, options.decimal, errors)
+    setup = read_setup(Path(path), sheets, options.decimal, errors, options.given)
     check = read_known(book, "Check", ("X_ref", "Y_ref", "Z_ref"), errors, options.decimal)
     control = read_known(book, "Georeference", ("E", "N", "H"), errors, options.decimal)
     parts = (table, setup, check, control)
@@ -208,14 +211,14 @@ def read_survey(path: Path | str, options: ReadOptions | None = None) -> SurveyI
         is_ours = any(area.name == "tblPoints" for area in sheets.tables)
     if errors:
         raise WorkbookError(errors)
-    remarks = [remark for part in parts for remark in part.remarks]
+    remarks = [remark for part in (table, check, control) for remark in part.remarks]
     remarks += _typed_as_text([cell for part in parts for cell in part.text_cells])
     return SurveyInput(
         points=points,
         setup=setup,
         unit=unit,
-        known=with_measured(check.points, points),
-        control=control.points,
+        known=with_measured(check.points.called_as(points.ids), points),
+        control=control.points.called_as(points.ids),
         model=model,
         language=language,
         is_ours=is_ours,
@@ -314,6 +317,13 @@ def _observations(table: Table, errors: list[CellError]) -> tuple[PointObservati
     if "id" not in table.present:
         ids = [str(number) for number in range(1, len(table) + 1)]
     ids = [name or "" for name in ids]
+    said = bare(table.headings.get("theta", "")) in ("angle", "angolo", "winkel")
+    if said and len(table) and "s1" in table.present and "x1" not in table.present:
+        table.remarks.append(
+            f'{table.cell(0, "theta")}: "{table.headings["theta"]}" is read as theta, clockwise '
+            "from up (+y). Of angles that run counter-clockwise from +x, as in CAD, X and Y would "
+            "come out exchanged: call the column theta and fill in 90 deg minus the angle."
+        )
     errors += table.repeated("id")
     refuse_absurd(table, (*_XY, *_POLAR, *_PIXELS, "r_measured"), errors)
     use = table.numbers("use")

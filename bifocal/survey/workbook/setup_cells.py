@@ -53,6 +53,8 @@ PAIR_GROUPS: Groups = (
     *MATRICES,
     (*_CHECKS[:2], "m_1", "b_lever", "e_x", "e_y", "sigma_s"),
 )
+#: The cells of options that are not called as these.
+OPTION_CELLS = {"d1": "d_1", "d2": "d_2", "c1": "c_1", "c2": "c_2", "unit": "input_unit"}
 #: Number formats.
 FORMS: Mapping[str, str] = {
     **dict.fromkeys(("d_1", "d_2", "delta_d", "b_lever"), "0.000"),

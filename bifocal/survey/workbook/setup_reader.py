@@ -50,8 +50,9 @@ _AGREE = 0.0015
 
 
 def read_setup(
-    path: Path, book: SheetFile | None, decimal: Decimal | None, errors: list[CellError]
-) -> SurveySetup:
+    path: Path, book: SheetFile | None, decimal: Decimal | None, errors: list[CellError],
+    given: Collection[str],
+) -> SurveySetup:  # fmt: skip
     """Return the values of `Setup`.
 
     Parameters
@@ -64,6 +65,8 @@ def read_setup(
         Decimal separator of numbers typed as text.
     errors : list
         Takes the complaints.
+    given : collection of str
+        Cells that options replace, by their names; ``pair`` replaces them all.
     """
     if book is None:
         return SurveySetup(where=path.name)
@@ -77,16 +80,22 @@ def read_setup(
     else:
         # Cells of media are found by name only: no workbook of a user's own has them otherwise.
         columns = [c for c in columns if c.key not in media_names(MOST)]
-    values = read_named_values(book, columns, sheet="Setup", decimal=decimal, errors=complaints)
+    values = read_named_values(
+        book, columns, sheet="Setup", decimal=decimal, errors=complaints, several=True, given=given
+    )
     where = f"{book.label} › Setup" if "Setup" in book.titles else book.label
     formulas = _formulas(path, values)
     defaults = {key for key in ("sigma_s", "sigma_r_max") if key in formulas}
     # Cells with the template's own formula are defaults, calculated or not.
-    errors += [e for e in complaints if e.column not in formulas]
+    told = [e for e in complaints if e.column not in formulas]
     number = {key: _number(values, key) for key in _NUMBERS if key not in defaults}
-    _check_positive(values, number, errors)
-    media = _media(book, values, errors)
-    d1 = _distance(values, number, "d_1" in formulas, errors)
+    _check_positive(values, number, told)
+    media = _media(book, values, told)
+    d1 = _distance(values, number, "d_1" in formulas, told)
+    unit = _unit(values, told)
+    # What options replace may hold anything, as all beside another pair that is not our workbook.
+    is_idle = "pair" in given and "d_1" not in book.names
+    errors += [] if is_idle else [error for error in told if error.column not in given]
     matrices, nadirs = _general(values)
     limits = FlagLimits()
     return SurveySetup(
@@ -103,7 +112,7 @@ def read_setup(
         k_off=number["k_off"] or limits.off_radial,
         k_plane=number["k_plane"] or limits.on_plane,
         sensor=_place(number["sensor_w"], number["sensor_h"]),
-        unit=_unit(values, errors),
+        unit=unit,
         pair_file=_text(values, "pair_file"),
         photo1=_text(values, "photo_1").strip(),
         photo2=_text(values, "photo_2").strip(),
