@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import tomllib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from difflib import get_close_matches
@@ -12,7 +11,7 @@ from typing import Any
 
 from bifocal.campaigns.pair_job import FILES, JOINT_OPTIONS, PRODUCTS, PairJob, tables_of
 from photocore.errors import InputError
-from photocore.textfile import file_name, read_text
+from photocore.textfile import file_name, read_toml
 from photocore.workbook.words import LANGUAGES
 
 FORMAT = "bifocal-survey/1"
@@ -243,11 +242,7 @@ def _faults_of_whole(jobs: Sequence[PairJob], whole: Mapping[str, Any]) -> list[
 
 
 def _parsed(path: Path) -> dict[str, Any]:
-    text = read_text(path, "survey file", form=" (TOML)")
-    try:
-        data = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise InputError(f"{path}: is not valid TOML: {error}.") from None
+    data = read_toml(path, "survey file")
     if data.get("format", FORMAT) != FORMAT:
         raise InputError(
             f"{path}: format {data['format']!r} is not known; this program reads {FORMAT}."
@@ -299,6 +294,8 @@ def _job(
         faults.append(f"{where}: far and near must name its two photos.")
         return None
     name = str(entry.get("name") or f"pair {number}")
+    if not name.strip() or not name.isprintable():
+        faults.append(f"{where}: name = {name!r}: expected a name that can be read.")
     far, near = (base / str(photo) for photo in photos)
     products = own["products"].get("products") or common["products"].get("products")
     return PairJob(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -46,7 +45,7 @@ from photocore.distortion import NAMES, Brown, Convention
 from photocore.errors import GeometryError, InputError, located
 from photocore.fisheye import Fisheye
 from photocore.output import all_or_none, atomic_path, check_all_writable
-from photocore.textfile import check_name, read_text
+from photocore.textfile import check_name, read_toml
 
 FORMAT = "multimedia-project/1"
 #: Each kind of ray-traced surface and its keys.
@@ -176,16 +175,7 @@ def _toml(path: Path) -> dict[str, Any]:
             f"{path}: is a folder. Give the project file in it; for an OpenPTV experiment make "
             "one with `multimedia openptv`."
         )
-    text = read_text(path, "project file", form=" (TOML)")
-    try:
-        return tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        hint = "" if path.suffix.lower() == ".toml" else " A project is a .toml file."
-        raise InputError(f"{path}: is not valid TOML: {error}.{hint}") from None
-    except ValueError:  # Python reads no whole number of more than 4300 digits
-        raise InputError(f"{path}: holds a whole number of thousands of digits.") from None
-    except RecursionError:
-        raise InputError(f"{path}: nested too deeply for a project file.") from None
+    return read_toml(path, "project file")
 
 
 def _project(data: dict[str, Any], folder: Path) -> Project:
