@@ -22,19 +22,23 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, BinaryIO
 
+import numpy as np
+
 from photocore.errors import InputError
 from photocore.output import atomic_path, check_writable, free_path
 from photocore.provenance import provenance
-from photocore.workbook.cells import CellValue, NewColumn, NewRows, escape
+from photocore.workbook.cells import CellValue, NewColumn, NewRows, escape, name_cell
 from photocore.workbook.changes import SheetChanges
 from photocore.workbook.formulas import ModelCell, model_cells
 from photocore.workbook.grid import split_cell
-from photocore.workbook.package import read_part, rewrite_package
+from photocore.workbook.package import read_part
+from photocore.workbook.rewrite import rewrite_package
 from photocore.workbook.splice import splice_sheet
 from photocore.workbook.xlsx import read_directory
 
 if TYPE_CHECKING:
     from openpyxl import Workbook
+    from openpyxl.worksheet.worksheet import Worksheet
 
 #: Date of every part, so that equal input makes equal files; ZIP knows nothing before 1980.
 PART_TIME = (1980, 1, 1, 0, 0, 0)
@@ -239,6 +243,21 @@ def save_book(book: Workbook, path: Path) -> None:
     with zipfile.ZipFile(package) as written:
         parts = {_CORE: _stated_properties(written.read(_CORE))}
     rewrite_package(package, path, parts, date=PART_TIME)
+
+
+def plain_cell(sheet: Worksheet, value: object) -> object:
+    """Return what openpyxl appends to a sheet: blank for NaN, a name as `name_cell` has it."""
+    from openpyxl.cell import WriteOnlyCell
+
+    if isinstance(value, np.generic):
+        value = value.item()
+    if isinstance(value, str):
+        value = name_cell(without_control(value))
+    if isinstance(value, str):
+        cell = WriteOnlyCell(sheet, value)
+        cell.data_type = "s"  # a name that begins with "=" stays a name
+        return cell
+    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def check_new_workbook(

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import gc
 import lzma
-import os
 import zipfile
 import zlib
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import lru_cache
 from pathlib import Path
-from typing import Any, BinaryIO, Literal
+from typing import Any, Literal
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 from xml.parsers import expat
@@ -25,12 +24,7 @@ SMALL = 16 * 2**20
 LARGEST_PART = 256 * 2**20
 LARGEST_TOTAL = 512 * 2**20
 MOST_MEMBERS = 10_000
-#: Date of parts that are added, so that equal input makes equal files.
-NEW_PART_TIME = (1980, 1, 1, 0, 0, 0)
 _RATIO_MATTERS_FROM = 2**20
-#: Levels of zlib. On 225 MB of sheets level 2 takes a third of the time of level 6 and a
-#: quarter more space.
-_FAST, _THOROUGH = 2, 6
 _OLE = b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1"
 #: Small, since the elements of a chunk are made before the first is looked at.
 _CHUNK = 2**15
@@ -139,48 +133,6 @@ def read_part(path: Path, package: zipfile.ZipFile, name: str) -> bytes:
     """
     with _unpacking(path, name):
         return package.read(name)
-
-
-def rewrite_package(
-    source: Path | BinaryIO,
-    target: Path,
-    parts: Mapping[str, bytes | None],
-    *,
-    date: tuple[int, int, int, int, int, int] | None = None,
-) -> None:
-    """Copy a zip package with parts replaced, left out (None), or added at its end.
-
-    Order, methods and (without one) dates stay.
-    """
-    named = source if isinstance(source, Path) else target
-    with zipfile.ZipFile(source) as old, target.open("wb") as file:
-        with zipfile.ZipFile(file, "w") as new:
-            new.comment = old.comment
-            listed = old.infolist()
-            for info in listed:
-                data = parts.get(info.filename)
-                if data is None and info.filename in parts:
-                    continue
-                copy = zipfile.ZipInfo(info.filename, date or info.date_time)
-                stored = info.compress_type == zipfile.ZIP_STORED
-                copy.compress_type = zipfile.ZIP_STORED if stored else zipfile.ZIP_DEFLATED
-                copy.external_attr, copy.create_system = info.external_attr, info.create_system
-                data = read_part(named, old, info.filename) if data is None else data
-                new.writestr(copy, data, compresslevel=_level(data))
-            known = {info.filename for info in listed}
-            for name in [name for name in parts if name not in known]:
-                added = zipfile.ZipInfo(name, date or NEW_PART_TIME)
-                added.compress_type = zipfile.ZIP_DEFLATED
-                added.external_attr = 0o600 << 16
-                data = parts[name] or b""
-                new.writestr(added, data, compresslevel=_level(data))
-        file.flush()
-        os.fsync(file.fileno())
-
-
-def _level(data: bytes) -> int:
-    """Return how hard to compress a part: sheets of many MB take most of the time of a change."""
-    return _FAST if len(data) > SMALL else _THOROUGH
 
 
 def xml_events(
