@@ -27,7 +27,7 @@ from bifocal.survey.workbook.columns import (
 from bifocal.survey.workbook.media_formulas import setup_values
 from bifocal.survey.workbook.setup_cells import MATRICES, NADIRS, PHOTOS, setup_checks
 from photocore.arrays import BoolArray, FloatArray
-from photocore.workbook.cells import CellValue
+from photocore.workbook.cells import CellValue, name_cell
 from photocore.workbook.live_columns import LiveColumn
 
 #: Rows of the tables of an empty template.
@@ -203,17 +203,6 @@ class SurveyContent:
     def control_rows(self) -> int:
         """Rows of `Georeference`."""
         return max(CONTROL_ROWS, len(self.control) + 3)
-
-
-def name_cell(name: str) -> CellValue:
-    """Return a point's name as a cell: plain whole numbers as numbers, all else as text.
-
-    Examples
-    --------
-    >>> name_cell("7"), name_cell("007"), name_cell("=1+1")
-    (7, '007', '=1+1')
-    """
-    return int(name) if name.isdecimal() and len(name) < 10 and str(int(name)) == name else name
 
 
 def inputs(values: FloatArray) -> list[CellValue]:
