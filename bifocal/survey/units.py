@@ -53,7 +53,7 @@ def refuse_wrong_unit(
     place = "the headings" if said else "Setup (input_unit)"
     typed = np.hstack([points.xy1, points.xy2])[cartesian]
     if setup.unit == "mm":
-        limit = LARGEST_MM if setup.c1 is None else WIDEST * max(setup.c1, setup.c2 or 0.0)
+        limit = LARGEST_MM if setup.c1 is None else WIDEST * max(c or 0.0 for c in setup.c_used)
         radial = points.polar[points.use & ~points.is_cartesian][:, :2]
         for values, what, mend in (
             (

@@ -20,7 +20,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, BinaryIO
+from typing import TYPE_CHECKING, Any, BinaryIO
 
 import numpy as np
 
@@ -38,7 +38,6 @@ from photocore.workbook.xlsx import read_directory
 
 if TYPE_CHECKING:
     from openpyxl import Workbook
-    from openpyxl.worksheet.worksheet import Worksheet
 
 #: Date of every part, so that equal input makes equal files; ZIP knows nothing before 1980.
 PART_TIME = (1980, 1, 1, 0, 0, 0)
@@ -245,19 +244,17 @@ def save_book(book: Workbook, path: Path) -> None:
     rewrite_package(package, path, parts, date=PART_TIME)
 
 
-def plain_cell(sheet: Worksheet, value: object) -> object:
+def plain_cell(sheet: Any, value: object) -> object:
     """Return what openpyxl appends to a sheet: blank for NaN, a name as `name_cell` has it."""
     from openpyxl.cell import WriteOnlyCell
 
-    if isinstance(value, np.generic):
-        value = value.item()
     if isinstance(value, str):
         value = name_cell(without_control(value))
     if isinstance(value, str):
         cell = WriteOnlyCell(sheet, value)
         cell.data_type = "s"  # a name that begins with "=" stays a name
         return cell
-    return None if isinstance(value, float) and not math.isfinite(value) else value
+    return None if isinstance(value, float | np.floating) and not np.isfinite(value) else value
 
 
 def check_new_workbook(

@@ -169,17 +169,19 @@ def read_directory(path: Path, package: zipfile.ZipFile) -> Workbook:
 
 
 def read_relations(path: Path, package: zipfile.ZipFile, part: str) -> dict[str, tuple[str, str]]:
-    """Return id -> (kind, target part) of a part's relations; external targets are left out."""
+    """Return id -> (kind, target part) of a part's relations; external targets are empty."""
     folder, name = posixpath.split(part)
     rels = posixpath.join(folder, "_rels", f"{name}.rels")
     relations: dict[str, tuple[str, str]] = {}
     if rels in package.namelist():
         for element in xml_root(path, package, rels).iter():
-            if local(element.tag) == "Relationship" and element.get("TargetMode") != "External":
+            if local(element.tag) == "Relationship":
                 # An absolute target replaces the folder.
                 whole = posixpath.join("/", folder, element.get("Target", ""))
-                kind = element.get("Type", "").rpartition("/")[2]
-                relations[element.get("Id", "")] = kind, posixpath.normpath(whole).lstrip("/")
+                inside = element.get("TargetMode") != "External"
+                kind = element.get("Type", "").rpartition("/")[2] if inside else ""
+                target = posixpath.normpath(whole).lstrip("/") if inside else ""
+                relations[element.get("Id", "")] = kind, target
     return relations
 
 
