@@ -14,8 +14,7 @@ import openpyxl
 import pytest
 
 from photocore.workbook.changes import SheetChanges
-from photocore.workbook.package import open_package, read_part
-from photocore.workbook.rewrite import rewrite_package
+from photocore.workbook.package import open_package, read_part, rewrite_package
 from photocore.workbook.splice import splice_sheet
 from photocore.workbook.xlsx import read_directory
 

@@ -22,8 +22,7 @@ from photocore.workbook.changes import SheetChanges, Spliced, replaced_outside_c
 from photocore.workbook.graft import Graft
 from photocore.workbook.grid import CellGrid, SheetFile, TableArea, cell_name
 from photocore.workbook.newbook import check_new_workbook, new_workbook
-from photocore.workbook.package import check_header, open_package, read_part
-from photocore.workbook.rewrite import rewrite_package
+from photocore.workbook.package import check_header, open_package, read_part, rewrite_package
 from photocore.workbook.splice import splice_sheet
 from photocore.workbook.styles import StyleSheet
 from photocore.workbook.xlsx import (

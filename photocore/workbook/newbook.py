@@ -31,8 +31,7 @@ from photocore.workbook.cells import CellValue, NewColumn, NewRows, escape, name
 from photocore.workbook.changes import SheetChanges
 from photocore.workbook.formulas import ModelCell, model_cells
 from photocore.workbook.grid import split_cell
-from photocore.workbook.package import read_part
-from photocore.workbook.rewrite import rewrite_package
+from photocore.workbook.package import read_part, rewrite_package
 from photocore.workbook.splice import splice_sheet
 from photocore.workbook.xlsx import read_directory
 

@@ -30,7 +30,7 @@ def calculated_names(media: int, *, is_pair: bool) -> tuple[str, ...]:
     return (*_used(media), *both, "r_top", *rays)
 
 
-def enlarged(image: int | str) -> str:
+def larger(image: int | str) -> str:
     """Return the formula of how much larger a print is than its sensor; blank is 1."""
     return f"IF(COUNT(enlargement_{image})=1,enlargement_{image},1)"
 
@@ -49,9 +49,7 @@ def setup_formulas(media: int, *, is_pair: bool) -> dict[str, str]:
     for image in "12":
         glass = "".join(f"+N(thick_{n})*n_used_1/n_used_{n}" for n in range(2, media))
         seen = f"N(z0_{image}){glass}+behind_{image}*n_used_1/n_used_{media}"
-        lens = (
-            f'IF(COUNT(c_1,c_2)=2,c_{image}*{enlarged(image)},IF(COUNT(d_{image})=1,d_{image},""))'
-        )
+        lens = f'IF(COUNT(c_1,c_2)=2,c_{image}*{larger(image)},IF(COUNT(d_{image})=1,d_{image},""))'
         formulas |= {
             f"behind_{image}": f'IF(COUNT(d_{image})=1,d_{image}-N(z0_{image}){inner},"")',
             f"seen_{image}": f'IF(COUNT(d_{image})=1,{seen},"")',

@@ -20,7 +20,6 @@ from bifocal.survey.workbook.precision_lines import precision_values
 from bifocal.survey.workbook.reader import TO_DEGREES, TO_MM, SurveyInput
 from bifocal.survey.workbook.setup_cells import SHOWN_ONLY
 from bifocal.survey.workbook.setup_update import (
-    CELLS,
     add_sheets,
     write_corrections,
     write_options,
@@ -114,8 +113,7 @@ def add_results(
 
 def _links(editor: WorkbookEditor, survey: SurveyInput, given: Mapping[str, Any]) -> dict[str, str]:
     """Return where values of `Setup` stand in sheets of the user's own, to refer to them."""
-    options = {"d1": "d_1", "d2": "d_2", **CELLS}
-    replaced = {options.get(option, option) for option in given}
+    replaced = {re.sub("([12])$", r"_\1", option) for option in given}
     links = {}
     for key, (sheet, cell) in survey.setup.places.items():
         row, column = split_cell(cell)

@@ -18,7 +18,7 @@ from bifocal.survey.workbook.columns import (
     verdict_columns,
 )
 from bifocal.survey.workbook.content import SurveyContent, check_cells, setup_cells
-from bifocal.survey.workbook.media_formulas import enlarged, planned
+from bifocal.survey.workbook.media_formulas import larger, planned
 from bifocal.survey.workbook.words import word
 from photocore.workbook.cells import CellValue
 from photocore.workbook.grid import column_letters
@@ -111,7 +111,7 @@ def planning(builder: BookBuilder, content: SurveyContent) -> None:
     def live(formula: str) -> str:
         formula = planned(formula, content.media_cells, is_pair=content.is_pair)
         frame = "(sensor_w^2+sensor_h^2)"
-        return formula if content.is_pair else formula.replace(frame, f"({frame}*{enlarged(1)}^2)")
+        return formula if content.is_pair else formula.replace(frame, f"({frame}*{larger(1)}^2)")
 
     sizes = content.sensor or (math.nan, math.nan)
     sheet.word("A6", "footprint")

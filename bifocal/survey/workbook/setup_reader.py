@@ -23,10 +23,10 @@ from bifocal.survey.workbook.columns import adjustment_names
 from bifocal.survey.workbook.known_reader import LARGEST
 from bifocal.survey.workbook.media_formulas import INDEX_LIMITS
 from bifocal.survey.workbook.setup_cells import (
-    ENLARGEMENTS,
     MATRICES,
     NADIRS,
     PHOTOS,
+    PRINTS,
     TITLE_BLOCK,
     TYPED_FORMULAS,
 )
@@ -41,7 +41,7 @@ from photocore.workbook.package import open_package
 from photocore.workbook.xlsx import read_directory
 
 _NUMBERS = (
-    *("c_1", "c_2", *ENLARGEMENTS, "d_1", "d_2", "delta_d", "pitch"),
+    *("c_1", "c_2", *PRINTS, "d_1", "d_2", "delta_d", "pitch"),
     *("sigma_s", "sigma_px", "sigma_r_max", "k_off", "k_plane"),
     *("nadir_1_col", "nadir_1_row", "nadir_2_col", "nadir_2_row", "sensor_w", "sensor_h"),
 )

@@ -20,7 +20,7 @@ from photocore.workbook.named_cells import place_of
 from photocore.workbook.newbook import finished_parts
 
 #: The cell of each option; those of the distances depend on each other.
-CELLS = {
+_CELLS = {
     "enlargement1": "enlargement_1", "enlargement2": "enlargement_2", "c1": "c_1", "c2": "c_2",
     "pitch": "pitch", "sigma_s": "sigma_s", "sigma_px": "sigma_px",
     "sigma_r_max": "sigma_r_max", "unit": "input_unit", "model": "g_model",
@@ -76,7 +76,7 @@ def write_options(editor: WorkbookEditor, content: SurveyContent, given: Mapping
         If a cell has lost its name.
     """
     cells = {**setup_cells(content), "g_model": content.model}
-    wanted = {name for option, name in CELLS.items() if option in given}
+    wanted = {name for option, name in _CELLS.items() if option in given}
     if content.is_pair:
         wanted.discard("sigma_s")  # follows from sigma_px
         if content.sigma_px is not None:
