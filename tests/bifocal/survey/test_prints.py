@@ -8,7 +8,10 @@ import openpyxl
 import pytest
 
 from bifocal import solve
+from bifocal.collimation.workbook_setup import completed, typed_setup
+from bifocal.model.pair import Pair
 from bifocal.survey.observations import PointObservations
+from bifocal.survey.setup import SurveySetup
 from bifocal.survey.survey_media import SurveyMedia
 from bifocal.survey.workbook.reader import SurveyInput, read_survey
 from tests.bifocal.survey.test_cli_solve import POINTS, fill, put, refused, rows, run, write_csv
@@ -87,6 +90,17 @@ def test_pixels_and_enlargements_exclude_each_other(tmp_path):
     path = fill(tmp_path / "s.xlsx", setup={"c_1": 35, "c_2": 19, "d_2": 9.5, "d_1": 17.5})
     options = ("--unit", "px", "--pitch", 0.004, "--enlargement1", 10)
     refused(path, "enlargement_1", "Type 1 for pixels", options=options)
+
+
+def test_the_page_picks_on_the_photos_whatever_was_measured_on_prints():
+    pair = Pair.ideal(d1=17.5, d2=9.5, c1=35, c2=19, pitch=0.005)
+    lenses = SurveySetup(**CAMERAS, pitch=0.005)
+    prints = replace(lenses, **SIZES)
+    assert completed(prints, pair).c_used == (35, 19)
+    assert typed_setup(prints, pair).items() - typed_setup(lenses, pair).items() == {
+        ("enlargement_1", 1),
+        ("enlargement_2", 1),
+    }
 
 
 @pytest.mark.parametrize("language", ["en", "it", "de"])
