@@ -39,6 +39,7 @@ from bifocal.survey.survey_media import UNBENT, SurveyMedia
 from bifocal.survey.tolerances import RULES, ToleranceRule, as_rule
 from bifocal.survey.units import (
     as_pixels,
+    given_above_zero,
     refuse_contradiction,
     refuse_far_stations,
     refuse_millimetres,
@@ -46,7 +47,7 @@ from bifocal.survey.units import (
 )
 from bifocal.survey.workbook.content import SurveyContent
 from bifocal.survey.workbook.reader import ReadOptions, SurveyInput, column_map
-from photocore.arrays import FloatArray, as_floats
+from photocore.arrays import FloatArray
 from photocore.errors import InputError
 from photocore.tables.numbers import Decimal
 
@@ -209,8 +210,8 @@ def solve(
     """
     lengths = {"d1": d1, "d2": d2, "c1": c1, "c2": c2, "pitch": pitch}
     lengths |= {"enlargement1": enlargement1, "enlargement2": enlargement2}
-    given = _checked(**lengths, sigma_s=sigma_s, sigma_r_max=sigma_r_max)
-    _checked(sigma_px=sigma_px, scale_tolerance=scale_tolerance)
+    given = given_above_zero(**lengths, sigma_s=sigma_s, sigma_r_max=sigma_r_max)
+    given_above_zero(sigma_px=sigma_px, scale_tolerance=scale_tolerance)
     judged = tuple(as_rule(rule) for rule in rules) or RULES
     by_hand = column_map(columns)
     options = ReadOptions(columns=by_hand, sheet=sheet, decimal=decimal, visible_only=visible_only)
@@ -276,18 +277,6 @@ def _media(
     if general is None or pair is None:
         return typed
     return SurveyMedia.of_photos((general.image1, general.image2), typed.media if typed else 0)
-
-
-def _checked(**numbers: float | None) -> dict[str, Any]:
-    """Return the options that are given, refusing what is not above zero."""
-    given = {name: value for name, value in numbers.items() if value is not None}
-    for name, value in given.items():
-        option = f"--{name.replace('_', '-')}"
-        if as_floats(value, option).ndim:
-            raise InputError(f"{option}: expected one number for the whole survey.")
-        if not value > 0:
-            raise InputError(f"{option}: must be a number above zero, got {value:g}.")
-    return given
 
 
 def _placed(
