@@ -75,6 +75,70 @@ def test_a_line_that_is_no_command_is_named(tmp_path) -> None:
         pass
 
 
+@pytest.mark.parametrize(
+    "line",
+    [
+        '{"op": "point.pick"}',
+        '{"op": "point.rename", "name": "A"}',
+        '{"op": ["undo"]}',
+        '{"op": {}}',
+        '{"op": "point.rename", "name": "nobody", "new": "B"}',
+        '{"op": "workbook.read", "rows": {"A": {"picks": 5}}, "gone": []}',
+        '{"op": "workbook.read", "rows": {"A": 1}, "gone": []}',
+        '{"op": "files", "stem": "facade", "photos": [1]}',
+        '{"op": "made", "kind": [], "names": []}',
+        '{"op": "proposed", "pair": 7, "report": {}}',
+        '{"op": ' + "[" * 100_000 + "]" * 100_000 + "}",
+        "[]",
+    ],
+    ids=lambda line: line[:40],
+)
+def test_a_damaged_line_is_named_and_the_journal_stays_as_it_is(tmp_path, line: str) -> None:
+    folder = sample_folder(tmp_path)
+    with opened(folder) as session:
+        pick(session, "A", 1, (10.0, 20.0))
+    path = folder / JOURNAL
+    path.write_text(path.read_text() + f'{line}\n{{"op": "cut o')
+    before = path.read_bytes()
+    for _ in range(2):
+        with pytest.raises(InputError, match=r"journal\.jsonl, line 3: .*delete this line"), \
+                opened(folder):  # fmt: skip
+            pass
+        assert path.read_bytes() == before
+
+
+def test_a_start_that_fails_leaves_no_journal_that_hides_the_pair(tmp_path) -> None:
+    folder = sample_folder(tmp_path)
+    pair = folder / "facade.pair.json"
+    good = pair.read_text()
+    pair.write_text(good.replace("near.jpg", "absent.jpg"))
+    with pytest.raises(InputError, match="absent"), opened(pair):
+        pass
+    assert not (folder / JOURNAL).exists()
+    pair.write_text(good)
+    for left in ("", '{"op": "files", "st'):  # by an earlier version, or a full disk
+        (folder / "other.journal.jsonl").write_text(left)
+        with opened(folder) as session:
+            assert session.files.pair == pair
+        assert (folder / "other.journal.jsonl").read_text() == left
+
+
+def test_a_journal_that_is_cut_off_before_its_first_line_is_not_deleted(tmp_path) -> None:
+    path = tmp_path / "a.journal.jsonl"
+    path.write_text("mine")
+    Journal(path).close()
+    assert path.read_text() == "mine"
+
+
+def test_a_photo_whose_name_is_not_utf_8_is_kept_in_the_journal(tmp_path) -> None:
+    journal = Journal(tmp_path / "a.journal.jsonl")
+    journal.append({"op": "files", "photos": ["fa\udce7ade é.jpg"]})
+    journal.close()
+    again = Journal(tmp_path / "a.journal.jsonl")
+    assert again.records[0]["photos"] == ["fa\udce7ade é.jpg"]
+    again.close()
+
+
 def test_a_command_sent_twice_is_done_once(tmp_path) -> None:
     folder = sample_folder(tmp_path)
     command = {"id": "u1", "op": "point.pick", "name": None, "image": 1, "column": 5, "row": 6}
