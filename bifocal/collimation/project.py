@@ -196,6 +196,12 @@ def _workbook(path: Path) -> Path:
         raise InputError(f"{path}: the survey workbook must end in .xlsx.")
     if not path.parent.is_dir():
         raise InputError(f"{path}: the folder {path.parent} does not exist; create it first.")
+    try:
+        path.stat()
+    except FileNotFoundError:
+        pass
+    except OSError as error:  # links that lead in a circle
+        raise InputError(f"{path}: cannot be used ({error.strerror}); name another one.") from None
     return path
 
 

@@ -15,7 +15,9 @@ from pathlib import Path
 
 import pytest
 
+from bifocal.collimation.access import Access
 from bifocal.collimation.journal import Journal
+from bifocal.collimation.project import find_files
 from photocore.errors import InputError
 from tests.page_session import client_of, opened, pick, pick_both, sample_folder, sample_picks
 
@@ -121,6 +123,30 @@ def test_a_start_that_fails_leaves_no_journal_that_hides_the_pair(tmp_path) -> N
         with opened(folder) as session:
             assert session.files.pair == pair
         assert (folder / "other.journal.jsonl").read_text() == left
+
+
+def test_a_workbook_that_is_a_circle_of_links_is_refused(tmp_path) -> None:
+    folder = sample_folder(tmp_path)
+    (folder / "a.xlsx").symlink_to("b.xlsx")
+    (folder / "b.xlsx").symlink_to("a.xlsx")
+    with pytest.raises(InputError, match=r"a\.xlsx: cannot be used \(Too many levels"):
+        find_files([folder / "facade.pair.json"], folder / "a.xlsx")
+
+
+@pytest.mark.parametrize(
+    "kept",
+    ["[" * 100_000, '{"token": "%s", "port": 1e400}' % ("x" * 40),
+     json.dumps({"token": "\ud800" * 40, "port": 80}),
+     json.dumps({"token": "a\nb: c" * 40, "port": 80})],
+    ids=["deep", "infinite port", "no characters", "two lines"],
+)  # fmt: skip
+def test_a_damaged_address_is_made_anew(tmp_path, kept: str) -> None:
+    path = tmp_path / ".facade.page.json"
+    path.write_text(kept)
+    path.chmod(0o600)
+    access = Access.of(path)
+    assert access.port == 0
+    assert access.token not in kept
 
 
 def test_a_journal_that_is_cut_off_before_its_first_line_is_not_deleted(tmp_path) -> None:
