@@ -91,6 +91,11 @@ export function spread(viewer, width, height) {
   viewer.classList.toggle("stacked", above > 1.15 * beside);
 }
 
+/** Put an element where it shall lie in its parent. [CSS px] */
+function lie(element, ...place) {
+  ["left", "top", "width", "height"].forEach((key, i) => { element.style[key] = `${place[i]}px`; });
+}
+
 export class Pane extends EventTarget {
   /** `painter(context, pane)` draws what lies above the photos. */
   constructor({ label, view, frame, painter }) {
@@ -100,10 +105,13 @@ export class Pane extends EventTarget {
     this.width = 0;
     this.height = 0;
     this.canvas = h("canvas", { class: "drawing", "aria-hidden": "true" });
-    this.element = h("div", { class: "pane", tabindex: "0", role: "application" });
+    // Of whole pixels: OpenLayers stretches the pointer's place, and the browser what is drawn, over
+    // fractions of one, but not the photo.
+    this.ground = h("div", { class: "ground" });
+    this.element = h("div", { class: "pane", tabindex: "0", role: "application" }, this.ground);
     this.element.setAttribute("aria-label", label);
     this.map = new TileMap({
-      target: this.element,
+      target: this.ground,
       layers: [],
       controls: [],
       view,
@@ -117,7 +125,7 @@ export class Pane extends EventTarget {
         zoomDuration: 120,
       }),
     });
-    this.element.append(this.canvas);
+    this.ground.append(this.canvas);
     this.map.on("postrender", () => this.#draw());
     this.map.on("click", (event) => this.#tell("pick", event.pixel));
     this.element.addEventListener("pointermove", (event) => {
@@ -220,11 +228,13 @@ export class Pane extends EventTarget {
   }
 
   #resize() {
-    this.width = this.element.clientWidth;
-    this.height = this.element.clientHeight;
+    const { left, top, width, height } = this.element.getBoundingClientRect();
     const ratio = window.devicePixelRatio;
-    this.canvas.width = Math.round(this.width * ratio);
-    this.canvas.height = Math.round(this.height * ratio);
+    [this.width, this.height] = [Math.ceil(width), Math.ceil(height)];
+    [this.canvas.width, this.canvas.height] = [this.width * ratio, this.height * ratio].map(Math.round);
+    lie(this.canvas, 0, 0, this.canvas.width / ratio, this.canvas.height / ratio);
+    const [x, y] = [left, top].map((edge) => Math.round(edge * ratio) / ratio - edge);
+    lie(this.ground, x, y, this.width, this.height);
     this.map.updateSize();
     if (this.width && !this.seen) {
       this.seen = true;
