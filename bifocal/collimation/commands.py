@@ -80,12 +80,14 @@ def _pick(state: SurveyState, command: Fields) -> list[Change]:
     if before is None and len(state.points) >= MOST_POINTS:
         raise InputError(f"a survey holds at most {MOST_POINTS} points; begin another.")
     after = (before or PickedPoint(name=name, order=state.next_order())).picked(image, pixel)
+    if "doubtful" in command:  # a pick that is only moved stays what it is
+        after = after.doubted(image, doubtful=command["doubtful"])
     return [Change("points", name, before, after)]
 
 
 def _unpick(state: SurveyState, command: Fields) -> list[Change]:
     before = _point(state, command)
-    after = before.picked(command["image"], None)
+    after = before.picked(command["image"], None).doubted(command["image"], doubtful=False)
     gone = after.picks == (None, None) and after.reference is None
     return [Change("points", before.name, before, None if gone else after)]
 
@@ -113,6 +115,11 @@ def _type(state: SurveyState, command: Fields) -> list[Change]:
     before, kind = _point(state, command), command["type"]
     if kind == before.type:
         return []
+    if before.type == "doubtful" and kind != "plain":
+        raise InputError(
+            f"{before.name} was accepted in doubt: pick it by hand, or make it plain once you are "
+            "sure; then it may become another."
+        )
     return [Change("points", before.name, before, replace(before, code=CODES[kind]))]
 
 

@@ -91,11 +91,6 @@ export function spread(viewer, width, height) {
   viewer.classList.toggle("stacked", above > 1.15 * beside);
 }
 
-/** Put an element where it shall lie in its parent. [CSS px] */
-function lie(element, ...place) {
-  ["left", "top", "width", "height"].forEach((key, i) => { element.style[key] = `${place[i]}px`; });
-}
-
 export class Pane extends EventTarget {
   /** `painter(context, pane)` draws what lies above the photos. */
   constructor({ label, view, frame, painter }) {
@@ -104,6 +99,7 @@ export class Pane extends EventTarget {
     this.painter = painter;
     this.width = 0;
     this.height = 0;
+    this.shift = [0, 0];
     this.canvas = h("canvas", { class: "drawing", "aria-hidden": "true" });
     // Of whole pixels: OpenLayers stretches the pointer's place, and the browser what is drawn, over
     // fractions of one, but not the photo.
@@ -232,9 +228,15 @@ export class Pane extends EventTarget {
     const ratio = window.devicePixelRatio;
     [this.width, this.height] = [Math.ceil(width), Math.ceil(height)];
     [this.canvas.width, this.canvas.height] = [this.width * ratio, this.height * ratio].map(Math.round);
-    lie(this.canvas, 0, 0, this.canvas.width / ratio, this.canvas.height / ratio);
-    const [x, y] = [left, top].map((edge) => Math.round(edge * ratio) / ratio - edge);
-    lie(this.ground, x, y, this.width, this.height);
+    const sizes = [[this.ground, this.width, this.height],
+      [this.canvas, this.canvas.width / ratio, this.canvas.height / ratio]];
+    for (const [{ style }, across, down] of sizes) {
+      [style.width, style.height] = [`${across}px`, `${down}px`];
+    }
+    // From a whole device pixel on, too.
+    const origin = [left - this.shift[0], top - this.shift[1]];
+    this.shift = origin.map((edge) => Math.round(edge * ratio) / ratio - edge);
+    [this.element.style.left, this.element.style.top] = this.shift.map((by) => `${by}px`);
     this.map.updateSize();
     if (this.width && !this.seen) {
       this.seen = true;
