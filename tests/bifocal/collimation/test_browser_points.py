@@ -425,3 +425,25 @@ def test_a_pick_is_where_the_pointer_was_in_panes_of_broken_pixels(
                 assert distance(pick, shown) < 0.05
                 marked, beside = (page.screen(1, (pick[0] + by, pick[1])) for by in (0, 1))
                 assert distance(marked, place) < 0.05 * distance(marked, beside)
+
+
+def test_a_suggestion_accepted_in_doubt_is_shown_as_doubtful_until_it_is_picked(
+    page: Driver,
+) -> None:
+    near = pixel_of(2, TARGETS["T08"])
+    hardly = {**near, "quality": 0.04, "score": 0.6, "sigma_px": 0.3, "misfit_px": 0.0,
+              "kept": False, "others": [], "line": []}  # fmt: skip
+    page.tab.route("**/api/suggest", lambda route: route.fulfill(json=hardly))
+    page.pick(1, true_pixel(1, TARGETS["T08"]))
+    page.settled("state.points.length === 1")
+    page.tab.get_by_text("Hardly: 4 % sure").first.wait_for()
+    page.keys("a", "ArrowLeft")
+    point = page.settled("state.points[0].result")["points"][0]
+    assert (point["type"], point["code"]) == ("doubtful", "DOUBTFUL 2")
+    assert point["result"]["flag"] == "UNCERTAIN"
+    assert page.tab.get_by_test_id("value-flag").text_content() != ""
+    page.tab.unroute("**/api/suggest")
+    page.keys("2")
+    page.pick(2, true_pixel(2, TARGETS["T08"]))
+    point = page.settled("state.points[0].type === 'plain'")["points"][0]
+    assert point["result"]["flag"] in ("OK", "ON-PLANE")
