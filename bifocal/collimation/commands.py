@@ -17,6 +17,7 @@ from bifocal.collimation.fields import (
     Fields,
     pixel_of,
     text_of,
+    tupled,
 )
 from bifocal.collimation.pasted import pasted_control
 from bifocal.collimation.records import (
@@ -225,7 +226,7 @@ def _control_delete(state: SurveyState, command: Fields) -> list[Change]:
 
 def _control_paste(state: SurveyState, command: Fields) -> list[Change]:
     changes = []
-    for name, known, picks in pasted_control(command["text"]):
+    for name, known, picks in pasted_control(command["text"].encode("utf-8", "replace").decode()):
         before = state.control.get(name)
         start = before or PickedControl(name=name, order=state.next_order())
         both = (picks[0] or start.picks[0], picks[1] or start.picks[1])
@@ -295,8 +296,8 @@ def _points_add(state: SurveyState, command: Fields) -> list[Change]:
             name = f"{name}b"
         taken.add(name)
         point = PickedPoint(
-            name=name, order=state.next_order(), picks=entry["picks"],
-            code=entry.get("code", "")[:LONGEST_NAME], note=entry.get("note", "")[:200],
+            name=name, order=state.next_order(), picks=tupled(entry["picks"]),
+            code=(entry.get("code") or "")[:LONGEST_NAME], note=(entry.get("note") or "")[:200],
         )  # fmt: skip
         changes.append(Change("points", name, None, point))
     return changes

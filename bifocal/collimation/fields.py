@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from bifocal.collimation.records import CODES, Picks, Pixel
+from bifocal.collimation.records import CODES, Pixel
 from bifocal.collimation.stated_media import MEDIA
 from photocore.errors import InputError
 from photocore.workbook.words import LANGUAGES
@@ -79,140 +79,106 @@ def pixel_of(command: Fields) -> Pixel:
     return column, row
 
 
-def _text(command: Fields, key: str) -> str:
-    if not isinstance(value := command.get(key), str):
-        raise FieldError(f"{key}: expected text.")
-    return value
+def _fits(value: Any, shape: Any) -> bool:
+    """Whether JSON has a shape: a type, words, (one, another), [each] or [first, second, ...]."""
+    if isinstance(shape, tuple):
+        return any(_fits(value, each) for each in shape)
+    if isinstance(shape, frozenset):
+        return isinstance(value, str) and value in shape
+    if isinstance(shape, list):
+        each = shape * len(value) if isinstance(value, list) and len(shape) == 1 else shape
+        return isinstance(value, list) and len(value) == len(each) and all(map(_fits, value, each))
+    if isinstance(shape, dict):
+        return isinstance(value, dict) and all(_fits(value.get(k), s) for k, s in shape.items())
+    if shape is float:
+        return type(value) in (int, float) and abs(value) < MOST
+    return value is None if shape is None else type(value) is shape
 
 
-def _line(command: Fields, key: str) -> str:
-    """Return text without what is no character, which no workbook takes."""
-    return _text(command, key).encode("utf-8", "replace").decode()
+def _of(shape: Any, said: str) -> Reader:
+    """Return a reader of what has a shape."""
 
+    def read(command: Fields, key: str) -> Any:
+        if not _fits(value := command.get(key), shape):
+            raise FieldError(f"{key}: expected {said}.")
+        return value
 
-def _flag(command: Fields, key: str) -> bool:
-    if not isinstance(value := command.get(key), bool):
-        raise FieldError(f"{key}: expected true or false.")
-    return value
-
-
-def _texts(command: Fields, key: str) -> list[str]:
-    value = command.get(key)
-    if not isinstance(value, list) or not all(isinstance(each, str) for each in value):
-        raise FieldError(f"{key}: expected a list of names.")
-    return value
-
-
-def _object(command: Fields, key: str) -> dict[str, Any]:
-    if not isinstance(value := command.get(key), dict):
-        raise FieldError(f"{key}: expected an object.")
-    return value
+    return read
 
 
 def _one_of(*words: str) -> Reader:
-    def read(command: Fields, key: str) -> str:
-        if (value := command.get(key)) not in words:
-            raise FieldError(f"{key}: one of {', '.join(words)}.")
-        return str(value)
-
-    return read
+    return _of(frozenset(words), f"one of {', '.join(words)}")
 
 
 def _if_any(reader: Reader) -> Reader:
     return lambda command, key: reader(command, key) if command.get(key) else None
 
 
-def _found(command: Fields, key: str) -> list[dict[str, Any]]:
-    """Return the points that a job found."""
-    value = command.get(key)
-    if not isinstance(value, list) or not all(isinstance(entry, dict) for entry in value):
-        raise FieldError(f"{key}: expected a list of points.")
-    words = ("code", "note")
-    return [
-        {"name": text_of(entry, "name"), "picks": _picks(entry)}
-        | {word: _line(entry, word) for word in words if word in entry}
-        for entry in value
-    ]
-
-
-def _rows(command: Fields, key: str) -> dict[str, dict[str, Any]]:
+def _rows(command: Fields, key: str) -> dict[str, Any]:
     """Return rows of the workbook, as `PointRow` takes them."""
-    rows = {}
-    for name in _object(command, key):
-        row = _object(command[key], name)
-        rows[name] = {word: _line(row, word) for word in ("code", "note")}
-        known = row.get("reference")
-        known = None if known is None else _numbers(known, "reference", 3, blank=True)
-        rows[name] |= {"picks": _picks(row), "use": _flag(row, "use"), "reference": known}
-    return rows
+    rows = _of(dict, "rows")(command, key)
+    if not _fits(list(rows.values()), [_ROW]):
+        raise FieldError(f"{key}: are no rows of a workbook.")
+    return {
+        name: {word: tupled(value) for word, value in row.items() if word in _ROW}
+        for name, row in rows.items()
+    }
 
 
-def _picks(entry: Fields) -> Picks:
-    picks = entry.get("picks")
-    if not isinstance(picks, list) or len(picks) != 2:
-        raise FieldError("picks: expected those of both photos.")
-    first, second = (None if pick is None else _numbers(pick, "picks", 2) for pick in picks)
-    return first, second
+def tupled(value: Any) -> Any:
+    """Return lists, and those in them, as tuples."""
+    return tuple(map(tupled, value)) if isinstance(value, list) else value
 
 
-def _numbers(values: Any, key: str, count: int, *, blank: bool = False) -> Any:
-    """Return numbers as a tuple, None among them only where one may be ``blank``."""
-    if not isinstance(values, list) or len(values) != count or not all(
-        (blank and value is None) or (type(value) in (int, float) and abs(value) < MOST)
-        for value in values
-    ):  # fmt: skip
-        raise FieldError(f"{key}: expected {count} numbers.")
-    return tuple(None if value is None else float(value) for value in values)
-
-
+_TEXT, _FLAG, _TEXTS = _of(str, "text"), _of(bool, "true or false"), _of([str], "a list of names")
+_PICK = [float, float]
+_FOUND = {"name": str, "picks": [_PICK, _PICK], "code": (None, str), "note": (None, str)}
+_ROW = {
+    "picks": [(None, _PICK)] * 2, "code": str, "note": str, "use": bool,
+    "reference": (None, [(None, float)] * 3),
+}  # fmt: skip
 _NAME = {"name": text_of}
+_PIXEL = {"image": image_of, "column?": number_of, "row?": number_of}
 _PLACE = {"X?": number_of, "Y?": number_of, "r?": number_of}
 _TAPE = {"from": text_of, "to": text_of}
-#: Fields of every command; those with ? may be left out, and others are not taken over.
+#: Fields of every command of the page; those with ? may be left out, others are not taken over.
 COMMANDS: Mapping[str, Mapping[str, Reader]] = {
-    "point.pick": {
-        "name?": _if_any(text_of), "image": image_of, "column?": number_of, "row?": number_of,
-        "doubtful?": _flag,
-    },
+    "point.pick": {"name?": _if_any(text_of), **_PIXEL, "doubtful?": _FLAG},
     "point.unpick": {**_NAME, "image": image_of},
     "point.rename": {**_NAME, "new": text_of},
     "point.type": {**_NAME, "type": _one_of(*CODES)},
     "point.reference": {**_NAME, **_PLACE},
     "point.delete": _NAME,
-    "points.add": {"points": _found},
-    "line.set": {**_NAME, "layer?": text_of, "points?": _texts, "closed?": _flag},
+    "line.set": {**_NAME, "layer?": text_of, "points?": _TEXTS, "closed?": _FLAG},
     "line.delete": _NAME,
     "control.set": {"name?": _if_any(text_of), **_PLACE},
-    "control.pick": {
-        "name?": _if_any(text_of), "image": image_of, "column?": number_of, "row?": number_of,
-    },
+    "control.pick": {"name?": _if_any(text_of), **_PIXEL},
     "control.rename": {**_NAME, "new": text_of},
     "control.delete": _NAME,
-    "control.paste": {"text": _line},
+    "control.paste": {"text": _TEXT},
     "tape.set": {**_TAPE, "length?": positive_of, "sigma?": positive_of},
     "tape.delete": _TAPE,
     "photo.set": {"image": image_of, "focal_mm?": positive_of, "sensor_width_mm?": positive_of},
     "setup.set": {f"{key}?": positive_of for key in SETUP},
-    "photos.exchange": {},
-    "align.accept": {},
     "stage.set": {"stage": _one_of(*STAGES)},
     "language.set": {"language": _one_of(*LANGUAGES)},
-    "undo": {},
-    "redo": {},
-}  # fmt: skip
-#: Records of the journal that are notes of the server's own, not commands.
+    **{op: {} for op in ("photos.exchange", "align.accept", "undo", "redo")},
+}
+#: Records of the journal that are the server's own.
 NOTES: Mapping[str, Mapping[str, Reader]] = {
-    "files": {"stem": _text, "pair?": _if_any(_text), "photos": _texts},
-    "workbook.saved": {"sha256": _text, "at?": number_of},
-    "workbook.read": {"rows": _rows, "gone": _texts},
-    "made": {"kind": _text, "names": _texts},
-    "proposed": {"pair": _text, "report": _object},
+    "files": {"stem": _TEXT, "pair?": _if_any(_TEXT), "photos": _TEXTS},
+    "workbook.saved": {"sha256": _TEXT, "at?": number_of},
+    "workbook.read": {"rows": _rows, "gone": _TEXTS},
+    "made": {"kind": _TEXT, "names": _TEXTS},
+    "proposed": {"pair": _TEXT, "report": _of(dict, "a report")},
     "accepted": {},
 }
+#: What the journal holds: also the points that a job found.
+RECORDS = {**COMMANDS, **NOTES, "points.add": {"points": _of([_FOUND], "a list of points")}}
 
 
 def fields_of(
-    command: Fields, known: Mapping[str, Mapping[str, Reader]] = COMMANDS
+    command: Fields, known: Mapping[str, Mapping[str, Reader]] = RECORDS
 ) -> dict[str, Any]:
     """Return a command with ``op``, ``id`` and its fields, each of its type.
 

@@ -14,7 +14,7 @@ from starlette.responses import Response, StreamingResponse
 from starlette.routing import Route
 
 from bifocal.collimation.assets import KEEP, Assets
-from bifocal.collimation.fields import FieldError
+from bifocal.collimation.fields import COMMANDS, FieldError, fields_of
 from bifocal.collimation.measuring_routes import ROUTES as MEASURING
 from bifocal.collimation.product_routes import ROUTES as PRODUCTS
 from bifocal.collimation.requests import answer, in_thread, json_body, session_of
@@ -105,7 +105,7 @@ async def _state(request: Request) -> Response:
 
 
 async def _command(request: Request) -> Response:
-    session, body = session_of(request), await json_body(request)
+    session, body = session_of(request), fields_of(await json_body(request), COMMANDS)
 
     def carry_out() -> dict[str, Any]:
         with session.lock:

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from bifocal.collimation.commands import changes_of
-from bifocal.collimation.fields import COMMANDS, NOTES, FieldError, fields_of
+from bifocal.collimation.fields import NOTES, FieldError, fields_of
 from bifocal.collimation.jobs import JobRunner
 from bifocal.collimation.journal import Journal
 from bifocal.collimation.live_orientation import LiveOrientation, live_orientation
@@ -320,7 +320,7 @@ class Session:
     def _replay(self, record: Mapping[str, Any]) -> None:
         """Carry out a record of the journal."""
         op = record["op"]
-        fields = fields_of(record, {**COMMANDS, **NOTES})
+        fields = fields_of(record)
         if op == "workbook.read":
             rows = {name: PointRow(**row) for name, row in fields["rows"].items()}
             gone = fields["gone"]
@@ -332,7 +332,7 @@ class Session:
             self.products.note(fields["kind"], fields["names"])
         elif op in ("proposed", "accepted"):
             self.proposal = fields if op == "proposed" else None
-        elif op in COMMANDS:
+        elif op not in NOTES:
             self._carry_out(fields, write=False)
             if "id" in fields:
                 self._remember_answer(fields["id"], {"name": fields.get("name")})

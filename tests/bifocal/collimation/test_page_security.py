@@ -120,7 +120,7 @@ def test_what_fails_is_answered_under_the_same_rules(session, monkeypatch) -> No
     monkeypatch.setattr(session, "command", lambda _: 1 / 0)
     app = application(session, TOKEN)
     client = TestClient(app, base_url=BASE, raise_server_exceptions=False)
-    answer = client.post("/api/command", json={}, headers={"x-bifocal-token": TOKEN})
+    answer = client.post("/api/command", json={"op": "undo"}, headers={"x-bifocal-token": TOKEN})
     assert answer.status_code == 500
     assert "default-src 'self'" in answer.headers["content-security-policy"]
     assert answer.json()["error"] == "an error of the program (ZeroDivisionError)."
