@@ -83,7 +83,8 @@ class LiveResults:
                 | {
                     "flag": table.flags[row],
                     "misfit_px": None if misfit is None else float(misfit[row]),
-                    "uncertain_area": table.flags[row] in ("UNCERTAIN", "NADIR"),
+                    "uncertain_area": table.flags[row] in ("UNCERTAIN", "NADIR")
+                    and point.type != "doubtful",
                 }
             )
             if covariance is not None:
