@@ -30,7 +30,6 @@ from bifocal.collimation.records import (
     SurveyState,
     TapedLength,
 )
-from bifocal.collimation.stated_media import INDICES, check_index
 from photocore.errors import InputError
 
 #: A larger survey is another one.
@@ -271,8 +270,6 @@ def _setup_set(state: SurveyState, command: Fields) -> None:
     given = {key: command[key] for key in command if key in SETUP}
     if not given:
         raise InputError(f"nothing to set; known are {', '.join(SETUP)}.")
-    for key in INDICES:
-        check_index(key, given.get(key))
     state.setup |= given
 
 

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from bifocal.collimation.records import CODES, Pixel
-from bifocal.collimation.stated_media import MEDIA
+from bifocal.collimation.stated_media import INDICES, MEDIA, check_index
 from photocore.errors import InputError
 from photocore.workbook.words import LANGUAGES
 
@@ -60,6 +60,16 @@ def positive_of(command: Fields, key: str) -> float | None:
     value = number_of(command, key)
     if value is not None and not value > 0:
         raise FieldError(f"{key}: must be above zero, got {value:g}.")
+    return value
+
+
+def _index(command: Fields, key: str) -> float | None:
+    """Return a refractive index or None."""
+    value = positive_of(command, key)
+    try:
+        check_index(key, value)
+    except InputError as error:
+        raise FieldError(str(error)) from None
     return value
 
 
@@ -159,7 +169,7 @@ COMMANDS: Mapping[str, Mapping[str, Reader]] = {
     "tape.set": {**_TAPE, "length?": positive_of, "sigma?": positive_of},
     "tape.delete": _TAPE,
     "photo.set": {"image": image_of, "focal_mm?": positive_of, "sensor_width_mm?": positive_of},
-    "setup.set": {f"{key}?": positive_of for key in SETUP},
+    "setup.set": {f"{key}?": _index if key in INDICES else positive_of for key in SETUP},
     "stage.set": {"stage": _one_of(*STAGES)},
     "language.set": {"language": _one_of(*LANGUAGES)},
     **{op: {} for op in ("photos.exchange", "align.accept", "undo", "redo")},
