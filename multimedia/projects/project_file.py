@@ -393,7 +393,8 @@ def _camera_data(camera: Camera, media: str) -> dict[str, Any]:
     data["c"] = camera.principal_distance
     data["principal_point"] = camera.principal_point.tolist()
     lens = camera.distortion
-    if not lens.is_identity:
+    if lens != Brown():
+        # Without terms too the convention counts: terms estimated later are of it.
         convention = _FISHEYE if isinstance(lens, Fisheye) else lens.convention.value
         terms = {name: float(getattr(lens, name)) for name in lens.names}
         data["distortion"] = {"convention": convention} | terms
