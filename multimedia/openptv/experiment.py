@@ -215,8 +215,8 @@ def write_experiment(
         "OpenPTV has no terms for this distortion as it is; it was written with those that come "
         f"nearest. Image points move by at most: {', '.join(inexact)}.",
         *_cost(project, sensor, views),
-        'To lose nothing, calibrate with convention = "openptv" in [camera.distortion] of every camera '
-        "(as an import of OpenPTV's files has it) and without scale.",
+        'To lose nothing, calibrate with convention = "openptv" in [camera.distortion] of every '
+        "camera (as an import of OpenPTV's files has it) and without scale.",
     )
 
 
