@@ -98,7 +98,8 @@ def bundle_adjust(project: Project, unknowns: Unknowns | None = None) -> Adjustm
     result = _adjustment(bundle, fitted, weights, remarks)
     refuse_impossible_media(bundle.project, columns, result, unknowns.priors)
     seen = bundle.observations
-    result = with_model_error(result, tuple(seen.source[rows] for rows in seen.rows))
+    order = tuple(seen.source[rows] for rows in seen.rows)
+    result = with_model_error(result, order, unknowns.plates)
     told = remarks_on_unknowns(bundle.project, columns, result)
     return replace(result, remarks=(*result.remarks, *told))
 
