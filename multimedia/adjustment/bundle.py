@@ -25,6 +25,7 @@ from multimedia.adjustment.plausibility import (
 )
 from multimedia.adjustment.unknowns import AUTO, Adjustment, Unknowns
 from multimedia.media.camera import EXTERIOR, Camera
+from multimedia.orientation.calibration_covariance import with_covariance
 from multimedia.orientation.intersection import intersect
 from multimedia.orientation.plate_poses import FEWEST, plate_pose
 from multimedia.projects.model import ObjectPoints, Project
@@ -101,7 +102,11 @@ def bundle_adjust(project: Project, unknowns: Unknowns | None = None) -> Adjustm
     order = tuple(seen.source[rows] for rows in seen.rows)
     result = with_model_error(result, order, unknowns.plates)
     told = remarks_on_unknowns(bundle.project, columns, result)
-    return replace(result, remarks=(*result.remarks, *told))
+    whose = {f"{camera}:{name}": at for camera, own in zip(project.camera_names, columns.cameras,
+             strict=True) for name, at in own.items()}  # fmt: skip
+    whose |= {f"{of}:{name}": at for of, own in columns.media.items() for name, at in own.items()}
+    project, lost = with_covariance(result.project, whose, result.covariance)
+    return replace(result, project=project, remarks=(*result.remarks, *told, *lost))
 
 
 def _weighted(bundle: Bundle, weights: FloatArray) -> Bundle:

@@ -12,6 +12,7 @@ import numpy as np
 from multimedia.media.camera import EXTERIOR
 from multimedia.media.projection import project as project_points
 from multimedia.media.projection import projection_status
+from multimedia.orientation.calibration_covariance import with_calibration
 from multimedia.orientation.intersection import (
     IntersectedPoints,
     intersect,
@@ -100,6 +101,8 @@ def intersect_project(
     u = project.unit
     if method == "rigorous":
         solved = intersect(project.cameras, image, project.interfaces, sigma=sigma)
+        solved, odd = with_calibration(project, solved, np.isfinite(image).all(axis=2), sigma)
+        remarks = [*remarks, *odd]
         columns, units, summary = _intersection_columns(project, solved, u)
         xyz = solved.xyz
     else:

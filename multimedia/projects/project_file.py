@@ -156,13 +156,12 @@ def project_data(project: Project, folder: Path) -> dict[str, Any]:
         data["name"] = project.name
     data["unit"] = project.unit
     data["sigma_image"] = float(project.sigma_image)
-    data |= {k: v for k, v in project.extra.items() if k not in data}
     data["media"] = {name: _media_data(media, folder) for name, media in project.media.items()}
     data["camera"] = [
         _camera_data(camera, media)
         for camera, media in zip(project.cameras, project.media_of, strict=True)
     ]
-    return data
+    return data | {k: v for k, v in project.extra.items() if k not in data}
 
 
 #: Keys of media; at the top of a file, where unknown keys are kept, they would have no effect.
