@@ -51,7 +51,7 @@ def with_covariance(
 
 
 def with_calibration(
-    project: Project, solved: IntersectedPoints, seen: FloatArray, sigma: FloatArray
+    project: Project, solved: IntersectedPoints, sigma: FloatArray
 ) -> tuple[IntersectedPoints, tuple[str, ...]]:
     """Return points whose covariances contain that of the cameras and media, and remarks.
 
@@ -60,7 +60,6 @@ def with_calibration(
     project : Project
     solved : IntersectedPoints
         Of all its cameras.
-    seen : ndarray of bool, shape (cameras, n)
     sigma : ndarray, shape (cameras, n, 2)
         Standard deviations of the image points. [mm]
     """
@@ -76,16 +75,13 @@ def with_calibration(
     places = np.flatnonzero(np.isfinite(solved.xyz[:, 0]))
     by_unknowns = np.zeros((len(places), 3, len(names)))
     for k, camera in enumerate(project.cameras):
-        mine = np.flatnonzero(seen[k][places])
-        rows, of_camera, of_media = places[mine], dict[str, int](), dict[str, int]()
-        for column, name in enumerate(names):
-            owner, _, parameter = name.rpartition(":")
-            if parameter in _OF_CAMERA and owner == camera.name:
-                of_camera[parameter] = column
-            elif parameter not in _OF_CAMERA and owner == project.media_of[k]:
-                of_media[parameter] = column
+        mine = np.flatnonzero(np.isfinite(solved.residuals[k, places, 0]))
+        rows = places[mine]
+        media = project.interface_of(k)
+        of_camera = _columns(names, camera.name, _OF_CAMERA)
+        of_media = _columns(names, project.media_of[k], media.parameter_names if media else ())
         part = project_with_jacobian(
-            camera, solved.xyz[rows], project.interface_of(k), camera_names=tuple(of_camera),
+            camera, solved.xyz[rows], media, camera_names=tuple(of_camera),
             interface_names=tuple(of_media),
         )  # fmt: skip
         by_own = np.concatenate([part.by_camera, part.by_interface], axis=2)
@@ -95,11 +91,17 @@ def with_calibration(
         # What moves the images of a point by b moves the point by minus N^-1 a^T P b.
         weighted = part.by_point / sigma[k][rows][:, :, None] ** 2
         pull = solved.covariance[rows] @ weighted.transpose(0, 2, 1)
-        columns = [*of_camera.values(), *of_media.values()]
-        by_unknowns[np.ix_(mine, range(3), columns)] -= pull @ by_own
+        columns = np.array([*of_camera.values(), *of_media.values()], dtype=np.int64)
+        by_unknowns[np.ix_(mine, np.arange(3), columns)] -= pull @ by_own
     full = solved.covariance.copy()
     full[places] += by_unknowns @ covariance @ by_unknowns.transpose(0, 2, 1)
     return replace(solved, covariance=full), ()
+
+
+def _columns(names: Sequence[str], owner: str, parameters: Sequence[str]) -> dict[str, int]:
+    """Return the columns of the parameters of a camera or media that were unknown."""
+    labels = {p: f"{owner}:{p}" for p in parameters}
+    return {p: names.index(label) for p, label in labels.items() if label in names}
 
 
 def _value(project: Project, name: str) -> float:

@@ -101,7 +101,7 @@ def intersect_project(
     u = project.unit
     if method == "rigorous":
         solved = intersect(project.cameras, image, project.interfaces, sigma=sigma)
-        solved, odd = with_calibration(project, solved, np.isfinite(image).all(axis=2), sigma)
+        solved, odd = with_calibration(project, solved, sigma)
         remarks = [*remarks, *odd]
         columns, units, summary = _intersection_columns(project, solved, u)
         xyz = solved.xyz

@@ -50,7 +50,7 @@ def test_errors_of_points_are_as_large_as_their_covariances_say():
         tank, image = calibrated(seed), measured(seed)
         sigma = np.full(image.shape, NOISE)
         plain = intersect(tank.cameras, image, tank.interfaces, sigma=sigma)
-        whole, odd = with_calibration(tank, plain, np.isfinite(image).all(axis=2), sigma)
+        whole, odd = with_calibration(tank, plain, sigma)
         assert odd == ()
         for name, got in (("image noise alone", plain), ("calibration too", whole)):
             miss = got.xyz - POINTS
