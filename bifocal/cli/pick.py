@@ -41,7 +41,7 @@ def command(
     current one). The page runs on this computer alone and works offline; what is picked goes
     into the workbook and a journal beside it at once. Ctrl-C ends it.
     """
-    from bifocal.collimation.workflow import open_browser, page_server
+    from bifocal.collimation.workflow import page_server
 
     with page_server(*sources, workbook=workbook, port=port, language=lang) as server:
         if as_json:
@@ -50,5 +50,5 @@ def command(
             click.echo(server.url)
             remark("Open this address in a browser on this computer; Ctrl-C ends the page.")
         if not no_browser:
-            open_browser(server.url)
+            server.open_browser()
         server.serve()

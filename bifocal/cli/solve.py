@@ -47,6 +47,8 @@ SHOWN = 40
 @number("--d2", "M", "Distance of camera 2 [m].  [default: Setup]")
 @number("--c1", "MM", "Principal distance of image 1 [mm].  [default: Setup]", type=FOCAL)
 @number("--c2", "MM", "Principal distance of image 2 [mm].  [default: Setup]", type=FOCAL)
+@number("--enlargement1", "X", "Print 1, if measured: size over the sensor's.  [default: Setup]")
+@number("--enlargement2", "X", "The same of print 2; 1 = measured on the sensor.  [default: Setup]")
 @number("--pitch", "MM", "Size of a pixel [mm].  [default: Setup]")
 @choice("--unit", "mm|px", "Unit of x1 y1 x2 y2.  [default: as headings or Setup say, else mm]")
 @number("--sigma-s", "MM", "Precision of an image coordinate [mm].  [default: Setup, else 0.5 px]")

@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from bifocal.collimation.commands import number_of, positive_of
 from bifocal.collimation.drawing import write_points_drawing
+from bifocal.collimation.fields import FieldError, number_of, positive_of
 from bifocal.collimation.jobs import PageJob
 from bifocal.collimation.live_orientation import control_of, lenses_of, site_of
 from bifocal.collimation.session import Session
@@ -49,7 +49,7 @@ def task_of(session: Session, kind: str, options: Options) -> dict[str, Any]:
         If the survey is not far enough for it, or an option is impossible.
     """
     if kind not in KINDS:
-        raise InputError(f"kind: one of {', '.join(KINDS)}.")
+        raise FieldError(f"kind: one of {', '.join(KINDS)}.")
     if kind == "align":
         return {"kind": kind, **_align_task(session, options)}
     if session.files.pair is None:
@@ -63,7 +63,7 @@ def task_of(session: Session, kind: str, options: Options) -> dict[str, Any]:
     if kind == "relief":
         quality = options.get("quality", "standard")
         if quality not in ("fast", "standard", "best"):
-            raise InputError("quality: fast, standard or best.")
+            raise FieldError("quality: fast, standard or best.")
         out = products.place("relief", ".relief.tif")
         return task | {"out": str(out), "quality": quality, "overwrite": products.is_own(out)}
     task |= _ortho_options(session, options)
@@ -78,10 +78,10 @@ def _bounds(options: Options) -> list[float] | None:
     if bounds is None:
         return None
     if not isinstance(bounds, list) or len(bounds) != 4:
-        raise InputError("bounds: xmin, ymin, xmax, ymax in metres.")
+        raise FieldError("bounds: xmin, ymin, xmax, ymax in metres.")
     values = [number_of({"bounds": value}, "bounds") for value in bounds]
     if None in values:
-        raise InputError("bounds: xmin, ymin, xmax, ymax in metres.")
+        raise FieldError("bounds: xmin, ymin, xmax, ymax in metres.")
     return [value for value in values if value is not None]
 
 
@@ -96,7 +96,7 @@ def scale_of(options: Options) -> float | None:
 def _ortho_options(session: Session, options: Options) -> dict[str, Any]:
     image = str(options.get("image", "1"))
     if image not in ("1", "2", "both"):
-        raise InputError("image: 1, 2 or both.")
+        raise FieldError("image: 1, 2 or both.")
     relief = session.products.current("relief")
     points = None
     if relief is None and options.get("surface") == "points":
@@ -118,13 +118,13 @@ def _deliver_options(session: Session, options: Options) -> dict[str, Any]:
         folder = free_path(products.folder, f"{products.stem}-delivered")
     sheet = options.get("sheet")
     if sheet is not None and sheet not in ("A4", "A3", "A2", "A1", "A0"):
-        raise InputError("sheet: A4, A3, A2, A1, A0 or none.")
+        raise FieldError("sheet: A4, A3, A2, A1, A0 or none.")
     sections = options.get("sections", [])
     if not isinstance(sections, list) or not all(isinstance(cut, str) for cut in sections):
-        raise InputError('sections: a list like ["x=1.5"].')
+        raise FieldError('sections: a list like ["x=1.5"].')
     title = options.get("title") or ""
     if not isinstance(title, str) or len(title) > 120:
-        raise InputError("title: a line of text.")
+        raise FieldError("title: a line of text.")
     return {
         "out": str(folder),
         "overwrite": own,

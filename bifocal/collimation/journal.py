@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import importlib
 import json
 import os
@@ -23,8 +24,7 @@ class Journal:
     Attributes
     ----------
     records : list of dict
-        What it held when opened. A last line that a crash cut off is not among them; it is taken
-        off the file.
+        What it held when opened; without a last line that a crash cut off.
 
     Raises
     ------
@@ -51,6 +51,8 @@ class Journal:
     def _lock(self) -> None:
         try:
             lock(self._file.fileno())
+            if not os.fstat(self._file.fileno()).st_nlink:
+                raise OSError
         except OSError:
             raise InputError(
                 f"{self.path}: this survey is open already in another `bifocal pick`; use its page "
@@ -60,22 +62,28 @@ class Journal:
     def _read(self) -> list[dict[str, Any]]:
         self._file.seek(0)
         data = self._file.read()
-        whole = data.rfind(b"\n") + 1
-        if whole < len(data):
-            self._file.truncate(whole)
+        self._whole = data.rfind(b"\n") + 1
         records = []
-        for number, line in enumerate(data[:whole].splitlines(), start=1):
+        for number, line in enumerate(data[: self._whole].splitlines(), start=1):
             try:
                 record = json.loads(line)
-            except ValueError:
+            except (ValueError, RecursionError):
                 record = None
             if not isinstance(record, dict) or "op" not in record:
-                raise InputError(
-                    f"{self.path}, line {number}: is no command of a survey's journal. Restore the "
-                    "file from a backup, or delete this line."
-                )
+                raise self.refusal(number, "is no command of a survey's journal.")
             records.append(record)
         return records
+
+    def refusal(self, number: int, why: str) -> InputError:
+        """Return what is wrong with a line, and how to mend it."""
+        return InputError(
+            f"{self.path}, line {number}: {why} Restore the file from a backup, or delete this "
+            "line."
+        )
+
+    def cut(self) -> None:
+        """Take a last line that a crash cut off from the file, once all others are understood."""
+        self._file.truncate(self._whole)
 
     def append(self, record: Mapping[str, Any]) -> None:
         """Add a command; on return it is on the disk.
@@ -85,7 +93,9 @@ class Journal:
         InputError
             If it could not be written; the journal is then as it was before.
         """
-        line = json.dumps(record, ensure_ascii=False, allow_nan=False).encode() + b"\n"
+        text = json.dumps(record, ensure_ascii=False, allow_nan=False)
+        # What is no character, as in names of files that are not UTF-8, becomes JSON's own \\udcXX.
+        line = text.encode("utf-8", "backslashreplace") + b"\n"
         end = os.fstat(self._file.fileno()).st_size
         try:
             written = 0
@@ -100,7 +110,10 @@ class Journal:
             ) from error
 
     def close(self) -> None:
-        """Close the file."""
+        """Close the file; one that holds nothing is not left behind."""
+        if not self._file.closed and not os.fstat(self._file.fileno()).st_size:
+            with contextlib.suppress(OSError):  # Windows deletes no open file: it is skipped later
+                self.path.unlink()
         self._file.close()
 
 

@@ -38,6 +38,14 @@ def observations(points: Iterable[PickedPoint]) -> PointObservations:
     )
 
 
+#: What results follow from.
+_Key = tuple[Picks, bool]
+
+
+def _key(point: PickedPoint) -> _Key:
+    return point.picks, point.type == "doubtful"
+
+
 @dataclass(slots=True, eq=False)
 class LiveResults:
     """Results of complete points, kept until their picks change.
@@ -57,12 +65,12 @@ class LiveResults:
     sigma_px: float | None = None
     limits: FlagLimits = field(default_factory=FlagLimits)
     setup: SurveySetup | None = None
-    _rows: dict[Picks, dict[str, Any]] = field(default_factory=dict, init=False)
-    _places: dict[Picks, tuple[FloatArray, FloatArray]] = field(default_factory=dict, init=False)
+    _rows: dict[_Key, dict[str, Any]] = field(default_factory=dict, init=False)
+    _places: dict[_Key, tuple[FloatArray, FloatArray]] = field(default_factory=dict, init=False)
 
     def solve(self, points: Iterable[PickedPoint]) -> None:
         """Solve all points whose picks are new, at once."""
-        new = list({p.picks: p for p in points if p.is_complete and p.picks not in self._rows}
+        new = list({_key(p): p for p in points if p.is_complete and _key(p) not in self._rows}
                    .values())  # fmt: skip
         if not new:
             return
@@ -70,16 +78,17 @@ class LiveResults:
         covariance = table.covariance
         for row, point in enumerate(new):
             misfit = table.carried.get("misfit_px")
-            self._rows[point.picks] = plain(
+            self._rows[_key(point)] = plain(
                 {key: float(table[column][row]) for key, column in _KEYS.items()}
                 | {
                     "flag": table.flags[row],
                     "misfit_px": None if misfit is None else float(misfit[row]),
-                    "uncertain_area": table.flags[row] in ("UNCERTAIN", "NADIR"),
+                    "uncertain_area": table.flags[row] in ("UNCERTAIN", "NADIR")
+                    and point.type != "doubtful",
                 }
             )
             if covariance is not None:
-                self._places[point.picks] = table.xyz[row], covariance[row]
+                self._places[_key(point)] = table.xyz[row], covariance[row]
 
     def _solved(self, seen: PointObservations) -> ReliefTable:
         if self.setup is None:
@@ -91,9 +100,9 @@ class LiveResults:
     def row(self, point: PickedPoint) -> Mapping[str, Any] | None:
         """Return a point's results: lengths on the photos in mm, on the wall in m."""
         self.solve([point])
-        return self._rows.get(point.picks)
+        return self._rows.get(_key(point))
 
     def place(self, point: PickedPoint) -> tuple[FloatArray, FloatArray] | None:
         """Return X, Y, r [m], shape (3,), and their covariance [m²]; None if incomplete."""
         self.solve([point])
-        return self._places.get(point.picks)
+        return self._places.get(_key(point))

@@ -6,10 +6,9 @@ from starlette.requests import Request
 from starlette.responses import Response
 from starlette.routing import Route
 
-from bifocal.collimation.commands import image_of, pixel_of, positive_of
+from bifocal.collimation.fields import FieldError, image_of, pixel_of, positive_of
 from bifocal.collimation.requests import answer, in_thread, json_body, session_of
 from photocore.arrays import as_points
-from photocore.errors import InputError
 from photocore.jsonfile import plain
 
 
@@ -34,7 +33,7 @@ async def _snap(request: Request) -> Response:
 async def _measure(request: Request) -> Response:
     names = (await json_body(request)).get("points")
     if not isinstance(names, list) or len(names) > 1000:
-        raise InputError("points: expected a list of names.")
+        raise FieldError("points: expected a list of names.")
     return answer(await in_thread(session_of(request).measure, [str(name) for name in names]))
 
 
@@ -42,10 +41,10 @@ async def _convert(request: Request) -> Response:
     body = await json_body(request)
     source = body.get("from", "photo")
     if source not in ("photo", "wall"):
-        raise InputError("from: photo or wall.")
+        raise FieldError("from: photo or wall.")
     pixels = as_points(body.get("pixels") or [], "pixels", dimension=2)
     if pixels.ndim != 2:
-        raise InputError("pixels: expected a list of [column, row].")
+        raise FieldError("pixels: expected a list of [column, row].")
     session = session_of(request)
     moved = await in_thread(session.pictures.convert, image_of(body), pixels, source)
     return answer({"pixels": plain(moved)})

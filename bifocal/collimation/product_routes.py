@@ -10,8 +10,8 @@ from starlette.requests import Request
 from starlette.responses import FileResponse, Response
 from starlette.routing import Route
 
-from bifocal.collimation.commands import number_of
 from bifocal.collimation.drawing import points_drawing
+from bifocal.collimation.fields import FieldError, number_of
 from bifocal.collimation.job_tasks import start_job
 from bifocal.collimation.requests import answer, in_thread, json_body, session_of
 from bifocal.collimation.session import Session
@@ -19,7 +19,6 @@ from bifocal.collimation.state_view import state_of
 from bifocal.collimation.uncertainty import precision_contours, uncertainty_picture
 from bifocal.collimation.uploads import take_photos
 from photocore.arrays import FloatArray, as_points
-from photocore.errors import InputError
 
 _FRESH = {"cache-control": "no-store"}
 
@@ -45,7 +44,7 @@ async def _start(request: Request) -> Response:
     body = await json_body(request)
     options = body.get("options", body)
     if not isinstance(options, dict):
-        raise InputError("options: expected an object.")
+        raise FieldError("options: expected an object.")
     job = await in_thread(start_job, session_of(request), str(body.get("kind")), options)
     return answer({"id": job.number})
 
@@ -88,7 +87,7 @@ async def _overlay(request: Request) -> Response:
 async def _value(request: Request) -> Response:
     x, y = (number_of(dict(request.query_params), key) for key in ("X", "Y"))
     if x is None or y is None:
-        raise InputError("X, Y: a place on the wall, in metres.")
+        raise FieldError("X, Y: a place on the wall, in metres.")
     return answer(await in_thread(session_of(request).products.value, x, y))
 
 
@@ -101,7 +100,7 @@ async def _profile(request: Request) -> Response:
 def _place(body: dict[str, Any], key: str) -> FloatArray:
     place = as_points(body.get(key) or [], key, dimension=2)
     if place.ndim != 1:
-        raise InputError(f"{key}: expected [X, Y] in metres.")
+        raise FieldError(f"{key}: expected [X, Y] in metres.")
     return place
 
 

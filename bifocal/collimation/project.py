@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from bifocal.collimation.fields import NOTES, FieldError, fields_of
 from bifocal.files.images import image_info
 from bifocal.survey.pair_workflow import is_survey, read_pair
 from bifocal.survey.workbook.reader import read_survey
@@ -152,7 +154,8 @@ def _of_folder(folder: Path, workbook: Path | None) -> SurveyFiles:
     if workbook is not None and workbook.exists():
         return _of_workbook(workbook)
     names = sorted(folder.iterdir())
-    journals = [path for path in names if path.name.endswith(_JOURNAL)]
+    # Every journal names its files; one that does not was left by a start that failed.
+    journals = [path for path in names if path.name.endswith(_JOURNAL) and last_opened(path)]
     pairs = [path for path in names if path.name.endswith(_PAIR)]
     photos = [path for path in names if path.suffix.lower() in PHOTOS]
     for found, what in ((journals, "surveys"), (pairs, "pair files")):
@@ -193,6 +196,12 @@ def _workbook(path: Path) -> Path:
         raise InputError(f"{path}: the survey workbook must end in .xlsx.")
     if not path.parent.is_dir():
         raise InputError(f"{path}: the folder {path.parent} does not exist; create it first.")
+    try:
+        path.stat()
+    except FileNotFoundError:
+        pass
+    except OSError as error:  # links that lead in a circle
+        raise InputError(f"{path}: cannot be used ({error.strerror}); name another one.") from None
     return path
 
 
@@ -203,8 +212,8 @@ def _remembered(files: SurveyFiles) -> SurveyFiles:
         return files
     folder = files.folder
     pair = folder / record["pair"] if record.get("pair") else None
-    photos = tuple(folder / name for name in record.get("photos", ()))
-    stem = str(record.get("stem") or files.stem)
+    photos = tuple(folder / name for name in record["photos"])
+    stem = record["stem"] or files.stem
     return replace(files, stem=stem, pair=files.pair or pair, photos=files.photos or photos)
 
 
@@ -215,8 +224,7 @@ def last_opened(journal: Path) -> dict[str, Any] | None:
     last = None
     for line in journal.read_bytes().splitlines():
         if b'"op": "files"' in line:
-            try:
-                last = json.loads(line)
-            except ValueError:
-                continue
-    return last if isinstance(last, dict) else None
+            # What is wrong with a line is said when the journal is replayed.
+            with contextlib.suppress(ValueError, RecursionError, AttributeError, FieldError):
+                last = fields_of(json.loads(line), NOTES)
+    return last

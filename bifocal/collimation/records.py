@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from bifocal.survey.observations import PLANE_CODES
+from bifocal.survey.observations import DOUBT_CODES, PLANE_CODES
 
 #: A pick: column and row in the photo as taken. [px]
 Pixel = tuple[float, float]
@@ -47,8 +47,10 @@ class PickedPoint:
 
     @property
     def type(self) -> str:
-        """One of `CODES`; other codes of the user's count as plain."""
+        """One of `CODES`, or doubtful; other codes of the user's count as plain."""
         code = self.code.strip().upper()
+        if code.startswith(DOUBT_CODES):
+            return "doubtful"
         if code in PLANE_CODES:
             return "wall"
         return next((name for name, word in CODES.items() if word and word == code), "plain")
@@ -61,6 +63,14 @@ class PickedPoint:
     def picked(self, image: int, pixel: Pixel | None) -> PickedPoint:
         """Return the point with a pick of photo 1 or 2 set or taken away."""
         return replace(self, picks=with_pick(self.picks, image, pixel))
+
+    def doubted(self, image: int, *, doubtful: bool) -> PickedPoint:
+        """Return the point with the pick of a photo accepted in doubt, or made by hand."""
+        mark = f"{DOUBT_CODES[0]} {image}"
+        if doubtful:
+            return replace(self, code=mark)
+        other = self.type != "doubtful" or self.code == f"{DOUBT_CODES[0]} {3 - image}"
+        return self if other else replace(self, code="")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -10,7 +10,7 @@ from typing import Any
 from starlette.concurrency import run_in_threadpool
 from starlette.exceptions import HTTPException
 from starlette.requests import Request
-from starlette.responses import JSONResponse, Response
+from starlette.responses import Response
 
 from bifocal.collimation.session import Session
 
@@ -47,7 +47,9 @@ def _no_constant(name: str) -> float:
 
 def answer(value: Any, status: int = 200) -> Response:
     """Return JSON that no browser keeps."""
-    return JSONResponse(value, status, headers={"cache-control": "no-store"})
+    text = json.dumps(value, allow_nan=False)  # ASCII: names of files may hold no characters
+    headers = {"cache-control": "no-store"}
+    return Response(text, status, headers=headers, media_type="application/json")
 
 
 async def in_thread(work: Callable[..., Any], *args: Any) -> Any:

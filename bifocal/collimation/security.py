@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import hmac
 import secrets
 from collections.abc import Mapping
@@ -9,13 +10,16 @@ from http.cookies import CookieError, SimpleCookie
 from urllib.parse import parse_qs
 
 from starlette.datastructures import Headers, MutableHeaders
-from starlette.responses import JSONResponse
+from starlette.responses import HTMLResponse, JSONResponse, Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+from bifocal.collimation.wording import say
+from photocore.workbook.words import LANGUAGES
 
 #: Bodies of commands, and of two dropped photos. [bytes]
 LARGEST_COMMAND, LARGEST_PHOTOS = 1 << 20, 1 << 30
 UPLOAD = "/api/photos"
-COOKIE = "bifocal_token"
+LONGEST_PATH = 1000
 _HEADERS: Mapping[str, str] = {
     "content-security-policy": (
         "default-src 'self'; img-src 'self' blob: data:; style-src 'self'; base-uri 'none'; "
@@ -26,6 +30,11 @@ _HEADERS: Mapping[str, str] = {
     "cross-origin-opener-policy": "same-origin",
     "cross-origin-resource-policy": "same-origin",
 }
+
+
+def cookie_of(scope: Scope) -> str:
+    """Return the name of a server's cookie; a browser sends those of all ports to each."""
+    return f"bifocal_token_{(scope.get('server') or ('', 0))[1]}"
 
 
 def new_token() -> str:
@@ -59,8 +68,7 @@ class Guard:
             return
         refusal = self._refusal(scope)
         if refusal is not None:
-            status, text = refusal
-            await JSONResponse({"error": text}, status)(scope, receive, _with_headers(send))
+            await _answer(scope, *refusal)(scope, receive, _with_headers(send))
             return
         limit = LARGEST_PHOTOS if scope["path"] == UPLOAD else LARGEST_COMMAND
         await self.app(scope, _limited(receive, limit), _with_headers(send))
@@ -75,10 +83,16 @@ class Guard:
         origins = {f"http://{host}" for host in hosts}
         if any(origin not in origins for origin in headers.getlist("origin")):
             return 403, "another page may not use this server."
-        if headers.get("sec-fetch-site", "none") not in ("same-origin", "none"):
+        query = parse_qs(scope.get("query_string", b"").decode("latin-1")).get("token", [])
+        # A file of the user's own that knows the token may open the page, and nothing else.
+        opens = scope["path"] == "/" and self._is_token(*query)
+        foreign = headers.get("sec-fetch-site", "none") not in ("same-origin", "none")
+        if foreign and not (opens and headers.get("sec-fetch-mode") == "navigate"):
             return 403, "another page may not use this server."
-        if not self._knows_token(scope, headers):
+        if not self._is_token(*query, *_tokens_in(scope, headers)):
             return 403, "open the page with the address that `bifocal pick` printed."
+        if len(scope["path"]) > LONGEST_PATH:
+            return 414, "the address is too long."
         try:
             length = int(headers.get("content-length") or 0)
         except ValueError:
@@ -88,20 +102,32 @@ class Guard:
             return 413, f"more than {limit // 2**20} MB are not taken."
         return None
 
-    def _knows_token(self, scope: Scope, headers: Headers) -> bool:
-        query = parse_qs(scope.get("query_string", b"").decode("latin-1"))
-        cookies = SimpleCookie()
-        try:
-            cookies.load(headers.get("cookie", ""))
-        except CookieError:
-            cookies = SimpleCookie()
-        given = [
-            *query.get("token", []),
-            headers.get("x-bifocal-token", ""),
-            *[morsel.value for name, morsel in cookies.items() if name == COOKIE],
-        ]
+    def _is_token(self, *given: str) -> bool:
         known = self.token.encode()
         return any(hmac.compare_digest(word.encode("utf-8", "replace"), known) for word in given)
+
+
+def _tokens_in(scope: Scope, headers: Headers) -> list[str]:
+    """Return the tokens that a request's headers name."""
+    cookies = SimpleCookie()
+    with contextlib.suppress(CookieError):
+        cookies.load(headers.get("cookie", ""))
+    own = cookies.get(cookie_of(scope))
+    return [headers.get("x-bifocal-token", ""), *([] if own is None else [own.value])]
+
+
+def _answer(scope: Scope, status: int, text: str) -> Response:
+    """Return a refusal: to a person a page, to a program JSON."""
+    headers = Headers(scope=scope)
+    if "text/html" not in headers.get("accept", ""):
+        return JSONResponse({"error": text}, status)
+    asked = headers.get("accept-language", "")[:2]
+    language = asked if asked in LANGUAGES else "en"
+    return HTMLResponse(
+        f'<!doctype html><html lang="{language}"><meta charset="utf-8"><title>bifocal</title>'
+        f"<h1>bifocal</h1><p>{say('ask', 'token', language)}</p><p><small>{text}</small></p>",
+        status,
+    )
 
 
 class TooLarge(Exception):

@@ -9,16 +9,16 @@ from typing import Any
 
 from starlette.applications import Starlette
 from starlette.exceptions import HTTPException
-from starlette.middleware import Middleware
 from starlette.requests import Request
 from starlette.responses import Response, StreamingResponse
 from starlette.routing import Route
 
 from bifocal.collimation.assets import KEEP, Assets
+from bifocal.collimation.fields import COMMANDS, FieldError, fields_of
 from bifocal.collimation.measuring_routes import ROUTES as MEASURING
 from bifocal.collimation.product_routes import ROUTES as PRODUCTS
 from bifocal.collimation.requests import answer, in_thread, json_body, session_of
-from bifocal.collimation.security import COOKIE, Guard, TooLarge
+from bifocal.collimation.security import Guard, TooLarge, cookie_of
 from bifocal.collimation.session import Session
 from bifocal.collimation.state_view import state_of
 from photocore.errors import PhotogrammetryError
@@ -27,7 +27,7 @@ from photocore.errors import PhotogrammetryError
 _ALIVE = 15.0
 
 
-def application(session: Session, token: str) -> Starlette:
+def application(session: Session, token: str) -> Guard:
     """Return the page's server for a survey.
 
     Parameters
@@ -50,13 +50,21 @@ def application(session: Session, token: str) -> Starlette:
     ]
     app = Starlette(
         routes=routes,
-        middleware=[Middleware(Guard, token=token)],
         exception_handlers={
-            PhotogrammetryError: _refused, HTTPException: _plain_error, TooLarge: _too_large,
+            FieldError: _wrong_field, PhotogrammetryError: _refused, HTTPException: _plain_error,
+            TooLarge: _too_large, OSError: _refused, Exception: _fault,
         },
     )  # fmt: skip
     app.state.session, app.state.token, app.state.assets = session, token, Assets()
-    return app
+    return Guard(app, token)  # outside of all: what fails is answered under its rules too
+
+
+async def _wrong_field(request: Request, error: Exception) -> Response:  # noqa: ARG001
+    return answer({"error": str(error)}, 400)
+
+
+async def _fault(request: Request, error: Exception) -> Response:  # noqa: ARG001
+    return answer({"error": f"an error of the program ({type(error).__name__})."}, 500)
 
 
 async def _refused(request: Request, error: Exception) -> Response:  # noqa: ARG001
@@ -78,7 +86,11 @@ async def _page(request: Request) -> Response:
     response = Response(text, media_type="text/html", headers={"cache-control": "no-store"})
     if "token" in request.query_params:
         response.set_cookie(
-            COOKIE, request.app.state.token, httponly=True, samesite="strict", path="/"
+            cookie_of(request.scope),
+            request.app.state.token,
+            httponly=True,
+            samesite="strict",
+            path="/",
         )
     return response
 
@@ -93,7 +105,7 @@ async def _state(request: Request) -> Response:
 
 
 async def _command(request: Request) -> Response:
-    session, body = session_of(request), await json_body(request)
+    session, body = session_of(request), fields_of(await json_body(request), COMMANDS)
 
     def carry_out() -> dict[str, Any]:
         with session.lock:

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from bifocal.collimation.commands import changes_of
+from bifocal.collimation.fields import NOTES, FieldError, fields_of
 from bifocal.collimation.jobs import JobRunner
 from bifocal.collimation.journal import Journal
 from bifocal.collimation.live_orientation import LiveOrientation, live_orientation
@@ -21,19 +22,19 @@ from bifocal.collimation.measures import measure
 from bifocal.collimation.pictures import Pictures
 from bifocal.collimation.products import Products, accept_pair
 from bifocal.collimation.project import SurveyFiles
-from bifocal.collimation.records import Change, PickedPoint, SurveyState
+from bifocal.collimation.records import Change, PickedPoint, Picks, SurveyState
 from bifocal.collimation.workbook_rows import PointRow, row_of
 from bifocal.collimation.workbook_setup import ideal_setup, pair_of
 from bifocal.collimation.workbook_sync import WorkbookSync
 from bifocal.model.flags import FlagLimits
 from bifocal.model.pair import Pair
-from photocore.errors import InputError
+from photocore.errors import InputError, PhotogrammetryError
 from photocore.output import relative_name
 
 #: Commands that were answered already, by their ids.
 MOST_ANSWERS = 10_000
-#: Records of the journal that are notes, not commands.
-_NO_COMMANDS = ("files", "workbook.saved", "workbook.read", "made", "proposed", "accepted")
+#: Commands that bring picks of the photos.
+_PICKING = ("point.pick", "points.add", "control.pick", "control.paste")
 
 
 class Session:
@@ -75,6 +76,7 @@ class Session:
             self.jobs = JobRunner(self.lock, self.tell, self.changed)
             self.sync = WorkbookSync(self)
             self._replay_all()
+            self.journal.cut()
             self._remember_files()
             self._show_proposal()
             self.show_products()
@@ -237,7 +239,7 @@ class Session:
             known = command.get("id")
             if isinstance(known, str) and known in self.answered:
                 return self.answered[known]
-            result = self._checked(dict(command))
+            result = self._checked(fields_of(command))
             if isinstance(known, str):
                 self._remember_answer(known, result)
             self.changed()
@@ -245,7 +247,7 @@ class Session:
 
     def _checked(self, command: dict[str, Any]) -> Any:
         """Carry out a command where the survey's files allow it."""
-        op = command.get("op")
+        op = command["op"]
         if op == "align.accept":
             return self._accept()
         if op == "photos.exchange":
@@ -254,7 +256,6 @@ class Session:
             result = self._carry_out(command, write=True)
             self._exchange_photos()
             return result
-        self._check_pick(command)
         return self._carry_out(command, write=True)
 
     def _remember_answer(self, known: str, result: Any) -> None:
@@ -264,7 +265,7 @@ class Session:
 
     def _carry_out(self, command: dict[str, Any], *, write: bool) -> Any:
         """Change the state by a command, after it stands in the journal."""
-        op = command.get("op")
+        op = command["op"]
         if op in ("undo", "redo"):
             return self._undo(command, back=op == "undo", write=write)
         trial = copy.copy(self.state)
@@ -274,6 +275,8 @@ class Session:
         if op in ("point.pick", "control.set", "control.pick") and not command.get("name"):
             command["name"] = changes[0].key
         if write:
+            if op in _PICKING:
+                self._check_picks(op, changes)
             self._write(command)
         self.state = trial
         self._apply(changes)
@@ -303,25 +306,36 @@ class Session:
 
     def _replay_all(self) -> None:
         """Carry out the journal, and find out what of it stands in the workbook."""
-        saved = [record for record in self.journal.records if record["op"] == "workbook.saved"]
+        records = self.journal.records
+        saved = [record for record in records if record["op"] == "workbook.saved"]
         at = saved[-1].get("at") if saved else None
-        for record in self.journal.records:
-            if record["op"] == "workbook.read":
-                rows, gone = _rows_of(record)
-                self._apply_rows(rows, gone)
-                self.sync.take(rows, gone)
-            elif record["op"] == "workbook.saved":
-                self.sync.digest = record.get("sha256", "")
-            elif record["op"] == "made":
-                self.products.note(record["kind"], record["names"])
-            elif record["op"] in ("proposed", "accepted"):
-                self.proposal = record if record["op"] == "proposed" else None
-            elif record["op"] not in _NO_COMMANDS:
-                self._carry_out(record, write=False)
-                if isinstance(record.get("id"), str):
-                    self._remember_answer(record["id"], {"name": record.get("name")})
+        for number, record in enumerate(records, start=1):
+            try:
+                self._replay(record)
+            except PhotogrammetryError as error:
+                raise self.journal.refusal(number, str(error)) from None
             if self.state.revision == at:
                 self.sync.synced = {n: row_of(p) for n, p in self.state.points.items()}
+
+    def _replay(self, record: Mapping[str, Any]) -> None:
+        """Carry out a record of the journal."""
+        op = record["op"]
+        fields = fields_of(record)
+        if op == "workbook.read":
+            rows = {name: PointRow(**row) for name, row in fields["rows"].items()}
+            gone = fields["gone"]
+            self._apply_rows(rows, gone)
+            self.sync.take(rows, gone)
+        elif op == "workbook.saved":
+            self.sync.digest = fields["sha256"]
+        elif op == "made":
+            self.products.note(fields["kind"], fields["names"])
+        elif op in ("proposed", "accepted"):
+            self.proposal = fields if op == "proposed" else None
+        elif op not in NOTES:
+            self._carry_out(fields, write=False)
+            if "id" in fields:
+                self._remember_answer(fields["id"], {"name": fields.get("name")})
 
     # ---- the workbook
 
@@ -364,19 +378,19 @@ class Session:
         stamp = datetime.now(UTC).isoformat(timespec="milliseconds")
         self.journal.append({**record, "time": stamp})
 
-    def _check_pick(self, command: Mapping[str, Any]) -> None:
-        """Refuse a pick outside its photo."""
-        if command.get("op") not in ("point.pick", "control.pick"):
-            return
-        image, column, row = (command.get(key) for key in ("image", "column", "row"))
-        if image not in (1, 2) or not isinstance(column, int | float):
-            return  # the command itself says what is wrong
-        if len(self.pictures.infos) < 2:
+    def _check_picks(self, op: str, changes: Sequence[Change]) -> None:
+        """Refuse picks outside their photos."""
+        sizes = [info.size for info in self.pictures.infos]
+        if len(sizes) < 2 and op.endswith(".pick"):
             raise InputError("there are no photos yet; give two.")
-        width, height = self.pictures.infos[image - 1].size
-        inside = -0.5 <= column <= width - 0.5
-        if isinstance(row, int | float) and not (inside and -0.5 <= row <= height - 0.5):
-            raise InputError(f"the pick lies outside photo {image} ({width} x {height} px).")
+        for change in changes:
+            picks: Picks = getattr(change.after, "picks", (None, None))
+            for image, (pick, size) in enumerate(zip(picks, sizes, strict=False), start=1):
+                if pick and not all(-0.5 <= p <= n - 0.5 for p, n in zip(pick, size, strict=True)):
+                    raise FieldError(
+                        f"column, row: the pick of {change.key} lies outside photo {image} "
+                        f"({size[0]} x {size[1]} px)."
+                    )
 
     # ---- listeners
 
@@ -446,13 +460,3 @@ def _typed(pair: Pair) -> list[object]:
         ]
         for photo in (pair.image1, pair.image2)
     ]
-
-
-def _rows_of(record: Mapping[str, Any]) -> tuple[dict[str, PointRow], list[str]]:
-    """Return the rows that a record of the journal holds."""
-    rows = {}
-    for name, row in record["rows"].items():
-        first, second = (None if pick is None else tuple(pick) for pick in row["picks"])
-        known = None if row["reference"] is None else tuple(row["reference"])
-        rows[name] = PointRow((first, second), row["code"], row["note"], row["use"], known)
-    return rows, list(record["gone"])

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from bifocal.collimation.commands import SETUP
+from bifocal.collimation.fields import SETUP
 from bifocal.collimation.live_orientation import LiveOrientation
 from bifocal.collimation.session import Session
 from bifocal.collimation.wording import say, without_options

@@ -20,7 +20,7 @@ from bifocal.survey.output import as_typed, result_content
 from bifocal.survey.pair_workflow import is_survey
 from bifocal.survey.survey_media import MOST, SurveyMedia, media_names
 from bifocal.survey.template_workflow import write_survey
-from bifocal.survey.workbook.content import SurveyContent, name_cell, setup_cells
+from bifocal.survey.workbook.content import SurveyContent, setup_cells
 from bifocal.survey.workbook.reader import SurveyInput, read_survey
 from bifocal.survey.workbook.setup_cells import MATRICES, NADIRS
 from bifocal.survey.workbook.update import update_book
@@ -33,7 +33,7 @@ from photocore.output import (
     relative_name,
     scratch_beside,
 )
-from photocore.workbook.cells import CellValue
+from photocore.workbook.cells import CellValue, name_cell
 from photocore.workbook.editor import WorkbookEditor
 from photocore.workbook.grid import TableArea
 from photocore.workbook.named_cells import place_of

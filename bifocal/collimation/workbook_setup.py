@@ -51,6 +51,8 @@ def completed(setup: SurveySetup, pair: Pair) -> SurveySetup:
     return replace(
         setup,
         unit="px",
+        enlargement1=1.0,
+        enlargement2=1.0,
         pitch=setup.pitch or float(metres * c / d),
         nadir1=setup.nadir1 or first,
         nadir2=setup.nadir2 or second,
@@ -67,6 +69,8 @@ def typed_setup(setup: SurveySetup, pair: Pair) -> dict[str, CellValue]:
     cells: dict[str, CellValue] = {"input_unit": whole.unit}
     if setup.pitch is None:
         cells["pitch"] = whole.pitch
+    if setup.c_used != whole.c_used:
+        cells |= {"enlargement_1": 1, "enlargement_2": 1}
     known = ((setup.nadir1, whole.nadir1), (setup.nadir2, whole.nadir2))
     for number, (typed, nadir) in enumerate(known, start=1):
         if typed is None and nadir is not None:

@@ -43,6 +43,12 @@ class PageServer:
     session: Session
     _server: uvicorn.Server
     _socket: socket.socket
+    _page: Path
+
+    def open_browser(self) -> None:
+        """Open the page in the browser, as soon as the server answers."""
+        url = self._page.absolute().as_uri() if self._page.is_file() else self.url
+        threading.Timer(0.3, webbrowser.open, [url]).start()
 
     def serve(self) -> None:
         """Answer requests until the server is stopped."""
@@ -78,26 +84,28 @@ def page_server(
         If the files are unusable, or the port is taken.
     """
     files = find_files([Path(s) for s in sources], None if workbook is None else Path(workbook))
-    session = Session(files, language=language)
     access = Access.of(files.folder / f".{files.stem}.page.json")
-    warm = threading.Timer(WARM_UP, _warm_up, [session])
-    warm.daemon = True
-    try:
-        with raising(), _listening(port, access.port) as listening:
-            number = listening.getsockname()[1]
+    with raising(), _listening(port, access.port) as listening:
+        number = listening.getsockname()[1]
+        url = f"http://{HOST}:{number}/?token={access.token}"
+        session = Session(files, language=language)
+        warm = threading.Timer(WARM_UP, _warm_up, [session])
+        warm.daemon = True
+        try:
             config = uvicorn.Config(
                 application(session, access.token), log_level="critical", access_log=False,
                 lifespan="off", server_header=False, timeout_graceful_shutdown=1,
             )  # fmt: skip
-            access.keep(number)
+            access.keep(number, url)
             session.sync.start()
             warm.start()
-            url = f"http://{HOST}:{number}/?token={access.token}"
-            yield PageServer(url, access.token, session, uvicorn.Server(config), listening)
-    finally:
-        warm.cancel()
-        access.forget()
-        session.close()
+            yield PageServer(
+                url, access.token, session, uvicorn.Server(config), listening, access.page
+            )
+        finally:
+            warm.cancel()
+            access.forget()
+            session.close()
 
 
 def _warm_up(session: Session) -> None:
@@ -129,13 +137,8 @@ def pick(
     """
     with page_server(*sources, workbook=workbook, port=port, language=language) as server:
         if browser:
-            open_browser(server.url)
+            server.open_browser()
         server.serve()
-
-
-def open_browser(url: str) -> None:
-    """Open an address in the browser, as soon as the server answers."""
-    threading.Timer(0.3, webbrowser.open, [url]).start()
 
 
 @contextmanager

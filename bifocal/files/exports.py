@@ -16,7 +16,7 @@ from photocore.cloud import write_cloud
 from photocore.errors import InputError
 from photocore.output import atomic_path
 from photocore.tables import write_csv
-from photocore.workbook.newbook import new_workbook, save_book, without_control
+from photocore.workbook.newbook import new_workbook, plain_cell, save_book
 
 #: Point lists as surveyors name them: P point, N north, E east, Z height, D description.
 ORDERS = ("PNEZD", "PENZD")
@@ -232,7 +232,6 @@ _ELLIPSE = ("ellipse_a", "ellipse_b", "ellipse_azimuth")
 def _write_xlsx(path: Path, points: SurveyPoints, coordinates: FloatArray) -> None:  # noqa: ARG001
     """Write all coordinates as a plain table of values."""
     from openpyxl import Workbook
-    from openpyxl.cell import WriteOnlyCell
 
     book = Workbook(write_only=True)
     sheet = book.create_sheet("Results")
@@ -241,11 +240,6 @@ def _write_xlsx(path: Path, points: SurveyPoints, coordinates: FloatArray) -> No
     world = points.world if points.world is not None else np.full((len(points), 3), np.nan)
     for i, name in enumerate(points.ids):
         numbers = [*points.xyz[i], *world[i], *(values[i] for values in sigmas.values())]
-        texts = []
-        for text in (name, points.flags[i], points.notes[i]):
-            cell = WriteOnlyCell(sheet, without_control(text))
-            cell.data_type = "s"  # a name that starts with "=" stays a name
-            texts.append(cell)
-        cells = [float(value) if np.isfinite(value) else None for value in numbers]
-        sheet.append([texts[0], *cells, texts[1], texts[2]])
+        row = (name, *numbers, points.flags[i], points.notes[i])
+        sheet.append([plain_cell(sheet, value) for value in row])
     save_book(book, path)

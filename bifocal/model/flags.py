@@ -14,6 +14,9 @@ FLAGS = ("NADIR", "OFF-RADIAL", "CHECK", "UNCERTAIN", "WEAK", "ON-PLANE", "OK")
 SIGMA_PIXEL = 0.5
 #: Beyond this share of d2 the standard deviation of r makes a point UNCERTAIN, beyond half WEAK.
 UNCERTAIN_SHARE = 0.02
+#: A place accepted in doubt may be any on its line: standard deviation of r as a share of d2, where
+#: places from half of d2 behind the wall to 0.4 of it before are equally likely.
+DOUBTFUL_SHARE = 0.9 / 12**0.5
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -20,6 +20,8 @@ NUMBERS = (
 TEXTS = ("id", "code", "note")
 #: Codes that mark a point as lying on the reference plane (r = 0), for the set-up check.
 PLANE_CODES = ("PLANE", "PIANO", "EBENE")
+#: What a code begins with where a pick was accepted in doubt: its relief may be any.
+DOUBT_CODES = ("DOUBTFUL", "DUBBIO", "ZWEIFELHAFT")
 
 
 #: Stands for columns that were not given; replaced by blanks when the object is made.
@@ -172,6 +174,12 @@ class PointObservations:
         """Which used points the user marks as lying on the reference plane, shape (n,)."""
         marked = [word.strip().upper() in PLANE_CODES for word in self.code]
         return np.array(marked, dtype=bool) & self.use
+
+    @property
+    def in_doubt(self) -> BoolArray:
+        """Which points were accepted in doubt, shape (n,)."""
+        marked = [word.strip().upper().startswith(DOUBT_CODES) for word in self.code]
+        return np.array(marked, dtype=bool)
 
     def exchanged(self) -> PointObservations:
         """Return the observations with images 1 and 2 exchanged."""

@@ -152,6 +152,7 @@ def _ideal(setup: SurveySetup, folder: Path) -> Pair:
     if setup.c1 is None or setup.c2 is None:
         raise InputError("c_1 and c_2, the principal distances [mm], are needed to use the photos.")
     setup.check_scales()
+    setup = replace(setup, enlargement1=1.0, enlargement2=1.0)  # of prints; these are the photos
     sizes = [image_info(folder / name).size for name in names]
     remarks = [*setup.remarks]
     pitch = setup.pitch

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from bifocal.equations import plane_coordinates, relief, relief_displacement
-from bifocal.model.flags import FlagLimits, point_flags
+from bifocal.model.flags import DOUBTFUL_SHARE, FlagLimits, point_flags
 from bifocal.model.intersection import PlanePicks, intersect
 from bifocal.model.pair import Pair
 from bifocal.model.photo import Photo
@@ -81,6 +82,8 @@ def solve_points(
         radii = _adjusted_radii(first, second, points, sigma_px, limits, pair)
     else:
         radii = _measured_radii(first, second, points, sigma_px)
+    if points.in_doubt.any():
+        radii = _doubted(radii, points, first.distance, DOUBTFUL_SHARE * pair.d2)
     s1, s2, d1, d2 = radii.s1, radii.s2, first.distance, second.distance
     if radii.bent is not None:
         ds, den, r, e1, e2, _ = radii.bent
@@ -130,6 +133,25 @@ def solve_points(
         image_scale=first.scale_number,
         sigma_px=radii.sigma_px,
         pair=None if pair.orientation is None else pair,
+    )
+
+
+def _doubted(radii: Radii, points: PointObservations, d1: float, sigma: float) -> Radii:
+    """Return radii whose doubtful points may lie anywhere on the ray of the far photo. [m]"""
+    spread = np.where(points.in_doubt, sigma, 0.0)
+    angle, rate = np.radians(radii.own_theta), -radii.own1 * radii.scale_number / (1000 * d1)
+    along = np.stack([rate * np.sin(angle), rate * np.cos(angle), np.ones(len(rate))], axis=-1)
+    along *= spread[:, None]
+    own, carried = along[:, :, None] * along[:, None, :], dict(radii.carried)
+    if radii.sigma_px is not None:
+        carried["k_r"] = np.hypot(carried["k_r"], spread / radii.sigma_px)
+        for key, value in entries(own / radii.sigma_px**2, "k_").items():
+            carried[key] = carried[key] + value
+    return replace(
+        radii,
+        sigma_r=np.hypot(radii.sigma_r, spread),
+        covariance=radii.covariance + own,
+        carried=carried,
     )
 
 

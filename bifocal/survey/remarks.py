@@ -16,6 +16,8 @@ from photocore.arrays import FloatArray
 
 #: A scale further from 1 than this is no matter of taping distances.
 SCALE_SHARE = 0.01
+#: Only a handful of lenses sees further off its axis, and none of them on a telephoto. [deg]
+WIDEST_ANGLE = 60.0
 #: Residuals of control points beyond this are named. [m]
 LARGEST_RESIDUAL = 0.10
 
@@ -143,6 +145,24 @@ def point_remarks(
     if len(off) > 10:
         remarks.append(f"... and {len(off) - 10} more OFF-RADIAL points.")
     return remarks
+
+
+def wide_remarks(setup: SurveySetup, points: PointObservations) -> list[str]:
+    """Return a warning where a point lies further off the axis than lenses see."""
+    measured = setup.in_millimetres(points)
+    x, y = np.array([measured.xy1, measured.xy2]).transpose(2, 0, 1)
+    s = np.where(measured.is_cartesian, np.hypot(x, y), measured.polar[:, :2].T)
+    c = np.array([[c or np.inf] for c in setup.c_used])
+    angles = np.nan_to_num(np.degrees(np.arctan(s / c))) * measured.use
+    image, worst = np.unravel_index(angles.argmax(), angles.shape)
+    if angles[image, worst] <= WIDEST_ANGLE:
+        return []
+    return [
+        f"WARNING: {points.ids[worst]} lies {angles.max():.0f} deg off the axis of image "
+        f"{image + 1}, further than lenses see. If prints were measured, give their enlargements "
+        "(enlargement_1, enlargement_2 in Setup; --enlargement1, --enlargement2; 1 = on the "
+        f"sensor); else check c_{image + 1}, the unit and the size of a pixel."
+    ]
 
 
 def refraction_remarks(pair: Pair, points: PointObservations) -> list[str]:

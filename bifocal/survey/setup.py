@@ -22,6 +22,8 @@ from photocore.errors import GeometryError, InputError, located
 SCALE_TOLERANCE = 0.02
 #: Precision of an image coordinate where the pixel size is unknown. [mm]
 SIGMA_RADIAL = 0.004
+#: The same on a print, read by a ruler: what a line on a drawing is good to. [mm]
+SIGMA_PRINT = 0.2
 UNITS = ("mm", "px")
 Place = tuple[float, float]
 
@@ -36,10 +38,13 @@ class SurveySetup:
         Distances of the projection centres to the reference plane. [m]
     c1, c2 : float or None
         Principal distances; both or none. Without them there is relief but no X and Y. [mm]
+    enlargement1, enlargement2 : float
+        How many times larger the image is on the print that was measured; 1 = on the sensor.
     pitch : float or None
         Size of a pixel; needed when coordinates are in pixels. [mm/px]
     sigma_s : float or None
-        Precision of a measured image coordinate; default 0.5 px, or 0.004 mm. [mm]
+        Precision of a measured image coordinate; default 0.5 px, or 0.004 mm; of prints 0.2 mm,
+        there. [mm]
     sigma_px : float or None
         Precision of a raw pixel. [px]
     nadir1, nadir2 : tuple of float or None
@@ -77,6 +82,8 @@ class SurveySetup:
     d2: float | None = None
     c1: float | None = None
     c2: float | None = None
+    enlargement1: float = 1.0
+    enlargement2: float = 1.0
     pitch: float | None = None
     sigma_s: float | None = None
     sigma_px: float | None = None
@@ -112,10 +119,18 @@ class SurveySetup:
         )
 
     @property
+    def c_used(self) -> tuple[float | None, ...]:
+        """Principal distances of the images as measured: those of prints are enlarged too. [mm]"""
+        own = (self.c1, self.enlargement1), (self.c2, self.enlargement2)
+        return tuple(c and c * enlargement for c, enlargement in own)
+
+    @property
     def precision(self) -> float:
         """Precision of an image coordinate. [mm]"""
         if self.sigma_s is not None:
             return self.sigma_s
+        if max(self.enlargement1, self.enlargement2) > 1.0:
+            return SIGMA_PRINT
         return SIGMA_PIXEL * self.pitch if self.pitch is not None else SIGMA_RADIAL
 
     def pair(self) -> Pair:
@@ -137,6 +152,11 @@ class SurveySetup:
                 "d_1), or give --d1 and --d2 in metres, or a pair file with --pair."
                 f"{''.join(f' {remark}' for remark in self.remarks)}"
             )
+        if self.unit == "px" and {self.enlargement1, self.enlargement2} != {1.0}:
+            raise InputError(
+                "enlargement_1, enlargement_2: these are of prints measured in mm. Type 1 for "
+                "pixels, and as pitch their size on the sensor (of a scan: over its enlargement)."
+            )
         if self.unit == "px" and self.pitch is None:
             raise InputError("pitch: the size of a pixel [mm/px] is needed to read pixels.")
         if self.unit == "px" and (self.nadir1 is None or self.nadir2 is None):
@@ -154,7 +174,8 @@ class SurveySetup:
         for name in ("pitch", "sigma_r_max"):
             if (value := getattr(self, name)) is not None:
                 positive(value, name)
-        pair = Pair.ideal(d1=self.d1, d2=self.d2, c1=self.c1, c2=self.c2, sigma=self.precision)
+        c1, c2 = self.c_used
+        pair = Pair.ideal(d1=self.d1, d2=self.d2, c1=c1, c2=c2, sigma=self.precision)
         if self.media is None:
             return pair
         if self.media.layers is not None and self.c1 is None:
@@ -191,7 +212,7 @@ class SurveySetup:
         other = {"1": "2", "2": "1"}
         swapped: dict[str, Any] = {
             f"{name}{image}": getattr(self, f"{name}{other[image]}")
-            for name in ("d", "c", "nadir", "photo")
+            for name in ("d", "c", "enlargement", "nadir", "photo")
             for image in "12"
         }
         media = None if self.media is None else self.media.exchanged()
@@ -208,21 +229,23 @@ class SurveySetup:
         if self.c1 is None or self.c2 is None or self.d1 is None or self.d2 is None:
             return ""
         media = None if self.media is None else self.media.layers
-        share = (1000.0 * self.d2 / self.c2) / (1000.0 * self.d1 / self.c1) - 1.0
+        enlarged = self.enlargement2 / self.enlargement1  # apart are the prints' scales by it too
+        share = (1000.0 * self.d2 / self.c2) / (1000.0 * self.d1 / self.c1) / enlarged - 1.0
         if media is not None:
             share = scale_ratio(*self.pair().as_given) - 1.0
-        if abs(share) > tolerance:
+        apart = abs(share * enlarged + enlarged - 1.0)
+        if apart > tolerance:
             place = f"{self.where}: " if self.where else ""
             if media is not None:
                 raise GeometryError(
                     f"{place}the scales of the photos, as seen through the media near the axis, "
-                    f"differ by {abs(share):.1%}: a bifocal pair has the same scale in both "
+                    f"differ by {apart:.1%}: a bifocal pair has the same scale in both "
                     "photos. Check c, d, z0 and the indices; of photos taken so, allow it with "
                     "--scale-tolerance (`bifocal plan` places cameras at equal scale)."
                 )
             raise GeometryError(
                 f"{place}c_1/d_1 = {self.c1 / self.d1:.4g} and c_2/d_2 = {self.c2 / self.d2:.4g} "
-                f"differ by {abs(share):.1%}: a bifocal pair has the same scale in both photos. "
+                f"differ by {apart:.1%}: a bifocal pair has the same scale in both photos. "
                 f"Check c_1, c_2, d_1 and d_2 (tolerance {tolerance:.1%}, --scale-tolerance)."
             )
         if abs(share) < 1e-4:
@@ -232,7 +255,7 @@ class SurveySetup:
             far, near = self.pair().straight_distances
         return (
             f"the scales of the photos differ by {share:+.2%}; image 2 is brought to the scale of "
-            "image 1 (k_12). If c or d is wrong instead, this is "
+            "image 1 (k_12). If c, d or an enlargement is wrong instead, this is "
             f"{float(false_relief_of_scale(abs(share), d1=far, d2=near)):.3f} m of false relief: "
             "points of known relief tell."
         )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -12,7 +13,7 @@ from bifocal.model.photo import Photo
 from bifocal.survey.observations import PointObservations
 from bifocal.survey.relief_table import ReliefTable
 from bifocal.survey.setup import SurveySetup
-from photocore.arrays import BoolArray, FloatArray
+from photocore.arrays import BoolArray, FloatArray, as_floats
 from photocore.errors import GeometryError, InputError
 
 #: Misfits across the radius beyond this many sigma, at most points, are no slips of the hand.
@@ -53,7 +54,7 @@ def refuse_wrong_unit(
     place = "the headings" if said else "Setup (input_unit)"
     typed = np.hstack([points.xy1, points.xy2])[cartesian]
     if setup.unit == "mm":
-        limit = LARGEST_MM if setup.c1 is None else WIDEST * max(setup.c1, setup.c2 or 0.0)
+        limit = LARGEST_MM if setup.c1 is None else WIDEST * max(c or 0.0 for c in setup.c_used)
         radial = points.polar[points.use & ~points.is_cartesian][:, :2]
         for values, what, mend in (
             (
@@ -93,6 +94,18 @@ def _typical(values: FloatArray) -> float:
     """Return the median size of the numbers given; 0 where there are none."""
     known = np.abs(values[~np.isnan(values)])
     return float(np.median(known)) if known.size else 0.0
+
+
+def given_above_zero(**numbers: float | None) -> dict[str, Any]:
+    """Return the options that are given, refusing what is not above zero."""
+    given = {name: value for name, value in numbers.items() if value is not None}
+    for name, value in given.items():
+        option = f"--{name.replace('_', '-')}"
+        if as_floats(value, option).ndim:
+            raise InputError(f"{option}: expected one number for the whole survey.")
+        if not value > 0:
+            raise InputError(f"{option}: must be a number above zero, got {value:g}.")
+    return given
 
 
 def refuse_far_stations(

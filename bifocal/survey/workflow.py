@@ -31,6 +31,7 @@ from bifocal.survey.remarks import (
     point_remarks,
     refraction_remarks,
     unused_remarks,
+    wide_remarks,
 )
 from bifocal.survey.setup import SCALE_TOLERANCE, SurveySetup
 from bifocal.survey.sources import Source, given_pair, measured, set_up
@@ -38,6 +39,7 @@ from bifocal.survey.survey_media import UNBENT, SurveyMedia
 from bifocal.survey.tolerances import RULES, ToleranceRule, as_rule
 from bifocal.survey.units import (
     as_pixels,
+    given_above_zero,
     refuse_contradiction,
     refuse_millimetres,
     refuse_wrong_unit,
@@ -45,7 +47,7 @@ from bifocal.survey.units import (
 from bifocal.survey.workbook.content import SurveyContent
 from bifocal.survey.workbook.reader import ReadOptions, SurveyInput, column_map
 from bifocal.survey.workbook.setup_cells import OPTION_CELLS
-from photocore.arrays import FloatArray, as_floats
+from photocore.arrays import FloatArray
 from photocore.errors import InputError
 from photocore.tables.numbers import Decimal
 
@@ -118,6 +120,8 @@ def solve(
     d2: float | None = None,
     c1: float | None = None,
     c2: float | None = None,
+    enlargement1: float | None = None,
+    enlargement2: float | None = None,
     pitch: float | None = None,
     unit: str | None = None,
     sigma_s: float | None = None,
@@ -149,13 +153,15 @@ def solve(
         `Setup`, as all that follow. [m]
     c1, c2 : float, optional
         Principal distances; without them X and Y stay NaN. [mm]
+    enlargement1, enlargement2 : float, optional
+        How many times larger than on the sensor the images are on the prints that were measured.
     pitch : float, optional
         Size of a pixel. [mm/px]
     unit : {"mm", "px"}, optional
         Of ``x1 y1 x2 y2``; default as headings or `Setup` say, else mm.
     sigma_s, sigma_px : float, optional
-        Precision of an image coordinate [mm], default 0.5 px, and of a raw pixel [px], default the
-        pair's, else found from the misfits of 20 or more points, else 0.5.
+        Precision of an image coordinate [mm], default 0.5 px, of prints 0.2 mm, and of a raw pixel
+        [px], default the pair's, else found from the misfits of 20 or more points, else 0.5.
     sigma_r_max : float, optional
         Points of less precise relief are UNCERTAIN; default 2 % of d2. [m]
     adjust_setup : bool
@@ -203,8 +209,9 @@ def solve(
     ([[2.0, 0.0, 1.0]], ('OK',))
     """
     lengths = {"d1": d1, "d2": d2, "c1": c1, "c2": c2, "pitch": pitch}
-    given = _checked(**lengths, sigma_s=sigma_s, sigma_r_max=sigma_r_max)
-    _checked(sigma_px=sigma_px, scale_tolerance=scale_tolerance)
+    lengths |= {"enlargement1": enlargement1, "enlargement2": enlargement2}
+    given = given_above_zero(**lengths, sigma_s=sigma_s, sigma_r_max=sigma_r_max)
+    given_above_zero(sigma_px=sigma_px, scale_tolerance=scale_tolerance)
     judged = tuple(as_rule(rule) for rule in rules) or RULES
     asked = {**given, "unit": unit, "pair": pair, "sigma_px": sigma_px, "model": model}
     asked = {name: value for name, value in asked.items() if value is not None}
@@ -270,18 +277,6 @@ def _media(
     if general is None or pair is None:
         return typed
     return SurveyMedia.of_photos((general.image1, general.image2), typed.media if typed else 0)
-
-
-def _checked(**numbers: float | None) -> dict[str, Any]:
-    """Return the options that are given, refusing what is not above zero."""
-    given = {name: value for name, value in numbers.items() if value is not None}
-    for name, value in given.items():
-        option = f"--{name.replace('_', '-')}"
-        if as_floats(value, option).ndim:
-            raise InputError(f"{option}: expected one number for the whole survey.")
-        if not value > 0:
-            raise InputError(f"{option}: must be a number above zero, got {value:g}.")
-    return given
 
 
 def _placed(
@@ -428,6 +423,7 @@ def _solve_ideal(survey: SurveyInput, scale_tolerance: float, *, adjust: bool) -
     pair = setup.pair()
     remarks = [*setup.remarks, setup.check_scales(scale_tolerance)]
     refuse_wrong_unit(setup, points, survey.where, said=survey.unit)
+    remarks += wide_remarks(setup, points)
     if pair.exchanged:
         remarks.append(exchanged_remark(setup))
         setup, points = setup.exchanged(), points.exchanged()
@@ -454,6 +450,8 @@ def _solve_ideal(survey: SurveyInput, scale_tolerance: float, *, adjust: bool) -
             c2 = None if setup.c1 is None else setup.c1 * pair.d2 / pair.d1
             if bent:
                 c2 = setup.c2
+            if not bent:
+                setup = replace(setup, enlargement2=setup.enlargement1)
             setup = replace(setup, unit="mm", c2=c2, adjusted=(None, None))
             pair = setup.pair()
             remarks += said

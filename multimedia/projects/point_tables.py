@@ -209,21 +209,14 @@ def fill_sheet(sheet: Any, headings: Sequence[str], rows: Iterable[Sequence[obje
     """Write a table into an empty sheet: bold headings that stay in sight, then the rows."""
     from openpyxl.styles import Font
 
+    from photocore.workbook.newbook import plain_cell
+
     sheet.append(list(headings))
     for cell in sheet[1]:
         cell.font = Font(bold=True)
     for row in rows:
-        sheet.append([_cell(value) for value in row])
+        sheet.append([plain_cell(sheet, value) for value in row])
     sheet.freeze_panes = "A2"
-
-
-def _cell(value: object) -> object:
-    """Return a cell value: no NaN, no text that a spreadsheet takes for a formula."""
-    if isinstance(value, float | np.floating):
-        return float(value) if np.isfinite(value) else None
-    if isinstance(value, np.integer):
-        return int(value)
-    return f"'{value}" if isinstance(value, str) and value.startswith(("=", "+", "@")) else value
 
 
 def _ids(table: Table) -> tuple[str, ...]:

@@ -155,13 +155,12 @@ def project_data(project: Project, folder: Path) -> dict[str, Any]:
         data["name"] = project.name
     data["unit"] = project.unit
     data["sigma_image"] = float(project.sigma_image)
-    data |= {k: v for k, v in project.extra.items() if k not in data}
     data["media"] = {name: _media_data(media, folder) for name, media in project.media.items()}
     data["camera"] = [
         _camera_data(camera, media)
         for camera, media in zip(project.cameras, project.media_of, strict=True)
     ]
-    return data
+    return data | {k: v for k, v in project.extra.items() if k not in data}
 
 
 #: Keys of media; at the top of a file, where unknown keys are kept, they would have no effect.
@@ -383,7 +382,8 @@ def _camera_data(camera: Camera, media: str) -> dict[str, Any]:
     data["c"] = camera.principal_distance
     data["principal_point"] = camera.principal_point.tolist()
     lens = camera.distortion
-    if not lens.is_identity:
+    if lens != Brown():
+        # Without terms too the convention counts: terms estimated later are of it.
         convention = _FISHEYE if isinstance(lens, Fisheye) else lens.convention.value
         terms = {name: float(getattr(lens, name)) for name in lens.names}
         data["distortion"] = {"convention": convention} | terms

@@ -39,6 +39,17 @@ def escape(text: str) -> str:
     return text
 
 
+def name_cell(name: str) -> CellValue:
+    """Return a point's name as a cell: plain whole numbers as numbers, all else as text.
+
+    Examples
+    --------
+    >>> name_cell("7"), name_cell("007"), name_cell("=1+1")
+    (7, '007', '=1+1')
+    """
+    return int(name) if name.isdecimal() and len(name) < 10 and str(int(name)) == name else name
+
+
 def number_text(value: float) -> str:
     """Return a finite number as cells hold it.
 

@@ -10,14 +10,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from photocore.workbook.grid import TableArea, cell_name, plain_title, split_area
-from photocore.workbook.package import local, read_part, understood, xml_elements
-from photocore.workbook.xlsx import (
-    SheetPart,
-    Workbook,
-    part_of_kind,
-    read_relations,
-    row_cells,
-)
+from photocore.workbook.package import local, read_part, read_relations, understood, xml_elements
+from photocore.workbook.xlsx import SheetPart, Workbook, part_of_kind, row_cells
 from photocore.workbook.xmltext import escaped, unescaped
 
 _RANGE = re.compile(

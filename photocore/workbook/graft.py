@@ -153,15 +153,15 @@ class Graft:
         data = self._book()
         key = self._relate(self.book.part, part, "worksheet")
         numbers = [int(n) for n in re.findall(rb"\ssheetId\s*=\s*[\"'](\d+)", data)]
-        like = re.search(rb"<(?:\w+:)?sheet\s[^>]*?\s(\w+):id\s*=", data)
         place = re.search(rb"</(?:\w+:)?sheets\s*>", data)
-        if like is None or place is None:
+        if place is None:
             raise InputError(f"{self.path}: its list of sheets cannot be understood.")
         entry = (
-            f'<{_prefix_of(data)}sheet name={quoted(title)} sheetId="{max(numbers) + 1}" '
-            f'{like[1].decode()}:id="{key}"/>'
+            f'<{_prefix_of(data)}sheet xmlns:r="{_RELATIONS}" name={quoted(title)} '
+            f'sheetId="{max(numbers) + 1}" r:id="{key}"/>'
         )
-        self._put(self.book.part, data[: place.start()] + entry.encode() + data[place.start() :])
+        made = self._strict(entry.encode())
+        self._put(self.book.part, data[: place.start()] + made + data[place.start() :])
 
     def _add_part(self, name: str, content: Mapping[str, bytes]) -> str:
         """Add a part and all it refers to; return its new name."""

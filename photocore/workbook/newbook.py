@@ -20,12 +20,14 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, BinaryIO
+from typing import TYPE_CHECKING, Any, BinaryIO
+
+import numpy as np
 
 from photocore.errors import InputError
 from photocore.output import atomic_path, check_writable, free_path
 from photocore.provenance import provenance
-from photocore.workbook.cells import CellValue, NewColumn, NewRows, escape
+from photocore.workbook.cells import CellValue, NewColumn, NewRows, escape, name_cell
 from photocore.workbook.changes import SheetChanges
 from photocore.workbook.formulas import ModelCell, model_cells
 from photocore.workbook.grid import split_cell
@@ -239,6 +241,19 @@ def save_book(book: Workbook, path: Path) -> None:
     with zipfile.ZipFile(package) as written:
         parts = {_CORE: _stated_properties(written.read(_CORE))}
     rewrite_package(package, path, parts, date=PART_TIME)
+
+
+def plain_cell(sheet: Any, value: object) -> object:
+    """Return what openpyxl appends to a sheet: blank for NaN, a name as `name_cell` has it."""
+    from openpyxl.cell import WriteOnlyCell
+
+    if isinstance(value, str):
+        value = name_cell(without_control(value))
+    if isinstance(value, str):
+        cell = WriteOnlyCell(sheet, value)
+        cell.data_type = "s"  # a name that begins with "=" stays a name
+        return cell
+    return None if isinstance(value, float | np.floating) and not np.isfinite(value) else value
 
 
 def check_new_workbook(

@@ -5,9 +5,11 @@ from __future__ import annotations
 import gc
 import lzma
 import os
+import posixpath
+import re
 import zipfile
 import zlib
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Container, Iterator, Mapping
 from contextlib import contextmanager
 from functools import lru_cache
 from pathlib import Path
@@ -32,6 +34,8 @@ _RATIO_MATTERS_FROM = 2**20
 #: quarter more space.
 _FAST, _THOROUGH = 2, 6
 _OLE = b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1"
+#: The namespaces of references to relations, of ordinary and of strict workbooks.
+_REFERENCES = re.compile(rb"xmlns:(\w+)=[\"'][^\"']*/officeDocument/(?:2006/)?relationships[\"']")
 #: Small, since the elements of a chunk are made before the first is looked at.
 _CHUNK = 2**15
 #: What unpacking a damaged member may raise.
@@ -151,6 +155,11 @@ def rewrite_package(
     """Copy a zip package with parts replaced, left out (None), or added at its end.
 
     Order, methods and (without one) dates stay.
+
+    Raises
+    ------
+    InputError
+        If the copy would be damaged where the package was not: see `_refuse_damage`.
     """
     named = source if isinstance(source, Path) else target
     with zipfile.ZipFile(source) as old, target.open("wb") as file:
@@ -176,11 +185,61 @@ def rewrite_package(
                 new.writestr(added, data, compresslevel=_level(data))
         file.flush()
         os.fsync(file.fileno())
+        _refuse_damage(named, old, target, parts)
 
 
 def _level(data: bytes) -> int:
     """Return how hard to compress a part: sheets of many MB take most of the time of a change."""
     return _FAST if len(data) > SMALL else _THOROUGH
+
+
+def _refuse_damage(path: Path, old: zipfile.ZipFile, target: Path, changed: Container[str]) -> None:
+    """Refuse changed parts that are no XML or refer to what is not there, unless they did so."""
+    with zipfile.ZipFile(target) as new:
+        found = (f for f in _faults(path, new, changed) if f not in {*_faults(path, old, changed)})
+        fault = next(found, "")
+    if fault:
+        raise InputError(
+            f"{path}: nothing was written, since no program would open the changed workbook "
+            f"({fault}). Open it in the spreadsheet program, save it there, and try again."
+        )
+
+
+def _faults(path: Path, package: zipfile.ZipFile, changed: Container[str]) -> Iterator[str]:
+    """Yield why a spreadsheet program would not open a package."""
+    names = {*package.namelist()}
+    for name in ("", *package.namelist()):
+        try:
+            relations = read_relations(path, package, name)
+            data = package.read(name) if name in changed and name.endswith(".xml") else b"<x/>"
+            expat.ParserCreate(namespace_separator=" ").Parse(data, True)
+        except (InputError, expat.ExpatError) as error:
+            yield f"{name} is not valid XML: {str(error).partition(': line')[0]}"
+            continue
+        for _, place in relations.values():
+            if place and place not in names:
+                yield f"{name} leads to {place}, which is missing"
+        for prefix in {*_REFERENCES.findall(data)}:
+            for key in re.findall(rb"\s%s:(?:id|embed|link)=[\"']([^\"']+)" % prefix, data):
+                if key.decode() not in relations:
+                    yield f"{name} has no relation {key.decode()}"
+
+
+def read_relations(path: Path, package: zipfile.ZipFile, part: str) -> dict[str, tuple[str, str]]:
+    """Return id -> (kind, target part) of a part's relations; external targets are empty."""
+    folder, name = posixpath.split(part)
+    rels = posixpath.join(folder, "_rels", f"{name}.rels")
+    relations: dict[str, tuple[str, str]] = {}
+    if rels in package.namelist():
+        for element in xml_root(path, package, rels).iter():
+            if local(element.tag) == "Relationship":
+                # An absolute target replaces the folder.
+                whole = posixpath.join("/", folder, element.get("Target", ""))
+                kind = element.get("Type", "").rpartition("/")[2]
+                found = kind, posixpath.normpath(whole).lstrip("/")
+                external = element.get("TargetMode") == "External"
+                relations[element.get("Id", "")] = ("", "") if external else found
+    return relations
 
 
 def xml_events(

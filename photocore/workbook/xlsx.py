@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import posixpath
 import re
 import zipfile
 from collections.abc import Callable, Iterator, Sequence
@@ -34,6 +33,7 @@ from photocore.workbook.package import (
     new_parser,
     open_package,
     read_part,
+    read_relations,
     uncollected,
     understood,
     xml_elements,
@@ -168,21 +168,6 @@ def read_directory(path: Path, package: zipfile.ZipFile) -> Workbook:
     if not book.sheets:
         raise InputError(f"{path}: the workbook has no sheet with cells.")
     return book
-
-
-def read_relations(path: Path, package: zipfile.ZipFile, part: str) -> dict[str, tuple[str, str]]:
-    """Return id -> (kind, target part) of a part's relations; external targets are left out."""
-    folder, name = posixpath.split(part)
-    rels = posixpath.join(folder, "_rels", f"{name}.rels")
-    relations: dict[str, tuple[str, str]] = {}
-    if rels in package.namelist():
-        for element in xml_root(path, package, rels).iter():
-            if local(element.tag) == "Relationship" and element.get("TargetMode") != "External":
-                # An absolute target replaces the folder.
-                whole = posixpath.join("/", folder, element.get("Target", ""))
-                kind = element.get("Type", "").rpartition("/")[2]
-                relations[element.get("Id", "")] = kind, posixpath.normpath(whole).lstrip("/")
-    return relations
 
 
 def read_tables(path: Path, package: zipfile.ZipFile, sheet: SheetPart) -> list[TableArea]:

@@ -27,7 +27,7 @@ from bifocal.survey.workbook.columns import (
 from bifocal.survey.workbook.media_formulas import setup_values
 from bifocal.survey.workbook.setup_cells import MATRICES, NADIRS, PHOTOS, setup_checks
 from photocore.arrays import BoolArray, FloatArray
-from photocore.workbook.cells import CellValue
+from photocore.workbook.cells import CellValue, name_cell
 from photocore.workbook.live_columns import LiveColumn
 
 #: Rows of the tables of an empty template.
@@ -203,17 +203,6 @@ class SurveyContent:
     def control_rows(self) -> int:
         """Rows of `Georeference`."""
         return max(CONTROL_ROWS, len(self.control) + 3)
-
-
-def name_cell(name: str) -> CellValue:
-    """Return a point's name as a cell: plain whole numbers as numbers, all else as text.
-
-    Examples
-    --------
-    >>> name_cell("7"), name_cell("007"), name_cell("=1+1")
-    (7, '007', '=1+1')
-    """
-    return int(name) if name.isdecimal() and len(name) < 10 and str(int(name)) == name else name
 
 
 def inputs(values: FloatArray) -> list[CellValue]:
@@ -401,7 +390,7 @@ def _setup_cells(content: SurveyContent) -> dict[str, CellValue]:
     limits, setup = content.limits, content.setup
     cells: dict[str, CellValue] = {
         "input_unit": "mm", "k_off": limits.off_radial, "k_plane": limits.on_plane,
-        "unit_x": 1, "unit_y": 1, "k_12": 1.0,
+        "unit_x": 1, "unit_y": 1, "k_12": 1.0, "enlargement_1": 1, "enlargement_2": 1,
         **{f"off_{axis}{image}": 0 for axis in "xy" for image in "12"},
     }  # fmt: skip
     if content.pair is None:
@@ -422,6 +411,8 @@ def _setup_cells(content: SurveyContent) -> dict[str, CellValue]:
     if first.scale_number is not None and second.scale_number is not None:
         cells["k_12"] = second.scale_number / first.scale_number
     cells |= {"photo_1": setup.photo1 or None, "photo_2": setup.photo2 or None}
+    cells |= {"c_1": setup.c1, "enlargement_1": setup.enlargement1}
+    cells |= {"c_2": setup.c2, "enlargement_2": setup.enlargement2}
     cells |= setup.title_block
     cells |= {"pitch": setup.pitch, "input_unit": setup.unit, "sigma_s": setup.precision}
     if setup.unit == "px" and setup.pitch is not None:

@@ -30,6 +30,11 @@ def calculated_names(media: int, *, is_pair: bool) -> tuple[str, ...]:
     return (*_used(media), *both, "r_top", *rays)
 
 
+def larger(image: int | str) -> str:
+    """Return the formula of how much larger a print is than its sensor; blank is 1."""
+    return f"IF(COUNT(enlargement_{image})=1,enlargement_{image},1)"
+
+
 def setup_formulas(media: int, *, is_pair: bool) -> dict[str, str]:
     """Return the formulas of the sheet `Setup` that media add or change.
 
@@ -44,7 +49,7 @@ def setup_formulas(media: int, *, is_pair: bool) -> dict[str, str]:
     for image in "12":
         glass = "".join(f"+N(thick_{n})*n_used_1/n_used_{n}" for n in range(2, media))
         seen = f"N(z0_{image}){glass}+behind_{image}*n_used_1/n_used_{media}"
-        lens = f'IF(COUNT(c_1,c_2)=2,c_{image},IF(COUNT(d_{image})=1,d_{image},""))'
+        lens = f'IF(COUNT(c_1,c_2)=2,c_{image}*{larger(image)},IF(COUNT(d_{image})=1,d_{image},""))'
         formulas |= {
             f"behind_{image}": f'IF(COUNT(d_{image})=1,d_{image}-N(z0_{image}){inner},"")',
             f"seen_{image}": f'IF(COUNT(d_{image})=1,{seen},"")',
@@ -58,10 +63,10 @@ def setup_formulas(media: int, *, is_pair: bool) -> dict[str, str]:
         "MIN(behind_1,behind_2)))",
         "b_lever": f'IF(COUNT(d_1,d_2)=2,{lever},"")',
         "mm_1": "IF(COUNT(m_1,m_2)=2,1000/m_1,1)",
-        "m_seen": 'IF(COUNT(c_1,d_1)=2,1000*seen_1/c_1,"")',
+        "m_seen": 'IF(COUNT(c_1,c_2,d_1)=3,1000*seen_1/c_rays_1,"")',
     }
     if not is_pair:
-        formulas["k_12"] = "IF(COUNT(m_1,m_2)=2,(seen_2/c_2)/(seen_1/c_1),1)"
+        formulas["k_12"] = "IF(COUNT(m_1,m_2)=2,(seen_2/c_rays_2)/(seen_1/c_rays_1),1)"
     return formulas
 
 

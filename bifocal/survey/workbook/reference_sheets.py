@@ -18,7 +18,7 @@ from bifocal.survey.workbook.columns import (
     verdict_columns,
 )
 from bifocal.survey.workbook.content import SurveyContent, check_cells, setup_cells
-from bifocal.survey.workbook.media_formulas import planned
+from bifocal.survey.workbook.media_formulas import larger, planned
 from bifocal.survey.workbook.words import word
 from photocore.workbook.cells import CellValue
 from photocore.workbook.grid import column_letters
@@ -109,7 +109,9 @@ def planning(builder: BookBuilder, content: SurveyContent) -> None:
     )
 
     def live(formula: str) -> str:
-        return planned(formula, content.media_cells, is_pair=content.is_pair)
+        formula = planned(formula, content.media_cells, is_pair=content.is_pair)
+        frame = "(sensor_w^2+sensor_h^2)"
+        return formula if content.is_pair else formula.replace(frame, f"({frame}*{larger(1)}^2)")
 
     sizes = content.sensor or (math.nan, math.nan)
     sheet.word("A6", "footprint")
@@ -131,7 +133,7 @@ def planning(builder: BookBuilder, content: SurveyContent) -> None:
         body = 'IF(COUNT(pixel_wall)=1,pixel_wall,"")'
         pixel = float(cells.get("pixel_wall") or math.nan)
     sheet.formula("B7", body, _known(pixel), form="0.00", name="gsd_mm")
-    diagonal = math.hypot(*sizes)
+    diagonal = math.hypot(*sizes) * float(cells["enlargement_1"] or 1)  # of the print, if any
     sheet.word("A9", "uncertainty", HEAD_FONT)
     shown = _uncertainty(content, sigma, scale, diagonal)
     columns = [replace(column, formula=live(column.formula)) for column in UNCERTAINTY]
@@ -145,7 +147,8 @@ def planning(builder: BookBuilder, content: SurveyContent) -> None:
         "sigma_r": [_known(math.sqrt(2) * sigma * base / radius) for radius in radii],
     }
     rows = len(FRAME_SHARES)
-    sheet.table("tblFrame", OVER_FRAME, at=(head, 1), rows=rows, cells=over_frame)
+    columns = [replace(column, formula=live(column.formula)) for column in OVER_FRAME]
+    sheet.table("tblFrame", columns, at=(head, 1), rows=rows, cells=over_frame)
     sheet.worksheet.column_dimensions["A"].width = 36
     sheet.finish()
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from bifocal.model.flags import SIGMA_PIXEL, UNCERTAIN_SHARE
-from bifocal.survey.setup import SCALE_TOLERANCE, SIGMA_RADIAL
+from bifocal.survey.setup import SCALE_TOLERANCE, SIGMA_PRINT, SIGMA_RADIAL
 from bifocal.survey.survey_media import HEIGHTS, index_names, media_names
-from bifocal.survey.workbook.media_formulas import calculated_names, setup_formulas
+from bifocal.survey.workbook.media_formulas import calculated_names, larger, setup_formulas
 from photocore.workbook.cells import CellValue
 
 Groups = tuple[tuple[str, ...], ...]
@@ -18,15 +18,17 @@ PHOTOS = ("photo_1", "photo_2")
 IDEAL_NADIRS = ("nadir_1_col", "nadir_1_row", "nadir_2_col", "nadir_2_row")
 #: Cells for the head of the printed results.
 TITLE_BLOCK = ("project", "client", "surveyor", "survey_date")
+#: How many times larger than on the sensor the images are that were measured.
+PRINTS = ("enlargement_1", "enlargement_2")
 #: Cells that hold texts.
 TEXTS = ("pair_file", *PHOTOS, *TITLE_BLOCK)
 _CHECKS = ("setup_missing", "check_order", "check_scale")
 #: Cells that no formula of a point needs; workbooks of older versions do not have them.
-SHOWN_ONLY = (*TITLE_BLOCK, *_CHECKS, "setup_state")
+SHOWN_ONLY = (*TITLE_BLOCK, *PRINTS, *_CHECKS, "setup_state")
 #: Cells of an ideal pair, group by group; the last group is calculated, the others are typed.
 IDEAL_GROUPS: Groups = (
     (
-        *("c_1", "c_2", "d_2", "delta_d", "d_1", "input_unit", "pitch"),
+        *("c_1", "c_2", "d_2", "delta_d", "d_1", "input_unit", *PRINTS, "pitch"),
         *IDEAL_NADIRS,
         *PHOTOS,
     ),
@@ -54,7 +56,10 @@ PAIR_GROUPS: Groups = (
     (*_CHECKS[:2], "m_1", "b_lever", "e_x", "e_y", "sigma_s"),
 )
 #: The cells of options that are not called as these.
-OPTION_CELLS = {"d1": "d_1", "d2": "d_2", "c1": "c_1", "c2": "c_2", "unit": "input_unit"}
+OPTION_CELLS = {
+    **{f"{name}{k}": f"{name}_{k}" for name in ("d", "c", "enlargement") for k in "12"},
+    "unit": "input_unit",
+}
 #: Number formats.
 FORMS: Mapping[str, str] = {
     **dict.fromkeys(("d_1", "d_2", "delta_d", "b_lever"), "0.000"),
@@ -65,11 +70,12 @@ FORMS: Mapping[str, str] = {
     **dict.fromkeys((*PHOTOS, *TITLE_BLOCK), "@"),
 }
 #: Typed numbers that must be above zero; of the others the sheet only asks that they are numbers.
-POSITIVE = ("c_1", "c_2", "d_1", "d_2", "pitch", "sigma_s", "sigma_px", "sigma_r_max")
+POSITIVE = ("c_1", "c_2", "d_1", "d_2", "pitch", "sigma_s", "sigma_px", "sigma_r_max", *PRINTS)
 #: Cells that are yellow and hold a formula until something is typed over it.
 TYPED_FORMULAS: Mapping[str, str] = {
     "d_1": 'IF(COUNT(d_2,delta_d)=2,d_2+delta_d,"")',
-    "sigma_s": f"IF(COUNT(pitch)=1,{SIGMA_PIXEL:g}*pitch,{SIGMA_RADIAL:g})",
+    "sigma_s": f"IF(MAX({','.join(PRINTS)})>1,{SIGMA_PRINT:g},"
+    f"IF(COUNT(pitch)=1,{SIGMA_PIXEL:g}*pitch,{SIGMA_RADIAL:g}))",
     "sigma_r_max": f'IF(COUNT(d_1,d_2)=2,{UNCERTAIN_SHARE:g}*MIN(d_1,d_2),"")',
 }
 #: What a set-up needs: what to type, the cells that then hold numbers, for which input unit.
@@ -127,7 +133,9 @@ def setup_checks(
         order = _verdict(float(cells["d_1"] or 0) > float(cells["d_2"] or 0))
     scale: CellValue = None
     if known("m_1", "m_2"):
-        scale = _verdict(abs(float(cells["k_12"] or 0) - 1) <= SCALE_TOLERANCE)
+        first, second = (float(cells.get(name) or 1) for name in PRINTS)
+        ratio = float(cells["k_12"] or 0) * second / first
+        scale = _verdict(abs(ratio - 1) <= SCALE_TOLERANCE)
     checks = (", ".join(missing) or None, order, scale)
     return dict(zip(_CHECKS, checks, strict=True))
 
@@ -162,16 +170,19 @@ def state(cells: Mapping[str, CellValue], words: Mapping[str, str]) -> str:
 #: Keys of the sentences about the set-up.
 STATES = ("state_ready", "state_missing", "state_order", "state_scale")
 
+#: How far the scales of the photos are apart, whatever those of their prints.
+_OFF = f"ABS(k_12*{larger(2)}/{larger(1)}-1)"
+
 _CHECK_FORMULAS: Mapping[str, str] = {
     "check_order": 'IF(COUNT(d_1,d_2)<2,"",IF(d_1>d_2,"OK","CHECK"))',
-    "check_scale": (f'IF(COUNT(m_1,m_2)<2,"",IF(ABS(k_12-1)<={SCALE_TOLERANCE:g},"OK","CHECK"))'),
+    "check_scale": f'IF(COUNT(m_1,m_2)<2,"",IF({_OFF}<={SCALE_TOLERANCE:g},"OK","CHECK"))',
 }
 IDEAL_FORMULAS: Mapping[str, str] = {
     **TYPED_FORMULAS,
     **_CHECK_FORMULAS,
     "setup_missing": _missing_formula(_IDEAL_NEEDED),
-    "m_1": 'IF(COUNT(c_1,d_1)=2,1000*d_1/c_1,"")',
-    "m_2": 'IF(COUNT(c_2,d_2)=2,1000*d_2/c_2,"")',
+    "m_1": f'IF(COUNT(c_1,d_1)=2,1000*d_1/(c_1*{larger(1)}),"")',
+    "m_2": f'IF(COUNT(c_2,d_2)=2,1000*d_2/(c_2*{larger(2)}),"")',
     "k_12": "IF(COUNT(m_1,m_2)=2,m_2/m_1,1)",
     "b_lever": 'IF(COUNT(d_1,d_2)=2,IF(d_1=d_2,"",d_1*d_2/(d_1-d_2)),"")',
     "unit_x": 'IF(input_unit="px",pitch,1)',

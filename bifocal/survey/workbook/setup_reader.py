@@ -26,6 +26,7 @@ from bifocal.survey.workbook.setup_cells import (
     MATRICES,
     NADIRS,
     PHOTOS,
+    PRINTS,
     TITLE_BLOCK,
     TYPED_FORMULAS,
 )
@@ -40,7 +41,7 @@ from photocore.workbook.package import open_package
 from photocore.workbook.xlsx import read_directory
 
 _NUMBERS = (
-    *("c_1", "c_2", "d_1", "d_2", "delta_d", "pitch"),
+    *("c_1", "c_2", *PRINTS, "d_1", "d_2", "delta_d", "pitch"),
     *("sigma_s", "sigma_px", "sigma_r_max", "k_off", "k_plane"),
     *("nadir_1_col", "nadir_1_row", "nadir_2_col", "nadir_2_row", "sensor_w", "sensor_h"),
 )
@@ -101,6 +102,8 @@ def read_setup(
     return SurveySetup(
         c1=number["c_1"],
         c2=number["c_2"],
+        enlargement1=number["enlargement_1"] or 1.0,
+        enlargement2=number["enlargement_2"] or 1.0,
         d1=d1,
         d2=_near(number, d1),
         pitch=number["pitch"],
@@ -234,7 +237,9 @@ def _formulas(path: Path, values: NamedValues) -> set[str]:
         for key, (sheet, cell) in wanted.items():
             text = package.read(parts[sheet]).decode("utf-8", errors="replace")
             match = re.search(rf'<(?:\w+:)?c r="{cell}"[^>]*><(?:\w+:)?f[^>]*>([^<]*)<', text)
-            if match and _plain(match[1]) == _plain(TYPED_FORMULAS[key]):
+            # Those of older versions are a part of today's.
+            stands = _plain(match[1]) if match else ""
+            if stands.startswith("if(") and stands in _plain(TYPED_FORMULAS[key]):
                 own.add(key)
     return own
 

@@ -21,7 +21,8 @@ from photocore.workbook.newbook import finished_parts
 
 #: The cell of each option; those of the distances depend on each other.
 _CELLS = {
-    "c1": "c_1", "c2": "c_2", "pitch": "pitch", "sigma_s": "sigma_s", "sigma_px": "sigma_px",
+    "enlargement1": "enlargement_1", "enlargement2": "enlargement_2", "c1": "c_1", "c2": "c_2",
+    "pitch": "pitch", "sigma_s": "sigma_s", "sigma_px": "sigma_px",
     "sigma_r_max": "sigma_r_max", "unit": "input_unit", "model": "g_model",
 }  # fmt: skip
 #: The table by which a sheet is known, whatever it is called now.
@@ -85,7 +86,7 @@ def write_options(editor: WorkbookEditor, content: SurveyContent, given: Mapping
             typed = {name for group in listed[:-1] for name in group}
             wanted |= typed - {"delta_d", "sigma_r_max", "k_off", "k_plane", *TITLE_BLOCK}
     elif content.setup is not None:
-        wanted |= {"input_unit"} | ({"c_2"} if "adjust_setup" in given else set())
+        wanted |= {"input_unit"} | ({"c_2", "enlargement_2"} if "adjust_setup" in given else set())
     if {"d1", "d2", "pair"} & given.keys():
         wanted |= _distances(editor, cells)
     for name in sorted(wanted):
@@ -94,7 +95,7 @@ def write_options(editor: WorkbookEditor, content: SurveyContent, given: Mapping
             if place_of(editor, "d_2") is not None and cells.get(name) is not None:
                 raise InputError(
                     f"{editor.path}: no cell is named {name} any more, so the value cannot be "
-                    "written. Give the cell its name again."
+                    "written. Give the cell its name again, or write to a new workbook."
                 )
             continue
         if not _holds(editor, place, cells.get(name)):

@@ -384,3 +384,66 @@ def test_opacity_swipe_blink_and_contrast_show_what_they_say(page: Driver) -> No
     # A loaded machine draws the new contrast some frames later.
     assert any(seen(page).std() > 1.3 * far.std() for _ in range(20))
     page.tab.get_by_test_id("contrast-1").fill("100")
+
+
+#: Where the layout leaves fractions of a CSS pixel; and the browser's own zoom.
+_CANVAS = """() => { const canvas = document.querySelector('#stage-points canvas.drawing');
+  const { width, left } = canvas.getBoundingClientRect(), ratio = devicePixelRatio;
+  return [canvas.width / ratio - width, Math.abs(left * ratio - Math.round(left * ratio))]; }"""
+
+
+@pytest.mark.parametrize(
+    ("width", "height", "ratio"),
+    [
+        (1280, 720, 1.1),
+        pytest.param(1001, 653, 1.0, marks=pytest.mark.acceptance),
+        pytest.param(1283, 701, 1.5, marks=pytest.mark.acceptance),
+    ],
+)
+def test_a_pick_is_where_the_pointer_was_in_panes_of_broken_pixels(
+    browser: Any, server: Served, width: int, height: int, ratio: float
+) -> None:
+    size = {"width": width, "height": height}
+    with tab_of(browser, server, viewport=size, device_scale_factor=ratio) as page:
+        for mode in ("v", "d"):
+            page.empty()
+            page.keys(mode)
+            page.wait("() => document.querySelector('#stage-points .pane').offsetWidth > 99")
+            box = page.pane.bounding_box()
+            page.keys("0", *["+"] * 4)
+            stretched, off_grid = page.tab.evaluate(_CANVAS)
+            assert abs(stretched) < 0.02
+            assert off_grid < 0.02
+            for number, (right, down) in enumerate([(0.97, 0.52), (0.03, 0.55)], start=1):
+                place = box["x"] + right * box["width"], box["y"] + down * box["height"]
+                shown = page.photo(1, place)
+                page.pane.focus()
+                page.keys("n")
+                page.tab.mouse.click(*place)
+                picked = page.settled("state.points.length === argument", number)
+                pick = picked["points"][-1]["picks"]["1"]
+                assert distance(pick, shown) < 0.05
+                marked, beside = (page.screen(1, (pick[0] + by, pick[1])) for by in (0, 1))
+                assert distance(marked, place) < 0.05 * distance(marked, beside)
+
+
+def test_a_suggestion_accepted_in_doubt_is_shown_as_doubtful_until_it_is_picked(
+    page: Driver,
+) -> None:
+    near = pixel_of(2, TARGETS["T08"])
+    hardly = {**near, "quality": 0.04, "score": 0.6, "sigma_px": 0.3, "misfit_px": 0.0,
+              "kept": False, "others": [], "line": []}  # fmt: skip
+    page.tab.route("**/api/suggest", lambda route: route.fulfill(json=hardly))
+    page.pick(1, true_pixel(1, TARGETS["T08"]))
+    page.settled("state.points.length === 1")
+    page.tab.get_by_text("Hardly: 4 % sure").first.wait_for()
+    page.keys("a", "ArrowLeft")
+    point = page.settled("state.points[0].result")["points"][0]
+    assert (point["type"], point["code"]) == ("doubtful", "DOUBTFUL 2")
+    assert point["result"]["flag"] == "UNCERTAIN"
+    assert page.tab.get_by_test_id("value-flag").text_content() != ""
+    page.tab.unroute("**/api/suggest")
+    page.keys("2")
+    page.pick(2, true_pixel(2, TARGETS["T08"]))
+    point = page.settled("state.points[0].type === 'plain'")["points"][0]
+    assert point["result"]["flag"] in ("OK", "ON-PLANE")

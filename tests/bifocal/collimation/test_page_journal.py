@@ -15,7 +15,9 @@ from pathlib import Path
 
 import pytest
 
+from bifocal.collimation.access import Access
 from bifocal.collimation.journal import Journal
+from bifocal.collimation.project import find_files
 from photocore.errors import InputError
 from tests.page_session import client_of, opened, pick, pick_both, sample_folder, sample_picks
 
@@ -73,6 +75,94 @@ def test_a_line_that_is_no_command_is_named(tmp_path) -> None:
     path.write_text("\n".join([lines[0], "nonsense", *lines[1:]]) + "\n")
     with pytest.raises(InputError, match=r"journal\.jsonl, line 2"), opened(folder):
         pass
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        '{"op": "point.pick"}',
+        '{"op": "point.rename", "name": "A"}',
+        '{"op": ["undo"]}',
+        '{"op": {}}',
+        '{"op": "point.rename", "name": "nobody", "new": "B"}',
+        '{"op": "workbook.read", "rows": {"A": {"picks": 5}}, "gone": []}',
+        '{"op": "workbook.read", "rows": {"A": 1}, "gone": []}',
+        '{"op": "files", "stem": "facade", "photos": [1]}',
+        '{"op": "made", "kind": [], "names": []}',
+        '{"op": "proposed", "pair": 7, "report": {}}',
+        '{"op": ' + "[" * 100_000 + "]" * 100_000 + "}",
+        "[]",
+    ],
+    ids=lambda line: line[:40],
+)
+def test_a_damaged_line_is_named_and_the_journal_stays_as_it_is(tmp_path, line: str) -> None:
+    folder = sample_folder(tmp_path)
+    with opened(folder) as session:
+        pick(session, "A", 1, (10.0, 20.0))
+    path = folder / JOURNAL
+    path.write_text(path.read_text() + f'{line}\n{{"op": "cut o')
+    before = path.read_bytes()
+    for _ in range(2):
+        with pytest.raises(InputError, match=r"journal\.jsonl, line 3: .*delete this line"), \
+                opened(folder):  # fmt: skip
+            pass
+        assert path.read_bytes() == before
+
+
+def test_a_start_that_fails_leaves_no_journal_that_hides_the_pair(tmp_path) -> None:
+    folder = sample_folder(tmp_path)
+    pair = folder / "facade.pair.json"
+    good = pair.read_text()
+    pair.write_text(good.replace("near.jpg", "absent.jpg"))
+    with pytest.raises(InputError, match="absent"), opened(pair):
+        pass
+    assert not (folder / JOURNAL).exists()
+    pair.write_text(good)
+    for left in ("", '{"op": "files", "st'):  # by an earlier version, or a full disk
+        (folder / "other.journal.jsonl").write_text(left)
+        with opened(folder) as session:
+            assert session.files.pair == pair
+        assert (folder / "other.journal.jsonl").read_text() == left
+
+
+def test_a_workbook_that_is_a_circle_of_links_is_refused(tmp_path) -> None:
+    folder = sample_folder(tmp_path)
+    (folder / "a.xlsx").symlink_to("b.xlsx")
+    (folder / "b.xlsx").symlink_to("a.xlsx")
+    with pytest.raises(InputError, match=r"a\.xlsx: cannot be used \(Too many levels"):
+        find_files([folder / "facade.pair.json"], folder / "a.xlsx")
+
+
+@pytest.mark.parametrize(
+    "kept",
+    ["[" * 100_000, '{"token": "%s", "port": 1e400}' % ("x" * 40),
+     json.dumps({"token": "\ud800" * 40, "port": 80}),
+     json.dumps({"token": "a\nb: c" * 40, "port": 80})],
+    ids=["deep", "infinite port", "no characters", "two lines"],
+)  # fmt: skip
+def test_a_damaged_address_is_made_anew(tmp_path, kept: str) -> None:
+    path = tmp_path / ".facade.page.json"
+    path.write_text(kept)
+    path.chmod(0o600)
+    access = Access.of(path)
+    assert access.port == 0
+    assert access.token not in kept
+
+
+def test_a_journal_that_is_cut_off_before_its_first_line_is_not_deleted(tmp_path) -> None:
+    path = tmp_path / "a.journal.jsonl"
+    path.write_text("mine")
+    Journal(path).close()
+    assert path.read_text() == "mine"
+
+
+def test_a_photo_whose_name_is_not_utf_8_is_kept_in_the_journal(tmp_path) -> None:
+    journal = Journal(tmp_path / "a.journal.jsonl")
+    journal.append({"op": "files", "photos": ["fa\udce7ade é.jpg"]})
+    journal.close()
+    again = Journal(tmp_path / "a.journal.jsonl")
+    assert again.records[0]["photos"] == ["fa\udce7ade é.jpg"]
+    again.close()
 
 
 def test_a_command_sent_twice_is_done_once(tmp_path) -> None:

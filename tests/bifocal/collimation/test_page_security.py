@@ -19,6 +19,7 @@ from tests.page_session import BASE, TOKEN, client_of, entries, opened, sample_f
 PATHS = ["/", "/api/state", "/api/events", "/tiles/photo/1/info", "/tiles/photo/1/0/0_0.jpg",
          "/download/facade.xlsx", "/download/all.zip", "/relief/overlay.png", "/uncertainty.png",
          "/web/index.html", "/nowhere"]  # fmt: skip
+NAME = "bifocal_token_8765"
 POSTS = ["/api/command", "/api/suggest", "/api/photos", "/api/jobs", "/api/measure"]
 
 
@@ -78,7 +79,54 @@ def test_the_first_visit_sets_a_cookie_that_scripts_cannot_read(session) -> None
     assert "httponly" in cookie
     assert "samesite=strict" in cookie
     assert client.get("/api/state").status_code == 200
-    assert stranger(session, cookie="bifocal_token=wrong").get("/api/state").status_code == 403
+    assert stranger(session, cookie=f"{NAME}=wrong").get("/api/state").status_code == 403
+
+
+def test_servers_side_by_side_keep_their_cookies_apart(session) -> None:
+    """A browser keeps cookies by name, not by port, and sends those of all ports to each."""
+    client = stranger(session)
+    answer = client.get("/", params={"token": TOKEN})
+    assert answer.headers["set-cookie"].startswith(f"{NAME}={TOKEN}")
+    both = {"cookie": f"bifocal_token_9999=another; {NAME}={TOKEN}"}
+    assert stranger(session, **both).get("/api/state").status_code == 200
+    other = {"cookie": f"bifocal_token_9999={TOKEN}"}
+    assert stranger(session, **other).get("/api/state").status_code == 403
+
+
+def test_a_person_without_the_token_gets_a_page_in_his_language(session) -> None:
+    asked = {"accept": "text/html,*/*", "accept-language": "de-AT,en;q=0.5"}
+    answer = stranger(session, **asked).get("/")
+    assert answer.status_code == 403
+    assert answer.headers["content-type"].startswith("text/html")
+    assert '<html lang="de">' in answer.text
+    assert "bifocal pick</code> beim Start genannt" in answer.text
+    assert TOKEN not in answer.text
+
+
+def test_a_file_that_knows_the_token_opens_the_page_and_nothing_else(session) -> None:
+    """The browser counts the file that `bifocal pick` opens as a foreign page."""
+    foreign = {"sec-fetch-site": "cross-site", "sec-fetch-mode": "navigate"}
+    client = stranger(session, **foreign)
+    assert client.get("/", params={"token": TOKEN}).status_code == 200
+    assert client.get("/", params={"token": TOKEN[:-1]}).status_code == 403
+    assert client.get("/").status_code == 403  # the cookie alone is what a foreign page would use
+    assert client.get("/api/state", params={"token": TOKEN}).status_code == 403
+    assert stranger(session, **{"sec-fetch-site": "cross-site"}).get(
+        "/", params={"token": TOKEN}
+    ).status_code == 403  # fmt: skip
+
+
+def test_what_fails_is_answered_under_the_same_rules(session, monkeypatch) -> None:
+    monkeypatch.setattr(session, "command", lambda _: 1 / 0)
+    app = application(session, TOKEN)
+    client = TestClient(app, base_url=BASE, raise_server_exceptions=False)
+    answer = client.post("/api/command", json={"op": "undo"}, headers={"x-bifocal-token": TOKEN})
+    assert answer.status_code == 500
+    assert "default-src 'self'" in answer.headers["content-security-policy"]
+    assert answer.json()["error"] == "an error of the program (ZeroDivisionError)."
+    long = client.get("/tiles/photo/1/0/" + 5000 * "9" + "_1.jpg")
+    assert long.status_code == 403  # unknown to the server without the token, as everything
+    assert client_of(session).get("/tiles/photo/1/0/" + 5000 * "9" + "_1.jpg").status_code == 414
 
 
 def test_every_answer_carries_the_rules_and_none_invites_others(session) -> None:

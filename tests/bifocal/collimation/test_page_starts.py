@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import os
+import queue
 import shutil
+import socket
 
 import openpyxl
 import pytest
@@ -10,7 +13,17 @@ from click.testing import CliRunner
 
 import bifocal
 from bifocal.cli.main import main
-from tests.page_session import client_of, opened, pick, pick_both, sample_folder, sample_picks
+from bifocal.collimation.workflow import page_server
+from photocore.errors import InputError
+from tests.page_session import (
+    client_of,
+    entries,
+    opened,
+    pick,
+    pick_both,
+    sample_folder,
+    sample_picks,
+)
 
 #: A pixel of the sample's wall is 7.38 mm seen from 17.5 m by 35 mm. (tests/scenes/make_sample)
 PITCH = 0.00738 * 35 / 17.5
@@ -225,3 +238,31 @@ def test_what_the_lenses_say_of_far_and_near_is_asked(tmp_path) -> None:
         assert "exchange far and near?" in questions()
         session.command({"op": "photos.exchange"})
         assert "exchange" not in questions()
+
+
+def test_the_browser_is_given_a_file_of_the_user_alone_not_the_token(tmp_path, monkeypatch) -> None:
+    """What stands in a command line is read by all users of the computer."""
+    opened_with = queue.SimpleQueue()
+    monkeypatch.setattr("webbrowser.open", opened_with.put)
+    with page_server(sample_folder(tmp_path)) as server:
+        server.open_browser()
+        address = opened_with.get(timeout=10)
+        page = tmp_path / ".facade.page.html"
+        assert address == page.as_uri()
+        assert server.token not in address
+        assert os.name == "nt" or page.stat().st_mode & 0o777 == 0o600
+        assert f'content="0; url={server.url}"' in page.read_text()
+    assert not page.exists()
+
+
+def test_a_port_that_is_taken_is_said_before_anything_is_written(tmp_path) -> None:
+    folder = sample_folder(tmp_path)
+    with socket.socket() as other:
+        other.bind(("127.0.0.1", 0))
+        other.listen()
+        with (
+            pytest.raises(InputError, match="leave --port out"),
+            page_server(folder, port=other.getsockname()[1]),
+        ):
+            pass
+    assert entries(folder) == ["facade.pair.json", "far.jpg", "near.jpg"]

@@ -220,7 +220,7 @@ def test_media_are_typed_on_the_page_and_what_lacks_is_said(tmp_path):
             assert missing in state["advice"][0] or missing == "four control points"
         for value in (0.8, 13.37, "water"):
             answer = typed(water_index=value)
-            assert answer.status_code == 422
+            assert answer.status_code == 400
             assert "water_index" in answer.json()["error"]
         state = typed(d1=3.5, d2=1.9).json()["state"]
         assert (state["setup"]["water_index"], state["setup"]["port"]) == (1.337, 0.05)

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import numpy as np
 import openpyxl
 import pytest
+from click.testing import CliRunner
 
 import bifocal
 from bifocal import Pair
+from bifocal.cli.main import main
 from bifocal.demo import SAMPLE
+from photocore.errors import InputError
 from tests.bifocal.collimation.page_truth import noisy_picks
 from tests.page_session import client_of, opened, pick, pick_both, sample_folder, sample_picks
 from tests.workbook_lint import lint
@@ -263,3 +267,53 @@ def test_many_points_are_written_by_a_process_of_its_own(tmp_path, monkeypatch) 
         assert session.sync.waiting is None
         assert_solved_alike(session, folder / BOOK)
         assert bifocal.solve(folder / BOOK).points.pixels1[2].tolist() == [1052.25, 803.0]
+
+
+def test_what_was_accepted_in_doubt_stays_so_in_page_workbook_and_export(tmp_path) -> None:
+    folder = sample_folder(tmp_path)
+    (name, picks), (other, wrong) = list(sample_picks().items())[:2]
+    with opened(folder) as session:
+        pick_both(session, name, picks)
+        pick(session, other, 1, wrong[0])
+        place = {"op": "point.pick", "name": other, "image": 2, "row": wrong[1][1]}
+        session.command(place | {"column": wrong[1][0] + 0.1, "doubtful": True})
+        session.command(place | {"column": wrong[1][0]})  # moved by the keys: nobody looked anew
+        pick(session, other, 1, wrong[0])
+        near = session.pictures.needed_pair().d2
+        shown = session.results.row(session.state.points[other])
+        assert shown["flag"] == "UNCERTAIN"
+        assert shown["sigma_r"] == pytest.approx(0.26 * near, rel=0.01)
+        assert session.results.row(session.state.points[name])["flag"] != "UNCERTAIN"
+        assert session.state.points[other].type == "doubtful"
+        with pytest.raises(InputError, match="accepted in doubt"):
+            session.command({"op": "point.type", "name": other, "type": "check"})
+        session.sync.step()
+        assert_solved_alike(session, folder / BOOK)
+        listed = bifocal.solve(folder / BOOK)
+        assert listed.points.code[listed.table.ids.index(other)] == "DOUBTFUL 2"
+        out = folder / "out.csv"
+        assert (
+            CliRunner().invoke(main, ["export", str(folder / BOOK), "--out", str(out)]).exit_code
+            == 0
+        )
+        row = next(line for line in out.read_text().splitlines() if line.startswith(other))
+        assert "UNCERTAIN" in row
+    with opened(folder) as again:
+        assert again.state.points[other].code == "DOUBTFUL 2"
+        again.command(place | {"column": wrong[1][0], "doubtful": False})  # clicked
+        assert again.state.points[other].code == ""
+        assert again.results.row(again.state.points[other])["flag"] != "UNCERTAIN"
+        again.command({"op": "undo"})
+        again.command({"op": "point.type", "name": other, "type": "plain"})  # somebody is sure
+        assert again.state.points[other].code == ""
+
+
+def test_points_of_an_ideal_set_up_are_doubtful_too() -> None:
+    points = {"id": ["A", "B"], "x1": [4.0] * 2, "y1": [3.0] * 2, "x2": [4.2] * 2, "y2": [3.15] * 2}
+    solved = bifocal.solve({**points, "code": ["", "dubbio"]}, d1=17.5, d2=9.5, c1=35, c2=19)
+    assert solved.table.flags == ("OK", "UNCERTAIN")
+    sure, doubtful = solved.table.covariance
+    assert doubtful[2, 2] - sure[2, 2] == pytest.approx((0.9 * 9.5) ** 2 / 12)
+    # Along the far photo's ray, which leads to the nadir: X and Y grow less as r grows.
+    assert (doubtful - sure)[0, 2] < 0
+    assert np.linalg.matrix_rank(doubtful - sure, tol=1e-9) == 1

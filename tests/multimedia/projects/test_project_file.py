@@ -12,7 +12,11 @@ from multimedia.media.flat_interface import FlatInterface
 from multimedia.media.interfaces import Interfaces
 from multimedia.media.surfaces import Cylinder, Plane, Sphere
 from multimedia.projects.model import ImagePoints, ObjectPoints, Project
-from multimedia.projects.point_tables import read_image_points, read_object_points
+from multimedia.projects.point_tables import (
+    read_image_points,
+    read_object_points,
+    write_columns,
+)
 from multimedia.projects.project_file import read_project, write_project
 from photocore.errors import GeometryError, InputError
 from tests.multimedia.tank import LAYERS, cameras, control, images
@@ -281,6 +285,18 @@ def test_both_tables_may_be_sheets_of_one_workbook(folder):
     project = read_project(folder / "tank.toml")
     assert project.object_points.xyz.tolist() == [[1.5, 2, -50], [0, 0, -60]]
     assert project.image_points.image[0] == pytest.approx([-0.474, 0.138])
+
+
+NAMES = ("+5", "@a", "=b", "-c", "'d", "007", "7", "=SUM(A1)")
+
+
+@pytest.mark.parametrize("ending", ["xlsx", "csv"])
+def test_names_come_back_from_a_table_as_they_were(tmp_path, ending):
+    path = tmp_path / f"points.{ending}"
+    measured = np.arange(float(len(NAMES)))
+    columns = {"id": NAMES, **{f"{axis} [mm]": measured for axis in "XYZ"}}
+    write_columns(path, columns, overwrite=False)
+    assert read_object_points(path, unit="mm")[0].ids == NAMES
 
 
 HUGE = "1" + "0" * 400

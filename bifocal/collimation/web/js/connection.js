@@ -76,7 +76,7 @@ export class Connection extends EventTarget {
     this.moved.set(key, [args.column, args.row]);
     const last = this.unsent.at(-1);
     if (last?.key === key && !last.sent) {
-      last.args = args;
+      Object.assign(last.args, args); // moved only, it stays as doubtful as it was
       this.#keep();
       this.dispatchEvent(new Event("state"));
       return last.promise;

@@ -250,7 +250,7 @@ class App {
 
 /** What `window.bifocal` offers: image 1 or 2, original photo pixels, CSS pixels of the page. */
 function outside(app) {
-  const box = (pane) => pane.element.getBoundingClientRect();
+  const box = (pane) => pane.ground.getBoundingClientRect();
   return {
     state: () => app.state,
     photoFromScreen(image, x, y) {

@@ -132,11 +132,11 @@ export class Picker extends EventTarget {
     return this.latest;
   }
 
-  async #place(name, image, [column, row]) {
+  async #place(name, image, [column, row], doubtful = false) {
     this.forget();
     this.hovered = null;
     const op = `${this.kind}.pick`;
-    const args = { name, image, column, row };
+    const args = { name, image, column, row, doubtful };
     const answer = await (name ? this.connection.move(op, args) : this.connection.send(op, args));
     this.selected = name ?? answer.name;
     this.cursor = null;
@@ -217,8 +217,8 @@ export class Picker extends EventTarget {
     return this.#next(async () => {
       if (!this.proposal && this.lacking) await this.#suggest();
       if (!this.proposal) return;
-      const { name, image, column, row } = this.proposal;
-      await this.#place(name, image, [column, row]);
+      const { name, image, column, row, kept } = this.proposal;
+      await this.#place(name, image, [column, row], !kept);
     });
   }
 

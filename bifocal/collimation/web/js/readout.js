@@ -17,7 +17,7 @@ export class Readout {
     this.name = textInput({ label: t("point.name"), testid: "point-name",
       save: (text) => text && this.#rename(text) });
     this.type = choice({ label: t("point.type"), testid: "point-type",
-      options: Object.fromEntries(TYPES.map((type) => [type, t(`type.${type}`)])),
+      options: Object.fromEntries([...TYPES, "doubtful"].map((type) => [type, t(`type.${type}`)])),
       save: (type) => send("point.type", { name: picker.selected, type }) });
     this.reference = Object.fromEntries(["X", "Y", "r"].map((key) => [key, numberInput({
       label: t("point.reference", { key }), size: "7", save: (value) => this.#refer(key, value) })]));

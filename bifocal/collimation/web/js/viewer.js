@@ -99,11 +99,15 @@ export class Pane extends EventTarget {
     this.painter = painter;
     this.width = 0;
     this.height = 0;
+    this.shift = [0, 0];
     this.canvas = h("canvas", { class: "drawing", "aria-hidden": "true" });
-    this.element = h("div", { class: "pane", tabindex: "0", role: "application" });
+    // Of whole pixels: OpenLayers stretches the pointer's place, and the browser what is drawn, over
+    // fractions of one, but not the photo.
+    this.ground = h("div", { class: "ground" });
+    this.element = h("div", { class: "pane", tabindex: "0", role: "application" }, this.ground);
     this.element.setAttribute("aria-label", label);
     this.map = new TileMap({
-      target: this.element,
+      target: this.ground,
       layers: [],
       controls: [],
       view,
@@ -117,7 +121,7 @@ export class Pane extends EventTarget {
         zoomDuration: 120,
       }),
     });
-    this.element.append(this.canvas);
+    this.ground.append(this.canvas);
     this.map.on("postrender", () => this.#draw());
     this.map.on("click", (event) => this.#tell("pick", event.pixel));
     this.element.addEventListener("pointermove", (event) => {
@@ -220,11 +224,19 @@ export class Pane extends EventTarget {
   }
 
   #resize() {
-    this.width = this.element.clientWidth;
-    this.height = this.element.clientHeight;
+    const { left, top, width, height } = this.element.getBoundingClientRect();
     const ratio = window.devicePixelRatio;
-    this.canvas.width = Math.round(this.width * ratio);
-    this.canvas.height = Math.round(this.height * ratio);
+    [this.width, this.height] = [Math.ceil(width), Math.ceil(height)];
+    [this.canvas.width, this.canvas.height] = [this.width * ratio, this.height * ratio].map(Math.round);
+    const sizes = [[this.ground, this.width, this.height],
+      [this.canvas, this.canvas.width / ratio, this.canvas.height / ratio]];
+    for (const [{ style }, across, down] of sizes) {
+      [style.width, style.height] = [`${across}px`, `${down}px`];
+    }
+    // From a whole device pixel on, too.
+    const origin = [left - this.shift[0], top - this.shift[1]];
+    this.shift = origin.map((edge) => Math.round(edge * ratio) / ratio - edge);
+    [this.element.style.left, this.element.style.top] = this.shift.map((by) => `${by}px`);
     this.map.updateSize();
     if (this.width && !this.seen) {
       this.seen = true;

@@ -144,6 +144,7 @@ export default {
   "type.wall": "Wand",
   "type.check": "Kontrolle",
   "type.control": "Passpunkt",
+  "type.doubtful": "zweifelhaft",
   "value.s1": "s1",
   "value.s2": "s2",
   "value.e1": "e1",

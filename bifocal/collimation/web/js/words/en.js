@@ -144,6 +144,7 @@ export default {
   "type.wall": "wall",
   "type.check": "check",
   "type.control": "control",
+  "type.doubtful": "doubtful",
   "value.s1": "s1",
   "value.s2": "s2",
   "value.e1": "e1",

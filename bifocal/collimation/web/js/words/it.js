@@ -144,6 +144,7 @@ export default {
   "type.wall": "muro",
   "type.check": "verifica",
   "type.control": "controllo",
+  "type.doubtful": "dubbio",
   "value.s1": "s1",
   "value.s2": "s2",
   "value.e1": "e1",
