@@ -21,6 +21,7 @@ from photocore.interrupts import STOPPED
 from photocore.log import COMMAND_LINE, DATE, is_quiet, log_options
 from photocore.options import NUMBER, STREAMS
 from photocore.provenance import recording
+from photocore.textfile import odd_name
 
 #: Exit status of a fault of the program: EX_SOFTWARE of sysexits.h, which Windows' os lacks.
 UNFORESEEN = 70
@@ -159,6 +160,9 @@ class LazyGroup(click.Group):
             _show_details(ctx)
             name = f"{error.filename}: " if error.filename else ""
             _tell_error(f"Error: {name}{error.strerror or error}.")
+        except UnicodeEncodeError as error:
+            _show_details(ctx)
+            _tell_error(f"Error: {odd_name(error)}")
         except Exception as error:  # the last resort; the tests let nobody get here
             _show_details(ctx)
             program = self.commands_package.partition(".")[0]

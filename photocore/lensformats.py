@@ -281,9 +281,7 @@ def _yaml_values(path: Path, text: str) -> dict[str, FloatArray]:
             found[match["key"]] = np.array([float(word) for word in words])
     for key in re.findall(r"^(\w+):[ \t]*!!opencv-matrix", text, re.MULTILINE):
         if key not in found:
-            raise InputError(
-                f"{path}: the matrix {key} is damaged; export the calibration again."
-            )
+            raise InputError(f"{path}: the matrix {key} is damaged; export the calibration again.")
     return found
 
 

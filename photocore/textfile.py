@@ -31,6 +31,12 @@ def check_name(path: Path) -> None:
             raise InputError(f"{path}: is too long a name for a file; choose another.") from None
 
 
+def odd_name(error: UnicodeEncodeError) -> str:
+    """Return what to say of a name in bytes that are no text, where a library wants text."""
+    named = error.object[max(0, error.start - 60) : error.end + 20].splitlines()
+    return f"{named[-1]!r}: the name of this file or folder is no UTF-8 text; rename it."
+
+
 def read_text(path: Path, what: str, *, form: str = "") -> str:
     """Return the text of a UTF-8 file, without a byte order mark.
 

@@ -25,7 +25,7 @@ from photocore.cli import Progress, no_progress, unforeseen_message
 from photocore.errors import InputError, PhotogrammetryError
 from photocore.provenance import FileHashes, recording
 from photocore.raster_places import cloud_optimised
-from photocore.textfile import check_file, check_name, file_name
+from photocore.textfile import check_file, check_name, file_name, odd_name
 
 if TYPE_CHECKING:
     from bifocal.orthophotos.ortho_workflow import OrthoTask
@@ -270,6 +270,8 @@ def failure_message(error: Exception, what: str, folder: Path) -> str:
         return str(error)
     if isinstance(error, MemoryError):
         return "not enough memory; give it fewer neighbours (--jobs) or a coarser gsd."
+    if isinstance(error, UnicodeEncodeError):
+        return odd_name(error)
     if isinstance(error, OSError):
         return f"{error.filename or folder}: {error.strerror or error}."
     if os.environ.get("BIFOCAL_DEBUG"):
