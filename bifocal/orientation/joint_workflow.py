@@ -465,7 +465,9 @@ def _write_pair(pair: Pair, path: Path, name: str, folder: Path) -> None:
             photo.lens.write(path.with_name(lens))
             extra["lens"] = lens
         file = relative_name(pair.photo_file(number), folder) if photo.file else ""
-        size = photo_info(pair, number).size if photo.file else photo.image_size
+        size = photo.image_size
+        if photo.file and pair.photo_file(number).is_file():
+            size = photo_info(pair, number).size
         photos.append(replace(photo, file=file, image_size=size, extra=extra))
     content = replace(pair, image1=photos[0], image2=photos[1]).to_dict()
     if pair.exchanged:
