@@ -13,6 +13,7 @@ from photocore.options import (
     FILE,
     Length,
     Names,
+    Numbers,
     Scale,
     as_json,
     bounds,
@@ -58,11 +59,26 @@ Examples:
 @number("--focal1", "MM", "Focal length, far photo [mm].  [default: EXIF]")
 @number("--focal2", "MM", "Focal length, near photo [mm].  [default: EXIF]")
 @number("--sensor-width", "MM", "Longer side of the sensor, both photos [mm].")
+@number("--delta-d", "M", "Difference of the two distances [m].")
+@number("--pixel-size", "MM", "Instead of the sensor width: one pixel, both photos [mm].")
+@click.option(
+    "--length", type=Numbers(5), metavar="COL,ROW,COL,ROW,M",
+    help="A length on the wall: two points of the far photo [px] and metres.",
+)  # fmt: skip
+@click.option(
+    "--wall", type=Numbers(2), metavar="COL,ROW",
+    help="A spot of the wall in the far photo, where several planes compete [px].",
+)  # fmt: skip
 @media_of_pair
 @choice("--unit", "m|cm|mm", "Unit of the coordinates.  [default: the headings', else m]")
 @choice("--quality", "fast|standard|best", "Of the relief map.  [default: standard]")
 @bounds("Part of the wall [m].  [default: all that is known]")
 @click.option("--relief-gsd", type=Length(above=0), help="Pixel of the relief map [m].")
+@click.option("--gsd", type=Length(above=0), help="Pixel of the product ortho [m].")
+@click.option("--any-size", is_flag=True, help="Make an orthophoto of an unusual size.")
+@choice("--image", "1|2|both", "Photo that gives the colours.  [default: 1]")
+@click.option("--fill", is_flag=True, help="Close holes with the colours around them.")
+@click.option("--complete", is_flag=True, help="A whole picture; what is not measured is marked.")
 @choice("--paper", "A4|A3|A2|A1|A0", "Sheet of paper.  [default: the smallest that fits]")
 @click.option(
     "--products", type=Names(), metavar="NAME,NAME,...",
