@@ -25,6 +25,8 @@ _DAMAGE = re.compile(
     r"(JPEG data: (?!\d+ extraneous bytes before marker 0x(?!d\d))|Premature end"
     r"|TIFF_Error .*(?:scanline|strip|tile)).*"
 )
+#: So many zeros in a row are a hole in the data. [bytes]
+_LOST = 16
 _STRAY = re.compile(r"(\d+) extraneous bytes before marker 0xd9")
 
 
@@ -36,9 +38,12 @@ def decoded(path: Path | str, data: ByteArray, flags: int) -> NDArray[Any]:
     InputError
         If they cannot be decoded, or a part of them is damaged.
     """
-    if _is_jpeg(data) and data.tobytes().rfind(b"\xff\xd9") < len(data) // 2:
-        # OpenCV fills the rest with grey, silently.
-        raise InputError(f"{path}: the photo is cut off (no end of image); copy it again.")
+    hole = ""
+    if _is_jpeg(data):
+        if data.tobytes().rfind(b"\xff\xd9") < len(data) // 2:
+            # OpenCV fills the rest with grey, silently.
+            raise InputError(f"{path}: the photo is cut off (no end of image); copy it again.")
+        hole = _hole(data.tobytes())
     with decoders_words() as words:
         try:
             image = cv2.imdecode(data, flags)
@@ -46,7 +51,7 @@ def decoded(path: Path | str, data: ByteArray, flags: int) -> NDArray[Any]:
             raise InputError(f"{path}: the image cannot be decoded ({error.err}).") from error
     if image is None:
         raise InputError(f"{path}: the image cannot be decoded; open it and save it again.")
-    damage = next((found[0] for word in words if (found := _DAMAGE.search(word))), "")
+    damage = next((found[0] for word in words if (found := _DAMAGE.search(word))), hole)
     if damage and not _is_padded(data, damage):
         raise InputError(
             f"{path}: the photo is damaged ({damage}): a part of it is dark, shifted or missing. "
@@ -70,6 +75,29 @@ def refuse_damaged_jpeg(path: Path) -> None:
 
 def _is_jpeg(data: ByteArray) -> bool:
     return data[:2].tobytes() == b"\xff\xd8"
+
+
+def _hole(data: bytes) -> str:
+    """Return where bytes of a plain JPEG were lost; decoders take zeros for data, silently.
+
+    Zeros are a block's coefficients of one value, -1, in a row: no photo has so many, unless the
+    zeros of the table of luminance end a block, which is then flat.
+    """
+    at, zeros = 2, 0
+    while data[at : at + 1] == b"\xff":
+        kind, size = data[at + 1], int.from_bytes(data[at + 2 : at + 4])
+        if kind in (0xC2, 0xC6, 0xCA, 0xCE):  # progressive: flat parts are zeros
+            return ""
+        tables = data[at + 4 : at + 2 + size] if kind == 0xC4 else b""
+        while len(tables) > 17:
+            zeros = tables[17] if tables[0] == 0x10 else zeros
+            tables = tables[17 + sum(tables[1:17]) :]
+        at += 2 + size
+        if kind == 0xDA:
+            break
+    end = data.find(b"\xff\xd9", at)
+    lost = data.find(bytes(_LOST), at, end) if zeros else -1
+    return f"bytes lost at {(lost - at) / (end - at):.0%} of its data" if lost >= 0 else ""
 
 
 def _is_padded(data: ByteArray, damage: str) -> bool:

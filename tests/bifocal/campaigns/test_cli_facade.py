@@ -77,7 +77,9 @@ def test_every_option_that_its_steps_advise_is_one_of_its_own_and_a_key_of_surve
         for option in set(re.findall(r"(?<![\w-])--[a-z][a-z0-9-]*", path.read_text("utf-8"))):
             if option not in others:
                 assert option in own, (path.name, option)
-                assert option[2:].replace("-", "_") in {*OPTIONS, *FILES, "overwrite", "out"}, option
+                assert option[2:].replace("-", "_") in {*OPTIONS, *FILES, "overwrite", "out"}, (
+                    option
+                )
 
 
 def test_it_ends_with_where_the_results_are_and_what_to_open(tmp_path):

@@ -62,6 +62,23 @@ def test_damage_is_refused_by_the_files_name_alone(tmp_path, capfd, name, conten
     assert capfd.readouterr().err == ""
 
 
+@pytest.mark.parametrize("place", range(20, 100, 10))
+def test_bytes_lost_anywhere_are_noticed_where_the_decoder_is_silent_too(tmp_path, place):
+    start = len(FAR) * place // 100
+    (tmp_path / "far.jpg").write_bytes(FAR[:start] + bytes(40) + FAR[start + 40 :])
+    with pytest.raises(InputError, match=r"damaged \((bytes lost at \d+%|JPEG data)"):
+        read_image(tmp_path / "far.jpg")
+
+
+@pytest.mark.parametrize("options", [{}, {"optimize": True}, {"progressive": True}])
+@pytest.mark.parametrize("mode", ["L", "RGB"])
+def test_a_flat_picture_is_whole(tmp_path, options, mode):
+    flat = np.zeros((900, 1200), np.uint8)
+    flat[:8, :8] = 200
+    Image.fromarray(flat).convert(mode).save(tmp_path / "flat.jpg", quality=95, **options)
+    assert read_image(tmp_path / "flat.jpg").shape[:2] == (900, 1200)
+
+
 def test_large_photos_and_those_of_tanks_are_asked_too(tmp_path, monkeypatch):
     monkeypatch.setattr(images, "_BY_STRIPS", 1000)
     path = tmp_path / "far.jpg"
