@@ -41,8 +41,6 @@ from photocore.provenance import FileHashes, recording, today
 
 #: File that says which process works in a folder.
 LOCK = ".survey.lock"
-#: What to look at first.
-_TO_OPEN = ("report/*.html", "drawing/*.pdf", "points/*.xlsx", "relief/*.png", "ortho/*.tif")
 #: What it says: machine and process; nothing where the process was killed at that moment.
 _OURS = re.compile(r"(\S+ \d+)?")
 #: In place of a pair's name in a plan.
@@ -495,15 +493,3 @@ def facade(
     if outcome.failed_step:
         raise InputError(outcome.message)
     return outcome
-
-
-def facade_lines(job: PairJob, outcome: PairOutcome) -> list[str]:
-    """Return what was made where, for people."""
-    lines = []
-    for step in (*outcome.kept, *outcome.done):
-        names = sorted(path.name for path in (job.folder / step).iterdir() if path.name[0] != ".")
-        kept = " (kept)" if step in outcome.kept else ""
-        lines.append(f"{job.folder / step}{kept}: {', '.join(names)}")
-    ready = [path for kind in _TO_OPEN for path in sorted(job.folder.glob(kind))]
-    opened = f"; open {' and '.join(map(str, ready[:2]))} first" if ready else ""
-    return [*lines, f"All of it is in {job.folder.resolve()}{opened}."]

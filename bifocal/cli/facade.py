@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -22,6 +22,9 @@ from photocore.options import (
     overwrite,
 )  # fmt: skip
 
+if TYPE_CHECKING:
+    from bifocal.campaigns.pair_job import PairJob, PairOutcome
+
 EXAMPLE = """\b
 Examples:
   bifocal facade far.jpg near.jpg --control points.csv --scale 1:50 --out DIR
@@ -30,6 +33,9 @@ Examples:
   bifocal facade reef_far.jpg reef_near.jpg --control reef.csv --indices 1,1.49,1.337
                  --thicknesses 0.01 --port 0.05 --prior index3=0.003 --out reef
 """
+
+#: What to look at first.
+_TO_OPEN = ("report/*.html", "drawing/*.pdf", "points/*.xlsx", "relief/*.png", "ortho/*.tif")
 
 
 @click.command(epilog=EXAMPLE)
@@ -99,11 +105,21 @@ def command(
     its own within DIR. Run it again, and only what changed is made anew; stopped, it goes on where
     it was.
     """
-    from bifocal.campaigns.workflow import facade, facade_job, facade_lines
+    from bifocal.campaigns.workflow import facade, facade_job
 
     job = facade_job(far, near, out, name=name, given=given, products=products, overwrite=overwrite)
     with progress_bar("facade", quiet=as_json) as progress:
         outcome = facade(job, progress=progress)
-    print_result(
-        outcome.to_dict(), facade_lines(job, outcome), as_json=as_json, remarks=outcome.remarks
-    )
+    print_result(outcome.to_dict(), _lines(job, outcome), as_json=as_json, remarks=outcome.remarks)
+
+
+def _lines(job: PairJob, outcome: PairOutcome) -> list[str]:
+    """Return what was made where, for people."""
+    lines = []
+    for step in (*outcome.kept, *outcome.done):
+        names = sorted(path.name for path in (job.folder / step).iterdir() if path.name[0] != ".")
+        kept = " (kept)" if step in outcome.kept else ""
+        lines.append(f"{job.folder / step}{kept}: {', '.join(names)}")
+    ready = [path for kind in _TO_OPEN for path in sorted(job.folder.glob(kind))]
+    opened = f"; open {' and '.join(map(str, ready[:2]))} first" if ready else ""
+    return [*lines, f"All of it is in {job.folder.resolve()}{opened}."]
