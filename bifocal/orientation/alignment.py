@@ -206,6 +206,7 @@ def _photo(
         nadir=camera.centre[:2],
         distance=float(camera.centre[2]),
         lens=lens,
+        image_size=interior.image_size,
         principal_distance=None if pitch is None else float(camera.matrix[0, 0]) * pitch,
         pixel_size=pitch,
         layers=None if media is None else media.layers,

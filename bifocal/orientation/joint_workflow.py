@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from bifocal.files.images import read_grey
+from bifocal.files.images import photo_info, read_grey
 from bifocal.model.orientation_precision import NAMES, as_dict, exchanged, pinhole
 from bifocal.model.pair import Pair
 from bifocal.model.photo import Photo
@@ -233,7 +233,7 @@ def joint_adjustment(
     for index, pair in enumerate(pairs):
         for number in (1, 2):
             progress(index, len(pairs), f"{names[index]}: features")
-            image = read_grey(pair.photo_file(number))
+            image = read_grey(photo_info(pair, number).path)
             features.append(find_features(image, limit=FEATURES, budget=PIXELS))
             shapes.append(image.shape)
     progress(len(pairs), len(pairs), "matches")
@@ -465,7 +465,10 @@ def _write_pair(pair: Pair, path: Path, name: str, folder: Path) -> None:
             photo.lens.write(path.with_name(lens))
             extra["lens"] = lens
         file = relative_name(pair.photo_file(number), folder) if photo.file else ""
-        photos.append(replace(photo, file=file, extra=extra))
+        size = photo.image_size
+        if photo.file and pair.photo_file(number).is_file():
+            size = photo_info(pair, number).size
+        photos.append(replace(photo, file=file, image_size=size, extra=extra))
     content = replace(pair, image1=photos[0], image2=photos[1]).to_dict()
     if pair.exchanged:
         # In the order given: that of its columns in the tables of points.

@@ -117,6 +117,7 @@ def described_pair(setup: SurveySetup, file: Path | None, folder: Path) -> Pair 
     if setup.matrices is None or setup.d1 is None or setup.d2 is None:
         return None
     lenses: list[Lens | None] = [None, None]
+    sizes: list[tuple[int, int] | None] = [None, None]
     orientation, doubt = None, ""
     media: list[dict[str, Any]] = [{}, {}]
     if setup.media is not None:
@@ -128,6 +129,7 @@ def described_pair(setup: SurveySetup, file: Path | None, folder: Path) -> Pair 
         try:
             given = Pair.read(file)
             lenses = [given.image1.lens, given.image2.lens]
+            sizes = [given.image1.image_size, given.image2.image_size]
             if setup.media is None or setup.media.layers == given.layers:
                 orientation = given.orientation  # it may count the media too
             if setup.media is None:
@@ -141,11 +143,11 @@ def described_pair(setup: SurveySetup, file: Path | None, folder: Path) -> Pair 
     photos = [
         Photo(
             plane_from_pixel=matrix, nadir=nadir, distance=d, lens=lens, principal_distance=c,
-            **through,
+            image_size=size, **through,
         )
-        for matrix, nadir, d, lens, c, through in zip(
+        for matrix, nadir, d, lens, c, size, through in zip(
             setup.matrices, setup.nadirs, (setup.d1, setup.d2), lenses, (setup.c1, setup.c2),
-            media, strict=True,
+            sizes, media, strict=True,
         )
     ]  # fmt: skip
     return Pair(
