@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from bifocal.collimation.commands import SETUP
+from bifocal.collimation.commands import SETUP, lens_ratio
 from bifocal.collimation.live_orientation import LiveOrientation
 from bifocal.collimation.session import Session
 from bifocal.collimation.wording import say, without_options
@@ -101,17 +101,9 @@ def _photos(session: Session) -> list[dict[str, Any]]:
 
 def _exchanged(session: Session, shown: list[dict[str, Any]]) -> bool:
     """Whether lenses or distances say that the far photo is the near one."""
-    sensors = [photo["sensor_width_mm"] for photo in shown]
-    scales = sensors if all(sensors) else [1.0, 1.0]
-    lenses = [
-        None if photo["focal_mm"] is None else photo["focal_mm"] / scale
-        for photo, scale in zip(shown, scales, strict=True)
-    ]
-    distances = [session.state.setup.get(key) for key in ("d1", "d2")]
-    return any(
-        first is not None and second is not None and first < second
-        for first, second in (lenses, distances)
-    )
+    first, second = (session.state.setup.get(key) for key in ("d1", "d2"))
+    nearer = first is not None and second is not None and first < second
+    return nearer or (lens_ratio(*shown) or 1.0) < 1.0
 
 
 def _missing(info: ImageInfo, typed: Mapping[str, float | None], language: str) -> list[str]:

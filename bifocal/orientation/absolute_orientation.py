@@ -21,6 +21,7 @@ from bifocal.orientation.orientation_remarks import (
     control_remarks,
     distance_remarks,
     model_remarks,
+    order_remarks,
 )
 from bifocal.orientation.orientation_stages import (
     ONE_LENS,
@@ -33,6 +34,7 @@ from bifocal.orientation.orientation_stages import (
 )
 from bifocal.orientation.pair_media import THROUGH_MEDIA, PairMedia
 from bifocal.orientation.pair_observations import PairObservations, PairUnknowns
+from bifocal.orientation.photo_order import SURE, first_is_far
 from bifocal.orientation.refracted_bend import refracted_bend
 from bifocal.orientation.refracted_resection import resect_through
 from bifocal.orientation.refracted_stage import with_bent_ties
@@ -49,6 +51,10 @@ from photocore.arrays import BoolArray
 from photocore.camera import fundamental, ray_on_plane
 from photocore.errors import GeometryError, located
 from photocore.similarity import Similarity, fit_plane
+
+#: Logarithms of a ratio of distances so far apart contradict each other; tilted cameras change the
+#: scale over the wall.
+UNLIKE = 0.15
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -108,7 +114,14 @@ def orient_pair(
     photos = (first, second)
     given = _Given(photos=photos, control=control, site=site)
     enough = given.enough
+    if not enough:
+        validation.check_known(interiors, given.names, site)
     ties, remarks = _ties(given, needed=not enough)
+    if ties is not None and not enough:
+        order = _order(given, ties)
+        if order < -SURE:
+            return _with_photos_exchanged(given, typed_stay=True)
+        remarks = (*remarks, *order_remarks(order, given.names))
     cameras, agree, interiors = _start(given, ties, enough)
     if enough and ties is not None:
         misfit = _contradiction(cameras, ties)
@@ -119,7 +132,10 @@ def orient_pair(
     if enough:
         validation.check_units(cameras, site)
     elif ties is not None:
-        validation.check_parallax(ties, interiors, given.names, flat_is_fine=site.parallel)
+        flat = validation.is_flat(ties, interiors, given.names, flat_is_fine=site.parallel)
+        # What stands out shows how the cameras stood; a flat wall does not.
+        site = replace(site, parallel=flat)
+        given = replace(given, site=site)
     observations = _observations(given, interiors, ties, agree)
     if one_lens:
         observations = replace(observations, sigma_zoom=ONE_LENS)
@@ -260,8 +276,35 @@ def _with_picks_exchanged(given: _Given) -> OrientedPair:
     return replace(pair, remarks=(note, *pair.remarks))
 
 
-def _with_photos_exchanged(given: _Given) -> OrientedPair:
-    """Return the pair with the photos the other way round, saying so."""
+def _order(given: _Given, ties: Ties) -> float:
+    """Return by how many standard deviations the first photo is the far one.
+
+    Focal lengths and distances that were typed tell nothing of the photos' order, unless the scale
+    on the wall fits them in one order only.
+    """
+    first, second = given.interiors
+    if not (first.is_typed or second.is_typed):
+        return np.inf
+    d1, d2 = given.site.distances
+    lenses = np.log(first.focal / second.focal)
+    scale = np.log(plane_scale(ties, first.image_size))
+    if d1 and d2:
+        as_given, turned = (abs(lenses + s - np.log(d1 / d2)) < UNLIKE for s in (scale, -scale))
+    else:
+        as_given, turned = lenses + scale > 0, lenses - scale > UNLIKE
+    if not turned or first.image_size != second.image_size:
+        return np.inf
+    images = given.photos[0].grey, given.photos[1].grey
+    if not as_given or images[0] is None or images[1] is None:
+        return -np.inf
+    return first_is_far((images[0], images[1]), ties)
+
+
+def _with_photos_exchanged(given: _Given, *, typed_stay: bool = False) -> OrientedPair:
+    """Return the pair with the photos the other way round, saying so.
+
+    What was typed for the far photo goes with its file, or stays with the far one.
+    """
     (near, far), site = given.names, given.site
     if site.wall is not None:
         raise GeometryError(
@@ -271,12 +314,14 @@ def _with_photos_exchanged(given: _Given) -> OrientedPair:
     if site.distance1 and site.distance2 and site.distance1 < site.distance2:
         site = replace(site, distance1=site.distance2, distance2=site.distance1)
     media = given.media and given.media.exchanged()
-    pair = orient_pair(
-        given.photos[::-1], control=given.control.exchanged(), site=site, media=media
-    )
+    photos = given.photos[::-1]
+    if typed_stay:
+        first, second = (replace(i, is_typed=False) for i in given.interiors)
+        photos = replace(photos[0], interior=first), replace(photos[1], interior=second)
+    pair = orient_pair(photos, control=given.control.exchanged(), site=site, media=media)
     note = (
         f"{near} is the near photo; the two were exchanged. Image 1 of the pair file is {far}, and "
-        "--distance1 means its distance."
+        f"--distance1 means its distance{', --focal1 its lens' if typed_stay else ''}."
     )
     return replace(pair, exchanged=True, remarks=(note, *pair.remarks))
 
@@ -325,11 +370,8 @@ def _plausible_focals(interiors: Interiors, ties: Ties, site: SiteMeasures) -> I
     if not (first.is_assumed or second.is_assumed):
         return interiors
     d1, d2 = site.distances
-    if not (d1 and d2):
-        raise GeometryError(
-            "the focal lengths are unknown (no EXIF). Give --lens, or --focal1 and --focal2 with "
-            "--sensor-width or --pixel-size, or both distances, or four control points."
-        )
+    assert d1 is not None
+    assert d2 is not None
     # On the wall photo 2 is s times as large: s = (f2 / d2) / (f1 / d1).
     ratio = plane_scale(ties, first.image_size) * d2 / d1
     if second.is_assumed:
