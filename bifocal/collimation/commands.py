@@ -326,7 +326,7 @@ def _setup_set(state: SurveyState, command: Fields) -> None:
     state.setup |= given
 
 
-def _exchange(state: SurveyState, command: Fields) -> None:  # noqa: ARG001
+def _exchange(state: SurveyState, command: Fields) -> None:
     """Exchange far and near photo; what was picked goes with them, and no orientation stays.
 
     A lens goes with its photo too, unless the longer one was typed for the far photo.
@@ -335,6 +335,7 @@ def _exchange(state: SurveyState, command: Fields) -> None:  # noqa: ARG001
     state.control = {n: _turned(p) for n, p in state.control.items()}
     if not (lens_ratio(state.lenses.get(1, {}), state.lenses.get(2, {})) or 0.0) > 1.0:
         state.lenses = {3 - image: lens for image, lens in state.lenses.items()}
+    state.ordered = command.get("found") is not True
     state.forget_orientation()
     state.done, state.undone = (
         [[Change(c.kind, c.key, _turned(c.before), _turned(c.after)) for c in x] for x in history]

@@ -133,6 +133,8 @@ class SurveyState:
         Focal length and sensor width of each photo, where typed. [mm]
     stage, language : str
         Where the user is, and in which language.
+    ordered : bool
+        Whether the user exchanged the photos himself.
     revision : int
         Number of the last command.
     undone, done : list of lists of Change
@@ -148,6 +150,7 @@ class SurveyState:
     lenses: dict[int, dict[str, float | None]] = field(default_factory=dict)
     stage: str = ""
     language: str = ""
+    ordered: bool = False
     revision: int = 0
     count: int = 0
     done: list[list[Change]] = field(default_factory=list)

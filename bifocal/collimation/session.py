@@ -122,7 +122,7 @@ class Session:
         with self.lock:
             first = Pair.read(path).photo_file(1)
             if not first.samefile(self.pictures.infos[0].path):
-                self.command({"op": "photos.exchange"})
+                self.command({"op": "photos.exchange", "found": True})
             record = {"op": "proposed", "pair": path.name, "report": dict(report)}
             self._write(record)
             self.proposal = record

@@ -211,7 +211,9 @@ def _advice(session: Session, live: LiveOrientation | None) -> list[str]:
         return [say("ask", "photos", language)]
     if session.files.pair is not None:
         return [] if session.state.points else [say("advice", "points", language)]
-    return [] if live is None else list(live.advice)
+    # What was found contradictory or unknown is said first.
+    told = ["".join((session.proposal or {}).get("report", {}).get("remarks", ())[:1])]
+    return [text for text in map(without_options, told) if text] + list(live.advice if live else ())
 
 
 def _points(session: Session) -> list[dict[str, Any]]:

@@ -54,15 +54,15 @@ def check_different(name1: str, name2: str, images: Images) -> None:
         )
 
 
-def check_known(interiors: Interiors, names: tuple[str, str], site: SiteMeasures) -> None:
-    """Refuse photos of unknown lenses where no other measure tells their focal lengths."""
+def unknown_lenses(interiors: Interiors, names: tuple[str, str]) -> str:
+    """Return of which photos nobody knows the focal length, and what to give; or nothing."""
     unknown = [name for name, i in zip(names, interiors, strict=True) if i.is_assumed]
-    if unknown and None in site.distances:
-        raise GeometryError(
-            f"the focal lengths are unknown (no EXIF) of {' and '.join(unknown)}. Give --lens, or "
-            "--focal1 and --focal2 with --sensor-width or --pixel-size, or both distances, or four "
-            "control points."
-        )
+    if not unknown:
+        return ""
+    return (
+        f"the focal lengths are unknown (no EXIF) of {' and '.join(unknown)}. Give --lens, or "
+        "--focal1 and --focal2 with --sensor-width or --pixel-size"
+    )
 
 
 def is_flat(
