@@ -157,7 +157,7 @@ def orient_pair(
         pair = oriented_in_stages(observations, start, photos, site, with_control=enough)
     except GeometryError as error:
         # Photos through glass or water may fit no cameras at all: then that is the reason.
-        raise _reason(error, observations, start) from error
+        raise _reason(error, observations, start, lacking) from error
     bend = _bend(pair.observations, pair.adjusted)
     pair = replace(pair, bend=bend)
     # A model that does not fit leaves honest points with large misfits.
@@ -237,15 +237,17 @@ def _bend(observations: PairObservations, state: PairUnknowns) -> float:
 
 
 def _reason(
-    error: GeometryError, observations: PairObservations, state: PairUnknowns
+    error: GeometryError, observations: PairObservations, state: PairUnknowns, lacking: str
 ) -> GeometryError:
     """Return why no cameras were found: that the wall is bent where it strongly is, or the error.
+
+    With what is ``lacking`` of the lenses.
 
     Features as first found are good to a pixel; only a bend beyond `STRONGLY_BENT` counts.
     """
     bend = _bend(observations, state)
     if not bend > STRONGLY_BENT:
-        return error
+        return GeometryError(f"{error} The likely reason: {lacking}.") if lacking else error
     known = any(i.is_calibrated or i.sigma_radial > 0 for i in observations.interiors)
     return GeometryError(bend_in_words(bend, with_lens=known))
 
@@ -297,22 +299,20 @@ def _order(given: _Given, ties: Ties) -> float:
     on the wall fits them in one order only.
     """
     first, second = given.interiors
-    d1, d2 = given.site.distances
     typed = (first.is_typed or second.is_typed) and first.image_size == second.image_size
-    if given.site.ordered or not typed:
+    # Logarithms of the distances' ratio by lenses and scale in either order, against the taped one.
+    ratio, scale = first.focal / second.focal, plane_scale(ties, first.image_size)
+    d1, d2 = given.site.distances
+    either = (
+        np.log([ratio * scale, ratio / scale]) - np.log(d1 / d2 if d1 and d2 else 1.0)
+    ).tolist()
+    if not (d1 and d2):  # the far camera is any farther
+        either = [min(off, 0.0) for off in either]
+    as_given, turned = (abs(off) < UNLIKE for off in either)
+    far, near = (photo.grey for photo in given.photos)
+    if given.site.ordered or not (typed and turned) or far is None or near is None:
         return np.inf
-    lenses = np.log(first.focal / second.focal)
-    scale = np.log(plane_scale(ties, first.image_size))
-    if d1 and d2:
-        as_given, turned = (abs(lenses + s - np.log(d1 / d2)) < UNLIKE for s in (scale, -scale))
-    else:
-        as_given, turned = True, lenses + scale > 0 and lenses - scale > UNLIKE
-    if not turned:
-        return np.inf
-    images = given.photos[0].grey, given.photos[1].grey
-    assert images[0] is not None
-    assert images[1] is not None
-    return first_is_far((images[0], images[1]), ties) if as_given else -np.inf
+    return first_is_far((far, near), ties) if as_given else -np.inf
 
 
 def _with_photos_exchanged(given: _Given, *, typed_stay: bool = False) -> OrientedPair:
@@ -337,10 +337,9 @@ def _with_photos_exchanged(given: _Given, *, typed_stay: bool = False) -> Orient
     pair = orient_pair(photos, control=given.control.exchanged(), site=site, media=media)
     note = (
         f"{near} is the near photo; the two were exchanged. Image 1 of the pair file is {far}, and "
-        f"--distance1 means its distance{', --focal1 its lens' if typed_stay else ''}."
+        "--distance1 means its distance"
+        + (", --focal1 its lens; if it is not so, measure control points." if typed_stay else ".")
     )
-    if typed_stay:
-        note += " That is how they look; if it is wrong, measure four control points."
     return replace(pair, exchanged=True, remarks=(note, *pair.remarks))
 
 

@@ -166,7 +166,7 @@ def align_photos(
     if way == "as set up":
         oriented = pair_as_set_up((first, second), options.site, options.media)
     else:
-        if way == "site" and options.length is None:
+        if way == "site" and not options.auto and options.length is None:
             _check_focal((first, second))
         control = _control(options, (first.interior.image_size, second.interior.image_size))
         oriented = orient_pair(

@@ -10,9 +10,11 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
+from bifocal.model.homography import apply_homography
 from bifocal.orientation.interior_orientation import Images
 from bifocal.orientation.relative_orientation import Ties
-from photocore.arrays import BoolArray, ByteArray, FloatArray
+from photocore.arrays import BoolArray, FloatArray
+from photocore.camera import homogeneous
 
 #: Longer side of the pictures that are compared, and blocks a side for the scatter. [px]
 SIDE, BLOCKS = 1500, 10
@@ -38,48 +40,35 @@ def first_is_far(images: Images, ties: Ties) -> float:
     Where it does so from the far to the near photo the missing part is covered, and what the near
     photo shows in its place is something else; the other way round it is seen foreshortened.
     """
-    pictures, seen, frame = _on_the_plane(images, ties)
+    pictures, seen, centre = _on_the_plane(images, ties)
     rows, columns = np.indices(seen.shape, dtype=np.float32)
-    away = np.stack([columns, rows], axis=-1) - _centre(ties, frame)
+    away = np.stack([columns, rows], axis=-1) - centre
     radius = np.linalg.norm(away, axis=-1)
     away = (away / np.maximum(radius, 1e-6)[..., None]).astype(np.float32)
     fair = seen & (radius > 0.12 * np.hypot(*seen.shape))
     first, variance1 = _change(pictures, away, fair)
     second, variance2 = _change(pictures[::-1], away, fair)
-    test = (first - second) / np.sqrt(variance1 + variance2)
-    return float(np.nan_to_num(test, nan=0.0, posinf=0.0, neginf=0.0))
+    return float(np.nan_to_num((first - second) / np.sqrt(variance1 + variance2)))
 
 
 def _on_the_plane(images: Images, ties: Ties) -> tuple[Images, BoolArray, FloatArray]:
-    """Return the first photo, the second laid over it by the plane, where both are, the scale."""
+    """Return the first photo, the second laid over it by the plane, where both are, the centre."""
     height, width = images[0].shape
-    frame = np.diag([*[min(1.0, SIDE / max(height, width))] * 2, 1.0])
-    size = round(width * frame[0, 0]), round(height * frame[0, 0])
-    moved = frame @ np.linalg.inv(ties.homography)
+    part = min(1.0, SIDE / max(height, width))
+    size = round(width * part), round(height * part)
+    moved = np.diag([part, part, 1.0]) @ np.linalg.inv(ties.homography)
     coarser = 1 / np.sqrt(abs(np.linalg.det(moved[:2, :2] / moved[2, 2])))
     second = cv2.blur(images[1], (max(1, round(coarser)),) * 2)
-    shown = cv2.warpPerspective(np.full(second.shape, 1, np.uint8), moved, size)
+    shown = cv2.warpPerspective(np.ones_like(second), moved, size)
     inside = cv2.erode(shown, np.ones((61, 61)), borderType=cv2.BORDER_CONSTANT, borderValue=0)
     equal = cv2.createCLAHE(2.0, (8, 8)).apply
     reduced = cv2.resize(images[0], size, interpolation=cv2.INTER_AREA)
     laid = cv2.warpPerspective(second, moved, size)
-    return (equal(reduced), equal(laid)), np.asarray(inside > 0), frame
-
-
-def _centre(ties: Ties, frame: FloatArray) -> FloatArray:
-    """Return from where parallax spreads, in the frame: where the ties' parallaxes meet."""
-    places = ties.pixels1 @ frame[:2, :2]
-    back = cv2.perspectiveTransform(ties.pixels2[None], np.linalg.inv(ties.homography))[0]
-    moved = back @ frame[:2, :2] - places
-    length = np.linalg.norm(moved, axis=1)
-    places, moved = places[length > STEP], moved[length > STEP] / length[length > STEP, None]
-    across = np.column_stack([-moved[:, 1], moved[:, 0]])
-    centre, weight = np.zeros(2), np.ones(len(places))
-    for _ in range(20):
-        level = (across * places).sum(axis=1)
-        centre = np.linalg.lstsq(across * weight[:, None], level * weight, rcond=None)[0]
-        weight = 1.0 / (1.0 + ((across @ centre - level) / 10.0) ** 2)
-    return centre.astype(np.float32)
+    # Parallax runs along lines that meet in the centre of zoom.
+    places = homogeneous(part * ties.pixels1 / SIDE)
+    lines = np.cross(places, homogeneous(apply_homography(moved, ties.pixels2) / SIDE))
+    centre = np.linalg.svd(lines, full_matrices=False)[2][2]
+    return (equal(reduced), equal(laid)), np.asarray(inside > 0), SIDE * centre[:2] / centre[2]
 
 
 def _change(pictures: Images, away: FloatArray, fair: BoolArray) -> tuple[float, float]:
@@ -90,8 +79,7 @@ def _change(pictures: Images, away: FloatArray, fair: BoolArray) -> tuple[float,
     flow = cv2.DISOpticalFlow.create(cv2.DISOPTICAL_FLOW_PRESET_MEDIUM)
     flow.setFinestScale(0)
     first, second = pictures
-    rows, columns = np.indices(fair.shape, dtype=np.float32)
-    places = np.stack([columns, rows], axis=-1)
+    places = np.stack(np.indices(fair.shape, dtype=np.float32)[::-1], axis=-1)
     moved = flow.calc(first, second, None)
     outwards = cv2.medianBlur((moved * away).sum(axis=-1), 5)
     inner, outer = (
@@ -99,24 +87,18 @@ def _change(pictures: Images, away: FloatArray, fair: BoolArray) -> tuple[float,
         for reach in (-REACH, REACH)
     )
     steps = np.clip(inner - outer - STEP, 0, 10) * fair
-    found = cv2.remap(second, places + moved, None, cv2.INTER_LINEAR)
-    detail = _detail(first)
+    detail, found = (
+        picture - cv2.GaussianBlur(picture, (0, 0), 6)
+        for picture in np.float32(
+            [first, cv2.remap(second, places + moved, None, cv2.INTER_LINEAR)]
+        )
+    )
     usual = cv2.GaussianBlur(np.abs(detail), (0, 0), 8) + 4
-    replaced = steps * np.minimum(np.abs(detail - _detail(found)), 40) / usual
-    part, whole = (_blocks(values) for values in (replaced, steps))
+    replaced = steps * np.minimum(np.abs(detail - found), 40) / usual
+    part, whole = (
+        cv2.resize(v, (BLOCKS, BLOCKS), interpolation=cv2.INTER_AREA) for v in (replaced, steps)
+    )
     with np.errstate(divide="ignore", invalid="ignore"):
         share = part.sum() / whole.sum()
         variance = ((part - share * whole) ** 2).sum() / part.sum() ** 2
         return float(np.log(share)), float(variance)
-
-
-def _detail(picture: ByteArray) -> FloatArray:
-    """Return a picture without its coarse shades."""
-    values = picture.astype(np.float32)
-    return values - cv2.GaussianBlur(values, (0, 0), 6)
-
-
-def _blocks(values: FloatArray) -> FloatArray:
-    """Return the sums of blocks of a picture."""
-    rows, columns = (np.arange(BLOCKS) * size // BLOCKS for size in values.shape)
-    return np.add.reduceat(np.add.reduceat(values.astype(np.float64), rows, 0), columns, 1)
