@@ -116,7 +116,7 @@ def orient_pair(
         try:
             return _through_media(given, media, lacking)
         except GeometryError as error:
-            if not lacking or lacking in str(error):
+            if not lacking or "--focal1" in str(error):
                 raise
             raise GeometryError(f"{error} The likely reason: {lacking}.") from error
     interiors, one_lens = with_one_lens((photos[0].interior, photos[1].interior))

@@ -79,7 +79,8 @@ def _change(pictures: Images, away: FloatArray, fair: BoolArray) -> tuple[float,
     flow = cv2.DISOpticalFlow.create(cv2.DISOPTICAL_FLOW_PRESET_MEDIUM)
     flow.setFinestScale(0)
     first, second = pictures
-    places = np.stack(np.indices(fair.shape, dtype=np.float32)[::-1], axis=-1)
+    rows, columns = np.indices(fair.shape, dtype=np.float32)
+    places = np.stack([columns, rows], axis=-1)
     moved = flow.calc(first, second, None)
     outwards = cv2.medianBlur((moved * away).sum(axis=-1), 5)
     inner, outer = (
@@ -87,14 +88,13 @@ def _change(pictures: Images, away: FloatArray, fair: BoolArray) -> tuple[float,
         for reach in (-REACH, REACH)
     )
     steps = np.clip(inner - outer - STEP, 0, 10) * fair
-    detail, found = (
+    found = cv2.remap(second, places + moved, None, cv2.INTER_LINEAR)
+    detail, other = (
         picture - cv2.GaussianBlur(picture, (0, 0), 6)
-        for picture in np.float32(
-            [first, cv2.remap(second, places + moved, None, cv2.INTER_LINEAR)]
-        )
+        for picture in (first.astype(np.float32), found.astype(np.float32))
     )
     usual = cv2.GaussianBlur(np.abs(detail), (0, 0), 8) + 4
-    replaced = steps * np.minimum(np.abs(detail - found), 40) / usual
+    replaced = steps * np.minimum(np.abs(detail - other), 40) / usual
     part, whole = (
         cv2.resize(v, (BLOCKS, BLOCKS), interpolation=cv2.INTER_AREA) for v in (replaced, steps)
     )
