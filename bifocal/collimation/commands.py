@@ -352,12 +352,11 @@ def _turned(record: Any) -> Any:
 
 def lens_ratio(*photos: Fields) -> float | None:
     """Return how much longer the lens of the first photo is; None where that is not known."""
-    sensors = [photo.get("sensor_width_mm") for photo in photos]
-    scales = sensors if all(sensors) else [1.0, 1.0]
-    focals = [photo.get("focal_mm") for photo in photos]
+    focals: list[Any] = [photo.get("focal_mm") for photo in photos]
+    sensors: list[Any] = [photo.get("sensor_width_mm") for photo in photos]
     if None in focals:
         return None
-    return float((focals[0] / scales[0]) / (focals[1] / scales[1]))
+    return float(focals[0] / focals[1] * (sensors[1] / sensors[0] if all(sensors) else 1.0))
 
 
 def _points_add(state: SurveyState, command: Fields) -> list[Change]:
