@@ -133,6 +133,7 @@ def orient_pair(
         if order < -SURE:
             return _with_photos_exchanged(given, typed_stay=True)
         remarks = (*remarks, *order_remarks(order, given.names))
+    stated = site
     cameras, agree, interiors = _start(given, ties, enough)
     if enough and ties is not None:
         misfit = _contradiction(cameras, ties)
@@ -154,7 +155,7 @@ def orient_pair(
     if ties is not None:
         start = replace(start, radial=np.array([[ties.radial, 0.0]] * 2))
     try:
-        pair = oriented_in_stages(observations, start, photos, site, with_control=enough)
+        pair = oriented_in_stages(observations, start, photos, stated, with_control=enough)
     except GeometryError as error:
         # Photos through glass or water may fit no cameras at all: then that is the reason.
         raise _reason(error, observations, start, lacking) from error
