@@ -21,6 +21,7 @@ from bifocal.orientation.orientation_remarks import (
     control_remarks,
     distance_remarks,
     model_remarks,
+    order_remarks,
 )
 from bifocal.orientation.orientation_stages import (
     ONE_LENS,
@@ -33,6 +34,7 @@ from bifocal.orientation.orientation_stages import (
 )
 from bifocal.orientation.pair_media import THROUGH_MEDIA, PairMedia
 from bifocal.orientation.pair_observations import PairObservations, PairUnknowns
+from bifocal.orientation.photo_order import SURE, first_is_far
 from bifocal.orientation.refracted_bend import refracted_bend
 from bifocal.orientation.refracted_resection import resect_through
 from bifocal.orientation.refracted_stage import with_bent_ties
@@ -49,6 +51,13 @@ from photocore.arrays import BoolArray
 from photocore.camera import fundamental, ray_on_plane
 from photocore.errors import GeometryError, located
 from photocore.similarity import Similarity, fit_plane
+
+#: Distances that control through media leaves so uncertain are not found from common points either,
+#: without focal lengths: 44 % ends at 10 %.
+HOPELESS = 0.6
+#: Logarithms of a ratio of distances so far apart contradict each other; tilted cameras change the
+#: scale over the wall.
+UNLIKE = 0.15
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -102,13 +111,29 @@ def orient_pair(
         If the photos and measurements do not make a pair; the message says why and what to do.
     """
     if media is not None:
-        return _through_media(_Given(photos=photos, control=control, site=site, media=media), media)
+        given = _Given(photos=photos, control=control, site=site, media=media)
+        lacking = validation.unknown_lenses(given.interiors, given.names)
+        try:
+            return _through_media(given, media, lacking)
+        except GeometryError as error:
+            if not lacking or "--focal1" in str(error):
+                raise
+            raise GeometryError(f"{error} The likely reason: {lacking}.") from error
     interiors, one_lens = with_one_lens((photos[0].interior, photos[1].interior))
     first, second = (replace(p, interior=i) for p, i in zip(photos, interiors, strict=True))
     photos = (first, second)
     given = _Given(photos=photos, control=control, site=site)
     enough = given.enough
+    lacking = validation.unknown_lenses(interiors, given.names)
+    if lacking and not enough and None in site.distances:
+        raise GeometryError(f"{lacking}, or both distances, or four control points.")
     ties, remarks = _ties(given, needed=not enough)
+    if ties is not None and not enough:
+        order = _order(given, ties)
+        if order < -SURE:
+            return _with_photos_exchanged(given, typed_stay=True)
+        remarks = (*remarks, *order_remarks(order, given.names))
+    stated = site
     cameras, agree, interiors = _start(given, ties, enough)
     if enough and ties is not None:
         misfit = _contradiction(cameras, ties)
@@ -119,7 +144,10 @@ def orient_pair(
     if enough:
         validation.check_units(cameras, site)
     elif ties is not None:
-        validation.check_parallax(ties, interiors, given.names, flat_is_fine=site.parallel)
+        flat = validation.is_flat(ties, interiors, given.names, flat_is_fine=site.parallel)
+        # What stands out shows how the cameras stood; a flat wall does not.
+        site = replace(site, parallel=flat)
+        given = replace(given, site=site)
     observations = _observations(given, interiors, ties, agree)
     if one_lens:
         observations = replace(observations, sigma_zoom=ONE_LENS)
@@ -127,10 +155,10 @@ def orient_pair(
     if ties is not None:
         start = replace(start, radial=np.array([[ties.radial, 0.0]] * 2))
     try:
-        pair = oriented_in_stages(observations, start, photos, site, with_control=enough)
+        pair = oriented_in_stages(observations, start, photos, stated, with_control=enough)
     except GeometryError as error:
         # Photos through glass or water may fit no cameras at all: then that is the reason.
-        raise _reason(error, observations, start) from error
+        raise _reason(error, observations, start, lacking) from error
     bend = _bend(pair.observations, pair.adjusted)
     pair = replace(pair, bend=bend)
     # A model that does not fit leaves honest points with large misfits.
@@ -148,7 +176,7 @@ def orient_pair(
     return replace(pair, remarks=told, assumed=assumed)
 
 
-def _through_media(given: _Given, media: PairMedia) -> OrientedPair:
+def _through_media(given: _Given, media: PairMedia, lacking: str) -> OrientedPair:
     """Return the cameras of a pair that looks through media, from control and common points.
 
     Common points say that their bent rays meet; the plane is that of the control points.
@@ -173,6 +201,9 @@ def _through_media(given: _Given, media: PairMedia) -> OrientedPair:
     observations = replace(_observations(given, interiors, None, agree), media=media)
     start = PairUnknowns(cameras=cameras, media=media)
     pair = control_alone(observations, start, named=given.site.wall is not None)
+    shares = [pair.adjusted.sigma("Z", n) / pair.adjusted.cameras[n - 1].centre[2] for n in (1, 2)]
+    if lacking and max(shares) > HOPELESS:
+        raise GeometryError(f"the control points alone do not tell the distances, and {lacking}.")
     ties, remarks = _ties(given, needed=False)
     note = "the media as given, no common points: control points alone"
     if ties is not None:
@@ -207,15 +238,17 @@ def _bend(observations: PairObservations, state: PairUnknowns) -> float:
 
 
 def _reason(
-    error: GeometryError, observations: PairObservations, state: PairUnknowns
+    error: GeometryError, observations: PairObservations, state: PairUnknowns, lacking: str
 ) -> GeometryError:
     """Return why no cameras were found: that the wall is bent where it strongly is, or the error.
+
+    With what is ``lacking`` of the lenses.
 
     Features as first found are good to a pixel; only a bend beyond `STRONGLY_BENT` counts.
     """
     bend = _bend(observations, state)
     if not bend > STRONGLY_BENT:
-        return error
+        return GeometryError(f"{error} The likely reason: {lacking}.") if lacking else error
     known = any(i.is_calibrated or i.sigma_radial > 0 for i in observations.interiors)
     return GeometryError(bend_in_words(bend, with_lens=known))
 
@@ -260,8 +293,34 @@ def _with_picks_exchanged(given: _Given) -> OrientedPair:
     return replace(pair, remarks=(note, *pair.remarks))
 
 
-def _with_photos_exchanged(given: _Given) -> OrientedPair:
-    """Return the pair with the photos the other way round, saying so."""
+def _order(given: _Given, ties: Ties) -> float:
+    """Return by how many standard deviations the first photo is the far one.
+
+    Focal lengths and distances that were typed tell nothing of the photos' order, unless the scale
+    on the wall fits them in one order only.
+    """
+    first, second = given.interiors
+    typed = (first.is_typed or second.is_typed) and first.image_size == second.image_size
+    # Logarithms of the distances' ratio by lenses and scale in either order, against the taped one.
+    ratio, scale = first.focal / second.focal, plane_scale(ties, first.image_size)
+    d1, d2 = given.site.distances
+    either = (
+        np.log([ratio * scale, ratio / scale]) - np.log(d1 / d2 if d1 and d2 else 1.0)
+    ).tolist()
+    if not (d1 and d2):  # the far camera is any farther
+        either = [min(off, 0.0) for off in either]
+    as_given, turned = (abs(off) < UNLIKE for off in either)
+    far, near = (photo.grey for photo in given.photos)
+    if given.site.ordered or not (typed and turned) or far is None or near is None:
+        return np.inf
+    return first_is_far((far, near), ties) if as_given else -np.inf
+
+
+def _with_photos_exchanged(given: _Given, *, typed_stay: bool = False) -> OrientedPair:
+    """Return the pair with the photos the other way round, saying so.
+
+    What was typed for the far photo goes with its file, or stays with the far one.
+    """
     (near, far), site = given.names, given.site
     if site.wall is not None:
         raise GeometryError(
@@ -271,12 +330,16 @@ def _with_photos_exchanged(given: _Given) -> OrientedPair:
     if site.distance1 and site.distance2 and site.distance1 < site.distance2:
         site = replace(site, distance1=site.distance2, distance2=site.distance1)
     media = given.media and given.media.exchanged()
-    pair = orient_pair(
-        given.photos[::-1], control=given.control.exchanged(), site=site, media=media
-    )
+    photos = given.photos[::-1]
+    if typed_stay:
+        first, second = given.interiors
+        photos = replace(photos[0], interior=first), replace(photos[1], interior=second)
+        site = replace(site, ordered=True)
+    pair = orient_pair(photos, control=given.control.exchanged(), site=site, media=media)
     note = (
         f"{near} is the near photo; the two were exchanged. Image 1 of the pair file is {far}, and "
-        "--distance1 means its distance."
+        "--distance1 means its distance"
+        + (", --focal1 its lens; if it is not so, measure control points." if typed_stay else ".")
     )
     return replace(pair, exchanged=True, remarks=(note, *pair.remarks))
 
@@ -325,11 +388,8 @@ def _plausible_focals(interiors: Interiors, ties: Ties, site: SiteMeasures) -> I
     if not (first.is_assumed or second.is_assumed):
         return interiors
     d1, d2 = site.distances
-    if not (d1 and d2):
-        raise GeometryError(
-            "the focal lengths are unknown (no EXIF). Give --lens, or --focal1 and --focal2 with "
-            "--sensor-width or --pixel-size, or both distances, or four control points."
-        )
+    assert d1 is not None
+    assert d2 is not None
     # On the wall photo 2 is s times as large: s = (f2 / d2) / (f1 / d1).
     ratio = plane_scale(ties, first.image_size) * d2 / d1
     if second.is_assumed:

@@ -166,7 +166,7 @@ def align_photos(
     if way == "as set up":
         oriented = pair_as_set_up((first, second), options.site, options.media)
     else:
-        if way == "site" and options.length is None:
+        if way == "site" and not options.auto and options.length is None:
             _check_focal((first, second))
         control = _control(options, (first.interior.image_size, second.interior.image_size))
         oriented = orient_pair(
@@ -257,6 +257,8 @@ def _way(options: AlignOptions) -> tuple[str, AlignOptions]:
         return "as set up", options
     if options.control is not None:
         return "control", options
+    if len(measured) >= 2:
+        return "site", replace(options, site=replace(site, parallel=True))
     if options.auto:
         if not (measured or options.length or options.lengths):
             raise InputError(
@@ -265,8 +267,6 @@ def _way(options: AlignOptions) -> tuple[str, AlignOptions]:
                 "(--length)."
             )
         return "auto", options
-    if len(measured) >= 2:
-        return "site", replace(options, site=replace(site, parallel=True))
     raise InputError(
         "say how the pair is to be set up: --control FILE (points measured on the wall), "
         "--distance1 and --distance2 (or one of them and --delta-d) with the cameras square to "
@@ -327,9 +327,10 @@ def interior_of_photo(info: ImageInfo, data: KnownLens, number: int) -> Interior
         source = f"EXIF, {info.focal_length_35:g} mm equivalent"
     else:
         return Interior.unknown(info.size)
-    return Interior.from_focal(
+    found = Interior.from_focal(
         focal, image_size=info.size, sigma=sigma, source=source, pixel_size=pitch
     )
+    return replace(found, is_typed=data.focal is not None)
 
 
 def _control(options: AlignOptions, sizes: tuple[tuple[int, int], tuple[int, int]]) -> Control:

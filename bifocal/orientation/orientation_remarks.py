@@ -9,6 +9,7 @@ from bifocal.orientation.bend import bend_in_words
 from bifocal.orientation.control_points import Control, SiteMeasures
 from bifocal.orientation.orientation_stages import OrientedPair
 from bifocal.orientation.pair_observations import PairObservations
+from bifocal.orientation.photo_order import SURE
 
 #: Common points that fit their lines no better than this, at 3000 px of width, do not fit. Clean
 #: pairs reach 0.19, a phone pair with its lens estimated 0.4. [px]
@@ -57,6 +58,16 @@ def model_remarks(pair: OrientedPair, site: SiteMeasures) -> list[str]:
                 "tape, the plane it was measured to, the focal lengths and the lens distortion."
             )
     return [remark for remark in remarks if remark]
+
+
+def order_remarks(order: float, names: tuple[str, str]) -> list[str]:
+    """Return that the photos do not tell which of them is the near one."""
+    if order > SURE:
+        return []
+    return [
+        f"Which photo was taken from near cannot be told from what is known; {names[1]} was taken "
+        "for it, as given. If what stands out comes out as lying back, exchange the photos."
+    ]
 
 
 def control_remarks(control: Control, pair: OrientedPair) -> list[str]:

@@ -170,7 +170,7 @@ def oriented_in_stages(
     if not with_control:
         pair = pair.readjusted(measured=observations.measured).settled()
         if pair.observations.free_datum and pair.observations.sigma_tilt is None:
-            pair = _parallel_if_so(pair)
+            pair = _parallel_if_so(pair, np.inf if site.parallel else np.deg2rad(1.5))
     return pair
 
 
@@ -426,8 +426,8 @@ def _onto_plane(cameras: Cameras, plane: FloatArray) -> Cameras:
     return cameras[0].moved(turn, origin), cameras[1].moved(turn, origin)
 
 
-def _parallel_if_so(pair: OrientedPair) -> OrientedPair:
-    """Return the pair with image planes taken as parallel, if nothing contradicts it.
+def _parallel_if_so(pair: OrientedPair, most: float) -> OrientedPair:
+    """Return the pair with image planes taken as parallel, if nothing contradicts it, up to `most`.
 
     Photos alone give the tilt to the wall to 0.1° to 0.5°; a camera that was set up square to the
     wall with care stands better than that.
@@ -436,7 +436,7 @@ def _parallel_if_so(pair: OrientedPair) -> OrientedPair:
         size = float(np.linalg.norm(camera.tilt))
         turns = [pair.adjusted.sigma(name, number) for name in ("turn X", "turn Y")]
         limit = 3 * float(np.linalg.norm([*turns, SIGMA_PARALLEL]))
-        if size > min(limit, np.deg2rad(1.5)):
+        if size > min(limit, most):
             return pair
     sigma = _care(pair.adjusted.cameras)
     changes: dict[str, Any] = {"sigma_tilt": sigma}

@@ -54,10 +54,21 @@ def check_different(name1: str, name2: str, images: Images) -> None:
         )
 
 
-def check_parallax(
+def unknown_lenses(interiors: Interiors, names: tuple[str, str]) -> str:
+    """Return of which photos nobody knows the focal length, and what to give; or nothing."""
+    unknown = [name for name, i in zip(names, interiors, strict=True) if i.is_assumed]
+    if not unknown:
+        return ""
+    return (
+        f"the focal lengths are unknown (no EXIF) of {' and '.join(unknown)}. Give --lens, or "
+        "--focal1 and --focal2 with --sensor-width or --pixel-size"
+    )
+
+
+def is_flat(
     ties: Ties, interiors: Interiors, names: tuple[str, str], *, flat_is_fine: bool
-) -> None:
-    """Refuse photos in which nothing moves against the wall.
+) -> bool:
+    """Return whether nothing moves against the wall; refuse that where it is no pair then.
 
     Parameters
     ----------
@@ -75,7 +86,7 @@ def check_parallax(
             "same place. The method needs two distances."
         )
     if moving >= 0.03:
-        return
+        return False
     if rotation_only(ties, interiors):
         raise GeometryError(
             f"no parallax: {names[0]} and {names[1]} were taken from one place, only the zoom was "
@@ -87,8 +98,9 @@ def check_parallax(
             "no parallax: nothing in the photos stands out from the wall or behind it (or only "
             "the zoom was changed, without walking), so the nadir cannot be found. Give four "
             "control points (--control), or both distances with the camera square to the wall "
-            "(--distance1, --distance2 without --auto)."
+            "(--distance1, --distance2)."
         )
+    return True
 
 
 def check_units(cameras: Cameras, site: SiteMeasures) -> None:
