@@ -5,6 +5,7 @@ One adjustment serves all three ways; they differ in what is observed. See docs/
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -17,6 +18,7 @@ from bifocal.orientation.features import find_features
 from bifocal.orientation.interior_orientation import Cameras, Interiors, with_one_lens
 from bifocal.orientation.media_report import media_remarks, refuse_impossible_media
 from bifocal.orientation.orientation_remarks import (
+    WORST_FIT,
     assumptions,
     control_remarks,
     distance_remarks,
@@ -43,6 +45,7 @@ from bifocal.orientation.relative_orientation import (
     first_cameras,
     plane_scale,
 )
+from bifocal.orientation.slips import MOST, Fitted, Typed, slip_of
 from bifocal.orientation.space_resection import resect
 from bifocal.orientation.tie_points import robust_sigma, tie_positions
 from photocore.arrays import BoolArray
@@ -109,13 +112,17 @@ def orient_pair(
     given = _Given(photos=photos, control=control, site=site)
     enough = given.enough
     ties, remarks = _ties(given, needed=not enough)
+    if enough:
+        right = _typed_right(given, lambda one: _by_control(one, ties), by_control=True)
+        if right is not None:
+            return right
     cameras, agree, interiors = _start(given, ties, enough)
     if enough and ties is not None:
-        misfit = _contradiction(cameras, ties)
-        if misfit > 2 * ties.tolerance and _picks_exchanged(given, ties, misfit):
-            return _with_picks_exchanged(given)
+        _check_picks(cameras, ties, interiors)
     if cameras[0].centre[2] < cameras[1].centre[2]:
         return _with_photos_exchanged(given)
+    if site.distance1 and site.distance2 and site.distance1 < site.distance2:
+        return _with_distances_exchanged(given)
     if enough:
         validation.check_units(cameras, site)
     elif ties is not None:
@@ -129,17 +136,31 @@ def orient_pair(
     try:
         pair = oriented_in_stages(observations, start, photos, site, with_control=enough)
     except GeometryError as error:
+        right = None
+        if ties is not None and not enough:
+            right = _typed_right(
+                given, lambda one: _by_ties(one, ties, observations), by_control=False
+            )
+        if right is not None:
+            return right
         # Photos through glass or water may fit no cameras at all: then that is the reason.
         raise _reason(error, observations, start) from error
     bend = _bend(pair.observations, pair.adjusted)
     pair = replace(pair, bend=bend)
     # A model that does not fit leaves honest points with large misfits.
     pair = pair if bend > MOST_BENT else without_gross(pair)
+    doubts = model_remarks(pair, site)
+    if doubts and ties is not None and not enough:
+        right = _typed_right(
+            given, lambda one: _by_ties(one, ties, pair.observations), by_control=False
+        )
+        if right is not None:
+            return right
     validation.check_determined(pair.adjusted)
     validation.check_movement(pair.adjusted)
     told = (
         *remarks,
-        *model_remarks(pair, site),
+        *doubts,
         *pair.remarks,
         *control_remarks(control, pair),
         *distance_remarks(pair),
@@ -225,37 +246,101 @@ def _contradiction(cameras: Cameras, ties: Ties) -> float:
     return robust_sigma(epipolar_distance(fundamental(*cameras), ties.pixels1, ties.pixels2))
 
 
-def _picks_exchanged(given: _Given, ties: Ties, misfit: float) -> bool:
-    """Return whether the picks of the two photos were exchanged.
-
-    Raises
-    ------
-    GeometryError
-        If they fit neither way round.
-    """
-    try:
-        turned = replace(given, control=given.control.exchanged())
-        cameras = _start(turned, ties, True)[0]
-        other = _contradiction(cameras, ties)
-    except GeometryError:
-        other = np.inf
-    if other < 0.5 * misfit:
-        return True
-    if misfit > 0.012 * max(given.interiors[0].image_size):
+def _check_picks(cameras: Cameras, ties: Ties, interiors: Interiors) -> None:
+    """Refuse control points that the photos contradict."""
+    if _contradiction(cameras, ties) > 0.012 * max(interiors[0].image_size):
         raise GeometryError(
             "the control points' pixels do not fit the photos: the details common to both photos "
             "contradict them. Check that col1, row1 are pixels of the first photo and col2, row2 "
             "of the second, at full size."
         )
-    return False
 
 
-def _with_picks_exchanged(given: _Given) -> OrientedPair:
-    """Return the pair with the picks of the two photos exchanged, saying so."""
-    pair = orient_pair(given.photos, control=given.control.exchanged(), site=given.site)
+def _typed_right(
+    given: _Given, fitted: Callable[[_Given], Fitted | None], *, by_control: bool
+) -> OrientedPair | None:
+    """Return the pair with the slip mended that explains a misfit, saying so; None without one.
+
+    Raises
+    ------
+    GeometryError
+        Naming a slip that only the user can mend.
+    """
+
+    def meant(typed: Typed) -> _Given:
+        first, second = (
+            replace(p, interior=i) for p, i in zip(given.photos, typed.interiors, strict=True)
+        )
+        return replace(given, photos=(first, second), control=typed.control, site=typed.site)
+
+    typed = Typed(interiors=given.interiors, control=given.control, site=given.site)
+    slip = slip_of(typed, lambda one: fitted(meant(one)), by_control=by_control)
+    if slip is None:
+        return None
+    if not slip.mended:
+        raise GeometryError(slip.words)
+    right = meant(slip.meant)
+    pair = orient_pair(right.photos, control=right.control, site=right.site)
+    return replace(pair, remarks=(slip.words, *pair.remarks))
+
+
+def _by_control(given: _Given, ties: Ties | None) -> Fitted | None:
+    """Return how well control points, lenses and common points fit each other, whatever the tape.
+
+    Their lenses and the common points' lines count as much as all control points.
+    """
+    given = replace(given, site=replace(given.site, distance1=None, distance2=None, delta_d=None))
+    try:
+        cameras, agree, interiors = _start(given, None, True)
+        observations = _observations(given, interiors, None, agree)
+        pair = control_alone(observations, PairUnknowns(cameras=cameras), named=False)
+        pair = without_gross(pair)
+    except GeometryError:
+        return None
+    adjusted, used = pair.adjusted, pair.observations.pick_used
+    test = np.minimum(adjusted.control_test[given.control.positioned], MOST)
+    squares = [float((test**2).mean()), _pulled(pair)]
+    if ties is not None:
+        squares.append((_contradiction(adjusted.cameras, ties) / (4 * ties.tolerance)) ** 2)
+    return Fitted(misfit=float(np.sqrt(sum(squares))), cameras=adjusted.cameras, lost=~used)
+
+
+def _by_ties(given: _Given, ties: Ties, seen: PairObservations) -> Fitted | None:
+    """Return how well common points as matched meet, as a share of what they may miss by."""
+    first, second = (replace(photo, grey=None) for photo in given.photos)
+    try:
+        cameras, agree, interiors = _start(given, ties, False)
+        observations = replace(
+            _observations(given, interiors, ties, agree), tie1=seen.tie1, tie2=seen.tie2,
+            tie_used=seen.tie_used, wall=seen.wall, wall_rows=np.zeros_like(seen.wall_rows),
+            sigma_zoom=seen.sigma_zoom,
+        )  # fmt: skip
+        pair = oriented_in_stages(
+            observations, PairUnknowns(cameras=cameras), (first, second), given.site,
+            with_control=False,
+        )  # fmt: skip
+    except GeometryError:
+        return None
+    fine = WORST_FIT / 3 * max(interiors[0].image_size) / 3000
+    misfit = float(np.hypot(pair.observations.sigma_tie / fine, np.sqrt(_pulled(pair))))
+    return Fitted(misfit=misfit, cameras=pair.adjusted.cameras, lost=~pair.observations.pick_used)
+
+
+def _pulled(pair: OrientedPair) -> float:
+    """Return the mean square by which focal lengths came out other than known, in sigma."""
+    pairs = zip(pair.adjusted.cameras, pair.observations.interiors, strict=True)
+    changes = [np.log(c.matrix[0, 0] / i.focal) / i.sigma_focal for c, i in pairs]
+    return float(np.mean(np.square(changes)))
+
+
+def _with_distances_exchanged(given: _Given) -> OrientedPair:
+    """Return the pair with the two distances exchanged, saying so."""
+    d1, d2 = given.site.distance1, given.site.distance2
+    site = replace(given.site, distance1=d2, distance2=d1)
+    pair = orient_pair(given.photos, control=given.control, site=site)
     note = (
-        f"col1, row1 of the control points are pixels of {given.names[1]}, col2, row2 of "
-        f"{given.names[0]}; the picks were exchanged."
+        f"--distance1 {d1:g} m is less than --distance2 {d2:g} m, but {given.names[0]} was taken "
+        "from farther away: the two distances were exchanged."
     )
     return replace(pair, remarks=(note, *pair.remarks))
 

@@ -174,7 +174,7 @@ def test_a_wall_beyond_300_m_is_taken_and_one_beyond_500_m_where_the_tape_agrees
     site = SiteMeasures(distance1=16 * scale, distance2=9 * scale) if measured else SiteMeasures()
     known = photos(far=FAR.matrix[0, 0], near=NEAR.matrix[0, 0])
     made = orient_pair(known, control=far_wall(scale), site=site)
-    assert made.adjusted.cameras[0].centre[2] == pytest.approx(16 * scale, rel=0.001)
+    assert made.adjusted.cameras[0].centre[2] == pytest.approx(16 * scale, rel=0.003)
 
 
 def test_a_wall_too_far_is_refused_with_the_far_distance_first() -> None:
