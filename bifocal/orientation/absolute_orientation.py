@@ -50,7 +50,7 @@ from bifocal.orientation.space_resection import resect
 from bifocal.orientation.tie_points import robust_sigma, tie_positions
 from photocore.arrays import BoolArray
 from photocore.camera import fundamental, ray_on_plane
-from photocore.errors import GeometryError, located
+from photocore.errors import ConvergenceError, GeometryError, PhotogrammetryError, located
 from photocore.similarity import Similarity, fit_plane
 
 
@@ -122,7 +122,12 @@ def orient_pair(
     if cameras[0].centre[2] < cameras[1].centre[2]:
         return _with_photos_exchanged(given)
     if site.distance1 and site.distance2 and site.distance1 < site.distance2:
-        return _with_distances_exchanged(given)
+        turned = replace(site, distance1=site.distance2, distance2=site.distance1)
+        note = (
+            f"--distance1 {site.distance1:g} m is less than --distance2 {site.distance2:g} m, but "
+            f"{photos[0].name} is the far photo; the two distances were exchanged."
+        )
+        return _told(replace(given, site=turned), note)
     if enough:
         validation.check_units(cameras, site)
     elif ties is not None:
@@ -133,14 +138,16 @@ def orient_pair(
     start = PairUnknowns(cameras=cameras)
     if ties is not None:
         start = replace(start, radial=np.array([[ties.radial, 0.0]] * 2))
+
+    def mended(seen: PairObservations) -> OrientedPair | None:
+        if ties is None or enough:
+            return None
+        return _typed_right(given, lambda one: _by_ties(one, ties, seen), by_control=False)
+
     try:
         pair = oriented_in_stages(observations, start, photos, site, with_control=enough)
-    except GeometryError as error:
-        right = None
-        if ties is not None and not enough:
-            right = _typed_right(
-                given, lambda one: _by_ties(one, ties, observations), by_control=False
-            )
+    except (GeometryError, ConvergenceError) as error:
+        right = mended(observations)
         if right is not None:
             return right
         # Photos through glass or water may fit no cameras at all: then that is the reason.
@@ -150,12 +157,9 @@ def orient_pair(
     # A model that does not fit leaves honest points with large misfits.
     pair = pair if bend > MOST_BENT else without_gross(pair)
     doubts = model_remarks(pair, site)
-    if doubts and ties is not None and not enough:
-        right = _typed_right(
-            given, lambda one: _by_ties(one, ties, pair.observations), by_control=False
-        )
-        if right is not None:
-            return right
+    right = mended(pair.observations) if doubts else None
+    if right is not None:
+        return right
     validation.check_determined(pair.adjusted)
     validation.check_movement(pair.adjusted)
     told = (
@@ -228,8 +232,8 @@ def _bend(observations: PairObservations, state: PairUnknowns) -> float:
 
 
 def _reason(
-    error: GeometryError, observations: PairObservations, state: PairUnknowns
-) -> GeometryError:
+    error: PhotogrammetryError, observations: PairObservations, state: PairUnknowns
+) -> PhotogrammetryError:
     """Return why no cameras were found: that the wall is bent where it strongly is, or the error.
 
     Features as first found are good to a pixel; only a bend beyond `STRONGLY_BENT` counts.
@@ -268,81 +272,69 @@ def _typed_right(
     """
 
     def meant(typed: Typed) -> _Given:
-        first, second = (
-            replace(p, interior=i) for p, i in zip(given.photos, typed.interiors, strict=True)
-        )
+        both = zip(given.photos, typed.interiors, strict=True)
+        first, second = (replace(photo, interior=interior) for photo, interior in both)
         return replace(given, photos=(first, second), control=typed.control, site=typed.site)
 
     typed = Typed(interiors=given.interiors, control=given.control, site=given.site)
     slip = slip_of(typed, lambda one: fitted(meant(one)), by_control=by_control)
-    if slip is None:
-        return None
-    if not slip.mended:
+    if slip is not None and not slip.mended:
         raise GeometryError(slip.words)
-    right = meant(slip.meant)
-    pair = orient_pair(right.photos, control=right.control, site=right.site)
-    return replace(pair, remarks=(slip.words, *pair.remarks))
+    return None if slip is None else _told(meant(slip.meant), slip.words)
+
+
+def _told(given: _Given, note: str) -> OrientedPair:
+    """Return the pair of what is given instead of what was typed, saying so."""
+    pair = orient_pair(given.photos, control=given.control, site=given.site)
+    return replace(pair, remarks=(note, *pair.remarks))
 
 
 def _by_control(given: _Given, ties: Ties | None) -> Fitted | None:
-    """Return how well control points, lenses and common points fit each other, whatever the tape.
+    """Return how well control points, lenses, tapes and common points fit each other.
 
-    Their lenses and the common points' lines count as much as all control points.
+    Whichever photo is the far one, the longer distance is its. Control points leave the lines of
+    common points uncertain by some pixels.
     """
-    given = replace(given, site=replace(given.site, distance1=None, distance2=None, delta_d=None))
+    d1, d2 = given.site.distance1, given.site.distance2
     try:
         cameras, agree, interiors = _start(given, None, True)
+        if d1 and d2 and (d1 < d2) != (cameras[0].centre[2] < cameras[1].centre[2]):
+            given = replace(given, site=replace(given.site, distance1=d2, distance2=d1))
         observations = _observations(given, interiors, None, agree)
         pair = control_alone(observations, PairUnknowns(cameras=cameras), named=False)
         pair = without_gross(pair)
-    except GeometryError:
+    except (GeometryError, ConvergenceError):
         return None
     adjusted, used = pair.adjusted, pair.observations.pick_used
     test = np.minimum(adjusted.control_test[given.control.positioned], MOST)
-    squares = [float((test**2).mean()), _pulled(pair)]
+    square = float((test**2).mean()) + _pulled(pair) / (4 * len(test))
     if ties is not None:
-        squares.append((_contradiction(adjusted.cameras, ties) / (4 * ties.tolerance)) ** 2)
-    return Fitted(misfit=float(np.sqrt(sum(squares))), cameras=adjusted.cameras, lost=~used)
+        off = _contradiction(adjusted.cameras, ties) / (2 * ties.tolerance)
+        square += max(off - 1.0, 0.0) ** 2
+    return Fitted(misfit=float(np.sqrt(square)), cameras=adjusted.cameras, lost=~used)
 
 
 def _by_ties(given: _Given, ties: Ties, seen: PairObservations) -> Fitted | None:
     """Return how well common points as matched meet, as a share of what they may miss by."""
     first, second = (replace(photo, grey=None) for photo in given.photos)
     try:
-        cameras, agree, interiors = _start(given, ties, False)
-        observations = replace(
-            _observations(given, interiors, ties, agree), tie1=seen.tie1, tie2=seen.tie2,
-            tie_used=seen.tie_used, wall=seen.wall, wall_rows=np.zeros_like(seen.wall_rows),
-            sigma_zoom=seen.sigma_zoom,
-        )  # fmt: skip
-        pair = oriented_in_stages(
-            observations, PairUnknowns(cameras=cameras), (first, second), given.site,
-            with_control=False,
-        )  # fmt: skip
-    except GeometryError:
+        cameras, _, interiors = _start(given, ties, False)
+        tilt = seen.sigma_tilt if given.site.parallel else None
+        seen = replace(seen, interiors=interiors, lines=(), sigma_tilt=tilt)
+        start = PairUnknowns(cameras=cameras)
+        pair = oriented_in_stages(seen, start, (first, second), given.site, with_control=False)
+    except (GeometryError, ConvergenceError):
         return None
     fine = WORST_FIT / 3 * max(interiors[0].image_size) / 3000
-    misfit = float(np.hypot(pair.observations.sigma_tie / fine, np.sqrt(_pulled(pair))))
+    misfit = float(np.hypot(pair.observations.sigma_tie / fine, np.sqrt(_pulled(pair) / 2)))
     return Fitted(misfit=misfit, cameras=pair.adjusted.cameras, lost=~pair.observations.pick_used)
 
 
 def _pulled(pair: OrientedPair) -> float:
-    """Return the mean square by which focal lengths came out other than known, in sigma."""
+    """Return the sum of squares by which focal lengths came out other than known, in sigma."""
     pairs = zip(pair.adjusted.cameras, pair.observations.interiors, strict=True)
     changes = [np.log(c.matrix[0, 0] / i.focal) / i.sigma_focal for c, i in pairs]
-    return float(np.mean(np.square(changes)))
-
-
-def _with_distances_exchanged(given: _Given) -> OrientedPair:
-    """Return the pair with the two distances exchanged, saying so."""
-    d1, d2 = given.site.distance1, given.site.distance2
-    site = replace(given.site, distance1=d2, distance2=d1)
-    pair = orient_pair(given.photos, control=given.control, site=site)
-    note = (
-        f"--distance1 {d1:g} m is less than --distance2 {d2:g} m, but {given.names[0]} was taken "
-        "from farther away: the two distances were exchanged."
-    )
-    return replace(pair, remarks=(note, *pair.remarks))
+    return float(np.sum(np.square(changes)))
 
 
 def _with_photos_exchanged(given: _Given) -> OrientedPair:
