@@ -403,9 +403,13 @@ def _plausible_focals(interiors: Interiors, ties: Ties, site: SiteMeasures) -> I
         return interiors
     d1, d2 = site.distances
     if not (d1 and d2):
+        known = [number for number, i in enumerate(interiors, start=1) if not i.is_assumed]
+        said = (
+            f", only --focal{known[0]} is known: --focal{3 - known[0]} is missing" if known else ""
+        )
         raise GeometryError(
-            "the focal lengths are unknown (no EXIF). Give --lens, or --focal1 and --focal2 with "
-            "--sensor-width or --pixel-size, or both distances, or four control points."
+            f"the focal lengths are unknown (no EXIF){said}. Give --lens, or --focal1 and --focal2 "
+            "with --sensor-width or --pixel-size, or both distances, or four control points."
         )
     # On the wall photo 2 is s times as large: s = (f2 / d2) / (f1 / d1).
     ratio = plane_scale(ties, first.image_size) * d2 / d1

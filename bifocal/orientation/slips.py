@@ -19,7 +19,7 @@ DOUBTED = 2.0
 #: camera on its side, and a focal length of any size, are believed if nothing fits nearly so well.
 BETTER, FITS, CLEARLY = 3.0, 3.0, 1.3
 #: Beyond so many standard deviations control points contradict a focal length.
-CERTAIN = 5.0
+CERTAIN = 4.0
 #: A point that misses by more says no more. [sigma]
 MOST = 10.0
 FILM = 36.0  #: Width of 35-mm film. [mm]
@@ -83,7 +83,7 @@ def slip_of(
     if fits and not by_control:
         return None
     found: list[tuple[float, Slip]] = []
-    slips = [*_of_lenses(typed, by_control=by_control)]
+    slips = [*_of_lenses(typed, free=by_control and not fits)]
     if not fits:
         slips += _of_control(typed, now) if by_control else _of_site(typed)
     for slip in slips:
@@ -101,7 +101,7 @@ def slip_of(
     return best if best.mended else replace(best, words=" Or: ".join(alike))
 
 
-def _of_lenses(typed: Typed, *, by_control: bool) -> Iterator[Slip]:
+def _of_lenses(typed: Typed, *, free: bool) -> Iterator[Slip]:
     """Yield slips of the focal lengths, of the sensor's size, and of a photo's."""
     first, second = typed.interiors
     if any(i.is_calibrated or i.is_assumed or i.pixel_size is None for i in typed.interiors):
@@ -135,13 +135,13 @@ def _of_lenses(typed: Typed, *, by_control: bool) -> Iterator[Slip]:
             "former fits as a part cut out of a photo as large as the latter, and was taken so."
         )
         yield Slip(meant=replace(typed, interiors=(both[0], both[1])), words=words)
-    if by_control and typed.site.distances == (None, None):  # a wrong tape is not the lens
-        free = replace(first, sigma_focal=0.5), replace(second, sigma_focal=0.5)
+    if free and typed.site.distances == (None, None):  # a wrong tape is not the lens
+        loose = replace(first, sigma_focal=0.5), replace(second, sigma_focal=0.5)
         words = (
             f"The focal lengths ({first.source}, {second.source}) contradict the control points "
             "and were left out. Check --focal1, --focal2 and --sensor-width."
         )
-        yield Slip(meant=replace(typed, interiors=free), words=words, handicap=CLEARLY)
+        yield Slip(meant=replace(typed, interiors=loose), words=words, handicap=CLEARLY)
 
 
 def _of_site(typed: Typed) -> Iterator[Slip]:
