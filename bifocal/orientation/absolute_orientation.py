@@ -298,8 +298,14 @@ def _by_control(given: _Given, ties: Ties | None) -> Fitted | None:
     d1, d2 = given.site.distance1, given.site.distance2
     try:
         cameras, agree, interiors = _start(given, None, True)
-        if d1 and d2 and (d1 < d2) != (cameras[0].centre[2] < cameras[1].centre[2]):
+        z1, z2 = (float(camera.centre[2]) for camera in cameras)
+        if d1 and d2 and (d1 < d2) != (z1 < z2):
             given = replace(given, site=replace(given.site, distance1=d2, distance2=d1))
+        if any(
+            known and not 0.5 < known / z < 2
+            for known, z in zip((given.site.distance1, given.site.distance2), (z1, z2), strict=True)
+        ):  # another unit: `validation.check_units` says so
+            given = replace(given, site=replace(given.site, distance1=None, distance2=None))
         observations = _observations(given, interiors, None, agree)
         pair = control_alone(observations, PairUnknowns(cameras=cameras), named=False)
         pair = without_gross(pair)
