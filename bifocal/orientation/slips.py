@@ -135,7 +135,9 @@ def _of_lenses(typed: Typed, *, free: bool) -> Iterator[Slip]:
             "former fits as a part cut out of a photo as large as the latter, and was taken so."
         )
         yield Slip(meant=replace(typed, interiors=(both[0], both[1])), words=words)
-    if free and typed.site.distances == (None, None):  # a wrong tape is not the lens
+    if (
+        free and len(typed.control.ids) > 5 and typed.site.distances == (None, None)
+    ):  # a wrong tape is not the lens
         loose = replace(first, sigma_focal=0.5), replace(second, sigma_focal=0.5)
         words = (
             f"The focal lengths ({first.source}, {second.source}) contradict the control points "
