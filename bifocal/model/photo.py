@@ -31,6 +31,8 @@ from photocore.errors import GeometryError, InputError, located
 
 #: No wall is photographed from further away, nor has coordinates beyond. [m]
 FARTHEST, OUTERMOST = 1e5, 1e8
+#: What is typed beyond this is in millimetres or centimetres, unless something measured agrees. [m]
+FARTHEST_WALL = 500.0
 #: Numbers of a photo that the pair file may hold, with their units.
 _OPTIONAL = {"sigma_pixel": "px", "principal_distance": "mm", "pixel_size": "mm"}
 #: The normal of a port that is square to the camera's optical axis.

@@ -5,6 +5,7 @@ One adjustment serves all three ways; they differ in what is observed. See docs/
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -17,6 +18,7 @@ from bifocal.orientation.features import find_features
 from bifocal.orientation.interior_orientation import Cameras, Interiors, with_one_lens
 from bifocal.orientation.media_report import media_remarks, refuse_impossible_media
 from bifocal.orientation.orientation_remarks import (
+    WORST_FIT,
     assumptions,
     control_remarks,
     distance_remarks,
@@ -45,11 +47,12 @@ from bifocal.orientation.relative_orientation import (
     first_cameras,
     plane_scale,
 )
+from bifocal.orientation.slips import MOST, Fitted, Typed, slip_of
 from bifocal.orientation.space_resection import resect
 from bifocal.orientation.tie_points import robust_sigma, tie_positions
 from photocore.arrays import BoolArray
 from photocore.camera import fundamental, ray_on_plane
-from photocore.errors import GeometryError, located
+from photocore.errors import ConvergenceError, GeometryError, PhotogrammetryError, located
 from photocore.similarity import Similarity, fit_plane
 
 #: Distances that control through media leaves so uncertain are not found from common points either,
@@ -134,13 +137,22 @@ def orient_pair(
             return _with_photos_exchanged(given, typed_stay=True)
         remarks = (*remarks, *order_remarks(order, given.names))
     stated = site
+    if enough:
+        right = _typed_right(given, lambda one: _by_control(one, ties), by_control=True)
+        if right is not None:
+            return right
     cameras, agree, interiors = _start(given, ties, enough)
     if enough and ties is not None:
-        misfit = _contradiction(cameras, ties)
-        if misfit > 2 * ties.tolerance and _picks_exchanged(given, ties, misfit):
-            return _with_picks_exchanged(given)
+        _check_picks(cameras, ties, interiors)
     if cameras[0].centre[2] < cameras[1].centre[2]:
         return _with_photos_exchanged(given)
+    if site.distance1 and site.distance2 and site.distance1 < site.distance2:
+        turned = replace(site, distance1=site.distance2, distance2=site.distance1)
+        note = (
+            f"--distance1 {site.distance1:g} m is less than --distance2 {site.distance2:g} m, but "
+            f"{photos[0].name} is the far photo; the two distances were exchanged."
+        )
+        return _told(replace(given, site=turned), note)
     if enough:
         validation.check_units(cameras, site)
     elif ties is not None:
@@ -154,20 +166,33 @@ def orient_pair(
     start = PairUnknowns(cameras=cameras)
     if ties is not None:
         start = replace(start, radial=np.array([[ties.radial, 0.0]] * 2))
+
+    def mended(seen: PairObservations) -> OrientedPair | None:
+        if ties is None or enough:
+            return None
+        return _typed_right(given, lambda one: _by_ties(one, ties, seen), by_control=False)
+
     try:
         pair = oriented_in_stages(observations, start, photos, stated, with_control=enough)
-    except GeometryError as error:
+    except (GeometryError, ConvergenceError) as error:
+        right = mended(observations)
+        if right is not None:
+            return right
         # Photos through glass or water may fit no cameras at all: then that is the reason.
         raise _reason(error, observations, start, lacking) from error
     bend = _bend(pair.observations, pair.adjusted)
     pair = replace(pair, bend=bend)
     # A model that does not fit leaves honest points with large misfits.
     pair = pair if bend > MOST_BENT else without_gross(pair)
+    doubts = model_remarks(pair, site)
+    right = mended(pair.observations) if doubts else None
+    if right is not None:
+        return right
     validation.check_determined(pair.adjusted)
     validation.check_movement(pair.adjusted)
     told = (
         *remarks,
-        *model_remarks(pair, site),
+        *doubts,
         *pair.remarks,
         *control_remarks(control, pair),
         *distance_remarks(pair),
@@ -238,8 +263,8 @@ def _bend(observations: PairObservations, state: PairUnknowns) -> float:
 
 
 def _reason(
-    error: GeometryError, observations: PairObservations, state: PairUnknowns, lacking: str
-) -> GeometryError:
+    error: PhotogrammetryError, observations: PairObservations, state: PairUnknowns, lacking: str
+) -> PhotogrammetryError:
     """Return why no cameras were found: that the wall is bent where it strongly is, or the error.
 
     With what is ``lacking`` of the lenses.
@@ -258,38 +283,42 @@ def _contradiction(cameras: Cameras, ties: Ties) -> float:
     return robust_sigma(epipolar_distance(fundamental(*cameras), ties.pixels1, ties.pixels2))
 
 
-def _picks_exchanged(given: _Given, ties: Ties, misfit: float) -> bool:
-    """Return whether the picks of the two photos were exchanged.
-
-    Raises
-    ------
-    GeometryError
-        If they fit neither way round.
-    """
-    try:
-        turned = replace(given, control=given.control.exchanged())
-        cameras = _start(turned, ties, True)[0]
-        other = _contradiction(cameras, ties)
-    except GeometryError:
-        other = np.inf
-    if other < 0.5 * misfit:
-        return True
-    if misfit > 0.012 * max(given.interiors[0].image_size):
+def _check_picks(cameras: Cameras, ties: Ties, interiors: Interiors) -> None:
+    """Refuse control points that the photos contradict."""
+    if _contradiction(cameras, ties) > 0.012 * max(interiors[0].image_size):
         raise GeometryError(
             "the control points' pixels do not fit the photos: the details common to both photos "
             "contradict them. Check that col1, row1 are pixels of the first photo and col2, row2 "
             "of the second, at full size."
         )
-    return False
 
 
-def _with_picks_exchanged(given: _Given) -> OrientedPair:
-    """Return the pair with the picks of the two photos exchanged, saying so."""
-    pair = orient_pair(given.photos, control=given.control.exchanged(), site=given.site)
-    note = (
-        f"col1, row1 of the control points are pixels of {given.names[1]}, col2, row2 of "
-        f"{given.names[0]}; the picks were exchanged."
-    )
+def _typed_right(
+    given: _Given, fitted: Callable[[_Given], Fitted | None], *, by_control: bool
+) -> OrientedPair | None:
+    """Return the pair with the slip mended that explains a misfit, saying so; None without one.
+
+    Raises
+    ------
+    GeometryError
+        Naming a slip that only the user can mend.
+    """
+
+    def meant(typed: Typed) -> _Given:
+        both = zip(given.photos, typed.interiors, strict=True)
+        first, second = (replace(photo, interior=interior) for photo, interior in both)
+        return replace(given, photos=(first, second), control=typed.control, site=typed.site)
+
+    typed = Typed(interiors=given.interiors, control=given.control, site=given.site)
+    slip = slip_of(typed, lambda one: fitted(meant(one)), by_control=by_control)
+    if slip is not None and not slip.mended:
+        raise GeometryError(slip.words)
+    return None if slip is None else _told(meant(slip.meant), slip.words)
+
+
+def _told(given: _Given, note: str) -> OrientedPair:
+    """Return the pair of what is given instead of what was typed, saying so."""
+    pair = orient_pair(given.photos, control=given.control, site=given.site)
     return replace(pair, remarks=(note, *pair.remarks))
 
 
@@ -304,9 +333,8 @@ def _order(given: _Given, ties: Ties) -> float:
     # Logarithms of the distances' ratio by lenses and scale in either order, against the taped one.
     ratio, scale = first.focal / second.focal, plane_scale(ties, first.image_size)
     d1, d2 = given.site.distances
-    either = (
-        np.log([ratio * scale, ratio / scale]) - np.log(d1 / d2 if d1 and d2 else 1.0)
-    ).tolist()
+    taped = abs(np.log(d1 / d2)) if d1 and d2 else 0.0
+    either = (np.log([ratio * scale, ratio / scale]) - taped).tolist()
     if not (d1 and d2):  # the far camera is any farther
         either = [min(off, 0.0) for off in either]
     as_given, turned = (abs(off) < UNLIKE for off in either)
@@ -314,6 +342,60 @@ def _order(given: _Given, ties: Ties) -> float:
     if given.site.ordered or not (typed and turned) or far is None or near is None:
         return np.inf
     return first_is_far((far, near), ties) if as_given else -np.inf
+
+
+def _by_control(given: _Given, ties: Ties | None) -> Fitted | None:
+    """Return how well control points, lenses, tapes and common points fit each other.
+
+    Whichever photo is the far one, the longer distance is its. Control points leave the lines of
+    common points uncertain by some pixels.
+    """
+    d1, d2 = given.site.distance1, given.site.distance2
+    try:
+        cameras, agree, interiors = _start(given, None, True)
+        z1, z2 = (float(camera.centre[2]) for camera in cameras)
+        if d1 and d2 and (d1 < d2) != (z1 < z2):
+            given = replace(given, site=replace(given.site, distance1=d2, distance2=d1))
+        if any(
+            known and not 0.5 < known / z < 2
+            for known, z in zip((given.site.distance1, given.site.distance2), (z1, z2), strict=True)
+        ):  # another unit: `validation.check_units` says so
+            given = replace(given, site=replace(given.site, distance1=None, distance2=None))
+        observations = _observations(given, interiors, None, agree)
+        pair = control_alone(observations, PairUnknowns(cameras=cameras), named=False)
+        pair = without_gross(pair)
+    except (GeometryError, ConvergenceError):
+        return None
+    adjusted, used = pair.adjusted, pair.observations.pick_used
+    test = np.minimum(adjusted.control_test[given.control.positioned], MOST)
+    square = float((test**2).mean()) + _pulled(pair) / (4 * len(test))
+    if ties is not None:
+        off = _contradiction(adjusted.cameras, ties) / (2 * ties.tolerance)
+        square += max(off - 1.0, 0.0) ** 2
+    return Fitted(misfit=float(np.sqrt(square)), cameras=adjusted.cameras, lost=~used)
+
+
+def _by_ties(given: _Given, ties: Ties, seen: PairObservations) -> Fitted | None:
+    """Return how well common points as matched meet, as a share of what they may miss by."""
+    first, second = (replace(photo, grey=None) for photo in given.photos)
+    try:
+        cameras, _, interiors = _start(given, ties, False)
+        tilt = seen.sigma_tilt if given.site.parallel else None
+        seen = replace(seen, interiors=interiors, lines=(), sigma_tilt=tilt)
+        start = PairUnknowns(cameras=cameras)
+        pair = oriented_in_stages(seen, start, (first, second), given.site, with_control=False)
+    except (GeometryError, ConvergenceError):
+        return None
+    fine = WORST_FIT / 3 * max(interiors[0].image_size) / 3000
+    misfit = float(np.hypot(pair.observations.sigma_tie / fine, np.sqrt(_pulled(pair) / 2)))
+    return Fitted(misfit=misfit, cameras=pair.adjusted.cameras, lost=~pair.observations.pick_used)
+
+
+def _pulled(pair: OrientedPair) -> float:
+    """Return the sum of squares by which focal lengths came out other than known, in sigma."""
+    pairs = zip(pair.adjusted.cameras, pair.observations.interiors, strict=True)
+    changes = [np.log(c.matrix[0, 0] / i.focal) / i.sigma_focal for c, i in pairs]
+    return float(np.sum(np.square(changes)))
 
 
 def _with_photos_exchanged(given: _Given, *, typed_stay: bool = False) -> OrientedPair:

@@ -13,6 +13,7 @@ from bifocal.files.haze import read_greys
 from bifocal.files.images import WRITTEN, ImageInfo, image_info
 from bifocal.model.basis import rests_on
 from bifocal.model.lens import Lens
+from bifocal.model.photo import FARTHEST_WALL
 from bifocal.orientation.absolute_orientation import orient_pair
 from bifocal.orientation.alignment import Alignment, make_alignment, with_files
 from bifocal.orientation.alignment_picture import write_alignment_picture
@@ -33,8 +34,6 @@ from photocore.output import (
 
 #: A wall point given without r lies on the plane to this. [m]
 SIGMA_ON_WALL = 0.005
-#: Distances and lengths beyond this are taken for millimetres. [m]
-FARTHEST = 500.0
 #: Nominal focal lengths are rounded and change with focus; 35 mm equivalents are rounder still.
 SIGMA_NOMINAL, SIGMA_EQUIVALENT = 0.02, 0.04
 
@@ -285,12 +284,13 @@ def _check_focal(photos: tuple[PhotoInput, PhotoInput]) -> None:
 
 
 def _check_metres(options: AlignOptions) -> None:
-    """Refuse distances and lengths in millimetres."""
+    """Refuse distances and lengths in millimetres; control points tell of distances themselves."""
     site = options.site
-    given = {"--distance1": site.distance1, "--distance2": site.distance2}
-    given |= {"--delta-d": site.delta_d, "--length": options.length and options.length[1]}
+    given = {"--delta-d": site.delta_d, "--length": options.length and options.length[1]}
+    if options.control is None:
+        given |= {"--distance1": site.distance1, "--distance2": site.distance2}
     for name, value in given.items():
-        if value and value > FARTHEST:
+        if value and value > FARTHEST_WALL:
             raise InputError(
                 f"{name} {value:g} m is too far for a wall: is it in mm? Distances and lengths are "
                 f"in metres ({name} {value / 1000:g})."

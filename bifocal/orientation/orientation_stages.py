@@ -38,6 +38,7 @@ from bifocal.orientation.wall_planes import (
     planes_of_any_direction,
     steep_rivals_in_words,
 )
+from photocore.adjustment import OUTLIER_LIMIT
 from photocore.arrays import ByteArray, FloatArray
 from photocore.camera import plane_transfer
 from photocore.errors import GeometryError
@@ -46,8 +47,6 @@ from photocore.rotation import rotation_from_vector
 #: "Image plane parallel to the wall" when nothing contradicts it. [rad]
 SIGMA_PARALLEL = np.deg2rad(0.3)
 UNEVEN = 0.004  #: A wall's face slopes by this against the plane it was meant to be. [m/m]
-#: A control point's misfit beyond this many standard deviations is a gross error.
-GROSS_LIMIT = 4.0
 #: Control points of so small a relief, in their sigma, say that they lie on the wall; it is
 #: believed if its plane is no further from theirs, in sigma.
 ON_WALL, WALL_LIMIT = 4.0, 3.0
@@ -486,13 +485,13 @@ def without_gross(pair: OrientedPair) -> OrientedPair:
         test = np.where(used, pair.adjusted.control_test, 0.0)
         usual = max(1.0, float(np.median(test[used])) if used.any() else 1)
         worst = int(test.argmax())
-        if test[worst] < GROSS_LIMIT * usual or used.sum() <= 4:
+        if test[worst] < OUTLIER_LIMIT * usual or used.sum() <= 4:
             break
         used[worst] = False
         dropped.append(worst)
         pair = pair.readjusted(pick_used=used)
     # A point thrown out by the first, rough fit may be good after all.
-    back = [i for i in dropped if pair.adjusted.control_test[i] < GROSS_LIMIT]
+    back = [i for i in dropped if pair.adjusted.control_test[i] < OUTLIER_LIMIT]
     if back:
         used = pair.observations.pick_used.copy()
         used[back] = True

@@ -14,6 +14,7 @@ from bifocal.orientation.patches import refine, same_scale
 from bifocal.orientation.reference_plane import NarrowFace, narrow_face
 from bifocal.orientation.refracted_observations import guessed_points
 from bifocal.orientation.relative_orientation import supported
+from photocore.adjustment import OUTLIER_LIMIT
 from photocore.arrays import BoolArray, FloatArray
 from photocore.camera import (
     fundamental,
@@ -24,8 +25,6 @@ from photocore.camera import (
     triangulate,
 )
 
-#: A tie farther than this many sigma from its line is gross.
-GROSS = 3.5
 #: Ties are never believed to be more precise than this. [px]
 BEST_TIE = 0.03
 #: Fewer ties than this are no wall.
@@ -88,7 +87,7 @@ def without_gross_ties(
         Precision of a tie's coordinate. [px]
     """
     sigma = max(sigma, BEST_TIE)
-    used = np.abs(adjusted.tie_misfit) < GROSS * sigma
+    used = np.abs(adjusted.tie_misfit) < OUTLIER_LIMIT * sigma
     xyz = tie_positions(observations, adjusted)
     lowest = min(camera.centre[2] for camera in adjusted.cameras)
     used &= np.isfinite(xyz).all(axis=1) & (xyz[:, 2] < 0.95 * lowest)

@@ -161,6 +161,34 @@ def test_control_in_millimetres_is_told_by_the_tape() -> None:
         orient_pair(photos(), control=points, site=SiteMeasures(distance1=16.0))
 
 
+def far_wall(scale: float) -> Control:
+    """Return the control points of a wall that is so many times as large and as far."""
+    points = control()
+    return replace(points, xyz=points.xyz * scale, sigma=points.sigma * scale)
+
+
+@pytest.mark.parametrize(("scale", "measured"), [(22.0, False), (22.0, True), (40.0, True)])
+def test_a_wall_beyond_300_m_is_taken_and_one_beyond_500_m_where_the_tape_agrees(
+    scale, measured
+) -> None:
+    site = SiteMeasures(distance1=16 * scale, distance2=9 * scale) if measured else SiteMeasures()
+    known = photos(far=FAR.matrix[0, 0], near=NEAR.matrix[0, 0])
+    made = orient_pair(known, control=far_wall(scale), site=site)
+    assert made.adjusted.cameras[0].centre[2] == pytest.approx(16 * scale, rel=0.003)
+
+
+def test_a_wall_too_far_is_refused_with_the_far_distance_first() -> None:
+    known = photos(far=FAR.matrix[0, 0], near=NEAR.matrix[0, 0])
+    with pytest.raises(InputError, match=r"the cameras 6[34]\d and 3[56]\d m from the wall"):
+        orient_pair(known, control=far_wall(40.0), site=SiteMeasures())
+
+
+def test_a_tape_in_millimetres_is_told_by_the_control_points() -> None:
+    known = photos(far=FAR.matrix[0, 0], near=NEAR.matrix[0, 0])
+    with pytest.raises(InputError, match=r"--distance1 16000 m is too far.*\(--distance1 16\)"):
+        orient_pair(known, control=control(), site=SiteMeasures(distance1=16000.0))
+
+
 def test_points_in_one_line_are_refused() -> None:
     line = np.column_stack([np.linspace(-3, 3, 6), np.full(6, 0.5), np.zeros(6)])
     with pytest.raises(GeometryError, match="on one line"):
