@@ -11,7 +11,7 @@ import numpy as np
 
 from bifocal.orientation import validation
 from bifocal.orientation.as_set_up import check_room
-from bifocal.orientation.bend import MOST_BENT, STRONGLY_BENT, bend_in_words, bend_of_wall
+from bifocal.orientation.bend import STRONGLY_BENT, WallBend, bend_in_words, bend_of_wall
 from bifocal.orientation.control_points import Control, SiteMeasures
 from bifocal.orientation.features import find_features
 from bifocal.orientation.interior_orientation import Cameras, Interiors, with_one_lens
@@ -131,10 +131,7 @@ def orient_pair(
     except GeometryError as error:
         # Photos through glass or water may fit no cameras at all: then that is the reason.
         raise _reason(error, observations, start) from error
-    bend = _bend(pair.observations, pair.adjusted)
-    pair = replace(pair, bend=bend)
-    # A model that does not fit leaves honest points with large misfits.
-    pair = pair if bend > MOST_BENT else without_gross(pair)
+    pair = without_gross(replace(pair, bend=_bend(pair.observations, pair.adjusted)))
     validation.check_determined(pair.adjusted)
     validation.check_movement(pair.adjusted)
     told = (
@@ -179,7 +176,7 @@ def _through_media(given: _Given, media: PairMedia) -> OrientedPair:
         pair, note = with_bent_ties(pair, ties), "the media as given"
         bend = refracted_bend(pair.adjusted, ties.seen1, ties.seen2, interiors[0].image_size)
         pair = replace(pair, bend=bend)
-    pair = pair if pair.bend > MOST_BENT else without_gross(pair)
+    pair = without_gross(pair)
     refuse_impossible_media(pair.adjusted, media)
     check_room(pair.adjusted.media, pair.adjusted.cameras)
     validation.check_determined(pair.adjusted)
@@ -195,11 +192,11 @@ def _through_media(given: _Given, media: PairMedia) -> OrientedPair:
     return replace(pair, remarks=told, assumed=assumed)
 
 
-def _bend(observations: PairObservations, state: PairUnknowns) -> float:
-    """Return how far the wall is from a plane between the photos. [px at 3000 px of width]"""
+def _bend(observations: PairObservations, state: PairUnknowns) -> WallBend:
+    """Return how far the wall is from a plane between the photos."""
     used = observations.tie_used
     if used.sum() < 30:
-        return float("nan")
+        return WallBend()
     seen1, seen2 = observations.straight_ties(state.radial)
     height = tie_positions(observations, state)[used, 2] / state.cameras[0].centre[2]
     size = observations.interiors[0].image_size
@@ -214,7 +211,7 @@ def _reason(
     Features as first found are good to a pixel; only a bend beyond `STRONGLY_BENT` counts.
     """
     bend = _bend(observations, state)
-    if not bend > STRONGLY_BENT:
+    if not bend.px > STRONGLY_BENT:
         return error
     known = any(i.is_calibrated or i.sigma_radial > 0 for i in observations.interiors)
     return GeometryError(bend_in_words(bend, with_lens=known))

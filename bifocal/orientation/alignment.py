@@ -282,7 +282,8 @@ def _diagnostics(
             }
             for line in observations.lines
         ],
-        "wall_bend_px": oriented.bend if np.isfinite(oriented.bend) else None,
+        "wall_bend_px": oriented.bend.px if np.isfinite(oriented.bend.px) else None,
+        "wall_bend_sigma_px": oriented.bend.sigma if np.isfinite(oriented.bend.px) else None,
         "focal_given_px": [interior.focal for interior in observations.interiors],
         "wall_relief_mm": wall_relief(oriented),
         "assumed": oriented.assumed,

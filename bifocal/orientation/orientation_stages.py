@@ -13,6 +13,7 @@ import numpy as np
 from bifocal.model.orientation_precision import NAMES
 from bifocal.orientation import facade_lines, validation
 from bifocal.orientation.area_points import even_points
+from bifocal.orientation.bend import WallBend
 from bifocal.orientation.control_points import SiteMeasures
 from bifocal.orientation.interior_orientation import SIGMA_RADIAL, Cameras, Images, Interior
 from bifocal.orientation.pair_adjustment import (
@@ -96,8 +97,8 @@ class OrientedPair:
         Whether the user said which of them is the wall.
     tolerance : pair of float
         How far the wall may lie from the reference plane [m] and slope against it [m/m].
-    bend : float
-        How far the wall is from a plane between the photos. [px at 3000 px of width]
+    bend : WallBend
+        How far the wall is from a plane between the photos.
     """
 
     observations: PairObservations
@@ -108,7 +109,7 @@ class OrientedPair:
     faces: tuple[Face, ...] = ()
     wall_named: bool = False
     tolerance: tuple[float, float] = FREE
-    bend: float = float("nan")
+    bend: WallBend = WallBend()
 
     def readjusted(self, start: PairUnknowns | None = None, **changes: Any) -> OrientedPair:
         """Return the pair adjusted with changed observations, from here or another start."""
@@ -478,19 +479,26 @@ def _care(cameras: Cameras) -> float:
 
 
 def without_gross(pair: OrientedPair) -> OrientedPair:
-    """Return the pair without gross control points, taking out the worst one by one."""
+    """Return the pair without gross control points, taking out the worst one by one.
+
+    What is usual is seen in the fit without the suspect, which spoils its neighbours too: where
+    the model itself does not fit, honest points have large misfits.
+    """
     count = len(pair.observations.control.ids)
     dropped: list[int] = list(np.flatnonzero(~pair.observations.pick_used))
     for _ in range(max(count // 3, 1) if count > 4 else 0):
         used = pair.observations.pick_used.copy()
         test = np.where(used, pair.adjusted.control_test, 0.0)
-        usual = max(1.0, float(np.median(test[used])) if used.any() else 1)
         worst = int(test.argmax())
-        if test[worst] < GROSS_LIMIT * usual or used.sum() <= 4:
+        if test[worst] < GROSS_LIMIT or used.sum() <= 4:
             break
         used[worst] = False
+        without = pair.readjusted(pick_used=used)
+        usual = max(1.0, float(np.median(without.adjusted.control_test[used])))
+        if test[worst] < GROSS_LIMIT * usual:
+            break
         dropped.append(worst)
-        pair = pair.readjusted(pick_used=used)
+        pair = without
     # A point thrown out by the first, rough fit may be good after all.
     back = [i for i in dropped if pair.adjusted.control_test[i] < GROSS_LIMIT]
     if back:
