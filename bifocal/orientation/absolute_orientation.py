@@ -21,6 +21,7 @@ from bifocal.orientation.orientation_remarks import (
     control_remarks,
     distance_remarks,
     model_remarks,
+    wall_remarks,
 )
 from bifocal.orientation.orientation_stages import (
     ONE_LENS,
@@ -138,6 +139,7 @@ def orient_pair(
         *remarks,
         *model_remarks(pair, site),
         *pair.remarks,
+        *wall_remarks(pair),
         *control_remarks(control, pair),
         *distance_remarks(pair),
     )

@@ -11,15 +11,14 @@ from typing import NamedTuple
 import cv2
 import numpy as np
 
+from bifocal.model.doubts import MOST_BENT, bend_is_certain
 from bifocal.model.homography import apply_homography
 from bifocal.orientation.reference_plane import faces
 from photocore.arrays import BoolArray, FloatArray
 
-#: A wall bent by certainly more than this, at 3000 px of width, is not that of an honest pair.
-#: Rendered façades reach 0.006 px, church_1 0.10; the rendered ones seen
-#: through half a metre of water in 17 m 0.22 and 0.43. Set after they were seen. [px]
-MOST_BENT, CERTAIN = 0.2, 2.0
-#: Beyond this it is refraction or a strong lens for certain.
+#: Beyond this it is refraction or a strong lens for certain. `MOST_BENT` is the limit of an honest
+#: pair: rendered façades reach 0.006 px, church_1 and church_2 0.10; rendered ones seen through
+#: half a metre of water in 17 m 0.22 and 0.43. Set after they were seen. [px]
 STRONGLY_BENT = 1.0
 #: A face is what lies within this share of the far distance from its plane; where it holds fewer
 #: ties, or a smaller part of what a bent surface through all ties would hold, the wall itself is
@@ -52,7 +51,7 @@ class WallBend(NamedTuple):
     @property
     def is_certain(self) -> bool:
         """Whether the model does not fit, beyond what the wall's own unevenness explains."""
-        return self.px - CERTAIN * self.sigma > MOST_BENT
+        return bend_is_certain(self.px, self.sigma)
 
 
 def wall_bend(
@@ -209,8 +208,9 @@ def bend_in_words(
         )
     return (
         f"THE MODEL DOES NOT FIT: between the photos the wall is bent by {bend.px:.2f} ± "
-        f"{bend.sigma:.2f} px (an honest pair: at most {MOST_BENT:g}). The likely reason is{sure} {reason}. Relief may be wrong "
-        "by many times its stated precision, although every point lies on its line; "
+        f"{bend.sigma:.2f} px (an honest pair: at most {MOST_BENT:g}). The likely reason is"
+        f"{sure} {reason}. Relief may be wrong by many times the precision of the picks, although "
+        "every point lies on its line: sigma_r counts the bend; "
         + (
             "control points that fit no camera were left out, but may be good."
             if left_out

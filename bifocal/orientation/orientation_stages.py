@@ -5,7 +5,7 @@ Each stage takes the pair as oriented so far and returns it better, with what is
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -23,7 +23,13 @@ from bifocal.orientation.pair_adjustment import (
     line_test,
 )
 from bifocal.orientation.pair_observations import PairObservations, PairUnknowns, at
-from bifocal.orientation.reference_plane import STEEPEST, Face, choose_wall, rivals_in_words
+from bifocal.orientation.reference_plane import (
+    STEEPEST,
+    Face,
+    choose_wall,
+    onto_plane,
+    rivals_in_words,
+)
 from bifocal.orientation.tie_points import (
     refine_ties,
     robust_sigma,
@@ -39,10 +45,9 @@ from bifocal.orientation.wall_planes import (
     planes_of_any_direction,
     steep_rivals_in_words,
 )
-from photocore.arrays import ByteArray, FloatArray
+from photocore.arrays import ByteArray
 from photocore.camera import plane_transfer
 from photocore.errors import GeometryError
-from photocore.rotation import rotation_from_vector
 
 #: "Image plane parallel to the wall" when nothing contradicts it. [rad]
 SIGMA_PARALLEL = np.deg2rad(0.3)
@@ -109,7 +114,7 @@ class OrientedPair:
     faces: tuple[Face, ...] = ()
     wall_named: bool = False
     tolerance: tuple[float, float] = FREE
-    bend: WallBend = WallBend()
+    bend: WallBend = field(default_factory=WallBend)
 
     def readjusted(self, start: PairUnknowns | None = None, **changes: Any) -> OrientedPair:
         """Return the pair adjusted with changed observations, from here or another start."""
@@ -294,7 +299,7 @@ def _facing_the_wall(pair: OrientedPair, site: SiteMeasures) -> OrientedPair:
     pair = pair.told(question) if question else pair
     if wall.slope <= STEEPEST:
         return pair
-    cameras = _onto_plane(
+    cameras = onto_plane(
         adjusted.cameras, np.array([wall.offset, *-wall.normal[:2]]) / wall.normal[2]
     )
     far, near = cameras
@@ -344,7 +349,7 @@ def _on_the_wall(pair: OrientedPair, images: Images, site: SiteMeasures) -> Orie
     )
     pair = replace(pair, faces=tuple(faces))
     pair = pair.told(*(text for text in [rivals_in_words(faces, site)] if text))
-    start = evaluated(ties, replace(adjusted, cameras=_onto_plane(adjusted.cameras, plane)))
+    start = evaluated(ties, replace(adjusted, cameras=onto_plane(adjusted.cameras, plane)))
     ties = with_wall(ties, start, FREE)
     return replace(pair, observations=ties).readjusted(start).settled()
 
@@ -415,16 +420,6 @@ def _with_named_wall(pair: OrientedPair) -> OrientedPair:
             "of the wall they were measured on, and their relief r."
         )
     return replace(pair, observations=walled).readjusted()
-
-
-def _onto_plane(cameras: Cameras, plane: FloatArray) -> Cameras:
-    """Return cameras in the frame of the plane z = a + b X + c Y, X and Y all but kept."""
-    slope = float(np.hypot(plane[1], plane[2]))
-    # The rotation that takes the normal to the new Z axis, about their common perpendicular.
-    angle = np.arctan(slope) / slope if slope > 0 else 0.0
-    turn = rotation_from_vector([-angle * plane[2], angle * plane[1], 0.0])
-    origin = np.array([0.0, 0.0, plane[0]])
-    return cameras[0].moved(turn, origin), cameras[1].moved(turn, origin)
 
 
 def _parallel_if_so(pair: OrientedPair) -> OrientedPair:
