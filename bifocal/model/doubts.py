@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from typing import Any
 
 import numpy as np
@@ -12,9 +13,11 @@ from photocore.arrays import FloatArray
 #: A wall bent by certainly more than this, at 3000 px of width, is not that of an honest pair; by
 #: how many standard deviations it is certain. [px]
 MOST_BENT, CERTAIN = 0.2, 2.0
-#: Root mean square bend over a photo of 3 to 2 by x (1 + k rho²), over k and half the diagonal, and
-#: the mean of rho²: what scale takes up of it.
-BEND_BY_K, MEAN_SQUARE = 0.114, 1 / 3
+#: Root mean square bend at 3000 px of width, over a photo of 3 to 2, by k of x (1 + k rho²), rho
+#: over half the diagonal, and what of k a scale takes up, the mean of rho². [px, -]
+BEND_BY_K, MEAN_SQUARE = 205.0, 1 / 3
+#: What free diagnostics may lack or hold instead of numbers.
+NO_NUMBER = (LookupError, TypeError, ValueError, ZeroDivisionError)
 
 
 def bend_is_certain(px: float, sigma: float) -> bool:
@@ -25,11 +28,10 @@ def bend_is_certain(px: float, sigma: float) -> bool:
 def doubts_in_words(setup: Any) -> tuple[str, ...]:
     """Return what is known to be wrong with a pair, from the ``setup`` of its file."""
     told = setup.get("doubts") if isinstance(setup, dict) else ()
-    if told is None and _bend(setup):
+    if told is None and (bend := _bend(setup)):
         told = [
-            "THE MODEL DOES NOT FIT: when the pair was set up, the wall was bent between the "
-            f"photos by {_bend(setup):.2f} px (an honest pair: at most {MOST_BENT:g}). Relief may "
-            "be wrong by what sigma_r says and more. Set it up again (`bifocal align`)."
+            f"THE MODEL DOES NOT FIT: the wall is bent by {bend:.2f} px between the photos (an "
+            f"honest pair: at most {MOST_BENT:g}). Set the pair up again (`bifocal align`)."
         ]
     return tuple(map(str, told)) if isinstance(told, list | tuple) else ()
 
@@ -53,33 +55,21 @@ def covariance_of_doubts(setup: Any) -> FloatArray | None:
     up of it; another face that may be the wall moves both cameras alike.
     """
     variance = np.zeros((len(NAMES), len(NAMES)))
-    bend, offset = _bend(setup), _number(setup, "standard_deviations", "relief_offset")
-    focal, column, row = (
-        _number(setup, *place)
-        for place in (("focal_px", 0), ("principal_point_px", 0, 0), ("principal_point_px", 0, 1))
-    )
-    half = float(np.hypot(column, row))
-    if bend and half and focal:
-        k = bend * 2 * max(column, row) / 3000.0 / (BEND_BY_K * half)
-        for name, size in (("k1 1", k * (focal / half) ** 2), ("focal length 1", MEAN_SQUARE * k)):
-            variance[NAMES.index(name), NAMES.index(name)] = size**2
-    both = [NAMES.index("Z 1"), NAMES.index("Z 2")]
-    variance[np.ix_(both, both)] += offset**2
-    return variance if variance.any() else None
+    k1, scale, *both = (NAMES.index(name) for name in ("k1 1", "focal length 1", "Z 1", "Z 2"))
+    with suppress(*NO_NUMBER):
+        k = _bend(setup) / BEND_BY_K
+        half = float(np.hypot(*setup["principal_point_px"][0]))
+        variance[k1, k1] = (k * (float(setup["focal_px"][0]) / half) ** 2) ** 2
+        variance[scale, scale] = (k * MEAN_SQUARE) ** 2
+    with suppress(*NO_NUMBER):
+        offset = float(setup["standard_deviations"]["relief_offset"])
+        variance[np.ix_(both, both)] += offset**2
+    return variance if variance.any() and np.isfinite(variance).all() else None
 
 
 def _bend(setup: Any) -> float:
     """Return by how much the wall is certainly bent between the photos, else 0. [px]"""
-    bend = _number(setup, "wall_bend_px")
-    return bend if bend_is_certain(bend, _number(setup, "wall_bend_sigma_px")) else 0.0
-
-
-def _number(data: Any, *place: str | int) -> float:
-    """Return a number of free diagnostics, 0 where there is none."""
-    for key in place:
-        try:
-            data = data[key]
-        except (LookupError, TypeError):
-            return 0.0
-    usable = isinstance(data, int | float) and not isinstance(data, bool) and np.isfinite(data)
-    return float(data) if usable else 0.0
+    with suppress(*NO_NUMBER):
+        bend, sigma = float(setup["wall_bend_px"]), float(setup.get("wall_bend_sigma_px") or 0.0)
+        return bend if bend_is_certain(bend, sigma) else 0.0
+    return 0.0

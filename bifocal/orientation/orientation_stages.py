@@ -357,7 +357,7 @@ def _on_the_wall(pair: OrientedPair, images: Images, site: SiteMeasures) -> Orie
 def _with_lines(pair: OrientedPair, images: Images) -> OrientedPair:
     """Return the pair with the façade's uprights and levels lying along the wall.
 
-    Directions that contradict the wall found by the ties are told of and not used.
+    Those that contradict the wall found by the ties are told of and not used.
     """
     old, adjusted = pair.observations, pair.adjusted
     bent = old.radial_models(adjusted.radial)
@@ -476,8 +476,7 @@ def _care(cameras: Cameras) -> float:
 def without_gross(pair: OrientedPair) -> OrientedPair:
     """Return the pair without gross control points, taking out the worst one by one.
 
-    What is usual is seen in the fit without the suspect, which spoils its neighbours too: where
-    the model itself does not fit, honest points have large misfits.
+    What is usual shows without the suspect, which spoils its neighbours too.
     """
     count = len(pair.observations.control.ids)
     dropped: list[int] = list(np.flatnonzero(~pair.observations.pick_used))

@@ -156,19 +156,18 @@ def choose_wall(
         heights = _heights(xyz, plane)
     planes = faces(heights, pixels, band=band)
     tests = _ratio_tests(planes, cameras, plane, site, sigma_ratio)
-    if tests is not None:
-        chances = np.exp(-0.5 * np.minimum(tests, 30.0) ** 2).tolist()
-        planes = [replace(face, chance=c) for face, c in zip(planes, chances, strict=True)]
+    chances = np.exp(-0.5 * np.minimum(tests, 30.0) ** 2).tolist()
+    planes = [replace(face, chance=c) for face, c in zip(planes, chances, strict=True)]
     return plane, sorted(planes, key=lambda face: (abs(face.offset) > band, -face.share))
 
 
 def _ratio_tests(
     planes: Sequence[Face], cameras: Cameras, plane: FloatArray, site: SiteMeasures, sigma: float
-) -> FloatArray | None:
-    """Return how far each face's distances are from the measured ratio, in sigma; None: unknown."""
+) -> FloatArray:
+    """Return how far each face's distances are from the measured ratio, in sigma; 0: unknown."""
     d1, d2 = site.distances
     if not (d1 and d2):
-        return None
+        return np.zeros(len(planes))
     far, near = (float(c.centre[2] - plane[0] - c.centre[:2] @ plane[1:]) for c in cameras)
     sigma = float(np.hypot(sigma, np.hypot(site.sigma / d1, site.sigma / d2)))
     ratios = [np.log((far - face.offset) / (near - face.offset)) for face in planes]
@@ -187,7 +186,7 @@ def _face_by_ratio(
     planes = faces(heights, pixels, band=BAND * float(cameras[0].centre[2]))
     fair = [face for face in planes if face.share >= FAIR * planes[0].share]
     tests = _ratio_tests(fair, cameras, plane, site, sigma)
-    if len(fair) < 2 or tests is None:
+    if len(fair) < 2 or not tests.any():
         return None
     order = np.argsort(tests)
     # The nearest must fit, and the next must not.

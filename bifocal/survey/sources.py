@@ -98,7 +98,7 @@ def described_pair(setup: SurveySetup, file: Path | None, folder: Path) -> Pair 
     if setup.matrices is None or setup.d1 is None or setup.d2 is None:
         return None
     lenses: list[Lens | None] = [None, None]
-    orientation, doubt, extra = None, "", {}
+    orientation, doubt, extra = None, "", {"setup": None}
     media: list[dict[str, Any]] = [{}, {}]
     if setup.media is not None:
         through = [setup.media.through(number) for number in (1, 2)]
@@ -108,7 +108,7 @@ def described_pair(setup: SurveySetup, file: Path | None, folder: Path) -> Pair 
     if file is not None:
         try:
             given = Pair.read(file)
-            extra = {key: given.extra[key] for key in ("setup",) if key in given.extra}
+            extra = {"setup": given.extra.get("setup")}
             lenses = [given.image1.lens, given.image2.lens]
             if setup.media is None or setup.media.layers == given.layers:
                 orientation = given.orientation  # it may count the media too
@@ -131,10 +131,6 @@ def described_pair(setup: SurveySetup, file: Path | None, folder: Path) -> Pair 
         )
     ]  # fmt: skip
     return Pair(
-        image1=photos[0],
-        image2=photos[1],
-        folder=folder,
-        orientation=orientation,
-        remarks=remarks,
-        extra=extra,
-    )
+        image1=photos[0], image2=photos[1], folder=folder, orientation=orientation,
+        remarks=remarks, extra=extra,
+    )  # fmt: skip
