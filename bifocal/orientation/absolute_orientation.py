@@ -45,7 +45,12 @@ from bifocal.orientation.relative_orientation import (
     plane_scale,
 )
 from bifocal.orientation.space_resection import resect
-from bifocal.orientation.tie_points import robust_sigma, tie_positions
+from bifocal.orientation.tie_points import (
+    FEWEST_ON_WALL,
+    likely_on_wall,
+    robust_sigma,
+    tie_positions,
+)
 from photocore.arrays import BoolArray
 from photocore.camera import fundamental, ray_on_plane
 from photocore.errors import GeometryError, located
@@ -133,6 +138,11 @@ def orient_pair(
         # Photos through glass or water may fit no cameras at all: then that is the reason.
         raise _reason(error, observations, start) from error
     pair = without_gross(replace(pair, bend=_bend(pair.observations, pair.adjusted)))
+    likely = likely_on_wall(pair.observations, pair.adjusted)
+    if not enough and pair.bend.px > STRONGLY_BENT and likely < FEWEST_ON_WALL:
+        # What holds a bent wall by small chances only is none.
+        known = any(i.is_calibrated or i.sigma_radial > 0 for i in interiors)
+        raise GeometryError(bend_in_words(pair.bend, with_lens=known))
     validation.check_determined(pair.adjusted)
     validation.check_movement(pair.adjusted)
     told = (

@@ -474,10 +474,7 @@ def _care(cameras: Cameras) -> float:
 
 
 def without_gross(pair: OrientedPair) -> OrientedPair:
-    """Return the pair without gross control points, taking out the worst one by one.
-
-    What is usual shows without the suspect, which spoils its neighbours too.
-    """
+    """Return the pair without gross control points, the worst first, tested without it."""
     count = len(pair.observations.control.ids)
     dropped: list[int] = list(np.flatnonzero(~pair.observations.pick_used))
     for _ in range(max(count // 3, 1) if count > 4 else 0):

@@ -206,6 +206,11 @@ def wall_roughness(observations: PairObservations, state: PairUnknowns) -> float
     return _wall_of(observations, state)[3].roughness
 
 
+def likely_on_wall(observations: PairObservations, state: PairUnknowns) -> int:
+    """Return how many ties are more likely of the wall than of anything else."""
+    return int((_wall_of(observations, state)[3].chance > 0.5).sum())
+
+
 def wall_test(observations: PairObservations, adjusted: AdjustedPair) -> float:
     """Return how far the wall's ties lie from the reference plane, adjusted without them, in sigma.
 
