@@ -319,7 +319,7 @@ def _align_step(job: PairJob) -> Step:
             job.far, job.near, out, AlignOptions.from_given({**options, **files}),
             picture=out.with_suffix("").with_suffix(".pair.png"),
         )  # fmt: skip
-        return (*made.remarks, *made.pair.remarks)
+        return tuple(dict.fromkeys((*made.pair.remarks, *made.remarks)))
 
     photos = {"far": job.far, "near": job.near}
     return Step(name=ALIGN, files={**photos, **files}, options=options, make=make)

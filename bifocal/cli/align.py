@@ -133,7 +133,7 @@ def command(
     )  # fmt: skip
     print_result(
         alignment_as_dict(alignment), _lines(alignment), as_json=as_json,
-        remarks=(*alignment.remarks, *alignment.pair.remarks),
+        remarks=dict.fromkeys((*alignment.pair.remarks, *alignment.remarks)),
     )  # fmt: skip
     if not as_json:
         remark(f"Pair written to {out}" + (f", picture to {picture}" if not no_picture else ""))

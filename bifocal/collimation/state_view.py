@@ -148,7 +148,7 @@ def _pair(session: Session, pair: Pair) -> dict[str, Any]:
         )
     centre = np.asarray(pair.zoom_centre)
     found = (session.proposal or {}).get("report", {}).get("remarks", ())
-    remarks = (*pair.remarks, *found)
+    remarks = dict.fromkeys((*pair.remarks, *found))
     return plain(
         {
             "name": str(pair.extra.get("name") or session.files.stem),

@@ -12,7 +12,7 @@ import numpy as np
 
 from bifocal.orientation import validation
 from bifocal.orientation.as_set_up import check_room
-from bifocal.orientation.bend import MOST_BENT, STRONGLY_BENT, bend_in_words, bend_of_wall
+from bifocal.orientation.bend import STRONGLY_BENT, WallBend, bend_in_words, bend_of_wall
 from bifocal.orientation.control_points import Control, SiteMeasures
 from bifocal.orientation.features import find_features
 from bifocal.orientation.interior_orientation import Cameras, Interiors, with_one_lens
@@ -24,6 +24,7 @@ from bifocal.orientation.orientation_remarks import (
     distance_remarks,
     model_remarks,
     order_remarks,
+    wall_remarks,
 )
 from bifocal.orientation.orientation_stages import (
     ONE_LENS,
@@ -49,7 +50,12 @@ from bifocal.orientation.relative_orientation import (
 )
 from bifocal.orientation.slips import MOST, Fitted, Typed, slip_of
 from bifocal.orientation.space_resection import resect
-from bifocal.orientation.tie_points import robust_sigma, tie_positions
+from bifocal.orientation.tie_points import (
+    FEWEST_ON_WALL,
+    likely_on_wall,
+    robust_sigma,
+    tie_positions,
+)
 from photocore.arrays import BoolArray
 from photocore.camera import fundamental, ray_on_plane
 from photocore.errors import ConvergenceError, GeometryError, PhotogrammetryError, located
@@ -180,20 +186,23 @@ def orient_pair(
             return right
         # Photos through glass or water may fit no cameras at all: then that is the reason.
         raise _reason(error, observations, start, lacking) from error
-    bend = _bend(pair.observations, pair.adjusted)
-    pair = replace(pair, bend=bend)
-    # A model that does not fit leaves honest points with large misfits.
-    pair = pair if bend > MOST_BENT else without_gross(pair)
+    pair = without_gross(replace(pair, bend=_bend(pair.observations, pair.adjusted)))
     doubts = model_remarks(pair, site)
     right = mended(pair.observations) if doubts else None
     if right is not None:
         return right
+    likely = likely_on_wall(pair.observations, pair.adjusted)
+    if not enough and pair.bend.px > STRONGLY_BENT and likely < FEWEST_ON_WALL:
+        # What holds a bent wall by small chances only is none.
+        known = any(i.is_calibrated or i.sigma_radial > 0 for i in interiors)
+        raise GeometryError(bend_in_words(pair.bend, with_lens=known))
     validation.check_determined(pair.adjusted)
     validation.check_movement(pair.adjusted)
     told = (
         *remarks,
         *doubts,
         *pair.remarks,
+        *wall_remarks(pair),
         *control_remarks(control, pair),
         *distance_remarks(pair),
     )
@@ -235,7 +244,7 @@ def _through_media(given: _Given, media: PairMedia, lacking: str) -> OrientedPai
         pair, note = with_bent_ties(pair, ties), "the media as given"
         bend = refracted_bend(pair.adjusted, ties.seen1, ties.seen2, interiors[0].image_size)
         pair = replace(pair, bend=bend)
-    pair = pair if pair.bend > MOST_BENT else without_gross(pair)
+    pair = without_gross(pair)
     refuse_impossible_media(pair.adjusted, media)
     check_room(pair.adjusted.media, pair.adjusted.cameras)
     validation.check_determined(pair.adjusted)
@@ -251,11 +260,11 @@ def _through_media(given: _Given, media: PairMedia, lacking: str) -> OrientedPai
     return replace(pair, remarks=told, assumed=assumed)
 
 
-def _bend(observations: PairObservations, state: PairUnknowns) -> float:
-    """Return how far the wall is from a plane between the photos. [px at 3000 px of width]"""
+def _bend(observations: PairObservations, state: PairUnknowns) -> WallBend:
+    """Return how far the wall is from a plane between the photos."""
     used = observations.tie_used
     if used.sum() < 30:
-        return float("nan")
+        return WallBend()
     seen1, seen2 = observations.straight_ties(state.radial)
     height = tie_positions(observations, state)[used, 2] / state.cameras[0].centre[2]
     size = observations.interiors[0].image_size
@@ -272,7 +281,7 @@ def _reason(
     Features as first found are good to a pixel; only a bend beyond `STRONGLY_BENT` counts.
     """
     bend = _bend(observations, state)
-    if not bend > STRONGLY_BENT:
+    if not bend.px > STRONGLY_BENT:
         return GeometryError(f"{error} The likely reason: {lacking}.") if lacking else error
     known = any(i.is_calibrated or i.sigma_radial > 0 for i in observations.interiors)
     return GeometryError(bend_in_words(bend, with_lens=known))

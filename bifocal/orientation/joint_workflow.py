@@ -44,6 +44,8 @@ SIGMA_FEATURE = 0.5
 FEATURES, PIXELS = 8000, 6e6
 #: Footprints that share this part of the smaller one may show common points.
 OVERLAP = 0.05
+#: What a pair's set-up says of a bend, which no other pair mends.
+BENT = ("wall_bend_px", "wall_bend_sigma_px", "focal_px", "principal_point_px")
 #: Blunders that are named one by one.
 NAMED = 20
 
@@ -419,6 +421,8 @@ def _adjusted_pair(pair: Pair, adjusted: JointAdjustment, index: int) -> Pair:
     ]
     extra = {key: value for key, value in pair.extra.items() if key != "setup"}
     said = {"way": "joint adjustment", "sigma0": adjusted.sigma0}
+    if isinstance(before := pair.extra.get("setup"), dict):
+        said |= {key: before[key] for key in BENT if key in before}
     return replace(
         pair, image1=photos[0], image2=photos[1], orientation=adjusted.orientation(index),
         extra={**extra, "setup": said}, remarks=(),

@@ -61,8 +61,8 @@ def unknown_lenses(interiors: Interiors, names: tuple[str, str]) -> str:
     alone = [number for number, i in enumerate(interiors, start=1) if i.is_assumed]
     missing = f"; --focal{alone[0]} is missing" if len(alone) == 1 else ""
     return (
-        f"the focal lengths are unknown (no EXIF) of {' and '.join(unknown)}{missing}. Give --lens, or "
-        "--focal1 and --focal2 with --sensor-width or --pixel-size"
+        f"the focal lengths are unknown (no EXIF) of {' and '.join(unknown)}{missing}. Give --lens "
+        "or --focal1 and --focal2 with --sensor-width or --pixel-size"
     )
 
 

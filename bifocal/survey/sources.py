@@ -118,7 +118,7 @@ def described_pair(setup: SurveySetup, file: Path | None, folder: Path) -> Pair 
         return None
     lenses: list[Lens | None] = [None, None]
     sizes: list[tuple[int, int] | None] = [None, None]
-    orientation, doubt = None, ""
+    orientation, doubt, extra = None, "", {"setup": None}
     media: list[dict[str, Any]] = [{}, {}]
     if setup.media is not None:
         through = [setup.media.through(number) for number in (1, 2)]
@@ -128,6 +128,7 @@ def described_pair(setup: SurveySetup, file: Path | None, folder: Path) -> Pair 
     if file is not None:
         try:
             given = Pair.read(file)
+            extra = {"setup": given.extra.get("setup")}
             lenses = [given.image1.lens, given.image2.lens]
             sizes = [given.image1.image_size, given.image2.image_size]
             if setup.media is None or setup.media.layers == given.layers:
@@ -151,5 +152,6 @@ def described_pair(setup: SurveySetup, file: Path | None, folder: Path) -> Pair 
         )
     ]  # fmt: skip
     return Pair(
-        image1=photos[0], image2=photos[1], folder=folder, orientation=orientation, remarks=remarks
-    )
+        image1=photos[0], image2=photos[1], folder=folder, orientation=orientation,
+        remarks=remarks, extra=extra,
+    )  # fmt: skip

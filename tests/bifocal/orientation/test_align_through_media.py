@@ -22,7 +22,7 @@ from bifocal.model.orientation_precision import NAMES, from_dict, names_of
 from bifocal.model.refracted_view import seen_through, view_through
 from bifocal.orientation import absolute_orientation
 from bifocal.orientation.absolute_orientation import orient_pair
-from bifocal.orientation.bend import bend_in_words
+from bifocal.orientation.bend import WallBend, bend_in_words
 from bifocal.orientation.orientation_stages import PhotoInput
 from bifocal.orientation.refracted_stage import with_bent_ties
 from bifocal.orientation.relative_orientation import Ties
@@ -543,9 +543,11 @@ def test_parameters_of_a_covariance_that_are_no_list_are_refused(stated):
 
 
 def test_a_bent_wall_proposes_the_options_for_media():
-    assert "--indices with --port or --depth" in bend_in_words(3.0, with_lens=False)
-    assert "media are not as given" in bend_in_words(3.0, with_lens=True, through_media=True)
-    assert "may be good" in bend_in_words(3.0, with_lens=True, left_out=True)
+    assert "--indices with --port or --depth" in bend_in_words(WallBend(3.0, 0.1), with_lens=False)
+    assert "media are not as given" in bend_in_words(
+        WallBend(3.0, 0.1), with_lens=True, through_media=True
+    )
+    assert "may be good" in bend_in_words(WallBend(3.0, 0.1), with_lens=True, left_out=True)
 
 
 def test_ports_and_depth_exclude_each_other():

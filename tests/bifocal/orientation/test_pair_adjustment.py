@@ -12,6 +12,7 @@ from bifocal.orientation.interior_orientation import Interior
 from bifocal.orientation.orientation_stages import PhotoInput
 from bifocal.orientation.pair_adjustment import adjust, line_test, pair_equations
 from bifocal.orientation.pair_observations import NAMES, PairObservations, PairUnknowns, at
+from bifocal.orientation.reference_plane import NarrowFace
 from bifocal.orientation.space_resection import resect
 from bifocal.orientation.tie_points import with_wall
 from photocore.camera import project
@@ -121,6 +122,28 @@ def test_a_gross_error_is_named_and_left_out(size: float) -> None:
     assert left_out(made) == ("P5",)
     assert any("P5 is a gross error" in text for text in made.remarks)
     assert max(misplaced(made, (FAR, NEAR))) < 0.25
+
+
+@pytest.mark.parametrize("wrong", [0, 2, 5])
+def test_one_wrong_point_of_eight_is_named_though_it_spoils_the_others(wrong: int) -> None:
+    some = np.r_[:5, -3:0]
+    points = control(POINTS[some], sigma_px=0.3)
+    points.xyz[wrong, 0] += 0.05
+    exact = photos(far=FAR.matrix[0, 0], near=NEAR.matrix[0, 0])
+    made = orient_pair(exact, control=points, site=SiteMeasures(sigma_pick=0.3))
+    assert left_out(made) == (f"P{wrong}",)
+
+
+def test_a_wall_of_many_small_chances_holds_the_plane(monkeypatch) -> None:
+    problem, start = everything()
+    monkeypatch.setattr(
+        "bifocal.orientation.tie_points.narrow_face",
+        lambda xyz, *_, **__: NarrowFace(np.zeros(3), 0.001, np.full(len(xyz), 0.46)),
+    )
+    assert with_wall(problem, start, (1e-4, 1e-5)).wall.sum() > 40
+    # All of it in a corner of the photo is none.
+    corner = replace(problem, tie1=problem.tie1 / 1000)
+    assert not with_wall(corner, start, (1e-4, 1e-5)).wall.any()
 
 
 def test_a_wrong_pick_in_one_photo_is_named() -> None:
