@@ -6,16 +6,24 @@ One adjustment serves all three ways; they differ in what is observed. See docs/
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from bifocal.orientation import validation
+from bifocal.orientation.approximate_orientation import (
+    Given,
+    approximate_cameras,
+    check_picks,
+    contradiction,
+    observations_of,
+    order_of,
+    ties_of,
+)
 from bifocal.orientation.as_set_up import check_room
 from bifocal.orientation.bend import STRONGLY_BENT, WallBend, bend_in_words, bend_of_wall
 from bifocal.orientation.control_points import Control, SiteMeasures
-from bifocal.orientation.features import find_features
-from bifocal.orientation.interior_orientation import Cameras, Interiors, with_one_lens
+from bifocal.orientation.interior_orientation import with_one_lens
 from bifocal.orientation.media_report import media_remarks, refuse_impossible_media
 from bifocal.orientation.orientation_remarks import (
     WORST_FIT,
@@ -28,7 +36,6 @@ from bifocal.orientation.orientation_remarks import (
 )
 from bifocal.orientation.orientation_stages import (
     ONE_LENS,
-    SIGMA_PARALLEL,
     OrientedPair,
     Photos,
     control_alone,
@@ -37,65 +44,24 @@ from bifocal.orientation.orientation_stages import (
 )
 from bifocal.orientation.pair_media import THROUGH_MEDIA, PairMedia
 from bifocal.orientation.pair_observations import PairObservations, PairUnknowns
-from bifocal.orientation.photo_order import SURE, first_is_far
+from bifocal.orientation.photo_order import SURE
 from bifocal.orientation.refracted_bend import refracted_bend
 from bifocal.orientation.refracted_resection import resect_through
 from bifocal.orientation.refracted_stage import with_bent_ties
 from bifocal.orientation.relative_orientation import (
     Ties,
-    epipolar_distance,
-    find_ties,
-    first_cameras,
-    plane_scale,
 )
 from bifocal.orientation.slips import MOST, Fitted, Typed, slip_of
-from bifocal.orientation.space_resection import resect
 from bifocal.orientation.tie_points import (
     FEWEST_ON_WALL,
     likely_on_wall,
-    robust_sigma,
     tie_positions,
 )
-from photocore.arrays import BoolArray
-from photocore.camera import fundamental, ray_on_plane
 from photocore.errors import ConvergenceError, GeometryError, PhotogrammetryError, located
-from photocore.similarity import Similarity, fit_plane
 
 #: Distances that control through media leaves so uncertain are not found from common points either,
 #: without focal lengths: 44 % ends at 10 %.
 HOPELESS = 0.6
-#: Logarithms of a ratio of distances so far apart contradict each other; tilted cameras change the
-#: scale over the wall.
-UNLIKE = 0.15
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class _Given:
-    """What `orient_pair` is given."""
-
-    photos: Photos
-    control: Control
-    site: SiteMeasures
-    media: PairMedia | None = None
-
-    @property
-    def names(self) -> tuple[str, str]:
-        """Names of the photos."""
-        return self.photos[0].name, self.photos[1].name
-
-    @property
-    def interiors(self) -> Interiors:
-        """Interior orientations of the photos."""
-        return self.photos[0].interior, self.photos[1].interior
-
-    @property
-    def enough(self) -> bool:
-        """Whether control points alone orient both cameras."""
-        known, control = self.control.positioned, self.control
-        return all(
-            (known & np.isfinite(pixels).all(axis=1)).sum() >= 4
-            for pixels in (control.pixels1, control.pixels2)
-        )
 
 
 def orient_pair(
@@ -120,7 +86,7 @@ def orient_pair(
         If the photos and measurements do not make a pair; the message says why and what to do.
     """
     if media is not None:
-        given = _Given(photos=photos, control=control, site=site, media=media)
+        given = Given(photos=photos, control=control, site=site, media=media)
         lacking = validation.unknown_lenses(given.interiors, given.names)
         try:
             return _through_media(given, media, lacking)
@@ -131,14 +97,14 @@ def orient_pair(
     interiors, one_lens = with_one_lens((photos[0].interior, photos[1].interior))
     first, second = (replace(p, interior=i) for p, i in zip(photos, interiors, strict=True))
     photos = (first, second)
-    given = _Given(photos=photos, control=control, site=site)
+    given = Given(photos=photos, control=control, site=site)
     enough = given.enough
     lacking = validation.unknown_lenses(interiors, given.names)
     if lacking and not enough and None in site.distances:
         raise GeometryError(f"{lacking}, or both distances, or four control points.")
-    ties, remarks = _ties(given, needed=not enough)
+    ties, remarks = ties_of(given, needed=not enough)
     if ties is not None and not enough:
-        order = _order(given, ties)
+        order = order_of(given, ties)
         if order < -SURE:
             return _with_photos_exchanged(given, typed_stay=True)
         remarks = (*remarks, *order_remarks(order, given.names))
@@ -147,9 +113,9 @@ def orient_pair(
         right = _typed_right(given, lambda one: _by_control(one, ties), by_control=True)
         if right is not None:
             return right
-    cameras, agree, interiors = _start(given, ties, enough)
+    cameras, agree, interiors = approximate_cameras(given, ties, enough)
     if enough and ties is not None:
-        _check_picks(cameras, ties, interiors)
+        check_picks(cameras, ties, interiors)
     if cameras[0].centre[2] < cameras[1].centre[2]:
         return _with_photos_exchanged(given)
     if site.distance1 and site.distance2 and site.distance1 < site.distance2:
@@ -166,7 +132,7 @@ def orient_pair(
         # What stands out shows how the cameras stood; a flat wall does not.
         site = replace(site, parallel=flat)
         given = replace(given, site=site)
-    observations = _observations(given, interiors, ties, agree)
+    observations = observations_of(given, interiors, ties, agree)
     if one_lens:
         observations = replace(observations, sigma_zoom=ONE_LENS)
     start = PairUnknowns(cameras=cameras)
@@ -210,7 +176,7 @@ def orient_pair(
     return replace(pair, remarks=told, assumed=assumed)
 
 
-def _through_media(given: _Given, media: PairMedia, lacking: str) -> OrientedPair:
+def _through_media(given: Given, media: PairMedia, lacking: str) -> OrientedPair:
     """Return the cameras of a pair that looks through media, from control and common points.
 
     Common points say that their bent rays meet; the plane is that of the control points.
@@ -232,13 +198,13 @@ def _through_media(given: _Given, media: PairMedia, lacking: str) -> OrientedPai
     if cameras[0].centre[2] < cameras[1].centre[2]:
         return _with_photos_exchanged(given)
     validation.check_units(cameras, given.site)
-    observations = replace(_observations(given, interiors, None, agree), media=media)
+    observations = replace(observations_of(given, interiors, None, agree), media=media)
     start = PairUnknowns(cameras=cameras, media=media)
     pair = control_alone(observations, start, named=given.site.wall is not None)
     shares = [pair.adjusted.sigma("Z", n) / pair.adjusted.cameras[n - 1].centre[2] for n in (1, 2)]
     if lacking and max(shares) > HOPELESS:
         raise GeometryError(f"the control points alone do not tell the distances, and {lacking}.")
-    ties, remarks = _ties(given, needed=False)
+    ties, remarks = ties_of(given, needed=False)
     note = "the media as given, no common points: control points alone"
     if ties is not None:
         pair, note = with_bent_ties(pair, ties), "the media as given"
@@ -287,23 +253,8 @@ def _reason(
     return GeometryError(bend_in_words(bend, with_lens=known))
 
 
-def _contradiction(cameras: Cameras, ties: Ties) -> float:
-    """Return how far the common points are from the cameras' epipolar lines. [px]"""
-    return robust_sigma(epipolar_distance(fundamental(*cameras), ties.pixels1, ties.pixels2))
-
-
-def _check_picks(cameras: Cameras, ties: Ties, interiors: Interiors) -> None:
-    """Refuse control points that the photos contradict."""
-    if _contradiction(cameras, ties) > 0.012 * max(interiors[0].image_size):
-        raise GeometryError(
-            "the control points' pixels do not fit the photos: the details common to both photos "
-            "contradict them. Check that col1, row1 are pixels of the first photo and col2, row2 "
-            "of the second, at full size."
-        )
-
-
 def _typed_right(
-    given: _Given, fitted: Callable[[_Given], Fitted | None], *, by_control: bool
+    given: Given, fitted: Callable[[Given], Fitted | None], *, by_control: bool
 ) -> OrientedPair | None:
     """Return the pair with the slip mended that explains a misfit, saying so; None without one.
 
@@ -313,7 +264,7 @@ def _typed_right(
         Naming a slip that only the user can mend.
     """
 
-    def meant(typed: Typed) -> _Given:
+    def meant(typed: Typed) -> Given:
         both = zip(given.photos, typed.interiors, strict=True)
         first, second = (replace(photo, interior=interior) for photo, interior in both)
         return replace(given, photos=(first, second), control=typed.control, site=typed.site)
@@ -325,35 +276,13 @@ def _typed_right(
     return None if slip is None else _told(meant(slip.meant), slip.words)
 
 
-def _told(given: _Given, note: str) -> OrientedPair:
+def _told(given: Given, note: str) -> OrientedPair:
     """Return the pair of what is given instead of what was typed, saying so."""
     pair = orient_pair(given.photos, control=given.control, site=given.site)
     return replace(pair, remarks=(note, *pair.remarks))
 
 
-def _order(given: _Given, ties: Ties) -> float:
-    """Return by how many standard deviations the first photo is the far one.
-
-    Focal lengths and distances that were typed tell nothing of the photos' order, unless the scale
-    on the wall fits them in one order only.
-    """
-    first, second = given.interiors
-    typed = (first.is_typed or second.is_typed) and first.image_size == second.image_size
-    # Logarithms of the distances' ratio by lenses and scale in either order, against the taped one.
-    ratio, scale = first.focal / second.focal, plane_scale(ties, first.image_size)
-    d1, d2 = given.site.distances
-    taped = abs(np.log(d1 / d2)) if d1 and d2 else 0.0
-    either = (np.log([ratio * scale, ratio / scale]) - taped).tolist()
-    if not (d1 and d2):  # the far camera is any farther
-        either = [min(off, 0.0) for off in either]
-    as_given, turned = (abs(off) < UNLIKE for off in either)
-    far, near = (photo.grey for photo in given.photos)
-    if given.site.ordered or not (typed and turned) or far is None or near is None:
-        return np.inf
-    return first_is_far((far, near), ties) if as_given else -np.inf
-
-
-def _by_control(given: _Given, ties: Ties | None) -> Fitted | None:
+def _by_control(given: Given, ties: Ties | None) -> Fitted | None:
     """Return how well control points, lenses, tapes and common points fit each other.
 
     Whichever photo is the far one, the longer distance is its. Control points leave the lines of
@@ -361,7 +290,7 @@ def _by_control(given: _Given, ties: Ties | None) -> Fitted | None:
     """
     d1, d2 = given.site.distance1, given.site.distance2
     try:
-        cameras, agree, interiors = _start(given, None, True)
+        cameras, agree, interiors = approximate_cameras(given, None, True)
         z1, z2 = (float(camera.centre[2]) for camera in cameras)
         if d1 and d2 and (d1 < d2) != (z1 < z2):
             given = replace(given, site=replace(given.site, distance1=d2, distance2=d1))
@@ -370,7 +299,7 @@ def _by_control(given: _Given, ties: Ties | None) -> Fitted | None:
             for known, z in zip((given.site.distance1, given.site.distance2), (z1, z2), strict=True)
         ):  # another unit: `validation.check_units` says so
             given = replace(given, site=replace(given.site, distance1=None, distance2=None))
-        observations = _observations(given, interiors, None, agree)
+        observations = observations_of(given, interiors, None, agree)
         pair = control_alone(observations, PairUnknowns(cameras=cameras), named=False)
         pair = without_gross(pair)
     except (GeometryError, ConvergenceError):
@@ -379,16 +308,16 @@ def _by_control(given: _Given, ties: Ties | None) -> Fitted | None:
     test = np.minimum(adjusted.control_test[given.control.positioned], MOST)
     square = float((test**2).mean()) + _pulled(pair) / (4 * len(test))
     if ties is not None:
-        off = _contradiction(adjusted.cameras, ties) / (2 * ties.tolerance)
+        off = contradiction(adjusted.cameras, ties) / (2 * ties.tolerance)
         square += max(off - 1.0, 0.0) ** 2
     return Fitted(misfit=float(np.sqrt(square)), cameras=adjusted.cameras, lost=~used)
 
 
-def _by_ties(given: _Given, ties: Ties, seen: PairObservations) -> Fitted | None:
+def _by_ties(given: Given, ties: Ties, seen: PairObservations) -> Fitted | None:
     """Return how well common points as matched meet, as a share of what they may miss by."""
     first, second = (replace(photo, grey=None) for photo in given.photos)
     try:
-        cameras, _, interiors = _start(given, ties, False)
+        cameras, _, interiors = approximate_cameras(given, ties, False)
         tilt = seen.sigma_tilt if given.site.parallel else None
         seen = replace(seen, interiors=interiors, lines=(), sigma_tilt=tilt)
         start = PairUnknowns(cameras=cameras)
@@ -407,7 +336,7 @@ def _pulled(pair: OrientedPair) -> float:
     return float(np.sum(np.square(changes)))
 
 
-def _with_photos_exchanged(given: _Given, *, typed_stay: bool = False) -> OrientedPair:
+def _with_photos_exchanged(given: Given, *, typed_stay: bool = False) -> OrientedPair:
     """Return the pair with the photos the other way round, saying so.
 
     What was typed for the far photo goes with its file, or stays with the far one.
@@ -433,136 +362,3 @@ def _with_photos_exchanged(given: _Given, *, typed_stay: bool = False) -> Orient
         + (", --focal1 its lens; if it is not so, measure control points." if typed_stay else ".")
     )
     return replace(pair, exchanged=True, remarks=(note, *pair.remarks))
-
-
-def _ties(given: _Given, *, needed: bool) -> tuple[Ties | None, tuple[str, ...]]:
-    """Return the photos' common points and remarks; none only if control points suffice."""
-    far, near = given.photos[0].grey, given.photos[1].grey
-    if far is None or near is None:
-        return None, ()
-    try:
-        for name, image in zip(given.names, (far, near), strict=True):
-            validation.check_sharp(name, image)
-        validation.check_different(*given.names, (far, near))
-        features = find_features(far), find_features(near)
-        return find_ties(*features, given.interiors, given.names), ()
-    except GeometryError as error:
-        if needed or isinstance(error, validation.SamePhotoError):
-            raise
-        remark = f"The pair rests on the control points alone, without common points: {error}"
-        return None, (remark,)
-
-
-def _start(given: _Given, ties: Ties | None, enough: bool) -> tuple[Cameras, BoolArray, Interiors]:
-    """Return approximate cameras, the control points that agree, and the interiors used."""
-    control, interiors = given.control, given.interiors
-    agree = np.ones(len(control.ids), dtype=bool)
-    if enough:
-        cameras = []
-        for pixels, photo in zip((control.pixels1, control.pixels2), given.photos, strict=True):
-            seen = control.positioned & np.isfinite(pixels).all(axis=1)
-            xyz = np.nan_to_num(control.xyz[seen])
-            with located(photo.name):
-                camera, fits = resect(xyz, photo.interior.ideal(pixels[seen]), photo.interior)
-            cameras.append(camera)
-            agree[np.flatnonzero(seen)[~fits]] = False
-        return (cameras[0], cameras[1]), agree, interiors
-    if ties is None:
-        raise GeometryError("too few control points, and no common points to go with them.")
-    interiors = _plausible_focals(interiors, ties, given.site)
-    return _scaled(first_cameras(ties, interiors), given, interiors), agree, interiors
-
-
-def _plausible_focals(interiors: Interiors, ties: Ties, site: SiteMeasures) -> Interiors:
-    """Return interiors whose unknown focal length follows from the distances and the scale."""
-    first, second = interiors
-    if not (first.is_assumed or second.is_assumed):
-        return interiors
-    d1, d2 = site.distances
-    assert d1 is not None
-    assert d2 is not None
-    # On the wall photo 2 is s times as large: s = (f2 / d2) / (f1 / d1).
-    ratio = plane_scale(ties, first.image_size) * d2 / d1
-    if second.is_assumed:
-        return first, replace(second, focal=first.focal * ratio)
-    return replace(first, focal=second.focal / ratio), second
-
-
-def _scaled(cameras: Cameras, given: _Given, interiors: Interiors) -> Cameras:
-    """Return cameras of far distance 1 brought to metres and, where known, to X and Y."""
-    control, site = given.control, given.site
-    near, scale = cameras[1].centre[2], 0.0
-    positions = ray_on_plane(cameras[0], interiors[0].ideal(control.pixels1))
-    points = np.flatnonzero(control.positioned & np.isfinite(positions).all(axis=1))
-    if len(points) >= 2:
-        on_wall = control.xyz[points] * [1.0, 1.0, 0.0]
-        metres = fit_plane(positions[points], np.nan_to_num(on_wall))
-    elif site.distance1:
-        scale = site.distance1
-    elif site.distance2:
-        scale = site.distance2 / near
-    elif site.delta_d:
-        scale = site.delta_d / (1.0 - near)
-    elif control.lengths:
-        ratios = [
-            length / np.linalg.norm(positions[a] - positions[b]) for a, b, length in control.lengths
-        ]
-        scale = float(np.median(ratios))
-    else:
-        raise GeometryError(
-            "nothing gives the scale: two photos alone have none. Measure one distance from a "
-            "camera to the wall (--distance1 or --distance2), or one length on the wall (--length)."
-        )
-    if scale:
-        nowhere = np.zeros(3)
-        metres = Similarity(
-            scale=scale, rotation=np.eye(3), source_centre=nowhere, target_centre=nowhere
-        )
-    first, second = (
-        camera._replace(rotation=camera.rotation @ metres.rotation.T, centre=metres(camera.centre))
-        for camera in cameras
-    )
-    return first, second
-
-
-def _observations(
-    given: _Given, interiors: Interiors, ties: Ties | None, agree: BoolArray
-) -> PairObservations:
-    """Return everything observed, ideal pixels throughout."""
-    control, site = given.control, given.site
-    pixels1, pixels2 = interiors[0].ideal(control.pixels1), interiors[1].ideal(control.pixels2)
-    measured = {
-        name: (value, site.sigma)
-        for name in ("distance1", "distance2", "delta_d")
-        if (value := getattr(site, name)) is not None
-    }
-    base = PairObservations(
-        interiors=interiors,
-        control=replace(control, pixels1=pixels1, pixels2=pixels2),
-        pick_used=agree,
-        sigma_pick=site.sigma_pick,
-        measured=measured,
-        sigma_tilt=SIGMA_PARALLEL if site.parallel else None,
-        free_datum=control.positioned.sum() < 2,
-        sigma_body=_same_body(interiors),
-    )
-    if ties is None:
-        return base
-    return replace(
-        base,
-        tie1=ties.seen1,
-        tie2=ties.seen2,
-        sigma_tie=ties.tolerance / 2,
-        tie_used=np.ones(len(ties.seen1), dtype=bool),
-        wall=ties.on_plane,
-        wall_rows=np.zeros((3, len(ties.seen1))),
-    )
-
-
-def _same_body(interiors: Interiors) -> float | None:
-    """Return how closely the principal points agree, if both may be of one camera body. [px]"""
-    first, second = interiors
-    # With one photo upright and one lying the axes differ.
-    if first.is_calibrated or second.is_calibrated or first.image_size != second.image_size:
-        return None
-    return 0.002 * float(np.hypot(*first.image_size))
