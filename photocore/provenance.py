@@ -22,6 +22,7 @@ from pathlib import Path
 from typing import Any
 
 from photocore.errors import InputError
+from photocore.installation import DISTRIBUTION
 
 _CHUNK = 1 << 20
 #: A file changed within this time may change again without its time stamp showing it. [s]
@@ -194,7 +195,7 @@ def today() -> str:
 def program() -> str:
     """Return the program's name and version."""
     try:
-        return f"bifocal {version('bifocal')}"
+        return f"bifocal {version(DISTRIBUTION)}"
     except PackageNotFoundError:
         return "bifocal"
 

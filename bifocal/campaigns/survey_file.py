@@ -100,6 +100,8 @@ OPTIONS: Mapping[str, Callable[[Any], Any]] = {
     "relief_gsd": _number,
     "gsd": _number,
     "fill": _truth,
+    "complete": _truth,
+    "any_size": _truth,
     "cog": _truth,
     "sections": _words,
     "contours": _number,

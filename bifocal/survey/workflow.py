@@ -233,8 +233,8 @@ def solve(
     check = check_points(table, known, judged)
     world, world_remarks = _placed(control, table, model or survey.model)
     remarks = (
+        *pair_remarks,  # what is wrong with the pair comes first
         *survey.remarks,
-        *pair_remarks,
         *solved.remarks,
         *point_remarks(solved.points, table, solved.setup),
         *check.remarks,
