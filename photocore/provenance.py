@@ -253,11 +253,10 @@ class FileHashes:
         return digest
 
     def save(self) -> None:
-        """Write the memory, if anything is new; not being able to costs time only."""
-        if not self._changed:
+        """Write the memory, if it is new and has a folder; not being able to costs time only."""
+        if not (self._changed and self.memory.parent.is_dir()):
             return
         with suppress(OSError):
-            self.memory.parent.mkdir(parents=True, exist_ok=True)
             temporary = self.memory.with_name(f"{self.memory.name}.{os.getpid()}")
             try:
                 temporary.write_text(json.dumps(self._known), encoding="utf-8")

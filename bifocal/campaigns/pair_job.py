@@ -25,7 +25,7 @@ from photocore.cli import Progress, no_progress, unforeseen_message
 from photocore.errors import InputError, PhotogrammetryError
 from photocore.provenance import FileHashes, recording
 from photocore.raster_places import cloud_optimised
-from photocore.textfile import check_file, check_name, file_name, odd_name
+from photocore.textfile import file_name, odd_name
 
 if TYPE_CHECKING:
     from bifocal.orthophotos.ortho_workflow import OrthoTask
@@ -243,8 +243,6 @@ def run_pair(job: PairJob, progress: Progress = no_progress) -> PairOutcome:
             if record is not None and is_current(job.folder / step.name, record, key, hashes):
                 kept.append(step.name)
             else:
-                if not done and (told := refusal(job)):
-                    raise InputError(told)
                 rasters = cloud_optimised(bool(job.options.get("cog")))
                 with recording(step.described(), day=job.date or None), rasters:
                     record = run_step(
@@ -297,16 +295,10 @@ def _some(job: PairJob, *names: str) -> dict[str, Any]:
 def refusal(job: PairJob) -> str:
     """Return why a pair cannot be aligned as it is described; empty where nothing is missing."""
     from bifocal.orientation.align_workflow import AlignOptions, check_way
-    from bifocal.orientation.control_points import read_control
 
     step = _align_step(job)
     try:
         check_way(AlignOptions.from_given({**step.options, **_align_files(job)}))
-        for path in step.files.values():
-            check_name(path)
-            check_file(path)
-        for path in tables_of(job).values():
-            read_control(path, sigma=0.003, sigma_plane=0.005, unit=job.options.get("unit", ""))
     except InputError as error:
         return str(error)
     return ""

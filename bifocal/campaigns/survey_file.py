@@ -252,6 +252,11 @@ def _parsed(path: Path) -> dict[str, Any]:
     return data
 
 
+def _is_name(value: Any) -> bool:
+    """Whether a value may be the name of a file."""
+    return isinstance(value, str) and bool(value) and value.isprintable()
+
+
 def _entries(
     data: Mapping[str, Any], base: Path, where: str, faults: list[str]
 ) -> dict[str, dict[str, Any]]:
@@ -259,7 +264,7 @@ def _entries(
     found: dict[str, dict[str, Any]] = {"files": {}, "options": {}, "products": {}}
     for key, value in data.items():
         if key in FILES:
-            if isinstance(value, str) and value:
+            if _is_name(value):
                 found["files"][key] = base / value
             elif value != "":
                 faults.append(f"{where}: {key} = {value!r}: expected the name of a file.")
@@ -292,7 +297,7 @@ def _job(
     rest = {key: value for key, value in entry.items() if key not in ("name", "far", "near")}
     own = _entries(rest, base, where, faults)
     photos = [entry.get(key) for key in ("far", "near")]
-    if not all(isinstance(photo, str) and photo for photo in photos):
+    if not all(map(_is_name, photos)):
         faults.append(f"{where}: far and near must name its two photos.")
         return None
     name = str(entry.get("name") or f"pair {number}")

@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from bifocal.campaigns.inputs import check_files
 from bifocal.campaigns.pair_job import (
     ALIGN,
     FILES,
@@ -484,12 +485,16 @@ def facade(
     Raises
     ------
     InputError
-        Where a step fails: with what it said. What was made before stays and counts; where nothing
-        was, and the pair cannot be set up as it is described, nothing is written.
+        Where a step fails: with what it said. What was made before stays and counts.
     """
-    if not job.folder.exists() and (told := refusal(job)):
+    if (fresh := not job.folder.exists()) and (told := refusal(job)):
         raise InputError(told)
+    check_files(job)
     outcome = run_survey([job], machines=machines, progress=progress).outcomes[0]
     if outcome.failed_step:
+        if fresh and not outcome.done:
+            with suppress(OSError):  # what else lies there is not ours
+                (job.folder / ".hashes.json").unlink(missing_ok=True)
+                job.folder.rmdir()
         raise InputError(outcome.message)
     return outcome

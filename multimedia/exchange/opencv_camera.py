@@ -98,8 +98,8 @@ def camera_of(
         )
     if lens.coefficients.size > MOST_TERMS:
         raise InputError(
-            f"{lens.source}: camera {name} has {lens.coefficients.size} distortion terms; OpenCV "
-            f"has at most {MOST_TERMS}."
+            f"{lens.source}: camera {name} has {lens.coefficients.size} distortion terms; expected "
+            f"at most {MOST_TERMS}."
         )
     width, height = lens.image_size
     sensor = Sensor(

@@ -460,8 +460,8 @@ CONTENTS: list[tuple[str, str, Any, str]] = [
         )
     ),
     (
-        "bifocal survey street.toml", "street.toml",
-        swapped("street.toml", '"far.jpg"', '"far\\u0000.jpg"'), "NUL",
+        "bifocal survey street.toml --dry-run", "street.toml",
+        swapped("street.toml", '"far.jpg"', '"far\\u0000.jpg"'), "far and near must name",
     ),
     *(
         ("multimedia convert aquacal.json o.toml", "aquacal.json",

@@ -52,8 +52,7 @@ INPUTS: list[tuple[str, ...]] = [
     ("bifocal report {} --out o.html", "wall.pair.json"),
     ("bifocal report {} --out o.html", "survey.xlsx"),
     ("bifocal report wall.pair.json --out o.html --relief {}", "relief.tif"),
-    ("bifocal pick {}", "wall.pair.json"),
-    ("bifocal pick wall.pair.json --workbook {}", "survey.xlsx"),
+    ("bifocal pick {}", "wall.pair.json", "folder"),
     (
         "multimedia particles {} --targets t --targets t --targets t --targets t --out o.csv",
         "tank.toml",

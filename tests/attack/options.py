@@ -402,7 +402,7 @@ WORDS: list[tuple[str, str]] = [
     (f"{ORTHO} --plane --vignetting 1e300,0,0", "vignetting"),
     ("multimedia convert lens.yml o.toml --pitch 1e-300", "pitch"),
     ("multimedia convert lens.yml o.toml --to aquacal", "o.toml.*--to"),
-    ("bifocal facade far.jpg near.jpg --out d", "--scale|scale"),
+    ("bifocal facade far.jpg near.jpg --out d", "--control"),
     ("bifocal survey", "survey file|SURVEY"),
     ("bifocal survey --init nowhere", "nowhere"),
     ("multimedia particles tank.toml --targets t --out o.csv", "targets"),
