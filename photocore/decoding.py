@@ -83,10 +83,12 @@ def _hole(data: bytes) -> str:
     Zeros are a block's coefficients of one value, -1, in a row: no photo has so many, unless the
     zeros of the table of luminance end a block, which is then flat.
     """
-    at, zeros = 2, 0
+    at, zeros, parts = 2, 0, 0
     while data[at : at + 1] == b"\xff":
         kind, size = data[at + 1], int.from_bytes(data[at + 2 : at + 4])
-        if kind in (0xC2, 0xC6, 0xCA, 0xCE):  # progressive: flat parts are zeros
+        parts = data[at + 9] if kind in (0xC0, 0xC1) else parts
+        # Progressive, or colours one by one: flat parts are zeros.
+        if kind in (0xC2, 0xC6, 0xCA, 0xCE) or (kind == 0xDA and data[at + 4] != parts):
             return ""
         tables = data[at + 4 : at + 2 + size] if kind == 0xC4 else b""
         while len(tables) > 17:
