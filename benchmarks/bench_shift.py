@@ -20,7 +20,6 @@ from importlib.util import find_spec
 import numpy as np
 
 from multimedia import Layers, ShiftTable, iterated_radius, radial_shift
-from multimedia.refraction.compiled import compiled_solve
 
 LAYERS = Layers(indices=(1.0, 1.5, 1.34), thicknesses=(10.0,))
 HEIGHT = 500.0
@@ -103,15 +102,6 @@ def main() -> None:
             1,
         ),
     ]
-    if find_spec("numba") is not None:
-        rows.insert(
-            1,
-            (
-                "exact, machine code, one thread",
-                lambda: compiled_solve(radius, heights, LAYERS.indices, threads=1),
-                9,
-            ),
-        )
     liboptv = optv_work(radius, depth)
     if liboptv is not None:
         rows.append(("liboptv (projection, 1e-3 mm)", liboptv, 3))
@@ -127,16 +117,6 @@ def main() -> None:
     for name, spent, error in results:
         ratio = f"{base[1] / spent:13.1f}" if base else ""
         print(f"{name:34s} {spent:9.1f} {error:11.1e} mm {ratio}")
-    if find_spec("numba") is not None:
-        wall = []
-        for _ in range(7):
-            start = time.perf_counter()
-            compiled_solve(radius, heights, LAYERS.indices)
-            wall.append(time.perf_counter() - start)
-        print(
-            f"machine code, {os.cpu_count()} threads: {min(wall) / points * 1e9:.1f} ns/point "
-            "of wall time"
-        )
     if base is None:
         print("liboptv: not installed (pip install optv)")
 

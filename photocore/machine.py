@@ -20,7 +20,7 @@ LIBRARIES = (
     "matplotlib", "ezdxf", "laspy", "click",
 )  # fmt: skip
 EXTRAS = {
-    "lens": ("lensfunpy",), "fast": ("numba", "pyarrow"), "cluster": ("dask", "distributed"),
+    "lens": ("lensfunpy",), "fast": ("pyarrow",), "cluster": ("dask", "distributed"),
 }  # fmt: skip
 OFFICE = ("soffice", "libreoffice")
 

@@ -13,7 +13,6 @@ from benchmarks import bench_cameras as tank
 from benchmarks import bench_shift
 from benchmarks.peers.comparison import Comparison, Task, Tool
 from multimedia import epipolar_curve, intersect, intersect_pairs, project, radial_shift, resect
-from multimedia.refraction.compiled import compiled_solve
 
 SEEN = 2000  # of the results so many are compared with the truth
 NOISE = 0.002  # of image coordinates [mm]
@@ -30,10 +29,6 @@ def _shift(count: int, way: str) -> Task:
     layers, height = bench_shift.LAYERS, bench_shift.HEIGHT
     if way == "numpy":
         work: Any = functools.partial(radial_shift, radius, z0=height, zp=depth, layers=layers)
-    elif way == "compiled":
-        heights = [np.asarray(height), np.asarray(layers.thicknesses[0]), depth]
-        work = functools.partial(compiled_solve, radius, heights, layers.indices, threads=1)
-        work()  # compiled once
     else:
         work = bench_shift.optv_work(radius, depth)
     return Task(work, lambda found: np.abs(found[:SEEN] - truth).max())
@@ -167,7 +162,6 @@ COMPARISONS = {
         item="point", error="largest error [mm]", sizes=(10_000, 100_000, 1_000_000),
         tools={
             "multimedia, NumPy": Tool(_of(_shift, way="numpy"), "bifocal-relief"),
-            "multimedia, compiled": Tool(_of(_shift, way="compiled"), "numba"),
             "OpenPTV liboptv": Tool(_of(_shift, way="optv"), "optv"),
         },
     ),

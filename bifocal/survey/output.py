@@ -22,7 +22,7 @@ from bifocal.survey.tolerances import RULES, sentence
 from bifocal.survey.workbook.book import write_book
 from bifocal.survey.workbook.content import SurveyContent
 from bifocal.survey.workbook.own_table import add_results
-from bifocal.survey.workbook.update import check_kind, is_older, is_same_kind, update_book
+from bifocal.survey.workbook.update import check_kind, is_same_kind, update_book
 from bifocal.survey.workflow import SolvedSurvey
 from photocore.errors import InputError
 from photocore.jsonfile import to_text
@@ -132,16 +132,6 @@ def _update(path: Path, solution: SolvedSurvey, content: SurveyContent, *, overw
     if done.added:
         titles = ", ".join(done.added)
         kept = f"missing sheets were added again, behind all others: {titles}; {kept}".rstrip("; ")
-    if solution.georeference is not None and _is_older(solution):
-        how = (
-            "weigh all control points alike"
-            if _weighs_alike(solution)
-            else "leave what the transformation is worth out of sigma_E, sigma_N, sigma_H"
-        )
-        return (
-            f"its formulas {how}, since it was made by an older version; a new template does "
-            f"better. {kept}"
-        ).strip()
     return kept
 
 
@@ -209,11 +199,6 @@ def as_typed(solution: SolvedSurvey, content: SurveyContent) -> SurveyContent:
         )
         if world is not None:
             world = georeference(table, control, model=world.model)
-    if world is not None and _is_older(solution):
-        alike = KnownPoints(ids=table.ids, xyz=table.xyz)
-        covariance = None if _weighs_alike(solution) else table.covariance
-        world = georeference(alike, control, model=world.model, covariance=covariance)
-        world = replace(world, precision=None)
     # Relief given beside the points is checked too, but stands not on the sheet Check.
     listed = len(solution.survey.known_rows)
     whole = solution.survey.known
@@ -228,18 +213,6 @@ def as_typed(solution: SolvedSurvey, content: SurveyContent) -> SurveyContent:
         check=check_points(table, known.without(points.unused)),
         georeference=world,
     )
-
-
-def _is_older(solution: SolvedSurvey) -> bool:
-    """Tell whether the survey's own workbook has no formulas for what the transformation costs."""
-    book = solution.survey.book
-    return solution.survey.is_ours and book is not None and is_older(book.names)
-
-
-def _weighs_alike(solution: SolvedSurvey) -> bool:
-    """Tell whether the survey's own workbook is an older one, whose formulas have no weights."""
-    book = solution.survey.book
-    return solution.survey.is_ours and book is not None and "g_ok" not in book.names
 
 
 def _uncorrected(

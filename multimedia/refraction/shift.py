@@ -23,7 +23,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from multimedia.refraction.compiled import WORTHWHILE, compiled_solve, is_available
 from multimedia.refraction.shift_slopes import BLOCK, slopes_row
 from multimedia.refraction.tangent import solve
 from photocore.arrays import FloatArray, as_floats
@@ -55,8 +54,6 @@ def shifted_radius(
     radius: ArrayLike,
     heights: Sequence[ArrayLike],
     indices: Sequence[float],
-    *,
-    compiled: bool | None = None,
 ) -> FloatArray:
     r"""Radius :math:`\bar R` at which the point would lie if its ray went straight on.
 
@@ -68,9 +65,6 @@ def shifted_radius(
         Heights of the layers from camera to point, not negative: z0, thicknesses, zp.
     indices : sequence of float
         Refractive index of each layer.
-    compiled : bool, optional
-        Whether to use the machine code of the extra ``fast``, on all cores. By default where it is
-        installed and there are so many points that it pays; the results agree to 2e-15.
 
     Returns
     -------
@@ -82,8 +76,7 @@ def shifted_radius(
     Raises
     ------
     InputError
-        If a radius or height is negative, the numbers of heights and indices differ, or machine
-        code is asked for and not installed.
+        If a radius or height is negative, or the numbers of heights and indices differ.
 
     Notes
     -----
@@ -107,13 +100,7 @@ def shifted_radius(
     >>> round(float(shifted_radius(1.62584, [1.0, 1.0], [1.0, 1.3329])), 4)
     2.0
     """
-    radius, layers = _checked(radius, heights, indices)
-    if compiled is None:
-        size = max(radius.size, *(layer.size for layer in layers))
-        compiled = size >= WORTHWHILE and is_available()
-    if compiled:
-        return compiled_solve(radius, layers, indices)
-    return np.asarray(solve(radius, layers, indices)[0])
+    return np.asarray(solve(*_checked(radius, heights, indices), indices)[0])
 
 
 def shift_ratio(

@@ -15,9 +15,7 @@ from multimedia.refraction.shift import (
 from photocore.arrays import FloatArray
 
 
-def radial_shift(
-    radius: ArrayLike, *, z0: ArrayLike, zp: ArrayLike, layers: Layers, compiled: bool | None = None
-) -> FloatArray:
+def radial_shift(radius: ArrayLike, *, z0: ArrayLike, zp: ArrayLike, layers: Layers) -> FloatArray:
     r"""Radius :math:`\bar R` of the points as straight rays in the camera's medium would see them.
 
     Parameters
@@ -30,9 +28,6 @@ def radial_shift(
         Depth of the point below the last interface. [m]
     layers : Layers
         The media, any number and order.
-    compiled : bool, optional
-        Whether to use the machine code of the extra ``fast`` (``pip install ".[fast]"``), on
-        all cores. By default where it is installed and pays: fifty million points and more.
 
     Returns
     -------
@@ -47,7 +42,7 @@ def radial_shift(
     GeometryError
         If a camera or point is on the wrong side of its interface.
     InputError
-        If a radius is negative, or machine code is asked for and not installed.
+        If a radius is negative.
 
     Notes
     -----
@@ -64,9 +59,8 @@ def radial_shift(
     0.108322
     """
     if any(hasattr(value, "__dask_graph__") for value in (radius, z0, zp)):
-        return _lazily(radius, z0, zp, layers, compiled)
-    heights = layers.heights(z0=z0, zp=zp)
-    return shifted_radius(radius, heights, layers.indices, compiled=compiled)
+        return _lazily(radius, z0, zp, layers)
+    return shifted_radius(radius, layers.heights(z0=z0, zp=zp), layers.indices)
 
 
 def radial_shift_ratio(
@@ -129,14 +123,11 @@ def radial_shift_derivatives(
     return shift_derivatives(radius, layers.heights(z0=z0, zp=zp), layers.indices)
 
 
-def _lazily(
-    radius: ArrayLike, z0: ArrayLike, zp: ArrayLike, layers: Layers, compiled: bool | None
-) -> FloatArray:
+def _lazily(radius: ArrayLike, z0: ArrayLike, zp: ArrayLike, layers: Layers) -> FloatArray:
     """Return the shift as a dask array, computed chunk by chunk when asked for."""
     import dask.array
 
-    # One thread per chunk: dask runs the chunks side by side.
     def chunk(r: FloatArray, z: FloatArray, p: FloatArray) -> FloatArray:
-        return radial_shift(r, z0=z, zp=p, layers=layers, compiled=bool(compiled))
+        return radial_shift(r, z0=z, zp=p, layers=layers)
 
     return dask.array.map_blocks(chunk, radius, z0, zp, dtype=np.float64)

@@ -12,8 +12,7 @@ F increases and is concave, so Newton's method approaches the root from below wh
 it cannot diverge, overshoot into total reflection, or stop at a wrong value.
 
 `layer_terms`, `first_tangent` and `apparent_radius` are these formulas, once for all that use them:
-the rows of numpy here, the loops that `multimedia.refraction.compiled` hands to the compiler, and
-the workbook's columns (`multimedia.refraction.unrolled`).
+the rows of numpy here and the workbook's columns (`multimedia.refraction.unrolled`).
 """
 
 from __future__ import annotations
@@ -23,7 +22,7 @@ from collections.abc import Callable, Iterable, Sequence
 import numpy as np
 
 from photocore import double_double as dd
-from photocore.arrays import BoolArray, FloatArray, contiguous_rows
+from photocore.arrays import FloatArray, contiguous_rows
 
 #: Elements worked on at a time: the dozen scratch rows stay in the processor's second-level cache.
 BLOCK = 4096
@@ -41,9 +40,6 @@ BENIGN = 4.0
 
 #: The cubic first guess may overshoot beyond this; R over its slope at the axis never does.
 NEAR_AXIS = 0.6
-
-#: Steps of the compiled loops, enough for every set-up as long as t² stays below `BENIGN`.
-FEW_STEPS = 12
 
 Height = float | FloatArray
 #: Shifted radius, t, and the index of the layer t belongs to, of one row.
@@ -241,58 +237,3 @@ def _residual(
         above = dd.multiply(dd.product(height, lowest), dd.exact(t))
         rest = dd.subtract(rest, dd.divide(above, below))
     return rest.high
-
-
-def shift_blocks(
-    radius: FloatArray,
-    heights: FloatArray,
-    moving: BoolArray,
-    k: FloatArray,
-    q: FloatArray,
-    inner: int,
-    out: FloatArray,
-    unsure: BoolArray,
-) -> None:
-    """Shift every element in loops that a compiler vectorises; for machine code, not for Python."""
-    t, value, slope = np.empty(inner), np.empty(inner), np.empty(inner)
-    whole, straight, layer = np.empty(inner), np.empty(inner), np.empty((k.size, inner))
-    for j in range(k.size):
-        layer[j, :] = k[j] * heights[j, 0]
-    for low in range(0, radius.size, inner):
-        width = min(inner, radius.size - low)
-        goal = radius[low : low + width]
-        for i in range(width):
-            whole[i] = straight[i] = value[i] = slope[i] = 0.0
-        for j in range(k.size):
-            if moving[j]:
-                for i in range(width):
-                    layer[j, i] = k[j] * heights[j, low + i]
-            n, lowest, half = 1.0 / k[j], 1.0 if q[j] == 0 else 0.0, 0.5 * q[j]
-            for i in range(width):
-                whole[i] += n * layer[j, i]
-                straight[i] += lowest * layer[j, i]
-                slope[i] += layer[j, i]
-                value[i] += half * layer[j, i]
-        for i in range(width):
-            x = goal[i] / slope[i]
-            t[i] = first_tangent(x, value[i] / slope[i] if x < NEAR_AXIS else 0.0)
-        for _ in range(FEW_STEPS):
-            for i in range(width):
-                value[i] = slope[i] = straight[i]
-            for j in range(k.size):
-                if q[j] > 0:
-                    for i in range(width):
-                        by_value, by_slope = layer_terms(t[i] * t[i], layer[j, i], q[j])
-                        value[i] += by_value
-                        slope[i] += by_slope
-            open_ = 0
-            for i in range(width):
-                step = (goal[i] - value[i] * t[i]) / slope[i]
-                t[i] += step
-                open_ += abs(step) > LAST_STEP * t[i]
-            if open_ == 0:
-                break
-        for i in range(width):
-            out[low + i] = apparent_radius(t[i], whole[i], k[0], q[0])
-            # steep (or not finite), or the layer that t belongs to is absent
-            unsure[low + i] = not (t[i] * t[i] < BENIGN and straight[i] > 0)

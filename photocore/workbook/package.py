@@ -220,7 +220,9 @@ def _faults(path: Path, package: zipfile.ZipFile, changed: Container[str]) -> It
             if place and place not in names:
                 yield f"{name} leads to {place}, which is missing"
         for prefix in {*_REFERENCES.findall(data)}:
-            for key in re.findall(rb"\s%s:(?:id|embed|link)=[\"']([^\"']+)" % prefix, data):
+            # What begins with plain letters is found ten times as quickly.
+            own = rb"%s:(?<=\s%s:)(?:id|embed|link)=[\"']([^\"']+)" % (prefix, prefix)
+            for key in re.findall(own, data):
                 if key.decode() not in relations:
                     yield f"{name} has no relation {key.decode()}"
 

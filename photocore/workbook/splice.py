@@ -14,7 +14,7 @@ from photocore.workbook.cells import CellValue, NewCell, cell_xml, type_and_cont
 from photocore.workbook.changes import SheetChanges, Spliced
 from photocore.workbook.formfill import FormFiller
 from photocore.workbook.formulas import areas_of_arrays
-from photocore.workbook.grid import cell_name, column_letters, column_number
+from photocore.workbook.grid import cell_name, column_number
 from photocore.workbook.package import local, new_parser, uncollected, understood
 from photocore.workbook.plainsheet import NotPlain, PlainRow, plain_rows, sheet_data, with_cells
 from photocore.workbook.xlsx import unescape
@@ -130,8 +130,6 @@ class _Splicer:
             if found.form is not None and self.fill_formed(filler, found):
                 continue
             row = with_cells(self.data, found)
-            if self.fill_plain(row):
-                continue
             self.start_row(row.number, row.start, "")
             new, cached, before = self.new, self.cached, 0
             for cell in row.cells:
@@ -155,7 +153,10 @@ class _Splicer:
         self.parser.Parse(self.data[end:], True)
 
     def fill_formed(self, filler: FormFiller, row: PlainRow) -> bool:
-        """Do as `fill_plain` to a row of a form, if no more is to be done."""
+        """Give every formula of a row of a form its result, if no more is to be done.
+
+        Nearly every row of a large table is such a row.
+        """
         if not self.new_rows or self.new_rows[0] != row.number or self.arrays:
             return False
         filled = filler.filled(row)
@@ -165,53 +166,6 @@ class _Splicer:
         self.result.inputs_changed |= filled.is_typed
         if filled.parts is not None:
             self.edits.append((row.body, row.end, b"".join(filled.parts)))
-        return True
-
-    def fill_plain(self, row: PlainRow) -> bool:
-        """Give every formula of a row its result, and numbers others, if no more is to be done.
-
-        Nearly every row of a large table is such a row.
-        """
-        if not self.new_rows or self.new_rows[0] != row.number or self.arrays:
-            return False
-        block = self.changes.only_filled(row.number)
-        if block is None:
-            return False
-        index = row.number - block.first
-        results, found, edits, is_changed = block.by_letters, 0, [], False
-        given = self.changes.inputs.get(row.number, {}).items()
-        typed = {column_letters(column).encode(): value for column, value in given}
-        for cell in row.cells:
-            if cell[1] in typed:
-                number = typed.pop(cell[1])
-                if cell[5] or cell[4] or not _is_value(cell[6]) or type(number) is not float:
-                    return False
-                if float(cell[6][3:-4]) != number:
-                    new = type_and_content(number, "", formula=False)[1].encode()
-                    edits.append((*cell.span(6), new))
-                    is_changed = True
-                continue
-            values, formula, stored = results.get(cell[1]), cell[5], cell[6]
-            if values is None and not (formula and stored):
-                continue
-            if values is None or not formula or not stored or stored[:3] != b"<v>":
-                return False
-            found += 1
-            kind, content = type_and_content(values[index], "", formula=True)
-            new = content.encode()
-            if kind.encode() != (cell[4] or b""):
-                style = b' s="%s"' % cell[3] if cell[3] else b""
-                style += f' t="{kind}"'.encode() if kind else b""
-                name = cell[1] + cell[2]
-                new = b'<c r="%s"%s>%s%s</c>' % (name, style, formula, new)
-                edits.append((cell.start(1) - len(b'<c r="'), cell.end(), new))
-            elif new != stored:
-                edits.append((*cell.span(6), new))
-        if typed or found != len(results):
-            return False
-        self.new_rows.popleft()
-        self.edits += edits
-        self.result.inputs_changed |= is_changed
         return True
 
     def take_cell(self, cell: re.Match[bytes], column: int) -> None:
@@ -492,8 +446,3 @@ class _Splicer:
                 count=1,
             )
             self.edits.append((start, end, tag))
-
-
-def _is_value(stored: bytes | None) -> bool:
-    """Tell whether what stands in a cell is a value, and not an empty text."""
-    return stored is not None and stored[:3] == b"<v>" and stored[3:4] != b"<"

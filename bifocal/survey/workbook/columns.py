@@ -338,10 +338,10 @@ def pair_points(*, undistorted: bool, media: int = 0) -> tuple[LiveColumn, ...]:
 #: Where a point of another table stands in `Points`; the second search finds the number 7 among
 #: names kept as text.
 _AT = 'IFERROR(MATCH([@id],tblPoints[id],0),MATCH([@id]&"",tblPoints[id],0))'
-#: Whether a row of another table is used, here and in `Points`; before, it was asked here only.
-USED_HERE = 'OR([@use]="",[@use]<>0)'
+#: Whether a row of another table is used, here and in `Points`.
 USED = (
-    f'{USED_HERE},IFERROR(OR(INDEX(tblPoints[use],{_AT})="",INDEX(tblPoints[use],{_AT})<>0),TRUE)'
+    'OR([@use]="",[@use]<>0),'
+    f'IFERROR(OR(INDEX(tblPoints[use],{_AT})="",INDEX(tblPoints[use],{_AT})<>0),TRUE)'
 )
 
 

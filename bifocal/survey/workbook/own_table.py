@@ -18,13 +18,13 @@ from bifocal.survey.workbook.content import SurveyContent, point_cells, result_c
 from bifocal.survey.workbook.placed_formulas import added_covariance
 from bifocal.survey.workbook.precision_lines import precision_values
 from bifocal.survey.workbook.reader import TO_DEGREES, TO_MM, SurveyInput
-from bifocal.survey.workbook.setup_cells import OPTION_CELLS, SHOWN_ONLY
+from bifocal.survey.workbook.setup_cells import OPTION_CELLS, TITLE_BLOCK
 from bifocal.survey.workbook.setup_update import (
     add_sheets,
     write_corrections,
     write_options,
 )
-from bifocal.survey.workbook.update import store_named_cells
+from bifocal.survey.workbook.update import refuse_earlier, store_named_cells
 from bifocal.survey.workbook.words import term
 from photocore.errors import InputError
 from photocore.tables import Table
@@ -84,13 +84,14 @@ def add_results(
         raise InputError(
             f"{target}: results go into the table of {source.name} itself, or into a new .xlsx."
         )
+    refuse_earlier(source, survey)
     editor = WorkbookEditor(source, survey.book)
     content = replace(content, links=_links(editor, survey, given))
     built = build(content)
     needed = [
         name
         for name, defined in built.book.defined_names.items()
-        if defined.attr_text.startswith("'Setup'!") and name not in SHOWN_ONLY
+        if defined.attr_text.startswith("'Setup'!") and name not in TITLE_BLOCK
     ]
     if any(place_of(editor, name) is None for name in needed if not name.startswith("a")):
         add_sheets(editor, built, ["Setup"])

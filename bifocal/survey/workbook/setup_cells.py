@@ -23,8 +23,6 @@ PRINTS = ("enlargement_1", "enlargement_2")
 #: Cells that hold texts.
 TEXTS = ("pair_file", *PHOTOS, *TITLE_BLOCK)
 _CHECKS = ("setup_missing", "check_order", "check_scale")
-#: Cells that no formula of a point needs; workbooks of older versions do not have them.
-SHOWN_ONLY = (*TITLE_BLOCK, *PRINTS, *_CHECKS, "setup_state")
 #: Cells of an ideal pair, group by group; the last group is calculated, the others are typed.
 IDEAL_GROUPS: Groups = (
     (

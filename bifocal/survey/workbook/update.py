@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from bifocal.survey.workbook.book import build, unprinted_formula
 from bifocal.survey.workbook.charts import HEAD, LEFT
-from bifocal.survey.workbook.columns import USED, USED_HERE
 from bifocal.survey.workbook.content import STRUCTURED_ROWS, SurveyContent
 from bifocal.survey.workbook.reader import SurveyInput
 from bifocal.survey.workbook.setup_cells import TYPED_FORMULAS
@@ -60,34 +59,63 @@ class BookUpdate:
     added: tuple[str, ...]
 
 
-def is_same_kind(survey: SurveyInput, content: SurveyContent) -> bool:
-    """Tell whether a survey workbook has the formulas that what came out of it needs."""
+def is_earlier(survey: SurveyInput) -> bool:
+    """Tell by its names whether a workbook's sheets were made by an earlier version."""
     names = () if survey.book is None else survey.book.names
-    measured = content.is_pair == ("col1" in survey.table.present)
-    return measured and content.media_cells == media_count(names)
+    newest = "setup_missing" if "sigma_px" in names else "enlargement_1"
+    came = {"b_lever": newest, "g_k": "g_space"}  # what stands beside what from the start
+    return any(old in names and new not in names for old, new in came.items())
 
 
-def check_kind(source: Path, survey: SurveyInput, content: SurveyContent) -> None:
-    """Refuse to change a survey workbook for coordinates into one for raw pixels, or the reverse.
-
-    Nor one for photos in air into one for media.
+def refuse_earlier(source: Path, survey: SurveyInput) -> None:
+    """Refuse to change a workbook in place whose formulas an earlier version made.
 
     Raises
     ------
     InputError
         Naming the way out.
     """
+    if is_earlier(survey):
+        raise InputError(
+            f"{source}: was made by an earlier version of this program, whose formulas are not "
+            f"renewed in place. Write to a new workbook, e.g. --out {_other(source)}: set-up, "
+            "points, check and control points are carried over; this one stays as it is."
+        )
+
+
+def is_same_kind(survey: SurveyInput, content: SurveyContent) -> bool:
+    """Tell whether a survey workbook has the formulas that what came out of it needs."""
+    names = () if survey.book is None else survey.book.names
+    measured = content.is_pair == ("col1" in survey.table.present)
+    return measured and content.media_cells == media_count(names) and not is_earlier(survey)
+
+
+def check_kind(source: Path, survey: SurveyInput, content: SurveyContent) -> None:
+    """Refuse to change a survey workbook for coordinates into one for raw pixels, or the reverse.
+
+    Nor one for photos in air into one for media, nor one of an earlier version.
+
+    Raises
+    ------
+    InputError
+        Naming the way out.
+    """
+    refuse_earlier(source, survey)
     if is_same_kind(survey, content):
         return
-    other = free_path(source.parent, f"{source.stem}-result", source.suffix).name
     kind = "coordinates in mm or px" if content.is_pair else "raw pixels of a pair"
     if content.is_pair == ("col1" in survey.table.present):
         kind = "photos in air"
     raise InputError(
         f"{source}: its formulas are made for another kind of measurement ({kind}) and are not "
-        f"changed into others in place. Write to a new workbook, e.g. --out {other}; this one "
-        "stays as it is."
+        f"changed into others in place. Write to a new workbook, e.g. --out {_other(source)}; this "
+        "one stays as it is."
     )
+
+
+def _other(source: Path) -> str:
+    """Return the name of a new workbook beside one that stays as it is."""
+    return free_path(source.parent, f"{source.stem}-result", source.suffix).name
 
 
 @uncollected()
@@ -153,9 +181,7 @@ def update_book(
         own = editor.table(name)
         if own is not None:
             rows_there = [row - own.area[0] - 1 for row in sheet_rows]
-            _table(
-                editor, built, name, rows_there, anew=_asked_here_only(editor, built, own, content)
-            )
+            _table(editor, built, name, rows_there)
     for name, key in (("tblPlan", "relief_cm"), ("tblFrame", "share")):
         _fixed_table(editor, built, name, key)
     _verdict(editor, built, content, rules="rules" in given, words=other_words)
@@ -186,26 +212,6 @@ def _corrected(content: SurveyContent) -> Sequence[str]:
     return ("s1_used", "s2_used", "theta_used", "q")
 
 
-def _asked_here_only(
-    editor: WorkbookEditor, built: BookBuilder, area: TableArea, content: SurveyContent
-) -> Sequence[str]:
-    """Return the columns whose formulas do not yet see that a point is out of use in `Points`.
-
-    None where no point listed here is: formulas are not touched without need.
-    """
-    known = content.known if area.name == "tblCheck" else content.control
-    if content.points is None or content.points.unused.isdisjoint(known.ids):
-        return ()
-    headings, stands = area.headings(), editor.models(area.sheet, area.area[0] + 1)
-    older = {
-        column.key: row_formula(area.name, column.formula.replace(USED, USED_HERE))[1:]
-        for column in built.tables[area.name].columns
-        if USED in column.formula and column.key in headings
-    }
-    cells = {key: stands.get(headings[key]) for key in older}
-    return [key for key, cell in cells.items() if cell and cell.formula == older[key]]
-
-
 def _length(area: TableArea) -> int:
     return area.area[2] - area.area[0]
 
@@ -213,13 +219,6 @@ def _length(area: TableArea) -> int:
 def store_named_cells(editor: WorkbookEditor, built: BookBuilder, content: SurveyContent) -> None:
     """Store the results of single formulas, found by their names; type what was found."""
     typed = {"g_auto"}
-    if is_older(editor.book.names):
-        # The model 3D was no formula: what the program found was typed.
-        typed |= {
-            "s3_k",
-            *(f"s3_{i}{j}" for i in "123" for j in "123"),
-            *(f"s3_{i}" for i in "XYZ"),
-        }
     for name, defined in built.book.defined_names.items():
         sheet, _, cell = defined.attr_text.partition("!")
         sheet, cell = plain_title(sheet), cell.replace("$", "")
@@ -237,14 +236,6 @@ def store_named_cells(editor: WorkbookEditor, built: BookBuilder, content: Surve
             editor.set_result(*place, _result(value))
         if built.book[sheet][cell].data_type != "f" and name not in typed:
             _make_number(editor, place, value)
-
-
-def is_older(names: Collection[str]) -> bool:
-    """Tell by its names whether a workbook's sheet `Georeference` has no live model 3D yet.
-
-    Its formulas of sigma_E, sigma_N, sigma_H then leave out what the transformation is worth.
-    """
-    return "g_k" in names and "g_space" not in names
 
 
 def _store_block(editor: WorkbookEditor, results: Mapping[str, CellValue], cells: str) -> None:
@@ -303,7 +294,6 @@ def _table(
     letters = {key: column_letters(number) for key, number in headings.items()}
     styles = editor.styles_of(area.sheet, first)
     filled, prepared = [], []
-    repeated: Mapping[int, str] | None = None
     for column in content.columns:
         if column.key not in headings:
             continue
@@ -332,10 +322,8 @@ def _table(
                 editor.put(area.sheet, row, number, value, formula=text, style=style)
             continue
         formula: Callable[[int], str] | None = _constant(escape(text))
-        if is_older(editor.book.names) or _lacks(editor, text):
-            repeated = _repeated(editor, area) if repeated is None else repeated
-            text = repeated.get(number, "")
-            formula = _constant(escape(text)) if text else None
+        if _lacks(editor, text):
+            formula = None
         elif length > STRUCTURED_ROWS:
             formula = _escaped(short_formula(area.name, column.formula, letters, area.area[0]))
         filled.append(NewColumn(number, values, style, formula))
@@ -365,21 +353,6 @@ def _lacks(editor: WorkbookEditor, formula: str) -> bool:
         if area is None or key not in area.headings():
             return True
     return False
-
-
-def _repeated(editor: WorkbookEditor, area: TableArea) -> dict[int, str]:
-    """Return by column the formulas that stand alike in a table's first row and its last.
-
-    New rows of a workbook made by an older version calculate as the rows above them do.
-    """
-    if _length(area) < 2:
-        return {}
-    top, last = (editor.models(area.sheet, row) for row in (area.area[0] + 1, area.area[2]))
-    return {
-        column: cell.formula
-        for column, cell in top.items()
-        if column in last and last[column].formula == cell.formula
-    }
 
 
 def _complete(

@@ -5,8 +5,6 @@ from __future__ import annotations
 import openpyxl
 import pytest
 
-from bifocal.survey.workbook.columns import USED, USED_HERE
-from photocore.workbook.live_columns import row_formula
 from tests.bifocal.survey.test_cli_solve import POINTS, by_id, fill, run, solved
 from tests.bifocal.survey.test_survey_workbook import assert_recalculated_equals_cached
 
@@ -46,20 +44,8 @@ def test_a_point_out_of_use_is_neither_check_nor_control_point(tmp_path):
 
 @pytest.mark.office
 @pytest.mark.acceptance
-@pytest.mark.parametrize("older", [False, True])
-def test_the_sheets_say_the_same_new_and_in_place(tmp_path, older):
+def test_the_sheets_say_the_same_new_and_in_place(tmp_path):
     path = with_known_points(tmp_path / "a.xlsx", 0)
-    if older:  # asked in their own column only, as before
-        book = openpyxl.load_workbook(path)
-        for sheet, table in (("Check", "tblCheck"), ("Georeference", "tblGeo")):
-            now = row_formula(table, USED)[1:]
-            assert now in str([c.value for r in book[sheet].iter_rows() for c in r])
-            for row in book[sheet].iter_rows():
-                for cell in row:
-                    if isinstance(cell.value, str):
-                        was = row_formula(table, USED_HERE)[1:]
-                        cell.value = cell.value.replace(now, was)
-        book.save(path)
     assert run("solve", path, "--out", path, "--overwrite").exit_code == 0
     assert_recalculated_equals_cached(path, tmp_path)
     check = openpyxl.load_workbook(path, data_only=True)["Check"]

@@ -128,24 +128,6 @@ def test_labels_and_options_of_an_own_table_are_honoured(tmp_path):
     np.testing.assert_allclose(xyz_of(path), TRUTH, atol=1e-9)
 
 
-def test_a_set_up_of_an_older_version_has_no_prints_and_needs_none(tmp_path):
-    path = own_book(tmp_path / "o.xlsx")
-    assert run("solve", path, *OPTIONS, "--out", path, "--overwrite").exit_code == 0
-    book = openpyxl.load_workbook(path)
-    for name in ("enlargement_1", "enlargement_2"):
-        put(book, name, None)
-        del book.defined_names[name]
-    put(book, "m_1", "=1000*d_1/c_1")
-    put(book, "m_2", "=1000*d_2/c_2")
-    put(book, "sigma_s", "=IF(COUNT(pitch)=1,0.5*pitch,0.004)")
-    book.save(path)
-    sheets = book.sheetnames
-    result = run("solve", path, "--out", path, "--overwrite")
-    assert result.exit_code == 0, result.stderr
-    assert openpyxl.load_workbook(path).sheetnames == sheets
-    assert read_survey(path).setup.sigma_s is None
-
-
 def test_prints_through_water_are_bent_like_the_sensors():
     media = {"index_1": 1, "index_2": 1.5, "index_3": 1.337, "thick_2": 0.01}
     media = SurveyMedia.of_cells({**media, "z0_1": 0.3, "z0_2": 0.3}, 3)

@@ -567,39 +567,68 @@ def test_a_coordinate_survey_becomes_one_for_pixels_in_a_new_workbook_only(tmp_p
     assert result.exit_code == 0, result.stderr
 
 
-def test_new_rows_of_an_older_workbook_calculate_as_those_above(tmp_path):
-    """Its tables lack the columns that formulas of today name: Excel would refuse the file."""
-    path = tmp_path / "s.xlsx"
-    assert (
-        run("solve", write_csv(tmp_path / "p.csv", TABLE), "--out", path, *DISTANCES).exit_code == 0
-    )
+@pytest.mark.parametrize(
+    "names", [("g_space", "g_space_block"), ("enlargement_1", "enlargement_2", "setup_missing")]
+)
+def test_a_workbook_of_an_earlier_version_goes_into_a_new_one(tmp_path, names):
+    path, out = tmp_path / "s.xlsx", tmp_path / "s-result.xlsx"
+    table = write_csv(tmp_path / "p.csv", TABLE)
+    assert run("solve", table, "--out", path, *DISTANCES).exit_code == 0
+    truth = json.loads(run("solve", path, "--json").stdout)["points"]
     book = openpyxl.load_workbook(path)
-    for name in ("g_space", "g_space_block"):
+    for name in names:
         del book.defined_names[name]
-    points, results = book["Points"], book["Results"]
-    column = [cell.value for cell in results[4]].index("sigma_E") + 1
-    last = results.max_row
-    for row in range(5, last + 1):
-        results.cell(row, column).value = "=ROWS(tblPoints[id])"
-    for row in range(last + 1, last + 9):
+    book.save(path)
+    before = path.read_bytes()
+    result = run("solve", path, "--out", path, "--overwrite")
+    assert (result.exit_code, result.stderr.count("\n")) == (1, 1)
+    assert f"{path}: was made by an earlier version" in result.stderr
+    assert "--out s-result.xlsx" in result.stderr
+    assert path.read_bytes() == before
+    assert run("solve", path, "--out", out).exit_code == 0
+    assert path.read_bytes() == before
+    assert json.loads(run("solve", out, "--json").stdout)["points"] == truth
+    solved_in_place(out)
+
+
+def test_new_rows_name_no_column_that_the_user_took_away(tmp_path):
+    """Excel would take the file for a damaged one."""
+    path = tmp_path / "s.xlsx"
+    table = write_csv(tmp_path / "p.csv", TABLE)
+    assert run("solve", table, "--out", path, *DISTANCES).exit_code == 0
+    book = openpyxl.load_workbook(path)
+    points = book["Points"]
+    heads = {cell.value: cell.column for cell in points[4]}
+    points.cell(4, heads["cov_XX"]).value = "mine"
+    points.tables["tblPoints"].tableColumns[heads["cov_XX"] - 1].name = "mine"
+    for row in range(points.max_row + 1, points.max_row + 5):
         for number in range(1, 6):
             points.cell(row, number).value = points.cell(5, number).value
         points.cell(row, 1).value = f"Q{row}"
     book.save(path)
     solved_in_place(path)
-    sheet = openpyxl.load_workbook(path)["Results"]
-    assert sheet.cell(last + 8, 1).value.startswith("=")
-    assert {sheet.cell(row, column).value for row in range(5, last + 9)} == {"=ROWS(tblPoints[id])"}
+    points = openpyxl.load_workbook(path)["Points"]
+    assert points.cell(points.max_row, heads["X"]).value.startswith("=")
+    assert "cov_XX" not in str(points.cell(points.max_row, heads["sigma_X"]).value)
 
 
-def test_the_setup_of_an_older_version_in_the_users_own_workbook_is_enough(tmp_path):
+def test_the_setup_of_an_earlier_version_in_the_users_own_workbook_is_refused(tmp_path):
     heads, table, head = FOREIGN["plain"]
     path = foreign(tmp_path / "own.xlsx", heads=heads, table=table, head=head)
     solved_in_place(path, *DISTANCES)
     book = openpyxl.load_workbook(path)
     before = book.sheetnames
-    for name in ("project", "client", "setup_state", "setup_missing", "check_scale"):
+    for name in ("project", "client"):  # the user's to delete
         del book.defined_names[name]
     book.save(path)
     solved_in_place(path, *DISTANCES)
     assert openpyxl.load_workbook(path).sheetnames == before
+    for name in ("enlargement_1", "setup_missing"):
+        del book.defined_names[name]
+    book.save(path)
+    result = run("solve", path, *DISTANCES, "--out", path, "--overwrite")
+    assert result.exit_code == 1
+    assert "was made by an earlier version" in result.stderr
+    assert "--out own-result.xlsx" in result.stderr
+    out = tmp_path / "own-result.xlsx"
+    assert run("solve", path, "--out", out, *DISTANCES).exit_code == 0

@@ -45,6 +45,24 @@ def test_shift_equals_fifty_digits(case: dict[str, Any]) -> None:
 
 
 @pytest.mark.parametrize(
+    ("radius", "heights", "indices", "digits"),
+    [
+        (792.8031188221366, [6.463068387908665e-08, 717.1471617700691],
+         [1.297791886352206, 1.7499755231406378], "7047153.17571120995104"),
+        (1445.769535524978, [4.762620572760927e-06, 687.689091503706],
+         [1.5664012663078761, 1.7345718941107], "640804.924148501881130"),
+        (0.1758208247674193, [3.1652054571859194e-07, 0.06457677622800193, 0.06056637343937393],
+         [1.1308448538163847, 1.3458967453152002, 1.4478061329250513], "11.836165469981758035"),
+    ],
+)  # fmt: skip
+def test_a_gap_beyond_the_critical_angle_keeps_all_digits(
+    radius: float, heights: list[float], indices: list[float], digits: str
+) -> None:
+    # By tests/golden/make_radial_shift.py; float64 alone is wrong by up to 3e-11 here.
+    assert relative_error(float(shifted_radius(radius, heights, indices)), digits) <= 8 * EPS
+
+
+@pytest.mark.parametrize(
     "case",
     [case for case in GOLDEN if "d_radius" in case],
     ids=lambda case: f"{case['name']}, R={case['radius']:g}",

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 import multimedia as mm
-from multimedia.refraction import compiled
 from multimedia.refraction.iteration import best_over_compensation, iterated_radius
 from multimedia.refraction.shift import axis_ratio, shift_derivatives, shift_ratio, shifted_radius
 from multimedia.refraction.unrolled import unrolled_shift
@@ -22,12 +21,6 @@ DIVER = mm.Layers(indices=(1.34, 1.5, 1.0), thicknesses=(0.01,))
 MEDIA = ((1.0, 1.5, 1.34), (1.5, 1.0, 1.34), (1.34, 1.5, 1.0))
 KNOWN = (0.1, 0.5, 0.01, 0.2)  # radius, z0, thickness, zp
 
-needs_numba = pytest.mark.skipif(not compiled.is_available(), reason="numba is not installed")
-
-
-def machine_code(radius, heights, indices):
-    return shifted_radius(radius, heights, indices, compiled=True)
-
 
 def every_derivative(radius, heights, indices):
     found = shift_derivatives(radius, heights, indices)
@@ -39,7 +32,6 @@ def every_derivative(radius, heights, indices):
 
 SHIFTS = [
     shifted_radius,
-    pytest.param(machine_code, marks=needs_numba),
     shift_ratio,
     every_derivative,
     lambda *a: iterated_radius(*a).radius_bar,
@@ -47,7 +39,7 @@ SHIFTS = [
     best_over_compensation,
     lambda *a: unrolled_shift(*a).radius_bar,
 ]
-IDS = ["shift", "compiled", "ratio", "derivatives", "iteration", "iteration with its own factor",
+IDS = ["shift", "ratio", "derivatives", "iteration", "iteration with its own factor",
        "factor", "workbook"]  # fmt: skip
 
 
@@ -126,8 +118,6 @@ def test_every_public_shift_says_unknown(
         mm.shift_per_colour(radius, z0=z0, zp=zp, colours=[layers]),
         *derivatives,
     ]
-    if compiled.is_available():
-        found.append(mm.radial_shift(radius, z0=z0, zp=zp, layers=layers, compiled=True))
     for values in found:
         assert (np.isnan(values) == any(unknown)).all()
 
