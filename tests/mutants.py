@@ -168,18 +168,27 @@ def importers(root: Path) -> dict[str, set[str]]:
             )
             if target := files.get(known or source):
                 found[target.relative_to(root).as_posix()].add(file.relative_to(root).as_posix())
+        if file.parent.name == "cli":  # commands are loaded by name
+            found[file.relative_to(root).as_posix()].add(f"{file.parts[-3]}/cli/main.py")
     return found
 
 
 def nearest_tests(file: str, by: dict[str, set[str]], most: int) -> list[str]:
-    """Return the test files that import a file over the fewest others, its own folder's first."""
-    room = Path(file).parent.as_posix()
+    """Return the test files that import a file over the fewest others.
+
+    Of equals, those of its own folder come first, and those named like it.
+    """
+    room, words = f"tests/{Path(file).parent.as_posix()}/", Path(file).stem.split("_")
+
+    def rank(test: str) -> tuple[bool, bool, str]:
+        return not test.startswith(room), not any(word in test for word in words), test
+
     seen, ring, tests = {file}, {file}, []
     while ring and len(tests) < most:
         ring = set().union(*(by.get(one, set()) for one in ring)) - seen
         seen |= ring
         near = (one for one in ring if Path(one).name.startswith("test_"))
-        tests += sorted(near, key=lambda one: (not one.startswith(f"tests/{room}/"), one))
+        tests += sorted(near, key=rank)
     return tests[:most]
 
 
