@@ -233,6 +233,14 @@ def test_pixels_for_millimetres_are_named():
         resect(truth, points, pixels, LAYERS)
 
 
+def test_where_no_sensor_is_known_no_lens_sees_farther_than_four_principal_distances():
+    truth, points = replace(cameras()[1], sensor=None), control(30)
+    seen = project(truth, points, LAYERS)
+    seen[0, 0] = 4.1 * truth.principal_distance
+    with pytest.raises(InputError, match="Are these pixels"):
+        resect(truth, points, seen, LAYERS)
+
+
 def test_an_unknown_parameter_is_named():
     with pytest.raises(InputError, match="focal"):
         resect(cameras()[0], control(9), np.zeros((9, 2)), LAYERS, estimate=("focal",))
