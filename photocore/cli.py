@@ -17,10 +17,12 @@ from typing import Any, Protocol
 import click
 
 from photocore.errors import PhotogrammetryError
+from photocore.installation import too_old
 from photocore.interrupts import STOPPED
 from photocore.log import COMMAND_LINE, DATE, is_quiet, log_options
 from photocore.options import NUMBER, STREAMS
 from photocore.provenance import recording
+from photocore.textfile import odd_name
 
 #: Exit status of a fault of the program: EX_SOFTWARE of sysexits.h, which Windows' os lacks.
 UNFORESEEN = 70
@@ -138,6 +140,8 @@ class LazyGroup(click.Group):
         """
         if isinstance(sys.stdout, TextIOWrapper):  # a name the terminal lacks letters for
             sys.stdout.reconfigure(errors="backslashreplace")
+        for line in too_old():
+            click.echo(f"{line}.", err=True)
         try:
             with recording(ctx.meta[COMMAND_LINE], day=ctx.meta.get(DATE)):
                 return super().invoke(ctx)
@@ -159,10 +163,16 @@ class LazyGroup(click.Group):
             _show_details(ctx)
             name = f"{error.filename}: " if error.filename else ""
             _tell_error(f"Error: {name}{error.strerror or error}.")
+        except UnicodeEncodeError as error:
+            _show_details(ctx)
+            _tell_error(f"Error: {odd_name(error)}")
         except Exception as error:  # the last resort; the tests let nobody get here
             _show_details(ctx)
             program = self.commands_package.partition(".")[0]
             task = f"{program} {ctx.invoked_subcommand or ''}".rstrip()
+            if old := too_old():
+                _tell_error(f"Error: {task} cannot be done with what is installed: {old[0]}.")
+                ctx.exit(1)
             _tell_error(f"Error: {unforeseen_message(task, error)}")
             ctx.exit(UNFORESEEN)
         return ctx.exit(1)

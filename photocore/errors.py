@@ -71,9 +71,11 @@ class MissingExtraError(InputError):
     """
 
     def __init__(self, what: str, extra: str) -> None:
+        from photocore.installation import how_to_install  # asks the system; seldom needed
+
         super().__init__(
             f"{what} needs an optional part that is not installed. "
-            f'Install it with: pip install "bifocal[{extra}]"'
+            f"Install it with: {how_to_install(extra)}"
         )
 
 

@@ -279,6 +279,9 @@ def _yaml_values(path: Path, text: str) -> dict[str, FloatArray]:
             found[match["key"]] = _table(path, match["key"], words, shape)
         elif words and all(map(_is_number, words)):
             found[match["key"]] = np.array([float(word) for word in words])
+    for key in re.findall(r"^(\w+):[ \t]*!!opencv-matrix", text, re.MULTILINE):
+        if key not in found:
+            raise InputError(f"{path}: the matrix {key} is damaged; export the calibration again.")
     return found
 
 

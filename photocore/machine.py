@@ -11,6 +11,7 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
+from photocore.installation import how_to_install, not_ours, too_old
 from photocore.provenance import program
 
 #: What the program is built on, and the extras with what each brings.
@@ -62,6 +63,7 @@ def diagnosis() -> dict[str, Any]:
         "extras": {
             extra: {name: _version(name) for name in names} for extra, names in EXTRAS.items()
         },
+        "problems": [*too_old(), *not_ours()],
         "libreoffice": office,
         "cores": cores(),
         "free_memory": free_memory(),
@@ -77,8 +79,9 @@ def diagnosis_lines(found: dict[str, Any]) -> list[str]:
     lines.append(f"{'GDAL':24} {found['gdal']}")
     for extra, packages in found["extras"].items():
         said = ", ".join(f"{name} {number or 'absent'}" for name, number in packages.items())
-        hint = "" if all(packages.values()) else f'   (pip install "bifocal[{extra}]")'
+        hint = "" if all(packages.values()) else f"   ({how_to_install(extra)})"
         lines.append(f"{'extra ' + extra:24} {said}{hint}")
+    lines += [f"TO MEND: {problem}." for problem in found["problems"]]
     office = found["libreoffice"] or "absent (only needed to recalculate workbooks without Excel)"
     lines.append(f"{'LibreOffice':24} {office}")
     lines.append(f"{'cores':24} {found['cores']}")

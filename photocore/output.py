@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import filecmp
 import logging
 import os
 import re
@@ -172,6 +173,22 @@ def free_path(folder: Path, stem: str, ending: str = "") -> Path:
     """
     names = (f"{stem}{number if number > 1 else ''}{ending}" for number in count(1))
     return next(path for path in map(folder.joinpath, names) if not os.path.lexists(path))
+
+
+def kept_copy(path: Path) -> Path:
+    """Return the backup of a file as it is, made where there is none yet."""
+    stem = f"{path.name}.bak"
+    for number in count(1):
+        backup = path.with_name(f"{stem}{number if number > 1 else ''}")
+        if not backup.is_file():
+            break
+        if filecmp.cmp(backup, path, shallow=False):
+            return backup
+    kept = free_path(path.parent, stem)
+    with atomic_path(kept, overwrite=False) as temporary:
+        shutil.copyfile(path, temporary)
+    shutil.copystat(path, kept)
+    return kept
 
 
 @contextmanager
@@ -395,14 +412,19 @@ def _not_written(path: Path, error: OSError) -> InputError:
     )
 
 
+#: Stem of a temporary file, from that of its output.
+_OURS = re.compile(r"^\.(.+)-[0-9a-f]{6}-\d+-\w{8}$")
+
+
 def _prefix(stem: str) -> str:
     return f"{stem}-{_NODE}-{os.getpid()}-"
 
 
 def _temporary_file(place: Path) -> Path:
     """Make an empty file beside a place, of the same ending, and remove left-over ones."""
-    # Names have an end; Python's random letters and the process number take some of it.
-    stem = f".{place.stem[:60]}"
+    # Names have an end; Python's random letters and the process number take some of it. What is
+    # written for a temporary file is left over with it, and bears the same name.
+    stem = "." + _OURS.sub(r"\1", place.stem)[:60]
     _remove_left_over(place.parent, stem, place.suffix)
     with interrupts.held():
         handle, name = tempfile.mkstemp(prefix=_prefix(stem), suffix=place.suffix, dir=place.parent)

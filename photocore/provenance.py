@@ -22,6 +22,7 @@ from pathlib import Path
 from typing import Any
 
 from photocore.errors import InputError
+from photocore.installation import DISTRIBUTION
 
 _CHUNK = 1 << 20
 #: A file changed within this time may change again without its time stamp showing it. [s]
@@ -194,7 +195,7 @@ def today() -> str:
 def program() -> str:
     """Return the program's name and version."""
     try:
-        return f"bifocal {version('bifocal')}"
+        return f"bifocal {version(DISTRIBUTION)}"
     except PackageNotFoundError:
         return "bifocal"
 
@@ -252,11 +253,10 @@ class FileHashes:
         return digest
 
     def save(self) -> None:
-        """Write the memory, if anything is new; not being able to costs time only."""
-        if not self._changed:
+        """Write the memory, if it is new and has a folder; not being able to costs time only."""
+        if not (self._changed and self.memory.parent.is_dir()):
             return
         with suppress(OSError):
-            self.memory.parent.mkdir(parents=True, exist_ok=True)
             temporary = self.memory.with_name(f"{self.memory.name}.{os.getpid()}")
             try:
                 temporary.write_text(json.dumps(self._known), encoding="utf-8")

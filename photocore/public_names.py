@@ -31,7 +31,9 @@ def public_names(
         if name == "__version__":
             from importlib.metadata import version
 
-            return version("bifocal")
+            from photocore.installation import DISTRIBUTION
+
+            return version(DISTRIBUTION)
         from difflib import get_close_matches
 
         near = get_close_matches(name, everything, n=1)

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import tomllib
 import unicodedata
 from collections.abc import Iterator
 from contextlib import contextmanager
 from errno import ENAMETOOLONG
 from pathlib import Path
+from typing import Any
 
 from photocore.errors import InputError
 from photocore.provenance import note
@@ -27,6 +29,12 @@ def check_name(path: Path) -> None:
     except OSError as error:
         if error.errno == ENAMETOOLONG:
             raise InputError(f"{path}: is too long a name for a file; choose another.") from None
+
+
+def odd_name(error: UnicodeEncodeError) -> str:
+    """Return what to say of a name in bytes that are no text, where a library wants text."""
+    named = error.object[max(0, error.start - 60) : error.end + 20].splitlines()
+    return f"{named[-1]!r}: the name of this file or folder is no UTF-8 text; rename it."
 
 
 def read_text(path: Path, what: str, *, form: str = "") -> str:
@@ -70,6 +78,26 @@ def check_file(path: Path, missing: str = "file") -> None:
         raise InputError(f"{path}: no such {missing}.")
     if not path.is_file():
         raise InputError(f"{path}: is a pipe or a device; save what it gives as a file first.")
+
+
+def read_toml(path: Path, what: str) -> dict[str, Any]:
+    """Return what a TOML file holds.
+
+    Raises
+    ------
+    InputError
+        As for `read_text`, or if it is no valid TOML.
+    """
+    text = read_text(path, what, form=" (TOML)")
+    try:
+        return tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        hint = "" if path.suffix.lower() == ".toml" else f" A {what} ends in .toml."
+        raise InputError(f"{path}: is not valid TOML: {error}.{hint}") from None
+    except ValueError:  # Python reads no whole number of more than 4300 digits
+        raise InputError(f"{path}: holds a whole number of thousands of digits.") from None
+    except RecursionError:
+        raise InputError(f"{path}: nested too deeply for a {what}.") from None
 
 
 @contextmanager

@@ -16,7 +16,7 @@ MODULES = (water, images, pairs, tables)
 def test_ours_comes_first_in_every_comparison():
     for module in MODULES:
         for comparison in module.COMPARISONS.values():
-            assert next(iter(comparison.tools.values())).package == "bifocal"
+            assert next(iter(comparison.tools.values())).package == "bifocal-relief"
             assert list(comparison.sizes) == sorted(comparison.sizes)
 
 
@@ -37,7 +37,7 @@ def test_the_page_tells_ratio_growth_and_what_is_missing(tmp_path):
     comparison = Comparison(
         title="A thing done", data="Made.", item="point", error="error [mm]", sizes=(10, 100),
         tools={
-            "ours": Tool(never, "bifocal"),
+            "ours": Tool(never, "bifocal-relief"),
             "theirs": Tool(never, "numpy"),
             "absent": Tool(never, "no-such-package"),
         },

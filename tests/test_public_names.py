@@ -78,7 +78,7 @@ def test_a_name_that_is_not_offered_is_answered_with_the_nearest(package, name, 
 
 @pytest.mark.parametrize("package", PACKAGES, ids=lambda p: p.__name__)
 def test_the_version_is_that_of_the_distribution(package) -> None:
-    assert package.__version__ == version("bifocal")
+    assert package.__version__ == version("bifocal-relief")
 
 
 HEAVY = ("numpy", "scipy", "cv2", "skimage", "rasterio", "openpyxl", "click", "matplotlib", "numba")

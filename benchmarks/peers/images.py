@@ -349,6 +349,7 @@ def _calibration(_count: int, _folder: Path, *, ours: bool) -> Task:
 
 
 MEGA = 1_000_000
+OURS = "bifocal-relief"
 CV2 = "opencv-python-headless"
 COMPARISONS = {
     "relief": Comparison(
@@ -359,8 +360,8 @@ COMPARISONS = {
         item="pixel", error="wrong by 3 cm or missing, of what both photos see [%]",
         sizes=(1_500_000, 6 * MEGA),
         tools={
-            "bifocal, standard": Tool(functools.partial(_relief, quality="standard"), "bifocal"),
-            "bifocal, fast": Tool(functools.partial(_relief, quality="fast"), "bifocal"),
+            "bifocal, standard": Tool(functools.partial(_relief, quality="standard"), OURS),
+            "bifocal, fast": Tool(functools.partial(_relief, quality="fast"), OURS),
             "OpenCV DIS, medium, full resolution": Tool(_flow, CV2),
             "OpenCV SGBM on radial lines": Tool(_semi_global, CV2),
         },
@@ -373,9 +374,9 @@ COMPARISONS = {
         item="pixel", error="RMS difference [grey levels]",
         sizes=(1_500_000, 6 * MEGA, 24 * MEGA),
         tools={
-            "bifocal ortho, no mask": Tool(lambda n, f: _ortho(n, f, "--no-mask"), "bifocal"),
+            "bifocal ortho, no mask": Tool(lambda n, f: _ortho(n, f, "--no-mask"), OURS),
             "bifocal ortho, hidden pixels masked": Tool(
-                lambda n, f: _ortho(n, f, "--mask"), "bifocal"
+                lambda n, f: _ortho(n, f, "--mask"), OURS
             ),
             "orthority, no mask": Tool(_orthority, "orthority"),
             "OpenCV by hand, no mask": Tool(_ortho_by_hand, CV2),
@@ -388,7 +389,7 @@ COMPARISONS = {
         "photo is a smooth pattern, distorted exactly.",
         item="pixel", error="RMS difference [grey levels]", sizes=(6 * MEGA, 24 * MEGA),
         tools={
-            "bifocal, cubic": Tool(functools.partial(_undistortion, ours=True), "bifocal"),
+            "bifocal, cubic": Tool(functools.partial(_undistortion, ours=True), OURS),
             "OpenCV undistort, linear": Tool(functools.partial(_undistortion, ours=False), CV2),
         },
     ),
@@ -398,7 +399,7 @@ COMPARISONS = {
         item="photo", error="RMS residual [px]", sizes=(len(_boards()),) if _boards() else (),
         tools={
             "bifocal, model chosen, precision told": Tool(
-                functools.partial(_calibration, ours=True), "bifocal"
+                functools.partial(_calibration, ours=True), OURS
             ),
             "OpenCV calibrateCamera": Tool(functools.partial(_calibration, ours=False), CV2),
         },

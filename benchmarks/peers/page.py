@@ -89,7 +89,7 @@ def _table(comparison: Comparison, found: Found) -> list[str]:
         base = found[first].get(largest, {}).get("seconds")
         ratio = f"{good[largest]['seconds'] / base:.2g}" if base else ""
         last = [ratio, _growth(good), f"{good[largest]['memory']:.0f} MB"]
-        name = tool if how.package == "bifocal" else f"{tool} ({how.package} {how.version})"
+        name = tool if how.package == "bifocal-relief" else f"{tool} ({how.package} {how.version})"
         row = [*times, *last, f"{good[largest]['error']:.2g}"]
         lines.append(f"| {name} | " + " | ".join(row) + " |")
     return lines

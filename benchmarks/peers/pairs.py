@@ -151,7 +151,7 @@ COMPARISONS = {
         "distances, to 2 cm.",
         item="pixel", error="RMS of points [mm]", sizes=(1_500_000, 6_000_000),
         tools={
-            "bifocal align": Tool(_ours, "bifocal"),
+            "bifocal align": Tool(_ours, "bifocal-relief"),
             "OpenCV recoverPose, MAGSAC": Tool(_opencv, "opencv-python-headless"),
             "COLMAP two-view geometry": Tool(_colmap, "pycolmap"),
         },

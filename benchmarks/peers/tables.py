@@ -114,7 +114,7 @@ COMPARISONS = {
         "values alone.",
         item="row", error="largest error of stored relief [m]", sizes=SIZES,
         tools={
-            "bifocal, into a workbook that exists": Tool(_write(book.write_ours), "bifocal"),
+            "bifocal, into a workbook that exists": Tool(_write(book.write_ours), "bifocal-relief"),
             "openpyxl, formulas alone": Tool(_write(book.write_openpyxl), "openpyxl"),
             "XlsxWriter, a new workbook": Tool(_write(xlsxwriter), "xlsxwriter"),
             "pandas, values alone": Tool(_write(pandas), "pandas"),
@@ -124,7 +124,7 @@ COMPARISONS = {
         title="A workbook read",
         data=DATA, item="row", error="largest error of relief [m]", sizes=SIZES,
         tools={
-            "bifocal": Tool(_read(ours_read), "bifocal"),
+            "bifocal": Tool(_read(ours_read), "bifocal-relief"),
             "openpyxl, read only": Tool(_read(openpyxl_read), "openpyxl"),
             "pandas": Tool(_read(pandas_read), "pandas"),
         },

@@ -166,7 +166,7 @@ COMPARISONS = {
         "double.",
         item="point", error="largest error [mm]", sizes=(10_000, 100_000, 1_000_000),
         tools={
-            "multimedia, NumPy": Tool(_of(_shift, way="numpy"), "bifocal"),
+            "multimedia, NumPy": Tool(_of(_shift, way="numpy"), "bifocal-relief"),
             "multimedia, compiled": Tool(_of(_shift, way="compiled"), "numba"),
             "OpenPTV liboptv": Tool(_of(_shift, way="optv"), "optv"),
         },
@@ -176,7 +176,7 @@ COMPARISONS = {
         data=f"{TANK} Truth: the shift in long double, then a plain central projection.",
         item="point", error="largest error [mm]", sizes=(10_000, 100_000, 1_000_000),
         tools={
-            "multimedia": Tool(_of(_projection, ours=True), "bifocal"),
+            "multimedia": Tool(_of(_projection, ours=True), "bifocal-relief"),
             "OpenPTV liboptv": Tool(_of(_projection, ours=False), "optv", 100_000),
         },
     ),
@@ -186,9 +186,9 @@ COMPARISONS = {
         item="point", error="RMS error [mm]", sizes=(1_000, 10_000, 100_000),
         tools={
             "multimedia, rigorous, with covariances": Tool(
-                _of(_intersection, way="rigorous"), "bifocal"
+                _of(_intersection, way="rigorous"), "bifocal-relief"
             ),
-            "multimedia, mean of pairs": Tool(_of(_intersection, way="pairs"), "bifocal"),
+            "multimedia, mean of pairs": Tool(_of(_intersection, way="pairs"), "bifocal-relief"),
             "OpenPTV liboptv, mean of pairs": Tool(_of(_intersection, way="optv"), "optv"),
         },
     ),
@@ -197,7 +197,7 @@ COMPARISONS = {
         data=f"{TANK} 2 µm of noise, start 27 mm and 2 degrees off. Truth: the camera.",
         item="point", error="error of the position [mm]", sizes=(20, 200, 2_000, 20_000),
         tools={
-            "multimedia": Tool(_of(_resection, ours=True), "bifocal"),
+            "multimedia": Tool(_of(_resection, ours=True), "bifocal-relief"),
             "OpenPTV liboptv": Tool(_of(_resection, ours=False), "optv"),
         },
     ),
@@ -206,7 +206,7 @@ COMPARISONS = {
         data=f"{TANK} Truth: the vertices projected by the shift in long double.",
         item="curve", error="largest error [px]", sizes=(100, 1_000, 10_000),
         tools={
-            "multimedia": Tool(_of(_curves, ours=True), "bifocal"),
+            "multimedia": Tool(_of(_curves, ours=True), "bifocal-relief"),
             "OpenPTV liboptv": Tool(_of(_curves, ours=False), "optv", 1_000),
         },
     ),

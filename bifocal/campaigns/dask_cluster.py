@@ -16,6 +16,7 @@ from bifocal.campaigns.pair_job import PairJob, PairOutcome, run_pair
 from bifocal.campaigns.shipping import ShippedPair, found_anywhere, packed, run_parcel, unpacked
 from bifocal.campaigns.worker_pool import Listener
 from photocore.errors import InputError
+from photocore.installation import how_to_install
 from photocore.provenance import program
 
 #: Name of the resource by which workers tell their memory: ``dask worker --resources memory=8e9``.
@@ -57,7 +58,7 @@ def run_on_cluster(
         cluster: Any = import_module("distributed")
     except ImportError:
         raise InputError(
-            'a cluster needs Dask: pip install "bifocal[cluster]" here and on its workers.'
+            f"a cluster needs Dask, here and on its workers: {how_to_install('cluster')}."
         ) from None
     try:
         client = cluster.Client(address, timeout=TIMEOUT, set_as_default=False)

@@ -25,7 +25,7 @@ from photocore.cli import Progress, no_progress, unforeseen_message
 from photocore.errors import InputError, PhotogrammetryError
 from photocore.provenance import FileHashes, recording
 from photocore.raster_places import cloud_optimised
-from photocore.textfile import file_name
+from photocore.textfile import file_name, odd_name
 
 if TYPE_CHECKING:
     from bifocal.orthophotos.ortho_workflow import OrthoTask
@@ -45,9 +45,11 @@ WEIGHTS = {
     "align": 0.22, "relief": 0.36, "points": 0.02, "ortho": 0.07, "drawing": 0.15, "view": 0.02,
     "report": 0.16,
 }  # fmt: skip
-#: Memory of a pair in work: of the program, and for each pixel of its larger photo; a relief map
-#: of 6 MP takes 1.5 GiB. [bytes]
-BASE_MEMORY, MEMORY_PER_PIXEL = 300 << 20, 210
+#: What every orthophoto of a pair is made by.
+_PICTURE = ("image", "bounds", "fill", "complete", "any_size")
+#: Memory of a pair in work: of the program, and for each pixel of its larger photo; 6.3 MP took
+#: 1.55 GB on church_2, 2.04 GB on a church with more relief. [bytes]
+BASE_MEMORY, MEMORY_PER_PIXEL = 300 << 20, 290
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -268,6 +270,8 @@ def failure_message(error: Exception, what: str, folder: Path) -> str:
         return str(error)
     if isinstance(error, MemoryError):
         return "not enough memory; give it fewer neighbours (--jobs) or a coarser gsd."
+    if isinstance(error, UnicodeEncodeError):
+        return odd_name(error)
     if isinstance(error, OSError):
         return f"{error.filename or folder}: {error.strerror or error}."
     if os.environ.get("BIFOCAL_DEBUG"):
@@ -317,7 +321,7 @@ def _align_step(job: PairJob) -> Step:
             job.far, job.near, out, AlignOptions.from_given({**options, **files}),
             picture=out.with_suffix("").with_suffix(".pair.png"),
         )  # fmt: skip
-        return (*made.remarks, *made.pair.remarks)
+        return tuple(dict.fromkeys((*made.pair.remarks, *made.remarks)))
 
     photos = {"far": job.far, "near": job.near}
     return Step(name=ALIGN, files={**photos, **files}, options=options, make=make)
@@ -406,12 +410,13 @@ def _ortho_task(job: PairJob, options: Mapping[str, Any]) -> OrthoTask:
 
     return OrthoTask(
         relief=job.relief_path, image=options.get("image", "1"), gsd=options.get("gsd"),
-        bounds=_tuple(options.get("bounds")), options=OrthoOptions(fill=options.get("fill", False)),
+        bounds=_tuple(options.get("bounds")), any_size=options.get("any_size", False),
+        options=OrthoOptions(**{key: options.get(key, False) for key in ("fill", "complete")}),
     )  # fmt: skip
 
 
 def _ortho_step(job: PairJob) -> Step:
-    options = _some(job, "image", "gsd", "bounds", "fill", "cog")
+    options = _some(job, "gsd", "cog", *_PICTURE)
 
     def make(place: Path, progress: Progress) -> tuple[str, ...]:
         from bifocal.orthophotos.ortho_workflow import make_ortho
@@ -426,8 +431,7 @@ def _ortho_step(job: PairJob) -> Step:
 
 
 def _drawing_step(job: PairJob) -> Step:
-    names = ("scale", "dpi", "paper", "image", "bounds", "fill", "sections", "contours", "cog")
-    options = _some(job, *names)
+    options = _some(job, "scale", "dpi", "paper", "sections", "contours", "cog", *_PICTURE)
     control = {k: v for k, v in tables_of(job).items() if k == "control"}
 
     def make(place: Path, progress: Progress) -> tuple[str, ...]:

@@ -2,7 +2,8 @@
 
 A step works in a hidden folder beside its own; when all is written, a record of what went in and
 came out (`RECORD`) is added, and the folder takes the place of the old one by a rename. Killed at
-any moment, it leaves either the old folder or the new one.
+any moment, it leaves either the old folder or the new one. A folder that only passes holds a `MARK`
+with its own name: what a killed run left is known by that alone, and nobody else's is touched.
 """
 
 from __future__ import annotations
@@ -25,11 +26,14 @@ from photocore.errors import InputError
 from photocore.jsonfile import to_text
 from photocore.output import check_not_open, told_as
 from photocore.provenance import FileHashes, file_hash, program, today
+from photocore.textfile import check_file, check_name
 
 FORMAT = "bifocal-step/1"
 #: The record of a step, in its folder.
 RECORD = ".made.json"
-_WRITING, _OLD = "-writing-", ".old"
+#: In a folder that only passes: which one it is.
+MARK = ".bifocal-passing.json"
+_WRITING, _OLD = "-writing-", "-old-"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -85,6 +89,9 @@ class StepRecord:
 
 def step_key(step: Step, earlier: Mapping[str, StepRecord], hashes: FileHashes) -> str:
     """Return the hash of everything that decides a step's result."""
+    for path in step.files.values():
+        check_name(path)
+        check_file(path)
     content = {
         "format": FORMAT,
         "program": program(),
@@ -149,7 +156,7 @@ def run_step(
             seconds=time.perf_counter() - start,
         )  # fmt: skip
         _write_record(place, step, record, hashes)
-        _publish(place, folder, old)
+        _publish(place, folder, old, overwrite=overwrite)
     return record
 
 
@@ -171,7 +178,7 @@ def receive_step(
         for name, content in files.items():
             (place / name).parent.mkdir(parents=True, exist_ok=True)
             (place / name).write_bytes(content)
-        _publish(place, folder, old)
+        _publish(place, folder, old, overwrite=overwrite)
 
 
 @contextmanager
@@ -182,8 +189,9 @@ def _written_aside(parent: Path, name: str) -> Iterator[Path]:
     with interrupts.held():
         place = Path(tempfile.mkdtemp(prefix=f".{name}{_WRITING}", dir=parent))
         interrupts.temporary.add(place)
-    place.chmod(0o777 & ~_umask())
     try:
+        _mark(place, place.name)
+        place.chmod(0o777 & ~_umask())
         yield place
     finally:
         shutil.rmtree(place, ignore_errors=True)
@@ -192,14 +200,25 @@ def _written_aside(parent: Path, name: str) -> Iterator[Path]:
 
 def clean(parent: Path) -> None:
     """Remove what a killed run left half-written, and put back what it was about to replace."""
-    for left in parent.glob(f".*{_OLD}"):
-        folder = parent / left.name[1 : -len(_OLD)]
-        if folder.exists():
-            shutil.rmtree(left, ignore_errors=True)
+    for left in [path for path in parent.glob(".*") if _bears_mark(path)]:
+        name, aside, _ = left.name[1:].rpartition(_OLD)
+        if aside and not (parent / name).exists():
+            (left.rename(parent / name) / MARK).unlink()
         else:
-            left.rename(folder)
-    for left in parent.glob(f".*{_WRITING}*"):
-        shutil.rmtree(left, ignore_errors=True)
+            shutil.rmtree(left, ignore_errors=True)
+
+
+def _mark(folder: Path, name: str) -> None:
+    """Note that a folder is ours to remove as long as it bears this name."""
+    text = to_text({"format": FORMAT, "passing": name})
+    (folder / MARK).write_text(text, encoding="utf-8")
+
+
+def _bears_mark(folder: Path) -> bool:
+    with suppress(OSError, ValueError):
+        mark = json.loads((folder / MARK).read_text(encoding="utf-8"))
+        return mark == {"format": FORMAT, "passing": folder.name} and not folder.is_symlink()
+    return False
 
 
 def _umask() -> int:
@@ -209,9 +228,9 @@ def _umask() -> int:
 
 
 def _files(folder: Path) -> list[Path]:
-    """Return the files of a folder, relative, without the record, in order."""
+    """Return the files of a folder, relative, without the record and the mark, in order."""
     found = (path.relative_to(folder) for path in folder.rglob("*") if path.is_file())
-    return sorted(path for path in found if path.name != RECORD)
+    return sorted(path for path in found if path.name not in (RECORD, MARK))
 
 
 def _changed_files(
@@ -270,16 +289,26 @@ def _write_record(place: Path, step: Step, record: StepRecord, hashes: FileHashe
 
 
 @interrupts.held()
-def _publish(place: Path, folder: Path, old: StepRecord | None) -> None:
-    """Put a finished folder in place of the old one; files the user added move over."""
-    aside = folder.with_name(f".{folder.name}{_OLD}")
+def _publish(place: Path, folder: Path, old: StepRecord | None, *, overwrite: bool) -> None:
+    """Put a finished folder in place of the old one; what the user added moves over."""
+    aside = folder.with_name(_OLD.join(place.name.rsplit(_WRITING, 1)))
     if folder.exists():
-        known = set(old.outputs) if old else set()
-        for name in _files(folder):
-            if name.as_posix() not in known and not (place / name).exists():
-                (place / name).parent.mkdir(parents=True, exist_ok=True)
-                shutil.copy2(folder / name, place / name)
-        shutil.rmtree(aside, ignore_errors=True)
+        known = {*(old.outputs if old else ()), RECORD, MARK}
+        for path in folder.rglob("*"):
+            there = place / path.relative_to(folder)
+            if path.relative_to(folder).as_posix() in known:
+                continue
+            if path.is_dir() and not path.is_symlink():
+                there.mkdir(exist_ok=True)
+            elif not there.exists():
+                shutil.copy2(path, there, follow_symlinks=False)
+            elif not overwrite:
+                raise InputError(
+                    f"{path}: is not this survey's, and a file of this name would now be made. "
+                    "Move it away, or add --overwrite to lose it."
+                )
+        _mark(folder, aside.name)
         folder.rename(aside)
     place.rename(folder)
+    (folder / MARK).unlink()
     shutil.rmtree(aside, ignore_errors=True)

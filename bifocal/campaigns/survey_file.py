@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import tomllib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from difflib import get_close_matches
@@ -12,7 +11,7 @@ from typing import Any
 
 from bifocal.campaigns.pair_job import FILES, JOINT_OPTIONS, PRODUCTS, PairJob, tables_of
 from photocore.errors import InputError
-from photocore.textfile import file_name, read_text
+from photocore.textfile import file_name, read_toml
 from photocore.workbook.words import LANGUAGES
 
 FORMAT = "bifocal-survey/1"
@@ -101,6 +100,8 @@ OPTIONS: Mapping[str, Callable[[Any], Any]] = {
     "relief_gsd": _number,
     "gsd": _number,
     "fill": _truth,
+    "complete": _truth,
+    "any_size": _truth,
     "cog": _truth,
     "sections": _words,
     "contours": _number,
@@ -243,16 +244,17 @@ def _faults_of_whole(jobs: Sequence[PairJob], whole: Mapping[str, Any]) -> list[
 
 
 def _parsed(path: Path) -> dict[str, Any]:
-    text = read_text(path, "survey file", form=" (TOML)")
-    try:
-        data = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise InputError(f"{path}: is not valid TOML: {error}.") from None
+    data = read_toml(path, "survey file")
     if data.get("format", FORMAT) != FORMAT:
         raise InputError(
             f"{path}: format {data['format']!r} is not known; this program reads {FORMAT}."
         )
     return data
+
+
+def _is_name(value: Any) -> bool:
+    """Whether a value may be the name of a file."""
+    return isinstance(value, str) and bool(value) and value.isprintable()
 
 
 def _entries(
@@ -262,7 +264,7 @@ def _entries(
     found: dict[str, dict[str, Any]] = {"files": {}, "options": {}, "products": {}}
     for key, value in data.items():
         if key in FILES:
-            if isinstance(value, str) and value:
+            if _is_name(value):
                 found["files"][key] = base / value
             elif value != "":
                 faults.append(f"{where}: {key} = {value!r}: expected the name of a file.")
@@ -295,10 +297,12 @@ def _job(
     rest = {key: value for key, value in entry.items() if key not in ("name", "far", "near")}
     own = _entries(rest, base, where, faults)
     photos = [entry.get(key) for key in ("far", "near")]
-    if not all(isinstance(photo, str) and photo for photo in photos):
+    if not all(map(_is_name, photos)):
         faults.append(f"{where}: far and near must name its two photos.")
         return None
     name = str(entry.get("name") or f"pair {number}")
+    if not name.strip() or not name.isprintable():
+        faults.append(f"{where}: name = {name!r}: expected a name that can be read.")
     far, near = (base / str(photo) for photo in photos)
     products = own["products"].get("products") or common["products"].get("products")
     return PairJob(

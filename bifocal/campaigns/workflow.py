@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import socket
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -11,6 +12,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from bifocal.campaigns.inputs import check_files
 from bifocal.campaigns.pair_job import (
     ALIGN,
     FILES,
@@ -40,6 +42,8 @@ from photocore.provenance import FileHashes, recording, today
 
 #: File that says which process works in a folder.
 LOCK = ".survey.lock"
+#: What it says: machine and process; nothing where the process was killed at that moment.
+_OURS = re.compile(r"(\S+ \d+)?")
 #: In place of a pair's name in a plan.
 _ALL = "all pairs"
 
@@ -384,6 +388,8 @@ def _locked(folders: Sequence[Path]) -> Iterator[None]:
                         f"{folder}: another run works on it ({path.read_text('utf-8').strip()}). "
                         f"Wait for it; if there is none, delete {path}."
                     )
+                if path.exists() and not _OURS.fullmatch(path.read_text("utf-8", "replace")):
+                    raise InputError(f"{path}: is not this program's; move it away.")
                 taken.append(path)
                 path.write_text(mine, encoding="utf-8")
             except OSError as error:
@@ -479,22 +485,16 @@ def facade(
     Raises
     ------
     InputError
-        Where a step fails: with what it said. What was made before stays and counts; where nothing
-        was, and the pair cannot be set up as it is described, nothing is written.
+        Where a step fails: with what it said. What was made before stays and counts.
     """
-    if not job.folder.exists() and (told := refusal(job)):
+    if (fresh := not job.folder.exists()) and (told := refusal(job)):
         raise InputError(told)
+    check_files(job)
     outcome = run_survey([job], machines=machines, progress=progress).outcomes[0]
     if outcome.failed_step:
+        if fresh and not outcome.done:
+            with suppress(OSError):  # what else lies there is not ours
+                (job.folder / ".hashes.json").unlink(missing_ok=True)
+                job.folder.rmdir()
         raise InputError(outcome.message)
     return outcome
-
-
-def facade_lines(job: PairJob, outcome: PairOutcome) -> list[str]:
-    """Return what was made where, for people."""
-    lines = []
-    for step in (*outcome.kept, *outcome.done):
-        names = sorted(path.name for path in (job.folder / step).iterdir() if path.name[0] != ".")
-        kept = " (kept)" if step in outcome.kept else ""
-        lines.append(f"{job.folder / step}{kept}: {', '.join(names)}")
-    return lines

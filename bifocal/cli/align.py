@@ -110,8 +110,8 @@ def command(
     """Set up a pair: where both cameras stood, how they looked, at which scale.
 
     FAR is the photo taken from afar with the long lens, NEAR the other one. Four ways: control
-    points measured on the wall (--control), distances measured on site with the cameras square to
-    the wall (--distance1, --distance2), the same taken as they are (--as-set-up), or the photos
+    points measured on the wall (--control), distances measured on site (--distance1, --distance2),
+    the same with the cameras square to the wall, taken as they are (--as-set-up), or the photos
     alone (--auto) and one distance or length. Photos taken through glass or water are set up by
     control points or as they are, with --indices and --port or --depth. FAR alone may be a survey
     workbook that states distances, focal lengths and nadirs: they are taken as they are.
@@ -133,7 +133,7 @@ def command(
     )  # fmt: skip
     print_result(
         alignment_as_dict(alignment), _lines(alignment), as_json=as_json,
-        remarks=(*alignment.remarks, *alignment.pair.remarks),
+        remarks=dict.fromkeys((*alignment.pair.remarks, *alignment.remarks)),
     )  # fmt: skip
     if not as_json:
         remark(f"Pair written to {out}" + (f", picture to {picture}" if not no_picture else ""))

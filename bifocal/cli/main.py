@@ -5,6 +5,7 @@ from __future__ import annotations
 import click
 
 from photocore.cli import LazyGroup
+from photocore.installation import DISTRIBUTION
 
 #: Name and one-line help of every command, in the order of work.
 SUMMARIES: dict[str, str] = {
@@ -44,6 +45,6 @@ First steps:
     summaries=SUMMARIES,
     epilog=EPILOG,
 )
-@click.version_option(package_name="bifocal", prog_name="bifocal")
+@click.version_option(package_name=DISTRIBUTION, prog_name="bifocal")
 def main() -> None:
     """Relief, coordinates and orthophotos of a wall from two photos of the same scale."""

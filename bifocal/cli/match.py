@@ -82,7 +82,7 @@ def command(
     summary = match_summary(*found)
     print_result(
         {**summary, "out": out}, _lines(summary), as_json=as_json,
-        remarks=_remarks(summary["kinds"], what),
+        remarks=(*found[0].remarks, *_remarks(summary["kinds"], what)),
     )  # fmt: skip
     if not as_json:
         remark(f"Points written to {out}")

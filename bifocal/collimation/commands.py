@@ -30,6 +30,7 @@ from bifocal.collimation.records import (
     SurveyState,
     TapedLength,
 )
+from bifocal.survey.observations import DOUBT_CODES
 from photocore.errors import InputError
 
 #: A larger survey is another one.
@@ -273,12 +274,42 @@ def _setup_set(state: SurveyState, command: Fields) -> None:
     state.setup |= given
 
 
-def _exchange(state: SurveyState, command: Fields) -> None:  # noqa: ARG001
-    """Exchange far and near photo; what was picked goes with them."""
-    state.points = {n: replace(p, picks=p.picks[::-1]) for n, p in state.points.items()}
-    state.control = {n: replace(p, picks=p.picks[::-1]) for n, p in state.control.items()}
-    state.lenses = {3 - image: lens for image, lens in state.lenses.items()}
-    state.done, state.undone = [], []
+def _exchange(state: SurveyState, command: Fields) -> None:
+    """Exchange far and near photo; what was picked goes with them, and no orientation stays.
+
+    A lens goes with its photo too, unless the longer one was typed for the far photo.
+    """
+    state.points = {n: _turned(p) for n, p in state.points.items()}
+    state.control = {n: _turned(p) for n, p in state.control.items()}
+    if not (lens_ratio(state.lenses.get(1, {}), state.lenses.get(2, {})) or 0.0) > 1.0:
+        state.lenses = {3 - image: lens for image, lens in state.lenses.items()}
+    state.ordered = command.get("found") is not True
+    state.forget_orientation()
+    state.done, state.undone = (
+        [[Change(c.kind, c.key, _turned(c.before), _turned(c.after)) for c in x] for x in history]
+        for history in (state.done, state.undone)
+    )
+    if state.stage in ("points", "products"):
+        state.stage = "orientation"
+
+
+def _turned(record: Any) -> Any:
+    """Return a record with the picks of both photos exchanged, where it has some."""
+    if not hasattr(record, "picks"):
+        return record
+    turned = replace(record, picks=record.picks[::-1])
+    if getattr(record, "code", "").upper().startswith(DOUBT_CODES):  # it names the photo in doubt
+        turned = replace(turned, code=record.code.translate({49: "2", 50: "1"}))
+    return turned
+
+
+def lens_ratio(*photos: Fields) -> float | None:
+    """Return how much longer the lens of the first photo is; None where that is not known."""
+    focals: list[Any] = [photo.get("focal_mm") for photo in photos]
+    sensors: list[Any] = [photo.get("sensor_width_mm") for photo in photos]
+    if None in focals:
+        return None
+    return float(focals[0] / focals[1] * (sensors[1] / sensors[0] if all(sensors) else 1.0))
 
 
 def _points_add(state: SurveyState, command: Fields) -> list[Change]:

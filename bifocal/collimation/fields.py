@@ -181,10 +181,14 @@ NOTES: Mapping[str, Mapping[str, Reader]] = {
     "workbook.read": {"rows": _rows, "gone": _TEXTS},
     "made": {"kind": _TEXT, "names": _TEXTS},
     "proposed": {"pair": _TEXT, "report": _of(dict, "a report")},
-    "accepted": {},
+    "accepted": {"pair?": _TEXT},
+    "unaligned": {},
 }
-#: What the journal holds: also the points that a job found.
-RECORDS = {**COMMANDS, **NOTES, "points.add": {"points": _of([_FOUND], "a list of points")}}
+#: What the journal holds: also the points, and the order of the photos, that a job found.
+RECORDS = {
+    **COMMANDS, **NOTES, "points.add": {"points": _of([_FOUND], "a list of points")},
+    "photos.exchange": {"found?": _FLAG},
+}  # fmt: skip
 
 
 def fields_of(

@@ -148,9 +148,7 @@ def _align_task(session: Session, options: Options) -> dict[str, Any]:
         raise InputError("there are no photos yet; give two.")
     control, site = control_of(state), site_of(state)
     given = [site.distance1, site.distance2, site.delta_d]
-    way = options.get("way") or ("control" if len(control.ids) else "site")
-    if way == "site" and sum(value is not None for value in given) < 2:
-        way = "auto"
+    way = options.get("way") or ("control" if len(control.ids) else "auto")
     way = _through_media(session, way, given)
     if way == "auto" and not any(given) and not control.lengths:
         raise InputError(
@@ -167,7 +165,7 @@ def _align_task(session: Session, options: Options) -> dict[str, Any]:
         "out": str(out.resolve()),
         "site": plain(asdict(site)),
         "lenses": [plain(asdict(lens)) for lens in lenses_of(state)],
-        "auto": way == "auto",
+        "auto": way not in ("control", "as set up"),
         "as_set_up": way == "as set up",
         "media": media_as_dict(media_of(state.setup, session.pictures.pair)),
         **{key: None if path is None else str(path.resolve()) for key, path in tables.items()},

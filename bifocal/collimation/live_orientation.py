@@ -66,8 +66,9 @@ def site_of(state: SurveyState) -> SiteMeasures:
     sigmas = [setup.get(f"sigma_{name}") for name in ("d", "d1", "d2", "delta_d")]
     given = [sigma for sigma in sigmas if sigma]
     site = SiteMeasures(
-        distance1=setup.get("d1"), distance2=setup.get("d2"), delta_d=setup.get("delta_d")
-    )
+        distance1=setup.get("d1"), distance2=setup.get("d2"), delta_d=setup.get("delta_d"),
+        ordered=state.ordered,
+    )  # fmt: skip
     if all((site.distance1, site.distance2, site.delta_d)):
         site = replace(site, delta_d=None)
     return replace(site, sigma=max(given)) if given else site

@@ -64,6 +64,8 @@ class Pictures:
         """Show the photos on the wall, as a pair orients them."""
         if len(self.infos) != 2:
             raise InputError("a pair needs two photos.")
+        for number, info in enumerate(self.infos, start=1):
+            pair.photo(number).check_size(info.size, info.path)
         grid = wall_grid(pair, (self.infos[0].size, self.infos[1].size))
         for number, pyramid in enumerate(self.pyramids, start=1):
             photo = pair.photo(number)

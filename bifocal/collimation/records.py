@@ -107,7 +107,9 @@ class DrawnLine:
     closed: bool = False
 
 
-Record = PickedPoint | PickedControl | TapedLength | DrawnLine
+#: An orientation that was accepted: its pair file, and what was reported of it.
+Accepted = dict[str, Any]
+Record = PickedPoint | PickedControl | TapedLength | DrawnLine | Accepted
 
 
 @dataclass(frozen=True, slots=True)
@@ -133,12 +135,16 @@ class SurveyState:
     ----------
     points, control, tapes, lines : dict
         Records by name; tapes by ``from|to``.
+    orientation : dict
+        The orientation that was accepted on the page, as ``pair``.
     setup : dict of str to float or None
         Distances and principal distances asked of the user. [m, mm]
     lenses : dict of int to dict
         Focal length and sensor width of each photo, where typed. [mm]
     stage, language : str
         Where the user is, and in which language.
+    ordered : bool
+        Whether the user exchanged the photos himself.
     revision : int
         Number of the last command.
     undone, done : list of lists of Change
@@ -149,10 +155,12 @@ class SurveyState:
     control: dict[str, PickedControl] = field(default_factory=dict)
     tapes: dict[str, TapedLength] = field(default_factory=dict)
     lines: dict[str, DrawnLine] = field(default_factory=dict)
+    orientation: dict[str, Accepted] = field(default_factory=dict)
     setup: dict[str, float | None] = field(default_factory=dict)
     lenses: dict[int, dict[str, float | None]] = field(default_factory=dict)
     stage: str = ""
     language: str = ""
+    ordered: bool = False
     revision: int = 0
     count: int = 0
     done: list[list[Change]] = field(default_factory=list)
@@ -166,6 +174,14 @@ class SurveyState:
                 records.pop(change.key, None)
             else:
                 records[change.key] = change.after
+
+    def forget_orientation(self) -> None:
+        """Let go of an orientation that was accepted; nothing can be taken back to it."""
+        self.orientation = {}
+        self.done, self.undone = (
+            [changes for changes in history if changes[0].kind != "orientation"]
+            for history in (self.done, self.undone)
+        )
 
     def next_order(self) -> int:
         """Return a place in the list after all given so far."""

@@ -10,7 +10,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, replace
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 from bifocal.collimation.commands import changes_of
 from bifocal.collimation.fields import NOTES, FieldError, fields_of
@@ -29,7 +29,7 @@ from bifocal.collimation.workbook_sync import WorkbookSync
 from bifocal.model.flags import FlagLimits
 from bifocal.model.pair import Pair
 from photocore.errors import InputError, PhotogrammetryError
-from photocore.output import relative_name
+from photocore.output import free_path, relative_name
 
 #: Commands that were answered already, by their ids.
 MOST_ANSWERS = 10_000
@@ -120,21 +120,19 @@ class Session:
     def propose(self, path: Path, report: Mapping[str, Any]) -> None:
         """Show the orientation that a job found; `align.accept` makes it the survey's own."""
         with self.lock:
+            first = Pair.read(path).photo_file(1)
+            if not first.samefile(self.pictures.infos[0].path):
+                self.command({"op": "photos.exchange", "found": True})
             record = {"op": "proposed", "pair": path.name, "report": dict(report)}
             self._write(record)
             self.proposal = record
-            first = Pair.read(path).photo_file(1)
-            if not first.samefile(self.pictures.infos[0].path):
-                self.command({"op": "photos.exchange"})
             self._show_proposal()
             self.changed()
 
     def _show_proposal(self) -> None:
         path = self.proposed_path
         if path is not None:
-            pair = Pair.read(path)
-            self.pictures.show_pair(pair)
-            self.results = self._results(pair)
+            self._show_pair(Pair.read(path))
 
     @property
     def proposed_path(self) -> Path | None:
@@ -153,6 +151,10 @@ class Session:
         """Return results of points with a pair, as `bifocal solve` will find them."""
         return LiveResults(pair, setup=ideal_setup(self.files, pair))
 
+    def _show_pair(self, pair: Pair) -> None:
+        self.pictures.show_pair(pair)
+        self.results = self._results(pair)
+
     def follow_workbook(self) -> None:
         """Take over the orientation of a workbook that is the pair itself, where it changed.
 
@@ -170,8 +172,7 @@ class Session:
         photos = [pair.photo_file(1), pair.photo_file(2)]
         if photos != [info.path for info in self.pictures.infos]:
             self.pictures.show_photos(photos)
-        self.pictures.show_pair(pair)
-        self.results = self._results(pair)
+        self._show_pair(pair)
 
     def _accept(self) -> None:
         """Make the proposed orientation the survey's own pair file."""
@@ -179,22 +180,47 @@ class Session:
         if path is None:
             raise InputError("there is no orientation to accept; align the photos first.")
         target = self.products.place("pair", ".pair.json")
-        accept_pair(path, target)
+        if path != target:
+            accept_pair(path, target)
         self.files = replace(self.files, pair=target)
         self.note_made("pair", [target.name])
-        self._write({"op": "accepted"})
-        self.proposal = None
+        self._write({"op": "accepted", "pair": target.name})
+        self._note_accepted(target.name)
         self._remember_files()
-        pair = Pair.read(target)
-        self.pictures.show_pair(pair)
-        self.results = self._results(pair)
+        self._show_pair(Pair.read(target))
         if self.sync.read is not None:
             self.set_precision(self.sync.read.sigma_px, self.sync.read.limits)
 
+    def _note_accepted(self, name: str) -> None:
+        """Let the last proposal be the survey's orientation, as a step that can be taken back."""
+        after = {"report": {}, **(self.proposal or {}), "pair": name}
+        self.state.forget_orientation()
+        self._apply([Change("orientation", "pair", None, after)])
+        self.proposal = None
+
+    def _follow_orientation(self, change: Change, *, live: bool) -> None:
+        """Propose an orientation whose acceptance was taken back, or accept it again."""
+        gone, came = cast("dict[str, Any] | None", change.before), cast("Any", change.after)
+        self.proposal = gone
+        if live:
+            path = self.files.folder / (gone or came)["pair"]
+            self.files = replace(self.files, pair=path if gone is None else None)
+            self._remember_files()
+            self._show_pair(Pair.read(path))
+
     def _exchange_photos(self) -> None:
+        """Exchange far and near; what was made with them the other way round is put aside."""
         photos = [info.path for info in self.pictures.infos][::-1]
+        if self.pictures.pair is not None:
+            self._write({"op": "unaligned"})
+            made = [self.products.current(kind) for kind in ("relief", "ortho", "pair")]
+            self.note_made("exchanged", [path.name for path in made if path is not None])
+        if self.files.pair is not None:
+            aside = free_path(self.files.folder, f"{self.files.stem}-exchanged", ".pair.json")
+            self.files.pair.replace(aside)
         self.pictures.show_photos(photos)
-        self.files = replace(self.files, photos=tuple(photos))
+        self.results, self.proposal = None, None
+        self.files = replace(self.files, photos=tuple(photos), pair=None)
         self._remember_files()
 
     def note_made(self, kind: str, names: Sequence[str]) -> None:
@@ -251,8 +277,14 @@ class Session:
         if op == "align.accept":
             return self._accept()
         if op == "photos.exchange":
-            if self.files.pair is not None or len(self.pictures.infos) != 2:
-                raise InputError("photos are exchanged before they are oriented.")
+            pair = self.files.pair
+            if len(self.pictures.infos) != 2:
+                raise InputError("there are no photos yet; give two.")
+            if pair is not None and not self.products.is_own(pair):
+                raise InputError(
+                    f"{pair.name}: this survey was begun with it, photos are exchanged before they "
+                    "are oriented. Start with both photos in a folder of their own."
+                )
             result = self._carry_out(command, write=True)
             self._exchange_photos()
             return result
@@ -301,6 +333,8 @@ class Session:
         changes = [change.reversed for change in reversed(source.pop())]
         self.state.apply(changes)
         self.state.revision += 1
+        if changes[0].kind == "orientation":
+            self._follow_orientation(changes[0], live=write)
         target.append(changes)
         return {"name": changes[-1].key}
 
@@ -330,7 +364,9 @@ class Session:
             self.sync.digest = fields["sha256"]
         elif op == "made":
             self.products.note(fields["kind"], fields["names"])
-        elif op in ("proposed", "accepted"):
+        elif op == "accepted" and "pair" in fields:
+            self._note_accepted(fields["pair"])
+        elif op in ("proposed", "accepted", "unaligned"):
             self.proposal = fields if op == "proposed" else None
         elif op not in NOTES:
             self._carry_out(fields, write=False)

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from bifocal.collimation.commands import lens_ratio
 from bifocal.collimation.fields import SETUP
 from bifocal.collimation.live_orientation import LiveOrientation
 from bifocal.collimation.session import Session
@@ -101,17 +102,9 @@ def _photos(session: Session) -> list[dict[str, Any]]:
 
 def _exchanged(session: Session, shown: list[dict[str, Any]]) -> bool:
     """Whether lenses or distances say that the far photo is the near one."""
-    sensors = [photo["sensor_width_mm"] for photo in shown]
-    scales = sensors if all(sensors) else [1.0, 1.0]
-    lenses = [
-        None if photo["focal_mm"] is None else photo["focal_mm"] / scale
-        for photo, scale in zip(shown, scales, strict=True)
-    ]
-    distances = [session.state.setup.get(key) for key in ("d1", "d2")]
-    return any(
-        first is not None and second is not None and first < second
-        for first, second in (lenses, distances)
-    )
+    first, second = (session.state.setup.get(key) for key in ("d1", "d2"))
+    nearer = first is not None and second is not None and first < second
+    return nearer or (lens_ratio(*shown) or 1.0) < 1.0
 
 
 def _missing(info: ImageInfo, typed: Mapping[str, float | None], language: str) -> list[str]:
@@ -155,7 +148,7 @@ def _pair(session: Session, pair: Pair) -> dict[str, Any]:
         )
     centre = np.asarray(pair.zoom_centre)
     found = (session.proposal or {}).get("report", {}).get("remarks", ())
-    remarks = (*pair.remarks, *found)
+    remarks = dict.fromkeys((*pair.remarks, *found))
     return plain(
         {
             "name": str(pair.extra.get("name") or session.files.stem),
@@ -219,7 +212,9 @@ def _advice(session: Session, live: LiveOrientation | None) -> list[str]:
         return [say("ask", "photos", language)]
     if session.files.pair is not None:
         return [] if session.state.points else [say("advice", "points", language)]
-    return [] if live is None else list(live.advice)
+    # What was found contradictory or unknown is said first.
+    told = ["".join((session.proposal or {}).get("report", {}).get("remarks", ())[:1])]
+    return [text for text in map(without_options, told) if text] + list(live.advice if live else ())
 
 
 def _points(session: Session) -> list[dict[str, Any]]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import hashlib
 import os
+import re
 import shutil
 import tempfile
 import threading
@@ -57,7 +58,7 @@ class TileStore:
         kept = self.folder / name
         if kept.is_dir():
             for old in kept.iterdir():
-                if old.name != version:
+                if old.name != version and re.fullmatch("[0-9a-f]{16}", old.name):  # ours
                     shutil.rmtree(old, ignore_errors=True)
 
     def forget(self, name: str) -> None:

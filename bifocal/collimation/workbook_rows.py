@@ -29,7 +29,7 @@ from photocore.errors import InputError, PhotogrammetryError
 from photocore.output import (
     atomic_path,
     check_not_open,
-    free_path,
+    kept_copy,
     relative_name,
     scratch_beside,
 )
@@ -203,8 +203,7 @@ def change_rows(
         if digest_of(path) != before:
             raise InputError(f"{path.name}: was changed by another program just now.")
         if keep:
-            backup = free_path(path.parent, f"{path.name}.bak")
-            backup.write_bytes(path.read_bytes())
+            kept_copy(path)
 
 
 def _solved(typed: Path, target: Path) -> bool:

@@ -130,7 +130,7 @@ def create_raster(
         with create_geotiff(
             path, width=grid.width, height=grid.height, bands=bands, dtype=dtype, names=names,
             colour=colour, nodata=nodata, overviews=overviews, overwrite=overwrite, tags=known,
-            crs=CRS.from_wkt(LOCAL_CRS.format(name=crs_name.replace('"', "'"))),
+            crs=CRS.from_wkt(LOCAL_CRS.format(name=_printable(crs_name))),
             transform=corner_transform(grid.plane_from_pixel),
         ) as writer:  # fmt: skip
             yield writer
@@ -140,6 +140,11 @@ def create_raster(
             with atomic_path(world, overwrite=overwrite) as temporary:
                 text = "".join(f"{value:.12f}\n" for value in values)
                 temporary.write_text(text, encoding="ascii")
+
+
+def _printable(name: str) -> str:
+    """Return a name as the text of a coordinate system takes it: no quotes, nothing unseen."""
+    return "".join(c if c.isprintable() else " " for c in name).replace('"', "'")
 
 
 def dpi_at_scale(gsd: float, scale: float) -> float:

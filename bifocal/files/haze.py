@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from bifocal.files.images import as_grey, read_grey, read_image
 from bifocal.model.image import as_photo, local_contrast, noise
+from bifocal.model.pair import Pair
 from photocore.arrays import ByteArray, Float32Array
 
 #: Grey values that all but these percentiles are stretched to.
@@ -67,6 +68,22 @@ def greys_through_water(
     weights = _weights(photos[0])
     first, second = (cv2.transform(photo.astype(np.float32), weights[None]) for photo in photos)
     return _stretched(np.asarray(first)), _stretched(np.asarray(second))
+
+
+def greys_of_pair(
+    pair: Pair, image1: NDArray[np.generic], image2: NDArray[np.generic]
+) -> tuple[ByteArray, ByteArray]:
+    """Return both photos of a pair in grey, for matching, in air or through its media.
+
+    Raises
+    ------
+    InputError
+        If one is no photo, or of another size than the pair was made from.
+    """
+    greys = as_grey(image1, "image1"), as_grey(image2, "image2")
+    for number, grey in enumerate(greys, start=1):
+        pair.photo(number).check_size(grey.shape[::-1], f"image{number}")
+    return greys if pair.layers is None else greys_through_water(image1, image2)
 
 
 def read_greys(

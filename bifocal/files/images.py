@@ -18,7 +18,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bifocal.model.image import as_photo
+from bifocal.model.pair import Pair
 from photocore.arrays import ByteArray
+from photocore.decoding import decoded, decoders_words, refuse_damaged_jpeg
 from photocore.errors import InputError
 from photocore.output import atomic_path, check_ending
 from photocore.provenance import note
@@ -123,6 +125,19 @@ def image_info(path: Path | str) -> ImageInfo:
         raise InputError(f"{path}: the image is damaged ({error}).") from error
 
 
+def photo_info(pair: Pair, number: int) -> ImageInfo:
+    """Return what photo 1 or 2 of a pair says of itself; see `image_info`.
+
+    Raises
+    ------
+    InputError
+        Also if it is of another size than the pair was made from.
+    """
+    info = image_info(pair.photo_file(number))
+    pair.photo(number).check_size(info.size, info.path)
+    return info
+
+
 def read_image(path: Path | str, *, grey: bool = False) -> ImageArray:
     """Return the upright pixels of a photo.
 
@@ -145,22 +160,16 @@ def read_image(path: Path | str, *, grey: bool = False) -> ImageArray:
     """
     info = image_info(path)
     if info.size[0] * info.size[1] > _BY_STRIPS and not grey:
+        refuse_damaged_jpeg(info.path)
         large = _read_by_strips(info)
         if large is not None:
             return turn_upright(large, info.orientation)
     flags = cv2.IMREAD_IGNORE_ORIENTATION | cv2.IMREAD_ANYDEPTH
     flags |= cv2.IMREAD_GRAYSCALE if grey else cv2.IMREAD_ANYCOLOR
     data = np.fromfile(info.path, dtype=np.uint8)  # imread itself fails on some Windows paths
-    if info.path.suffix.lower() in {".jpg", ".jpeg"}:
-        _refuse_cut_jpeg(info.path, data)
-    elif info.path.suffix.lower() in {".tif", ".tiff"}:
+    if info.path.suffix.lower() in {".tif", ".tiff"}:
         _hide_tiff_orientation(info.path, data)
-    try:
-        image = cv2.imdecode(data, flags)
-    except cv2.error as error:
-        raise InputError(f"{path}: the image cannot be decoded ({error.err}).") from error
-    if image is None:
-        raise InputError(f"{path}: the image cannot be decoded; open it and save it again.")
+    image = decoded(path, data, flags)
     if image.dtype not in (np.uint8, np.uint16):
         raise InputError(f"{path}: {image.dtype} pixels are not read; save it with 8 or 16 bits.")
     del data
@@ -274,7 +283,7 @@ def _tiff_info(path: Path) -> ImageInfo:
     import tifffile
 
     try:
-        with tifffile.TiffFile(path) as tiff:
+        with decoders_words(), tifffile.TiffFile(path) as tiff:
             page: Any = tiff.pages[0]
             if page.photometric == tifffile.PHOTOMETRIC.SEPARATED:
                 _check_mode(path, "CMYK")
@@ -351,12 +360,6 @@ def _pitch(tags: dict[int, Any]) -> float | None:
     resolution = _number(tags.get(41486))
     unit = {2: 25.4, 3: 10.0, 4: 1.0}.get(tags.get(41488, 2))
     return unit / resolution if resolution and unit else None
-
-
-def _refuse_cut_jpeg(path: Path, data: NDArray[np.uint8]) -> None:
-    """Refuse a JPEG without end-of-image mark: OpenCV would fill the rest with grey, silently."""
-    if data.tobytes().rfind(b"\xff\xd9") < len(data) // 2:
-        raise InputError(f"{path}: the photo is cut off (no end of image); copy it again.")
 
 
 def _hide_tiff_orientation(path: Path, data: NDArray[np.uint8]) -> None:

@@ -30,6 +30,6 @@ of relief and in no sigma.'
     d1, d2 = pair.straight_distances
     slip = float(false_relief_of_scale(0.01, d1=d1, d2=d2))
     share = f"of which 1 % of scale is {slip:.2f} m of relief and in no sigma"
-    if pair.orientation is not None:
+    if pair.whole_orientation is not None:
         share = "with the covariance of its orientation"
     return f"Sigmas rest on: {picks}; {setup}, {share}{'; ' + more if more else ''}."

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 
 from bifocal import rays
 from bifocal.model import orientation_precision
+from bifocal.model.doubts import covariance_of_doubts, doubts_in_words
 from bifocal.model.flags import FlagLimits
 from bifocal.model.intersection import Intersection, intersect
 from bifocal.model.photo import Photo
@@ -85,8 +86,10 @@ class Pair:
                 object.__setattr__(self, "orientation", turned)
             note = f"image1 was the near camera ({d1:g} m < {d2:g} m); the two were exchanged."
             object.__setattr__(self, "remarks", (*self.remarks, note))
-        if doubts := self._doubts_about_media():
-            object.__setattr__(self, "remarks", (*self.remarks, *doubts))
+        first, last = doubts_in_words(self.extra.get("setup")), self._doubts_about_media()
+        if first or last:
+            told = tuple(dict.fromkeys((*first, *self.remarks, *last)))
+            object.__setattr__(self, "remarks", told)
 
     def _doubts_about_media(self) -> tuple[str, ...]:
         """Return what looks like a slip in what lies between cameras and object."""
@@ -237,6 +240,17 @@ class Pair:
         """Whether the covariance is that of all that places and bends the pair's rays."""
         whole = len(orientation_precision.names_of(self.layers))
         return self.orientation is not None and len(self.orientation) == whole
+
+    @property
+    def whole_orientation(self) -> FloatArray | None:
+        """``orientation`` and what is known to be wrong; None where the pair states neither."""
+        whole = self.orientation if self._knows_its_precision else None
+        doubted = covariance_of_doubts(self.extra.get("setup"))
+        if doubted is not None:
+            size = len(orientation_precision.names_of(self.layers))
+            whole = np.zeros((size, size)) if whole is None else whole.copy()
+            whole[:_IN_AIR, :_IN_AIR] += doubted
+        return whole
 
     @property
     def zoom_centre(self) -> FloatArray:
@@ -422,13 +436,14 @@ class Pair:
         Returns
         -------
         ndarray, shape (n, 3, 3)
-            Zero where the pair does not state it, or through media only that of its cameras.
+            Zero where the pair does not state it, or through media only that of its cameras; with
+            what its file says is wrong with it, as a bent wall.
             Common to all points: neighbours share it.
         """
-        if self.orientation is None or not self._knows_its_precision:
+        if (whole := self.whole_orientation) is None:
             return np.zeros((len(xyz), 3, 3))
         photos = (self.image1, self.image2)
-        return orientation_precision.orientation_covariance(photos, self.orientation, xyz)
+        return orientation_precision.orientation_covariance(photos, whole, xyz)
 
     def effect_of_orientation(self, xyz: FloatArray) -> FloatArray | None:
         """Return what independent errors of the pair's own orientation, of sigma 1, move points by.
@@ -444,7 +459,7 @@ class Pair:
             Errors in X, Y, r [m], the same k errors for all points; None where the pair does not
             state its covariance, or through media only that of its cameras.
         """
-        if self.orientation is None or not self._knows_its_precision:
+        if (whole := self.whole_orientation) is None:
             return None
         photos = (self.image1, self.image2)
-        return orientation_precision.orientation_effect(photos, self.orientation, xyz)
+        return orientation_precision.orientation_effect(photos, whole, xyz)

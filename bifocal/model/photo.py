@@ -31,6 +31,8 @@ from photocore.errors import GeometryError, InputError, located
 
 #: No wall is photographed from further away, nor has coordinates beyond. [m]
 FARTHEST, OUTERMOST = 1e5, 1e8
+#: What is typed beyond this is in millimetres or centimetres, unless something measured agrees. [m]
+FARTHEST_WALL = 500.0
 #: Numbers of a photo that the pair file may hold, with their units.
 _OPTIONAL = {"sigma_pixel": "px", "principal_distance": "mm", "pixel_size": "mm"}
 #: The normal of a port that is square to the camera's optical axis.
@@ -57,6 +59,8 @@ class Photo:
         Distortion of the pixels; None if they are free of it.
     sigma_pixel : float or None
         Measuring precision. [px]
+    image_size : tuple of int, or None
+        Width and height of the photo that the homography belongs to; None where not known. [px]
     principal_distance, pixel_size : float or None
         Of the camera, for lengths in millimetres of the image. [mm]
     layers : Layers or None
@@ -77,6 +81,7 @@ class Photo:
     file: str = ""
     lens: Lens | None = None
     sigma_pixel: float | None = None
+    image_size: tuple[int, int] | None = None
     principal_distance: float | None = None
     pixel_size: float | None = None
     layers: Layers | None = None
@@ -105,6 +110,8 @@ class Photo:
                     f"{name}: {getattr(self, name)} m is beyond reason (more than {most:g} m); "
                     "check the number and its unit, metres."
                 )
+        if self.image_size is not None:
+            set_(self, "image_size", _whole_size(self.image_size))
         for name, unit in _OPTIONAL.items():
             value = getattr(self, name)
             set_(self, name, None if value is None else positive(value, name, unit=unit))
@@ -246,6 +253,35 @@ class Photo:
         reference = self.plane_from_pixel[2] @ [shape[1] / 2, shape[0] / 2, 1.0]
         return np.asarray(scale * reference > 0)
 
+    def check_size(self, size: tuple[int, int], name: Path | str) -> None:
+        """Refuse a photo of another size than that the homography belongs to.
+
+        Parameters
+        ----------
+        size : tuple of int
+            Width and height of the photo. [px]
+        name : path or str
+            What to call it.
+
+        Raises
+        ------
+        InputError
+            With both sizes, and what became of the photo.
+        """
+        made = self.image_size
+        if made is None or size == made:
+            return
+        ratio = size[0] / made[0], size[1] / made[1]
+        what = "a part of it, or another photo"
+        if abs(ratio[0] - ratio[1]) <= max(1 / made[0], 1 / made[1]):  # within a rounded pixel
+            what = f"a copy {'reduced' if ratio[0] < 1 else 'enlarged'} to {ratio[0]:.3g} of it"
+        elif size == made[::-1]:
+            what = "it turned by 90 degrees"
+        raise InputError(
+            f"{name}: {size[0]} x {size[1]} px, the pair was made from {made[0]} x {made[1]} px: "
+            f"this is {what}. Use the photo as it was, or align this one anew."
+        )
+
     def gsd(self, size: tuple[int, int]) -> float:
         """Return the side of a pixel in the middle of a photo of (width, height) px. [m]
 
@@ -307,7 +343,7 @@ class Photo:
                 plane_from_pixel=data.pop("plane_from_pixel"),
                 nadir=data.pop("nadir"),
                 distance=data.pop("distance"),
-                **{name: data.pop(name, None) for name in (*_OPTIONAL, *_MEDIA)},
+                **{name: data.pop(name, None) for name in ("image_size", *_OPTIONAL, *_MEDIA)},
                 layers=layers,
                 extra=data,
             )
@@ -320,10 +356,17 @@ class Photo:
             "nadir": self.nadir,
             "distance": self.distance,
         }
-        for name in (*_OPTIONAL, *_MEDIA):
+        for name in ("image_size", *_OPTIONAL, *_MEDIA):
             if (value := getattr(self, name)) is not None:
                 data[name] = value
         return data | dict(self.extra)
+
+
+def _whole_size(size: Any) -> tuple[int, int]:
+    width, height = read_only(size, "image_size", shape=(2,)).tolist()
+    if min(width, height) < 1 or width % 1 or height % 1:
+        raise InputError(f"image_size: expected [columns, rows] in whole pixels, found {size}.")
+    return int(width), int(height)
 
 
 def _towards_camera(data: Mapping[str, Any]) -> FloatArray:

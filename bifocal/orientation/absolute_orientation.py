@@ -5,26 +5,37 @@ One adjustment serves all three ways; they differ in what is observed. See docs/
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
 from bifocal.orientation import validation
+from bifocal.orientation.approximate_orientation import (
+    Given,
+    approximate_cameras,
+    check_picks,
+    contradiction,
+    observations_of,
+    order_of,
+    ties_of,
+)
 from bifocal.orientation.as_set_up import check_room
-from bifocal.orientation.bend import MOST_BENT, STRONGLY_BENT, bend_in_words, bend_of_wall
+from bifocal.orientation.bend import STRONGLY_BENT, WallBend, bend_in_words, bend_of_wall
 from bifocal.orientation.control_points import Control, SiteMeasures
-from bifocal.orientation.features import find_features
-from bifocal.orientation.interior_orientation import Cameras, Interiors, with_one_lens
+from bifocal.orientation.interior_orientation import with_one_lens
 from bifocal.orientation.media_report import media_remarks, refuse_impossible_media
 from bifocal.orientation.orientation_remarks import (
+    WORST_FIT,
     assumptions,
     control_remarks,
     distance_remarks,
     model_remarks,
+    order_remarks,
+    wall_remarks,
 )
 from bifocal.orientation.orientation_stages import (
     ONE_LENS,
-    SIGMA_PARALLEL,
     OrientedPair,
     Photos,
     control_alone,
@@ -33,51 +44,24 @@ from bifocal.orientation.orientation_stages import (
 )
 from bifocal.orientation.pair_media import THROUGH_MEDIA, PairMedia
 from bifocal.orientation.pair_observations import PairObservations, PairUnknowns
+from bifocal.orientation.photo_order import SURE
 from bifocal.orientation.refracted_bend import refracted_bend
 from bifocal.orientation.refracted_resection import resect_through
 from bifocal.orientation.refracted_stage import with_bent_ties
 from bifocal.orientation.relative_orientation import (
     Ties,
-    epipolar_distance,
-    find_ties,
-    first_cameras,
-    plane_scale,
 )
-from bifocal.orientation.space_resection import resect
-from bifocal.orientation.tie_points import robust_sigma, tie_positions
-from photocore.arrays import BoolArray
-from photocore.camera import fundamental, ray_on_plane
-from photocore.errors import GeometryError, located
-from photocore.similarity import Similarity, fit_plane
+from bifocal.orientation.slips import MOST, Fitted, Typed, slip_of
+from bifocal.orientation.tie_points import (
+    FEWEST_ON_WALL,
+    likely_on_wall,
+    tie_positions,
+)
+from photocore.errors import ConvergenceError, GeometryError, PhotogrammetryError, located
 
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class _Given:
-    """What `orient_pair` is given."""
-
-    photos: Photos
-    control: Control
-    site: SiteMeasures
-    media: PairMedia | None = None
-
-    @property
-    def names(self) -> tuple[str, str]:
-        """Names of the photos."""
-        return self.photos[0].name, self.photos[1].name
-
-    @property
-    def interiors(self) -> Interiors:
-        """Interior orientations of the photos."""
-        return self.photos[0].interior, self.photos[1].interior
-
-    @property
-    def enough(self) -> bool:
-        """Whether control points alone orient both cameras."""
-        known, control = self.control.positioned, self.control
-        return all(
-            (known & np.isfinite(pixels).all(axis=1)).sum() >= 4
-            for pixels in (control.pixels1, control.pixels2)
-        )
+#: Distances that control through media leaves so uncertain are not found from common points either,
+#: without focal lengths: 44 % ends at 10 %.
+HOPELESS = 0.6
 
 
 def orient_pair(
@@ -102,45 +86,89 @@ def orient_pair(
         If the photos and measurements do not make a pair; the message says why and what to do.
     """
     if media is not None:
-        return _through_media(_Given(photos=photos, control=control, site=site, media=media), media)
+        given = Given(photos=photos, control=control, site=site, media=media)
+        lacking = validation.unknown_lenses(given.interiors, given.names)
+        try:
+            return _through_media(given, media, lacking)
+        except GeometryError as error:
+            if not lacking or "--focal1" in str(error):
+                raise
+            raise GeometryError(f"{error} The likely reason: {lacking}.") from error
     interiors, one_lens = with_one_lens((photos[0].interior, photos[1].interior))
     first, second = (replace(p, interior=i) for p, i in zip(photos, interiors, strict=True))
     photos = (first, second)
-    given = _Given(photos=photos, control=control, site=site)
+    given = Given(photos=photos, control=control, site=site)
     enough = given.enough
-    ties, remarks = _ties(given, needed=not enough)
-    cameras, agree, interiors = _start(given, ties, enough)
+    lacking = validation.unknown_lenses(interiors, given.names)
+    if lacking and not enough and None in site.distances:
+        raise GeometryError(f"{lacking}, or both distances, or four control points.")
+    ties, remarks = ties_of(given, needed=not enough)
+    if ties is not None and not enough:
+        order = order_of(given, ties)
+        if order < -SURE:
+            return _with_photos_exchanged(given, typed_stay=True)
+        remarks = (*remarks, *order_remarks(order, given.names))
+    stated = site
+    if enough:
+        right = _typed_right(given, lambda one: _by_control(one, ties), by_control=True)
+        if right is not None:
+            return right
+    cameras, agree, interiors = approximate_cameras(given, ties, enough)
     if enough and ties is not None:
-        misfit = _contradiction(cameras, ties)
-        if misfit > 2 * ties.tolerance and _picks_exchanged(given, ties, misfit):
-            return _with_picks_exchanged(given)
+        check_picks(cameras, ties, interiors)
     if cameras[0].centre[2] < cameras[1].centre[2]:
         return _with_photos_exchanged(given)
+    if site.distance1 and site.distance2 and site.distance1 < site.distance2:
+        turned = replace(site, distance1=site.distance2, distance2=site.distance1)
+        note = (
+            f"--distance1 {site.distance1:g} m is less than --distance2 {site.distance2:g} m, but "
+            f"{photos[0].name} is the far photo; the two distances were exchanged."
+        )
+        return _told(replace(given, site=turned), note)
     if enough:
         validation.check_units(cameras, site)
     elif ties is not None:
-        validation.check_parallax(ties, interiors, given.names, flat_is_fine=site.parallel)
-    observations = _observations(given, interiors, ties, agree)
+        flat = validation.is_flat(ties, interiors, given.names, flat_is_fine=site.parallel)
+        # What stands out shows how the cameras stood; a flat wall does not.
+        site = replace(site, parallel=flat)
+        given = replace(given, site=site)
+    observations = observations_of(given, interiors, ties, agree)
     if one_lens:
         observations = replace(observations, sigma_zoom=ONE_LENS)
     start = PairUnknowns(cameras=cameras)
     if ties is not None:
         start = replace(start, radial=np.array([[ties.radial, 0.0]] * 2))
+
+    def mended(seen: PairObservations) -> OrientedPair | None:
+        if ties is None or enough:
+            return None
+        return _typed_right(given, lambda one: _by_ties(one, ties, seen), by_control=False)
+
     try:
-        pair = oriented_in_stages(observations, start, photos, site, with_control=enough)
-    except GeometryError as error:
+        pair = oriented_in_stages(observations, start, photos, stated, with_control=enough)
+    except (GeometryError, ConvergenceError) as error:
+        right = mended(observations)
+        if right is not None:
+            return right
         # Photos through glass or water may fit no cameras at all: then that is the reason.
-        raise _reason(error, observations, start) from error
-    bend = _bend(pair.observations, pair.adjusted)
-    pair = replace(pair, bend=bend)
-    # A model that does not fit leaves honest points with large misfits.
-    pair = pair if bend > MOST_BENT else without_gross(pair)
+        raise _reason(error, observations, start, lacking) from error
+    pair = without_gross(replace(pair, bend=_bend(pair.observations, pair.adjusted)))
+    doubts = model_remarks(pair, site)
+    right = mended(pair.observations) if doubts else None
+    if right is not None:
+        return right
+    likely = likely_on_wall(pair.observations, pair.adjusted)
+    if not enough and pair.bend.px > STRONGLY_BENT and likely < FEWEST_ON_WALL:
+        # What holds a bent wall by small chances only is none.
+        known = any(i.is_calibrated or i.sigma_radial > 0 for i in interiors)
+        raise GeometryError(bend_in_words(pair.bend, with_lens=known))
     validation.check_determined(pair.adjusted)
     validation.check_movement(pair.adjusted)
     told = (
         *remarks,
-        *model_remarks(pair, site),
+        *doubts,
         *pair.remarks,
+        *wall_remarks(pair),
         *control_remarks(control, pair),
         *distance_remarks(pair),
     )
@@ -148,7 +176,7 @@ def orient_pair(
     return replace(pair, remarks=told, assumed=assumed)
 
 
-def _through_media(given: _Given, media: PairMedia) -> OrientedPair:
+def _through_media(given: Given, media: PairMedia, lacking: str) -> OrientedPair:
     """Return the cameras of a pair that looks through media, from control and common points.
 
     Common points say that their bent rays meet; the plane is that of the control points.
@@ -170,16 +198,19 @@ def _through_media(given: _Given, media: PairMedia) -> OrientedPair:
     if cameras[0].centre[2] < cameras[1].centre[2]:
         return _with_photos_exchanged(given)
     validation.check_units(cameras, given.site)
-    observations = replace(_observations(given, interiors, None, agree), media=media)
+    observations = replace(observations_of(given, interiors, None, agree), media=media)
     start = PairUnknowns(cameras=cameras, media=media)
     pair = control_alone(observations, start, named=given.site.wall is not None)
-    ties, remarks = _ties(given, needed=False)
+    shares = [pair.adjusted.sigma("Z", n) / pair.adjusted.cameras[n - 1].centre[2] for n in (1, 2)]
+    if lacking and max(shares) > HOPELESS:
+        raise GeometryError(f"the control points alone do not tell the distances, and {lacking}.")
+    ties, remarks = ties_of(given, needed=False)
     note = "the media as given, no common points: control points alone"
     if ties is not None:
         pair, note = with_bent_ties(pair, ties), "the media as given"
         bend = refracted_bend(pair.adjusted, ties.seen1, ties.seen2, interiors[0].image_size)
         pair = replace(pair, bend=bend)
-    pair = pair if pair.bend > MOST_BENT else without_gross(pair)
+    pair = without_gross(pair)
     refuse_impossible_media(pair.adjusted, media)
     check_room(pair.adjusted.media, pair.adjusted.cameras)
     validation.check_determined(pair.adjusted)
@@ -195,11 +226,11 @@ def _through_media(given: _Given, media: PairMedia) -> OrientedPair:
     return replace(pair, remarks=told, assumed=assumed)
 
 
-def _bend(observations: PairObservations, state: PairUnknowns) -> float:
-    """Return how far the wall is from a plane between the photos. [px at 3000 px of width]"""
+def _bend(observations: PairObservations, state: PairUnknowns) -> WallBend:
+    """Return how far the wall is from a plane between the photos."""
     used = observations.tie_used
     if used.sum() < 30:
-        return float("nan")
+        return WallBend()
     seen1, seen2 = observations.straight_ties(state.radial)
     height = tie_positions(observations, state)[used, 2] / state.cameras[0].centre[2]
     size = observations.interiors[0].image_size
@@ -207,61 +238,109 @@ def _bend(observations: PairObservations, state: PairUnknowns) -> float:
 
 
 def _reason(
-    error: GeometryError, observations: PairObservations, state: PairUnknowns
-) -> GeometryError:
+    error: PhotogrammetryError, observations: PairObservations, state: PairUnknowns, lacking: str
+) -> PhotogrammetryError:
     """Return why no cameras were found: that the wall is bent where it strongly is, or the error.
+
+    With what is ``lacking`` of the lenses.
 
     Features as first found are good to a pixel; only a bend beyond `STRONGLY_BENT` counts.
     """
     bend = _bend(observations, state)
-    if not bend > STRONGLY_BENT:
-        return error
+    if not bend.px > STRONGLY_BENT:
+        return GeometryError(f"{error} The likely reason: {lacking}.") if lacking else error
     known = any(i.is_calibrated or i.sigma_radial > 0 for i in observations.interiors)
     return GeometryError(bend_in_words(bend, with_lens=known))
 
 
-def _contradiction(cameras: Cameras, ties: Ties) -> float:
-    """Return how far the common points are from the cameras' epipolar lines. [px]"""
-    return robust_sigma(epipolar_distance(fundamental(*cameras), ties.pixels1, ties.pixels2))
-
-
-def _picks_exchanged(given: _Given, ties: Ties, misfit: float) -> bool:
-    """Return whether the picks of the two photos were exchanged.
+def _typed_right(
+    given: Given, fitted: Callable[[Given], Fitted | None], *, by_control: bool
+) -> OrientedPair | None:
+    """Return the pair with the slip mended that explains a misfit, saying so; None without one.
 
     Raises
     ------
     GeometryError
-        If they fit neither way round.
+        Naming a slip that only the user can mend.
     """
-    try:
-        turned = replace(given, control=given.control.exchanged())
-        cameras = _start(turned, ties, True)[0]
-        other = _contradiction(cameras, ties)
-    except GeometryError:
-        other = np.inf
-    if other < 0.5 * misfit:
-        return True
-    if misfit > 0.012 * max(given.interiors[0].image_size):
-        raise GeometryError(
-            "the control points' pixels do not fit the photos: the details common to both photos "
-            "contradict them. Check that col1, row1 are pixels of the first photo and col2, row2 "
-            "of the second, at full size."
-        )
-    return False
+
+    def meant(typed: Typed) -> Given:
+        both = zip(given.photos, typed.interiors, strict=True)
+        first, second = (replace(photo, interior=interior) for photo, interior in both)
+        return replace(given, photos=(first, second), control=typed.control, site=typed.site)
+
+    typed = Typed(interiors=given.interiors, control=given.control, site=given.site)
+    slip = slip_of(typed, lambda one: fitted(meant(one)), by_control=by_control)
+    if slip is not None and not slip.mended:
+        raise GeometryError(slip.words)
+    return None if slip is None else _told(meant(slip.meant), slip.words)
 
 
-def _with_picks_exchanged(given: _Given) -> OrientedPair:
-    """Return the pair with the picks of the two photos exchanged, saying so."""
-    pair = orient_pair(given.photos, control=given.control.exchanged(), site=given.site)
-    note = (
-        f"col1, row1 of the control points are pixels of {given.names[1]}, col2, row2 of "
-        f"{given.names[0]}; the picks were exchanged."
-    )
+def _told(given: Given, note: str) -> OrientedPair:
+    """Return the pair of what is given instead of what was typed, saying so."""
+    pair = orient_pair(given.photos, control=given.control, site=given.site)
     return replace(pair, remarks=(note, *pair.remarks))
 
 
-def _with_photos_exchanged(given: _Given) -> OrientedPair:
-    """Return the pair with the photos the other way round, saying so."""
+def _by_control(given: Given, ties: Ties | None) -> Fitted | None:
+    """Return how well control points, lenses, tapes and common points fit each other.
+
+    Whichever photo is the far one, the longer distance is its. Control points leave the lines of
+    common points uncertain by some pixels.
+    """
+    d1, d2 = given.site.distance1, given.site.distance2
+    try:
+        cameras, agree, interiors = approximate_cameras(given, None, True)
+        z1, z2 = (float(camera.centre[2]) for camera in cameras)
+        if d1 and d2 and (d1 < d2) != (z1 < z2):
+            given = replace(given, site=replace(given.site, distance1=d2, distance2=d1))
+        if any(
+            known and not 0.5 < known / z < 2
+            for known, z in zip((given.site.distance1, given.site.distance2), (z1, z2), strict=True)
+        ):  # another unit: `validation.check_units` says so
+            given = replace(given, site=replace(given.site, distance1=None, distance2=None))
+        observations = observations_of(given, interiors, None, agree)
+        pair = control_alone(observations, PairUnknowns(cameras=cameras), named=False)
+        pair = without_gross(pair)
+    except (GeometryError, ConvergenceError):
+        return None
+    adjusted, used = pair.adjusted, pair.observations.pick_used
+    test = np.minimum(adjusted.control_test[given.control.positioned], MOST)
+    square = float((test**2).mean()) + _pulled(pair) / (4 * len(test))
+    if ties is not None:
+        off = contradiction(adjusted.cameras, ties) / (2 * ties.tolerance)
+        square += max(off - 1.0, 0.0) ** 2
+    return Fitted(misfit=float(np.sqrt(square)), cameras=adjusted.cameras, lost=~used)
+
+
+def _by_ties(given: Given, ties: Ties, seen: PairObservations) -> Fitted | None:
+    """Return how well common points as matched meet, as a share of what they may miss by."""
+    first, second = (replace(photo, grey=None) for photo in given.photos)
+    try:
+        cameras, _, interiors = approximate_cameras(given, ties, False)
+        tilt = seen.sigma_tilt if given.site.parallel else None
+        seen = replace(seen, interiors=interiors, lines=(), sigma_tilt=tilt)
+        start = PairUnknowns(cameras=cameras)
+        pair = oriented_in_stages(seen, start, (first, second), given.site, with_control=False)
+    except (GeometryError, ConvergenceError):
+        return None
+    fine = WORST_FIT / 3 * max(interiors[0].image_size) / 3000
+    misfit = float(np.hypot(pair.observations.sigma_tie / fine, np.sqrt(_pulled(pair) / 2)))
+    return Fitted(misfit=misfit, cameras=pair.adjusted.cameras, lost=~pair.observations.pick_used)
+
+
+def _pulled(pair: OrientedPair) -> float:
+    """Return the sum of squares by which focal lengths came out other than known, in sigma."""
+    pairs = zip(pair.adjusted.cameras, pair.observations.interiors, strict=True)
+    changes = [np.log(c.matrix[0, 0] / i.focal) / i.sigma_focal for c, i in pairs]
+    return float(np.sum(np.square(changes)))
+
+
+def _with_photos_exchanged(given: Given, *, typed_stay: bool = False) -> OrientedPair:
+    """Return the pair with the photos the other way round, saying so.
+
+    What was typed for the far photo goes with its file, or stays with the far one.
+    """
     (near, far), site = given.names, given.site
     if site.wall is not None:
         raise GeometryError(
@@ -271,147 +350,15 @@ def _with_photos_exchanged(given: _Given) -> OrientedPair:
     if site.distance1 and site.distance2 and site.distance1 < site.distance2:
         site = replace(site, distance1=site.distance2, distance2=site.distance1)
     media = given.media and given.media.exchanged()
-    pair = orient_pair(
-        given.photos[::-1], control=given.control.exchanged(), site=site, media=media
-    )
+    photos = given.photos[::-1]
+    if typed_stay:
+        first, second = given.interiors
+        photos = replace(photos[0], interior=first), replace(photos[1], interior=second)
+        site = replace(site, ordered=True)
+    pair = orient_pair(photos, control=given.control.exchanged(), site=site, media=media)
     note = (
         f"{near} is the near photo; the two were exchanged. Image 1 of the pair file is {far}, and "
-        "--distance1 means its distance."
+        "--distance1 means its distance"
+        + (", --focal1 its lens; if it is not so, measure control points." if typed_stay else ".")
     )
     return replace(pair, exchanged=True, remarks=(note, *pair.remarks))
-
-
-def _ties(given: _Given, *, needed: bool) -> tuple[Ties | None, tuple[str, ...]]:
-    """Return the photos' common points and remarks; none only if control points suffice."""
-    far, near = given.photos[0].grey, given.photos[1].grey
-    if far is None or near is None:
-        return None, ()
-    try:
-        for name, image in zip(given.names, (far, near), strict=True):
-            validation.check_sharp(name, image)
-        validation.check_different(*given.names, (far, near))
-        features = find_features(far), find_features(near)
-        return find_ties(*features, given.interiors, given.names), ()
-    except GeometryError as error:
-        if needed or isinstance(error, validation.SamePhotoError):
-            raise
-        remark = f"The pair rests on the control points alone, without common points: {error}"
-        return None, (remark,)
-
-
-def _start(given: _Given, ties: Ties | None, enough: bool) -> tuple[Cameras, BoolArray, Interiors]:
-    """Return approximate cameras, the control points that agree, and the interiors used."""
-    control, interiors = given.control, given.interiors
-    agree = np.ones(len(control.ids), dtype=bool)
-    if enough:
-        cameras = []
-        for pixels, photo in zip((control.pixels1, control.pixels2), given.photos, strict=True):
-            seen = control.positioned & np.isfinite(pixels).all(axis=1)
-            xyz = np.nan_to_num(control.xyz[seen])
-            with located(photo.name):
-                camera, fits = resect(xyz, photo.interior.ideal(pixels[seen]), photo.interior)
-            cameras.append(camera)
-            agree[np.flatnonzero(seen)[~fits]] = False
-        return (cameras[0], cameras[1]), agree, interiors
-    if ties is None:
-        raise GeometryError("too few control points, and no common points to go with them.")
-    interiors = _plausible_focals(interiors, ties, given.site)
-    return _scaled(first_cameras(ties, interiors), given, interiors), agree, interiors
-
-
-def _plausible_focals(interiors: Interiors, ties: Ties, site: SiteMeasures) -> Interiors:
-    """Return interiors whose unknown focal length follows from the distances and the scale."""
-    first, second = interiors
-    if not (first.is_assumed or second.is_assumed):
-        return interiors
-    d1, d2 = site.distances
-    if not (d1 and d2):
-        raise GeometryError(
-            "the focal lengths are unknown (no EXIF). Give --lens, or --focal1 and --focal2 with "
-            "--sensor-width or --pixel-size, or both distances, or four control points."
-        )
-    # On the wall photo 2 is s times as large: s = (f2 / d2) / (f1 / d1).
-    ratio = plane_scale(ties, first.image_size) * d2 / d1
-    if second.is_assumed:
-        return first, replace(second, focal=first.focal * ratio)
-    return replace(first, focal=second.focal / ratio), second
-
-
-def _scaled(cameras: Cameras, given: _Given, interiors: Interiors) -> Cameras:
-    """Return cameras of far distance 1 brought to metres and, where known, to X and Y."""
-    control, site = given.control, given.site
-    near, scale = cameras[1].centre[2], 0.0
-    positions = ray_on_plane(cameras[0], interiors[0].ideal(control.pixels1))
-    points = np.flatnonzero(control.positioned & np.isfinite(positions).all(axis=1))
-    if len(points) >= 2:
-        on_wall = control.xyz[points] * [1.0, 1.0, 0.0]
-        metres = fit_plane(positions[points], np.nan_to_num(on_wall))
-    elif site.distance1:
-        scale = site.distance1
-    elif site.distance2:
-        scale = site.distance2 / near
-    elif site.delta_d:
-        scale = site.delta_d / (1.0 - near)
-    elif control.lengths:
-        ratios = [
-            length / np.linalg.norm(positions[a] - positions[b]) for a, b, length in control.lengths
-        ]
-        scale = float(np.median(ratios))
-    else:
-        raise GeometryError(
-            "nothing gives the scale: two photos alone have none. Measure one distance from a "
-            "camera to the wall (--distance1 or --distance2), or one length on the wall (--length)."
-        )
-    if scale:
-        nowhere = np.zeros(3)
-        metres = Similarity(
-            scale=scale, rotation=np.eye(3), source_centre=nowhere, target_centre=nowhere
-        )
-    first, second = (
-        camera._replace(rotation=camera.rotation @ metres.rotation.T, centre=metres(camera.centre))
-        for camera in cameras
-    )
-    return first, second
-
-
-def _observations(
-    given: _Given, interiors: Interiors, ties: Ties | None, agree: BoolArray
-) -> PairObservations:
-    """Return everything observed, ideal pixels throughout."""
-    control, site = given.control, given.site
-    pixels1, pixels2 = interiors[0].ideal(control.pixels1), interiors[1].ideal(control.pixels2)
-    measured = {
-        name: (value, site.sigma)
-        for name in ("distance1", "distance2", "delta_d")
-        if (value := getattr(site, name)) is not None
-    }
-    base = PairObservations(
-        interiors=interiors,
-        control=replace(control, pixels1=pixels1, pixels2=pixels2),
-        pick_used=agree,
-        sigma_pick=site.sigma_pick,
-        measured=measured,
-        sigma_tilt=SIGMA_PARALLEL if site.parallel else None,
-        free_datum=control.positioned.sum() < 2,
-        sigma_body=_same_body(interiors),
-    )
-    if ties is None:
-        return base
-    return replace(
-        base,
-        tie1=ties.seen1,
-        tie2=ties.seen2,
-        sigma_tie=ties.tolerance / 2,
-        tie_used=np.ones(len(ties.seen1), dtype=bool),
-        wall=ties.on_plane,
-        wall_rows=np.zeros((3, len(ties.seen1))),
-    )
-
-
-def _same_body(interiors: Interiors) -> float | None:
-    """Return how closely the principal points agree, if both may be of one camera body. [px]"""
-    first, second = interiors
-    # With one photo upright and one lying the axes differ.
-    if first.is_calibrated or second.is_calibrated or first.image_size != second.image_size:
-        return None
-    return 0.002 * float(np.hypot(*first.image_size))

@@ -13,6 +13,7 @@ from bifocal.files.haze import read_greys
 from bifocal.files.images import WRITTEN, ImageInfo, image_info
 from bifocal.model.basis import rests_on
 from bifocal.model.lens import Lens
+from bifocal.model.photo import FARTHEST_WALL
 from bifocal.orientation.absolute_orientation import orient_pair
 from bifocal.orientation.alignment import Alignment, make_alignment, with_files
 from bifocal.orientation.alignment_picture import write_alignment_picture
@@ -33,8 +34,6 @@ from photocore.output import (
 
 #: A wall point given without r lies on the plane to this. [m]
 SIGMA_ON_WALL = 0.005
-#: Distances and lengths beyond this are taken for millimetres. [m]
-FARTHEST = 500.0
 #: Nominal focal lengths are rounded and change with focus; 35 mm equivalents are rounder still.
 SIGMA_NOMINAL, SIGMA_EQUIVALENT = 0.02, 0.04
 
@@ -166,7 +165,7 @@ def align_photos(
     if way == "as set up":
         oriented = pair_as_set_up((first, second), options.site, options.media)
     else:
-        if way == "site" and options.length is None:
+        if way == "site" and not options.auto and options.length is None:
             _check_focal((first, second))
         control = _control(options, (first.interior.image_size, second.interior.image_size))
         oriented = orient_pair(
@@ -257,6 +256,8 @@ def _way(options: AlignOptions) -> tuple[str, AlignOptions]:
         return "as set up", options
     if options.control is not None:
         return "control", options
+    if len(measured) >= 2:
+        return "site", replace(options, site=replace(site, parallel=True))
     if options.auto:
         if not (measured or options.length or options.lengths):
             raise InputError(
@@ -265,8 +266,6 @@ def _way(options: AlignOptions) -> tuple[str, AlignOptions]:
                 "(--length)."
             )
         return "auto", options
-    if len(measured) >= 2:
-        return "site", replace(options, site=replace(site, parallel=True))
     raise InputError(
         "say how the pair is to be set up: --control FILE (points measured on the wall), "
         "--distance1 and --distance2 (or one of them and --delta-d) with the cameras square to "
@@ -285,12 +284,13 @@ def _check_focal(photos: tuple[PhotoInput, PhotoInput]) -> None:
 
 
 def _check_metres(options: AlignOptions) -> None:
-    """Refuse distances and lengths in millimetres."""
+    """Refuse distances and lengths in millimetres; control points tell of distances themselves."""
     site = options.site
-    given = {"--distance1": site.distance1, "--distance2": site.distance2}
-    given |= {"--delta-d": site.delta_d, "--length": options.length and options.length[1]}
+    given = {"--delta-d": site.delta_d, "--length": options.length and options.length[1]}
+    if options.control is None:
+        given |= {"--distance1": site.distance1, "--distance2": site.distance2}
     for name, value in given.items():
-        if value and value > FARTHEST:
+        if value and value > FARTHEST_WALL:
             raise InputError(
                 f"{name} {value:g} m is too far for a wall: is it in mm? Distances and lengths are "
                 f"in metres ({name} {value / 1000:g})."
@@ -327,9 +327,10 @@ def interior_of_photo(info: ImageInfo, data: KnownLens, number: int) -> Interior
         source = f"EXIF, {info.focal_length_35:g} mm equivalent"
     else:
         return Interior.unknown(info.size)
-    return Interior.from_focal(
+    found = Interior.from_focal(
         focal, image_size=info.size, sigma=sigma, source=source, pixel_size=pitch
     )
+    return replace(found, is_typed=data.focal is not None)
 
 
 def _control(options: AlignOptions, sizes: tuple[tuple[int, int], tuple[int, int]]) -> Control:

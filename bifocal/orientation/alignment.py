@@ -22,7 +22,7 @@ from bifocal.orientation.orientation_stages import OrientedPair, PhotoInput, Pho
 from bifocal.orientation.pair_adjustment import AdjustedPair
 from bifocal.orientation.pair_media import PairMedia
 from bifocal.orientation.pair_observations import PairObservations, at
-from bifocal.orientation.reference_plane import rivals
+from bifocal.orientation.reference_plane import zero_sigma
 from bifocal.orientation.tie_points import robust_sigma, tie_positions
 from photocore.arrays import BoolArray, FloatArray
 from photocore.camera import Pinhole, camera_matrix, plane_from_pixel
@@ -111,9 +111,8 @@ def make_alignment(
         )
     )
     deviations = standard_deviations(adjusted)
-    others = rivals(oriented.faces)
-    if others and not oriented.wall_named:
-        deviations["relief_offset"] = max(abs(face.offset) for face in others)
+    if (offset := zero_sigma(oriented.faces)) and not oriented.wall_named:
+        deviations["relief_offset"] = offset
     used = observations.tie_used
     sigma_tie = robust_sigma(adjusted.tie_misfit[used]) if used.any() else observations.sigma_pick
     words = orientation_in_words(
@@ -206,6 +205,7 @@ def _photo(
         nadir=camera.centre[:2],
         distance=float(camera.centre[2]),
         lens=lens,
+        image_size=interior.image_size,
         principal_distance=None if pitch is None else float(camera.matrix[0, 0]) * pitch,
         pixel_size=pitch,
         layers=None if media is None else media.layers,
@@ -282,8 +282,10 @@ def _diagnostics(
             }
             for line in observations.lines
         ],
-        "wall_bend_px": oriented.bend if np.isfinite(oriented.bend) else None,
+        "wall_bend_px": oriented.bend.px if np.isfinite(oriented.bend.px) else None,
+        "wall_bend_sigma_px": oriented.bend.sigma if np.isfinite(oriented.bend.px) else None,
         "focal_given_px": [interior.focal for interior in observations.interiors],
+        "doubts": [text for text in oriented.remarks if text.partition(":")[0].isupper()],
         "wall_relief_mm": wall_relief(oriented),
         "assumed": oriented.assumed,
         "words": list(words),

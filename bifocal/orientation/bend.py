@@ -6,34 +6,58 @@ epipolar lines, so every tie fits. But the wall, a plane, is then no plane betwe
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import cv2
 import numpy as np
 
+from bifocal.model.doubts import MOST_BENT, bend_is_certain
 from bifocal.model.homography import apply_homography
-from photocore.arrays import FloatArray
+from bifocal.orientation.reference_plane import faces
+from photocore.arrays import BoolArray, FloatArray
 
-#: A wall bent by more than this, at 3000 px of width, is not that of an honest pair. Of the ties on
-#: the wall, two rendered façades reach 0.03 and 0.10 px, church_1, church_2 and berlin_1 0.04; the
-#: rendered ones seen through half a metre of water in 17 m 0.22 and 0.43. Set after they were
-#: seen. [px]
-MOST_BENT = 0.2
-#: The same of all ties: mouldings before the wall bend it too, six real clean pairs by up to 0.19
-#: px, five rendered façades, whose ties crowd on mouldings, by 0.02 to 0.46; photos through a port
-#: by 6.3 to 23, a water surface 2.9, by a distorting compact camera 0.44. [px]
-MOST_BENT_WITH_RELIEF = 0.5
-#: Beyond this it is refraction or a strong lens for certain; heights of ties say nothing. [px]
+#: Beyond this it is refraction or a strong lens for certain. `MOST_BENT` is the limit of an honest
+#: pair: rendered façades reach 0.006 px, church_1 and church_2 0.10; rendered ones seen through
+#: half a metre of water in 17 m 0.22 and 0.43. Set after they were seen. [px]
 STRONGLY_BENT = 1.0
-#: Ties of the wall lie within this share of the far distance from the reference plane; fewer say
-#: nothing of its flatness.
-BAND, FEWEST = 0.0025, 100
-#: Residuals that count less and less, at 3000 px of width [px], and the prior of the bend.
-WIDTHS, SIGMA_BEND = (8.0, 5.0, 3.0, 2.0, 1.5), 0.05
-#: Ties used.
-MOST_POINTS = 2500
+#: A face is what lies within this share of the far distance from its plane; where it holds fewer
+#: ties, or a smaller part of what a bent surface through all ties would hold, the wall itself is
+#: bent. Of six rendered façades flat faces hold 1.03 to 1.4 times as many as the best bent surface,
+#: walls bent by 1.8 to 14 px 0.1 to 0.6.
+BAND, FEWEST, HOLDS = 0.0025, 100, 0.8
+#: Faces tried, and half the thickness of one when they are looked for, as a share of the distance.
+MOST_FACES, THIN = 3, 0.0012
+#: Residuals that count less and less, at 3000 px of width [px], and the prior of the bend. The last
+#: tell one bent wall from parallel faces, which a bent surface meets along lines only.
+WIDTHS, SIGMA_BEND = (8.0, 5.0, 3.0, 2.0, 1.5, 1.0, 0.7, 0.5, 0.3), 0.05
+#: A bend so small that what it does is proportional to it.
+SMALL = 1e-3
+#: Ties used; side of the cells whose ties err alike, over half the diagonal.
+MOST_POINTS, CELL = 2500, 0.17
 
 
-def wall_bend(pixels1: FloatArray, pixels2: FloatArray, size: tuple[int, int]) -> float:
-    """Return how far the wall between two photos is from a plane. [px, at 3000 px of width]
+class WallBend(NamedTuple):
+    """How far a wall is from a plane between the photos, and its standard deviation.
+
+    Attributes
+    ----------
+    px, sigma : float
+        At 3000 px of width; NaN where too few ties tell. [px]
+    """
+
+    px: float = float("nan")
+    sigma: float = float("nan")
+
+    @property
+    def is_certain(self) -> bool:
+        """Whether the model does not fit, beyond what the wall's own unevenness explains."""
+        return bend_is_certain(self.px, self.sigma)
+
+
+def wall_bend(
+    pixels1: FloatArray, pixels2: FloatArray, size: tuple[int, int], face: BoolArray | None = None
+) -> tuple[WallBend, float]:
+    """Return how far the wall between two photos is from a plane, and how many ties say so.
 
     Parameters
     ----------
@@ -41,49 +65,58 @@ def wall_bend(pixels1: FloatArray, pixels2: FloatArray, size: tuple[int, int]) -
         Ties, straightened by the lenses as far as they are known. [px]
     size : tuple of int
         Width and height of photo 1. [px]
+    face : ndarray of bool, shape (n,), optional
+        The ties asked; default all. The bend counts over the area of all.
 
     Returns
     -------
-    float
-        Root mean square distance, over the wall, of ``x2 = H (x1 (1 + k rho²))`` from its best
-        homography; NaN with fewer than 30 ties.
+    bend : WallBend
+        Root mean square distance of ``x2 = H (x1 (1 + k rho²))`` from its best homography; NaN with
+        fewer than 30 ties.
+    held : float
+        Ties that lie on that surface.
 
     Notes
     -----
     rho is the radius about the photo's middle over half the diagonal. Robust fits (biweight of
-    shrinking width) from three homographies and five bends; the one of most support counts.
+    shrinking width) from two homographies and five bends, of a face from none; the one of most
+    support counts. The
+    standard deviation of k takes the ties of a cell as one: a wall's unevenness is common to them.
     """
     unit = max(size) / 3000.0
-    if len(pixels1) < 30:
-        return float("nan")
-    some = np.linspace(0, len(pixels1) - 1, min(len(pixels1), MOST_POINTS)).astype(int)
+    asked = np.flatnonzero(np.ones(len(pixels1), dtype=bool) if face is None else face)
+    if len(asked) < 30:
+        return WallBend(), 0.0
+    some = asked[np.linspace(0, len(asked) - 1, min(len(asked), MOST_POINTS)).astype(int)]
     middle, half = (np.array(size) - 1) / 2.0, float(np.hypot(*size)) / 2
-    x1, x2 = (pixels1[some] - middle) / half, pixels2[some]
+    everywhere = (pixels1 - middle) / half
+    x1, x2 = everywhere[some], pixels2[some]
     square = (x1**2).sum(axis=1)
-    best, answer = -1.0, float("nan")
-    for start in (0.0, -0.06, -0.03, 0.03, 0.06):
+    held, answer = -1.0, WallBend()
+    for start in (0.0, -0.06, -0.03, 0.03, 0.06) if face is None else (0.0,):
         bent = x1 * (1.0 + start * square[:, None])
         for width in (1.5, 6.0):
             cv2.setRNGSeed(7)
             matrix, _ = cv2.findHomography(bent, x2, cv2.USAC_MAGSAC, width * unit, maxIters=500)
             if matrix is None:
                 continue
-            fitted, k, weight = _fitted(x1, x2, matrix, start, unit)
-            if weight.sum() <= best:
+            fitted, k, sigma, support = _fitted(x1, x2, matrix, start, unit)
+            if support <= held:
                 continue
-            best = float(weight.sum())
-            on = weight > 0.2
-            seen = apply_homography(fitted, x1[on] * (1.0 + k * square[on, None]))
-            flat, _ = cv2.findHomography(x1[on], seen, 0)
-            apart = np.linalg.norm(seen - apply_homography(flat, x1[on]), axis=1)
-            answer = float(np.sqrt((apart**2).mean())) / unit
-    return answer
+            held = support
+            radii = (everywhere**2).sum(axis=1, keepdims=True)
+            seen = apply_homography(fitted, everywhere * (1.0 + SMALL * radii))
+            flat, _ = cv2.findHomography(everywhere, seen, 0)
+            apart = np.linalg.norm(seen - apply_homography(flat, everywhere), axis=1)
+            by_k = float(np.sqrt((apart**2).mean())) / unit / SMALL
+            answer = WallBend(abs(k) * by_k, sigma * by_k)
+    return answer, held * len(asked) / len(some)
 
 
 def bend_of_wall(
     pixels1: FloatArray, pixels2: FloatArray, size: tuple[int, int], height: FloatArray
-) -> float:
-    """Return how far the wall is from a plane, as far as its own ties tell.
+) -> WallBend:
+    """Return how far the wall is from a plane, as far as the ties of one face tell.
 
     Parameters
     ----------
@@ -94,27 +127,28 @@ def bend_of_wall(
 
     Returns
     -------
-    float
-        `wall_bend` of the ties near the plane; of all where that is strong, or where hardly any is
-        near it and the bend is more than relief explains; else NaN. [px, at 3000 px of width]
+    WallBend
+        That of the fullest face parallel to the reference plane, if it holds as many ties as a
+        bent surface through all of them: two faces look like one bent wall. Else of all ties.
     """
-    whole = wall_bend(pixels1, pixels2, size)
-    near = np.abs(height) < BAND
-    if whole > STRONGLY_BENT:
-        return whole
-    if near.sum() < FEWEST:
-        return whole if whole > MOST_BENT_WITH_RELIEF else float("nan")
-    return wall_bend(pixels1[near], pixels2[near], size)
+    whole, held = wall_bend(pixels1, pixels2, size)
+    known = np.flatnonzero(np.isfinite(height))
+    known = known[:: len(known) // MOST_POINTS + 1]
+    found = faces(height[known], pixels1[known], band=THIN)[:MOST_FACES]
+    near = [np.abs(height - offset) < BAND for offset in (0.0, *(face.offset for face in found))]
+    own = [wall_bend(pixels1, pixels2, size, face) for face in near if face.sum() >= FEWEST]
+    bend, most = max(own, key=lambda one: one[1], default=(whole, 0.0))
+    return bend if most >= HOLDS * held else whole
 
 
 def _fitted(
     x1: FloatArray, x2: FloatArray, matrix: FloatArray, k: float, unit: float
-) -> tuple[FloatArray, float, FloatArray]:
-    """Return homography, bend and weights of the robust fit of x2 = H (x1 (1 + k rho²))."""
+) -> tuple[FloatArray, float, float, float]:
+    """Return homography, k, its sigma and the support of the robust x2 = H (x1 (1 + k rho²))."""
     square = (x1**2).sum(axis=1)
-    weight = np.zeros(len(x1))
+    cell = np.unique(np.floor(x1 / CELL), axis=0, return_inverse=True)[1].ravel()
     matrix = matrix / matrix[2, 2]
-    for width in np.repeat(WIDTHS, 3) * unit:
+    for width in np.repeat(WIDTHS, 2) * unit:
         bent = np.column_stack([x1 * (1.0 + k * square[:, None]), np.ones(len(x1))])
         carried = bent @ matrix.T
         seen = carried[:, :2] / carried[:, 2:]
@@ -128,24 +162,27 @@ def _fitted(
         by[:, :, 8] = (by_bent @ (x1 * square[:, None])[:, :, None])[:, :, 0]
         rows, root = by.reshape(-1, 9), np.repeat(weight, 2)
         normal = (rows * root[:, None]).T @ rows
-        right = rows.T @ (root * left.ravel())
+        pulls = (rows * (root * left.ravel())[:, None]).reshape(-1, 2, 9).sum(axis=1)
+        right = pulls.sum(axis=0)
         normal[8, 8] += (unit / SIGMA_BEND) ** 2
         right[8] -= k * (unit / SIGMA_BEND) ** 2
         step = np.linalg.lstsq(normal, right, rcond=None)[0]
         matrix = matrix + np.append(step[:8], 0.0).reshape(3, 3)
         k += float(step[8])
-    return matrix, k, weight
+    apart = np.zeros((cell.max() + 1, 9))
+    np.add.at(apart, cell, pulls)
+    of_k = np.linalg.pinv(normal)[8]
+    return matrix, k, float(np.linalg.norm(apart @ of_k)), float(weight.sum())
 
 
 def bend_in_words(
-    bend: float, *, with_lens: bool, through_media: bool = False, left_out: bool = False
+    bend: WallBend, *, with_lens: bool, through_media: bool = False, left_out: bool = False
 ) -> str:
     """Return the warning that the model does not fit; empty if the wall is flat enough.
 
     Parameters
     ----------
-    bend : float
-        From `wall_bend`. [px]
+    bend : WallBend
     with_lens : bool
         Whether the lens was calibrated, or estimated from the photos.
     through_media : bool
@@ -153,9 +190,9 @@ def bend_in_words(
     left_out : bool
         Whether control points that no camera fits were left out.
     """
-    if not bend > MOST_BENT:
+    if not bend.is_certain:
         return ""
-    sure = "" if bend > STRONGLY_BENT else " probably"
+    sure = "" if bend.px > STRONGLY_BENT else " probably"
     reason = (
         "refraction (photos taken through glass or water: give --indices with --port or --depth), "
         "a lens file of another camera or focus, or wrong distances"
@@ -170,9 +207,10 @@ def bend_in_words(
             "stays with the wall), or lens distortion (--lens)"
         )
     return (
-        f"THE MODEL DOES NOT FIT: between the photos the wall is bent by {bend:.2f} px (an honest "
-        f"pair: at most {MOST_BENT:g}). The likely reason is{sure} {reason}. Relief may be wrong "
-        "by many times its stated precision, although every point lies on its line; "
+        f"THE MODEL DOES NOT FIT: between the photos the wall is bent by {bend.px:.2f} ± "
+        f"{bend.sigma:.2f} px (an honest pair: at most {MOST_BENT:g}). The likely reason is"
+        f"{sure} {reason}. Relief may be wrong by many times the precision of the picks, although "
+        "every point lies on its line: sigma_r counts the bend; "
         + (
             "control points that fit no camera were left out, but may be good."
             if left_out

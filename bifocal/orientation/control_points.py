@@ -86,7 +86,8 @@ class Control:
 class SiteMeasures:
     """Distances measured on site, None where not measured [m], and a spot of the wall.
 
-    ``wall`` is a pixel (column, row) of the far photo that shows the wall. [px]
+    ``wall`` is a pixel (column, row) of the far photo that shows the wall. [px] ``ordered`` says
+    that the photos are in the order in which the user wants them, whatever they show.
     """
 
     distance1: float | None = None
@@ -97,6 +98,7 @@ class SiteMeasures:
     sigma_control: float = 0.003
     sigma_pick: float = 0.5
     wall: tuple[float, float] | None = None
+    ordered: bool = False
 
     @property
     def distances(self) -> tuple[float | None, float | None]:

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from bifocal.files.haze import greys_through_water
-from bifocal.files.images import as_grey
+from bifocal.files.haze import greys_of_pair
 from bifocal.model.pair import Pair
 from bifocal.orientation.matching import Matches, MatchSettings, match_pair
 
@@ -64,7 +63,4 @@ def match(
     >>> bool(np.abs(points.pixels1 - points.pixels2).max() < 0.001)
     True
     """
-    greys = as_grey(image1, "image1"), as_grey(image2, "image2")
-    if pair.layers is not None:
-        greys = greys_through_water(image1, image2)
-    return match_pair(pair, greys, settings)
+    return match_pair(pair, greys_of_pair(pair, image1, image2), settings)

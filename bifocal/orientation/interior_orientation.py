@@ -59,6 +59,8 @@ class Interior:
         [mm]
     is_calibrated : bool
         Whether it comes from a lens file.
+    is_typed : bool
+        Whether the focal length was typed for the far or the near photo, and is not the file's own.
     """
 
     focal: float
@@ -73,6 +75,7 @@ class Interior:
     sigma_radial: float = 0.0
     pixel_size: float | None = None
     is_calibrated: bool = False
+    is_typed: bool = False
 
     def __post_init__(self) -> None:
         """Refuse what is no principal distance, and a standard deviation of it in pixels."""

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from bifocal.files.images import read_grey
+from bifocal.files.images import photo_info, read_grey
 from bifocal.model.orientation_precision import NAMES, as_dict, exchanged, pinhole
 from bifocal.model.pair import Pair
 from bifocal.model.photo import Photo
@@ -44,6 +44,8 @@ SIGMA_FEATURE = 0.5
 FEATURES, PIXELS = 8000, 6e6
 #: Footprints that share this part of the smaller one may show common points.
 OVERLAP = 0.05
+#: What a pair's set-up says of a bend, which no other pair mends.
+BENT = ("wall_bend_px", "wall_bend_sigma_px", "focal_px", "principal_point_px")
 #: Blunders that are named one by one.
 NAMED = 20
 
@@ -233,7 +235,7 @@ def joint_adjustment(
     for index, pair in enumerate(pairs):
         for number in (1, 2):
             progress(index, len(pairs), f"{names[index]}: features")
-            image = read_grey(pair.photo_file(number))
+            image = read_grey(photo_info(pair, number).path)
             features.append(find_features(image, limit=FEATURES, budget=PIXELS))
             shapes.append(image.shape)
     progress(len(pairs), len(pairs), "matches")
@@ -419,6 +421,8 @@ def _adjusted_pair(pair: Pair, adjusted: JointAdjustment, index: int) -> Pair:
     ]
     extra = {key: value for key, value in pair.extra.items() if key != "setup"}
     said = {"way": "joint adjustment", "sigma0": adjusted.sigma0}
+    if isinstance(before := pair.extra.get("setup"), dict):
+        said |= {key: before[key] for key in BENT if key in before}
     return replace(
         pair, image1=photos[0], image2=photos[1], orientation=adjusted.orientation(index),
         extra={**extra, "setup": said}, remarks=(),
@@ -465,7 +469,10 @@ def _write_pair(pair: Pair, path: Path, name: str, folder: Path) -> None:
             photo.lens.write(path.with_name(lens))
             extra["lens"] = lens
         file = relative_name(pair.photo_file(number), folder) if photo.file else ""
-        photos.append(replace(photo, file=file, extra=extra))
+        size = photo.image_size
+        if photo.file and pair.photo_file(number).is_file():
+            size = photo_info(pair, number).size
+        photos.append(replace(photo, file=file, image_size=size, extra=extra))
     content = replace(pair, image1=photos[0], image2=photos[1]).to_dict()
     if pair.exchanged:
         # In the order given: that of its columns in the tables of points.

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from bifocal.files.haze import read_greys
-from bifocal.files.images import image_info
+from bifocal.files.images import photo_info
 from bifocal.model.basis import rests_on
 from bifocal.model.pair import Pair
 from bifocal.orientation.matching import Matches, MatchSettings, match_pair, precision
@@ -71,7 +71,7 @@ def match_pair_file(pair_path: Pair | Path, settings: MatchSettings) -> tuple[Pa
         If a file is at fault, or photos and pair do not belong together.
     """
     pair = Pair.of(pair_path)
-    paths = pair.photo_file(1), pair.photo_file(2)
+    paths = photo_info(pair, 1).path, photo_info(pair, 2).path
     images = read_greys(*paths, in_water=pair.layers is not None)
     return pair, match_pair(pair, images, settings)
 
@@ -136,7 +136,7 @@ def empty_parts(pair: Pair, matches: Matches, least: int) -> list[dict[str, list
 
     Each as ``columns`` and ``rows``, first and last. [px]
     """
-    sizes = [image_info(pair.photo_file(number)).size for number in (1, 2)]
+    sizes = [photo_info(pair, number).size for number in (1, 2)]
     parts = np.array(PARTS)
     side = np.array(sizes[0]) / parts
     place = np.clip((matches.pixels1 + 0.5) // side, 0, parts - 1).astype(int)

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from bifocal.orientation.alignment import standard_deviations
+from bifocal.orientation.alignment import standard_deviations, wall_relief
 from bifocal.orientation.bend import bend_in_words
 from bifocal.orientation.control_points import Control, SiteMeasures
 from bifocal.orientation.orientation_stages import OrientedPair
 from bifocal.orientation.pair_observations import PairObservations
+from bifocal.orientation.photo_order import SURE
 
 #: Common points that fit their lines no better than this, at 3000 px of width, do not fit. Clean
 #: pairs reach 0.19, a phone pair with its lens estimated 0.4. [px]
@@ -16,6 +17,8 @@ WORST_FIT = 0.6
 #: Relief whose size is known no better than this calls for a tape: nine points with 0.45 m of
 #: relief and no lens give 2 to 4 %, a tape of 2 cm 0.4 %.
 WORST_SCALE = 0.01
+#: The wall is found in a part of the photo only if so much of it lies in so few of nine zones.
+MOST_OF_WALL, FEW_ZONES = 0.95, 3
 #: Beyond this many standard deviations an adjusted value contradicts what was given.
 CONTRADICTS = 3.0
 
@@ -57,6 +60,39 @@ def model_remarks(pair: OrientedPair, site: SiteMeasures) -> list[str]:
                 "tape, the plane it was measured to, the focal lengths and the lens distortion."
             )
     return [remark for remark in remarks if remark]
+
+
+def order_remarks(order: float, names: tuple[str, str]) -> list[str]:
+    """Return that the photos do not tell which of them is the near one."""
+    if order > SURE:
+        return []
+    return [
+        f"Which photo was taken from near cannot be told from what is known; {names[1]} was taken "
+        "for it, as given. If what stands out comes out as lying back, exchange the photos."
+    ]
+
+
+def wall_remarks(pair: OrientedPair) -> list[str]:
+    """Return where the wall was found, if not all over the photo; where no plane is given."""
+    if not pair.observations.free_datum or pair.observations.media is not None:
+        return []
+    zones = sorted(wall_relief(pair), key=lambda zone: -zone["points"])
+    if not zones:
+        return [
+            "NO WALL FOUND: hardly any common points gather on one plane, and relief counts from "
+            "one that is known no better than sigma_r says. Name a spot of the wall in the far "
+            "photo (--wall COL,ROW), or give control points."
+        ]
+    held = np.cumsum([zone["points"] for zone in zones])
+    most = int(np.searchsorted(held, MOST_OF_WALL * held[-1])) + 1
+    if most > FEW_ZONES:
+        return []
+    named = ", ".join(zone["zone"] for zone in zones[:most])
+    return [
+        f"The wall was found in a part of the far photo only ({named}: {held[most - 1]} of "
+        f"{held[-1]} points on it). Its plane is carried on from there; check that it is the wall "
+        "you mean (green in the picture), or give control points (--control)."
+    ]
 
 
 def control_remarks(control: Control, pair: OrientedPair) -> list[str]:

@@ -157,7 +157,8 @@ def _plane(offset: float) -> str:
         return ""
     return (
         f"All relief counts from the plane taken for the wall: its zero is certain only to "
-        f"{1000 * offset:.0f} mm, because other planes compete (see the warning)."
+        f"{1000 * offset:.0f} mm, because other planes compete (see the warning); sigma_r counts "
+        "it."
     )
 
 

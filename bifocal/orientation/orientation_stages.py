@@ -5,7 +5,7 @@ Each stage takes the pair as oriented so far and returns it better, with what is
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -13,6 +13,7 @@ import numpy as np
 from bifocal.model.orientation_precision import NAMES
 from bifocal.orientation import facade_lines, validation
 from bifocal.orientation.area_points import even_points
+from bifocal.orientation.bend import WallBend
 from bifocal.orientation.control_points import SiteMeasures
 from bifocal.orientation.interior_orientation import SIGMA_RADIAL, Cameras, Images, Interior
 from bifocal.orientation.pair_adjustment import (
@@ -22,7 +23,13 @@ from bifocal.orientation.pair_adjustment import (
     line_test,
 )
 from bifocal.orientation.pair_observations import PairObservations, PairUnknowns, at
-from bifocal.orientation.reference_plane import STEEPEST, Face, choose_wall, rivals_in_words
+from bifocal.orientation.reference_plane import (
+    STEEPEST,
+    Face,
+    choose_wall,
+    onto_plane,
+    rivals_in_words,
+)
 from bifocal.orientation.tie_points import (
     refine_ties,
     robust_sigma,
@@ -38,16 +45,14 @@ from bifocal.orientation.wall_planes import (
     planes_of_any_direction,
     steep_rivals_in_words,
 )
-from photocore.arrays import ByteArray, FloatArray
+from photocore.adjustment import OUTLIER_LIMIT
+from photocore.arrays import ByteArray
 from photocore.camera import plane_transfer
 from photocore.errors import GeometryError
-from photocore.rotation import rotation_from_vector
 
 #: "Image plane parallel to the wall" when nothing contradicts it. [rad]
 SIGMA_PARALLEL = np.deg2rad(0.3)
 UNEVEN = 0.004  #: A wall's face slopes by this against the plane it was meant to be. [m/m]
-#: A control point's misfit beyond this many standard deviations is a gross error.
-GROSS_LIMIT = 4.0
 #: Control points of so small a relief, in their sigma, say that they lie on the wall; it is
 #: believed if its plane is no further from theirs, in sigma.
 ON_WALL, WALL_LIMIT = 4.0, 3.0
@@ -96,8 +101,8 @@ class OrientedPair:
         Whether the user said which of them is the wall.
     tolerance : pair of float
         How far the wall may lie from the reference plane [m] and slope against it [m/m].
-    bend : float
-        How far the wall is from a plane between the photos. [px at 3000 px of width]
+    bend : WallBend
+        How far the wall is from a plane between the photos.
     """
 
     observations: PairObservations
@@ -108,7 +113,7 @@ class OrientedPair:
     faces: tuple[Face, ...] = ()
     wall_named: bool = False
     tolerance: tuple[float, float] = FREE
-    bend: float = float("nan")
+    bend: WallBend = field(default_factory=WallBend)
 
     def readjusted(self, start: PairUnknowns | None = None, **changes: Any) -> OrientedPair:
         """Return the pair adjusted with changed observations, from here or another start."""
@@ -170,7 +175,7 @@ def oriented_in_stages(
     if not with_control:
         pair = pair.readjusted(measured=observations.measured).settled()
         if pair.observations.free_datum and pair.observations.sigma_tilt is None:
-            pair = _parallel_if_so(pair)
+            pair = _parallel_if_so(pair, np.inf if site.parallel else np.deg2rad(1.5))
     return pair
 
 
@@ -293,7 +298,7 @@ def _facing_the_wall(pair: OrientedPair, site: SiteMeasures) -> OrientedPair:
     pair = pair.told(question) if question else pair
     if wall.slope <= STEEPEST:
         return pair
-    cameras = _onto_plane(
+    cameras = onto_plane(
         adjusted.cameras, np.array([wall.offset, *-wall.normal[:2]]) / wall.normal[2]
     )
     far, near = cameras
@@ -343,7 +348,7 @@ def _on_the_wall(pair: OrientedPair, images: Images, site: SiteMeasures) -> Orie
     )
     pair = replace(pair, faces=tuple(faces))
     pair = pair.told(*(text for text in [rivals_in_words(faces, site)] if text))
-    start = evaluated(ties, replace(adjusted, cameras=_onto_plane(adjusted.cameras, plane)))
+    start = evaluated(ties, replace(adjusted, cameras=onto_plane(adjusted.cameras, plane)))
     ties = with_wall(ties, start, FREE)
     return replace(pair, observations=ties).readjusted(start).settled()
 
@@ -351,7 +356,7 @@ def _on_the_wall(pair: OrientedPair, images: Images, site: SiteMeasures) -> Orie
 def _with_lines(pair: OrientedPair, images: Images) -> OrientedPair:
     """Return the pair with the façade's uprights and levels lying along the wall.
 
-    Directions that contradict the wall found by the ties are told of and not used.
+    Those that contradict the wall found by the ties are told of and not used.
     """
     old, adjusted = pair.observations, pair.adjusted
     bent = old.radial_models(adjusted.radial)
@@ -416,18 +421,8 @@ def _with_named_wall(pair: OrientedPair) -> OrientedPair:
     return replace(pair, observations=walled).readjusted()
 
 
-def _onto_plane(cameras: Cameras, plane: FloatArray) -> Cameras:
-    """Return cameras in the frame of the plane z = a + b X + c Y, X and Y all but kept."""
-    slope = float(np.hypot(plane[1], plane[2]))
-    # The rotation that takes the normal to the new Z axis, about their common perpendicular.
-    angle = np.arctan(slope) / slope if slope > 0 else 0.0
-    turn = rotation_from_vector([-angle * plane[2], angle * plane[1], 0.0])
-    origin = np.array([0.0, 0.0, plane[0]])
-    return cameras[0].moved(turn, origin), cameras[1].moved(turn, origin)
-
-
-def _parallel_if_so(pair: OrientedPair) -> OrientedPair:
-    """Return the pair with image planes taken as parallel, if nothing contradicts it.
+def _parallel_if_so(pair: OrientedPair, most: float) -> OrientedPair:
+    """Return the pair with image planes taken as parallel, if nothing contradicts it, up to `most`.
 
     Photos alone give the tilt to the wall to 0.1° to 0.5°; a camera that was set up square to the
     wall with care stands better than that.
@@ -436,7 +431,7 @@ def _parallel_if_so(pair: OrientedPair) -> OrientedPair:
         size = float(np.linalg.norm(camera.tilt))
         turns = [pair.adjusted.sigma(name, number) for name in ("turn X", "turn Y")]
         limit = 3 * float(np.linalg.norm([*turns, SIGMA_PARALLEL]))
-        if size > min(limit, np.deg2rad(1.5)):
+        if size > min(limit, most):
             return pair
     sigma = _care(pair.adjusted.cameras)
     changes: dict[str, Any] = {"sigma_tilt": sigma}
@@ -478,21 +473,24 @@ def _care(cameras: Cameras) -> float:
 
 
 def without_gross(pair: OrientedPair) -> OrientedPair:
-    """Return the pair without gross control points, taking out the worst one by one."""
+    """Return the pair without gross control points, the worst first, tested without it."""
     count = len(pair.observations.control.ids)
     dropped: list[int] = list(np.flatnonzero(~pair.observations.pick_used))
     for _ in range(max(count // 3, 1) if count > 4 else 0):
         used = pair.observations.pick_used.copy()
         test = np.where(used, pair.adjusted.control_test, 0.0)
-        usual = max(1.0, float(np.median(test[used])) if used.any() else 1)
         worst = int(test.argmax())
-        if test[worst] < GROSS_LIMIT * usual or used.sum() <= 4:
+        if test[worst] < OUTLIER_LIMIT or used.sum() <= 4:
             break
         used[worst] = False
+        without = pair.readjusted(pick_used=used)
+        usual = max(1.0, float(np.median(without.adjusted.control_test[used])))
+        if test[worst] < OUTLIER_LIMIT * usual:
+            break
         dropped.append(worst)
-        pair = pair.readjusted(pick_used=used)
+        pair = without
     # A point thrown out by the first, rough fit may be good after all.
-    back = [i for i in dropped if pair.adjusted.control_test[i] < GROSS_LIMIT]
+    back = [i for i in dropped if pair.adjusted.control_test[i] < OUTLIER_LIMIT]
     if back:
         used = pair.observations.pick_used.copy()
         used[back] = True

@@ -45,7 +45,8 @@ def align(
         both photos suffice, one of them off the plane by 0.3 m or more unless the lenses are
         calibrated.
     site : SiteMeasures, optional
-        Distances to the wall [m], and whether the cameras were square to it (``parallel``).
+        Distances to the wall [m], and whether the cameras were square to it (``parallel``, counts
+        where nothing stands out from the wall).
     line : ("level" or "upright", array_like of shape (2, 2)), optional
         Two pixels of the far photo on such a line of the wall, for the direction of X and Y where
         no control points give it. [px]

@@ -7,7 +7,7 @@ one shifts every relief by the same offset, and nothing in the photos says so.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -15,6 +15,7 @@ from bifocal.orientation.control_points import SiteMeasures
 from bifocal.orientation.interior_orientation import Cameras, Interior, Interiors
 from photocore.arrays import BoolArray, FloatArray, IntArray
 from photocore.errors import GeometryError
+from photocore.rotation import rotation_from_vector
 
 #: Half the thickness of a face, as a share of the far distance.
 BAND = 0.0012
@@ -22,6 +23,8 @@ BAND = 0.0012
 STEEPEST = 0.02
 #: A face with this share of the chosen one's points may as well be the wall.
 RIVAL = 0.5
+#: A face whose chance by the measured distances is this share of the chosen one's is none.
+UNLIKELY = 0.01
 #: With this share of the largest face's points, a face at one scale is preferred to it.
 COMPARABLE = 0.5
 #: With this share of the largest face's points a face may be chosen by the measured distances; it
@@ -47,11 +50,14 @@ class Face:
         Of all points.
     pixel : tuple of float
         A spot of the far photo in its midst. [px]
+    chance : float
+        How well its distances stand in the ratio of the measured ones; 1: perfectly, or not known.
     """
 
     offset: float
     share: float
     pixel: tuple[float, float]
+    chance: float = 1.0
 
 
 def faces(heights: FloatArray, pixels: FloatArray, *, band: float) -> list[Face]:
@@ -149,7 +155,23 @@ def choose_wall(
         plane = refitted(xyz, plane + np.array([offset, 0.0, 0.0]), band=band)
         heights = _heights(xyz, plane)
     planes = faces(heights, pixels, band=band)
+    tests = _ratio_tests(planes, cameras, plane, site, sigma_ratio)
+    chances = np.exp(-0.5 * np.minimum(tests, 30.0) ** 2).tolist()
+    planes = [replace(face, chance=c) for face, c in zip(planes, chances, strict=True)]
     return plane, sorted(planes, key=lambda face: (abs(face.offset) > band, -face.share))
+
+
+def _ratio_tests(
+    planes: Sequence[Face], cameras: Cameras, plane: FloatArray, site: SiteMeasures, sigma: float
+) -> FloatArray:
+    """Return how far each face's distances are from the measured ratio, in sigma; 0: unknown."""
+    d1, d2 = site.distances
+    if not (d1 and d2):
+        return np.zeros(len(planes))
+    far, near = (float(c.centre[2] - plane[0] - c.centre[:2] @ plane[1:]) for c in cameras)
+    sigma = float(np.hypot(sigma, np.hypot(site.sigma / d1, site.sigma / d2)))
+    ratios = [np.log((far - face.offset) / (near - face.offset)) for face in planes]
+    return np.abs(np.array(ratios) - np.log(d1 / d2)) / sigma
 
 
 def _face_by_ratio(
@@ -161,17 +183,11 @@ def _face_by_ratio(
     sigma: float,
 ) -> float | None:
     """Return the offset of the face whose distances have the measured ratio; None: cannot tell."""
-    d1, d2 = site.distances
-    if not (d1 and d2):
-        return None
     planes = faces(heights, pixels, band=BAND * float(cameras[0].centre[2]))
     fair = [face for face in planes if face.share >= FAIR * planes[0].share]
-    if len(fair) < 2:
+    tests = _ratio_tests(fair, cameras, plane, site, sigma)
+    if len(fair) < 2 or not tests.any():
         return None
-    far, near = (float(c.centre[2] - plane[0] - c.centre[:2] @ plane[1:]) for c in cameras)
-    sigma = float(np.hypot(sigma, np.hypot(site.sigma / d1, site.sigma / d2)))
-    ratios = [np.log((far - face.offset) / (near - face.offset)) for face in fair]
-    tests = np.abs(np.array(ratios) - np.log(d1 / d2)) / sigma
     order = np.argsort(tests)
     # The nearest must fit, and the next must not.
     if tests[order[0]] > FITS or tests[order[1]] < max(FITS, 2 * tests[order[0]]):
@@ -218,6 +234,16 @@ def refitted(xyz: FloatArray, plane: FloatArray, *, band: float) -> FloatArray:
     return np.asarray(plane)
 
 
+def onto_plane(cameras: Cameras, plane: FloatArray) -> Cameras:
+    """Return cameras in the frame of the plane z = a + b X + c Y, X and Y all but kept."""
+    slope = float(np.hypot(plane[1], plane[2]))
+    # The rotation that takes the normal to the new Z axis, about their common perpendicular.
+    angle = np.arctan(slope) / slope if slope > 0 else 0.0
+    turn = rotation_from_vector([-angle * plane[2], angle * plane[1], 0.0])
+    origin = np.array([0.0, 0.0, plane[0]])
+    return cameras[0].moved(turn, origin), cameras[1].moved(turn, origin)
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class NarrowFace:
     """A wall's own face, found among everything near it.
@@ -238,8 +264,11 @@ class NarrowFace:
 
     @property
     def members(self) -> BoolArray:
-        """Points that are more likely of the face than of anything else."""
-        return self.chance > 0.5
+        """Points that are at least half as likely of the face as its likeliest one.
+
+        On a plain wall no point is more likely of it than of the shallow relief around it.
+        """
+        return self.chance > 0.5 * self.chance.max(initial=0.0)
 
 
 def narrow_face(xyz: FloatArray, sigma: FloatArray, *, band: float) -> NarrowFace:
@@ -366,7 +395,19 @@ def scale_difference(cameras: Cameras, plane: FloatArray, offset: float) -> floa
 
 def rivals(planes: Sequence[Face]) -> list[Face]:
     """Return the faces that may as well be the wall."""
-    return [face for face in planes[1:] if face.share >= RIVAL * planes[0].share]
+    likely = [face for face in planes[1:] if face.chance >= UNLIKELY * planes[0].chance]
+    return [face for face in likely if face.share >= RIVAL * planes[0].share]
+
+
+def zero_sigma(planes: Sequence[Face]) -> float:
+    """Return how far the wall's zero may be off, as another face may be the wall; 0: none. [m]
+
+    Root mean square offset, each face as likely as its share of the points and its chance say.
+    """
+    likely = [*planes[:1], *rivals(planes)]
+    weight = np.array([face.share * face.chance for face in likely])
+    square = np.array([face.offset for face in likely]) ** 2
+    return float(np.sqrt(weight @ square / weight.sum())) if len(likely) > 1 else 0.0
 
 
 def rivals_in_words(planes: Sequence[Face], site: SiteMeasures) -> str:

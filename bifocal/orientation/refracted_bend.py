@@ -8,7 +8,7 @@ import numpy as np
 from bifocal import rays
 from bifocal.model.homography import apply_homography
 from bifocal.model.refracted_view import foot_of
-from bifocal.orientation.bend import bend_of_wall
+from bifocal.orientation.bend import WallBend, bend_of_wall
 from bifocal.orientation.pair_adjustment import AdjustedPair
 from bifocal.orientation.pair_observations import PairUnknowns
 from bifocal.orientation.refracted_observations import guessed_points, pixels_of
@@ -22,7 +22,7 @@ DRAWS, BEYOND = 24, 2.0
 
 def refracted_bend(
     adjusted: AdjustedPair, pixels1: FloatArray, pixels2: FloatArray, size: tuple[int, int]
-) -> float:
+) -> WallBend:
     """Return how far the wall is from a plane between photos freed of refraction.
 
     Parameters
@@ -36,7 +36,7 @@ def refracted_bend(
 
     Returns
     -------
-    float
+    WallBend
         As of `bifocal.orientation.bend.bend_of_wall`; NaN too where it is no more than cameras and
         media, as uncertain as they are, leave open. [px, at 3000 px of width]
     """
@@ -45,7 +45,7 @@ def refracted_bend(
     xyz = guessed_points(adjusted, np.hstack([pixels1, pixels2])[known])[0]
     height = xyz[:, 2] / adjusted.cameras[0].centre[2]
     bend = bend_of_wall(flat[0][known], flat[1][known], size, height)
-    return bend if bend > BEYOND * _open(adjusted, size) else float("nan")
+    return bend if bend.px > BEYOND * _open(adjusted, size) else WallBend()
 
 
 def straightened(

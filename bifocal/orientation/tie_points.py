@@ -14,6 +14,7 @@ from bifocal.orientation.patches import refine, same_scale
 from bifocal.orientation.reference_plane import NarrowFace, narrow_face
 from bifocal.orientation.refracted_observations import guessed_points
 from bifocal.orientation.relative_orientation import supported
+from photocore.adjustment import OUTLIER_LIMIT
 from photocore.arrays import BoolArray, FloatArray
 from photocore.camera import (
     fundamental,
@@ -24,12 +25,10 @@ from photocore.camera import (
     triangulate,
 )
 
-#: A tie farther than this many sigma from its line is gross.
-GROSS = 3.5
 #: Ties are never believed to be more precise than this. [px]
 BEST_TIE = 0.03
-#: Fewer ties than this are no wall.
-FEWEST_ON_WALL = 20
+#: Fewer ties than this, counted by their chances, or in fewer tenths of the photo, are no wall.
+FEWEST_ON_WALL, FEWEST_CELLS = 20, 6
 #: Half the band, as a share of the far distance, in which the wall's own face is looked for.
 WALL_BAND = 0.005
 
@@ -88,7 +87,7 @@ def without_gross_ties(
         Precision of a tie's coordinate. [px]
     """
     sigma = max(sigma, BEST_TIE)
-    used = np.abs(adjusted.tie_misfit) < GROSS * sigma
+    used = np.abs(adjusted.tie_misfit) < OUTLIER_LIMIT * sigma
     xyz = tie_positions(observations, adjusted)
     lowest = min(camera.centre[2] for camera in adjusted.cameras)
     used &= np.isfinite(xyz).all(axis=1) & (xyz[:, 2] < 0.95 * lowest)
@@ -158,7 +157,10 @@ def with_wall(
         rough = WALL_BAND * float(state.cameras[0].centre[2])
         on_wall = observations.wall & np.isfinite(xyz).all(axis=1) & np.isfinite(metres)
         face = replace(face, roughness=rough, chance=on_wall.astype(float))
-    if face.members.sum() < FEWEST_ON_WALL:
+    seen = observations.tie1[face.members]
+    cell = np.floor(seen / (0.1 * max(observations.interiors[0].image_size)))
+    cells = len(np.unique(cell, axis=0))
+    if face.chance.sum() < FEWEST_ON_WALL or cells < FEWEST_CELLS:
         return replace(
             observations,
             wall=np.zeros_like(face.members),
@@ -171,9 +173,7 @@ def with_wall(
     lifted = np.column_stack([np.ones(len(on)), xyz[on, :2]])
     weight = face.chance[on] / (sigma[on] ** 2 + face.roughness**2)
     inverse = np.linalg.inv((lifted * weight[:, None]).T @ lifted)
-    seen = observations.tie1[face.members]
-    cell = np.floor(seen / (0.1 * max(observations.interiors[0].image_size)))
-    independent = max(len(np.unique(cell, axis=0)) / 4.0, 3.0)
+    independent = max(cells / 4.0, 3.0)
     covariance = inverse * max(face.chance.sum() / independent, 1.0)
     # The height is that of the wall's middle; slopes act about it.
     slack = np.zeros((3, 3))
@@ -203,6 +203,11 @@ def _wall_of(
 def wall_roughness(observations: PairObservations, state: PairUnknowns) -> float:
     """Return the standard deviation of the wall's own unevenness. [m]"""
     return _wall_of(observations, state)[3].roughness
+
+
+def likely_on_wall(observations: PairObservations, state: PairUnknowns) -> int:
+    """Return how many ties are more likely of the wall than of anything else."""
+    return int((_wall_of(observations, state)[3].chance > 0.5).sum())
 
 
 def wall_test(observations: PairObservations, adjusted: AdjustedPair) -> float:

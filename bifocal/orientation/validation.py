@@ -6,6 +6,7 @@ import cv2
 import numpy as np
 
 from bifocal.model.homography import apply_homography
+from bifocal.model.photo import FARTHEST_WALL
 from bifocal.orientation.control_points import SiteMeasures
 from bifocal.orientation.features import sharpness
 from bifocal.orientation.interior_orientation import Cameras, Images, Interior, Interiors
@@ -16,8 +17,6 @@ from photocore.errors import GeometryError, InputError
 
 #: Below this a photo is blurred (sharp photos: 0.3 to 0.6; blurred by 3 px: below 0.17).
 BLURRED = 0.15
-#: Walls farther away than this are taken for coordinates in millimetres. [m]
-FARTHEST = 300.0
 #: The distances must differ by this share; relief errors grow with its inverse.
 LEAST_CHANGE = 0.03
 #: Lenses for façades bend less than this in the corner, as a share of the half diagonal: compact
@@ -54,10 +53,23 @@ def check_different(name1: str, name2: str, images: Images) -> None:
         )
 
 
-def check_parallax(
+def unknown_lenses(interiors: Interiors, names: tuple[str, str]) -> str:
+    """Return of which photos nobody knows the focal length, and what to give; or nothing."""
+    unknown = [name for name, i in zip(names, interiors, strict=True) if i.is_assumed]
+    if not unknown:
+        return ""
+    alone = [number for number, i in enumerate(interiors, start=1) if i.is_assumed]
+    missing = f"; --focal{alone[0]} is missing" if len(alone) == 1 else ""
+    return (
+        f"the focal lengths are unknown (no EXIF) of {' and '.join(unknown)}{missing}. Give --lens "
+        "or --focal1 and --focal2 with --sensor-width or --pixel-size"
+    )
+
+
+def is_flat(
     ties: Ties, interiors: Interiors, names: tuple[str, str], *, flat_is_fine: bool
-) -> None:
-    """Refuse photos in which nothing moves against the wall.
+) -> bool:
+    """Return whether nothing moves against the wall; refuse that where it is no pair then.
 
     Parameters
     ----------
@@ -75,7 +87,7 @@ def check_parallax(
             "same place. The method needs two distances."
         )
     if moving >= 0.03:
-        return
+        return False
     if rotation_only(ties, interiors):
         raise GeometryError(
             f"no parallax: {names[0]} and {names[1]} were taken from one place, only the zoom was "
@@ -87,16 +99,25 @@ def check_parallax(
             "no parallax: nothing in the photos stands out from the wall or behind it (or only "
             "the zoom was changed, without walking), so the nadir cannot be found. Give four "
             "control points (--control), or both distances with the camera square to the wall "
-            "(--distance1, --distance2 without --auto)."
+            "(--distance1, --distance2)."
         )
+    return True
 
 
 def check_units(cameras: Cameras, site: SiteMeasures) -> None:
-    """Refuse control points that are not in metres."""
+    """Refuse control points and distances that are not in metres, one beside the other."""
     d1, d2 = (float(camera.centre[2]) for camera in cameras)
+    agree = False
     for name, distance, measured in (("1", d1, site.distance1), ("2", d2, site.distance2)):
         if measured is None:
             continue
+        agree |= 0.8 < distance / measured < 1.25
+        if measured > FARTHEST_WALL and not agree:
+            raise InputError(
+                f"--distance{name} {measured:g} m is too far for a wall, and the control points "
+                f"say {distance:.4g} m: is it in mm? Distances are in metres "
+                f"(--distance{name} {measured / 1000:g})."
+            )
         for factor, unit in ((1000.0, "mm"), (100.0, "cm")):
             if 0.8 < distance / measured / factor < 1.25:
                 raise InputError(
@@ -104,9 +125,9 @@ def check_units(cameras: Cameras, site: SiteMeasures) -> None:
                     f"away, --distance{name} says {measured:g} m. Write them in metres, or the "
                     f"unit into the headings (X [{unit}])."
                 )
-    if max(d1, d2) > FARTHEST:
+    if max(d1, d2) > FARTHEST_WALL and not agree:
         raise InputError(
-            f"the control points put the cameras {d2:,.0f} and {d1:,.0f} m from the wall: they "
+            f"the control points put the cameras {d1:,.0f} and {d2:,.0f} m from the wall: they "
             "are in mm or cm. Write them in metres, or the unit into the headings (X [mm])."
         )
 

@@ -124,6 +124,8 @@ def orthophoto(
         images = dict(enumerate(image, start=1))
         if len(images) != 2:
             raise InputError(f"image: expected one photo or two, got {len(images)}.")
+    for number, pixels in images.items():
+        pair.photo(number).check_size(pixels.shape[1::-1], f"image {number}")
     first = min(images)
     height, width = images[first].shape[:2]
     grid = choose_grid(pair, first, (width, height), surface, gsd=gsd, bounds=bounds)

@@ -98,6 +98,8 @@ def common_grid(
     gsd = gsd or finest.gsd
     if bounds is None:
         bounds = bounds_of(np.array([layer.grid.bounds for layer in layers]))
+    if gsd > max(bounds[2] - bounds[0], bounds[3] - bounds[1]) > 0:
+        raise InputError(f"gsd: a pixel of {gsd:g} m is larger than the mosaic; give a finer one.")
     if abs(gsd / finest.gsd - 1) > 1e-9:
         return Grid.from_bounds(bounds, gsd=gsd)
     left, _, _, top = finest.bounds

@@ -16,7 +16,7 @@ from bifocal.files.geotiff import (
     create_raster,
     dpi_at_scale,
 )
-from bifocal.files.images import ImageArray, image_info, read_image
+from bifocal.files.images import ImageArray, photo_info, read_image
 from bifocal.files.point_tables import read_survey_points
 from bifocal.model.grid import Bounds, Grid
 from bifocal.model.pair import Pair
@@ -119,7 +119,7 @@ def make_ortho(
     check_writable(out, overwrite=overwrite)
     with open_surface(task, pair) as (surface, _, remarks):
         numbers = {"1": (1,), "2": (2,), "both": (1, 2)}[task.image]
-        images = {number: read_image(pair.photo_file(number)) for number in numbers}
+        images = {number: read_image(photo_info(pair, number).path) for number in numbers}
         height, width = images[numbers[0]].shape[:2]
         grid = _grid(pair, numbers[0], (width, height), surface, task)
         photos, notes = _sources(pair, images, surface, grid, task)
@@ -250,7 +250,7 @@ def survey_points_of(source: Path | SurveyPoints) -> tuple[SurveyPoints, tuple[s
 def planned_grid(pair: Pair, surface: Surface, task: OrthoTask) -> Grid:
     """Return the grid the task will have, without decoding a photo; asks back like `make_ortho`."""
     number = 2 if task.image == "2" else 1
-    return _grid(pair, number, image_info(pair.photo_file(number)).size, surface, task)
+    return _grid(pair, number, photo_info(pair, number).size, surface, task)
 
 
 def _grid(pair: Pair, first: int, size: tuple[int, int], surface: Surface, task: OrthoTask) -> Grid:

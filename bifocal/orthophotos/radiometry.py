@@ -23,6 +23,8 @@ from bifocal.orthophotos.visibility import hidden_from
 from photocore.arrays import BoolArray, Float32Array, FloatArray
 from photocore.errors import InputError
 
+#: Largest coefficient of vignetting; lenses have some tenths.
+STEEPEST = 100.0
 #: Side of the grid on which two photos are compared. [px]
 _COMPARE = 400
 #: Fewer common pixels than this say nothing about colours.
@@ -84,12 +86,12 @@ def devignetted(image: ImageArray, photo: Photo, model: str) -> ImageArray:
         share = (radius / focal) ** 2
         return _scaled(image, lambda square: (1 + np.float32(share) * square) ** 2)
     try:
-        k1, k2, k3 = (np.float32(value) for value in model.split(","))
-        if not np.isfinite(k1 + k2 + k3):
+        k1, k2, k3 = (float(value) for value in model.split(","))
+        if not max(abs(k1), abs(k2), abs(k3)) <= STEEPEST:
             raise ValueError(model)
     except ValueError:
         raise InputError(
-            f"vignetting: {model!r} is neither cos4 nor three numbers k1,k2,k3."
+            f"vignetting: {model!r} is neither cos4 nor three numbers k1,k2,k3 up to {STEEPEST:g}."
         ) from None
 
     def gain(square: Float32Array) -> Float32Array:

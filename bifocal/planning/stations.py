@@ -20,6 +20,8 @@ from photocore.errors import GeometryError, InputError
 OVERLAP = 0.2
 #: Closer than this share of the far distance the two stations hardly differ.
 LEAST_RATIO = 1.05
+#: More lenses than anyone carries.
+MOST_LENSES = 40
 #: Nobody photographs a wall from closer than this. [m]
 NEAREST = 0.2
 
@@ -88,6 +90,11 @@ def plan_stations(
     >>> best.c1, best.c2, round(best.d1, 2), round(best.d2, 2), round(best.sigma_r_rms * 1000, 1)
     (35.0, 19.0, 17.5, 9.5, 27.6)
     """
+    if len(focal_lengths) > MOST_LENSES:
+        raise InputError(
+            f"focal lengths: {len(focal_lengths)} lenses make too many pairs to compare; give at "
+            f"most {MOST_LENSES} of them."
+        )
     lenses = sorted({positive(c, "focal length", unit="mm") for c in focal_lengths}, reverse=True)
     if len(lenses) < 2:
         raise InputError("give at least two different focal lengths, e.g. --focal 35 --focal 19.")

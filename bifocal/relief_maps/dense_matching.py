@@ -8,8 +8,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from bifocal.files.haze import greys_through_water
-from bifocal.files.images import as_grey
+from bifocal.files.haze import greys_of_pair
 from bifocal.model.grid import Bounds, Grid, bounds_of
 from bifocal.model.pair import Pair
 from bifocal.model.relief_map import Quality, ReliefMap
@@ -145,13 +144,12 @@ def dense_relief(
     >>> result.shape, round(result.gsd, 6)
     ((67, 100), 0.06)
     """
-    grey1, grey2 = as_grey(image1, "image1"), as_grey(image2, "image2")
+    grey1, grey2 = greys_of_pair(pair, image1, image2)
     if quality not in QUALITIES:
         raise InputError(f"quality: expected {', '.join(QUALITIES)}, got {quality!r}.")
     if relief_range is not None:
         _check_range(relief_range, pair.image2.distance)
     if pair.layers is not None:  # nothing stands out of the water, or through the glass
-        grey1, grey2 = greys_through_water(image1, image2)
         low, high = relief_range or seed.usual_range(pair.image2.distance)
         relief_range = (low, min(high, 0.999 * pair.highest_relief))
         if not low < relief_range[1]:

@@ -31,7 +31,7 @@ def orientation_sigma(pair: Pair, relief: Float32Array, grid: Grid) -> Float32Ar
     on a coarse net and interpolated. These errors are common to the whole map: a profile or an area
     does not average them out.
     """
-    if pair.orientation is None:
+    if pair.whole_orientation is None:
         return np.zeros(relief.shape, dtype=np.float32)
     import cv2
 

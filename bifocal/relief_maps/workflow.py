@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bifocal.files.geotiff import write_relief
-from bifocal.files.images import ImageArray, read_image, to_eight_bit
+from bifocal.files.images import ImageArray, photo_info, read_image, to_eight_bit
 from bifocal.model.basis import rests_on
 from bifocal.model.pair import Pair
 from bifocal.model.relief_map import ReliefMap
@@ -78,7 +78,7 @@ def relief_of_pair(
     """
     pair = Pair.of(pair_file)
     _check_outputs(job, pair)
-    image1, image2 = (read_image(pair.photo_file(number)) for number in (1, 2))
+    image1, image2 = (read_image(photo_info(pair, number).path) for number in (1, 2))
     result = dense_relief(
         pair, image1, image2, gsd=job.gsd, bounds=job.bounds, quality=job.quality,
         relief_range=job.relief_range, progress=progress,

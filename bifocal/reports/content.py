@@ -11,7 +11,7 @@ import cv2
 import numpy as np
 
 from bifocal.files.geotiff import RasterReader, read_relief
-from bifocal.files.images import read_image, to_eight_bit
+from bifocal.files.images import photo_info, read_image, to_eight_bit
 from bifocal.files.strips import ROWS, colour_strips
 from bifocal.model.grid import Bounds
 from bifocal.model.pair import Pair
@@ -216,7 +216,7 @@ def _photos(pair: Pair) -> tuple[SeenPhoto, ...]:
         photo = pair.photo(number)
         if not photo.file or not pair.photo_file(number).is_file():
             return ()
-        image = to_eight_bit(read_image(pair.photo_file(number)))
+        image = to_eight_bit(read_image(photo_info(pair, number).path))
         height, width = image.shape[:2]
         reduction = max(1.0, max(width, height) / SIDE)
         size = (round(width / reduction), round(height / reduction))

@@ -22,8 +22,6 @@ from photocore.errors import GeometryError, InputError
 NAMES = ("scale", "rotation", "shift X", "shift Y", "tilt X", "tilt Y")
 #: Residuals of this share of their sigma are rounding: the points fit exactly.
 ROUNDING = 1e-9
-#: Beyond this many sigma a plane point is taken for one that is not on the plane.
-OUTLIER_LIMIT = 4.0
 #: Points that move against the plane by more than this many sigma show the centre of zoom.
 OFF_PLANE = 10.0
 #: Tilt needs this many points: 6 unknowns, 2 observations a point, and some redundancy.
@@ -327,12 +325,14 @@ def _fit(
 
 def _worst(scaled: FloatArray, used: BoolArray) -> tuple[int | None, float]:
     """Return the point that fits worst and the limit it has to keep."""
+    from photocore.adjustment import OUTLIER_DISTANCE  # brings scipy, as above
+
     if used.sum() < 4:
         return None, np.inf
     # Robust unit: the median of |N2| is 1.177; never finer than a quarter of the given sigma.
     unit = max(float(np.median(scaled[used])) / 1.177, 0.25)
     worst = int(np.argmax(np.where(used, scaled, -1.0)))
-    return worst, OUTLIER_LIMIT * unit
+    return worst, OUTLIER_DISTANCE * unit
 
 
 def _parameters(

@@ -177,8 +177,10 @@ def _ideal(setup: SurveySetup, folder: Path) -> Pair:
         nadir1=nadirs[0], nadir2=nadirs[1], sigma=setup.precision / pitch,
     )  # fmt: skip
     photos = [
-        replace(photo, file=name, plane_from_pixel=_corrected(photo, matrix))
-        for photo, name, matrix in zip(pair.as_given, names, setup.adjusted, strict=True)
+        replace(photo, file=name, image_size=size, plane_from_pixel=_corrected(photo, matrix))
+        for photo, name, size, matrix in zip(
+            pair.as_given, names, sizes, setup.adjusted, strict=True
+        )
     ]
     if setup.media is not None and setup.media.layers is not None:
         through = [setup.media.through(number) for number in (1, 2)]

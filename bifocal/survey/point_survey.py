@@ -132,7 +132,7 @@ def solve_points(
         carried=radii.carried,
         image_scale=first.scale_number,
         sigma_px=radii.sigma_px,
-        pair=None if pair.orientation is None else pair,
+        pair=None if pair.whole_orientation is None else pair,
     )
 
 

@@ -117,7 +117,8 @@ def described_pair(setup: SurveySetup, file: Path | None, folder: Path) -> Pair 
     if setup.matrices is None or setup.d1 is None or setup.d2 is None:
         return None
     lenses: list[Lens | None] = [None, None]
-    orientation, doubt = None, ""
+    sizes: list[tuple[int, int] | None] = [None, None]
+    orientation, doubt, extra = None, "", {"setup": None}
     media: list[dict[str, Any]] = [{}, {}]
     if setup.media is not None:
         through = [setup.media.through(number) for number in (1, 2)]
@@ -127,7 +128,9 @@ def described_pair(setup: SurveySetup, file: Path | None, folder: Path) -> Pair 
     if file is not None:
         try:
             given = Pair.read(file)
+            extra = {"setup": given.extra.get("setup")}
             lenses = [given.image1.lens, given.image2.lens]
+            sizes = [given.image1.image_size, given.image2.image_size]
             if setup.media is None or setup.media.layers == given.layers:
                 orientation = given.orientation  # it may count the media too
             if setup.media is None:
@@ -141,13 +144,14 @@ def described_pair(setup: SurveySetup, file: Path | None, folder: Path) -> Pair 
     photos = [
         Photo(
             plane_from_pixel=matrix, nadir=nadir, distance=d, lens=lens, principal_distance=c,
-            **through,
+            image_size=size, **through,
         )
-        for matrix, nadir, d, lens, c, through in zip(
+        for matrix, nadir, d, lens, c, size, through in zip(
             setup.matrices, setup.nadirs, (setup.d1, setup.d2), lenses, (setup.c1, setup.c2),
-            media, strict=True,
+            sizes, media, strict=True,
         )
     ]  # fmt: skip
     return Pair(
-        image1=photos[0], image2=photos[1], folder=folder, orientation=orientation, remarks=remarks
-    )
+        image1=photos[0], image2=photos[1], folder=folder, orientation=orientation,
+        remarks=remarks, extra=extra,
+    )  # fmt: skip

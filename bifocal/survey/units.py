@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from bifocal.model.pair import Pair
-from bifocal.model.photo import Photo
+from bifocal.model.photo import FARTHEST_WALL, Photo
 from bifocal.survey.observations import PointObservations
 from bifocal.survey.relief_table import ReliefTable
 from bifocal.survey.setup import SurveySetup
@@ -25,8 +25,6 @@ WIDEST = 3.0
 LARGEST_MM = 150.0
 #: Pixels that all lie within this of the top-left corner are millimetres. [px]
 CORNER_PX = 60.0
-#: No wall is surveyed with a hand camera from further away. [m]
-FARTHEST = 500.0
 
 
 def refuse_wrong_unit(
@@ -128,7 +126,7 @@ def refuse_far_stations(
         Naming the distance and what was probably meant.
     """
     for key, value in (("d1", d1), ("d2", d2)):
-        if value is None or value <= FARTHEST:
+        if value is None or value <= FARTHEST_WALL:
             continue
         place = f"--{key}" if key in options else f"{where}: {key[0]}_{key[1]}"
         # 9500 is 9.5 m in millimetres; 950 is 9.5 m in centimetres and 0.95 m in millimetres.

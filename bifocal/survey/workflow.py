@@ -233,8 +233,8 @@ def solve(
     check = check_points(table, known, judged)
     world, world_remarks = _placed(control, table, model or survey.model)
     remarks = (
+        *pair_remarks,  # what is wrong with the pair comes first
         *survey.remarks,
-        *pair_remarks,
         *solved.remarks,
         *point_remarks(solved.points, table, solved.setup),
         *check.remarks,
@@ -243,30 +243,14 @@ def solve(
         *world_remarks,
     )
     return SolvedSurvey(
-        language=survey.language,
-        source=path,
-        survey=survey,
-        points=solved.points,
-        table=table,
-        setup=solved.setup,
-        pair=solved.pair,
-        pair_path=pair_path,
-        sigma_px=solved.sigma_px,
-        known=survey.known,
-        check=check,
-        control=survey.control,
-        georeference=world,
-        model=model or survey.model,
-        sensor=setup.sensor,
-        limits=setup.limits,
-        orientation_check=solved.check,
-        media=_media(survey, pair, general),
-        adjusted=adjust_setup,
-        corrections=solved.corrections,
-        given=asked,
-        rules=judged,
+        language=survey.language, source=path, survey=survey, points=solved.points, table=table,
+        setup=solved.setup, pair=solved.pair, pair_path=pair_path, sigma_px=solved.sigma_px,
+        known=survey.known, check=check, control=survey.control, georeference=world,
+        model=model or survey.model, sensor=setup.sensor, limits=setup.limits,
+        orientation_check=solved.check, media=_media(survey, pair, general), adjusted=adjust_setup,
+        corrections=solved.corrections, given=asked, rules=judged,
         remarks=tuple(dict.fromkeys(remarks)),
-    )
+    )  # fmt: skip
 
 
 def _media(

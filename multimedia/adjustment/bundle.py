@@ -25,6 +25,7 @@ from multimedia.adjustment.plausibility import (
 )
 from multimedia.adjustment.unknowns import AUTO, Adjustment, Unknowns
 from multimedia.media.camera import EXTERIOR, Camera
+from multimedia.orientation.calibration_covariance import with_covariance
 from multimedia.orientation.intersection import intersect
 from multimedia.orientation.plate_poses import FEWEST, plate_pose
 from multimedia.projects.model import ObjectPoints, Project
@@ -98,9 +99,14 @@ def bundle_adjust(project: Project, unknowns: Unknowns | None = None) -> Adjustm
     result = _adjustment(bundle, fitted, weights, remarks)
     refuse_impossible_media(bundle.project, columns, result, unknowns.priors)
     seen = bundle.observations
-    result = with_model_error(result, tuple(seen.source[rows] for rows in seen.rows))
+    order = tuple(seen.source[rows] for rows in seen.rows)
+    result = with_model_error(result, order, unknowns.plates)
     told = remarks_on_unknowns(bundle.project, columns, result)
-    return replace(result, remarks=(*result.remarks, *told))
+    whose = {f"{camera}:{name}": at for camera, own in zip(project.camera_names, columns.cameras,
+             strict=True) for name, at in own.items()}  # fmt: skip
+    whose |= {f"{of}:{name}": at for of, own in columns.media.items() for name, at in own.items()}
+    project, lost = with_covariance(result.project, whose, result.covariance)
+    return replace(result, project=project, remarks=(*result.remarks, *told, *lost))
 
 
 def _weighted(bundle: Bundle, weights: FloatArray) -> Bundle:

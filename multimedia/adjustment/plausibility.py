@@ -30,6 +30,8 @@ RISK_PARAMETER, RISK_WHITE = 0.01, 0.001
 #: Points of one image that may share what the model lacks; the largest effect counts.
 NEIGHBOURS = (4, 8, 16)
 _FEWEST_CELLS = 6
+#: Classes of depth before each camera, as many points in each.
+_DEPTHS = 3
 #: Image coordinates better than this are exact, as computed ones are: only rounding is left. [mm]
 EXACT = 1e-7
 _SHOWN = 6
@@ -93,7 +95,9 @@ def refuse_impossible_media(
         )
 
 
-def with_model_error(result: Adjustment, order: tuple[IntArray, ...]) -> Adjustment:
+def with_model_error(
+    result: Adjustment, order: tuple[IntArray, ...], plates: Sequence[str] = ()
+) -> Adjustment:
     """Return the adjustment with sigmas that include what the model lacks.
 
     Residuals of neighbouring points are independent if the model is complete. Where their sums
@@ -105,25 +109,28 @@ def with_model_error(result: Adjustment, order: tuple[IntArray, ...]) -> Adjustm
     result : Adjustment
     order : tuple of ndarray of int
         Rows of the image points of each camera.
+    plates : sequence of str
+        Groups of object points whose pose was an unknown.
     """
     if not result.sigma0 > EXACT:
         return result
     place = result.project.image_points.image
-    scaled = result.residuals / result.sigma_image
-    effect = 1.0
+    effect, remarks = 1.0, list[str]()
     for size in NEIGHBOURS:
-        sums, free, count = 0.0, 0.0, 0
-        for rows in order:
-            for cell in _cells(place[rows], size):
-                mine = rows[cell]
-                sums += float((scaled[mine].sum(axis=0) ** 2).sum())
-                free += float(result.redundancy_numbers[mine].sum())
-                count += 2
-        if count < 2 * _FEWEST_CELLS or free <= 0:
+        cells = [rows[cell] for rows in order for cell in _cells(place[rows], size)]
+        squares, free = _sums(result, cells)
+        count = 2 * len(cells)
+        if len(cells) < _FEWEST_CELLS or free.sum() <= 0:
             break
-        ratio = sums / free
+        ratio = float(squares.sum() / free.sum())
         if ratio > chi2.isf(RISK_WHITE / len(NEIGHBOURS), count) / count:
             effect = max(effect, ratio)
+    for groups in _groups(result, order):
+        squares, free = _sums(result, [rows for _, _, rows in groups])
+        ratios = np.divide(squares, free, out=np.zeros_like(free), where=free > 0.5)
+        if ratios.max(initial=0.0) > chi2.isf(RISK_WHITE / max(len(groups), 1), 2) / 2:
+            effect = max(effect, float(squares.sum() / free.sum()))
+            remarks.append(_worst_group(result, groups, ratios, plates))
     if effect == 1.0:
         return result
     points = result.project.object_points
@@ -136,10 +143,67 @@ def with_model_error(result: Adjustment, order: tuple[IntArray, ...]) -> Adjustm
         model_error=factor,
         remarks=(
             *result.remarks,
+            *remarks,
             f"Residuals of neighbouring points are alike: the model lacks something (lens terms, a "
             f"tilt, an index, gross errors). All sigmas were made {factor:.1f} times larger, the "
             "least that this costs.",
         ),
+    )
+
+
+def _sums(result: Adjustment, cells: Sequence[IntArray]) -> tuple[FloatArray, FloatArray]:
+    """Return the squared sum of the residuals of each cell in sigmas, and what chance makes it."""
+    scaled = result.residuals / result.sigma_image
+    squares = [float((scaled[rows].sum(axis=0) ** 2).sum()) for rows in cells]
+    free = [float(result.redundancy_numbers[rows].sum()) for rows in cells]
+    return np.array(squares), np.array(free)
+
+
+def _groups(
+    result: Adjustment, order: tuple[IntArray, ...]
+) -> Iterator[list[tuple[str, str, IntArray]]]:
+    """Yield what may be wrong as a whole: plates, depths; name, camera and rows of the residuals.
+
+    Plates overlap in an image, so that no neighbours there are of one of them alone.
+    """
+    points = result.project.object_points
+    at = np.array(points.rows(result.project.image_points.ids), dtype=np.int64)
+    label = np.array(points.groups)[at]
+    plates, depths = list[tuple[str, str, IntArray]](), list[tuple[str, str, IntArray]]()
+    for camera, rows in zip(result.project.cameras, order, strict=True):
+        own = [g for g in np.unique(label[rows]) if g not in ("", "new")]
+        plates += [(str(g), camera.name, rows[label[rows] == g]) for g in own if len(own) > 1]
+        depth = -camera.vectors_to(points.xyz[at[rows]])[:, 2]
+        parts = np.array_split(np.argsort(depth, kind="stable"), _DEPTHS)
+        depths += [
+            (f"{depth[part[0]]:.4g} to {depth[part[-1]]:.4g}", camera.name, rows[part])
+            for part in parts if len(part) >= NEIGHBOURS[0]
+        ]  # fmt: skip
+    yield plates
+    yield depths
+
+
+def _worst_group(
+    result: Adjustment, groups: Sequence[tuple[str, str, IntArray]], ratios: FloatArray,
+    plates: Sequence[str],
+) -> str:  # fmt: skip
+    """Return what to say of the group that is off most, and what would free it."""
+    label, camera, rows = groups[int(np.argmax(ratios))]
+    mean = np.hypot(*result.residuals[rows].mean(axis=0)) * 1000
+    off = (
+        f"off by {mean:.1f} um on average in camera {camera}, {np.sqrt(ratios.max()):.0f} "
+        "standard errors"
+    )
+    if label not in result.project.object_points.groups:
+        return (
+            f"Points {label} {result.project.unit} before the camera are {off}: depth is not "
+            "modelled. An index, the place of the glass (--media index3,offset) or c may free it."
+        )
+    if label in plates:
+        return f"Points of plate {label} are {off}: it is bent, or measured wrongly."
+    return (
+        f"Points of plate {label} are {off}: they are not where their coordinates say. --plate "
+        f"{label} frees the pose of the plate."
     )
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import click
 
 from photocore.cli import LazyGroup
+from photocore.installation import DISTRIBUTION
 
 #: Name and one-line help of every command, in the order of work.
 SUMMARIES: dict[str, str] = {
@@ -39,6 +40,6 @@ First steps:
     summaries=SUMMARIES,
     epilog=EPILOG,
 )
-@click.version_option(package_name="bifocal", prog_name="multimedia")
+@click.version_option(package_name=DISTRIBUTION, prog_name="multimedia")
 def main() -> None:
     """Photogrammetry through air, glass and water."""

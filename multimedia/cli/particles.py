@@ -44,13 +44,15 @@ def command(project: Path, targets: tuple[Path, ...], as_json: bool, **options: 
     Targets belong together where their rays through glass and water meet: along each other's
     epipolar curves. Those seen by most cameras are taken first, the best fitting before others,
     each target once. Positions are in the unit of the project, in rt_is in mm.
+
+    How many come by chance is counted on the same targets displaced against each other; what
+    cannot be told from that is refused.
     """
     from multimedia.openptv.particles_workflow import find_particles
 
     found = find_particles(project, targets, **options)
-    seen = (found.numbers >= 0).sum(axis=1)
     names = found.project.camera_names
-    median = float(sorted(found.misfit)[len(seen) // 2]) if len(seen) else None
+    median = float(sorted(found.misfit)[len(found.misfit) // 2]) if len(found.misfit) else None
     data = {
         "particles": [
             {"X": x, "Y": y, "Z": z, "targets": row, "misfit_px": miss}
@@ -59,9 +61,13 @@ def command(project: Path, targets: tuple[Path, ...], as_json: bool, **options: 
             )
         ],
         "unit": found.project.unit, "median_misfit_px": median, "out": options["out"],
+        "by_chance_at_most": float(found.chance.sum()),
     }  # fmt: skip
-    rows = [(f"seen by {k}", int((seen == k).sum())) for k in range(len(names), 1, -1)]
-    lines = [text_table(("particles", "number"), [row for row in rows if row[1]])]
+    rows = [
+        (f"seen by {k}", int(found.seen_by[k]), f"{found.chance[k]:.3g}")
+        for k in range(len(names), 1, -1) if found.seen_by[k]
+    ]  # fmt: skip
+    lines = [text_table(("particles", "number", "by chance at most"), rows)]
     for k, (name, count) in enumerate(zip(names, found.targets, strict=True)):
         lines.append(f"{name}: {int((found.numbers[:, k] >= 0).sum())} of {count} targets used")
     if median is not None:

@@ -180,6 +180,8 @@ def _port(words: Sequence[str], path: Path) -> FlatInterface | Interfaces:
             f"{path}: {kind} with {len(values)} parameters after the lens: known are "
             f"{' and '.join(_PORTS)} with 8."
         )
+    if kind == "FLATPORT" and not np.linalg.norm(values[:3]) > 0:
+        raise InputError(f"{path}: FLATPORT: its normal must not be zero; expected Nx Ny Nz.")
     first, (size, thickness), indices = FLIP @ values[:3], values[3:5], tuple(values[5:].tolist())
     if kind == "FLATPORT":
         return FlatInterface(
@@ -236,6 +238,8 @@ def _views(path: Path, lenses: dict[str, LensData]) -> list[_View]:
             raise InputError(
                 f"{where}: expected IMAGE_ID, QW to TZ, CAMERA_ID, NAME; found {first!r:.60}."
             )
+        if not words[0].isdecimal():
+            raise InputError(f"{where}: IMAGE_ID {words[0]!r:.60} is no whole number.")
         if words[8] not in lenses:
             raise InputError(f"{where}: camera {words[8]} is not in cameras.txt.")
         pose = _floats(words[1:8], path, f"line {number}")

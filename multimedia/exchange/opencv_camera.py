@@ -26,6 +26,8 @@ from photocore.rotation import nearest_rotation
 PITCH = 0.005
 #: Beyond so many pixels a camera of another lens model is another camera.
 FARTHEST = 1.0
+#: Distortion terms of OpenCV's largest model.
+MOST_TERMS = 14
 _FISHEYE = "fisheye"
 _FREE = ("c", "xh", "yh", "k1", "k2", "k3", "p1", "p2", "scale")
 
@@ -89,6 +91,16 @@ def camera_of(
     if abs(matrix[0, 1]) > 1e-9 * matrix[0, 0]:
         raise InputError(f"{lens.source}: camera {name} has a skew of {matrix[0, 1]:g} px.")
     fx, fy = float(matrix[0, 0]), float(matrix[1, 1])
+    if not (fx > 0 and fy > 0 and np.size(translation) == 3):
+        raise InputError(
+            f"{lens.source}: camera {name}: expected focal lengths above zero and a translation of "
+            "three numbers."
+        )
+    if lens.coefficients.size > MOST_TERMS:
+        raise InputError(
+            f"{lens.source}: camera {name} has {lens.coefficients.size} distortion terms; expected "
+            f"at most {MOST_TERMS}."
+        )
     width, height = lens.image_size
     sensor = Sensor(
         width=width, height=height, pitch=np.array([pitch, pitch * (fx / fy)]),  # type: ignore[arg-type]

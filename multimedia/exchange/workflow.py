@@ -81,6 +81,11 @@ def convert(
         Naming file and place of what cannot be read, or what the target cannot hold.
     """
     check_not_input(target, source)
+    if form is not None and target.suffix.lower() == ".toml":
+        raise InputError(
+            f"{target}: is the name of a project file; leave --to out, or end the name as {form} "
+            "files do."
+        )
     wanted = "project" if target.suffix.lower() == ".toml" else form
     if wanted is None:
         wanted = _BY_ENDING.get(target.suffix.lower())

@@ -32,6 +32,9 @@ Distortion = Brown | Fisheye
 #: A full turn and a little: larger "radians" are degrees.
 LARGEST_ANGLE = 6.2832
 
+#: Finer than this no sensor's pixel is. [mm]
+SMALLEST_PIXEL = 1e-9
+
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Sensor:
@@ -69,8 +72,11 @@ class Sensor:
                 raise InputError(f"sensor {name}: must be a whole number of pixels, got {size:g}.")
             set_(self, name, round(size))
         pitch = np.broadcast_to(as_floats(self.pitch, "pitch"), (2,))
-        if not (pitch > 0).all():
-            raise InputError(f"pitch: a pixel is {pitch} mm wide and high; both must be above 0.")
+        if not (pitch >= SMALLEST_PIXEL).all():
+            raise InputError(
+                f"pitch: a pixel is {pitch} mm wide and high; both must be {SMALLEST_PIXEL:g} or "
+                "more."
+            )
         origin = ((self.width - 1) / 2, (self.height - 1) / 2)
         set_(self, "pitch", read_only(pitch, "pitch", shape=(2,)))
         set_(self, "origin", read_only(origin if self.origin is None else self.origin, "origin"))

@@ -16,6 +16,9 @@ from photocore.errors import InputError
 
 #: Farthest that a target may lie from where its particle is seen. [px]
 TOLERANCE = 2.0
+#: Frames of targets that have nothing to do with each other, and how far they are displaced: so
+#: many pixels, or so many tolerances. Risk of calling chance particles.
+DECOYS, _DISPLACED, RISK = 2, (40.0, 10.0), 0.001
 #: Pairs of rays worked on at a time.
 _BLOCK = 200_000
 
@@ -89,6 +92,54 @@ def correspondences(
     return xyz[kept], numbers[kept], misfit[kept]
 
 
+def found_by_chance(
+    cameras: Sequence[Camera],
+    targets: Sequence[FloatArray],
+    media: Sequence[Media],
+    *,
+    tolerance: float = TOLERANCE,
+    fewest: int = 3,
+) -> FloatArray:
+    """Return how many "particles" seen by 0, 1, 2 ... cameras come by chance, at most.
+
+    Parameters
+    ----------
+    cameras, targets, media, tolerance, fewest
+        As for `correspondences`.
+
+    Notes
+    -----
+    Counted, not computed: the targets of each camera are displaced in a direction of its own, by
+    far more than the tolerance, so that no two are of one particle while there are as many of
+    them in the same clusters. True particles leave fewer targets to chance than there are here.
+    """
+    away, counts = max(_DISPLACED[0], _DISPLACED[1] * tolerance), np.zeros(len(cameras) + 1)
+    for turn in range(DECOYS):
+        # Golden angles: no shift or turn of the object moves the images like this, and for two
+        # cameras, whose one condition a displacement may keep, the other frame breaks it.
+        angles = 2.4 * np.arange(len(cameras)) + turn * np.pi / 2
+        moved = [t.reshape(-1, 2) + away * np.array([np.cos(a), np.sin(a)])
+                 for t, a in zip(targets, angles, strict=True)]  # fmt: skip
+        _, numbers, _ = correspondences(cameras, moved, media, tolerance=tolerance, fewest=fewest)
+        counts += np.bincount((numbers >= 0).sum(axis=1), minlength=len(counts))
+    return counts / DECOYS
+
+
+def is_chance(found: FloatArray, chance: FloatArray) -> bool:
+    """Whether no number of cameras agrees on more particles than chance makes them.
+
+    Parameters
+    ----------
+    found, chance : ndarray, shape (cameras + 1,)
+        Particles by the number of cameras that saw them, and those of `found_by_chance`.
+    """
+    from scipy.stats import binom
+
+    ours, theirs = (np.cumsum(counts[::-1]) for counts in (found, DECOYS * chance))
+    by_chance = binom.sf(ours - 1, ours + theirs, 1 / (1 + DECOYS)) > RISK
+    return bool((by_chance | (ours == 0)).all() and theirs[-1] > 0)
+
+
 def _seen(
     cameras: Sequence[Camera],
     targets: Sequence[FloatArray],
@@ -127,7 +178,8 @@ def _misfits(
         (((project(c, xyz, m) - i) / s.pitch) ** 2).sum(axis=-1)
         for c, m, s, i in zip(cameras, media, sensors, image, strict=True)
     ])  # fmt: skip
-    return np.sqrt(np.nanmean(squares, axis=0))
+    with np.errstate(invalid="ignore"):  # a proposal that no camera sees has no misfit
+        return np.sqrt(np.nansum(squares, axis=0) / np.isfinite(squares).sum(axis=0))
 
 
 def _each_once(numbers: IntArray, order: IntArray) -> IntArray:

@@ -8,10 +8,11 @@ from pathlib import Path
 
 import numpy as np
 
-from multimedia.media.camera import Camera
+from multimedia.media.camera import Camera, Sensor
 from multimedia.media.flat_interface import FlatInterface
 from multimedia.openptv.openptv_cameras import (
     NO_MISFIT,
+    OpenptvCamera,
     common_sensor,
     glass_vector,
     in_openptvs_terms,
@@ -32,10 +33,11 @@ from multimedia.openptv.openptv_files import (
 )
 from multimedia.openptv.plane_files import find_sets, read_stems
 from multimedia.openptv.plane_sets import PlaneCandidates
+from multimedia.orientation.intersection import intersect
+from multimedia.orientation.workflow import known_misses
 from multimedia.projects.model import SHOWN, ImagePoints, ObjectPoints, Project
 from multimedia.projects.point_tables import METRES
 from photocore.arrays import FloatArray, IntArray
-from photocore.distortion import Brown
 from photocore.errors import InputError
 from photocore.output import atomic_folder
 from photocore.textfile import check_name
@@ -169,6 +171,7 @@ def write_experiment(
     sensor = common_sensor(project.cameras)
     lines, inexact = [str(len(project.cameras))], list[str]()
     files: dict[str, str] = {}
+    views: list[tuple[OpenptvCamera, FlatInterface]] = []
     layers = None
     for number, camera in enumerate(project.cameras):
         wall = wall_of(camera, project.interface_of(number))
@@ -184,6 +187,7 @@ def write_experiment(
         if ours.misfit > NO_MISFIT:
             where = " (at the object points)" if ours.at_points else ""
             inexact.append(f"{camera.name} {ours.misfit:.3g} px{where}")
+        views.append((ours, wall))
         moved = replace(ours.camera, centre=ours.camera.centre * factor)
         files |= {f"{base}.ori": ori_text(moved, glass)}
         files |= {f"{base}.addpar": addpar_text(moved, ours.scale)}
@@ -210,7 +214,37 @@ def write_experiment(
     return (
         "OpenPTV has no terms for this distortion as it is; it was written with those that come "
         f"nearest. Image points move by at most: {', '.join(inexact)}.",
+        *_cost(project, sensor, views),
+        'To lose nothing, calibrate with convention = "openptv" in [camera.distortion] of every '
+        "camera (as an import of OpenPTV's files has it) and without scale.",
     )
+
+
+def _cost(
+    project: Project, sensor: Sensor, views: Sequence[tuple[OpenptvCamera, FlatInterface]]
+) -> list[str]:
+    """Return what the cameras as written do to the points that the project's cameras measured."""
+    ids = project.image_points.names
+    if len(views) < 2 or not ids:
+        return []
+    image, _ = project.image_points.grid(project.camera_names, ids)
+    there = np.stack([
+        sensor.image_from_pixel(camera.sensor.pixel_from_image(seen)) / ours.scale
+        for camera, seen, (ours, _) in zip(project.cameras, image, views, strict=True)
+        if camera.sensor is not None
+    ])  # fmt: skip
+    own = intersect(project.cameras, image, project.interfaces).xyz
+    media = [None if len(set(wall.indices)) == 1 else wall for _, wall in views]
+    moved = intersect([ours.camera for ours, _ in views], there, media).xyz
+    miss = np.linalg.norm(moved - own, axis=1)
+    if not np.isfinite(miss).any():
+        return []
+    checks = zip(known_misses(project, ids, own), known_misses(project, ids, moved), strict=False)
+    return [
+        f"Points in space move by {np.sqrt(np.nanmean(miss**2)):.3g} {project.unit} (RMS), "
+        f"{np.nanmax(miss):.3g} at most."
+        + "".join(f" Here {ours}; as written for OpenPTV {theirs}." for ours, theirs in checks)
+    ]
 
 
 def _targets_text(project: Project, camera: Camera, rows: Sequence[int]) -> str:
@@ -307,9 +341,6 @@ def _cameras(
             name = f"{name}_{number}"
         camera, glass, said = read_camera(path, sensor=control.sensor, name=name)
         remarks += said
-        if camera.distortion.is_identity:
-            # Without distortion all conventions agree; the usual one calibrates best.
-            camera = replace(camera, distortion=Brown())
         cameras.append(camera)
         if not np.any(glass):
             media_of.append("")

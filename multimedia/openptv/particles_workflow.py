@@ -7,7 +7,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from multimedia.openptv.correspondences import TOLERANCE, correspondences
+import numpy as np
+
+from multimedia.openptv.correspondences import (
+    TOLERANCE,
+    correspondences,
+    found_by_chance,
+    is_chance,
+)
 from multimedia.openptv.openptv_files import read_targets, rt_is_text
 from multimedia.projects.model import Project
 from multimedia.projects.point_tables import METRES, write_columns
@@ -33,6 +40,8 @@ class Particles:
         Root mean square distance of its targets from where it is seen. [px]
     targets : tuple of int
         Targets of each camera.
+    seen_by, chance : ndarray, shape (cameras + 1,)
+        Particles by the number of cameras that saw them, and how many at most come by chance.
     """
 
     project: Project
@@ -40,6 +49,8 @@ class Particles:
     numbers: IntArray
     misfit: FloatArray
     targets: tuple[int, ...]
+    seen_by: FloatArray
+    chance: FloatArray
 
 
 def find_particles(
@@ -67,6 +78,11 @@ def find_particles(
         Cameras that must have seen a particle.
     overwrite : bool
         Whether an existing file may be replaced.
+
+    Raises
+    ------
+    InputError
+        If what is found cannot be told from chance.
     """
     if out is not None:
         check_all_writable(out, overwrite=overwrite)
@@ -83,12 +99,21 @@ def find_particles(
             f"camera, in the order {', '.join(names)}."
         )
     places = [read_targets(path).pixels for path in targets]
-    xyz, numbers, misfit = correspondences(
-        content.cameras, places, content.interfaces, tolerance=tolerance, fewest=fewest
-    )
+    frame: Any = (content.cameras, places, content.interfaces)
+    xyz, numbers, misfit = correspondences(*frame, tolerance=tolerance, fewest=fewest)
+    seen_by = np.bincount((numbers >= 0).sum(axis=1), minlength=len(names) + 1).astype(float)
+    chance = found_by_chance(*frame, tolerance=tolerance, fewest=fewest)
+    if is_chance(seen_by, chance):
+        raise InputError(
+            f"{project}: {len(xyz)} particles would be found, and {chance.sum():.0f} where the "
+            "targets of the cameras have nothing to do with each other: these are chance. Are the "
+            f"targets of one frame, in the order {', '.join(names)}? Do the cameras fit them "
+            "(`multimedia adjust`)? Fewer come by chance with a smaller --tolerance"
+            + (f" or --fewest {len(names)}." if fewest < len(names) else ".")
+        )
     found = Particles(
         project=content, xyz=xyz, numbers=numbers, misfit=misfit,
-        targets=tuple(len(place) for place in places),
+        targets=tuple(len(place) for place in places), seen_by=seen_by, chance=chance,
     )  # fmt: skip
     if out is not None:
         _write(out, found, overwrite=overwrite)

@@ -9,9 +9,9 @@ import numpy as np
 
 from multimedia.media.camera import Camera
 from multimedia.media.optical_media import OpticalMedia
-from photocore.arrays import LARGEST, FloatArray
+from photocore.arrays import FloatArray
 from photocore.camera import cameras_seeing
-from photocore.errors import GeometryError
+from photocore.errors import LARGEST, GeometryError
 
 #: Camera frame with y down and z forwards (OpenCV) from ours.
 _FLIP = np.diag([1.0, -1.0, -1.0])

@@ -12,6 +12,7 @@ import numpy as np
 from multimedia.media.camera import EXTERIOR
 from multimedia.media.projection import project as project_points
 from multimedia.media.projection import projection_status
+from multimedia.orientation.calibration_covariance import with_calibration
 from multimedia.orientation.intersection import (
     IntersectedPoints,
     intersect,
@@ -100,6 +101,8 @@ def intersect_project(
     u = project.unit
     if method == "rigorous":
         solved = intersect(project.cameras, image, project.interfaces, sigma=sigma)
+        solved, odd = with_calibration(project, solved, sigma)
+        remarks = [*remarks, *odd]
         columns, units, summary = _intersection_columns(project, solved, u)
         xyz = solved.xyz
     else:
@@ -120,7 +123,7 @@ def intersect_project(
             f"{int(np.isfinite(xyz[:, 0]).sum())} points from {len(images.ids)} image points"
         ]
     columns = {"id": list(ids), **columns}
-    summary += _check(project, list(ids), xyz)
+    summary += known_misses(project, ids, xyz)
     remarks = [*remarks, *_suspicious(project, columns["status"])]
     _write(out, columns, units, overwrite)
     return PointTable(columns=columns, remarks=(*project.remarks, *remarks), summary=tuple(summary))
@@ -337,7 +340,7 @@ def _suspicious(project: Project, status: Sequence[str]) -> list[str]:
     return [f"{len(status) - good} of {len(status)} points fail. " + " Or: ".join(hints)]
 
 
-def _check(project: Project, ids: list[str], xyz: FloatArray) -> list[str]:
+def known_misses(project: Project, ids: Sequence[str], xyz: FloatArray) -> list[str]:
     """Return how well intersected points agree with the object points of the same name."""
     place = project.object_points.rows(ids)
     known = [k for k, at in enumerate(place) if at >= 0 and np.isfinite(xyz[k, 0])]

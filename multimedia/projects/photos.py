@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from photocore.arrays import ByteArray
+from photocore.decoding import refuse_damaged_jpeg
 from photocore.errors import InputError
 from photocore.textfile import readable
 
@@ -25,6 +26,7 @@ def read_photo(path: Path) -> ByteArray:
 
     with readable(path, "photo", missing="image"), warnings.catch_warnings():
         warnings.simplefilter("ignore", Image.DecompressionBombWarning)
+        refuse_damaged_jpeg(path)
         try:
             with Image.open(path) as image:
                 return _grey(image)

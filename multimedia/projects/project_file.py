@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -46,7 +45,7 @@ from photocore.distortion import NAMES, Brown, Convention
 from photocore.errors import GeometryError, InputError, located
 from photocore.fisheye import Fisheye
 from photocore.output import all_or_none, atomic_path, check_all_writable
-from photocore.textfile import check_name, read_text
+from photocore.textfile import check_name, read_toml
 
 FORMAT = "multimedia-project/1"
 #: Each kind of ray-traced surface and its keys.
@@ -156,13 +155,12 @@ def project_data(project: Project, folder: Path) -> dict[str, Any]:
         data["name"] = project.name
     data["unit"] = project.unit
     data["sigma_image"] = float(project.sigma_image)
-    data |= {k: v for k, v in project.extra.items() if k not in data}
     data["media"] = {name: _media_data(media, folder) for name, media in project.media.items()}
     data["camera"] = [
         _camera_data(camera, media)
         for camera, media in zip(project.cameras, project.media_of, strict=True)
     ]
-    return data
+    return data | {k: v for k, v in project.extra.items() if k not in data}
 
 
 #: Keys of media; at the top of a file, where unknown keys are kept, they would have no effect.
@@ -176,16 +174,7 @@ def _toml(path: Path) -> dict[str, Any]:
             f"{path}: is a folder. Give the project file in it; for an OpenPTV experiment make "
             "one with `multimedia openptv`."
         )
-    text = read_text(path, "project file", form=" (TOML)")
-    try:
-        return tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        hint = "" if path.suffix.lower() == ".toml" else " A project is a .toml file."
-        raise InputError(f"{path}: is not valid TOML: {error}.{hint}") from None
-    except ValueError:  # Python reads no whole number of more than 4300 digits
-        raise InputError(f"{path}: holds a whole number of thousands of digits.") from None
-    except RecursionError:
-        raise InputError(f"{path}: nested too deeply for a project file.") from None
+    return read_toml(path, "project file")
 
 
 def _project(data: dict[str, Any], folder: Path) -> Project:
@@ -393,7 +382,8 @@ def _camera_data(camera: Camera, media: str) -> dict[str, Any]:
     data["c"] = camera.principal_distance
     data["principal_point"] = camera.principal_point.tolist()
     lens = camera.distortion
-    if not lens.is_identity:
+    if lens != Brown():
+        # Without terms too the convention counts: terms estimated later are of it.
         convention = _FISHEYE if isinstance(lens, Fisheye) else lens.convention.value
         terms = {name: float(getattr(lens, name)) for name in lens.names}
         data["distortion"] = {"convention": convention} | terms

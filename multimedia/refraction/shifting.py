@@ -31,7 +31,7 @@ def radial_shift(
     layers : Layers
         The media, any number and order.
     compiled : bool, optional
-        Whether to use the machine code of the extra ``fast`` (``pip install "bifocal[fast]"``), on
+        Whether to use the machine code of the extra ``fast`` (``pip install ".[fast]"``), on
         all cores. By default where it is installed and pays: fifty million points and more.
 
     Returns

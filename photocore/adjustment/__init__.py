@@ -3,10 +3,16 @@
 from photocore.adjustment.blocks import BlockEquations
 from photocore.adjustment.dense import DenseEquations
 from photocore.adjustment.iteration import LARGEST, Fit, correlations, fit, minimise
-from photocore.adjustment.outliers import OUTLIER_LIMIT, huber_weights, standardised
+from photocore.adjustment.outliers import (
+    OUTLIER_DISTANCE,
+    OUTLIER_LIMIT,
+    huber_weights,
+    standardised,
+)
 
 __all__ = [
     "LARGEST",
+    "OUTLIER_DISTANCE",
     "OUTLIER_LIMIT",
     "BlockEquations",
     "DenseEquations",

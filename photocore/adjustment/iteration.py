@@ -254,7 +254,7 @@ def fit(
         )
     if not result.settled:
         alike = np.abs(np.triu(np.nan_to_num(correlations(result.linear.cofactor)), 1))
-        one, other = np.unravel_index(int(alike.argmax()), alike.shape)
+        one, other = divmod(int(alike.argmax()), len(alike))
         apart = f"{names[one]} and {names[other]}" if alike.max() > ALIKE else "the unknowns"
         raise ConvergenceError(
             f"{what}: the adjustment does not settle. The data can hardly tell {apart} apart: "

@@ -8,6 +8,9 @@ from photocore.arrays import FloatArray
 
 #: A residual beyond this many of its own standard deviations is a gross error (1 honest in 2000).
 OUTLIER_LIMIT = 3.5
+#: The same chance for the length of a residual in the plane, of unit variance either way:
+#: sqrt(-2 ln 0.000465).
+OUTLIER_DISTANCE = 3.917
 #: Observations with a smaller redundancy number are not controlled: their residual says nothing.
 CONTROLLED = 1e-9
 

@@ -160,7 +160,7 @@ def find_columns(
             match.score = (*match.score[:2], int(header == row))
             if match.score[0] > len(fixed) and (best is None or match.score > best.score):
                 best = match
-    if best is not None:
+    if best is not None and "id" not in (column_map or {}):
         _take_names(grid, best, wanted, span or (1, 10**6))
     return best
 

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import filecmp
 import math
-import shutil
 import zipfile
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -15,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from photocore.errors import InputError
-from photocore.output import atomic_path, check_writable, free_path
+from photocore.output import atomic_path, check_writable, kept_copy
 from photocore.workbook import formulas
 from photocore.workbook.cells import CellValue, NewCell, NewColumn, NewRows, RowFormula, escape
 from photocore.workbook.changes import SheetChanges, Spliced, replaced_outside_cells
@@ -376,22 +374,7 @@ class WorkbookEditor:
         parts = self.changed_parts()
         with atomic_path(target, overwrite=True) as temporary:
             rewrite_package(self.path, temporary, parts)
-            return self._kept()
-
-    def _kept(self) -> Path:
-        """Return the backup of the file as it is, made where there is none yet."""
-        stem = f"{self.path.name}.bak"
-        for number in counted(1):
-            backup = self.path.with_name(f"{stem}{number if number > 1 else ''}")
-            if not backup.is_file():
-                break
-            if filecmp.cmp(backup, self.path, shallow=False):
-                return backup
-        kept = free_path(self.path.parent, stem)
-        with atomic_path(kept, overwrite=False) as temporary:
-            shutil.copyfile(self.path, temporary)
-        shutil.copystat(self.path, kept)
-        return kept
+            return kept_copy(self.path)
 
     def changed_parts(self) -> dict[str, bytes | None]:
         """Return the parts of the package that change or are new, with their new content."""

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from tests.attack.lines import ALIGN, SOLVE, WATER
+from tests.attack.lines import ALIGN, FACADE, SOLVE, WATER
 from tests.attack.options import LIDAR, LINES, SHIFT
 
 
@@ -449,4 +449,32 @@ CONTENTS: list[tuple[str, str, Any, str]] = [
             "   data: [ .Nan, 0., 1., 0., 1., 1., 0., 0., 1. ]\n",
         )
     ),
-]
+    *(
+        ("bifocal survey street.toml --dry-run", "street.toml", content, "street.toml")
+        for content in (
+            "distance1 = " + "9" * 5000,
+            "a = " + "[" * 100_000,
+            swapped("street.toml", '"wall"', '" "'),
+            swapped("street.toml", '"wall"', '"w\\u0000"'),
+            swapped("street.toml", "[[pair]]", "[pair]"),
+        )
+    ),
+    (
+        "bifocal survey street.toml --dry-run", "street.toml",
+        swapped("street.toml", '"far.jpg"', '"far\\u0000.jpg"'), "far and near must name",
+    ),
+    *(
+        ("multimedia convert aquacal.json o.toml", "aquacal.json",
+         edited("aquacal.json", "cameras", "c", *path, value=value), "camera c|sensor")
+        for path, value in (
+            (("intrinsics", "K"), [[0, 0, 100], [0, 0, 80], [0, 0, 1]]),
+            (("intrinsics", "dist_coeffs"), [0] * 99), (("intrinsics", "image_size"), [2.5, 3]),
+            (("extrinsics", "t"), 3), (("extrinsics", "t"), [1, 2]),
+        )
+    ),
+    (
+        "multimedia convert lens.yml o.toml", "lens.yml",
+        swapped("lens.yml", "-0.05, 0.01, 0., 0., 0. ]\n", "-0.05, 0.0"), "distortion.*damaged",
+    ),
+    (FACADE + " --check bad.csv", "bad.csv", "a,b\n1,2\n", "bad.csv"),
+]  # fmt: skip

@@ -10,6 +10,10 @@ RING = "multimedia design --distance 0.6 --c 25 --extent 0.3x0.3 --depths 0.02x0
 CANON = "bifocal plan --focal 35 --focal 19 --sensor 22.7x15.1 --pixels 3072x2048"
 ALIGN = "bifocal align far.jpg near.jpg --focal1 35 --focal2 19 --sensor-width 22.7 --out o.json"
 SITE = "--distance1 17.5 --distance2 9.5"
+FACADE = (
+    f"bifocal facade far.jpg near.jpg {SITE} --focal1 35 --focal2 19 --sensor-width 22.7 "
+    "--scale 1:100 --out d"
+)
 
 #: A line with {} where a file goes in, a valid file of its kind, and the kinds that are no fault.
 INPUTS: list[tuple[str, ...]] = [
@@ -40,6 +44,24 @@ INPUTS: list[tuple[str, ...]] = [
     ("bifocal mosaic ortho1.tif ortho2.tif --out o.tif --relief {}", "relief.tif"),
     ("bifocal view {} --out o.html", "relief.tif"),
     ("bifocal view relief.tif --out o.html --ortho {}", "ortho1.tif"),
+    (FACADE.replace("far.jpg", "{}"), "far.jpg", "photo"),
+    (FACADE + " --control {}", "control.csv", "half"),
+    (FACADE + " --check {}", "control.csv", "half"),
+    (FACADE + " --lens {}", "lens.json"),
+    ("bifocal survey {} --dry-run", "street.toml"),
+    ("bifocal report {} --out o.html", "wall.pair.json"),
+    ("bifocal report {} --out o.html", "survey.xlsx"),
+    ("bifocal report wall.pair.json --out o.html --relief {}", "relief.tif"),
+    ("bifocal pick {}", "wall.pair.json", "folder"),
+    (
+        "multimedia particles {} --targets t --targets t --targets t --targets t --out o.csv",
+        "tank.toml",
+    ),
+    (
+        "multimedia particles tank.toml --targets {} --targets t --targets t --targets t "
+        "--out o.csv",
+        "ptv",
+    ),
     ("bifocal export {} --out o.dxf", "result.csv", "half"),
     ("bifocal export {} --out o.dxf", "survey.xlsx"),
     ("multimedia shift {} --z0 1 --indices 1,1.337 --json", "shift.csv", "half"),
@@ -108,6 +130,8 @@ OUTPUTS: list[tuple[str, ...]] = [
         )
     ),
     ("bifocal view relief.tif --out {}", ".html"),
+    ("bifocal report wall.pair.json --out {}", ".html"),
+    ("bifocal report wall.pair.json --out {}", ".pdf"),
     ("multimedia template {}", ".xlsx"),
     ("multimedia shift shift.csv --z0 1 --indices 1,1.337 --out {}", ".csv"),
     ("multimedia shift shift.csv --z0 1 --indices 1,1.337 --out {}", ".xlsx"),

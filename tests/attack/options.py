@@ -393,4 +393,17 @@ WORDS: list[tuple[str, str]] = [
     (f"{RING} --out o.csv", "o.csv"),
     (f"{RING} --plot o.txt", "o.txt"),
     ("multimedia design tank.toml --distance 1", "PROJECT"),
+    (
+        CANON.replace("--focal 35", " ".join(f"--focal {10 + k}" for k in range(200)))
+        + " --scale 500",
+        "focal lengths: 20. lenses",
+    ),
+    ("bifocal mosaic ortho1.tif ortho2.tif --out o.tif --gsd 1e9", "gsd"),
+    (f"{ORTHO} --plane --vignetting 1e300,0,0", "vignetting"),
+    ("multimedia convert lens.yml o.toml --pitch 1e-300", "pitch"),
+    ("multimedia convert lens.yml o.toml --to aquacal", "o.toml.*--to"),
+    ("bifocal facade far.jpg near.jpg --out d", "--control"),
+    ("bifocal survey", "survey file|SURVEY"),
+    ("bifocal survey --init nowhere", "nowhere"),
+    ("multimedia particles tank.toml --targets t --out o.csv", "targets"),
 ]

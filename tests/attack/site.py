@@ -48,6 +48,27 @@ XML = """<?xml version="1.0" encoding="UTF-8"?>
 <calibration><projection>frame</projection><width>240</width><height>160</height><f>350</f>
 <cx>0</cx><cy>0</cy><k1>-0.05</k1><k2>0.01</k2></calibration>
 """
+#: A survey file, and a calibration of AquaCal.
+STREET = """[[pair]]
+name = "wall"
+far = "far.jpg"
+near = "near.jpg"
+distance1 = 17.5
+distance2 = 9.5
+focal1 = 35
+focal2 = 19
+sensor_width = 22.7
+"""
+AQUACAL = {
+    "cameras": {"c": {
+        "intrinsics": {
+            "K": [[300, 0, 100], [0, 300, 80], [0, 0, 1]], "dist_coeffs": [0] * 5,
+            "image_size": [200, 160],
+        },
+        "extrinsics": {"R": np.eye(3).tolist(), "t": [0, 0, 0]}, "water_z": 1.0,
+    }},
+    "interface": {"normal": [0, 0, -1], "n_air": 1, "n_water": 1.33},
+}  # fmt: skip
 ODS = """<?xml version="1.0" encoding="UTF-8"?>
 <office:document-content xmlns:office="o" xmlns:table="t" xmlns:text="x">
 <office:body><office:spreadsheet><table:table table:name="Points">{rows}</table:table>
@@ -93,6 +114,8 @@ def _photos_and_pair(folder: Path, rng: np.random.Generator) -> None:
     }  # fmt: skip
     (folder / "cameras.txt").write_text("1 OPENCV 240 160 350 350 120 80 -0.05 0.01 0 0\n")
     (folder / "lens.yml").write_text(YAML)
+    (folder / "street.toml").write_text(STREET)
+    (folder / "aquacal.json").write_text(json.dumps(AQUACAL))
     (folder / "lens.xml").write_text(XML)
     for name, content in (("wall.pair.json", pair), ("lens.json", lens)):
         (folder / name).write_text(json.dumps(content, indent=1), encoding="utf-8")

@@ -100,5 +100,5 @@ def test_the_doctor_names_what_is_there_and_what_to_install(monkeypatch):
     result = CliRunner().invoke(main, ["doctor"])
     assert result.exit_code == 0
     for part in ("bifocal ", "Python", "numpy", "GDAL", "free memory", "no-such-package absent",
-                 'pip install "bifocal[cluster]"'):  # fmt: skip
+                 'pip install ".[cluster]"'):  # fmt: skip
         assert part in result.stdout

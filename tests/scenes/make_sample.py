@@ -96,10 +96,11 @@ def main(folder: Path, *, water: bool = False) -> None:
     for name, image in (("far.jpg", rendering.image1), ("near.jpg", rendering.image2)):
         Image.fromarray(image).save(folder / name, quality=JPEG_QUALITY, subsampling=0)
     pair = rendering.pair
+    height, width = rendering.image1.shape[:2]
     pair = replace(
         pair,
-        image1=replace(pair.image1, file="far.jpg"),
-        image2=replace(pair.image2, file="near.jpg"),
+        image1=replace(pair.image1, file="far.jpg", image_size=(width, height)),
+        image2=replace(pair.image2, file="near.jpg", image_size=(width, height)),
     )
     pair.write(folder / "facade.pair.json", overwrite=True)
     write_relief(folder / "truth.tif", rendering.truth, overwrite=True)

@@ -4,12 +4,22 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 from pathlib import Path
 
 import pytest
 
 from bifocal.campaigns import step_store
-from bifocal.campaigns.step_store import RECORD, Step, clean, is_current, read_record, run_step
+from bifocal.campaigns.step_store import (
+    MARK,
+    RECORD,
+    Step,
+    clean,
+    is_current,
+    read_record,
+    run_step,
+)
+from bifocal.campaigns.workflow import LOCK, _locked
 from photocore.cli import no_progress
 from photocore.errors import InputError
 from photocore.provenance import FileHashes
@@ -20,14 +30,14 @@ class Kitchen:
     """A step that copies its input, counts its runs, and may be told to break."""
 
     def __init__(self, folder: Path) -> None:
-        self.folder, self.runs, self.fault = folder, 0, None
+        self.folder, self.runs, self.fault, self.name = folder, 0, None, "out.txt"
         self.source = folder / "source.txt"
         self.source.write_text("one")
 
     def step(self, **options: object) -> Step:
         def make(place: Path, progress: object) -> tuple[str, ...]:  # noqa: ARG001
             self.runs += 1
-            (place / "out.txt").write_text(f"{self.source.read_text()} {options}")
+            (place / self.name).write_text(f"{self.source.read_text()} {options}")
             if self.fault:
                 raise self.fault
             return ("done",)
@@ -101,19 +111,76 @@ def test_whatever_breaks_a_step_leaves_the_old_result(kitchen, fault):
     assert [p.name for p in (kitchen.folder / "out").iterdir()] == ["cook"]
 
 
-@pytest.mark.parametrize("moment", ["writing", "old aside", "both there"])
-def test_a_killed_run_is_cleaned_up_at_whatever_moment(kitchen, moment):
+class Killed(BaseException):
+    """What no `finally` of a killed process sees."""
+
+
+@pytest.mark.parametrize("renames", [0, 1, 2])
+def test_a_killed_run_is_cleaned_up_at_whatever_moment(kitchen, monkeypatch, renames):
     kitchen.run()
     home = kitchen.folder / "out"
-    (home / ".cook-writing-x1").mkdir()
-    (home / ".cook-writing-x1/half.txt").write_text("ha")
-    if moment == "old aside":
-        (home / "cook").rename(home / ".cook.old")
-    if moment == "both there":
-        (home / ".cook.old").mkdir()
+    kitchen.source.write_text("two")
+    left = iter(range(renames))
+    rename = Path.rename
+
+    def until_killed(path, target):
+        if next(left, None) is None:
+            raise Killed
+        return rename(path, target)
+
+    def killed(*_, **__):
+        raise Killed
+
+    with monkeypatch.context() as patch:
+        patch.setattr(Path, "rename", until_killed)
+        patch.setattr(step_store.shutil, "rmtree", lambda *_, **__: None)
+        patch.setattr(Path, "unlink", killed)
+        with pytest.raises(Killed):
+            kitchen.run()
+    assert len(list(home.iterdir())) == 2
     clean(home)
     assert [p.name for p in home.iterdir()] == ["cook"]
-    assert not kitchen.run()
+    text = (home / "cook/out.txt").read_text()
+    assert text.startswith("two" if renames == 2 else "one")
+    clean(home)
+    assert kitchen.run() == (renames < 2)
+
+
+@pytest.mark.parametrize(
+    "name", [".cook.old", ".diary.old", ".thesis-writing-x1", ".thesis-old-x1", ".cook-old-x1"]
+)
+def test_hidden_folders_of_the_user_stay_as_they_are(kitchen, name):
+    kitchen.run()
+    home = kitchen.folder / "out"
+    # Even a copy of what is ours, marks and all, is the user's.
+    shutil.copytree(home / "cook", home / name)
+    (home / name / MARK).write_text('{"format": "bifocal-step/1", "passing": ".cook-old-x2"}')
+    (home / name / "thesis.txt").write_text("mine")
+    clean(home)
+    kitchen.source.write_text("two")
+    assert kitchen.run()
+    assert (home / name / "thesis.txt").read_text() == "mine"
+    assert {p.name for p in home.iterdir()} == {"cook", name}
+
+
+def test_empty_folders_and_links_of_the_user_move_along(kitchen):
+    kitchen.run()
+    (kitchen.folder / "out/cook/for later").mkdir()
+    (kitchen.folder / "out/cook/link").symlink_to("nowhere")
+    kitchen.source.write_text("two")
+    assert kitchen.run()
+    assert (kitchen.folder / "out/cook/for later").is_dir()
+    assert (kitchen.folder / "out/cook/link").is_symlink()
+
+
+def test_a_file_the_user_added_under_a_name_of_ours_is_not_lost(kitchen):
+    kitchen.run()
+    (kitchen.folder / "out/cook/two.txt").write_text("mine")
+    kitchen.name = "two.txt"
+    with pytest.raises(InputError, match=r"two\.txt: is not this survey's.*--overwrite"):
+        kitchen.run(scale=50)
+    assert (kitchen.folder / "out/cook/two.txt").read_text() == "mine"
+    assert kitchen.run(scale=50, overwrite=True)
 
 
 def test_the_record_says_what_was_made_from_what(kitchen):
@@ -162,3 +229,14 @@ def test_a_workbook_that_is_open_is_not_replaced(kitchen, lock):
     assert kitchen.runs == 1
     (folder / lock).unlink()
     assert kitchen.run()
+
+
+def test_a_lock_of_somebody_else_is_left_alone(tmp_path):
+    (tmp_path / LOCK).write_text("my own notes")
+    with pytest.raises(InputError, match="is not this program's"), _locked([tmp_path]):
+        pass
+    assert (tmp_path / LOCK).read_text() == "my own notes"
+    (tmp_path / LOCK).write_text("")  # killed before it said whose
+    with _locked([tmp_path]):
+        assert (tmp_path / LOCK).read_text()
+    assert not (tmp_path / LOCK).exists()

@@ -116,3 +116,31 @@ def test_a_thousand_points_pan_nearly_as_smoothly_as_none(browser: Any, tmp_path
         full = page.frames()
     # Measured: 17 ms (median) without and with a thousand points (benchmarks/bench_page.py).
     assert np.median(full) < max(2 * np.median(empty), 40)
+
+
+@pytest.mark.acceptance
+def test_photos_dropped_near_one_first_are_exchanged_and_an_acceptance_is_undone(
+    browser: Any, tmp_path: Path
+) -> None:
+    """Typed by the cards; the sample hides too little to tell its order, so it is asked."""
+    with served(tmp_path) as server, tab_of(browser, server) as page:
+        dropped(page, [SAMPLE / name for name in ("near.jpg", "far.jpg")])
+        page.settled("state.photos.length === 2")
+        for image, focal in ((1, 35), (2, 19)):
+            page.command("photo.set", image=image, focal_mm=focal, sensor_width_mm=22.7)
+        page.command("setup.set", d1=17.5, d2=9.5)
+        names = [photo["name"] for photo in page.settled("state.setup.d2 === 9.5")["photos"]]
+        page.click("mode-orientation")
+        page.click("align")
+        assert "cannot be told" in page.finished("align")["message"]
+        assert "cannot be told" in page.settled("state.pair")["advice"][0]
+        page.click("align-accept")
+        page.settled("state.pair.accepted")
+        page.click("undo")
+        page.settled("state.pair.accepted === false")
+        page.click("exchange")
+        after = page.settled("state.pair === null")
+        assert [photo["name"] for photo in after["photos"]] == names[::-1]
+        assert [photo["focal_mm"] for photo in after["photos"]] == [35, 19]
+        page.click("exchange")
+        assert page.settled("state.photos[0].name === argument", names[0])["pair"] is None

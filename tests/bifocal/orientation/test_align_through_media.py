@@ -20,8 +20,9 @@ from bifocal.cli.main import main
 from bifocal.media import MediaPath, interface_axes
 from bifocal.model.orientation_precision import NAMES, from_dict, names_of
 from bifocal.model.refracted_view import seen_through, view_through
+from bifocal.orientation import absolute_orientation
 from bifocal.orientation.absolute_orientation import orient_pair
-from bifocal.orientation.bend import bend_in_words
+from bifocal.orientation.bend import WallBend, bend_in_words
 from bifocal.orientation.orientation_stages import PhotoInput
 from bifocal.orientation.refracted_stage import with_bent_ties
 from bifocal.orientation.relative_orientation import Ties
@@ -542,11 +543,36 @@ def test_parameters_of_a_covariance_that_are_no_list_are_refused(stated):
 
 
 def test_a_bent_wall_proposes_the_options_for_media():
-    assert "--indices with --port or --depth" in bend_in_words(3.0, with_lens=False)
-    assert "media are not as given" in bend_in_words(3.0, with_lens=True, through_media=True)
-    assert "may be good" in bend_in_words(3.0, with_lens=True, left_out=True)
+    assert "--indices with --port or --depth" in bend_in_words(WallBend(3.0, 0.1), with_lens=False)
+    assert "media are not as given" in bend_in_words(
+        WallBend(3.0, 0.1), with_lens=True, through_media=True
+    )
+    assert "may be good" in bend_in_words(WallBend(3.0, 0.1), with_lens=True, left_out=True)
 
 
 def test_ports_and_depth_exclude_each_other():
     with pytest.raises(InputError, match="one of the two"):
         PairMedia.stated((1.0, 1.337), ports=(0.1, None), depth=0.5)
+
+
+@pytest.mark.parametrize(
+    ("kind", "seed", "count", "relief", "said"),
+    [("port", 3, 8, 0.05, "The likely reason"), ("surface", 2, 8, 0.02, "do not tell")],
+)
+def test_unknown_lenses_are_named_where_control_does_not_make_up_for_them(
+    monkeypatch, kind, seed, count, relief, said
+):
+    """Before photos are matched: control off the wall by 2 to 5 cm, picked to 0.3 px."""
+    monkeypatch.setattr(absolute_orientation, "HOPELESS", 0.3)
+    monkeypatch.setattr(absolute_orientation, "_ties", lambda *_, **__: pytest.fail("matched"))
+    rng = np.random.default_rng(seed)
+    taken, media, placed = cameras(kind)
+    xyz = points(rng, count, relief)
+    seen = [camera.view_of(xyz) + rng.normal(0, 0.3, (count, 2)) for camera in taken]
+    with pytest.raises(
+        GeometryError, match=f"{said}.*focal lengths are unknown.*image1 and image2"
+    ):
+        align(
+            None, None, interiors=(Interior.unknown(SIZE),) * 2,
+            control=control_of(xyz, seen, 0.003), media=PairMedia.stated(*media, **placed),
+        )  # fmt: skip

@@ -12,6 +12,7 @@ from bifocal.orientation.interior_orientation import Interior
 from bifocal.orientation.orientation_stages import PhotoInput
 from bifocal.orientation.pair_adjustment import adjust, line_test, pair_equations
 from bifocal.orientation.pair_observations import NAMES, PairObservations, PairUnknowns, at
+from bifocal.orientation.reference_plane import NarrowFace
 from bifocal.orientation.space_resection import resect
 from bifocal.orientation.tie_points import with_wall
 from photocore.camera import project
@@ -123,6 +124,28 @@ def test_a_gross_error_is_named_and_left_out(size: float) -> None:
     assert max(misplaced(made, (FAR, NEAR))) < 0.25
 
 
+@pytest.mark.parametrize("wrong", [0, 2, 5])
+def test_one_wrong_point_of_eight_is_named_though_it_spoils_the_others(wrong: int) -> None:
+    some = np.r_[:5, -3:0]
+    points = control(POINTS[some], sigma_px=0.3)
+    points.xyz[wrong, 0] += 0.05
+    exact = photos(far=FAR.matrix[0, 0], near=NEAR.matrix[0, 0])
+    made = orient_pair(exact, control=points, site=SiteMeasures(sigma_pick=0.3))
+    assert left_out(made) == (f"P{wrong}",)
+
+
+def test_a_wall_of_many_small_chances_holds_the_plane(monkeypatch) -> None:
+    problem, start = everything()
+    monkeypatch.setattr(
+        "bifocal.orientation.tie_points.narrow_face",
+        lambda xyz, *_, **__: NarrowFace(np.zeros(3), 0.001, np.full(len(xyz), 0.46)),
+    )
+    assert with_wall(problem, start, (1e-4, 1e-5)).wall.sum() > 40
+    # All of it in a corner of the photo is none.
+    corner = replace(problem, tie1=problem.tie1 / 1000)
+    assert not with_wall(corner, start, (1e-4, 1e-5)).wall.any()
+
+
 def test_a_wrong_pick_in_one_photo_is_named() -> None:
     points = control(sigma_px=0.3)
     points.pixels2[9] += [9.0, -4.0]
@@ -159,6 +182,34 @@ def test_control_in_millimetres_is_told_by_the_tape() -> None:
     points.sigma[:] *= 1000
     with pytest.raises(InputError, match=r"are in mm: they put camera 1 1[56],"):
         orient_pair(photos(), control=points, site=SiteMeasures(distance1=16.0))
+
+
+def far_wall(scale: float) -> Control:
+    """Return the control points of a wall that is so many times as large and as far."""
+    points = control()
+    return replace(points, xyz=points.xyz * scale, sigma=points.sigma * scale)
+
+
+@pytest.mark.parametrize(("scale", "measured"), [(22.0, False), (22.0, True), (40.0, True)])
+def test_a_wall_beyond_300_m_is_taken_and_one_beyond_500_m_where_the_tape_agrees(
+    scale, measured
+) -> None:
+    site = SiteMeasures(distance1=16 * scale, distance2=9 * scale) if measured else SiteMeasures()
+    known = photos(far=FAR.matrix[0, 0], near=NEAR.matrix[0, 0])
+    made = orient_pair(known, control=far_wall(scale), site=site)
+    assert made.adjusted.cameras[0].centre[2] == pytest.approx(16 * scale, rel=0.003)
+
+
+def test_a_wall_too_far_is_refused_with_the_far_distance_first() -> None:
+    known = photos(far=FAR.matrix[0, 0], near=NEAR.matrix[0, 0])
+    with pytest.raises(InputError, match=r"the cameras 6[34]\d and 3[56]\d m from the wall"):
+        orient_pair(known, control=far_wall(40.0), site=SiteMeasures())
+
+
+def test_a_tape_in_millimetres_is_told_by_the_control_points() -> None:
+    known = photos(far=FAR.matrix[0, 0], near=NEAR.matrix[0, 0])
+    with pytest.raises(InputError, match=r"--distance1 16000 m is too far.*\(--distance1 16\)"):
+        orient_pair(known, control=control(), site=SiteMeasures(distance1=16000.0))
 
 
 def test_points_in_one_line_are_refused() -> None:

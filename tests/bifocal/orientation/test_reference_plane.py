@@ -1,12 +1,21 @@
 """Which of several planes is taken for the wall, and what is said of the others."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from bifocal.orientation.control_points import SiteMeasures
 from bifocal.orientation.interior_orientation import Interior
 from bifocal.orientation.orientation_report import orientation_in_words
-from bifocal.orientation.reference_plane import choose_wall, faces, rivals_in_words
+from bifocal.orientation.reference_plane import (
+    Face,
+    NarrowFace,
+    choose_wall,
+    faces,
+    rivals_in_words,
+    zero_sigma,
+)
 from photocore.camera import project
 from photocore.errors import GeometryError
 from tests.bifocal.orientation.layered_wall import SIZE, camera
@@ -84,3 +93,29 @@ def test_the_zero_of_relief_is_stated_no_better_than_the_planes_agree() -> None:
     assert not any("zero" in word for word in orientation_in_words(CAMERAS, sure, sigma_px=0.1))
     text = orientation_in_words(CAMERAS, {**sure, "relief_offset": 0.113}, sigma_px=0.1)[-1]
     assert "its zero is certain only to 113 mm" in text
+
+
+def test_the_zero_of_relief_is_as_sure_as_the_faces_that_compete() -> None:
+    here, other = Face(0.0, 0.30, (0.0, 0.0)), Face(-0.114, 0.23, (9.0, 9.0))
+    # One of two such faces is the wall: 114 mm, with a chance of 23 in 53.
+    assert zero_sigma([here, other]) == pytest.approx(0.114 * np.sqrt(23 / 53))
+    assert zero_sigma([here, replace(other, share=0.1)]) == 0.0
+    # Measured distances that contradict the other face settle it, by as much as they do.
+    assert zero_sigma([here, replace(other, chance=0.1)]) == pytest.approx(0.031, abs=1e-3)
+    assert zero_sigma([here, replace(other, chance=0.001)]) == 0.0
+
+
+@pytest.mark.parametrize(("sigma", "least", "most"), [(0.02, 0.0, 0.06), (0.5, 0.06, 0.12)])
+def test_measured_distances_tell_which_face_is_the_wall(sigma, least, most) -> None:
+    xyz, pixels = plinth_and_wall(900, 1200, offset=0.113)
+    site = replace(SITE, sigma=sigma)
+    found = choose_wall(xyz, pixels, CAMERAS, interiors(), site, sigma_ratio=1e-3)[1]
+    assert found[0].chance > 0.8
+    assert least <= zero_sigma(found) < most
+
+
+def test_a_wall_of_many_small_chances_is_a_wall() -> None:
+    # A plain façade: 900 points, none more likely of the wall than of shallow relief around it.
+    face = NarrowFace(np.zeros(3), 0.01, np.repeat([0.46, 0.4, 0.1], 300))
+    assert face.members.tolist() == [True] * 600 + [False] * 300
+    assert not NarrowFace(np.zeros(3), 0.0, np.zeros(9)).members.any()

@@ -1,11 +1,13 @@
 """Ties without support, the wall's own face, and walls bent by lens or refraction."""
 
+from collections.abc import Callable
+
 import cv2
 import numpy as np
 import pytest
 
 from bifocal.orientation.absolute_orientation import orient_pair
-from bifocal.orientation.bend import MOST_BENT, bend_in_words, bend_of_wall, wall_bend
+from bifocal.orientation.bend import WallBend, bend_in_words, bend_of_wall, wall_bend
 from bifocal.orientation.control_points import Control, SiteMeasures
 from bifocal.orientation.features import Features, match_features
 from bifocal.orientation.interior_orientation import Interior
@@ -39,34 +41,60 @@ def wall_ties(k: float, *, seed: int = 1, relief: float = 0.3) -> tuple[np.ndarr
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
 def test_a_flat_wall_is_not_bent_and_a_distorted_one_is(seed: int) -> None:
-    assert wall_bend(*wall_ties(0.0, seed=seed), SIZE) < 0.1
-    bent = wall_bend(*wall_ties(-0.15, seed=seed), SIZE)
-    assert bent > MOST_BENT
+    assert wall_bend(*wall_ties(0.0, seed=seed), SIZE)[0].px < 0.1
+    bent = wall_bend(*wall_ties(-0.15, seed=seed), SIZE)[0]
+    assert bent.is_certain
+    assert bent.sigma < 0.1 * bent.px
     assert "calibrate" in bend_in_words(bent, with_lens=False)
     assert "glass or water" in bend_in_words(bent, with_lens=True)
-    assert bend_in_words(0.1, with_lens=False) == ""
+
+
+@pytest.mark.parametrize(("px", "sigma"), [(0.1, 0.0), (0.23, 0.02), (np.nan, np.nan)])
+def test_a_bend_no_greater_than_its_own_uncertainty_is_not_told(px: float, sigma: float) -> None:
+    assert bend_in_words(WallBend(px, sigma), with_lens=False) == ""
+    assert bend_in_words(WallBend(px + 0.2, sigma), with_lens=False) != "" or np.isnan(px)
 
 
 def test_the_bend_counts_at_one_size_of_photo() -> None:
     first, second = wall_ties(-0.15)
-    half = wall_bend(first / 2 - 0.25, second / 2 - 0.25, (SIZE[0] // 2, SIZE[1] // 2))
-    assert half == pytest.approx(wall_bend(first, second, SIZE), rel=0.15)
+    half = wall_bend(first / 2 - 0.25, second / 2 - 0.25, (SIZE[0] // 2, SIZE[1] // 2))[0]
+    assert half.px == pytest.approx(wall_bend(first, second, SIZE)[0].px, rel=0.15)
+
+
+def seen_in_both(heights: Callable[[np.ndarray], np.ndarray], *, seed: int = 2, k: float = 0.0):
+    """Return the ties of a wall of given heights, and these as shares of the far distance."""
+    rng = np.random.default_rng(seed)
+    cameras = bifocal_cameras(size=SIZE, errors=SetupErrors(tilt_deg=1.0), rng=rng)
+    xyz = np.column_stack([rng.uniform(-5, 5, 3000), rng.uniform(-3, 3, 3000), np.zeros(3000)])
+    xyz[:, 2] = heights(xyz)
+    ties = [c.view_of(xyz) + rng.normal(0, 0.1, (3000, 2)) for c in (cameras.far, cameras.near)]
+    lens = RadialDivision(k, cameras.far.matrix[:2, 2], float(cameras.far.matrix[0, 0]))
+    return lens.distort(ties[0]), ties[1], xyz[:, 2] / float(cameras.far.centre[2])
 
 
 def test_relief_before_the_wall_does_not_bend_it() -> None:
     """Mouldings that stand out more towards top and bottom read as a bend of all ties."""
-    rng = np.random.default_rng(2)
-    cameras = bifocal_cameras(size=SIZE, errors=SetupErrors(tilt_deg=1.0), rng=rng)
-    xyz = np.column_stack([rng.uniform(-5, 5, 3000), rng.uniform(-3, 3, 3000), np.zeros(3000)])
-    moulded = rng.random(3000) < 0.8
-    xyz[moulded, 2] = 0.03 * np.abs(xyz[moulded, 1])
-    x1, x2 = (c.view_of(xyz) + rng.normal(0, 0.1, (3000, 2)) for c in (cameras.far, cameras.near))
-    height = xyz[:, 2] / float(cameras.far.centre[2])
-    assert wall_bend(x1, x2, SIZE) > 1.5 * MOST_BENT
-    assert bend_of_wall(x1, x2, SIZE, height) < 0.5 * MOST_BENT
-    # Where no detail is near the plane, all of them decide, and more generously.
-    assert np.isnan(bend_of_wall(*wall_ties(0.0), SIZE, np.full(900, 0.1)))
-    assert bend_of_wall(*wall_ties(-0.15), SIZE, np.full(900, 0.1)) > MOST_BENT
+    moulded = np.random.default_rng(2).random(3000) < 0.8
+    x1, x2, height = seen_in_both(lambda at: np.where(moulded, 0.03 * np.abs(at[:, 1]), 0.0))
+    assert wall_bend(x1, x2, SIZE)[0].is_certain
+    assert not bend_of_wall(x1, x2, SIZE, height).is_certain
+
+
+@pytest.mark.parametrize("seed", range(10, 13))
+def test_two_parallel_faces_are_no_bent_wall(seed: int) -> None:
+    # Piers on both sides, 15 cm before the wall between them: all ties bend by 2.5 px.
+    piers = lambda at: np.where(np.abs(at[:, 0]) > 2.5, 0.15, 0.0)  # noqa: E731
+    x1, x2, height = seen_in_both(piers, seed=seed)
+    assert wall_bend(x1, x2, SIZE)[0].px > 1.0
+    for plane in (0.0, 0.01):  # that of the wall, and one between the faces
+        assert bend_of_wall(x1, x2, SIZE, height - plane).px < 0.1
+
+
+@pytest.mark.parametrize("seed", range(10, 13))
+def test_a_bent_wall_behind_another_face_is_told(seed: int) -> None:
+    faced = lambda at: np.where(np.floor(1.1 * at[:, 0]) % 3 == 0, 0.13, 0.0)  # noqa: E731
+    x1, x2, height = seen_in_both(faced, seed=seed, k=-0.02)
+    assert bend_of_wall(x1, x2, SIZE, height).is_certain
 
 
 def test_wrong_ties_on_their_lines_have_no_support() -> None:

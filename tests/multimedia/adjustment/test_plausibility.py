@@ -202,3 +202,43 @@ def test_white_residuals_leave_the_sigmas_alone():
         for seed in range(12)
     ]
     assert factors == [1.0] * 12
+
+
+def plates_of(moved: float, plate: int = 0, seed: int = 3) -> Project:
+    """Return four plates at four depths, over one another in the images, one of them moved."""
+    rng = np.random.default_rng(seed)
+    depths = (-60.0, -85.0, -110.0, -135.0)
+    flat = flat_control()[::2]
+    points = np.concatenate([flat * (1, 1, 0) + (0, 0, depth) for depth in depths])
+    given = pinholes(points, rng, 0.0005)
+    names = tuple(f"P{k + 1}" for k in range(4) for _ in flat)
+    wrong = points + np.where(np.array(names) == f"P{plate + 1}", moved, 0.0)[:, None] * (
+        0.8,
+        0.6,
+        0,
+    )
+    return replace(given, object_points=replace(given.object_points, xyz=wrong, groups=names))
+
+
+@pytest.mark.parametrize("plate", [0, 2])
+def test_a_plate_out_of_its_place_is_named_and_freed_by_what_is_said(plate):
+    given = plates_of(0.2, plate)
+    wrong = bundle_adjust(given)
+    told = remark(wrong, "--plate")
+    assert f"Points of plate P{plate + 1} are off by" in told
+    assert wrong.model_error > 2
+    right = bundle_adjust(given, Unknowns(plates=(f"P{plate + 1}",)))
+    assert right.model_error == 1.0
+    assert not [line for line in right.remarks if "off by" in line]
+
+
+def test_plates_in_their_places_are_left_alone():
+    assert [bundle_adjust(plates_of(0.0, seed=k)).model_error for k in range(6)] == [1.0] * 6
+
+
+def test_residuals_that_go_with_depth_are_said_to():
+    points = np.concatenate([two_planes(), two_planes() + np.array([3.0, 2.0, -30.0])])
+    given = pinholes(points, np.random.default_rng(5), 0.0003)
+    wrong = bundle_adjust(with_start(given, index=1.40), Unknowns(fixed_cameras=("cam1",)))
+    assert "depth is not modelled" in remark(wrong, "before the camera")
+    assert wrong.model_error > 1.5

@@ -83,6 +83,49 @@ def test_no_targets_are_no_particles():
         correspondences(VIEWS, none, [WALL] * 4, fewest=5)
 
 
+def written_frame(folder: Path, targets) -> list[str]:
+    """Write a project and target files; return the words of the command."""
+    tank = Project(cameras=tuple(VIEWS), media={"w": WALL}, media_of=("w",) * 4, unit="mm")
+    write_project(folder / "tank.toml", tank)
+    words = ["particles", str(folder / "tank.toml")]
+    for k, pixels in enumerate(targets):
+        lines = [f"{n} {x:.6f} {y:.6f} 9 3 3 99 -1" for n, (x, y) in enumerate(pixels)]
+        path = folder / f"cam{k}.1_targets"
+        path.write_text(f"{len(lines)}\n" + "\n".join(lines) + "\n")
+        words += ["--targets", str(path)]
+    return words
+
+
+def test_targets_that_have_nothing_to_do_with_each_other_are_no_particles(tmp_path: Path):
+    _, targets, _ = frame(0, 0.0, 110, 11)
+    words = [
+        *written_frame(tmp_path, targets),
+        "--tolerance",
+        "3",
+        "--out",
+        str(tmp_path / "p.csv"),
+    ]
+    got = CliRunner().invoke(main, words)
+    assert got.exit_code == 1
+    assert "these are chance" in got.stderr
+    assert "--fewest 4" in got.stderr
+    assert not (tmp_path / "p.csv").exists()
+
+
+def test_how_many_come_by_chance_is_said_beside_the_particles(tmp_path: Path):
+    _, targets, numbers = frame(30, 0.1, 110, 12)
+    words = [*written_frame(tmp_path, targets), "--tolerance", "8"]
+    got = CliRunner().invoke(main, [*words, "--json"])
+    assert got.exit_code == 0, got.output
+    found = json.loads(got.stdout)
+    truth = {tuple(row) for row in numbers.tolist()}
+    wrong = sum(tuple(one["targets"]) not in truth for one in found["particles"])
+    assert wrong == 11
+    # True ones leave fewer targets to chance than the displaced frames have.
+    assert wrong < found["by_chance_at_most"] < 3 * wrong
+    assert "by chance at most" in CliRunner().invoke(main, words).stdout
+
+
 @pytest.mark.acceptance
 def test_a_real_frame_gives_openptvs_tuples(data_dir):
     folder = data_dir / "openptv_cavity"
@@ -106,14 +149,7 @@ def test_a_real_frame_gives_openptvs_tuples(data_dir):
 
 def test_the_command_writes_what_openptv_reads(tmp_path: Path):
     xyz, targets, numbers = frame(30, 0.0, 0, 7)
-    tank = Project(cameras=tuple(VIEWS), media={"w": WALL}, media_of=("w",) * 4, unit="mm")
-    write_project(tmp_path / "tank.toml", tank)
-    words = ["particles", str(tmp_path / "tank.toml"), "--tolerance", "0.05"]
-    for k, pixels in enumerate(targets):
-        lines = [f"{n} {x:.6f} {y:.6f} 9 3 3 99 -1" for n, (x, y) in enumerate(pixels)]
-        path = tmp_path / f"cam{k}.1_targets"
-        path.write_text(f"{len(lines)}\n" + "\n".join(lines) + "\n")
-        words += ["--targets", str(path)]
+    words = [*written_frame(tmp_path, targets), "--tolerance", "0.05"]
     run = CliRunner().invoke
     got = run(main, [*words, "--json", "--out", str(tmp_path / "rt_is.1")])
     assert got.exit_code == 0, got.output
@@ -124,7 +160,7 @@ def test_the_command_writes_what_openptv_reads(tmp_path: Path):
     table = run(main, [*words, "--out", str(tmp_path / "p.csv")])
     assert "30 of 30 targets used" in table.stdout
     assert (tmp_path / "p.csv").read_text().startswith("id,X [mm],Y [mm],Z [mm],cam1 target")
-    short = run(main, words[:-2])
+    short = run(main, words[:-4])
     assert short.exit_code == 1
     assert "3 file(s) of targets for 4 cameras" in short.stderr
     wrong = run(main, [*words, "--out", str(tmp_path / "p.txt")])

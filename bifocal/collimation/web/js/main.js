@@ -39,6 +39,7 @@ class App {
     this.title = h("h1", {}, "bifocal");
     this.undoButton = button("↶", () => this.undo(), { class: "icon", testid: "undo", "aria-label": t("top.undo"), title: `${t("top.undo")} (Ctrl+Z)` });
     this.redoButton = button("↷", () => this.redo(), { class: "icon", testid: "redo", "aria-label": t("top.redo"), title: `${t("top.redo")} (Ctrl+Y)` });
+    this.exchangeButton = button("⇄", () => this.exchange(), { class: "icon", testid: "exchange", "aria-label": t("photos.exchange"), title: t("photos.exchange") });
     this.link = h("p", { class: "link-state", role: "status", testid: "link" });
     const language = choice({ label: t("top.language"), options: LANGUAGES, value: document.documentElement.lang,
       testid: "language", save: (code) => this.send("language.set", { language: code }) });
@@ -47,7 +48,7 @@ class App {
       h("a", { class: "skip", href: "#stage" }, t("top.skip")),
       h("header", { class: "top" }, this.title,
         h("nav", { role: "tablist", "aria-label": t("top.stages") }, Object.values(this.tabs)),
-        h("div", { class: "tools" }, this.link, this.undoButton, this.redoButton, language,
+        h("div", { class: "tools" }, this.link, this.exchangeButton, this.undoButton, this.redoButton, language,
           button("?", () => this.help(), { class: "icon", "aria-label": t("top.help"), testid: "help" }))),
       h("div", { id: "stage", tabindex: "-1" }, Object.values(this.stages).map(({ element }) => element)),
       this.toast);
@@ -106,6 +107,7 @@ class App {
       this.tabs[key].classList.toggle("done", Boolean(done));
     }
     this.undoButton.disabled = !state.undo;
+    this.exchangeButton.hidden = state.photos.length < 2;
     this.redoButton.disabled = !state.redo;
     for (const paint of this.boxes) paint(state);
     this.reach();
@@ -120,6 +122,15 @@ class App {
     setText(this.link, t(key, { count: unsent.length }));
     this.link.title = waiting ?? "";
     this.link.dataset.level = locked || !online ? "warn" : waiting ? "fair" : "good";
+  }
+
+  /** Far and near the other way round: what is picked goes along, an orientation has to be made anew. */
+  async exchange() {
+    const oriented = Boolean(this.state.pair);
+    if (await this.send("photos.exchange") && oriented) {
+      this.open("orientation");
+      this.say(t("photos.exchanged"));
+    }
   }
 
   undo() {

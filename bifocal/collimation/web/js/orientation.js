@@ -32,6 +32,7 @@ export class OrientationStage {
     this.align = button(t("align.run"), () => app.job("align"), { class: "primary", testid: "align" });
     this.acceptAlign = button(t("align.accept"), () => app.send("align.accept"),
       { testid: "align-accept" });
+    this.exchange = button(t("photos.exchange"), () => app.exchange(), { class: "quiet" });
     this.target = h("p", { class: "target", role: "status" });
     this.element = h("main", { class: "stage work", id: "stage-orientation" }, this.photos,
       h("aside", { class: "panel" }, this.#targetBox(), this.loupe.element, this.#controlTable(),
@@ -87,7 +88,7 @@ export class OrientationStage {
   /** What is to be done next stays in sight, however long the table. */
   #result() {
     return h("section", { class: "card next" }, h("h2", {}, t("align.title")), this.advice,
-      h("div", { class: "row" }, this.align, this.acceptAlign), this.app.jobBox("align"));
+      h("div", { class: "row" }, this.align, this.acceptAlign, this.exchange), this.app.jobBox("align"));
   }
 
   #pasted(event) {

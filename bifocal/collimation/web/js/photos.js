@@ -33,7 +33,7 @@ export class PhotosStage {
     this.media = h("details", { class: "card site", testid: "media" },
       h("summary", {}, h("h2", {}, t("photos.media"))), this.through,
       h("p", { class: "hint" }, t("photos.mediaHint")), fields(MEDIA));
-    this.exchange = button(t("photos.exchange"), () => app.send("photos.exchange"), { class: "quiet" });
+    this.exchange = button(t("photos.exchange"), () => app.exchange(), { class: "quiet" });
     this.next = button(t("photos.next"), () => app.open("orientation"), { class: "primary" });
     this.element = h("main", { class: "stage photos", id: "stage-photos" }, this.zone,
       h("div", { class: "cards" }, this.cards.map(({ element }) => element)), this.form, this.media,

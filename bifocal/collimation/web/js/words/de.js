@@ -42,6 +42,7 @@ export default {
   "photos.mediaHint": "Nur wo die Fotos durch Glas oder Wasser blicken; in Luft bleibt alles leer. Ein Port bewegt sich mit der Kamera: seinen Abstand von der Kamera eintragen. Das Glas eines Beckens oder die Oberfläche bleibt stehen: eintragen, wie tief die Wand dahinter liegt. Die Abstände d1 und d2 sind die wahren, alle Medien zusammen.",
   "photos.through": "Dieses Paar blickt durch Medien der Brechzahl {media}, die beginnen {far} m vor der fernen und {near} m vor der nahen Kamera.",
   "photos.exchange": "Fern und nah tauschen",
+  "photos.exchanged": "Fern und nah sind getauscht, die Messungen mit ihnen. Bitte neu orientieren.",
   "photos.next": "Weiter: Orientierung",
   "photo.far": "fern",
   "photo.near": "nah",

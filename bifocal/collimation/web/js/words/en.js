@@ -42,6 +42,7 @@ export default {
   "photos.mediaHint": "Only where the photos look through glass or water; in air leave all of it empty. The port moves with the camera: type its distance from the camera. The glass of a tank or the surface stays: type how deep the wall lies behind it. Distances d1 and d2 are true ones, all media together.",
   "photos.through": "This pair looks through media of index {media}, which begin {far} m before the far camera and {near} m before the near one.",
   "photos.exchange": "Exchange far and near",
+  "photos.exchanged": "Far and near are exchanged, the picks with them. Align the photos again.",
   "photos.next": "Next: orientation",
   "photo.far": "far",
   "photo.near": "near",

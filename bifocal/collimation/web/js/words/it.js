@@ -42,6 +42,7 @@ export default {
   "photos.mediaHint": "Solo se le foto guardano attraverso vetro o acqua; in aria lascia tutto vuoto. L’oblò si muove con la fotocamera: scrivi la sua distanza dalla fotocamera. Il vetro di una vasca o la superficie sta fermo: scrivi quanto il muro gli sta dietro. Le distanze d1 e d2 sono quelle vere, mezzi compresi.",
   "photos.through": "Questa coppia guarda attraverso mezzi di indice {media}, che cominciano {far} m davanti alla fotocamera lontana e {near} m davanti alla vicina.",
   "photos.exchange": "Scambia lontana e vicina",
+  "photos.exchanged": "Lontana e vicina sono scambiate, e le collimazioni con loro. Orienta di nuovo le foto.",
   "photos.next": "Avanti: orientamento",
   "photo.far": "lontana",
   "photo.near": "vicina",

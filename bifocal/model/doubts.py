@@ -1,0 +1,75 @@
+"""What a pair file says is wrong with its own pair: in words, and as a covariance."""
+
+from __future__ import annotations
+
+from contextlib import suppress
+from typing import Any
+
+import numpy as np
+
+from bifocal.model.orientation_precision import NAMES
+from photocore.arrays import FloatArray
+
+#: A wall bent by certainly more than this, at 3000 px of width, is not that of an honest pair; by
+#: how many standard deviations it is certain. [px]
+MOST_BENT, CERTAIN = 0.2, 2.0
+#: Root mean square bend at 3000 px of width, over a photo of 3 to 2, by k of x (1 + k rho²), rho
+#: over half the diagonal, and what of k a scale takes up, the mean of rho². [px, -]
+BEND_BY_K, MEAN_SQUARE = 205.0, 1 / 3
+#: What free diagnostics may lack or hold instead of numbers.
+NO_NUMBER = (LookupError, TypeError, ValueError, ZeroDivisionError)
+
+
+def bend_is_certain(px: float, sigma: float) -> bool:
+    """Return whether a wall bent by so much between the photos says that the model does not fit."""
+    return px - CERTAIN * sigma > MOST_BENT
+
+
+def doubts_in_words(setup: Any) -> tuple[str, ...]:
+    """Return what is known to be wrong with a pair, from the ``setup`` of its file."""
+    told = setup.get("doubts") if isinstance(setup, dict) else ()
+    if told is None and (bend := _bend(setup)):
+        told = [
+            f"THE MODEL DOES NOT FIT: the wall is bent by {bend:.2f} px between the photos (an "
+            f"honest pair: at most {MOST_BENT:g}). Set the pair up again (`bifocal align`)."
+        ]
+    return tuple(map(str, told)) if isinstance(told, list | tuple) else ()
+
+
+def covariance_of_doubts(setup: Any) -> FloatArray | None:
+    """Return what doubts add to the covariance of both cameras; None where there are none.
+
+    Parameters
+    ----------
+    setup : object
+        As the pair file states it.
+
+    Returns
+    -------
+    ndarray, shape (24, 24), or None
+        Of `NAMES`.
+
+    Notes
+    -----
+    A bend counts as radial distortion k of one photo against the other, and as what a scale takes
+    up of it; another face that may be the wall moves both cameras alike.
+    """
+    variance = np.zeros((len(NAMES), len(NAMES)))
+    k1, scale, *both = (NAMES.index(name) for name in ("k1 1", "focal length 1", "Z 1", "Z 2"))
+    with suppress(*NO_NUMBER):
+        k = _bend(setup) / BEND_BY_K
+        half = float(np.hypot(*setup["principal_point_px"][0]))
+        variance[k1, k1] = (k * (float(setup["focal_px"][0]) / half) ** 2) ** 2
+        variance[scale, scale] = (k * MEAN_SQUARE) ** 2
+    with suppress(*NO_NUMBER):
+        offset = float(setup["standard_deviations"]["relief_offset"])
+        variance[np.ix_(both, both)] += offset**2
+    return variance if variance.any() and np.isfinite(variance).all() else None
+
+
+def _bend(setup: Any) -> float:
+    """Return by how much the wall is certainly bent between the photos, else 0. [px]"""
+    with suppress(*NO_NUMBER):
+        bend, sigma = float(setup["wall_bend_px"]), float(setup.get("wall_bend_sigma_px") or 0.0)
+        return bend if bend_is_certain(bend, sigma) else 0.0
+    return 0.0

@@ -1,0 +1,239 @@
+"""What a pair is oriented from: what is given, its common points, and cameras to start from."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from bifocal.orientation import validation
+from bifocal.orientation.control_points import Control, SiteMeasures
+from bifocal.orientation.features import find_features
+from bifocal.orientation.interior_orientation import Cameras, Interiors
+from bifocal.orientation.orientation_stages import (
+    SIGMA_PARALLEL,
+    Photos,
+)
+from bifocal.orientation.pair_media import PairMedia
+from bifocal.orientation.pair_observations import PairObservations
+from bifocal.orientation.photo_order import first_is_far
+from bifocal.orientation.relative_orientation import (
+    Ties,
+    epipolar_distance,
+    find_ties,
+    first_cameras,
+    plane_scale,
+)
+from bifocal.orientation.space_resection import resect
+from bifocal.orientation.tie_points import (
+    robust_sigma,
+)
+from photocore.arrays import BoolArray
+from photocore.camera import fundamental, ray_on_plane
+from photocore.errors import GeometryError, located
+from photocore.similarity import Similarity, fit_plane
+
+#: Logarithms of a ratio of distances so far apart contradict each other; tilted cameras change the
+#: scale over the wall.
+UNLIKE = 0.15
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Given:
+    """What `orient_pair` is given."""
+
+    photos: Photos
+    control: Control
+    site: SiteMeasures
+    media: PairMedia | None = None
+
+    @property
+    def names(self) -> tuple[str, str]:
+        """Names of the photos."""
+        return self.photos[0].name, self.photos[1].name
+
+    @property
+    def interiors(self) -> Interiors:
+        """Interior orientations of the photos."""
+        return self.photos[0].interior, self.photos[1].interior
+
+    @property
+    def enough(self) -> bool:
+        """Whether control points alone orient both cameras."""
+        known, control = self.control.positioned, self.control
+        return all(
+            (known & np.isfinite(pixels).all(axis=1)).sum() >= 4
+            for pixels in (control.pixels1, control.pixels2)
+        )
+
+
+def order_of(given: Given, ties: Ties) -> float:
+    """Return by how many standard deviations the first photo is the far one.
+
+    Focal lengths and distances that were typed tell nothing of the photos' order, unless the scale
+    on the wall fits them in one order only.
+    """
+    first, second = given.interiors
+    typed = (first.is_typed or second.is_typed) and first.image_size == second.image_size
+    # Logarithms of the distances' ratio by lenses and scale in either order, against the taped one.
+    ratio, scale = first.focal / second.focal, plane_scale(ties, first.image_size)
+    d1, d2 = given.site.distances
+    taped = abs(np.log(d1 / d2)) if d1 and d2 else 0.0
+    either = (np.log([ratio * scale, ratio / scale]) - taped).tolist()
+    if not (d1 and d2):  # the far camera is any farther
+        either = [min(off, 0.0) for off in either]
+    as_given, turned = (abs(off) < UNLIKE for off in either)
+    far, near = (photo.grey for photo in given.photos)
+    if given.site.ordered or not (typed and turned) or far is None or near is None:
+        return np.inf
+    return first_is_far((far, near), ties) if as_given else -np.inf
+
+
+def contradiction(cameras: Cameras, ties: Ties) -> float:
+    """Return how far the common points are from the cameras' epipolar lines. [px]"""
+    return robust_sigma(epipolar_distance(fundamental(*cameras), ties.pixels1, ties.pixels2))
+
+
+def check_picks(cameras: Cameras, ties: Ties, interiors: Interiors) -> None:
+    """Refuse control points that the photos contradict."""
+    if contradiction(cameras, ties) > 0.012 * max(interiors[0].image_size):
+        raise GeometryError(
+            "the control points' pixels do not fit the photos: the details common to both photos "
+            "contradict them. Check that col1, row1 are pixels of the first photo and col2, row2 "
+            "of the second, at full size."
+        )
+
+
+def ties_of(given: Given, *, needed: bool) -> tuple[Ties | None, tuple[str, ...]]:
+    """Return the photos' common points and remarks; none only if control points suffice."""
+    far, near = given.photos[0].grey, given.photos[1].grey
+    if far is None or near is None:
+        return None, ()
+    try:
+        for name, image in zip(given.names, (far, near), strict=True):
+            validation.check_sharp(name, image)
+        validation.check_different(*given.names, (far, near))
+        features = find_features(far), find_features(near)
+        return find_ties(*features, given.interiors, given.names), ()
+    except GeometryError as error:
+        if needed or isinstance(error, validation.SamePhotoError):
+            raise
+        remark = f"The pair rests on the control points alone, without common points: {error}"
+        return None, (remark,)
+
+
+def approximate_cameras(
+    given: Given, ties: Ties | None, enough: bool
+) -> tuple[Cameras, BoolArray, Interiors]:
+    """Return approximate cameras, the control points that agree, and the interiors used."""
+    control, interiors = given.control, given.interiors
+    agree = np.ones(len(control.ids), dtype=bool)
+    if enough:
+        cameras = []
+        for pixels, photo in zip((control.pixels1, control.pixels2), given.photos, strict=True):
+            seen = control.positioned & np.isfinite(pixels).all(axis=1)
+            xyz = np.nan_to_num(control.xyz[seen])
+            with located(photo.name):
+                camera, fits = resect(xyz, photo.interior.ideal(pixels[seen]), photo.interior)
+            cameras.append(camera)
+            agree[np.flatnonzero(seen)[~fits]] = False
+        return (cameras[0], cameras[1]), agree, interiors
+    if ties is None:
+        raise GeometryError("too few control points, and no common points to go with them.")
+    interiors = _plausible_focals(interiors, ties, given.site)
+    return _scaled(first_cameras(ties, interiors), given, interiors), agree, interiors
+
+
+def _plausible_focals(interiors: Interiors, ties: Ties, site: SiteMeasures) -> Interiors:
+    """Return interiors whose unknown focal length follows from the distances and the scale."""
+    first, second = interiors
+    if not (first.is_assumed or second.is_assumed):
+        return interiors
+    d1, d2 = site.distances
+    assert d1 is not None
+    assert d2 is not None
+    # On the wall photo 2 is s times as large: s = (f2 / d2) / (f1 / d1).
+    ratio = plane_scale(ties, first.image_size) * d2 / d1
+    if second.is_assumed:
+        return first, replace(second, focal=first.focal * ratio)
+    return replace(first, focal=second.focal / ratio), second
+
+
+def _scaled(cameras: Cameras, given: Given, interiors: Interiors) -> Cameras:
+    """Return cameras of far distance 1 brought to metres and, where known, to X and Y."""
+    control, site = given.control, given.site
+    near, scale = cameras[1].centre[2], 0.0
+    positions = ray_on_plane(cameras[0], interiors[0].ideal(control.pixels1))
+    points = np.flatnonzero(control.positioned & np.isfinite(positions).all(axis=1))
+    if len(points) >= 2:
+        on_wall = control.xyz[points] * [1.0, 1.0, 0.0]
+        metres = fit_plane(positions[points], np.nan_to_num(on_wall))
+    elif site.distance1:
+        scale = site.distance1
+    elif site.distance2:
+        scale = site.distance2 / near
+    elif site.delta_d:
+        scale = site.delta_d / (1.0 - near)
+    elif control.lengths:
+        ratios = [
+            length / np.linalg.norm(positions[a] - positions[b]) for a, b, length in control.lengths
+        ]
+        scale = float(np.median(ratios))
+    else:
+        raise GeometryError(
+            "nothing gives the scale: two photos alone have none. Measure one distance from a "
+            "camera to the wall (--distance1 or --distance2), or one length on the wall (--length)."
+        )
+    if scale:
+        nowhere = np.zeros(3)
+        metres = Similarity(
+            scale=scale, rotation=np.eye(3), source_centre=nowhere, target_centre=nowhere
+        )
+    first, second = (
+        camera._replace(rotation=camera.rotation @ metres.rotation.T, centre=metres(camera.centre))
+        for camera in cameras
+    )
+    return first, second
+
+
+def observations_of(
+    given: Given, interiors: Interiors, ties: Ties | None, agree: BoolArray
+) -> PairObservations:
+    """Return everything observed, ideal pixels throughout."""
+    control, site = given.control, given.site
+    pixels1, pixels2 = interiors[0].ideal(control.pixels1), interiors[1].ideal(control.pixels2)
+    measured = {
+        name: (value, site.sigma)
+        for name in ("distance1", "distance2", "delta_d")
+        if (value := getattr(site, name)) is not None
+    }
+    base = PairObservations(
+        interiors=interiors,
+        control=replace(control, pixels1=pixels1, pixels2=pixels2),
+        pick_used=agree,
+        sigma_pick=site.sigma_pick,
+        measured=measured,
+        sigma_tilt=SIGMA_PARALLEL if site.parallel else None,
+        free_datum=control.positioned.sum() < 2,
+        sigma_body=_same_body(interiors),
+    )
+    if ties is None:
+        return base
+    return replace(
+        base,
+        tie1=ties.seen1,
+        tie2=ties.seen2,
+        sigma_tie=ties.tolerance / 2,
+        tie_used=np.ones(len(ties.seen1), dtype=bool),
+        wall=ties.on_plane,
+        wall_rows=np.zeros((3, len(ties.seen1))),
+    )
+
+
+def _same_body(interiors: Interiors) -> float | None:
+    """Return how closely the principal points agree, if both may be of one camera body. [px]"""
+    first, second = interiors
+    # With one photo upright and one lying the axes differ.
+    if first.is_calibrated or second.is_calibrated or first.image_size != second.image_size:
+        return None
+    return 0.002 * float(np.hypot(*first.image_size))

@@ -1,0 +1,185 @@
+"""The few slips people make when typing a set-up: tried where what was typed does not fit."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from itertools import combinations
+
+import numpy as np
+
+from bifocal.orientation.control_points import Control, SiteMeasures
+from bifocal.orientation.interior_orientation import Cameras, Interiors
+from photocore.arrays import BoolArray
+
+#: What was typed is doubted where it misses by so many times what it may: with clean control
+#: church_1, church_2 and semireal_church come to 0.7 to 1.7, with a slip to 4 and more.
+DOUBTED = 2.0
+#: A slip is believed that fits so many times better, and to this; a mirror image that lays the
+#: camera on its side, and a focal length of any size, are believed if nothing fits nearly so well.
+BETTER, FITS, CLEARLY = 3.0, 3.0, 1.3
+#: Beyond so many standard deviations control points contradict a focal length.
+CERTAIN = 4.0
+#: A point that misses by more says no more. [sigma]
+MOST = 10.0
+FILM = 36.0  #: Width of 35-mm film. [mm]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Typed:
+    """What a pair is set up from."""
+
+    interiors: Interiors
+    control: Control
+    site: SiteMeasures
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Fitted:
+    """How well that fits: the misfit over what it may be, and which control points do not."""
+
+    misfit: float
+    cameras: Cameras
+    lost: BoolArray
+
+    def explains(self, now: Fitted | None) -> bool:
+        """Return whether this is what was meant, where what was typed fits so.
+
+        Both fits with all points: then the sum of squares tells, as precise as the points are.
+        """
+        before, count = MOST if now is None else now.misfit, 4 * len(self.lost)
+        if now is not None and not (self.lost.any() or now.lost.any()):
+            surplus = count * (before**2 - self.misfit**2)
+            if self.misfit < DOUBTED and surplus > CERTAIN**2 * max(1.0, self.misfit**2):
+                return True
+        return self.misfit < min(FITS, before / BETTER)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Slip:
+    """What was meant, and what to say; whether to go on with it, or only a person can mend it."""
+
+    meant: Typed
+    words: str
+    mended: bool = True
+    handicap: float = 1.0
+
+
+def slip_of(
+    typed: Typed, fitted: Callable[[Typed], Fitted | None], *, by_control: bool
+) -> Slip | None:
+    """Return the slip that explains why something typed does not fit; None where nothing does.
+
+    Parameters
+    ----------
+    typed : Typed
+    fitted : function
+        Tells how well something fits; None if not at all.
+    by_control : bool
+        Whether control points tell; else the common points do.
+    """
+    now = fitted(typed)
+    fits = now is not None and now.misfit < DOUBTED
+    if fits and not by_control:
+        return None
+    found: list[tuple[float, Slip]] = []
+    slips = [*_of_lenses(typed, free=by_control and not fits)]
+    if not fits:
+        slips += _of_control(typed, now) if by_control else _of_site(typed)
+    for slip in slips:
+        tried = fitted(slip.meant)
+        if tried is not None and tried.explains(now):
+            lying = sum(camera.rotation[0, 0] for camera in tried.cameras) < 0.7
+            tilts = [np.rad2deg(np.arccos(-c.rotation[2, 2])) for c in tried.cameras]
+            words = slip.words.replace("<tilts>", " and ".join(f"{tilt:.0f}" for tilt in tilts))
+            misfit = tried.misfit * slip.handicap * (CLEARLY**2 if lying else 1.0)
+            found.append((misfit, replace(slip, words=words)))
+    if not found:
+        return None
+    least, best = min(found, key=lambda one: one[0])
+    alike = [s.words for misfit, s in found if misfit < CLEARLY * least and not s.mended]
+    return best if best.mended else replace(best, words=" Or: ".join(alike))
+
+
+def _of_lenses(typed: Typed, *, free: bool) -> Iterator[Slip]:
+    """Yield slips of the focal lengths, of the sensor's size, and of a photo's."""
+    first, second = typed.interiors
+    if any(i.is_calibrated or i.is_assumed or i.pixel_size is None for i in typed.interiors):
+        return
+    pixels = np.array([i.pixel_size for i in typed.interiors], dtype=float)
+    sizes = np.array([max(i.image_size) for i in typed.interiors])
+    focals, sensor = pixels * [first.focal, second.focal], float(sizes[0] * pixels[0])
+    shown, true = (" and ".join(dict.fromkeys(f"{f:.3g}" for f in fs))
+                   for fs in (focals, focals * sensor / FILM))  # fmt: skip
+    height, wide = min(first.image_size) / sizes[0], f"A sensor {sensor:.3g} mm wide does not fit;"
+    rows: list[tuple[float, str]] = [
+        (height, f"{wide} that is probably its height: {sensor / height:.1f} mm was taken. Give "
+                 "--sensor-width, the longer side."),
+        (sensor / FILM, f"{shown} mm is probably the 35-mm equivalent: {true} mm on this sensor, "
+                        "which was taken."),
+        *((crop, f"{wide} {sensor / crop:.1f} mm does (crop factor {crop:g}) and was taken. Check "
+                 "--sensor-width.") for crop in (1.5, 1.6)),
+    ]  # fmt: skip
+    for factor, words in rows:
+        one, two = (replace(i, focal=i.focal * factor) for i in typed.interiors)
+        yield Slip(meant=replace(typed, interiors=(one, two)), words=words)
+    ratio, small = float(sizes[1] / sizes[0]), int(sizes[1] < sizes[0])
+    if abs(ratio - 1) > 0.01 and abs(pixels[1] / pixels[0] * ratio - 1) < 0.01:
+        both, part = [first, second], typed.interiors[small]
+        both[small] = replace(
+            part, focal=part.focal * max(ratio, 1 / ratio), pixel_size=float(pixels[1 - small]),
+            sigma_centre=0.3 * float(sizes.max() - sizes.min()),
+        )  # fmt: skip
+        words = (
+            f"Photo {small + 1} is {sizes[small]} px wide, photo {2 - small} {sizes.max()} px: the "
+            "former fits as a part cut out of a photo as large as the latter, and was taken so."
+        )
+        yield Slip(meant=replace(typed, interiors=(both[0], both[1])), words=words)
+    if (
+        free and len(typed.control.ids) > 5 and typed.site.distances == (None, None)
+    ):  # a wrong tape is not the lens
+        loose = replace(first, sigma_focal=0.5), replace(second, sigma_focal=0.5)
+        words = (
+            f"The focal lengths ({first.source}, {second.source}) contradict the control points "
+            "and were left out. Check --focal1, --focal2 and --sensor-width."
+        )
+        yield Slip(meant=replace(typed, interiors=loose), words=words, handicap=CLEARLY)
+
+
+def _of_site(typed: Typed) -> Iterator[Slip]:
+    """Yield that the cameras were not square to the wall, where that was said."""
+    if typed.site.parallel:
+        words = (
+            "the cameras are not square to the wall, as two distances alone suppose: they look "
+            "<tilts> degrees off its normal. Give --auto with the distances, or --control."
+        )
+        meant = replace(typed, site=replace(typed.site, parallel=False))
+        yield Slip(meant=meant, words=words, mended=False)
+
+
+def _of_control(typed: Typed, now: Fitted | None) -> Iterator[Slip]:
+    """Yield slips of the control table: how its axes count, which pick and which point is which."""
+    control, count = typed.control, len(typed.control.ids)
+    xyz, picks = control.xyz, (control.pixels1, control.pixels2)
+    last = [interior.image_size[1] - 1.0 for interior in typed.interiors]
+    rows = [pixels * [1, -1] + [0, end] for pixels, end in zip(picks, last, strict=True)]
+    for words, meant in (
+        ("rows counted from the top: row1, row2 seem to count from the bottom",
+         replace(control, pixels1=rows[0], pixels2=rows[1])),
+        ("the sign of Y changed: Y counts upwards", replace(control, xyz=xyz * [1, -1, 1])),
+        ("X and Y exchanged: X counts to the right", replace(control, xyz=xyz[:, [1, 0, 2]])),
+        ("the sign of r changed: r counts towards the cameras",
+         replace(control, xyz=xyz * [1, 1, -1])),
+    ):  # fmt: skip
+        words = f"the control points do not fit as typed; they fit with {words}."
+        yield Slip(meant=replace(typed, control=meant), words=words, mended=False)
+    words = "col1, row1 and col2, row2 of the control points are exchanged; they were put right."
+    yield Slip(meant=replace(typed, control=control.exchanged()), words=words)
+    few = list(range(count)) if now is None else np.flatnonzero(now.lost).tolist()
+    for a, b in combinations(few, 2) if len(few) <= 7 else ():
+        order = np.arange(count)
+        order[[a, b]] = b, a
+        meant = replace(control, xyz=xyz[order], sigma=control.sigma[order])
+        both = f"{control.ids[a]} and {control.ids[b]}"
+        words = f"The coordinates of the control points {both} are exchanged; they were put right."
+        yield Slip(meant=replace(typed, control=meant), words=words)

@@ -1,0 +1,74 @@
+"""What is installed beside the program: its own name, what is too old, what is not ours."""
+
+from __future__ import annotations
+
+import os
+import re
+import sys
+from contextlib import suppress
+from importlib.metadata import PackageNotFoundError, requires
+from importlib.util import find_spec
+from pathlib import Path
+
+#: Our name on the package indexes, where ``bifocal`` and ``multimedia`` are other people's.
+DISTRIBUTION = "bifocal-relief"
+_STRANGERS = ("bifocal", "multimedia")
+_BOUND = re.compile(r"([\w.-]+)(?:\[.*\])?>=([\d.]+)$")
+
+
+def how_to_install(extra: str) -> str:
+    """Return the command that installs an extra; no index has our program by its own name."""
+    return f'pip install ".[{extra}]" in the program\'s folder, or its wheel: "NAME.whl[{extra}]"'
+
+
+def installed() -> dict[str, str]:
+    """Return what is installed and its version; names of folders alone, for every start asks."""
+    found: dict[str, str] = {}
+    for folder in reversed(sys.path):
+        with suppress(OSError):
+            for name in os.listdir(folder or "."):  # noqa: PTH208
+                if name.endswith(".dist-info"):
+                    package, _, version = name.removesuffix(".dist-info").partition("-")
+                    found[package.lower().replace("_", "-")] = version
+    return found
+
+
+def too_old() -> list[str]:
+    """Return which libraries are older than the program needs, and the command that mends each."""
+    try:
+        needed = [_BOUND.match(line.replace(" ", "")) for line in requires(DISTRIBUTION) or ()]
+    except PackageNotFoundError:
+        return []
+    here, said = installed(), []
+    for name, bound in [found.groups() for found in needed if found]:
+        # Four distributions bring OpenCV, each into the same folder.
+        twins = [key for key in here if name.startswith("opencv") and key.startswith("opencv-")]
+        for twin in twins or [name]:
+            if twin in here and _numbers(here[twin]) < _numbers(bound):
+                away = "" if twin == name else f'"{sys.executable}" -m pip uninstall -y {twin}; '
+                said.append(
+                    f"{twin} {here[twin]} is too old, {bound} is needed. Mend it: {away}"
+                    f'"{sys.executable}" -m pip install --force-reinstall "{name}>={bound}"'
+                )
+    return said
+
+
+def not_ours() -> list[str]:
+    """Return what stands where a package of ours should, or writes over it."""
+    ours, here = Path(__file__).parents[1], installed()
+    said = []
+    for name in _STRANGERS:
+        found = find_spec(name)
+        away = found is None or found.origin is None or Path(found.origin).parents[1] != ours
+        if away or name in here:
+            version = f" {here[name]}" if name in here else ""
+            said.append(
+                f"{name}{version} is another program, or an old version of this one, over files "
+                f'of ours. Mend it: "{sys.executable}" -m pip uninstall -y {name}, then install '
+                f"{DISTRIBUTION} again with --force-reinstall --no-deps"
+            )
+    return said
+
+
+def _numbers(version: str) -> list[int]:
+    return [int(number) for number in re.findall(r"\d+", version.partition("+")[0])]

@@ -1,0 +1,147 @@
+"""Which of two photos is the near one, where typed values alone say so; which way a pair is set up.
+
+The boards of the wall hide more of it from near than from afar, whatever was typed.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from bifocal.collimation.job_tasks import task_of
+from bifocal.orientation import absolute_orientation
+from bifocal.orientation.absolute_orientation import orient_pair
+from bifocal.orientation.align_workflow import AlignOptions, KnownLens, _way, align_photos
+from bifocal.orientation.control_points import Control, SiteMeasures
+from bifocal.orientation.interior_orientation import Interior
+from bifocal.orientation.orientation_stages import PhotoInput
+from bifocal.orientation.photo_order import SURE, first_is_far
+from bifocal.orientation.relative_orientation import Ties
+from photocore.camera import plane_transfer, project
+from photocore.errors import GeometryError
+from tests.bifocal.orientation.layered_wall import SIZE, camera, relief_at, take
+from tests.page_session import opened, sample_folder
+
+FAR, NEAR = camera(16.0), camera(8.0)
+SITE = SiteMeasures(distance1=16.0, distance2=8.0, parallel=True)
+
+
+@pytest.fixture(scope="module")
+def views():
+    return take(FAR, NEAR)
+
+
+def typed(cam) -> Interior:
+    made = Interior.from_focal(cam.matrix[0, 0], image_size=SIZE, sigma=0.02, source="--focal")
+    return replace(made, is_typed=True)
+
+
+def inputs(first, second) -> tuple[PhotoInput, PhotoInput]:
+    """Return two photos with the lenses typed for the far and the near one, as they lie."""
+    return (
+        PhotoInput(grey=first, interior=typed(FAR), name="one.jpg"),
+        PhotoInput(grey=second, interior=typed(NEAR), name="two.jpg"),
+    )
+
+
+def ties(first, second) -> Ties:
+    """Return points that both cameras see, and the wall's homography, from the truth."""
+    rng = np.random.default_rng(0)
+    xyz = np.column_stack([rng.uniform(-5, 5, (300, 2)) * [1, 0.7], np.zeros(300)])
+    xyz[:, 2] = relief_at(xyz)
+    pixels1, pixels2 = project(first, xyz), project(second, xyz)
+    return Ties(
+        pixels1=pixels1, pixels2=pixels2, seen1=pixels1, seen2=pixels2,
+        homography=plane_transfer(first, second, np.zeros(3)), on_plane=xyz[:, 2] == 0,
+        tolerance=1.0,
+    )  # fmt: skip
+
+
+def test_what_is_hidden_shows_which_photo_is_the_far_one(views) -> None:
+    assert first_is_far((views.far, views.near), ties(FAR, NEAR)) > SURE
+    assert first_is_far((views.near, views.far), ties(NEAR, FAR)) < -SURE
+
+
+def test_a_flat_wall_shows_no_order() -> None:
+    flat = take(FAR, NEAR, boards=())
+    assert abs(first_is_far((flat.far, flat.near), ties(FAR, NEAR))) < SURE
+
+
+@pytest.mark.acceptance
+def test_photos_in_the_wrong_order_keep_the_sign_of_relief(views) -> None:
+    made = orient_pair(inputs(views.near, views.far), control=Control(), site=SITE)
+    assert made.exchanged
+    assert "one.jpg is the near photo" in made.remarks[0]
+    cameras = made.adjusted.cameras
+    assert [float(c.matrix[0, 0]) for c in cameras] == pytest.approx([16 / 0.013, 8 / 0.013], 0.02)
+    # The user's own word stands.
+    kept = orient_pair(
+        inputs(views.near, views.far), control=Control(), site=replace(SITE, ordered=True)
+    )
+    assert not kept.exchanged
+
+
+@pytest.mark.acceptance
+def test_an_order_that_nothing_tells_is_asked(views, monkeypatch) -> None:
+    monkeypatch.setattr(absolute_orientation, "first_is_far", lambda *_: -2.0)
+    made = orient_pair(inputs(views.far, views.near), control=Control(), site=SITE)
+    assert not made.exchanged
+    assert "cannot be told" in made.remarks[0]
+
+
+def test_missing_focal_lengths_are_found_before_the_work(views, monkeypatch) -> None:
+    monkeypatch.setattr(absolute_orientation, "find_features", lambda *_: pytest.fail("worked"))
+    unknown = [
+        replace(photo, interior=Interior.unknown(SIZE)) for photo in inputs(views.far, views.near)
+    ]
+    with pytest.raises(GeometryError, match=r"unknown .*one\.jpg and two\.jpg"):
+        orient_pair(
+            (unknown[0], unknown[1]), control=Control(), site=SiteMeasures(distance1=16.0)
+        )  # fmt: skip
+
+
+def test_both_distances_are_taken_the_same_way_by_page_and_command(tmp_path) -> None:
+    """A wall that is not flat shows itself how the cameras stood to it."""
+    both = SiteMeasures(distance1=16.0, distance2=8.0)
+    ways = [_way(AlignOptions(site=both, auto=auto)) for auto in (False, True)]
+    assert ways[0][0] == ways[1][0] == "site"
+    assert ways[0][1].site == ways[1][1].site
+    folder = sample_folder(tmp_path)
+    with opened(folder / "far.jpg", folder / "near.jpg") as session:
+        session.command({"op": "setup.set", "d1": 17.5, "d2": 9.5})
+        assert task_of(session, "align", {})["auto"]
+
+
+@pytest.mark.acceptance
+def test_turned_cameras_and_both_distances_give_what_one_distance_gives() -> None:
+    """Cameras 9 and 12 degrees off the wall's normal, in one sitting with both tapes."""
+    far = camera(16.0, offset=(-1.5, 0.0), turn_deg=(0.0, -9.0, 0.0))
+    near = camera(8.0, offset=(-1.0, 0.3), turn_deg=(2.0, -12.0, 0.0))
+    views = take(far, near)
+    made = orient_pair(inputs(views.far, views.near), control=Control(), site=SITE)
+    found = [float(np.rad2deg(np.linalg.norm(c.tilt))) for c in made.adjusted.cameras]
+    assert found == pytest.approx([9.0, np.hypot(2.0, 12.0)], abs=0.3)
+    assert not any("parallel" in text for text in made.assumed)
+
+
+@pytest.mark.acceptance
+@pytest.mark.parametrize("first", ["d9.png", "d18.png"])
+def test_a_rendered_church_dropped_in_either_order_lies_back(
+    data_dir: Path, tmp_path: Path, first: str
+) -> None:
+    folder = data_dir / "semireal_church"
+    second = "d18.png" if first == "d9.png" else "d9.png"
+    made = align_photos(
+        folder / first, folder / second, tmp_path / "church.pair.json",
+        AlignOptions(
+            site=SiteMeasures(distance1=18.0, distance2=9.0),
+            lenses=tuple(KnownLens(focal=focal, sensor_width=22.7) for focal in (36.0, 18.0)),
+        ),
+    )  # fmt: skip
+    rows = np.loadtxt(folder / "checkpoints.csv", delimiter=",", skiprows=1)
+    found = made.pair.intersect(rows[:, 6:8], rows[:, 4:6]).xyz[:, 2]
+    assert made.pair.image1.file.endswith("d18.png")
+    assert np.nanmedian(np.abs(found - rows[:, 3])) < 0.003

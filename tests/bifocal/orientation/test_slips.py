@@ -1,0 +1,145 @@
+"""Slips of the hand when a set-up is typed: named, and mended where only one thing can be meant."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from bifocal.orientation.absolute_orientation import orient_pair
+from bifocal.orientation.control_points import Control, SiteMeasures
+from bifocal.orientation.interior_orientation import Interior
+from bifocal.orientation.orientation_stages import PhotoInput
+from photocore.camera import project
+from photocore.errors import GeometryError
+from tests.bifocal.orientation.layered_wall import SIZE, camera
+from tests.bifocal.orientation.test_pair_adjustment import POINTS
+
+#: Turned to the wall, and square to it.
+OBLIQUE = (
+    camera(16.0, offset=(0.4, -0.2), turn_deg=(8.0, -20.0, 1.0)),
+    camera(9.0, offset=(-0.3, 0.1), turn_deg=(-6.0, 15.0, -2.0)),
+)
+SQUARE = (camera(16.0, turn_deg=(0.3, -0.2, 0.1)), camera(9.0, turn_deg=(-0.2, 0.3, -0.2)))
+SENSOR = 22.7
+NINE = POINTS[[0, 1, 2, 3, 4, 8, 9, 10, 11]]
+
+
+def control(cameras=OBLIQUE, *, xyz=NINE, seed=0, noise=0.4) -> Control:
+    rng = np.random.default_rng(seed)
+    picks = [project(cam, xyz) + rng.normal(0, noise, (len(xyz), 2)) for cam in cameras]
+    return Control(
+        ids=tuple(f"P{k}" for k in range(len(xyz))), xyz=xyz + rng.normal(0, 0.002, xyz.shape),
+        sigma=np.full(xyz.shape, 0.003), pixels1=picks[0], pixels2=picks[1],
+    )  # fmt: skip
+
+
+def photos(cameras=OBLIQUE, *, times=(1.0, 1.0), size=SIZE) -> tuple[PhotoInput, PhotoInput]:
+    """Return photos whose focal lengths are typed so many times too long."""
+    interiors = [
+        Interior.from_focal(
+            cam.matrix[0, 0] * factor, image_size=shape, sigma=0.02, source="--focal",
+            pixel_size=SENSOR / shape[0],
+        )
+        for cam, factor, shape in zip(cameras, times, (SIZE, size), strict=True)
+    ]  # fmt: skip
+    first, second = (
+        PhotoInput(grey=None, interior=interior, name=name)
+        for interior, name in zip(interiors, ("far.jpg", "near.jpg"), strict=True)
+    )
+    return first, second
+
+
+def off(made, cameras=OBLIQUE) -> float:
+    """Return by which share of it a distance is wrong at most."""
+    found = [c.centre[2] for c in made.adjusted.cameras]
+    return max(abs(a / c.centre[2] - 1) for a, c in zip(found, cameras, strict=True))
+
+
+@pytest.mark.parametrize(
+    ("times", "said"),
+    [
+        ((36 / SENSOR, 36 / SENSOR), r"35-mm equivalent: 29.1 and 16.4 mm on this sensor"),
+        ((1.5, 1.5), "probably its height: 34.1 mm was taken"),
+        ((1.35, 1.0), "contradict the control points and were left out"),
+    ],
+)
+def test_a_focal_length_that_control_contradicts_is_overruled_and_named(times, said) -> None:
+    made = orient_pair(photos(times=times), control=control(), site=SiteMeasures())
+    assert said.replace(r"29.1 and 16.4", focals()) in made.remarks[0]
+    assert off(made) < 0.01
+    assert made.observations.pick_used.all()
+
+
+def focals() -> str:
+    return " and ".join(f"{cam.matrix[0, 0] * SENSOR / SIZE[0]:.3g}" for cam in OBLIQUE)
+
+
+def test_a_crop_factor_left_out_of_the_sensor_is_named() -> None:
+    made = orient_pair(photos(times=(1 / 1.6,) * 2), control=control(), site=SiteMeasures())
+    assert "(crop factor 1.6) and was taken" in made.remarks[0]
+    assert off(made) < 0.01
+
+
+def test_distances_tell_what_control_square_to_the_wall_hardly_does() -> None:
+    site = SiteMeasures(distance1=16.0, distance2=9.0)
+    typed = photos(SQUARE, times=(36 / SENSOR,) * 2)
+    made = orient_pair(typed, control=control(SQUARE), site=site)
+    assert "35-mm equivalent" in made.remarks[0]
+    assert off(made, SQUARE) < 0.01
+
+
+def test_a_cropped_photo_is_taken_as_a_part_of_one_as_large_as_the_other() -> None:
+    points = control()
+    points = replace(points, pixels2=points.pixels2 - [90, 40])
+    size = (SIZE[0] - 150, SIZE[1] - 100)
+    typed = photos(times=(1.0, size[0] / SIZE[0]), size=size)
+    made = orient_pair(typed, control=points, site=SiteMeasures())
+    assert "Photo 2 is 810 px wide, photo 1 960 px: the former fits as a part" in made.remarks[0]
+    assert off(made) < 0.02
+
+
+def from_bottom(pixels: np.ndarray) -> np.ndarray:
+    return pixels * [1, -1] + [0, SIZE[1] - 1]
+
+
+@pytest.mark.parametrize(
+    ("slip", "said"),
+    [
+        (lambda c: replace(c, pixels1=from_bottom(c.pixels1), pixels2=from_bottom(c.pixels2)),
+         "row1, row2 seem to count from the bottom"),
+        (lambda c: replace(c, xyz=c.xyz * [1, -1, 1]), "the sign of Y changed"),
+        (lambda c: replace(c, xyz=c.xyz[:, [1, 0, 2]]), "with X and Y exchanged"),
+        (lambda c: replace(c, xyz=c.xyz * [1, 1, -1]), "with the sign of r changed"),
+    ],
+)  # fmt: skip
+def test_a_control_table_that_counts_otherwise_is_refused_by_name(slip, said) -> None:
+    with pytest.raises(GeometryError, match=said):
+        orient_pair(photos(), control=slip(control()), site=SiteMeasures())
+
+
+def test_two_points_exchanged_are_put_right() -> None:
+    points = control()
+    order = [0, 1, 5, 3, 4, 2, 6, 7, 8]
+    made = orient_pair(
+        photos(), control=replace(points, xyz=points.xyz[order]), site=SiteMeasures()
+    )
+    assert "control points P2 and P5 are exchanged" in made.remarks[0]
+    assert made.observations.pick_used.all()
+    assert off(made) < 0.01
+
+
+def test_distances_in_the_wrong_order_are_exchanged() -> None:
+    site = SiteMeasures(distance1=9.0, distance2=16.0)
+    made = orient_pair(photos(), control=control(), site=site)
+    assert "the two distances were exchanged" in made.remarks[0]
+    assert off(made) < 0.002
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_clean_control_is_charged_with_no_slip(seed) -> None:
+    for cameras in (OBLIQUE, SQUARE):
+        rng = np.random.default_rng(seed)
+        typed = photos(cameras, times=np.exp(rng.normal(0, 0.02, 2)))
+        site = SiteMeasures(distance1=16.0, distance2=9.0) if seed % 2 else SiteMeasures()
+        made = orient_pair(typed, control=control(cameras, seed=seed), site=site)
+        assert not [text for text in made.remarks if "taken" in text or "exchanged" in text]
